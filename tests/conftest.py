@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import signal
 import sys
 
@@ -14,6 +15,10 @@ from tests.tracing import trace_seldom
 settings.register_profile("tiltsim", deadline=None)
 settings.load_profile("tiltsim")
 
+# Importing and compiling leave much to look through and little to free: every search for cycles
+# among all that the session keeps would take a tenth of its time.
+gc.disable()
+
 # A shell has processes in its background ignore the keyboard, which tests press.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -25,6 +30,13 @@ def pytest_collection(session):
     runs_tests = hasattr(session.config, "workerinput") or not session.config.getoption("-n", None)
     if runs_tests and sys.gettrace() is not None:
         trace_seldom()
+
+
+def pytest_collection_finish():
+    """From here on, cycles are searched for again, among what is new and not quite as often."""
+    gc.freeze()
+    gc.set_threshold(20_000, 20, 20)
+    gc.enable()
 
 
 def pytest_collection_modifyitems(items):

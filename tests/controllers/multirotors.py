@@ -12,7 +12,7 @@ from tiltsim_controllers.laws.decouplers import EXACT
 from tiltsim_controllers.laws.gains import GAIN_SETS, IntegralGains
 from tiltsim_controllers.laws.gait_feedforward import FeedforwardTerms
 from tiltsim_controllers.laws.multirotor import multirotor_law_of
-from tiltsim_controllers.laws.multirotor_steps import Parameters, SideGains
+from tiltsim_controllers.laws.multirotor_steps import Form, Parameters, SideGains
 from tiltsim_controllers.mathematics.rotation import euler_from_quaternion, quaternion_from_rotation
 from tiltsim_controllers.references.trajectories import SETPOINT, ReferenceParameters
 from tiltsim_controllers.vehicle.effectiveness import (
@@ -128,7 +128,7 @@ def fly(vehicle, law, knots, duration, *, gait=None, step=0.005, start=(), wind=
     """Fly along a gait; ``start`` is position, velocity and acceleration, level and at rest."""
     layout = layout_of(vehicle.table)
     rotors, tilts = len(layout), tilts_of(layout)
-    inputs = multirotor_law_of(layout, vehicle.dimension, vehicle.norm)
+    inputs = multirotor_law_of(layout, Form(vehicle.dimension, vehicle.norm))
     motion = equations_of_motion_of(layout)
     at = int(law.rotors)
     planned = gait or plans.fixed((0.0,) * tilts)

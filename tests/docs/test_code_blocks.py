@@ -250,7 +250,7 @@ def run_command(call, folder):
         quick = "duration=2.0" if "--controller" in arguments else "engine=native"
         arguments += ["--set", f"simulation.{quick}"]
     elif arguments[0] == "attraction":  # of few and short flights
-        arguments += ["--refine", "0", "--set", "simulation.duration=1.0"]
+        arguments += ["--coarse", "4", "--refine", "0", "--set", "simulation.duration=1.0"]
     also = EXPECTATION_FAILED if arguments[0] == "map" else VEHICLE_LOST
     assert main(arguments) in {DONE, also}, shlex.join(call)
 

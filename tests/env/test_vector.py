@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from tests.env.test_environment import documented
+from tests.laws.test_multirotor import mjcf
 from tiltsim.env.domain import Domain
-from tiltsim.env.environment import TiltrotorEnv
+from tiltsim.env.environment import HOVER, TiltrotorEnv
 from tiltsim.env.functions import loop_on_equations
 from tiltsim.env.tasks import TASKS
 from tiltsim.equations.implicitfast import make_implicitfast_step
@@ -28,8 +29,29 @@ LIMITED = {
 LIMITED["vehicle"]["tilt_servo"] = {"natural_frequency": 50.0, "max_rate": 3.0, "max_angle": 0.4}
 
 
+OTHERS = {
+    name: {
+        "simulation": TASKS["Hover"]["scenario"]["simulation"],
+        "vehicle": vehicle,
+        "initial": {**SPINNING, "rotor_speed": 250.0},
+        "controller": HOVER["controller"],
+    }
+    for name, vehicle in {
+        "quadrotor": {"model": "quadrotor"},
+        "hexarotor": {
+            "model": "multirotor",
+            "mjcf": mjcf("tilt_hexarotor"),
+            "rotor_time_constant": 0.03,
+        },
+        "octorotor": {"model": "multirotor", "mjcf": mjcf("omni_octorotor")},
+    }.items()
+}
+
+
 @pytest.mark.parametrize(
-    "scenario", [{**TASKS["Hover"]["scenario"], "initial": SPINNING}, LIMITED], ids=["ideal", "all"]
+    "scenario",
+    [{**TASKS["Hover"]["scenario"], "initial": SPINNING}, LIMITED, *OTHERS.values()],
+    ids=["ideal", "all", *OTHERS],
 )
 def test_the_step_is_mujocos(scenario):
     """Also with gyroscopic torques, drag, and rotors and servos that lag and have limits."""
@@ -38,29 +60,31 @@ def test_the_step_is_mujocos(scenario):
     assembly = assemble(env.scenario)
     loop = loop_on_equations(env.scenario)
     setup = loop.setup(assembly, loop.signature)
-    lagging = env.scenario.rotorcraft.rotor_time_constant is not None
-    first = 30 if lagging else 26  # where commanded speeds go
+    vehicle = env.scenario.any_rotorcraft
+    rotors, tilts = vehicle.rotor_count, vehicle.tilt_count
+    first = 13 + 2 * tilts  # where commanded speeds go, unless rotors lag behind them
+    first += rotors * (vehicle.rotor_time_constant is not None)
     state = [*map(float, loop.equations.initial(assembly, setup))]
-    step = make_implicitfast_step(loop.equations)
+    step = make_implicitfast_step(loop.equations, tilts)
     generator, index = np.random.default_rng(0), 0
-    vehicle = env.scenario.rotorcraft.resolve()
     for _ in range(6):
-        action = generator.uniform([0.5] * 4 + [-0.5] * 4, [2.0] * 4 + [0.5] * 4)
+        low = np.array([0.5] * rotors + [-0.5] * tilts)
+        action = generator.uniform(low, [2.0] * rotors + [0.5] * tilts)
         env.step(action)
-        speeds = np.sqrt(action[:4] / vehicle.thrust_coefficient) * [-1, 1, -1, 1]
-        limit = env.scenario.rotorcraft.speeds_along_spin[1]
-        state[first : first + 4] = np.clip(speeds, -limit, limit).tolist()
-        parameters = with_command(setup.parameters, (*action[4:].tolist(), *(0.0,) * 4))
+        speeds = np.sqrt(action[:rotors] / vehicle.thrust_coefficients)
+        limited = vehicle.spins * np.clip(speeds, *vehicle.speeds_along_spin)
+        state[first : first + rotors] = limited.tolist()
+        command = (*action[rotors:].tolist(), *(0.0,) * rotors)
+        parameters = with_command(setup.parameters, command)
         inputs = loop.equations.inputs(0.004 * index, state, parameters, setup.knots)
         for _ in range(5):
             time = 0.004 * index
             state = step(time, state, inputs, 0.004, parameters, setup.knots, (0.0, 0.0, 0.0))
             index += 1
-        sample = env.flight().samples[-1]
-        moved = np.array(state)[[*range(6), *range(15, 22), *range(26, 30)]]
-        flown = sample[[*range(1, 7), *range(10, 21)]]
+        flown = env._plant.data
         # MuJoCo's pods have inertia: 1e-7 of their servos', by which the body moves them.
-        np.testing.assert_allclose(moved, flown, rtol=1e-7, atol=1e-7)
+        expected = np.concatenate([flown.qpos, flown.qvel, flown.act])
+        np.testing.assert_allclose(state, expected, rtol=1e-7, atol=1e-7)
 
 
 AXES = [
@@ -107,9 +131,9 @@ def make(*args, **arguments):
         ("tiltsim/Hover-v0", {"precision": "half"}, "precision = 'half': must be 'float32' or"),
         ({}, {}, "simulation.integrator = 'RK4': only 'implicitfast' flies on arrays"),
         (
-            {"vehicle": {"model": "quadrotor"}, "controller": {"law": "yaw_position"}},
-            {"control_timestep": 0.02},
-            "vehicle.model = 'quadrotor': only 'tiltrotor' flies on arrays; use GymnasiumEnv",
+            {**TASKS["Hover"]["scenario"], "vehicle": {"rotor_inertia": 1e-5}},
+            {},
+            "vehicle.rotor_inertia = 1e-05: does not fly on arrays; use GymnasiumEnv",
         ),
         (
             "tiltsim/Hover-v0",
@@ -124,11 +148,17 @@ def test_what_does_not_fly_on_arrays_is_refused_by_name(task, arguments, words):
     assert "\n" not in str(caught.value)
 
 
+FLOWN = {
+    **TASKS,
+    **{name: {"scenario": scenario, "domain": AXES[2:]} for name, scenario in OTHERS.items()},
+}
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("task", TASKS)
+@pytest.mark.parametrize("task", FLOWN)
 def test_episodes_are_those_of_single_environments_step_for_step(task):
     """Observations, rewards, ends and the starts after them, with Gymnasium's own autoreset."""
-    arguments = {**TASKS[task], "max_position_error": 2.0}
+    arguments = {**FLOWN[task], "max_position_error": 2.0}
     scenario = arguments.pop("scenario")
     scenario = {**scenario, "simulation": {**scenario["simulation"], "duration": 0.8}}
     vector = make(scenario, num_envs=3, precision="float64", **arguments)
@@ -142,9 +172,10 @@ def test_episodes_are_those_of_single_environments_step_for_step(task):
         assert getattr(vector, name) == getattr(several, name)
     assert vector.metadata["autoreset_mode"] == several.metadata["autoreset_mode"]
     generator, ends = np.random.default_rng(0), [0, 0]
+    (entries,) = vector.single_action_space.shape
     np.testing.assert_array_equal(vector.reset(seed=3)[0], several.reset(seed=3)[0])
     for _ in range(100):
-        actions = generator.normal([-1.0, 0.0, 0.0], 0.02, (8, 3)).T  # the first one falls
+        actions = generator.normal([-1.0, 0.0, 0.0], 0.02, (entries, 3)).T  # the first one falls
         *mine, _ = vector.step(actions)
         *theirs, _ = several.step(actions)
         np.testing.assert_allclose(mine[0], theirs[0], rtol=0.0, atol=2e-7)  # single precision

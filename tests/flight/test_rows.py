@@ -11,6 +11,7 @@ from tiltsim.flight.flight import Flight
 from tiltsim.flight.metrics import metrics_of_rows
 from tiltsim.laws.assembling import assemble
 from tiltsim.scenario.loading import load_scenario
+from tiltsim_controllers.mathematics.records import flatten
 
 TROT = {"type": "trot_continuous", "period": 1.0, "amplitude": 0.4}
 CIRCLE = {"type": "circle", "radius": 2.0, "angular_frequency": 0.5}
@@ -51,7 +52,8 @@ def test_metrics_of_rows_are_those_of_each_flight_to_the_last_bit(name):
     samples[:, :, 0] = TIMES
     for place, field in enumerate(fields):
         samples[:, :, place] += 300.0 if field.startswith("rotor_speed") else 0.0
-    together = metrics_of_rows(assemblies, samples, END, 1.0)
+    numbers = np.array([[*flatten(assembly.setup.parameters)] for assembly in assemblies])
+    together = metrics_of_rows(assemblies, numbers, samples, END, 1.0)
     for assembly, own, found in zip(assemblies, samples, together, strict=True):
         alone = Flight(assembly, own.copy(), END, "jax", 1.0).metrics()
         assert [*found.items()] == [*alone.items()]
@@ -63,4 +65,4 @@ def test_rows_that_differ_in_more_than_numbers_have_no_metrics_together():
         assemble(load_scenario({"vehicle": limits})) for limits in ({}, {"max_rotor_speed": 400.0})
     ]
     samples = np.zeros((2, len(TIMES), len(assemblies[0].loop.sample_fields)))
-    assert metrics_of_rows(assemblies, samples, END, 1.0) is None
+    assert metrics_of_rows(assemblies, np.empty((2, 0)), samples, END, 1.0) is None

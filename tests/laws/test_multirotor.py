@@ -9,8 +9,8 @@ import pytest
 
 import tiltsim
 from tiltsim.errors import InputError
+from tiltsim.models.hover import hover_speeds
 from tiltsim.resources import shipped_folder
-from tiltsim.vehicles.rotorcraft.hover import hover_speeds
 from tiltsim_controllers.analysis.torque_free import torque_free_forces
 from tiltsim_controllers.vehicle.effectiveness import force_and_torque
 

@@ -184,6 +184,7 @@ def test_flights_without_an_analysis_have_no_slowest_mode(monkeypatch):
 def test_a_duration_is_short_if_more_is_left_than_counts_as_back():
     slowest = SlowestMode("altitude", 0.2)
     assert advice_on_duration(slowest, 16.0, 0.05, 1.0) == ""  # exp(-3) < 0.05
+    assert advice_on_duration(slowest, 15.9, 0.05, 1.0).endswith("take 16 s")
     advice = advice_on_duration(slowest, 8.0, 0.05, 1.0)
     assert "duration = 8 s is short: the slowest mode, altitude, decays as exp(-0.2 t)" in advice
     assert "leaves 25 % of a disturbance" in advice

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from math import ceil
+
 import numpy as np
 import pytest
 
 import tiltsim
 from tests.linear.test_rest import SETPOINT, random_hover
-from tiltsim.linear.linearization import linearize
+from tiltsim.linear.linearization import Linearization, Signal, linearize
 from tiltsim.linear.margins import Margin, broken_loops, frequency_grid, margins_of
 
 
@@ -82,6 +84,37 @@ def test_opening_a_loop_leaves_the_others_closed():
         assert closed == pytest.approx(system.A, abs=1e-9)
 
 
+def scalar_loop(pole, gain, timestep):
+    """``x' = pole x + u`` with ``u = -gain x``, or from sample to sample."""
+    one, signal = np.ones((1, 1)), Signal("x", "m")
+    return Linearization(
+        A=(pole - gain) * one,
+        B=one,
+        C=one,
+        D=0.0 * one,
+        feedback=-gain * one,
+        states=(signal,),
+        inputs=(signal,),
+        outputs=(signal,),
+        timestep=timestep,
+        state={},
+        command={},
+        loop="closed",
+    )
+
+
+def test_a_sampled_loop_may_reach_minus_one_at_the_nyquist_frequency():
+    """``L = gain / (z - pole)`` is real at z = -1 and nowhere else between."""
+    margin = margins_of(scalar_loop(0.5, 0.6, 0.01))[0]
+    assert margin.gain == (0.0, pytest.approx(1.5 / 0.6))
+
+
+def test_an_unstable_vehicle_needs_a_gain():
+    """``L = gain / (s - pole)`` reaches -1 at frequency zero."""
+    margin = margins_of(scalar_loop(1.0, 3.0, None))[0]
+    assert margin.gain == (pytest.approx(1.0 / 3.0), np.inf)
+
+
 def test_report_has_null_where_there_is_no_limit():
     margin = Margin("z", (0.0, np.inf), np.inf, np.inf, np.nan, 2.0)
     report = margin.report()
@@ -105,14 +138,42 @@ def test_an_unstable_loop_has_no_margins():
         tiltsim.margins(tiltsim.load_scenario(SETPOINT, changes))
 
 
+STEP = 0.002
+"""Physics step, control step and resolution of the latency, s."""
+
+
+def is_lost(scenario, latency):
+    """Whether a flight from a small offset, with a latency of so many steps, grows or ends."""
+    flight = tiltsim.simulate(scenario.replace({"simulation.control_latency": latency * STEP}))
+    if flight.end.kind != "completed":
+        return True
+    moving = np.abs([flight[name] for name in ("p", "q", "r", "vz")])
+    _, early, _, late = np.array_split(moving, 4, axis=1)
+    return bool((late.max(axis=1) > np.maximum(early.max(axis=1), 1e-7)).any())
+
+
 @pytest.mark.slow
-def test_the_delay_margin_is_the_latency_that_makes_the_flown_steps_unstable():
-    """To one step: 28.7 ms, of which holding the commands for 4 ms costs half a step."""
-    scenario = tiltsim.load_scenario("fleet/cant_quadrotor#hover")
-    step = 0.004
-    steps = (margins_of(linearize(scenario))[0].delay - 0.5 * step) / step
-    sampled = {"simulation.timestep": step, "simulation.control_timestep": step}
-    for latency, stable in ((int(steps), True), (int(steps) + 1, False)):
-        late = {**sampled, "simulation.control_latency": latency * step}
-        allowed = {**late, "controller.allow_unstable": True}
-        assert tiltsim.stability(scenario.replace(allowed)).stable == stable
+@pytest.mark.parametrize(
+    "name",
+    [
+        "beyond/actuators#ideal",
+        "beyond/actuators#rotor_lag",
+        "fleet/hexarotor#hover",
+        "fleet/tilt_hexarotor#hover",
+        "fleet/cant_quadrotor#hover",
+    ],
+)
+def test_the_delay_margin_is_the_smallest_latency_that_loses_the_flight(name):
+    """Found by bisection of flights in MuJoCo: the first whole step beyond the margin."""
+    offset = {"initial.position": [0, 0, 0], "initial.velocity": [0, 0, 0.01]}
+    steps = {"simulation.timestep": STEP, "simulation.control_timestep": STEP}
+    changes = {"reference.type": "setpoint", "initial.attitude": [0.01, -0.01, 0.01]}
+    short = {"simulation.duration": 8.0, "simulation.engine": "python"}
+    allowed = {"controller.allow_unstable": True} if name.startswith("beyond") else {}
+    scenario = tiltsim.load_scenario(name, {**offset, **steps, **changes, **short, **allowed})
+    predicted = tiltsim.margins(scenario)[0].delay
+    returns, loses = 0, 2 * ceil(predicted / STEP)
+    while loses - returns > 1:
+        middle = (returns + loses) // 2
+        returns, loses = (returns, middle) if is_lost(scenario, middle) else (middle, loses)
+    assert returns * STEP < predicted < loses * STEP

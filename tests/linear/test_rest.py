@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from math import factorial
+
 import numpy as np
 import pytest
 
 import tiltsim
+from tiltsim.linear.differences import ERROR
 from tiltsim.linear.equilibrium import equilibrium_of
-from tiltsim.linear.modes import exponents, is_stable, modes_of
+from tiltsim.linear.modes import exponents, is_stable, modes_of, spectrum
 from tiltsim.linear.motion import make_motion
 from tiltsim.linear.newton import derivative_at
 from tiltsim_controllers.analysis.stability import error_loops
@@ -85,43 +88,38 @@ def test_poles_are_the_roots_of_the_routh_polynomials(seed):
     assert not found.stable  # its place drifts
 
 
-@pytest.mark.parametrize("plant", ["thesis", "mujoco"])
-def test_poles_are_those_of_the_flown_step(plant):
-    """A step multiplies a mode by the solver's polynomial of time step times pole."""
-    scenario = tiltsim.load_scenario(SETPOINT, {"simulation.plant": plant})
-    found = equilibrium_of(scenario)
-    motion, state = found.motion, found.root.state
-    coordinates, timestep = motion.coordinates, scenario.simulation.timestep
-
-    step = derivative_at(
-        lambda at: coordinates.between(state, motion.flown(0, at, 1)), coordinates, state
-    )
-    poles = tiltsim.stability(scenario).poles
-    # Of the servos' double poles the differences give no more than half the digits.
-    z = timestep * poles[np.abs(poles + 300.0) > 1.0]
-    growth = 1.0 + z + z**2 / 2.0 + z**3 / 6.0 + (z**4 / 24.0 if plant == "mujoco" else 0.0)
-    assert distance(np.linalg.eigvals(step), growth) < 1e-5 * timestep
+RANDOM = [
+    pytest.param(seed, engine, marks=marks, id=f"{seed}-{engine}")
+    for seeds, engine, marks in (((0, 1), "python", ()), (range(20), "native", pytest.mark.slow))
+    for seed in seeds
+]
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", range(8))
-def test_the_linear_system_is_that_of_the_native_step(seed):
-    """The matrix of a step is the solver's polynomial of the linear system's matrix.
+@pytest.mark.parametrize(("seed", "engine"), RANDOM)
+def test_matrix_and_poles_are_those_of_a_flown_step(seed, engine):
+    """A step's matrix is the solver's polynomial of the linear system's, its poles those of it.
 
-    Matrices, not eigenvalues: those of the servos are defective, and differences give of a double
-    one no more than half the digits.
+    The servos' poles are double and defective. An error of differences splits such an eigenvalue by
+    the error's root, so neither side has single ones to compare: what is well posed is the mean of
+    those that the error splits, which both sides take.
     """
-    found = equilibrium_of(random_line(seed))
-    motion, state = make_motion(found.motion.scenario, "native"), found.root.state
-    coordinates, timestep = motion.coordinates, motion.scenario.simulation.timestep
+    scenario = random_line(seed)
+    found = tiltsim.stability(scenario)
+    motion, state = make_motion(scenario, engine), found.equilibrium.root.state
+    coordinates, timestep = motion.coordinates, scenario.simulation.timestep
     step = derivative_at(
         lambda at: coordinates.between(state, motion.flown(0, at, 1)), coordinates, state
     )
+    order = 4 if scenario.simulation.plant == "mujoco" else 3
     power = growth = np.eye(coordinates.size)
-    for order in range(1, 5 if motion.scenario.simulation.plant == "mujoco" else 4):
-        power = power @ found.root.derivative * (timestep / order)
+    for term in range(1, order + 1):
+        power = power @ found.equilibrium.root.derivative * (timestep / term)
         growth = growth + power
     assert np.abs(step - growth).max() < 1e-8 * np.abs(growth).max()
+    kept = found.equilibrium.kept
+    flown, _, _ = spectrum(step[np.ix_(kept, kept)], ERROR)
+    factors = np.polynomial.Polynomial(1.0 / np.array([factorial(i) for i in range(order + 1)]))
+    assert distance(flown, factors(timestep * found.poles)) < 1e-5 * timestep
 
 
 def test_the_plants_have_the_same_poles_but_for_the_servos():
@@ -231,6 +229,35 @@ def test_double_integrators_are_not_stable_but_single_ones_are():
         assert is_stable(matrix, poles, timestep) == (timestep is not None)
 
 
+def test_an_undamped_swing_is_not_stable_beside_neutral_states_either():
+    swing = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    assert not is_stable(swing, np.linalg.eigvals(swing), None)
+    damped = swing - np.diag([0.0, 0.1, 0.0])
+    assert is_stable(damped, np.linalg.eigvals(damped), None)
+
+
+def test_what_decays_slowest_comes_first():
+    """A fast swing that lasts before a slow pole, and neutral states before both."""
+    matrix = np.zeros((4, 4))
+    matrix[0, 0] = -1.0
+    matrix[1:3, 1:3] = [[-0.1, 50.0], [-50.0, -0.1]]
+    modes = modes_of(matrix, ("z", "p", "q", "x"), None)
+    assert [mode.frequency for mode in modes] == [0.0, pytest.approx(50.0, rel=1e-4), 1.0]
+    found = tiltsim.stability(tiltsim.load_scenario(SETPOINT, THESIS))
+    assert (np.diff(found.poles.real) <= 0.0).all()
+
+
+def test_a_multiple_pole_that_errors_split_is_its_mean():
+    """A critically damped servo: an error of 1e-11 splits -300 by 1e-3; a pole 0.1 away stays."""
+    matrix = np.zeros((3, 3))
+    matrix[:2, :2] = [[0.0, 1.0], [-9e4 * (1.0 + 1e-11), -600.0]]
+    matrix[2, 2] = -300.1
+    split = np.sort_complex(np.linalg.eigvals(matrix))
+    assert np.abs(split[1:] + 300.0).min() > 5e-4
+    values, _, _ = spectrum(matrix, 2e-11)
+    assert distance(values, (-300.0, -300.0, -300.1)) < 1e-8
+
+
 def test_modes_group_equal_poles_and_name_their_states():
     block = np.array([[-1.0, 2.0], [-2.0, -1.0]])
     matrix = np.kron(np.eye(2), block)
@@ -242,7 +269,7 @@ def test_modes_group_equal_poles_and_name_their_states():
 def test_a_negative_multiplier_is_one_pole():
     """Its logarithm is complex, without a partner."""
     modes = modes_of(np.diag([-0.5, 0.3]), ("x", "y"), 1.0)
-    assert [(mode.name, mode.count) for mode in modes] == [("y", 1), ("x", 1)]
+    assert [(mode.name, mode.count) for mode in modes] == [("x", 1), ("y", 1)]
 
 
 def test_rest_is_where_the_vehicle_is_told_to_turn():
@@ -262,7 +289,17 @@ def test_a_rest_point_beyond_a_singular_attitude_does_not_count():
         tiltsim.stability(tiltsim.load_scenario(SETPOINT, beyond))
 
 
+LINE = {"reference.type": "line", "reference.velocity": [0.5, 0.0, 0.1]}
+
 REFUSED = {
+    "a line that accelerates through air": (
+        {**LINE, "reference.acceleration": [0.1, 0, 0], "air.drag.linear": [0.1, 0.1, 0.1]},
+        "reference.acceleration = .*: with air.drag",
+    ),
+    "a line that climbs above ground": (
+        {**LINE, "air.ground_effect.height": -1.0},
+        "the line climbs or descends: with air.ground_effect",
+    ),
     "noise": ({"sensors.position_noise": 0.1}, "sensors.position_noise: with noise"),
     "a moving gait": (
         {"gait.type": "trot_continuous", "gait.amplitude": 0.5, "gait.period": 2.0},

@@ -81,10 +81,14 @@ def test_a_rounded_blue_gait_hovers_undisturbed_and_is_lost_on_a_circle():
     assert circle.end.time < 0.01
 
 
+@cache
+def coarse_map(name):
+    """From 81 attitudes."""
+    return attraction_map(name, coarse=8, refinements=0)
+
+
 def test_what_comes_back_was_acceptable_when_the_flight_began():
-    """Fixed gait, trot and red gait, from 81 attitudes each."""
-    names = ("ch. 4, fixed at 0.65", "ch. 4, trot to 0.65, T = 2 s", "ch. 6, gait 3, red")
-    fixed, trot, red = (attraction_map(name, coarse=8, refinements=0) for name in names)
+    fixed, trot = coarse_map("ch. 4, fixed at 0.65"), coarse_map("ch. 4, trot to 0.65, T = 2 s")
     for found in (fixed, trot):
         across, up = np.meshgrid(*found.edges)
         angles = assemble(found.scenario).gait.angles(0.0)
@@ -93,5 +97,18 @@ def test_what_comes_back_was_acceptable_when_the_flight_began():
         assert not found.returned[beyond].any()
     assert 0.85 < fixed.report()["acceptable_returned"] < 0.98
     assert 0.35 < trot.report()["unacceptable_returned"] < 0.65
+
+
+def test_acceptable_attitudes_are_lost_by_the_time_step():
+    red = coarse_map("ch. 6, gait 3, red")
     assert red.acceptable.all()
-    assert red.share.mean() < 0.9
+    assert 0.7 < red.report()["acceptable_returned"] < 0.9
+    lost = [(red.edges[0][i], red.edges[1][j], 0.0) for j, i in np.argwhere(~red.returned)]
+    share = {}
+    for timestep in (1e-3, 2.5e-5):
+        keys = {"simulation.timestep": timestep, "simulation.duration": 0.1}
+        short = red.scenario.replace(keys)
+        flown = tiltsim.fly([short.replace({"initial.attitude": attitude}) for attitude in lost])
+        share[timestep] = np.mean([flight.end.kind == "completed" for flight in flown])
+    assert share[1e-3] < 0.1
+    assert share[2.5e-5] > 0.9

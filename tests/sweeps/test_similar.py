@@ -45,10 +45,18 @@ def test_each_scenario_is_that_of_its_document_and_one_of_a_kind_is_made_in_full
 
 
 @pytest.mark.parametrize(
-    ("key", "value"), [("gait.period", -1.0), ("gait.amplitude", 4.0), ("vehicle.mass", -1.0)]
+    ("key", "allowed", "value"),
+    [
+        ("gait.amplitude", 0.5, 4.0),
+        ("vehicle.mass", 0.5, -1.0),
+        ("simulation.timestep", 0.001, 0.01),  # too long for the servo, which is in another table
+    ],
 )
-def test_a_number_that_is_not_allowed_is_refused_in_the_words_of_the_whole_document(key, value):
-    points = sweep(axis(key, 0.5))
+def test_a_number_that_is_refused_is_refused_in_the_words_of_the_whole_document(
+    key, allowed, value
+):
+    points = sweep(axis(key, allowed))
+    points.scenario({key: allowed})
     with pytest.raises(InputError) as full:
         parse_scenario(points.document({key: value}), "sweep")
     with pytest.raises(InputError) as similar:

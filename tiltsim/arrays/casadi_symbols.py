@@ -30,6 +30,10 @@ class CasadiSymbols:
         """Whether a value is a symbol or an expression of symbols."""
         return isinstance(value, self.casadi.SX)
 
+    def vector(self, values: Any) -> Any:
+        """Numbers as a column."""
+        return self.casadi.vertcat(*values)
+
     def take(self, values: Any, index: Any) -> Any:
         """The entry of a vector at an index that is an expression."""
         first, *others = values

@@ -32,7 +32,9 @@ class Frame(Expressions):
         else:
             ends = self.block(self.node.body, variables)
             if set(ends) != {RETURN}:
-                raise self.error("may end without a value")
+                # A plan that raises an error whatever the arrays are needs plain numbers.
+                kind = LiftError if ends else PlainNumberError
+                raise self.error("may end without a value", kind)
             value = ends[RETURN][1]
         return list(value) if isinstance(value, Borrowed) else value
 

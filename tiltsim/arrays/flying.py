@@ -193,8 +193,9 @@ class Kernel:
 
         last, before = jax.lax.scan(interval, carried, length=full)
         ends = [last, self.steps(last, rest)] if rest else [last]
-        join = lambda *parts: self._numpy.concatenate([parts[0], self._numpy.stack(parts[1:])])
-        return jax.lax.map(self.sample, jax.tree.map(join, before, *ends))
+        join, stack = self._numpy.concatenate, self._numpy.stack
+        states = jax.tree.map(lambda first, *later: join([first, stack(later)]), before, *ends)
+        return jax.lax.map(self.sample, states)
 
     def record(self, state: Iterable[Any], reference: Any) -> Recording:
         """A whole flight, as if nothing ended it."""

@@ -39,6 +39,9 @@ class Arrays(Protocol):
     def where(self, condition: Any, yes: Any, no: Any) -> Any:
         """Select by a condition, entry by entry."""
 
+    def vector(self, values: Any) -> Any:
+        """Numbers as an array of one dimension."""
+
     def take(self, values: Any, index: Any) -> Any:
         """The entry of a vector at an index that is an array."""
 

@@ -17,6 +17,7 @@ import numpy as np
 from tiltsim.closed_loop.vehicle_kind import VehicleKind
 from tiltsim.models.parts import ExtraActuators
 from tiltsim.system.quantity import Quantity, in_words
+from tiltsim_controllers.laws.supervisor import Supervision
 from tiltsim_controllers.mathematics.records import flatten, record_dtype, record_size
 from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector, scalar
 from tiltsim_controllers.vehicle.parameters import SPIN
@@ -168,12 +169,19 @@ class SupervisedLaw(NamedTuple):
     ``motion`` is the supervisor's state with its rate and acceleration.
     """
 
+    code: Supervision
+    vehicle: Callable[..., Any]  # (parameters): what this code reads of the vehicle
+    state: Callable[..., Values]  # (qpos, qvel, act): of the controller, that of the body first
     controls: Callable[..., Values]
     """``(time, state, qvel, act, motion, parameters, knots)``: the controls from the rotor
     accelerations on."""
     references: Callable[..., Values]
-    """``(time, sample, motion, parameters, knots)``: columns of position and attitude reference."""
+    """``(time, sample, motion, parameters, knots)``: columns of references, those of the tilts
+    left out."""
+    names: tuple[str, ...]  # of these columns
     fields: tuple[str, ...]  # of a sample, those that the references need
+    margins: Callable[[Mapping[str, Floats], ControlSetup], dict[str, Floats]]
+    """``(samples by field, setup) -> columns`` that depend on the samples alone."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,14 +9,16 @@ from contextlib import contextmanager
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
+from tiltsim.commands.analysis import add_analysis, print_analysis, requested_scenarios
 from tiltsim.commands.angles import allow_negative_lists
-from tiltsim.commands.figure_options import add_plot, check_plot, save_figure
-from tiltsim.commands.options import Subparsers, add_json, add_overrides, add_quiet
+from tiltsim.commands.options import Subparsers
 from tiltsim.commands.progress import Progress, show_progress
-from tiltsim.commands.text import aligned, json_text, number, print_figure_path
+from tiltsim.commands.text import aligned, number
 from tiltsim.errors import InputError
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from tiltsim.linear.attraction import Attraction
 
 DEFAULT_COARSE: Final = 12
@@ -31,8 +33,8 @@ def add_parser(subparsers: Subparsers) -> None:
     summary = "from which initial states a flight comes back"
     parser = subparsers.add_parser("attraction", help=summary, description=description)
     allow_negative_lists(parser)
+    add_analysis(parser, "the map", "simulation.duration=15")
     add = parser.add_argument
-    add("scenario", metavar="SCENARIO", help="a TOML file or a library name")
     axes = "two of x, y, z, vx, vy, vz, roll, pitch, yaw, p, q, r (default: roll,pitch)"
     add("--axes", default="roll,pitch", metavar="A,B", help=axes)
     ranges = "of each axis, SI units (default: 1.5 rad, 5 m, 5 m/s, 10 rad/s either way)"
@@ -41,21 +43,12 @@ def add_parser(subparsers: Subparsers) -> None:
     add("--coarse", type=int, default=DEFAULT_COARSE, metavar="N", help=coarse)
     refine = "how often cells at the boundary are divided (default: 3, 96 cells across)"
     add("--refine", type=int, default=DEFAULT_REFINEMENTS, metavar="N", help=refine)
-    add_overrides(parser, "the scenario", "simulation.duration=15")
-    add_json(parser)
-    add_quiet(parser, "show no progress")
-    add_plot(parser, "the map")
     parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Fly, draw, print."""
-    from tiltsim.scenario.loading import load_scenario
-    from tiltsim.scenario.override_keys import parse_override
-
-    check_plot(arguments)
-    overrides = dict(parse_override(text) for text in arguments.overrides)
-    scenario = load_scenario(arguments.scenario, overrides)
+    (scenario,) = requested_scenarios(arguments)
 
     from tiltsim.linear.attraction import attraction
 
@@ -71,12 +64,7 @@ def run(arguments: argparse.Namespace) -> int:
             refinements=arguments.refine,
             progress=partial(progress.tell, "flights"),
         )
-    if arguments.plot is not None:
-        from tiltsim.views.figures.attraction import attraction_figure
-
-        save_figure(partial(attraction_figure, found), arguments.plot, arguments)
-    print(json_text(found.report()) if arguments.json else _text(found))
-    print_figure_path(arguments)
+    print_analysis(arguments, found.report(), _text(found), lambda: _draw(found))
     return 0
 
 
@@ -91,6 +79,12 @@ def _warnings_in_a_line(progress: Progress) -> Iterator[None]:
         warnings.simplefilter("always", RuntimeWarning)
         warnings.showwarning = show
         yield
+
+
+def _draw(found: Attraction) -> Figure:
+    from tiltsim.views.figures.attraction import attraction_figure
+
+    return attraction_figure(found)
 
 
 def _parse_ranges(

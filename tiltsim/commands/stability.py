@@ -8,15 +8,18 @@ from functools import partial
 from math import degrees
 from typing import TYPE_CHECKING, Any, Final
 
-from tiltsim.commands.figure_options import add_plot, check_plot, save_figure
-from tiltsim.commands.options import Subparsers, add_json, add_overrides, add_quiet
+from tiltsim.commands.analysis import add_analysis, print_analysis, requested_scenarios
+from tiltsim.commands.options import Subparsers
 from tiltsim.commands.progress import show_progress
-from tiltsim.commands.text import aligned, json_text, number, print_figure_path, table
+from tiltsim.commands.text import aligned, number, table
 from tiltsim.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
+    from matplotlib.figure import Figure
+
+    from tiltsim.linear.linearization import Linearization
     from tiltsim.linear.margins import Margin
     from tiltsim.linear.stability import Stability
     from tiltsim.linear.sweeping import Point
@@ -36,30 +39,20 @@ def add_parser(subparsers: Subparsers) -> None:
     sampling and latency included, on the plant of the scenario."""
     summary = "poles of a rest point or multipliers of a periodic flight"
     parser = subparsers.add_parser("stability", help=summary, description=description)
+    add_analysis(parser, "the poles or multipliers, or the sweep", "gait.period=1.5")
     add = parser.add_argument
-    add("scenario", metavar="SCENARIO", help="a TOML file or a library name")
     add("more", nargs="*", metavar="SCENARIO", help="further ones, with --sweep")
     sweep = """how the largest multiplier moves with a number: period, amplitude or any key;
     default: from half to twice its value at 16 points, spaced evenly by ratio"""
     add("--sweep", metavar="KEY[=FROM:TO[:POINTS]]", help=sweep)
     margins = "at rest: gain, phase, delay and disk margins of the loop broken at one place"
     add("--margins", action="store_true", help=margins)
-    add_overrides(parser, "the scenario", "gait.period=1.5")
-    add_json(parser)
-    add_quiet(parser, "show no progress")
-    add_plot(parser, "the poles or multipliers, or the sweep")
     parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Analyze, draw, print."""
-    from tiltsim.scenario.loading import load_scenario
-    from tiltsim.scenario.override_keys import parse_override
-
-    check_plot(arguments)
-    overrides = dict(parse_override(text) for text in arguments.overrides)
-    addresses = (arguments.scenario, *arguments.more)
-    scenarios = [load_scenario(address, overrides) for address in addresses]
+    scenarios = requested_scenarios(arguments, *arguments.more)
     if arguments.sweep is not None:
         if arguments.margins:
             raise InputError("--margins: of one rest point, not with --sweep")
@@ -73,6 +66,7 @@ def run(arguments: argparse.Namespace) -> int:
         progress.begin(FLIGHTS)
         found = stability(scenarios[0], progress=progress.move)
     report, text = found.report(), stability_text(found)
+    draw = partial(_draw, found)
     if arguments.margins:
         from tiltsim.linear.linearization import linearization_at
         from tiltsim.linear.margins import margins_of
@@ -85,16 +79,27 @@ def run(arguments: argparse.Namespace) -> int:
         margins = margins_of(system)
         report["margins"] = [margin.report() for margin in margins]
         text = f"{text}\n\n{margins_text(margins)}"
-    if arguments.plot is not None:
-        from tiltsim.views.figures.stability import loop_figure, stability_figure
-
-        draw = (
-            partial(loop_figure, system) if arguments.margins else partial(stability_figure, found)
-        )
-        save_figure(draw, arguments.plot, arguments)
-    print(json_text(report) if arguments.json else text)
-    print_figure_path(arguments)
+        draw = partial(_draw_loop, system)
+    print_analysis(arguments, report, text, draw)
     return 0
+
+
+def _draw(found: Stability) -> Figure:
+    from tiltsim.views.figures.stability import stability_figure
+
+    return stability_figure(found)
+
+
+def _draw_loop(system: Linearization) -> Figure:
+    from tiltsim.views.figures.stability import loop_figure
+
+    return loop_figure(system)
+
+
+def _draw_sweep(key: str, sweeps: Mapping[str, Sequence[Point]]) -> Figure:
+    from tiltsim.views.figures.stability import sweep_figure
+
+    return sweep_figure(key, sweeps)
 
 
 def margins_text(margins: Sequence[Margin]) -> str:
@@ -163,24 +168,17 @@ def _run_sweep(arguments: argparse.Namespace, scenarios: Sequence[Scenario]) -> 
             sweeps[one.address] = sweep_stability(
                 one, key, values, lambda _point: progress.move(next(found))
             )
-    if arguments.plot is not None:
-        from tiltsim.views.figures.stability import sweep_figure
-
-        save_figure(partial(sweep_figure, key, sweeps), arguments.plot, arguments)
-    if arguments.json:
-        report = [
-            {
-                "scenario": address,
-                "key": key,
-                "points": [point.report() for point in points],
-                "crossings": [crossing.report() for crossing in crossings(points)],
-            }
-            for address, points in sweeps.items()
-        ]
-        print(json_text(report))
-    else:
-        print("\n\n".join(_sweep_text(key, *item) for item in sweeps.items()))
-        print_figure_path(arguments)
+    report = [
+        {
+            "scenario": address,
+            "key": key,
+            "points": [point.report() for point in points],
+            "crossings": [crossing.report() for crossing in crossings(points)],
+        }
+        for address, points in sweeps.items()
+    ]
+    text = "\n\n".join(_sweep_text(key, *item) for item in sweeps.items())
+    print_analysis(arguments, report, text, partial(_draw_sweep, key, sweeps))
     return 0
 
 

@@ -24,6 +24,7 @@ from numba.core.ccallback import CFunc
 from numba.core.typing.templates import infer, infer_global, make_overload_template
 
 from tiltsim.engines.cache import failed_saves, native_code_folder, native_code_is_cacheable
+from tiltsim.engines.inner_code import InnerCompiler, loaded_inner_code
 from tiltsim.system.locks import locked, one_thread_at_a_time
 from tiltsim_controllers.mathematics.scalar import scalar_functions
 
@@ -48,6 +49,11 @@ class _Locator(UserProvidedCacheLocator):  # type: ignore[misc]
 
 class _CacheImpl(CompileResultCacheImpl):  # type: ignore[misc]
     _locator_classes = (_Locator,)
+
+
+class _InnerImpl(_CacheImpl):
+    def rebuild(self, target_context: Any, payload: Any) -> Any:
+        return loaded_inner_code(target_context, payload)
 
 
 class _SafeIndex(IndexDataCacheFile):  # type: ignore[misc]
@@ -106,11 +112,17 @@ class NativeCodeCache(FunctionCache):  # type: ignore[misc]
             failed_saves.append(error)
 
 
-def _cached(compiled: Any, function: Callable[..., Any]) -> Any:
+class _InnerCodeCache(NativeCodeCache):
+    _impl_class = _InnerImpl
+
+
+def _cached(
+    compiled: Any, function: Callable[..., Any], kind: type[NativeCodeCache] = NativeCodeCache
+) -> Any:
     """Give a dispatcher or C callback our cache, if its folder may be used."""
     in_file = Path(function.__code__.co_filename).is_file()  # not in a notebook
     if native_code_is_cacheable() and in_file:
-        compiled._cache = NativeCodeCache(function)
+        compiled._cache = kind(function)
     return compiled
 
 
@@ -156,8 +168,9 @@ def _decorator_of_inner(**options: Any) -> Callable[[Callable[..., Any]], Any]:
     def decorate(function: Callable[..., Any]) -> Any:
         if function.__closure__:
             # Made for few callers, with long tuples: to pass those costs as much as to use them.
-            return njit(forceinline=True, **options)(function)
-        return _cached(njit(**options)(function), function)
+            return njit(forceinline=True, pipeline_class=InnerCompiler, **options)(function)
+        inner = njit(pipeline_class=InnerCompiler, **options)(function)
+        return _cached(inner, function, _InnerCodeCache)
 
     return decorate
 

@@ -6,11 +6,10 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from numba.extending import register_jitable
 
 from tiltsim.closed_loop.loop import ClosedLoop
 from tiltsim.engines.cache import announce_native_code
-from tiltsim.engines.compiling import INNER, compiled, register_scalar_functions
+from tiltsim.engines.compiling import callable_natively, compiled, register_scalar_functions
 from tiltsim.engines.recorder import record_sample, recording_is_over
 from tiltsim.equations.solvers import make_stepper
 from tiltsim.system.locks import one_thread_at_a_time
@@ -36,10 +35,10 @@ def compile_stepper(loop: ClosedLoop, plant: str, solver: str) -> tuple[Any, Any
     assert loop.equations is not None
     stepper = make_stepper(loop.equations, solver)  # defines a scalar function
     register_scalar_functions()
+    callable_natively(stepper)
     inputs, observe = loop.equations.inputs, loop.equations.observe
     watch = loop.monitoring.sign_check_values
     limit_exceeded = loop.kind.limit_exceeded
-    stepper = register_jitable(**INNER)(stepper)
 
     @compiled
     def advance(step_index, state, held, steps, integration):  # type: ignore[no-untyped-def]

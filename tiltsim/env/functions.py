@@ -16,9 +16,8 @@ from tiltsim.arrays.jax_arrays import JaxArrays, require_jax
 from tiltsim.arrays.lifting import Lifting
 from tiltsim.closed_loop.limits import WITHIN_LIMITS
 from tiltsim.env.task import Task
-from tiltsim.equations.actuator_level import actuator_plant
-from tiltsim.equations.implicitfast import RATE_1, SPEED_1, TILT_1, make_implicitfast_step
-from tiltsim.equations.tiltrotor import P, body_fields, rotation_of
+from tiltsim.equations.implicitfast import make_implicitfast_step
+from tiltsim.equations.rigid_body import form_of, rigid_body_of
 from tiltsim.errors import InputError
 from tiltsim.laws.assembling import loop_of
 from tiltsim.laws.commanded import commanded_parameters, with_command
@@ -26,13 +25,13 @@ from tiltsim.laws.layers.on_equations import on_equations
 from tiltsim.plants.command import Observation, Reference
 from tiltsim.scenario.override_keys import split_key
 from tiltsim.scenario.surroundings import SensorTable
-from tiltsim.scenario.vehicle import PodTable
+from tiltsim.scenario.vehicle import PodTable, VehicleTable
 from tiltsim.simulation.array_plan import ArrayPlan, PlannedFlight
 from tiltsim.system.text import short_repr
-from tiltsim_controllers.mathematics.rotation import quaternion_from_rotation
+from tiltsim.vehicles.rotorcraft.layout import QW, TILT_1, TILT_RATE_1
+from tiltsim_controllers.mathematics.rotation import euler_from_quaternion, rotation_from_quaternion
 from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.references.trajectories import reference_derivatives
-from tiltsim_controllers.vehicle.parameters import SPIN
 
 if TYPE_CHECKING:
     from tiltsim.closed_loop.loop import ClosedLoop
@@ -42,9 +41,8 @@ LEAST_THRUST: Final = 1e-30  # N; a root has no derivative at zero
 
 
 def loop_on_equations(scenario: Scenario) -> ClosedLoop:
-    """The loop of a tiltrotor under commands, on chapter 3's equations with real actuators."""
-    loop = loop_of(scenario)
-    return on_equations(loop, actuator_plant(loop.dynamics))
+    """The loop of a rotorcraft under commands, as a rigid body."""
+    return on_equations(loop_of(scenario), rigid_body_of(form_of(scenario)))
 
 
 class Episode(NamedTuple):
@@ -52,7 +50,7 @@ class Episode(NamedTuple):
 
     numbers: Any  # drawn for it, shape (numbers,)
     index: Any  # of the physics step
-    state: tuple[Any, ...]  # motion of the vehicle, then activations as in MuJoCo
+    state: tuple[Any, ...]  # MuJoCo's qpos, qvel and act
 
 
 class Outcome(NamedTuple):
@@ -71,8 +69,8 @@ class EnvFunctions:
     integrated as MuJoCo does with ``implicitfast``, but its pods are massless.
 
     Args:
-        task: With a tiltrotor and ``simulation.integrator = "implicitfast"``; without errors of
-            sensors, latency, faults, rotor inertia, ground and MJCF file of its own.
+        task: With any rotorcraft and ``simulation.integrator = "implicitfast"``; without errors of
+            sensors, latency, faults, rotor inertia and ground.
         precision: "float32" or, if JAX has 64-bit numbers enabled, "float64".
 
     Attributes:
@@ -98,18 +96,26 @@ class EnvFunctions:
         loop = loop_on_equations(scenario)
         self._follows = loop.follows_position(scenario)
         self._plan = ArrayPlan(scenario, loop, precision)
-        rotorcraft = scenario.rotorcraft
+        rotorcraft = scenario.any_rotorcraft
+        self._rotors, self._tilts = rotorcraft.rotor_count, rotorcraft.tilt_count
+        self._spins = np.array(rotorcraft.spins)
+        self._coefficients = np.array(rotorcraft.thrust_coefficients)
         self._slowest, self._fastest = rotorcraft.speeds_along_spin
+        self._qvel = TILT_1 + self._tilts
+        self._act = self._qvel + TILT_RATE_1 + self._tilts
         # A command is written to the speeds, or to what they lag behind.
-        self._speeds = SPEED_1 + (4 if rotorcraft.rotor_time_constant is not None else 0)
+        lags = rotorcraft.rotor_time_constant is not None
+        self._commanded = self._act + self._rotors * lags
         equations = loop.equations
         assert equations is not None
         lifting = Lifting(JaxArrays(precision), guarded=True)
-        self._advance = lifting(make_implicitfast_step(equations))
+        self._advance = lifting(make_implicitfast_step(equations, self._tilts))
         self._inputs, self._sample = lifting(equations.inputs), lifting(equations.observe)
         self._limit = lifting(loop.kind.limit_exceeded)
         self._reference_at = lifting(reference_derivatives)
-        self._body, self._quaternion = lifting(body_fields), lifting(quaternion_from_rotation)
+        self._euler, self._rotation = map(
+            lifting, (euler_from_quaternion, rotation_from_quaternion)
+        )
         first = {} if task.domain is None else task.domain.values(np.random.default_rng(0))
         self.keys = tuple(first)
         self._widths = [None if np.ndim(value) == 0 else len(value) for value in first.values()]
@@ -185,13 +191,17 @@ class EnvFunctions:
         """An episode after a control step."""
         jnp, knots, timestep = self._numpy, planned.knots, self._simulation.timestep
         parameters, count = planned.parameters, self._simulation.control_steps
-        coefficient = commanded_parameters(parameters.inner).vehicle.thrust_coefficient
-        speeds = jnp.sqrt(jnp.maximum(action[:4], LEAST_THRUST) / coefficient)
-        speeds = jnp.clip(speeds, self._slowest, self._fastest) * jnp.asarray(SPIN, self._dtype)
-        tilts = tuple(action[index] for index in range(4, 8))
-        parameters = with_command(parameters, (*tilts, 0.0, 0.0, 0.0, 0.0))
+        vehicle, rotors = commanded_parameters(parameters.inner).vehicle, self._rotors
+        per_square = getattr(vehicle, "thrust_coefficient", None)  # which may be drawn
+        if per_square is None:
+            per_square = jnp.asarray(self._coefficients, self._dtype)
+        thrusts = action[:rotors]
+        sizes = jnp.sqrt(jnp.maximum(abs(thrusts), LEAST_THRUST) / per_square)
+        speeds = jnp.clip(jnp.copysign(sizes, thrusts), self._slowest, self._fastest)
+        speeds = speeds * jnp.asarray(self._spins, self._dtype)
+        parameters = with_command(parameters, (*action[rotors:], *(0.0,) * rotors))
         state = [*episode.state]
-        state[self._speeds : self._speeds + 4] = [*speeds]
+        state[self._commanded : self._commanded + rotors] = [*speeds]
         held = self._inputs(self._time(episode.index), state, parameters, knots)
 
         def one(now: tuple[Any, ...], step: Any) -> tuple[tuple[Any, ...], None]:
@@ -210,20 +220,23 @@ class EnvFunctions:
     def _observed(self, episode: Episode, planned: PlannedFlight) -> dict[str, Any]:
         """The arrays of an observation."""
         jnp, state, time = self._numpy, episode.state, self._time(episode.index)
-        rotation, names = rotation_of(state), self._task.observed.bounds
-        reference, spins = planned.plan.reference, jnp.asarray(SPIN, self._dtype)
+        qvel, act, names = self._qvel, self._act, self._task.observed.bounds
+        quaternion = state[QW : QW + 4]
+        rotation = self._rotation(*quaternion)
+        reference, spins = planned.plan.reference, jnp.asarray(self._spins, self._dtype)
+        none, tilts = jnp.zeros(0, self._dtype), self._tilts  # a stack of none is an error
         motion = jnp.asarray(self._reference_at(time, reference, planned.knots)[:9])
-        unseen = np.full(4, np.nan)  # what is not observed, as the gait
+        unseen = np.full(3, np.nan)  # what is not observed, as the gait
         seen = Observation(
             time=time,
             position=jnp.stack(state[:3]),
-            velocity=jnp.stack(state[3:6]),
-            attitude=jnp.stack(self._body(state)[6:9]) if "attitude" in names else unseen[:3],
-            quaternion=jnp.stack(self._quaternion(rotation)) if "quaternion" in names else unseen,
-            body_rates=jnp.stack(state[P : P + 3]),
-            tilt_angles=jnp.stack(state[TILT_1 : TILT_1 + 4]),
-            tilt_rates=jnp.stack(state[RATE_1 : RATE_1 + 4]),
-            rotor_speeds=spins * jnp.stack(state[SPEED_1 : SPEED_1 + 4]),
+            velocity=jnp.stack(state[qvel : qvel + 3]),
+            attitude=jnp.stack(self._euler(*quaternion)) if "attitude" in names else unseen,
+            quaternion=jnp.stack(quaternion),
+            body_rates=jnp.stack(state[qvel + 3 : qvel + 6]),
+            tilt_angles=jnp.stack(state[TILT_1:qvel]) if tilts else none,
+            tilt_rates=jnp.stack(state[act - tilts : act]) if tilts else none,
+            rotor_speeds=spins * jnp.stack(state[act : act + self._rotors]),
             reference=Reference(
                 position=motion[:3],
                 velocity=motion[3:6],
@@ -283,9 +296,6 @@ def _with(tree: Any, path: Sequence[str | int], value: Any) -> Any:
 def _check_supported(scenario: Scenario) -> None:
     """Refuse what these equations do not have."""
     allowed: dict[str, object] = {
-        "vehicle.model": "tiltrotor",
-        "vehicle.mjcf": None,
-        "vehicle.pod": PodTable(),
         "vehicle.rotor_inertia": 0.0,
         "ground": None,
         "fault": (),
@@ -293,9 +303,17 @@ def _check_supported(scenario: Scenario) -> None:
         "simulation.control_latency": 0.0,
         "simulation.integrator": "implicitfast",
     }
+    if isinstance(scenario.vehicle, VehicleTable):  # else they are in its file
+        allowed["vehicle.pod"] = PodTable()
     for key, value in allowed.items():
         found = attrgetter(key)(scenario)
         if found != value:
             shown = short_repr(found)
             only = f"only {value!r} flies" if isinstance(value, str) else "does not fly"
             raise InputError(f"environment: {key} = {shown}: {only} on arrays; use GymnasiumEnv")
+    file = scenario.any_rotorcraft.user_vehicle
+    if file is not None and file.unmodeled_properties:
+        raise InputError(
+            f"environment: vehicle.mjcf = {short_repr(scenario.any_rotorcraft.mjcf)}: "
+            f"{file.unmodeled_properties} does not fly on arrays; use GymnasiumEnv"
+        )

@@ -1,71 +1,99 @@
-"""MuJoCo's integrator ``implicitfast`` for the tiltrotor at the level of its actuators.
+"""MuJoCo's integrator ``implicitfast`` for the rigid body of any rotorcraft.
 
 It is the semi-implicit Euler method, with the servos' damping taken at the end of the step: first
-the velocities, then the positions with the new velocities. The body has its gyroscopic torque, as
-in MuJoCo; the pods are massless.
+the velocities, then the positions with the new velocities. Of a body without hinges the gyroscopic
+torque is taken at the end of the step as well, to first order (MuJoCo 4; of others it is not).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
-from math import sin, sqrt
-from typing import Any, Final
+from math import cos, sin, sqrt
+from typing import Any
 
 from tiltsim.closed_loop.loop import Equations
-from tiltsim.equations.tiltrotor import P, Q, R, rotation_of, velocity_of
-from tiltsim_controllers.laws.yaw_position import gyroscopic_acceleration
-from tiltsim_controllers.mathematics.scalar import Triple, Values, Vector, scalar
-from tiltsim_controllers.vehicle.multirotor import BODY_STATES
-
-TILT_1: Final = BODY_STATES
-RATE_1: Final = TILT_1 + 4
-SPEED_1: Final = RATE_1 + 4
-"""Where tilts, their rates and the rotor speeds begin in a tiltrotor's state."""
+from tiltsim.vehicles.rotorcraft.layout import QW, TILT_1, TILT_RATE_1
+from tiltsim_controllers.mathematics.scalar import Quad, Triple, Vector, scalar
+from tiltsim_controllers.mathematics.vectors import entries_of
+from tiltsim_controllers.vehicle.multirotor import Body, inertia_times
+from tiltsim_controllers.vehicle.rigid_body import cross
 
 
 @scalar
-def turned(rotation: Values, angle: Triple) -> Values:
-    """A rotation, rows first, followed by one about an axis of the body, whose length is the angle.
+def _dot(a: Triple, b: Triple) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
-    By Rodrigues' formula ``1 + sin(a) / a W + (1 - cos(a)) / a^2 W W``.
-    """
-    r11, r12, r13, r21, r22, r23, r31, r32, r33 = rotation
-    x, y, z = angle
-    whole = sqrt(x * x + y * y + z * z + 1e-30)  # never zero: so quotients have derivatives
-    half = sin(0.5 * whole) / (0.5 * whole)
-    first, second = sin(whole) / whole, 0.5 * half * half
-    t11, t22, t33 = (
-        1.0 - second * (y * y + z * z),
-        1.0 - second * (x * x + z * z),
-        1.0 - second * (x * x + y * y),
-    )
-    t12, t21 = second * x * y - first * z, second * x * y + first * z
-    t13, t31 = second * x * z + first * y, second * x * z - first * y
-    t23, t32 = second * y * z - first * x, second * y * z + first * x
+
+@scalar
+def _column(body: Body, omega: Triple, spin: Triple, axis: Triple, timestep: float) -> Triple:
+    """A column of the matrix of `turning_at_the_end`: along an axis, kg m^2."""
+    along = inertia_times(body, axis)
+    x, y, z = cross(omega, along)
+    u, v, w = cross(spin, axis)
     return (
-        r11 * t11 + r12 * t21 + r13 * t31,
-        r11 * t12 + r12 * t22 + r13 * t32,
-        r11 * t13 + r12 * t23 + r13 * t33,
-        r21 * t11 + r22 * t21 + r23 * t31,
-        r21 * t12 + r22 * t22 + r23 * t32,
-        r21 * t13 + r22 * t23 + r23 * t33,
-        r31 * t11 + r32 * t21 + r33 * t31,
-        r31 * t12 + r32 * t22 + r33 * t32,
-        r31 * t13 + r32 * t23 + r33 * t33,
+        along[0] + timestep * (x - u),
+        along[1] + timestep * (y - v),
+        along[2] + timestep * (z - w),
+    )
+
+
+@scalar
+def turned(quaternion: Quad, angle: Triple) -> Quad:
+    """An attitude followed by a turn about an axis of the body, whose length is the angle (rad)."""
+    w, x, y, z = quaternion
+    a, b, c = angle
+    whole = sqrt(a * a + b * b + c * c + 1e-30)  # never zero: so the quotient has derivatives
+    along, about = cos(0.5 * whole), sin(0.5 * whole) / whole
+    a, b, c = about * a, about * b, about * c
+    return (
+        w * along - x * a - y * b - z * c,
+        x * along + w * a + y * c - z * b,
+        y * along + w * b + z * a - x * c,
+        z * along + w * c + x * b - y * a,
+    )
+
+
+@scalar
+def turning_at_the_end(body: Body, omega: Triple, turning: Triple, timestep: float) -> Triple:
+    """The angular acceleration (rad/s^2) with the gyroscopic torque at the end of a step.
+
+    It solves ``(I + h d(omega x I omega)/d omega) a = I turning`` by Cramer's rule.
+
+    Args:
+        body: its inertia I counts
+        omega: body rates at the beginning, rad/s
+        turning: the angular acceleration with the gyroscopic torque there, rad/s^2
+        timestep: h, s
+    """
+    spin = inertia_times(body, omega)
+    first = _column(body, omega, spin, (1.0, 0.0, 0.0), timestep)
+    second = _column(body, omega, spin, (0.0, 1.0, 0.0), timestep)
+    third = _column(body, omega, spin, (0.0, 0.0, 1.0), timestep)
+    torque = inertia_times(body, turning)
+    normal_1, normal_2, normal_3 = cross(second, third), cross(third, first), cross(first, second)
+    whole = _dot(first, normal_1)
+    return (
+        _dot(torque, normal_1) / whole,
+        _dot(torque, normal_2) / whole,
+        _dot(torque, normal_3) / whole,
     )
 
 
 @cache
-def make_implicitfast_step(equations: Equations) -> Callable[..., list[float]]:
-    """One step of the equations of a loop that `tiltsim.laws.layers.on_equations` has wrapped.
+def make_implicitfast_step(equations: Equations, tilts: int) -> Callable[..., list[float]]:
+    """One step of the equations of a loop on a `tiltsim.equations.rigid_body` with so many tilts.
 
     Returns:
         Scalar code ``(time, state, inputs, timestep, parameters, knots, disturbance) -> state``,
         from a time (s) on, with the inputs since the last control sample.
     """
     rates_of, project_onto_limits = equations.rates, equations.project_onto_limits
-    assert project_onto_limits is not None  # at the level of actuators there are limits
+    assert project_onto_limits is not None  # which keeps the quaternion's length
+    qvel_1 = TILT_1 + tilts
+    rate_1 = qvel_1 + TILT_RATE_1
+    quaternion_in: Callable[[Vector], Any] = entries_of(QW, 4)
+    body_rates_in: Callable[[Vector], Any] = entries_of(qvel_1 + 3, 3)
 
     @scalar
     def step(
@@ -79,19 +107,23 @@ def make_implicitfast_step(equations: Equations) -> Callable[..., list[float]]:
     ) -> list[float]:
         mechanics = parameters.layer
         rates = rates_of(time, state, inputs, parameters, knots, disturbance)
-        gyroscopic = gyroscopic_acceleration(state[P], state[Q], state[R], mechanics.vehicle)
         damping = 1.0 + 2.0 * mechanics.servo_damping * mechanics.servo_frequency * timestep
         new = [value + timestep * rate for value, rate in zip(state, rates)]
+        if tilts == 0:
+            omega, turning = body_rates_in(state), body_rates_in(rates)
+            turning = turning_at_the_end(mechanics.vehicle.body, omega, turning, timestep)
+            for axis in range(3):
+                new[qvel_1 + 3 + axis] = omega[axis] + timestep * turning[axis]
         for axis in range(3):
-            new[P + axis] += timestep * gyroscopic[axis]
-        for rotor in range(4):
-            rate = state[RATE_1 + rotor] + timestep * rates[RATE_1 + rotor] / damping
-            new[RATE_1 + rotor] = rate
-            new[TILT_1 + rotor] = state[TILT_1 + rotor] + timestep * rate
-        vx, vy, vz, p, q, r = velocity_of(new)
-        position = (state[0] + timestep * vx, state[1] + timestep * vy, state[2] + timestep * vz)
-        rotation = turned(rotation_of(state), (timestep * p, timestep * q, timestep * r))
-        moved = [*position, vx, vy, vz, *rotation, p, q, r, *new[TILT_1:]]
-        return project_onto_limits(moved, parameters)
+            new[axis] = state[axis] + timestep * new[qvel_1 + axis]
+        for tilt in range(tilts):
+            rate = state[rate_1 + tilt] + timestep * rates[rate_1 + tilt] / damping
+            new[rate_1 + tilt] = rate
+            new[TILT_1 + tilt] = state[TILT_1 + tilt] + timestep * rate
+        p, q, r = body_rates_in(new)
+        attitude = turned(quaternion_in(state), (timestep * p, timestep * q, timestep * r))
+        for entry in range(4):
+            new[QW + entry] = attitude[entry]
+        return project_onto_limits(new, parameters)
 
     return step

@@ -16,7 +16,7 @@ from tiltsim.flight.end import End
 from tiltsim.scenario.messages import did_you_mean
 from tiltsim.scenario.metric_names import METRICS
 from tiltsim.system.text import short_repr
-from tiltsim_controllers.mathematics.records import flatten, unflatten
+from tiltsim_controllers.mathematics.records import unflatten
 from tiltsim_controllers.mathematics.scalar import Floats
 
 
@@ -63,12 +63,13 @@ def _metrics(own: dict[str, float], duration: float, end: End, wall_time: float)
 
 
 def metrics_of_rows(
-    assemblies: Sequence[Assembly], samples: Floats, end: End, wall_time: float
+    assemblies: Sequence[Assembly], numbers: Floats, samples: Floats, end: End, wall_time: float
 ) -> list[Metrics] | None:
     """`compute_metrics` of flights of one closed loop, computed together.
 
     Args:
         assemblies: Those of the flights, with the same knots.
+        numbers: Those of their parameters, shape (rows, numbers), as `flatten` has them.
         samples: Of shape (rows, N, fields), at the same times.
         end: How they ended.
         wall_time: Of the integration of one, s.
@@ -86,7 +87,6 @@ def metrics_of_rows(
     except _DifferentError:
         return None
     scenario = first.scenario.model_copy(update=read)
-    numbers = np.array([[*flatten(assembly.setup.parameters)] for assembly in assemblies])
     same = (numbers.view(np.int64) == numbers[:1].view(np.int64)).all(axis=0)
     values: list[Any] = [
         value if common else np.repeat(column, count)

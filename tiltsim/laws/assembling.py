@@ -81,7 +81,7 @@ def loop_of(
     elif isinstance(controller, ScalarController):
         loop = loop_of_scalar_law(scenario)
     elif scenario.vehicle.model == "multirotor":
-        loop = MULTIROTOR_LOOPS[controller.loop_name](scenario)
+        loop = MULTIROTOR_LOOPS[controller.loop_name](scenario, measured)
     else:
         loop = (MEASURED_LOOPS if measured else LOOPS)[controller.loop_name]
     loop, supervisor = adapted(loop), controller.supervision

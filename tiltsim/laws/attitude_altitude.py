@@ -12,7 +12,6 @@ from tiltsim.closed_loop.loop import (
     Equations,
     Monitoring,
     Sampling,
-    SupervisedLaw,
 )
 from tiltsim.equations.tiltrotor import law_state
 from tiltsim.laws.tiltrotor import (
@@ -31,6 +30,7 @@ from tiltsim.laws.tiltrotor import (
     rotor_thrust_controls,
     servo_lead,
     singularity_columns,
+    supervised_law,
     tiltrotor_dynamics,
     tiltrotor_state,
     with_measured_inputs,
@@ -196,7 +196,7 @@ TILTROTOR: Final = ClosedLoop(
         observe=observe_gait_equations,
         tilts=gait_tilts,
     ),
-    supervised=SupervisedLaw(_supervised_controls, _supervised_reference_values, TILTROTOR_FIELDS),
+    supervised=supervised_law(_supervised_controls, _supervised_reference_values, TILTROTOR_FIELDS),
     follows_position=follows_position,
 )
 """The attitude-altitude controller of the tiltrotor."""

@@ -12,7 +12,6 @@ from tiltsim.closed_loop.loop import (
     Equations,
     Monitoring,
     Sampling,
-    SupervisedLaw,
 )
 from tiltsim.equations.tiltrotor import FURTHER, law_state
 from tiltsim.laws.attitude_altitude import follows_position
@@ -32,6 +31,7 @@ from tiltsim.laws.tiltrotor import (
     rotor_thrust_controls,
     servo_lead,
     singularity_columns,
+    supervised_law,
     tiltrotor_dynamics,
     tiltrotor_state,
     with_measured_inputs,
@@ -72,7 +72,7 @@ def _supervised_controls(
     parameters: LoopParameters,
     knots: Vector,
 ) -> Values:
-    """Rotor accelerations and rates of the integrals; see `SupervisedLaw`."""
+    """Rotor accelerations and rates of the integrals, as `SupervisedLaw.controls`."""
     tilt_rates, integrals = four(qvel, TILT_RATE_1), (act[4], act[5], act[6])
     return tracking_inputs(time, state, tilt_rates, integrals, parameters.law, knots, motion)[:7]
 
@@ -252,7 +252,7 @@ GAIT_FEEDFORWARD: Final = ClosedLoop(
         observe=observe_equations,
         tilts=gait_tilts,
     ),
-    supervised=SupervisedLaw(_supervised_controls, _supervised_reference_values, REFERENCE_FIELDS),
+    supervised=supervised_law(_supervised_controls, _supervised_reference_values, REFERENCE_FIELDS),
     follows_position=follows_position,
 )
 """The attitude-altitude controller with tilt-rate feed-forward, of the tiltrotor."""

@@ -21,6 +21,7 @@ from tiltsim.closed_loop.loop import (
     Equations,
     Monitoring,
     Sampling,
+    SupervisedLaw,
 )
 from tiltsim.equations.tiltrotor import body_fields, initial_state
 from tiltsim.laws.gait_feedforward import tracking_fields
@@ -40,7 +41,7 @@ from tiltsim.laws.tiltrotor import (
     singular_attitude,
 )
 from tiltsim.models.rotor_table import Multirotor
-from tiltsim.scenario.multirotor_controllers import AttitudeForceController, UsedForce, upper_side
+from tiltsim.scenario.multirotor_controllers import AttitudeForceController, upper_side
 from tiltsim.vehicles.rotorcraft import initial_rotor_speeds, rotorcraft_kind
 from tiltsim.vehicles.rotorcraft.layout import TILT_1, TILT_RATE_1
 from tiltsim.vehicles.rotorcraft.layout import Layout as Places
@@ -50,7 +51,13 @@ from tiltsim_controllers.laws.gait_feedforward import INTEGRAL_FIELDS
 from tiltsim_controllers.laws.multirotor import multirotor_law_of
 from tiltsim_controllers.laws.multirotor_allocation import RotorRange
 from tiltsim_controllers.laws.multirotor_inputs import independence_of
-from tiltsim_controllers.laws.multirotor_steps import ATTITUDE_ERRORS, Parameters, SideGains
+from tiltsim_controllers.laws.multirotor_steps import ATTITUDE_ERRORS, Form, Parameters, SideGains
+from tiltsim_controllers.laws.multirotor_supervisor import (
+    Watched,
+    multirotor_supervision_of,
+    watched,
+)
+from tiltsim_controllers.laws.supervisor import SUPERVISOR_AT_REST
 from tiltsim_controllers.mathematics.rotation import world_up_in_body
 from tiltsim_controllers.mathematics.scalar import Floats, Triple, Values, Vector, scalar
 from tiltsim_controllers.mathematics.vectors import componentwise, entries_of
@@ -64,6 +71,11 @@ if TYPE_CHECKING:
 
 NULL_PART: Final = "null_part"
 """A column: the share of the rotors' ``varpi |varpi|`` that neither force nor torque show."""
+
+REFERENCES: Final = (*REFERENCE_COLUMNS, NULL_PART)
+"""Columns of what the law asks for."""
+
+Margins = Callable[[Mapping[str, Floats], ControlSetup], dict[str, Floats]]
 
 STATES: Final = len(INTEGRAL_FIELDS)
 """The controller's own, after the rotor speeds."""
@@ -109,13 +121,59 @@ def layout_of_vehicle(vehicle: Multirotor) -> Layout:
     return Layout(layout_of(vehicle.table), vehicle.spins)
 
 
+@scalar
+def _by_model(qvel: Vector) -> None:
+    """For a law that computes the angular acceleration by its model."""
+    return
+
+
 @cache
-def _sampling_of(layout: Layout, law: Callable[..., Values]) -> Sampling:
-    """The control step in MuJoCo of a law with the layout's inputs."""
+def _state_of(layout: Layout) -> Callable[..., Values]:
+    """Scalar code of the state that the law knows: ``(qpos, qvel, act)``."""
+    tilts_in = entries_of(TILT_1, layout.places.tilts)
+    speeds_in = entries_of(0, layout.places.rotors)
+
+    @scalar
+    def state(qpos: Vector, qvel: Vector, act: Vector) -> Values:
+        return (*body_state(qpos, qvel), *tilts_in(qpos), *speeds_in(act))
+
+    return state
+
+
+@cache
+def _rates_of(layout: Layout, law: Callable[..., Values], measured: bool) -> Callable[..., Values]:
+    """Scalar code of a law's controls from the rotor accelerations on; see `SupervisedLaw`.
+
+    ``measured``: whether it reads, after MuJoCo's velocities, the plant's angular acceleration.
+    """
     rotors, tilts = layout.places
-    tilts_in, tilt_rates_in = entries_of(TILT_1, tilts), entries_of(TILT_RATE_1, tilts)
-    speeds_in, integrals_in = entries_of(0, rotors), entries_of(rotors, STATES)
+    tilt_rates_in, integrals_in = entries_of(TILT_RATE_1, tilts), entries_of(rotors, STATES)
+    acceleration_in = entries_of(TILT_RATE_1 + tilts, 3) if measured else _by_model
     rates_in = entries_of(0, rotors + STATES)
+
+    @scalar
+    def rates(
+        time: float,
+        state: Values,
+        qvel: Vector,
+        act: Vector,
+        motion: Triple,
+        parameters: LoopParameters,
+        knots: Vector,
+    ) -> Values:
+        own, acceleration = parameters.law, acceleration_in(qvel)
+        moving, integrals = tilt_rates_in(qvel), integrals_in(act)
+        inputs = law(time, state, moving, integrals, own, knots, motion, acceleration)
+        found: Values = rates_in(inputs)
+        return found
+
+    return rates
+
+
+@cache
+def _sampling_of(layout: Layout, rates: Callable[..., Values]) -> Sampling:
+    """The control step in MuJoCo, by `_rates_of` a law."""
+    tilts, state_of = layout.places.tilts, _state_of(layout)
     thrusts, servo_commands = thrust_controls_of(layout.spins), servo_commands_of(tilts)
 
     @scalar
@@ -127,56 +185,77 @@ def _sampling_of(layout: Layout, law: Callable[..., Values]) -> Sampling:
         parameters: LoopParameters,
         knots: Vector,
     ) -> Values:
-        own = parameters.law
-        state = (*body_state(qpos, qvel), *tilts_in(qpos), *speeds_in(act))
-        rates = law(time, state, tilt_rates_in(qvel), integrals_in(act), own, knots)
+        own, state = parameters.law, state_of(qpos, qvel, act)
         return (
             *servo_commands(time, parameters.servo_lead, own.gait, knots),
             *thrusts(act),
-            *rates_in(rates),
+            *rates(time, state, qvel, act, SUPERVISOR_AT_REST, parameters, knots),
         )
 
     return Sampling(controls, held_controls_of(layout.spins, tilts))
 
 
 @cache
-def _columns_of(layout: Layout, dimension: int, law: Callable[..., Values]) -> Columns:
-    """Samples of flights under a law, and the columns of references, margin and null part."""
-    places = layout.places
-    rotors, tilts = places
-    tilts_in, tilt_rates_in = entries_of(TILT_1, tilts), entries_of(TILT_RATE_1, tilts)
-    speeds_in, integrals_in = entries_of(0, rotors), entries_of(rotors, STATES)
-    fields = (*places.observed_fields, *INTEGRAL_FIELDS)
-    state_in = entries_of(0, len(fields) - tilts - STATES)
-    rates_of_sample = entries_of(len(fields) - tilts - STATES, tilts)
-    integrals_of_sample = entries_of(len(fields) - STATES, STATES)
+def _references_of(layout: Layout, law: Callable[..., Values]) -> Callable[..., Values]:
+    """Scalar code of the columns `REFERENCES`; see `SupervisedLaw.references`."""
+    rotors, tilts = layout.places
+    first = layout.places.speed_1 + rotors
+    state_in, rates_of_sample = entries_of(0, first), entries_of(first, tilts)
+    integrals_of_sample = entries_of(first + tilts, STATES)
     asked_in = entries_of(rotors + STATES, 4)  # roll, pitch, yaw, null part
+
+    @scalar
+    def references(
+        time: float, values: Vector, motion: Triple, parameters: LoopParameters, knots: Vector
+    ) -> Values:
+        own = parameters.law
+        x, y, z, _, _, _, _, _, _ = position_reference(time, own.reference, knots)
+        moving, integrals = rates_of_sample(values), integrals_of_sample(values)
+        inputs = law(time, state_in(values), moving, integrals, own, knots, motion)
+        return (x, y, z, *asked_in(inputs))
+
+    return references
+
+
+@cache
+def _columns_of(layout: Layout, references: Callable[..., Values], margins: Margins) -> Columns:
+    """Samples of flights under a law, and the columns of references, margin and null part."""
+    places, state_of = layout.places, _state_of(layout)
+    rotors, tilts = places
+    tilt_rates_in, integrals_in = entries_of(TILT_RATE_1, tilts), entries_of(rotors, STATES)
     planned = tilt_motion_of(tilts).planned
     angles = componentwise("angles_of_jets", "jets", "jets#[0]", tilts)
 
     @scalar
     def observe(qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector) -> Values:
-        state = (*body_state(qpos, qvel), *tilts_in(qpos), *speeds_in(act))
-        return (*state, *tilt_rates_in(qvel), *integrals_in(act))
+        return (*state_of(qpos, qvel, act), *tilt_rates_in(qvel), *integrals_in(act))
 
     @scalar
     def asked(time: float, values: Vector, parameters: LoopParameters, knots: Vector) -> Values:
-        own = parameters.law
-        x, y, z, _, _, _, _, _, _ = position_reference(time, own.reference, knots)
-        moving, integrals = rates_of_sample(values), integrals_of_sample(values)
-        rates = law(time, state_in(values), moving, integrals, own, knots)
-        return (x, y, z, *asked_in(rates), *angles(planned(time, own.gait, knots)))
+        jets = planned(time, parameters.law.gait, knots)
+        return (*references(time, values, SUPERVISOR_AT_REST, parameters, knots), *angles(jets))
 
-    names = (*REFERENCE_COLUMNS, NULL_PART, *places.names("alpha_ref"))
+    names = (*REFERENCES, *places.names("alpha_ref"))
 
     def derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
-        return {
-            **reference_columns(asked, fields, samples, setup, names),
-            **torque_free_columns(places, _table(setup), samples, dimension),
-        }
+        found = reference_columns(asked, _fields(layout), samples, setup, names)
+        return {**found, **margins(samples, setup)}
 
     units = {**dict.fromkeys(INTEGRAL_FIELDS, "m s"), NULL_PART: "1", CONDITION: "1"}
     return Columns(observe, derive, fields=INTEGRAL_FIELDS, units=units)
+
+
+def _fields(layout: Layout) -> tuple[str, ...]:
+    """The fields of a sample."""
+    return (*layout.places.observed_fields, *INTEGRAL_FIELDS)
+
+
+@cache
+def _margins_of(layout: Layout, dimension: int) -> Margins:
+    """The columns that a sample's state alone decides."""
+    return lambda samples, setup: torque_free_columns(
+        layout.places, _table(setup), samples, dimension
+    )
 
 
 def _table(setup: ControlSetup) -> Values:
@@ -185,16 +264,17 @@ def _table(setup: ControlSetup) -> Values:
 
 
 @cache
-def _monitoring_of(layout: Layout, uses: UsedForce, norm: str) -> Monitoring:
+def _monitoring_of(layout: Layout, form: Form) -> Monitoring:
     """Where the outputs depend on each other or, in the norm of the speeds, a rotor stops."""
     places = layout.places
     tilts_in = entries_of(places.alpha_1, places.tilts)
-    speeds_in = entries_of(places.speed_1, places.rotors if norm == "speed" else 0)
+    turning = places.rotors if form.norm == "speed" else 0
+    speeds_in = entries_of(places.speed_1, turning)
     independence, names = (
-        independence_of(layout.tilt_of_rotor, uses.dimension, uses.forward),
+        independence_of(layout.tilt_of_rotor, form.dimension, form.forward),
         places.names("alpha"),
     )
-    stops = rotor_stops(places.rotors if norm == "speed" else 0)
+    stops = rotor_stops(turning)
     harmless = (1.0,) * len(stops)  # as published, the factor 2 |varpi| is in rows of force only
 
     @scalar
@@ -293,9 +373,13 @@ def _setup(plan: FlightPlan, signature: float) -> ControlSetup:
             *scenario.any_rotorcraft.speeds_along_spin, controller.allocation_horizon
         ),
     )
-    lead = servo_lead(scenario.any_rotorcraft.tilt_servo)
-    side = Direction(*upper_side(vehicle, gait))
-    parameters = LoopParameters(signature, lead, law, side)
+    lead, side = servo_lead(scenario.any_rotorcraft.tilt_servo), upper_side(vehicle, gait)
+    if controller.supervision is not None:
+        law = law._replace(
+            supervisor=controller.resolve_supervisor(vehicle),
+            watched=watched(vehicle.table, len(plan.knots), side),
+        )
+    parameters = LoopParameters(signature, lead, law, Direction(*side))
     return ControlSetup(parameters, (*plan.knots, *vehicle.table))
 
 
@@ -305,22 +389,30 @@ def _follows_position(scenario: Scenario) -> bool:
     return controller.decoupler != "none"
 
 
+@scalar
+def _watched(parameters: LoopParameters) -> Watched:
+    """What the supervisor reads of a vehicle."""
+    return parameters.law.watched
+
+
 @cache
-def multirotor_loop(layout: Layout, uses: UsedForce, norm: str) -> ClosedLoop:
+def multirotor_loop(layout: Layout, form: Form, measured: bool = False) -> ClosedLoop:
     """The controller of attitude and force of all multirotors of a layout.
 
     Args:
         layout: Of the vehicles.
-        uses: The components of force that are controlled.
-        norm: See `tiltsim_controllers.laws.multirotor.multirotor_law_of`.
+        form: Of the law.
+        measured: Whether it feeds back the angular acceleration of the plant, which
+            `tiltsim.laws.layers.measured_acceleration` measures.
     """
-    places = layout.places
-    law = multirotor_law_of(
-        layout.tilt_of_rotor, uses.dimension, norm, uses.forward, uses.losses, uses.prioritized
-    )
-    sampling, equations = _sampling_of(layout, law), _equations_of(layout, law)
+    places, rotors = layout.places, layout.tilt_of_rotor
+    law = multirotor_law_of(rotors, form)
+    rates, references = _rates_of(layout, law, measured), _references_of(layout, law)
+    margins = _margins_of(layout, form.dimension)
+    sampling, equations = _sampling_of(layout, rates), _equations_of(layout, law)
     for step in (sampling.controls, equations.inputs):
-        step.__qualname__ = f"attitude_force_{uses.name}_{norm}_{layout.name}"
+        name = f"attitude_force_{form.name}_{layout.name}"
+        step.__qualname__ = f"measured.{name}" if measured else name
     return ClosedLoop(
         kind=rotorcraft_kind(places, ("singularity_margin",)),
         parameters=LoopParameters,
@@ -334,18 +426,30 @@ def multirotor_loop(layout: Layout, uses: UsedForce, norm: str) -> ClosedLoop:
             layout.tilt_of_rotor,
         ),
         sampling=sampling,
-        columns=_columns_of(layout, uses.dimension, law),
-        monitoring=_monitoring_of(layout, uses, norm),
-        equations=equations,
+        columns=_columns_of(layout, references, margins),
+        monitoring=_monitoring_of(layout, form),
+        equations=None if measured else equations,
+        supervised=SupervisedLaw(
+            multirotor_supervision_of(rotors, form.dimension, form.forward),
+            _watched,
+            _state_of(layout),
+            rates,
+            references,
+            REFERENCES,
+            _fields(layout),
+            margins,
+        )
+        if form.supervised
+        else None,
         follows_position=_follows_position,
         uses_gait=places.tilts > 0,
     )
 
 
-def loop_of_multirotor(scenario: Scenario) -> ClosedLoop:
-    """The closed loop of a scenario's multirotor, without layers."""
+def loop_of_multirotor(scenario: Scenario, measured: bool) -> ClosedLoop:
+    """The `multirotor_loop` of a scenario, without layers."""
     controller, vehicle = scenario.controller, scenario.vehicle.resolve()
     assert isinstance(controller, AttitudeForceController)
     assert isinstance(vehicle, Multirotor)
-    uses = controller.resolve_force(vehicle, scenario.gait.plan(vehicle))
-    return multirotor_loop(layout_of_vehicle(vehicle), uses, controller.norm)
+    form = controller.resolve_force(vehicle, scenario.gait.plan(vehicle))
+    return multirotor_loop(layout_of_vehicle(vehicle), form, measured)

@@ -205,8 +205,8 @@ def full_pose_loop(layout: Layout) -> ClosedLoop:
     )
 
 
-def full_pose_loop_of(scenario: Scenario) -> ClosedLoop:
-    """The full-pose loop of a scenario's multirotor, without layers."""
+def full_pose_loop_of(scenario: Scenario, _measured: bool) -> ClosedLoop:
+    """The full-pose loop of a scenario's multirotor, without layers; it measures nothing."""
     vehicle = scenario.vehicle.resolve()
     assert isinstance(vehicle, Multirotor)
     return full_pose_loop(layout_of_vehicle(vehicle))

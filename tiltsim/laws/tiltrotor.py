@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Dynamics, Sizes
+from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Dynamics, Sizes, SupervisedLaw
 from tiltsim.engines.sample_evaluation import evaluate_over_samples, flights_in
 from tiltsim.equations.tiltrotor import equations_of_motion, initial_state, law_state
 from tiltsim.laws.rotorcraft import held_controls_of, thrust_controls_of
@@ -22,6 +22,7 @@ from tiltsim_controllers.analysis.singularity import determinant, margin_over_ga
 from tiltsim_controllers.gaits.parameters import GaitParameters
 from tiltsim_controllers.gaits.tilts import tilt_reference
 from tiltsim_controllers.laws.supervisor import SUPERVISOR_AT_REST
+from tiltsim_controllers.laws.tiltrotor_supervisor import SUPERVISION
 from tiltsim_controllers.mathematics.rotation import euler_from_quaternion, world_up_in_body
 from tiltsim_controllers.mathematics.scalar import Floats, Quad, Triple, Values, Vector, scalar
 from tiltsim_controllers.vehicle.decoupling_matrix import (
@@ -195,6 +196,28 @@ def singularity_columns(samples: Mapping[str, Floats], vehicle: Vehicle) -> dict
         ),
         "determinant": determinant(tilts, *attitude, vehicle),
     }
+
+
+@scalar
+def watched_vehicle(parameters: Any) -> float:
+    """What the tiltrotor's supervisor reads of it."""
+    return drag_ratio(parameters.law.vehicle)
+
+
+def supervised_law(
+    controls: Callable[..., Values], references: Callable[..., Values], fields: tuple[str, ...]
+) -> SupervisedLaw:
+    """A controller of the tiltrotor for a supervisor; arguments as of `SupervisedLaw`."""
+    return SupervisedLaw(
+        SUPERVISION,
+        watched_vehicle,
+        tiltrotor_state,
+        controls,
+        references,
+        REFERENCE_COLUMNS,
+        fields,
+        lambda samples, setup: singularity_columns(samples, setup.parameters.law.vehicle),
+    )
 
 
 def reference_columns(

@@ -15,7 +15,7 @@ from tiltsim.errors import InputError
 from tiltsim.laws.assembling import assemble
 from tiltsim.linear.differences import CENTRAL, HALF_STENCIL
 from tiltsim.linear.forcing import Forcing, forcing_of
-from tiltsim.linear.motion import Motion, make_motion
+from tiltsim.linear.motion import LONG, Motion, make_motion
 from tiltsim.linear.newton import Root, solve
 from tiltsim.plants.engine_choice import native_pays_off
 from tiltsim.scenario.scenario import Scenario
@@ -28,7 +28,12 @@ ORBIT: Final = 1e-7
 """Largest difference after a period, in SI units, that counts as periodic."""
 
 SETTLING_TIME: Final = 40.0  # s, flown at most to approach an orbit or a rest point
-LONG: Final = 1000  # steps, from which on an orbit's differences have fewer evaluations
+RETURNS: Final = 10
+"""Periods, flown at most to approach a long orbit: a derivative takes two for each state."""
+
+SETTLED: Final = 1e-9
+"""Change over a period below which more of them gain nothing: the derivative is the orbit's."""
+
 MOST_STEPS: Final = 200_000
 """Of an orbit: some 250 flights over it take a quarter of an hour with compiled steps."""
 
@@ -96,6 +101,7 @@ def equilibrium_of(
     scenario: Scenario,
     *,
     at_rest: bool = False,
+    near: Floats | None = None,
     progress: Callable[[int], None] = lambda _flights: None,
 ) -> Equilibrium:
     """The rest point or the periodic orbit of a scenario.
@@ -103,6 +109,7 @@ def equilibrium_of(
     Args:
         scenario: The scenario.
         at_rest: Demands a rest point.
+        near: A state near the orbit, such as one of a neighbouring scenario's; tried first.
         progress: Called with the number of periods or samples flown so far.
 
     Raises:
@@ -132,9 +139,12 @@ def equilibrium_of(
     motion = make_motion(scenario, _engine(scenario, max(settling, flights * steps)))
     step = ceil(forcing.start / simulation.timestep - 1e-9)
     step = ceil(step / steps) * steps if steps else step
-    returns = max(1, settling // max(1, steps))
+    fewest = 1 if forcing.period is None else RETURNS
+    returns = max(fewest, settling // max(1, steps))
     search = _Search(motion, forcing, step, steps, returns, progress)
-    return Equilibrium(motion, forcing, search.root(), step, steps)
+    if forcing.period is None or (near is not None and near.shape != motion.initial.shape):
+        near = None  # at rest, neutral states stay where the scenario puts them
+    return Equilibrium(motion, forcing, search.root(near), step, steps)
 
 
 def _engine(scenario: Scenario, steps: int) -> EngineName:
@@ -183,11 +193,11 @@ class _Search:
         self._start = step * self._timestep
         self._sides = self._signs(motion.initial)
 
-    def root(self) -> Root:
-        """The state, or an `InputError`."""
+    def root(self, near: Floats | None = None) -> Root:
+        """The state, sought near another one first, or an `InputError`."""
         tolerance = ORBIT if self._forcing.period is not None else REST
         best = None
-        for state in self._starts():
+        for state in self._starts(near):
             root = self._solve(state, tolerance)
             if root is not None and root.residual <= tolerance:
                 return root
@@ -200,15 +210,17 @@ class _Search:
 
     def _solve(self, state: Floats, tolerance: float) -> Root | None:
         stencil = CENTRAL if self._steps > LONG else HALF_STENCIL
-        root = solve(self._change, self._motion.coordinates, state, 1e-4 * tolerance, stencil)
+        root = solve(self._changes, self._motion.coordinates, state, 1e-4 * tolerance, stencil)
         regular = np.array_equal(self._signs(root.state), self._sides)
         if not (regular and np.isfinite(root.derivative).all()):
             return None  # beyond a singular attitude, or with a rotor that turns backwards
         return root
 
-    def _starts(self) -> Iterator[Floats]:
+    def _starts(self, near: Floats | None) -> Iterator[Floats]:
         """States to start from: first of a rest point that no event precedes the initial one."""
         initial = self._motion.initial
+        if near is not None:
+            yield near
         at_once = self._forcing.period is None and self._step == 0
         if at_once:
             yield initial
@@ -234,15 +246,14 @@ class _Search:
                 break
             if change < least:
                 best, least = self._back(after, step * self._timestep), float(change)
-            if change < ORBIT:
+            if change < SETTLED:
                 break
         return best
 
     def _flown(self, step: int, state: Floats, steps: int) -> Floats:
         """The state some steps after a step, reported."""
-        after = self._motion.flown(step, state, steps)
-        self._flights += 1
-        self._progress(self._flights)
+        (after,) = self._motion.flown_each(step, [state], steps)
+        self._count()
         return after
 
     def _frame(self, start: float, end: float) -> Floats:
@@ -253,18 +264,29 @@ class _Search:
         """A state in the moving frame, where it was at the time of the search."""
         return self._motion.coordinates.moved(state, self._frame(time, self._start))
 
-    def _change(self, state: Floats) -> Floats:
-        """Rates, or the change over the steps, in the moving frame."""
+    def _changes(self, states: list[Floats]) -> Iterator[Floats]:
+        """Rates, or the changes over the steps, in the moving frame."""
         motion, start = self._motion, self._start
-        try:
-            if self._steps == 0:
-                names = motion.coordinates.names
-                return motion.rates(start, state) - self._forcing.rates(names, start)
-            after = self._flown(self._step, state, self._steps)
-        except (ArithmeticError, ValueError):
-            return np.full(motion.coordinates.size, np.nan)
+        if self._steps == 0:
+            frame = self._forcing.rates(motion.coordinates.names, start)
+            yield from (self._rates(state) - frame for state in states)
+            return
         moved = self._frame(start, start + self._steps * self._timestep)
-        return motion.coordinates.between(state, after) - moved
+        ends = motion.flown_each(self._step, states, self._steps)
+        for state, after in zip(states, ends, strict=True):
+            self._count()
+            yield motion.coordinates.between(state, after) - moved
+
+    def _rates(self, state: Floats) -> Floats:
+        try:
+            return self._motion.rates(self._start, state)
+        except (ArithmeticError, ValueError):
+            return np.full(self._motion.coordinates.size, np.nan)
+
+    def _count(self) -> None:
+        """Report one more flight."""
+        self._flights += 1
+        self._progress(self._flights)
 
     def _signs(self, state: Floats) -> Floats:
         """Signs that the flight keeps: of the determinant and of the rotors' speeds."""

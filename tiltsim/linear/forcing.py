@@ -72,6 +72,7 @@ def forcing_of(assembly: Assembly) -> Forcing:
     if reference.type == LINE:
         velocity = reference.velocity_x, reference.velocity_y, reference.velocity_z
         acceleration = reference.acceleration_x, reference.acceleration_y, reference.acceleration_z
+        _check_line(scenario, velocity, acceleration)
     if assembly.loop.uses_gait and gait.period is not None:
         kind = gait.parameters
         if kind.type == TABLE and not kind.repeats:
@@ -102,6 +103,23 @@ def _check(scenario: Scenario) -> None:
         raise InputError(f"{address}: sensors.{noisy[0]}: with noise nothing repeats; set it to 0")
     if scenario.air is not None and scenario.air.turbulence is not None:
         raise InputError(f"{address}: air.turbulence: in turbulence nothing repeats; leave it out")
+
+
+def _check_line(scenario: Scenario, velocity: Triple, acceleration: Triple) -> None:
+    """Refuse lines along which the air acts differently from place to place or time to time."""
+    air, address = scenario.air, scenario.address or "scenario"
+    if air is None:
+        return
+    if any(acceleration) and (any(air.drag.linear) or any(air.drag.area)):
+        raise InputError(
+            f"{address}: reference.acceleration = {list(acceleration)}: with air.drag the flight "
+            "is neither at rest nor periodic, for its airspeed grows; leave out one of the two"
+        )
+    if air.ground_effect is not None and (velocity[2] or acceleration[2]):
+        raise InputError(
+            f"{address}: the line climbs or descends: with air.ground_effect the flight is neither "
+            "at rest nor periodic, for its height changes; leave out one of the two"
+        )
 
 
 def _periods(reference: ReferenceParameters, scenario: Scenario) -> list[float]:

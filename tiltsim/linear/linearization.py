@@ -135,7 +135,8 @@ def linearization_at(found: Equilibrium) -> Linearization:
 
     coordinates = motion.coordinates
     count = coordinates.size
-    by_input = jacobian(varied, INPUT_SCALE * steps_at(np.zeros(len(motion.inputs))))
+    scales = INPUT_SCALE * steps_at(np.zeros(len(motion.inputs)))
+    by_input = jacobian(lambda each: map(varied, each), scales)
     observed = derivative_at(lambda at: motion.observed(time, at), coordinates, state)
     feedback = derivative_at(lambda at: motion.commanded(time, at), coordinates, state)
     level = coordinates.between(_level(found), state)

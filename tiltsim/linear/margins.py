@@ -7,7 +7,7 @@ loop's transfer matrix: ``det(I + g exp(-i w tau) L(i w)) = 0`` where one of the
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from math import atan, inf, isfinite, pi
 from os import PathLike
@@ -42,8 +42,9 @@ TOGETHER: Final = "all inputs"
 PER_DECADE: Final = 100  # frequencies
 DECADES_BEYOND: Final = 1.0  # of the slowest and of the fastest pole
 GROWTH: Final = 1e-4  # rad/s; slower growth is that of a multiple pole at zero, by rounding
-NEGLIGIBLE: Final = 1e-6  # a loop's transfer below this is rounding
+NEGLIGIBLE: Final = 1e-6  # a loop's transfer below this is rounding, one above its inverse a pole
 BISECTIONS: Final = 48
+REGULAR: Final = 1e12  # condition of a matrix whose inverse is more than rounding
 
 
 @dataclass(frozen=True)
@@ -182,11 +183,38 @@ def _margin(loop: BrokenLoop, grid: Floats) -> Margin:
                 phase, at = float(from_minus_one), frequency
             lag = float(np.angle(value)) + pi  # until it arrives at -1
             delay = min(delay, (lag if lag > 0.0 else 2.0 * pi) / frequency)
-        for _, value in _crossings(loop, grid, locus, locus.imag, np.imag):
-            if value.real < -NEGLIGIBLE:
-                factor = float(-1.0 / value.real)
-                low, high = (max(low, factor), high) if factor < 1.0 else (low, min(high, factor))
+        real = [value for _, value in _crossings(loop, grid, locus, locus.imag, np.imag)]
+        low, high = _between_gains((low, high), real)
+    low, high = _between_gains((low, high), _real_ends(loop))
     return Margin(loop.place, (low, high), phase, delay, at, disk)
+
+
+def _between_gains(
+    between: tuple[float, float], crossings: Iterable[complex]
+) -> tuple[float, float]:
+    """Factors of the gain nearest to one, of those given and those that take a crossing to -1."""
+    low, high = between
+    for value in crossings:
+        if -1.0 / NEGLIGIBLE < value.real < -NEGLIGIBLE:
+            factor = float(-1.0 / value.real)
+            low, high = (max(low, factor), high) if factor < 1.0 else (low, min(high, factor))
+    return low, high
+
+
+def _real_ends(loop: BrokenLoop) -> list[complex]:
+    """Loci at the ends of all frequencies, where they are real without a change of sign.
+
+    At zero, and of a sampled loop at the Nyquist frequency ``z = -1``; none where it has a pole.
+    """
+    ends = (0.0,) if loop.timestep is None else (1.0, -1.0)
+    values: list[complex] = []
+    for end in ends:
+        pencil = end * np.eye(len(loop.A)) - loop.A
+        if np.linalg.cond(pencil) < REGULAR:
+            transfer = -loop.C @ np.linalg.solve(pencil, loop.B)
+            found = np.linalg.eigvals(transfer)
+            values += found[np.abs(found.imag) <= NEGLIGIBLE * np.abs(found)].tolist()
+    return values
 
 
 def _size(value: complex) -> float:

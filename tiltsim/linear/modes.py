@@ -69,6 +69,30 @@ class Mode:
         return {**vars(self), "states": list(self.states)}
 
 
+def spectrum(matrix: Floats, error: float) -> tuple[Any, Any, Any]:
+    """Eigenvalues, right and left eigenvectors of a matrix known to an error.
+
+    An error of the matrix splits a multiple eigenvalue with too few eigenvectors by its root, but
+    hardly moves the mean of the parts: where the split is no larger than the error explains, each
+    part is replaced by the mean. Others keep their values.
+
+    Args:
+        matrix: Shape (n, n).
+        error: Of its entries, as a share of the largest of their row; 0 to keep all eigenvalues.
+    """
+    values, vectors = np.linalg.eig(matrix)
+    values, left = values.astype(complex), np.linalg.pinv(vectors)
+    of_rows = error * np.abs(matrix).max(axis=1)
+    # To first order; summed over a row, and for a pair from both sides.
+    unsure = 4.0 * (np.abs(left) @ of_rows) * np.abs(vectors).sum(axis=0)
+    apart, sizes = np.abs(values[:, None] - values), np.abs(values)
+    near = EQUAL * np.minimum(sizes[:, None], sizes)
+    together = apart <= np.minimum(unsure[:, None] + unsure, near)
+    for _ in range(len(values)):  # of chains, too
+        together = together @ together
+    return (together @ values) / together.sum(axis=1), vectors, left
+
+
 def exponents(eigenvalues: Floats, timestep: float | None) -> Floats:
     """The poles (rad/s) of a system's eigenvalues.
 
@@ -82,33 +106,39 @@ def exponents(eigenvalues: Floats, timestep: float | None) -> Floats:
 
 
 def is_stable(matrix: Floats, poles: Floats, timestep: float | None) -> bool:
-    """Whether small disturbances stay small.
+    """Whether small disturbances die out, but for states that stay where they are put.
 
-    No pole has a positive real part, and those at zero have an eigenvector each, so that the states
-    along them stay where they are put but do not grow.
+    All poles have a negative real part but those at zero, which have an eigenvector each, so that
+    the states along them do not grow. An undamped swing is not stable: it never dies out.
     """
-    if (poles.real > NEUTRAL).any():
+    neutral = np.abs(poles) <= NEUTRAL
+    if (poles.real[~neutral] >= -NEUTRAL).any():
         return False
-    count = int((np.abs(poles) <= NEUTRAL).sum())
+    count = int(neutral.sum())
     if count == 0:
-        return bool((poles.real < -NEUTRAL).all())
+        return True
     moving = matrix if timestep is None else (matrix - np.eye(len(matrix))) / timestep
     singular_values = np.linalg.svd(moving, compute_uv=False)
     return int((singular_values <= NEUTRAL * max(1.0, singular_values[0])).sum()) >= count
 
 
-def modes_of(matrix: Floats, names: Sequence[str], timestep: float | None) -> tuple[Mode, ...]:
-    """The modes of a system, the slowest first.
+def modes_of(
+    matrix: Floats, names: Sequence[str], timestep: float | None, error: float = 0.0
+) -> tuple[Mode, ...]:
+    """The modes of a system: those that grow fastest or decay slowest first.
 
     Args:
         matrix: Of the system.
         names: Of its states.
         timestep: s; None in continuous time.
+        error: As in `spectrum`.
     """
-    eigenvalues, vectors = np.linalg.eig(matrix)
-    poles, left = exponents(eigenvalues, timestep), np.linalg.pinv(vectors)
+    eigenvalues, vectors, left = spectrum(matrix, error)
+    poles = exponents(eigenvalues, timestep)
     left_over = [
-        int(i) for i in np.argsort(np.abs(poles)) if poles[i].imag >= 0.0 and np.isfinite(poles[i])
+        int(i)
+        for i in np.argsort(-poles.real, kind="stable")
+        if poles[i].imag >= 0.0 and np.isfinite(poles[i])
     ]
     found = []
     while left_over:

@@ -6,14 +6,17 @@ minimal coordinates at a time, and the state some physics steps later, as flight
 
 from __future__ import annotations
 
+import os
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import cached_property
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
+from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.closed_loop.loop import ClosedLoop, Equations
 from tiltsim.closed_loop.userdata import EVALUATIONS, EVALUATIONS_PER_STEP, HEADER_SIZE
 from tiltsim.engines.base import EngineName
@@ -31,6 +34,13 @@ from tiltsim.plants.flight_model import disturbance_acceleration
 from tiltsim.plants.mujoco_plant import MujocoPlant
 from tiltsim.scenario.scenario import Scenario
 from tiltsim_controllers.mathematics.scalar import Floats, Values
+
+LONG: Final = 1000
+"""Steps, from which on a flight is long: worth a thread, and a derivative of fewer evaluations."""
+
+THREADS: Final = os.cpu_count() or 1
+ROWS_PER_THREAD: Final = 4
+"""Flights of a thread between reports of progress."""
 
 
 class Motion(ABC):
@@ -96,6 +106,26 @@ class Motion(ABC):
     def flown(self, step: int, state: Floats, steps: int) -> Floats:
         """The state some physics steps after a step."""
 
+    def flown_each(self, step: int, states: Sequence[Floats], steps: int) -> Iterator[Floats]:
+        """Of several states each some physics steps after a step; NaN where the flight is lost.
+
+        Long native flights are flown on all cores.
+        """
+        if self.engine == "native" and len(states) > 1 and steps >= LONG and not self.offsets.any():
+            size = ROWS_PER_THREAD * THREADS
+            for start in range(0, len(states), size):
+                yield from self._together(step, states[start : start + size], steps)
+            return
+        for state in states:
+            try:
+                yield self.flown(step, state, steps)
+            except (ArithmeticError, ValueError):
+                yield np.full(len(state), np.nan)
+
+    @abstractmethod
+    def _together(self, step: int, states: Sequence[Floats], steps: int) -> list[Floats]:
+        """As `flown_each`, natively and on all cores."""
+
     @abstractmethod
     def observed(self, time: float, state: Floats) -> Floats:
         """The fields of a sample after its time."""
@@ -115,8 +145,12 @@ class EquationMotion(Motion):
         return equations
 
     @cached_property
+    def _plant_assembly(self) -> Assembly:
+        return assemble(self.scenario)
+
+    @cached_property
     def _plant(self) -> EquationsPlant:
-        return EquationsPlant(assemble(self.scenario), self.engine)
+        return EquationsPlant(self._plant_assembly, self.engine)
 
     @cached_property
     def _varied(self) -> EquationsPlant:
@@ -139,6 +173,19 @@ class EquationMotion(Motion):
         plant.state = np.array((step, *(0.0,) * held, *state))  # a sample is due
         plant.advance(steps)
         return plant.state[1 + held :]
+
+    def _together(self, step: int, states: Sequence[Floats], steps: int) -> list[Floats]:
+        held = (0.0,) * self._equations.inputs_size
+        self._plant.advance(0)  # compiles before threads do
+
+        def fly(state: Floats) -> Floats:
+            plant = EquationsPlant(self._plant_assembly, self.engine)
+            plant.state = np.array((step, *held, *state))
+            plant.advance(steps)
+            return plant.state[1 + len(held) :]
+
+        with ThreadPoolExecutor(THREADS) as pool:
+            return list(pool.map(fly, states))
 
     def observed(self, time: float, state: Floats) -> Floats:
         values, setup = state.tolist(), self.assembly.setup
@@ -195,13 +242,36 @@ class MujocoMotion(Motion):
 
     def flown(self, step: int, state: Floats, steps: int) -> Floats:
         plant = self._varied if self.offsets.any() else self._plant
+        plant.state = self._whole_at(step, state)
+        plant.advance(steps)
+        if plant.fault():  # MuJoCo has begun anew
+            return np.full(len(state), np.nan)
+        return plant.state[self._part]
+
+    def _whole_at(self, step: int, state: Floats) -> Floats:
+        """An integration state after so many steps."""
         whole = self._whole.copy()
         whole[self._part] = state
-        header = whole[plant.header_offset :][:HEADER_SIZE]
+        header = whole[self._varied.header_offset :][:HEADER_SIZE]
         header[EVALUATIONS] = step * header[EVALUATIONS_PER_STEP]
-        plant.state = whole
-        plant.advance(steps)
-        return plant.state[self._part]
+        return whole
+
+    def _together(self, step: int, states: Sequence[Floats], steps: int) -> list[Floats]:
+        batch, places = self._batch, np.arange(len(states), dtype=np.int32)
+        for place, state in enumerate(states):
+            batch.state[place] = self._whole_at(step, state)
+        batch.warning[:] = 0
+        with control_callback(self._plant.callback):
+            batch.rollout(steps, record=(), ids=places)
+        lost = batch.warning[places].reshape(len(states), -1).any(axis=1)
+        ends = batch.state[places][:, self._part]
+        return [np.full(len(end), np.nan) if fell else end for end, fell in zip(ends, lost)]
+
+    @cached_property
+    def _batch(self) -> Any:
+        from mujoco.batch import Batch
+
+        return Batch(self._plant.model, ROWS_PER_THREAD * THREADS, THREADS)
 
     def observed(self, time: float, state: Floats) -> Floats:
         parts = [part.tolist() for part in self._split(state)]

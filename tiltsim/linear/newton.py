@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -17,6 +17,10 @@ GOOD: Final = 0.1  # a step that shrinks the value to this share needs no new de
 NEAR: Final = 1e-5  # steps of the differences; so near the derivative is the same
 NEUTRAL: Final = 1e-9
 """Directions in which the function changes less than this share of the largest are left alone."""
+
+
+OfEach = Callable[[list[Floats]], Iterable[Floats]]
+"""A function of several states, each on its own: their values in turn."""
 
 
 class Root(NamedTuple):
@@ -46,8 +50,25 @@ def derivative_at(
         state: Where.
         stencil: Of the differences.
     """
+    return _derivative_of_each(
+        lambda states: [function(each) for each in states], coordinates, state, stencil
+    )
+
+
+def _derivative_of_each(
+    function: OfEach, coordinates: Coordinates, state: Floats, stencil: Stencil
+) -> Floats:
+    """As `derivative_at`, of a function of several states."""
     steps = _steps(coordinates, state)
-    return jacobian(lambda by: function(coordinates.moved(state, by)), steps, stencil)
+    return jacobian(
+        lambda moved: function([coordinates.moved(state, by) for by in moved]), steps, stencil
+    )
+
+
+def _is_near(coordinates: Coordinates, start: Floats, end: Floats) -> bool:
+    """Whether the derivatives at two states are the same."""
+    moved = coordinates.between(start, end) / _steps(coordinates, start)
+    return bool(np.abs(moved).max() <= NEAR)
 
 
 def _steps(coordinates: Coordinates, state: Floats) -> Floats:
@@ -60,7 +81,7 @@ def _steps(coordinates: Coordinates, state: Floats) -> Floats:
 
 
 def solve(
-    function: Callable[[Floats], Floats],
+    function: OfEach,
     coordinates: Coordinates,
     state: Floats,
     tolerance: float,
@@ -73,36 +94,41 @@ def solve(
     derivative is computed anew only where that pays off.
 
     Args:
-        function: Of a state; as many values as coordinates, NaN where it is not defined.
+        function: Of several states, each on its own: of each as many values as coordinates, NaN
+            where it is not defined.
         coordinates: Of the state.
         state: Where to begin.
         tolerance: Of the largest entry of the value.
         stencil: Of the differences.
     """
-    value, derived_at = function(state), state
-    derivative, renew = derivative_at(function, coordinates, state, stencil), False
+
+    def derivative_here() -> Floats:
+        return _derivative_of_each(function, coordinates, state, stencil)
+
+    (value,), derived_at = function([state]), state
+    derivative, renew = derivative_here(), False
     for _ in range(ITERATIONS):
         if np.abs(value).max() <= tolerance:
             break
         if renew:
-            derived_at, derivative = state, derivative_at(function, coordinates, state, stencil)
+            derived_at, derivative = state, derivative_here()
         if not np.isfinite(derivative).all():
             break
         scale = _steps(coordinates, state)
         step = scale * np.linalg.lstsq(derivative * scale, -value, rcond=NEUTRAL)[0]
         for _ in range(HALVINGS):
             moved = coordinates.moved(state, step)
-            its_value = function(moved)
+            (its_value,) = function([moved])
             if np.linalg.norm(its_value) < np.linalg.norm(value):
                 break
             step = 0.5 * step
         else:
-            if renew or derived_at is state:
+            if renew or _is_near(coordinates, derived_at, state):
                 break
             renew = True
             continue
         renew = bool(np.linalg.norm(its_value) > GOOD * np.linalg.norm(value))
         state, value = moved, its_value
-    if np.abs(coordinates.between(derived_at, state) / _steps(coordinates, state)).max() > NEAR:
-        derivative = derivative_at(function, coordinates, state, stencil)
+    if not _is_near(coordinates, derived_at, state):
+        derivative = derivative_here()
     return Root(state, value, derivative)

@@ -10,8 +10,9 @@ from typing import Any, Final
 
 import numpy as np
 
+from tiltsim.linear.differences import ERROR
 from tiltsim.linear.equilibrium import Equilibrium, equilibrium_of
-from tiltsim.linear.modes import Mode, exponents, is_stable, modes_of
+from tiltsim.linear.modes import Mode, exponents, is_stable, modes_of, spectrum
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.scenario import Scenario
 from tiltsim_controllers.mathematics.scalar import Floats
@@ -31,10 +32,10 @@ class Stability:
             SI units.
         stable: Whether small disturbances stay small.
         neutral: Number of poles at zero or multipliers of one: states that stay where they are put.
-        poles: At rest, rad/s, complex, the slowest first; of a sampled controller
-            ``log(mu) / control_timestep``. None of an orbit.
+        poles: At rest, rad/s, complex, those that grow fastest or decay slowest first; of a sampled
+            controller ``log(mu) / control_timestep``. None of an orbit.
         multipliers: Of an orbit, complex, the largest first; None at rest.
-        modes: The slowest first, but for states that are forgotten within a period or sample.
+        modes: In the same order, but for states that are forgotten within a period or sample.
         states: Names of the coordinates.
         matrix: Of the linear system, shape (states, states): rates by coordinates, or the
             coordinates after a control sample or period by those before.
@@ -81,28 +82,32 @@ class Stability:
 def stability(
     scenario: Scenario | str | PathLike[str] | Mapping[str, Any],
     *,
+    near: Stability | None = None,
     progress: Callable[[int], None] = lambda _flights: None,
 ) -> Stability:
     """Poles of a scenario's rest point, or Floquet multipliers of its periodic orbit.
 
     Args:
         scenario: Anything that `tiltsim.load_scenario` takes.
+        near: Of a neighbouring scenario, whose orbit is followed to this one's.
         progress: Called with the number of periods or samples flown so far.
 
     Raises:
         InputError: If it is invalid, neither at rest nor periodic, or has no such state nearby.
     """
-    return stability_at(equilibrium_of(load_scenario(scenario), progress=progress))
+    state = None if near is None else near.equilibrium.root.state
+    return stability_at(equilibrium_of(load_scenario(scenario), near=state, progress=progress))
 
 
 def stability_at(found: Equilibrium) -> Stability:
     """The stability of a rest point or orbit."""
     matrix, timestep = found.matrix, found.timestep
-    eigenvalues = np.linalg.eigvals(matrix).astype(complex)
+    error = 0.0 if found.is_orbit else ERROR
+    eigenvalues, _, _ = spectrum(matrix, error)
     eigenvalues = eigenvalues[np.argsort(-np.abs(eigenvalues), kind="stable")]
     poles = exponents(eigenvalues, timestep)
     finite = poles[np.isfinite(poles)]
-    modes = modes_of(matrix, found.names, timestep)
+    modes = modes_of(matrix, found.names, timestep, error)
     if found.is_orbit and timestep is not None:
         fastest = log(RESOLVED) / timestep
         modes = tuple(mode for mode in modes if mode.growth_rate > fastest)
@@ -112,7 +117,7 @@ def stability_at(found: Equilibrium) -> Stability:
         residual=found.root.residual,
         stable=is_stable(matrix, poles, timestep),
         neutral=sum(mode.count for mode in modes if mode.frequency == 0.0),
-        poles=None if found.is_orbit else finite[np.argsort(np.abs(finite), kind="stable")],
+        poles=None if found.is_orbit else finite[np.argsort(-finite.real, kind="stable")],
         multipliers=eigenvalues if found.is_orbit else None,
         modes=modes,
         states=found.names,

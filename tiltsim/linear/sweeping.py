@@ -59,17 +59,22 @@ def sweep_stability(
 ) -> list[Point]:
     """The stability for each value of a key.
 
+    An orbit is followed from value to value: where several exist, it is the same one as long as it
+    changes steadily, also where it has become unstable and no flight approaches it.
+
     Args:
         scenario: The scenario.
         key: Dotted, of a number.
         values: For the key.
         seen: Called with each point when it is found.
     """
-    points = []
+    points: list[Point] = []
+    last: Stability | None = None
     for value in values:
         changed = scenario.replace({key: value})  # refused values are mistakes
         try:
-            point = Point(value, stability(changed))
+            last = stability(changed, near=last)
+            point = Point(value, last)
         except InputError as error:
             point = Point(value, None, str(error))
         points.append(point)

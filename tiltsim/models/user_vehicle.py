@@ -30,6 +30,9 @@ if TYPE_CHECKING:
 ALIGNMENT_TOLERANCE: Final = 1e-4
 """Largest misalignment, as a fraction of the arm or of a unit vector."""
 
+BALANCE_TOLERANCE: Final = 1e-9
+"""Largest change of the inertia by a balanced pod, as a fraction of the smallest moment."""
+
 PRODUCT_TOLERANCE: Final = 0.01
 """Largest product of inertia that is not reported, as a fraction of the smallest moment."""
 
@@ -45,6 +48,8 @@ class UserVehicle:
         layout_mismatch: How it differs from the layout that the built-in control laws assume; empty
             if it does not.
         hinge_inertias: About each tilt hinge, armature included, kg m^2.
+        pod_inertias: The same without armature.
+        pods_are_balanced: Whether mass and inertia stay where they are as the pods turn.
         carried: Mass properties of all bodies that the body ``vehicle`` carries, about its origin.
         center: The whole vehicle's centre of mass, m, shape (3,).
         radius: Distance of the rotor that is farthest from the body's origin, m.
@@ -57,6 +62,8 @@ class UserVehicle:
     parts: Parts
     layout_mismatch: str
     hinge_inertias: tuple[float, ...]
+    pod_inertias: tuple[float, ...]
+    pods_are_balanced: bool
     carried: Moments
     center: Floats
     radius: float
@@ -187,12 +194,37 @@ def _read(path: str, model: str, _version: object) -> UserVehicle:
         parts=parts,
         layout_mismatch=mismatch,
         hinge_inertias=tuple(float(compiled.dof_M0[dof]) for dof in tilts),
+        pod_inertias=tuple(
+            float(compiled.dof_M0[dof] - compiled.dof_armature[dof]) for dof in tilts
+        ),
+        pods_are_balanced=_pods_are_balanced(pose, parts.tilts, [pose.body, *carried], whole),
         carried=pose.moments(carried),
         center=center,
         radius=max(float(np.linalg.norm(pose.point(data.site(s).xpos))) for s in parts.sites),
         products=(float(inertia[0, 1]), float(inertia[0, 2]), float(inertia[1, 2])),
         has_contact_geoms=_has_contact_geoms(compiled),
     )
+
+
+def _pods_are_balanced(pose: VehiclePose, tilts: int, bodies: list[int], untilted: Moments) -> bool:
+    """Whether each pod, turned alone by a right angle, leaves the vehicle's moments as they are.
+
+    Then it is balanced about its hinge, and its inertia the same across all directions.
+    """
+    import mujoco
+
+    compiled, data = pose.compiled, mujoco.MjData(pose.compiled)
+    tolerance = BALANCE_TOLERANCE * np.linalg.eigvalsh(untilted.inertia)[0]
+    for tilt in range(1, tilts + 1):
+        data.qpos[7:] = 0.0
+        data.qpos[compiled.joint(f"tilt_{tilt}").qposadr[0]] = 0.5 * np.pi
+        mujoco.mj_kinematics(compiled, data)
+        turned = VehiclePose(compiled, data).moments(bodies)
+        radius = np.sqrt(np.trace(untilted.inertia) / untilted.mass)
+        moved = radius * np.abs(turned.first_moment - untilted.first_moment).max()
+        if max(moved, np.abs(turned.inertia - untilted.inertia).max()) > tolerance:
+            return False
+    return True
 
 
 def _has_contact_geoms(compiled: mujoco.MjModel) -> bool:

@@ -11,7 +11,7 @@ from tiltsim.closed_loop.loop import Dynamics
 from tiltsim.errors import InputError
 from tiltsim.laws.assembling import assemble
 from tiltsim.laws.layers.actuation import allocated_accelerations
-from tiltsim.laws.layers.measured_acceleration import Motion, plant_angular_acceleration
+from tiltsim.laws.layers.measured_acceleration import plant_angular_acceleration_of
 from tiltsim.laws.layers.on_equations import read_actuators
 from tiltsim.laws.layers.sensing import measured_qpos, measured_qvel
 from tiltsim.laws.tiltrotor import four
@@ -37,10 +37,11 @@ def built_in_command(assembly: Assembly, plant: MujocoPlant) -> Command:
     act, allocation = data.act.tolist(), None
     while loop.within is not None:
         layer, within, inner = parameters.layer, loop.within, parameters.inner
-        if isinstance(layer, Motion):
+        if hasattr(layer, "pod_inertias"):  # of measured acceleration: a record for the model
             ctrl = within.sampling.controls(time, qpos, (*qvel, 0.0, 0.0, 0.0), act, inner, knots)
             loads = read_actuators(within.dynamics)[1](ctrl)
-            qvel = (*qvel, *plant_angular_acceleration(qpos, qvel, ctrl, loads, layer))
+            measured = plant_angular_acceleration_of(within.dynamics)
+            qvel = (*qvel, *measured(qpos, qvel, ctrl, loads, layer))
         elif hasattr(layer, "allocation"):  # of actuation: a record for the number of rotors
             qpos = measured_qpos(time, qpos, layer.sensors)
             qvel = measured_qvel(time, qvel, layer.sensors)

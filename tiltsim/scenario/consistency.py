@@ -147,20 +147,31 @@ def _check_actuators(scenario: ScenarioTables) -> None:
             twice = "stuck servo" if stuck else "loss of thrust"
             raise InvalidValueError("fault.rotor", rotor, f"has more than one {twice}")
     if scenario.controller.measures_angular_acceleration:
-        reason = 'not supported with controller.angular_acceleration = "measured"; remove it'
-        scenario.require("ground", None, reason)
-        scenario.require("vehicle.mjcf", None, reason)
-        if scenario.rotorcraft.rotor_time_constant is None:
-            reason = (
-                'not supported with controller.angular_acceleration = "measured" without lag; '
-                "set vehicle.rotor_time_constant or remove it"
-            )
-            scenario.require("vehicle.rotor_inertia", 0.0, reason)
+        _check_measured_acceleration(scenario)
     if scenario.controller.prioritizes_attitude and not scenario.any_rotorcraft.has_rotor_limits:
         raise scenario.mistake(
             "controller.allocation",
             "needs rotor limits: vehicle.min_rotor_speed or vehicle.max_rotor_speed",
         )
+
+
+def _check_measured_acceleration(scenario: ScenarioTables) -> None:
+    """Refuse vehicles whose angular acceleration is not known before the controls."""
+    vehicle = scenario.vehicle
+    reason = 'not supported with controller.angular_acceleration = "measured"'
+    scenario.require("ground", None, f"{reason}; remove it")
+    if isinstance(vehicle, MultirotorTable):
+        if scenario.simulation.plant == "mujoco" and not vehicle.file.pods_are_balanced:
+            raise scenario.mistake(
+                "simulation.plant",
+                f"{reason} of a vehicle whose mass or inertia moves with its pods; use rigid_body, "
+                "or balance the pods of vehicle.mjcf about their hinges",
+            )
+    else:
+        scenario.require("vehicle.mjcf", None, f"{reason}; remove it")
+    if scenario.any_rotorcraft.rotor_time_constant is None:
+        lag = f"{reason} without lag; set vehicle.rotor_time_constant or remove it"
+        scenario.require("vehicle.rotor_inertia", 0.0, lag)
 
 
 def _check_layout(scenario: ScenarioTables) -> None:

@@ -9,10 +9,12 @@ from typing import Annotated, Any, ClassVar, Literal, Self, TypeVar
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
+from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.table import Positive, Table, example
 from tiltsim_controllers.analysis.stability import ErrorLoop, linear_loop
 from tiltsim_controllers.gaits.red_gait import determinant_at_clearance
-from tiltsim_controllers.laws.supervisor import STRATEGIES, Supervisor
+from tiltsim_controllers.laws.multirotor_supervisor import untilted_volume
+from tiltsim_controllers.laws.supervisor import STRATEGIES, UNTILTED, Supervisor
 from tiltsim_controllers.vehicle.parameters import Vehicle, drag_ratio
 
 ReferenceKind = Literal["position", "attitude_altitude", "pose"]
@@ -39,11 +41,12 @@ class SupervisorTable(Table):
         "at which the decoupling matrix is singular, where tilted rotors cannot carry the weight "
         "without a torque; 0 disables the limit [rad]",
     )
-    min_determinant: Annotated[float, Field(ge=0.0, lt=4.0)] = Field(
+    min_determinant: Annotated[float, Field(ge=0.0, lt=UNTILTED)] = Field(
         0.5,
         description="smallest determinant of the decoupling matrix to allow, which relates rotor "
         "speeds to torques and vertical force: 4 for a level untilted vehicle, 0 where it is "
-        "singular; 0 disables the limit [-]",
+        "singular, and of multirotors less where components of side force depend on the others; 0 "
+        "disables the limit [-]",
     )
     horizon: Annotated[float, Field(gt=0.0, le=10.0)] = Field(
         0.5,
@@ -73,13 +76,15 @@ class SupervisorTable(Table):
                 self.require_defaults(keys, needs)
         return self
 
-    def resolve(self, vehicle: Vehicle) -> Supervisor:
+    def resolve(self, vehicle: Vehicle | Multirotor) -> Supervisor:
         """The supervisor's parameters for a vehicle.
 
-        Raises `InvalidValueError` if red gaits at the clearance have too small a determinant, or
-        not even the untilted vehicle keeps the clearance.
+        Raises `InvalidValueError` if red gaits at the clearance have too small a determinant, not
+        even the untilted vehicle keeps the clearance, or a multirotor has nothing to supervise.
         """
-        if self.strategy == "return_to_red":
+        if isinstance(vehicle, Multirotor):
+            self._check_multirotor(vehicle)
+        elif self.strategy == "return_to_red":
             ratio = drag_ratio(vehicle)
             delta, reached = atan(ratio), determinant_at_clearance(self.clearance, ratio)
             if self.clearance >= delta:
@@ -99,6 +104,17 @@ class SupervisorTable(Table):
             self.max_tilt_rate,
             self.clearance,
         )
+
+    def _check_multirotor(self, vehicle: Multirotor) -> None:
+        if self.strategy == "return_to_red":
+            reason = "only the tiltrotor has red gaits; choose scale or hold"
+            raise self.mistake("strategy", reason)
+        if not vehicle.tilts:
+            raise self.mistake("strategy", "vehicle.mjcf has no tilts; remove the supervisor")
+        if untilted_volume(vehicle.table) == 0.0:
+            raise self.mistake(
+                "min_determinant", "level and untilted the vehicle has no lift without torque"
+            )
 
 
 class ControllerTable(Table):

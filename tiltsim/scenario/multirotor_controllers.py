@@ -2,23 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Final, Literal, NamedTuple, Self
+from typing import Annotated, Final, Literal, Self
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
 from tiltsim.models.rotor_table import Multirotor
-from tiltsim.scenario.controller_table import ControllerTable
-from tiltsim.scenario.messages import InvalidValueError
-from tiltsim.scenario.table import NonNegative, Positive, Vector3, example
-from tiltsim.scenario.tiltrotor_controllers import (
-    FeedforwardTerm,
+from tiltsim.scenario.gait_following import (
+    FailureAwareController,
     GainTable,
+    GaitFollowingController,
     PolePlacementTable,
     attitude_altitude_gain_kind,
-    resolved_gains,
-    resolved_integral_gains,
-    with_numbers,
 )
+from tiltsim.scenario.messages import InvalidValueError
+from tiltsim.scenario.table import NonNegative, Vector3, example
 from tiltsim_controllers.analysis.stability import (
     ErrorLoop,
     error_loops,
@@ -27,10 +24,8 @@ from tiltsim_controllers.analysis.stability import (
 )
 from tiltsim_controllers.analysis.torque_free import hover_direction, torque_free_forces
 from tiltsim_controllers.gaits.plans import Gait
-from tiltsim_controllers.laws.attitude_altitude import PUBLISHED_DECOUPLING, Gains
-from tiltsim_controllers.laws.failures import Failure
-from tiltsim_controllers.laws.gains import IntegralGains
-from tiltsim_controllers.laws.gait_feedforward import FeedforwardTerms
+from tiltsim_controllers.laws.attitude_altitude import PUBLISHED_DECOUPLING
+from tiltsim_controllers.laws.multirotor_steps import Form
 from tiltsim_controllers.mathematics.scalar import Floats, Triple
 from tiltsim_controllers.vehicle.effectiveness import force_and_torque
 
@@ -38,22 +33,7 @@ RESTORING: Final = 0.5
 """1/s, the default where rotor speeds would drift."""
 
 
-class UsedForce(NamedTuple):
-    """The components of force that a controller uses."""
-
-    dimension: int
-    forward: bool  # two along the x and z axes, of a vehicle that has three
-    losses: bool = False  # whether the controller knows of a failed rotor
-    prioritized: bool = False  # whether it keeps rotor accelerations within limits
-
-    @property
-    def name(self) -> str:
-        """For file names."""
-        options = "_forward" * self.forward, "_losses" * self.losses
-        return f"{self.dimension}{''.join(options)}{'_prioritized' * self.prioritized}"
-
-
-class AttitudeForceController(ControllerTable):
+class AttitudeForceController(GaitFollowingController, FailureAwareController):
     """Attitude and one, two or three components of force of a multirotor."""
 
     model_config = example(law="attitude_force", dimension=1)
@@ -116,40 +96,8 @@ class AttitudeForceController(ControllerTable):
         "rotors than outputs, else 0 [1/s]",
         examples=[0.5],
     )
-    allocation: Literal["inversion", "prioritized"] = Field(
-        "inversion",
-        description="at rotor limits: inversion saturates each rotor alone, prioritized gives up "
-        "side forces first, then lift, then torque",
-    )
-    allocation_horizon: Positive = Field(
-        0.02, description="time for which prioritized allocation keeps within the limits [s]"
-    )
     turn_time: NonNegative = Field(
         0.0, description="time in which the reference of roll and pitch is reached, smoothly [s]"
-    )
-    failed_rotor: Annotated[int, Field(ge=1)] | None = Field(
-        None,
-        description="a rotor that the law knows to have failed and does not use; default: none",
-        examples=[2],
-    )
-    failure_known_from: NonNegative = Field(
-        0.0, description="time from which failed_rotor is known [s]", examples=[10.0]
-    )
-    max_acceleration: Positive = Field(
-        3.0,
-        description="limit on the horizontal acceleration of the position feedback, at which its "
-        "integrators stop [m/s^2]",
-    )
-    max_angular_acceleration: Positive = Field(
-        60.0, description="limit on the demanded angular acceleration of each axis [rad/s^2]"
-    )
-    anticipation: NonNegative = Field(
-        0.12,
-        description="time before and after a corner of the gait in which the body turns, at most "
-        "half of the gait's shortest segment [s]",
-    )
-    leave_out: Annotated[tuple[FeedforwardTerm, ...], Field(strict=False)] = Field(
-        (), description="terms of the controller to omit, for comparison", examples=[["gait_rates"]]
     )
 
     @model_validator(mode="after")
@@ -158,23 +106,8 @@ class AttitudeForceController(ControllerTable):
             self.require_defaults(("slowest_rotor",), 'needs controller.norm = "thrust"')
         return self
 
-    def in_full(self) -> Self:
-        return with_numbers(self, self.gains)
-
-    def resolve_gains(self) -> Gains:
-        return resolved_gains(self.gains)
-
-    def resolve_integral_gains(self) -> IntegralGains:
-        """The gains on the integrals, zero unless given by poles."""
-        return resolved_integral_gains(self.gains)
-
-    def resolve_feedforward_terms(self, *, gyroscopic_torque: bool) -> FeedforwardTerms:
-        """The terms of the law on a plant with or without gyroscopic torque."""
-        terms = FeedforwardTerms(gyroscopic_torque=float(gyroscopic_torque))
-        return terms._replace(**dict.fromkeys(self.leave_out, 0.0))
-
-    def resolve_force(self, vehicle: Multirotor, gait: Gait) -> UsedForce:
-        """The components of force that are controlled, checked over the gait."""
+    def resolve_force(self, vehicle: Multirotor, gait: Gait) -> Form:
+        """The form of the law, whose components of force are checked over the gait."""
         lost = self.failed_rotor
         least, where = min(force_dimension(vehicle, gait, rotor) for rotor in {None, lost})
         if least == 0 and where.endswith(f"rotor {lost}"):
@@ -184,15 +117,14 @@ class AttitudeForceController(ControllerTable):
         if self.dimension is not None and self.dimension > least:
             raise self.mistake("dimension", f"the vehicle has {least} only, {where}")
         forward = self.dimension == 2 and least == 3
-        return UsedForce(
-            self.dimension or least, forward, lost is not None, self.prioritizes_attitude
+        return Form(
+            self.dimension or least,
+            self.norm,
+            forward,
+            lost is not None,
+            self.prioritizes_attitude,
+            self.supervisor is not None,
         )
-
-    def resolve_failure(self) -> Failure:
-        """The failed rotor that the law knows of."""
-        if self.failed_rotor is None:
-            return Failure()
-        return Failure(float(self.failed_rotor), self.failure_known_from)
 
     def resolve_restoring(self, rotors: int, dimension: int, gait: Gait) -> float:
         """The restoring rate, 1/s."""
@@ -207,14 +139,6 @@ class AttitudeForceController(ControllerTable):
             return error_loops(gains, speed, PUBLISHED_DECOUPLING)
         side = linear_loop("side", self.side_gains)
         return [*feedforward_loops(gains, self.resolve_integral_gains()), side]
-
-    @property
-    def prioritizes_attitude(self) -> bool:
-        return self.allocation == "prioritized"
-
-    @property
-    def linearization(self) -> str:
-        return f"the {self.decoupling} decoupling matrix"
 
 
 def _gait_angles(vehicle: Multirotor, gait: Gait) -> Floats:

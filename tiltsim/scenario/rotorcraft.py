@@ -137,6 +137,11 @@ class RotorcraftTable(AnyVehicleTable, ABC):
         """Inertia (kg m^2) of servo and pod about each tilt hinge."""
 
     @property
+    @abstractmethod
+    def pod_inertias(self) -> Values:
+        """The pods' own share of `hinge_inertias`."""
+
+    @property
     def speeds_along_spin(self) -> tuple[float, float]:
         """Lowest and highest speed (rad/s) of a rotor along its spin; infinite without limits."""
         low, high = self.min_rotor_speed, self.max_rotor_speed
@@ -219,6 +224,10 @@ class MultirotorTable(RotorcraftTable):
     @property
     def hinge_inertias(self) -> Values:
         return self.file.hinge_inertias
+
+    @property
+    def pod_inertias(self) -> Values:
+        return self.file.pod_inertias
 
     @model_validator(mode="after")
     def _check(self) -> Self:

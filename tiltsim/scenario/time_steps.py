@@ -7,17 +7,25 @@ from typing import Any, Final
 
 import numpy as np
 
+from tiltsim.models.hover import hover_speeds
+from tiltsim.models.rotor_table import Multirotor
+from tiltsim.scenario.gait_following import GaitFollowingController
 from tiltsim.scenario.messages import InvalidValueError
+from tiltsim.scenario.multirotor_controllers import AttitudeForceController
 from tiltsim.scenario.rotorcraft import RotorcraftTable
 from tiltsim.scenario.scenario_tables import ScenarioTables
 from tiltsim.scenario.simulation_table import SimulationTable
-from tiltsim.scenario.tiltrotor_controllers import AttitudeAltitudeController
-from tiltsim.scenario.vehicle import VehicleTable
-from tiltsim_controllers.analysis.rotor_reaction import largest_held_gain, reaction_gains
+from tiltsim_controllers.analysis.rotor_reaction import (
+    attitude_feedback,
+    largest_held_gain,
+    reaction_gains,
+)
 from tiltsim_controllers.analysis.stability import ErrorLoop
+from tiltsim_controllers.analysis.statics import hover_rotor_speeds
 from tiltsim_controllers.laws.attitude_altitude import DECOUPLINGS
 from tiltsim_controllers.laws.supervisor import LAG
-from tiltsim_controllers.mathematics.scalar import Values
+from tiltsim_controllers.mathematics.scalar import Floats, Values
+from tiltsim_controllers.vehicle.effectiveness import cross_table
 from tiltsim_controllers.vehicle.parameters import Vehicle
 
 MAX_LOOP_STEP: Final = 2.5
@@ -86,9 +94,7 @@ def _check_rotors(scenario: ScenarioTables) -> None:
             f"too long for vehicle.rotor_time_constant = {vehicle.rotor_time_constant:g}; at most "
             f"{longest:.3g} s",
         )
-    controller = scenario.controller
-    if isinstance(controller, AttitudeAltitudeController) and isinstance(vehicle, VehicleTable):
-        _check_measured_reaction(scenario, vehicle, controller)
+    _check_measured_reaction(scenario, vehicle)
 
 
 def _largest_servo_step(simulation: SimulationTable) -> float:
@@ -101,23 +107,41 @@ def _largest_rotor_step(simulation: SimulationTable) -> float:
     return MAX_EULER_STEP if by_euler else _largest_servo_step(simulation)
 
 
-def _check_measured_reaction(
-    scenario: ScenarioTables, vehicle: VehicleTable, controller: AttitudeAltitudeController
-) -> None:
+def _reaction_gains(scenario: ScenarioTables, controller: GaitFollowingController) -> Floats:
+    """The `reaction_gains` of level hovers with the tilts of a scenario's gait."""
+    assumed, limits = scenario.vehicle.resolve(), (-np.inf, np.inf)
+    gait = scenario.gait.plan(assumed)
+    angles, dimension, norm = gait.angles(gait.sample_times()), 1, "speed"
+    found: list[Values | None]
+    if isinstance(assumed, Multirotor):
+        assert isinstance(controller, AttitudeForceController)
+        dimension, norm = controller.resolve_force(assumed, gait).dimension, controller.norm
+        table, inertia = assumed.table, np.reshape(assumed.inertia, (3, 3))
+        found = [hover_speeds(assumed, (*row,), limits, dimension) for row in angles.tolist()]
+    else:
+        assert isinstance(assumed, Vehicle)
+        table, inertia = cross_table(assumed, tilting=True), np.diag(assumed.moments)
+        found = [hover_rotor_speeds((*row,), assumed) for row in angles.tolist()]
+    return reaction_gains(
+        table,
+        [(tilts, speeds) for tilts, speeds in zip(angles, found, strict=True) if speeds],
+        fed_back=attitude_feedback(controller.resolve_gains(), inertia),
+        rotor_inertia=scenario.any_rotorcraft.rotor_inertia,
+        decoupling=DECOUPLINGS[controller.decoupling],
+        dimension=dimension,
+        norm=norm,
+    )
+
+
+def _check_measured_reaction(scenario: ScenarioTables, vehicle: RotorcraftTable) -> None:
     """Refuse rotors whose reaction, measured and fed back, makes a loop that is unstable."""
     lag, simulation = vehicle.rotor_time_constant, scenario.simulation
+    controller = scenario.controller
     measured = controller.measures_angular_acceleration and vehicle.rotor_inertia > 0.0
     if lag is None or not measured or controller.allow_unstable:
         return
-    assumed = vehicle.resolve()
-    gait = scenario.gait.plan(assumed)
-    gains = reaction_gains(
-        gait.angles(gait.sample_times()),
-        controller.resolve_gains(),
-        assumed,
-        vehicle.rotor_inertia,
-        DECOUPLINGS[controller.decoupling],
-    )
+    assert isinstance(controller, GaitFollowingController)  # no other measures it
+    gains = _reaction_gains(scenario, controller)
     highest, against = gains.max(initial=0.0), -gains.min(initial=0.0)
     if simulation.control_timestep:
         held = simulation.control_timestep
@@ -144,7 +168,7 @@ def _check_supervisor(scenario: ScenarioTables) -> None:
     supervisor = scenario.controller.supervision
     if supervisor is None:
         return
-    supervisor.resolve(scenario.rotorcraft.resolve())
+    supervisor.resolve(scenario.any_rotorcraft.resolve())
     longest = MAX_HELD_STEP * LAG
     step, strategy = scenario.simulation.control_timestep, supervisor.strategy
     if strategy != "scale" and step >= longest:

@@ -144,6 +144,11 @@ class VehicleTable(RotorcraftTable):
         return of_file or (shipped,) * 4
 
     @property
+    def pod_inertias(self) -> Values:
+        user_vehicle = self.user_vehicle
+        return (self.pod.inertia,) * 4 if user_vehicle is None else user_vehicle.pod_inertias
+
+    @property
     def has_standard_layout(self) -> bool:
         """Whether the rotors are at the ends of four equal arms at right angles."""
         return self.user_vehicle is None or not self.user_vehicle.layout_mismatch

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
+from operator import attrgetter
 from time import perf_counter
 from typing import Any, Final, Generic, TypeVar
 
@@ -31,7 +32,7 @@ from tiltsim.flight.metrics import Metrics, metrics_of_rows
 from tiltsim.plants.flight_model import disturbance_acceleration
 from tiltsim.simulation.monitor import TerminationMonitor
 from tiltsim.simulation.simulate import simulate_assembly
-from tiltsim_controllers.mathematics.records import flatten, names_of
+from tiltsim_controllers.mathematics.records import flatten, paths_of, record_size
 from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.references.trajectories import ReferenceParameters
 
@@ -55,10 +56,9 @@ class _Sound:
 
 
 @cache
-def _codes_of(record: type[tuple[Any, ...]]) -> tuple[int, ...]:
-    """Where the `CODES` are among the numbers of a record of a type."""
-    names = names_of(record)
-    return tuple(place for place, name in enumerate(names) if name in CODES)
+def _codes_of(record: type[tuple[Any, ...]]) -> Callable[[Any], Any]:
+    """Reads the `CODES` in a record of a type."""
+    return attrgetter(*(path for path in paths_of(record) if path.rpartition(".")[2] in CODES))
 
 
 def numbers_of(assembly: Assembly) -> tuple[float, ...]:
@@ -76,14 +76,9 @@ def numbers_of(assembly: Assembly) -> tuple[float, ...]:
 def batch_key(assembly: Assembly) -> object:
     """Equal for flights that may share a batch."""
     parameters, knots = assembly.setup
-    codes: list[float] = []
-    for kind, record in (
-        (assembly.loop.parameters, parameters),
-        (ReferenceParameters, assembly.reference),
-    ):
-        numbers = [*flatten(record)]
-        codes += (numbers[place] for place in _codes_of(kind))
-    return course_of(assembly), len(knots), tuple(codes)
+    own = _codes_of(assembly.loop.parameters)(parameters)
+    of_reference = _codes_of(ReferenceParameters)(assembly.reference)
+    return course_of(assembly), len(knots), own, of_reference
 
 
 def _padded(rows: int) -> int:
@@ -173,7 +168,8 @@ class ArrayBatch(Generic[Result]):
             if len(whole) < 2 or len({*map(tuple, self._knots[indices])}) > 1:
                 return {}
             assemblies = [self._assemblies[indices[i]] for i in whole]
-            found = metrics_of_rows(assemblies, samples[whole], completed, seconds)
+            numbers = self._numbers[indices][whole, : record_size(course.loop.parameters)]
+            found = metrics_of_rows(assemblies, numbers, samples[whole], completed, seconds)
             return dict(zip(whole, found or ()))
 
         for i, (row, index) in enumerate(zip(rows, indices, strict=True)):

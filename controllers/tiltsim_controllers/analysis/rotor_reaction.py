@@ -17,40 +17,64 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tiltsim_controllers.analysis.singularity import decoupling_matrix, force_matrix
-from tiltsim_controllers.analysis.statics import hover_rotor_speeds
+from tiltsim_controllers.analysis.torque_free import LEVEL, controlled_axes, torque_free_forces
 from tiltsim_controllers.laws.attitude_altitude import EXACT_DECOUPLING, Gains
-from tiltsim_controllers.vehicle.parameters import SPIN, Vehicle
+from tiltsim_controllers.vehicle.effectiveness import ROTOR_FLOATS, SPIN_SIGN, force_and_torque
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import ArrayLike
+
     from tiltsim_controllers.mathematics.scalar import Floats
 
 
+def attitude_feedback(gains: Gains, inertia: Floats) -> Floats:
+    """Torque rate (N m/s) against a torque (N m) whose acceleration is fed back, shape (3, 3)."""
+    fed_back = np.diag([gains.roll_1, gains.pitch_1, gains.yaw_1])
+    return np.asarray(inertia @ fed_back @ np.linalg.inv(inertia))
+
+
 def reaction_gains(
-    tilts: Floats, gains: Gains, vehicle: Vehicle, rotor_inertia: float, decoupling: float
+    table: Sequence[float],
+    hovers: Sequence[tuple[ArrayLike, ArrayLike]],
+    *,
+    fed_back: Floats,
+    rotor_inertia: float,
+    decoupling: float,
+    dimension: int = 1,
+    norm: str = "speed",
 ) -> Floats:
     """The three ``mu`` of level hovers with fixed tilts, ascending, real, shape (M, 3).
 
     Args:
-        tilts: Tilt angles, rad, shape (N, 4); those without a hover in which all rotors turn are
-            left out.
-        gains: Of the controller.
-        vehicle: As the controller assumes it.
+        table: Of the rotors, as the controller assumes them.
+        hovers: Tilt angles (rad) and rotor speeds (rad/s) of each; those in which a rotor stands
+            still are left out.
+        fed_back: `attitude_feedback`.
         rotor_inertia: Of one rotor about its axis, kg m^2.
         decoupling: The form of the decoupling matrix.
+        dimension: How many components of force are controlled.
+        norm: In which the controller's inputs are the least, of `multirotor_inputs.NORMS`.
     """
-    found = [(row, hover_rotor_speeds((*row,), vehicle)) for row in tilts.tolist()]
-    hovers = [(row, speeds) for row, speeds in found if speeds is not None and all(speeds)]
-    if not hovers:
+    turning = [(tilts, speeds) for tilts, speeds in hovers if np.all(speeds)]
+    if not turning:
         return np.empty((0, 3))
-    angles, speeds = (np.array(part) for part in zip(*hovers, strict=True))
-    matrix = decoupling_matrix(angles, 0.0, 0.0, vehicle)
-    scaled = slice(0 if decoupling == EXACT_DECOUPLING else 3, 4)
-    matrix[:, scaled] *= 2.0 * np.abs(speeds)[:, np.newaxis]
-    per_torque_rate = np.linalg.inv(matrix)[..., :3]
-    reactions = -rotor_inertia * force_matrix(angles) * SPIN
-    fed_back = np.array([[gains.roll_1], [gains.pitch_1], [gains.yaw_1]])
-    return np.sort(np.linalg.eigvals(fed_back * reactions @ per_torque_rate).real)
+    angles, speeds = (np.array(part) for part in zip(*turning, strict=True))
+    force, torque = force_and_torque(table, angles)
+    axes = controlled_axes(
+        torque_free_forces(force, torque), np.tile(LEVEL, (len(angles), 1)), dimension
+    )
+    gain = 2.0 * np.abs(speeds)[:, np.newaxis]
+    one_each = decoupling != EXACT_DECOUPLING or norm != "speed"
+    lifts = axes @ force * (gain if norm == "speed" else 1.0)
+    matrix = np.concatenate([torque if one_each else torque * gain, lifts], axis=-2)
+    per_torque_rate = np.linalg.pinv(matrix)[..., :3]
+    if norm != "speed":
+        per_torque_rate = per_torque_rate / np.swapaxes(gain, -1, -2)
+    spins = np.array(table[SPIN_SIGN::ROTOR_FLOATS])
+    reactions = -rotor_inertia * spins * force / np.linalg.norm(force, axis=-2, keepdims=True)
+    return np.sort(np.linalg.eigvals(fed_back @ reactions @ per_torque_rate).real)
 
 
 def largest_held_gain(step: float, time_constant: float, latency_steps: int) -> float:

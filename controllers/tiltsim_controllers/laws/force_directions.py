@@ -12,8 +12,7 @@ from functools import cache
 from math import nan, sqrt
 from typing import Any
 
-from tiltsim_controllers.gaits.any_tilts import tilt_motion_of
-from tiltsim_controllers.gaits.parameters import GaitParameters
+from tiltsim_controllers.gaits.any_tilts import Jets
 from tiltsim_controllers.laws.failures import health_of, masked_of
 from tiltsim_controllers.laws.least_norm import nearest_of, orthogonal_of
 from tiltsim_controllers.mathematics.jets import (
@@ -109,6 +108,19 @@ def combination_of(length: int) -> Callable[..., Values]:
 
 
 @cache
+def share_of(length: int) -> Callable[..., float]:
+    """Scalar code of the share of a row that lies along a unit row: ``(row, unit)``; 0 of none."""
+    dot = vectors_of(length).dot
+
+    @scalar
+    def share(row: Values, unit: Values) -> float:
+        square = dot(row, row)
+        return dot(row, unit) / sqrt(square) if square > 0.0 else 0.0
+
+    return share
+
+
+@cache
 def factors_of(length: int, dimension: int, forward: bool = False) -> Callable[..., Factors]:
     """Orthogonal factors of the decoupling matrix: scalar code ``(rows, pushes, up) -> Factors``.
 
@@ -195,12 +207,13 @@ def _torque_free_jet_of(length: int) -> Callable[..., Jets3]:
 def direction_jet_of(layout: Layout, dimension: int, losses: bool) -> Callable[..., Jets3]:
     """The ``direction`` of one or two components over a planned gait, with derivatives.
 
-    A scalar function ``(time, up, gait, knots, half, at, failure)``; ``half`` as in
-    `anticipated_tilts`, ``at`` is where in the knots the table of the rotors begins. ``losses``:
-    whether the failure counts.
+    A scalar function ``(time, up, tilts, knots, at, failure)`` of the gait's tilts with
+    derivatives, as `tiltsim_controllers.gaits.any_tilts.TiltMotion.anticipated` returns them;
+    ``at`` is where in the knots the table of the rotors begins. ``losses``: whether the failure
+    counts.
     """
     length, tilts = len(layout), tilts_of(layout)
-    effect, anticipated = effectiveness_of(layout).rows, tilt_motion_of(tilts).anticipated
+    effect = effectiveness_of(layout).rows
     orthonormal, remainder = orthogonal_of(length)[2:]
     normal_of, moving = _normal_of(length), _torque_free_jet_of(length)
     cosines = componentwise("jet_cosines", "tilts", "cosine(tilts#)", tilts, cosine=jet_cosine)
@@ -213,10 +226,9 @@ def direction_jet_of(layout: Layout, dimension: int, losses: bool) -> Callable[.
 
     @scalar
     def rows_with_derivatives(
-        time: float, gait: GaitParameters, knots: Vector, half: float, at: int, failure: Any
+        time: float, tilts: Jets, knots: Vector, at: int, failure: Any
     ) -> tuple[Rows, Rows, Rows]:
-        moving_tilts = anticipated(time, gait, knots, half)
-        c, s = cosines(moving_tilts), sines(moving_tilts)
+        c, s = cosines(tilts), sines(tilts)
         rows = effect(1.0, value(c), value(s), knots, at)
         first = effect(0.0, rate(c), rate(s), knots, at)
         second = effect(0.0, acceleration(c), acceleration(s), knots, at)
@@ -226,30 +238,14 @@ def direction_jet_of(layout: Layout, dimension: int, losses: bool) -> Callable[.
         return rows, first, second
 
     @scalar
-    def force(
-        time: float,
-        up: Triple,
-        gait: GaitParameters,
-        knots: Vector,
-        half: float,
-        at: int,
-        failure: Any,
-    ) -> Jets3:
-        rows, first, second = rows_with_derivatives(time, gait, knots, half, at, failure)
+    def force(time: float, up: Triple, tilts: Jets, knots: Vector, at: int, failure: Any) -> Jets3:
+        rows, first, second = rows_with_derivatives(time, tilts, knots, at, failure)
         units = orthonormal(rows[3], rows[4], rows[5])
         return moving(up, rows, first, second, units)
 
     @scalar
-    def normal(
-        time: float,
-        up: Triple,
-        gait: GaitParameters,
-        knots: Vector,
-        half: float,
-        at: int,
-        failure: Any,
-    ) -> Jets3:
-        rows, first, second = rows_with_derivatives(time, gait, knots, half, at, failure)
+    def normal(time: float, up: Triple, tilts: Jets, knots: Vector, at: int, failure: Any) -> Jets3:
+        rows, first, second = rows_with_derivatives(time, tilts, knots, at, failure)
         units = orthonormal(rows[3], rows[4], rows[5])
         across = normal_of(
             remainder(rows[0], units), remainder(rows[1], units), remainder(rows[2], units)

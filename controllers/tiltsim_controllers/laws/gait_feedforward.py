@@ -42,13 +42,8 @@ from tiltsim_controllers.laws.force_motion import (
     torque_free_force_jet,
 )
 from tiltsim_controllers.laws.gains import IntegralGains
-from tiltsim_controllers.laws.supervisor import (
-    SUPERVISOR_AT_REST,
-    Supervisor,
-    gait_time,
-    supervised_gait_scale,
-    supervised_tilts,
-)
+from tiltsim_controllers.laws.supervisor import SUPERVISOR_AT_REST, Supervisor, gait_time
+from tiltsim_controllers.laws.tiltrotor_supervisor import SUPERVISION
 from tiltsim_controllers.mathematics.jets import Jet, Jets3, jet_sum
 from tiltsim_controllers.mathematics.rotation import rotation_from_euler, to_world, wrap_angle
 from tiltsim_controllers.mathematics.scalar import Octet, Pair, Quad, Triple, Values, Vector, scalar
@@ -107,6 +102,9 @@ INTEGRAL_FIELDS: Final = ("integral_x", "integral_y", "integral_z")
 # --- the gait ----------------------------------------------------------------------------------
 
 
+_gait_scale, _supervised_tilts = SUPERVISION.gait_scale, SUPERVISION.tilts
+
+
 @scalar
 def _planned_force(
     time: float, attitude: Pair, supervisor_motion: Triple, parameters: Parameters, knots: Vector
@@ -120,11 +118,10 @@ def _planned_force(
     ratio = drag_ratio(parameters.vehicle)
     clock = gait_time(time, supervisor_motion, supervisor)
     planned = tilt_reference(clock, gait, knots)
-    scale = supervised_gait_scale(planned, roll, pitch, supervisor, parameters.vehicle)
+    scale = _gait_scale(planned[:4], roll, pitch, supervisor, ratio, knots)
     tilts = anticipated_tilts(clock, gait, knots, parameters.anticipation)
-    return torque_free_force_jet(
-        supervised_tilts(tilts, scale, supervisor_motion, supervisor, ratio), ratio
-    )
+    a1, a2, a3, a4 = _supervised_tilts(tilts, scale, supervisor_motion, supervisor, ratio)
+    return torque_free_force_jet((a1, a2, a3, a4), ratio)
 
 
 # --- steps of the control law ------------------------------------------------------------------

@@ -28,6 +28,7 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any
 
+from tiltsim_controllers.gaits.any_tilts import Jets, tilt_motion_of
 from tiltsim_controllers.gaits.parameters import FIXED, NO_KNOTS
 from tiltsim_controllers.laws.decouplers import NONE
 from tiltsim_controllers.laws.failures import health_of, masked_of
@@ -49,17 +50,20 @@ from tiltsim_controllers.laws.multirotor_inputs import (
 )
 from tiltsim_controllers.laws.multirotor_steps import (
     ROTATION,
+    Form,
     desired_direction,
     lean,
     rotation_control,
     side_control,
     turned,
 )
+from tiltsim_controllers.laws.multirotor_supervisor import multirotor_supervision_of
+from tiltsim_controllers.laws.supervisor import SUPERVISOR_AT_REST, gait_time
 from tiltsim_controllers.mathematics.jets import Jet, Jets3
 from tiltsim_controllers.mathematics.rotation import rotation_from_euler, to_body, to_world
 from tiltsim_controllers.mathematics.scalar import Triple, Values, Vector, scalar
-from tiltsim_controllers.mathematics.vectors import entries_of, vectors_of
-from tiltsim_controllers.vehicle.effectiveness import Layout, effectiveness_of, tilts_of
+from tiltsim_controllers.mathematics.vectors import componentwise, entries_of, vectors_of
+from tiltsim_controllers.vehicle.effectiveness import Layout, Rows, effectiveness_of, tilts_of
 from tiltsim_controllers.vehicle.multirotor import body_acceleration, body_torque_rate
 from tiltsim_controllers.vehicle.rigid_body import cross
 from tiltsim_controllers.vehicle.states import PITCH, ROLL, YAW, P, Q, R
@@ -72,6 +76,9 @@ Motion = tuple[Values, Triple, Triple]
 
 Tracking = tuple[Jets3, Jets3]
 """What `tracking_errors` returns: errors of position, and the reference's accelerations."""
+
+Watching = tuple[float, float, Triple]
+"""Roll and pitch (rad) and the supervisor's state with its rate and acceleration."""
 
 Horizontal = tuple[Jet, Jet, float, float, float, float]
 """References of roll and pitch, desired jerk of x and y (m/s^3), integrator rates of x and y."""
@@ -86,45 +93,77 @@ def told_attitude(time: float, parameters: Any) -> tuple[Jet, Jet]:
 
 @scalar
 def direction_at_rest(
-    time: float, up: Triple, present: Triple, parameters: Any, knots: Vector
+    time: float, up: Triple, present: Triple, watching: Watching, parameters: Any, knots: Vector
 ) -> Jets3:
     """The present ``direction``, for pods that do not move, or whose motion does not count.
 
     Args:
-        time, up, parameters, knots: as the planned one has them, without use here
+        time, up, watching, parameters, knots: as the planned one has them, without use here
         present: the ``direction`` of the factors
     """
     return (present[0], 0.0, 0.0), (present[1], 0.0, 0.0), (present[2], 0.0, 0.0)
 
 
 @cache
-def _direction_of(
-    layout: Layout, dimension: int, forward: bool, losses: bool
-) -> Callable[..., Jets3]:
-    """Scalar code of the ``direction`` with derivatives, as `direction_at_rest`."""
-    if dimension == 3 or forward or not tilts_of(layout):
-        return direction_at_rest
-    planned = direction_jet_of(layout, dimension, losses)
+def _tilts_of(layout: Layout, form: Form) -> Callable[..., Jets]:
+    """Scalar code of the gait's tilts with derivatives: ``(time, watching, parameters, knots)``.
+
+    They are the anticipated ones of the plan or, under a supervisor, of what it makes of it.
+    """
+    motion = tilt_motion_of(tilts_of(layout))
+    planned_of, anticipated = motion.planned, motion.anticipated
+    angles = componentwise("angles_of_jets", "jets", "jets#[0]", tilts_of(layout))
 
     @scalar
-    def over_gait(
-        time: float, up: Triple, present: Triple, parameters: Any, knots: Vector
-    ) -> Jets3:
-        gait = parameters.gait
-        if parameters.terms.attitude_rates == 0.0 or gait.type == FIXED:
-            return direction_at_rest(time, up, present, parameters, knots)
-        half, at = parameters.anticipation, int(parameters.rotors)
-        return planned(time, up, gait, knots, half, at, parameters.failure)
+    def planned(time: float, watching: Watching, parameters: Any, knots: Vector) -> Jets:
+        return anticipated(time, parameters.gait, knots, parameters.anticipation)
 
-    return over_gait
+    if not form.supervised:
+        return planned
+    supervision = multirotor_supervision_of(layout, form.dimension, form.forward)
+    gait_scale, supervised_tilts = supervision.gait_scale, supervision.tilts
+
+    @scalar
+    def supervised(time: float, watching: Watching, parameters: Any, knots: Vector) -> Jets:
+        supervisor, vehicle = parameters.supervisor, parameters.watched
+        roll, pitch, moving = watching
+        clock = gait_time(time, moving, supervisor)
+        now = angles(planned_of(clock, parameters.gait, knots))
+        scale = gait_scale(now, roll, pitch, supervisor, vehicle, knots)
+        ahead = planned(clock, watching, parameters, knots)
+        return supervised_tilts(ahead, scale, moving, supervisor, vehicle)
+
+    return supervised
 
 
 @cache
-def _horizontal_of(
-    layout: Layout, dimension: int, forward: bool, losses: bool
-) -> Callable[..., Horizontal]:
+def _direction_of(layout: Layout, form: Form) -> Callable[..., Jets3]:
+    """Scalar code of the ``direction`` with derivatives, as `direction_at_rest`."""
+    if form.dimension == 3 or form.forward or not tilts_of(layout):
+        return direction_at_rest
+    over_gait, tilts_at = (
+        direction_jet_of(layout, form.dimension, form.losses),
+        _tilts_of(layout, form),
+    )
+    supervised = form.supervised
+
+    @scalar
+    def moving_direction(
+        time: float, up: Triple, present: Triple, watching: Watching, parameters: Any, knots: Vector
+    ) -> Jets3:
+        still = parameters.gait.type == FIXED and not supervised
+        if parameters.terms.attitude_rates == 0.0 or still:
+            return direction_at_rest(time, up, present, watching, parameters, knots)
+        tilts, at = tilts_at(time, watching, parameters, knots), int(parameters.rotors)
+        return over_gait(time, up, tilts, knots, at, parameters.failure)
+
+    return moving_direction
+
+
+@cache
+def _horizontal_of(layout: Layout, form: Form) -> Callable[..., Horizontal]:
     """Scalar code of what moves x and y: force as far as it is controlled, and leaning."""
-    moving_direction = _direction_of(layout, dimension, forward, losses)
+    moving_direction, dimension = _direction_of(layout, form), form.dimension
 
     @scalar
     def horizontal(
@@ -135,6 +174,7 @@ def _horizontal_of(
         forces: Forces,
         yaw: Jet,
         integrals: Triple,
+        watching: Watching,
         parameters: Any,
         knots: Vector,
     ) -> Horizontal:
@@ -148,6 +188,7 @@ def _horizontal_of(
             forces: of the rotors
             yaw: rad, with derivatives, for the decoupler
             integrals: of the position errors, m s
+            watching: what the supervisor goes by
             parameters, knots: of the controller
         """
         errors, accelerations = tracking
@@ -161,7 +202,7 @@ def _horizontal_of(
             return roll, pitch, jerk_x, jerk_y, x_rate, y_rate
         rotation, omega, _ = motion
         up = (rotation[6], rotation[7], rotation[8])
-        force = moving_direction(time, up, direction, parameters, knots)
+        force = moving_direction(time, up, direction, watching, parameters, knots)
         jerk = (0.0, 0.0, 0.0)  # counts only for the attitude's rates
         if dimension == 2:
             x, y, z = cross(omega, forces[0])
@@ -183,16 +224,14 @@ def _horizontal_of(
 
 
 @cache
-def _control_of(
-    layout: Layout, dimension: int, forward: bool, losses: bool
-) -> Callable[..., tuple[Any, ...]]:
+def _control_of(layout: Layout, form: Form) -> Callable[..., tuple[Any, ...]]:
     """Scalar code of position and attitude control.
 
-    ``(time, state, motion, direction, forces, integrals, parameters, knots)``; it returns the
-    desired jerk (m/s^3, world axes), the desired second derivatives of the body rates (rad/s^3),
-    the rates of the integrals (m) and the references of roll and pitch (rad).
+    ``(time, state, motion, direction, forces, integrals, supervisor_motion, parameters, knots)``;
+    it returns the desired jerk (m/s^3, world axes), the desired second derivatives of the body
+    rates (rad/s^3), the rates of the integrals (m) and the references of roll and pitch (rad).
     """
-    horizontal = _horizontal_of(layout, dimension, forward, losses)
+    horizontal = _horizontal_of(layout, form)
 
     @scalar
     def control(
@@ -202,6 +241,7 @@ def _control_of(
         direction: Triple,
         forces: Forces,
         integrals: Triple,
+        supervisor_motion: Triple,
         parameters: Any,
         knots: Vector,
     ) -> tuple[Triple, Triple, Triple, float, float]:
@@ -214,8 +254,9 @@ def _control_of(
         if parameters.attitude == ROTATION or terms.attitude_rates == 0.0:
             yaw = (parameters.reference.yaw, 0.0, 0.0)
         tracking = tracking_errors(time, state, to_world(rotation, forces[0]), parameters, knots)
+        watching = (state[ROLL], state[PITCH], supervisor_motion)
         roll, pitch, jerk_x, jerk_y, x_rate, y_rate = horizontal(
-            time, motion, direction, tracking, forces, yaw, integrals, parameters, knots
+            time, motion, direction, tracking, forces, yaw, integrals, watching, parameters, knots
         )
         errors, accelerations = tracking
         jerk_z, z_rate = altitude_control(errors[2], accelerations[2], integrals[2], parameters)
@@ -230,23 +271,48 @@ def _control_of(
 
 
 @cache
-def multirotor_law_of(
-    layout: Layout,
-    dimension: int,
-    norm: str = "speed",
-    forward: bool = False,
-    losses: bool = False,
-    prioritized: bool = False,
-) -> Callable[..., Values]:
+def _present_of(layout: Layout, form: Form) -> Callable[..., tuple[Any, ...]]:
+    """Scalar code of what the rotors do now, and how it changes as the pods turn.
+
+    ``(time, state, tilt_rates, parameters, knots)``; it returns ``w``, the rows of F and tau, the
+    wrench and its rate.
+    """
+    length, tilts, losses = len(layout), tilts_of(layout), form.losses
+    tilts_in, speeds_in = entries_of(12, tilts), entries_of(12 + tilts, length)
+    squares, pushing = effectiveness_of(layout).squares, pushing_of(layout)
+    health, masked, product = health_of(length), masked_of(length), vectors_of(length).product
+
+    @scalar
+    def present(
+        time: float, state: Values, tilt_rates: Values, parameters: Any, knots: Vector
+    ) -> tuple[Values, Rows, Values, Values]:
+        w = squares(speeds_in(state))
+        if losses:
+            works = health(time, parameters.failure)
+            w = product(works, w)
+        rows, wrench, change = pushing(
+            tilts_in(state), tilt_rates, w, knots, int(parameters.rotors)
+        )
+        if losses:
+            rows = masked(works, rows)
+        return w, rows, wrench, change
+
+    return present
+
+
+@cache
+def multirotor_law_of(layout: Layout, form: Form) -> Callable[..., Values]:
     """The control law of vehicles of a layout.
 
-    A scalar function ``(time, state, tilt_rates, integrals, parameters, knots, measured)``:
+    A scalar function ``(time, state, tilt_rates, integrals, parameters, knots, supervisor_motion,
+    measured)``:
 
     - ``state``: twelve numbers of the body (`tiltsim_controllers.vehicle.states.BODY_FIELDS`), the
       tilt angles (rad) and the rotor speeds (rad/s, signed); ``tilt_rates`` in rad/s;
     - ``integrals`` of the position errors (m s, world axes);
     - ``parameters``: `tiltsim_controllers.laws.multirotor_steps.Parameters`; ``knots`` of the gait
       (from the first on), the reference and the table of the rotors, each where the parameters say;
+    - ``supervisor_motion``: the supervisor's state with its rate and acceleration;
     - ``measured``: the angular acceleration (rad/s^2, body axes); None takes the model's.
 
     It returns the rotor accelerations (rad/s^2), the rates of the integrals (m), the references of
@@ -255,26 +321,15 @@ def multirotor_law_of(
 
     Args:
         layout: of the table of rotors, four or more
-        dimension: how many components of force are outputs, 1 to 3
-        norm: in `NORMS`
-        forward: two components are those along x and z, of a vehicle that has three
-        losses: whether the controller knows of failures
-        prioritized: whether it keeps within rotor limits (`multirotor_allocation`)
+        form: what the code is made for
     """
-    length, tilts = len(layout), tilts_of(layout)
-    tilts_in, speeds_in = entries_of(12, tilts), entries_of(12 + tilts, length)
-    squares, pushing = effectiveness_of(layout).squares, pushing_of(layout)
-    scaled_rows, factors_of_rows = (
-        scaled_rows_of(length, norm),
-        factors_of(length, dimension, forward),
-    )
-    control, solution = (
-        _control_of(layout, dimension, forward, losses),
-        solution_of(length, dimension, norm),
-    )
-    null_part = null_part_of(length, dimension, forward)
-    health, masked, product = health_of(length), masked_of(length), vectors_of(length).product
-    limited = limited_of(length)
+    length, dimension, norm, forward = len(layout), form.dimension, form.norm, form.forward
+    present, speeds_in = _present_of(layout, form), entries_of(12 + tilts_of(layout), length)
+    scaled_rows = scaled_rows_of(length, norm)
+    factors_of_rows = factors_of(length, dimension, forward)
+    control, solution = _control_of(layout, form), solution_of(length, dimension, norm)
+    null_part, limited = null_part_of(length, dimension, forward), limited_of(length)
+    prioritized = form.prioritized
 
     @scalar
     def inputs(
@@ -284,22 +339,13 @@ def multirotor_law_of(
         integrals: Triple,
         parameters: Any,
         knots: Vector = NO_KNOTS,
+        supervisor_motion: Triple = SUPERVISOR_AT_REST,
         measured: Triple | None = None,
     ) -> Values:
         body, terms = parameters.vehicle, parameters.terms
         mass, omega, speeds = body.mass, (state[P], state[Q], state[R]), speeds_in(state)
         rotation = rotation_from_euler(state[ROLL], state[PITCH], state[YAW])
-
-        # What the rotors do now, and how it changes as the pods turn.
-        w = squares(speeds)
-        if losses:
-            works = health(time, parameters.failure)
-            w = product(works, w)
-        rows, wrench, change = pushing(
-            tilts_in(state), tilt_rates, w, knots, int(parameters.rotors)
-        )
-        if losses:
-            rows = masked(works, rows)
+        w, rows, wrench, change = present(time, state, tilt_rates, parameters, knots)
         fx, fy, fz, tx, ty, tz = wrench
         known = terms.gait_rates
         gx, gy, gz = known * change[0], known * change[1], known * change[2]
@@ -318,6 +364,7 @@ def multirotor_law_of(
             factors[3],
             ((fx / mass, fy / mass, fz / mass), (gx / mass, gy / mass, gz / mass)),
             integrals,
+            supervisor_motion,
             parameters,
             knots,
         )

@@ -11,7 +11,13 @@ from math import nan, sqrt
 from typing import Any, Final
 
 from tiltsim_controllers.laws.attitude_altitude import PUBLISHED_DECOUPLING
-from tiltsim_controllers.laws.force_directions import Factors, Force, combination_of, factors_of
+from tiltsim_controllers.laws.force_directions import (
+    Factors,
+    Force,
+    combination_of,
+    factors_of,
+    share_of,
+)
 from tiltsim_controllers.laws.least_norm import nearest_of, shares_of
 from tiltsim_controllers.mathematics.scalar import Triple, Values, Vector, scalar
 from tiltsim_controllers.mathematics.vectors import componentwise, vectors_of
@@ -182,6 +188,7 @@ def independence_of(layout: Layout, dimension: int, forward: bool = False) -> Ca
     cosines, sines, effect, _, _ = effectiveness_of(layout)
     factors_of_rows = factors_of(len(layout), dimension, forward)
     dot, combination = vectors_of(len(layout)).dot, combination_of(len(layout))
+    share_of_row = share_of(len(layout))
 
     @scalar
     def independence(tilts: Values, up: Triple, side: Triple, table: Vector, at: int) -> float:
@@ -190,7 +197,7 @@ def independence_of(layout: Layout, dimension: int, forward: bool = False) -> Ca
         _, lifts, units, _ = factors_of_rows(rows, forces, up)
         share = 1.0
         for k in range(dimension):
-            share *= dot(lifts[k], units[3 + k]) / sqrt(dot(lifts[k], lifts[k]))
+            share *= share_of_row(lifts[k], units[3 + k])
         if not share > 0.0:
             return 0.0
         against = dimension == 1 and dot(units[3], combination(side, *forces)) < 0.0

@@ -20,6 +20,8 @@ from tiltsim_controllers.laws.full_pose import attitude_error
 from tiltsim_controllers.laws.gains import IntegralGains
 from tiltsim_controllers.laws.gait_feedforward import FeedforwardTerms, decoupled_attitude
 from tiltsim_controllers.laws.multirotor_allocation import RotorRange
+from tiltsim_controllers.laws.multirotor_supervisor import Watched
+from tiltsim_controllers.laws.supervisor import Supervisor
 from tiltsim_controllers.mathematics.jets import (
     Jet,
     Jets3,
@@ -40,6 +42,24 @@ ROTATION: Final = 1.0
 ATTITUDE_ERRORS: Final = {"euler_angles": EULER_ANGLES, "rotation": ROTATION}
 """What the attitude's error dynamics act on, by name: roll, pitch and yaw as in ch. 3, or the
 rotation that remains, which has no singular pitch."""
+
+
+class Form(NamedTuple):
+    """What the code of the law is made for; all else is data."""
+
+    dimension: int  # components of force that are outputs, 1 to 3
+    norm: str = "speed"  # in `tiltsim_controllers.laws.multirotor_inputs.NORMS`
+    forward: bool = False  # two components are those along x and z, of a vehicle that has three
+    losses: bool = False  # whether the controller knows of failures
+    prioritized: bool = False  # whether it keeps within rotor limits (`multirotor_allocation`)
+    supervised: bool = False  # whether a supervisor changes its gait
+
+    @property
+    def name(self) -> str:
+        """For file names."""
+        options = "_forward" * self.forward, "_losses" * self.losses
+        further = "_prioritized" * self.prioritized, "_supervised" * self.supervised
+        return f"{self.dimension}{''.join((*options, *further))}_{self.norm}"
 
 
 class SideGains(NamedTuple):
@@ -73,6 +93,8 @@ class Parameters(NamedTuple):
     failure: Failure = Failure()
     turn_time: float = 0.0  # s in which a reference of roll and pitch is reached, smoothly
     limits: RotorRange = RotorRange()  # of prioritized allocation
+    supervisor: Supervisor = Supervisor()
+    watched: Watched = Watched()
 
 
 @scalar

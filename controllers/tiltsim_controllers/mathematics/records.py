@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from functools import cache
-from itertools import islice, repeat
+from itertools import islice
 from typing import Any, NamedTuple, TypeVar, get_type_hints
 
 import numpy as np
@@ -18,13 +18,15 @@ import numpy as np
 Record = TypeVar("Record", bound=tuple[Any, ...])
 
 
-def leaves(record: Iterable[Any]) -> Iterator[Any]:
-    """Yield the numbers of a record in the order of declaration, nested records in place."""
+def leaves(record: Iterable[Any]) -> list[Any]:
+    """The numbers of a record in the order of declaration, nested records in place."""
+    found: list[Any] = []
     for value in record:
         if isinstance(value, tuple):
-            yield from leaves(value)
+            found += leaves(value)
         else:
-            yield value
+            found.append(value)
+    return found
 
 
 def flatten(record: Iterable[Any]) -> Iterator[float]:
@@ -32,13 +34,11 @@ def flatten(record: Iterable[Any]) -> Iterator[float]:
     return map(float, leaves(record))
 
 
-def names_of(record_type: type[tuple[Any, ...]]) -> Iterator[str]:
-    """The names of the fields that hold the floats of a record, in the order of `flatten`."""
+def paths_of(record_type: type[tuple[Any, ...]]) -> Iterator[str]:
+    """The dotted names of the fields of a record and of those within, in order."""
     for name, kind in _fields(record_type).items():
         if _is_record(kind):
-            yield from names_of(kind)
-        elif issubclass(kind, tuple):
-            yield from repeat(name, kind.length)
+            yield from (f"{name}.{inner}" for inner in paths_of(kind))
         else:
             yield name
 

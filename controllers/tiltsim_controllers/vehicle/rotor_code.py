@@ -20,11 +20,14 @@ from tiltsim_controllers.mathematics.vectors import (
 )
 from tiltsim_controllers.vehicle.decoupling_matrix import (
     body_force,
+    body_torque,
     sines_and_cosines,
+    torque_entries,
     trigonometric_rates,
 )
 from tiltsim_controllers.vehicle.effectiveness import (
     ROTOR_FLOATS,
+    SPIN_SIGN,
     VECTOR_FLOATS,
     Layout,
     Rotor,
@@ -33,7 +36,7 @@ from tiltsim_controllers.vehicle.effectiveness import (
     turning_vectors_of,
 )
 from tiltsim_controllers.vehicle.multirotor import Body, inertia_times, inverse_inertia_times
-from tiltsim_controllers.vehicle.parameters import Vehicle
+from tiltsim_controllers.vehicle.parameters import Vehicle, drag_ratio
 
 
 class RotorCode(NamedTuple):
@@ -43,12 +46,17 @@ class RotorCode(NamedTuple):
     """
 
     record: Any
+    body: Any  # the type of what `inertia` and `inverse` read of a vehicle
     heights: Callable[..., Values]
     """``(tilts, up, vehicle)``: of the rotors along a direction, from the body's centre, m."""
     lift: Callable[..., Values]
     """``(force, tilts, thrusts, gains, vehicle)``: a force (N), increased by that of shares
     ``gains`` of the rotors' thrusts, and their torque (N m) without drag. ``thrusts`` are controls,
     (rad/s)^2."""
+    torque: Callable[..., Triple]  # (tilts, thrusts, vehicle): N m, of these controls, with drag
+    pods: Callable[..., Triple]
+    """``(inertias, rates, vehicle)``: sum of both and the unit vectors of the hinges, one a tilt:
+    of tilt rates, the pods' own momentum."""
     axes: Callable[..., Any]  # (tilts, vehicle)
     turning: Callable[..., Any]  # (axes, tilt rates): the axes' rates, 1/s
     along: Callable[..., Triple]  # (axes, values): sum of values_i d_i
@@ -151,10 +159,40 @@ def _lift_of_cross(axes: Callable[..., Octet]) -> Callable[..., Values]:
     return lift
 
 
+@cache
+def _torque_of_cross(axes: Callable[..., Octet]) -> Callable[..., Triple]:
+    @scalar
+    def torque(tilts: Values, thrusts: Quad, vehicle: Vehicle) -> Triple:
+        per_torque = vehicle.arm_length * vehicle.thrust_coefficient
+        # The controls are s varpi |varpi| with s = (-1, 1, -1, 1), the matrix's are without s.
+        x, y, z = body_torque(
+            torque_entries(axes(tilts, vehicle), drag_ratio(vehicle)),
+            *(-thrusts[0], thrusts[1], -thrusts[2], thrusts[3]),
+        )
+        return per_torque * x, per_torque * y, per_torque * z
+
+    return torque
+
+
+@scalar
+def _cross_pods(inertias: Quad, rates: Quad, vehicle: Vehicle) -> Triple:
+    """The hinges lie along x, y, -x and -y, and the pods are alike."""
+    inertia = inertias[0]
+    return inertia * (rates[0] - rates[2]), inertia * (rates[1] - rates[3]), 0.0
+
+
+@scalar
+def _no_pods(inertias: Values, rates: Values, vehicle: Vehicle) -> Triple:
+    return 0.0, 0.0, 0.0
+
+
 TILTING_CROSS: Final = RotorCode(
+    Vehicle,
     Vehicle,
     _cross_heights,
     _lift_of_cross(_tilting_axes),
+    _torque_of_cross(_tilting_axes),
+    _cross_pods,
     _tilting_axes,
     trigonometric_rates,
     sum_along_thrust_axes,
@@ -166,6 +204,8 @@ TILTING_CROSS: Final = RotorCode(
 
 UPRIGHT_CROSS: Final = TILTING_CROSS._replace(
     lift=_lift_of_cross(_upright_axes),
+    torque=_torque_of_cross(_upright_axes),
+    pods=_no_pods,
     axes=_upright_axes,
     turning=_upright_turning,
     on_hinges=_no_hinges,
@@ -176,9 +216,15 @@ UPRIGHT_CROSS: Final = TILTING_CROSS._replace(
 # --- any rotors ---------------------------------------------------------------------------------
 
 
+class RotorlessBody(NamedTuple):
+    """What `RotorCode.inertia` and `RotorCode.inverse` read of such a vehicle."""
+
+    body: Body
+
+
 @cache
-def rotors_record(count: int) -> Any:
-    """The type of the parameters of a vehicle with so many rotors."""
+def rotors_record(count: int, tilts: int) -> Any:
+    """The type of the parameters of a vehicle with so many rotors and hinges."""
     return make_record_type(
         "Rotors",
         body=Body,
@@ -186,17 +232,20 @@ def rotors_record(count: int) -> Any:
         places=vector_of(VECTOR_FLOATS * count),
         axes=vector_of(VECTOR_FLOATS * count),
         thrusts=vector_of(count),  # K_f of each, N s^2/rad^2
+        hinges=vector_of(3 * tilts),  # unit vectors along them
     )
 
 
 def rotors_of(body: Body, rotors: tuple[Rotor, ...]) -> Any:
     """The parameters of a vehicle."""
-    return rotors_record(len(rotors))(
+    hinges = {rotor.tilt: rotor.hinge_axis for rotor in rotors if rotor.tilt >= 0}
+    return rotors_record(len(rotors), len(hinges))(
         body,
         tuple(entry for rotor in rotors for entry in rotor.entries),
         tuple(entry for rotor in rotors for entry in rotor.place_entries),
         tuple(entry for rotor in rotors for entry in rotor.axis_entries),
         tuple(rotor.thrust for rotor in rotors),
+        tuple(entry for tilt in sorted(hinges) for entry in hinges[tilt]),
     )
 
 
@@ -224,6 +273,20 @@ def rotor_code_of(layout: Layout) -> RotorCode:
     rates = [f"rates[{tilt}]" if tilt >= 0 else "0.0" for tilt in layout]
     turned = written_out(
         f"turned_{name}", "d, rates", tuple_text(f"d[{i}] * {rate}" for i, rate in enumerate(rates))
+    )
+    wrench_of = code.wrench
+    squares = componentwise(
+        "squares_of_thrusts",
+        "thrusts, effects",
+        f"effects[{ROTOR_FLOATS} * @ + {SPIN_SIGN}] * thrusts#",
+        count,
+    )
+    hinge_sums = [
+        " + ".join(f"a[{j}] * b[{j}] * h[{3 * j + k}]" for j in range(tilts_of(layout))) or "0.0"
+        for k in range(3)
+    ]
+    along_hinges = written_out(
+        f"along_hinges_{tilts_of(layout)}", "a, b, h", tuple_text(hinge_sums)
     )
     on_each = componentwise(
         "on_each", "x, y, z, w, o", "w# * (x# * o[0] + y# * o[1] + z# * o[2])", count
@@ -256,6 +319,16 @@ def rotor_code_of(layout: Layout) -> RotorCode:
         )  # fmt: skip
 
     @scalar
+    def torque(tilts: Values, thrusts: Values, rotors: Any) -> Triple:
+        _, _, _, x, y, z = wrench_of(tilts, squares(thrusts, rotors.effects), rotors.effects, 0)
+        return x, y, z
+
+    @scalar
+    def pods(inertias: Values, rates: Values, rotors: Any) -> Triple:
+        momentum: Triple = along_hinges(inertias, rates, rotors.hinges)
+        return momentum
+
+    @scalar
     def axes(tilts: Values, rotors: Any) -> tuple[Values, ...]:
         cosines, sines = cosines_of(tilts), sines_of(tilts)
         x, y, z = vectors(1.0, cosines, sines, rotors.axes, 0)
@@ -277,5 +350,16 @@ def rotor_code_of(layout: Layout) -> RotorCode:
         return torques
 
     return RotorCode(
-        rotors_record(count), heights, lift, axes, turning, along, on_hinges, _inertia, _inverse
+        rotors_record(count, tilts_of(layout)),
+        RotorlessBody,
+        heights,
+        lift,
+        torque,
+        pods,
+        axes,
+        turning,
+        along,
+        on_hinges,
+        _inertia,
+        _inverse,
     )

@@ -7,9 +7,14 @@ from math import exp, inf
 import numpy as np
 import pytest
 
-from tiltsim_controllers.analysis.rotor_reaction import largest_held_gain, reaction_gains
+from tiltsim_controllers.analysis.rotor_reaction import (
+    attitude_feedback,
+    largest_held_gain,
+    reaction_gains,
+)
 from tiltsim_controllers.laws.attitude_altitude import EXACT_DECOUPLING
 from tiltsim_controllers.laws.gains import GAIN_SETS
+from tiltsim_controllers.vehicle.effectiveness import cross_table
 from tiltsim_controllers.vehicle.parameters import PRESETS
 
 
@@ -28,9 +33,12 @@ def test_steps_of_nothing_allow_any_gain():
     assert largest_held_gain(1e-20, 0.02, 0) == inf
 
 
-def test_tilts_without_a_hover_are_left_out():
-    tilts = np.array([[0.0] * 4, [np.pi / 2] * 4])
-    gains = GAIN_SETS["exact"]
-    found = reaction_gains(tilts, gains, PRESETS["ar_drone_2"], 1e-5, EXACT_DECOUPLING)
+def test_hovers_with_a_rotor_at_rest_are_left_out():
+    vehicle, gains = PRESETS["ar_drone_2"], GAIN_SETS["exact"]
+    table = cross_table(vehicle, tilting=True)
+    fed_back = attitude_feedback(gains, np.diag(vehicle.moments))
+    hovers = [([0.0] * 4, [300.0] * 4), ([0.0] * 4, [0.0, 300.0, 300.0, 300.0])]
+    settings = {"rotor_inertia": 1e-5, "decoupling": EXACT_DECOUPLING}
+    found = reaction_gains(table, hovers, fed_back=fed_back, **settings)
     assert found.shape == (1, 3)
-    assert reaction_gains(tilts[1:], gains, PRESETS["ar_drone_2"], 1e-5, 0.0).shape == (0, 3)
+    assert reaction_gains(table, hovers[1:], fed_back=fed_back, **settings).shape == (0, 3)

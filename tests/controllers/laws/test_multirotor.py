@@ -35,6 +35,7 @@ from tiltsim_controllers.laws.multirotor import multirotor_law_of
 from tiltsim_controllers.laws.multirotor_inputs import independence_of
 from tiltsim_controllers.laws.multirotor_steps import (
     EULER_ANGLES,
+    Form,
     SideGains,
     rotation_control,
     turned,
@@ -76,7 +77,7 @@ def test_the_law_of_chapters_3_and_4_is_a_case(decoupler, decoupling):
         vehicle, gait, ON_CIRCLE, gains=gains, terms=AS_PUBLISHED, decoupler=codes[0],
         decoupling=codes[1], attitude=EULER_ANGLES,
     )  # fmt: skip
-    inputs, rest = multirotor_law_of(layout_of(vehicle.table), 1), (0.0,) * 4
+    inputs, rest = multirotor_law_of(layout_of(vehicle.table), Form(1)), (0.0,) * 4
     found = differences(
         lambda time, state: attitude_altitude.rotor_accelerations(time, state, special),
         lambda time, state: inputs(time, state, rest, (0.0,) * 3, law, knots),
@@ -111,7 +112,7 @@ def test_gait_feedforward_is_a_case(gait):
         vehicle, gait, ON_CIRCLE, gains=gains, integral=integral, max_acceleration=3.0,
         max_angular_acceleration=200.0, anticipation=0.05, attitude=EULER_ANGLES,
     )  # fmt: skip
-    inputs = multirotor_law_of(layout_of(vehicle.table), 1)
+    inputs = multirotor_law_of(layout_of(vehicle.table), Form(1))
     found = differences(
         lambda time, state: gait_feedforward.tracking_inputs(
             time, state, rates, integrals, special, knots
@@ -159,8 +160,8 @@ def test_a_rotor_known_to_have_failed_is_as_if_it_were_not_there(dimension):
     lost = list(knots)
     first = int(law.rotors) + 2 * ROTOR_FLOATS + CONSTANT
     lost[first : first + ROTOR_FLOATS - CONSTANT] = [0.0] * (ROTOR_FLOATS - CONSTANT)
-    aware = multirotor_law_of(layout, dimension, "speed", forward, True)
-    unaware = multirotor_law_of(layout, dimension, "speed", forward)
+    aware = multirotor_law_of(layout, Form(dimension, "speed", forward, True))
+    unaware = multirotor_law_of(layout, Form(dimension, "speed", forward))
     body = 0.2 * np.random.default_rng(5).normal(size=12)
     speeds = 450.0 * (-1.0) ** np.arange(1, 8)
     state = (*body.tolist(), *angles[0], *speeds.tolist())

@@ -11,6 +11,7 @@ from tests.controllers.scalar_sources import as_native
 from tiltsim.engines.compiling import compiled, register_scalar_functions
 from tiltsim_controllers.gaits import plans
 from tiltsim_controllers.laws.multirotor import multirotor_law_of
+from tiltsim_controllers.laws.multirotor_steps import Form
 from tiltsim_controllers.references.trajectories import CIRCLE, ReferenceParameters
 from tiltsim_controllers.vehicle.effectiveness import layout_of, tilts_of
 
@@ -34,7 +35,7 @@ def test_the_law_gives_the_same_bits_natively(case):
     reference = ReferenceParameters(CIRCLE, radius=1.0, angular_frequency=0.5)
     law, knots = parameters_of(vehicle, gait, reference, restoring=0.5, slowest=10.0)
     layout = layout_of(vehicle.table)
-    inputs = multirotor_law_of(layout, vehicle.dimension, vehicle.norm)
+    inputs = multirotor_law_of(layout, Form(vehicle.dimension, vehicle.norm))
     tilts, size = tilts_of(layout), 12 + tilts_of(layout) + len(layout)
     register_scalar_functions()
 

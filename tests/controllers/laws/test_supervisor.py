@@ -7,6 +7,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from tests.controllers.multirotors import ring
 from tiltsim_controllers.analysis.singularity import (
     determinant,
     margin_over_gait,
@@ -17,20 +18,20 @@ from tiltsim_controllers.gaits.plans import fixed, waypoints
 from tiltsim_controllers.gaits.plans import instant_trot as trot_instant
 from tiltsim_controllers.gaits.tilts import planned_jets, tilt_reference
 from tiltsim_controllers.laws.decouplers import exact_decoupler
-from tiltsim_controllers.laws.supervisor import (
-    BAND,
-    LAG,
-    STRATEGIES,
-    Supervisor,
-    allowed_scale,
-    margin_and_determinant,
-    supervised_derivative,
-    supervised_gait_scale,
-    supervised_tilts,
-    threshold_clearance,
-)
+from tiltsim_controllers.laws.multirotor_supervisor import multirotor_supervision_of, watched
+from tiltsim_controllers.laws.supervisor import BAND, LAG, STRATEGIES, Supervisor
+from tiltsim_controllers.laws.tiltrotor_supervisor import SUPERVISION
+from tiltsim_controllers.vehicle.effectiveness import cross_table, layout_of
 from tiltsim_controllers.vehicle.parameters import PRESETS, drag_ratio
 
+(
+    margin_and_determinant,
+    threshold_clearance,
+    allowed_scale,
+    supervised_gait_scale,
+    supervised_tilts,
+    supervised_derivative,
+) = SUPERVISION
 VEHICLE = PRESETS["ar_drone_2"]
 RATIO = drag_ratio(VEHICLE)
 WATCH = Supervisor(min_margin=0.3, min_determinant=1.0)
@@ -68,8 +69,8 @@ def test_what_passes_is_regular_and_a_little_more_is_not(tilts, roll, pitch):
 
 
 def test_without_thresholds_everything_passes():
-    wild = (3.0, -2.0, 1.0, 2.5, 0.0, 0.0, 0.0, 0.0)
-    assert supervised_gait_scale(wild, 2.0, 1.0, Supervisor(), VEHICLE) == 1.0
+    wild = (3.0, -2.0, 1.0, 2.5)
+    assert supervised_gait_scale(wild, 2.0, 1.0, Supervisor(), RATIO) == 1.0
 
 
 def test_a_vehicle_that_leans_too_far_gets_no_tilt():
@@ -175,20 +176,20 @@ def test_the_clock_slows_down_within_the_band():
 
 @pytest.mark.parametrize("strategy", WITH_STATES)
 def test_only_the_scaling_strategy_scales(strategy):
-    planned = (1.2, -0.9, 0.7, 1.1, 0.0, 0.0, 0.0, 0.0)
+    planned = (1.2, -0.9, 0.7, 1.1)
     scaling = Supervisor(0.3, 1.0, STRATEGIES["scale"])
-    passed = supervised_gait_scale(planned, 0.2, -0.1, scaling, VEHICLE)
-    assert passed == allowed_scale(planned[:4], 0.2, -0.1, scaling, RATIO)
+    passed = supervised_gait_scale(planned, 0.2, -0.1, scaling, RATIO)
+    assert passed == allowed_scale(planned, 0.2, -0.1, scaling, RATIO)
     assert 0.0 < passed < 1.0
     other = scaling._replace(strategy=STRATEGIES[strategy])
-    assert supervised_gait_scale(planned, 0.2, -0.1, other, VEHICLE) == 1.0
+    assert supervised_gait_scale(planned, 0.2, -0.1, other, RATIO) == 1.0
 
 
 @pytest.mark.parametrize("threshold", ["min_margin", "min_determinant"])
 def test_one_threshold_is_enough_to_scale(threshold):
-    planned = (1.2, -0.9, 0.7, 1.1, 0.0, 0.0, 0.0, 0.0)
+    planned = (1.2, -0.9, 0.7, 1.1)
     single = Supervisor(**{threshold: 1.0})
-    assert supervised_gait_scale(planned, 0.2, -0.1, single, VEHICLE) < 1.0
+    assert supervised_gait_scale(planned, 0.2, -0.1, single, RATIO) < 1.0
 
 
 @pytest.mark.parametrize("left", [1e-4, 1e-3])
@@ -257,3 +258,33 @@ def test_what_meets_its_threshold_exactly_is_allowed():
         assert allowed_scale(untilted, 0.0, 0.0, Supervisor(**threshold), RATIO) == 1.0
         above = {name: value * (1.0 + 1e-15) for name, value in threshold.items()}
         assert allowed_scale(untilted, 0.0, 0.0, Supervisor(**above), RATIO) == 0.0
+
+
+# --- any multirotor ------------------------------------------------------------------------------
+
+
+@settings(deadline=None, max_examples=30)
+@given(angles, leans, leans)
+def test_four_rotors_of_a_table_have_the_tiltrotor_s_margin_and_determinant(tilts, roll, pitch):
+    table, up = cross_table(VEHICLE, tilting=True), tuple(world_up(roll, pitch))
+    known = margin_and_determinant(tilts, up, RATIO)
+    n = np.array(torque_free_direction(tilts, VEHICLE))
+    side = tuple(np.sign(known[1]) * np.sign(n @ up) * n)  # that of the determinant
+    general = multirotor_supervision_of(layout_of(table), 1).margin_and_determinant
+    found = general(tilts, up, watched(table, 0, side), table)
+    np.testing.assert_allclose(found, known, rtol=0.0, atol=1e-7)
+
+
+@pytest.mark.parametrize(("dimension", "forward"), [(1, False), (2, True), (3, False)])
+def test_it_is_zero_where_the_outputs_depend_on_each_other(dimension, forward):
+    """Six arms without tilt push upwards only; sideways, none of them lifts."""
+    table = ring(6, hinged=True)
+    watch_all = multirotor_supervision_of(layout_of(table), dimension, forward)
+    vehicle, up = watched(table, 0, (0.0, 0.0, 1.0)), (0.0, 0.0, 1.0)
+
+    def determinant_at(*tilts):
+        return watch_all.margin_and_determinant(tilts, up, vehicle, table)[1]
+
+    level = determinant_at(*[0.0] * 6)
+    assert level == pytest.approx(4.0) if dimension == 1 else abs(level) < 1e-6
+    assert determinant_at(0.4, -0.3, 0.4, -0.5, 0.2, -0.4) > 0.5

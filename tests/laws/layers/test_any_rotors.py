@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import tiltsim
+from tiltsim.errors import InputError
 from tiltsim.laws.assembling import assemble
 from tiltsim.models.pose import VehiclePose
 from tiltsim.plants.command import Command, check_command
@@ -165,3 +166,91 @@ def test_stiff_servos_approach_pods_that_follow_exactly():
     light = fly("tilt_hexarotor", {}, short, gait=TILTS)
     assert furthest(exact, stiff) < 1e-2 * furthest(exact, light)
     assert furthest(exact, light) > 1e-6
+
+
+# --- a supervisor, and the measured angular acceleration ---------------------------------------
+
+JUMPS = {"type": "trot_instant", "amplitude": 0.7, "period": 0.2}
+HOLD = {"supervisor": {"strategy": "hold", "min_margin": 0.8}}
+SCALE = {"supervisor": {"strategy": "scale", "min_margin": 1.3}}
+MEASURED = {"angular_acceleration": "measured"}
+LATER = [{"type": "rotor_loss", "rotor": 1, "time": 1e6}]  # makes the thesis plant measure, too
+
+
+@pytest.mark.parametrize(
+    ("plant", "layer"),
+    [
+        ("mujoco", HOLD),
+        ("thesis", HOLD | MEASURED),
+        ("rigid_body", SCALE),
+        ("mujoco", MEASURED),
+        ("rigid_body", MEASURED),
+    ],
+)
+def test_supervised_and_measured_the_tiltrotor_flies_as_a_multirotor_does(plant, layer):
+    tables = {
+        "gait": JUMPS,
+        "fault": LATER,
+        "initial": {"attitude": [0.1, 0.05, 0.0], "rotor_speed": 361.0},
+    }
+    law = {"gait_rate_feedforward": True, "decoupling": "exact", "decoupler": "exact"}
+    general = fly(
+        "tiltrotor",
+        simulation={"plant": plant, "timestep": 0.002},
+        controller={
+            **{"law": "attitude_force", "gains": "feedforward", "attitude_error": "euler_angles"},
+            **layer,
+        },
+        **tables,
+    )
+    simulation = general.scenario.simulation.model_dump()
+    special = tiltsim.simulate(
+        {"controller": {**law, "gains": "feedforward", **layer}, "simulation": simulation, **tables}
+    )
+    names = (*MOTION, "tilt_angles", "reference_tilt_angles", "reference_attitude")
+    assert furthest(general, special, names) < 1e-9
+    if "supervisor" in layer:
+        assert 0.2 < special["supervision"].max() <= 1.0
+        np.testing.assert_allclose(general["supervision"], special["supervision"], atol=1e-9)
+
+
+def test_six_arms_hold_a_gait_that_would_push_aside_until_the_vehicle_leans():
+    """At a level attitude the gait ahead has a margin of 1.4 rad, against 1.5 that are asked."""
+    aside = (0.4 * np.sin(np.pi / 6.0 + np.pi / 3.0 * np.arange(6))).tolist()
+    gait = {"type": "waypoints", "angles": [[0.0] * 6, aside], "period": 1.0}
+    held = fly(
+        "tilt_hexarotor",
+        simulation={"duration": 0.2, "timestep": 0.002},
+        controller={
+            "law": "attitude_force",
+            "dimension": 1,
+            "supervisor": {"strategy": "hold", "min_margin": 1.5, "horizon": 0.3},
+        },
+        gait=gait,
+    )
+    assert 0.1 < held["supervision"].max() < 1.2
+    planned = 0.4 * held["time"][-1] / 0.5
+    assert 0.05 < held["alpha_ref_2"][-1] / planned < 0.95
+    clock = held["time"] - held["supervisor_state"]
+    np.testing.assert_allclose(held["alpha_ref_2"], 0.8 * clock, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("name", "controller", "message"),
+    [
+        (
+            "tilt_hexarotor",
+            {"supervisor": {"strategy": "return_to_red"}},
+            'controller.supervisor.strategy = "return_to_red": only the tiltrotor has red gaits',
+        ),
+        (
+            "hexarotor",
+            {"supervisor": {"strategy": "hold"}},
+            'controller.supervisor.strategy = "hold": vehicle.mjcf has no tilts',
+        ),
+    ],
+)
+def test_what_there_is_nothing_to_supervise_for_is_refused(name, controller, message):
+    with pytest.raises(InputError) as caught:
+        scenario(name, controller={"law": "attitude_force", **controller})
+    assert message in str(caught.value)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import tiltsim
+from tests.laws.layers.test_any_rotors import TILTS
 from tests.laws.layers.test_on_equations import (
     LATE,
     SENSORS,
@@ -23,15 +24,16 @@ from tests.laws.layers.test_on_equations import (
 )
 from tests.simulation.test_batch import three_ways
 from tiltsim.engines.callback import control_callback
+from tiltsim.equations.actuator_level import actuator_plant
 from tiltsim.errors import InputError
 from tiltsim.laws.assembling import LOOPS, assemble, loop_of
-from tiltsim.laws.layers.measured_acceleration import plant_angular_acceleration
+from tiltsim.laws.layers.measured_acceleration import plant_angular_acceleration_of
 from tiltsim.laws.layers.on_equations import read_actuators
+from tiltsim.models.hover import hover_speeds
 from tiltsim.plants.factory import make_plant
 from tiltsim.resources import shipped_folder
-from tiltsim_controllers.analysis.rotor_reaction import reaction_gains
+from tiltsim.scenario.time_steps import _reaction_gains
 from tiltsim_controllers.analysis.statics import hover_rotor_speeds
-from tiltsim_controllers.laws.attitude_altitude import DECOUPLINGS
 from tiltsim_controllers.vehicle.parameters import SPIN
 
 MEASURED = {"controller": {"angular_acceleration": "measured"}}
@@ -47,20 +49,45 @@ EVERYTHING = (TILTROTOR, TROT, SPINNING, STORM, LATE, SENSORS, SLOW, WEAK, WRONG
 HEAVY_ROTORS = {"vehicle": {"rotor_inertia": 1e-5}}
 
 
+def hexarotor(folder, inertial):
+    """Six tilting arms with other pods than the shipped ones."""
+    for name in ("scene.xml", "tilt_hexarotor.xml"):
+        text = (shipped_folder("mjcf") / name).read_text()
+        (folder / name).write_text(text.replace(LIGHT_POD, inertial))
+    vehicle = {"model": "multirotor", "mjcf": str(folder / "tilt_hexarotor.xml")}
+    controller = {"law": "attitude_force", "allow_unstable": True}
+    return {"vehicle": vehicle, "controller": controller, "gait": TILTS}
+
+
+LIGHT_POD = '<inertial pos="0 0 0" mass="1e-9" diaginertia="1e-13 1e-13 1e-13"/>'
+HEAVY_POD = '<inertial pos="0 0 0" mass="0.02" diaginertia="2e-5 2e-5 2e-5"/>'
+BENT_POD = '<inertial pos="0 0 0.001" mass="0.02" diaginertia="2e-5 2e-5 2e-5"/>'
+MASS = {"model_error": {"mass": 1.05, "inertia": [1.05, 1.02, 1.0]}}
+SIX = {"simulation": {"timestep": 0.002, "engine": "python", "duration": 0.2}}
+
+
 @pytest.mark.parametrize(
-    "changes", [(TILTROTOR, TROT, SPINNING), EVERYTHING, (*EVERYTHING, HEAVY_ROTORS)]
+    "changes",
+    [
+        (TILTROTOR, TROT, SPINNING, HEAVY),
+        (*EVERYTHING, HEAVY),
+        (*EVERYTHING, HEAVY_ROTORS, HEAVY),
+        (SIX, HEAVY_POD, SPINNING, STORM, SLOW, WEAK, MASS),
+    ],
 )
-def test_it_is_the_acceleration_that_mujoco_integrates(changes):
-    plant = make_plant(assemble(scenario(*changes, HEAVY, MEASURED)))
+def test_it_is_the_acceleration_that_mujoco_integrates(changes, tmp_path):
+    tables = [hexarotor(tmp_path, this) if isinstance(this, str) else this for this in changes]
+    plant = make_plant(assemble(scenario(*tables, MEASURED)))
     loop, parameters = plant._loop, plant._setup.parameters
     _, wrench = read_actuators(loop.dynamics)
+    acceleration_of = plant_angular_acceleration_of(loop.dynamics)
     data, largest = plant.data, 0.0
     for _ in range(20):
         plant.advance(3)
         with control_callback(plant.callback):
             mujoco.mj_forward(plant.model, data)
         state, ctrl = (data.qpos.tolist(), data.qvel.tolist()), data.ctrl.tolist()
-        measured = plant_angular_acceleration(*state, ctrl, wrench(ctrl), parameters.layer)
+        measured = acceleration_of(*state, ctrl, wrench(ctrl), parameters.layer)
         np.testing.assert_allclose(measured, data.qacc[3:6], rtol=1e-9, atol=1e-9)
         largest = max(largest, *np.abs(measured))
     assert largest > 5.0
@@ -73,19 +100,19 @@ def test_it_is_the_acceleration_that_the_equations_integrate():
     plant.advance(60)
     first = 1 + len(plant._held)
     state, setup = plant.state[first:].tolist(), assembly.setup
-    equations = loop.equations
-    inputs = equations.inputs(plant.time, state, setup.parameters, setup.knots)
-    rates = equations.rates(plant.time, state, inputs, setup.parameters, setup.knots, (0.0,) * 3)
-    seen = []
-
-    def watch(qpos, qvel, ctrl, wrench, motion):
-        seen.append(plant_angular_acceleration(qpos, qvel, ctrl, wrench, motion))
-        return seen[-1]
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("tiltsim.laws.layers.measured_acceleration.plant_angular_acceleration", watch)
-        equations.inputs(plant.time, state, setup.parameters, setup.knots)
-    np.testing.assert_allclose(seen[-1], rates[15:18], rtol=1e-12)
+    inputs = loop.equations.inputs(plant.time, state, setup.parameters, setup.knots)
+    rates = loop.equations.rates(
+        plant.time, state, inputs, setup.parameters, setup.knots, (0.0,) * 3
+    )
+    body, (layer, inner) = actuator_plant(loop.dynamics), setup.parameters.inner[1:]
+    qpos, qvel, act = body.qpos(state), body.qvel(state), state[body.motion :]
+    unmeasured = loop.within.within
+    ctrl = unmeasured.sampling.controls(
+        plant.time, qpos, (*qvel, 0.0, 0.0, 0.0), act, inner, setup.knots
+    )
+    loads = read_actuators(unmeasured.dynamics)[1](ctrl)
+    seen = plant_angular_acceleration_of(loop.dynamics)(qpos, qvel, ctrl, loads, layer)
+    np.testing.assert_allclose(seen, rates[15:18], rtol=1e-12)
 
 
 def test_on_the_ideal_thesis_plant_it_is_the_model_s():
@@ -126,6 +153,13 @@ def test_what_it_does_not_include_is_refused(changes):
         scenario(TILTROTOR, MEASURED, changes)
 
 
+def test_pods_out_of_balance_are_refused_in_mujoco(tmp_path):
+    tables = hexarotor(tmp_path, BENT_POD)
+    with pytest.raises(InputError, match="whose mass or inertia moves with its pods"):
+        scenario(SIX, tables, MEASURED)
+    scenario(SIX, hexarotor(tmp_path, HEAVY_POD), MEASURED)
+
+
 # --- the reaction of the rotors, fed back ------------------------------------------------------
 
 LAG = 0.02  # s
@@ -149,9 +183,15 @@ def poles_of_hover(desired):
     """Poles of the closed loop in MuJoCo, linearized numerically about a level hover."""
     plant = make_plant(assemble(desired))
     model, data = plant.model, plant.data
-    speeds = hover_rotor_speeds(desired.gait.angles, desired.vehicle.resolve())
+    vehicle = desired.vehicle.resolve()
+    angles = desired.gait.plan(vehicle).angles(0.0).tolist()
+    if desired.vehicle.model == "multirotor":
+        signed = hover_speeds(vehicle, angles, (-np.inf, np.inf))
+    else:
+        signed = np.multiply(SPIN, hover_rotor_speeds((*angles,), vehicle))
     data.qpos[3:7], data.qvel[:] = (1.0, 0.0, 0.0, 0.0), 0.0
-    data.act[:] = np.tile(np.multiply(SPIN, speeds), 2)  # speeds, and their commands
+    rotors = len(signed)
+    data.act[:rotors] = data.act[-rotors:] = signed  # speeds, and their commands
     hover, n = np.concatenate([data.qvel, data.qvel, data.act]), model.nv
     pose = data.qpos.copy()
 
@@ -167,10 +207,7 @@ def poles_of_hover(desired):
 
 
 def gains_of_reaction(desired):
-    controller, vehicle = desired.controller, desired.vehicle
-    tilts, form = np.array([desired.gait.angles]), DECOUPLINGS[controller.decoupling]
-    gains = controller.resolve_gains()
-    return reaction_gains(tilts, gains, vehicle.resolve(), vehicle.rotor_inertia, form)[0]
+    return _reaction_gains(desired, desired.controller)[0]
 
 
 @pytest.mark.parametrize("form", [{}, EXACT], ids=["published", "exact"])
@@ -196,6 +233,23 @@ def test_it_moves_the_pole_of_the_lag(form, angles):
     desired = scenario(LAGGING, form, UNSTABLE, gait={"type": "fixed", "angles": angles})
     fastest = -(1.0 + gains_of_reaction(desired).max()) / LAG
     assert poles_of_hover(desired).real.min() == pytest.approx(fastest, rel=0.02)
+
+
+@pytest.mark.parametrize("norm", ["speed", "thrust"])
+def test_it_moves_the_pole_of_the_lag_of_six_rotors(norm):
+    """Canted, they push in all directions; a short lag leaves the law's own poles far behind."""
+    law, lag = {"law": "attitude_force", "dimension": 3, "norm": norm}, 5e-4
+    file = str(shipped_folder("mjcf") / "cant_hexarotor.xml")
+    desired = scenario(
+        {"simulation": {**LAGGING["simulation"], "timestep": 1e-4}, "controller": law},
+        {"vehicle": {"rotor_time_constant": lag, "rotor_inertia": 3e-3}},
+        {"vehicle": {"model": "multirotor", "mjcf": file}},
+        MEASURED,
+        UNSTABLE,
+    )
+    moved = -(1.0 + gains_of_reaction(desired).max()) / lag
+    assert moved < -30_000.0
+    assert poles_of_hover(desired).real.min() == pytest.approx(moved, rel=0.01)
 
 
 def test_at_some_tilts_it_is_unstable():

@@ -9,32 +9,20 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup
+from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, SupervisedLaw
 from tiltsim.engines.sample_evaluation import evaluate_over_samples
 from tiltsim.laws.layers.layer import Layer, Samples, wrap_loop
-from tiltsim.laws.tiltrotor import (
-    TILT_REFERENCE_COLUMNS,
-    reference_columns,
-    rotor_thrust_controls,
-    singularity_columns,
-    tiltrotor_state,
-)
+from tiltsim.laws.rotorcraft import thrust_controls_of
+from tiltsim.laws.tiltrotor import reference_columns
 from tiltsim.models.parts import ExtraActuators
-from tiltsim.scenario.tiltrotor_controllers import AttitudeAltitudeController
-from tiltsim.vehicles.rotorcraft.layout import QW, QX, QY, QZ
+from tiltsim.scenario.gait_following import GaitFollowingController
+from tiltsim.vehicles.rotorcraft.layout import QW, QX, QY, QZ, layout_of
+from tiltsim_controllers.gaits.any_tilts import tilt_motion_of
 from tiltsim_controllers.gaits.parameters import GaitParameters
-from tiltsim_controllers.gaits.tilts import planned_jets, tilt_reference
-from tiltsim_controllers.laws.supervisor import (
-    HOLD,
-    Supervisor,
-    gait_time,
-    supervised_derivative,
-    supervised_gait_scale,
-    supervised_tilts,
-)
+from tiltsim_controllers.laws.supervisor import HOLD, Supervisor, gait_time
 from tiltsim_controllers.mathematics.rotation import euler_from_quaternion
-from tiltsim_controllers.mathematics.scalar import Floats, Quad, Triple, Values, Vector, scalar
-from tiltsim_controllers.vehicle.parameters import drag_ratio
+from tiltsim_controllers.mathematics.scalar import Floats, Triple, Values, Vector, scalar
+from tiltsim_controllers.mathematics.vectors import componentwise, entries_of, vectors_of
 from tiltsim_controllers.vehicle.states import PITCH, ROLL
 
 if TYPE_CHECKING:
@@ -54,52 +42,40 @@ _STATE_UNITS: Final = {"hold": ("s", "1"), "return_to_red": ("1", "1/s")}
 
 def _read(plan: FlightPlan) -> Supervisor:
     controller = plan.scenario.controller
-    assert isinstance(controller, AttitudeAltitudeController)
-    return controller.resolve_supervisor(plan.scenario.rotorcraft.resolve())
+    assert isinstance(controller, GaitFollowingController)
+    return controller.resolve_supervisor(plan.scenario.any_rotorcraft.resolve())
 
 
-@scalar
-def supervised_servo_commands(
-    time: float,
-    motion: Triple,
-    gait: GaitParameters,
-    knots: Vector,
-    supervisor: Supervisor,
-    ratio: float,
-    lead: float,
-) -> Quad:
-    """Commands (rad) of the tilt servos under a supervisor with states.
-
-    Args:
-        time: s.
-        motion: The supervisor's state with its rate and acceleration.
-        gait, knots, supervisor: See `tiltsim_controllers.laws.supervisor.supervised_tilts`.
-        ratio: The vehicle's drag ratio.
-        lead: s, of the servos.
-    """
-    clock = gait_time(time, motion, supervisor)
-    planned = planned_jets(clock, gait, knots)
-    a1, a2, a3, a4 = supervised_tilts(planned, 1.0, motion, supervisor, ratio)
-    return (a1[0] + lead * a1[1], a2[0] + lead * a2[1], a3[0] + lead * a3[1], a4[0] + lead * a4[1])
-
-
-@scalar
-def _gait_scale(time: float, roll: float, pitch: float, parameters: Any, knots: Vector) -> float:
-    """`supervised_gait_scale` of the planned gait at an attitude (rad)."""
-    law = parameters.inner.law
-    planned = tilt_reference(time, law.gait, knots)
-    return supervised_gait_scale(planned, roll, pitch, parameters.layer, law.vehicle)
-
-
-@scalar
-def _scale(time: float, attitude: Vector, parameters: Any, knots: Vector) -> tuple[float]:
-    """`_gait_scale` of a sample."""
-    return (_gait_scale(time, attitude[0], attitude[1], parameters, knots),)
+def _supervised(loop: ClosedLoop) -> SupervisedLaw:
+    assert loop.supervised is not None  # other controllers have no supervisor in their tables
+    return loop.supervised
 
 
 def _scaling(loop: ClosedLoop) -> Layer:
     """A supervisor that scales the gait, without states."""
-    inner_controls = loop.sampling.controls
+    inner_controls, law = loop.sampling.controls, _supervised(loop)
+    layout = layout_of(loop.dynamics)
+    names, tilts = layout.names("alpha_ref"), layout.tilts
+    planned_of, gait_scale, vehicle_of = (
+        tilt_motion_of(tilts).planned,
+        law.code.gait_scale,
+        law.vehicle,
+    )
+    angles = componentwise("angles_of_jets", "jets", "jets#[0]", tilts)
+    commands_in, scaled = entries_of(0, tilts), vectors_of(tilts).scaled
+
+    @scalar
+    def scale_at(time: float, roll: float, pitch: float, parameters: Any, knots: Vector) -> float:
+        """The factor of the planned gait at an attitude (rad)."""
+        inner = parameters.inner
+        planned = angles(planned_of(time, inner.law.gait, knots))
+        scale: float = gait_scale(planned, roll, pitch, parameters.layer, vehicle_of(inner), knots)
+        return scale
+
+    @scalar
+    def scale_of(time: float, attitude: Vector, parameters: Any, knots: Vector) -> tuple[float]:
+        """The same of a sample."""
+        return (scale_at(time, attitude[0], attitude[1], parameters, knots),)
 
     @scalar
     def controls(
@@ -107,48 +83,74 @@ def _scaling(loop: ClosedLoop) -> Layer:
     ) -> Values:
         planned = inner_controls(time, qpos, qvel, act, parameters.inner, knots)
         roll, pitch, _yaw = euler_from_quaternion(qpos[QW], qpos[QX], qpos[QY], qpos[QZ])
-        scale = _gait_scale(time, roll, pitch, parameters, knots)
-        return (
-            scale * planned[0],
-            scale * planned[1],
-            scale * planned[2],
-            scale * planned[3],
-            *planned[4:],
-        )
+        scale = scale_at(time, roll, pitch, parameters, knots)
+        return (*scaled(scale, commands_in(planned)), *planned[tilts:])
 
     def derive(
         inner: Callable[[], dict[str, Floats]], samples: Samples, setup: ControlSetup
     ) -> dict[str, Floats]:
         columns, attitude = inner(), np.stack([samples["roll"], samples["pitch"]], axis=-1)
-        (scale,) = evaluate_over_samples(_scale, 1, samples["time"], attitude, setup).T
-        scaled = {name: scale * columns[name] for name in TILT_REFERENCE_COLUMNS}
-        return {**columns, **scaled, SUPERVISION: 1.0 - scale}
+        (scale,) = evaluate_over_samples(scale_of, 1, samples["time"], attitude, setup).T
+        scaled_tilts = {name: scale * columns[name] for name in names}
+        return {**columns, **scaled_tilts, SUPERVISION: 1.0 - scale}
 
     return Layer(
         "scaling", Supervisor, _read, controls=controls, derive=derive, units={SUPERVISION: "1"}
     )
 
 
+def _servo_commands_of(law: SupervisedLaw, tilts: int) -> Callable[..., Values]:
+    """Scalar code of the commands (rad) of the tilt servos under a supervisor with states.
+
+    It is ``(time, motion, gait, knots, supervisor, vehicle, lead)``: s, and the supervisor's state
+    with its rate and acceleration; ``lead`` in s, of the servos.
+    """
+    planned_of, supervised_tilts = tilt_motion_of(tilts).planned, law.code.tilts
+    ahead = componentwise("servo_commands", "jets, lead", "jets#[0] + lead * jets#[1]", tilts)
+
+    @scalar
+    def servo_commands(
+        time: float,
+        motion: Triple,
+        gait: GaitParameters,
+        knots: Vector,
+        supervisor: Supervisor,
+        vehicle: Any,
+        lead: float,
+    ) -> Values:
+        clock = gait_time(time, motion, supervisor)
+        planned = planned_of(clock, gait, knots)
+        commands: Values = ahead(supervised_tilts(planned, 1.0, motion, supervisor, vehicle), lead)
+        return commands
+
+    return servo_commands
+
+
 def _with_states(loop: ClosedLoop, units: tuple[str, ...]) -> Layer:
     """A supervisor that holds the gait or returns to red; its two states have these units."""
-    assert loop.supervised is not None  # other controllers have no supervisor in their tables
-    law_controls, references, fields = loop.supervised
-    first, seen = loop.dynamics.sizes.act, len(fields)
+    law, layout = _supervised(loop), layout_of(loop.dynamics)
+    law_controls, references, vehicle_of, state_of = (
+        law.controls,
+        law.references,
+        law.vehicle,
+        law.state,
+    )
+    derivative, servo_commands = law.code.derivative, _servo_commands_of(law, layout.tilts)
+    thrusts = thrust_controls_of(loop.dynamics.spins)
+    first, seen = loop.dynamics.sizes.act, len(law.fields)
 
     @scalar
     def controls(
         time: float, qpos: Vector, qvel: Vector, act: Vector, parameters: Any, knots: Vector
     ) -> Values:
         inner, supervisor = parameters.inner, parameters.layer
-        state = tiltrotor_state(qpos, qvel, act)
-        gait, lead, ratio = inner.law.gait, inner.servo_lead, drag_ratio(inner.law.vehicle)
+        state = state_of(qpos, qvel, act)
+        gait, lead, vehicle = inner.law.gait, inner.servo_lead, vehicle_of(inner)
         roll, pitch, delay, rate = state[ROLL], state[PITCH], act[first], act[first + 1]
-        motion = supervised_derivative(
-            time, roll, pitch, delay, rate, gait, knots, supervisor, ratio
-        )
+        motion = derivative(time, roll, pitch, delay, rate, gait, knots, supervisor, vehicle)
         return (
-            *supervised_servo_commands(time, motion, gait, knots, supervisor, ratio, lead),
-            *rotor_thrust_controls(act),
+            *servo_commands(time, motion, gait, knots, supervisor, vehicle, lead),
+            *thrusts(act),
             *law_controls(time, state, qvel, act, motion, inner, knots),
             motion[1],
             motion[2],
@@ -158,21 +160,21 @@ def _with_states(loop: ClosedLoop, units: tuple[str, ...]) -> Layer:
     def reference_values(time: float, state: Vector, parameters: Any, knots: Vector) -> Values:
         inner, supervisor = parameters.inner, parameters.layer
         motion = (state[seen], state[seen + 1], 0.0)
-        gait, ratio = inner.law.gait, drag_ratio(inner.law.vehicle)
+        gait, vehicle = inner.law.gait, vehicle_of(inner)
         return (
             *references(time, state, motion, inner, knots),
-            *supervised_servo_commands(time, motion, gait, knots, supervisor, ratio, 0.0),
+            *servo_commands(time, motion, gait, knots, supervisor, vehicle, 0.0),
         )
 
     def derive(
         _inner: Callable[[], dict[str, Floats]], samples: Samples, setup: ControlSetup
     ) -> dict[str, Floats]:
-        layer, inner = setup.parameters.layer, setup.parameters.inner
+        layer = setup.parameters.layer
         state, rate = SUPERVISOR_FIELDS
-        names = (*fields, *SUPERVISOR_FIELDS)
+        fields, names = (*law.fields, *SUPERVISOR_FIELDS), (*law.names, *layout.names("alpha_ref"))
         return {
-            **reference_columns(reference_values, names, samples, setup),
-            **singularity_columns(samples, inner.law.vehicle),
+            **reference_columns(reference_values, fields, samples, setup, names),
+            **law.margins(samples, setup._replace(parameters=setup.parameters.inner)),
             SUPERVISION: samples[rate if layer.strategy == HOLD else state],
         }
 

@@ -22,12 +22,12 @@ from tiltsim.closed_loop.limits import (
     horizontal_error,
 )
 from tiltsim.closed_loop.vehicle_kind import VehicleKind
+from tiltsim.models.hover import hover_speeds
 from tiltsim.models.parts import RotorLimits
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.multirotor_controllers import AttitudeForceController
 from tiltsim.scenario.vehicle import VehicleTable
 from tiltsim.system.quantity import Quantity, subscript
-from tiltsim.vehicles.rotorcraft.hover import hover_speeds
 from tiltsim.vehicles.rotorcraft.layout import CROSS, Layout
 from tiltsim.vehicles.rotorcraft.metrics import rotorcraft_metrics
 from tiltsim_controllers.mathematics.rotation import quaternion_from_euler

@@ -12,6 +12,7 @@ from tiltsim_controllers.vehicle.rotor_code import (
     TILTING_CROSS,
     UPRIGHT_CROSS,
     RotorCode,
+    RotorlessBody,
     rotor_code_of,
     rotors_of,
 )
@@ -19,6 +20,7 @@ from tiltsim_controllers.vehicle.rotor_code import (
 if TYPE_CHECKING:
     from tiltsim.closed_loop.loop import Dynamics
     from tiltsim.scenario.scenario import Scenario
+    from tiltsim_controllers.mathematics.scalar import Values
 
 CROSSES: Final = {"tiltrotor": TILTING_CROSS, "quadrotor": UPRIGHT_CROSS}
 """Those of vehicles whose rotors lie on a cross, by the model's name."""
@@ -38,3 +40,18 @@ def true_rotors(scenario: Scenario) -> Any:
         return vehicle
     body = body_of(vehicle.mass, np.reshape(vehicle.inertia, (3, 3)), vehicle.gravity)
     return rotors_of(body, vehicle.rotors)
+
+
+def body_less(scenario: Scenario, inertias: Values) -> Any:
+    """The simulated vehicle's `RotorCode.body` without inertias (kg m^2) about its hinges."""
+    vehicle = scenario.true_vehicle
+    if isinstance(vehicle, Multirotor):
+        inertia = np.reshape(vehicle.inertia, (3, 3)).copy()
+        for tilt, own in enumerate(inertias):
+            axis = next(rotor.hinge_axis for rotor in vehicle.rotors if rotor.tilt == tilt)
+            inertia -= own * np.outer(axis, axis)
+        return RotorlessBody(body_of(vehicle.mass, inertia, vehicle.gravity))
+    about_x, about_y = (2.0 * own for own in inertias[:2])  # two hinges lie along each
+    return vehicle._replace(
+        inertia_xx=vehicle.inertia_xx - about_x, inertia_yy=vehicle.inertia_yy - about_y
+    )

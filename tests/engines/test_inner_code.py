@@ -1,0 +1,57 @@
+"""Machine code is generated for the outermost function only, compiled or loaded."""
+
+from __future__ import annotations
+
+import importlib.util
+
+import pytest
+from numba.core.codegen import JITCodeLibrary
+
+from tiltsim.engines.compiling import callable_natively, compiled
+
+SOURCE = """
+def squared(x):
+    return x * x
+
+def norm(x, y):
+    return squared(x) + squared(y)
+
+def outermost(x, y):
+    return norm(x, y)
+"""
+
+
+@pytest.fixture
+def generated(monkeypatch):
+    """Names of our functions that get machine code."""
+    names, generate = [], JITCodeLibrary._finalize_final_module
+
+    def noted(library):
+        if f"def {library.name}(" in SOURCE:  # numba compiles a library of its own once a process
+            names.append(library.name)
+        generate(library)
+
+    monkeypatch.setattr(JITCodeLibrary, "_finalize_final_module", noted)
+    return names
+
+
+def functions_of(file):
+    """Another outermost function whenever the file is loaded."""
+    spec = importlib.util.spec_from_file_location(file.stem, file)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    callable_natively(module.squared)
+    callable_natively(module.norm)
+    return compiled(module.outermost)
+
+
+def test_inner_functions_have_none(tmp_path, monkeypatch, generated):
+    monkeypatch.setattr("tiltsim.engines.compiling.native_code_folder", lambda: tmp_path)
+    file = tmp_path / "source.py"
+    file.write_text(SOURCE)
+    assert functions_of(file)(3.0, 4.0) == 25.0
+    assert generated == ["outermost"]
+    for stored in tmp_path.rglob("source.outermost*.nbc"):
+        stored.unlink()
+    assert functions_of(file)(3.0, 4.0) == 25.0, "of inner functions loaded from the cache"
+    assert generated == ["outermost"] * 2
