@@ -54,6 +54,7 @@ NOT_RUN = {
     "check": "a step of .ci/run flies the library",
     "report": "takes minutes; tests/report makes one",
     "bench": "a step of .ci/run",
+    "arena": "takes minutes; tests/studies/test_arena.py scores given flights",
     "compare": "takes minutes; tests/studies/test_comparison.py makes short ones",
 }
 """Commands that are parsed but not run, and why."""
