@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 import tiltsim
+from tests.arrays.recorded_calls import MULTIROTORS
+from tests.laws.test_baselines import BASELINES
 from tests.laws.test_laws import LAWS
 from tiltsim.arrays.flying import double_precision
 from tiltsim.arrays.values import LiftError
@@ -91,6 +93,14 @@ def test_a_plan_that_cannot_be_lifted_hides_no_parameter(monkeypatch):
         tiltsim.vectorized(tiltsim.parse_scenario({**LAWS["attitude_altitude"], **THESIS}))
 
 
+@pytest.mark.parametrize("name", ["tilting hexarotor", "lqr"])
+def test_numbers_that_numpy_plans_with_are_fixed_and_the_others_vary(name):
+    tables = BASELINES["lqr"] if name == "lqr" else MULTIROTORS["tilting"]
+    parameters = tiltsim.vectorized(tiltsim.parse_scenario({**tables, **THESIS})).parameters
+    assert {"initial", "reference"} <= set(parameters)
+    assert not {"vehicle", "gait"} & set(parameters)  # gains, and the directions of the forces
+
+
 def test_a_gait_has_derivatives_by_its_scale_and_bias_where_they_are_one():
     tables = {"gait": {"type": "trot_continuous", "amplitude": 0.4, "period": 1.0}}
     flown = tiltsim.vectorized(tiltsim.parse_scenario({**tables, **THESIS}))
@@ -98,7 +108,7 @@ def test_a_gait_has_derivatives_by_its_scale_and_bias_where_they_are_one():
     def alpha_3(gait):
         return flown.observe(flown.initial({"gait": gait}), {"gait": gait})["alpha_3"]
 
-    slopes = jax.jacfwd(alpha_3)({"scale": 1.0, "bias": 1.0})
+    slopes = jax.jit(jax.jacfwd(alpha_3))({"scale": 1.0, "bias": 1.0})
     assert slopes == {"scale": pytest.approx(0.4), "bias": pytest.approx(0.4)}
 
 

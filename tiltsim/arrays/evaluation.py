@@ -104,6 +104,8 @@ class Frame(Expressions):
                 )
             case ast.Raise() if self.lifting.planning:
                 return {}
+            case ast.Try(finalbody=[]) if self.lifting.planning:  # to name an error by its key
+                return self.block([*node.body, *node.orelse], variables)
             case ast.Expr(value=ast.Call()) if self.lifting.planning:  # appends to a list
                 self.value(node.value, variables)
             case ast.Break():

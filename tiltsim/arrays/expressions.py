@@ -11,6 +11,8 @@ from pathlib import Path
 from types import FunctionType
 from typing import Any, Final
 
+import numpy as np
+
 from tiltsim.arrays.values import Function, LiftError, PlainNumberError
 
 DATA_LENGTH: Final = "the length of a loop depends on arrays"
@@ -19,6 +21,7 @@ BINARY: Final[dict[type[ast.operator], Function]] = {
     ast.Add: operator.add,
     ast.Sub: operator.sub,
     ast.Mult: operator.mul,
+    ast.MatMult: operator.matmul,
     ast.Div: operator.truediv,
     ast.FloorDiv: operator.floordiv,
     ast.Mod: operator.mod,
@@ -161,7 +164,8 @@ class Expressions:
             case ast.DictComp(key=key, value=value):
                 rounds = self.items(node.generators, variables)
                 return {self.value(key, inner): self.value(value, inner) for inner in rounds}
-        raise self.error(f"{type(node).__name__} has no form on arrays")
+        kind = PlainNumberError if isinstance(node, ast.Slice) else LiftError  # NumPy's [:, 1:]
+        raise self.error(f"{type(node).__name__} has no form on arrays", kind)
 
     def items(
         self, loops: list[ast.comprehension], variables: dict[str, Any]
@@ -296,7 +300,8 @@ class Expressions:
             case ast.Subscript(value=vector, slice=place):
                 into = self.value(vector, variables)
                 if not isinstance(into, list) or isinstance(into, Borrowed):
-                    raise self.error(f"changes {ast.unparse(vector)}, which it did not make")
+                    kind = PlainNumberError if isinstance(into, np.ndarray) else LiftError
+                    raise self.error(f"changes {ast.unparse(vector)}, which it did not make", kind)
                 into[self.plain(place, variables, "writes to an index that is an array")] = value
             case _:
                 raise self.error(f"assignment to {ast.unparse(target)}")
