@@ -144,7 +144,7 @@ def check_tiltsim(arguments):
         assert collect(parsed.paths or [str(ROOT / "scenarios")], parsed.word)
     elif arguments[0] == "sweep":
         find_scenario_file(parsed.sweep)
-    elif "--controller" in arguments:
+    elif "--controller" in arguments and hasattr(parsed, "scenario"):
         find_scenario_file(parsed.scenario.partition("#")[0])
     elif getattr(parsed, "scenario", None) and not parsed.scenario.endswith(".toml"):
         tiltsim.load_scenario(parsed.scenario, overrides)
