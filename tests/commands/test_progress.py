@@ -78,10 +78,18 @@ def test_a_total_may_change(monkeypatch, capsys):
 
 
 def test_the_clock_moves_while_nothing_is_finished(monkeypatch):
+    ticks, tick = Semaphore(0), progress._Bars.tick
+
+    def counted(bars):
+        tick(bars)
+        if bars._bar is not None:
+            ticks.release()
+
+    monkeypatch.setattr(progress._Bars, "tick", counted)
     monkeypatch.setattr(progress.Progress, "interval", 0.02)
     with terminal_as_stderr(monkeypatch) as shown, show_progress(shown=True) as moving:
         moving.begin("flights", 5)
-        time.sleep(1.0)
+        assert all(ticks.acquire(timeout=60.0) for _ in range(6))
     assert shown.text.count("| 0/5 [") > 5
 
 

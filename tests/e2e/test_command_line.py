@@ -389,7 +389,7 @@ def test_interrupt_ends_a_whole_check_at_once_and_keeps_what_is_finished(
     compile_control(TILTROTOR)  # so that the interrupt falls into the flights
     (tmp_path / "a.toml").write_text("[simulation]\nduration = 0.01\n")
     for name in ("b", "c"):
-        endless = "[simulation]\nduration = 2000.0\nrecord_timestep = 1.0\n"
+        endless = "[simulation]\nduration = 20000.0\nrecord_timestep = 10.0\n"
         (tmp_path / f"{name}.toml").write_text(endless)
     # Of two processes one has the longest flight, the other what comes before it.
     paths = [tmp_path / f"{name}.toml" for name in ("abc" if jobs == "1" else "ab")]
