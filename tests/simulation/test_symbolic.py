@@ -10,10 +10,12 @@ import numpy as np
 import pytest
 
 import tiltsim
+from tests.arrays.recorded_calls import MULTIROTORS
 from tests.laws.test_laws import LAWS
 from tests.simulation.test_batch import EXACT, GAITS
 from tiltsim.errors import InputError, TiltsimError
 from tiltsim.laws.assembling import assemble
+from tiltsim.scenario.loading import merge
 from tiltsim_controllers.vehicle.parameters import PRESETS
 
 casadi = pytest.importorskip("casadi")
@@ -23,12 +25,13 @@ LOOPS = LAWS | {
     f"gait {name}": {"gait": {"type": name, **table}, "controller": EXACT}
     for name, table in GAITS.items()
 }
+LOOPS["multirotor"] = MULTIROTORS["tilting"]
 LOOPS["rigid body"] = {**LAWS["attitude_altitude"], "simulation": {"plant": "rigid_body"}}
 
 
 @pytest.mark.parametrize("name", LOOPS)
 def test_closed_loops_are_those_of_python(name):
-    scenario = tiltsim.parse_scenario({**THESIS, **LOOPS[name]})
+    scenario = tiltsim.parse_scenario(merge(THESIS, LOOPS[name]))
     model, assembly = tiltsim.symbolic(scenario), assemble(scenario)
     equations, (parameters, knots) = assembly.loop.equations, assembly.setup
     state = np.array(model.initial) + 0.01
