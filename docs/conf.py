@@ -42,7 +42,7 @@ myst_fence_as_directive = ["math"]
 nb_execution_mode = "cache"  # until the notebook changes, or build is removed
 nb_execution_raise_on_error = True
 nb_execution_in_temp = True
-nb_execution_timeout = 60  # s, a cell
+nb_execution_timeout = 180  # s, a cell; one compiles a gradient
 
 add_module_names = False
 autodoc_member_order = "bysource"
