@@ -12,7 +12,7 @@ from tests.laws.layers.test_actuation import EVERYTHING
 from tests.laws.layers.test_air import STORM
 from tests.laws.test_baselines import BASELINES
 from tests.laws.test_laws import GUST, LAWS
-from tests.laws.test_multirotor import CLIMB, PRIORITIZED, TILTS, WEAK, document
+from tests.laws.test_multirotor import ASIDE, CLIMB, HELD, PRIORITIZED, TILTS, WEAK, document
 from tests.simulation.test_batch import CAR, CAR_GAITS, EXACT, GAITS
 from tiltsim.scenario.loading import merge
 from tiltsim_controllers.mathematics.scalar import scalar_functions
@@ -27,6 +27,7 @@ SUPERVISED = {
 }
 HEAVY = {"rotor_time_constant": 0.02, "rotor_inertia": 1e-5}
 MEASURED = {"angular_acceleration": "measured"}
+MODEL = {"angular_acceleration": "model"}
 LAYERED = {
     "yaw_position in air": {**LAWS["yaw_position"], "air": STORM},
     "full_pose in air": {**LAWS["full_pose"], "air": STORM},
@@ -62,6 +63,7 @@ MULTIROTORS = {
         "hexarotor", controller={"law": "attitude_force", "attitude_error": "euler_angles"}
     ),
     "tilting": document("tilt_hexarotor", gait=TILTS),
+    "supervised": document("tilt_hexarotor", gait=ASIDE, controller={**HELD, **MODEL}),
     "within limits": document("hexarotor", WEAK, controller=PRIORITIZED, **CLIMB),
     "by thrust": document("cant_hexarotor", controller={"law": "attitude_force", "norm": "thrust"}),
     "heavy rotors": merge(document("tilt_hexarotor", gait=TILTS), {"vehicle": HEAVY}),

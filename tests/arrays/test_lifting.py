@@ -162,6 +162,8 @@ NEVER_CALLED = {
     *("normal_of_rows", "_fixed_jet", "_rounded", "_table_jet"),
     "torque_for",  # of the example package
     *("_no_hinges", "_upright_turning"),  # of the quadrotor in MuJoCo under a user's function
+    "_no_pods",  # of the quadrotor, of which nothing is measured
+    *("_as_planned", "_standing"),  # of multirotors, which have no way back to red
 }
 """Functions of modules that none of these flights calls."""
 

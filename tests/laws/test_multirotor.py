@@ -206,13 +206,22 @@ EVERYTHING = {
 }
 
 
+PUSH = (0.4 * np.sin(np.pi / 6.0 + np.pi / 3.0 * np.arange(6))).tolist()
+ASIDE = {"type": "waypoints", "angles": [[0.0] * 6, PUSH], "period": 1.0}
+HELD = {
+    **{"law": "attitude_force", "dimension": 1, "angular_acceleration": "measured"},
+    "supervisor": {"strategy": "hold", "min_margin": 1.5},
+}
+"""It pushes aside, which a level vehicle holds until it leans."""
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "tables"),
     [
         ("hexarotor", BEYOND_THE_SIDE),
         ("hexarotor", {"vehicle": WEAK, "controller": PRIORITIZED, **CLIMB}),
-        ("tilt_hexarotor", {"gait": TILTS}),
+        ("tilt_hexarotor", {"controller": HELD, "gait": ASIDE}),
         ("tilt_hexarotor", {"vehicle": HEAVY, "gait": TILTS, "simulation": {"plant": "thesis"}}),
         ("tilt_hexarotor", EVERYTHING),
         ("tilt_hexarotor", {"controller": {"law": "full_pose", "failed_rotor": 2}}),
