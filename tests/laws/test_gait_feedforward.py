@@ -7,7 +7,7 @@ import pytest
 
 import tiltsim
 from tiltsim.errors import InputError
-from tiltsim.scenario.tiltrotor_controllers import FeedforwardTerm
+from tiltsim.scenario.gait_following import FeedforwardTerm
 from tiltsim_controllers.laws.gait_feedforward import FeedforwardTerms
 
 SCENARIO = "beyond/gait_feedforward#t2"
