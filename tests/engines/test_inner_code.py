@@ -36,8 +36,8 @@ def generated(monkeypatch):
 
 
 def functions_of(file):
-    """Another outermost function whenever the file is loaded."""
-    spec = importlib.util.spec_from_file_location(file.stem, file)
+    """Another outermost function whenever the file is loaded, as a module of ours."""
+    spec = importlib.util.spec_from_file_location(f"tiltsim.{file.stem}", file)
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     callable_natively(module.squared)
@@ -55,3 +55,22 @@ def test_inner_functions_have_none(tmp_path, monkeypatch, generated):
         stored.unlink()
     assert functions_of(file)(3.0, 4.0) == 25.0, "of inner functions loaded from the cache"
     assert generated == ["outermost"] * 2
+
+
+def test_a_users_function_is_compiled_with_what_it_calls_as_that_is_now(tmp_path, monkeypatch):
+    monkeypatch.setattr("tiltsim.engines.compiling.native_code_folder", lambda: tmp_path)
+    gain, law = tmp_path / "gain.py", tmp_path / "law.py"
+    law.write_text("def law(x):\n    return gain(x)")
+
+    def loaded(file, **called):
+        spec = importlib.util.spec_from_file_location(file.stem, file)
+        module = importlib.util.module_from_spec(spec)
+        vars(module).update(called)
+        spec.loader.exec_module(module)
+        return callable_natively(getattr(module, file.stem))
+
+    for value in (2.0, 5.0):
+        gain.write_text(f"def gain(x):\n    return {value} * x")
+        known = {"law": loaded(law, gain=loaded(gain))}
+        exec("def flown(x):\n    return law(x)", known)
+        assert compiled(known["flown"])(3.0) == 3.0 * value

@@ -10,7 +10,7 @@ from contextlib import suppress
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import tiltsim_controllers
 from tiltsim.folders import FLYING
@@ -21,6 +21,11 @@ def core_sources() -> list[Path]:
     package = Path(__file__).parents[1]
     own = [file for name in FLYING for file in (package / name).rglob("*.py")]
     return sorted([*Path(tiltsim_controllers.__file__).parent.rglob("*.py"), *own])
+
+
+def is_core_code(function: Callable[..., Any]) -> bool:
+    """Whether a function is of the packages that name the `native_code_folder` by their sources."""
+    return function.__module__.startswith(("tiltsim.", "tiltsim_controllers."))
 
 
 @cache

@@ -23,7 +23,12 @@ from numba.core.caching import (
 from numba.core.ccallback import CFunc
 from numba.core.typing.templates import infer, infer_global, make_overload_template
 
-from tiltsim.engines.cache import failed_saves, native_code_folder, native_code_is_cacheable
+from tiltsim.engines.cache import (
+    failed_saves,
+    is_core_code,
+    native_code_folder,
+    native_code_is_cacheable,
+)
 from tiltsim.engines.inner_code import InnerCompiler, loaded_inner_code
 from tiltsim.system.locks import locked, one_thread_at_a_time
 from tiltsim_controllers.mathematics.scalar import scalar_functions
@@ -147,7 +152,8 @@ def callable_natively(function: Callable[..., Any]) -> Callable[..., Any]:
     """Let compiled code call a Python function, as `numba.extending.register_jitable` does.
 
     Its code is cached separately, since controllers share most of their functions; but not that of
-    a closure, which has no name of its own.
+    a closure, which has no name of its own, nor that of a user's function, which holds the code of
+    what it calls in files that may have changed since.
     """
 
     def implementation(*_args: Any, **_keywords: Any) -> Callable[..., Any]:
@@ -170,7 +176,7 @@ def _decorator_of_inner(**options: Any) -> Callable[[Callable[..., Any]], Any]:
             # Made for few callers, with long tuples: to pass those costs as much as to use them.
             return njit(forceinline=True, pipeline_class=InnerCompiler, **options)(function)
         inner = njit(pipeline_class=InnerCompiler, **options)(function)
-        return _cached(inner, function, _InnerCodeCache)
+        return _cached(inner, function, _InnerCodeCache) if is_core_code(function) else inner
 
     return decorate
 

@@ -13,9 +13,10 @@ from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
+from tiltsim.engines.cache import is_core_code
 from tiltsim.errors import InputError
 from tiltsim.laws.airframe import airframe_of
-from tiltsim.laws.multirotor import layout_of_vehicle
+from tiltsim.laws.multirotor_layout import layout_of_vehicle
 from tiltsim.laws.scalar_loop import scalar_loop
 from tiltsim.laws.scalar_parameters import Key
 from tiltsim.scenario.controller import ScalarFunctionController
@@ -45,7 +46,7 @@ def foreign_code(law: Callable[..., Any]) -> str:
 
 def _collect(function: Callable[..., Any], found: dict[str, bytes]) -> None:
     """Add the code of a function and of those that it calls, by file or by name without one."""
-    if function.__module__.startswith(("tiltsim.", "tiltsim_controllers.")):
+    if is_core_code(function):
         return
     code = function.__code__
     name, file = f"{code.co_filename}:{code.co_qualname}", Path(code.co_filename)
