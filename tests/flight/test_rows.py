@@ -8,7 +8,7 @@ import pytest
 from tests.laws.test_laws import LAWS
 from tiltsim.flight.end import End
 from tiltsim.flight.flight import Flight
-from tiltsim.flight.metrics import metrics_of_rows
+from tiltsim.flight.metrics import Metrics, metrics_of_rows
 from tiltsim.laws.assembling import assemble
 from tiltsim.scenario.loading import load_scenario
 from tiltsim_controllers.mathematics.records import flatten
@@ -66,3 +66,14 @@ def test_rows_that_differ_in_more_than_numbers_have_no_metrics_together():
     ]
     samples = np.zeros((2, len(TIMES), len(assemblies[0].loop.sample_fields)))
     assert metrics_of_rows(assemblies, np.empty((2, 0)), samples, END, 1.0) is None
+
+
+def test_squares_may_overflow_in_metrics_of_rows_as_in_those_of_one_flight():
+    def shared():
+        return Metrics({"max_abs_roll": np.square(np.array([1e200]))[0]})
+
+    assembly = assemble(load_scenario({}))
+    samples = np.zeros((2, len(assembly.loop.sample_fields)))
+    flight = Flight(assembly, samples, END, "jax", 1.0, shared_metrics=shared)
+    with np.errstate(over="raise"):
+        assert flight.metrics() == {"max_abs_roll": np.inf}

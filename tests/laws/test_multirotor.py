@@ -9,9 +9,12 @@ import pytest
 
 import tiltsim
 from tiltsim.errors import InputError
+from tiltsim.laws.multirotor import multirotor_loop
+from tiltsim.laws.multirotor_layout import Layout
 from tiltsim.models.hover import hover_speeds
 from tiltsim.resources import shipped_folder
 from tiltsim_controllers.analysis.torque_free import torque_free_forces
+from tiltsim_controllers.laws.multirotor_steps import Form
 from tiltsim_controllers.vehicle.effectiveness import force_and_torque
 
 TILTS = {"type": "waypoints", "angles": [[0.2, -0.2] * 3, [0.3, -0.3] * 3], "period": 2.0}
@@ -237,6 +240,15 @@ def test_engines_fly_the_same_bit_for_bit(name, tables):
     assert flown[0].end == flown[1].end
     for column, values in flown[0].columns.items():
         np.testing.assert_array_equal(values, flown[1][column], err_msg=column)
+
+
+def test_compiled_code_has_the_same_name_beside_a_loop_that_measures():
+    layout, form = Layout((0, 1, 0, 1), (1.0, -1.0, 1.0, -1.0)), Form(1)
+    loop = multirotor_loop.__wrapped__(layout, form)
+    names = [loop.native_name(plant) for plant in ("mujoco", "thesis")]
+    measuring = multirotor_loop.__wrapped__(layout, form, measured=True)
+    assert [loop.native_name(plant) for plant in ("mujoco", "thesis")] == names
+    assert measuring.native_name("mujoco") not in names
 
 
 @pytest.mark.parametrize(

@@ -140,11 +140,11 @@ class Flight:
 
     @cached_property
     def _metrics(self) -> Metrics:
-        known = self.shared_metrics()
-        if known is not None:
-            return known
         with _overflow_ignored():
-            return compute_metrics(self.columns, self.assembly, self.end, self.wall_time)
+            known = self.shared_metrics()
+            if known is None:
+                known = compute_metrics(self.columns, self.assembly, self.end, self.wall_time)
+            return known
 
     def metrics(self) -> Metrics:
         """The metrics of the flight by name; see `tiltsim.scenario.metric_names.METRICS`."""

@@ -18,7 +18,7 @@ from tiltsim.closed_loop.loop import (
     Sampling,
 )
 from tiltsim.equations.tiltrotor import body_fields, initial_state
-from tiltsim.laws.multirotor import Layout, layout_of_vehicle
+from tiltsim.laws.multirotor_layout import Layout, layout_of_vehicle
 from tiltsim.laws.quadrotor import constant_attitude_references
 from tiltsim.laws.rotorcraft import (
     body_state,

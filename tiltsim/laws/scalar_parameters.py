@@ -6,7 +6,7 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any, NamedTuple
 
-from tiltsim.laws.multirotor import Layout
+from tiltsim.laws.multirotor_layout import Layout
 from tiltsim_controllers.gaits.parameters import GaitParameters
 from tiltsim_controllers.mathematics.records import make_record_type
 from tiltsim_controllers.mathematics.scalar import Values
