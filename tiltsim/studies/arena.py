@@ -221,7 +221,7 @@ def _scores(standing: Standing, gains: str) -> Mapping[str, float | None]:
 
 
 def beaten(every: Sequence[Standing], gains: str) -> list[str]:
-    """Of each task in which a baseline stands before all of the thesis's laws and ours, who wins.
+    """Of each task in which a baseline stands before all other controllers, who wins.
 
     Args:
         every: The controllers of a vehicle.

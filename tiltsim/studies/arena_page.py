@@ -33,7 +33,7 @@ def _who_wins(every: Mapping[str, Sequence[Standing]], tuned: bool) -> Iterator[
         found = {vehicle: beaten(ranked, gains) for vehicle, ranked in every.items()}
         tasks = sum(len(ranked[0].scores) for ranked in every.values() if ranked)
         yield (
-            f"With {gains} gains a baseline beats the thesis's laws and ours, the best of them, in "
+            f"With {gains} gains a baseline beats all other controllers that flew in "
             f"{sum(map(len, found.values()))} of {tasks} tasks:"
         )
         yield ""
