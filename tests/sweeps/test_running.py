@@ -23,7 +23,7 @@ from tiltsim.scenario.metric_names import METRICS, Metric
 from tiltsim.simulation import batch
 from tiltsim.simulation.simulate import simulate
 from tiltsim.sweeps import chunks, running
-from tiltsim.sweeps.chunks import ChunkWork
+from tiltsim.sweeps.chunks import ChunkWork, fly_points
 from tiltsim.sweeps.dataset import load_results
 from tiltsim.sweeps.folder import open_sweep_folder
 from tiltsim.sweeps.loading import load_sweep
@@ -170,10 +170,33 @@ def test_a_sweep_whose_flights_all_crash_stops_after_the_first_few(tmp_path, mon
 
     monkeypatch.setattr(batch, "simulate_assembly", simulate)
     file = short_sweep(tmp_path / "sweep.toml", count=16, chunk_size=chunk)
-    with pytest.raises(InputError, match=r"flights, tried all over .* TypeError: no such luck$"):
+    found = r"every flight tried, from all over the sweep, crashed with TypeError: no such luck$"
+    with pytest.raises(InputError, match=found):
         run_sweep(load_sweep(file), tmp_path / "out")
     assert len(tried) < 8
     assert not parts_in(tmp_path / "out")
+
+
+def test_code_that_is_not_trusted_is_not_tried_either(tmp_path, monkeypatch):
+    code = tmp_path / "own.py"
+    code.write_text("def law(observation): ...")
+    laws = {"ours": {}, "own": {"controller": {"law": "python", "function": f"{code}:law"}}}
+    axes = [
+        {"type": "cases", "key": "law", "cases": laws},
+        {"type": "list", "key": "initial.attitude[0]", "values": [0.0, 0.1, 0.2]},
+    ]
+    simulation = {"duration": 0.01, "engine": "python"}
+    points = SweepPoints(load_sweep({"scenario": {"simulation": simulation}, "axis": axes}))
+    tried = []
+
+    def simulate(assembly):
+        tried.append(assembly.scenario.controller.law)
+        raise TypeError("no such luck")
+
+    monkeypatch.setattr(batch, "simulate_assembly", simulate)
+    with pytest.raises(InputError, match="every flight tried"):
+        fly_points(points, range(3), None)
+    assert "python" not in tried
 
 
 def test_points_without_a_valid_scenario_become_rows(tmp_path):

@@ -107,18 +107,22 @@ def _fly_values(
     flown = fly_scenarios(
         list(scenarios.values()),
         keep_flights=points.sweep.keep_flights,
-        others=lambda: _valid(points, points.spread(FEW)),
+        others=lambda: _valid(points, points.spread(FEW), trusted),
     )
     for position, result in zip(scenarios, flown, strict=True):
         results[position] = replace(result, scenario=asked[position])
     return [results[position] for position in range(len(batch))]
 
 
-def _valid(points: SweepPoints, several: Iterable[dict[str, Any]]) -> Iterator[Scenario]:
-    """The scenarios of points that have one."""
+def _valid(
+    points: SweepPoints, several: Iterable[dict[str, Any]], trusted: bool
+) -> Iterator[Scenario]:
+    """The scenarios of points that have one, without code that is not trusted."""
     for values in several:
         with suppress(InputError):
-            yield points.scenario(values)
+            scenario = points.scenario(values)
+            require_trust(scenario, trusted)
+            yield scenario
 
 
 Search = Generator[dict[str, Any], ScenarioResult, tuple[Row, ScenarioResult]]

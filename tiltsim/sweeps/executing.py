@@ -57,8 +57,7 @@ def fly_scenarios(
             tried = [*first, *(_fly_alone(scenario, False) for scenario in others())]
             if len(tried) > len(first) and _have_one_crash(tried):
                 raise InputError(
-                    f"all of {len(tried)} flights, tried all over the sweep, crashed with "
-                    f"{crash.cause}"
+                    f"every flight tried, from all over the sweep, crashed with {crash.cause}"
                 ) from None
         return [*first, *(_fly_alone(scenario, keep_flights) for scenario in scenarios[FEW:])]
 
