@@ -260,6 +260,40 @@ def _inverse(momentum: Triple, rotors: Any) -> Triple:
 
 
 @cache
+def _torque_of(layout: Layout) -> Callable[..., Triple]:
+    wrench_of = effectiveness_of(layout).wrench
+    squares = componentwise(
+        "squares_of_thrusts",
+        "thrusts, effects",
+        f"effects[{ROTOR_FLOATS} * @ + {SPIN_SIGN}] * thrusts#",
+        len(layout),
+    )
+
+    @scalar
+    def torque(tilts: Values, thrusts: Values, rotors: Any) -> Triple:
+        _, _, _, x, y, z = wrench_of(tilts, squares(thrusts, rotors.effects), rotors.effects, 0)
+        return x, y, z
+
+    return torque
+
+
+@cache
+def _pods_of(tilts: int) -> Callable[..., Triple]:
+    sums = [
+        " + ".join(f"a[{j}] * b[{j}] * h[{3 * j + k}]" for j in range(tilts)) or "0.0"
+        for k in range(3)
+    ]
+    along_hinges = written_out(f"along_hinges_{tilts}", "a, b, h", tuple_text(sums))
+
+    @scalar
+    def pods(inertias: Values, rates: Values, rotors: Any) -> Triple:
+        momentum: Triple = along_hinges(inertias, rates, rotors.hinges)
+        return momentum
+
+    return pods
+
+
+@cache
 def rotor_code_of(layout: Layout) -> RotorCode:
     """The functions for any rotors of a layout."""
     count, code, vectors = len(layout), effectiveness_of(layout), turning_vectors_of(layout)
@@ -273,20 +307,6 @@ def rotor_code_of(layout: Layout) -> RotorCode:
     rates = [f"rates[{tilt}]" if tilt >= 0 else "0.0" for tilt in layout]
     turned = written_out(
         f"turned_{name}", "d, rates", tuple_text(f"d[{i}] * {rate}" for i, rate in enumerate(rates))
-    )
-    wrench_of = code.wrench
-    squares = componentwise(
-        "squares_of_thrusts",
-        "thrusts, effects",
-        f"effects[{ROTOR_FLOATS} * @ + {SPIN_SIGN}] * thrusts#",
-        count,
-    )
-    hinge_sums = [
-        " + ".join(f"a[{j}] * b[{j}] * h[{3 * j + k}]" for j in range(tilts_of(layout))) or "0.0"
-        for k in range(3)
-    ]
-    along_hinges = written_out(
-        f"along_hinges_{tilts_of(layout)}", "a, b, h", tuple_text(hinge_sums)
     )
     on_each = componentwise(
         "on_each", "x, y, z, w, o", "w# * (x# * o[0] + y# * o[1] + z# * o[2])", count
@@ -319,16 +339,6 @@ def rotor_code_of(layout: Layout) -> RotorCode:
         )  # fmt: skip
 
     @scalar
-    def torque(tilts: Values, thrusts: Values, rotors: Any) -> Triple:
-        _, _, _, x, y, z = wrench_of(tilts, squares(thrusts, rotors.effects), rotors.effects, 0)
-        return x, y, z
-
-    @scalar
-    def pods(inertias: Values, rates: Values, rotors: Any) -> Triple:
-        momentum: Triple = along_hinges(inertias, rates, rotors.hinges)
-        return momentum
-
-    @scalar
     def axes(tilts: Values, rotors: Any) -> tuple[Values, ...]:
         cosines, sines = cosines_of(tilts), sines_of(tilts)
         x, y, z = vectors(1.0, cosines, sines, rotors.axes, 0)
@@ -354,8 +364,8 @@ def rotor_code_of(layout: Layout) -> RotorCode:
         RotorlessBody,
         heights,
         lift,
-        torque,
-        pods,
+        _torque_of(layout),
+        _pods_of(tilts_of(layout)),
         axes,
         turning,
         along,
