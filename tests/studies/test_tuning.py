@@ -161,3 +161,5 @@ def test_kept_gains_are_read_and_others_refused(tmp_path):
         file.write_text(text)
         with pytest.raises(InputError, match="not a file of tuned gains"):
             tuning.read_tuning(file)
+    with pytest.raises(InputError, match="no such file"):
+        tuning.read_tuning(tmp_path / "missing.json")

@@ -302,6 +302,8 @@ def read_tuning(file: FilePath) -> dict[str, Any]:
         text = json.loads(file.read_text(encoding="utf-8"))
         tables = [one["table"]["law"] for by in text["gains"].values() for one in by.values()]
         numbers = int(text["seed"]), int(text["flights"]), text["made"]["date"]
+    except FileNotFoundError:
+        raise InputError(f"{file}: no such file") from None
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise InputError(f"{file}: not a file of tuned gains ({type(error).__name__})") from None
     assert all((*tables, *numbers))
