@@ -13,12 +13,12 @@ from tiltsim.cli import main
 from tiltsim.commands.controllers import chosen_controllers
 from tiltsim.errors import InputError
 from tiltsim.exit_codes import INTERRUPTED
+from tiltsim.studies.call_times import compiled_time_per_call
 from tiltsim.studies.comparison import (
     MEASURES,
     SEARCHES,
     Entry,
     Search,
-    _compiled_time_per_call,
     _last,
     _latency_refusal,
     _survived,
@@ -134,6 +134,7 @@ def named(controllers="", *own):
 
 def test_a_controller_has_gains_of_its_own(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
+    (tmp_path / "my_law.py").touch()
     fast = 'fast={law="pid", velocity_gains=[6.0, 3.6]}'
     assert named("pid", fast, "my_law.py:hover") == {
         "pid": {"law": "pid"},
@@ -151,6 +152,23 @@ def test_a_controller_has_gains_of_its_own(tmp_path, monkeypatch):
 def test_gains_that_are_no_table_are_refused(text):
     with pytest.raises(InputError, match=r"write NAME=\{law=\"pid\", KEY=VALUE, ...\}"):
         named("", text)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ('x={law="pdi"}', "law: did you mean pid? choose "),
+        ('x={law="pid", position_gian=2.0}', "position_gian: did you mean position_gain? "),
+        ("none.py:hover", "none.py: no such file"),
+        ('x={law="scalar", function="none.py:hover"}', "none.py: no such file"),
+        ('={law="pid"}', "write NAME={law="),
+    ],
+)
+def test_a_misspelt_controller_is_a_mistake_and_no_refusal(text, message):
+    with pytest.raises(InputError) as caught:
+        named("", text)
+    assert str(caught.value).startswith(f"--controller {text}: ")
+    assert message in str(caught.value)
 
 
 def test_two_controllers_of_one_name_are_refused():
@@ -172,8 +190,8 @@ def test_a_refused_sample_time_is_not_a_lost_flight():
 
 def test_the_time_of_compiled_code_is_that_of_the_mujoco_plant():
     scenario = tiltsim.load_scenario(SETPOINT)
-    assert _compiled_time_per_call(scenario) >= 0.0
-    assert np.isnan(_compiled_time_per_call(scenario.replace({"simulation.plant": "thesis"})))
+    assert compiled_time_per_call(scenario) >= 0.0
+    assert np.isnan(compiled_time_per_call(scenario.replace({"simulation.plant": "thesis"})))
 
 
 def test_an_unknown_controller_is_refused():

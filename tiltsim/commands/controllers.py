@@ -8,8 +8,11 @@ from pathlib import Path
 from typing import Any
 
 from tiltsim.errors import InputError
+from tiltsim.scenario.controller import CONTROLLERS
+from tiltsim.scenario.messages import choose
 from tiltsim.scenario.override_keys import parse_override
 from tiltsim.studies.comparison import controller_tables
+from tiltsim.system.files import is_file
 
 
 def chosen_controllers(arguments: argparse.Namespace) -> dict[str, Mapping[str, Any]]:
@@ -31,18 +34,32 @@ def names(text: str) -> list[str]:
 def _own(text: str) -> tuple[str, dict[str, Any]]:
     """Name and table of ``NAME={law = ..., KEY = VALUE, ...}`` or ``FILE.py:FUNCTION``."""
     if "=" not in text and ".py:" in text:
-        return text.rpartition(":")[2], {"law": "scalar", "function": _absolute(text)}
-    name, table = parse_override(text) if "=" in text else (text, None)
+        return text.rpartition(":")[2], {"law": "scalar", "function": _absolute(text, text)}
+    name, table = parse_override(text) if text.find("=") > 0 else (text, None)
     if not isinstance(table, dict) or not isinstance(table.get("law"), str):
         raise InputError(
             f'--controller {text}: write NAME={{law="pid", KEY=VALUE, ...}} or FILE.py:FUNCTION'
         )
+    _check(text, table)
     if isinstance(table.get("function"), str):
-        table["function"] = _absolute(table["function"])
+        table["function"] = _absolute(table["function"], text)
     return name, table
 
 
-def _absolute(function: str) -> str:
+def _check(text: str, table: Mapping[str, Any]) -> None:
+    """Raise `InputError` for a law or key that does not exist: no vehicle would take it."""
+    law = table["law"]
+    if law not in CONTROLLERS:
+        raise InputError(f"--controller {text}: law: {choose(law, CONTROLLERS)}")
+    known = [*CONTROLLERS[law].model_fields]
+    for key in table:
+        if key not in known:
+            raise InputError(f"--controller {text}: {key}: {choose(key, known)}")
+
+
+def _absolute(function: str, text: str) -> str:
     """Of this folder, as the scenario's files are elsewhere."""
     file, colon, name = function.rpartition(":")
+    if file and not is_file(Path(file)):
+        raise InputError(f"--controller {text}: {file}: no such file")
     return f"{Path(file).resolve()}{colon}{name}" if file else function

@@ -7,21 +7,14 @@ from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from math import isclose, nan
-from time import perf_counter
 from typing import Any, Final
 
-import mujoco
 import numpy as np
 
-from tiltsim.closed_loop.assembly import Assembly
-from tiltsim.closed_loop.userdata import CONTROL_PERIOD as PERIOD_IN_USERDATA
-from tiltsim.engines.callback import control_callback
-from tiltsim.engines.native_engine import compile_empty
 from tiltsim.errors import InputError
 from tiltsim.flight.flight import Flight
 from tiltsim.laws.assembling import assemble, loop_of
 from tiltsim.plants.engine_choice import MIN_STEPS_TO_COMPILE
-from tiltsim.plants.mujoco_plant import MujocoPlant
 from tiltsim.plants.trust import require_trust
 from tiltsim.scenario.controller import CONTROLLERS
 from tiltsim.scenario.loading import load_scenario
@@ -29,6 +22,7 @@ from tiltsim.scenario.messages import choose
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.simulation.shared_engine import compile_together, with_compiled
 from tiltsim.simulation.simulate import simulate
+from tiltsim.studies.call_times import compiled_time_per_call, time_per_call
 from tiltsim.sweeps.search import boundary
 from tiltsim.system.processes import in_processes
 from tiltsim.vehicles.spans import in_last_second
@@ -42,12 +36,6 @@ CONTROL_PERIOD: Final = 0.005
 
 WITHIN: Final = 1.0
 """m: largest position error in the last second of a flight that counts as survived."""
-
-CALLS: Final = 200
-"""Control steps that are timed together."""
-
-ROUNDS: Final = 40
-"""Timings of compiled code, of which the least counts."""
 
 
 @dataclass(frozen=True)
@@ -239,8 +227,8 @@ def compare_one(
     for measure, search in SEARCHES.items():
         row[measure] = _survived(scenario, search) if searches else None
     row["control_period"] = _control_period(scenario)
-    row["time_per_call"] = _time_per_call(assembly) if timed else None
-    row["compiled_time_per_call"] = _compiled_time_per_call(scenario) if searches else None
+    row["time_per_call"] = time_per_call(assembly) if timed else None
+    row["compiled_time_per_call"] = compiled_time_per_call(scenario) if searches else None
     row["latency_refused"] = _latency_refusal(scenario) if searches else None
     row = {key: _number(value) for key, value in row.items()}
     return Compared(row, flight["time"], _distance(flight))
@@ -369,42 +357,3 @@ def why_none(row: Mapping[str, Any], measure: str) -> str:
     if measure not in SEARCHES or row["end"] == "refused":
         return "-"
     return "refused" if measure == "max_latency" and row["latency_refused"] else "lost"
-
-
-def _time_per_call(assembly: Assembly) -> float:
-    """Seconds that one control step takes in Python, the least of a few rounds."""
-    loop, setup = assembly.loop, assembly.setup
-    if assembly.scenario.controller.is_external:
-        return nan
-    qpos, qvel = loop.kind.initial_motion(assembly)
-    act = tuple(map(float, loop.dynamics.initial_activations(assembly, setup)))
-    vectors = tuple(map(float, qpos)), tuple(map(float, qvel)), act
-    rounds = []
-    for _ in range(3):
-        start = perf_counter()
-        for _ in range(CALLS):
-            loop.sampling.controls(0.0, *vectors, setup.parameters, setup.knots)
-        rounds.append((perf_counter() - start) / CALLS)
-    return min(rounds)
-
-
-def _compiled_time_per_call(scenario: Scenario) -> float:
-    """Seconds that one control step takes in compiled code; NaN where it does not fly in MuJoCo.
-
-    The difference, the least of a few rounds each, of MuJoCo's forward dynamics with the control
-    step and with a callback that does nothing.
-    """
-    if scenario.controller.is_external or scenario.simulation.plant != "mujoco":
-        return nan
-    plant = MujocoPlant(assemble(scenario), engine="native")
-    plant.data.userdata[PERIOD_IN_USERDATA] = 0.0  # the control step at every evaluation
-    callbacks = plant.callback, compile_empty().ctypes
-    rounds = []
-    for _ in range(ROUNDS):  # by turns, as the speed of a machine changes
-        for callback in callbacks:
-            with control_callback(callback):
-                start = perf_counter()
-                for _ in range(CALLS):
-                    mujoco.mj_forward(plant.model, plant.data)
-                rounds.append((perf_counter() - start) / CALLS)
-    return max(0.0, min(rounds[::2]) - min(rounds[1::2]))
