@@ -159,6 +159,13 @@ def flown(entries, **_):
         yield Compared(row(entry.name, task, error), np.zeros(0), np.zeros(0))
 
 
+def test_gains_are_searched_or_read(tmp_path, capsys):
+    both = ["--tune", "40", "--gains", "gains.json"]
+    assert main(["arena", *both, "--out", str(tmp_path / "arena")]) == 2
+    assert "--gains: not with --tune" in capsys.readouterr().err
+    assert not (tmp_path / "arena").exists()
+
+
 def test_the_command_writes_data_page_and_figure(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(arena, "fly_entries", flown)
     found = {

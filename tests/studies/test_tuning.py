@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from json import dumps
 from math import log
 
 import numpy as np
@@ -124,6 +125,12 @@ def test_a_search_finds_the_gains_that_score_best(flights):
     assert again == found
 
 
+def test_a_budget_below_one_flight_on_each_task_is_refused(flights):
+    with pytest.raises(InputError, match="--tune 4: must be at least 5, one flight on each"):
+        tuning.tune(tuning.Search("quadrotor", "pid"), vehicles(), TABLES, 4, 1)
+    assert not flights
+
+
 def test_what_fits_no_task_has_no_tuned_gains(monkeypatch):
     def refused(entry, **_):
         return Compared({"scenario": entry.address, "end": "refused"}, np.zeros(0), np.zeros(0))
@@ -157,7 +164,8 @@ def test_kept_gains_are_read_and_others_refused(tmp_path):
     kept = tuning.tuning_document(found, 3, 1, made)
     assert list(kept["gains"]["tiltrotor"]) == ["pid"]
     file = tmp_path / "gains.json"
-    for text in ("[]", "{}", "nothing"):
+    partly = dict(kept, gains={"tiltrotor": {"pid": {"table": {"law": "pid"}}}})
+    for text in ("[]", "{}", "nothing", dumps(partly), dumps({**kept, "made": {"date": ""}})):
         file.write_text(text)
         with pytest.raises(InputError, match="not a file of tuned gains"):
             tuning.read_tuning(file)

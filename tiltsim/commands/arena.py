@@ -17,6 +17,7 @@ from tiltsim.commands.options import (
 )
 from tiltsim.commands.progress import Progress, show_progress
 from tiltsim.commands.text import json_text, print_line
+from tiltsim.errors import InputError
 
 if TYPE_CHECKING:
     from tiltsim.studies.arena import Vehicle
@@ -81,6 +82,8 @@ def run(arguments: argparse.Namespace) -> int:
     from tiltsim.views.figures import style
     from tiltsim.views.figures.arena_scores import arena_figure
 
+    if arguments.tune is not None and arguments.gains is not None:
+        raise InputError("--gains: not with --tune, which searches gains anew")
     own = chosen_controllers(arguments)
     vehicles = chosen_vehicles(names(arguments.vehicles))
     tables = {

@@ -177,6 +177,8 @@ def tune(
 ) -> Tuned | None:
     """Search the gains of one controller; None if it has none, or fits no task.
 
+    Raises InputError if the budget is less than one flight on each task.
+
     Args:
         search: The vehicle and the controller.
         vehicles: By name.
@@ -187,6 +189,11 @@ def tune(
     vehicle = vehicles[search.vehicle]
     table = controllers[search.vehicle][search.controller]
     tasks = tuning_entries(vehicle, search.controller, table)
+    if flights < len(tasks):
+        raise InputError(
+            f"--tune {flights}: must be at least {len(tasks)}, one flight on each tuning task of "
+            f"{search.vehicle}"
+        )
     controller = _controller(tasks)
     names = [*knobs(controller)] if controller else []
     if controller is None or not names:
@@ -300,11 +307,12 @@ def read_tuning(file: FilePath) -> dict[str, Any]:
     """A document of `tuning_document`. Raises InputError if the file is none."""
     try:
         text = json.loads(file.read_text(encoding="utf-8"))
-        tables = [one["table"]["law"] for by in text["gains"].values() for one in by.values()]
-        numbers = int(text["seed"]), int(text["flights"]), text["made"]["date"]
+        searches = [one for by in text["gains"].values() for one in by.values()]
+        needed: list[Any] = [(dict(one["table"])["law"], dict(one["of"])) for one in searches]
+        needed += [int(text["seed"]), int(text["flights"])]
+        needed += [text["made"]["date"], text["made"]["commit"]]
     except FileNotFoundError:
         raise InputError(f"{file}: no such file") from None
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise InputError(f"{file}: not a file of tuned gains ({type(error).__name__})") from None
-    assert all((*tables, *numbers))
     return dict(text)
