@@ -69,6 +69,7 @@ def test_a_sweep_prints_where_stability_is_lost(capsys):
         ("gait.period=1", "write KEY=FROM:TO"),
         ("gait.period=a:b", "write KEY=FROM:TO"),
         ("gait.period=1:1", "with 2 to 1000 :POINTS"),
+        ("gait.period=1:inf", "two finite numbers"),
         ("gait.period=1:2:100000000000", "with 2 to 1000 :POINTS"),
         ("period", "gait.period has no value to start from"),
     ],
@@ -76,6 +77,13 @@ def test_a_sweep_prints_where_stability_is_lost(capsys):
 def test_a_wrong_sweep_is_refused(text, message):
     with pytest.raises(tiltsim.InputError, match=message):
         parse_sweep(text, [tiltsim.load_scenario(SETPOINT)])
+
+
+def test_all_values_of_a_sweep_are_checked_before_the_first_is_analyzed():
+    seen = []
+    with pytest.raises(tiltsim.InputError, match=r"vehicle.mass = -1"):
+        sweep_stability(tiltsim.load_scenario(SETPOINT), "vehicle.mass", [0.4, -1.0], seen.append)
+    assert not seen
 
 
 def test_a_sweep_without_a_range_goes_from_half_to_twice():

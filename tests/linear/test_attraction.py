@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from math import inf
 
 import numpy as np
 import pytest
@@ -202,14 +203,17 @@ def test_a_short_duration_is_a_warning(flown, monkeypatch):
     ("arguments", "message"),
     [
         ((("roll", "roll"),), "axes = roll,roll: choose two of x, y"),
-        ((("roll", "pitch"), "ranges"), "range of pitch = -1:2: must be within pi/2"),
+        ((("roll", "pitch"), (-1.0, 2.0)), "range of pitch = -1:2: must be within pi/2"),
         ((("tilt_car", "tilt_car"),), "choose two"),
+        ((("roll", "vx"), (1.0, 1.0)), "range of vx = 1:1: must be finite and grow"),
+        ((("roll", "vx"), (0.0, inf)), "range of vx = 0:inf: must be finite and grow"),
     ],
 )
 def test_wrong_arguments(arguments, message):
-    ranges = {"ranges": (None, (-1.0, 2.0))} if len(arguments) > 1 else {}
+    axes, *second = arguments
+    ranges = {"ranges": (None, *second)} if second else {}
     with pytest.raises(tiltsim.InputError, match=message):
-        attraction(SETPOINT, arguments[0], **ranges)
+        attraction(SETPOINT, axes, **ranges)
 
 
 def test_tilt_cars_have_no_attitude():

@@ -300,6 +300,10 @@ REFUSED = {
         {**LINE, "air.ground_effect.height": -1.0},
         "the line climbs or descends: with air.ground_effect",
     ),
+    "a table that ends": (
+        {"gait": {"type": "table", "rows": [[0.0, *[0.0] * 4], [1.0, *[0.1] * 4]]}},
+        "gait.repeat = false: a table that does not repeat ends; set it to true",
+    ),
     "noise": ({"sensors.position_noise": 0.1}, "sensors.position_noise: with noise"),
     "a moving gait": (
         {"gait.type": "trot_continuous", "gait.amplitude": 0.5, "gait.period": 2.0},

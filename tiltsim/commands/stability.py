@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import itertools
 from functools import partial
-from math import degrees
+from math import degrees, isfinite
 from typing import TYPE_CHECKING, Any, Final
 
 from tiltsim.commands.analysis import add_analysis, print_analysis, requested_scenarios
@@ -147,8 +147,12 @@ def parse_sweep(text: str, scenarios: Sequence[Scenario]) -> tuple[str, list[flo
                 f"--sweep {text}: {key} has no value to start from; write {name}=FROM:TO"
             )
         first, last = 0.5 * value, 2.0 * value
-    if len(parts) not in {0, 2, 3} or not 2 <= points <= MOST_POINTS or first == last:
-        raise InputError(f"--sweep {text}: write KEY=FROM:TO, with 2 to {MOST_POINTS} :POINTS")
+    differ = isfinite(first) and isfinite(last) and first != last
+    if len(parts) not in {0, 2, 3} or not 2 <= points <= MOST_POINTS or not differ:
+        raise InputError(
+            f"--sweep {text}: write KEY=FROM:TO, two finite numbers, with 2 to {MOST_POINTS} "
+            ":POINTS"
+        )
     shares = [index / (points - 1) for index in range(points)]
     if first > 0.0 and last > 0.0:
         return key, [first * (last / first) ** share for share in shares]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from math import pi
+from math import inf, pi
 from os import PathLike
 from typing import Any, Final
 from warnings import warn
@@ -139,14 +139,14 @@ def attraction(
     """
     scenario = load_scenario(scenario)
     _check(scenario, axes, coarse, refinements)
+    size = 2**refinements
+    cells = coarse * size
+    edges = tuple(_edges(*pair, cells) for pair in zip(axes, ranges, strict=True))
     slowest = slowest_mode(scenario)
     if slowest is not None:
         advice = advice_on_duration(slowest, scenario.simulation.duration, NEAR, MEAN)
         if advice:
             warn(f"{scenario.address or 'scenario'}: {advice}", RuntimeWarning, stacklevel=2)
-    size = 2**refinements
-    cells = coarse * size
-    edges = tuple(_edges(*pair, cells) for pair in zip(axes, ranges, strict=True))
     grid = _Grid(scenario, axes, (edges[0], edges[1]), progress)
     leaves = [(i, j, size) for i in range(0, cells, size) for j in range(0, cells, size)]
     returned = np.zeros((cells + 1, cells + 1), dtype=bool)
@@ -191,8 +191,8 @@ def _check(scenario: Scenario, axes: tuple[str, str], coarse: int, refinements: 
 
 def _edges(axis: str, given: tuple[float, float] | None, cells: int) -> Floats:
     low, high = given or (-SPANS[PLACES[axis][0]], SPANS[PLACES[axis][0]])
-    if not low < high:
-        raise InputError(f"range of {axis} = {low:g}:{high:g}: must grow")
+    if not -inf < low < high < inf:
+        raise InputError(f"range of {axis} = {low:g}:{high:g}: must be finite and grow")
     if axis == "pitch" and not -0.5 * pi < low < high < 0.5 * pi:
         raise InputError(f"range of pitch = {low:g}:{high:g}: must be within pi/2 either way")
     return np.linspace(low, high, cells + 1)

@@ -66,6 +66,7 @@ def forcing_of(assembly: Assembly) -> Forcing:
     """The forcing of a flight. Raises `InputError` where it is neither steady nor periodic."""
     scenario, gait = assembly.scenario, assembly.gait
     _check(scenario)
+    address = scenario.address or "scenario"
     reference = assembly.reference
     periods = _periods(reference, scenario)
     velocity, acceleration = _AT_REST, _AT_REST
@@ -76,10 +77,12 @@ def forcing_of(assembly: Assembly) -> Forcing:
     if assembly.loop.uses_gait and gait.period is not None:
         kind = gait.parameters
         if kind.type == TABLE and not kind.repeats:
-            raise InputError(f"{scenario.address}: gait.hold: a table that does not repeat ends")
+            raise InputError(
+                f"{address}: gait.repeat = false: a table that does not repeat ends; set it to true"
+            )
         if kind.type == ROTATING and scenario.simulation.plant != "thesis":
             raise InputError(
-                f'{scenario.address}: gait.type = "rotating": its tilt angles grow for ever; '
+                f'{address}: gait.type = "rotating": its tilt angles grow for ever; '
                 'choose simulation.plant = "thesis"'
             )
         periods.append(gait.period)
@@ -117,8 +120,8 @@ def _check_line(scenario: Scenario, velocity: Triple, acceleration: Triple) -> N
         )
     if air.ground_effect is not None and (velocity[2] or acceleration[2]):
         raise InputError(
-            f"{address}: the line climbs or descends: with air.ground_effect the flight is neither "
-            "at rest nor periodic, for its height changes; leave out one of the two"
+            f"{address}: reference: the line climbs or descends: with air.ground_effect the flight "
+            "is neither at rest nor periodic, for its height changes; leave out one of the two"
         )
 
 

@@ -70,8 +70,8 @@ def sweep_stability(
     """
     points: list[Point] = []
     last: Stability | None = None
-    for value in values:
-        changed = scenario.replace({key: value})  # refused values are mistakes
+    every = [(value, scenario.replace({key: value})) for value in values]  # refused: a mistake
+    for value, changed in every:
         try:
             last = stability(changed, near=last)
             point = Point(value, last)
