@@ -8,7 +8,7 @@ from math import isfinite
 import numpy as np
 import pytest
 
-from tests.arrays.recorded_calls import described, flown, mapped, record, short_flights
+from tests.arrays.recorded_calls import described, flown, frozen, mapped, record, short_flights
 from tests.laws.test_laws import LAWS
 from tiltsim.arrays.flying import CODES, double_precision
 from tiltsim.arrays.jax_arrays import JaxArrays
@@ -46,12 +46,12 @@ def _as_when_compiled(monkeypatch):
 
 
 def numbers(values):
-    """The numbers of nested tuples, lists and records."""
+    """The numbers of nested tuples, lists and records; NaN where there is none."""
     if isinstance(values, tuple | list):
         for value in values:
             yield from numbers(value)
     else:
-        yield values
+        yield np.nan if values is None else values
 
 
 COUNTS = {"rows", "size", "start", "offset"}
@@ -75,34 +75,62 @@ def fields(function, arguments):
     return found
 
 
-def differences(function, arguments, rng):
-    """What is wrong with a lifted function at arguments and near them."""
-    found = [value for value, name in fields(function, arguments) if varies(value, name)]
+LONG = 100
+"""Entries from which a tuple is a table, whose entries are looked up."""
 
-    def filled(row):
-        """The arguments with the numbers of a row in place of those found."""
-        following = iter(range(len(found)))
-        change = lambda v, name: row[next(following)] if varies(v, name) else v  # noqa: E731
-        return changed(change, function, arguments)
 
-    lifted = Lifting(JaxArrays("float64"))(function)
-    for change in CHANGES:
-        row = np.array(found) * (1.0 + change * rng.standard_normal(len(found)))
+def with_tables(value):
+    """A value whose tables are one array each: to join one at each look-up takes minutes."""
+    if hasattr(value, "_fields"):
+        return type(value)(*map(with_tables, value))
+    if isinstance(value, tuple | list):
+        entries = [with_tables(entry) for entry in value]
+        return jax.numpy.asarray(entries) if len(entries) > LONG else type(value)(entries)
+    return value
+
+
+class Compared(Lifting):
+    """Lifts functions, and compares each of them, at its first call, with what it is in Python."""
+
+    def __init__(self):
+        super().__init__(JaxArrays("float64"))
+        self.compared, self.wrong = set(), {}
+
+    def run(self, function, args, keywords):
+        args, new = [*args], self.is_scalar(function) and described(function) not in self.compared
+        if keywords or not new:
+            return super().run(function, args, keywords)
+        before = [*map(frozen, args)]
+        lifted = super().run(function, args, keywords)
+        self.compare(function, before, lifted)
+        return lifted
+
+    def compare(self, function, args, lifted):
         try:
-            expected = np.array([float(v) for v in numbers(function(*filled(row.tolist())))])
+            expected = np.array([float(v) for v in numbers(function(*args))])
         except (ArithmeticError, ValueError):  # where arrays have NaN
-            continue
-        except TypeError as error:
-            return f"in Python: {error}"
-        try:
-            values = numbers(lifted(*filled([*map(jax.numpy.asarray, row)])))
-            result = np.array([np.asarray(value, float) for value in values])
-        except (LiftError, TypeError) as error:
-            return str(error)
+            return
+        self.compared.add(described(function))
+        result = np.array([np.asarray(value, float) for value in numbers(lifted)])
         size = np.abs(expected[np.isfinite(expected)]).max(initial=0.0)
         if not np.allclose(result, expected, rtol=ROUNDING, atol=ROUNDING * size, equal_nan=True):
-            return f"{result} instead of {expected}"
-    return None
+            self.wrong[name_of(function)] = f"{result} instead of {expected}"
+
+
+def name_of(function):
+    return f"{function.__module__}.{function.__qualname__}"
+
+
+def differences(lifting, function, arguments, change, rng):
+    """What keeps a function from being lifted near its arguments; the rest notes the lifting."""
+    found = np.array([value for value, name in fields(function, arguments) if varies(value, name)])
+    row = found * (1.0 + change * rng.standard_normal(len(found)))
+    following = iter(map(jax.numpy.asarray, row))
+    lifted = changed(lambda v, n: next(following) if varies(v, n) else v, function, arguments)
+    try:
+        lifting(function)(*map(with_tables, lifted))
+    except (LiftError, TypeError) as error:
+        lifting.wrong[name_of(function)] = str(error)
 
 
 def all_differences(flights):
@@ -111,15 +139,12 @@ def all_differences(flights):
     for tables, simulation in flights:
         record(lambda: flown(tables, **simulation).metrics(), calls)  # noqa: B023
     wrong = {}
-    one_of_each = {
-        # Of all steps in time one: `tests.arrays.test_engine` compares each of the others.
-        "step" if function.__name__ == "step" else described(function): function
-        for function in calls
-    }
-    for function in one_of_each.values():
-        reason = differences(function, calls[function], rng)
-        if reason is not None:
-            wrong[f"{function.__module__}.{function.__qualname__}"] = reason
+    for change in CHANGES:
+        lifting = Compared()
+        for function in calls:  # callers first: most of what they call is compared with them
+            if described(function) not in lifting.compared:
+                differences(lifting, function, calls[function], change, rng)
+        wrong |= lifting.wrong
     return wrong, calls
 
 
@@ -159,7 +184,7 @@ NEVER_CALLED = {
     *("decoupling_matrix", "attitude_altitude_thrust_rate", "tilt_states"),
     # Vehicles whose torque-free forces are a plane, and these gaits with more than four tilts:
     *("unit_vector", "jet_cross", "_jet_dot", "desired_direction", "nearest_in_plane"),
-    *("normal_of_rows", "_fixed_jet", "_rounded", "_table_jet"),
+    *("normal_of_rows", "_fixed_jet", "_table_jet"),
     "torque_for",  # of the example package
     *("_no_hinges", "_upright_turning"),  # of the quadrotor in MuJoCo under a user's function
     "_no_pods",  # of the quadrotor, of which nothing is measured
