@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import random
+import re
 import signal
 import subprocess
 import sys
@@ -17,6 +18,7 @@ import pytest
 
 from tests.sweeps.files import boundary_sweep, short_sweep
 from tests.system.test_files import HEX
+from tiltsim.cli import main
 from tiltsim.errors import InputError
 from tiltsim.scenario.loading import parse_scenario
 from tiltsim.scenario.metric_names import METRICS, Metric
@@ -199,11 +201,14 @@ def test_code_that_is_not_trusted_is_not_tried_either(tmp_path, monkeypatch):
     assert "python" not in tried
 
 
-def test_points_without_a_valid_scenario_become_rows(tmp_path):
+def test_points_without_a_valid_scenario_become_rows(tmp_path, capsys):
     file = short_sweep(tmp_path / "sweep.toml", count=32)
     text = file.read_text().replace("0.1", "0.2").replace("mean = 0.0", "mean = 2.9")
     file.write_text(text.replace("seed = 3", "seed = 5"))
-    run_sweep(load_sweep(file), tmp_path / "out")
+    assert main(["sweep", str(file), "--jobs", "1", "--out", str(tmp_path / "out")]) == 0
+    assert re.search(
+        r"\nmost frequent reason \(\d of 8\): .* to 3\.14159\n", capsys.readouterr().out
+    )
     ends = {row["end"] for row in rows(tmp_path / "out")}
     for row in rows(tmp_path / "out"):
         assert (row["end"] == "invalid") == (abs(row["initial.attitude[0]"]) > 3.141592653589793)

@@ -4,15 +4,22 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from tiltsim.commands.options import Subparsers, add_jobs, add_overrides, add_quiet, add_trust
 from tiltsim.commands.progress import show_progress
 from tiltsim.commands.text import counted, print_line, tally
 from tiltsim.exit_codes import INTERRUPTED
+from tiltsim.system.text import shortened
 
 if TYPE_CHECKING:
     from tiltsim.sweeps.points import SweepPoints
+
+NOT_FLOWN: Final = frozenset({"invalid", "crashed", "failed"})
+"""Ends whose reason is a mistake in a scenario or in a controller's code."""
+
+LONGEST_REASON: Final = 300
+"""Characters of a reason; messages that list what is allowed can be long."""
 
 
 def add_parser(subparsers: Subparsers) -> None:
@@ -96,6 +103,13 @@ def _summary(dataset: Path, units: tuple[str, str]) -> str:
     from tiltsim.system.parquet import open_parquet
 
     with open_parquet(dataset) as opened:
-        ends = Counter(opened.read(columns=["end"])["end"].to_pylist())
+        table = opened.read(columns=["end", "cause"])
+    ends = Counter(table["end"].to_pylist())
     total = counted(sum(ends.values()), *units)
-    return f"{total}: {tally(dict(ends.most_common()))}"
+    text = f"{total}: {tally(dict(ends.most_common()))}"
+    rows = zip(*(table[name].to_pylist() for name in ("end", "cause")), strict=True)
+    reasons = Counter(cause for end, cause in rows if end in NOT_FLOWN)
+    for reason, number in reasons.most_common(1):
+        share = f"{number} of {reasons.total()}"
+        text += f"\nmost frequent reason ({share}): {shortened(reason, LONGEST_REASON)}"
+    return text
