@@ -111,5 +111,5 @@ def _summary(dataset: Path, units: tuple[str, str]) -> str:
     reasons = Counter(cause for end, cause in rows if end in NOT_FLOWN)
     for reason, number in reasons.most_common(1):
         share = f"{number} of {reasons.total()}"
-        text += f"\nmost frequent reason ({share}): {shortened(reason, LONGEST_REASON)}"
+        text += f"\nmost frequent reason ({share}): {shortened(' '.join(reason.split()), LONGEST_REASON)}"
     return text
