@@ -206,9 +206,8 @@ def test_points_without_a_valid_scenario_become_rows(tmp_path, capsys):
     text = file.read_text().replace("0.1", "0.2").replace("mean = 0.0", "mean = 2.9")
     file.write_text(text.replace("seed = 3", "seed = 5"))
     assert main(["sweep", str(file), "--jobs", "1", "--out", str(tmp_path / "out")]) == 0
-    assert re.search(
-        r"\nmost frequent reason \(\d of 8\): .* to 3\.14159\n", capsys.readouterr().out
-    )
+    shown = capsys.readouterr().out
+    assert re.search(r"\nmost frequent reason \(\d of 8\): .* to 3\.14159\n", shown)
     ends = {row["end"] for row in rows(tmp_path / "out")}
     for row in rows(tmp_path / "out"):
         assert (row["end"] == "invalid") == (abs(row["initial.attitude[0]"]) > 3.141592653589793)

@@ -13,6 +13,8 @@ from tiltsim.exit_codes import INTERRUPTED
 from tiltsim.system.text import shortened
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from tiltsim.sweeps.points import SweepPoints
 
 NOT_FLOWN: Final = frozenset({"invalid", "crashed", "failed"})
@@ -81,7 +83,8 @@ def run(arguments: argparse.Namespace) -> int:
             )
             return INTERRUPTED
     if shown:
-        print_line(_summary(dataset, units))
+        for line in _summary(dataset, units):
+            print_line(line)
         print_line(f"written to {dataset}")
     return 0
 
@@ -97,7 +100,8 @@ def _headline(points: SweepPoints, finished: int, units: tuple[str, str]) -> str
     return f"{title}: {everything}"
 
 
-def _summary(dataset: Path, units: tuple[str, str]) -> str:
+def _summary(dataset: Path, units: tuple[str, str]) -> Iterator[str]:
+    """Lines: how the flights ended, and why most of those were not flown."""
     from collections import Counter
 
     from tiltsim.system.parquet import open_parquet
@@ -106,10 +110,9 @@ def _summary(dataset: Path, units: tuple[str, str]) -> str:
         table = opened.read(columns=["end", "cause"])
     ends = Counter(table["end"].to_pylist())
     total = counted(sum(ends.values()), *units)
-    text = f"{total}: {tally(dict(ends.most_common()))}"
+    yield f"{total}: {tally(dict(ends.most_common()))}"
     rows = zip(*(table[name].to_pylist() for name in ("end", "cause")), strict=True)
     reasons = Counter(cause for end, cause in rows if end in NOT_FLOWN)
     for reason, number in reasons.most_common(1):
-        share = f"{number} of {reasons.total()}"
-        text += f"\nmost frequent reason ({share}): {shortened(' '.join(reason.split()), LONGEST_REASON)}"
-    return text
+        shown = shortened(reason, LONGEST_REASON)
+        yield f"most frequent reason ({number} of {reasons.total()}): {shown}"
