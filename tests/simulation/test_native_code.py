@@ -123,17 +123,14 @@ def test_all_that_processes_fly_with_is_compiled_for_them_once(monkeypatch):
         def record(self, samples, steps):
             calls.append("record")
 
-        def advance(self, steps):
-            calls.append("advance")
-
     monkeypatch.setattr(shared_engine, "make_plant", Recorded)
     flights = [scenario({}, plant="thesis", duration=1.0) for _ in range(2)]
     assert shared_engine.shared_engine(flights, 99_999) is None
     assert shared_engine.shared_engine(flights, 100_000) == "native"
-    assert calls == ["thesis", "record", "advance"]
+    assert calls == ["thesis", "record"]
     on_arrays = [flight.replace({"simulation.engine": "jax"}) for flight in flights]
     shared_engine.shared_engine(on_arrays, 100_000)
-    assert len(calls) == 3
+    assert len(calls) == 2
 
 
 def test_only_loops_that_fly_long_are_compiled_together(monkeypatch, tmp_path):

@@ -19,7 +19,7 @@ from tiltsim_controllers.mathematics.scalar import Floats
 
 @one_thread_at_a_time
 @cache
-def compile_stepper(loop: ClosedLoop, plant: str, solver: str) -> tuple[Any, Any]:
+def compile_stepper(loop: ClosedLoop, plant: str, solver: str) -> Any:
     """Compile a solver of a loop's equations, or load it from the cache on disk.
 
     Args:
@@ -27,9 +27,10 @@ def compile_stepper(loop: ClosedLoop, plant: str, solver: str) -> tuple[Any, Any
         plant, solver: As in `tiltsim.closed_loop.loop.ClosedLoop.native_name`.
 
     Returns:
-        ``advance`` is the stepper of `tiltsim.equations.solvers.make_stepper` with an array for the
-        state. ``record`` takes the address of a `Recorder` and the number of samples before the
-        same arguments, and stops when the recording is over. Neither holds Python's lock.
+        ``(recorder, samples, step_index, state, held, steps, integration) -> state, held``: the
+        stepper of `tiltsim.equations.solvers.make_stepper` with an array for the state, so many
+        times over. ``recorder`` is the address of a `Recorder`, which takes a sample after each
+        time and stops when the recording is over; 0 for none. Python's lock is not held.
     """
     announce_native_code(loop.native_name(plant, solver))
     assert loop.equations is not None
@@ -40,13 +41,9 @@ def compile_stepper(loop: ClosedLoop, plant: str, solver: str) -> tuple[Any, Any
     watch = loop.monitoring.sign_check_values
     limit_exceeded = loop.kind.limit_exceeded
 
+    # One function with and without a recorder: each would compile the whole loop.
     @compiled
-    def advance(step_index, state, held, steps, integration):  # type: ignore[no-untyped-def]
-        values, held = stepper(step_index, list(state), held, steps, integration)
-        return np.array(values), held
-
-    @compiled
-    def record(  # type: ignore[no-untyped-def]
+    def advance(  # type: ignore[no-untyped-def]
         recorder, samples, step_index, state, held, steps, integration
     ):
         timestep, control_steps, parameters, knots, _ = integration
@@ -54,6 +51,8 @@ def compile_stepper(loop: ClosedLoop, plant: str, solver: str) -> tuple[Any, Any
         for _ in range(samples):
             values, held = stepper(step_index, values, held, steps, integration)
             step_index += steps
+            if recorder == 0:
+                continue
             time = step_index * timestep
             force = held
             if control_steps == 0 or step_index % control_steps == 0:
@@ -65,7 +64,7 @@ def compile_stepper(loop: ClosedLoop, plant: str, solver: str) -> tuple[Any, Any
                 break
         return np.array(values), held
 
-    return advance, record
+    return advance
 
 
 def native_record(loop: ClosedLoop, userdata: Floats) -> tuple[Any, Floats]:

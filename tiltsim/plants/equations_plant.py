@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from math import nan
 from typing import Any
 
@@ -41,7 +42,8 @@ class EquationsPlant(Plant):
         if self.engine == "native":
             from tiltsim.engines.native_stepper import compile_stepper, native_record
 
-            self._advance, self._record = compile_stepper(loop, plant, solver)
+            self._record = compile_stepper(loop, plant, solver)
+            self._advance = partial(self._record, 0, 1)
             record: tuple[Any, Any] = native_record(loop, setup.userdata)
         elif self.engine == "jax":
             from tiltsim.arrays.flying import course_of, stepper_on_arrays
