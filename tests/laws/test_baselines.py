@@ -163,6 +163,20 @@ def test_indi_follows_a_step_of_yaw_as_designed():
     assert np.abs(yaw - designed).max() < 0.015 * step
 
 
+def test_indi_lets_go_of_thrusts_that_make_neither_torque_nor_push():
+    """The others of six would stay as they are, and push to the side."""
+    hover = 6 * [np.sqrt(2.663 / 8.048e-6)]
+    initial = {"rotor_speed": [s * w for s, w in zip(2 * [1.0, 1.05, 0.95], hover, strict=True)]}
+    hexarotor = BASELINES["geometric multirotor"]
+    gait = {"type": "fixed", "angles": 3 * [0.35, -0.35]}
+    tables = {"gait": gait, "initial": initial, "reference": {"type": "setpoint"}}
+    flight = fly({**hexarotor, **tables, "controller": {"law": "indi"}})
+    spread = np.ptp(flight["thrusts"], axis=1)
+    assert spread[0] > 0.5
+    # The rotors' 100 1/s in 0.3 s leave nothing; the attitude answers the push meanwhile.
+    assert spread[-1] < 0.01 * spread[0]
+
+
 @pytest.fixture(scope="module")
 def regulated():
     """A flight under the regulator, and the hover that it is designed for."""

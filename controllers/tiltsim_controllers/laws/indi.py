@@ -5,13 +5,15 @@ control of micro air vehicles", Eqs. 10 to 21. The torque is a change of that wh
 present angular acceleration, so that no model of other torques is needed. The angular acceleration
 comes from filtered rates, and the thrusts that go with it pass the same filter; then it follows its
 demand as the rotors follow theirs.
+
+Increments are of the torque, not of each thrust. Of four thrusts that is the same; more would keep
+forever the part of them that makes neither torque nor push, and with tilts a force to the side.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
-from math import sqrt
 from typing import NamedTuple
 
 from tiltsim_controllers.laws.full_pose import attitude_error
@@ -64,7 +66,7 @@ def filtered(value: float, state: float, rate: float, frequency: float, damping:
 def indi_law_of(rotors: int) -> Callable[..., Commands]:
     """The law of vehicles with this many rotors, whose tilts follow a gait."""
     lift_of, axis_of, thrusts_of = planned_allocation_of(rotors)
-    dot, _, add_scaled = vectors_of(rotors)[:3]
+    dot = vectors_of(rotors).dot
     slow_in, rates_in = entries_of(6, rotors), entries_of(6 + rotors, rotors)
     all_filtered = componentwise(
         "all_filtered", "x, state, rate, f, d", "filtered(x#, state#, rate#, f, d)", rotors,
@@ -73,7 +75,7 @@ def indi_law_of(rotors: int) -> Callable[..., Commands]:
 
     @scalar
     def indi(observed: Observed, parameters: Parameters) -> Commands:
-        c, states, force = parameters, observed.states, observed.force
+        c, states = parameters, observed.states
         p, q, r = observed.body_rates
         fp, fq, fr, dp, dq, dr = states[0], states[1], states[2], states[3], states[4], states[5]
         slow, rates = slow_in(states), rates_in(states)
@@ -82,7 +84,7 @@ def indi_law_of(rotors: int) -> Callable[..., Commands]:
         axis = axis_of(observed, lift)
         desired = pointing_attitude(observed, acceleration, axis)
         ex, ey, ez = attitude_error(observed.rotation, desired)
-        change = inertia_times(
+        tx, ty, tz = inertia_times(
             observed.vehicle,
             (
                 c.rates * (c.attitude * ex - p) - dp,
@@ -90,10 +92,10 @@ def indi_law_of(rotors: int) -> Callable[..., Commands]:
                 c.rates * (c.attitude * ez - r) - dr,
             ),
         )
-        x, y, z = axis
-        along = x * dot(force[0], slow) + y * dot(force[1], slow) + z * dot(force[2], slow)
-        more = push_along(observed, acceleration, axis) - along / sqrt(x * x + y * y + z * z)
-        thrusts = add_scaled(thrusts_of(observed, lift, axis, more, change), 1.0, slow)
+        rows = observed.torque
+        torque = tx + dot(rows[0], slow), ty + dot(rows[1], slow), tz + dot(rows[2], slow)
+        push = push_along(observed, acceleration, axis)
+        thrusts = thrusts_of(observed, lift, axis, push, torque)
         f, d = c.filter_frequency, c.filter_damping
         filters = (
             dp, dq, dr,
