@@ -167,7 +167,7 @@ class Kernel:
 
     def sides(self, sample: Any) -> Any:
         """The signs of the numbers that must keep them, 0 where one vanishes."""
-        checked = self._arrays.vector(self._check(tuple(sample[1:]), *self.setup))
+        checked = self._arrays.vector(self._check(sample[0], tuple(sample[1:]), *self.setup))
         return self._numpy.where(abs(checked) < SINGULAR, 0.0, self._numpy.sign(checked))
 
     def goes_on(self, sample: Any, sides: Any, reference: Any) -> Any:

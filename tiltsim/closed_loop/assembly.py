@@ -26,6 +26,6 @@ class Assembly(FlightPlan):
     setup: ControlSetup
     follows_position: bool
 
-    def sign_check_values(self, values: Vector) -> Values:
-        """The numbers of `Monitoring.sign_check_values`, from the ``values`` of a sample."""
-        return self.loop.monitoring.sign_check_values(values, *self.setup)
+    def sign_check_values(self, time: float, values: Vector) -> Values:
+        """The numbers of `Monitoring.sign_check_values`, from a sample."""
+        return self.loop.monitoring.sign_check_values(time, values, *self.setup)

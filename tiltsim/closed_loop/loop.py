@@ -117,7 +117,7 @@ class Columns:
 
 
 @scalar
-def nothing_singular(values: Vector, parameters: Any, knots: Vector) -> tuple[float]:
+def nothing_singular(time: float, values: Vector, parameters: Any, knots: Vector) -> tuple[float]:
     """For controllers that are singular nowhere."""
     return (1.0,)
 
@@ -127,8 +127,8 @@ class Monitoring:
     """Where the controller becomes singular: numbers that have to keep their sign.
 
     Attributes:
-        sign_check_values: Scalar function ``(values, parameters, knots) -> numbers``, from
-            ``values`` as `Columns.observe` returns them.
+        sign_check_values: Scalar function ``(time, values, parameters, knots) -> numbers``, from
+            the time (s) of a sample and its ``values`` as `Columns.observe` returns them.
         causes: ``(sample by field) -> texts``: why the flight ends where each of them reaches zero.
     """
 

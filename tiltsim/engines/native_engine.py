@@ -88,7 +88,7 @@ def compile_control(loop: ClosedLoop) -> Any:
             if sample_is_due(recorder):  # at the first evaluation of a step
                 start = count / per_step * userdata[TIMESTEP]
                 sample = observe(positions, velocities, activations, values)
-                checked = watch(sample, parameters, knots)
+                checked = watch(start, sample, parameters, knots)
                 record_sample(recorder, start, sample, checked, limit_exceeded, knots)
             if recording_is_over(recorder):
                 for index in range(nu):

@@ -58,7 +58,7 @@ def compile_stepper(loop: ClosedLoop, plant: str, solver: str) -> Any:
             if control_steps == 0 or step_index % control_steps == 0:
                 force = inputs(time, values, parameters, knots)
             sample = observe(time, values, force, parameters, knots)
-            checked = watch(sample, parameters, knots)
+            checked = watch(time, sample, parameters, knots)
             record_sample(recorder, time, sample, checked, limit_exceeded, knots)
             if recording_is_over(recorder):
                 break

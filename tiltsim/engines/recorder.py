@@ -107,7 +107,7 @@ class Recorder:
         samples: How many to take.
         interval, last_interval: Evaluations of the control step between samples, and between the
             last two.
-        checked: The numbers that must keep their signs, as they are now; see `ClosedLoop.watch`.
+        checked: The numbers that must keep their signs, as they are now; see `Monitoring`.
     """
 
     def __init__(

@@ -89,7 +89,9 @@ def _observe_full_pose(qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector) ->
 
 
 @scalar
-def sign_check_values(values: Vector, parameters: LoopParameters, knots: Vector) -> Quad:
+def sign_check_values(
+    time: float, values: Vector, parameters: LoopParameters, knots: Vector
+) -> Quad:
     """The rotor speeds along their spin."""
     return rotor_speeds_along_spin(values)
 

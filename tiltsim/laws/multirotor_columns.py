@@ -120,7 +120,9 @@ def monitoring_of(layout: Layout, form: Form) -> Monitoring:
     harmless = (1.0,) * len(stops)  # as published, the factor 2 |varpi| is in rows of force only
 
     @scalar
-    def sign_check_values(values: Vector, parameters: LoopParameters, knots: Vector) -> Values:
+    def sign_check_values(
+        time: float, values: Vector, parameters: LoopParameters, knots: Vector
+    ) -> Values:
         own, side = parameters.law, parameters.upper_side
         up, to_side = world_up_in_body(values[ROLL], values[PITCH]), (side.x, side.y, side.z)
         share = independence(tilts_in(values), up, to_side, knots, int(own.rotors))

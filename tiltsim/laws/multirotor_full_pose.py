@@ -183,7 +183,7 @@ def full_pose_loop(layout: Layout) -> ClosedLoop:
         step.__qualname__ = f"full_pose_{layout.name}"
 
     @scalar
-    def speeds(values: Vector, parameters: LoopParameters, knots: Vector) -> Values:
+    def speeds(time: float, values: Vector, parameters: LoopParameters, knots: Vector) -> Values:
         return speeds_in(values)
 
     return ClosedLoop(

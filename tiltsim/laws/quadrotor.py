@@ -147,7 +147,9 @@ def _observe_extended_equations(
 
 
 @scalar
-def thrust_axis_value(values: Vector, parameters: object, knots: Vector) -> tuple[float]:
+def thrust_axis_value(
+    time: float, values: Vector, parameters: object, knots: Vector
+) -> tuple[float]:
     """The cosine of the thrust axis's tilt."""
     return (thrust_tilt_cosine(values),)
 

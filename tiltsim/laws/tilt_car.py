@@ -101,7 +101,9 @@ ROTORS_AT_REST: Final = "the decoupling matrix became singular: both rotors came
 
 
 @scalar
-def sum_of_squared_speeds(values: Vector, parameters: object, knots: Vector) -> tuple[float]:
+def sum_of_squared_speeds(
+    time: float, values: Vector, parameters: object, knots: Vector
+) -> tuple[float]:
     """Zero where the decoupling matrix loses rank."""
     return (values[SPEED_1] * values[SPEED_1] + values[SPEED_2] * values[SPEED_2],)
 

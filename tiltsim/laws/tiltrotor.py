@@ -272,7 +272,7 @@ def scaled_determinant(values: Vector, vehicle: Vehicle) -> float:
 
 
 @scalar
-def determinant_and_speeds(values: Vector, parameters: Any, knots: Vector) -> Values:
+def determinant_and_speeds(time: float, values: Vector, parameters: Any, knots: Vector) -> Values:
     """`scaled_determinant` and `rotor_speeds_along_spin`."""
     determinant = scaled_determinant(values, parameters.law.vehicle)
     return (determinant, *rotor_speeds_along_spin(values))

@@ -64,7 +64,7 @@ def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Flo
 
 @scalar
 def sign_check_values(
-    values: Vector, parameters: LoopParameters, knots: Vector
+    time: float, values: Vector, parameters: LoopParameters, knots: Vector
 ) -> tuple[float, float]:
     """The cosine of the thrust axis's tilt and the extension's thrust."""
     return thrust_tilt_cosine(values), values[24]

@@ -292,7 +292,7 @@ class _Search:
         """Signs that the flight keeps: of the determinant and of the rotors' speeds."""
         try:
             sample = self._motion.observed(self._start, state)
-            values = self._motion.assembly.sign_check_values(tuple(sample.tolist()))
+            values = self._motion.assembly.sign_check_values(self._start, tuple(sample.tolist()))
         except (ArithmeticError, ValueError):
             return np.full(1, np.nan)
         return np.sign(values)

@@ -99,7 +99,7 @@ class EquationsPlant(Plant):
     def _record_natively(self, samples: int, steps: int) -> Floats | None:
         from tiltsim.engines.recorder import Recorder
 
-        checked = self._assembly.sign_check_values(self.observe())
+        checked = self._assembly.sign_check_values(self.time, self.observe())
         recorder = Recorder(self._assembly, samples, steps, steps, checked)
         state, self._held = self._record(
             int(recorder.address),

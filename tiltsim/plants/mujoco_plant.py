@@ -140,7 +140,7 @@ class MujocoPlant(Plant):
             samples,
             steps * evaluations,
             last_steps * evaluations,
-            self._assembly.sign_check_values(self.observe()),
+            self._assembly.sign_check_values(self.time, self.observe()),
         )
 
     def _record_natively(self, samples: int, steps: int) -> Floats | None:

@@ -75,7 +75,7 @@ class TerminationMonitor:
     def _check_signs(self, time: float, state: dict[str, float]) -> End | None:
         monitoring = self._loop.monitoring
         values = list(state.values())[1:]
-        checked = monitoring.sign_check_values(values, *self._setup)
+        checked = monitoring.sign_check_values(time, values, *self._setup)
         for index, value in enumerate(checked):
             # A number that changes its sign between two samples was zero in between.
             side = 0.0 if abs(value) < SINGULAR else copysign(1.0, value)

@@ -156,7 +156,7 @@ def _functions_within(inner: ClosedLoop, fields: int) -> tuple[Callable[..., Val
         return (*inner_observe(qpos, qvel, act[:act_size], ctrl[:ctrl_size]), *activations(act))
 
     @scalar
-    def sign_check_values(values: Vector, parameters: Any, knots: Vector) -> Values:
-        return inner_check(values, parameters.inner, knots)
+    def sign_check_values(time: float, values: Vector, parameters: Any, knots: Vector) -> Values:
+        return inner_check(time, values, parameters.inner, knots)
 
     return controls, hold, observe, sign_check_values
