@@ -63,10 +63,11 @@ def test_a_refusal_counts_as_zero_in_the_total_alone(rows):
 
 def test_the_page_says_first_where_a_baseline_wins(rows):
     lines = arena_page({"tiltrotor": rows}, ["Made."]).splitlines()
-    assert lines[2].endswith("in 2 of 2 tasks:")
-    assert lines[4] == (
-        "- tiltrotor: `step` (`pid` 50, `full_pose` 33), `circle` (`lqr` 50, `full_pose` 25)"
-    )
+    assert lines[2].endswith("in 2 of 2 tasks: tiltrotor 2.")
+    assert (
+        "- a baseline wins with default gains: "
+        "`step` (`pid` 50, `full_pose` 33), `circle` (`lqr` 50, `full_pose` 25)"
+    ) in lines
     assert "| `circle` | 25 | - | 50 |" in lines
     assert "- `pid`: needs legs" in lines
     assert "- `lqr` in `step`, default gains: singular" in lines
@@ -86,8 +87,9 @@ def tuned(rows):
 def test_tuned_scores_stand_beside_default_ones_and_decide_the_order(tuned):
     lines = arena_page({"tiltrotor": tuned}, ["Made."]).splitlines()
     assert lines[2].startswith("With tuned gains a baseline beats")
-    assert lines[4] == "- tiltrotor: `circle` (`lqr` 50, `full_pose` 25)"
-    assert "- tiltrotor: `step` (`pid` 50, then `full_pose` 67)" in lines
+    assert lines[2].endswith("in 1 of 2 tasks: tiltrotor 1.")
+    assert "- a baseline wins with tuned gains: `circle` (`lqr` 50, `full_pose` 25)" in lines
+    assert "- tuning changes who wins: `step` (`pid` 50, then `full_pose` 67)" in lines
     assert "| `step` | 33 → 67 | 50 | 0 |" in lines
     assert "| tiltrotor | 29 → 46 | 25 | 25 |" in lines
 

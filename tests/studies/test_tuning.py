@@ -90,8 +90,12 @@ def test_a_search_begins_at_the_default_gains_and_keeps_its_budget_and_bounds():
     assert not np.array_equal(points[1], other[1][0])
 
 
-def test_a_budget_of_one_evaluation_keeps_the_default_gains():
-    assert len(tuning.maximize(lambda x: 1.0, 3, 1, seed=1)) == 1
+@pytest.mark.parametrize("budget", [1, 2, 9, 14, 17, 18])
+def test_a_search_of_many_factors_flies_its_whole_budget(budget):
+    # Nine points make a simplex of eight factors: a second half of 9 evaluations holds it.
+    flown = tuning.maximize(lambda x: -float((x**2).sum()), 8, budget, seed=1)
+    assert len(flown) == budget
+    np.testing.assert_array_equal(flown[0][0], 0.0)
 
 
 @pytest.fixture

@@ -9,17 +9,19 @@ from tiltsim.studies.arena import Standing, beaten, changed, standings, task_of
 
 
 def arena_page(rows: Mapping[str, Sequence[Mapping[str, Any]]], made: Sequence[str]) -> str:
-    """Where baselines win, what tuning changes, all totals, and a table for each vehicle.
+    """How often baselines win, all totals, and for each vehicle who wins and a table.
 
     Args:
         rows: Of each vehicle.
         made: Sentences on versions, seeds and gains.
     """
     every = {vehicle: standings(chosen) for vehicle, chosen in rows.items()}
-    lines = ["# Arena", "", *_who_wins(every, is_tuned(rows)), "", "## All tasks", ""]
-    lines += _totals(every)
+    kinds = ("tuned", "default") if is_tuned(rows) else ("default",)
+    lines = ["# Arena", "", *_baselines_win(every, kinds), "## All tasks", "", *_totals(every)]
     for vehicle, ranked in every.items():
-        lines += ["", f"## {vehicle.capitalize()}", "", *_table(ranked), *_failures(rows[vehicle])]
+        title = vehicle.replace("_", " ").capitalize()
+        lines += ["", f"## {title}", "", *_table(ranked), "", *_winners(ranked, kinds)]
+        lines += _failures(rows[vehicle])
     return "\n".join([*lines, "", *made, ""])
 
 
@@ -28,23 +30,26 @@ def is_tuned(rows: Mapping[str, Sequence[Mapping[str, Any]]]) -> bool:
     return any(row["gains"] == "tuned" for chosen in rows.values() for row in chosen)
 
 
-def _who_wins(every: Mapping[str, Sequence[Standing]], tuned: bool) -> Iterator[str]:
-    for gains in ("tuned", "default") if tuned else ("default",):
-        found = {vehicle: beaten(ranked, gains) for vehicle, ranked in every.items()}
-        tasks = sum(len(ranked[0].scores) for ranked in every.values() if ranked)
+def _baselines_win(every: Mapping[str, Sequence[Standing]], kinds: Sequence[str]) -> Iterator[str]:
+    """In how many tasks."""
+    tasks = sum(len(ranked[0].scores) for ranked in every.values() if ranked)
+    for gains in kinds:
+        won = {vehicle: len(beaten(ranked, gains)) for vehicle, ranked in every.items()}
+        shares = (f"{vehicle} {won[vehicle]}" for vehicle in every)
         yield (
             f"With {gains} gains a baseline beats all other controllers that flew in "
-            f"{sum(map(len, found.values()))} of {tasks} tasks:"
+            f"{sum(won.values())} of {tasks} tasks: {', '.join(shares)}."
         )
         yield ""
-        for vehicle, lines in found.items():
-            yield f"- {vehicle}: {', '.join(lines) or 'none'}"
-        yield ""
-    if tuned:
-        yield "Tuning changes who wins:"
-        yield ""
-        for vehicle, ranked in every.items():
-            yield f"- {vehicle}: {', '.join(changed(ranked)) or 'nowhere'}"
+
+
+def _winners(ranked: Sequence[Standing], kinds: Sequence[str]) -> Iterator[str]:
+    """Of one vehicle, where baselines win, and where tuning changes who wins."""
+    for gains in kinds:
+        won = ", ".join(beaten(ranked, gains)) or "nowhere"
+        yield f"- a baseline wins with {gains} gains: {won}"
+    if len(kinds) > 1:
+        yield f"- tuning changes who wins: {', '.join(changed(ranked)) or 'nowhere'}"
 
 
 def _totals(every: Mapping[str, Sequence[Standing]]) -> Iterator[str]:

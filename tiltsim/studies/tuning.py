@@ -3,7 +3,8 @@
 The tasks are not the arena's: its scenarios with other points, curves, winds and delays. A search
 varies factors on the default gains, one for every knob, between `FACTORS`: the default gains first,
 then a Latin hypercube of their logarithms, half of the flights together, then Nelder and Mead's
-simplex from the best. A flight that is refused or ends early scores 0.
+simplex from the best; where the other half is too small for a simplex, all of them are the
+hypercube. A flight that is refused or ends early scores 0.
 """
 
 from __future__ import annotations
@@ -241,11 +242,13 @@ def maximize(
 
     low, high = map(log, FACTORS)
     cost(np.zeros(size))
-    spread = qmc.LatinHypercube(size, seed=seed).random(max(0, evaluations // 2 - 1))
+    left = evaluations - max(1, evaluations // 2)
+    if left <= size:
+        left = 0
+    spread = qmc.LatinHypercube(size, seed=seed).random(evaluations - left - 1)
     for point in low + (high - low) * spread:
         cost(point)
-    left = evaluations - len(tried)
-    if left > size:
+    if left:
         start = max(tried, key=lambda one: one[1])[0]
         steps = np.where(start + 0.3 < high, 0.3, -0.3)
         simplex = np.vstack([start, start + np.diag(steps)])
