@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import re
+import tomllib
 from collections import defaultdict
+from pathlib import Path
 
 import pytest
 
+import tiltsim.report.claims as claim_modules
 from tiltsim.report.claim import ExpectationClaim, scenario_claims
 from tiltsim.report.claims import registered_claims
 from tiltsim.report.findings import FINDINGS
@@ -78,3 +81,14 @@ def test_statements_name_findings_and_pictures_that_exist(rows):
     for name, claims in rows.items():
         assert claims[0].settled_by in {"", *findings}, name
         assert set(claims[0].statement.pictures) <= pictures, name
+
+
+def test_every_statement_of_the_chapters_has_a_row():
+    folder = Path(claim_modules.__file__).parent
+    stated = {
+        name
+        for file in folder.glob("*.toml")
+        for name in tomllib.loads(file.read_text(encoding="utf-8"))
+    }
+    used = {claim.statement.id for claim in registered_claims()}
+    assert stated - {"shared"} == used

@@ -253,16 +253,7 @@ def _statement(scenario: Scenario, expectation: Expectation) -> Statement:
     """From the table that the expectation names; otherwise its own words are the statement."""
     table = scenario.claim.get(expectation.claim)
     if table is not None:
-        return Statement(
-            id=expectation.claim,
-            source=scenario.source,
-            text=table.statement,
-            thesis=table.thesis,
-            criterion=table.criterion,
-            note=table.note,
-            fitted=table.fitted,
-            finding=table.finding,
-        )
+        return Statement.of_table(expectation.claim, source=scenario.source, **table.model_dump())
     measured = METRICS[expectation.metric].described.capitalize()
     words = expectation.claim or measured
     chapter = CHAPTER.match(scenario.source)

@@ -27,6 +27,11 @@ if TYPE_CHECKING:
 PRINTED: Final = 1e-3
 """Accuracy to which the coefficients of the determinant are printed."""
 
+EVERY_TERM: Final = (
+    "Every product of sines and cosines has the printed coefficient, to 0.001, and none is missing"
+)
+"""The criterion of `terms_hold`."""
+
 PRINTED_OFFSET: Final = 0.334198
 """α₁ + α₃ on blue as ch. 8 prints it (rad), 1e-5 beside the exact 2δ; twice α₁ of its point P."""
 

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import re
+import tomllib
 import unicodedata
+from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import Enum
-from typing import Final
+from pathlib import Path
+from typing import Any, Final, Self
 
 CHAPTER: Final = re.compile(r"ch\. (\d+)")
 ID: Final = re.compile(r"ch(\d+)(-[a-z0-9]+)+")
@@ -71,6 +74,19 @@ class Statement:
     tests: tuple[str, ...] = ()
     """Tests beside the row's own: "controllers/analysis/test_x.py::test_y"."""
 
+    @classmethod
+    def of_table(cls, name: str, *, statement: str, ours: Iterable[str] = (), **more: Any) -> Self:
+        """From a TOML table: of a scenario file or of a file beside a module of claims.
+
+        Args:
+            name: Its id.
+            statement: The text.
+            ours: Names of its origins: "gains".
+            more: The other fields under their names.
+        """
+        origins = tuple(Origin[name.upper()] for name in ours)
+        return cls(id=name, text=statement, origins=origins, **more)
+
     def __post_init__(self) -> None:
         for name in ("text", "thesis", "criterion"):
             if not getattr(self, name).strip():
@@ -102,3 +118,26 @@ def slug(text: str) -> str:
     spelled = re.sub(r"-(?=\d)", " minus ", "".join(_SPELLED.get(c, c) for c in text))
     plain = unicodedata.normalize("NFKD", spelled).encode("ascii", "ignore").decode().lower()
     return re.sub(r"[^a-z0-9]+", "-", plain).strip("-")
+
+
+def read_statements(chapter: str, **words: object) -> dict[str, Statement]:
+    """The statements of a module of `claims`, by id: the tables of the TOML file beside it.
+
+    Words in braces stand for the text of that name in the file's table ``[shared]`` or in
+    ``words``: what several statements say, and bounds that measures need, too.
+    """
+    file = Path(__file__).parent / "claims" / f"{chapter}.toml"
+    tables = tomllib.loads(file.read_text(encoding="utf-8"))
+    shared = tables.pop("shared", {}) | words
+
+    def complete(value: Any) -> Any:
+        if isinstance(value, list):
+            return tuple(value)
+        if not isinstance(value, str):
+            return value
+        return re.sub(r"{(\w+)}", lambda found: str(shared[found[1]]), value)
+
+    return {
+        name: Statement.of_table(name, **{key: complete(value) for key, value in table.items()})
+        for name, table in tables.items()
+    }

@@ -1,10 +1,14 @@
 """Claims that need more than one flight, or none: computed, or derived from several flights.
 
-One module per chapter, found by its name; each has its statements and a tuple ``CLAIMS`` of rows,
-in the order of the text::
+One module per chapter, found by its name, with a tuple ``CLAIMS`` of rows in the order of the text.
+What the thesis states is in the TOML file beside it, like the ``[claim.NAME]`` of scenarios::
 
-    OFFSET = Statement(id="ch6-blue-offset", source="ch. 6, Sec. 3, Eq. (13)", ...)
-    AnalysisClaim(OFFSET, lambda: 2.0 * delta(AR_DRONE_2), published="0.334198")
+    [ch6-blue-offset]
+    source = "ch. 6, Sec. 3, Eq. (13)"
+    statement = "On blue α₁ + α₃ is"
+    ...
+
+    AnalysisClaim(THESIS["ch6-blue-offset"], lambda: 2.0 * delta(AR_DRONE_2), published="0.334198")
 
 A number written as a string keeps its digits: this one is good to 0.0000005. ``published`` is True
 by default: the thesis says yes. ``measure`` returns a number, several numbers or a bool, always

@@ -19,7 +19,7 @@ from tiltsim.report.measures import (
     routh_holds,
     tracking_error,
 )
-from tiltsim.report.statement import Origin, Statement
+from tiltsim.report.statement import read_statements
 from tiltsim_controllers.analysis.singularity import residuals
 from tiltsim_controllers.laws.decouplers import conventional_decoupler, modified_decoupler
 from tiltsim_controllers.laws.gains import GAIN_SETS
@@ -43,12 +43,6 @@ _SHORT: Final = 0.25
 """Fraction of the larger error up to which a difference at T = 1 s is not significant."""
 _MEASURED: Final = {("instant", 1, "modified"), ("instant", 3, "conventional")}
 """Trots on which it matters in MuJoCo whether the angular acceleration is the model's."""
-_FEEDBACK: Final = (
-    "Eq. (26) feeds back the second derivative of the output. In the instant trots of T = 1 s, "
-    "modified, and T = 3 s, conventional, it is measured; elsewhere it is computed from the law's "
-    "model, which makes no difference of 2 % there. With the model's, MuJoCo loses the latter "
-    "(gyroscopic torque)."
-)
 _WORSE: Final = (
     "The modified decoupler is worse: it assumes tilt angles at rest and leans at every switch of "
     "the trot, which costs most where switches are most frequent."
@@ -114,132 +108,6 @@ _ALL_TROTS: Final = tuple(
 )
 
 
-DETERMINANT = Statement(
-    id="ch4-determinant",
-    source="ch. 4, Sec. 3.3, Eq. (25)",
-    text="For the trot the determinant at level attitude is 4 cos² ρ",
-    thesis="“Substituting (21) – (24) into the left side of (20) yields 4 cos²(ρ)” (Eq. 25).",
-    criterion="R and 4 cos² ρ differ by less than 1e-9 for |ρ| up to 0.65",
-)
-NO_SINGULARITY = Statement(
-    id="ch4-no-singularity",
-    source="ch. 4, Sec. 3.3, Prop. 3",
-    text="The trot meets no singularity at level attitude for |ρ| <= 0.65",
-    thesis="“When the roll angle and pitch angle of the tilt-rotor are close to zero, the "
-    "cat-trot gait introduces no singular problem.”",
-    criterion="R is positive for all |ρ| up to 0.65",
-)
-ATTITUDE_GAINS = Statement(
-    id="ch4-attitude-gains",
-    source="ch. 4, Sec. 5.1, Prop. 4",
-    text="The gains satisfy Eqs. (35)-(38), so that attitude and altitude are stable",
-    thesis="“Thus, all degrees of freedom have been proved exponentially stable”, by Prop. 4 with "
-    "the gains of Sec. 3.4.",
-    criterion="All three gains of the loop are positive and K_P1 K_P2 > K_P3",
-    finding="gains",
-)
-POSITION_GAINS = Statement(
-    id="ch4-position-gains",
-    source="ch. 4, Sec. 5.1, Prop. 5",
-    text="The gains of the position loop satisfy Eqs. (39)-(40)",
-    thesis="“The position (X, Y) is exponentially stable if” both gains are positive.",
-    criterion="Both gains are positive",
-)
-REDUCES = Statement(
-    id="ch4-reduces",
-    source="ch. 4, Secs. 7.1-7.3",
-    text="The modified decoupler reduces the remaining error",
-    thesis="“… the modified attitude-position decoupler notably reduces the steady state error in "
-    "the same gait” (7.1); “… significantly reduces the dynamic state error (supremum), "
-    "especially for the gait with long period” (7.2, 7.3).",
-    criterion="The error at rest, or the largest one after 20 s, is smaller than with the "
-    "conventional decoupler; periods of 2 s and 3 s, since Secs. 7.2 and 7.3 except short ones "
-    "(ch4-short-period)",
-    pictures=("setpoint-errors", "trot-errors"),
-    note=_FEEDBACK,
-)
-PER_AXIS = Statement(
-    id="ch4-per-axis",
-    source="ch. 4, Sec. 7.2, Fig. 5",
-    text="With ρ fixed, the modified decoupler reduces the error along each axis of the line",
-    thesis="“… the yellow curve, e_x (with), and the purple curve, e_y (with), are closer to zero "
-    "comparing with the blue curve, e_x (without), and the red curve, e_y (without), respectively, "
-    "after sufficient time.”",
-    criterion="The absolute error along the axis, as a mean over the last second, is smaller",
-)
-GROWS = Statement(
-    id="ch4-period",
-    source="ch. 4, Secs. 7.2-7.3",
-    text="The error grows with the period of the trot (T = 1, 2, 3 s)",
-    thesis="“Clearly, with the increase of the period, the gait receives larger dynamic state "
-    "error (supremum) for both cat-trot gaits with instant switch and with continuous switch.”",
-    criterion="The largest error after 20 s grows from T = 1 s to 2 s and from 2 s to 3 s",
-    pictures=("trot-errors",),
-    note=_FEEDBACK,
-)
-SHORT_PERIOD = Statement(
-    id="ch4-short-period",
-    source="ch. 4, Secs. 7.2-7.3",
-    text="At the short period, T = 1 s, the decouplers do not differ significantly",
-    thesis="“While no significant differences in the dynamic state error (supremum) are reported "
-    "for the gaits whose period is short for both cat-trot gaits with instant switch and with "
-    "continuous switch.”",
-    criterion="The largest errors after 20 s differ by less than a quarter of the larger one",
-    note="At T = 1 s the modified decoupler is the worse one in all four cases.",
-    finding="short-period",
-    pictures=("trot-errors",),
-)
-CONTINUOUS = Statement(
-    id="ch4-continuous",
-    source="ch. 4, Secs. 7.2-7.3",
-    text="The continuous trot tracks better than the instant one, period by period",
-    thesis="“… the dynamic state error (supremum) received by the cat-trot gait with continuous "
-    "switch (Figure 9) is smaller than the corresponding dynamic state error (supremum) received "
-    "by the cat-trot gait with instant switch (Figure 8).”",
-    criterion="The largest error after 20 s is smaller for each of T = 1, 2, 3 s",
-    pictures=("trot-errors",),
-    note=_FEEDBACK,
-)
-TRACKED = Statement(
-    id="ch4-tracked",
-    source="ch. 4, Sec. 8",
-    text="The trot tracks line and circle, with either decoupler and every period",
-    thesis="“All the references considered in this research (setpoint, uniform rectilinear "
-    "motion, uniform circular motion) are successfully tracked with acceptable steady state error "
-    "by cat-trot gait.”",
-    criterion="None of the 24 flights is lost",
-    note=_FEEDBACK,
-)
-NOT_ACTIVATED = Statement(
-    id="ch4-constraints",
-    source="ch. 4, Sec. 5.1",
-    text="No rotor reaches the limit of zero speed",
-    thesis="“In this research, these constraints are not activated, which simplifies our "
-    "discussion on the stability.”",
-    criterion="The smallest rotor speed along its spin stays above zero in all 24 flights",
-    note=_FEEDBACK,
-)
-UNTILTED = Statement(
-    id="ch4-untilted",
-    source="ch. 4, Sec. 3.2, Remark 2",
-    text="Without tilt the modified decoupler is the conventional one",
-    thesis="“… the attitude-position decoupler for the conventional quadrotor is a special case "
-    "of the modified attitude-position decoupler for the tilt-rotor.”",
-    criterion="Roll and pitch of both agree to 1e-12 for the untilted vehicle",
-)
-FURTHER = Statement(
-    id="ch4-further",
-    source="ch. 4, Sec. 8",
-    text="Without neglecting higher-order terms the error decreases further",
-    thesis="“… further reduction of the dynamic state error may be possible by not ignoring the "
-    "high-order infinitesimal terms while deducing the modified attitude-position decoupler.”",
-    criterion="With the exact decoupler, ours, the error at rest is smaller than with the "
-    "modified one",
-    origins=(Origin.FLIGHT,),
-    finding="statics",
-)
-
-
 def _better(
     where: str,
     case: str,
@@ -247,19 +115,26 @@ def _better(
     error: Callable[[Metrics], float] = tracking_error,
 ) -> FlightClaim:
     flights = tuple(flights)
-    return FlightClaim(REDUCES, flights, partial(falls, error), where=where, case=case)
+    return FlightClaim(
+        THESIS["ch4-reduces"], flights, partial(falls, error), where=where, case=case
+    )
 
 
 def _axis_error(axis: str, metrics: Metrics) -> float:
     return abs(float(metrics[f"final_position_error_{axis}"]))
 
 
+THESIS: Final = read_statements("ch04")
+
 CLAIMS = (
-    AnalysisClaim(DETERMINANT, _eq_25_holds),
-    AnalysisClaim(NO_SINGULARITY, lambda: bool((_trot_residuals()[1] > 0.0).all())),
+    AnalysisClaim(THESIS["ch4-determinant"], _eq_25_holds),
+    AnalysisClaim(THESIS["ch4-no-singularity"], lambda: bool((_trot_residuals()[1] > 0.0).all())),
     *(
         AnalysisClaim(
-            ATTITUDE_GAINS, partial(routh_holds, case.split(" and ")), case=case, refuted=reason
+            THESIS["ch4-attitude-gains"],
+            partial(routh_holds, case.split(" and ")),
+            case=case,
+            refuted=reason,
         )
         for case, reason in (
             (
@@ -277,7 +152,7 @@ CLAIMS = (
         )
     ),
     AnalysisClaim(
-        POSITION_GAINS,
+        THESIS["ch4-position-gains"],
         lambda: min(GAIN_SETS["ch04"].position_1, GAIN_SETS["ch04"].position_2) > 0.0,
     ),
     *(
@@ -313,7 +188,7 @@ CLAIMS = (
     ),
     *(
         FlightClaim(
-            GROWS,
+            THESIS["ch4-period"],
             tuple(_trot(reference, form, T, decoupler) for T in _PERIODS),
             partial(grows, tracking_error),
             where=_PERIOD_FIGURES[reference],
@@ -323,7 +198,7 @@ CLAIMS = (
     ),
     *(
         FlightClaim(
-            SHORT_PERIOD,
+            THESIS["ch4-short-period"],
             _trots(reference, form),
             partial(_short_periods_do_not_differ, reference, form),
             where=_PERIOD_FIGURES[reference],
@@ -334,7 +209,7 @@ CLAIMS = (
     ),
     *(
         FlightClaim(
-            CONTINUOUS,
+            THESIS["ch4-continuous"],
             tuple(_trot(reference, f, T, decoupler) for f in _FORMS for T in _PERIODS),
             partial(_continuous_is_better, reference, decoupler),
             where=_PERIOD_FIGURES[reference],
@@ -342,21 +217,21 @@ CLAIMS = (
         )
         for reference, decoupler in product(_PERIOD_FIGURES, _DECOUPLERS)
     ),
-    FlightClaim(TRACKED, _ALL_TROTS, every_flight_completed),
-    FlightClaim(NOT_ACTIVATED, _ALL_TROTS, no_rotor_stops),
+    FlightClaim(THESIS["ch4-tracked"], _ALL_TROTS, every_flight_completed),
+    FlightClaim(THESIS["ch4-constraints"], _ALL_TROTS, no_rotor_stops),
     *(
         FlightClaim(
-            PER_AXIS,
+            THESIS["ch4-per-axis"],
             tuple(_address("line", "fixed", decoupler) for decoupler in _DECOUPLERS),
             partial(falls, partial(_axis_error, axis)),
             case=f"along {axis}",
         )
         for axis in "xy"
     ),
-    AnalysisClaim(UNTILTED, _decouplers_agree_without_tilt),
+    AnalysisClaim(THESIS["ch4-untilted"], _decouplers_agree_without_tilt),
     *(
         FlightClaim(
-            FURTHER,
+            THESIS["ch4-further"],
             (_address("setpoint", name, "modified"), f"beyond/setpoint_exact_decoupler#{name}"),
             partial(falls, resting_error),
             case=f"setpoint, {title}",

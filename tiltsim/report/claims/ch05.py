@@ -15,8 +15,8 @@ import numpy as np
 
 from tiltsim.report.claim import AnalysisClaim
 from tiltsim.report.claims.ch03 import EQ_17, EQ_19
-from tiltsim.report.measures import routh_holds, terms, terms_hold
-from tiltsim.report.statement import Origin, Statement
+from tiltsim.report.measures import EVERY_TERM, routh_holds, terms, terms_hold
+from tiltsim.report.statement import read_statements
 from tiltsim_controllers.analysis.published_gaits import smallest_margin
 from tiltsim_controllers.analysis.singularity import determinant
 from tiltsim_controllers.gaits import plans
@@ -60,73 +60,12 @@ def _shrunk_gaits_are_regular() -> bool:
     return agrees and bool((limit > 0.0).all())
 
 
-_EVERY_TERM: Final = (
-    "Every product of sines and cosines has the printed coefficient, to 0.001, and none is missing"
-)
-_KEYFRAMES: Final = (Origin.KEYFRAMES,)
-
-EQ_11 = Statement(
-    id="ch5-eq-11",
-    source="ch. 5, Sec. 3.1, Eq. (11)",
-    text="Eq. (11), term by term, is the determinant at level attitude",
-    thesis="“Once the gait … satisfies (11), the decoupling matrix in feedback linearization is "
-    "asserted to be invertible in our case, given φ ≈ 0, θ ≈ 0.”",
-    criterion=_EVERY_TERM,
-)
-EQ_15_HOLDS = Statement(
-    id="ch5-eq-15",
-    source="ch. 5, Sec. 4, Eq. (15)",
-    text="Eq. (15), term by term, is the determinant at any attitude",
-    thesis="“The exact necessary and sufficient condition [18] to receive an invertible decoupling "
-    "matrix is” Eq. (15).",
-    criterion=_EVERY_TERM,
-    finding="slips",
-)
-UNSCALED = Statement(
-    id="ch5-unscaled",
-    source="ch. 5, Abstract and Sec. 4",
-    text="Unscaled, the gait meets a singular matrix at level attitude",
-    thesis="“It is found that the singular decoupling matrix exists in walk gait, transverse "
-    "gallop gait, and rotary gallop gait”; the run “remains identical to the original cat-run "
-    "gait”.",
-    criterion="R vanishes or changes its sign within a period",
-    origins=_KEYFRAMES,
-    fitted=True,
-)
-SOME_SCALE = Statement(
-    id="ch5-some-scale",
-    source="ch. 5, Sec. 4, Prop. 1, Eq. (18)",
-    text="Some integer n makes a gait scaled by 1/n regular",
-    thesis="“There will always be a positive integer n such that the modified gait by scaling by "
-    "1/n produces an invertible decoupling matrix”, since the determinant tends to 4.000 cφ cθ.",
-    criterion="At zero tilt the determinant is 4 cos φ cos θ to 1e-9 and positive within 1.5 rad; "
-    "it is continuous, so small gaits are regular, too",
-)
-SCALING = Statement(
-    id="ch5-scaling",
-    source="ch. 5, Sec. 4, Figs. 9-11",
-    text="Scaled by 1/2 and 1/3 the singular attitudes move away from level",
-    thesis="“It can be found that the acceptable attitude region is enlarging while evenly "
-    "shrinking the scale of the walk gait. A similar result can also be notably observed in” both "
-    "gallops.",
-    criterion="The smallest rotation from level to a singular attitude grows from scale 1 to 1/2 "
-    "and from 1/2 to 1/3",
-    origins=_KEYFRAMES,
-    fitted=True,
-)
-GAINS = Statement(
-    id="ch5-gains",
-    source="ch. 5, App. A, Eqs. (A1)-(A4)",
-    text="With the printed gains the attitude loops are stable",
-    thesis="App. A prints the gains of ch. 4, whose Prop. 4 is the stability condition.",
-    criterion="All three gains of each loop are positive and K1 K2 > K3",
-    finding="gains",
-)
+THESIS: Final = read_statements("ch05", every_term=EVERY_TERM)
 
 CLAIMS = (
-    AnalysisClaim(EQ_11, partial(terms_hold, "R", EQ_19, _VEHICLE)),
+    AnalysisClaim(THESIS["ch5-eq-11"], partial(terms_hold, "R", EQ_19, _VEHICLE)),
     AnalysisClaim(
-        EQ_15_HOLDS,
+        THESIS["ch5-eq-15"],
         lambda: all(
             terms_hold(part, printed, _VEHICLE) for part, printed in EQ_15._asdict().items()
         ),
@@ -135,17 +74,17 @@ CLAIMS = (
     ),
     *(
         AnalysisClaim(
-            UNSCALED,
+            THESIS["ch5-unscaled"],
             partial(_is_singular, gait),
             case=gait.replace("_", " "),
             published=gait != "run",
         )
         for gait in (*_SCALED, "run")
     ),
-    AnalysisClaim(SOME_SCALE, _shrunk_gaits_are_regular),
+    AnalysisClaim(THESIS["ch5-some-scale"], _shrunk_gaits_are_regular),
     *(
         AnalysisClaim(
-            SCALING,
+            THESIS["ch5-scaling"],
             partial(_scaling_enlarges, gait),
             case=gait.replace("_", " "),
             where=f"ch. 5, Sec. 4, Fig. {figure}",
@@ -153,7 +92,7 @@ CLAIMS = (
         for gait, figure in zip(_SCALED, (9, 10, 11), strict=True)
     ),
     AnalysisClaim(
-        GAINS,
+        THESIS["ch5-gains"],
         partial(routh_holds, ("roll", "pitch", "yaw")),
         refuted="K1 K2 > K3 fails as in ch. 4, Prop. 4: 10 against 50 for roll and pitch, 1 "
         "against 1 for yaw. The factor missing in the printed matrix makes the flights stable.",

@@ -11,7 +11,7 @@ import numpy as np
 
 from tiltsim.report.claim import FlightClaim, Metrics
 from tiltsim.report.measures import every_flight_completed, falls, no_rotor_stops, tracking_error
-from tiltsim.report.statement import Statement
+from tiltsim.report.statement import Statement, read_statements
 
 _REFERENCES: Final = {"line": "Sec. 6, Fig. 12", "circle": "Sec. 6, Fig. 13"}
 _PERIODS: Final = (1, 2, 3)
@@ -39,7 +39,6 @@ _RUN_HARDLY: Final = (
     "With the conventional decoupler the run's error grows by less than half; with the modified "
     "one it grows by more."
 )
-_RADARS: Final = "ch. 5, Sec. 6, Figs. 12-13"
 
 
 def _address(reference: str, gait: str, period: int, decoupler: str) -> str:
@@ -124,103 +123,12 @@ def _by_decoupler(
         )
 
 
-FLOWN = Statement(
-    id="ch5-flown",
-    source=_RADARS,
-    text="The gait tracks the reference at every period",
-    thesis="“The result shows that these gaits, after modifications, are feasible in tracking "
-    "references, especially for the cases equipped with the modified attitude-position decoupler.”",
-    criterion="With T = 1, 2 and 3 s the flight completes and no rotor reverses",
-    fitted=True,
-    pictures=("walk",),
-)
-DECREASES = Statement(
-    id="ch5-decreases",
-    source=_RADARS,
-    text="The modified decoupler decreases the error for all gaits",
-    thesis="“… the inner purple quadrilateral is much smaller than the outer blue quadrilateral, "
-    "which demonstrates that our modified attitude-position decoupler significantly decreases the "
-    "dynamic state error for all the gaits discussed.”",
-    criterion="The largest error after 20 s is smaller than with the conventional decoupler",
-    fitted=True,
-)
-HELPS_MOST = Statement(
-    id="ch5-helps-most",
-    source=_RADARS,
-    text="The modified decoupler helps most where the error is largest",
-    thesis="“This novel attitude-position decoupler is particularly effective for the case "
-    "suffering from a large dynamic state error equipped with the conventional attitude-position "
-    "decoupler.”",
-    criterion="Of the twelve gaits and periods, the one with the largest conventional error is "
-    "the one whose error decreases most",
-    fitted=True,
-)
-GROWS = Statement(
-    id="ch5-period",
-    source=_RADARS,
-    text="The error tends to grow with the period of the gait",
-    thesis="“The longer the period is, the larger dynamic state error there tends to be in walk "
-    "gait, run gait, transverse gallop gait, and rotary gallop gait.”",
-    criterion="The largest error after 20 s grows from T = 1 s to 2 s and from 2 s to 3 s, with "
-    "either decoupler",
-    fitted=True,
-)
-DEPENDS = Statement(
-    id="ch5-depends-on-period",
-    source=_RADARS,
-    text="The error depends strongly on the period",
-    thesis="“The result of the walk gaits is insignificantly influenced by the period settings, "
-    "while the result in the run gait highly relies on the period settings.”",
-    criterion="The error grows by more than half from T = 1 s to 3 s",
-    fitted=True,
-)
-WALK_LEAST = Statement(
-    id="ch5-walk-least",
-    source="ch. 5, Sec. 7, Figs. 12-13",
-    text="The walk has the smallest errors of the four gaits",
-    thesis="“… the modified walk-inspired gait in this research receives the least suprema of the "
-    "dynamic state error after sufficient time.”",
-    criterion="With the decoupler of the row, the mean over T = 1, 2, 3 s is the smallest of the "
-    "four",
-    note="The scale and the lean of our gaits are fitted, and “the dynamic state error may also be "
-    "influenced by the maximum tilting angle of each gait” (Sec. 7).",
-    finding="gallops",
-    fitted=True,
-)
-RUN_LARGEST = Statement(
-    id="ch5-run-largest",
-    source="ch. 5, Sec. 7, Figs. 12-13",
-    text="The run has the largest errors of the four gaits",
-    thesis="“… the run-inspired gait receives the largest suprema of the dynamic state error after "
-    "sufficient time.”",
-    criterion="With the decoupler of the row, the mean over T = 1, 2, 3 s is the largest of the "
-    "four",
-    fitted=True,
-)
-GALLOPS_ALIKE = Statement(
-    id="ch5-gallops-alike",
-    source="ch. 5, Sec. 7, Figs. 12-13",
-    text="The two gallops have similar errors",
-    thesis="“… the modified transverse gallop gait and rotary gallop gait receive similar suprema "
-    "of the dynamic state error after sufficient time.”",
-    criterion="With the decoupler of the row, the means over T = 1, 2, 3 s differ by less than a "
-    "tenth",
-    fitted=True,
-)
-SCALE_SPEEDS = Statement(
-    id="ch5-scale-speeds",
-    source="ch. 5, Sec. 7, Figs. 14-15",
-    text="The scale of the walk, 1/3 or 1/6, changes the rotor speeds",
-    thesis="“… the scale of the tilting angles influences the resulting angular velocities of the "
-    "propellers of the tilt-rotor.”",
-    criterion="The range of rotor speeds on the line at T = 3 s differs by at least a tenth",
-    fitted=True,
-)
+THESIS: Final = read_statements("ch05_flights")
 
 CLAIMS = (
     *(
         FlightClaim(
-            FLOWN,
+            THESIS["ch5-flown"],
             _all(reference, (gait,), (decoupler,)),
             _flown,
             case=f"{reference}, {title}, {decoupler}",
@@ -230,7 +138,7 @@ CLAIMS = (
     ),
     *(
         FlightClaim(
-            DECREASES,
+            THESIS["ch5-decreases"],
             tuple(_address(reference, gait, period, d) for d in _DECOUPLERS),
             partial(falls, tracking_error),
             where=f"ch. 5, {section}",
@@ -242,7 +150,7 @@ CLAIMS = (
     ),
     *(
         FlightClaim(
-            HELPS_MOST,
+            THESIS["ch5-helps-most"],
             _all(reference),
             partial(_saves_most_where_the_error_is_largest, reference),
             where=f"ch. 5, {section}",
@@ -252,7 +160,7 @@ CLAIMS = (
     ),
     *(
         FlightClaim(
-            GROWS,
+            THESIS["ch5-period"],
             _all(reference, (gait,)),
             partial(_grows, reference, gait),
             where=f"ch. 5, {section}",
@@ -262,7 +170,7 @@ CLAIMS = (
     ),
     *(
         FlightClaim(
-            DEPENDS,
+            THESIS["ch5-depends-on-period"],
             _all(reference, (gait,), (decoupler,)),
             partial(_depends_on_period, reference, gait, decoupler),
             case=f"{reference}, {_GAITS[gait]}, {decoupler}",
@@ -276,11 +184,11 @@ CLAIMS = (
             _REFERENCES, ("walk_third", "run_full"), _DECOUPLERS
         )
     ),
-    *_by_decoupler(WALK_LEAST, _walk_is_smallest, _GALLOPS_WIN),
-    *_by_decoupler(RUN_LARGEST, _run_is_largest),
-    *_by_decoupler(GALLOPS_ALIKE, _gallops_are_alike),
+    *_by_decoupler(THESIS["ch5-walk-least"], _walk_is_smallest, _GALLOPS_WIN),
+    *_by_decoupler(THESIS["ch5-run-largest"], _run_is_largest),
+    *_by_decoupler(THESIS["ch5-gallops-alike"], _gallops_are_alike),
     FlightClaim(
-        SCALE_SPEEDS,
+        THESIS["ch5-scale-speeds"],
         tuple(_address("line", f"walk_{n}", 3, "modified") for n in ("third", "sixth")),
         _scale_changes_the_speeds,
     ),

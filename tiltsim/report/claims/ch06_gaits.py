@@ -12,7 +12,7 @@ from tiltsim.report.claim import AnalysisClaim
 from tiltsim.report.claims.ch03 import EQ_17, EQ_19
 from tiltsim.report.claims.ch06 import EQ_4, RANK
 from tiltsim.report.measures import PRINTED_OFFSET
-from tiltsim.report.statement import Statement
+from tiltsim.report.statement import read_statements
 from tiltsim_controllers.analysis.published_gaits import (
     PUBLISHED_GAITS,
     Robustness,
@@ -120,79 +120,16 @@ def _angles_on_lines(key: str) -> bool:
     return bool(np.abs(np.stack([third - first, fourth - second])).max() < 0.0005)
 
 
-ON_SURFACE = Statement(
-    id="ch6-angles",
-    source="ch. 6, Sec. 5",
-    text="The printed angles lie on the surface",
-    thesis="Secs. 5.1-5.3 print the vertices of the four gaits with three decimals.",
-    criterion="α₃ and α₄ are those of the gait's color, to half the last printed digit",
-)
-SIGN = Statement(
-    id="ch6-sign",
-    source="ch. 6, Sec. 5",
-    text="Sign of R along the whole gait",
-    thesis="“Three of them satisfy R … < 0 for any given time. The rest one satisfies R … > 0 for "
-    "any given time.”",
-    criterion="R has one sign over the period and exceeds 1e-9 everywhere, in absolute value",
-)
-ROBUST = Statement(
-    id="ch6-robust",
-    source="ch. 6, Sec. 5",
-    text="The gait is more robust than its biased twin",
-    thesis="“… the red curves are generally further to the origin, (φ, θ) = (0,0), comparing with "
-    "the blue curves.”",
-    criterion="The smallest rotation from level to a singular attitude, over the period, is "
-    "larger; a gait without any margin is not robust",
-    pictures=("red-and-biased", "blue-and-biased"),
-)
-NEARLY_ALL = Statement(
-    id="ch6-nearly-all",
-    source="ch. 6, Sec. 5",
-    text="Nearly all attitudes within 90 degrees are admissible",
-    thesis="“The region of admissible attitudes enlarges nearly to the whole region of φ ∈ (-π/2, "
-    "π/2), θ ∈ (-π/2, π/2).”",
-    criterion="The margin exceeds 1.55 rad",
-    finding="red",
-    pictures=("red-and-biased",),
-)
-ADVANTAGE = Statement(
-    id="ch6-advantage",
-    source="ch. 6, Sec. 6, Figs. 23, 28",
-    text="Gait 2 has a greater advantage over the gait with a bias of 99 % than over that of 80 %",
-    thesis="“… the robustness of Gait 2 has little advantages compared with this biased gait by "
-    "scaling (η = 80%). At the same time, it shows a greater advantage compared with the other "
-    "biased gait (η = 99%).”",
-    criterion="Its margin exceeds that of the 99 % gait by more than that of the 80 % gait",
-    finding="blue",
-)
-RED_BEATS_BLUE = Statement(
-    id="ch6-red-beats-blue",
-    source="ch. 6, Sec. 6",
-    text="Gaits on (+,+) have more acceptable attitudes than those on (-,-)",
-    thesis="“The gait planned on the planes (+,+) generally receives a larger acceptable attitude "
-    "zone than the gait planned on the planes (-,-).”",
-    criterion="On the exact lines the margin of Gait 3 exceeds that of Gait 2, which has the same "
-    "(α₁, α₂)",
-    note="The thesis leaves “the underlying mechanism” open: on blue every attitude is singular.",
-    finding="blue",
-)
-CAN_HARM = Statement(
-    id="ch6-partial-scaling",
-    source="ch. 6, Sec. 6",
-    text="Scaling only α₃ and α₄ may make a gait less robust",
-    thesis="“… partially scaling may not increase the robustness and even may have the opposite "
-    "effect for some gaits.”",
-    criterion="The margin of Gait 3 or 4 is smaller with α₃ and α₄ scaled",
-)
+THESIS: Final = read_statements("ch06_gaits")
 
 CLAIMS = (
     *(
-        AnalysisClaim(ON_SURFACE, partial(_angles_on_lines, key), case=name)
+        AnalysisClaim(THESIS["ch6-angles"], partial(_angles_on_lines, key), case=name)
         for key, name in _GAITS.items()
     ),
     *(
         AnalysisClaim(
-            SIGN,
+            THESIS["ch6-sign"],
             partial(lambda gait: _as_published(gait)[1], key),
             case=f"{_GAITS[key]}, {_BLUE_PRINTED}",
             key=f"{key[5:].replace('_', '-')}-as-published",
@@ -202,7 +139,7 @@ CLAIMS = (
     ),
     *(
         AnalysisClaim(
-            SIGN,
+            THESIS["ch6-sign"],
             partial(_signs, key),
             case=f"{name}, {_BLUE_EXACT}",
             key=key[5:].replace("_", "-"),
@@ -214,7 +151,7 @@ CLAIMS = (
     ),
     *(
         AnalysisClaim(
-            ROBUST,
+            THESIS["ch6-robust"],
             partial(_is_more_robust_as_published, key),
             case=f"{_GAITS[key]}, {_BLUE_PRINTED}",
             key=f"{key[5:].replace('_', '-')}-as-published",
@@ -224,7 +161,7 @@ CLAIMS = (
     ),
     *(
         AnalysisClaim(
-            ROBUST,
+            THESIS["ch6-robust"],
             partial(lambda gait: bool(_robustness(gait).claim_holds), key),
             case=f"{name}, {_BLUE_EXACT}",
             key=key[5:].replace("_", "-"),
@@ -236,7 +173,7 @@ CLAIMS = (
     ),
     *(
         AnalysisClaim(
-            NEARLY_ALL,
+            THESIS["ch6-nearly-all"],
             partial(_nearly_all, key),
             case=_GAITS[key],
             where=f"ch. 6, Sec. 5, Fig. {_FIGURES[key]}",
@@ -244,18 +181,18 @@ CLAIMS = (
         for key in ("ch06_gait_3", "ch06_gait_4")
     ),
     AnalysisClaim(
-        ADVANTAGE,
+        THESIS["ch6-advantage"],
         partial(_greater_advantage_over_99, lambda bias: _as_published("ch06_gait_2", bias)[0]),
         case=_BLUE_PRINTED,
         key="as-published",
     ),
     AnalysisClaim(
-        ADVANTAGE,
+        THESIS["ch6-advantage"],
         partial(_greater_advantage_over_99, _margin_on_exact_lines),
         case=_BLUE_EXACT,
         key="exact",
         refuted="Gait 2 has no margin at all. " + RANK,
     ),
-    AnalysisClaim(RED_BEATS_BLUE, _red_beats_blue),
-    AnalysisClaim(CAN_HARM, _partial_scaling_can_harm),
+    AnalysisClaim(THESIS["ch6-red-beats-blue"], _red_beats_blue),
+    AnalysisClaim(THESIS["ch6-partial-scaling"], _partial_scaling_can_harm),
 )

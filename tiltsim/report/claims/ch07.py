@@ -11,7 +11,7 @@ import numpy as np
 from tiltsim.report.claim import AnalysisClaim, FlightClaim, Metrics
 from tiltsim.report.claims.ch06 import RANK
 from tiltsim.report.measures import beats_its_biased_twin, margins_as_printed
-from tiltsim.report.statement import Origin, Statement
+from tiltsim.report.statement import read_statements
 from tiltsim_controllers.analysis.published_gaits import PUBLISHED_GAITS, robustness
 from tiltsim_controllers.analysis.two_color_map import delta, find_roots
 from tiltsim_controllers.vehicle.parameters import PRESETS
@@ -52,67 +52,13 @@ def _rotors_keep_turning(flights: Mapping[str, Metrics]) -> bool:
     return not metrics["diverged"] and float(metrics["min_rotor_speed"]) > 0.0
 
 
-TWO_ROOTS = Statement(
-    id="ch7-two-roots",
-    source="ch. 7, Sec. 3.1, Figs. 2-3",
-    text="The complete map: to every (α₁, α₂) belong two (α₃, α₄), one of each color's planes",
-    thesis="“… there are two (α₃(t₁), α₄(t₁)) corresponding to a defined (α₁(t₁), α₂(t₁)), in "
-    "general, to design a robust gait. … Fig. 2 and Fig. 3 display the entire map for the first "
-    "time.”",
-    criterion="At each of 200 random points, R_φ = R_θ = 0 has two roots within a quarter turn, "
-    "one on the red and one on the blue lines",
-    finding="map",
-    pictures=("map",),
-)
-MORE_ROBUST = Statement(
-    id="ch7-more-robust",
-    source="ch. 7, Sec. 3.2, Figs. 5-7",
-    text="The gait is more robust than its biased twin",
-    thesis="“In general, the acceptable attitude region enlarges if the gait following Two Color "
-    "Map Theorem” (Figs. 5-7: red curves of the gait, blue ones of its twin with α₃ and α₄ at "
-    "80 %).",
-    criterion="The gait's smallest singularity margin at level attitude exceeds its twin's, and "
-    "is not zero",
-    note="The rectangles of Fig. 4 have the described color; place and size are ours.",
-    origins=(Origin.PATH,),
-)
-RED_ESPECIALLY = Statement(
-    id="ch7-red-especially",
-    source="ch. 7, Sec. 3.2",
-    text="The advantage is greatest for the red gaits",
-    thesis="“… the acceptable attitude region enlarges …, especially for the gaits with the red "
-    "(α₃, α₄).”",
-    criterion="Both red gaits have larger singularity margins than the blue one with the printed "
-    "offset",
-    origins=(Origin.PATH,),
-    finding="red",
-)
-SENSITIVE = Statement(
-    id="ch7-biased-2-sensitive",
-    source="ch. 7, Sec. 3.2, Fig. 6",
-    text="The biased Gait 2 is very sensitive to the attitude",
-    thesis="“The decoupling matrix introduced by the biased Gait 2 is very sensitive to the "
-    "attitude.”",
-    criterion=f"Its singularity margin at level attitude is below {_SENSITIVE} rad; ours, larger "
-    "or not, would not refute the thesis, whose rectangle we do not have",
-    origins=(Origin.PATH,),
-)
-NO_SATURATION = Statement(
-    id="ch7-no-saturation",
-    source="ch. 7, Sec. 5, Fig. 9",
-    text="No rotor reaches zero speed while Gait 1 tracks",
-    thesis="“No saturations or negative constraints of the angular velocities of the propeller "
-    "are activated in the simulation.”",
-    criterion="The flight with Gait 1 and the printed offset completes, and no rotor stops or "
-    "reverses",
-    finding="blue",
-)
+THESIS: Final = read_statements("ch07", sensitive=_SENSITIVE)
 
 CLAIMS = (
-    AnalysisClaim(TWO_ROOTS, _one_root_of_each_color),
+    AnalysisClaim(THESIS["ch7-two-roots"], _one_root_of_each_color),
     *(
         AnalysisClaim(
-            MORE_ROBUST,
+            THESIS["ch7-more-robust"],
             partial(beats_its_biased_twin, key),
             case=name + (", on the exact lines" if key == "ch07_gait_1" else ""),
             where=f"ch. 7, Sec. 3.2, Fig. {_FIGURES[key]}",
@@ -122,21 +68,21 @@ CLAIMS = (
         for key, name in _GAITS.items()
     ),
     AnalysisClaim(
-        MORE_ROBUST,
+        THESIS["ch7-more-robust"],
         lambda: margins_as_printed("ch07_gait_1")[0] > margins_as_printed("ch07_gait_1")[1],
         case="Gait 1, with the printed offset",
         where="ch. 7, Sec. 3.2, Fig. 5",
         note="The margin is that of a matrix singular up to the sixth digit of the offset.",
     ),
-    AnalysisClaim(RED_ESPECIALLY, _red_is_more_robust),
+    AnalysisClaim(THESIS["ch7-red-especially"], _red_is_more_robust),
     AnalysisClaim(
-        SENSITIVE,
+        THESIS["ch7-biased-2-sensitive"],
         _is_sensitive,
         why="Our rectangle's biased twin keeps most of a right angle. A larger rectangle would "
         "leave it less.",
     ),
     FlightClaim(
-        NO_SATURATION,
+        THESIS["ch7-no-saturation"],
         (_BLUE_ROUNDED,),
         _rotors_keep_turning,
         why="The flight is lost at the first attitude error: a matrix that the sixth digit of an "

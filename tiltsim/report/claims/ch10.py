@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 
 from tiltsim.report.claim import AnalysisClaim, FlightClaim, Metrics
-from tiltsim.report.statement import Origin, Statement
+from tiltsim.report.statement import Origin, read_statements
 from tiltsim_controllers.tilt_car.third_derivative import input_columns
 from tiltsim_controllers.tilt_car.vehicle import (
     THESIS_CAR,
@@ -95,104 +95,11 @@ def _fails_after_a_rotor_stops(flights: Mapping[str, Metrics]) -> bool:
     return metrics["min_rotor_speed"] == 0.0 and error > _SMALL_ERROR
 
 
-COUNTER_YAW = Statement(
-    id="ch10-counter-yaw",
-    source="ch. 10, Sec. 2, Eq. (2)",
-    text="Yaw of the bottom disc over tilt of the top disc, with I_T = 0.001 and I_B = 0.002",
-    thesis="“Based on Conservation of Angular Momentum” ψ = -(I_T / I_B) α, “where I_T and I_B are "
-    "the rotational inertias of the top disc and bottom disc”.",
-    criterion="The ratio by conservation of angular momentum rounds to -0.5",
-)
-INVERTIBLE = Statement(
-    id="ch10-invertible",
-    source="ch. 10, Sec. 2, Eq. (6)",
-    text="The matrix from squared speeds to acceleration can be inverted",
-    thesis="“… both J_ψ+α and J_θ have full rank. Thus, J_ψ+α · J_θ is invertible.”",
-    criterion="The determinant of J_θ is not zero; a rotation does not change it",
-)
-RANK_BOTH = Statement(
-    id="ch10-rank-both-turn",
-    source="ch. 10, Sec. 3.1, Eqs. (10)-(12)",
-    text="Rank 2 if and only if both rotors turn",
-    thesis="“Since Δ₁ is invertible if and only if ω₁ ≠ 0 and ω₂ ≠ 0, [Δ₁|Δ₂] has full row rank if "
-    "and only if ω₁ ≠ 0 and ω₂ ≠ 0.”",
-    criterion="The rank is 2 with both rotors turning and below 2 with either at rest",
-)
-RANK_28 = Statement(
-    id="ch10-eq-28",
-    source="ch. 10, Sec. 6.1, Eq. (28)",
-    text="The columns of the rotors have rank 2 unless both rotors are at rest",
-    thesis="“Notice that when ω₁ and ω₂ are not both zero, we have” rank 2.",
-    criterion="The rank is 2 with either rotor at rest",
-)
-DRIFT = Statement(
-    id="ch10-drift",
-    source="ch. 10, Secs. 4.1-4.2, Figs. 9, 14",
-    text="State drift: the inputs diverge after the error has vanished",
-    thesis="“The inputs diverge in two opposite directions. … the input changes dramatically after "
-    "the vehicle is stable already. We define this phenomenon 'State Drift'.”",
-    criterion="ω₁² - ω₂² is more than ten times as large after 2000 s as after 10 s",
-    finding="holonomy",
-    pictures=("drift",),
-)
-TO_THE_CENTER = Statement(
-    id="ch10-direction-10-s",
-    source="ch. 10, Sec. 4.1, Fig. 10",
-    text="After 10 s the middle of the thrusts points to the center of the circle",
-    thesis="“… the direction of the middle of two thrusts of the vehicle (orange line) seems to "
-    "stabilize at the direction pointing to the center of the circle … when time approaches 10 "
-    "seconds.”",
-    criterion=f"The angle between them, from ω₁² - ω₂², is below {_ALIGNED} rad",
-)
-BIASED = Statement(
-    id="ch10-direction-2000-s",
-    source="ch. 10, Sec. 4.1, Fig. 15",
-    text="After 2000 s the middle of the thrusts is far from the direction to the center",
-    thesis="“It dramatically biases from the direction pointing to the center of the circle.”",
-    criterion="The angle between them, from ω₁² - ω₂², is above half of the thrusts' half angle "
-    "π/6, at which a rotor would stop",
-    finding="holonomy",
-    pictures=("drift",),
-)
-PLANNED = Statement(
-    id="ch10-eq-18",
-    source="ch. 10, Sec. 5, Eq. (18)",
-    text="With the tilt of Eq. (18) the thrusts stay pointed at the center",
-    thesis="“α is defined in Equation (18) such that the direction of the middle of two thrusts "
-    "(ψ + α) always points to the center of the circular reference.”",
-    criterion="The rates of yaw and tilt together equal the circle's 1 rad/s to rounding",
-    note="Eq. (18) prints T_B, a symbol that the chapter does not define; I_B is meant.",
-)
-SATURATES = Statement(
-    id="ch10-planned-saturates",
-    source="ch. 10, Sec. 5, Fig. 23",
-    text="With the tilt planned the inputs saturate for a while",
-    thesis="“There is an undesired behavior in this controller: the saturation in inputs.”",
-    criterion="In some samples, but not in all, a rotor is at rest",
-)
-COLUMN = Statement(
-    id="ch10-eq-27",
-    source="ch. 10, Sec. 6.1, Eq. (27)",
-    text="Eq. (27) is the column of the tilt in the fourth derivative",
-    thesis="Eq. (27) prints the column without the factor (1 - I_T/I_B) that Eq. (11) has.",
-    criterion="The column equals the derivative of Eq. (3) with respect to the tilt, yaw following "
-    "by Eq. (2), to 1e-6",
-    finding="tilt-column",
-)
-FAILS = Statement(
-    id="ch10-fourth-fails",
-    source="ch. 10, Sec. 6.1, Figs. 24-25",
-    text="With the fourth-derivative controller a rotor drifts to a stop, and then it fails",
-    thesis="“… the input (ω₂²) hit the positive constraint (negative thrust is not allowed) … "
-    "unstable system with increasing dynamic state error is reported.”",
-    criterion=f"A rotor stops, and the error from 20 s on exceeds {_SMALL_ERROR} m, the value at "
-    "the beginning",
-    finding="tilt-column",
-)
+THESIS: Final = read_statements("ch10", aligned=_ALIGNED, small_error=_SMALL_ERROR)
 
 CLAIMS = (
     AnalysisClaim(
-        COUNTER_YAW,
+        THESIS["ch10-counter-yaw"],
         lambda: -counter_yaw_per_tilt(THESIS_CAR),
         case="I_B read as the inertia of the whole car",
         published="-0.5",
@@ -201,44 +108,52 @@ CLAIMS = (
         origins=(Origin.PARAMETERS,),
     ),
     AnalysisClaim(
-        COUNTER_YAW,
+        THESIS["ch10-counter-yaw"],
         lambda: -counter_yaw_per_tilt(THESIS_CAR._replace(bottom_inertia=0.002)),
         case="I_B read as the bottom disc's own inertia, as the text says",
         published="-0.5",
         refuted="α is the top disc's angle on the bottom one, so that I_T (ψ' + α') + I_bottom ψ' "
         "= 0: -1/3. Eq. (2) holds where I_B is the inertia of the whole car.",
     ),
-    AnalysisClaim(INVERTIBLE, _thrusts_can_be_inverted),
+    AnalysisClaim(THESIS["ch10-invertible"], _thrusts_can_be_inverted),
     AnalysisClaim(
-        RANK_BOTH, partial(_full_rank_needs_both, tilting=False), case="columns of the rotors, Δ1"
+        THESIS["ch10-rank-both-turn"],
+        partial(_full_rank_needs_both, tilting=False),
+        case="columns of the rotors, Δ1",
     ),
     AnalysisClaim(
-        RANK_BOTH,
+        THESIS["ch10-rank-both-turn"],
         partial(_full_rank_needs_both, tilting=True),
         case="with the column of the tilt, [Δ1 | Δ2]",
         refuted="With one rotor at rest the tilt turns the other one's thrust: still rank 2.",
     ),
-    FlightClaim(TO_THE_CENTER, (_EARLY,), lambda flights: abs(_lean(_EARLY, flights)) < _ALIGNED),
-    FlightClaim(DRIFT, (_EARLY, _LATE), _inputs_diverge),
     FlightClaim(
-        BIASED, (_LATE,), lambda flights: abs(_lean(_LATE, flights)) > 0.5 * THESIS_CAR.half_angle
+        THESIS["ch10-direction-10-s"],
+        (_EARLY,),
+        lambda flights: abs(_lean(_EARLY, flights)) < _ALIGNED,
     ),
-    AnalysisClaim(PLANNED, _thrust_points_to_the_center),
+    FlightClaim(THESIS["ch10-drift"], (_EARLY, _LATE), _inputs_diverge),
     FlightClaim(
-        SATURATES,
+        THESIS["ch10-direction-2000-s"],
+        (_LATE,),
+        lambda flights: abs(_lean(_LATE, flights)) > 0.5 * THESIS_CAR.half_angle,
+    ),
+    AnalysisClaim(THESIS["ch10-eq-18"], _thrust_points_to_the_center),
+    FlightClaim(
+        THESIS["ch10-planned-saturates"],
         (_PLANNED,),
         lambda flights: 0.0 < float(flights[_PLANNED]["saturated_fraction"]) < 1.0,
     ),
     AnalysisClaim(
-        COLUMN,
+        THESIS["ch10-eq-27"],
         _printed_tilt_column_is_right,
         refuted="The bottom disc turns back while the top disc tilts: the thrusts turn by "
         "1 - I_T/I_B of the tilt, and so does the column.",
     ),
     AnalysisClaim(
-        RANK_28,
+        THESIS["ch10-eq-28"],
         _full_rank_unless_both_rest,
         refuted="One rotor at rest leaves one column: rank 1. Both must turn.",
     ),
-    FlightClaim(FAILS, (_FAILURE,), _fails_after_a_rotor_stops),
+    FlightClaim(THESIS["ch10-fourth-fails"], (_FAILURE,), _fails_after_a_rotor_stops),
 )

@@ -11,13 +11,14 @@ import numpy as np
 from tiltsim.report.claim import AnalysisClaim
 from tiltsim.report.measures import (
     DIGITS,
+    EVERY_TERM,
     coefficient,
     determinant_coefficients,
     exact_and_printed,
     terms,
     terms_hold,
 )
-from tiltsim.report.statement import Statement
+from tiltsim.report.statement import read_statements
 from tiltsim_controllers.analysis.singularity import residuals
 from tiltsim_controllers.analysis.two_color_map import (
     curve_l,
@@ -96,100 +97,14 @@ def _two_vehicles_can_share_a_map() -> bool:
     return all(np.allclose(own, changed, rtol=1e-9, atol=1e-12) for own, changed in same)
 
 
-COEFFICIENTS = Statement(
-    id="ch12-coefficients",
-    source="ch. 12, Eq. (4)",
-    text="Coefficients of the determinant, times 1.025",
-    thesis="Condition (4) prints them with four digits.",
-    criterion="The coefficient rounds to the printed digits, scaled so that the smallest of R_φ "
-    "is 1.025",
-)
-TERMS = Statement(
-    id="ch12-terms",
-    source="ch. 12, Eqs. (4)-(10)",
-    text="The condition is printed correctly, term by term",
-    thesis="Eqs. (6), (7), (8) and (10) print R_φ, R_θ and R.",
-    criterion="Every product of sines and cosines has the printed coefficient, to 0.001, and none "
-    "is missing",
-)
-DIFFER = Statement(
-    id="ch12-coefficients-differ",
-    source="ch. 12",
-    text="The coefficients differ greatly from those of ch. 3",
-    thesis="“In comparison, the coefficients in Equation (4) in this chapter differ greatly from "
-    "the ones in Equation (17) in Chapter 3.”",
-    criterion="Some coefficient differs by a tenth or more, up to a common factor, which does not "
-    "move a zero of the determinant",
-)
-PARAMETERS = Statement(
-    id="ch12-three-parameters",
-    source="ch. 12",
-    text="L, K_f and K_m are the only parameters that the map depends on",
-    thesis="“… there are three parameters (…, L, …, K_f, …, K_m) of the tiltrotor model that "
-    "influences the result of the Two Color Map.”",
-    criterion="Other masses, inertias and gravity leave R, R_φ and R_θ of 50 random gaits bit for "
-    "bit the same",
-    finding="map",
-)
-UNIQUE = Statement(
-    id="ch12-unique-map",
-    source="ch. 12",
-    text="Every set of L, K_f and K_m has its own map",
-    thesis="“… the differences in these three parameters … result in different decoupling "
-    "matrices, which consequentially lead to the unique corresponding Two Color Map.”",
-    criterion="Another set with the same ratio K_m / (L K_f) has another map",
-    finding="map",
-)
-SIMILAR = Statement(
-    id="ch12-similar-map",
-    source="ch. 12, Fig. 1",
-    text="The map is very similar to that of ch. 8",
-    thesis="“Note that these results are highly resemble to the ones reported in Chapter 8.”",
-    criterion="The grid has the same numbers of roots, P moves by less than 0.01 rad, L by less "
-    "than 0.02 rad",
-    pictures=("map-luukkonen",),
-)
-SHIFTS = Statement(
-    id="ch12-shifts",
-    source="ch. 12, Fig. 1",
-    text="P and L move",
-    thesis="“Firstly, the orange point (α₁, α₂) in Figure 1 slightly changes its location. "
-    "Secondly, L … shifts its shape in Two Color Map.”",
-    criterion="The point, or the curve somewhere on the square, moves by more than 0.001 rad",
-    pictures=("map-luukkonen",),
-)
-P = Statement(
-    id="ch12-p",
-    source="ch. 12, Fig. 1",
-    text="The colors meet at P = (p, -p) with p",
-    thesis="“The orange point is at (α₁, α₂) = (0.168421, -0.168421).”",
-    criterion="p rounds to the printed digits; within 1e-4 rad it is the same point",
-    note="In closed form p is δ = atan(K_m / (L K_f)), half the offset. "
-    + DIGITS.format("1.025 / 2.927"),
-    finding="map",
-)
-P_BELOW = Statement(
-    id="ch12-p-below",
-    source="ch. 12, Fig. 1",
-    text="P lies below L, in S_D",
-    thesis="“Note that this point is a little below L rather than on L.”",
-    criterion="R at P, in closed form, is below zero by more than rounding",
-    finding="red",
-)
-OFFSET = Statement(
-    id="ch12-offset",
-    source="ch. 12, Eq. (12)",
-    text="On blue α₁ + α₃ = -(α₂ + α₄) is",
-    thesis="Eq. (12): α₃ = -α₁ + 0.336842, α₄ = -α₂ - 0.336842.",
-    criterion="The sum rounds to the printed digits; within 1e-4 rad it is the same plane",
-    note="In closed form it is 2δ. " + DIGITS.format("1.025 / 2.927"),
-    finding="map",
+THESIS: Final = read_statements(
+    "ch12", every_term=EVERY_TERM, digits=DIGITS.format("1.025 / 2.927")
 )
 
 CLAIMS = (
     *(
         AnalysisClaim(
-            COEFFICIENTS,
+            THESIS["ch12-coefficients"],
             partial(coefficient, part, name, _VEHICLE, SCALE),
             case=" ".join(map("{}{}".format, name, (1, 2, 3, 4))) + factors,
             published=published,
@@ -206,7 +121,7 @@ CLAIMS = (
     ),
     *(
         AnalysisClaim(
-            TERMS,
+            THESIS["ch12-terms"],
             partial(terms_hold, part, printed, _VEHICLE, SCALE),
             case=name,
             where=f"ch. 12, {equations}",
@@ -218,23 +133,27 @@ CLAIMS = (
         )
     ),
     AnalysisClaim(
-        DIFFER,
+        THESIS["ch12-coefficients-differ"],
         _coefficients_differ_greatly,
         refuted="Up to the common factor 1.025 they are those of ch. 3 within 1 %: K_m / (L K_f) "
         "is 0.1700 instead of 0.1687.",
     ),
-    AnalysisClaim(PARAMETERS, _only_three_parameters_matter),
+    AnalysisClaim(THESIS["ch12-three-parameters"], _only_three_parameters_matter),
     AnalysisClaim(
-        UNIQUE,
+        THESIS["ch12-unique-map"],
         lambda: not _two_vehicles_can_share_a_map(),
         refuted="The map depends only on the ratio K_m / (L K_f).",
     ),
-    AnalysisClaim(SIMILAR, _maps_are_similar),
-    AnalysisClaim(SHIFTS, lambda: abs(_P[0] - point_p(_FORMER)[0]) > 1e-3, case="point P"),
-    AnalysisClaim(SHIFTS, lambda: _l_apart() > 1e-3, case="curve L"),
-    *exact_and_printed(P, _P[0], 0.5 * atan(1.025 / 2.927), "0.168421"),
+    AnalysisClaim(THESIS["ch12-similar-map"], _maps_are_similar),
     AnalysisClaim(
-        P_BELOW, lambda: region(*_P, _VEHICLE) == "S_D", refuted="As in ch. 8: P lies on L exactly."
+        THESIS["ch12-shifts"], lambda: abs(_P[0] - point_p(_FORMER)[0]) > 1e-3, case="point P"
     ),
-    *exact_and_printed(OFFSET, 2.0 * _P[0], atan(1.025 / 2.927), "0.336842"),
+    AnalysisClaim(THESIS["ch12-shifts"], lambda: _l_apart() > 1e-3, case="curve L"),
+    *exact_and_printed(THESIS["ch12-p"], _P[0], 0.5 * atan(1.025 / 2.927), "0.168421"),
+    AnalysisClaim(
+        THESIS["ch12-p-below"],
+        lambda: region(*_P, _VEHICLE) == "S_D",
+        refuted="As in ch. 8: P lies on L exactly.",
+    ),
+    *exact_and_printed(THESIS["ch12-offset"], 2.0 * _P[0], atan(1.025 / 2.927), "0.336842"),
 )
