@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from tiltsim.report.findings import FINDINGS
+from tiltsim.report.findings.numbers import NUMBERS
 from tiltsim.report.pictures import PICTURES
 from tiltsim.resources import shipped_folder
 from tiltsim.scenario.library import library_entries
@@ -50,3 +51,4 @@ def test_flights_and_pictures_of_findings_exist():
 def test_keys_are_unique():
     keys = [finding.key for finding in FINDINGS]
     assert len(set(keys)) == len(keys)
+    assert NUMBERS.keys() <= set(keys)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 
@@ -13,17 +13,17 @@ class Finding:
     key: str
     title: str
     chapters: str
-    text: tuple[str, ...]
+    text: Sequence[str]
     """Paragraphs with ``{names}`` of ``numbers``; text between backticks is code."""
     proof: str
     """Why it is true, or where that is derived; also with ``{names}``."""
-    tests: Mapping[str, tuple[str, ...]]
+    tests: Mapping[str, Sequence[str]]
     """Names of tests by their file in the folder of the tests."""
-    flights: tuple[str, ...] = ()
+    flights: Sequence[str] = ()
     """Addresses in the scenario library that show it."""
     sweep: str = ""
     """Name of a sweep of the library that shows it."""
-    pictures: tuple[str, ...] = ()
+    pictures: Sequence[str] = ()
     """Names of pictures of the report that show it."""
     numbers: Callable[[], dict[str, str]] = dict
 
