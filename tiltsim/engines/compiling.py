@@ -30,6 +30,7 @@ from tiltsim.engines.cache import (
     native_code_is_cacheable,
 )
 from tiltsim.engines.inner_code import InnerCompiler, loaded_inner_code
+from tiltsim.system.interrupts import reraise_swallowed_interrupts
 from tiltsim.system.locks import locked, one_thread_at_a_time
 from tiltsim_controllers.mathematics.scalar import scalar_functions
 
@@ -142,7 +143,8 @@ def compiled_callback(signature: Any) -> Callable[[Callable[..., Any]], Any]:
     def decorate(function: Callable[..., Any]) -> Any:
         normalized = sigutils.normalize_signature(signature)
         callback = _cached(CFunc(function, normalized, {}, dict(ERROR_MODEL)), function)
-        callback.compile()
+        with reraise_swallowed_interrupts():
+            callback.compile()
         return callback
 
     return decorate

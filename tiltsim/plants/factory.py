@@ -10,7 +10,6 @@ from tiltsim.plants.equations_plant import EquationsPlant
 from tiltsim.plants.mujoco_plant import MujocoPlant
 from tiltsim.plants.plant import Plant
 from tiltsim.plants.user_controller import UserControlledPlant
-from tiltsim.system.interrupts import reraise_swallowed_interrupts
 
 
 def make_plant(
@@ -28,7 +27,6 @@ def make_plant(
     """
     if assembly.scenario.controller.is_external:
         return UserControlledPlant(assembly, model)
-    with reraise_swallowed_interrupts():  # it may compile
-        if assembly.scenario.simulation.plant == "mujoco":
-            return MujocoPlant(assembly, model, engine)
-        return EquationsPlant(assembly, engine)
+    if assembly.scenario.simulation.plant == "mujoco":
+        return MujocoPlant(assembly, model, engine)
+    return EquationsPlant(assembly, engine)

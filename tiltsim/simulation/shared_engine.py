@@ -17,7 +17,6 @@ from tiltsim.laws.assembling import assemble, loop_of
 from tiltsim.plants.engine_choice import MIN_STEPS_TO_COMPILE, native_name, with_engine
 from tiltsim.plants.factory import make_plant
 from tiltsim.scenario.scenario import Scenario
-from tiltsim.system.interrupts import reraise_swallowed_interrupts
 from tiltsim.system.processes import ProcessDiedError, in_processes
 
 MIN_STEPS_TO_SHARE: Final = 25_000
@@ -94,5 +93,4 @@ def _examples(scenarios: Sequence[Scenario]) -> dict[str, Scenario]:
 
 def _compile(scenarios: Sequence[Scenario]) -> None:
     for scenario in scenarios:
-        with reraise_swallowed_interrupts():
-            make_plant(assemble(scenario), engine="native").record(1, 1)
+        make_plant(assemble(scenario), engine="native").record(1, 1)

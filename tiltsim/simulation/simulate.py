@@ -22,7 +22,6 @@ from tiltsim.plants.plant import Plant, take_sample
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.simulation.monitor import TerminationMonitor
-from tiltsim.system.interrupts import reraise_swallowed_interrupts
 from tiltsim.system.progress import Report, reported
 from tiltsim.system.text import short_repr
 from tiltsim_controllers.mathematics.scalar import Floats
@@ -121,8 +120,7 @@ def simulate_assembly(
             steps = min(simulation.record_steps, steps_left)
             count = max(1, min(chunk, steps_left // steps))
             began = perf_counter()
-            with reraise_swallowed_interrupts():
-                flown, end = fly_chunk(plant, monitor, count, steps)
+            flown, end = fly_chunk(plant, monitor, count, steps)
             for sample in flown:
                 record(sample)
             report(float(samples[-1][0]))

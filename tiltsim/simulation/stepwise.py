@@ -26,7 +26,6 @@ from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.simulation.monitor import TerminationMonitor
 from tiltsim.simulation.simulate import failure, fly_chunk
-from tiltsim.system.interrupts import reraise_swallowed_interrupts
 from tiltsim.system.numbers import whole_number
 from tiltsim_controllers.mathematics.scalar import Floats
 
@@ -110,8 +109,7 @@ class Simulation:
         start = perf_counter()
         samples: Iterable[Floats] = ()
         try:
-            with reraise_swallowed_interrupts():
-                samples, self._end = fly_chunk(self._plant, self._monitor, 1, steps)
+            samples, self._end = fly_chunk(self._plant, self._monitor, 1, steps)
         except ControllerError as error:
             samples, self._end = failure(self._plant, self._monitor, self._samples[-1][0], error)
             raise

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 @contextmanager
 def reraise_swallowed_interrupts() -> Iterator[None]:
-    """Raise KeyboardInterrupt after the block if one was swallowed within it.
+    """Raise KeyboardInterrupt after the block, whatever its end, if one was swallowed within it.
 
     An exception cannot pass through compiled code that calls Python back, as LLVM does while it
     compiles: Python reports it as unraisable and continues. Only the main thread receives
@@ -41,8 +41,8 @@ def reraise_swallowed_interrupts() -> Iterator[None]:
         yield
     finally:
         sys.unraisablehook = before
-    if swallowed:
-        raise KeyboardInterrupt
+        if swallowed:
+            raise KeyboardInterrupt
 
 
 @contextmanager
