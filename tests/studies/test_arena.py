@@ -161,11 +161,33 @@ def flown(entries, **_):
         yield Compared(row(entry.name, task, error), np.zeros(0), np.zeros(0))
 
 
-def test_gains_are_searched_or_read(tmp_path, capsys):
-    both = ["--tune", "40", "--gains", "gains.json"]
-    assert main(["arena", *both, "--out", str(tmp_path / "arena")]) == 2
-    assert "--gains: not with --tune" in capsys.readouterr().err
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--tune", "40", "--gains", "gains.json"], "--gains: not with --tune"),
+        (["--seed", "2"], "--seed: only with --tune"),
+        (["--vehicles", ","], "--vehicles ',': name one at least"),
+        (["--controllers", ""], "--controllers '': name one at least"),
+    ],
+)
+def test_contradicting_or_empty_options_are_refused(options, message, tmp_path, capsys):
+    assert main(["arena", *options, "--out", str(tmp_path / "arena")]) == 2
+    assert message in capsys.readouterr().err
     assert not (tmp_path / "arena").exists()
+
+
+def test_an_arena_without_a_flight_fails(tmp_path, capsys, monkeypatch):
+    def refused(entries, **_):
+        for one in flown(entries):
+            one.row.update(end="refused", refused="needs legs")
+            yield one
+
+    monkeypatch.setattr(arena, "fly_entries", refused)
+    chosen = ["--controllers", "pid", "--vehicles", "quadrotor", "--quiet"]
+    assert main(["arena", *chosen, "--out", str(tmp_path)]) == 2
+    message = "tiltsim: nothing could be flown; most frequent reason (18 of 18): needs legs\n"
+    assert capsys.readouterr().err == message
+    assert (tmp_path / "arena.md").exists()
 
 
 def test_the_command_writes_data_page_and_figure(tmp_path, capsys, monkeypatch):

@@ -116,6 +116,11 @@ def test_a_latency_is_sought_in_control_periods(monkeypatch):
 def test_the_command_prints_rows_and_writes_a_folder(tmp_path, capsys):
     options = [x for key, value in SHORT.items() for x in ("--set", f"{key}={json.dumps(value)}")]
     names = ["--controllers", "lqr,yaw_position", "--jobs", "1", "--nominal", *options]
+    only = ["--controllers", "yaw_position", "--jobs", "1", "--nominal"]
+    assert main(["compare", SETPOINT, *only]) == 2
+    printed = capsys.readouterr()
+    assert "yaw_position: " in printed.out
+    assert "nothing could be flown; most frequent reason (1 of 1): " in printed.err
     assert main(["compare", SETPOINT, *names, "--json", "--out", str(tmp_path)]) == 0
     printed = json.loads(capsys.readouterr().out)
     assert [row["controller"] for row in printed] == ["lqr", "yaw_position"]
@@ -128,7 +133,7 @@ def test_the_command_prints_rows_and_writes_a_folder(tmp_path, capsys):
     assert "yaw_position: " in table[4]
 
 
-def named(controllers="", *own):
+def named(controllers=None, *own):
     return chosen_controllers(Namespace(controllers=controllers, controller=own))
 
 
@@ -141,7 +146,7 @@ def test_a_controller_has_gains_of_its_own(tmp_path, monkeypatch):
         "fast": {"law": "pid", "velocity_gains": [6.0, 3.6]},
         "hover": {"law": "scalar", "function": f"{tmp_path}/my_law.py:hover"},
     }
-    entry = Entry(SETPOINT, "fast", named("", fast)["fast"], {"simulation.duration": 1.0})
+    entry = Entry(SETPOINT, "fast", named(None, fast)["fast"], {"simulation.duration": 1.0})
     assert entry.scenario().controller.velocity_gains == (6.0, 3.6)
     within = Entry(SETPOINT, "fast", entry.table, {"controller.position_gain": 2.0})
     assert within.scenario().controller.velocity_gains == (6.0, 3.6)
@@ -151,7 +156,7 @@ def test_a_controller_has_gains_of_its_own(tmp_path, monkeypatch):
 @pytest.mark.parametrize("text", ["pid", "fast=2", "fast={position_gain=2.0}", "mine.py"])
 def test_gains_that_are_no_table_are_refused(text):
     with pytest.raises(InputError, match=r"write NAME=\{law=\"pid\", KEY=VALUE, ...\}"):
-        named("", text)
+        named(None, text)
 
 
 @pytest.mark.parametrize(
@@ -166,7 +171,7 @@ def test_gains_that_are_no_table_are_refused(text):
 )
 def test_a_misspelt_controller_is_a_mistake_and_no_refusal(text, message):
     with pytest.raises(InputError) as caught:
-        named("", text)
+        named(None, text)
     assert str(caught.value).startswith(f"--controller {text}: ")
     assert message in str(caught.value)
 

@@ -214,6 +214,20 @@ def test_points_without_a_valid_scenario_become_rows(tmp_path, capsys):
     assert "invalid" in ends
 
 
+def test_a_sweep_without_a_valid_scenario_fails(tmp_path, capsys, monkeypatch):
+    def refuse(_assembly):
+        raise InputError("no such mesh")
+
+    monkeypatch.setattr(batch, "simulate_assembly", refuse)
+    file = short_sweep(tmp_path / "sweep.toml", count=1)
+    options = ["--jobs", "1", "--quiet", "--out", str(tmp_path / "out")]
+    for _ in range(2):  # flown, then read
+        assert main(["sweep", str(file), *options]) == 2
+        message = "tiltsim: nothing could be flown; most frequent reason (2 of 2): no such mesh\n"
+        assert capsys.readouterr().err == message
+    assert {row["end"] for row in rows(tmp_path / "out")} == {"invalid"}
+
+
 def test_flights_are_kept_if_requested(tmp_path):
     file = short_sweep(tmp_path / "sweep.toml", count=2)
     file.write_text("keep_flights = true\n" + file.read_text())

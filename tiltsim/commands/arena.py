@@ -16,7 +16,7 @@ from tiltsim.commands.options import (
     positive_integer,
 )
 from tiltsim.commands.progress import Progress, show_progress
-from tiltsim.commands.text import json_text, print_line
+from tiltsim.commands.text import json_text, print_line, require_flown
 from tiltsim.errors import InputError
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ def add_parser(subparsers: Subparsers) -> None:
     )
     listed = "laws, or given, the scenarios' own; default without --controller: all that fit"
     add_controllers(parser, listed)
-    add("--vehicles", default="", metavar="A,B,...", help="default: all")
+    add("--vehicles", metavar="A,B,...", help="default: all")
     add(
         "--tune",
         type=positive_integer,
@@ -56,7 +56,7 @@ def add_parser(subparsers: Subparsers) -> None:
         help=f"first search each controller's gains with at most N flights on other tasks, and "
         f"write them to {GAINS_FILE}",
     )
-    add("--seed", type=positive_integer, default=1, help="of that search (default: 1)")
+    add("--seed", type=positive_integer, metavar="S", help="of that search (default: 1)")
     add(
         "--gains",
         type=Path,
@@ -84,8 +84,10 @@ def run(arguments: argparse.Namespace) -> int:
 
     if arguments.tune is not None and arguments.gains is not None:
         raise InputError("--gains: not with --tune, which searches gains anew")
+    if arguments.tune is None and arguments.seed is not None:
+        raise InputError("--seed: only with --tune, whose search it is of")
     own = chosen_controllers(arguments)
-    vehicles = chosen_vehicles(names(arguments.vehicles))
+    vehicles = chosen_vehicles(names("--vehicles", arguments.vehicles))
     tables = {
         name: dict(own) or controller_tables(fitting(vehicle)) for name, vehicle in vehicles.items()
     }
@@ -115,6 +117,7 @@ def run(arguments: argparse.Namespace) -> int:
     else:
         print(page)
         print_line(f"arena written to {arguments.out}")
+    require_flown([row["refused"] for chosen in rows.values() for row in chosen])
     return 0
 
 
@@ -139,7 +142,7 @@ def _tuning(
     total, found = sum(map(len, tables.values())), {}
     progress.begin("searches", total)
     made = asdict(Made.now())
-    budget = {"flights": arguments.tune, "seed": arguments.seed}
+    budget = {"flights": arguments.tune, "seed": arguments.seed or 1}
     tuning: dict[str, Any] = {}
     for search, result in tune_all(vehicles, tables, **budget, jobs=arguments.jobs):
         found[search] = result

@@ -16,7 +16,7 @@ from tiltsim.commands.options import (
     add_trust,
 )
 from tiltsim.commands.progress import show_progress
-from tiltsim.commands.text import json_text, number, print_line, table
+from tiltsim.commands.text import json_text, number, print_line, require_flown, table
 
 if TYPE_CHECKING:
     from tiltsim.studies.comparison import Compared
@@ -94,6 +94,7 @@ def run(arguments: argparse.Namespace) -> int:
     finally:  # what is flown is shown, even if the rest is interrupted
         if compared:
             _show(compared, arguments)
+    require_flown([one.row["refused"] for one in compared])
     return 0
 
 

@@ -17,7 +17,7 @@ from tiltsim.system.files import is_file
 
 def chosen_controllers(arguments: argparse.Namespace) -> dict[str, Mapping[str, Any]]:
     """The tables of ``--controllers`` and ``--controller``, by name."""
-    chosen = controller_tables(names(arguments.controllers))
+    chosen = controller_tables(names("--controllers", arguments.controllers))
     for text in arguments.controller:
         name, table = _own(text)
         if name in chosen:
@@ -26,9 +26,14 @@ def chosen_controllers(arguments: argparse.Namespace) -> dict[str, Mapping[str, 
     return chosen
 
 
-def names(text: str) -> list[str]:
-    """What an option lists."""
-    return list(dict.fromkeys(filter(None, (name.strip() for name in text.split(",")))))
+def names(option: str, text: str | None) -> list[str]:
+    """What an option lists, nothing without it. Raises `InputError` for an empty list."""
+    if text is None:
+        return []
+    listed = list(dict.fromkeys(filter(None, (name.strip() for name in text.split(",")))))
+    if not listed:
+        raise InputError(f"{option} {text!r}: name one at least")
+    return listed
 
 
 def _own(text: str) -> tuple[str, dict[str, Any]]:

@@ -80,7 +80,7 @@ def add_vehicle(parser: argparse.ArgumentParser) -> None:
 
 def add_controllers(parser: argparse.ArgumentParser, listed: str) -> None:
     """Declare ``--controllers`` and ``--controller``; see `tiltsim.commands.controllers`."""
-    parser.add_argument("--controllers", default="", metavar="A,B,...", help=listed)
+    parser.add_argument("--controllers", metavar="A,B,...", help=listed)
     parser.add_argument(
         "--controller",
         action="append",

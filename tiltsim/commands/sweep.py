@@ -8,20 +8,19 @@ from typing import TYPE_CHECKING, Final
 
 from tiltsim.commands.options import Subparsers, add_jobs, add_overrides, add_quiet, add_trust
 from tiltsim.commands.progress import show_progress
-from tiltsim.commands.text import counted, print_line, tally
+from tiltsim.commands.text import counted, most_frequent, print_line, require_flown, tally
 from tiltsim.exit_codes import INTERRUPTED
-from tiltsim.system.text import shortened
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
     from tiltsim.sweeps.points import SweepPoints
 
-NOT_FLOWN: Final = frozenset({"invalid", "crashed", "failed"})
-"""Ends whose reason is a mistake in a scenario or in a controller's code."""
+NOT_FLOWN: Final = frozenset({"invalid", "crashed"})
+"""Ends of rows without a flight."""
 
-LONGEST_REASON: Final = 300
-"""Characters of a reason; messages that list what is allowed can be long."""
+MISTAKES: Final = NOT_FLOWN | {"failed"}
+"""Ends whose reason is a mistake in a scenario or in a controller's code."""
 
 
 def add_parser(subparsers: Subparsers) -> None:
@@ -82,10 +81,12 @@ def run(arguments: argparse.Namespace) -> int:
                 error=True,
             )
             return INTERRUPTED
+    ends = _ends(dataset)
     if shown:
-        for line in _summary(dataset, units):
+        for line in _summary(ends, units):
             print_line(line)
         print_line(f"written to {dataset}")
+    require_flown([cause if end in NOT_FLOWN else None for end, cause in ends])
     return 0
 
 
@@ -100,19 +101,21 @@ def _headline(points: SweepPoints, finished: int, units: tuple[str, str]) -> str
     return f"{title}: {everything}"
 
 
-def _summary(dataset: Path, units: tuple[str, str]) -> Iterator[str]:
-    """Lines: how the flights ended, and why most of those were not flown."""
-    from collections import Counter
-
+def _ends(dataset: Path) -> list[tuple[str, str]]:
+    """End and cause of every row."""
     from tiltsim.system.parquet import open_parquet
 
     with open_parquet(dataset) as opened:
         table = opened.read(columns=["end", "cause"])
-    ends = Counter(table["end"].to_pylist())
-    total = counted(sum(ends.values()), *units)
-    yield f"{total}: {tally(dict(ends.most_common()))}"
-    rows = zip(*(table[name].to_pylist() for name in ("end", "cause")), strict=True)
-    reasons = Counter(cause for end, cause in rows if end in NOT_FLOWN)
-    for reason, number in reasons.most_common(1):
-        shown = shortened(reason, LONGEST_REASON)
-        yield f"most frequent reason ({number} of {reasons.total()}): {shown}"
+    return list(zip(table["end"].to_pylist(), table["cause"].to_pylist(), strict=True))
+
+
+def _summary(ends: Sequence[tuple[str, str]], units: tuple[str, str]) -> Iterator[str]:
+    """Lines: how the flights ended, and why most of those were not flown or failed."""
+    from collections import Counter
+
+    counts = Counter(end for end, _ in ends)
+    yield f"{counted(len(ends), *units)}: {tally(dict(counts.most_common()))}"
+    reasons = [cause for end, cause in ends if end in MISTAKES]
+    if reasons:
+        yield most_frequent(reasons)

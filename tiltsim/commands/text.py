@@ -7,12 +7,17 @@ import json
 import shlex
 import shutil
 import sys
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from textwrap import fill
-from typing import Any
+from typing import Any, Final
 
-from tiltsim.system.text import printable
+from tiltsim.errors import InputError
+from tiltsim.system.text import printable, shortened
+
+LONGEST_REASON: Final = 300
+"""Characters of a reason; messages that list what is allowed can be long."""
 
 
 def number(value: float, form: str = ".6g") -> str:
@@ -34,6 +39,20 @@ def counted(count: int, one: str, many: str) -> str:
 def tally(counts: Mapping[str, int]) -> str:
     """Counts by name: ``3 passed, 1 failed``."""
     return ", ".join(f"{count} {name}" for name, count in counts.items())
+
+
+def most_frequent(reasons: Sequence[str]) -> str:
+    """Of some reasons the most frequent one, in a line that says how many have it."""
+    ((reason, number),) = Counter(reasons).most_common(1)
+    shown = shortened(reason, LONGEST_REASON)
+    return f"most frequent reason ({number} of {len(reasons)}): {shown}"
+
+
+def require_flown(reasons: Sequence[str | None]) -> None:
+    """Raise `InputError` if every row has a reason why it could not be flown."""
+    known = [reason for reason in reasons if reason is not None]
+    if known and len(known) == len(reasons):
+        raise InputError(f"nothing could be flown; {most_frequent(known)}")
 
 
 def print_line(text: str, *, error: bool = False) -> None:
