@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -12,8 +13,10 @@ from tests.laws.test_laws import LAWS
 from tests.simulation.test_batch import EXACT, without_speed
 from tiltsim import cli
 from tiltsim.arrays import jax_arrays
+from tiltsim.flight.flight import Flight
+from tiltsim.laws.assembling import assemble
 from tiltsim.scenario.loading import merge
-from tiltsim.simulation.array_batch import _padded
+from tiltsim.simulation.array_batch import ArrayBatch, _padded
 
 pytest.importorskip("jax")
 
@@ -36,13 +39,15 @@ def alone(scenario):
 
 
 def assert_rows_fly_as_alone(several):
-    for row, scenario in zip(tiltsim.fly(several, keep_samples=True), several, strict=True):
+    rows = list(tiltsim.fly(several, keep_samples=True))
+    for row, scenario in zip(rows, several, strict=True):
         flight = alone(scenario)
         assert row.flight.engine == "jax"
         assert row.end == flight.end
         np.testing.assert_allclose(row.flight.samples, flight.samples, rtol=1e-9, atol=1e-9)
         expected = pytest.approx(without_speed(flight.metrics()), rel=1e-9, abs=1e-9, nan_ok=True)
         assert without_speed(row.metrics) == expected
+    return rows
 
 
 def test_rows_differ_in_numbers_and_fly_as_alone():
@@ -53,7 +58,9 @@ def test_rows_differ_in_numbers_and_fly_as_alone():
         {"initial": {"position": [0.0, 0.1, 0.0]}, "reference": {"velocity": [0.4, 0.1, 0.0]}},
         {"initial": {"position": [99.0, 0.0, 0.0]}},  # ends at once
     )
-    assert_rows_fly_as_alone(several)
+    first, second, *_ = assert_rows_fly_as_alone(several)
+    # The block from which their metrics come together is kept anyway: no copy beside it.
+    assert first.flight.samples.base is second.flight.samples.base is not None
 
 
 @pytest.mark.slow
@@ -72,6 +79,18 @@ def test_single_precision_is_near_double_precision():
     difference = np.abs(first.samples[:, 1:4] - second.samples[:, 1:4]).max()
     assert 0.0 < difference < 1e-4
     np.testing.assert_array_equal(first["time"], second["time"])
+
+
+def test_zeros_of_either_sign_are_different_numbers():
+    starts = ({"initial": {"position": [0.0, zero, 0.0]}} for zero in (0.0, -0.0))
+    assemblies = list(map(assemble, scenarios(CAR, *starts)))
+    with ThreadPoolExecutor(1) as pool:
+        both, *each = (
+            ArrayBatch(chosen, 1, pool, Flight.metrics)._batch
+            for chosen in (assemblies, assemblies[:1], assemblies[1:])
+        )
+    assert both._numbers.count(None) == 1
+    assert each[0] is not each[1]
 
 
 def test_batches_have_few_sizes_since_each_is_compiled():

@@ -44,6 +44,12 @@ def test_each_scenario_is_that_of_its_document_and_one_of_a_kind_is_made_in_full
     assert len(documents) == len(cases)
 
 
+def test_a_zero_keeps_its_sign():
+    points = sweep(axis("initial.position[1]", 0.0, -0.0))
+    values = [points.scenario(points.point(i)).initial.position[1] for i in (0, 1)]
+    assert list(map(str, values)) == ["0.0", "-0.0"]
+
+
 @pytest.mark.parametrize(
     ("key", "allowed", "value"),
     [

@@ -290,8 +290,18 @@ class Batch:
         return self._kernel(row, knots)[0].approach(carried)
 
 
-compile_batch = lru_cache(maxsize=64)(Batch)
-"""`Batch`, whose compiled code is kept."""
+def compile_batch(
+    course: Course, numbers: tuple[float | None, ...], knots: tuple[float, ...] | None
+) -> Batch:
+    """A `Batch`, whose compiled code is kept for these very numbers: 0.0 is not -0.0."""
+    return _compiled(course, numbers, knots, repr((numbers, knots)))
+
+
+@lru_cache(maxsize=64)
+def _compiled(
+    course: Course, numbers: tuple[float | None, ...], knots: tuple[float, ...] | None, _signs: str
+) -> Batch:
+    return Batch(course, numbers, knots)
 
 
 def course_of(assembly: Assembly) -> Course:

@@ -109,10 +109,12 @@ class ArrayBatch(Generic[Result]):
         self._course = course = course_of(assemblies[0])
         self._numbers = np.array([numbers_of(assembly) for assembly in assemblies])
         self._knots = np.array([assembly.setup.knots for assembly in assemblies])
-        first = self._numbers[0]
-        self._varies = (self._numbers != first).any(axis=0)
-        common = tuple(None if v else float(n) for v, n in zip(self._varies, first))
-        self._one_plan = bool((self._knots == self._knots[0]).all())
+        bits = self._numbers.view(np.int64)  # zeros of either sign are equal
+        self._varies = (bits != bits[0]).any(axis=0)
+        first = zip(self._varies, self._numbers[0], strict=True)
+        common = tuple(None if varies else float(number) for varies, number in first)
+        plans = self._knots.view(np.int64)
+        self._one_plan = bool((plans == plans[0]).all())
         self._batch: Batch = compile_batch(
             course, common, tuple(assemblies[0].setup.knots) if self._one_plan else None
         )
@@ -175,7 +177,7 @@ class ArrayBatch(Generic[Result]):
         for i, (row, index) in enumerate(zip(rows, indices, strict=True)):
             if recording.alive[row].all():
                 flight = Flight(
-                    *(self._assemblies[index], samples[i].copy(), completed, "jax", seconds),
+                    *(self._assemblies[index], samples[i], completed, "jax", seconds),
                     shared_metrics=lambda i=i: together().get(i),  # type: ignore[misc]
                 )
             else:

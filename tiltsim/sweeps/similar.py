@@ -60,7 +60,8 @@ class SimilarScenarios:
 
 def _changes(before: Mapping[str, Any], now: Mapping[str, Any]) -> dict[str, Any] | None:
     """The values that changed; None if one is no number or list of numbers as before."""
-    changed = {key: value for key, value in now.items() if value != before.get(key)}
+    # 0.0 equals -0.0 and 1, but a flight's scenario is the one that its row names.
+    changed = {key: value for key, value in now.items() if repr(value) != repr(before.get(key))}
     if before.keys() != now.keys():
         return None
     return changed if all(_alike(before[key], value) for key, value in changed.items()) else None
