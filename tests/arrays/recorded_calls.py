@@ -66,7 +66,9 @@ MULTIROTORS = {
     "tilting": document("tilt_hexarotor", gait=TILTS),
     "supervised": document("tilt_hexarotor", gait=ASIDE, controller={**HELD, **MODEL}),
     "within limits": document("hexarotor", WEAK, controller=PRIORITIZED, **CLIMB),
-    "by thrust": document("cant_hexarotor", controller={"law": "attitude_force", "norm": "thrust"}),
+    "by thrust": document(
+        "cant_hexarotor", controller={"law": "attitude_force", "norm": "thrust", "failed_rotor": 1}
+    ),
     "heavy rotors": merge(document("tilt_hexarotor", gait=TILTS), {"vehicle": HEAVY}),
     "turning over": document(
         "omni_octorotor",

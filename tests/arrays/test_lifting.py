@@ -182,9 +182,8 @@ def test_stages_of_a_step_do_not_multiply_the_operations():
 
 NEVER_CALLED = {
     *("decoupling_matrix", "attitude_altitude_thrust_rate", "tilt_states"),
-    # Vehicles whose torque-free forces are a plane, and these gaits with more than four tilts:
-    *("unit_vector", "jet_cross", "_jet_dot", "desired_direction", "nearest_in_plane"),
-    *("normal_of_rows", "_fixed_jet", "_table_jet"),
+    *("_fixed_jet", "_table_jet"),  # these gaits with more than four tilts
+    "jet_cross",  # of a plane of torque-free forces that moves
     "torque_for",  # of the example package
     *("_no_hinges", "_upright_turning"),  # of the quadrotor in MuJoCo under a user's function
     "_no_pods",  # of the quadrotor, of which nothing is measured

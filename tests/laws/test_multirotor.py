@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from itertools import product
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,7 +14,9 @@ from tiltsim.laws.multirotor import multirotor_loop
 from tiltsim.laws.multirotor_layout import Layout
 from tiltsim.models.hover import hover_speeds
 from tiltsim.resources import shipped_folder
-from tiltsim_controllers.analysis.torque_free import torque_free_forces
+from tiltsim.scenario.loading import merge
+from tiltsim_controllers.analysis.singularity import world_up
+from tiltsim_controllers.analysis.torque_free import hover_direction, torque_free_forces
 from tiltsim_controllers.laws.multirotor_steps import Form
 from tiltsim_controllers.vehicle.effectiveness import force_and_torque
 
@@ -132,6 +135,43 @@ def test_a_flight_past_a_singular_attitude_ends_there(name, plant):
     assert flight["singularity_margin"][-1] < 0.0 < flight["singularity_margin"][-2]
 
 
+PENTAROTOR = {"mjcf": str(Path(__file__).with_name("pentarotor.xml"))}
+WITHOUT_ONE: dict[str, dict[str, object]] = {
+    "controller": {
+        **{"law": "attitude_force", "dimension": 1, "decoupler": "none", "norm": "thrust"},
+        **{"failed_rotor": 5, "failure_known_from": 0.01},
+    },
+    "reference": {"type": "attitude_altitude", "roll": 1.4},
+    "initial": {
+        "position": [0.0] * 3,
+        "attitude": [1.22, 0.0, 0.0],
+        "angular_velocity": [10, 0, 0],
+    },
+    "simulation": {"timestep": 0.002, "record_timestep": 0.002},
+}
+"""It rolls past where four of its five rotors have no lift left, which the five would have."""
+
+
+@pytest.mark.parametrize("plant", ["mujoco", "thesis"])
+def test_without_a_rotor_a_flight_ends_where_the_others_are_singular(plant):
+    tables = merge(WITHOUT_ONE, {"simulation": {"plant": plant}})
+    flight = tiltsim.simulate(document("pentarotor", PENTAROTOR, **tables))
+    assert flight.end.kind == "singular"
+    assert flight.end.cause.startswith("the decoupling matrix became singular at roll = 1.38 rad")
+    assert flight.end.cause.endswith(" rad, without rotor 5")
+    force, torque = force_and_torque(flight.scenario.vehicle.resolve().table, ())
+    works = [1.0, 1.0, 1.0, 1.0, 0.0]
+    side = hover_direction(torque_free_forces(force * works, torque * works))
+    along = world_up(flight["roll"], flight["pitch"]) @ side
+    assert along[-1] < 0.0 < along[:-1].min()
+    known = flight["time"] >= 0.01
+    margin = np.abs(flight["singularity_margin"])
+    np.testing.assert_allclose(margin[known], np.abs(np.arcsin(along[known])), atol=1e-9)
+    assert margin[~known].min() > margin[known].max() + 0.3
+    condition = flight["decoupling_condition"]
+    assert condition[-1] < 0.1 * condition[~known].min()
+
+
 @pytest.mark.parametrize("aware", [True, False])
 def test_seven_of_eight_rotors_hold_the_pose_if_the_controller_knows(aware):
     controller = {"law": "attitude_force", "norm": "thrust"}
@@ -222,7 +262,7 @@ HELD = {
 @pytest.mark.parametrize(
     ("name", "tables"),
     [
-        ("hexarotor", BEYOND_THE_SIDE),
+        ("pentarotor", {"vehicle": PENTAROTOR, **WITHOUT_ONE}),
         ("hexarotor", {"vehicle": WEAK, "controller": PRIORITIZED, **CLIMB}),
         ("tilt_hexarotor", {"controller": HELD, "gait": ASIDE}),
         ("tilt_hexarotor", {"vehicle": HEAVY, "gait": TILTS, "simulation": {"plant": "thesis"}}),

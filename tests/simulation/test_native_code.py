@@ -31,8 +31,9 @@ def test_every_sign_check_has_a_cause(law):
     plant, loop = make_plant(assemble(scenario(ALL_LAWS[law], engine="python"))), LOOPS[law]
     values = plant.observe()
     sample = dict(zip(loop.sample_fields, (plant.time, *values), strict=True))
-    numbers = assemble(scenario(ALL_LAWS[law])).sign_check_values(plant.time, values)
-    assert len(loop.monitoring.causes(sample)) == len(numbers)
+    assembly = assemble(scenario(ALL_LAWS[law]))
+    numbers = assembly.sign_check_values(plant.time, values)
+    assert len(loop.monitoring.causes(sample, assembly.setup)) == len(numbers)
     assert all(np.isfinite(numbers))
 
 

@@ -129,11 +129,14 @@ class Monitoring:
     Attributes:
         sign_check_values: Scalar function ``(time, values, parameters, knots) -> numbers``, from
             the time (s) of a sample and its ``values`` as `Columns.observe` returns them.
-        causes: ``(sample by field) -> texts``: why the flight ends where each of them reaches zero.
+        causes: ``(sample by field, setup) -> texts``: why the flight ends where each of them
+            reaches zero.
     """
 
     sign_check_values: Callable[..., Values] = nothing_singular
-    causes: Callable[[Mapping[str, float]], tuple[str, ...]] = lambda _sample: ("",)
+    causes: Callable[[Mapping[str, float], ControlSetup], tuple[str, ...]] = (
+        lambda _sample, _setup: ("",)
+    )
 
 
 @dataclass(frozen=True, eq=False)

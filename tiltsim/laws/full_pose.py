@@ -170,7 +170,7 @@ FULL_POSE: Final = ClosedLoop(
     columns=Columns(
         _observe_full_pose, _derive, fields=TILT_COMMANDS, units=dict.fromkeys(TILT_COMMANDS, "rad")
     ),
-    monitoring=Monitoring(sign_check_values, lambda _sample: ROTOR_STOPS),
+    monitoring=Monitoring(sign_check_values, lambda _sample, _setup: ROTOR_STOPS),
     equations=Equations(
         inputs=_equation_inputs,
         inputs_size=8,

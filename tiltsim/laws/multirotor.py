@@ -207,7 +207,9 @@ def _setup(plan: FlightPlan, signature: float) -> ControlSetup:
             supervisor=controller.resolve_supervisor(vehicle),
             watched=watched(vehicle.table, len(plan.knots), side),
         )
-    parameters = LoopParameters(signature, lead, law, Direction(*side))
+    lost = controller.failed_rotor
+    without = side if lost is None else upper_side(vehicle, gait, lost)
+    parameters = LoopParameters(signature, lead, law, Direction(*side), Direction(*without))
     return ControlSetup(parameters, (*plan.knots, *vehicle.table))
 
 

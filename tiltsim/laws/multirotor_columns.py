@@ -18,6 +18,7 @@ from tiltsim.laws.tiltrotor import (
 from tiltsim.vehicles.rotorcraft.layout import TILT_RATE_1
 from tiltsim_controllers.gaits.any_tilts import tilt_motion_of
 from tiltsim_controllers.laws.attitude_altitude import PUBLISHED_DECOUPLING
+from tiltsim_controllers.laws.failures import health_of, masked_of
 from tiltsim_controllers.laws.gait_feedforward import INTEGRAL_FIELDS
 from tiltsim_controllers.laws.multirotor_inputs import independence_of
 from tiltsim_controllers.laws.multirotor_steps import Form
@@ -26,6 +27,7 @@ from tiltsim_controllers.mathematics.rotation import world_up_in_body
 from tiltsim_controllers.mathematics.scalar import Floats, Triple, Values, Vector, scalar
 from tiltsim_controllers.mathematics.vectors import componentwise, entries_of
 from tiltsim_controllers.references.trajectories import position_reference
+from tiltsim_controllers.vehicle.effectiveness import effectiveness_of
 from tiltsim_controllers.vehicle.states import PITCH, ROLL
 
 NULL_PART: Final = "null_part"
@@ -94,9 +96,9 @@ def fields_of(layout: Layout) -> tuple[str, ...]:
 
 @cache
 def margins_of(layout: Layout, dimension: int) -> Margins:
-    """The columns that a sample's state alone decides."""
+    """The columns that a sample alone decides."""
     return lambda samples, setup: torque_free_columns(
-        layout.places, _table(setup), samples, dimension
+        layout.places, _table(setup), samples, dimension, setup.parameters.law.failure
     )
 
 
@@ -112,25 +114,32 @@ def monitoring_of(layout: Layout, form: Form) -> Monitoring:
     tilts_in = entries_of(places.alpha_1, places.tilts)
     turning = places.rotors if form.norm == "speed" else 0
     speeds_in = entries_of(places.speed_1, turning)
-    independence, names = (
-        independence_of(layout.tilt_of_rotor, form.dimension, form.forward),
-        places.names("alpha"),
-    )
-    stops = rotor_stops(turning)
+    cosines, sines, effect, _, _ = effectiveness_of(layout.tilt_of_rotor)
+    independence = independence_of(places.rotors, form.dimension, form.forward)
+    health, masked = health_of(places.rotors), masked_of(places.rotors)
+    losses, names, stops = form.losses, places.names("alpha"), rotor_stops(turning)
     harmless = (1.0,) * len(stops)  # as published, the factor 2 |varpi| is in rows of force only
 
     @scalar
     def sign_check_values(
         time: float, values: Vector, parameters: LoopParameters, knots: Vector
     ) -> Values:
-        own, side = parameters.law, parameters.upper_side
-        up, to_side = world_up_in_body(values[ROLL], values[PITCH]), (side.x, side.y, side.z)
-        share = independence(tilts_in(values), up, to_side, knots, int(own.rotors))
+        own, side, tilts = parameters.law, parameters.upper_side, tilts_in(values)
+        rows = effect(1.0, cosines(tilts), sines(tilts), knots, int(own.rotors))
+        if losses:
+            rows = masked(health(time, own.failure), rows)
+            if time >= own.failure.known_from:
+                side = parameters.upper_side_without
+        up = world_up_in_body(values[ROLL], values[PITCH])
+        share = independence(rows, up, (side.x, side.y, side.z))
         if own.decoupling == PUBLISHED_DECOUPLING:
             return (share, *harmless)
         return (share, *speeds_in(values))
 
-    def causes(sample: Mapping[str, float]) -> tuple[str, ...]:
-        return (singular_attitude(sample, names), *stops)
+    def causes(sample: Mapping[str, float], setup: ControlSetup) -> tuple[str, ...]:
+        failure, attitude = setup.parameters.law.failure, singular_attitude(sample, names)
+        if sample["time"] >= failure.known_from:
+            attitude += f", without rotor {failure.rotor:g}"
+        return (attitude, *stops)
 
     return Monitoring(sign_check_values, causes)

@@ -184,6 +184,8 @@ def full_pose_loop(layout: Layout) -> ClosedLoop:
 
     @scalar
     def speeds(time: float, values: Vector, parameters: LoopParameters, knots: Vector) -> Values:
+        # A pod that turns across its thrust spans one plane with it at any angle: the rank of such
+        # rotors' matrix changes only where one of them stops, whichever of them are lost.
         return speeds_in(values)
 
     return ClosedLoop(
@@ -200,7 +202,7 @@ def full_pose_loop(layout: Layout) -> ClosedLoop:
         ),
         sampling=sampling,
         columns=_columns_of(layout),
-        monitoring=Monitoring(speeds, lambda _sample: stops),
+        monitoring=Monitoring(speeds, lambda _sample, _setup: stops),
         equations=equations,
     )
 

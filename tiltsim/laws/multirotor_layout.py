@@ -58,6 +58,7 @@ class LoopParameters(NamedTuple):
     servo_lead: float  # s, rate feed-forward of the tilt servos, 2 zeta / omega_n
     law: Parameters
     upper_side: Direction  # see `tiltsim.scenario.multirotor_controllers.upper_side`
+    upper_side_without: Direction  # the same once the failed rotor is known
 
 
 def layout_of_vehicle(vehicle: Multirotor) -> Layout:

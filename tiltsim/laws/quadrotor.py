@@ -260,7 +260,7 @@ def extended_singularity_columns(
     }
 
 
-def thrust_axis_cause(sample: Mapping[str, float]) -> tuple[str]:
+def thrust_axis_cause(sample: Mapping[str, float], _setup: ControlSetup) -> tuple[str]:
     """Cause for `thrust_axis_value`: a roll or pitch of 90 degrees."""
     roll, pitch = sample["roll"], sample["pitch"]
     return (

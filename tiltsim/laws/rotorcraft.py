@@ -19,6 +19,7 @@ from tiltsim_controllers.analysis.torque_free import (
 )
 from tiltsim_controllers.gaits.any_tilts import tilt_motion_of
 from tiltsim_controllers.gaits.parameters import GaitParameters
+from tiltsim_controllers.laws.failures import UNHARMED, Failure
 from tiltsim_controllers.mathematics.rotation import euler_from_quaternion
 from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector, scalar
 from tiltsim_controllers.mathematics.vectors import componentwise, tuple_text, written_out
@@ -86,7 +87,11 @@ CONDITION: Final = "decoupling_condition"
 
 
 def torque_free_columns(
-    layout: Layout, table: Vector, samples: Mapping[str, Floats], dimension: int | None = None
+    layout: Layout,
+    table: Vector,
+    samples: Mapping[str, Floats],
+    dimension: int | None = None,
+    failure: Failure = UNHARMED,
 ) -> dict[str, Floats]:
     """Angle (rad) to the nearest singular attitude, and how well the decoupling matrix inverts.
 
@@ -96,10 +101,14 @@ def torque_free_columns(
         samples: By field.
         dimension: How many components of force the controller controls; None for a controller
             without a decoupling matrix.
+        failure: A rotor that the controller knows to have failed, which is left out from then on.
     """
     names = layout.names("alpha")
     angles = np.reshape([samples[name] for name in names], (len(names), len(samples["time"]))).T
-    pushing, up = force_and_torque(table, angles), world_up(samples["roll"], samples["pitch"])
+    lost = np.arange(1, layout.rotors + 1) == failure.rotor
+    works = ~(lost & (samples["time"][:, np.newaxis] >= failure.known_from))[:, np.newaxis]
+    force, torque = force_and_torque(table, angles)
+    pushing, up = (force * works, torque * works), world_up(samples["roll"], samples["pitch"])
     forces = torque_free_forces(*pushing)
     columns = {"singularity_margin": margin_over_flight(forces, up, flights_in(samples["time"]))}
     if dimension is not None:

@@ -161,7 +161,7 @@ def integrating_loop(
         ),
         sampling=sampling,
         columns=columns,
-        monitoring=Monitoring(sum_of_squared_speeds, lambda _sample: (ROTORS_AT_REST,)),
+        monitoring=Monitoring(sum_of_squared_speeds, lambda _sample, _setup: (ROTORS_AT_REST,)),
         equations=Equations(
             inputs=inputs,
             inputs_size=3,

@@ -278,7 +278,9 @@ def determinant_and_speeds(time: float, values: Vector, parameters: Any, knots: 
     return (determinant, *rotor_speeds_along_spin(values))
 
 
-def determinant_and_speed_causes(sample: Mapping[str, float]) -> tuple[str, ...]:
+def determinant_and_speed_causes(
+    sample: Mapping[str, float], _setup: ControlSetup
+) -> tuple[str, ...]:
     """Causes for `determinant_and_speeds`."""
     return (singular_attitude(sample, TILT_FIELDS), *ROTOR_STOPS)
 

@@ -94,8 +94,8 @@ YAW_POSITION: Final = extended_loop(
     ),
     Monitoring(
         sign_check_values,
-        lambda sample: (
-            *thrust_axis_cause(sample),
+        lambda sample, setup: (
+            *thrust_axis_cause(sample, setup),
             "the decoupling matrix became singular: the thrust came to zero",
         ),
     ),

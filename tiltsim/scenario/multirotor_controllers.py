@@ -22,7 +22,11 @@ from tiltsim_controllers.analysis.stability import (
     feedforward_loops,
     linear_loop,
 )
-from tiltsim_controllers.analysis.torque_free import hover_direction, torque_free_forces
+from tiltsim_controllers.analysis.torque_free import (
+    TorqueFreeForces,
+    hover_direction,
+    torque_free_forces,
+)
 from tiltsim_controllers.gaits.plans import Gait
 from tiltsim_controllers.laws.attitude_altitude import PUBLISHED_DECOUPLING
 from tiltsim_controllers.laws.multirotor_steps import Form
@@ -146,13 +150,20 @@ def _gait_angles(vehicle: Multirotor, gait: Gait) -> Floats:
     return gait.angles(times).reshape(len(times), vehicle.tilts)
 
 
-def upper_side(vehicle: Multirotor, gait: Gait) -> Triple:
+def _torque_free_forces(vehicle: Multirotor, gait: Gait, lost: int | None) -> TorqueFreeForces:
+    """Those over a gait, without a rotor that is lost."""
+    works = [float(rotor != lost) for rotor in range(1, len(vehicle.spins) + 1)]
+    force, torque = force_and_torque(vehicle.table, _gait_angles(vehicle, gait))
+    return torque_free_forces(force * works, torque * works)
+
+
+def upper_side(vehicle: Multirotor, gait: Gait, lost: int | None = None) -> Triple:
     """The side (unit vector, body axes) on which level attitude starts, if there are two.
 
     That is so where the singular directions of world up are a great circle all over the gait;
-    zero elsewhere.
+    zero elsewhere. Arguments as of `force_dimension`.
     """
-    forces = torque_free_forces(*force_and_torque(vehicle.table, _gait_angles(vehicle, gait)))
+    forces = _torque_free_forces(vehicle, gait, lost)
     if not (forces.dimension == 1).all():
         return 0.0, 0.0, 0.0
     x, y, z = hover_direction(forces)[0].tolist()
@@ -167,11 +178,8 @@ def force_dimension(vehicle: Multirotor, gait: Gait, lost: int | None = None) ->
         gait: Its gait.
         lost: A rotor that does not work, from 1.
     """
-    angles = _gait_angles(vehicle, gait)
-    works = [float(rotor != lost) for rotor in range(1, len(vehicle.spins) + 1)]
-    force, torque = force_and_torque(vehicle.table, angles)
-    dimension = torque_free_forces(force * works, torque * works).dimension
+    dimension = _torque_free_forces(vehicle, gait, lost).dimension
     first = int(dimension.argmin())
-    at = ", ".join(f"{angle:.3g}" for angle in angles[first])
+    at = ", ".join(f"{angle:.3g}" for angle in _gait_angles(vehicle, gait)[first])
     where = f"at tilt angles ({at}) rad" if vehicle.tilts else "as its rotors are placed"
     return int(dimension[first]), where if lost is None else f"{where}, without rotor {lost}"

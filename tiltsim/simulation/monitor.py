@@ -80,5 +80,5 @@ class TerminationMonitor:
             # A number that changes its sign between two samples was zero in between.
             side = 0.0 if abs(value) < SINGULAR else copysign(1.0, value)
             if side == 0.0 or side != self._sides.setdefault(index, side):
-                return End("singular", time, monitoring.causes(state)[index])
+                return End("singular", time, monitoring.causes(state, self._setup)[index])
         return None

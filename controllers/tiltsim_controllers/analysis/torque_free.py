@@ -132,12 +132,13 @@ def decoupling_condition(force: ArrayLike, torque: ArrayLike, axes: ArrayLike) -
     of a rotor's force.
 
     Args:
-        force, torque: F and tau, shape (..., 3, N)
+        force, torque: F and tau, shape (..., 3, N); zeros for a rotor that is lost
         axes: directions of the force that are controlled, body axes, shape (..., k, 3)
     """
     force, torque = np.asarray(force, float), np.asarray(torque, float)
     thrusts = np.linalg.norm(force, axis=-2)
-    levers = np.linalg.norm(np.cross(force, torque, axis=-2), axis=-2) / thrusts
+    works = np.where(thrusts > 0.0, thrusts, 1.0)
+    levers = np.linalg.norm(np.cross(force, torque, axis=-2), axis=-2) / works
     scaled = torque / levers.max(axis=-1)[..., np.newaxis, np.newaxis]
     lifts = np.asarray(axes, float) @ (force / thrusts.max(axis=-1)[..., np.newaxis, np.newaxis])
     values = np.linalg.svd(np.concatenate([scaled, lifts], axis=-2), compute_uv=False)

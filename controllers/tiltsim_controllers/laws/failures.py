@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import cache
 from math import inf
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from tiltsim_controllers.mathematics.scalar import Values, scalar
 from tiltsim_controllers.mathematics.vectors import componentwise, vectors_of
@@ -17,6 +17,10 @@ class Failure(NamedTuple):
 
     rotor: float = 0.0  # from 1, 0 for none
     known_from: float = inf  # s
+
+
+UNHARMED: Final = Failure()
+"""All rotors work, as far as is known."""
 
 
 @cache

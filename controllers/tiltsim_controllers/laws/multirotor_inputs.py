@@ -177,22 +177,19 @@ def solution_of(length: int, dimension: int, norm: str) -> Callable[..., Values]
 
 
 @cache
-def independence_of(layout: Layout, dimension: int, forward: bool = False) -> Callable[..., float]:
-    """Scalar code of how independent the outputs are: ``(tilts, up, side, table, at)``.
+def independence_of(length: int, dimension: int, forward: bool = False) -> Callable[..., float]:
+    """Scalar code of how independent the outputs are: ``(rows, up, side)``.
 
     1 at best and 0 where the decoupling matrix is singular: the share of the force's rows that
-    remains without those of the torque, and without each other. ``up`` is world up, ``side`` a
-    direction of the force, in body axes; where one component is controlled and lift pushes against
-    ``side``, the number is negative.
+    remains without those of the torque, and without each other. ``rows`` are those of F and tau;
+    ``up`` is world up, ``side`` a direction of the force, in body axes; where one component is
+    controlled and lift pushes against ``side``, the number is negative.
     """
-    cosines, sines, effect, _, _ = effectiveness_of(layout)
-    factors_of_rows = factors_of(len(layout), dimension, forward)
-    dot, combination = vectors_of(len(layout)).dot, combination_of(len(layout))
-    share_of_row = share_of(len(layout))
+    factors_of_rows, share_of_row = factors_of(length, dimension, forward), share_of(length)
+    dot, combination = vectors_of(length).dot, combination_of(length)
 
     @scalar
-    def independence(tilts: Values, up: Triple, side: Triple, table: Vector, at: int) -> float:
-        rows = effect(1.0, cosines(tilts), sines(tilts), table, at)
+    def independence(rows: Rows, up: Triple, side: Triple) -> float:
         forces = rows[0], rows[1], rows[2]
         _, lifts, units, _ = factors_of_rows(rows, forces, up)
         share = 1.0

@@ -133,7 +133,8 @@ def test_independence_is_what_the_other_outputs_leave_of_the_force(dimension):
     tilts = (0.3, -0.2, 0.1, 0.4) if dimension == 1 else ()
     force, torque = force_and_torque(table, tilts)
     forces = torque_free_forces(force, torque)
-    share = independence_of(layout_of(table), dimension)
+    share = independence_of(len(table) // ROTOR_FLOATS, dimension)
+    effect = (*map(tuple, force.tolist()), *map(tuple, torque.tolist()))
     side = tuple(hover_direction(forces).tolist())
     for up in np.random.default_rng(2).normal(size=(5, 3)):
         up /= np.linalg.norm(up)
@@ -143,10 +144,10 @@ def test_independence_is_what_the_other_outputs_leave_of_the_force(dimension):
             expected *= np.linalg.norm(left) / np.linalg.norm(lift)
             rows = np.vstack([rows, lift])
         sign = np.sign(up @ side) if dimension == 1 else 1.0
-        found = share(tilts, tuple(up.tolist()), side, table, 0)
+        found = share(effect, tuple(up.tolist()), side)
         assert found == pytest.approx(sign * expected, abs=1e-12)
     across = tuple(np.cross(side, (0.6, 0.8, 0.0)).tolist())
-    singular = share(tilts, across, side, table, 0)
+    singular = share(effect, across, side)
     assert abs(singular) < 1e-15 if dimension == 1 else singular > 0.1
 
 

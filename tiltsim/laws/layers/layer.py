@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Final
 
-from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Equations, Sampling
+from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Equations, Monitoring, Sampling
 from tiltsim.models.parts import ExtraActuators
 from tiltsim_controllers.mathematics.records import make_record_type
 from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector, scalar
@@ -119,7 +119,9 @@ def wrap_loop(inner: ClosedLoop, layer: Layer) -> ClosedLoop:
         ),
         sampling=Sampling(controls, layer.hold or hold),
         columns=columns,
-        monitoring=replace(inner.monitoring, sign_check_values=sign_check_values),
+        monitoring=Monitoring(
+            sign_check_values, lambda sample, setup: inner.monitoring.causes(sample, within(setup))
+        ),
         equations=layer.equations,
         supervised=None,
         within=inner,
