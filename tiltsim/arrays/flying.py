@@ -235,9 +235,7 @@ class Kernel:
         return self._jax.lax.scan(one, carried, length=self.course.record_steps)[1]
 
 
-def kernel_of(
-    course: Course, leaves: Iterable[Any], knots: Any, disturbance: Any, *, guarded: bool = False
-) -> Kernel:
+def kernel_of(course: Course, leaves: Iterable[Any], knots: Any, disturbance: Any) -> Kernel:
     """A kernel whose parameters are given as the floats or arrays of their record.
 
     Args:
@@ -245,10 +243,9 @@ def kernel_of(
         leaves: The floats or arrays of the loop's record, in order.
         knots: Those of the flight.
         disturbance: m/s^2, world axes.
-        guarded: See `Lifting`.
     """
     parameters = unflatten(course.loop.parameters, leaves)
-    return Kernel(course, ControlSetup(parameters, knots), tuple(disturbance), guarded=guarded)
+    return Kernel(course, ControlSetup(parameters, knots), tuple(disturbance))
 
 
 class Batch:

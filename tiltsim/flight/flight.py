@@ -219,11 +219,11 @@ class Flight:
         write_flight(Path(folder), self.to_arrow(), self.metrics(), self.scenario)
 
 
-def as_flights(flights: Flight | Sequence[Flight], name: str = "flights") -> list[Flight]:
+def as_flights(flights: Flight | Sequence[Flight]) -> list[Flight]:
     """An argument that is one flight or several as a list. Raises `InputError` if it is neither."""
     several = [flights] if isinstance(flights, Flight) else flights
     known = isinstance(several, list | tuple) and all(isinstance(f, Flight) for f in several)
     if not known or not several:
         allowed = "must be a tiltsim.Flight or a list of them"
-        raise InputError(f"{name} = {short_repr(flights)}: {allowed}")
+        raise InputError(f"flights = {short_repr(flights)}: {allowed}")
     return [*several]

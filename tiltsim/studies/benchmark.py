@@ -154,7 +154,7 @@ def _peak_memory() -> int | None:
         return peak if sys.platform == "darwin" else peak * 1024
 
 
-def bench_accuracy(vehicles: int = BATCH_ROWS) -> Rows:
+def bench_accuracy() -> Rows:
     """Position error of RK4 for several time steps, and the speed of all cores together.
 
     The error (m) is the maximum difference of any coordinate from the flight with the reference
@@ -164,7 +164,7 @@ def bench_accuracy(vehicles: int = BATCH_ROWS) -> Rows:
     rows = []
     for timestep in ACCURACY_STEPS:
         error = float(np.abs(_positions(timestep) - reference).max())
-        row, *_ = _time_flights("accuracy", [_circling(timestep)] * vehicles)
+        row, *_ = _time_flights("accuracy", [_circling(timestep)] * BATCH_ROWS)
         rows.append(row | {"position_error": error})
     return rows
 

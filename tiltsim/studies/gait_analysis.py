@@ -58,12 +58,7 @@ REST_TOLERANCE: Final = 1e-6
 
 
 def gait_report(
-    gait: Gait,
-    vehicle: Vehicle,
-    *,
-    roll: float | None = None,
-    pitch: float | None = None,
-    samples: int = 201,
+    gait: Gait, vehicle: Vehicle, *, roll: float | None = None, pitch: float | None = None
 ) -> dict[str, Any]:
     """The singularities of a gait (``tiltsim gait --json``).
 
@@ -72,7 +67,6 @@ def gait_report(
         vehicle: Their vehicle.
         roll, pitch: Attitude of the margins and the determinant, rad; without either, margins at
             level.
-        samples: Number of samples over one period.
 
     Returns:
         Values at time zero. A moving gait adds ``time``, a table of arrays over one period, and
@@ -100,7 +94,7 @@ def gait_report(
         report |= {"roll": roll, "pitch": pitch}
         report["determinant"] = float(determinant(start, roll, pitch, vehicle))
     if not gait.is_constant:
-        times = gait.sample_times(samples)
+        times = gait.sample_times()
         angles = gait.angles(times)
         table = _instant(angles, vehicle, roll, pitch)
         table["singularity_margin"] = margin_over_gait(angles, vehicle, roll, pitch).tolist()
@@ -118,14 +112,14 @@ def gait_report(
         }
     a1, a2, a3, a4 = start.tolist()
     speeds = hover_rotor_speeds((a1, a2, a3, a4), vehicle) if gait.is_constant else None
-    report["warnings"] = gait_warnings(gait, vehicle, samples) + _backward_rotors(speeds)
+    report["warnings"] = gait_warnings(gait, vehicle) + _backward_rotors(speeds)
     report["hover_rotor_speeds"] = speeds
     return report
 
 
-def gait_warnings(gait: Gait, vehicle: Vehicle, samples: int = 201) -> list[str]:
+def gait_warnings(gait: Gait, vehicle: Vehicle) -> list[str]:
     """Reasons why a gait is not fit for flight, one line each."""
-    times = gait.sample_times(samples)
+    times = gait.sample_times()
     angles = gait.angles(times)
     deficient = rank(angles, vehicle) < 3
     values = singular_values(angles, vehicle)
@@ -266,14 +260,14 @@ def map_report(vehicle: Vehicle, path: Path | None = None) -> dict[str, Any]:
     return report
 
 
-def determinant_report(case: str, vehicle: Vehicle, samples: int = 101) -> dict[str, Any]:
+def determinant_report(case: str, vehicle: Vehicle) -> dict[str, Any]:
     """How far a restriction of ch. 3 stays from singular (``tiltsim gait --figure determinant``).
 
     For each pair ``(alpha_1, alpha_3)`` the minimum of ``R`` over the region of interest of
     ``(alpha_2, alpha_4)``, the triangle U V M with its edges.
     """
     corners = np.array(TRIANGLE)
-    share = np.linspace(0.0, 1.0, samples)
+    share = np.linspace(0.0, 1.0, 101)
     first, second = np.meshgrid(share, share)
     weights = np.stack([1.0 - first, first * (1.0 - second), first * second], axis=-1)
     points = weights.reshape(-1, 3) @ corners

@@ -122,18 +122,15 @@ def multirotor_report(
     return report
 
 
-def period_report(
-    vehicle: Multirotor, gait: Gait, roll: float, pitch: float, samples: int = 201
-) -> dict[str, Any]:
+def period_report(vehicle: Multirotor, gait: Gait, roll: float, pitch: float) -> dict[str, Any]:
     """The singularities of a moving gait over its period: a table of arrays, and their worst.
 
     Args:
         vehicle: of any number of rotors
         gait: its tilt angles over time
         roll, pitch: attitude of the margins, rad
-        samples: of the table
     """
-    times = gait.sample_times(samples)
+    times = gait.sample_times()
     angles = gait.angles(times)
     pairs = [force_and_torque(vehicle.table, row) for row in angles.tolist()]
     force, torque = (np.array(matrices) for matrices in zip(*pairs, strict=True))

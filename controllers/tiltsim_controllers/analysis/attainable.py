@@ -25,6 +25,8 @@ from tiltsim_controllers.analysis.torque_free import RANK_TOLERANCE
 from tiltsim_controllers.vehicle.parameters import SPIN
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import ArrayLike, NDArray
 
     from tiltsim_controllers.mathematics.scalar import Floats
@@ -179,24 +181,16 @@ def attainable_torque_thrust(
 
 
 def attainable_accelerations(
-    angles: ArrayLike,
-    vehicle: Vehicle,
-    speed_limits: tuple[float, float],
-    *,
-    yaw_torque: float | None = 0.0,
-    vertical_thrust: float | None = HOVER_THRUST,
+    angles: ArrayLike, vehicle: Vehicle, speed_limits: tuple[float, float]
 ) -> AttainableSet:
-    """Attainable ``(F_X, F_Y) / m`` (m/s^2, body axes; ch. 9, Figs. 8, 9).
+    """Attainable ``(F_X, F_Y) / m`` (m/s^2, body axes) in hover without yaw torque.
 
-    With the stated limits gaits 2 and 3 reach about 0.12 m/s^2, not the published 2 m/s^2.
-
-    Args:
-        angles, vehicle, speed_limits, yaw_torque, vertical_thrust: as for
-            `attainable_torque_thrust`
+    With the stated limits gaits 2 and 3 reach about 0.12 m/s^2, not the 2 m/s^2 of ch. 9, Figs. 8
+    and 9. The arguments are those of `attainable_torque_thrust`.
     """
     torque, force = _wrench(angles, vehicle)
     labels = ("a_X (m/s^2)", "a_Y (m/s^2)")
-    conditions = [(torque[2], yaw_torque), (force[2], vertical_thrust)]
+    conditions = [(torque[2], 0.0), (force[2], HOVER_THRUST)]
     return _attainable(force[:2] / vehicle.mass, labels, conditions, speed_limits)
 
 
@@ -210,7 +204,7 @@ def _wrench(angles: ArrayLike, vehicle: Vehicle) -> tuple[Floats, Floats]:
 def _attainable(
     image: Floats,
     labels: tuple[str, ...],
-    conditions: list[tuple[Floats, float | None]],
+    conditions: Sequence[tuple[Floats, float | None]],
     speed_limits: tuple[float, float],
 ) -> AttainableSet:
     active = [(row, value) for row, value in conditions if value is not None]

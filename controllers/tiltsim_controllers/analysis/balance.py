@@ -9,11 +9,11 @@ At level attitude the torque-free force ``n(alpha)`` must point along ``(-ax, -a
     D13)``,
 
 with ``A = sin(2 delta - E13) / sin(2 delta)`` and ``B = sin(2 delta + E24) / sin(2 delta)``. Pods
-with opposite tilts in pairs, E13 = E24 = 0, load the rotors evenly: `even_load_gait`, in closed
-form. A gait may tilt less by shifting load to the pair that produces the side force, in the limit
-until the other pair stops (A or B zero); where both are zero, at the point P of the Two Color Map,
-``n`` vanishes. The decoupling matrix is singular in both cases, so `balanced_gait` minimizes the
-tilt with A and B bounded away from zero.
+with opposite tilts in pairs, E13 = E24 = 0, load the rotors evenly. A gait may tilt less by
+shifting load to the pair that produces the side force, in the limit until the other pair stops (A
+or B zero); where both are zero, at the point P of the Two Color Map, ``n`` vanishes. The decoupling
+matrix is singular in both cases, so `balanced_gait` minimizes the tilt with A and B bounded away
+from zero.
 """
 
 from __future__ import annotations
@@ -55,38 +55,6 @@ def side_slopes(acceleration: Triple, gravity: float) -> tuple[float, float]:
             f" gravity, {gravity:g}; must be smaller"
         )
     return -ax / lift, -ay / lift
-
-
-def even_load_gait(acceleration: Triple, vehicle: Vehicle) -> Quad:
-    """The gait ``(a, b, -a, -b)`` that balances an acceleration, up to one scalar root.
-
-    ``sin 2b = X N`` and ``-sin 2a = Y N`` with ``N = 2 + cos 2a + cos 2b`` and the `side_slopes` X
-    and Y; it does not depend on the drag ratio. All four rotors have nearly the same thrust.
-
-    Args:
-        acceleration: constant acceleration that acts on the vehicle, m/s^2, world axes at yaw 0
-        vehicle: of which gravity alone matters
-
-    Returns:
-        The four tilt angles in rad.
-    """
-    x, y = side_slopes(acceleration, vehicle.gravity)
-    steepest = max(abs(x), abs(y))
-    low, high = 0.0, min(4.0, 1.0 / steepest) if steepest > 0.0 else 4.0
-
-    def excess(n: float) -> float:
-        return float(2.0 + _cosine(x * n) + _cosine(y * n) - n)
-
-    if excess(high) > 0.0:
-        raise ValueError(
-            f"acceleration {_shown(acceleration)}: out of reach of evenly loaded rotors with tilt"
-            " angles up to 45 degrees"
-        )
-    # `excess` is decreasing: bisection to the last bit.
-    while low < (middle := 0.5 * (low + high)) < high:
-        low, high = (middle, high) if excess(middle) > 0.0 else (low, middle)
-    a, b = -0.5 * asin(_clipped(y * high)), 0.5 * asin(_clipped(x * high))
-    return a, b, -a, -b
 
 
 def balanced_gait(

@@ -218,9 +218,9 @@ class Robustness:
     claim_holds: bool | None  # "more robust than its biased gait"; None where not compared
 
 
-def smallest_margin(gait: Gait, vehicle: Vehicle, samples: int = 401) -> float:
+def smallest_margin(gait: Gait, vehicle: Vehicle) -> float:
     """Minimum margin (rad) at level attitude over a period, negative after R changes sign."""
-    return float(margin_over_gait(gait.angles(gait.sample_times(samples)), vehicle).min())
+    return float(margin_over_gait(gait.angles(gait.sample_times(401)), vehicle).min())
 
 
 def robustness(published: PublishedGait) -> Robustness:

@@ -40,19 +40,16 @@ def published_determinant(roll: ArrayLike, pitch: ArrayLike) -> Floats:
     return np.asarray(surface)
 
 
-def published_singular_curve(points: int = 181) -> tuple[Floats, Floats]:
+def published_singular_curve() -> tuple[Floats, Floats]:
     """The closed curve ``S = 0`` of ch. 2, Fig. 3: roll and pitch in rad.
 
     ``cos(theta)^2 = 1 / (cos(phi) (cos(phi) - sin(phi)))`` has a solution only for
     ``-pi/4 <= phi <= 0``. The curve passes through level attitude and ``(-pi/4, 0)``.
-
-    Args:
-        points: Number of points on each half; pitch is positive on the first half, negative on the
-            second.
+    Pitch is positive on the first half of the points, negative on the second.
     """
     # Evenly spaced in the angle about the curve's centre: pitch grows like the square root of the
     # distance from either end.
-    roll = -np.pi / 8.0 * (1.0 - np.cos(np.linspace(0.0, np.pi, points)))
+    roll = -np.pi / 8.0 * (1.0 - np.cos(np.linspace(0.0, np.pi, 181)))
     cosine = 1.0 / np.sqrt(np.cos(roll) * (np.cos(roll) - np.sin(roll)))
     pitch = np.arccos(np.minimum(cosine, 1.0))
     return np.concatenate([roll, roll[::-1]]), np.concatenate([pitch, -pitch[::-1]])

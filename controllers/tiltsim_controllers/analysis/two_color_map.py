@@ -157,18 +157,18 @@ def find_roots(
     return sorted(roots, key=lambda root: (root.alpha_3, root.alpha_4))
 
 
-def grid_axis(size: int = GRID_SIZE) -> Floats:
-    """Grid of ch. 6 along one axis: ``size`` points from -pi/2 to pi/2 (rad)."""
-    return np.linspace(-pi / 2, pi / 2, size)
+def grid_axis() -> Floats:
+    """Grid of ch. 6 along one axis, from -pi/2 to pi/2 (rad)."""
+    return np.linspace(-pi / 2, pi / 2, GRID_SIZE)
 
 
-def grid_roots(vehicle: Vehicle, size: int = GRID_SIZE) -> list[list[list[Root]]]:
+def grid_roots(vehicle: Vehicle) -> list[list[list[Root]]]:
     """The roots at every grid point ``[i][j]`` of ``(alpha_1, alpha_2)`` (ch. 6, Fig. 4).
 
     Planes closer than half a grid step count as intersecting ("?").
     """
-    axis = grid_axis(size).tolist()
-    half_step = 0.5 * pi / (size - 1)
+    axis = grid_axis().tolist()
+    half_step = 0.5 * pi / (GRID_SIZE - 1)
     return [[find_roots(a, b, vehicle, half_step) for b in axis] for a in axis]
 
 

@@ -13,7 +13,6 @@ _PERFECT: Final = "ch01_gust/hover#perfect_gait"
 _QUADROTOR: Final = "ch01_gust/hover#quadrotor"
 _FLIGHTS: Final = (_PERFECT, "ch01_gust/hover#imperfect_gait", _QUADROTOR)
 _TILTING: Final = ("ch03_gaits/over_actuated#gait_1", "ch03_gaits/over_actuated#gait_1_planned")
-_GUST: Final = 1.0  # m/s^2 along +x
 
 
 def _tilt(metrics: Metrics) -> float:

@@ -342,14 +342,14 @@ def shade_share(axes: Axes, edges: Floats, share: Floats) -> None:
     axes.pcolormesh(edges, edges, share, cmap=shades, vmin=0.0, vmax=1.0, rasterized=True)
 
 
-def legend_below(axes: Axes, columns: int = 4) -> None:
-    """A legend below the x label, in as many columns as fit."""
+def legend_below(axes: Axes) -> None:
+    """A legend below the x label, in as many columns as fit, at most four."""
     from matplotlib import rcParams
 
     look: dict[str, Any] = {"loc": "upper center", "handlelength": 1.4, "columnspacing": 1.2}
     below = -4.2 * rcParams["font.size"] * axes.figure.dpi / 72.0
     box = axes.get_window_extent()
-    for number in range(columns, 0, -1):
+    for number in range(4, 0, -1):
         anchor = (0.5, below / box.height)
         legend = axes.legend(ncols=number, bbox_to_anchor=anchor, **look)
         if legend.get_window_extent().width <= 1.15 * box.width:
