@@ -21,8 +21,7 @@ import pytest
 
 from tiltsim.cli import main
 from tiltsim.commands import run as run_command
-from tiltsim.commands.progress import Progress, announce_compilation
-from tiltsim.engines.cache import before_compiling
+from tiltsim.commands.progress import Progress
 from tiltsim.engines.native_engine import compile_control
 from tiltsim.laws.attitude_altitude import TILTROTOR
 from tiltsim.scenario.loading import is_changed_from_library, load_scenario
@@ -489,22 +488,6 @@ def test_long_lines_are_wrapped_only_on_a_terminal(capsys, monkeypatch):
     assert max(map(len, piped.splitlines())) > 120
     assert max(map(len, shown.splitlines())) <= 80
     assert shown.split() == piped.split()
-
-
-def test_compilation_is_announced_on_a_terminal(capsys, monkeypatch):
-    name = TILTROTOR.native_name("thesis")
-    with announce_compilation(shown=True):
-        assert before_compiling == []  # standard error is no terminal here
-    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
-    with announce_compilation(shown=False):
-        assert before_compiling == []
-    with announce_compilation(shown=True):
-        (announce,) = before_compiling
-        announce(name)
-    assert before_compiling == []
-    assert (
-        "tiltsim: compiling attitude_altitude for the thesis plant, once" in capsys.readouterr().err
-    )
 
 
 def test_list_of_what_contains_a_word(capsys):

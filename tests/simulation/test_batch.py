@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import mujoco
 import numpy as np
 import pytest
@@ -19,7 +21,9 @@ from tiltsim.plants.flight_model import flight_model, model_cache_key
 from tiltsim.plants.mujoco_plant import MujocoPlant
 from tiltsim.resources import shipped_folder
 from tiltsim.scenario.loading import merge
+from tiltsim.simulation import batch
 from tiltsim.simulation.batch import fly
+from tiltsim.system import progress
 from tiltsim_controllers.gaits.parameters import GAIT_TYPES
 
 TROT = {"amplitude": 0.3, "period": 0.8}
@@ -463,6 +467,25 @@ def test_a_batch_takes_whatever_describes_a_scenario_and_flies_own_controllers()
     assert models == ["tiltrotor", "tiltrotor", "tilt_car"]
     assert results[0].flight["thrusts"][-1] == pytest.approx([2.0] * 4)
     np.testing.assert_array_equal(results[1].flight.samples, tiltsim.simulate(short).samples)
+
+
+def test_a_batch_tells_of_flights_whose_results_wait_for_others(monkeypatch):
+    class Flown:
+        def __init__(self, assemblies, *_):
+            self.flights = len(assemblies)
+
+        def results(self):
+            return ((place, SimpleNamespace(has_failed=False)) for place in range(self.flights))
+
+    monkeypatch.setattr(batch, "NativeBatch", Flown)
+    monkeypatch.setattr(batch, "_way_to_fly", lambda assembly, _: assembly.scenario.title)
+    monkeypatch.setattr(progress, "INTERVAL", 0.0)
+    counts = []
+    results = tiltsim.fly([{"title": title} for title in "ABAB"], progress=counts.append)
+    next(results)
+    assert counts == [1]
+    next(results)
+    assert counts == [1, 2, 3]  # the second A waits for the first B
 
 
 def test_a_batch_tells_of_its_flights_and_takes_numbers_of_numpy():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from argparse import Namespace
+from concurrent.futures import Future
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from tiltsim.studies.call_times import compiled_time_per_call
 from tiltsim.studies.comparison import (
     MEASURES,
     SEARCHES,
+    Compared,
     Entry,
     Search,
     _last,
@@ -24,6 +26,7 @@ from tiltsim.studies.comparison import (
     _survived,
     compare,
     controller_tables,
+    fly_entries,
     is_last_tried,
     why_none,
 )
@@ -131,6 +134,23 @@ def test_the_command_prints_rows_and_writes_a_folder(tmp_path, capsys):
     assert table[0] == SETPOINT
     assert table[1].split()[:2] == ["controller", "rms"]
     assert "yaw_position: " in table[4]
+
+
+def test_a_comparison_is_told_as_soon_as_it_is_there(monkeypatch):
+    def in_turn(work, entries, _jobs):
+        for entry in entries:
+            answered.append(entry.name)
+            future = Future()
+            future.set_result(Compared({"controller": entry.name}, np.zeros(0), np.zeros(0)))
+            yield entry, future
+
+    answered = []
+    monkeypatch.setattr("tiltsim.studies.comparison.in_processes", in_turn)
+    entries = [Entry(SETPOINT, name, {"law": name}, {}) for name in ("pid", "lqr")]
+    flown = fly_entries(entries, searches=True, jobs=2)
+    assert next(flown).row["controller"] == "pid"
+    assert answered == ["pid"]
+    assert [one.row["controller"] for one in flown] == ["lqr"]
 
 
 def named(controllers=None, *own):

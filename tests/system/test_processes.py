@@ -10,7 +10,7 @@ import sys
 import pytest
 
 from tiltsim.errors import InputError
-from tiltsim.system.processes import ProcessDiedError, in_processes
+from tiltsim.system.processes import ProcessDiedError, in_order, in_processes
 
 MEGABYTES = 1 << 24
 
@@ -37,6 +37,14 @@ def test_each_item_is_answered_regardless_of_the_others():
     with pytest.raises(InputError, match="no such luck"):
         found["raises"].result()
     assert not multiprocessing.active_children()
+
+
+def test_results_come_in_order_as_soon_as_they_can():
+    found = iter([(1, "b"), (0, "a"), (3, "d"), (2, "c")])
+    results = in_order(found)
+    assert [next(results), next(results)] == ["a", "b"]
+    assert next(found) == (3, "d")
+    assert list(results) == ["c"]
 
 
 def interrupts_blocked(_item):

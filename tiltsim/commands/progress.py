@@ -11,6 +11,7 @@ from time import monotonic
 from typing import TYPE_CHECKING, Final
 
 from tiltsim.commands.text import print_line
+from tiltsim.engines.cache import before_compiling
 from tiltsim.system.text import printable
 
 if TYPE_CHECKING:
@@ -21,31 +22,6 @@ TICK: Final = 1.0
 
 LINE_INTERVAL: Final = 8.0
 """Interval (s) of the lines where there is no terminal: CI services end a job that is silent."""
-
-
-@contextmanager
-def announce_compilation(*, shown: bool) -> Iterator[None]:
-    """Announce compilations within the block on standard error, if that is a terminal."""
-    if not shown or not sys.stderr.isatty():
-        yield
-        return
-    from tiltsim.engines.cache import before_compiling
-
-    def announce(name: str) -> None:
-        from tqdm import tqdm
-
-        plant, _, step = name.partition(".")
-        law = step.rpartition(".")[0].rpartition(".")[2]
-        tqdm.write(
-            f"tiltsim: compiling {law} for the {plant} plant, once: some ten seconds",
-            file=sys.stderr,
-        )
-
-    before_compiling.append(announce)
-    try:
-        yield
-    finally:
-        before_compiling.remove(announce)
 
 
 class Progress:
@@ -79,6 +55,9 @@ class Progress:
         self.expect(total)
         self.move(done)
 
+    def compile(self, name: str) -> None:
+        """Tell that native code of this name is compiled, until `move`; no rate counts that."""
+
     def print(self, line: str, *, error: bool = False) -> None:
         """Print a line, of results or to standard error."""
         print_line(line, error=error)
@@ -96,6 +75,7 @@ class _Bars(Progress):
     def __init__(self) -> None:
         super().__init__()
         self._bar: tqdm | None = None
+        self._compiling = False
 
     def begin(self, stage: str, total: float = 0, done: float = 0) -> None:
         super().begin(stage)
@@ -111,7 +91,17 @@ class _Bars(Progress):
         if self._bar is not None:
             if not self._bar.total:
                 self._bar.bar_format = self._stage + ": {n} [{elapsed}]"
+            if self._compiling:
+                self._bar.unpause()
+                self._compiling = False
             self._bar.update(done - self._bar.n)
+
+    def compile(self, name: str) -> None:
+        self._compiling = True
+        plant, _, step = name.partition(".")
+        law = step.rpartition(".")[0].rpartition(".")[2]
+        line = f"tiltsim: compiling {law} for the {plant} plant, once: some ten seconds"
+        self.print(line, error=True)
 
     def print(self, line: str, *, error: bool = False) -> None:
         from tqdm import tqdm
@@ -143,24 +133,30 @@ class _Lines(Progress):
     def begin(self, stage: str, total: float = 0, done: float = 0) -> None:
         super().begin(stage)
         self._total, self._done, self._initial = total, done, done
-        self._start = monotonic()
+        self._start = self._since = monotonic()
+        self._compiling = False
 
     def move(self, done: float) -> None:
+        if self._compiling:
+            self._since, self._initial, self._compiling = monotonic(), done, False
         self._done = done
+
+    def compile(self, name: str) -> None:
+        self._compiling = True
 
     def expect(self, total: float) -> None:
         self._total = total
 
     def tick(self) -> None:
-        elapsed, done, total = monotonic() - self._start, self._done, self._total
+        now, done, total = monotonic(), self._done, self._total
         line = f"tiltsim: {self._stage}"
         if total:
             line += f": {done:.0f} of {_total(total)}"
         elif done:
             line += f": {done:.0f}"
-        line += f", {_clock(elapsed)}"
-        if self._initial < done < total:
-            left = elapsed * (total - done) / (done - self._initial)
+        line += ", compiling" * self._compiling + f", {_clock(now - self._start)}"
+        if self._initial < done < total and not self._compiling:
+            left = (now - self._since) * (total - done) / (done - self._initial)
             line += f", about {_clock(left)} left"
         print_line(line, error=True)
 
@@ -180,13 +176,14 @@ def show_progress(*, shown: bool) -> Iterator[Progress]:
 
     ticking = threading.Thread(target=tick, daemon=True)
     ticking.start()
-    with announce_compilation(shown=True):
-        try:
-            yield progress
-        finally:
-            finished.set()
-            ticking.join()
-            progress.end()
+    before_compiling.append(progress.compile)
+    try:
+        yield progress
+    finally:
+        before_compiling.remove(progress.compile)
+        finished.set()
+        ticking.join()
+        progress.end()
 
 
 def _total(total: float) -> str:

@@ -7,6 +7,8 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
+from itertools import count
 from os import PathLike
 from typing import Any, Final, TypeVar
 from warnings import warn
@@ -24,6 +26,7 @@ from tiltsim.scenario.vehicle import VehicleTable
 from tiltsim.simulation.native_batch import NativeBatch
 from tiltsim.simulation.simulate import simulate_assembly
 from tiltsim.system.numbers import whole_number
+from tiltsim.system.processes import in_order
 from tiltsim.system.progress import Report, check_progress, reported
 from tiltsim.system.text import short_repr
 
@@ -98,28 +101,39 @@ def fly(
         kept = flight if keep_samples else None
         return FlightResult(flight.scenario, flight.end, flight.metrics(), kept)
 
-    return _with_progress(fly_each(chosen, result, threads), len(chosen), progress)
+    return _with_progress(partial(fly_each, chosen, result, threads), len(chosen), progress)
 
 
 def _with_progress(
-    results: Iterator[FlightResult], total: int, progress: Report | bool | None
+    flying: Callable[[Callable[[], None]], Iterator[FlightResult]],
+    total: int,
+    progress: Report | bool | None,
 ) -> Iterator[FlightResult]:
     with reported(progress, "flights", total) as report:
-        warned = False
-        for done, result in enumerate(results, start=1):
-            report(done)
+        number, warned = count(1), False
+        results = flying(lambda: report(next(number)))
+        for place, result in enumerate(results, start=1):
             if result.has_failed and not warned:
                 warned = True
-                warn(f"flight {done}: {result.end.message}", RuntimeWarning, stacklevel=2)
+                warn(f"flight {place}: {result.end.message}", RuntimeWarning, stacklevel=2)
             yield result
 
 
 def fly_each(
-    scenarios: Sequence[Scenario], finish: Callable[[Flight], Result], threads: int
+    scenarios: Sequence[Scenario],
+    finish: Callable[[Flight], Result],
+    threads: int,
+    finished: Callable[[], None] = lambda: None,
 ) -> Iterator[Result]:
     """Fly as `fly` does, and yield what ``finish`` makes of each flight, in their order.
 
     Samples are freed unless it keeps them. Raises `KeyboardInterrupt` if interrupted.
+
+    Args:
+        scenarios: What to fly.
+        finish: Makes a result of a flight.
+        threads: Maximum number of threads.
+        finished: Called after every flight, also one that waits for others before it.
     """
 
     def result(flight: Flight) -> Result:
@@ -131,7 +145,16 @@ def fly_each(
     with ThreadPoolExecutor(threads) as pool:
         for start in range(0, len(scenarios), WINDOW):
             window = [assemble(scenario) for scenario in scenarios[start : start + WINDOW]]
-            yield from _fly_window(window, native, threads, pool, result)
+            flown = _fly_window(window, native, threads, pool, result)
+            yield from in_order(_counted(flown, finished))
+
+
+def _counted(
+    flown: Iterable[tuple[int, Result]], finished: Callable[[], None]
+) -> Iterator[tuple[int, Result]]:
+    for one in flown:
+        finished()
+        yield one
 
 
 def _fly_window(
@@ -140,14 +163,11 @@ def _fly_window(
     threads: int,
     pool: ThreadPoolExecutor,
     result: Callable[[Flight], Result],
-) -> Iterator[Result]:
-    """Fly group by group, and put the results back into their order."""
+) -> Iterator[tuple[int, Result]]:
+    """Fly group by group; yields places and results."""
     groups: dict[object, list[int]] = {}
     for index, assembly in enumerate(assemblies):
         groups.setdefault(_way_to_fly(assembly, native), []).append(index)
-    done: dict[int, Result] = {}
-    following = 0
-
     for way, indices in groups.items():
         chosen = [assemblies[index] for index in indices]
         flown: Iterator[tuple[int, Result]]
@@ -167,11 +187,7 @@ def _fly_window(
             )
         else:
             flown = NativeBatch(chosen, threads, pool, result).results()
-        for place, outcome in flown:
-            done[indices[place]] = outcome
-            while following in done:
-                yield done.pop(following)
-                following += 1
+        yield from ((indices[place], outcome) for place, outcome in flown)
 
 
 def _way_to_fly(assembly: Assembly, native: bool) -> object:

@@ -24,7 +24,7 @@ from tiltsim.simulation.shared_engine import compile_together, with_compiled
 from tiltsim.simulation.simulate import simulate
 from tiltsim.studies.call_times import compiled_time_per_call, time_per_call
 from tiltsim.sweeps.search import boundary
-from tiltsim.system.processes import in_processes
+from tiltsim.system.processes import in_order, in_processes
 from tiltsim.vehicles.spans import in_last_second
 from tiltsim_controllers.mathematics.scalar import Floats
 
@@ -195,10 +195,9 @@ def fly_entries(
     if jobs == 1:
         yield from map(work, entries)
         return
-    done = {}
-    for entry, future in in_processes(work, entries, jobs):
-        done[entry] = future.result()
-    yield from map(done.__getitem__, entries)
+    places = {entry: place for place, entry in enumerate(entries)}
+    flown = in_processes(work, entries, jobs)
+    yield from in_order((places[entry], future.result()) for entry, future in flown)
 
 
 def compare_one(

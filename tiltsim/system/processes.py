@@ -8,7 +8,7 @@ import pickle
 import signal
 import sys
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future
 from contextlib import contextmanager, suppress
 from multiprocessing.connection import Connection, wait
@@ -57,6 +57,17 @@ def in_processes(
             process.terminate()
         for process in processes:
             process.join()
+
+
+def in_order(found: Iterable[tuple[int, Result]]) -> Iterator[Result]:
+    """Results whose places come in any order, each as soon as all those before it are there."""
+    done: dict[int, Result] = {}
+    following = 0
+    for place, result in found:
+        done[place] = result
+        while following in done:
+            yield done.pop(following)
+            following += 1
 
 
 def _begin(work: Callable[[Item], Result]) -> tuple[BaseProcess, Connection]:
