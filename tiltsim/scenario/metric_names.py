@@ -116,6 +116,12 @@ METRICS: Final = {
         "",
         "largest share of varpi |varpi| that neither force nor torque show (multirotor)",
     ),
+    "max_supervision": Metric(
+        "largest intervention of the supervisor",
+        "",
+        "largest share of the gait's angles (scale) or of its speed (hold) that the supervisor "
+        "takes away, or of the way to red; 0 where it never acted",
+    ),
     "saturated_fraction": Metric(
         "share of time with a saturated rotor",
         "",

@@ -55,6 +55,9 @@ def test_a_flight_with_room_is_the_unsupervised_one_bit_for_bit(strategy):
     watched = tiltsim.simulate(tiltsim.parse_scenario(tables))
     assert len(watched) == len(plain) == 131
     assert not watched["supervision"].any()
+    assert watched.metrics() | {"realtime_factor": 0.0} == plain.metrics() | {
+        **{"max_supervision": 0.0, "realtime_factor": 0.0}
+    }
     np.testing.assert_array_equal(watched.samples[:, : plain.samples.shape[1]], plain.samples)
 
 
@@ -101,6 +104,7 @@ def test_scaling_shows_the_share_of_the_gait_that_it_takes_away():
     flight = tiltsim.simulate(tiltsim.parse_scenario(tables))
     flown = np.stack([flight[f"alpha_ref_{rotor}"] for rotor in (1, 2, 3, 4)], axis=-1)
     assert 0.05 < flight["supervision"].min() <= flight["supervision"].max() < 0.95
+    assert flight.metrics()["max_supervision"] == flight["supervision"].max()
     np.testing.assert_allclose(flown, np.outer(1.0 - flight["supervision"], angles), rtol=1e-12)
 
 

@@ -47,7 +47,7 @@ def rotorcraft_metrics(
         **_singular_zone_metrics(columns),
         "max_tilt_rate": largest(rates) if rates else np.zeros(spins.shape[1:-1]),
         **_singularity_metrics(columns, limits.resolve()),
-        **_null_metrics(columns),
+        **_controller_metrics(columns),
         **saturation_metrics(time, saturated),
     }
 
@@ -120,10 +120,10 @@ def _singular_zone_metrics(columns: Mapping[str, Floats]) -> dict[str, Any]:
     return metrics
 
 
-def _null_metrics(columns: Mapping[str, Floats]) -> dict[str, Any]:
-    if "null_part" not in columns:
-        return {}
-    return {"max_null_part": columns["null_part"].max(axis=-1)}
+def _controller_metrics(columns: Mapping[str, Floats]) -> dict[str, Any]:
+    """The largest values of columns that some controllers have."""
+    names = [name for name in ("null_part", "supervision") if name in columns]
+    return {f"max_{name}": columns[name].max(axis=-1) for name in names}
 
 
 def _singularity_metrics(
