@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Final, Protocol
+from dataclasses import dataclass
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, Final
 
 from tiltsim.vehicles.rotorcraft import OTHER_LAYOUT, ROTORCRAFT
 from tiltsim.vehicles.tilt_car import TILT_CAR
@@ -17,97 +19,58 @@ if TYPE_CHECKING:
     from tiltsim.views.video.overlay import Overlay
 
 
-class VehicleViews(Protocol):
-    """The views of one kind of vehicle; methods import the libraries that they need."""
+@dataclass(frozen=True)
+class VehicleViews:
+    """The views of one kind of vehicle, whose modules are imported when they are needed.
+
+    Attributes:
+        page: Name of the panels of its page, below `tiltsim.views.figures`.
+        caption: Name of the class of its videos' overlay, in `tiltsim.views.video.overlay`.
+        viewer: Name of its display in Rerun, below `tiltsim.views.rerun`.
+    """
+
+    page: str
+    caption: str
+    viewer: str
 
     def panels(self) -> Mapping[str, Panel]:
         """The panels of a flight's page, by name."""
+        panels: Mapping[str, Panel] = _imported(f"figures.{self.page}")
+        return panels
 
     def overlay(self, flight: Flight, height: int) -> Overlay:
         """Camera and captions of a video of a flight, with frames of a height (pixels)."""
+        overlay: Overlay = _imported(f"video.overlay.{self.caption}")(flight, height)
+        return overlay
 
     def display(self) -> VehicleDisplay:
         """Panels and camera in Rerun."""
+        display: VehicleDisplay = _imported(f"rerun.{self.viewer}")
+        return display
 
 
-class RotorcraftViews(VehicleViews):
-    """Views of tiltrotor and quadrotor."""
+def _imported(name: str) -> Any:
+    """What has a dotted name in the modules beside this one."""
+    module, _, name = name.rpartition(".")
+    return getattr(import_module(f"tiltsim.views.{module}"), name)
 
-    def panels(self) -> Mapping[str, Panel]:
-        from tiltsim.views.figures.rotorcraft import ROTORCRAFT_PANELS
-
-        return ROTORCRAFT_PANELS
-
-    def overlay(self, flight: Flight, height: int) -> Overlay:
-        from tiltsim.views.video.overlay import RotorcraftOverlay
-
-        return RotorcraftOverlay(flight, height)
-
-    def display(self) -> VehicleDisplay:
-        from tiltsim.views.rerun.rotorcraft_display import ROTORCRAFT_DISPLAY
-
-        return ROTORCRAFT_DISPLAY
-
-
-class OtherLayoutViews(RotorcraftViews):
-    """Views of a rotorcraft whose singular attitudes are not known; its page leaves them out."""
-
-    def overlay(self, flight: Flight, height: int) -> Overlay:
-        from tiltsim.views.video.overlay import AttitudeOverlay
-
-        return AttitudeOverlay(flight, height)
-
-    def display(self) -> VehicleDisplay:
-        from tiltsim.views.rerun.rotorcraft_display import OTHER_LAYOUT_DISPLAY
-
-        return OTHER_LAYOUT_DISPLAY
-
-
-class MultirotorViews(RotorcraftViews):
-    """Views of a multirotor, whose singular attitudes need not be a curve."""
-
-    def panels(self) -> Mapping[str, Panel]:
-        from tiltsim.views.figures.rotorcraft import MULTIROTOR_PANELS
-
-        return MULTIROTOR_PANELS
-
-    def overlay(self, flight: Flight, height: int) -> Overlay:
-        from tiltsim.views.video.overlay import MarginOverlay
-
-        return MarginOverlay(flight, height)
-
-    def display(self) -> VehicleDisplay:
-        from tiltsim.views.rerun.rotorcraft_display import MULTIROTOR_DISPLAY
-
-        return MULTIROTOR_DISPLAY
-
-
-class TiltCarViews(VehicleViews):
-    """Views of the tilt-car."""
-
-    def panels(self) -> Mapping[str, Panel]:
-        from tiltsim.views.figures.tilt_car import TILT_CAR_PANELS
-
-        return TILT_CAR_PANELS
-
-    def overlay(self, flight: Flight, height: int) -> Overlay:
-        from tiltsim.views.video.overlay import TiltCarOverlay
-
-        return TiltCarOverlay(flight, height)
-
-    def display(self) -> VehicleDisplay:
-        from tiltsim.views.rerun.tilt_car_display import TILT_CAR_DISPLAY
-
-        return TILT_CAR_DISPLAY
-
-
-MULTIROTOR: Final = MultirotorViews()
 
 VIEWS: Final[dict[VehicleKind, VehicleViews]] = {
-    ROTORCRAFT: RotorcraftViews(),
-    OTHER_LAYOUT: OtherLayoutViews(),
-    TILT_CAR: TiltCarViews(),
+    ROTORCRAFT: VehicleViews(
+        "rotorcraft.ROTORCRAFT_PANELS", "RotorcraftOverlay", "rotorcraft_display.ROTORCRAFT_DISPLAY"
+    ),
+    OTHER_LAYOUT: VehicleViews(
+        "rotorcraft.ROTORCRAFT_PANELS", "AttitudeOverlay", "rotorcraft_display.OTHER_LAYOUT_DISPLAY"
+    ),
+    TILT_CAR: VehicleViews(
+        "tilt_car.TILT_CAR_PANELS", "TiltCarOverlay", "tilt_car_display.TILT_CAR_DISPLAY"
+    ),
 }
+
+MULTIROTOR: Final = VehicleViews(
+    "rotorcraft.MULTIROTOR_PANELS", "MarginOverlay", "rotorcraft_display.MULTIROTOR_DISPLAY"
+)
+"""Views of a multirotor, whose singular attitudes need not be a curve."""
 
 
 def views_of(assembly: Assembly) -> VehicleViews:
