@@ -105,9 +105,19 @@ def test_contradicting_options_are_refused(arguments, message, capsys):
     assert message in capsys.readouterr().err
 
 
-def test_wrong_ranges_of_a_map_are_refused(capsys):
-    assert main(["attraction", SETPOINT, "--ranges=-1:1"]) == 2
-    assert "write LOW:HIGH,LOW:HIGH" in capsys.readouterr().err
+@pytest.mark.parametrize(
+    ("option", "message"),
+    [
+        ("--ranges=-1:1", "--ranges -1:1: write LOW:HIGH,LOW:HIGH"),
+        ("--axes=roll,rol", "--axes roll,rol: choose two of x, y"),
+        ("--coarse=0", "--coarse 0: must be 1 to 125"),
+        ("--refine=7", "--refine 7: must be 0 to 6"),
+        ("--ranges=0:1,-2:0", "range of pitch = -2:0: must be within pi/2 either way"),
+    ],
+)
+def test_a_wrong_map_is_refused_by_what_was_typed(option, message, capsys):
+    assert main(["attraction", SETPOINT, option, "--quiet"]) == 2
+    assert capsys.readouterr().err.startswith(f"tiltsim: {message}")
 
 
 def test_a_map_of_short_flights_warns_in_one_line(capsys):

@@ -15,14 +15,15 @@ from tiltsim.commands.options import Subparsers
 from tiltsim.commands.progress import Progress, show_progress
 from tiltsim.commands.text import aligned, number
 from tiltsim.errors import InputError
+from tiltsim.linear.map_size import COARSE, REFINEMENTS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from tiltsim.linear.attraction import Attraction
 
-DEFAULT_COARSE: Final = 12
-DEFAULT_REFINEMENTS: Final = 3
+OPTIONS: Final = {"axes": "--axes", "coarse": "--coarse", "refinements": "--refine"}
+"""What is typed for an argument of `tiltsim.attraction`."""
 
 
 def add_parser(subparsers: Subparsers) -> None:
@@ -39,10 +40,11 @@ def add_parser(subparsers: Subparsers) -> None:
     add("--axes", default="roll,pitch", metavar="A,B", help=axes)
     ranges = "of each axis, SI units (default: 1.5 rad, 5 m, 5 m/s, 10 rad/s either way)"
     add("--ranges", metavar="LOW:HIGH,LOW:HIGH", help=ranges)
-    coarse = "cells across before cells at the boundary are divided (default: 12)"
-    add("--coarse", type=int, default=DEFAULT_COARSE, metavar="N", help=coarse)
-    refine = "how often cells at the boundary are divided (default: 3, 96 cells across)"
-    add("--refine", type=int, default=DEFAULT_REFINEMENTS, metavar="N", help=refine)
+    coarse = f"cells across before cells at the boundary are divided (default: {COARSE})"
+    add("--coarse", type=int, default=COARSE, metavar="N", help=coarse)
+    across = COARSE * 2**REFINEMENTS
+    refine = f"how often these are divided (default: {REFINEMENTS}, {across} cells across)"
+    add("--refine", type=int, default=REFINEMENTS, metavar="N", help=refine)
     parser.set_defaults(run=run)
 
 
@@ -54,7 +56,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     first, _, second = arguments.axes.partition(",")
     ranges = _parse_ranges(arguments.ranges)
-    with show_progress(shown=not arguments.quiet) as progress, _warnings_in_a_line(progress):
+    with show_progress(shown=not arguments.quiet) as progress, _in_lines(progress):
         progress.begin("linear analysis")
         found = attraction(
             scenario,
@@ -69,8 +71,8 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 @contextmanager
-def _warnings_in_a_line(progress: Progress) -> Iterator[None]:
-    """Within the block Python's warnings are lines on standard error."""
+def _in_lines(progress: Progress) -> Iterator[None]:
+    """Within the block Python's warnings are lines, and mistakes name what was typed."""
 
     def show(message: Warning | str, *_: Any, **__: Any) -> None:
         progress.print(f"tiltsim: {message}", error=True)
@@ -78,7 +80,12 @@ def _warnings_in_a_line(progress: Progress) -> Iterator[None]:
     with warnings.catch_warnings():
         warnings.simplefilter("always", RuntimeWarning)
         warnings.showwarning = show
-        yield
+        try:
+            yield
+        except InputError as error:
+            name, _, rest = str(error).partition(" = ")
+            known = OPTIONS.get(name)
+            raise InputError(f"{known} {rest}" if known else str(error)) from None
 
 
 def _draw(found: Attraction) -> Figure:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from tiltsim.errors import InputError
 from tiltsim.laws.assembling import assemble
 from tiltsim.linear.final_states import FinalStates
+from tiltsim.linear.map_size import COARSE, REFINEMENTS
 from tiltsim.linear.settling import SlowestMode, advice_on_duration, slowest_mode
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.scenario import Scenario
@@ -35,7 +36,6 @@ SPANS: Final = {"position": 5.0, "velocity": 5.0, "attitude": 1.5, "angular_velo
 
 NEAR: Final = 0.05  # m and rad
 MEAN: Final = 1.0  # s, at the end of a flight, over which the mean is taken
-COARSE: Final = 12  # cells across, before they are divided
 MOST_CELLS: Final = 1_000
 INSTANTS: Final = 24  # of a moving gait
 
@@ -115,7 +115,7 @@ def attraction(
     *,
     ranges: tuple[tuple[float, float] | None, tuple[float, float] | None] = (None, None),
     coarse: int = COARSE,
-    refinements: int = 3,
+    refinements: int = REFINEMENTS,
     progress: Callable[[int, int], None] = lambda _flights, _expected: None,
 ) -> Attraction:
     """Which initial states come back to a flight.
