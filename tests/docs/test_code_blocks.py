@@ -59,8 +59,11 @@ NOT_RUN = {
 }
 """Commands that are parsed but not run, and why."""
 
-FLOWN_ELSEWHERE = {"docs/own_controller.md": "tests/plants/test_user_controller.py"}
-"""Pages whose Python blocks another test executes, and judges the flights."""
+FLOWN_ELSEWHERE = {
+    "docs/environment.md": "tests/env/test_environment.py and test_vector.py",
+    "docs/own_controller.md": "tests/plants/test_user_controller.py",
+}
+"""Pages whose Python blocks other tests execute, and judge what they fly."""
 
 SMALL_SWEEP = """
 scenario = "ch04_tracking/setpoint#rho_0_modified"

@@ -89,12 +89,12 @@ def test_a_short_training_beats_zero_actions_whatever_the_number_of_processes(tm
     printed, weights = [], []
     for processes in ("1", "2"):
         file = tmp_path / f"{processes}.npy"
-        command = [sys.executable, "examples/train_hover.py", "--updates", "12", "--out", file]
+        command = [sys.executable, "examples/train_hover.py", "--updates", "5", "--out", file]
         done = subprocess.run(
             [*command, "--processes", processes], cwd=ROOT, capture_output=True, text=True
         )
         assert done.returncode == 0, done.stderr
-        assert re.findall(r"update (\d+): ", done.stdout) == [str(n) for n in range(1, 13)]
+        assert re.findall(r"update (\d+): ", done.stdout) == [str(n) for n in range(1, 6)]
         printed.append(float(re.search(r"score ([\d.]+)", done.stdout)[1]))
         weights.append(np.load(file))
     np.testing.assert_array_equal(*weights)

@@ -190,8 +190,9 @@ def test_episodes_are_those_of_single_environments_step_for_step(task):
 @pytest.mark.parametrize("block", [0, 1])
 def test_the_documented_examples_run(block):
     pytest.importorskip("jax")
-    names = {}
-    exec(compile(documented(arrays=True)[block], "environment.md", "exec"), names)
+    blocks, names = documented(arrays=True), {}
+    assert len(blocks) == 2
+    exec(compile(blocks[block], "environment.md", "exec"), names)
     result = names["slopes" if block else "observations"]
     assert result.shape == ((4, 8) if block else (16, 12))
     assert np.isfinite(result).all()

@@ -237,7 +237,7 @@ def test_actuators_sensors_and_faults_act_on_each_rotor():
     assert set(flight["thrust_factor_1"]) == {1.0}
 
 
-HEAVY = {"rotor_inertia": 2e-5}
+HEAVY = {"rotor_inertia": 1e-5}
 EVERYTHING = {
     **ACTUATORS,
     "vehicle": {**ACTUATORS["vehicle"], **HEAVY},
@@ -264,9 +264,8 @@ HELD = {
     [
         ("pentarotor", {"vehicle": PENTAROTOR, **WITHOUT_ONE}),
         ("hexarotor", {"vehicle": WEAK, "controller": PRIORITIZED, **CLIMB}),
-        ("tilt_hexarotor", {"controller": HELD, "gait": ASIDE}),
         ("tilt_hexarotor", {"vehicle": HEAVY, "gait": TILTS, "simulation": {"plant": "thesis"}}),
-        ("tilt_hexarotor", EVERYTHING),
+        ("tilt_hexarotor", {**EVERYTHING, "controller": HELD, "gait": ASIDE}),
         ("tilt_hexarotor", {"controller": {"law": "full_pose", "failed_rotor": 2}}),
         ("omni_octorotor", {"controller": {"law": "attitude_force", "norm": "thrust"}}),
     ],

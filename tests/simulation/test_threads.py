@@ -11,12 +11,10 @@ import numpy as np
 import pytest
 
 import tiltsim
-from tests.laws.layers.test_actuation import EVERYTHING
-from tests.simulation.test_batch import ALL_LAWS, EXACT, LAYERED, STORMY, scenario
+from tests.simulation.test_batch import ALL_LAWS, EVERY_LAYER, EXACT, LATE, layered, scenario
 from tiltsim.engines.callback import control_callback
 from tiltsim.env.environment import TiltrotorEnv
 from tiltsim.plants.command import Command
-from tiltsim.scenario.loading import merge
 from tiltsim.simulation.batch import fly
 from tiltsim.system.hooks import _ignore
 
@@ -86,12 +84,14 @@ def test_sixteen_threads_fly_what_each_flies_alone():
 
 @pytest.mark.slow
 def test_two_hundred_flights_of_all_kinds_are_the_same_in_threads():
-    layers = [merge(LAYERED, EVERYTHING), merge(LAYERED, STORMY)]
-    tables = [*ALL_LAWS.values(), *layers]
-    kinds = product(tables, ("python", "native"), ("mujoco", "thesis"), (0.0, 0.004))
+    engines, plants = ("python", "native"), ("mujoco", "thesis")
     scenarios = [
-        scenario(table, engine=engine, plant=plant, control_timestep=held, duration=0.2)
-        for table, engine, plant, held in kinds
+        scenario(table, engine=engine, plant=plant, control_timestep=held, duration=0.1)
+        for table, engine, plant, held in product(ALL_LAWS.values(), engines, plants, (0.0, 0.004))
+    ]
+    scenarios += [
+        layered(*EVERY_LAYER, seed=seed, engine=engine, plant=plant, **LATE)
+        for engine, plant, seed in product(engines, plants, (1, 2))
     ]
     flights = [lambda flown=flown: samples(flown) for flown in scenarios]
     flights += [flown_by_own_controller, flown_in_the_environment, flown_in_a_batch]

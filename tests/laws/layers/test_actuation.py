@@ -38,7 +38,6 @@ EVERYTHING = {
         {"type": "stuck_servo", "rotor": 2, "time": 0.3},
     ],
 }
-continuous_and_late = pytest.mark.parametrize("timing", [{}, LATE], ids=["continuous", "late"])
 
 
 def longest_lag(gains):
@@ -101,17 +100,7 @@ def test_the_layer_alone_changes_nothing(timing):
     np.testing.assert_array_equal(plain.samples, layered.samples)
 
 
-@pytest.mark.slow
-@continuous_and_late
-def test_engines_fly_the_same_flight(timing):
-    python, native = (
-        fly(EVERYTHING, simulation=timing | {"engine": engine}) for engine in ("python", "native")
-    )
-    assert len(python) == 61
-    np.testing.assert_array_equal(python.samples, native.samples)
-
-
-@continuous_and_late
+@pytest.mark.parametrize("timing", [{}, LATE], ids=["continuous", "late"])
 def test_a_saved_state_restarts_bit_identically(timing):
     desired = scenario(EVERYTHING, simulation=timing)
     straight = make_plant(assemble(desired))

@@ -55,19 +55,6 @@ def test_air_that_does_nothing_changes_nothing(tables, control_timestep):
     np.testing.assert_array_equal(still.samples, layered.samples[:, :same])
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("timing", [{}, LATE], ids=["continuous", "late"])
-def test_engines_fly_the_same_flight(timing):
-    python, native = (fly(STORM, timing | {"engine": e}) for e in ("python", "native"))
-    np.testing.assert_array_equal(python.samples, native.samples)
-
-
-@pytest.mark.slow
-def test_the_quadrotor_flies_the_same_flight_natively():
-    python, native = (fly(STORM, {"engine": e}, QUADROTOR) for e in ("python", "native"))
-    np.testing.assert_array_equal(python.samples, native.samples)
-
-
 @pytest.mark.parametrize("timing", [{}, LATE], ids=["continuous", "late"])
 def test_a_saved_state_restarts_bit_identically(timing):
     straight = make_plant(assemble(scenario(STORM, timing)))

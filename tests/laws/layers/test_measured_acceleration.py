@@ -17,7 +17,6 @@ from tests.laws.layers.test_on_equations import (
     STORM,
     TILTROTOR,
     TROT,
-    WATCHED,
     WEAK,
     WRONG,
     scenario,
@@ -130,16 +129,13 @@ def test_a_right_model_without_gyroscopic_torque_is_as_good_as_a_measurement(cha
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("plant", ["mujoco", "thesis"])
-def test_it_flies_the_same_three_ways(plant):
-    engine = {"simulation": {"plant": plant, "engine": "native", "duration": 0.2}}
+def test_it_flies_the_same_three_ways():
+    """Inside every other layer, and on the equations: `tests/simulation/test_batch.py`."""
+    engine = {"simulation": {"engine": "native", "duration": 0.2}}
     flights = [
-        (*EVERYTHING, MEASURED),
+        (TILTROTOR, TROT, SPINNING, MEASURED),
         (TILTROTOR, TROT, STORM, FEEDFORWARD, MEASURED),
-        (TILTROTOR, TROT, WATCHED, MEASURED),
     ]
-    if plant == "mujoco":  # on the equations each compiles for ten seconds; the first has it all
-        flights.append((TILTROTOR, TROT, SPINNING, MEASURED))
     rows = three_ways([scenario(*flight, engine) for flight in flights])
     assert {row.end.kind for row in rows} == {"completed"}
 

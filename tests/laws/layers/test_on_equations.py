@@ -173,26 +173,15 @@ def test_the_same_noise_and_turbulence_is_drawn():
     assert furthest((flights[1], other), states) > 0.03
 
 
-# --- engines, restarts -------------------------------------------------------------------------
+# --- restarts ----------------------------------------------------------------------------------
 
 LAYERED = {
     "tiltrotor": (TILTROTOR, TROT, STORM, LATE, SENSORS, SLOW, LIMITS),
     "quadrotor": (QUADROTOR, STORM),
 }
-on_layered_flights = pytest.mark.parametrize("name", LAYERED)
 
 
-@pytest.mark.slow
-@on_layered_flights
-def test_engines_fly_the_same_flight(name):
-    python, native = (
-        fly(*LAYERED[name], simulation={"engine": engine}) for engine in ("python", "native")
-    )
-    assert native.engine == "native"
-    np.testing.assert_array_equal(python.samples, native.samples)
-
-
-@on_layered_flights
+@pytest.mark.parametrize("name", LAYERED)
 def test_a_saved_state_restarts_bit_identically(name):
     desired = scenario(*LAYERED[name], {"simulation": {"plant": "thesis"}})
     straight = make_plant(assemble(desired))
