@@ -19,7 +19,7 @@ from time import perf_counter
 import gymnasium
 import numpy as np
 
-from tiltsim.env.tasks import EPISODE_STEPS  # importing it registers the tasks
+from tiltsim.env import EPISODE_STEPS  # importing it registers the tasks
 
 TASK = "tiltsim/Hover-v0"
 TRAINING_STEPS = 250

@@ -22,9 +22,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from tiltsim.env import VectorEnv
-from tiltsim.env.functions import EnvFunctions
-from tiltsim.env.tasks import EPISODE_STEPS
+from tiltsim.env import EPISODE_STEPS, EnvFunctions, VectorEnv
 
 TASK = "tiltsim/Hover-v0"
 STARTS, STEPS = 128, 100

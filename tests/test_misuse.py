@@ -64,6 +64,10 @@ MISUSES = {
         lambda: tiltsim.margins("ch04_tracking/circle#fixed_modified"),
         "moves with a period of",
     ),
+    "the airframe of a car": (
+        lambda: tiltsim.airframe("ch10_state_drift/third_derivative#clockwise"),
+        "takes rotorcraft only",
+    ),
     "attraction over one axis": (
         lambda: tiltsim.attraction(ADDRESS, ("roll", "roll")),
         "axes = roll,roll: choose two of",

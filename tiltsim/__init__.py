@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from tiltsim.flight.end import End
     from tiltsim.flight.flight import Flight
     from tiltsim.flight.reading import load_flight
+    from tiltsim.laws.airframe import airframe
     from tiltsim.linear.attraction import attraction
     from tiltsim.linear.linearization import linearize
     from tiltsim.linear.margins import margins
@@ -47,6 +48,7 @@ _HOMES = {
     "Scenario": "scenario.scenario",
     "Simulation": "simulation.stepwise",
     "TiltsimError": "errors",
+    "airframe": "laws.airframe",
     "attraction": "linear.attraction",
     "fly": "simulation.batch",
     "linearize": "linear.linearization",
@@ -77,6 +79,7 @@ __all__ = [
     "Scenario",
     "Simulation",
     "TiltsimError",
+    "airframe",
     "attraction",
     "fly",
     "linearize",

@@ -231,6 +231,18 @@ def test_notebooks_are_stored_without_outputs():
             assert cell.get("execution_count") is None, notebook.name
 
 
+def test_readers_import_public_modules_only():
+    sources = {notebook.name: "" for notebook in NOTEBOOKS}
+    for notebook in NOTEBOOKS:
+        for cell in json.loads(notebook.read_text(encoding="utf-8"))["cells"]:
+            sources[notebook.name] += "".join(cell["source"]) + "\n"
+    sources |= {file.name: file.read_text(encoding="utf-8") for file in ROOT.glob("examples/*.py")}
+    sources |= {name: "\n".join(code(name, "python")) for name in NAMES}
+    for name, text in sources.items():
+        modules = re.findall(r"^ *(?:from|import) (tiltsim\.[\w.]+)", text, re.MULTILINE)
+        assert {*modules} <= {"tiltsim.env"}, name
+
+
 # --- Python, and running it all ------------------------------------------------------------------
 
 

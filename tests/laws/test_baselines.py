@@ -9,9 +9,7 @@ from scipy.linalg import expm
 import tiltsim
 from tests.laws.test_laws import GUST
 from tests.laws.test_multirotor import TILTS, mjcf
-from tiltsim.laws.airframe import airframe_of
 from tiltsim.laws.assembling import assemble
-from tiltsim.scenario.scenario import plan_flight
 from tiltsim_controllers.laws.full_pose import attitude_error
 from tiltsim_controllers.mathematics.rotation import rotation_from_euler
 
@@ -187,7 +185,7 @@ def regulated():
         "reference": {"type": "setpoint"},
     }
     scenario = tiltsim.load_scenario({**tables, "simulation": {"plant": "thesis"}})
-    airframe = airframe_of(plan_flight(scenario))
+    airframe = tiltsim.airframe(scenario)
     table = scenario.controller
     return assemble(scenario), table.hover(airframe), airframe
 
@@ -234,7 +232,7 @@ def test_lqr_cost_decreases():
         "initial": {"rotor_speed": HOVER},
     }
     flight = fly(tables, plant="thesis", duration=1.0)
-    airframe = airframe_of(plan_flight(flight.scenario))
+    airframe = tiltsim.airframe(flight.scenario)
     _, cost = flight.scenario.controller.solution(airframe)
     errors = flight["position"] - flight["reference_position"]
     pushed = flight["thrusts"] - 0.25 * 0.429 * 9.8
@@ -254,7 +252,7 @@ ORBITING = {
 def orbit():
     """The regulator about a trot's orbit, and the errors of a flight that starts near it."""
     scenario = tiltsim.load_scenario({**ORBITING, "simulation": {"plant": "thesis"}})
-    airframe = airframe_of(plan_flight(scenario))
+    airframe = tiltsim.airframe(scenario)
     solution = scenario.controller.periodic_solution(airframe)
     thrust = np.array(airframe.vehicle.thrust_coefficients)
     nodes = len(solution.states)
@@ -323,7 +321,7 @@ def test_about_an_orbit_that_rests_the_gains_are_those_of_hover():
 def test_the_multipliers_about_an_orbit_are_those_of_the_riccati_solution():
     scenario = tiltsim.load_scenario({**ORBITING, "simulation": {"duration": 4.0}})
     flown = tiltsim.stability(scenario).multipliers
-    airframe = airframe_of(plan_flight(scenario))
+    airframe = tiltsim.airframe(scenario)
     designed = scenario.controller.periodic_solution(airframe).multipliers
     nearest = np.abs(flown[:, None] - designed[None, :]).min(axis=1)
     # The servos lag behind the gait's corners, which the design does not know: yaw feels it most.

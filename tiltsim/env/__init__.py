@@ -11,20 +11,31 @@ from typing import TYPE_CHECKING, Any
 from tiltsim.env.environment import Environment, TiltrotorEnv
 from tiltsim.env.registration import register
 from tiltsim.env.task import Reward, Task, hover_reward
+from tiltsim.env.tasks import EPISODE_STEPS
 
 if TYPE_CHECKING:
+    from tiltsim.env.functions import EnvFunctions
     from tiltsim.env.vector import VectorEnv
 
-__all__ = ["Environment", "Reward", "Task", "TiltrotorEnv", "VectorEnv", "hover_reward"]
+__all__ = [
+    "EPISODE_STEPS",
+    "EnvFunctions",
+    "Environment",
+    "Reward",
+    "Task",
+    "TiltrotorEnv",
+    "VectorEnv",
+    "hover_reward",
+]
 
 
 def __getattr__(name: str) -> Any:
-    """`VectorEnv` when it is asked for, as it needs JAX and Gymnasium."""
-    if name != "VectorEnv":
+    """`VectorEnv` and `EnvFunctions` when they are asked for, as they need JAX and Gymnasium."""
+    if name not in ("EnvFunctions", "VectorEnv"):
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    from tiltsim.env.vector import VectorEnv
+    from tiltsim.env import vector
 
-    return VectorEnv
+    return getattr(vector, name)
 
 
 register()

@@ -2,15 +2,36 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from tiltsim.errors import InputError
 from tiltsim.models.cross import as_multirotor
+from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.scalar_controller import Airframe, ScalarController
+from tiltsim.scenario.scenario import plan_flight
 from tiltsim.vehicles.rotorcraft import initial_rotor_speeds, initial_tilts
 from tiltsim_controllers.mathematics.scalar import Values
 
 if TYPE_CHECKING:
-    from tiltsim.scenario.scenario import FlightPlan
+    from collections.abc import Mapping
+    from os import PathLike
+
+    from tiltsim.scenario.scenario import FlightPlan, Scenario
+
+
+def airframe(scenario: Scenario | str | PathLike[str] | Mapping[str, Any]) -> Airframe:
+    """What the controller of a scenario may know, as methods of a `ScalarController` take it.
+
+    Args:
+        scenario: Anything that `tiltsim.load_scenario` takes, of a rotorcraft.
+
+    Raises:
+        InputError: If it is not valid, or of a tilt-car.
+    """
+    loaded = load_scenario(scenario)
+    if loaded.vehicle.model == "tilt_car":
+        raise InputError(f"{loaded.address}: vehicle.model: airframe takes rotorcraft only")
+    return airframe_of(plan_flight(loaded))
 
 
 def airframe_of(plan: FlightPlan) -> Airframe:
