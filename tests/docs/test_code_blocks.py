@@ -45,8 +45,12 @@ SAVED_AS = {
     "docs/gaits.md": {'title = "My own gait"': "my_gait.toml"},
     "docs/own_vehicle.md": {'title = "My own': "my_flight.toml", "<mujoco": "my_tiltrotor.xml"},
     "docs/own_controller.md": {"import numpy": "my_controller.py"},
+    "docs/supervisor.md": {'title = "Six tilting arms': "arms.toml"},
 }
 """Blocks that a page tells to save, by their start."""
+
+BRIEF = ("arms.toml", "level.toml")
+"""Flights of pages that are over before their code is compiled."""
 
 NOT_RUN = {
     "view": "opens a window; tests/views runs the viewer headless",
@@ -262,7 +266,7 @@ def run_command(call, folder):
             return
         (folder / "small.toml").write_text(SMALL_SWEEP)
         arguments = ["sweep", "small.toml", "--out", arguments[arguments.index("--out") + 1]]
-    elif arguments[0] == "run":
+    elif arguments[0] == "run" and arguments[1] not in BRIEF:
         quick = "duration=2.0" if "--controller" in arguments else "engine=native"
         arguments += ["--set", f"simulation.{quick}"]
     elif arguments[0] == "attraction":  # of few and short flights

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.messages import InvalidValueError
-from tiltsim.scenario.multirotor_controllers import AttitudeForceController
+from tiltsim.scenario.multirotor_controllers import AttitudeForceController, force_dimension
 from tiltsim.scenario.scenario_tables import ScenarioTables
 from tiltsim.scenario.tiltrotor_controllers import FullPoseController
-from tiltsim_controllers.gaits.plans import Gait
+from tiltsim_controllers.gaits.plans import Gait, fixed
 from tiltsim_controllers.laws.multirotor_full_pose import pose_rank
 
 
@@ -31,6 +31,22 @@ def check_full_pose(scenario: ScenarioTables, controller: FullPoseController, ga
             raise scenario.mistake("controller.law", reason)
 
 
+def _check_scaling(
+    controller: AttitudeForceController, vehicle: Multirotor, dimension: int
+) -> None:
+    """Refuse to scale a gait towards angles without the force that is controlled."""
+    supervisor = controller.supervision
+    if supervisor is None or supervisor.strategy != "scale":
+        return
+    untilted, _ = force_dimension(vehicle, fixed((0.0,) * vehicle.tilts))
+    if 0 < untilted < dimension:
+        raise supervisor.mistake(
+            "strategy",
+            f"untilted the vehicle has {untilted} of the {dimension} components of force; choose "
+            f"hold, or set controller.dimension = {untilted}",
+        )
+
+
 def check_dimension(
     scenario: ScenarioTables, controller: AttitudeForceController, gait: Gait
 ) -> None:
@@ -39,6 +55,7 @@ def check_dimension(
     vehicle = scenario.vehicle.resolve()
     assert isinstance(vehicle, Multirotor)
     dimension = controller.resolve_force(vehicle, gait).dimension
+    _check_scaling(controller, vehicle, dimension)
     reference = scenario.reference
     if (reference.kind == "attitude_altitude") != (controller.decoupler == "none"):
         raise scenario.mistake(

@@ -237,21 +237,16 @@ def test_six_arms_hold_a_gait_that_would_push_aside_until_the_vehicle_leans():
 
 
 @pytest.mark.parametrize(
-    ("name", "controller", "message"),
+    ("name", "strategy", "message"),
     [
-        (
-            "tilt_hexarotor",
-            {"supervisor": {"strategy": "return_to_red"}},
-            'controller.supervisor.strategy = "return_to_red": only the tiltrotor has red gaits',
-        ),
-        (
-            "hexarotor",
-            {"supervisor": {"strategy": "hold"}},
-            'controller.supervisor.strategy = "hold": vehicle.mjcf has no tilts',
-        ),
+        ("tilt_hexarotor", "return_to_red", "only the tiltrotor has red gaits"),
+        ("tilt_hexarotor", "scale", "untilted the vehicle has 1 of the 3 components of force"),
+        ("hexarotor", "hold", "vehicle.mjcf has no tilts"),
     ],
 )
-def test_what_there_is_nothing_to_supervise_for_is_refused(name, controller, message):
+def test_what_there_is_nothing_to_supervise_for_is_refused(name, strategy, message):
+    controller = {"law": "attitude_force", "supervisor": {"strategy": strategy}}
+    gait = {"gait": TILTS} if strategy == "scale" else {}
     with pytest.raises(InputError) as caught:
-        scenario(name, controller={"law": "attitude_force", **controller})
-    assert message in str(caught.value)
+        scenario(name, controller=controller, **gait)
+    assert f'controller.supervisor.strategy = "{strategy}": {message}' in str(caught.value)
