@@ -45,6 +45,7 @@ SAVED_AS = {
     "docs/gaits.md": {'title = "My own gait"': "my_gait.toml"},
     "docs/own_vehicle.md": {'title = "My own': "my_flight.toml", "<mujoco": "my_tiltrotor.xml"},
     "docs/own_controller.md": {"import numpy": "my_controller.py"},
+    "docs/multirotor.md": {'title = "A canted': "level.toml", "<mujoco": "own_hexarotor.xml"},
     "docs/supervisor.md": {'title = "Six tilting arms': "arms.toml"},
 }
 """Blocks that a page tells to save, by their start."""
@@ -94,6 +95,13 @@ def test_every_block_names_its_language(name):
 # --- TOML ----------------------------------------------------------------------------------------
 
 
+def save_blocks(name, folder):
+    """Save what a page tells to."""
+    for start, file in SAVED_AS.get(name, {}).items():
+        (text,) = (block.code for block in blocks(name) if block.code.startswith(start))
+        (folder / file).write_text(text)
+
+
 def check_toml(text, folder):
     """Validate a whole scenario, a whole sweep, or some tables of either."""
     document = tomllib.loads(text)
@@ -104,8 +112,9 @@ def check_toml(text, folder):
         else:
             Sweep.model_validate({"scenario": "ch04_tracking/circle#fixed_modified", **document})
         return
-    if document.get("vehicle", {}).get("model") != "multirotor":
-        document.get("vehicle", {}).pop("mjcf", None)  # the page's own; `test_pages_run` flies it
+    vehicle = document.get("vehicle", {})
+    if (folder / vehicle.get("mjcf", "-")).exists():
+        vehicle["mjcf"] = str(folder / vehicle["mjcf"])
     if "file" in document.get("gait", {}):  # a reader's own
         table = folder / document["gait"]["file"]
         table.write_text("time,alpha_1,alpha_2,alpha_3,alpha_4\n0,0,0,0,0\n1,0,0,0,0\n")
@@ -117,6 +126,7 @@ def check_toml(text, folder):
 
 @pytest.mark.parametrize("name", WITH_TOML)
 def test_toml_is_valid(name, tmp_path):
+    save_blocks(name, tmp_path)
     for block in blocks(name):
         if block.language == "toml":
             try:
@@ -290,9 +300,7 @@ def test_pages_run(name, tmp_path, monkeypatch, capsys):
     (tmp_path / "mjcf").symlink_to(ROOT / "mjcf")
     (tmp_path / "docs" / "pictures").mkdir(parents=True)  # where a page draws its own
     names = {"__name__": "page"}
-    for start, file in SAVED_AS.get(name, {}).items():
-        (text,) = (block.code for block in blocks(name) if block.code.startswith(start))
-        (tmp_path / file).write_text(text)
+    save_blocks(name, tmp_path)
     for block in blocks(name):
         if block.language == "sh":
             for call in commands(block.code, tmp_path):
