@@ -10,9 +10,11 @@ import pytest
 
 import tiltsim
 from tiltsim.errors import InputError
+from tiltsim.laws.assembling import assemble
 from tiltsim.laws.multirotor import multirotor_loop
 from tiltsim.laws.multirotor_layout import Layout
 from tiltsim.models.hover import hover_speeds
+from tiltsim.plants.factory import make_plant
 from tiltsim.resources import shipped_folder
 from tiltsim.scenario.loading import merge
 from tiltsim_controllers.analysis.singularity import world_up
@@ -279,6 +281,15 @@ def test_engines_fly_the_same_bit_for_bit(name, tables):
     assert flown[0].end == flown[1].end
     for column, values in flown[0].columns.items():
         np.testing.assert_array_equal(values, flown[1][column], err_msg=column)
+
+
+@pytest.mark.slow
+def test_native_code_notices_at_which_sample_the_others_are_singular():
+    """It checks all samples but the last."""
+    tables = merge(WITHOUT_ONE, {"simulation": {"engine": "native"}})
+    assembly = assemble(tiltsim.load_scenario(document("pentarotor", PENTAROTOR, **tables)))
+    for samples, ends in ((8, False), (9, True)):
+        assert (make_plant(assembly).record(samples, 1) is None) == ends
 
 
 def test_compiled_code_has_the_same_name_beside_a_loop_that_measures():
