@@ -12,7 +12,7 @@ import tiltsim
 from tiltsim.errors import InputError
 from tiltsim.laws.assembling import assemble
 from tiltsim.laws.multirotor import multirotor_loop
-from tiltsim.laws.multirotor_layout import Layout
+from tiltsim.laws.rotor_loop import Layout
 from tiltsim.models.hover import hover_speeds
 from tiltsim.plants.factory import make_plant
 from tiltsim.resources import shipped_folder

@@ -20,7 +20,6 @@ from tiltsim.system.quantity import Quantity, in_words
 from tiltsim_controllers.laws.supervisor import Supervision
 from tiltsim_controllers.mathematics.records import flatten, record_dtype, record_size
 from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector, scalar
-from tiltsim_controllers.vehicle.parameters import SPIN
 
 if TYPE_CHECKING:
     from tiltsim.scenario.scenario import FlightPlan, Scenario
@@ -55,7 +54,7 @@ class Dynamics:
         model: Name of the MJCF model.
         sizes: Lengths of its vectors, the controller's own states among the activations.
         initial_activations: ``(plan, setup) -> act`` at time zero.
-        spins: Signs of the rotor speeds.
+        spins: Signs of the rotor speeds, one a rotor of a rotorcraft.
         tilt_of_rotor: The number, from 0, of each rotor's tilt, -1 for a fixed one; empty for
             vehicles whose rotors lie on a cross.
         controller_states: Number of activations that are states of the controller.
@@ -67,7 +66,7 @@ class Dynamics:
     sizes: Sizes
     initial_activations: Callable[[FlightPlan, ControlSetup], Vector]
     controller_states: int = 0
-    spins: Values = SPIN
+    spins: Values = ()
     tilt_of_rotor: tuple[int, ...] = ()
     extra_actuators: tuple[ExtraActuators, ...] = ()
 

@@ -7,7 +7,7 @@ Tilt angles follow the gait exactly, or are further states where the controller 
 from __future__ import annotations
 
 from math import asin, atan2
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
 from tiltsim_controllers.mathematics.rotation import rotation_from_euler
 from tiltsim_controllers.mathematics.scalar import Quad, Triple, Values, Vector, scalar
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 
 VX, VY, VZ, R11, R12, R13, R21, R22, R23, R31, R32, R33, P, Q, R = range(3, 18)
 SPEED_1, SPEED_2, SPEED_3, SPEED_4 = range(18, 22)
-FURTHER: Final = 22  # the states of the controller
 
 
 @scalar
@@ -52,16 +51,6 @@ def body_fields(state: Vector) -> Values:
     return (
         state[0], state[1], state[2], state[VX], state[VY], state[VZ],
         roll, pitch, yaw, state[P], state[Q], state[R],
-    )  # fmt: skip
-
-
-@scalar
-def law_state(state: Vector, tilts: Quad) -> Values:
-    """State of the control laws, `tiltsim_controllers.vehicle.states.TILTROTOR_FIELDS`."""
-    return (
-        *body_fields(state),
-        tilts[0], tilts[1], tilts[2], tilts[3],
-        state[SPEED_1], state[SPEED_2], state[SPEED_3], state[SPEED_4],
     )  # fmt: skip
 
 

@@ -15,15 +15,16 @@ import numpy as np
 
 from tiltsim.closed_loop.loop import ClosedLoop, Columns, ControlSetup, Dynamics, Sampling
 from tiltsim.closed_loop.vehicle_kind import VehicleKind
-from tiltsim.laws.quadrotor import constant_attitude_references, upright_margin
+from tiltsim.laws.quadrotor import references, upright_margin
 from tiltsim.laws.rotorcraft import (
-    body_state,
     held_controls_of,
+    observed_of,
     servo_commands_of,
+    servo_lead,
     thrust_controls_of,
     torque_free_columns,
 )
-from tiltsim.laws.tiltrotor import servo_lead, singularity_columns
+from tiltsim.laws.tiltrotor import singularity_columns
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.vehicles.rotorcraft import (
     OTHER_LAYOUT,
@@ -31,7 +32,7 @@ from tiltsim.vehicles.rotorcraft import (
     initial_rotor_speeds,
     rotorcraft_kind,
 )
-from tiltsim.vehicles.rotorcraft.layout import CROSS, TILT_1, TILT_RATE_1, Layout
+from tiltsim.vehicles.rotorcraft.layout import CROSS, Layout
 from tiltsim_controllers.gaits.parameters import GaitParameters
 from tiltsim_controllers.mathematics.records import make_record_type, vector_of
 from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector, scalar
@@ -104,9 +105,9 @@ def _commanded_loop(
     """
     rotors, tilts = layout
     planned, fields = layout.names("alpha_ref"), layout.names("tilt_command")
-    idle = (0.0,) * ((len(kind.observed_fields) - len(layout.observed_fields)) // 2)
-    tilts_in, tilt_rates_in = entries_of(TILT_1, tilts), entries_of(TILT_RATE_1, tilts)
-    speeds_in, commands_in = entries_of(0, rotors), entries_of(0, tilts)
+    idle = (len(kind.observed_fields) - len(layout.observed_fields)) // 2
+    shown = layout._replace(tilts=tilts + idle)
+    observed, commands_in = observed_of(layout, shown, 0), entries_of(0, tilts)
     thrusts, servo_commands = thrust_controls_of(spins), servo_commands_of(tilts)
 
     @scalar
@@ -118,12 +119,12 @@ def _commanded_loop(
 
     @scalar
     def observe(qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector) -> Values:
-        seen = (*body_state(qpos, qvel), *tilts_in(qpos), *idle, *speeds_in(act))
-        return (*seen, *tilt_rates_in(qvel), *idle, *commands_in(ctrl))
+        return (*observed(qpos, qvel, act), *commands_in(ctrl))
 
     def derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
+        reference, names = setup.parameters.reference, shown.names("alpha_ref")
         return {
-            **constant_attitude_references(samples, setup.parameters.reference, setup.knots),
+            **references(samples, reference, setup.knots, tilts=names),
             **{column: samples[name] for column, name in zip(planned, fields, strict=True)},
             **singularity(samples, setup.parameters.vehicle),
         }

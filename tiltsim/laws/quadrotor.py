@@ -24,7 +24,8 @@ from tiltsim.closed_loop.loop import (
 )
 from tiltsim.engines.sample_evaluation import evaluate_over_samples
 from tiltsim.equations.quadrotor import equations_of_motion, initial_state, rigid_body
-from tiltsim.laws.tiltrotor import REFERENCE_COLUMNS, TILT_REFERENCE_COLUMNS
+from tiltsim.laws.rotorcraft import REFERENCE_COLUMNS
+from tiltsim.laws.tiltrotor import TILT_REFERENCE_COLUMNS
 from tiltsim.vehicles.rotorcraft import ROTORCRAFT
 from tiltsim_controllers.analysis.quadrotor_singularity import (
     normalized_determinant,
@@ -33,7 +34,7 @@ from tiltsim_controllers.analysis.quadrotor_singularity import (
 from tiltsim_controllers.mathematics.rotation import euler_from_quaternion
 from tiltsim_controllers.mathematics.scalar import Floats, Triple, Values, Vector, scalar
 from tiltsim_controllers.references.trajectories import ReferenceParameters, position_reference
-from tiltsim_controllers.vehicle.parameters import Vehicle
+from tiltsim_controllers.vehicle.parameters import SPIN, Vehicle
 from tiltsim_controllers.vehicle.quadrotor_mixer import speed_along_spin, thrust_controls
 from tiltsim_controllers.vehicle.states import PITCH, ROLL
 
@@ -178,6 +179,7 @@ def extended_loop(
             Sizes(qpos=7, qvel=6, act=6, ctrl=10),
             lambda plan, _setup: (0.0, 0.0, 0.0, 0.0, *_hover_thrust(plan)),
             controller_states=2,
+            spins=SPIN,
         ),
         sampling=Sampling(controls),
         columns=columns,
@@ -212,29 +214,25 @@ def references(
     samples: Mapping[str, Floats],
     reference: ReferenceParameters,
     knots: Vector,
-    attitude: Sequence[object],
+    attitude: Sequence[object] = (),
+    tilts: tuple[str, ...] = TILT_REFERENCE_COLUMNS,
 ) -> dict[str, Floats]:
     """The columns of references; those of the tilts are zero.
 
     Args:
         samples: By field.
         reference, knots: Of the position.
-        attitude: Columns of roll, pitch and yaw (rad): arrays or constants.
+        attitude: Columns of roll, pitch and yaw (rad): arrays or constants; empty for the
+            reference's.
+        tilts: Names of the tilts' columns.
     """
     time = samples["time"]
     states, setup = np.empty((len(time), 0)), ControlSetup(reference, tuple(knots))
     columns = [*evaluate_over_samples(_reference_position, 3, time, states, setup).T]
-    columns += [np.broadcast_to(np.asarray(angle, dtype=float), time.shape) for angle in attitude]
-    tilts = dict.fromkeys(TILT_REFERENCE_COLUMNS, np.zeros_like(time))
-    return dict(zip(REFERENCE_COLUMNS, columns, strict=True)) | tilts
-
-
-def constant_attitude_references(
-    samples: Mapping[str, Floats], reference: ReferenceParameters, knots: Vector
-) -> dict[str, Floats]:
-    """`references` with the attitude of the reference."""
-    attitude = (reference.roll, reference.pitch, reference.yaw)
-    return references(samples, reference, knots, attitude)
+    angles = attitude or (reference.roll, reference.pitch, reference.yaw)
+    columns += [np.broadcast_to(np.asarray(angle, dtype=float), time.shape) for angle in angles]
+    idle = dict.fromkeys(tilts, np.zeros_like(time))
+    return dict(zip(REFERENCE_COLUMNS, columns, strict=True)) | idle
 
 
 def upright_margin(samples: Mapping[str, Floats]) -> Floats:

@@ -19,10 +19,10 @@ from tiltsim.closed_loop.loop import (
 )
 from tiltsim.equations.quadrotor import initial_state, rigid_body
 from tiltsim.laws.quadrotor import (
-    constant_attitude_references,
     equation_rates,
     observe_equations,
     observe_quadrotor,
+    references,
     rigid_body_state,
     thrust_axis_cause,
     thrust_axis_value,
@@ -33,7 +33,7 @@ from tiltsim.vehicles.rotorcraft import ROTORCRAFT
 from tiltsim_controllers.laws.quadrotor_attitude_altitude import Gains, attitude_altitude_inputs
 from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector, scalar
 from tiltsim_controllers.references.trajectories import ReferenceParameters
-from tiltsim_controllers.vehicle.parameters import Vehicle
+from tiltsim_controllers.vehicle.parameters import SPIN, Vehicle
 from tiltsim_controllers.vehicle.quadrotor_mixer import thrust_controls
 
 if TYPE_CHECKING:
@@ -76,7 +76,7 @@ def _setup(plan: FlightPlan, signature: float) -> ControlSetup:
 def _derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
     reference = setup.parameters.reference
     return {
-        **constant_attitude_references(samples, reference, setup.knots),
+        **references(samples, reference, setup.knots),
         # cos(roll) cos(pitch) of the altitude times 1 / cos(pitch) of the Euler angles
         "determinant": np.cos(samples["roll"]),
         "singularity_margin": upright_margin(samples),
@@ -105,6 +105,7 @@ QUADROTOR_ATTITUDE_ALTITUDE: Final = ClosedLoop(
         "quadrotor",
         Sizes(qpos=7, qvel=6, act=4, ctrl=8),
         lambda _plan, _setup: (0.0, 0.0, 0.0, 0.0),
+        spins=SPIN,
     ),
     sampling=Sampling(_attitude_altitude_controls),
     columns=Columns(observe_quadrotor, _derive, observe_reads_controls=True),

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from tiltsim.engines.sample_evaluation import flights_in
-from tiltsim.vehicles.rotorcraft.layout import Layout
+from tiltsim.closed_loop.loop import ControlSetup
+from tiltsim.engines.sample_evaluation import evaluate_over_samples, flights_in
+from tiltsim.vehicles.rotorcraft.layout import QW, QX, QY, QZ, TILT_1, TILT_RATE_1, Layout
 from tiltsim_controllers.analysis.singularity import world_up
 from tiltsim_controllers.analysis.torque_free import (
     controlled_axes,
@@ -25,15 +26,67 @@ from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector, scala
 from tiltsim_controllers.mathematics.vectors import componentwise, tuple_text, written_out
 from tiltsim_controllers.vehicle.effectiveness import force_and_torque
 
+if TYPE_CHECKING:
+    from tiltsim.scenario.rotorcraft import ServoTable
 
-@scalar
-def body_state(qpos: Vector, qvel: Vector) -> Values:
-    """The twelve numbers of the rigid body, from MuJoCo's state."""
-    roll, pitch, yaw = euler_from_quaternion(qpos[3], qpos[4], qpos[5], qpos[6])
-    return (
-        qpos[0], qpos[1], qpos[2], qvel[0], qvel[1], qvel[2],
-        roll, pitch, yaw, qvel[3], qvel[4], qvel[5],
-    )  # fmt: skip
+
+def _written_state(name: str, numbers: tuple[str, ...]) -> Callable[..., Values]:
+    """Scalar code ``(qpos, qvel, act)`` of a vector, roll, pitch and yaw being ``angles``.
+
+    In one tuple: to join some costs Python a third of the function.
+    """
+    joined = written_out(name, "angles, qpos, qvel, act", tuple_text(numbers))
+
+    @scalar
+    def state(qpos: Vector, qvel: Vector, act: Vector) -> Values:
+        angles = euler_from_quaternion(qpos[QW], qpos[QX], qpos[QY], qpos[QZ])
+        found: Values = joined(angles, qpos, qvel, act)
+        return found
+
+    return state
+
+
+def _entries(vector: str, first: int, count: int) -> tuple[str, ...]:
+    return tuple(f"{vector}[{i}]" for i in range(first, first + count))
+
+
+_BODY: Final = (
+    *_entries("qpos", 0, 3),
+    *_entries("qvel", 0, 3),
+    *_entries("angles", 0, 3),
+    *_entries("qvel", 3, 3),
+)
+"""The rigid body, `tiltsim_controllers.vehicle.states.BODY_FIELDS`."""
+
+
+@cache
+def state_of(layout: Layout) -> Callable[..., Values]:
+    """Scalar code of the vehicle's state that control laws know: ``(qpos, qvel, act)``.
+
+    It has twelve numbers of the body, the tilt angles (rad) and the rotor speeds (rad/s).
+    """
+    rotors, tilts = layout
+    moved = (*_entries("qpos", TILT_1, tilts), *_entries("act", 0, rotors))
+    return _written_state(f"state_{rotors}_{tilts}", (*_BODY, *moved))
+
+
+@cache
+def observed_of(layout: Layout, shown: Layout, further: int) -> Callable[..., Values]:
+    """Scalar code of a sample, `Columns.observe` without controls.
+
+    Args:
+        layout: Of the vehicle.
+        shown: Of its samples, which may have tilts that are idle.
+        further: How many states of the controller they have.
+    """
+    rotors, tilts = layout
+    idle = ("0.0",) * (shown.tilts - tilts)
+    angles, rates = _entries("qpos", TILT_1, tilts), _entries("qvel", TILT_RATE_1, tilts)
+    speeds, states = _entries("act", 0, rotors), _entries("act", rotors, further)
+    return _written_state(
+        f"observed_{rotors}_{tilts}_{shown.tilts}_{further}",
+        (*_BODY, *angles, *idle, *speeds, *rates, *idle, *states),
+    )
 
 
 @cache
@@ -65,22 +118,37 @@ def held_controls_of(spins: Values, tilts: int) -> Callable[..., Values]:
     return held_controls
 
 
+def servo_lead(servo: ServoTable) -> float:
+    """Lag (s) of a tilt servo behind a command of constant rate, ``2 zeta / omega_n``."""
+    return 2.0 * servo.damping_ratio / servo.natural_frequency
+
+
+@cache
+def ahead_of(tilts: int) -> Callable[..., Values]:
+    """Scalar code of angles ahead of themselves by a lag: ``(angles, rates, lead)``."""
+    ahead: Callable[..., Values] = componentwise(
+        "ahead", "angles, rates, lead", "angles# + lead * rates#", tilts
+    )
+    return ahead
+
+
 @cache
 def servo_commands_of(tilts: int) -> Callable[..., Values]:
     """Scalar code of the commands of so many tilt servos, ahead of a gait by their lag.
 
     They are ``(time, lead, gait, knots) -> commands``, s and rad.
     """
-    planned = tilt_motion_of(tilts).planned
-    ahead = componentwise("servo_commands", "jets, lead", "jets#[0] + lead * jets#[1]", tilts)
+    moving, ahead = tilt_motion_of(tilts).moving, ahead_of(tilts)
 
     @scalar
     def servo_commands(time: float, lead: float, gait: GaitParameters, knots: Vector) -> Values:
-        commands: Values = ahead(planned(time, gait, knots), lead)
-        return commands
+        angles, rates = moving(time, gait, knots)
+        return ahead(angles, rates, lead)
 
     return servo_commands
 
+
+REFERENCE_COLUMNS: Final = ("x_ref", "y_ref", "z_ref", "roll_ref", "pitch_ref", "yaw_ref")
 
 CONDITION: Final = "decoupling_condition"
 """A column: smallest over largest singular value of the decoupling matrix."""
@@ -115,3 +183,41 @@ def torque_free_columns(
         axes = controlled_axes(forces, up, dimension)
         columns[CONDITION] = decoupling_condition(*pushing, axes)
     return columns
+
+
+def reference_columns(
+    in_force: Callable[..., Values],
+    fields: Sequence[str],
+    samples: Mapping[str, Floats],
+    setup: ControlSetup,
+    names: tuple[str, ...],
+) -> dict[str, Floats]:
+    """The columns of references, evaluated over samples.
+
+    Args:
+        in_force: Scalar function ``(time, values, parameters, knots)`` of the columns' values.
+        fields: Fields of a sample, its ``values``.
+        samples: By field.
+        setup: The flight's parameters and knots.
+        names: Of the columns.
+    """
+    states = np.stack([samples[name] for name in fields], axis=-1)
+    rows = evaluate_over_samples(in_force, len(names), samples["time"], states, setup)
+    return dict(zip(names, rows.T, strict=True))
+
+
+def rotor_stops(rotors: int) -> tuple[str, ...]:
+    """Causes of an end where the speed of a rotor reaches zero, one a rotor."""
+    return tuple(
+        f"the decoupling matrix became singular: rotor {rotor} came to a stop"
+        for rotor in range(1, rotors + 1)
+    )
+
+
+def singular_attitude(sample: Mapping[str, float], tilts: tuple[str, ...]) -> str:
+    """Cause of an end at an attitude and tilt angles, which have these names."""
+    angles = ", ".join(f"{sample[name]:.3g}" for name in tilts)
+    return (
+        f"the decoupling matrix became singular at roll = {sample['roll']:.3g} rad, "
+        f"pitch = {sample['pitch']:.3g} rad" + (f", tilt angles ({angles}) rad" if tilts else "")
+    )

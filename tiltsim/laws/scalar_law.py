@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 from tiltsim.engines.cache import is_core_code
 from tiltsim.errors import InputError
 from tiltsim.laws.airframe import airframe_of
-from tiltsim.laws.multirotor_layout import layout_of_vehicle
+from tiltsim.laws.rotor_loop import layout_of_vehicle
 from tiltsim.laws.scalar_loop import scalar_loop
 from tiltsim.laws.scalar_parameters import Key
 from tiltsim.scenario.controller import ScalarFunctionController
@@ -108,8 +108,7 @@ def loop_of_scalar_law(scenario: Scenario) -> ClosedLoop:
     except InvalidValueError as error:  # found only with the vehicle and its gait at hand
         raise InputError(f"{scenario.address or 'scenario'}: {error}") from error
     key = Key(
-        scenario.vehicle.model,
-        layout_of_vehicle(airframe.vehicle),
+        layout_of_vehicle(airframe.vehicle, scenario.vehicle.model),
         _with_checksum(law, checksum),
         f"{controller.law}{checksum}",
         type(parameters),

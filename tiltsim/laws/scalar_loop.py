@@ -7,39 +7,21 @@ law that commands them.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 from math import sqrt
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
-import numpy as np
-
-from tiltsim.closed_loop.loop import (
-    ClosedLoop,
-    Columns,
-    ControlSetup,
-    Dynamics,
-    Equations,
-    Sampling,
-)
-from tiltsim.equations.tiltrotor import body_fields, initial_state
+from tiltsim.closed_loop.loop import ClosedLoop
 from tiltsim.laws.airframe import airframe_of, initial_states
-from tiltsim.laws.rotorcraft import (
-    body_state,
-    held_controls_of,
-    servo_commands_of,
-    thrust_controls_of,
-    torque_free_columns,
-)
-from tiltsim.laws.scalar_parameters import Key, Known, record_of
-from tiltsim.laws.tiltrotor import REFERENCE_COLUMNS, reference_columns, servo_lead
+from tiltsim.laws.rotor_loop import RotorLaw, body_of_vehicle, rotor_loop
+from tiltsim.laws.scalar_parameters import Key, record_of
 from tiltsim.scenario.scalar_controller import ScalarController
-from tiltsim.vehicles.rotorcraft import initial_rotor_speeds, rotorcraft_kind
-from tiltsim.vehicles.rotorcraft.layout import CROSS, TILT_1, TILT_RATE_1
 from tiltsim_controllers.gaits.any_tilts import tilt_motion_of
 from tiltsim_controllers.laws.observed import Desired, Observed
 from tiltsim_controllers.mathematics.rotation import rotation_from_euler
-from tiltsim_controllers.mathematics.scalar import Floats, Triple, Values, Vector, scalar
+from tiltsim_controllers.mathematics.scalar import Values, Vector, scalar
 from tiltsim_controllers.mathematics.vectors import componentwise, entries_of, vectors_of
 from tiltsim_controllers.references.trajectories import reference_derivatives
 from tiltsim_controllers.vehicle.actuators import held_gain
@@ -48,7 +30,7 @@ from tiltsim_controllers.vehicle.effectiveness import (
     effectiveness_of,
     table_per_newton,
 )
-from tiltsim_controllers.vehicle.multirotor import BODY_STATES, body_of, equations_of_motion_of
+from tiltsim_controllers.vehicle.states import ALPHA_1
 
 if TYPE_CHECKING:
     from tiltsim.scenario.scenario import FlightPlan
@@ -64,12 +46,43 @@ def signed_root(value: float) -> float:
     return sqrt(value) if value >= 0.0 else -sqrt(-value)
 
 
+class _Following(NamedTuple):
+    """Scalar code by which rotors and tilts follow what a law commands."""
+
+    accelerations: Callable[..., Values]  # (gain, thrusts, k, speeds, spins): of rotors, rad/s^2
+    corrected: Callable[..., Values]
+    """``(rates, spins, f, modelled, speeds)``: the same of rotors that follow a model of theirs."""
+    tilt_rates: Callable[..., Values]  # (gain, angles, commanded): rad/s
+
+
+@cache
+def _following_of(rotors: int, tilts: int) -> _Following:
+    return _Following(
+        componentwise(
+            "accelerations",
+            "gain, thrusts, k, speeds, spins",
+            "gain * spins# * (root(thrusts# / k#) - speeds#)",
+            rotors,
+            root=signed_root,
+        ),
+        componentwise(
+            "corrected",
+            "rates, spins, f, modelled, speeds",
+            "rates# + f * spins# * (modelled# - speeds#)",
+            rotors,
+        ),
+        componentwise(
+            "tilt_rates_for", "gain, angles, commanded", "gain * (angles# - commanded#)", tilts
+        ),
+    )
+
+
 @cache
 def _inputs_of(key: Key) -> Callable[..., Values]:
-    """Scalar code ``(time, body, tilts, tilt_rates, speeds, states, parameters, knots)``.
+    """Scalar code of `RotorLaw.inputs`.
 
-    Returns rotor accelerations, rates of the law's states, tilt rates where it commands them; the
-    ``states`` end with the commanded tilts there.
+    The ``states`` are the law's own, the commanded tilts where it commands them, and the rotor
+    speeds of their model where they have one.
     """
     rotors, tilts = key.layout.places
     own, law, free, spins = len(key.states), key.law, key.tilts, key.layout.spins
@@ -81,77 +94,60 @@ def _inputs_of(key: Key) -> Callable[..., Values]:
     coefficients_in = componentwise("coefficients", "knots, at", "knots[at + @]", rotors)
     pushes = componentwise("pushes", "k, speeds", "k# * speeds# * abs(speeds#)", rotors)
     product = vectors_of(rotors).product
-    accelerations = componentwise(
-        "accelerations",
-        "gain, thrusts, k, speeds, spins",
-        "gain * spins# * (root(thrusts# / k#) - speeds#)",
-        rotors,
-        root=signed_root,
-    )
+    accelerations, corrected, tilt_rates_for = _following_of(rotors, tilts)
+    tilts_in, speeds_in = entries_of(ALPHA_1, tilts), entries_of(ALPHA_1 + tilts, rotors)
     states_in, commanded = entries_of(0, own), entries_of(own, tilts)
     modelled_in = entries_of(own + tilts * free, rotors)
     models_rotors, correction = key.models_rotors, CORRECTION
-    corrected = componentwise(
-        "corrected",
-        "rates, spins, f, modelled, speeds",
-        "rates# + f * spins# * (modelled# - speeds#)",
-        rotors,
-    )
-    tilt_rates_for = componentwise(
-        "tilt_rates_for", "gain, angles, commanded", "gain * (angles# - commanded#)", tilts
-    )
     per_newton, coefficients = ROTOR_FLOATS * rotors, 2 * ROTOR_FLOATS * rotors
     own_table = coefficients + rotors
 
     @scalar
     def inputs(
         time: float,
-        body: Values,
-        tilts: Values,
+        state: Values,
         tilt_rates: Values,
-        speeds: Values,
         states: Values,
         parameters: Any,
         knots: Vector,
     ) -> Values:
-        x, y, z, vx, vy, vz, roll, pitch, yaw, p, q, r = body
-        known = parameters.law
+        known, angles_now = parameters.law, tilts_in(state)
+        turning = product(spins, speeds_in(state))
         at, reference, jets = int(known.rotors), known.reference, planned(time, known.gait, knots)
-        fx, fy, fz, tx, ty, tz = rows_of(1.0, cosines(tilts), sines(tilts), knots, at + per_newton)
-        px, py, pz, ux, uy, uz, ax, ay, az, jx, jy, jz, _, _, _ = reference_derivatives(
-            time, reference, knots
-        )
-        turning, k = product(spins, speeds), coefficients_in(knots, at + coefficients)
+        seen: Any = state
+        motion: Any = reference_derivatives(time, reference, knots)
+        rows: Any = rows_of(1.0, cosines(angles_now), sines(angles_now), knots, at + per_newton)
+        k = coefficients_in(knots, at + coefficients)
         # Built where it is used: native code cannot return records.
         observed = Observed(
             time,
-            (x, y, z),
-            (vx, vy, vz),
-            (roll, pitch, yaw),
-            rotation_from_euler(roll, pitch, yaw),
-            (p, q, r),
-            tilts,
+            seen[:3],
+            seen[3:6],
+            seen[6:9],
+            rotation_from_euler(seen[6], seen[7], seen[8]),
+            seen[9:12],
+            angles_now,
             tilt_rates,
             turning,
             pushes(k, turning),
             states_in(states),
             Desired(
-                (px, py, pz),
-                (ux, uy, uz),
-                (ax, ay, az),
-                (jx, jy, jz),
+                motion[:3],
+                motion[3:6],
+                motion[6:9],
+                motion[9:12],
                 (reference.roll, reference.pitch, reference.yaw),
                 angles_of(jets),
                 rates_of(jets),
             ),
             known.vehicle,
-            (fx, fy, fz),
-            (tx, ty, tz),
+            rows[:3],
+            rows[3:],
             knots,
             at + per_newton,
             at + own_table,
         )
-        thrusts, angles, rates = law(observed, parameters.own)
+        thrusts, angles, rates = law(observed, known.own)
         reached = modelled_in(states) if models_rotors else turning
         demanded = accelerations(known.rotor_gain, thrusts, k, reached, spins)
         # Angles beside a gait are controls that no vehicle has: refused before the flight.
@@ -164,208 +160,50 @@ def _inputs_of(key: Key) -> Callable[..., Values]:
     return inputs
 
 
-def _sampling(key: Key) -> Sampling:
-    """The control step in MuJoCo."""
-    free, own = key.tilts, len(key.states)
-    rotors, tilts = key.layout.places
-    further = key.further_states
-    tilts_in, tilt_rates_in = entries_of(TILT_1, tilts), entries_of(TILT_RATE_1, tilts)
-    speeds_in, states_in = entries_of(0, rotors), entries_of(rotors, further)
-    commanded = entries_of(rotors + own, tilts)  # of activations, and their rates of the inputs
-    thrusts, servo_commands = thrust_controls_of(key.layout.spins), servo_commands_of(tilts)
-    led = componentwise("led", "angles, rates, lead", "angles# + lead * rates#", tilts)
-    inputs = _inputs_of(key)
+def _setup_of(record: Any) -> Callable[[FlightPlan], tuple[Any, Values]]:
+    """`RotorLaw.setup` of laws with a record of parameters."""
 
-    @scalar
-    def controls(
-        time: float, qpos: Vector, qvel: Vector, act: Vector, parameters: Any, knots: Vector
-    ) -> Values:
-        body, tilts, moving = body_state(qpos, qvel), tilts_in(qpos), tilt_rates_in(qvel)
-        speeds, states = speeds_in(act), states_in(act)
-        rates = inputs(time, body, tilts, moving, speeds, states, parameters, knots)
-        lead = parameters.servo_lead
-        if free:
-            servos = led(commanded(act), commanded(rates), lead)
-        else:
-            servos = servo_commands(time, lead, parameters.law.gait, knots)
-        return (*servos, *thrusts(act), *rates)
-
-    return Sampling(controls, held_controls_of(key.layout.spins, tilts))
-
-
-def _idle(key: Key) -> Values:
-    """Tilts that a sample of the quadrotor has, and it has not."""
-    return (0.0,) * (CROSS.tilts if key.model == "quadrotor" else 0)
-
-
-def _columns(key: Key) -> Columns:
-    """Samples of flights, and the columns of references and margin."""
-    rotors, tilts = key.layout.places
-    idle = _idle(key)
-    tilts_in, tilt_rates_in = entries_of(TILT_1, tilts), entries_of(TILT_RATE_1, tilts)
-    speeds_in, states_in = entries_of(0, rotors), entries_of(rotors, key.further_states)
-    planned = tilt_motion_of(tilts).planned
-    angles = componentwise("angles_of_jets", "jets", "jets#[0]", tilts)
-    shown = CROSS if idle else key.layout.places
-    commands = shown.names("tilt_command") if key.tilts else ()
-    modelled = shown.names("modelled_rotor_speed") if key.models_rotors else ()
-    units = {
-        **dict(key.states),
-        **dict.fromkeys(commands, "rad"),
-        **dict.fromkeys(modelled, "rad/s"),
-    }
-    columns = (*REFERENCE_COLUMNS, *shown.names("alpha_ref"))
-    fields = (*shown.observed_fields, *units)
-
-    @scalar
-    def observe(qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector) -> Values:
-        seen = (*body_state(qpos, qvel), *tilts_in(qpos), *idle, *speeds_in(act))
-        return (*seen, *tilt_rates_in(qvel), *idle, *states_in(act))
-
-    @scalar
-    def asked(time: float, values: Vector, parameters: Any, knots: Vector) -> Values:
-        known = parameters.law
-        reference = known.reference
-        motion = reference_derivatives(time, reference, knots)
-        jets = planned(time, known.gait, knots)
-        return (
-            *(motion[0], motion[1], motion[2], reference.roll, reference.pitch, reference.yaw),
-            *angles(jets),
-            *idle,
+    def setup(plan: FlightPlan) -> tuple[Any, Values]:
+        scenario, airframe = plan.scenario, airframe_of(plan)
+        controller, vehicle = scenario.controller, airframe.vehicle
+        assert isinstance(controller, ScalarController)
+        step = scenario.simulation.control_timestep
+        known = record(
+            plan.gait.parameters,
+            plan.reference,
+            body_of_vehicle(vehicle),
+            float(len(plan.knots)),
+            held_gain(controller.rotor_bandwidth, step),
+            held_gain(controller.tilt_rate_gain, step),
+            controller.law_parameters(airframe),
         )
+        per_newton = table_per_newton(vehicle.table, vehicle.thrust_coefficients)
+        tables = (*vehicle.table, *per_newton, *vehicle.thrust_coefficients)
+        return known, (*tables, *controller.law_table(airframe))
 
-    def derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
-        found = reference_columns(asked, fields, samples, setup, columns)
-        commanded = zip(shown.names("alpha_ref"), commands, strict=False)
-        first = int(setup.parameters.law.rotors)
-        table = setup.knots[first : first + ROTOR_FLOATS * rotors]
-        return {
-            **found,
-            **{column: samples[name] for column, name in commanded},
-            **torque_free_columns(key.layout.places, table, samples),
-        }
-
-    return Columns(observe, derive, fields=tuple(units), units=units)
-
-
-def _equations(key: Key) -> Equations:
-    """The law on the equations of motion, with pods that follow their commands exactly."""
-    rotors, tilts = key.layout.places
-    own, free, gyroscopic = len(key.states), key.tilts, float(key.model == "quadrotor")
-    further, idle = key.further_states, _idle(key)
-    motion = equations_of_motion_of(key.layout.tilt_of_rotor)
-    planned = tilt_motion_of(tilts).planned
-    angles = componentwise("angles_of_jets", "jets", "jets#[0]", tilts)
-    rates_of = componentwise("rates_of_jets", "jets", "jets#[1]", tilts)
-    zeros = componentwise("zeros", "tilts", "0.0", tilts)
-    speeds_in = entries_of(BODY_STATES, rotors)
-    states_in = entries_of(BODY_STATES + rotors, further)
-    commanded = entries_of(BODY_STATES + rotors + own, tilts)
-    moving, state_rates = entries_of(rotors + own, tilts), entries_of(rotors, further)
-    inputs_of = _inputs_of(key)
-
-    @scalar
-    def tilts_of(time: float, state: Vector, parameters: Any, knots: Vector) -> Any:
-        if free:
-            return commanded(state)
-        return angles(planned(time, parameters.law.gait, knots))
-
-    @scalar
-    def equation_inputs(time: float, state: Vector, parameters: Any, knots: Vector) -> Values:
-        tilts = tilts_of(time, state, parameters, knots)
-        rates = zeros(tilts) if free else rates_of(planned(time, parameters.law.gait, knots))
-        body, speeds, states = body_fields(state), speeds_in(state), states_in(state)
-        inputs: Values = inputs_of(time, body, tilts, rates, speeds, states, parameters, knots)
-        return inputs
-
-    @scalar
-    def rates(
-        time: float,
-        state: Vector,
-        inputs: Vector,
-        parameters: Any,
-        knots: Vector,
-        disturbance: Triple,
-    ) -> Values:
-        known, tilts = parameters.law, tilts_of(time, state, parameters, knots)
-        at = int(known.rotors)
-        body = motion(state, tilts, inputs, known.vehicle, knots, at, disturbance, gyroscopic)
-        return (*body, *state_rates(inputs))
-
-    @scalar
-    def observe(
-        time: float, state: Vector, inputs: Vector, parameters: Any, knots: Vector
-    ) -> Values:
-        tilts = tilts_of(time, state, parameters, knots)
-        rates = moving(inputs) if free else rates_of(planned(time, parameters.law.gait, knots))
-        seen = (*body_fields(state), *tilts, *idle, *speeds_in(state))
-        return (*seen, *rates, *idle, *states_in(state))
-
-    def initial(plan: FlightPlan, _setup: ControlSetup) -> Vector:
-        return (*initial_state(plan.scenario, initial_rotor_speeds(plan)), *initial_states(plan))
-
-    return Equations(
-        inputs=equation_inputs,
-        inputs_size=rotors + further,
-        rates=rates,
-        initial=initial,
-        observe=observe,
-        tilts=None if key.model == "quadrotor" else tilts_of,
-    )
-
-
-def _setup(plan: FlightPlan, signature: float) -> ControlSetup:
-    scenario, airframe = plan.scenario, airframe_of(plan)
-    controller, vehicle = scenario.controller, airframe.vehicle
-    assert isinstance(controller, ScalarController)
-    own, step = controller.law_parameters(airframe), scenario.simulation.control_timestep
-    known = Known(
-        plan.gait.parameters,
-        plan.reference,
-        body_of(vehicle.mass, np.reshape(vehicle.inertia, (3, 3)), vehicle.gravity),
-        float(len(plan.knots)),
-        held_gain(controller.rotor_bandwidth, step),
-        held_gain(controller.tilt_rate_gain, step),
-    )
-    lead = servo_lead(scenario.any_rotorcraft.tilt_servo)
-    knots = (
-        *plan.knots,
-        *vehicle.table,
-        *table_per_newton(vehicle.table, vehicle.thrust_coefficients),
-    )
-    return ControlSetup(
-        record_of(type(own))(signature, lead, known, own),
-        (*knots, *vehicle.thrust_coefficients, *controller.law_table(airframe)),
-    )
+    return setup
 
 
 @cache
 def scalar_loop(key: Key) -> ClosedLoop:
     """The closed loop of a scalar law."""
-    layout = key.layout
-    places, free = layout.places, key.tilts
-    states = key.further_states
-    sampling, equations = _sampling(key), _equations(key)
-    tilts = "".join(f"_{tilt}" if tilt >= 0 else "_f" for tilt in layout.tilt_of_rotor)
-    senses = "".join("p" if spin > 0.0 else "m" for spin in layout.spins)
-    for step in (sampling.controls, equations.inputs):
-        step.__qualname__ = f"{key.code_name}.{key.model}{tilts}_{senses}"
-    multirotor = key.model == "multirotor"
-    return ClosedLoop(
-        kind=rotorcraft_kind(places if multirotor else CROSS, ("singularity_margin",)),
-        parameters=record_of(key.parameters),
-        setup=_setup,
-        dynamics=Dynamics(
-            f"multirotor{tilts}_{senses}" if multirotor else key.model,
-            places.sizes(states),
-            lambda plan, _setup: (*initial_rotor_speeds(plan), *initial_states(plan)),
-            states,
-            layout.spins,
-            layout.tilt_of_rotor if multirotor else (),
-        ),
-        sampling=sampling,
-        columns=_columns(key),
-        equations=equations,
+    record, shown = record_of(key.parameters), key.layout.shown
+    commands = shown.names("tilt_command") if key.tilts else ()
+    modelled = shown.names("modelled_rotor_speed") if key.models_rotors else ()
+    law = RotorLaw(
+        key.code_name,
+        _inputs_of(key),
+        record,
+        _setup_of(record),
+        states={
+            **dict(key.states),
+            **dict.fromkeys(commands, "rad"),
+            **dict.fromkeys(modelled, "rad/s"),
+        },
+        initial=initial_states,
+        commands=len(key.states) if key.tilts else None,
+    )
+    return replace(
+        rotor_loop(key.layout, law),
         follows_position=lambda scenario: scenario.reference.kind != "attitude_altitude",
-        uses_gait=places.tilts > 0 and not free,
     )

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any, NamedTuple
 
-from tiltsim.laws.multirotor_layout import Layout
+from tiltsim.laws.rotor_loop import Layout
 from tiltsim_controllers.gaits.parameters import GaitParameters
 from tiltsim_controllers.mathematics.records import make_record_type
 from tiltsim_controllers.mathematics.scalar import Values
@@ -14,21 +14,9 @@ from tiltsim_controllers.references.trajectories import ReferenceParameters
 from tiltsim_controllers.vehicle.multirotor import Body
 
 
-class Known(NamedTuple):
-    """What every law's loop knows of its flight."""
-
-    gait: GaitParameters
-    reference: ReferenceParameters
-    vehicle: Body
-    rotors: float  # index in the knots of the table of rotors, then per newton, then K_f
-    rotor_gain: float  # 1/s, of the rotor speeds' errors
-    tilt_gain: float  # 1/s, of the errors of tilts that the law commands
-
-
 class Key(NamedTuple):
     """All that a loop is compiled for."""
 
-    model: str
     layout: Layout
     law: Callable[..., tuple[Values, Values, Values]]
     name: str
@@ -51,6 +39,14 @@ class Key(NamedTuple):
 
 @cache
 def record_of(parameters: type[tuple[Any, ...]]) -> Any:
-    """The type of the head of `userdata`."""
-    fields = {"signature": float, "servo_lead": float, "law": Known, "own": parameters}
-    return make_record_type("LoopParameters", **fields)
+    """The type of what every law's loop knows of its flight, with the law's own parameters."""
+    return make_record_type(
+        "Known",
+        gait=GaitParameters,
+        reference=ReferenceParameters,
+        vehicle=Body,
+        rotors=float,  # index in the knots of the table of rotors, then per newton, then K_f
+        rotor_gain=float,  # 1/s, of the rotor speeds' errors
+        tilt_gain=float,  # 1/s, of the errors of tilts that the law commands
+        own=parameters,
+    )

@@ -18,7 +18,7 @@ from tiltsim.closed_loop.loop import (
     Sizes,
 )
 from tiltsim.engines.sample_evaluation import evaluate_over_samples
-from tiltsim.laws.tiltrotor import servo_lead
+from tiltsim.laws.rotorcraft import servo_lead
 from tiltsim.vehicles.tilt_car import SPEED_1, SPEED_2, TILT_CAR, initial_tilt
 from tiltsim_controllers.mathematics.scalar import Floats, Pair, Values, Vector, scalar
 from tiltsim_controllers.references.trajectories import ReferenceParameters, reference_derivatives

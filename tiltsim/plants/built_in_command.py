@@ -10,12 +10,9 @@ from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.closed_loop.loop import Dynamics
 from tiltsim.errors import InputError
 from tiltsim.laws.assembling import assemble
-from tiltsim.laws.layers.actuation import allocated_accelerations
 from tiltsim.laws.layers.measured_acceleration import plant_angular_acceleration_of
 from tiltsim.laws.layers.on_equations import read_actuators
 from tiltsim.laws.layers.sensing import measured_qpos, measured_qvel
-from tiltsim.laws.tiltrotor import four
-from tiltsim.models.vehicle_parts import CROSSES
 from tiltsim.plants.command import Command, Observation
 from tiltsim.plants.mujoco_plant import MujocoPlant
 from tiltsim.plants.observing import flip_by_spin
@@ -34,7 +31,7 @@ def built_in_command(assembly: Assembly, plant: MujocoPlant) -> Command:
     time, data = plant.evaluation_time, plant.data
     qpos: Sequence[float] = data.qpos.tolist()
     qvel: Sequence[float] = data.qvel.tolist()
-    act, allocation = data.act.tolist(), None
+    act = data.act.tolist()
     while loop.within is not None:
         layer, within, inner = parameters.layer, loop.within, parameters.inner
         if hasattr(layer, "pod_inertias"):  # of measured acceleration: a record for the model
@@ -42,16 +39,11 @@ def built_in_command(assembly: Assembly, plant: MujocoPlant) -> Command:
             loads = read_actuators(within.dynamics)[1](ctrl)
             measured = plant_angular_acceleration_of(within.dynamics)
             qvel = (*qvel, *measured(qpos, qvel, ctrl, loads, layer))
-        elif hasattr(layer, "allocation"):  # of actuation: a record for the number of rotors
+        elif hasattr(layer, "sensors"):  # of actuation: a record for the number of rotors
             qpos = measured_qpos(time, qpos, layer.sensors)
             qvel = measured_qvel(time, qvel, layer.sensors)
-            allocation = layer.allocation
         loop, parameters = within, inner
     ctrl = loop.sampling.controls(time, qpos, qvel, act, parameters, knots)
-    if allocation is not None and loop.dynamics.model in CROSSES:
-        layout = layout_of(loop.dynamics)
-        rates = allocated_accelerations(four(ctrl, layout.acceleration_1), qpos, act, allocation)
-        ctrl = (*ctrl[: layout.acceleration_1], *rates)
     return _command(assembly, loop.dynamics, ctrl)
 
 

@@ -170,11 +170,6 @@ class ControllerTable(Table):
         """Whether rotor limits are shared out with attitude first."""
         return False
 
-    @property
-    def allocation_window(self) -> float:
-        """Time (s) for which prioritized allocation keeps within the rotor limits."""
-        return 1.0
-
     def in_full(self) -> Self:
         """The same with numbers in place of the name of a set of gains."""
         return self

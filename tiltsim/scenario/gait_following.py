@@ -202,10 +202,6 @@ class GaitFollowingController(ControllerTable):
     def prioritizes_attitude(self) -> bool:
         return self.allocation == "prioritized"
 
-    @property
-    def allocation_window(self) -> float:
-        return self.allocation_horizon
-
 
 class FailureAwareController(ControllerTable):
     """A law that can do without a rotor."""

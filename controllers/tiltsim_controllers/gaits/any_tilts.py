@@ -8,15 +8,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import cache
 from math import floor
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from tiltsim_controllers.gaits.anticipation import anticipated_tilts, rounded_corner
 from tiltsim_controllers.gaits.keyframes import keyframe_segment
 from tiltsim_controllers.gaits.parameters import FIXED, KEYFRAMES, TABLE, GaitParameters
 from tiltsim_controllers.gaits.tabulated import COEFFICIENTS, segment_jet
-from tiltsim_controllers.gaits.tilts import planned_jets
+from tiltsim_controllers.gaits.tilts import planned_jets, tilt_reference
 from tiltsim_controllers.mathematics.jets import Jet, jet_scaled
-from tiltsim_controllers.mathematics.scalar import Vector, scalar
+from tiltsim_controllers.mathematics.scalar import Quad, Values, Vector, scalar
 from tiltsim_controllers.mathematics.splines import row_at
 from tiltsim_controllers.mathematics.vectors import componentwise
 
@@ -29,6 +29,17 @@ class TiltMotion(NamedTuple):
     planned: Callable[..., Jets]  # (time, gait, knots)
     anticipated: Callable[..., Jets]
     """``(time, gait, knots, half)``, with corners rounded as in `anticipated_tilts`."""
+    moving: Callable[..., tuple[Values, Values]]  # (time, gait, knots): planned angles and rates
+
+
+@scalar
+def _four_moving(time: float, gait: GaitParameters, knots: Vector) -> tuple[Quad, Quad]:
+    a1, a2, a3, a4, rate_1, rate_2, rate_3, rate_4 = tilt_reference(time, gait, knots)
+    return (a1, a2, a3, a4), (rate_1, rate_2, rate_3, rate_4)
+
+
+CLOSED_FORMS: Final = {4: TiltMotion(planned_jets, anticipated_tilts, _four_moving)}
+"""By the number of tilts: those with the gaits of the thesis."""
 
 
 @scalar
@@ -59,8 +70,8 @@ def _rounded(before: Jet, after: Jet, half: float) -> Jet:
 @cache
 def tilt_motion_of(tilts: int) -> TiltMotion:
     """The functions of gaits of a number of tilts, 0 or more."""
-    if tilts == 4:
-        return TiltMotion(planned_jets, anticipated_tilts)
+    if tilts in CLOSED_FORMS:
+        return CLOSED_FORMS[tilts]
     keyframe_size, table_size = 1 + tilts, 1 + COEFFICIENTS * tilts
 
     def each(name: str, arguments: str, jet: Callable[..., Jet]) -> Callable[..., Jets]:
@@ -75,6 +86,8 @@ def tilt_motion_of(tilts: int) -> TiltMotion:
         "rounded_jets", "before, after, half", "rounded(before#, after#, half)", tilts,
         rounded=_rounded,
     )  # fmt: skip
+    angles_of = componentwise("angles_of_jets", "jets", "jets#[0]", tilts)
+    rates_of = componentwise("rates_of_jets", "jets", "jets#[1]", tilts)
 
     @scalar
     def planned(time: float, gait: GaitParameters, knots: Vector) -> Jets:
@@ -98,4 +111,9 @@ def tilt_motion_of(tilts: int) -> TiltMotion:
         before, after = planned(time - half, gait, knots), planned(time + half, gait, knots)
         return rounded_jets(before, after, half)
 
-    return TiltMotion(planned, anticipated)
+    @scalar
+    def moving(time: float, gait: GaitParameters, knots: Vector) -> tuple[Values, Values]:
+        jets = planned(time, gait, knots)
+        return angles_of(jets), rates_of(jets)
+
+    return TiltMotion(planned, anticipated, moving)

@@ -298,6 +298,52 @@ def spin_torques(spin: Jets3, omega: Triple, omega_rate: Triple) -> tuple[Triple
 
 
 @scalar
+def _leaning(
+    time: float,
+    motion: tuple[Jets3, Values, Triple],
+    specific: Triple,
+    errors: Jets3,
+    accelerations: Jets3,
+    integrals: Triple,
+    supervisor_motion: Triple,
+    parameters: Parameters,
+    knots: Vector,
+) -> tuple[Jet, Jet, float, float]:
+    """References of roll and pitch (rad) with derivatives, and integrator rates of x and y (m).
+
+    Args:
+        time: s
+        motion: Euler angles with derivatives, rotation and body rates
+        specific: force per mass, m/s^2, body axes
+        errors, accelerations: as `tracking_errors` returns them
+        integrals, supervisor_motion, parameters, knots: as of `tracking_inputs`
+    """
+    reference, (attitude, rotation, omega) = parameters.reference, motion
+    if parameters.decoupler == NONE:
+        return (reference.roll, 0.0, 0.0), (reference.pitch, 0.0, 0.0), 0.0, 0.0
+    angles = (attitude[0][0], attitude[1][0])
+    force = _planned_force(time, angles, supervisor_motion, parameters, knots)
+    jerk = to_world(rotation, jerk_along(force, specific, omega, parameters.terms.gait_rates))
+    along_x, along_y, x_rate, y_rate = horizontal_control(
+        errors, accelerations, jerk, integrals, parameters
+    )
+    roll, pitch = decoupled_attitude(
+        along_x, along_y, accelerations[2], attitude[2], force, parameters
+    )
+    return roll, pitch, x_rate, y_rate
+
+
+@scalar
+def _rotor_accelerations(rates: Quad, speeds: Quad) -> Quad:
+    """From the rates of ``varpi |varpi|``; NaN where a rotor is at rest."""
+    v1, v2, v3, v4 = rates
+    s1, s2, s3, s4 = speeds
+    if s1 == 0.0 or s2 == 0.0 or s3 == 0.0 or s4 == 0.0:
+        return nan, nan, nan, nan
+    return 0.5 * v1 / abs(s1), 0.5 * v2 / abs(s2), 0.5 * v3 / abs(s3), 0.5 * v4 / abs(s4)
+
+
+@scalar
 def tracking_inputs(
     time: float,
     state: Values,
@@ -308,9 +354,7 @@ def tracking_inputs(
     supervisor_motion: Triple = SUPERVISOR_AT_REST,
     measured: Triple | None = None,
 ) -> Values:
-    """Rotor accelerations (rad/s^2), integrator rates (m) and the attitude reference (rad).
-
-    NaN where the decoupling matrix is singular.
+    """Rotor accelerations (rad/s^2, singular: NaN), integrator rates (m), attitude to track (rad).
 
     Args:
         time: s
@@ -330,8 +374,7 @@ def tracking_inputs(
 
     # Force and torque, and their rates as the pods turn at constant rotor speeds.
     trig = sines_and_cosines(a1, a2, a3, a4)
-    r1, r2, r3, r4 = tilt_rates
-    known = terms.gait_rates
+    (r1, r2, r3, r4), known = tilt_rates, terms.gait_rates
     rates = (known * r1, known * r2, known * r3, known * r4)
     turning = trigonometric_rates(trig, rates)
     spin = spin_momentum(trig, rates, (s1, s2, s3, s4), parameters.rotor_inertia)
@@ -358,17 +401,10 @@ def tracking_inputs(
     errors, accelerations = tracking_errors(
         time, state, to_world(rotation, specific), parameters, knots
     )
-    x_rate = y_rate = 0.0
-    roll_ref, pitch_ref = (reference.roll, 0.0, 0.0), (reference.pitch, 0.0, 0.0)
-    if parameters.decoupler != NONE:
-        force = _planned_force(time, (roll, pitch), supervisor_motion, parameters, knots)
-        jerk = to_world(rotation, jerk_along(force, specific, omega, terms.gait_rates))
-        along_x, along_y, x_rate, y_rate = horizontal_control(
-            errors, accelerations, jerk, integrals, parameters
-        )
-        roll_ref, pitch_ref = decoupled_attitude(
-            along_x, along_y, accelerations[2], attitude[2], force, parameters
-        )
+    roll_ref, pitch_ref, x_rate, y_rate = _leaning(
+        time, (attitude, rotation, omega), specific, errors, accelerations, integrals,
+        supervisor_motion, parameters, knots,
+    )  # fmt: skip
     lift_jerk, z_rate = altitude_control(errors[2], accelerations[2], integrals[2], parameters)
     desired = attitude_control(roll_ref, pitch_ref, attitude, parameters)
 
@@ -378,7 +414,7 @@ def tracking_inputs(
     up_x, up_y, up_z = rotation[6], rotation[7], rotation[8]
     sweep_x, sweep_y, sweep_z = cross(omega, (fx, fy, fz))
     swept_lift = up_x * (sweep_x + gx) + up_y * (sweep_y + gy) + up_z * (sweep_z + gz)
-    v1, v2, v3, v4 = solve_by_pairs(
+    rates_of_w = solve_by_pairs(
         entries,
         vertical_force_entries(trig, up_x, up_y, up_z),
         (mx + kx - per_torque * hx) / per_torque,
@@ -386,9 +422,5 @@ def tracking_inputs(
         (mz + kz - per_torque * hz) / per_torque,
         lift_jerk / per_force - swept_lift,
     )
-    if s1 == 0.0 or s2 == 0.0 or s3 == 0.0 or s4 == 0.0:
-        v1 = v2 = v3 = v4 = nan
-    else:
-        v1, v2 = 0.5 * v1 / abs(s1), 0.5 * v2 / abs(s2)
-        v3, v4 = 0.5 * v3 / abs(s3), 0.5 * v4 / abs(s4)
-    return v1, v2, v3, v4, x_rate, y_rate, z_rate, roll_ref[0], pitch_ref[0], reference.yaw
+    found = _rotor_accelerations(rates_of_w, (s1, s2, s3, s4))
+    return (*found, x_rate, y_rate, z_rate, roll_ref[0], pitch_ref[0], reference.yaw)

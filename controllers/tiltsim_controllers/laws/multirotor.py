@@ -304,23 +304,13 @@ def _present_of(layout: Layout, form: Form) -> Callable[..., tuple[Any, ...]]:
 def multirotor_law_of(layout: Layout, form: Form) -> Callable[..., Values]:
     """The control law of vehicles of a layout.
 
-    A scalar function ``(time, state, tilt_rates, integrals, parameters, knots, supervisor_motion,
-    measured)``:
-
-    - ``state``: twelve numbers of the body (`tiltsim_controllers.vehicle.states.BODY_FIELDS`), the
-      tilt angles (rad) and the rotor speeds (rad/s, signed); ``tilt_rates`` in rad/s;
-    - ``integrals`` of the position errors (m s, world axes);
-    - ``parameters``: `tiltsim_controllers.laws.multirotor_steps.Parameters`; ``knots`` of the gait
-      (from the first on), the reference and the table of the rotors, each where the parameters say;
-    - ``supervisor_motion``: the supervisor's state with its rate and acceleration;
-    - ``measured``: the angular acceleration (rad/s^2, body axes); None takes the model's.
-
-    It returns the rotor accelerations (rad/s^2), the rates of the integrals (m), the references of
-    roll, pitch and yaw (rad) and the null part: the share, from 0 to 1, of ``w`` that the outputs
-    do not see; ``restoring`` keeps it near its least. NaN where the decoupling matrix is singular.
+    It is a scalar function as `tiltsim_controllers.laws.gait_feedforward.tracking_inputs`, with the
+    parameters of `tiltsim_controllers.laws.multirotor_steps` and the table of the rotors in the
+    knots. It also returns the null part: the share, from 0 to 1, of ``w`` that the outputs do not
+    see; ``restoring`` keeps it near its least.
 
     Args:
-        layout: of the table of rotors, four or more
+        layout: of the table of rotors
         form: what the code is made for
     """
     length, dimension, norm, forward = len(layout), form.dimension, form.norm, form.forward

@@ -71,6 +71,14 @@ class SideGains(NamedTuple):
     side_integral: float = 0.0  # 1/s^4
 
 
+class Direction(NamedTuple):
+    """A vector in body axes."""
+
+    x: float = 0.0
+    y: float = 0.0
+    z: float = 0.0
+
+
 class Parameters(NamedTuple):
     """Parameters of the controller."""
 
@@ -95,6 +103,8 @@ class Parameters(NamedTuple):
     limits: RotorRange = RotorRange()  # of prioritized allocation
     supervisor: Supervisor = Supervisor()
     watched: Watched = Watched()
+    upper_side: Direction = Direction()  # of the force with which it lifts, if it has two; else 0
+    upper_side_without: Direction = Direction()  # the same once the failed rotor is known
 
 
 @scalar

@@ -2,7 +2,7 @@
 
 `with_actuation` puts a layer between controller and vehicle. Each control step goes
 
-    sensors -> controller -> allocation -> latency -> servos and motors -> faults -> vehicle
+    sensors -> controller -> latency -> servos and motors -> faults -> vehicle
 
 and by default each of these stages does nothing. Its memory is MuJoCo's state: the speed commands
 of the motors and the commands under way are activations, the commands in force are controls of
@@ -24,15 +24,12 @@ from tiltsim.engines.sample_evaluation import evaluate_over_samples
 from tiltsim.laws.layers.delay_line import delay_line, held_line, undelayed
 from tiltsim.laws.layers.layer import Layer, Samples, wrap_loop
 from tiltsim.laws.layers.sensing import measured_qpos, measured_qvel, sensor_parameters
-from tiltsim.laws.tiltrotor import four, servo_lead
+from tiltsim.laws.rotorcraft import servo_lead
 from tiltsim.models.parts import ExtraActuators
-from tiltsim.models.vehicle_parts import CROSSES
 from tiltsim.vehicles.rotorcraft import initial_tilts
-from tiltsim.vehicles.rotorcraft.layout import QW, QX, QY, QZ, TILT_1, layout_of
-from tiltsim_controllers.laws.allocation import allocate_accelerations
+from tiltsim.vehicles.rotorcraft.layout import TILT_1, layout_of
 from tiltsim_controllers.mathematics.records import make_record_type
-from tiltsim_controllers.mathematics.rotation import euler_from_quaternion
-from tiltsim_controllers.mathematics.scalar import Floats, Quad, Values, Vector, clipped, scalar
+from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector, clipped, scalar
 from tiltsim_controllers.mathematics.vectors import entries_of, tuple_text, written_out
 from tiltsim_controllers.vehicle.actuators import (
     RotorFault,
@@ -40,28 +37,16 @@ from tiltsim_controllers.vehicle.actuators import (
     servo_command,
     thrust_factor,
 )
-from tiltsim_controllers.vehicle.parameters import PRESETS, Vehicle
 from tiltsim_controllers.vehicle.sensors import Sensors
 
 if TYPE_CHECKING:
     from tiltsim.scenario.scenario import FlightPlan
 
 
-class Allocation(NamedTuple):
-    """How rotor accelerations are kept within the speed limits."""
-
-    active: float  # 0: each rotor stops at its own limit
-    horizon: float  # s
-    min_speed: float  # rad/s, absolute
-    max_speed: float
-    vehicle: Vehicle
-
-
 class Actuation(NamedTuple):
     """The parameters of the layer; `actuation_record` adds the faults of every rotor."""
 
     sensors: Sensors
-    allocation: Allocation
     control_timestep: float  # s; 0 if continuous
     slowest: float  # rad/s, of a rotor along its spin
     fastest: float
@@ -85,48 +70,15 @@ def actuation_record(rotors: int) -> Any:
     return make_record_type("Actuation", **own, faults=faults_record(rotors))
 
 
-@scalar
-def allocated_accelerations(
-    demanded: Quad, qpos: Vector, act: Vector, allocation: Allocation
-) -> Quad:
-    """The demanded rotor accelerations, within the speed limits if allocation is on.
-
-    Args:
-        demanded: By the controller, rad/s^2.
-        qpos, act: MuJoCo's state.
-        allocation: The parameters.
-    """
-    if allocation.active == 0.0:
-        return demanded
-    roll, pitch, _yaw = euler_from_quaternion(qpos[QW], qpos[QX], qpos[QY], qpos[QZ])
-    return allocate_accelerations(
-        demanded,
-        four(qpos, TILT_1),
-        four(act, 0),
-        roll,
-        pitch,
-        allocation.vehicle,
-        (allocation.min_speed, allocation.max_speed),
-        allocation.horizon,
-    )
-
-
-class Actuators(NamedTuple):
-    """Scalar code of the actuators of a vehicle; ``actuation`` is the layer's parameters."""
-
-    servos: Callable[..., Values]  # (time, qpos, commands, actuation): their set points, rad
-    thrusts: Callable[..., Values]  # (time, act, faults): thrust controls, reduced by faults
-    motors: Callable[..., Values]
-    """``(act, commands, actuation)``: rotor accelerations (rad/s^2), as commanded or by the lag
-    behind the speed commands. Those are activations; the plant keeps them within the rotors' limits
-    at the end of each step, `clipped` at the stages of an integrator, too."""
-
-
 @cache
-def actuators_of(spins: Values, tilts: int, first: int) -> Actuators:
-    """The actuators of rotors with these spins, whose speed commands begin at ``first``.
+def actuators_of(spins: Values, tilts: int, first: int) -> Callable[..., Values]:
+    """Scalar code of the actuators of rotors with these spins: ``(time, qpos, act, commands, a)``.
 
-    Commands are tilt angles (rad), then rotor accelerations (rad/s^2).
+    Commands are tilt angles (rad), then rotor accelerations (rad/s^2); ``a`` is the layer's
+    parameters. It returns the set points of the servos (rad), the thrust controls as reduced by
+    faults, and the rotor accelerations, as commanded or by the lag behind the speed commands.
+    Those are activations from ``first`` on; the plant keeps them within the rotors' limits at the
+    end of each step, `clipped` at the stages of an integrator, too.
     """
     senses = "".join("p" if spin > 0.0 else "m" for spin in spins)
     signs, rotors = ["" if spin > 0.0 else "-" for spin in spins], range(len(spins))
@@ -165,13 +117,15 @@ def actuators_of(spins: Values, tilts: int, first: int) -> Actuators:
             return accelerations(commands)
         return lagging(act, actuation.rotor_pole, actuation.slowest, actuation.fastest)
 
-    return Actuators(servos, thrusts, motors)
+    @scalar
+    def driven(time: float, qpos: Vector, act: Vector, commands: Vector, actuation: Any) -> Values:
+        return (
+            *servos(time, qpos, commands, actuation),
+            *thrusts(time, act, actuation.faults),
+            *motors(act, commands, actuation),
+        )
 
-
-@scalar
-def _as_demanded(demanded: Values, qpos: Vector, act: Vector, allocation: Allocation) -> Values:
-    """For vehicles without allocation: each rotor stops at its own limit."""
-    return demanded
+    return driven
 
 
 @cache
@@ -199,10 +153,7 @@ def with_actuation(loop: ClosedLoop, latency_steps: int, external: bool = False)
         if external
         else delay_line(law_act + rotors, latency_steps, size)
     )
-    servos, thrusts, motors = actuators_of(dynamics.spins, tilts, law_act)
-    allocated: Callable[..., Values] = (
-        allocated_accelerations if dynamics.model in CROSSES else _as_demanded
-    )
+    driven = actuators_of(dynamics.spins, tilts, law_act)
     angles_in, demanded_in = entries_of(0, tilts), entries_of(layout.acceleration_1, rotors)
     accelerations_in, commands_in = entries_of(tilts, rotors), entries_of(memory, size)
     further = layout.further_rates
@@ -215,13 +166,10 @@ def with_actuation(loop: ClosedLoop, latency_steps: int, external: bool = False)
         seen_qpos = measured_qpos(time, qpos, actuation.sensors)
         seen_qvel = measured_qvel(time, qvel, actuation.sensors)
         ctrl = law_controls(time, seen_qpos, seen_qvel, act, parameters.inner, knots)
-        demanded = allocated(demanded_in(ctrl), seen_qpos, act, actuation.allocation)
-        sent = (*angles_in(ctrl), *demanded)
+        sent = (*angles_in(ctrl), *demanded_in(ctrl))
         commands = delivered(act, sent)
         return (
-            *servos(time, qpos, commands, actuation),
-            *thrusts(time, act, actuation.faults),
-            *motors(act, commands, actuation),
+            *driven(time, qpos, act, commands, actuation),
             *ctrl[further:],
             *accelerations_in(commands),
             *line_rates(act, sent, actuation.control_timestep),
@@ -235,9 +183,7 @@ def with_actuation(loop: ClosedLoop, latency_steps: int, external: bool = False)
         actuation = parameters.layer
         commands = commands_in(ctrl)
         return (
-            *servos(time, qpos, commands, actuation),
-            *thrusts(time, act, actuation.faults),
-            *motors(act, commands, actuation),
+            *driven(time, qpos, act, commands, actuation),
             *ctrl[further:law_ctrl],
             *accelerations_in(commands),
             *ctrl[line_ctrl:],
@@ -283,21 +229,11 @@ def _remaining(time: float, state: Vector, fault: RotorFault, knots: Vector) -> 
 
 def _actuation(plan: FlightPlan) -> Any:
     scenario = plan.scenario
-    simulation, controller = scenario.simulation, scenario.controller
-    vehicle, assumed = scenario.any_rotorcraft, scenario.vehicle.resolve()
-    low, high = vehicle.min_rotor_speed, vehicle.max_rotor_speed
+    simulation, vehicle = scenario.simulation, scenario.any_rotorcraft
     slowest, fastest = vehicle.speeds_along_spin
     max_rate, time_constant = vehicle.tilt_servo.max_rate, vehicle.rotor_time_constant
     return actuation_record(vehicle.rotor_count)(
         sensors=sensor_parameters(scenario),
-        allocation=Allocation(
-            active=float(controller.prioritizes_attitude),
-            horizon=controller.allocation_window,
-            min_speed=low or 0.0,
-            max_speed=inf if high is None else high,
-            # A multirotor's law keeps within the limits itself.
-            vehicle=assumed if isinstance(assumed, Vehicle) else PRESETS["ar_drone_2"],
-        ),
         control_timestep=simulation.control_timestep,
         slowest=slowest,
         fastest=fastest,

@@ -12,8 +12,7 @@ import numpy as np
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, SupervisedLaw
 from tiltsim.engines.sample_evaluation import evaluate_over_samples
 from tiltsim.laws.layers.layer import Layer, Samples, wrap_loop
-from tiltsim.laws.rotorcraft import thrust_controls_of
-from tiltsim.laws.tiltrotor import reference_columns
+from tiltsim.laws.rotorcraft import reference_columns, thrust_controls_of
 from tiltsim.models.parts import ExtraActuators
 from tiltsim.scenario.gait_following import GaitFollowingController
 from tiltsim.vehicles.rotorcraft.layout import QW, QX, QY, QZ, layout_of

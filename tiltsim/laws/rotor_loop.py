@@ -1,0 +1,391 @@
+"""Closed loops with any number of rotors: one factory for every control law.
+
+Native code wants to know how many rotors there are, which tilt together and which way they turn, so
+a loop is made for each such `Layout`, once. All other numbers of the vehicle are data. The rotors'
+speeds are states whose accelerations a law commands; tilts follow the gait, or are commands that a
+law integrates as states of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from functools import cache
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from tiltsim.closed_loop.loop import (
+    ClosedLoop,
+    Columns,
+    ControlSetup,
+    Dynamics,
+    Equations,
+    Sampling,
+)
+from tiltsim.equations.tiltrotor import body_fields, initial_state
+from tiltsim.laws.rotorcraft import (
+    REFERENCE_COLUMNS,
+    ahead_of,
+    held_controls_of,
+    observed_of,
+    reference_columns,
+    servo_commands_of,
+    servo_lead,
+    state_of,
+    thrust_controls_of,
+    torque_free_columns,
+)
+from tiltsim.models.rotor_table import Multirotor
+from tiltsim.vehicles.rotorcraft import initial_rotor_speeds, rotorcraft_kind
+from tiltsim.vehicles.rotorcraft.layout import CROSS, TILT_RATE_1
+from tiltsim.vehicles.rotorcraft.layout import Layout as Places
+from tiltsim.vehicles.rotorcraft.layout import layout_of as places_of
+from tiltsim_controllers.gaits.any_tilts import tilt_motion_of
+from tiltsim_controllers.laws.supervisor import SUPERVISOR_AT_REST
+from tiltsim_controllers.mathematics.records import make_record_type
+from tiltsim_controllers.mathematics.scalar import Floats, Triple, Values, Vector, scalar
+from tiltsim_controllers.mathematics.vectors import entries_of
+from tiltsim_controllers.references.trajectories import position_reference
+from tiltsim_controllers.vehicle.effectiveness import ROTOR_FLOATS, layout_of
+from tiltsim_controllers.vehicle.multirotor import (
+    BODY_STATES,
+    Body,
+    body_of,
+    equations_of_motion_of,
+)
+
+if TYPE_CHECKING:
+    from tiltsim.scenario.scenario import FlightPlan
+
+Margins = Callable[[Mapping[str, Floats], ControlSetup], dict[str, Floats]]
+"""``(samples by field, setup) -> columns`` that a sample's state alone decides."""
+
+
+class Layout(NamedTuple):
+    """What a rotorcraft's compiled code is made for."""
+
+    tilt_of_rotor: tuple[int, ...]  # from 0; -1 for a fixed rotor
+    spins: Values
+    model: str = "multirotor"  # ``vehicle.model``; of others the layout is known
+
+    @property
+    def places(self) -> Places:
+        """Where its numbers lie."""
+        return Places(len(self.spins), max(self.tilt_of_rotor) + 1)
+
+    @property
+    def shown(self) -> Places:
+        """The same of a sample, which may have tilts that are idle."""
+        return self.places if self.model == "multirotor" else CROSS
+
+    @property
+    def name(self) -> str:
+        """For files and models."""
+        if self.model != "multirotor":
+            return self.model
+        tilts = "_".join(str(tilt) if tilt >= 0 else "f" for tilt in self.tilt_of_rotor)
+        return f"multirotor_{tilts}_{''.join('p' if spin > 0.0 else 'm' for spin in self.spins)}"
+
+
+def layout_of_vehicle(vehicle: Multirotor, model: str = "multirotor") -> Layout:
+    """The layout of a vehicle."""
+    return Layout(layout_of(vehicle.table), vehicle.spins, model)
+
+
+def _no_states(_plan: FlightPlan) -> Values:
+    return ()
+
+
+class RotorLaw(NamedTuple):
+    """A control law with rotor accelerations as inputs, and what its loop is made of.
+
+    Its parameters have ``reference``, where the tilts follow the gait ``gait``, and for the general
+    margins and motion ``vehicle`` and ``rotors``, the index of the rotors' table in the knots.
+    """
+
+    name: str  # of compiled code
+    inputs: Callable[..., Values]
+    """Scalar code ``(time, state, tilt_rates, states, parameters, knots)``: rotor accelerations
+    (rad/s^2), then rates of the controller's ``states``. ``state`` is the vehicle's (`state_of`),
+    ``parameters`` the whole record."""
+    parameters: type[tuple[Any, ...]]
+    setup: Callable[[FlightPlan], tuple[Any, Values]]  # these, and knots after those of the flight
+    states: Mapping[str, str] = {}  # the controller's, with their units; part of a sample
+    initial: Callable[[FlightPlan], Values] = _no_states  # these states at time zero
+    commands: int | None = None  # which of them is the first commanded tilt; None: the gait's
+    references: Callable[..., Values] | None = None
+    """Scalar code ``(time, values, parameters, knots)`` of the columns ``names``, from a sample;
+    None for the position and attitude of the reference."""
+    names: tuple[str, ...] = REFERENCE_COLUMNS
+    margins: Margins | None = None  # None for the angle to the nearest singular attitude
+    units: Mapping[str, str] = {}  # further columns of a flight
+    motion: Callable[..., Values] | None = None
+    """Scalar code ``(state, tilts, inputs, parameters, knots, disturbance)`` of the derivative of
+    body and rotor speeds on the thesis's equations; None for those of a table of rotors."""
+
+
+@cache
+def head_of(law: type[tuple[Any, ...]]) -> Any:
+    """The type of the head of `userdata`, around the parameters of a law."""
+    return make_record_type(
+        "LoopParameters",
+        signature=float,  # see `tiltsim.closed_loop.loop.ClosedLoop.signature`
+        servo_lead=float,  # s, rate feed-forward of the tilt servos, 2 zeta / omega_n
+        law=law,
+    )
+
+
+def body_of_vehicle(vehicle: Multirotor) -> Body:
+    """The rigid body that a law knows of a vehicle."""
+    return body_of(vehicle.mass, np.reshape(vehicle.inertia, (3, 3)), vehicle.gravity)
+
+
+_Tilts = tuple[Callable[..., Values], Callable[..., tuple[Values, Values]]]
+
+
+@cache
+def _gait_of(tilts: int) -> _Tilts:
+    """Scalar code of a loop's planned tilt angles, and of them with their rates."""
+    moving = tilt_motion_of(tilts).moving
+
+    @scalar
+    def planned_angles(time: float, state: Vector, parameters: Any, knots: Vector) -> Values:
+        angles, _ = moving(time, parameters.law.gait, knots)
+        return angles
+
+    @scalar
+    def planned_motion(
+        time: float, state: Vector, inputs: Vector, parameters: Any, knots: Vector
+    ) -> tuple[Values, Values]:
+        return moving(time, parameters.law.gait, knots)
+
+    return planned_angles, planned_motion
+
+
+@cache
+def _integrated_of(tilts: int, state_1: int, rate_1: int) -> _Tilts:
+    """As `_gait_of`, of commanded tilts: states whose rates are inputs."""
+    angles, rates = entries_of(state_1, tilts), entries_of(rate_1, tilts)
+
+    @scalar
+    def commanded(time: float, state: Vector, parameters: Any, knots: Vector) -> Values:
+        return angles(state)
+
+    @scalar
+    def commanded_motion(
+        time: float, state: Vector, inputs: Vector, parameters: Any, knots: Vector
+    ) -> tuple[Values, Values]:
+        return angles(state), rates(inputs)
+
+    return commanded, commanded_motion
+
+
+def _sampling_of(layout: Layout, law: RotorLaw) -> Sampling:
+    """The control step in MuJoCo."""
+    rotors, tilts = layout.places
+    state_in, inputs_of = state_of(layout.places), law.inputs
+    tilt_rates_in, states_in = entries_of(TILT_RATE_1, tilts), entries_of(rotors, len(law.states))
+    thrusts, ahead = thrust_controls_of(layout.spins), servo_commands_of(tilts)
+    if law.commands is None:
+
+        @scalar
+        def servos(time: float, act: Vector, inputs: Values, head: Any, knots: Vector) -> Values:
+            return ahead(time, head.servo_lead, head.law.gait, knots)
+
+    else:
+        commanded = entries_of(rotors + law.commands, tilts)  # of activations, and their rates
+        led = ahead_of(tilts)
+
+        @scalar
+        def servos(time: float, act: Vector, inputs: Values, head: Any, knots: Vector) -> Values:
+            return led(commanded(act), commanded(inputs), head.servo_lead)
+
+    @scalar
+    def controls(
+        time: float, qpos: Vector, qvel: Vector, act: Vector, parameters: Any, knots: Vector
+    ) -> Values:
+        state, moving, states = state_in(qpos, qvel, act), tilt_rates_in(qvel), states_in(act)
+        inputs = inputs_of(time, state, moving, states, parameters, knots)
+        return (*servos(time, act, inputs, parameters, knots), *thrusts(act), *inputs)
+
+    return Sampling(controls, held_controls_of(layout.spins, tilts))
+
+
+@scalar
+def _constant_attitude(time: float, values: Vector, parameters: Any, knots: Vector) -> Values:
+    """Position and attitude of the reference, `REFERENCE_COLUMNS`."""
+    reference = parameters.law.reference
+    x, y, z, _, _, _, _, _, _ = position_reference(time, reference, knots)
+    return x, y, z, reference.roll, reference.pitch, reference.yaw
+
+
+def _columns_of(layout: Layout, law: RotorLaw) -> Columns:
+    """Samples of flights, and the columns of references and margin."""
+    places, shown, references = layout.places, layout.shown, law.references or _constant_attitude
+    fields, names = (*shown.observed_fields, *law.states), (*law.names, *shown.names("alpha_ref"))
+    observed, idle = observed_of(places, shown, len(law.states)), (0.0,) * (shown[1] - places[1])
+    tilts, _ = _gait_of(places.tilts)
+    if law.commands is not None:
+        first = len(shown.observed_fields) + law.commands
+        tilts, _ = _integrated_of(places.tilts, first, first)
+
+    @scalar
+    def observe(qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector) -> Values:
+        return observed(qpos, qvel, act)
+
+    @scalar
+    def asked(time: float, values: Vector, parameters: Any, knots: Vector) -> Values:
+        own = references(time, values, parameters, knots)
+        return (*own, *tilts(time, values, parameters, knots), *idle)
+
+    def margins(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
+        return torque_free_columns(places, table_of(places, setup), samples)
+
+    def derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
+        found = reference_columns(asked, fields, samples, setup, names)
+        return {**found, **(law.margins or margins)(samples, setup)}
+
+    return Columns(observe, derive, fields=tuple(law.states), units={**law.states, **law.units})
+
+
+def table_of(places: Places, setup: ControlSetup) -> Values:
+    """The table of the rotors, in the knots after those of gait and reference."""
+    first = int(setup.parameters.law.rotors)
+    return setup.knots[first : first + ROTOR_FLOATS * places.rotors]
+
+
+@cache
+def _motion_of(layout: Layout) -> Callable[..., Values]:
+    """`RotorLaw.motion` by a table of rotors."""
+    motion_of_body = equations_of_motion_of(layout.tilt_of_rotor)
+    # The thesis's equations have no gyroscopic torque but the quadrotor's.
+    gyroscopic = float(layout.model == "quadrotor")
+
+    @scalar
+    def motion(
+        state: Vector,
+        tilts: Values,
+        inputs: Vector,
+        parameters: Any,
+        knots: Vector,
+        disturbance: Triple,
+    ) -> Values:
+        own = parameters.law
+        body, at = own.vehicle, int(own.rotors)
+        return motion_of_body(state, tilts, inputs, body, knots, at, disturbance, gyroscopic)
+
+    return motion
+
+
+def _equations_of(layout: Layout, law: RotorLaw) -> Equations:
+    """The law on the equations of motion, with pods that follow their commands exactly."""
+    rotors, tilts = layout.places
+    own, inputs_of, motion = len(law.states), law.inputs, law.motion or _motion_of(layout)
+    idle = (0.0,) * (layout.shown.tilts - tilts)
+    speeds_in, states_in = entries_of(BODY_STATES, rotors), entries_of(BODY_STATES + rotors, own)
+    state_rates, at_rest = entries_of(rotors, own), (0.0,) * (rotors + own)
+    tilts_of, moving_tilts = _gait_of(tilts)
+    if law.commands is not None:
+        rate_1 = rotors + law.commands
+        tilts_of, moving_tilts = _integrated_of(tilts, BODY_STATES + rate_1, rate_1)
+
+    @scalar
+    def inputs(time: float, state: Vector, parameters: Any, knots: Vector) -> Values:
+        # Rates that the law is yet to command count as none.
+        angles, moving = moving_tilts(time, state, at_rest, parameters, knots)
+        seen = (*body_fields(state), *angles, *speeds_in(state))
+        return inputs_of(time, seen, moving, states_in(state), parameters, knots)
+
+    @scalar
+    def rates(
+        time: float,
+        state: Vector,
+        inputs: Vector,
+        parameters: Any,
+        knots: Vector,
+        disturbance: Triple,
+    ) -> Values:
+        angles = tilts_of(time, state, parameters, knots)
+        body = motion(state, angles, inputs, parameters, knots, disturbance)
+        return (*body, *state_rates(inputs))
+
+    @scalar
+    def observe(
+        time: float, state: Vector, inputs: Vector, parameters: Any, knots: Vector
+    ) -> Values:
+        angles, moving = moving_tilts(time, state, inputs, parameters, knots)
+        seen = (*body_fields(state), *angles, *idle, *speeds_in(state))
+        return (*seen, *moving, *idle, *states_in(state))
+
+    def initial(plan: FlightPlan, _setup: ControlSetup) -> Vector:
+        return (*initial_state(plan.scenario, initial_rotor_speeds(plan)), *law.initial(plan))
+
+    return Equations(inputs, rotors + own, rates, initial, observe, tilts=tilts_of)
+
+
+def rotor_loop(layout: Layout, law: RotorLaw) -> ClosedLoop:
+    """The closed loop of a control law with all vehicles of a layout."""
+    places, record = layout.places, head_of(law.parameters)
+    sampling, equations = _sampling_of(layout, law), _equations_of(layout, law)
+    for step in (sampling.controls, equations.inputs):
+        step.__qualname__ = f"{law.name}.{layout.name}"
+
+    def setup(plan: FlightPlan, signature: float) -> ControlSetup:
+        parameters, further = law.setup(plan)
+        lead = servo_lead(plan.scenario.any_rotorcraft.tilt_servo)
+        return ControlSetup(record(signature, lead, parameters), (*plan.knots, *further))
+
+    return ClosedLoop(
+        kind=rotorcraft_kind(layout.shown, ("singularity_margin",)),
+        parameters=record,
+        setup=setup,
+        dynamics=Dynamics(
+            layout.name,
+            places.sizes(len(law.states)),
+            lambda plan, _setup: (*initial_rotor_speeds(plan), *law.initial(plan)),
+            len(law.states),
+            layout.spins,
+            layout.tilt_of_rotor if layout.model == "multirotor" else (),
+        ),
+        sampling=sampling,
+        columns=_columns_of(layout, law),
+        equations=equations,
+        uses_gait=places.tilts > 0 and law.commands is None,
+    )
+
+
+def with_measured_inputs(loop: ClosedLoop, inputs: Callable[..., Values]) -> ClosedLoop:
+    """A gait-following controller that reads the `measured_acceleration`.
+
+    `tiltsim.laws.layers.measured_acceleration` measures it.
+
+    Args:
+        loop: The same controller without.
+        inputs: Its controls from the rotor accelerations on, as `SupervisedLaw.controls`.
+    """
+    assert loop.supervised is not None  # so has every controller that follows a gait
+    state_in, spins = loop.supervised.state, loop.dynamics.spins
+    thrusts, servo_commands = (
+        thrust_controls_of(spins),
+        servo_commands_of(places_of(loop.dynamics).tilts),
+    )
+
+    @scalar
+    def controls(
+        time: float, qpos: Vector, qvel: Vector, act: Vector, parameters: Any, knots: Vector
+    ) -> Values:
+        state = state_in(qpos, qvel, act)
+        return (
+            *servo_commands(time, parameters.servo_lead, parameters.law.gait, knots),
+            *thrusts(act),
+            *inputs(time, state, qvel, act, SUPERVISOR_AT_REST, parameters, knots),
+        )
+
+    controls.__qualname__ = f"measured.{loop.sampling.controls.__qualname__}"
+    return replace(
+        loop,
+        sampling=replace(loop.sampling, controls=controls),
+        equations=None,
+        supervised=loop.supervised._replace(controls=inputs),
+    )

@@ -1,0 +1,189 @@
+"""Loops of the laws that follow a gait with feed-forward and integrate the position error.
+
+Their control law is one function, ``(time, state, tilt_rates, integrals, parameters, knots,
+supervisor_motion, measured)``: rotor accelerations (rad/s^2), rates of the integrals (m), the
+references of roll, pitch and yaw (rad), and further numbers that are columns.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from typing import TYPE_CHECKING, Any, Final
+
+from tiltsim.closed_loop.loop import ClosedLoop, SupervisedLaw
+from tiltsim.laws.rotor_loop import Layout, RotorLaw, rotor_loop, with_measured_inputs
+from tiltsim.laws.rotorcraft import REFERENCE_COLUMNS, state_of
+from tiltsim.scenario.multirotor_controllers import AttitudeForceController
+from tiltsim.scenario.tiltrotor_controllers import AttitudeAltitudeController
+from tiltsim.vehicles.rotorcraft.layout import TILT_RATE_1
+from tiltsim_controllers.laws.decouplers import DECOUPLERS
+from tiltsim_controllers.laws.gait_feedforward import INTEGRAL_FIELDS
+from tiltsim_controllers.laws.supervisor import SUPERVISOR_AT_REST, Supervision
+from tiltsim_controllers.mathematics.scalar import Triple, Values, Vector, scalar
+from tiltsim_controllers.mathematics.vectors import entries_of
+from tiltsim_controllers.references.trajectories import position_reference
+
+if TYPE_CHECKING:
+    from tiltsim.scenario.scenario import FlightPlan, Scenario
+
+STATES: Final = len(INTEGRAL_FIELDS)
+"""The controller's own, after the rotor speeds."""
+
+
+def tracking_fields(plan: FlightPlan) -> dict[str, Any]:
+    """The parameters that controllers with feed-forward of the gait share, by name."""
+    controller, gait = plan.scenario.controller, plan.gait
+    assert isinstance(controller, (AttitudeAltitudeController, AttitudeForceController))
+    # The thesis's equations omit the gyroscopic torque.
+    gyroscopic_torque = plan.scenario.simulation.plant != "thesis"
+    return {
+        "gains": controller.resolve_gains(),
+        "integral": controller.resolve_integral_gains(),
+        "max_acceleration": controller.max_acceleration,
+        "max_angular_acceleration": controller.max_angular_acceleration,
+        "anticipation": min(controller.anticipation, 0.5 * gait.min_segment_time),
+        "terms": controller.resolve_feedforward_terms(gyroscopic_torque=gyroscopic_torque),
+        "gait": gait.parameters,
+        "reference": plan.reference,
+        "decoupler": DECOUPLERS[controller.decoupler],
+    }
+
+
+@cache
+def _inputs_of(layout: Layout, law: Callable[..., Values]) -> Callable[..., Values]:
+    """Scalar code of `RotorLaw.inputs`: the ``states`` are the integrals."""
+    inputs_in = entries_of(0, layout.places.rotors + STATES)
+
+    @scalar
+    def inputs(
+        time: float,
+        state: Values,
+        tilt_rates: Values,
+        states: Values,
+        parameters: Any,
+        knots: Vector,
+    ) -> Values:
+        found: Values = inputs_in(law(time, state, tilt_rates, states, parameters.law, knots))
+        return found
+
+    return inputs
+
+
+@scalar
+def _by_model(qvel: Vector) -> None:
+    """For a law that computes the angular acceleration by its model."""
+    return
+
+
+@cache
+def _controls_of(
+    layout: Layout, law: Callable[..., Values], measured: bool
+) -> Callable[..., Values]:
+    """Scalar code of a law's controls from the rotor accelerations on; see `SupervisedLaw`.
+
+    ``measured``: whether it reads, after MuJoCo's velocities, the plant's angular acceleration.
+    """
+    rotors, tilts = layout.places
+    tilt_rates_in, integrals_in = entries_of(TILT_RATE_1, tilts), entries_of(rotors, STATES)
+    acceleration_in = entries_of(TILT_RATE_1 + tilts, 3) if measured else _by_model
+    inputs_in = entries_of(0, rotors + STATES)
+
+    @scalar
+    def controls(
+        time: float,
+        state: Values,
+        qvel: Vector,
+        act: Vector,
+        motion: Triple,
+        parameters: Any,
+        knots: Vector,
+    ) -> Values:
+        own, acceleration = parameters.law, acceleration_in(qvel)
+        moving, integrals = tilt_rates_in(qvel), integrals_in(act)
+        inputs = law(time, state, moving, integrals, own, knots, motion, acceleration)
+        found: Values = inputs_in(inputs)
+        return found
+
+    return controls
+
+
+@cache
+def _references_of(
+    layout: Layout, law: Callable[..., Values], further: int
+) -> Callable[..., Values]:
+    """Scalar code of position, attitude and further numbers; see `SupervisedLaw.references`."""
+    rotors, tilts = layout.places
+    first = layout.places.speed_1 + rotors
+    state_in, rates_of_sample = entries_of(0, first), entries_of(first, tilts)
+    integrals_of_sample = entries_of(first + tilts, STATES)
+    asked_in = entries_of(rotors + STATES, 3 + further)  # roll, pitch, yaw and what follows
+
+    @scalar
+    def references(
+        time: float, values: Vector, motion: Triple, parameters: Any, knots: Vector
+    ) -> Values:
+        own = parameters.law
+        x, y, z, _, _, _, _, _, _ = position_reference(time, own.reference, knots)
+        moving, integrals = rates_of_sample(values), integrals_of_sample(values)
+        inputs = law(time, state_in(values), moving, integrals, own, knots, motion)
+        return (x, y, z, *asked_in(inputs))
+
+    return references
+
+
+def follows_position(scenario: Scenario) -> bool:
+    """Whether a decoupler steers the vehicle to the reference's horizontal position."""
+    controller = scenario.controller
+    assert isinstance(controller, (AttitudeAltitudeController, AttitudeForceController))
+    return controller.decoupler != "none"
+
+
+def tracking_loop(
+    layout: Layout,
+    law: RotorLaw,
+    supervision: Supervision,
+    watched: Callable[..., Any],
+    measured: bool = False,
+) -> ClosedLoop:
+    """The closed loop of a law that follows a gait.
+
+    Args:
+        layout: Of the vehicles.
+        law: Its ``inputs`` are the law itself; its ``names`` end with those of further numbers.
+        supervision: The supervisor's code.
+        watched: What this reads of a vehicle, by the parameters.
+        measured: Whether the law feeds back the angular acceleration of the plant, which
+            `tiltsim.laws.layers.measured_acceleration` measures.
+    """
+    code, margins = law.inputs, law.margins
+    assert margins is not None
+    references = _references_of(layout, code, len(law.names) - len(REFERENCE_COLUMNS))
+
+    @scalar
+    def asked(time: float, values: Vector, parameters: Any, knots: Vector) -> Values:
+        found: Values = references(time, values, SUPERVISOR_AT_REST, parameters, knots)
+        return found
+
+    loop = rotor_loop(
+        layout,
+        law._replace(
+            inputs=_inputs_of(layout, code),
+            states=dict.fromkeys(INTEGRAL_FIELDS, "m s"),
+            initial=lambda _plan: (0.0,) * STATES,
+            references=asked,
+        ),
+    )
+    supervised = SupervisedLaw(
+        supervision,
+        watched,
+        state_of(layout.places),
+        _controls_of(layout, code, measured),
+        references,
+        law.names,
+        (*layout.places.observed_fields, *INTEGRAL_FIELDS),
+        margins,
+    )
+    loop = replace(loop, supervised=supervised, follows_position=follows_position)
+    return with_measured_inputs(loop, supervised.controls) if measured else loop
