@@ -57,6 +57,32 @@ def test_inner_functions_have_none(tmp_path, monkeypatch, generated):
     assert generated == ["outermost"] * 2
 
 
+def test_what_is_inlined_is_optimized_by_its_callers_alone(monkeypatch):
+    optimized, optimize = [], JITCodeLibrary._optimize_final_module
+
+    def noted(library):
+        optimized.append(library.name.rpartition(".")[2])
+        optimize(library)
+
+    monkeypatch.setattr(JITCodeLibrary, "_optimize_final_module", noted)
+    gain = 2.0
+
+    @callable_natively
+    def inner(x):
+        return gain * x
+
+    @callable_natively
+    def layer(x):
+        return inner(x) + 1.0
+
+    @compiled
+    def outermost(x):
+        return layer(x)
+
+    assert outermost(3.0) == 7.0
+    assert {"inner", "layer", "outermost"} & {*optimized} == {"outermost"}
+
+
 def test_a_users_function_is_compiled_with_what_it_calls_as_that_is_now(tmp_path, monkeypatch):
     monkeypatch.setattr("tiltsim.engines.compiling.native_code_folder", lambda: tmp_path)
     gain, law = tmp_path / "gain.py", tmp_path / "law.py"

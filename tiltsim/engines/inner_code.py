@@ -38,6 +38,16 @@ class _InnerLibrary(JITCodeLibrary):  # type: ignore[misc]
         return stored
 
 
+class _InlinedLibrary(_InnerLibrary):
+    """The code of a function that its callers always inline, as written.
+
+    They optimize it with theirs. A layer around a loop would optimize all of the loop once more.
+    """
+
+    def _optimize_final_module(self) -> None:
+        pass
+
+
 def loaded_inner_code(target_context: Any, stored: Any) -> CompileResult:
     """A compiled inner function as it was stored; `CompileResult._rebuild` loads machine code."""
     (name, _, code), description, environment, signature, *others = stored
@@ -72,6 +82,6 @@ class InnerCompiler(Compiler):  # type: ignore[misc]
     def define_pipelines(self) -> Any:
         """Numba's passes, with a library of ours for their result."""
         state = self.state
-        codegen = state.targetctx.codegen()
-        state.library = _InnerLibrary(codegen, state.func_id.func_qualname)
+        library = _InlinedLibrary if state.flags.forceinline else _InnerLibrary
+        state.library = library(state.targetctx.codegen(), state.func_id.func_qualname)
         return super().define_pipelines()
