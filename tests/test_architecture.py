@@ -220,6 +220,31 @@ def test_an_unknown_name_of_the_package_is_an_attribute_error():
         _ = tiltsim.no_such_name
 
 
+FOUR_ROTORS = {"ROTORS", "SPIN", "TILT_FIELDS", "ROTOR_FIELDS", "TILTROTOR_FIELDS", "four"}
+"""Names that presume the four rotors of the thesis's vehicles."""
+
+OF_FOUR_ROTORS = {
+    *("attitude_altitude", "commanded", "quadrotor", "quadrotor_attitude_altitude", "tiltrotor"),
+    *("cross", "metrics", "user_vehicle", "vehicle", "vehicle_parts"),
+    *("attitude_plane", "concepts", "gait_analysis", "vehicle_drawing"),
+    *("attainable", "effectiveness", "fault_tolerance", "rotorcraft", "statics"),
+}
+"""The last names of modules that know these vehicles: their laws, models, tables, and figures."""
+
+
+def test_modules_for_any_number_of_rotors_do_not_know_four():
+    importing = {
+        module
+        for module, found in nodes().items()
+        for node in found
+        if isinstance(node, ast.ImportFrom) and FOUR_ROTORS & {name.name for name in node.names}
+    }
+    others = {module for module in importing if "tilt_car" not in module}
+    assert {module.rpartition(".")[2] for module in others} == OF_FOUR_ROTORS
+    general = ("tiltsim.closed_loop.", "tiltsim.laws.layers.", "tiltsim.laws.rotorcraft")
+    assert not [module for module in importing if module.startswith(general)]
+
+
 def test_every_public_definition_has_a_docstring():
     assert [module for module, tree in trees().items() if not ast.get_docstring(tree)] == []
     bare = [
