@@ -109,7 +109,7 @@ def is_constant(value):
 
 def test_there_is_scalar_code():
     assert rotor_accelerations in FUNCTIONS
-    assert tiltsim.laws.attitude_altitude.tiltrotor_controls in FUNCTIONS
+    assert tiltsim.laws.attitude_altitude.TILTROTOR.sampling.controls in FUNCTIONS
 
 
 def test_nothing_is_registered_twice():
