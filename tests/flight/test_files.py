@@ -14,6 +14,7 @@ import pytest
 
 from tests.damage import read_with_flipped_bits
 from tests.flights import SAMPLE_FIELDS
+from tests.refusals import refusal
 from tiltsim.errors import InputError
 from tiltsim.flight import writing
 from tiltsim.flight.end import End
@@ -178,10 +179,7 @@ def test_a_flight_reads_back_whole(tmp_path, path):
 
 
 def refused(path):
-    with pytest.raises(InputError) as caught:
-        load_flight(path)
-    line = str(caught.value)
-    assert len(line.splitlines()) == 1
+    line = refusal(load_flight, path)
     assert str(path) in line
     return line
 

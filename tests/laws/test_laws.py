@@ -10,7 +10,8 @@ import pytest
 from scipy.linalg import expm
 
 import tiltsim
-from tiltsim.errors import InputError
+from tests.laws.restarting import assert_restarts
+from tests.refusals import refusal
 from tiltsim.flight.reading import load_flight
 from tiltsim.laws.assembling import LOOPS, assemble, loop_of
 from tiltsim.models.rotorcraft import RotorcraftSpec, compile_model
@@ -120,19 +121,7 @@ def test_every_law_is_here():
 @continuous_and_held
 def test_a_saved_state_restarts_bit_identically(law, plant, control_timestep):
     simulation = {"plant": plant, "engine": "python", "control_timestep": control_timestep}
-    desired = scenario(law, simulation)
-    straight = make_plant(assemble(desired))
-    straight.advance(40)
-    saved, seen = straight.state, straight.observe()
-    straight.advance(20)
-
-    restarted = make_plant(assemble(desired))
-    restarted.advance(7)
-    restarted.state = saved
-    assert restarted.observe() == seen
-    restarted.advance(20)
-    np.testing.assert_array_equal(restarted.state, straight.state)
-    assert restarted.observe() == straight.observe()
+    assert_restarts(scenario(law, simulation), 40, 20)
 
 
 @each_law
@@ -468,10 +457,7 @@ MISTAKES = {
 @pytest.mark.parametrize("mistake", MISTAKES)
 def test_a_mistake_is_one_clear_line(mistake):
     document, message = MISTAKES[mistake]
-    with pytest.raises(InputError) as caught:
-        tiltsim.parse_scenario(document)
-    assert message in str(caught.value)
-    assert len(str(caught.value).splitlines()) == 1
+    assert message in refusal(tiltsim.parse_scenario, document)
 
 
 @each_law

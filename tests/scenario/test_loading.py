@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import json
 import tomllib
+from functools import partial
 from pathlib import Path
 
 import pytest
 
+from tests.refusals import refusal as refused
 from tiltsim.errors import InputError
 from tiltsim.scenario.library import library_entries
 from tiltsim.scenario.loading import load_scenario, merge, parse_scenario, scenario_toml
@@ -60,13 +62,7 @@ def write(tmp_path):
     return write
 
 
-def refusal(path, overrides=None):
-    """The one line with which a scenario is refused."""
-    with pytest.raises(InputError) as caught:
-        load_scenario(path, overrides)
-    line = str(caught.value)
-    assert len(line.splitlines()) == 1, line
-    return line
+refusal = partial(refused, load_scenario)
 
 
 def trot(amplitude="0.3", period="1.0", more=""):
@@ -558,9 +554,7 @@ def test_an_override_is_read_as_toml_or_as_a_string(text, key, value):
 
 @pytest.mark.parametrize("text", ["controller.decoupler", "=3", " = 3", ""])
 def test_an_override_without_key_or_equals_sign_is_refused(text):
-    with pytest.raises(InputError) as caught:
-        parse_override(text)
-    assert str(caught.value) == (
+    assert refused(parse_override, text) == (
         f"--set {text}: write KEY=VALUE, for example controller.decoupler=exact"
     )
 

@@ -16,6 +16,7 @@ from PIL import Image
 from PIL.ImageSequence import Iterator
 
 from tests.flights import flight, saved
+from tests.refusals import refusal
 from tiltsim.cli import main
 from tiltsim.errors import InputError
 from tiltsim.views.attitude_plane import MOVING_TRAIL_TIME, torque_free_directions
@@ -237,10 +238,7 @@ def test_a_missing_opengl_is_one_line_with_the_remedy(monkeypatch):
         pytest.skip("elsewhere the system brings OpenGL")
     monkeypatch.delenv("MUJOCO_GL", raising=False)
     monkeypatch.setattr(offscreen, "MODULES", dict.fromkeys(offscreen.MODULES, "mujoco.no_such"))
-    with pytest.raises(InputError) as caught:
-        make_contexts(NOTHING, 64, 64)
-    line = str(caught.value)
-    assert len(line.splitlines()) == 1
+    line = refusal(make_contexts, NOTHING, 64, 64)
     assert "apt-get install libegl1" in line
     assert "MUJOCO_GL=egl" in line
 

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 import tiltsim
+from tests.laws.restarting import assert_restarts
 from tiltsim.errors import InputError
 from tiltsim.laws.assembling import LOOPS, assemble, loop_of
 from tiltsim.plants.factory import make_plant
+from tiltsim.scenario.loading import merge
 from tiltsim.scenario.scenario import plan_flight
 from tiltsim_controllers.analysis.stability import is_hurwitz
 from tiltsim_controllers.laws.gains import GAIN_SETS
@@ -68,17 +70,10 @@ def delay_margin(gains):
     return float((((np.pi + phases) % (2.0 * np.pi)) / crossings).min())
 
 
-def merged(base, changes):
-    both = dict(base)
-    for key, value in changes.items():
-        both[key] = merged(both[key], value) if isinstance(value, dict) and key in both else value
-    return both
-
-
 def scenario(*changes, **more):
     tables = BASE
     for change in (*changes, more):
-        tables = merged(tables, change)
+        tables = merge(tables, change)
     return tiltsim.parse_scenario(tables)
 
 
@@ -102,18 +97,7 @@ def test_the_layer_alone_changes_nothing(timing):
 
 @pytest.mark.parametrize("timing", [{}, LATE], ids=["continuous", "late"])
 def test_a_saved_state_restarts_bit_identically(timing):
-    desired = scenario(EVERYTHING, simulation=timing)
-    straight = make_plant(assemble(desired))
-    straight.advance(101)
-    saved, seen = straight.state, straight.observe()
-    straight.advance(60)
-
-    restarted = make_plant(assemble(desired))
-    restarted.advance(13)
-    restarted.state = saved
-    assert restarted.observe() == seen
-    restarted.advance(60)
-    np.testing.assert_array_equal(restarted.state, straight.state)
+    assert_restarts(scenario(EVERYTHING, simulation=timing), 101, 60)
 
 
 def test_the_full_pose_law_flies_in_the_layer():

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import tiltsim
+from tests.laws.restarting import assert_restarts
 from tiltsim.engines.callback import control_callback
 from tiltsim.errors import InputError
 from tiltsim.laws.assembling import LOOPS, assemble, loop_of
@@ -57,16 +58,7 @@ def test_air_that_does_nothing_changes_nothing(tables, control_timestep):
 
 @pytest.mark.parametrize("timing", [{}, LATE], ids=["continuous", "late"])
 def test_a_saved_state_restarts_bit_identically(timing):
-    straight = make_plant(assemble(scenario(STORM, timing)))
-    straight.advance(51)
-    saved, seen = straight.state, straight.observe()
-    straight.advance(40)
-    restarted = make_plant(assemble(scenario(STORM, timing)))
-    restarted.advance(13)
-    restarted.state = saved
-    assert restarted.observe() == seen
-    restarted.advance(40)
-    np.testing.assert_array_equal(restarted.state, straight.state)
+    assert_restarts(scenario(STORM, timing), 51, 40)
 
 
 # --- physics -----------------------------------------------------------------------------------

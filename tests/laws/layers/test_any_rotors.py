@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import tiltsim
-from tiltsim.errors import InputError
+from tests.refusals import refusal
 from tiltsim.laws.assembling import assemble
 from tiltsim.models.pose import VehiclePose
 from tiltsim.plants.command import Command, check_command
@@ -247,6 +247,5 @@ def test_six_arms_hold_a_gait_that_would_push_aside_until_the_vehicle_leans():
 def test_what_there_is_nothing_to_supervise_for_is_refused(name, strategy, message):
     controller = {"law": "attitude_force", "supervisor": {"strategy": strategy}}
     gait = {"gait": TILTS} if strategy == "scale" else {}
-    with pytest.raises(InputError) as caught:
-        scenario(name, controller=controller, **gait)
-    assert f'controller.supervisor.strategy = "{strategy}": {message}' in str(caught.value)
+    line = refusal(scenario, name, controller=controller, **gait)
+    assert f'controller.supervisor.strategy = "{strategy}": {message}' in line

@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 
 import tiltsim
+from tests.laws.restarting import assert_restarts
 from tiltsim.equations.actuator_level import actuator_plant
 from tiltsim.errors import InputError
 from tiltsim.laws import assembling
 from tiltsim.laws.assembling import LOOPS, assemble, loop_of
 from tiltsim.plants.factory import make_plant
+from tiltsim.scenario.loading import merge
 from tiltsim_controllers.laws.yaw_position import gyroscopic_acceleration
 
 MOTION = ("x", "y", "z", "roll", "pitch", "yaw")
@@ -60,18 +62,10 @@ SPINNING = {"vehicle": {"rotor_inertia": 1e-5, "tilt_servo": {"natural_frequency
 WATCHED = {"controller": {"supervisor": {"min_margin": 0.3, "min_determinant": 3.5}}}
 
 
-def merged(base, changes):
-    both = dict(base)
-    for key, value in changes.items():
-        nested = isinstance(value, dict) and "type" not in value and key in both
-        both[key] = merged(both[key], value) if nested else value
-    return both
-
-
 def scenario(*changes, **more):
     tables = {}
     for change in (*changes, more):
-        tables = merged(tables, change)
+        tables = merge(tables, change)
     return tiltsim.parse_scenario(tables)
 
 
@@ -164,7 +158,7 @@ def test_without_the_gyroscopic_torque_they_part_where_the_body_turns():
 
 
 def test_the_same_noise_and_turbulence_is_drawn():
-    blowing = merged(STORM, {"air": {"turbulence": {"wind_at_6m": 4.0}}})
+    blowing = merge(STORM, {"air": {"turbulence": {"wind_at_6m": 4.0}}})
     flights = on_both(TILTROTOR, blowing)
     states = [f"dryden_{index}" for index in range(1, 6)]
     assert furthest(flights, states) < 0.01  # RK4's last stage sees the next draw, ode3's does not
@@ -183,17 +177,7 @@ LAYERED = {
 
 @pytest.mark.parametrize("name", LAYERED)
 def test_a_saved_state_restarts_bit_identically(name):
-    desired = scenario(*LAYERED[name], {"simulation": {"plant": "thesis"}})
-    straight = make_plant(assemble(desired))
-    straight.advance(51)
-    saved, seen = straight.state, straight.observe()
-    straight.advance(40)
-    restarted = make_plant(assemble(desired))
-    restarted.advance(13)
-    restarted.state = saved
-    assert restarted.observe() == seen
-    restarted.advance(40)
-    np.testing.assert_array_equal(restarted.state, straight.state)
+    assert_restarts(scenario(*LAYERED[name], {"simulation": {"plant": "thesis"}}), 51, 40)
 
 
 # --- the thesis's vehicle -----------------------------------------------------------------------

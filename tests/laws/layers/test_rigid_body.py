@@ -17,7 +17,6 @@ from tests.laws.layers.test_on_equations import (
     WEAK,
     fly,
     furthest,
-    merged,
     scenario,
 )
 from tests.laws.test_laws import LAWS
@@ -26,6 +25,7 @@ from tests.simulation.test_batch import GAITS
 from tiltsim.errors import InputError
 from tiltsim.laws.assembling import assemble
 from tiltsim.plants.factory import make_plant
+from tiltsim.scenario.loading import merge
 from tiltsim.vehicles.rotorcraft.layout import QW
 from tiltsim_controllers.vehicle.effectiveness import cross_table, rotor_entries
 from tiltsim_controllers.vehicle.multirotor import body_of, principal_body
@@ -178,7 +178,7 @@ def test_principal_moments_are_a_matrix():
 )
 def test_what_it_does_not_have_is_refused(tables, message):
     with pytest.raises(InputError, match=message):
-        tiltsim.parse_scenario(merged(RIGID, tables))
+        tiltsim.parse_scenario(merge(RIGID, tables))
 
 
 def test_mujoco_has_no_ode3():

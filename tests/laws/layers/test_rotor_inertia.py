@@ -15,6 +15,7 @@ from tiltsim.plants.commanded_plant import CommandedPlant
 from tiltsim.plants.factory import make_plant
 from tiltsim.plants.flight_model import build_model
 from tiltsim.resources import shipped_folder
+from tiltsim.scenario.loading import merge
 from tiltsim.vehicles.rotorcraft.layout import Layout
 from tiltsim_controllers.vehicle.parameters import PRESETS
 from tiltsim_controllers.vehicle.rotor_inertia import acceleration_within_limits
@@ -33,18 +34,10 @@ MOTION = ("x", "y", "z", "roll", "pitch", "yaw")
 SPIN = np.array([-1.0, 1.0, -1.0, 1.0])
 
 
-def merged(base, changes):
-    both = dict(base)
-    for key, value in changes.items():
-        nested = isinstance(value, dict) and "type" not in value and key in both
-        both[key] = merged(both[key], value) if nested else value
-    return both
-
-
 def scenario(*changes, **more):
     tables = TROT
     for change in (*changes, more):
-        tables = merged(tables, change)
+        tables = merge(tables, change)
     return tiltsim.parse_scenario(tables)
 
 
@@ -287,7 +280,7 @@ def test_commanded_speeds_take_their_momentum_from_the_body(model):
     ],
 )
 def test_what_has_no_such_rotors_is_refused(tables, message):
-    tables = merged({"vehicle": {"rotor_inertia": INERTIA}}, tables)
+    tables = merge({"vehicle": {"rotor_inertia": INERTIA}}, tables)
     with pytest.raises(InputError, match=message):
         tiltsim.parse_scenario(tables)
 

@@ -1,0 +1,29 @@
+"""Restarting a plant from a saved state."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tiltsim.laws.assembling import assemble
+from tiltsim.plants.factory import make_plant
+
+
+def assert_restarts(scenario, saved_at, steps):
+    """Another plant, restored from what one saved, goes on bit for bit as that does.
+
+    Args:
+        scenario: What is flown.
+        saved_at: Steps before the state is saved.
+        steps: Steps after that.
+    """
+    straight = make_plant(assemble(scenario))
+    straight.advance(saved_at)
+    saved, seen = straight.state, straight.observe()
+    straight.advance(steps)
+    restarted = make_plant(assemble(scenario))
+    restarted.advance(saved_at // 4)
+    restarted.state = saved
+    assert restarted.observe() == seen
+    restarted.advance(steps)
+    np.testing.assert_array_equal(restarted.state, straight.state)
+    assert restarted.observe() == straight.observe()
