@@ -11,7 +11,6 @@ from tiltsim.scenario.gait_following import FeedforwardTerm
 from tiltsim_controllers.laws.gait_feedforward import FeedforwardTerms
 
 SCENARIO = "beyond/gait_feedforward#t2"
-PUBLISHED = "ch04_tracking/circle#continuous_t2_modified"
 
 
 def test_what_can_be_left_out_is_what_the_law_counts_in():

@@ -78,7 +78,6 @@ def test_effectiveness_is_what_mujoco_makes_of_unit_thrusts(name, tmp_path):
     assert np.abs(ours - expected).max() < 1e-12 * np.abs(expected).max()
 
 
-HINGE = '<joint name="tilt_2"/>'
 LOOSE = '<body><joint name="tilt_2"/><geom size="1"/></body></worldbody>'
 SERVO = '<position name="tilt_2" joint="tilt_2" kp="1"/>'
 

@@ -21,7 +21,7 @@ def row(controller, task, position=0.0, yaw=0.0, end="completed", gains="default
         "controller": controller,
         "scenario": f"arena/tiltrotor#{task}",
         "end": end,
-        "refused": "arena/tiltrotor#x: needs legs" if end == "refused" else None,
+        "refused": f"arena/tiltrotor#{task}: needs legs" if end == "refused" else None,
         "rms_position_error": position,
         "rms_yaw_error": yaw,
         "gains": gains,
@@ -179,7 +179,7 @@ def test_contradicting_or_empty_options_are_refused(options, message, tmp_path, 
 def test_an_arena_without_a_flight_fails(tmp_path, capsys, monkeypatch):
     def refused(entries, **_):
         for one in flown(entries):
-            one.row.update(end="refused", refused="needs legs")
+            one.row.update(end="refused", refused=f"{one.row['scenario']}: needs legs")
             yield one
 
     monkeypatch.setattr(arena, "fly_entries", refused)

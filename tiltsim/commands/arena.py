@@ -76,7 +76,7 @@ def run(arguments: argparse.Namespace) -> int:
     from tiltsim.commands.controllers import chosen_controllers, names
     from tiltsim.report.made import Made
     from tiltsim.studies.arena import chosen_vehicles, fitting, fly_tasks, standings
-    from tiltsim.studies.arena_page import arena_page
+    from tiltsim.studies.arena_page import arena_page, refusal
     from tiltsim.studies.comparison import controller_tables
     from tiltsim.system.files import prepare_folder, replacing
     from tiltsim.views.figures import style
@@ -117,7 +117,7 @@ def run(arguments: argparse.Namespace) -> int:
     else:
         print(page)
         print_line(f"arena written to {arguments.out}")
-    require_flown([row["refused"] for chosen in rows.values() for row in chosen])
+    require_flown([refusal(row) for chosen in rows.values() for row in chosen])
     return 0
 
 

@@ -365,11 +365,8 @@ def with_measured_inputs(loop: ClosedLoop, inputs: Callable[..., Values]) -> Clo
         inputs: Its controls from the rotor accelerations on, as `SupervisedLaw.controls`.
     """
     assert loop.supervised is not None  # so has every controller that follows a gait
-    state_in, spins = loop.supervised.state, loop.dynamics.spins
-    thrusts, servo_commands = (
-        thrust_controls_of(spins),
-        servo_commands_of(places_of(loop.dynamics).tilts),
-    )
+    state_in, thrusts = loop.supervised.state, thrust_controls_of(loop.dynamics.spins)
+    servo_commands = servo_commands_of(places_of(loop.dynamics).tilts)
 
     @scalar
     def controls(

@@ -30,12 +30,6 @@ class Key(NamedTuple):
         """Of the law, with what it commands."""
         return f"{self.name}{'_free' * self.tilts}{'_late' * self.models_rotors}"
 
-    @property
-    def further_states(self) -> int:
-        """The number of the controller's: the law's, tilts that it commands, rotor speeds."""
-        rotors, tilts = self.layout.places
-        return len(self.states) + tilts * self.tilts + rotors * self.models_rotors
-
 
 @cache
 def record_of(parameters: type[tuple[Any, ...]]) -> Any:

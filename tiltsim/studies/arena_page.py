@@ -72,12 +72,16 @@ def _table(ranked: Sequence[Standing]) -> Iterator[str]:
     yield "| all tasks | " + " | ".join(cell(s.total, s.tuned_total) for s in ranked) + " |"
 
 
+def refusal(row: Mapping[str, Any]) -> str | None:
+    """Why a task refuses the controller, in words that other tasks share; None if it does not."""
+    reason: str | None = row["refused"]
+    return None if reason is None else reason.removeprefix(f"{row['scenario']}: ")
+
+
 def _failures(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
     """Refusals, each once, and flights that ended early."""
     refused = dict.fromkeys(
-        f"- `{row['controller']}`: {row['refused'].partition(': ')[2]}"
-        for row in rows
-        if row["end"] == "refused"
+        f"- `{row['controller']}`: {reason}" for row in rows if (reason := refusal(row)) is not None
     )
     lost = dict.fromkeys(
         f"- `{row['controller']}` in `{task_of(row)}`, {row['gains']} gains: {row['end']}"

@@ -74,4 +74,5 @@ def with_allocation(loop: ClosedLoop) -> ClosedLoop:
         return (*ctrl[:first], *accelerations, *ctrl[further:])
 
     layer = Layer("with_allocation", Allocation, _read, controls=controls)
+    # Part of the controller: who asks for its commands without layers gets them allocated.
     return replace(wrap_loop(loop, layer), within=None)
