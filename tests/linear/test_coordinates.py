@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
+from tiltsim import load_scenario
+from tiltsim.laws.assembling import assemble
 from tiltsim.linear.coordinates import MATRIX, QUATERNION, ROTATION_NAMES, Coordinates
+from tiltsim.linear.naming import equation_inputs
+from tiltsim.resources import shipped_folder
 from tiltsim_controllers.mathematics.rotation import rotation_from_quaternion
 
 NAMES = ("x", *ROTATION_NAMES, "speed")
@@ -50,3 +56,24 @@ def test_rates_are_those_of_the_coordinates(entries):
         ahead, behind = coordinates.moved(state, step * by), coordinates.moved(state, -step * by)
         derivative = (ahead - behind) / (2.0 * step)
         assert coordinates.rates(state, derivative) == pytest.approx(by, abs=1e-9)
+
+
+def test_a_vehicle_with_fewer_tilts_than_rotors_has_as_many_tilt_rates_as_tilts(tmp_path):
+    """Six rotors, of which the sixth does not tilt."""
+    folder, file = shipped_folder("mjcf"), tmp_path / "five_tilts.xml"
+    text = (folder / "tilt_hexarotor.xml").read_text().replace("scene.xml", f"{folder}/scene.xml")
+    text = re.sub(r'(?s)<\w+ name="(tilt_|tilt_angle_)6".*?/>|<keyframe>.*</keyframe>', "", text)
+    file.write_text(text)
+    tables = {
+        "title": "Full pose",
+        "source": "test",
+        "vehicle": {"model": "multirotor", "mjcf": str(file)},
+        "controller": {"law": "full_pose"},
+        "reference": {"type": "setpoint"},
+        "simulation": {"duration": 1.0, "plant": "thesis"},
+    }
+    assembly = assemble(load_scenario(tables))
+    names = equation_inputs(assembly, assembly.loop.equations.inputs_size)
+    rates = [f"alpha_rate_{arm}" for arm in range(1, 6)]
+    expected = [f"rotor_acceleration_{rotor}" for rotor in range(1, 7)] + rates
+    assert names == tuple((name, index) for index, name in enumerate(expected))

@@ -145,8 +145,8 @@ def equation_inputs(assembly: Assembly, size: int) -> tuple[tuple[str, int], ...
         if size > len(names):
             names = (*numbered(ROTOR_INPUT, 2), "alpha_rate")
     else:
-        rotors = len(loop.dynamics.spins)
-        names = numbered(ROTOR_INPUT, rotors)
-        if size == 2 * rotors:
-            names = (*names, *numbered("alpha_rate", rotors))
+        # Of the further inputs, those that integrate to commands of tilts turn the arms.
+        commands = (f for f in loop.columns.fields if f.startswith("tilt_command"))
+        rates = (command.replace("tilt_command", "alpha_rate") for command in commands)
+        names = (*numbered(ROTOR_INPUT, len(loop.dynamics.spins)), *rates)
     return tuple((name, index) for index, name in enumerate(names))
