@@ -192,7 +192,7 @@ NEVER_CALLED = {
 """Functions of modules that none of these flights calls."""
 
 
-@pytest.mark.slow
+@pytest.mark.slow(longest=True)
 def test_every_scalar_function_has_the_same_values_on_arrays():
     wrong, calls = all_differences(short_flights())
     assert wrong == {}

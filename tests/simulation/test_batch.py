@@ -307,7 +307,7 @@ def test_layers_around_the_law_that_knows_its_gait_fly_the_same_three_ways():
     assert all(row.end.kind == "completed" for row in rows)
 
 
-@pytest.mark.slow
+@pytest.mark.slow(longest=True)
 def test_rotors_with_inertia_fly_the_same_three_ways():
     knowing = {"controller": {"rotor_inertia_feedforward": True}}
     rows = three_ways(

@@ -82,7 +82,7 @@ def test_sixteen_threads_fly_what_each_flies_alone():
     assert_the_same_in_threads(flights + others)
 
 
-@pytest.mark.slow
+@pytest.mark.slow(longest=True)
 def test_two_hundred_flights_of_all_kinds_are_the_same_in_threads():
     engines, plants = ("python", "native"), ("mujoco", "thesis")
     scenarios = [
