@@ -225,6 +225,7 @@ def test_starts_on_one_model_are_those_of_a_new_environment():
         "ch02_singular_zone/exact_law#stable_gains",
         "beyond/gait_feedforward#t1",
         "beyond/allocation#prioritized_from_a_lean",
+        "fleet/arms_to_horizontal#hold",
     ],
 )
 def test_a_built_in_controller_commands_on_an_observation_what_it_does_in_its_plant(scenario):

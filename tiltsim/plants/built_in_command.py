@@ -50,7 +50,7 @@ def built_in_command(assembly: Assembly, plant: MujocoPlant) -> Command:
 class BuiltInController:
     """The built-in controller of a rotorcraft's scenario, as a function of what is observed.
 
-    It integrates its own states over ``simulation.control_timestep``.
+    It integrates its own states, and its supervisor's, over ``simulation.control_timestep``.
 
     Args:
         scenario: With a built-in controller.
@@ -72,9 +72,7 @@ class BuiltInController:
         self._loop, self._parameters = loop, parameters
         setup = assembly.setup._replace(parameters=parameters)
         initial = loop.dynamics.initial_activations(assembly, setup)
-        self._count = loop.dynamics.controller_states
-        self._speeds = len(initial) - self._count
-        self._states = list(initial[self._speeds :])
+        self._states = list(initial[layout_of(loop.dynamics).rotors :])
         self._period = simulation.control_timestep or simulation.timestep
 
     def __call__(self, seen: Observation) -> Command:
@@ -84,10 +82,10 @@ class BuiltInController:
         if layout_of(loop.dynamics).tilts:
             qpos, qvel = [*qpos, *seen.tilt_angles], [*qvel, *seen.tilt_rates]
         speeds = flip_by_spin(seen.rotor_speeds.tolist(), loop.dynamics.spins)
-        act = [*speeds[: self._speeds], *self._states]
+        act = [*speeds, *self._states]
         vectors = list(map(float, qpos)), list(map(float, qvel)), act
         ctrl = loop.sampling.controls(seen.time, *vectors, self._parameters, knots)
-        rates = ctrl[len(ctrl) - self._count :]
+        rates = ctrl[len(ctrl) - len(self._states) :]
         self._states = [
             state + self._period * rate for state, rate in zip(self._states, rates, strict=True)
         ]
