@@ -279,6 +279,8 @@ def run_command(call, folder):
     elif arguments[0] == "run" and arguments[1] not in BRIEF:
         quick = "duration=2.0" if "--controller" in arguments else "engine=native"
         arguments += ["--set", f"simulation.{quick}"]
+    elif arguments[0] == "stability" and "--sweep" in arguments:  # at few points
+        arguments = [re.sub("(=[^:]+:[^:]+).*", r"\1:3", one) for one in arguments]
     elif arguments[0] == "attraction":  # of few and short flights
         arguments += ["--coarse", "4", "--refine", "0", "--set", "simulation.duration=1.0"]
     also = EXPECTATION_FAILED if arguments[0] == "map" else VEHICLE_LOST
