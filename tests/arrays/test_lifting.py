@@ -181,7 +181,7 @@ def test_stages_of_a_step_do_not_multiply_the_operations():
 
 
 NEVER_CALLED = {
-    *("decoupling_matrix", "attitude_altitude_thrust_rate", "tilt_states"),
+    *("decoupling_matrix", "attitude_altitude_thrust_rate"),
     *("_fixed_jet", "_table_jet"),  # these gaits with more than four tilts
     "jet_cross",  # of a plane of torque-free forces that moves
     "torque_for",  # of the example package

@@ -288,7 +288,7 @@ def test_rows_with_and_without_layers_fly_the_same_three_ways():
             layered(),
         ]
     )
-    assert len({id(loop_of(row.scenario)) for row in rows}) == 6
+    assert len({id(loop_of(row.scenario)) for row in rows}) == 7
     paths = [row.flight.samples[:, 1:4].tolist() for row in rows]
     assert paths[0] == paths[-1]
     assert all(a != b for i, a in enumerate(paths[:-1]) for b in paths[:i])
