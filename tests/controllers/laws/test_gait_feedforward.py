@@ -31,13 +31,8 @@ from tiltsim_controllers.laws.gains import (
     second_order_gains,
     third_order_gains,
 )
-from tiltsim_controllers.laws.gait_feedforward import (
-    FeedforwardTerms,
-    Parameters,
-    spin_momentum,
-    spin_torques,
-    tracking_inputs,
-)
+from tiltsim_controllers.laws.gait_feedforward import FeedforwardTerms, Parameters, tracking_inputs
+from tiltsim_controllers.laws.rotor_spin import spin_momentum, spin_torques
 from tiltsim_controllers.references.trajectories import REFERENCE_TYPES, ReferenceParameters
 from tiltsim_controllers.vehicle.decoupling_matrix import (
     sines_and_cosines,
