@@ -330,3 +330,16 @@ def test_what_only_posix_has_is_guarded():
         at_the_top = {*imports(module, top_level)}
         assert not at_the_top & POSIX_ONLY, module
     assert found == GUARDED
+
+
+def test_modules_and_functions_fit_the_reader():
+    """Modules of at most 400 lines, functions of at most 80."""
+    modules = {name: len(file.read_text("utf-8").splitlines()) for name, file in FILES.items()}
+    functions = {
+        f"{module}.{node.name}": node.end_lineno - node.lineno + 1
+        for module, found in nodes().items()
+        for node in found
+        if isinstance(node, ast.FunctionDef)
+    }
+    assert [name for name, lines in modules.items() if lines > 400] == []
+    assert [name for name, lines in functions.items() if lines > 80] == []

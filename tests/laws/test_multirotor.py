@@ -13,7 +13,7 @@ from tests.refusals import refusal
 from tiltsim.errors import InputError
 from tiltsim.laws.assembling import assemble
 from tiltsim.laws.multirotor import multirotor_loop
-from tiltsim.laws.rotor_loop import Layout
+from tiltsim.laws.rotor_loop import RotorLayout
 from tiltsim.models.hover import hover_speeds
 from tiltsim.plants.factory import make_plant
 from tiltsim.resources import shipped_folder
@@ -294,7 +294,7 @@ def test_native_code_notices_at_which_sample_the_others_are_singular():
 
 
 def test_compiled_code_has_the_same_name_beside_a_loop_that_measures():
-    layout, form = Layout((0, 1, 0, 1), (1.0, -1.0, 1.0, -1.0)), Form(1)
+    layout, form = RotorLayout((0, 1, 0, 1), (1.0, -1.0, 1.0, -1.0)), Form(1)
     loop = multirotor_loop.__wrapped__(layout, form)
     names = [loop.native_name(plant) for plant in ("mujoco", "thesis")]
     measuring = multirotor_loop.__wrapped__(layout, form, measured=True)

@@ -25,15 +25,14 @@ from tiltsim.equations.actuator_level import (
 )
 from tiltsim.equations.solvers import identity
 from tiltsim.vehicles.rotorcraft import initial_motion
-from tiltsim.vehicles.rotorcraft.layout import QW, TILT_1, TILT_RATE_1
-from tiltsim.vehicles.rotorcraft.layout import Layout as Places
+from tiltsim.vehicles.rotorcraft.layout import QW, TILT_1, TILT_RATE_1, Layout
 from tiltsim_controllers.mathematics.records import make_record_type, vector_of
 from tiltsim_controllers.mathematics.rotation import rotation_from_quaternion, to_world
 from tiltsim_controllers.mathematics.scalar import Quad, Triple, Values, Vector, scalar
 from tiltsim_controllers.mathematics.vectors import componentwise, entries_of
 from tiltsim_controllers.vehicle.effectiveness import (
     ROTOR_FLOATS,
-    Layout,
+    TiltOfRotor,
     cross_table,
     effectiveness_of,
     tilts_of,
@@ -48,7 +47,7 @@ if TYPE_CHECKING:
 class Form(NamedTuple):
     """What the compiled code of a vehicle is made for; all its numbers are data."""
 
-    tilt_of_rotor: Layout
+    tilt_of_rotor: TiltOfRotor
     spins: Values
     has_limits: bool  # of rotor speeds or tilts
 
@@ -141,7 +140,7 @@ def rigid_body_of(form: Form) -> ActuatorPlant:
 def _rates_of(form: Form) -> Callable[..., Values]:
     """Scalar code of the derivative of the motion; see `ActuatorPlant.rates`."""
     layout, tilts = form.tilt_of_rotor, tilts_of(form.tilt_of_rotor)
-    places, qvel_1 = Places(len(layout), tilts), TILT_1 + tilts
+    places, qvel_1 = Layout(len(layout), tilts), TILT_1 + tilts
     velocity_in, omega_in = entries_of(qvel_1, 3), entries_of(qvel_1 + 3, 3)
     quaternion_in, tilts_in = entries_of(QW, 4), entries_of(TILT_1, tilts)
     tilt_rates_in = entries_of(qvel_1 + TILT_RATE_1, tilts)

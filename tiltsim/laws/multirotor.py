@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from tiltsim.closed_loop.loop import ClosedLoop
 from tiltsim.laws.multirotor_columns import NULL_PART, REFERENCES, margins_of, monitoring_of
-from tiltsim.laws.rotor_loop import Layout, RotorLaw, body_of_vehicle, layout_of_vehicle
+from tiltsim.laws.rotor_loop import RotorLaw, RotorLayout, body_of_vehicle, layout_of_vehicle
 from tiltsim.laws.rotorcraft import CONDITION
 from tiltsim.laws.tracking import tracking_fields, tracking_loop
 from tiltsim.models.rotor_table import Multirotor
@@ -74,7 +74,7 @@ def _watched(parameters: Any) -> Watched:
 
 
 @cache
-def multirotor_loop(layout: Layout, form: Form, measured: bool = False) -> ClosedLoop:
+def multirotor_loop(layout: RotorLayout, form: Form, measured: bool = False) -> ClosedLoop:
     """The controller of attitude and force of all multirotors of a layout.
 
     Args:

@@ -7,7 +7,7 @@ from functools import cache
 from typing import Any, Final
 
 from tiltsim.closed_loop.loop import ControlSetup, Monitoring
-from tiltsim.laws.rotor_loop import Layout, Margins, table_of
+from tiltsim.laws.rotor_loop import Margins, RotorLayout, table_of
 from tiltsim.laws.rotorcraft import (
     REFERENCE_COLUMNS,
     rotor_stops,
@@ -32,7 +32,7 @@ REFERENCES: Final = (*REFERENCE_COLUMNS, NULL_PART)
 
 
 @cache
-def margins_of(layout: Layout, dimension: int) -> Margins:
+def margins_of(layout: RotorLayout, dimension: int) -> Margins:
     """The columns that a sample alone decides."""
     places = layout.places
     return lambda samples, setup: torque_free_columns(
@@ -41,7 +41,7 @@ def margins_of(layout: Layout, dimension: int) -> Margins:
 
 
 @cache
-def monitoring_of(layout: Layout, form: Form) -> Monitoring:
+def monitoring_of(layout: RotorLayout, form: Form) -> Monitoring:
     """Where the outputs depend on each other or, in the norm of the speeds, a rotor stops."""
     places = layout.places
     tilts_in = entries_of(places.alpha_1, places.tilts)

@@ -8,7 +8,13 @@ from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from tiltsim.closed_loop.loop import ClosedLoop, Monitoring
-from tiltsim.laws.rotor_loop import Layout, RotorLaw, body_of_vehicle, layout_of_vehicle, rotor_loop
+from tiltsim.laws.rotor_loop import (
+    RotorLaw,
+    RotorLayout,
+    body_of_vehicle,
+    layout_of_vehicle,
+    rotor_loop,
+)
 from tiltsim.laws.rotorcraft import rotor_stops
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.tiltrotor_controllers import FullPoseController
@@ -23,7 +29,7 @@ if TYPE_CHECKING:
 
 
 @cache
-def _inputs_of(layout: Layout) -> Callable[..., Values]:
+def _inputs_of(layout: RotorLayout) -> Callable[..., Values]:
     """Scalar code of `RotorLaw.inputs`: the ``states`` are the commands of the servos."""
     rotors, tilts = layout.places
     accelerations, rates_in = entries_of(0, rotors), entries_of(rotors, tilts)
@@ -69,7 +75,7 @@ def _setup(plan: FlightPlan) -> tuple[Parameters, Values]:
 
 
 @cache
-def full_pose_loop(layout: Layout) -> ClosedLoop:
+def full_pose_loop(layout: RotorLayout) -> ClosedLoop:
     """Full-pose control of all multirotors of a layout."""
     places = layout.places
     speeds_in, stops = entries_of(places.speed_1, places.rotors), rotor_stops(places.rotors)

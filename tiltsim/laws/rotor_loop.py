@@ -1,9 +1,9 @@
 """Closed loops with any number of rotors: one factory for every control law.
 
 Native code wants to know how many rotors there are, which tilt together and which way they turn, so
-a loop is made for each such `Layout`, once. All other numbers of the vehicle are data. The rotors'
-speeds are states whose accelerations a law commands; tilts follow the gait, or are commands that a
-law integrates as states of its own.
+a loop is made for each such `RotorLayout`, once. All other numbers of the vehicle are data. The
+rotors' speeds are states whose accelerations a law commands; tilts follow the gait, or are commands
+that a law integrates as states of its own.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ Margins = Callable[[Mapping[str, Floats], ControlSetup], dict[str, Floats]]
 """``(samples by field, setup) -> columns`` that a sample's state alone decides."""
 
 
-class Layout(NamedTuple):
+class RotorLayout(NamedTuple):
     """What a rotorcraft's compiled code is made for."""
 
     tilt_of_rotor: tuple[int, ...]  # from 0; -1 for a fixed rotor
@@ -88,9 +88,9 @@ class Layout(NamedTuple):
         return f"multirotor_{tilts}_{''.join('p' if spin > 0.0 else 'm' for spin in self.spins)}"
 
 
-def layout_of_vehicle(vehicle: Multirotor, model: str = "multirotor") -> Layout:
+def layout_of_vehicle(vehicle: Multirotor, model: str = "multirotor") -> RotorLayout:
     """The layout of a vehicle."""
-    return Layout(layout_of(vehicle.table), vehicle.spins, model)
+    return RotorLayout(layout_of(vehicle.table), vehicle.spins, model)
 
 
 def _no_states(_plan: FlightPlan) -> Values:
@@ -181,7 +181,7 @@ def _integrated_of(tilts: int, state_1: int, rate_1: int) -> _Tilts:
     return commanded, commanded_motion
 
 
-def _sampling_of(layout: Layout, law: RotorLaw) -> Sampling:
+def _sampling_of(layout: RotorLayout, law: RotorLaw) -> Sampling:
     """The control step in MuJoCo."""
     rotors, tilts = layout.places
     state_in, inputs_of = state_of(layout.places), law.inputs
@@ -220,7 +220,7 @@ def _constant_attitude(time: float, values: Vector, parameters: Any, knots: Vect
     return x, y, z, reference.roll, reference.pitch, reference.yaw
 
 
-def _columns_of(layout: Layout, law: RotorLaw) -> Columns:
+def _columns_of(layout: RotorLayout, law: RotorLaw) -> Columns:
     """Samples of flights, and the columns of references and margin."""
     places, shown, references = layout.places, layout.shown, law.references or _constant_attitude
     fields, names = (*shown.observed_fields, *law.states), (*law.names, *shown.names("alpha_ref"))
@@ -256,7 +256,7 @@ def table_of(places: Places, setup: ControlSetup) -> Values:
 
 
 @cache
-def _motion_of(layout: Layout) -> Callable[..., Values]:
+def _motion_of(layout: RotorLayout) -> Callable[..., Values]:
     """`RotorLaw.motion` by a table of rotors."""
     motion_of_body = equations_of_motion_of(layout.tilt_of_rotor)
     # The thesis's equations have no gyroscopic torque but the quadrotor's.
@@ -278,7 +278,7 @@ def _motion_of(layout: Layout) -> Callable[..., Values]:
     return motion
 
 
-def _equations_of(layout: Layout, law: RotorLaw) -> Equations:
+def _equations_of(layout: RotorLayout, law: RotorLaw) -> Equations:
     """The law on the equations of motion, with pods that follow their commands exactly."""
     rotors, tilts = layout.places
     own, inputs_of, motion = len(law.states), law.inputs, law.motion or _motion_of(layout)
@@ -324,7 +324,7 @@ def _equations_of(layout: Layout, law: RotorLaw) -> Equations:
     return Equations(inputs, rotors + own, rates, initial, observe, tilts=tilts_of)
 
 
-def rotor_loop(layout: Layout, law: RotorLaw) -> ClosedLoop:
+def rotor_loop(layout: RotorLayout, law: RotorLaw) -> ClosedLoop:
     """The closed loop of a control law with all vehicles of a layout."""
     places, record = layout.places, head_of(law.parameters)
     sampling, equations = _sampling_of(layout, law), _equations_of(layout, law)

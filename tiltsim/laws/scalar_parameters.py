@@ -6,7 +6,7 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any, NamedTuple
 
-from tiltsim.laws.rotor_loop import Layout
+from tiltsim.laws.rotor_loop import RotorLayout
 from tiltsim_controllers.gaits.parameters import GaitParameters
 from tiltsim_controllers.mathematics.records import make_record_type
 from tiltsim_controllers.mathematics.scalar import Values
@@ -17,7 +17,7 @@ from tiltsim_controllers.vehicle.multirotor import Body
 class Key(NamedTuple):
     """All that a loop is compiled for."""
 
-    layout: Layout
+    layout: RotorLayout
     law: Callable[..., tuple[Values, Values, Values]]
     name: str
     parameters: type[tuple[Any, ...]]  # of the law

@@ -13,7 +13,7 @@ from functools import cache
 from typing import TYPE_CHECKING, Any, Final
 
 from tiltsim.closed_loop.loop import ClosedLoop, SupervisedLaw
-from tiltsim.laws.rotor_loop import Layout, RotorLaw, rotor_loop, with_measured_inputs
+from tiltsim.laws.rotor_loop import RotorLaw, RotorLayout, rotor_loop, with_measured_inputs
 from tiltsim.laws.rotorcraft import REFERENCE_COLUMNS, state_of
 from tiltsim.scenario.multirotor_controllers import AttitudeForceController
 from tiltsim.scenario.tiltrotor_controllers import AttitudeAltitudeController
@@ -52,7 +52,7 @@ def tracking_fields(plan: FlightPlan) -> dict[str, Any]:
 
 
 @cache
-def _inputs_of(layout: Layout, law: Callable[..., Values]) -> Callable[..., Values]:
+def _inputs_of(layout: RotorLayout, law: Callable[..., Values]) -> Callable[..., Values]:
     """Scalar code of `RotorLaw.inputs`: the ``states`` are the integrals."""
     inputs_in = entries_of(0, layout.places.rotors + STATES)
 
@@ -79,7 +79,7 @@ def _by_model(qvel: Vector) -> None:
 
 @cache
 def _controls_of(
-    layout: Layout, law: Callable[..., Values], measured: bool
+    layout: RotorLayout, law: Callable[..., Values], measured: bool
 ) -> Callable[..., Values]:
     """Scalar code of a law's controls from the rotor accelerations on; see `SupervisedLaw`.
 
@@ -111,7 +111,7 @@ def _controls_of(
 
 @cache
 def _references_of(
-    layout: Layout, law: Callable[..., Values], further: int
+    layout: RotorLayout, law: Callable[..., Values], further: int
 ) -> Callable[..., Values]:
     """Scalar code of position, attitude and further numbers; see `SupervisedLaw.references`."""
     rotors, tilts = layout.places
@@ -141,7 +141,7 @@ def follows_position(scenario: Scenario) -> bool:
 
 
 def tracking_loop(
-    layout: Layout,
+    layout: RotorLayout,
     law: RotorLaw,
     supervision: Supervision,
     watched: Callable[..., Any],

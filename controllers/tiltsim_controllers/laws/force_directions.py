@@ -26,7 +26,7 @@ from tiltsim_controllers.mathematics.jets import (
 )
 from tiltsim_controllers.mathematics.scalar import Triple, Values, Vector, scalar
 from tiltsim_controllers.mathematics.vectors import componentwise, vectors_of
-from tiltsim_controllers.vehicle.effectiveness import Layout, Rows, effectiveness_of, tilts_of
+from tiltsim_controllers.vehicle.effectiveness import Rows, TiltOfRotor, effectiveness_of, tilts_of
 from tiltsim_controllers.vehicle.rigid_body import cross
 
 Force = tuple[Values, Values, Values]
@@ -204,7 +204,7 @@ def _torque_free_jet_of(length: int) -> Callable[..., Jets3]:
 
 
 @cache
-def direction_jet_of(layout: Layout, dimension: int, losses: bool) -> Callable[..., Jets3]:
+def direction_jet_of(layout: TiltOfRotor, dimension: int, losses: bool) -> Callable[..., Jets3]:
     """The ``direction`` of one or two components over a planned gait, with derivatives.
 
     A scalar function ``(time, up, tilts, knots, at, failure)`` of the gait's tilts with

@@ -23,7 +23,7 @@ from tiltsim_controllers.laws.outer_loop import (
 from tiltsim_controllers.laws.rotor_allocation import planned_allocation_of, tilting_allocation_of
 from tiltsim_controllers.mathematics.rotation import rotation_from_euler, to_body
 from tiltsim_controllers.mathematics.scalar import Triple, Values, scalar
-from tiltsim_controllers.vehicle.effectiveness import Layout
+from tiltsim_controllers.vehicle.effectiveness import TiltOfRotor
 from tiltsim_controllers.vehicle.multirotor import inertia_times
 from tiltsim_controllers.vehicle.rigid_body import cross
 
@@ -89,7 +89,7 @@ def geometric_law_of(rotors: int) -> Callable[..., Commands]:
 
 
 @cache
-def free_geometric_law_of(layout: Layout) -> Callable[..., Commands]:
+def free_geometric_law_of(layout: TiltOfRotor) -> Callable[..., Commands]:
     """The law of vehicles of a layout whose tilts are its own: it tracks any attitude, too."""
     allocated = tilting_allocation_of(layout)
 

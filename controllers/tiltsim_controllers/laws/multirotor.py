@@ -63,7 +63,7 @@ from tiltsim_controllers.mathematics.jets import Jet, Jets3
 from tiltsim_controllers.mathematics.rotation import rotation_from_euler, to_body, to_world
 from tiltsim_controllers.mathematics.scalar import Triple, Values, Vector, scalar
 from tiltsim_controllers.mathematics.vectors import componentwise, entries_of, vectors_of
-from tiltsim_controllers.vehicle.effectiveness import Layout, Rows, effectiveness_of, tilts_of
+from tiltsim_controllers.vehicle.effectiveness import Rows, TiltOfRotor, effectiveness_of, tilts_of
 from tiltsim_controllers.vehicle.multirotor import body_acceleration, body_torque_rate
 from tiltsim_controllers.vehicle.rigid_body import cross
 from tiltsim_controllers.vehicle.states import PITCH, ROLL, YAW, P, Q, R
@@ -105,7 +105,7 @@ def direction_at_rest(
 
 
 @cache
-def _tilts_of(layout: Layout, form: Form) -> Callable[..., Jets]:
+def _tilts_of(layout: TiltOfRotor, form: Form) -> Callable[..., Jets]:
     """Scalar code of the gait's tilts with derivatives: ``(time, watching, parameters, knots)``.
 
     They are the anticipated ones of the plan or, under a supervisor, of what it makes of it.
@@ -137,7 +137,7 @@ def _tilts_of(layout: Layout, form: Form) -> Callable[..., Jets]:
 
 
 @cache
-def _direction_of(layout: Layout, form: Form) -> Callable[..., Jets3]:
+def _direction_of(layout: TiltOfRotor, form: Form) -> Callable[..., Jets3]:
     """Scalar code of the ``direction`` with derivatives, as `direction_at_rest`."""
     if form.dimension == 3 or form.forward or not tilts_of(layout):
         return direction_at_rest
@@ -161,7 +161,7 @@ def _direction_of(layout: Layout, form: Form) -> Callable[..., Jets3]:
 
 
 @cache
-def _horizontal_of(layout: Layout, form: Form) -> Callable[..., Horizontal]:
+def _horizontal_of(layout: TiltOfRotor, form: Form) -> Callable[..., Horizontal]:
     """Scalar code of what moves x and y: force as far as it is controlled, and leaning."""
     moving_direction, dimension = _direction_of(layout, form), form.dimension
 
@@ -224,7 +224,7 @@ def _horizontal_of(layout: Layout, form: Form) -> Callable[..., Horizontal]:
 
 
 @cache
-def _control_of(layout: Layout, form: Form) -> Callable[..., tuple[Any, ...]]:
+def _control_of(layout: TiltOfRotor, form: Form) -> Callable[..., tuple[Any, ...]]:
     """Scalar code of position and attitude control.
 
     ``(time, state, motion, direction, forces, integrals, supervisor_motion, parameters, knots)``;
@@ -271,7 +271,7 @@ def _control_of(layout: Layout, form: Form) -> Callable[..., tuple[Any, ...]]:
 
 
 @cache
-def _present_of(layout: Layout, form: Form) -> Callable[..., tuple[Any, ...]]:
+def _present_of(layout: TiltOfRotor, form: Form) -> Callable[..., tuple[Any, ...]]:
     """Scalar code of what the rotors do now, and how it changes as the pods turn.
 
     ``(time, state, tilt_rates, parameters, knots)``; it returns ``w``, the rows of F and tau, the
@@ -301,7 +301,7 @@ def _present_of(layout: Layout, form: Form) -> Callable[..., tuple[Any, ...]]:
 
 
 @cache
-def multirotor_law_of(layout: Layout, form: Form) -> Callable[..., Values]:
+def multirotor_law_of(layout: TiltOfRotor, form: Form) -> Callable[..., Values]:
     """The control law of vehicles of a layout.
 
     It is a scalar function as `tiltsim_controllers.laws.gait_feedforward.tracking_inputs`, with the

@@ -33,8 +33,8 @@ from tiltsim_controllers.mathematics.vectors import (
 )
 from tiltsim_controllers.references.trajectories import ReferenceParameters
 from tiltsim_controllers.vehicle.effectiveness import (
-    Layout,
     Rows,
+    TiltOfRotor,
     effectiveness_of,
     layout_of,
     tilts_of,
@@ -59,7 +59,7 @@ class Parameters(NamedTuple):
 
 
 @cache
-def pose_rows_of(layout: Layout) -> Callable[..., Rows]:
+def pose_rows_of(layout: TiltOfRotor) -> Callable[..., Rows]:
     """Scalar code ``(rows, turned, w)``: force and torque per rate of every input, body axes.
 
     Columns are those of the rates of ``w``, then of the tilts; ``rows`` are F and tau, ``turned``
@@ -95,7 +95,7 @@ def pose_rank(table: Sequence[float], tilts: Sequence[float], w: ArrayLike) -> i
 
 
 @cache
-def full_pose_law_of(layout: Layout) -> Callable[..., Values]:
+def full_pose_law_of(layout: TiltOfRotor) -> Callable[..., Values]:
     """The control law of vehicles of a layout: scalar code ``(time, state, parameters, knots)``.
 
     ``state`` has twelve numbers of the body (`tiltsim_controllers.vehicle.states.BODY_FIELDS`), the

@@ -21,14 +21,14 @@ from tiltsim_controllers.laws.force_directions import (
 from tiltsim_controllers.laws.least_norm import nearest_of, shares_of
 from tiltsim_controllers.mathematics.scalar import Triple, Values, Vector, scalar
 from tiltsim_controllers.mathematics.vectors import componentwise, vectors_of
-from tiltsim_controllers.vehicle.effectiveness import Layout, Rows, effectiveness_of, tilts_of
+from tiltsim_controllers.vehicle.effectiveness import Rows, TiltOfRotor, effectiveness_of, tilts_of
 
 NORMS: Final = ("speed", "thrust")
 """Norms in which the inputs are the least: of rotor accelerations, or of the rates of ``w``."""
 
 
 @cache
-def pushing_of(layout: Layout) -> Callable[..., tuple[Rows, Values, Values]]:
+def pushing_of(layout: TiltOfRotor) -> Callable[..., tuple[Rows, Values, Values]]:
     """Scalar code ``(tilts, tilt_rates, w, table, at)``: rows of F and tau, wrench and its rate.
 
     The rate is that of the pods' motion at constant rotor speeds.

@@ -21,7 +21,7 @@ from tiltsim_controllers.laws.supervisor import UNTILTED, Supervision, supervisi
 from tiltsim_controllers.mathematics.scalar import Triple, Values, Vector, scalar
 from tiltsim_controllers.mathematics.vectors import vectors_of
 from tiltsim_controllers.vehicle.effectiveness import (
-    Layout,
+    TiltOfRotor,
     effectiveness_of,
     force_and_torque,
     layout_of,
@@ -54,7 +54,9 @@ def watched(table: Sequence[float], rotors: int, side: Triple) -> Watched:
 
 
 @cache
-def multirotor_supervision_of(layout: Layout, dimension: int, forward: bool = False) -> Supervision:
+def multirotor_supervision_of(
+    layout: TiltOfRotor, dimension: int, forward: bool = False
+) -> Supervision:
     """The supervisor of vehicles of a layout, whose ``vehicle`` is a `Watched`.
 
     Args:

@@ -22,7 +22,7 @@ from tiltsim_controllers.mathematics.vectors import (
     vectors_of,
     written_out,
 )
-from tiltsim_controllers.vehicle.effectiveness import Layout, effectiveness_of, tilts_of
+from tiltsim_controllers.vehicle.effectiveness import TiltOfRotor, effectiveness_of, tilts_of
 
 
 class PlannedAllocation(NamedTuple):
@@ -71,7 +71,7 @@ def planned_allocation_of(rotors: int) -> PlannedAllocation:
 
 
 @cache
-def tilting_allocation_of(layout: Layout) -> Callable[..., tuple[Values, Values]]:
+def tilting_allocation_of(layout: TiltOfRotor) -> Callable[..., tuple[Values, Values]]:
     """Scalar code ``(observed, force, torque) -> thrusts, tilts`` for rotors with a tilt each.
 
     The shortest ``T cos(alpha), T sin(alpha)`` of all rotors that make force (N) and torque (N m),

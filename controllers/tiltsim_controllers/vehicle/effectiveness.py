@@ -41,7 +41,7 @@ VECTOR_FLOATS: Final = 9
 """Floats of a vector that turns with a rotor's pod, as its place and its thrust axis do: constant,
 cosine and sine, x, y, z each."""
 
-Layout = tuple[int, ...]
+TiltOfRotor = tuple[int, ...]
 """The number of every rotor's tilt, from 0; -1: fixed. Scalar code is made for a layout."""
 
 Rows = tuple[Values, Values, Values, Values, Values, Values]
@@ -145,12 +145,12 @@ def cross_table(vehicle: Vehicle, *, tilting: bool) -> Values:
     return tuple(table)
 
 
-def layout_of(table: Sequence[float]) -> Layout:
+def layout_of(table: Sequence[float]) -> TiltOfRotor:
     """The layout of a table."""
     return tuple(int(tilt) for tilt in table[TILT::ROTOR_FLOATS])
 
 
-def tilts_of(layout: Layout) -> int:
+def tilts_of(layout: TiltOfRotor) -> int:
     """The number of tilts of a layout."""
     return max(layout) + 1
 
@@ -168,7 +168,7 @@ class Effectiveness(NamedTuple):
 
 
 @cache
-def effectiveness_of(layout: Layout) -> Effectiveness:
+def effectiveness_of(layout: TiltOfRotor) -> Effectiveness:
     """The functions for a layout."""
     name = "_".join(str(tilt) if tilt >= 0 else "f" for tilt in layout)
     tilts = tilts_of(layout)
@@ -191,7 +191,7 @@ def effectiveness_of(layout: Layout) -> Effectiveness:
 
 
 @cache
-def turning_vectors_of(layout: Layout) -> Callable[..., tuple[Values, Values, Values]]:
+def turning_vectors_of(layout: TiltOfRotor) -> Callable[..., tuple[Values, Values, Values]]:
     """As `Effectiveness.rows`, of a table of `VECTOR_FLOATS`: x, y and z by rotor."""
     name = "_".join(str(tilt) if tilt >= 0 else "f" for tilt in layout)
     vectors: Callable[..., tuple[Values, Values, Values]] = written_out(
@@ -203,7 +203,7 @@ def turning_vectors_of(layout: Layout) -> Callable[..., tuple[Values, Values, Va
 _ROW_ARGUMENTS: Final = "constant, cosines, sines, table, at"
 
 
-def _rows(layout: Layout, size: int, first: int, components: int) -> str:
+def _rows(layout: TiltOfRotor, size: int, first: int, components: int) -> str:
     """The text of components by rotor, from a table of so many floats a rotor.
 
     The constants of a rotor begin at ``first``; its cosines and sines follow.

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from tiltsim_controllers.mathematics.rotation import to_world
 from tiltsim_controllers.mathematics.scalar import Triple, Values, Vector, scalar
 from tiltsim_controllers.mathematics.vectors import entries_of
-from tiltsim_controllers.vehicle.effectiveness import Layout, effectiveness_of
+from tiltsim_controllers.vehicle.effectiveness import TiltOfRotor, effectiveness_of
 from tiltsim_controllers.vehicle.parameters import Vehicle
 from tiltsim_controllers.vehicle.rigid_body import cross
 
@@ -156,7 +156,7 @@ def body_rates(
 
 
 @cache
-def equations_of_motion_of(layout: Layout) -> Callable[..., Values]:
+def equations_of_motion_of(layout: TiltOfRotor) -> Callable[..., Values]:
     """The equations of motion of vehicles of a layout.
 
     They are a scalar function ``(state, tilts, inputs, body, table, at, disturbance, gyroscopic)

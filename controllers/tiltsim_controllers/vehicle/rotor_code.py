@@ -29,8 +29,8 @@ from tiltsim_controllers.vehicle.effectiveness import (
     ROTOR_FLOATS,
     SPIN_SIGN,
     VECTOR_FLOATS,
-    Layout,
     Rotor,
+    TiltOfRotor,
     effectiveness_of,
     tilts_of,
     turning_vectors_of,
@@ -260,7 +260,7 @@ def _inverse(momentum: Triple, rotors: Any) -> Triple:
 
 
 @cache
-def _torque_of(layout: Layout) -> Callable[..., Triple]:
+def _torque_of(layout: TiltOfRotor) -> Callable[..., Triple]:
     wrench_of = effectiveness_of(layout).wrench
     squares = componentwise(
         "squares_of_thrusts",
@@ -294,7 +294,7 @@ def _pods_of(tilts: int) -> Callable[..., Triple]:
 
 
 @cache
-def rotor_code_of(layout: Layout) -> RotorCode:
+def rotor_code_of(layout: TiltOfRotor) -> RotorCode:
     """The functions for any rotors of a layout."""
     count, code, vectors = len(layout), effectiveness_of(layout), turning_vectors_of(layout)
     cosines_of, sines_of = code.cosines, code.sines
