@@ -113,7 +113,7 @@ class AttitudeForceController(GaitFollowingController, FailureAwareController):
     def resolve_force(self, vehicle: Multirotor, gait: Gait) -> Form:
         """The form of the law, whose components of force are checked over the gait."""
         lost = self.failed_rotor
-        least, where = min(force_dimension(vehicle, gait, rotor) for rotor in {None, lost})
+        least, where = self.least_dimension(vehicle, gait)
         if least == 0 and where.endswith(f"rotor {lost}"):
             raise self.mistake("failed_rotor", "the others are singular at every attitude")
         if least == 0:
@@ -129,6 +129,10 @@ class AttitudeForceController(GaitFollowingController, FailureAwareController):
             self.prioritizes_attitude,
             self.supervisor is not None,
         )
+
+    def least_dimension(self, vehicle: Multirotor, gait: Gait) -> tuple[int, str]:
+        """The `force_dimension`, with and without the failed rotor."""
+        return min(force_dimension(vehicle, gait, lost) for lost in {None, self.failed_rotor})
 
     def resolve_restoring(self, rotors: int, dimension: int, gait: Gait) -> float:
         """The restoring rate, 1/s."""

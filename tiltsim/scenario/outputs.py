@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.messages import InvalidValueError
-from tiltsim.scenario.multirotor_controllers import AttitudeForceController, force_dimension
+from tiltsim.scenario.multirotor_controllers import AttitudeForceController
 from tiltsim.scenario.scenario_tables import ScenarioTables
 from tiltsim.scenario.tiltrotor_controllers import FullPoseController
 from tiltsim_controllers.gaits.plans import Gait, fixed
@@ -38,12 +38,14 @@ def _check_scaling(
     supervisor = controller.supervision
     if supervisor is None or supervisor.strategy != "scale":
         return
-    untilted, _ = force_dimension(vehicle, fixed((0.0,) * vehicle.tilts))
-    if 0 < untilted < dimension:
+    supervisor.resolve(vehicle)  # refuses a vehicle that has no lift there with all its rotors
+    untilted, where = controller.least_dimension(vehicle, fixed((0.0,) * vehicle.tilts))
+    if untilted < dimension:
+        or_less = f", or set controller.dimension = {untilted}" if untilted else ""
         raise supervisor.mistake(
             "strategy",
-            f"untilted the vehicle has {untilted} of the {dimension} components of force; choose "
-            f"hold, or set controller.dimension = {untilted}",
+            f"the vehicle has {untilted} of the {dimension} components of force {where}; choose "
+            f"hold{or_less}",
         )
 
 

@@ -240,7 +240,7 @@ def test_six_arms_hold_a_gait_that_would_push_aside_until_the_vehicle_leans():
     ("name", "strategy", "message"),
     [
         ("tilt_hexarotor", "return_to_red", "only the tiltrotor has red gaits"),
-        ("tilt_hexarotor", "scale", "untilted the vehicle has 1 of the 3 components of force"),
+        ("tilt_hexarotor", "scale", "the vehicle has 1 of the 3 components of force at tilt"),
         ("hexarotor", "hold", "vehicle.mjcf has no tilts"),
     ],
 )
@@ -249,3 +249,20 @@ def test_what_there_is_nothing_to_supervise_for_is_refused(name, strategy, messa
     gait = {"gait": TILTS} if strategy == "scale" else {}
     line = refusal(scenario, name, controller=controller, **gait)
     assert f'controller.supervisor.strategy = "{strategy}": {message}' in line
+
+
+def test_scaling_is_refused_towards_angles_of_too_little_force_without_the_lost_rotor(tmp_path):
+    """Untilted all but one of six rotors are parallel, and that one is lost."""
+    text = fleet_file("tilt_hexarotor").read_text()
+    text = text.replace("scene.xml", str(fleet_file("scene")))
+    inclined = 'name="rotor_6" class="vehicle" axisangle="1 0 0 0.3"'
+    vehicle = tmp_path / "inclined.xml"
+    vehicle.write_text(text.replace('name="rotor_6" class="vehicle"', inclined))
+    law = {"law": "attitude_force", "dimension": 2, "supervisor": {"strategy": "scale"}}
+    tables = {"vehicle": {"mjcf": str(vehicle)}, "gait": TILTS}
+    scenario("tilt_hexarotor", controller=law, **tables)
+    line = refusal(scenario, "tilt_hexarotor", controller={**law, "failed_rotor": 6}, **tables)
+    assert line.endswith(
+        'strategy = "scale": the vehicle has 1 of the 2 components of force at tilt angles '
+        "(0, 0, 0, 0, 0, 0) rad, without rotor 6; choose hold, or set controller.dimension = 1"
+    )
