@@ -14,12 +14,15 @@ from tiltsim.errors import InputError
 from tiltsim.laws.assembling import assemble
 from tiltsim.laws.multirotor import multirotor_loop
 from tiltsim.laws.rotor_loop import RotorLayout
+from tiltsim.laws.rotorcraft import torque_free_columns
 from tiltsim.models.hover import hover_speeds
 from tiltsim.plants.factory import make_plant
 from tiltsim.resources import shipped_folder
 from tiltsim.scenario.loading import merge
+from tiltsim.vehicles.rotorcraft.layout import Layout
 from tiltsim_controllers.analysis.singularity import world_up
 from tiltsim_controllers.analysis.torque_free import hover_direction, torque_free_forces
+from tiltsim_controllers.laws.failures import Failure
 from tiltsim_controllers.laws.multirotor_steps import Form
 from tiltsim_controllers.vehicle.effectiveness import force_and_torque
 
@@ -168,11 +171,35 @@ def test_without_a_rotor_a_flight_ends_where_the_others_are_singular(plant):
     along = world_up(flight["roll"], flight["pitch"]) @ side
     assert along[-1] < 0.0 < along[:-1].min()
     known = flight["time"] >= 0.01
-    margin = np.abs(flight["singularity_margin"])
-    np.testing.assert_allclose(margin[known], np.abs(np.arcsin(along[known])), atol=1e-9)
+    margin = flight["singularity_margin"]
+    np.testing.assert_allclose(margin[known], np.arcsin(along[known]), atol=1e-9)
     assert margin[~known].min() > margin[known].max() + 0.3
     condition = flight["decoupling_condition"]
     assert condition[-1] < 0.1 * condition[~known].min()
+
+
+def test_margins_of_flights_that_lose_rotors_at_other_times_are_those_of_each():
+    vehicle = tiltsim.load_scenario(document("pentarotor", PENTAROTOR)).vehicle.resolve()
+    time, roll = np.linspace(0.0, 1.0, 9), np.linspace(1.2, 1.5, 9)
+    failures = [Failure(5.0, 0.5), Failure(), Failure(4.0, 0.25), Failure(5.0, 0.75)]
+
+    def margin(failure, flights=1):
+        samples = {"time": np.tile(time, flights), "roll": np.tile(roll, flights)}
+        samples["pitch"] = np.zeros(9 * flights)
+        columns = torque_free_columns(Layout(5, 0), vehicle.table, samples, 1, failure)
+        return columns["singularity_margin"]
+
+    alone = [margin(failure) for failure in failures]
+    of_samples = Failure(*(np.repeat(field, 9) for field in zip(*failures, strict=True)))
+    np.testing.assert_array_equal(margin(of_samples, 4), np.concatenate(alone))
+    force, torque = force_and_torque(vehicle.table, ())
+    for failure, values in zip(failures, alone, strict=True):
+        works, known = np.arange(1.0, 6.0) != failure.rotor, time >= failure.known_from
+        along = world_up(roll, 0.0 * roll) @ hover_direction(
+            torque_free_forces(force * works, torque * works)
+        )
+        np.testing.assert_allclose(values[known], np.arcsin(along[known]), atol=1e-9)
+        assert (values[~known] > 0.5).all()  # of all rotors, which have two directions
 
 
 @pytest.mark.parametrize("aware", [True, False])

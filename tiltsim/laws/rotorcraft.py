@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from tiltsim.closed_loop.loop import ControlSetup
-from tiltsim.engines.sample_evaluation import evaluate_over_samples, flights_in
+from tiltsim.engines.sample_evaluation import evaluate_over_samples
 from tiltsim.vehicles.rotorcraft.layout import QW, QX, QY, QZ, TILT_1, TILT_RATE_1, Layout
 from tiltsim_controllers.analysis.singularity import world_up
 from tiltsim_controllers.analysis.torque_free import (
@@ -173,12 +173,15 @@ def torque_free_columns(
     """
     names = layout.names("alpha")
     angles = np.reshape([samples[name] for name in names], (len(names), len(samples["time"]))).T
-    lost = np.arange(1, layout.rotors + 1) == failure.rotor
-    works = ~(lost & (samples["time"][:, np.newaxis] >= failure.known_from))[:, np.newaxis]
+    time, rotors = samples["time"], np.arange(1, layout.rotors + 1)
+    known = time >= failure.known_from
+    lost = known[:, np.newaxis] & (rotors == np.reshape(failure.rotor, (-1, 1)))
+    works = ~lost[:, np.newaxis]
     force, torque = force_and_torque(table, angles)
     pushing, up = (force * works, torque * works), world_up(samples["roll"], samples["pitch"])
     forces = torque_free_forces(*pushing)
-    columns = {"singularity_margin": margin_over_flight(forces, up, flights_in(samples["time"]))}
+    begins = (time == time[:1]) | (known != np.roll(known, 1))
+    columns = {"singularity_margin": margin_over_flight(forces, up, begins)}
     if dimension is not None:
         axes = controlled_axes(forces, up, dimension)
         columns[CONDITION] = decoupling_condition(*pushing, axes)

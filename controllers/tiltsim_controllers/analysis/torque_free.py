@@ -77,30 +77,34 @@ def singularity_margin(forces: TorqueFreeForces, up: ArrayLike = LEVEL) -> Float
     return np.asarray(np.arcsin(np.minimum(1.0, np.linalg.norm(along, axis=-1))))
 
 
-def margin_over_flight(forces: TorqueFreeForces, up: ArrayLike, flights: int = 1) -> Floats:
-    """Margin (rad) along a flight, shape (N,), negative beyond a singularity.
+def margin_over_flight(
+    forces: TorqueFreeForces, up: ArrayLike, begins: NDArray[np.bool_]
+) -> Floats:
+    """Margin (rad) along flights, shape (N,), negative beyond a singularity.
 
-    A great circle of singular directions has two sides, and world up starts on the positive one:
-    that of level attitude at the first sample. Elsewhere a flight goes past what is singular, and
-    this is `singularity_margin`.
+    A great circle of singular directions has two sides, and world up begins on the positive one:
+    that of level attitude then. Elsewhere a flight goes past what is singular, and this is
+    `singularity_margin`. A rotor that is lost may leave a great circle where there was none.
 
     Args:
         forces: in order of time
         up: world up in body axes, unit vectors of shape (N, 3)
-        flights: how many flights, of equal length, follow one another
+        begins: shape (N,), true where a flight begins, and where it goes on without a rotor
     """
     margin = singularity_margin(forces, up)
-    one_circle = (forces.dimension.reshape(flights, -1) == 1).all(axis=-1)
-    if not (one_circle.any() and margin.size):
+    starts, part = np.flatnonzero(begins), np.cumsum(begins) - 1
+    one_circle = np.logical_and.reduceat(forces.dimension == 1, starts)[part]
+    if not one_circle.any():
         return margin
     square = np.diagonal(forces.projector, axis1=-2, axis2=-1)
     along = square.argmax(axis=-1)[:, np.newaxis, np.newaxis]
     direction = np.take_along_axis(forces.projector, along, axis=-1)[..., 0]
-    turns = np.einsum("ki,ki->k", direction, np.roll(direction, 1, axis=0)).reshape(flights, -1)
-    turns[:, 0] = direction.reshape(flights, -1, 3)[:, 0, 2]  # from upward, at first
-    sides = np.cumprod(np.where(turns < 0.0, -1.0, 1.0), axis=-1)
-    side = sides.ravel() * np.einsum("ki,ki->k", direction, np.asarray(up, float))
-    crossed = (side < 0.0) & np.repeat(one_circle, len(side) // flights)
+    cosines = np.einsum("ki,ki->k", direction, np.roll(direction, 1, axis=0))
+    cosines[starts] = direction[starts, 2]  # from upward
+    turns = np.where(cosines < 0.0, -1.0, 1.0)
+    sides = np.cumprod(turns)
+    sides *= (turns * sides)[starts][part]  # of those since the part began
+    crossed = one_circle & (sides * np.einsum("ki,ki->k", direction, np.asarray(up, float)) < 0.0)
     return np.where(crossed, -margin, margin)
 
 
