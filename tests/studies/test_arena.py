@@ -71,7 +71,25 @@ def test_the_page_says_first_where_a_baseline_wins(rows):
     assert "| `circle` | 25 | - | 50 |" in lines
     assert "- `pid`: needs legs" in lines
     assert "- `lqr` in `step`, default gains: singular" in lines
-    assert not arena.beaten(arena.standings(rows[2:4]), "default")
+
+
+def test_the_page_of_controllers_without_rivals_names_no_winner(rows):
+    alone, baselines = rows[2:4], [*rows[:2], *rows[4:]]
+    page = arena_page({"tiltrotor": alone, "quadrotor": baselines}, ["Made."])
+    assert "baseline" not in page
+    assert page.startswith("# Arena\n\n## All tasks")
+    both = arena_page({"tiltrotor": rows, "quadrotor": baselines}, ["Made."]).splitlines()
+    assert both[2].endswith("in 2 of 2 tasks: tiltrotor 2.")
+
+
+def test_refusals_that_differ_in_numbers_stand_on_the_page_once(rows):
+    refused = [row("pid", task, end="refused") for task in ("gust", "step", "circle")]
+    for one, legs in zip(refused, ("4", "2.5e-3", "4"), strict=True):
+        one["refused"] = f"{one['scenario']}: needs {legs} legs"
+    lines = arena_page({"tiltrotor": [*rows[2:], *refused]}, []).splitlines()
+    first = lines.index("Refused (-):")
+    assert lines[first + 2] == "- `pid`: needs 4 legs (elsewhere with other numbers)"
+    assert not lines[first + 3]
 
 
 @pytest.fixture

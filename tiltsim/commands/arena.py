@@ -76,8 +76,8 @@ def run(arguments: argparse.Namespace) -> int:
     from tiltsim.commands.controllers import chosen_controllers, names
     from tiltsim.report.made import Made
     from tiltsim.studies.arena import chosen_vehicles, fitting, fly_tasks, standings
-    from tiltsim.studies.arena_page import arena_page, refusal
-    from tiltsim.studies.comparison import controller_tables
+    from tiltsim.studies.arena_page import arena_page
+    from tiltsim.studies.comparison import controller_tables, refusal
     from tiltsim.system.files import prepare_folder, replacing
     from tiltsim.views.figures import style
     from tiltsim.views.figures.arena_scores import arena_figure

@@ -69,7 +69,7 @@ def run(arguments: argparse.Namespace) -> int:
     from tiltsim.plants.trust import is_trusted
     from tiltsim.scenario.override_keys import parse_override
     from tiltsim.studies.checking import collect
-    from tiltsim.studies.comparison import compare
+    from tiltsim.studies.comparison import compare, refusal
     from tiltsim.system.files import prepare_folder
 
     if arguments.out is not None:
@@ -94,7 +94,7 @@ def run(arguments: argparse.Namespace) -> int:
     finally:  # what is flown is shown, even if the rest is interrupted
         if compared:
             _show(compared, arguments)
-    require_flown([one.row["refused"] for one in compared])
+    require_flown([refusal(one.row) for one in compared])
     return 0
 
 

@@ -7,14 +7,13 @@ import json
 import shlex
 import shutil
 import sys
-from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from textwrap import fill
 from typing import Any, Final
 
 from tiltsim.errors import InputError
-from tiltsim.system.text import printable, shortened
+from tiltsim.system.text import alike, printable, shortened
 
 LONGEST_REASON: Final = 300
 """Characters of a reason; messages that list what is allowed can be long."""
@@ -42,10 +41,14 @@ def tally(counts: Mapping[str, int]) -> str:
 
 
 def most_frequent(reasons: Sequence[str]) -> str:
-    """Of some reasons the most frequent one, in a line that says how many have it."""
-    ((reason, number),) = Counter(reasons).most_common(1)
+    """Of some reasons the most frequent one, in a line that says how many have it.
+
+    Those that differ in nothing but numbers count as one, and the first of them is shown.
+    """
+    kinds = alike(reasons)
+    reason = max(kinds, key=lambda first: len(kinds[first]))
     shown = shortened(reason, LONGEST_REASON)
-    return f"most frequent reason ({number} of {len(reasons)}): {shown}"
+    return f"most frequent reason ({len(kinds[reason])} of {len(reasons)}): {shown}"
 
 
 def require_flown(reasons: Sequence[str | None]) -> None:

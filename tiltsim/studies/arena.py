@@ -220,6 +220,11 @@ def _scores(standing: Standing, gains: str) -> Mapping[str, float | None]:
     return standing.tuned if gains == "tuned" else standing.scores
 
 
+def are_rivals(every: Sequence[Standing]) -> bool:
+    """Whether both baselines and others are among the controllers of a vehicle."""
+    return len({one.controller in BASELINES for one in every}) > 1
+
+
 def beaten(every: Sequence[Standing], gains: str) -> list[str]:
     """Of each task in which a baseline stands before all other controllers, who wins.
 
@@ -227,10 +232,12 @@ def beaten(every: Sequence[Standing], gains: str) -> list[str]:
         every: The controllers of a vehicle.
         gains: default or tuned.
     """
+    if not are_rivals(every):
+        return []
     known = [one for one in every if one.controller in BASELINES]
     others = [one for one in every if one.controller not in BASELINES]
     lines = []
-    for task in every[0].scores if known and others else ():
+    for task in every[0].scores:
         (winner, high), (loser, low) = best(known, task, gains), best(others, task, gains)
         if high > low:
             lines.append(f"`{task}` (`{winner}` {high:.0f}, `{loser}` {low:.0f})")

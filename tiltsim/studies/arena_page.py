@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from tiltsim.studies.arena import Standing, beaten, changed, standings, task_of
+from tiltsim.studies.arena import Standing, are_rivals, beaten, changed, standings, task_of
+from tiltsim.studies.comparison import refusal
+from tiltsim.system.text import alike
 
 
 def arena_page(rows: Mapping[str, Sequence[Mapping[str, Any]]], made: Sequence[str]) -> str:
@@ -31,11 +33,12 @@ def is_tuned(rows: Mapping[str, Sequence[Mapping[str, Any]]]) -> bool:
 
 
 def _baselines_win(every: Mapping[str, Sequence[Standing]], kinds: Sequence[str]) -> Iterator[str]:
-    """In how many tasks."""
-    tasks = sum(len(ranked[0].scores) for ranked in every.values() if ranked)
-    for gains in kinds:
-        won = {vehicle: len(beaten(ranked, gains)) for vehicle, ranked in every.items()}
-        shares = (f"{vehicle} {won[vehicle]}" for vehicle in every)
+    """In how many tasks, of the vehicles that baselines and others flew."""
+    rivals = {vehicle: ranked for vehicle, ranked in every.items() if are_rivals(ranked)}
+    tasks = sum(len(ranked[0].scores) for ranked in rivals.values())
+    for gains in kinds if rivals else ():
+        won = {vehicle: len(beaten(ranked, gains)) for vehicle, ranked in rivals.items()}
+        shares = (f"{vehicle} {number}" for vehicle, number in won.items())
         yield (
             f"With {gains} gains a baseline beats all other controllers that flew in "
             f"{sum(won.values())} of {tasks} tasks: {', '.join(shares)}."
@@ -45,10 +48,10 @@ def _baselines_win(every: Mapping[str, Sequence[Standing]], kinds: Sequence[str]
 
 def _winners(ranked: Sequence[Standing], kinds: Sequence[str]) -> Iterator[str]:
     """Of one vehicle, where baselines win, and where tuning changes who wins."""
-    for gains in kinds:
+    for gains in kinds if are_rivals(ranked) else ():
         won = ", ".join(beaten(ranked, gains)) or "nowhere"
         yield f"- a baseline wins with {gains} gains: {won}"
-    if len(kinds) > 1:
+    if len(kinds) > 1 and len(ranked) > 1:
         yield f"- tuning changes who wins: {', '.join(changed(ranked)) or 'nowhere'}"
 
 
@@ -72,17 +75,17 @@ def _table(ranked: Sequence[Standing]) -> Iterator[str]:
     yield "| all tasks | " + " | ".join(cell(s.total, s.tuned_total) for s in ranked) + " |"
 
 
-def refusal(row: Mapping[str, Any]) -> str | None:
-    """Why a task refuses the controller, in words that other tasks share; None if it does not."""
-    reason: str | None = row["refused"]
-    return None if reason is None else reason.removeprefix(f"{row['scenario']}: ")
-
-
 def _failures(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
-    """Refusals, each once, and flights that ended early."""
-    refused = dict.fromkeys(
-        f"- `{row['controller']}`: {reason}" for row in rows if (reason := refusal(row)) is not None
-    )
+    """Refusals, each once whatever its numbers, and flights that ended early."""
+    reasons: dict[str, list[str]] = {}
+    for row in rows:
+        if (reason := refusal(row)) is not None:
+            reasons.setdefault(row["controller"], []).append(reason)
+    refused = [
+        f"- `{name}`: {reason}{' (elsewhere with other numbers)' * (len({*found}) > 1)}"
+        for name, of_controller in reasons.items()
+        for reason, found in alike(of_controller).items()
+    ]
     lost = dict.fromkeys(
         f"- `{row['controller']}` in `{task_of(row)}`, {row['gains']} gains: {row['end']}"
         for row in rows

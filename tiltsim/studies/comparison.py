@@ -200,6 +200,12 @@ def fly_entries(
     yield from in_order((places[entry], future.result()) for entry, future in flown)
 
 
+def refusal(row: Mapping[str, Any]) -> str | None:
+    """Why a scenario refuses the controller, without its address; None if it does not."""
+    reason: str | None = row["refused"]
+    return None if reason is None else reason.removeprefix(f"{row['scenario']}: ")
+
+
 def compare_one(
     entry: Entry, *, searches: bool, timed: bool = True, compiled: frozenset[str] = frozenset()
 ) -> Compared:
@@ -217,8 +223,8 @@ def compare_one(
         assembly = assemble(scenario)
         flight = simulate(with_compiled(_engine(scenario, searches), compiled))
     except InputError as error:
-        refusal = {"end": "refused", "refused": str(error), **dict.fromkeys(MEASURES)}
-        return Compared(row | refusal | {"latency_refused": None}, np.zeros(0), np.zeros(0))
+        refused = {"end": "refused", "refused": str(error), **dict.fromkeys(MEASURES)}
+        return Compared(row | refused | {"latency_refused": None}, np.zeros(0), np.zeros(0))
     row |= {"end": flight.end.kind, "refused": None, **_tracking(flight), **_effort(flight)}
     metrics = flight.metrics()
     for measure in ("min_singularity_margin", "min_rotor_speed", "saturated_fraction"):

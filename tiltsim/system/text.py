@@ -11,6 +11,8 @@ from typing import Final
 LONGEST_WORD: Final = 300
 """Longer than any ordinary path."""
 
+_NUMBER: Final = re.compile(r"\d+(\.\d+)?(e[+-]?\d+)?")
+
 
 def printable(text: object) -> str:
     """Text with line breaks, terminal sequences and other invisible characters escaped.
@@ -45,6 +47,14 @@ def short_repr(value: object) -> str:
 def without_long_words(text: str) -> str:
     """Text whose words, such as unknown names, have at most `LONGEST_WORD` characters."""
     return re.sub(r"\S+", lambda word: shortened(word[0], LONGEST_WORD), text)
+
+
+def alike(messages: Iterable[str]) -> dict[str, list[str]]:
+    """Messages that differ in nothing but numbers, together under the first of them."""
+    kinds: dict[str, list[str]] = {}
+    for message in messages:
+        kinds.setdefault(_NUMBER.sub("0", message), []).append(message)
+    return {found[0]: found for found in kinds.values()}
 
 
 def _escaped(character: str) -> str:
