@@ -180,6 +180,17 @@ def test_stages_of_a_step_do_not_multiply_the_operations():
     np.testing.assert_allclose(np.transpose(made(start)), expected, rtol=ROUNDING)
 
 
+def test_all_look_ups_in_a_table_are_in_one_constant():
+    @scalar
+    def between(place, table):
+        return table[place] + table[place + 1]
+
+    numbers = tuple(map(float, range(LONG)))
+    lifted = Lifting(JaxArrays("float64"))(between)
+    program = jax.make_jaxpr(lambda place: lifted(place, numbers))(2)
+    assert [table.shape for table in program.consts] == [(LONG,)]
+
+
 NEVER_CALLED = {
     *("decoupling_matrix", "attitude_altitude_thrust_rate"),
     *("_fixed_jet", "_table_jet"),  # these gaits with more than four tilts

@@ -9,6 +9,8 @@ from collections.abc import Callable, Mapping
 from functools import cache
 from typing import Any, Final
 
+import numpy as np
+
 from tiltsim.system.optional import optional_package
 
 Function = Callable[..., Any]
@@ -51,6 +53,8 @@ class JaxArrays:
 
         self.dtype, self._jax = dtype, jax
         self._separate: dict[Any, tuple[Function, list[Any]]] = {}
+        # By the tuple's identity, which another one could get if the tuple were not kept.
+        self._tables: dict[int, tuple[tuple[float, ...], Any]] = {}
         self._array, self._numpy = jax.Array, jnp
         self.where, self.both = jnp.where, jnp.logical_and
         self.either, self.negated = jnp.logical_or, jnp.logical_not
@@ -62,8 +66,14 @@ class JaxArrays:
         return isinstance(value, self._array)
 
     def take(self, values: Any, index: Any) -> Any:
-        """The entry of a vector at an index that is an array."""
-        return self.vector(values)[index]
+        """The entry of a vector at an index that is an array.
+
+        All look-ups in a tuple of numbers are in one constant.
+        """
+        table = self._tables.get(id(values))
+        if table is None and isinstance(values, tuple) and not any(map(self.is_array, values)):
+            table = self._tables[id(values)] = values, np.asarray(values, self.dtype)
+        return (self.vector(values) if table is None else self._numpy.asarray(table[1]))[index]
 
     def separately(self, function: Function, args: Any, key: Any) -> Any:
         """A call that XLA compiles on its own and does not merge into its caller.
