@@ -173,10 +173,11 @@ class SupervisedLaw(NamedTuple):
 
     code: Supervision
     vehicle: Callable[..., Any]  # (parameters): what this code reads of the vehicle
-    state: Callable[..., Values]  # (qpos, qvel, act): of the controller, that of the body first
-    controls: Callable[..., Values]
-    """``(time, state, qvel, act, motion, parameters, knots)``: the controls from the rotor
-    accelerations on."""
+    seen: Callable[..., tuple[Values, ...]]
+    """``(qpos, qvel, act)``: state, that of the body first, tilt rates and the controller's own
+    states."""
+    inputs: Callable[..., Values]
+    """``(time, *seen, motion, parameters, knots)``: the controls from rotor accelerations on."""
     references: Callable[..., Values]
     """``(time, sample, motion, parameters, knots)``: columns of references, those of the tilts
     left out."""

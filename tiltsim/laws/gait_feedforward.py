@@ -50,7 +50,9 @@ _LAW: Final = RotorLaw(
 
 GAIT_FEEDFORWARD, MEASURED_GAIT_FEEDFORWARD = (
     replace(
-        tracking_loop(TILTROTOR_LAYOUT, _LAW, SUPERVISION, watched_vehicle, measured),
+        tracking_loop(
+            TILTROTOR_LAYOUT, _LAW._replace(measured=measured), SUPERVISION, watched_vehicle
+        ),
         kind=ROTORCRAFT,
         monitoring=Monitoring(determinant_and_speeds, determinant_and_speed_causes),
     )

@@ -91,12 +91,12 @@ def multirotor_loop(layout: RotorLayout, form: Form, measured: bool = False) -> 
         _setup,
         names=REFERENCES,
         margins=margins_of(layout, form.dimension),
+        measured=measured,
         units={NULL_PART: "1", CONDITION: "1"},
     )
     supervision = multirotor_supervision_of(rotors, form.dimension, form.forward)
     return replace(
-        tracking_loop(layout, law, supervision, _watched, measured),
-        monitoring=monitoring_of(layout, form),
+        tracking_loop(layout, law, supervision, _watched), monitoring=monitoring_of(layout, form)
     )
 
 

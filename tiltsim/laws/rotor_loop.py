@@ -9,7 +9,6 @@ that a law integrates as states of its own.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from functools import cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -40,9 +39,7 @@ from tiltsim.models.rotor_table import Multirotor
 from tiltsim.vehicles.rotorcraft import initial_rotor_speeds, rotorcraft_kind
 from tiltsim.vehicles.rotorcraft.layout import CROSS, TILT_RATE_1
 from tiltsim.vehicles.rotorcraft.layout import Layout as Places
-from tiltsim.vehicles.rotorcraft.layout import layout_of as places_of
 from tiltsim_controllers.gaits.any_tilts import tilt_motion_of
-from tiltsim_controllers.laws.supervisor import SUPERVISOR_AT_REST
 from tiltsim_controllers.mathematics.records import make_record_type
 from tiltsim_controllers.mathematics.scalar import Floats, Triple, Values, Vector, scalar
 from tiltsim_controllers.mathematics.vectors import entries_of
@@ -120,6 +117,9 @@ class RotorLaw(NamedTuple):
     names: tuple[str, ...] = REFERENCE_COLUMNS
     margins: Margins | None = None  # None for the angle to the nearest singular attitude
     units: Mapping[str, str] = {}  # further columns of a flight
+    measured: bool = False
+    """Whether ``tilt_rates`` end with the plant's angular acceleration (rad/s^2, body axes), of
+    `tiltsim.laws.layers.measured_acceleration`."""
     motion: Callable[..., Values] | None = None
     """Scalar code ``(state, tilts, inputs, parameters, knots, disturbance)`` of the derivative of
     body and rotor speeds on the thesis's equations; None for those of a table of rotors."""
@@ -181,11 +181,26 @@ def _integrated_of(tilts: int, state_1: int, rate_1: int) -> _Tilts:
     return commanded, commanded_motion
 
 
+@cache
+def seen_of(places: Places, states: int, measured: bool) -> Callable[..., tuple[Values, ...]]:
+    """Scalar code ``(qpos, qvel, act)`` of what a law sees of MuJoCo's vectors.
+
+    That is the vehicle's state, its tilt rates and the controller's states; see `RotorLaw`.
+    """
+    state_in, states_in = state_of(places), entries_of(places.rotors, states)
+    tilt_rates_in = entries_of(TILT_RATE_1, places.tilts + 3 * measured)
+
+    @scalar
+    def seen(qpos: Vector, qvel: Vector, act: Vector) -> tuple[Values, ...]:
+        return state_in(qpos, qvel, act), tilt_rates_in(qvel), states_in(act)
+
+    return seen
+
+
 def _sampling_of(layout: RotorLayout, law: RotorLaw) -> Sampling:
     """The control step in MuJoCo."""
     rotors, tilts = layout.places
-    state_in, inputs_of = state_of(layout.places), law.inputs
-    tilt_rates_in, states_in = entries_of(TILT_RATE_1, tilts), entries_of(rotors, len(law.states))
+    seen, inputs_of = seen_of(layout.places, len(law.states), law.measured), law.inputs
     thrusts, ahead = thrust_controls_of(layout.spins), servo_commands_of(tilts)
     if law.commands is None:
 
@@ -205,7 +220,7 @@ def _sampling_of(layout: RotorLayout, law: RotorLaw) -> Sampling:
     def controls(
         time: float, qpos: Vector, qvel: Vector, act: Vector, parameters: Any, knots: Vector
     ) -> Values:
-        state, moving, states = state_in(qpos, qvel, act), tilt_rates_in(qvel), states_in(act)
+        state, moving, states = seen(qpos, qvel, act)
         inputs = inputs_of(time, state, moving, states, parameters, knots)
         return (*servos(time, act, inputs, parameters, knots), *thrusts(act), *inputs)
 
@@ -327,9 +342,11 @@ def _equations_of(layout: RotorLayout, law: RotorLaw) -> Equations:
 def rotor_loop(layout: RotorLayout, law: RotorLaw) -> ClosedLoop:
     """The closed loop of a control law with all vehicles of a layout."""
     places, record = layout.places, head_of(law.parameters)
-    sampling, equations = _sampling_of(layout, law), _equations_of(layout, law)
-    for step in (sampling.controls, equations.inputs):
-        step.__qualname__ = f"{law.name}.{layout.name}"
+    sampling, equations = _sampling_of(layout, law), None
+    sampling.controls.__qualname__ = f"{'measured.' * law.measured}{law.name}.{layout.name}"
+    if not law.measured:  # the equations have no other acceleration than the law's
+        equations = _equations_of(layout, law)
+        equations.inputs.__qualname__ = sampling.controls.__qualname__
 
     def setup(plan: FlightPlan, signature: float) -> ControlSetup:
         parameters, further = law.setup(plan)
@@ -352,37 +369,4 @@ def rotor_loop(layout: RotorLayout, law: RotorLaw) -> ClosedLoop:
         columns=_columns_of(layout, law),
         equations=equations,
         uses_gait=places.tilts > 0 and law.commands is None,
-    )
-
-
-def with_measured_inputs(loop: ClosedLoop, inputs: Callable[..., Values]) -> ClosedLoop:
-    """A gait-following controller that reads the `measured_acceleration`.
-
-    `tiltsim.laws.layers.measured_acceleration` measures it.
-
-    Args:
-        loop: The same controller without.
-        inputs: Its controls from the rotor accelerations on, as `SupervisedLaw.controls`.
-    """
-    assert loop.supervised is not None  # so has every controller that follows a gait
-    state_in, thrusts = loop.supervised.state, thrust_controls_of(loop.dynamics.spins)
-    servo_commands = servo_commands_of(places_of(loop.dynamics).tilts)
-
-    @scalar
-    def controls(
-        time: float, qpos: Vector, qvel: Vector, act: Vector, parameters: Any, knots: Vector
-    ) -> Values:
-        state = state_in(qpos, qvel, act)
-        return (
-            *servo_commands(time, parameters.servo_lead, parameters.law.gait, knots),
-            *thrusts(act),
-            *inputs(time, state, qvel, act, SUPERVISOR_AT_REST, parameters, knots),
-        )
-
-    controls.__qualname__ = f"measured.{loop.sampling.controls.__qualname__}"
-    return replace(
-        loop,
-        sampling=replace(loop.sampling, controls=controls),
-        equations=None,
-        supervised=loop.supervised._replace(controls=inputs),
     )

@@ -50,12 +50,6 @@ def tiltrotor_motion(
     return equations_of_motion(state, tilts, four(inputs, 0), parameters.law.vehicle, disturbance)
 
 
-@scalar
-def measured_acceleration(qvel: Vector) -> Triple:
-    """The angular acceleration (rad/s^2, body axes) that follows MuJoCo's ten velocities."""
-    return qvel[10], qvel[11], qvel[12]
-
-
 def singularity_columns(samples: Mapping[str, Floats], vehicle: Vehicle) -> dict[str, Floats]:
     """Determinant of the attitude-altitude law, and the margin (rad) to a singular attitude."""
     tilts = np.stack([samples[name] for name in TILT_FIELDS], axis=-1)

@@ -1,8 +1,9 @@
-"""Loops of the laws that follow a gait with feed-forward and integrate the position error.
+"""Loops of the laws that follow a planned gait, which a supervisor may change.
 
-Their control law is one function, ``(time, state, tilt_rates, integrals, parameters, knots,
-supervisor_motion, measured)``: rotor accelerations (rad/s^2), rates of the integrals (m), the
-references of roll, pitch and yaw (rad), and further numbers that are columns.
+Those with feed-forward of the gait integrate the position error. Their control law is one function,
+``(time, state, tilt_rates, integrals, parameters, knots, supervisor_motion, measured)``: rotor
+accelerations (rad/s^2), rates of the integrals (m), the references of roll, pitch and yaw (rad),
+and further numbers that are columns.
 """
 
 from __future__ import annotations
@@ -13,11 +14,10 @@ from functools import cache
 from typing import TYPE_CHECKING, Any, Final
 
 from tiltsim.closed_loop.loop import ClosedLoop, SupervisedLaw
-from tiltsim.laws.rotor_loop import RotorLaw, RotorLayout, rotor_loop, with_measured_inputs
-from tiltsim.laws.rotorcraft import REFERENCE_COLUMNS, state_of
+from tiltsim.laws.rotor_loop import RotorLaw, RotorLayout, rotor_loop, seen_of
+from tiltsim.laws.rotorcraft import REFERENCE_COLUMNS
 from tiltsim.scenario.multirotor_controllers import AttitudeForceController
 from tiltsim.scenario.tiltrotor_controllers import AttitudeAltitudeController
-from tiltsim.vehicles.rotorcraft.layout import TILT_RATE_1
 from tiltsim_controllers.laws.decouplers import DECOUPLERS
 from tiltsim_controllers.laws.gait_feedforward import INTEGRAL_FIELDS
 from tiltsim_controllers.laws.supervisor import SUPERVISOR_AT_REST, Supervision
@@ -51,62 +51,38 @@ def tracking_fields(plan: FlightPlan) -> dict[str, Any]:
     }
 
 
-@cache
-def _inputs_of(layout: RotorLayout, law: Callable[..., Values]) -> Callable[..., Values]:
-    """Scalar code of `RotorLaw.inputs`: the ``states`` are the integrals."""
-    inputs_in = entries_of(0, layout.places.rotors + STATES)
-
-    @scalar
-    def inputs(
-        time: float,
-        state: Values,
-        tilt_rates: Values,
-        states: Values,
-        parameters: Any,
-        knots: Vector,
-    ) -> Values:
-        found: Values = inputs_in(law(time, state, tilt_rates, states, parameters.law, knots))
-        return found
-
-    return inputs
-
-
 @scalar
-def _by_model(qvel: Vector) -> None:
+def _by_model(moving: Values) -> None:
     """For a law that computes the angular acceleration by its model."""
     return
 
 
 @cache
-def _controls_of(
+def _inputs_of(
     layout: RotorLayout, law: Callable[..., Values], measured: bool
 ) -> Callable[..., Values]:
-    """Scalar code of a law's controls from the rotor accelerations on; see `SupervisedLaw`.
-
-    ``measured``: whether it reads, after MuJoCo's velocities, the plant's angular acceleration.
-    """
+    """Scalar code of `SupervisedLaw.inputs`: the ``states`` are the integrals."""
     rotors, tilts = layout.places
-    tilt_rates_in, integrals_in = entries_of(TILT_RATE_1, tilts), entries_of(rotors, STATES)
-    acceleration_in = entries_of(TILT_RATE_1 + tilts, 3) if measured else _by_model
-    inputs_in = entries_of(0, rotors + STATES)
+    tilt_rates_in, inputs_in = entries_of(0, tilts), entries_of(0, rotors + STATES)
+    acceleration_in = entries_of(tilts, 3) if measured else _by_model
 
     @scalar
-    def controls(
+    def inputs(
         time: float,
         state: Values,
-        qvel: Vector,
-        act: Vector,
+        moving: Values,
+        states: Values,
         motion: Triple,
         parameters: Any,
         knots: Vector,
     ) -> Values:
-        own, acceleration = parameters.law, acceleration_in(qvel)
-        moving, integrals = tilt_rates_in(qvel), integrals_in(act)
-        inputs = law(time, state, moving, integrals, own, knots, motion, acceleration)
-        found: Values = inputs_in(inputs)
+        rates, acceleration = tilt_rates_in(moving), acceleration_in(moving)
+        found: Values = inputs_in(
+            law(time, state, rates, states, parameters.law, knots, motion, acceleration)
+        )
         return found
 
-    return controls
+    return inputs
 
 
 @cache
@@ -140,50 +116,58 @@ def follows_position(scenario: Scenario) -> bool:
     return controller.decoupler != "none"
 
 
-def tracking_loop(
-    layout: RotorLayout,
-    law: RotorLaw,
-    supervision: Supervision,
-    watched: Callable[..., Any],
-    measured: bool = False,
+def supervised_loop(
+    layout: RotorLayout, law: RotorLaw, supervision: Supervision, watched: Callable[..., Any]
 ) -> ClosedLoop:
-    """The closed loop of a law that follows a gait.
+    """The closed loop of a law whose planned gait a supervisor may change.
 
     Args:
         layout: Of the vehicles.
-        law: Its ``inputs`` are the law itself; its ``names`` end with those of further numbers.
+        law: Its ``inputs`` and ``references`` are those of a `SupervisedLaw`.
         supervision: The supervisor's code.
         watched: What this reads of a vehicle, by the parameters.
-        measured: Whether the law feeds back the angular acceleration of the plant, which
-            `tiltsim.laws.layers.measured_acceleration` measures.
     """
-    code, margins = law.inputs, law.margins
+    inputs, references, margins = law.inputs, law.references, law.margins
+    assert references is not None
     assert margins is not None
-    references = _references_of(layout, code, len(law.names) - len(REFERENCE_COLUMNS))
 
     @scalar
-    def asked(time: float, values: Vector, parameters: Any, knots: Vector) -> Values:
-        found: Values = references(time, values, SUPERVISOR_AT_REST, parameters, knots)
-        return found
+    def inputs_at_rest(
+        time: float, state: Values, moving: Values, states: Values, parameters: Any, knots: Vector
+    ) -> Values:
+        return inputs(time, state, moving, states, SUPERVISOR_AT_REST, parameters, knots)
 
-    loop = rotor_loop(
-        layout,
-        law._replace(
-            inputs=_inputs_of(layout, code),
-            states=dict.fromkeys(INTEGRAL_FIELDS, "m s"),
-            initial=lambda _plan: (0.0,) * STATES,
-            references=asked,
-        ),
-    )
+    @scalar
+    def references_at_rest(time: float, values: Vector, parameters: Any, knots: Vector) -> Values:
+        return references(time, values, SUPERVISOR_AT_REST, parameters, knots)
+
+    loop = rotor_loop(layout, law._replace(inputs=inputs_at_rest, references=references_at_rest))
     supervised = SupervisedLaw(
-        supervision,
-        watched,
-        state_of(layout.places),
-        _controls_of(layout, code, measured),
-        references,
-        law.names,
-        (*layout.places.observed_fields, *INTEGRAL_FIELDS),
-        margins,
+        code=supervision,
+        vehicle=watched,
+        seen=seen_of(layout.places, len(law.states), law.measured),
+        inputs=inputs,
+        references=references,
+        names=law.names,
+        fields=(*layout.places.observed_fields, *law.states),
+        margins=margins,
     )
-    loop = replace(loop, supervised=supervised, follows_position=follows_position)
-    return with_measured_inputs(loop, supervised.controls) if measured else loop
+    return replace(loop, supervised=supervised, follows_position=follows_position)
+
+
+def tracking_loop(
+    layout: RotorLayout, law: RotorLaw, supervision: Supervision, watched: Callable[..., Any]
+) -> ClosedLoop:
+    """The closed loop of a law with feed-forward of the gait.
+
+    Its ``inputs`` are the law itself; its ``names`` end with those of further numbers. Other
+    arguments as of `supervised_loop`.
+    """
+    code = law.inputs
+    following = law._replace(
+        inputs=_inputs_of(layout, code, law.measured),
+        states=dict.fromkeys(INTEGRAL_FIELDS, "m s"),
+        initial=lambda _plan: (0.0,) * STATES,
+        references=_references_of(layout, code, len(law.names) - len(REFERENCE_COLUMNS)),
+    )
+    return supervised_loop(layout, following, supervision, watched)

@@ -128,12 +128,7 @@ def _servo_commands_of(law: SupervisedLaw, tilts: int) -> Callable[..., Values]:
 def _with_states(loop: ClosedLoop, units: tuple[str, ...]) -> Layer:
     """A supervisor that holds the gait or returns to red; its two states have these units."""
     law, layout = _supervised(loop), layout_of(loop.dynamics)
-    law_controls, references, vehicle_of, state_of = (
-        law.controls,
-        law.references,
-        law.vehicle,
-        law.state,
-    )
+    inputs, references, vehicle_of, seen_in = law.inputs, law.references, law.vehicle, law.seen
     derivative, servo_commands = law.code.derivative, _servo_commands_of(law, layout.tilts)
     thrusts = thrust_controls_of(loop.dynamics.spins)
     first, seen = loop.dynamics.sizes.act, len(law.fields)
@@ -143,14 +138,14 @@ def _with_states(loop: ClosedLoop, units: tuple[str, ...]) -> Layer:
         time: float, qpos: Vector, qvel: Vector, act: Vector, parameters: Any, knots: Vector
     ) -> Values:
         inner, supervisor = parameters.inner, parameters.layer
-        state = state_of(qpos, qvel, act)
+        state, moving, states = seen_in(qpos, qvel, act)
         gait, lead, vehicle = inner.law.gait, inner.servo_lead, vehicle_of(inner)
         roll, pitch, delay, rate = state[ROLL], state[PITCH], act[first], act[first + 1]
         motion = derivative(time, roll, pitch, delay, rate, gait, knots, supervisor, vehicle)
         return (
             *servo_commands(time, motion, gait, knots, supervisor, vehicle, lead),
             *thrusts(act),
-            *law_controls(time, state, qvel, act, motion, inner, knots),
+            *inputs(time, state, moving, states, motion, inner, knots),
             motion[1],
             motion[2],
         )
