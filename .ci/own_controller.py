@@ -2,6 +2,7 @@
 
 import json
 import subprocess
+import sys
 from pathlib import Path
 
 SCENARIO = """
@@ -25,7 +26,7 @@ max = 0.01
 
 def tiltsim(*arguments: str) -> str:
     """What a command of tiltsim prints; it must succeed."""
-    command = ("venv/bin/tiltsim", *arguments)
+    command = (sys.argv[1], *arguments)
     return subprocess.run(command, check=True, capture_output=True, text=True).stdout
 
 

@@ -13,7 +13,7 @@ from functools import wraps
 from importlib.machinery import SourceFileLoader
 
 OURS = {"tiltsim", "tiltsim_controllers", "tests"}
-BEGINNING = 0.05  # s of every flight, traced in full
+BEGINNING = 0.01  # s of every flight, traced in full
 EVERY = 16  # call after that
 
 
@@ -61,6 +61,7 @@ def trace_seldom():
     from matplotlib.figure import Figure
     from numba.core import compiler
 
+    from tiltsim.linear.motion import EquationMotion, MujocoMotion
     from tiltsim.plants.equations_plant import EquationsPlant
     from tiltsim.plants.mujoco_plant import MujocoPlant
     from tiltsim.plants.user_controller import UserControlledPlant
@@ -70,6 +71,8 @@ def trace_seldom():
 
     for plant in (MujocoPlant, EquationsPlant, UserControlledPlant):
         plant.advance = seldom_traced(plant.advance, begins)
+    for motion in (EquationMotion, MujocoMotion):
+        motion.flown = seldom_traced(motion.flown)
     elsewhere = {
         compiler: ["compile_extra"],
         Figure: ["add_subplot", "draw", "legend", "savefig"],

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from tests.tracing import seldom_traced
 from tiltsim_controllers.gaits import plans
 from tiltsim_controllers.laws.decouplers import EXACT
 from tiltsim_controllers.laws.gains import GAIN_SETS, IntegralGains
@@ -134,6 +135,7 @@ def fly(vehicle, law, knots, duration, *, gait=None, step=0.005, start=(), wind=
     planned = gait or plans.fixed((0.0,) * tilts)
     seen = []
 
+    @seldom_traced
     def rates(time, state):
         angles, turning = planned.angles(time), planned.rates(time)
         angles, turning = tuple(angles.tolist()), tuple(turning.tolist())

@@ -57,7 +57,8 @@ def test_inner_functions_have_none(tmp_path, monkeypatch, generated):
     assert generated == ["outermost"] * 2
 
 
-def test_what_is_inlined_is_optimized_by_its_callers_alone(monkeypatch):
+def test_what_is_inlined_is_optimized_by_its_callers_alone(tmp_path, monkeypatch):
+    monkeypatch.setattr("tiltsim.engines.compiling.native_code_folder", lambda: tmp_path)
     optimized, optimize = [], JITCodeLibrary._optimize_final_module
 
     def noted(library):
