@@ -7,6 +7,8 @@ from contextlib import contextmanager
 from functools import lru_cache, partial
 from typing import Any, Final, NamedTuple
 
+import numpy as np
+
 from tiltsim.arrays.jax_arrays import JaxArrays, recomputes, require_jax
 from tiltsim.arrays.lifting import Lifting
 from tiltsim.closed_loop.assembly import Assembly
@@ -15,7 +17,7 @@ from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup
 from tiltsim.equations.solvers import Integration, Stepper, make_step
 from tiltsim.system.locks import one_thread_at_a_time
 from tiltsim_controllers.mathematics.records import flatten, record_size, unflatten
-from tiltsim_controllers.mathematics.scalar import Triple, Values
+from tiltsim_controllers.mathematics.scalar import Floats, Triple, Values
 from tiltsim_controllers.references.trajectories import ReferenceParameters
 
 CODES: Final = frozenset(
@@ -320,16 +322,27 @@ def course_of(assembly: Assembly) -> Course:
 @lru_cache(maxsize=64)
 def _compiled_steps(
     course: Course, leaves: tuple[float, ...], knots: tuple[float, ...], disturbance: Triple
-) -> tuple[Kernel, Callable[[Carried, int], Carried]]:
+) -> Callable[[int, Floats, int], Any]:
+    """Steps of one flight, whose state and held inputs are one array: each takes time to pass."""
     import jax
+    import jax.numpy as jnp
 
     kernel = kernel_of(course, leaves, knots, disturbance)
 
-    def many(carried: Carried, steps: Any) -> Carried:
-        now: Carried = jax.lax.fori_loop(0, steps, lambda _, now: kernel.step(now), carried)
-        return now
+    def many(index: Any, numbers: Any, steps: Any) -> Any:
+        now = kernel.at(index, *_split(course, numbers))
+        now = jax.lax.fori_loop(0, steps, lambda _, now: kernel.step(now), now)
+        return jnp.stack([*now.state, *now.held])
 
-    return kernel, jax.jit(many)
+    compiled: Callable[[int, Floats, int], Any] = jax.jit(many)
+    return compiled
+
+
+def _split(course: Course, numbers: Any) -> tuple[Any, Any]:
+    """State and held inputs."""
+    assert course.loop.equations is not None
+    size = len(numbers) - course.loop.equations.inputs_size
+    return numbers[:size], numbers[size:]
 
 
 def stepper_on_arrays(course: Course) -> Stepper:
@@ -339,14 +352,11 @@ def stepper_on_arrays(course: Course) -> Stepper:
     def advance(
         step_index: int, state: list[float], held: Values, steps: int, integration: Integration
     ) -> tuple[list[float], Values]:
-        import jax
-
         _, _, parameters, knots, disturbance = integration
         with double_precision():
-            kernel, many = _compiled_steps(
-                course, tuple(flatten(parameters)), tuple(knots), disturbance
-            )
-            _, state, held = jax.device_get(many(kernel.at(step_index, state, held), steps))
-        return list(map(float, state)), tuple(map(float, held))
+            many = _compiled_steps(course, tuple(flatten(parameters)), tuple(knots), disturbance)
+            numbers = np.array([*state, *held], course.dtype)
+            state, held = _split(course, np.asarray(many(step_index, numbers, steps)).tolist())
+        return state, tuple(held)
 
     return advance
