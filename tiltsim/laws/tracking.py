@@ -160,8 +160,9 @@ def tracking_loop(
 ) -> ClosedLoop:
     """The closed loop of a law with feed-forward of the gait.
 
-    Its ``inputs`` are the law itself; its ``names`` end with those of further numbers. Other
-    arguments as of `supervised_loop`.
+    Args:
+        layout, supervision, watched: As of `supervised_loop`.
+        law: Its ``inputs`` are the law itself; its ``names`` end with those of further numbers.
     """
     code = law.inputs
     following = law._replace(
