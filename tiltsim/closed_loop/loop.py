@@ -204,7 +204,7 @@ class ClosedLoop:
             position.
         uses_gait: Whether the scenario's gait has a part in the flight.
         within: The loop that a layer of `tiltsim.laws.layers` goes around; None for a controller
-            itself, its supervisor included.
+            itself, its supervisor and allocation included.
     """
 
     kind: VehicleKind

@@ -6,7 +6,6 @@ Each vehicle has its own closed form, in `ALLOCATIONS`.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from functools import cache
 from math import inf
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
@@ -73,6 +72,5 @@ def with_allocation(loop: ClosedLoop) -> ClosedLoop:
         )
         return (*ctrl[:first], *accelerations, *ctrl[further:])
 
-    layer = Layer("with_allocation", Allocation, _read, controls=controls)
-    # Part of the controller: who asks for its commands without layers gets them allocated.
-    return replace(wrap_loop(loop, layer), within=None)
+    layer = Layer("with_allocation", Allocation, _read, controls=controls, of_controller=True)
+    return wrap_loop(loop, layer)

@@ -45,6 +45,8 @@ class Layer:
         units: Columns of a flight that the layer adds, with their units.
         equations: As in `ClosedLoop`, for these parameters. The equations of the loop within are
             not used: they do not know the layer.
+        of_controller: Whether it is part of the controller, as a supervisor is: the loop around it
+            is that of a controller itself, and has none ``within``.
     """
 
     name: str
@@ -60,6 +62,7 @@ class Layer:
     fields: tuple[str, ...] = ()
     units: Mapping[str, str] = field(default_factory=dict)
     equations: Equations | None = None
+    of_controller: bool = False
 
 
 def wrap_loop(inner: ClosedLoop, layer: Layer) -> ClosedLoop:
@@ -124,7 +127,7 @@ def wrap_loop(inner: ClosedLoop, layer: Layer) -> ClosedLoop:
         ),
         equations=layer.equations,
         supervised=None,
-        within=inner,
+        within=None if layer.of_controller else inner,
     )
 
 

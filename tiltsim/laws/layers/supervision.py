@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from functools import cache
 from typing import TYPE_CHECKING, Any, Final
 
@@ -94,7 +93,13 @@ def _scaling(loop: ClosedLoop) -> Layer:
         return {**columns, **scaled_tilts, SUPERVISION: 1.0 - scale}
 
     return Layer(
-        "scaling", Supervisor, _read, controls=controls, derive=derive, units={SUPERVISION: "1"}
+        "scaling",
+        Supervisor,
+        _read,
+        controls=controls,
+        derive=derive,
+        units={SUPERVISION: "1"},
+        of_controller=True,
     )
 
 
@@ -182,6 +187,7 @@ def _with_states(loop: ClosedLoop, units: tuple[str, ...]) -> Layer:
         derive=derive,
         fields=SUPERVISOR_FIELDS,
         units={**dict(zip(SUPERVISOR_FIELDS, units, strict=True)), SUPERVISION: "1"},
+        of_controller=True,
     )
 
 
@@ -189,5 +195,4 @@ def _with_states(loop: ClosedLoop, units: tuple[str, ...]) -> Layer:
 def with_supervisor(loop: ClosedLoop, strategy: str) -> ClosedLoop:
     """A loop under a supervisor with one of `tiltsim_controllers.laws.supervisor.STRATEGIES`."""
     units = _STATE_UNITS.get(strategy)
-    layer = _scaling(loop) if units is None else _with_states(loop, units)
-    return replace(wrap_loop(loop, layer), within=None)
+    return wrap_loop(loop, _scaling(loop) if units is None else _with_states(loop, units))
