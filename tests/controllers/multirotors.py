@@ -18,8 +18,8 @@ from tiltsim_controllers.mathematics.rotation import euler_from_quaternion, quat
 from tiltsim_controllers.references.trajectories import SETPOINT, ReferenceParameters
 from tiltsim_controllers.vehicle.effectiveness import (
     force_and_torque,
-    layout_of,
     rotor_entries,
+    tilt_of_rotor,
     tilts_of,
 )
 from tiltsim_controllers.vehicle.multirotor import body_of, equations_of_motion_of
@@ -127,7 +127,7 @@ class Flight(NamedTuple):
 
 def fly(vehicle, law, knots, duration, *, gait=None, step=0.005, start=(), wind=(0.0, 0.0, 0.0)):
     """Fly along a gait; ``start`` is position, velocity and acceleration, level and at rest."""
-    layout = layout_of(vehicle.table)
+    layout = tilt_of_rotor(vehicle.table)
     rotors, tilts = len(layout), tilts_of(layout)
     inputs = multirotor_law_of(layout, Form(vehicle.dimension, vehicle.norm))
     motion = equations_of_motion_of(layout)

@@ -44,7 +44,7 @@ from tiltsim_controllers.mathematics.records import make_record_type
 from tiltsim_controllers.mathematics.scalar import Floats, Triple, Values, Vector, scalar
 from tiltsim_controllers.mathematics.vectors import entries_of
 from tiltsim_controllers.references.trajectories import position_reference
-from tiltsim_controllers.vehicle.effectiveness import ROTOR_FLOATS, layout_of
+from tiltsim_controllers.vehicle.effectiveness import ROTOR_FLOATS
 from tiltsim_controllers.vehicle.multirotor import (
     BODY_STATES,
     Body,
@@ -87,7 +87,7 @@ class RotorLayout(NamedTuple):
 
 def layout_of_vehicle(vehicle: Multirotor, model: str = "multirotor") -> RotorLayout:
     """The layout of a vehicle."""
-    return RotorLayout(layout_of(vehicle.table), vehicle.spins, model)
+    return RotorLayout(vehicle.tilt_of_rotor, vehicle.spins, model)
 
 
 def _no_states(_plan: FlightPlan) -> Values:

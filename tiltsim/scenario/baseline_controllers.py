@@ -16,7 +16,7 @@ from tiltsim.scenario.scalar_controller import Airframe, ScalarController, Tilti
 from tiltsim.scenario.table import Gains2, Positive, Vector3
 from tiltsim_controllers.analysis.stability import ErrorLoop, linear_loop
 from tiltsim_controllers.mathematics.scalar import Values
-from tiltsim_controllers.vehicle.effectiveness import CONSTANT, COSINE, ROTOR_FLOATS, layout_of
+from tiltsim_controllers.vehicle.effectiveness import CONSTANT, COSINE, ROTOR_FLOATS, tilt_of_rotor
 
 
 def require_no_pose(scenario: Any) -> None:
@@ -57,7 +57,7 @@ class GeometricController(TiltingController):
             require_no_pose(scenario)
 
     def scalar_law(self, airframe: Airframe) -> Callable[..., Any]:
-        layout = layout_of(airframe.vehicle.table)
+        layout = tilt_of_rotor(airframe.vehicle.table)
         if self.tilts == "gait":
             return geometric.geometric_law_of(airframe.rotors)
         self._check_free(airframe)
@@ -66,7 +66,7 @@ class GeometricController(TiltingController):
     def _check_free(self, airframe: Airframe) -> None:
         """Refuse tilts that static allocation does not reach."""
         table = np.reshape(airframe.vehicle.table, (airframe.rotors, ROTOR_FLOATS))
-        layout = layout_of(airframe.vehicle.table)
+        layout = tilt_of_rotor(airframe.vehicle.table)
         fixed = np.abs(table[:, CONSTANT:COSINE]).max() > 1e-9 * np.abs(table[:, CONSTANT:]).max()
         if len(set(layout)) < len(layout) or -1 in layout or fixed:
             reason = "every rotor needs a tilt of its own, about an axis across its thrust"

@@ -18,7 +18,7 @@ from tiltsim_controllers.vehicle.effectiveness import (
     ROTOR_FLOATS,
     SPIN_SIGN,
     effectiveness_of,
-    layout_of,
+    tilt_of_rotor,
 )
 
 if TYPE_CHECKING:
@@ -85,7 +85,7 @@ class _Problem:
     """Imbalance of tilts and inputs, in units of the desired force and its torque on a lever."""
 
     def __init__(self, table: Sequence[float], force: Floats) -> None:
-        layout = layout_of(table)
+        layout = tilt_of_rotor(table)
         self._functions = effectiveness_of(layout)
         self._table = table
         self.rotors, self.tilts = len(layout), max(layout) + 1

@@ -36,7 +36,7 @@ from tiltsim_controllers.vehicle.effectiveness import (
     Rows,
     TiltOfRotor,
     effectiveness_of,
-    layout_of,
+    tilt_of_rotor,
     tilts_of,
 )
 from tiltsim_controllers.vehicle.multirotor import Body, body_acceleration, inertia_times
@@ -85,11 +85,11 @@ def pose_rank(table: Sequence[float], tilts: Sequence[float], w: ArrayLike) -> i
         tilts: rad
         w: ``varpi |varpi|`` of each rotor, of any unit, 0 for one that is not used
     """
-    functions, squares = effectiveness_of(layout_of(table)), np.asarray(w, float)
+    functions, squares = effectiveness_of(tilt_of_rotor(table)), np.asarray(w, float)
     c, s = functions.cosines(tilts), functions.sines(tilts)
     rows = np.array(functions.rows(1.0, c, s, table, 0)) * (squares != 0.0)
     turned = functions.rows(0.0, [-sine for sine in s], c, table, 0)
-    whole = np.array(pose_rows_of(layout_of(table))(rows, turned, squares))
+    whole = np.array(pose_rows_of(tilt_of_rotor(table))(rows, turned, squares))
     sizes = np.abs(whole[:3]).max(), np.abs(whole[3:]).max()
     return int(np.linalg.matrix_rank(whole / np.repeat(sizes, 3)[:, np.newaxis], 1e-8))
 

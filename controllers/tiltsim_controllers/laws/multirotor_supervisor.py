@@ -24,7 +24,7 @@ from tiltsim_controllers.vehicle.effectiveness import (
     TiltOfRotor,
     effectiveness_of,
     force_and_torque,
-    layout_of,
+    tilt_of_rotor,
     tilts_of,
 )
 
@@ -41,7 +41,7 @@ class Watched(NamedTuple):
 
 def untilted_volume(table: Sequence[float]) -> float:
     """Volume of the rows of torque and lift of the level untilted vehicle; 0 where singular."""
-    force, torque = force_and_torque(table, (0.0,) * tilts_of(layout_of(table)))
+    force, torque = force_and_torque(table, (0.0,) * tilts_of(tilt_of_rotor(table)))
     sizes = np.linalg.norm(torque, axis=-1).max(), np.linalg.norm(force[2])
     rows = np.vstack([torque / sizes[0], force[2] / sizes[1]])
     volume = float(np.prod(np.linalg.svd(rows, compute_uv=False)))

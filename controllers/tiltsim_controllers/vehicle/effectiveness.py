@@ -145,8 +145,8 @@ def cross_table(vehicle: Vehicle, *, tilting: bool) -> Values:
     return tuple(table)
 
 
-def layout_of(table: Sequence[float]) -> TiltOfRotor:
-    """The layout of a table."""
+def tilt_of_rotor(table: Sequence[float]) -> TiltOfRotor:
+    """The layout in a table."""
     return tuple(int(tilt) for tilt in table[TILT::ROTOR_FLOATS])
 
 
@@ -231,7 +231,7 @@ def force_and_torque(table: Sequence[float], tilts: ArrayLike = ()) -> tuple[Flo
     angles = np.moveaxis(np.asarray(tilts, float), -1, 0)
     # The scalar functions: those of arrays differ in the last bit.
     cosines, sines = (np.frompyfunc(f, 1, 1)(angles).astype(float) for f in (cos, sin))
-    rows = effectiveness_of(layout_of(table)).rows(1.0, cosines, sines, table, 0)
+    rows = effectiveness_of(tilt_of_rotor(table)).rows(1.0, cosines, sines, table, 0)
     entries = [[np.broadcast_to(entry, angles.shape[1:]) for entry in row] for row in rows]
     wrenches = np.moveaxis(np.array(entries), (0, 1), (-2, -1))
     return wrenches[..., :3, :], wrenches[..., 3:, :]

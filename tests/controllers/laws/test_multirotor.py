@@ -46,7 +46,7 @@ from tiltsim_controllers.vehicle.effectiveness import (
     CONSTANT,
     ROTOR_FLOATS,
     force_and_torque,
-    layout_of,
+    tilt_of_rotor,
 )
 
 ON_CIRCLE = ReferenceParameters(
@@ -77,7 +77,7 @@ def test_the_law_of_chapters_3_and_4_is_a_case(decoupler, decoupling):
         vehicle, gait, ON_CIRCLE, gains=gains, terms=AS_PUBLISHED, decoupler=codes[0],
         decoupling=codes[1], attitude=EULER_ANGLES,
     )  # fmt: skip
-    inputs, rest = multirotor_law_of(layout_of(vehicle.table), Form(1)), (0.0,) * 4
+    inputs, rest = multirotor_law_of(tilt_of_rotor(vehicle.table), Form(1)), (0.0,) * 4
     found = differences(
         lambda time, state: attitude_altitude.rotor_accelerations(time, state, special),
         lambda time, state: inputs(time, state, rest, (0.0,) * 3, law, knots),
@@ -112,7 +112,7 @@ def test_gait_feedforward_is_a_case(gait):
         vehicle, gait, ON_CIRCLE, gains=gains, integral=integral, max_acceleration=3.0,
         max_angular_acceleration=200.0, anticipation=0.05, attitude=EULER_ANGLES,
     )  # fmt: skip
-    inputs = multirotor_law_of(layout_of(vehicle.table), Form(1))
+    inputs = multirotor_law_of(tilt_of_rotor(vehicle.table), Form(1))
     found = differences(
         lambda time, state: gait_feedforward.tracking_inputs(
             time, state, rates, integrals, special, knots
@@ -156,7 +156,7 @@ def test_a_rotor_known_to_have_failed_is_as_if_it_were_not_there(dimension):
     angles = [[0.3, -0.2, 0.3, -0.3, 0.1, -0.3, 0.2], [0.1, -0.4, 0.2, -0.2, 0.3, -0.1, 0.3]]
     gait, failure = plans.waypoints(angles, 2.0, tilts=7), Failure(3.0, 2.0)
     vehicle = Vehicle(ring(7, hinged=True), HEXAROTOR, dimension)
-    layout, forward = layout_of(vehicle.table), dimension == 2
+    layout, forward = tilt_of_rotor(vehicle.table), dimension == 2
     law, knots = parameters_of(vehicle, gait, ON_CIRCLE, restoring=0.5, failure=failure)
     lost = list(knots)
     first = int(law.rotors) + 2 * ROTOR_FLOATS + CONSTANT

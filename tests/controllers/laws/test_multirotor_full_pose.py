@@ -13,8 +13,8 @@ from tiltsim_controllers.mathematics.rotation import rotation_from_euler
 from tiltsim_controllers.references.trajectories import CIRCLE, ReferenceParameters
 from tiltsim_controllers.vehicle.effectiveness import (
     force_and_torque,
-    layout_of,
     rotor_entries,
+    tilt_of_rotor,
     tilts_of,
 )
 
@@ -32,7 +32,7 @@ LOST = Failure(2.0, 10.0)
 @pytest.mark.parametrize(("weight", "bound"), [(EVEN, 1e-12), (1.0, 1e-9)])
 def test_the_tiltrotors_law_is_a_case(weight, bound, failure):
     vehicle, limits = tiltrotor(), Limits(5.0, 1.0)
-    law = full_pose_law_of(layout_of(vehicle.table))
+    law = full_pose_law_of(tilt_of_rotor(vehicle.table))
     own = full_pose.Parameters(FOUR, GAINS, ON_CIRCLE, limits, weight, failure)
     general = Parameters(vehicle.body, GAINS, ON_CIRCLE, limits, weight, 0.0, failure)
     for time, state in random_states(100):
@@ -60,7 +60,7 @@ def on_shared_pods():
     "table", [ring(6, hinged=True), ring(7, 0.44), on_shared_pods()], ids=["arms", "fixed", "pods"]
 )
 def test_force_and_torque_change_as_desired_with_the_least_inputs(table, failure):
-    vehicle, layout = Vehicle(table, HEXAROTOR, 3), layout_of(table)
+    vehicle, layout = Vehicle(table, HEXAROTOR, 3), tilt_of_rotor(table)
     rotors, tilts = len(layout), tilts_of(layout)
     law = full_pose_law_of(layout)
     parameters = Parameters(vehicle.body, GAINS, ON_CIRCLE, Limits(), 3e5, 0.0, failure)

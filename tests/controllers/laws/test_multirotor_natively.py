@@ -13,7 +13,7 @@ from tiltsim_controllers.gaits import plans
 from tiltsim_controllers.laws.multirotor import multirotor_law_of
 from tiltsim_controllers.laws.multirotor_steps import Form
 from tiltsim_controllers.references.trajectories import CIRCLE, ReferenceParameters
-from tiltsim_controllers.vehicle.effectiveness import layout_of, tilts_of
+from tiltsim_controllers.vehicle.effectiveness import tilt_of_rotor, tilts_of
 
 CASES = {
     "fixed rotors, leaning": (Vehicle(ring(6), HEXAROTOR, 1), plans.fixed(())),
@@ -34,7 +34,7 @@ def test_the_law_gives_the_same_bits_natively(case):
     vehicle, gait = CASES[case]
     reference = ReferenceParameters(CIRCLE, radius=1.0, angular_frequency=0.5)
     law, knots = parameters_of(vehicle, gait, reference, restoring=0.5, slowest=10.0)
-    layout = layout_of(vehicle.table)
+    layout = tilt_of_rotor(vehicle.table)
     inputs = multirotor_law_of(layout, Form(vehicle.dimension, vehicle.norm))
     tilts, size = tilts_of(layout), 12 + tilts_of(layout) + len(layout)
     register_scalar_functions()

@@ -9,11 +9,15 @@ import pytest
 
 from tests.controllers.multirotors import ring
 from tiltsim_controllers.laws.rotor_allocation import planned_allocation_of, tilting_allocation_of
-from tiltsim_controllers.vehicle.effectiveness import force_and_torque, layout_of, table_per_newton
+from tiltsim_controllers.vehicle.effectiveness import (
+    force_and_torque,
+    table_per_newton,
+    tilt_of_rotor,
+)
 
 
 def per_newton(table):
-    return table_per_newton(table, [8.5e-6] * len(layout_of(table)))
+    return table_per_newton(table, [8.5e-6] * len(tilt_of_rotor(table)))
 
 
 @pytest.mark.parametrize("rotors", [4, 6])
@@ -39,7 +43,7 @@ def test_planned_tilts_make_any_torque_and_force_along_one_axis(rotors):
 def test_tilts_of_its_own_make_any_force_and_torque_with_the_least_thrusts(rotors):
     rng = np.random.default_rng(rotors)
     table = per_newton(ring(rotors, hinged=True))
-    allocated = tilting_allocation_of(layout_of(table))
+    allocated = tilting_allocation_of(tilt_of_rotor(table))
     observed = SimpleNamespace(table=table, at=0, tilt_angles=(0.0,) * rotors)
     level, across = (
         np.vstack(force_and_torque(table, [angle] * rotors)) for angle in (0.0, np.pi / 2)

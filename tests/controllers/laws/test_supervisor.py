@@ -21,7 +21,7 @@ from tiltsim_controllers.laws.decouplers import exact_decoupler
 from tiltsim_controllers.laws.multirotor_supervisor import multirotor_supervision_of, watched
 from tiltsim_controllers.laws.supervisor import BAND, LAG, STRATEGIES, Supervisor
 from tiltsim_controllers.laws.tiltrotor_supervisor import SUPERVISION
-from tiltsim_controllers.vehicle.effectiveness import cross_table, layout_of
+from tiltsim_controllers.vehicle.effectiveness import cross_table, tilt_of_rotor
 from tiltsim_controllers.vehicle.parameters import PRESETS, drag_ratio
 
 (
@@ -270,7 +270,7 @@ def test_four_rotors_of_a_table_have_the_tiltrotor_s_margin_and_determinant(tilt
     known = margin_and_determinant(tilts, up, RATIO)
     n = np.array(torque_free_direction(tilts, VEHICLE))
     side = tuple(np.sign(known[1]) * np.sign(n @ up) * n)  # that of the determinant
-    general = multirotor_supervision_of(layout_of(table), 1).margin_and_determinant
+    general = multirotor_supervision_of(tilt_of_rotor(table), 1).margin_and_determinant
     found = general(tilts, up, watched(table, 0, side), table)
     np.testing.assert_allclose(found, known, rtol=0.0, atol=1e-7)
 
@@ -279,7 +279,7 @@ def test_four_rotors_of_a_table_have_the_tiltrotor_s_margin_and_determinant(tilt
 def test_it_is_zero_where_the_outputs_depend_on_each_other(dimension, forward):
     """Six arms without tilt push upwards only; sideways, none of them lifts."""
     table = ring(6, hinged=True)
-    watch_all = multirotor_supervision_of(layout_of(table), dimension, forward)
+    watch_all = multirotor_supervision_of(tilt_of_rotor(table), dimension, forward)
     vehicle, up = watched(table, 0, (0.0, 0.0, 1.0)), (0.0, 0.0, 1.0)
 
     def determinant_at(*tilts):

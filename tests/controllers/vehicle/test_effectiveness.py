@@ -11,8 +11,8 @@ from tiltsim.equations import tiltrotor as printed
 from tiltsim_controllers.mathematics.rotation import rotation_from_euler
 from tiltsim_controllers.vehicle.effectiveness import (
     force_and_torque,
-    layout_of,
     rotor_entries,
+    tilt_of_rotor,
     tilts_of,
 )
 from tiltsim_controllers.vehicle.multirotor import equations_of_motion_of
@@ -76,7 +76,7 @@ def test_effectiveness_is_what_mujoco_makes_of_unit_thrusts(seed):
     rng = np.random.default_rng(seed)
     text, table = random_vehicle(rng)
     model = mujoco.MjModel.from_xml_string(text)
-    angles, quaternion = rng.uniform(-3.0, 3.0, tilts_of(layout_of(table))), rng.normal(size=4)
+    angles, quaternion = rng.uniform(-3.0, 3.0, tilts_of(tilt_of_rotor(table))), rng.normal(size=4)
     found = np.vstack(force_and_torque(table, tuple(angles)))
     expected = in_mujoco(model, angles, quaternion)
     assert np.abs(found - expected).max() < 1e-14 * np.abs(expected).max()
@@ -84,7 +84,7 @@ def test_effectiveness_is_what_mujoco_makes_of_unit_thrusts(seed):
 
 def test_equations_of_motion_are_those_of_chapter_3_for_its_tiltrotor():
     vehicle = tiltrotor()
-    motion = equations_of_motion_of(layout_of(vehicle.table))
+    motion = equations_of_motion_of(tilt_of_rotor(vehicle.table))
     inputs, gust = (1.0, -2.0, 3.0, -4.0), (0.1, 0.2, -0.3)
     for _, (*body, a1, a2, a3, a4, s1, s2, s3, s4) in random_states(50):
         tilts, speeds = (a1, a2, a3, a4), (s1, s2, s3, s4)
