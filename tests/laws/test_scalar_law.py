@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.metadata
 import warnings
 from importlib.metadata import EntryPoint
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -146,6 +147,12 @@ def test_a_held_rate_ends_where_the_lag_would_be():
     assert held_gain(bandwidth, 0.0) == bandwidth
 
 
+class Lawless(tiltsim.ScalarController):
+    """Of a package whose author forgot the method."""
+
+    law: Literal["lawless"]
+
+
 def entries(monkeypatch, *found):
     monkeypatch.setattr(
         importlib.metadata,
@@ -163,7 +170,7 @@ def entries(monkeypatch, *found):
         (("gone", "no_such_package:Table"), "ModuleNotFoundError"),
         (("other", "json:JSONDecoder"), "is no subclass of tiltsim.ScalarController"),
         (("geometric", "tiltsim:ScalarController"), "has a law of this name"),
-        (("other", "tiltsim:ScalarController"), "has no method scalar_law"),
+        (("lawless", f"{__name__}:Lawless"), r"Lawless has no method scalar_law\(airframe\)"),
         (
             ("renamed", "tiltsim.scenario.baseline_controllers:GeometricController"),
             'needs the field law: Literal\\["renamed"\\]',
@@ -174,6 +181,11 @@ def test_a_package_that_cannot_be_used_is_left_out_with_a_warning(entry, message
     entries(monkeypatch, entry)
     with pytest.warns(RuntimeWarning, match=message):
         assert installed_controllers({"geometric"}) == {}
+
+
+def test_a_controller_without_a_law_cannot_be_made():
+    with pytest.raises(TypeError, match=r"abstract method '?scalar_law"):
+        Lawless(law="lawless")  # type: ignore[abstract]
 
 
 def test_a_package_is_found(monkeypatch):

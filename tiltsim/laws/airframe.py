@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from tiltsim.errors import InputError
 from tiltsim.models.cross import as_multirotor
 from tiltsim.scenario.loading import load_scenario
-from tiltsim.scenario.scalar_controller import Airframe, ScalarController
+from tiltsim.scenario.scalar_controller import Airframe, ScalarTable
 from tiltsim.scenario.scenario import plan_flight
 from tiltsim.vehicles.rotorcraft import initial_rotor_speeds, initial_tilts
 from tiltsim_controllers.mathematics.scalar import Values
@@ -53,7 +53,7 @@ def airframe_of(plan: FlightPlan) -> Airframe:
 def initial_states(plan: FlightPlan) -> Values:
     """The states of the controller at time zero."""
     controller, airframe = plan.scenario.controller, airframe_of(plan)
-    assert isinstance(controller, ScalarController)
+    assert isinstance(controller, ScalarTable)
     tilts = airframe.initial_tilts if controller.commands_tilts else ()
     late = plan.scenario.simulation.latency_steps > 0
     speeds = airframe.initial_speeds if late else ()

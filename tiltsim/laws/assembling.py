@@ -27,7 +27,7 @@ from tiltsim.laws.tilt_car_fourth_derivative import FOURTH_DERIVATIVE
 from tiltsim.laws.tilt_car_planned_direction import PLANNED_DIRECTION
 from tiltsim.laws.tilt_car_third_derivative import THIRD_DERIVATIVE
 from tiltsim.laws.yaw_position import YAW_POSITION
-from tiltsim.scenario.scalar_controller import ScalarController
+from tiltsim.scenario.scalar_controller import ScalarTable
 from tiltsim.scenario.scenario import plan_flight
 from tiltsim.system.locks import one_thread_at_a_time
 
@@ -79,7 +79,7 @@ def loop_of(
     measured = not as_printed and controller.measures_angular_acceleration
     if external:
         loop = commanded_loop(scenario)
-    elif isinstance(controller, ScalarController):
+    elif isinstance(controller, ScalarTable):
         loop = loop_of_scalar_law(scenario)
     elif scenario.vehicle.model == "multirotor":
         loop = MULTIROTOR_LOOPS[controller.loop_name](scenario, measured)

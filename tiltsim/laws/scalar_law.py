@@ -95,12 +95,12 @@ def loop_of_scalar_law(scenario: Scenario) -> ClosedLoop:
     """
     plan = plan_flight(scenario)
     controller, airframe = scenario.controller, airframe_of(plan)
-    assert isinstance(controller, ScalarController)
     if isinstance(controller, ScalarFunctionController):
         address = scenario.address or "scenario"
         function = load_scalar_function(address, controller, scenario.own_controller)
         law, checksum = _without_parameters(function), foreign_code(function)
     else:
+        assert isinstance(controller, ScalarController)
         law = controller.scalar_law(airframe)
         checksum = foreign_code(law)
     try:

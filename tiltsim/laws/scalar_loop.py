@@ -17,7 +17,7 @@ from tiltsim.closed_loop.loop import ClosedLoop
 from tiltsim.laws.airframe import airframe_of, initial_states
 from tiltsim.laws.rotor_loop import RotorLaw, body_of_vehicle, rotor_loop
 from tiltsim.laws.scalar_parameters import Key, record_of
-from tiltsim.scenario.scalar_controller import ScalarController
+from tiltsim.scenario.scalar_controller import ScalarTable
 from tiltsim_controllers.gaits.any_tilts import tilt_motion_of
 from tiltsim_controllers.laws.observed import Desired, Observed
 from tiltsim_controllers.mathematics.rotation import rotation_from_euler
@@ -166,7 +166,7 @@ def _setup_of(record: Any) -> Callable[[FlightPlan], tuple[Any, Values]]:
     def setup(plan: FlightPlan) -> tuple[Any, Values]:
         scenario, airframe = plan.scenario, airframe_of(plan)
         controller, vehicle = scenario.controller, airframe.vehicle
-        assert isinstance(controller, ScalarController)
+        assert isinstance(controller, ScalarTable)
         step = scenario.simulation.control_timestep
         known = record(
             plan.gait.parameters,

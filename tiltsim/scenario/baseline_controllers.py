@@ -12,7 +12,7 @@ import tiltsim_controllers.laws.geometric as geometric
 import tiltsim_controllers.laws.indi as indi
 import tiltsim_controllers.laws.pid as pid
 from tiltsim.scenario.messages import InvalidValueError
-from tiltsim.scenario.scalar_controller import Airframe, ScalarController, TiltingController
+from tiltsim.scenario.scalar_controller import Airframe, ScalarController, TiltingTable
 from tiltsim.scenario.table import Gains2, Positive, Vector3
 from tiltsim_controllers.analysis.stability import ErrorLoop, linear_loop
 from tiltsim_controllers.mathematics.scalar import Values
@@ -28,7 +28,7 @@ def require_no_pose(scenario: Any) -> None:
             raise InvalidValueError(f"reference.{key}", getattr(reference, key), reason)
 
 
-class GeometricController(TiltingController):
+class GeometricController(TiltingTable, ScalarController):
     """Tracking control on SE(3) (Lee et al. 2010)."""
 
     reference_kinds = ("position", "pose")

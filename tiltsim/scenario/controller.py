@@ -21,7 +21,7 @@ from tiltsim.scenario.quadrotor_controllers import (
     SwitchingController,
     YawPositionController,
 )
-from tiltsim.scenario.scalar_controller import Airframe, TiltingController
+from tiltsim.scenario.scalar_controller import Airframe, TiltingTable
 from tiltsim.scenario.table import example
 from tiltsim.scenario.tilt_car_controllers import (
     FourthDerivativeController,
@@ -76,7 +76,7 @@ class PythonController(OwnFunctionController):
     law: Literal["python"] = Field(description="your own controller")
 
 
-class ScalarFunctionController(OwnFunctionController, TiltingController):
+class ScalarFunctionController(OwnFunctionController, TiltingTable):
     """A user's own scalar function; see docs/controller_package.md."""
 
     model_config = example(law="scalar", function="my_law.py:hover")

@@ -10,6 +10,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Container
 from importlib.metadata import EntryPoint, entry_points
+from inspect import isabstract
 from typing import Final, get_args
 
 from tiltsim.scenario.controller_table import ControllerTable
@@ -45,7 +46,7 @@ def _mistake(entry: EntryPoint, table: object, built_in: Container[str]) -> str:
         return f"{entry.value} is no subclass of tiltsim.ScalarController"
     if entry.name in built_in:
         return "tiltsim has a law of this name"
-    if table.scalar_law is ScalarController.scalar_law:
+    if isabstract(table):
         return f"{entry.value} has no method scalar_law(airframe)"
     if get_args(table.model_fields["law"].annotation) != (entry.name,):
         return f'{entry.value} needs the field law: Literal["{entry.name}"]'

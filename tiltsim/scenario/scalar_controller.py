@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import inspect
 import textwrap
+from abc import abstractmethod
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
@@ -69,12 +70,8 @@ class Airframe:
         return len(self.vehicle.spins)
 
 
-class ScalarController(ControllerTable):
-    """A controller whose law is one scalar function ``(observed, parameters)``.
-
-    The function returns thrusts, tilts and rates of states; see
-    `tiltsim_controllers.laws.observed`. The rotors take up the commanded speeds with a lag.
-    """
+class ScalarTable(ControllerTable):
+    """What controllers have in common whose law is a scalar function, wherever that comes from."""
 
     vehicle_models = ("tiltrotor", "quadrotor", "multirotor")
     reference_kinds: ClassVar[tuple[ReferenceKind, ...]] = ("position",)
@@ -92,10 +89,6 @@ class ScalarController(ControllerTable):
     @property
     def linearization(self) -> str:
         return "exact allocation"
-
-    def scalar_law(self, airframe: Airframe) -> Callable[..., tuple[Values, Values, Values]]:
-        """The law, a function marked `scalar`."""
-        raise NotImplementedError
 
     def law_parameters(self, airframe: Airframe) -> tuple[Any, ...]:
         """The law's parameters: a NamedTuple of floats and of such records, one at least."""
@@ -119,8 +112,20 @@ class ScalarController(ControllerTable):
         return 30.0
 
 
-class TiltingController(ScalarController):
-    """A `ScalarController` that may command the tilts, too."""
+class ScalarController(ScalarTable):
+    """A controller whose law is one scalar function ``(observed, parameters)``.
+
+    The function returns thrusts, tilts and rates of states; see
+    `tiltsim_controllers.laws.observed`. The rotors take up the commanded speeds with a lag.
+    """
+
+    @abstractmethod
+    def scalar_law(self, airframe: Airframe) -> Callable[..., tuple[Values, Values, Values]]:
+        """The law, a function marked `scalar`."""
+
+
+class TiltingTable(ScalarTable):
+    """Those that may command the tilts, too."""
 
     tilts: Literal["gait", "free"] = Field(
         "gait",

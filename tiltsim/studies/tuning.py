@@ -25,7 +25,7 @@ from scipy.stats import qmc
 
 from tiltsim.errors import InputError
 from tiltsim.scenario.controller_table import ControllerTable
-from tiltsim.scenario.scalar_controller import ScalarController
+from tiltsim.scenario.scalar_controller import ScalarTable
 from tiltsim.studies.arena import Vehicle, entry_of, score
 from tiltsim.studies.comparison import Entry, compare_one
 from tiltsim.system.processes import in_processes
@@ -109,7 +109,7 @@ def knobs(controller: ControllerTable) -> dict[str, dict[Path, int]]:
     share one.
     """
     found: dict[str, dict[Path, int]] = {}
-    scalar = isinstance(controller, ScalarController)
+    scalar = isinstance(controller, ScalarTable)
     for path, value in _leaves(controller.in_full().model_dump(mode="json")):
         if scalar and value > 0.0 and path[0] not in NOT_TUNED:
             found.setdefault(_name(path), {})[path] = 1
