@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ctypes
-import inspect
 import os
 import signal
 import subprocess
@@ -12,14 +11,13 @@ import threading
 import time
 
 import pytest
+from numba.core.dispatcher import Dispatcher
 
 import tiltsim.commands.run
 from tests.flights import flight as flight_named
 from tiltsim.cli import main
-from tiltsim.engines import native_stepper
+from tiltsim.engines.compiling import compiled
 from tiltsim.flight.reading import load_flight
-from tiltsim.linear.motion import make_motion
-from tiltsim.scenario.loading import load_scenario
 from tiltsim.system.interrupts import (
     defer_interrupts,
     reraise_swallowed_interrupts,
@@ -78,17 +76,13 @@ def test_an_interrupt_swallowed_by_c_comes_before_what_fails_of_it():
         work()
 
 
-def test_an_interrupt_while_a_linear_analysis_compiles_is_raised(monkeypatch):
+def test_an_interrupt_while_the_first_call_compiles_is_raised(monkeypatch):
     def raises():
         raise KeyboardInterrupt
 
-    uncached = inspect.unwrap(native_stepper.compile_stepper)
-    monkeypatch.setattr(native_stepper, "compile_stepper", uncached)
-    monkeypatch.setattr(native_stepper, "compiled", lambda _: lambda *_: call_from_c(raises))
-    scenario = load_scenario("ch04_tracking/setpoint#rho_065_modified")
-    motion = make_motion(scenario.replace({"simulation.plant": "thesis"}), "native")
+    monkeypatch.setattr(Dispatcher, "compile", lambda *_: call_from_c(raises))
     with pytest.raises(KeyboardInterrupt):
-        motion.flown(0, motion.initial, 1)
+        compiled(lambda x: x)(1.0)
 
 
 def test_other_exceptions_swallowed_by_c_are_reported_as_usual(monkeypatch):

@@ -134,7 +134,10 @@ def _cached(
 
 def compiled(function: Callable[..., Any]) -> Any:
     """Compile a function for calls from Python, without holding Python's lock."""
-    return _cached(njit(nogil=True, **ERROR_MODEL)(function), function)
+    dispatcher = njit(nogil=True, **ERROR_MODEL)(function)
+    # Called by numba at the first call, which compiles, not at later ones with the same types.
+    dispatcher._compile_for_args = reraise_swallowed_interrupts()(dispatcher._compile_for_args)
+    return _cached(dispatcher, function)
 
 
 def compiled_callback(signature: Any) -> Callable[[Callable[..., Any]], Any]:

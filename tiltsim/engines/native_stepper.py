@@ -12,7 +12,6 @@ from tiltsim.engines.cache import announce_native_code
 from tiltsim.engines.compiling import callable_natively, compiled, register_scalar_functions
 from tiltsim.engines.recorder import record_sample, recording_is_over
 from tiltsim.equations.solvers import make_stepper
-from tiltsim.system.interrupts import reraise_swallowed_interrupts
 from tiltsim.system.locks import one_thread_at_a_time
 from tiltsim_controllers.mathematics.records import record_dtype
 from tiltsim_controllers.mathematics.scalar import Floats
@@ -65,7 +64,7 @@ def compile_stepper(loop: ClosedLoop, plant: str, solver: str) -> Any:
                 break
         return np.array(values), held
 
-    return reraise_swallowed_interrupts()(advance)  # the first call compiles
+    return advance
 
 
 def native_record(loop: ClosedLoop, userdata: Floats) -> tuple[Any, Floats]:

@@ -12,7 +12,6 @@ from typing import Any, Final
 import numpy as np
 
 from tiltsim.closed_loop.loop import ControlSetup
-from tiltsim.system.interrupts import reraise_swallowed_interrupts
 from tiltsim.system.locks import one_thread_at_a_time
 from tiltsim_controllers.mathematics.records import leaves, record_dtype, record_size, unflatten
 from tiltsim_controllers.mathematics.scalar import Floats, Values
@@ -49,8 +48,7 @@ def evaluate_over_samples(
     rows = np.full((len(time), width), nan)
     for part, own in _flights(setup, len(time)):
         if natively:
-            with reraise_swallowed_interrupts():
-                rows[part] = _evaluate_natively(function, time[part], states[part], own)
+            rows[part] = _evaluate_natively(function, time[part], states[part], own)
             continue
         for row, t, state in zip(rows[part], time[part].tolist(), states[part].tolist()):
             with suppress(ArithmeticError, ValueError):
