@@ -6,6 +6,8 @@ import os
 import resource
 import subprocess
 import sys
+from inspect import unwrap
+from pathlib import Path
 
 import pytest
 
@@ -62,6 +64,18 @@ def test_processes_that_compile_at_once_find_what_they_compiled(tmp_path, monkey
     index = compiling.NativeCodeCache(named("clipped"))._cache_file
     keys = [(name, entry) for name in names for entry in range(ENTRIES)]
     assert [index.load(key) for key in keys] == keys
+
+
+def test_equal_sources_in_another_place_have_a_folder_of_their_own(tmp_path, monkeypatch):
+    here = Path(cache.__file__)
+    (tmp_path / "tiltsim").symlink_to(here.parents[1])
+    folder = native_code_folder()
+    monkeypatch.setattr(cache, "__file__", str(tmp_path / "tiltsim" / "engines" / "cache.py"))
+    moved = unwrap(native_code_folder)()
+    assert moved.parent == folder.parent
+    assert moved != folder
+    monkeypatch.setattr(cache, "__file__", str(here))
+    assert unwrap(native_code_folder)() == folder
 
 
 def named(name):

@@ -30,12 +30,15 @@ def is_core_code(function: Callable[..., Any]) -> bool:
 
 @cache
 def native_code_folder() -> Path:
-    """The folder of code compiled from exactly these sources with exactly these versions."""
+    """The folder of code compiled from exactly these sources with exactly these versions.
+
+    The sources' places count, too: numba finds code by the path of its source.
+    """
     versions = [version(name) for name in ("numba", "llvmlite", "numpy", "mujoco")]
     machine = platform.python_version(), platform.platform()
     digest = hashlib.sha256(repr([*versions, *machine]).encode())
     for source in core_sources():
-        digest.update(source.read_bytes())
+        digest.update(os.fsencode(source) + source.read_bytes())
     base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
     return Path(base) / "tiltsim" / digest.hexdigest()[:16]
 
