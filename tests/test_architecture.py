@@ -47,7 +47,7 @@ ORDER = {
 FLYING_PREFIXES = tuple(f"tiltsim.{folder}." for folder in FLYING)
 HEAVY = {
     *("av", "casadi", "dm_control", "gymnasium", "jax", "matplotlib", "mujoco"),
-    *("numba", "pyarrow", "pydantic", "rerun"),
+    *("numba", "pandas", "pyarrow", "pydantic", "rerun"),
 }
 
 
@@ -201,12 +201,12 @@ def test_reading_a_scenario_does_not_load_the_simulator():
     assert not modules_loaded_by(code) & (HEAVY - {"pydantic"})
 
 
-def test_a_flight_of_the_python_engine_does_not_load_the_compiler():
+def test_a_saved_flight_of_the_python_engine_does_not_load_the_compiler(tmp_path):
     tables = {"simulation": {"duration": 0.01, "engine": "python"}}
-    code = f"import tiltsim; tiltsim.simulate(tiltsim.parse_scenario({tables})).metrics()"
-    loaded = modules_loaded_by(code)
+    flight = f"tiltsim.simulate(tiltsim.parse_scenario({tables}))"
+    loaded = modules_loaded_by(f"import tiltsim; {flight}.save({str(tmp_path)!r})")
     assert "mujoco" in loaded
-    assert not loaded & (HEAVY - {"mujoco", "dm_control", "pydantic"})
+    assert not loaded & (HEAVY - {"mujoco", "dm_control", "pydantic", "pyarrow"})
 
 
 def test_every_public_name_of_the_package_resolves():

@@ -190,7 +190,10 @@ class Flight:
             for name, unit in self.units.items()
         ]
         schema = pa.schema(fields, metadata=self.origin())
-        return pa.table(list(self.columns.values()), schema=schema)
+        # Of their bytes, as converting an array would import pandas where it is installed.
+        memory = [pa.py_buffer(np.ascontiguousarray(column)) for column in self.columns.values()]
+        columns = [pa.Array.from_buffers(pa.float64(), len(self), [None, one]) for one in memory]
+        return pa.table(columns, schema=schema)
 
     def origin(self) -> dict[str, str]:
         """The metadata of the file: scenario (JSON), versions, seed, engine, end, wall time (s)."""
