@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
-from tiltsim.arrays.jax_arrays import JaxArrays, require_jax
+from tiltsim.arrays.jax_arrays import JaxArrays, recomputes, require_jax
 from tiltsim.arrays.lifting import Lifting
 from tiltsim.closed_loop.limits import WITHIN_LIMITS
 from tiltsim.env.task import Task
-from tiltsim.equations.implicitfast import make_implicitfast_step
+from tiltsim.equations.implicitfast import make_implicitfast_step, turned
 from tiltsim.equations.rigid_body import form_of, rigid_body_of
 from tiltsim.errors import InputError
 from tiltsim.laws.assembling import loop_of
@@ -108,7 +108,8 @@ class EnvFunctions:
         self._commanded = self._act + self._rotors * lags
         equations = loop.equations
         assert equations is not None
-        lifting = Lifting(JaxArrays(precision), guarded=True)
+        separate = (equations.rates, turned) if recomputes() else ()
+        lifting = Lifting(JaxArrays(precision), guarded=True, separate=separate)
         self._advance = lifting(make_implicitfast_step(equations, self._tilts))
         self._inputs, self._sample = lifting(equations.inputs), lifting(equations.observe)
         self._limit = lifting(loop.kind.limit_exceeded)
