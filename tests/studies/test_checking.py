@@ -8,8 +8,10 @@ from hypothesis import strategies as st
 
 from tiltsim.resources import shipped_folder
 from tiltsim.scenario.library import library_entries, library_families
+from tiltsim.scenario.loading import load_scenario
+from tiltsim.studies import checking
 from tiltsim.studies.check_results import CheckResult, exit_code
-from tiltsim.studies.checking import collect, shard
+from tiltsim.studies.checking import check_all, collect, shard
 
 SHIPPED = [str(shipped_folder("scenarios"))]
 LIBRARY = collect(SHIPPED)
@@ -68,6 +70,23 @@ def test_a_word_selects_in_files_of_ones_own(tmp_path, monkeypatch, word, select
         addresses, key=lambda address: address != "own.toml#fast"
     )
     assert collect(["own.toml", "wrong.toml"], "wrong") == ["wrong.toml"]
+
+
+def test_scenarios_are_read_once_and_invalid_ones_reported_before_any_is_flown(
+    tmp_path, monkeypatch
+):
+    read = []
+
+    def read_one(*arguments):
+        read.append(arguments)
+        return load_scenario(*arguments)
+
+    monkeypatch.setattr(checking, "load_scenario", read_one)
+    (tmp_path / "good.toml").write_text("[simulation]\nduration = 0.01\n")
+    (tmp_path / "wrong.toml").write_text("title = 3\n")
+    results = check_all(collect([str(tmp_path)]), 1, {})
+    assert [result.status for result in results] == ["invalid", "passed"]
+    assert len(read) == 2
 
 
 def test_the_most_severe_exit_code_is_returned():

@@ -96,26 +96,18 @@ def _find(name: str) -> Path:
     )
 
 
-def check_one(
-    address: str,
-    overrides: Mapping[str, Any],
-    compiled: frozenset[str] = frozenset(),
-    *,
-    trusted: bool = False,
-) -> CheckResult:
+def check_one(loaded: tuple[str, Scenario], *, trusted: bool = False) -> CheckResult:
     """Fly one scenario and evaluate its expectations; errors become part of the result.
 
     Args:
-        address: Of the scenario.
-        overrides: Values by dotted key.
-        compiled: Loops to fly natively, of `compile_together`.
+        loaded: The scenario and its address.
         trusted: Whether to execute Python code that the scenario names.
     """
     start = perf_counter()
+    address, scenario = loaded
     try:
-        scenario = load_scenario(address, overrides)
         require_trust(scenario, trusted)
-        flight = simulate(with_compiled(scenario, compiled))
+        flight = simulate(scenario)
     except InputError as error:
         return CheckResult(address, "invalid", str(error))
     if flight.end.kind == "interrupted":
@@ -145,8 +137,9 @@ def check_all(
 ) -> Iterator[CheckResult]:
     """Check scenarios on several processes; yield each result as it becomes known.
 
-    If a process dies, only the scenario that it was flying is reported as crashed. An interrupt
-    from the keyboard, or closing the iterator, ends all processes at once.
+    Invalid ones come first, before any is flown. If a process dies, only the scenario that it was
+    flying is reported as crashed. An interrupt from the keyboard, or closing the iterator, ends all
+    processes at once.
 
     Args:
         addresses: Of scenarios, as from `collect`.
@@ -154,17 +147,22 @@ def check_all(
         overrides: Values by dotted key, for every scenario.
         trusted: Whether to execute Python code that scenarios name.
     """
-    scenarios = _valid(addresses, overrides)
-    jobs = min(jobs, len(addresses))
-    compiled = compile_together(list(scenarios.values()), jobs)
-    work = partial(check_one, overrides=overrides, compiled=compiled, trusted=trusted)
+    scenarios = {}
+    for address in addresses:
+        try:
+            scenarios[address] = load_scenario(address, overrides)
+        except InputError as error:
+            yield CheckResult(address, "invalid", str(error))
+    jobs = min(jobs, len(scenarios))
+    compiled = compile_together([*scenarios.values()], jobs)
+    loaded = [(address, with_compiled(one, compiled)) for address, one in scenarios.items()]
+    work = partial(check_one, trusted=trusted)
     if jobs <= 1:
-        yield from map(work, addresses)
+        yield from map(work, loaded)
         return
     # The longest first, so that none of them is still running when all others have finished.
-    steps = {address: scenario.simulation.steps for address, scenario in scenarios.items()}
-    by_length = sorted(addresses, key=lambda address: -steps.get(address, 0))
-    for address, future in in_processes(work, by_length, jobs):
+    by_length = sorted(loaded, key=lambda one: -one[1].simulation.steps)
+    for (address, _), future in in_processes(work, by_length, jobs):
         yield _result(address, future)
 
 
@@ -173,13 +171,3 @@ def _result(address: str, future: Future[CheckResult]) -> CheckResult:
     if error is not None:
         return CheckResult(address, "crashed", f"{type(error).__name__}: {error}")
     return future.result()
-
-
-def _valid(addresses: list[str], overrides: Mapping[str, Any]) -> dict[str, Scenario]:
-    scenarios = {}
-    for address in addresses:
-        try:
-            scenarios[address] = load_scenario(address, overrides)
-        except InputError:
-            continue  # reported when it is checked
-    return scenarios
