@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import json
 import os
-import random
 import re
 import signal
 import subprocess
 import sys
 import time
 from concurrent.futures import Future
-from itertools import cycle
+from itertools import pairwise
 
 import pyarrow.parquet as pq
 import pytest
@@ -49,22 +48,46 @@ def parts_in(folder):
     return len(list(folder.glob("parts/[0-9]*.parquet")))
 
 
-def fly_until_killed(arguments, folder, moment, parts=0):
-    """Start a sweep in a process group of its own and kill all of it.
+DYING = """
+import os, signal, sys
+from pathlib import Path
+from tiltsim.sweeps.loading import load_sweep
+from tiltsim.sweeps.running import run_sweep
 
-    The moment (s) counts from when the folder holds so many parts.
-    """
-    process = subprocess.Popen(arguments, start_new_session=True)
-    while process.poll() is None and parts_in(folder) < parts:
-        time.sleep(0.01)
-    try:
-        process.wait(moment)
-    except subprocess.TimeoutExpired:
-        os.killpg(process.pid, signal.SIGKILL)
-        process.wait()
-    for file in folder.glob("parts/[0-9]*.parquet"):
-        assert pq.read_table(file, partitioning=None).num_rows > 0  # none is half-written
-    return process.returncode
+definition, folder, jobs = load_sweep(sys.argv[1]), Path(sys.argv[2]), int(sys.argv[3])
+replace = Path.replace
+
+
+def fly(files):
+    def die(temporary, file):
+        nonlocal files
+        files -= 0.5
+        if files == 0.0:
+            os.kill(os.getpid(), signal.SIGKILL)
+        replace(temporary, file)
+        files -= 0.5
+        if files == 0.0:
+            os.kill(os.getpid(), signal.SIGKILL)
+
+    Path.replace = die
+    run_sweep(definition, folder, jobs=jobs)
+
+
+if jobs > 1:
+    fly(4.0)
+while not (folder / "sweep.parquet").exists():
+    for files in (0.5, 1.0, 1.5, 2.0):
+        child = os.fork()
+        if child == 0:
+            fly(files)
+            os._exit(0)
+        assert os.waitpid(child, 0)[1] == signal.SIGKILL
+        print(*sorted(file.name for file in folder.glob("**/[!.]*.parquet")))
+"""
+"""A sweep killed before and after it renames the definition, and then the next file, each time.
+
+With several processes, their parent is killed after the third part.
+"""
 
 
 def test_rows_hold_what_was_flown(tmp_path):
@@ -84,14 +107,6 @@ def test_rows_hold_what_was_flown(tmp_path):
     kept = {name: value for name, value in flight.metrics().items() if name != "realtime_factor"}
     assert {name: table[7][name] for name in kept} == kept
     assert "realtime_factor" not in table[7]
-
-
-@pytest.mark.slow
-def test_processes_make_the_same_dataset_bit_for_bit(tmp_path):
-    definition = load_sweep(short_sweep(tmp_path / "sweep.toml"))
-    one = run_sweep(definition, tmp_path / "one", jobs=1)
-    two = run_sweep(definition, tmp_path / "two", jobs=2)
-    assert one.read_bytes() == two.read_bytes()
 
 
 def test_a_sweep_continues_where_it_stopped(tmp_path, monkeypatch):
@@ -249,29 +264,29 @@ def test_boundaries_are_found_to_their_tolerance(tmp_path):
         assert row["initial.attitude"] == [row["roll"], 0.0, 2 * row["roll"]]
 
 
-@pytest.mark.slow(longest=True)
-def test_a_thousand_flights_killed_eight_times(tmp_path):
-    file = short_sweep(tmp_path / "sweep.toml", count=500, chunk_size=10)
-    whole = run_sweep(load_sweep(file), tmp_path / "whole", jobs=2)
-    chance, folder, progress = random.Random(2000), tmp_path / "killed", []
-    for jobs, parts in zip(cycle((1, 2)), [0, *sorted(chance.sample(range(1, 60), 7))]):
-        moment = chance.uniform(0.0, 0.3 if parts else 2.0)
-        arguments = command(file, folder, f"--jobs={jobs}")
-        if fly_until_killed(arguments, folder, moment, parts) == 0:
-            break  # this process did not run for so long that the sweep was faster
-        progress.append(parts_in(folder))
-    assert progress == sorted(progress)  # nothing finished is lost
-    subprocess.run(command(file, folder, "--jobs=2"), check=True)
-    assert (folder / "sweep.parquet").read_bytes() == whole.read_bytes()
+@pytest.mark.slow
+def test_killed_at_every_file_it_continues_to_the_same_dataset(tmp_path):
+    file = short_sweep(tmp_path / "sweep.toml")
+    whole = run_sweep(load_sweep(file), tmp_path / "whole")
+    flown = subprocess.run(
+        [sys.executable, "-c", DYING, file, tmp_path / "killed", "1"],
+        **{"check": True, "capture_output": True, "text": True},
+    )
+    parts = [f"{number:06d}.parquet" for number in range(4)]
+    left = [*(parts[:number] for number in range(5)), [*parts, "sweep.parquet"]]
+    found = [line.split() for line in flown.stdout.splitlines()]
+    # Only the last of four kills, after the renaming, finds another file in the folder.
+    assert found == [x for old, new in pairwise(left) for x in (old, old, old, new)]
+    assert (tmp_path / "killed" / "sweep.parquet").read_bytes() == whole.read_bytes()
 
 
 @pytest.mark.slow
-def test_processes_end_with_their_parent(tmp_path):
-    file = short_sweep(tmp_path / "sweep.toml", count=4000, chunk_size=8)
-    process = subprocess.Popen(command(file, tmp_path / "out", "--jobs=2"), start_new_session=True)
-    while not list(tmp_path.glob("out/parts/0*")):
-        time.sleep(0.05)
-    os.kill(process.pid, signal.SIGKILL)  # the parent alone
+def test_its_processes_end_when_it_is_killed_and_others_continue_to_the_same_dataset(tmp_path):
+    file = short_sweep(tmp_path / "sweep.toml", count=80, chunk_size=8)
+    whole = run_sweep(load_sweep(file), tmp_path / "whole")
+    folder = tmp_path / "out"
+    arguments = [sys.executable, "-c", DYING, file, folder, "2"]
+    process = subprocess.Popen(arguments, start_new_session=True)
     process.wait()
     deadline = time.monotonic() + 300.0
     while time.monotonic() < deadline:
@@ -283,6 +298,10 @@ def test_processes_end_with_their_parent(tmp_path):
     else:
         os.killpg(process.pid, signal.SIGKILL)
         pytest.fail("processes outlive their parent")
+    reports = []
+    continued = run_sweep(load_sweep(file), folder, jobs=2, report=reports.append)
+    assert reports[0] == 3 * 8  # the parent alone was killed, after the third part
+    assert continued.read_bytes() == whole.read_bytes()
 
 
 @pytest.mark.parametrize("times", [2, 3])
