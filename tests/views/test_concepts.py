@@ -158,20 +158,26 @@ def test_keys_columns_and_flights_of_the_page_exist():
     assert all(f"#{address.partition('#')[2]}`" in text for address in DECOUPLER_FLIGHTS.values())
 
 
+@pytest.fixture(scope="module")
+def flown():
+    return fly_decouplers()
+
+
 @pytest.mark.slow
-def test_the_decouplers_rest_where_the_page_says():
+def test_the_decouplers_rest_where_the_page_says(flown):
     force = torque_free_direction(concepts.TROT_ANGLES, VEHICLE)
     text = PAGE.read_text(encoding="utf-8")
     hover = exact_decoupler(0.0, 0.0, 0.0, 0.0, 9.8, tuple(force))
-    for name, flown in fly_decouplers().items():
-        assert (flown["roll"][-1], flown["pitch"][-1]) == pytest.approx(hover, abs=1e-6)
-        away = np.hypot(flown["x"][-1], flown["y"][-1])
-        row = f"| {name} | ({flown['x'][-1]:.2f}, {flown['y'][-1]:.2f}) m | {away:.2f} m |"
+    for name, this in flown.items():
+        assert (this["roll"][-1], this["pitch"][-1]) == pytest.approx(hover, abs=1e-6)
+        away = np.hypot(this["x"][-1], this["y"][-1])
+        row = f"| {name} | ({this['x'][-1]:.2f}, {this['y'][-1]:.2f}) m | {away:.2f} m |"
         assert row in text or (name == "exact" and away < 1e-6 and "| below 1e-6 m |" in text)
 
 
 @pytest.mark.slow
-def test_the_command_draws_the_pictures_of_the_page(tmp_path, capsys):
+def test_the_command_draws_the_pictures_of_the_page(flown, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("tiltsim.commands.concepts.fly_decouplers", lambda: flown)
     assert main(["concepts", "--out", str(tmp_path / "pictures")]) == 0
     files = sorted(tmp_path.glob("pictures/*"))
     assert {file.name for file in files} == {f"concepts_{name}.svg" for name in drawings()}
