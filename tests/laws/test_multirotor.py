@@ -297,7 +297,6 @@ HELD = {
         ("tilt_hexarotor", {"vehicle": HEAVY, "gait": TILTS, "simulation": {"plant": "thesis"}}),
         ("tilt_hexarotor", {**EVERYTHING, "controller": HELD, "gait": ASIDE}),
         ("tilt_hexarotor", {"controller": {"law": "full_pose", "failed_rotor": 2}}),
-        ("omni_octorotor", {"controller": {"law": "attitude_force", "norm": "thrust"}}),
     ],
 )
 def test_engines_fly_the_same_bit_for_bit(name, tables):
