@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections import defaultdict
 from types import SimpleNamespace
 
 import numpy as np
@@ -123,16 +124,29 @@ def short_flights():
 
 def record(action, calls):
     """Add the arguments of the first call of each scalar function by an action."""
-    known = {}
+    known, by_code, read = {}, defaultdict(list), 0
+
+    def functions_of(code):
+        """Those with this very code; generated ones may have equal code of their own."""
+        nonlocal read
+        functions = scalar_functions()
+        for function in functions[read:]:  # the flight makes others
+            by_code[id(function.__code__)].append(function)
+        read = len(functions)
+        return by_code[id(code)]
 
     def notice(frame, event, _argument):
         code = frame.f_code
         if event != "call" or "tiltsim" not in code.co_filename:
             return
         if code not in known:
-            known[code] = [f for f in scalar_functions() if f.__code__ is code]
+            known[code] = [*functions_of(code)]
+            if all(function in calls for function in known[code]):
+                known[code] = []
+        if not known[code]:
+            return
         here = frame.f_locals
-        for function in known[code] or ():
+        for function in known[code]:
             cells = [cell.cell_contents for cell in function.__closure__ or ()]
             if all(here.get(n) is c for n, c in zip(code.co_freevars, cells)):
                 arguments = [here[name] for name in code.co_varnames[: code.co_argcount]]
