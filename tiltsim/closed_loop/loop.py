@@ -172,7 +172,7 @@ class SupervisedLaw(NamedTuple):
     """
 
     code: Supervision
-    vehicle: Callable[..., Any]  # (parameters): what this code reads of the vehicle
+    vehicle: Callable[..., Any]  # (time, parameters): what this code reads of the vehicle
     seen: Callable[..., tuple[Values, ...]]
     """``(qpos, qvel, act)``: state, that of the body first, tilt rates and the controller's own
     states."""

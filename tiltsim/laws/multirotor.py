@@ -27,8 +27,10 @@ from tiltsim_controllers.laws.multirotor_supervisor import (
     Watched,
     multirotor_supervision_of,
     watched,
+    watched_at,
 )
 from tiltsim_controllers.mathematics.scalar import Values, scalar
+from tiltsim_controllers.vehicle.effectiveness import without_rotor
 
 if TYPE_CHECKING:
     from tiltsim.scenario.scenario import FlightPlan, Scenario
@@ -41,6 +43,7 @@ def _setup(plan: FlightPlan) -> tuple[Parameters, Values]:
     assert isinstance(vehicle, Multirotor)
     dimension = controller.resolve_force(vehicle, gait).dimension
     side, lost = upper_side(vehicle, gait), controller.failed_rotor
+    side_without = side if lost is None else upper_side(vehicle, gait, lost)
     law = Parameters(
         vehicle=body_of_vehicle(vehicle),
         **tracking_fields(plan),
@@ -56,21 +59,23 @@ def _setup(plan: FlightPlan) -> tuple[Parameters, Values]:
             *scenario.any_rotorcraft.speeds_along_spin, controller.allocation_horizon
         ),
         upper_side=Direction(*side),
-        upper_side_without=Direction(*(side if lost is None else upper_side(vehicle, gait, lost))),
+        upper_side_without=Direction(*side_without),
     )
-    if controller.supervision is not None:
-        law = law._replace(
-            supervisor=controller.resolve_supervisor(vehicle),
-            watched=watched(vehicle.table, len(plan.knots), side),
-        )
-    return law, vehicle.table
+    if controller.supervision is None:
+        return law, vehicle.table
+    table, known = vehicle.table, watched(vehicle.table, len(plan.knots), side)
+    x, y, z = side_without
+    others = known._replace(rotors=known.rotors + len(table), side_x=x, side_y=y, side_z=z)
+    law = law._replace(
+        supervisor=controller.resolve_supervisor(vehicle), watched=known, watched_without=others
+    )
+    return law, table if lost is None else (*table, *without_rotor(table, lost))
 
 
 @scalar
-def _watched(parameters: Any) -> Watched:
+def _watched(time: float, parameters: Any) -> Watched:
     """What the supervisor reads of a vehicle."""
-    known: Watched = parameters.law.watched
-    return known
+    return watched_at(time, parameters.law)
 
 
 @cache

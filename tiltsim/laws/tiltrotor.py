@@ -63,7 +63,7 @@ def singularity_columns(samples: Mapping[str, Floats], vehicle: Vehicle) -> dict
 
 
 @scalar
-def watched_vehicle(parameters: Any) -> float:
+def watched_vehicle(time: float, parameters: Any) -> float:
     """What the tiltrotor's supervisor reads of it."""
     return drag_ratio(parameters.law.vehicle)
 

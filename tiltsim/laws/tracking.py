@@ -125,7 +125,7 @@ def supervised_loop(
         layout: Of the vehicles.
         law: Its ``inputs`` and ``references`` are those of a `SupervisedLaw`.
         supervision: The supervisor's code.
-        watched: What this reads of a vehicle, by the parameters.
+        watched: What this reads of a vehicle: ``(time, parameters)``.
     """
     inputs, references, margins = law.inputs, law.references, law.margins
     assert references is not None

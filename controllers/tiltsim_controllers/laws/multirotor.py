@@ -57,7 +57,7 @@ from tiltsim_controllers.laws.multirotor_steps import (
     side_control,
     turned,
 )
-from tiltsim_controllers.laws.multirotor_supervisor import multirotor_supervision_of
+from tiltsim_controllers.laws.multirotor_supervisor import multirotor_supervision_of, watched_at
 from tiltsim_controllers.laws.supervisor import SUPERVISOR_AT_REST, gait_time
 from tiltsim_controllers.mathematics.jets import Jet, Jets3
 from tiltsim_controllers.mathematics.rotation import rotation_from_euler, to_body, to_world
@@ -125,7 +125,7 @@ def _tilts_of(layout: TiltOfRotor, form: Form) -> Callable[..., Jets]:
 
     @scalar
     def supervised(time: float, watching: Watching, parameters: Any, knots: Vector) -> Jets:
-        supervisor, vehicle = parameters.supervisor, parameters.watched
+        supervisor, vehicle = parameters.supervisor, watched_at(time, parameters)
         roll, pitch, moving = watching
         clock = gait_time(time, moving, supervisor)
         now = angles(planned_of(clock, parameters.gait, knots))

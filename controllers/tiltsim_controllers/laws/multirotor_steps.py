@@ -103,6 +103,7 @@ class Parameters(NamedTuple):
     limits: RotorRange = RotorRange()  # of prioritized allocation
     supervisor: Supervisor = Supervisor()
     watched: Watched = Watched()
+    watched_without: Watched = Watched()  # the same once the failed rotor is known
     upper_side: Direction = Direction()  # of the force with which it lifts, if it has two; else 0
     upper_side_without: Direction = Direction()  # the same once the failed rotor is known
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import cache
 from math import asin, pi, sqrt
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -51,6 +51,15 @@ def untilted_volume(table: Sequence[float]) -> float:
 def watched(table: Sequence[float], rotors: int, side: Triple) -> Watched:
     """Of a vehicle whose table begins at an index of the knots."""
     return Watched(float(rotors), UNTILTED / untilted_volume(table), *side)
+
+
+@scalar
+def watched_at(time: float, parameters: Any) -> Watched:
+    """What is watched at a time (s): of the other rotors, once it is known that one failed."""
+    seen: Watched = parameters.watched
+    if time >= parameters.failure.known_from:
+        seen = parameters.watched_without
+    return seen
 
 
 @cache

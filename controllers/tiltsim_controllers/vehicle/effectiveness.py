@@ -145,6 +145,12 @@ def cross_table(vehicle: Vehicle, *, tilting: bool) -> Values:
     return tuple(table)
 
 
+def without_rotor(table: Sequence[float], rotor: int) -> Values:
+    """A table of which one rotor, from 1, makes neither force nor torque."""
+    first, end = (rotor - 1) * ROTOR_FLOATS + CONSTANT, rotor * ROTOR_FLOATS
+    return (*table[:first], *(0.0,) * (end - first), *table[end:])
+
+
 def tilt_of_rotor(table: Sequence[float]) -> TiltOfRotor:
     """The layout in a table."""
     return tuple(int(tilt) for tilt in table[TILT::ROTOR_FLOATS])

@@ -236,6 +236,26 @@ def test_six_arms_hold_a_gait_that_would_push_aside_until_the_vehicle_leans():
     np.testing.assert_allclose(held["alpha_ref_2"], 0.8 * clock, atol=1e-12)
 
 
+@pytest.mark.parametrize("strategy", ["scale", "hold"])
+def test_once_a_rotor_is_known_to_be_lost_the_others_are_watched(strategy):
+    """Level and untilted, five of the six arms have a determinant of 2.309 instead of 4."""
+    aside = (0.4 * np.sin(np.pi / 6.0 + np.pi / 3.0 * np.arange(6))).tolist()
+    limits = {"strategy": strategy, "min_margin": 0.0, "min_determinant": 2.305}
+    flight = fly(
+        "tilt_hexarotor",
+        simulation={"timestep": 0.002, "record_timestep": 0.01},
+        controller={
+            **{"law": "attitude_force", "dimension": 1, "supervisor": limits},
+            **{"failed_rotor": 1, "failure_known_from": 0.05},
+        },
+        gait={"type": "waypoints", "angles": [[0.0] * 6, aside], "period": 0.5},
+    )
+    known = flight["time"] > 0.06
+    assert not flight["supervision"][flight["time"] < 0.045].any()
+    assert flight["supervision"][known].min() > 0.05, flight["supervision"]
+    assert np.isfinite(flight["supervision"]).all()
+
+
 @pytest.mark.parametrize(
     ("name", "strategy", "message"),
     [

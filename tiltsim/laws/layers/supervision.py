@@ -67,7 +67,9 @@ def _scaling(loop: ClosedLoop) -> Layer:
         """The factor of the planned gait at an attitude (rad)."""
         inner = parameters.inner
         planned = angles(planned_of(time, inner.law.gait, knots))
-        scale: float = gait_scale(planned, roll, pitch, parameters.layer, vehicle_of(inner), knots)
+        scale: float = gait_scale(
+            planned, roll, pitch, parameters.layer, vehicle_of(time, inner), knots
+        )
         return scale
 
     @scalar
@@ -144,7 +146,7 @@ def _with_states(loop: ClosedLoop, units: tuple[str, ...]) -> Layer:
     ) -> Values:
         inner, supervisor = parameters.inner, parameters.layer
         state, moving, states = seen_in(qpos, qvel, act)
-        gait, lead, vehicle = inner.law.gait, inner.servo_lead, vehicle_of(inner)
+        gait, lead, vehicle = inner.law.gait, inner.servo_lead, vehicle_of(time, inner)
         roll, pitch, delay, rate = state[ROLL], state[PITCH], act[first], act[first + 1]
         motion = derivative(time, roll, pitch, delay, rate, gait, knots, supervisor, vehicle)
         return (
@@ -159,7 +161,7 @@ def _with_states(loop: ClosedLoop, units: tuple[str, ...]) -> Layer:
     def reference_values(time: float, state: Vector, parameters: Any, knots: Vector) -> Values:
         inner, supervisor = parameters.inner, parameters.layer
         motion = (state[seen], state[seen + 1], 0.0)
-        gait, vehicle = inner.law.gait, vehicle_of(inner)
+        gait, vehicle = inner.law.gait, vehicle_of(time, inner)
         return (
             *references(time, state, motion, inner, knots),
             *servo_commands(time, motion, gait, knots, supervisor, vehicle, 0.0),
