@@ -5,7 +5,9 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
+import subprocess
 import sys
+import time
 
 import pytest
 
@@ -65,3 +67,23 @@ def test_leaving_the_loop_ends_processes_that_are_answering():
         assert len(future.result()) == MEGABYTES
         break
     assert not multiprocessing.active_children()
+
+
+def work_for_long(_item):
+    os.write(sys.stdout.fileno(), b"working\n")
+    time.sleep(60.0)
+
+
+IN_A_PROCESS = """
+from tests.system.test_processes import in_processes, work_for_long
+next(in_processes(work_for_long, [0], 1))
+"""
+
+
+def test_a_process_ends_with_its_parent_in_the_middle_of_its_work():
+    """As long as it lives, it holds the output that it has from its parent."""
+    command = [sys.executable, "-c", IN_A_PROCESS]
+    with subprocess.Popen(command, stdout=subprocess.PIPE) as parent:
+        assert parent.stdout.readline() == b"working\n"
+        parent.kill()
+        assert parent.communicate(timeout=40.0) == (b"", None)
