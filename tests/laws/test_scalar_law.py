@@ -170,7 +170,7 @@ def entries(monkeypatch, *found):
         (("gone", "no_such_package:Table"), "ModuleNotFoundError"),
         (("other", "json:JSONDecoder"), "is no subclass of tiltsim.ScalarController"),
         (("geometric", "tiltsim:ScalarController"), "has a law of this name"),
-        (("lawless", f"{__name__}:Lawless"), r"Lawless has no method scalar_law\(airframe\)"),
+        (("lawless", f"{__name__}:Lawless"), r"Lawless has no method scalar_law"),
         (
             ("renamed", "tiltsim.scenario.baseline_controllers:GeometricController"),
             'needs the field law: Literal\\["renamed"\\]',

@@ -50,6 +50,7 @@ def parts_in(folder):
 
 DYING = """
 import os, signal, sys
+from itertools import count, product
 from pathlib import Path
 from tiltsim.sweeps.loading import load_sweep
 from tiltsim.sweeps.running import run_sweep
@@ -58,15 +59,15 @@ definition, folder, jobs = load_sweep(sys.argv[1]), Path(sys.argv[2]), int(sys.a
 replace = Path.replace
 
 
-def fly(files):
+def fly(death):
+    numbers = count(1)
+
     def die(temporary, file):
-        nonlocal files
-        files -= 0.5
-        if files == 0.0:
+        number = next(numbers)
+        if death == ("before", number):
             os.kill(os.getpid(), signal.SIGKILL)
         replace(temporary, file)
-        files -= 0.5
-        if files == 0.0:
+        if death == ("after", number):
             os.kill(os.getpid(), signal.SIGKILL)
 
     Path.replace = die
@@ -74,12 +75,12 @@ def fly(files):
 
 
 if jobs > 1:
-    fly(4.0)
+    fly(("after", 4))
 while not (folder / "sweep.parquet").exists():
-    for files in (0.5, 1.0, 1.5, 2.0):
+    for death in product(("before", "after"), (1, 2)):
         child = os.fork()
         if child == 0:
-            fly(files)
+            fly(death)
             os._exit(0)
         assert os.waitpid(child, 0)[1] == signal.SIGKILL
         print(*sorted(file.name for file in folder.glob("**/[!.]*.parquet")))

@@ -64,12 +64,12 @@ def _setup(plan: FlightPlan) -> tuple[Parameters, Values]:
     if controller.supervision is None:
         return law, vehicle.table
     table, known = vehicle.table, watched(vehicle.table, len(plan.knots), side)
+    law = law._replace(supervisor=controller.resolve_supervisor(vehicle), watched=known)
+    if lost is None:
+        return law, table
     x, y, z = side_without
     others = known._replace(rotors=known.rotors + len(table), side_x=x, side_y=y, side_z=z)
-    law = law._replace(
-        supervisor=controller.resolve_supervisor(vehicle), watched=known, watched_without=others
-    )
-    return law, table if lost is None else (*table, *without_rotor(table, lost))
+    return law._replace(watched_without=others), (*table, *without_rotor(table, lost))
 
 
 @scalar

@@ -47,7 +47,7 @@ def _mistake(entry: EntryPoint, table: object, built_in: Container[str]) -> str:
     if entry.name in built_in:
         return "tiltsim has a law of this name"
     if isabstract(table):
-        return f"{entry.value} has no method scalar_law(airframe)"
+        return f"{entry.value} has no method {', '.join(sorted(table.__abstractmethods__))}"
     if get_args(table.model_fields["law"].annotation) != (entry.name,):
         return f'{entry.value} needs the field law: Literal["{entry.name}"]'
     return ""
