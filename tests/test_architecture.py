@@ -106,12 +106,14 @@ def roots(module):
     return {name.partition(".")[0] for name in imported()[module]}
 
 
-def modules_loaded_by(code):
-    script = f"import sys\n{code}\nprint(*{{name.partition('.')[0] for name in sys.modules}})"
+def modules_loaded_by(*steps):
+    """Names of the packages that are loaded after each of some steps of one program."""
+    shown = "\nprint(*{name.partition('.')[0] for name in sys.modules})\n"
+    script = "import sys\n" + "".join(step + shown for step in steps)
     done = subprocess.run(
         [sys.executable, "-c", script], capture_output=True, text=True, check=True
     )
-    return set(done.stdout.split())
+    return [set(line.split()) for line in done.stdout.splitlines()]
 
 
 @cache
@@ -186,27 +188,20 @@ def test_flying_needs_no_library_for_screens():
     assert not set().union(*map(roots, flying)) & {"argparse", "av", "matplotlib", "rerun", "tqdm"}
 
 
-@pytest.mark.parametrize(
-    "code",
-    ["import tiltsim", "import tiltsim.cli", "import tiltsim.cli; tiltsim.cli.build_parser()"],
-)
-def test_importing_is_cheap(code):
-    loaded = modules_loaded_by(code)
-    assert "tiltsim" in loaded
-    assert not loaded & HEAVY
-
-
-def test_reading_a_scenario_does_not_load_the_simulator():
-    code = "import tiltsim; tiltsim.load_scenario('ch04_tracking/setpoint#rho_065_modified')"
-    assert not modules_loaded_by(code) & (HEAVY - {"pydantic"})
-
-
-def test_a_saved_flight_of_the_python_engine_does_not_load_the_compiler(tmp_path):
+def test_every_step_loads_only_what_it_needs(tmp_path):
+    """The simulator only to fly, and no compiler for a saved flight of the engine in Python."""
     tables = {"simulation": {"duration": 0.01, "engine": "python"}}
     flight = f"tiltsim.simulate(tiltsim.parse_scenario({tables}))"
-    loaded = modules_loaded_by(f"import tiltsim; {flight}.save({str(tmp_path)!r})")
-    assert "mujoco" in loaded
-    assert not loaded & (HEAVY - {"mujoco", "dm_control", "pydantic", "pyarrow"})
+    parser, scenario, saved = modules_loaded_by(
+        "import tiltsim.cli; tiltsim.cli.build_parser()",
+        "tiltsim.load_scenario('ch04_tracking/setpoint#rho_065_modified')",
+        f"{flight}.save({str(tmp_path)!r})",
+    )
+    assert "tiltsim" in parser
+    assert not parser & HEAVY
+    assert not scenario & (HEAVY - {"pydantic"})
+    assert "mujoco" in saved
+    assert not saved & (HEAVY - {"mujoco", "dm_control", "pydantic", "pyarrow"})
 
 
 def test_every_public_name_of_the_package_resolves():

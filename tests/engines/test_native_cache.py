@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import os
 import resource
 import subprocess
@@ -10,7 +11,10 @@ from inspect import unwrap
 from pathlib import Path
 
 import pytest
+from numba.core import config
+from numba.core.caching import FunctionCache, IndexDataCacheFile
 
+import tiltsim.engines.native_engine  # noqa: F401  as whoever flies
 from tiltsim.engines import cache, compiling
 from tiltsim.engines.cache import native_code_folder
 
@@ -21,48 +25,27 @@ import sys
 from tiltsim.engines.compiling import NativeCodeCache
 from tiltsim_controllers.mathematics.scalar import clipped
 
-name, count = sys.argv[1:]
 cache = NativeCodeCache(clipped)
 cache._impl.locator.ensure_cache_path()
 index = cache._cache_file
-for entry in range(int(count)):
-    index.save((name, entry), (name, entry))
+for entry in range(int(sys.argv[1])):
+    index.save(("other", entry), ("other", entry))
+    print(end=".", flush=True)
 """
-
-FOREIGN = """
-import sys
-import numba
-import tiltsim.engines.native_engine
-from tiltsim.engines.cache import native_code_folder
-sys.path.insert(0, sys.argv[1])
-from foreign import twice
-
-assert twice(2.0) == 4.0
-folder = str(native_code_folder())
-assert not twice._cache.cache_path.startswith(folder), twice._cache.cache_path
-assert type(twice._cache) is numba.core.caching.FunctionCache
-assert not numba.core.config.CACHE_DIR.startswith(folder)
-assert numba.core.caching.IndexDataCacheFile.save.__module__ == "numba.core.caching"
-"""
-
-
-def environment(folder):
-    return {**os.environ, "XDG_CACHE_HOME": str(folder)}
 
 
 def test_processes_that_compile_at_once_find_what_they_compiled(tmp_path, monkeypatch):
-    names = ("a", "b")
-    savers = [
-        subprocess.Popen(
-            [sys.executable, "-c", SAVE, name, str(ENTRIES)], env=environment(tmp_path)
-        )
-        for name in names
-    ]
-    assert [saver.wait(timeout=300) for saver in savers] == [0, 0]
+    environment = {**os.environ, "XDG_CACHE_HOME": str(tmp_path)}
+    command = [sys.executable, "-c", SAVE, str(ENTRIES)]
     folder = tmp_path / "tiltsim" / native_code_folder().name
     monkeypatch.setattr(compiling, "native_code_folder", lambda: folder)
     index = compiling.NativeCodeCache(named("clipped"))._cache_file
-    keys = [(name, entry) for name in names for entry in range(ENTRIES)]
+    with subprocess.Popen(command, env=environment, stdout=subprocess.PIPE) as other:
+        assert other.stdout.read(1)  # it has saved the first of its entries
+        for entry in range(ENTRIES):
+            index.save(("this", entry), ("this", entry))
+    assert other.returncode == 0
+    keys = [(name, entry) for name in ("this", "other") for entry in range(ENTRIES)]
     assert [index.load(key) for key in keys] == keys
 
 
@@ -82,13 +65,15 @@ def named(name):
     return next(f for f in compiling.scalar_functions() if f.__name__ == name)
 
 
-def test_compiled_code_of_others_is_cached_where_numba_puts_it(tmp_path):
+def test_compiled_code_of_others_is_cached_where_numba_puts_it(tmp_path, monkeypatch):
     code = "import numba\n\n\n@numba.njit(cache=True)\ndef twice(x):\n    return 2.0 * x\n"
     (tmp_path / "foreign.py").write_text(code, encoding="utf-8")
-    done = subprocess.run(
-        [sys.executable, "-c", FOREIGN, str(tmp_path)], env=environment(tmp_path / "cache")
-    )
-    assert done.returncode == 0
+    monkeypatch.syspath_prepend(tmp_path)
+    twice = importlib.import_module("foreign").twice
+    assert twice(2.0) == 4.0
+    assert type(twice._cache) is FunctionCache
+    assert IndexDataCacheFile.save.__module__ == "numba.core.caching"
+    assert not str(config.CACHE_DIR).startswith(str(native_code_folder()))
     assert list((tmp_path / "__pycache__").glob("foreign.twice-*.nbi"))
 
 
