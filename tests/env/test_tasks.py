@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import importlib
 import re
 import runpy
-import subprocess
 import sys
+from multiprocessing import dummy
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +23,7 @@ gymnasium = pytest.importorskip("gymnasium")
 
 from gymnasium.utils.env_checker import check_env  # noqa: E402
 
-from tiltsim.env.baselines import BuiltInPolicy, score, table, zeros  # noqa: E402
+from tiltsim.env.baselines import EPISODES, BuiltInPolicy, score, table, zeros  # noqa: E402
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "environment.md").read_text(encoding="utf-8")
@@ -72,34 +73,35 @@ def test_the_built_in_controller_flies_to_the_end_with_the_stated_score(flown):
 def test_zero_actions_lose_the_vehicle_with_the_stated_score(task):
     env = make(task).unwrapped
     scores = []
-    for seed in range(3):
+    for seed in EPISODES:
         scores.append(score(env, zeros(env), seed))
         assert env.env.end.kind == "diverged"
-    assert mean_is_plausible(scores, *stated(task)[0])
+    assert stated(task)[0] == (round(np.mean(scores), 1), round(np.std(scores), 1))
     assert max(scores) < 0.25 * stated(task)[2][0]
 
 
 @pytest.mark.slow(longest=True)
 def test_the_page_states_the_scores_that_its_command_prints():
-    assert table() in PAGE
+    """Of one task: the tests above fly the others."""
+    assert table(["Hover"]) in PAGE
 
 
 @pytest.mark.slow
-def test_a_short_training_beats_zero_actions_whatever_the_number_of_processes(tmp_path):
-    printed, weights = [], []
-    for processes in ("1", "2"):
-        file = tmp_path / f"{processes}.npy"
-        command = [sys.executable, "examples/train_hover.py", "--updates", "5", "--out", file]
-        done = subprocess.run(
-            [*command, "--processes", processes], cwd=ROOT, capture_output=True, text=True
-        )
-        assert done.returncode == 0, done.stderr
-        assert re.findall(r"update (\d+): ", done.stdout) == [str(n) for n in range(1, 6)]
-        printed.append(float(re.search(r"score ([\d.]+)", done.stdout)[1]))
-        weights.append(np.load(file))
-    np.testing.assert_array_equal(*weights)
+def test_a_short_training_beats_zero_actions_whatever_the_number_of_processes(
+    tmp_path, monkeypatch, capsys
+):
+    monkeypatch.syspath_prepend(ROOT / "examples")  # also for the processes that it starts
+    file = str(tmp_path / "policy.npy")
+    options = ["--updates", "3", "--processes", "2", "--out", file]
+    monkeypatch.setattr(sys, "argv", ["train_hover.py", *options])
+    example = importlib.import_module("train_hover")
+    example.main()
+    printed = capsys.readouterr().out
+    assert re.findall(r"update (\d+): ", printed) == ["1", "2", "3"]
+    monkeypatch.setattr(example, "get_context", lambda _: dummy)  # in this process
+    np.testing.assert_array_equal(np.load(file), example.train(updates=3, seed=0, processes=1))
     mean, deviation = stated("Hover")[0]
-    assert printed[0] == printed[1] > mean + 3.0 * deviation
+    assert float(re.search(r"score ([\d.]+)", printed)[1]) > mean + 3.0 * deviation
 
 
 @pytest.fixture

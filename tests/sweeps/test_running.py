@@ -267,14 +267,14 @@ def test_boundaries_are_found_to_their_tolerance(tmp_path):
 
 @pytest.mark.slow
 def test_killed_at_every_file_it_continues_to_the_same_dataset(tmp_path):
-    file = short_sweep(tmp_path / "sweep.toml")
+    file = short_sweep(tmp_path / "sweep.toml", count=3, chunk_size=2)
     whole = run_sweep(load_sweep(file), tmp_path / "whole")
     flown = subprocess.run(
         [sys.executable, "-c", DYING, file, tmp_path / "killed", "1"],
         **{"check": True, "capture_output": True, "text": True},
     )
-    parts = [f"{number:06d}.parquet" for number in range(4)]
-    left = [*(parts[:number] for number in range(5)), [*parts, "sweep.parquet"]]
+    parts = [f"{number:06d}.parquet" for number in range(3)]
+    left = [*(parts[:number] for number in range(4)), [*parts, "sweep.parquet"]]
     found = [line.split() for line in flown.stdout.splitlines()]
     # Only the last of four kills, after the renaming, finds another file in the folder.
     assert found == [x for old, new in pairwise(left) for x in (old, old, old, new)]

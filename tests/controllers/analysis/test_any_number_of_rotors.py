@@ -161,7 +161,7 @@ def by_brute_force(zeros, starts, up):
 @pytest.mark.parametrize("kind", KINDS)
 def test_classes_and_margins_are_those_of_a_search_over_attitudes(kind):
     rng, starts = np.random.default_rng(100 + KINDS.index(kind)), 16
-    for _ in range(40):
+    for _ in range(15):
         force, torque = random_vehicle(rng, kind)
         matrices = force, torque / np.linalg.norm(torque, axis=0).max()
         found, up = torque_free_forces(force, torque), random_unit(rng)
