@@ -199,7 +199,7 @@ def test_switching_tells_which_law_flies_and_what_it_aims_at():
 
 
 def test_full_pose_holds_a_position_at_a_tilted_attitude():
-    simulation = {"duration": 8.0, "timestep": 0.002, "engine": "python"}
+    simulation = {"duration": 2.5, "timestep": 0.002, "engine": "python"}
     metrics = fly("full_pose", simulation).metrics()
     assert abs(metrics["final_position_error_x"]) < 1e-4
     assert abs(metrics["final_roll"] - 0.05) < 1e-4
@@ -283,7 +283,7 @@ def test_a_step_in_yaw_stops_a_rotor_where_its_torque_ends():
     ids=["prioritized", "slow yaw"],
 )
 def test_what_the_documentation_names_flies_a_large_step_in_yaw(vehicle, controller):
-    flight = turned(3.0, 6.0, 300.0, vehicle, **controller)
+    flight = turned(3.0, 5.0, 300.0, vehicle, **controller)
     assert flight.end.kind == "completed"
     assert flight["yaw"][-1] == pytest.approx(3.0, abs=1e-3)
     assert flight["z"].min() > -0.5
@@ -487,7 +487,7 @@ def test_yaw_takes_the_short_way_past_half_a_revolution(law, start, end):
         reference["type"] = "attitude_altitude"
     flight = fly(
         law,
-        {"plant": "thesis", "engine": "python", "timestep": 0.002, "duration": 3.0},
+        {"plant": "thesis", "engine": "python", "timestep": 0.002, "duration": 2.0},
         initial={"attitude": [0.0, 0.0, start]},
         reference=reference,
         gait={"type": "fixed"},

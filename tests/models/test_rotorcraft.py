@@ -134,7 +134,7 @@ def test_actuators_stand_in_the_promised_order(name, tilts):
 
 @pytest.mark.parametrize(("vehicle", "pod"), BUILDS)
 @given(alpha=tilt_angles, attitude=attitudes)
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=15, deadline=None)
 def test_mass_and_inertia_are_the_vehicles_at_any_tilt(vehicle, pod, alpha, attitude):
     model = compiled("tiltrotor", vehicle, pod=pod)
     data = placed(model, alpha=alpha, attitude=attitude)
@@ -171,7 +171,7 @@ def test_too_heavy_pods_are_refused_with_the_numbers():
 
 @pytest.mark.parametrize(("vehicle", "pod"), BUILDS)
 @given(alpha=tilt_angles, attitude=attitudes)
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=15, deadline=None)
 def test_rotors_make_the_force_and_torque_of_chapter_3(vehicle, pod, alpha, attitude):
     model = compiled("tiltrotor", vehicle, pod=pod)
     data = placed(model, alpha=alpha, attitude=attitude)

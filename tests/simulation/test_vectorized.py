@@ -35,13 +35,14 @@ def test_the_flight_is_that_of_the_engine_and_steps_make_it():
     scenario = tiltsim.parse_scenario({**LAWS["tilt_car_planned_direction"], **THESIS})
     flown = tiltsim.vectorized(scenario)
     changes = {"vehicle": {"mass": 1.1}, "gait": {"period": 0.45}}
-    samples = jax.jit(flown.fly)(changes)
+    quickly = {"xla_backend_optimization_level": 0}
+    samples = jax.jit(flown.fly, compiler_options=quickly)(changes)
     flight = tiltsim.simulate(
         scenario.replace({"vehicle.mass": 1.1, "gait.period": 0.45, "simulation.engine": "python"})
     )
     for name in ("time", "x", "y", "rotor_speed_1"):
         np.testing.assert_allclose(samples[name], flight[name], rtol=1e-12, atol=1e-12)
-    step = jax.jit(flown.step)
+    step = jax.jit(flown.step, compiler_options=quickly)
     state = flown.initial(changes)
     for _ in range(10):
         state = step(state, changes)

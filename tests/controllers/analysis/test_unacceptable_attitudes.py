@@ -95,7 +95,7 @@ def test_share_of_a_nearly_vertical_curve_tends_to_that_of_the_line(steepness, s
 @pytest.mark.parametrize("half_width", [np.pi / 2, 0.7])
 def test_share_agrees_with_counting(half_width) -> None:
     generator = np.random.default_rng(3)
-    side = (np.arange(800) + 0.5) / 400 * half_width - half_width
+    side = (np.arange(400) + 0.5) / 200 * half_width - half_width
     roll, pitch = np.meshgrid(side, side)
     for angles in generator.uniform(-1.2, 1.2, (20, 4)):
         if np.isnan(torque_free_direction(angles, AR_DRONE)).any():

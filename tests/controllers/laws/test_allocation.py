@@ -121,8 +121,8 @@ def sequential_program(matrices, requested, low, high):
 
 
 def test_roll_and_pitch_come_before_yaw_and_yaw_before_lift():
-    """2,000 random cases, in units of 1e4 rad/s^2."""
-    random, cases, unit = np.random.default_rng(8), 2000, 1e4
+    """1,000 random cases, in units of 1e4 rad/s^2."""
+    random, cases, unit = np.random.default_rng(8), 1000, 1e4
     angles, leans = random.uniform(-0.4, 0.4, (cases, 4)), random.uniform(-0.4, 0.4, (cases, 2))
     slowest = random.choice([0.0, LIMITS[0]], (cases, 1))
     magnitudes = random.uniform(*LIMITS, (cases, 4))
@@ -146,7 +146,7 @@ def test_roll_and_pitch_come_before_yaw_and_yaw_before_lift():
     )
     attainable = sequential_program(matrices, requirement, ends.min(axis=0), ends.max(axis=0))
     limited = (np.abs(attainable - requirement) > 1e-6).sum(axis=0)
-    assert (limited > 200).all(), limited
+    assert (limited > 100).all(), limited
     # The linear program is solved to 1e-7.
     np.testing.assert_allclose(achieved, attainable, rtol=0, atol=1e-6)
 

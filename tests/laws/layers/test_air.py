@@ -67,9 +67,9 @@ def test_a_saved_state_restarts_bit_identically(timing):
 def test_a_steady_wind_is_leant_against_and_held_by_position_error():
     """Drag balances the lean; the position loop, gain one, asks for it at an error."""
     wind, linear = 3.0, 0.2
-    # The law's poles are at 1 rad/s and slower ones of the altitude; 20 s leave 1e-4 of the start.
+    # The law's poles are at 1 rad/s and slower ones of the altitude; 12 s leave 4e-5 of the lean.
     air = {"drag": {"linear": [linear] * 3}, "wind": [wind, 0.0, 0.0]}
-    flight = fly(air, {"duration": 22.0}, QUADROTOR)
+    flight = fly(air, {"duration": 12.0}, QUADROTOR)
     pitch = flight.metrics()["final_pitch"]
     mass, gravity = 0.429, 9.8
     assert pitch == pytest.approx(-atan2(linear * wind, mass * gravity), rel=2e-3)
