@@ -272,14 +272,16 @@ def run_command(call, folder):
         if "--out" not in arguments:
             return
         (folder / "small.toml").write_text(SMALL_SWEEP)
-        arguments = ["sweep", "small.toml", "--out", arguments[arguments.index("--out") + 1]]
+        out = arguments[arguments.index("--out") + 1]
+        arguments = ["sweep", "small.toml", "--jobs", "1", "--out", out]
     elif arguments[0] == "run" and not arguments[1].endswith(".toml"):
         # Compiling would take longer; `tiltsim check` flies the library to the end.
-        arguments += ["--set", "simulation.duration=2.0"]
-    elif arguments[0] == "stability" and "--sweep" in arguments:  # at few points
-        arguments = [re.sub("(=[^:]+:[^:]+).*", r"\1:3", one) for one in arguments]
+        arguments += ["--set", "simulation.duration=0.5"]
+    elif arguments[0] == "stability" and "--sweep" in arguments:  # at few points, with long steps
+        arguments = [re.sub("(=[^:]+:[^:]+).*", r"\1:2", one) for one in arguments]
+        arguments += ["--set", "simulation.timestep=0.0025"]
     elif arguments[0] == "attraction":  # of few and short flights
-        arguments += ["--coarse", "4", "--refine", "0", "--set", "simulation.duration=1.0"]
+        arguments += ["--coarse", "2", "--refine", "0", "--set", "simulation.duration=1.0"]
     also = EXPECTATION_FAILED if arguments[0] == "map" else VEHICLE_LOST
     assert main(arguments) in {DONE, also}, shlex.join(call)
 
