@@ -168,7 +168,7 @@ def test_the_delay_margin_is_the_smallest_latency_that_loses_the_flight(name):
     offset = {"initial.position": [0, 0, 0], "initial.velocity": [0, 0, 0.01]}
     steps = {"simulation.timestep": STEP, "simulation.control_timestep": STEP}
     changes = {"reference.type": "setpoint", "initial.attitude": [0.01, -0.01, 0.01]}
-    short = {"simulation.duration": 8.0, "simulation.engine": "python"}
+    short = {"simulation.duration": 6.0, "simulation.engine": "python"}
     allowed = {"controller.allow_unstable": True} if name.startswith("beyond") else {}
     scenario = tiltsim.load_scenario(name, {**offset, **steps, **changes, **short, **allowed})
     predicted = tiltsim.margins(scenario)[0].delay

@@ -114,8 +114,6 @@ SLOW_ROTORS = {
     ("kind", "plant", "keys", "stable"),
     [
         ("trot_instant", "thesis", {}, True),
-        pytest.param("walk", "thesis", {"gait.scale": 0.5}, True, marks=pytest.mark.slow),
-        pytest.param("trot_continuous", "mujoco", {}, True, marks=pytest.mark.slow),
         pytest.param("trot_instant", "mujoco", {}, True, marks=pytest.mark.slow),
         pytest.param("trot_continuous", "mujoco", SLOW_ROTORS, False, marks=pytest.mark.slow),
     ],

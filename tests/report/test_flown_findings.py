@@ -83,8 +83,8 @@ def test_a_rounded_blue_gait_hovers_undisturbed_and_is_lost_on_a_circle():
 
 @cache
 def coarse_map(name):
-    """From 81 attitudes."""
-    return attraction_map(name, coarse=8, refinements=0)
+    """From 49 attitudes."""
+    return attraction_map(name, coarse=6, refinements=0)
 
 
 def test_what_comes_back_was_acceptable_when_the_flight_began():

@@ -34,7 +34,7 @@ needs_driver = pytest.mark.skipif(bool(missing_driver()), reason=missing_driver(
 def test_the_viewer_reports_no_errors(names, tmp_path):
     path = tmp_path / "flight.rrd"
     save_recording([flight(name) for name in names], path)
-    shot = shoot(path, 1.0)
+    shot = shoot(path, 1.0, "800x500")
     assert shot.reports == []
     of_each = 2 * (len(names) - 1)  # flights that are compared have a vehicle and a plane each
     assert len(shot.views) == (8 if names == ["tilt_car"] else 9 + of_each)
@@ -60,7 +60,7 @@ def test_closing_the_viewer_does_not_affect_the_flight(stop, tmp_path):
     port = free_port()
     url = f"rerun+http://127.0.0.1:{port}/proxy"
     name = "ch04_tracking/setpoint#rho_065_modified"
-    options = ["--set", "simulation.duration=30", "--set", "simulation.engine=python", "--quiet"]
+    options = ["--set", "simulation.duration=20", "--set", "simulation.engine=python", "--quiet"]
     command = [sys.executable, "-m", "tiltsim", "run", name, "--connect", url, *options]
     with viewer_process(port) as process:
         client = client_of(process, port)
@@ -72,7 +72,7 @@ def test_closing_the_viewer_does_not_affect_the_flight(stop, tmp_path):
         finally:
             run.kill()
     this = load_flight(tmp_path)
-    assert (this.end.kind, len(this)) == ("completed", 3001)
+    assert (this.end.kind, len(this)) == ("completed", 2001)
     assert (tmp_path / "metrics.json").is_file()
 
 
