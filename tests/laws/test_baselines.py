@@ -150,7 +150,7 @@ def test_indi_follows_a_step_of_yaw_as_designed():
         "reference": {"type": "setpoint", "yaw": step},
         "initial": {"rotor_speed": HOVER},
     }
-    yaw = fly(tables, plant="thesis", duration=1.0)["attitude"][:, 2]
+    yaw = fly(tables, plant="thesis", duration=0.6)["attitude"][:, 2]
     # Yaw, its rate and the angular acceleration that the rotors make.
     system = np.array(
         [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [-lag * rate * attitude, -lag * rate, -lag]]

@@ -197,14 +197,14 @@ def test_flights_end_early_on_the_same_step_with_the_same_cause(plant):
         [
             scenario(tables, duration=3.0, record_timestep=record, plant=plant)
             for tables in (UPSIDE_DOWN, STOPPING_ROTOR)
-            for record in (0.001, 0.01, 0.25)
+            for record in (0.001, 0.25)
         ]
     )
     ends = [row.end for row in rows]
     assert ends[0].kind in {"diverged", "singular"}
-    assert ends[3].kind == "singular"
-    assert "came to a stop" in ends[3].cause
-    assert ends[0] == ends[1] == ends[2], "recording must not matter"
+    assert ends[2].kind == "singular"
+    assert "came to a stop" in ends[2].cause
+    assert ends[0] == ends[1], "recording must not matter"
 
 
 def test_a_row_that_ends_early_makes_room_for_the_next():
@@ -421,7 +421,7 @@ def test_own_controllers_are_flown_one_by_one_among_others(tmp_path):
 def test_more_flights_than_rows_come_in_their_order():
     scenarios = [
         scenario({"initial": {"position": [0.001 * i, 0.0, 0.0]}}, duration=0.02 + 0.01 * (i % 7))
-        for i in range(150)
+        for i in range(60)
     ]
     results = list(fly(scenarios, threads=2, keep_samples=True))
     assert [result.scenario for result in results] == scenarios

@@ -121,7 +121,7 @@ def test_engines_fly_the_same_flight_for_every_gait_and_decoupler(plant, gait, d
     python, native = both_engines(
         gait=GAITS[gait],
         controller={"decoupler": decoupler},
-        simulation={"plant": plant, "duration": 0.3},
+        simulation={"plant": plant, "duration": 0.21},
     )
     assert (python.engine, native.engine) == ENGINES
     np.testing.assert_array_equal(python.samples, native.samples)
@@ -133,7 +133,7 @@ def test_engines_fly_the_same_flight_for_every_reference(plant, reference):
     python, native = both_engines(
         reference=REFERENCES[reference],
         controller=EXACT,
-        simulation={"plant": plant, "duration": 0.3},
+        simulation={"plant": plant, "duration": 0.21},
     )
     np.testing.assert_array_equal(python.samples, native.samples)
 
@@ -178,7 +178,8 @@ def test_sample_and_hold_is_coarser_than_continuous_control_but_converges_to_it(
 @pytest.mark.parametrize("plant", PLANTS)
 @pytest.mark.parametrize("engine", ENGINES)
 def test_two_runs_are_bit_identical(plant, engine):
-    flown = scenario(gait=GAITS["trot_continuous"], simulation={"plant": plant, "engine": engine})
+    simulation = {"plant": plant, "engine": engine, "duration": 0.2}
+    flown = scenario(gait=GAITS["trot_continuous"], simulation=simulation)
     first, second = tiltsim.simulate(flown), tiltsim.simulate(flown)
     np.testing.assert_array_equal(first.samples, second.samples)
     assert first.to_arrow().equals(second.to_arrow())
