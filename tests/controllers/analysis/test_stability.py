@@ -35,7 +35,7 @@ roots = st.lists(
     max_size=4,
 ).map(lambda groups: [root for group in groups for root in group])
 
-quick = settings(deadline=None, max_examples=150)
+quick = settings(deadline=None, max_examples=60)
 
 
 def largest_real_part(polynomial):
