@@ -199,7 +199,7 @@ def circling():
     circle = {"type": "circle", "radius": 0.5, "angular_frequency": 2.0, "position": [0, 0, 1]}
     tables = {
         **SHORT,
-        "simulation": {"duration": 2.0},
+        "simulation": {"duration": 2.0, "timestep": 0.002},
         "reference": {**circle, "acceleration_feedforward": True},
     }
 

@@ -87,10 +87,10 @@ def printed_product():
 
 
 def test_the_surface_is_the_determinant_of_eq_43_as_printed():
-    roll, pitch = np.random.default_rng(0).uniform(-1.5, 1.5, (2, 20))
+    roll, pitch, yaw = np.random.default_rng(0).uniform(-1.5, 1.5, (3, 20))
     surface = sympy.lambdify((PHI, THETA), SURFACE)(roll, pitch)
     product = sympy.lambdify((PHI, THETA, PSI), printed_product())
-    found = [np.linalg.det(product(*angles, 0.3)) for angles in zip(roll, pitch, strict=True)]
+    found = [np.linalg.det(product(*angles)) for angles in zip(roll, pitch, yaw, strict=True)]
     np.testing.assert_allclose(found, surface, rtol=0, atol=1e-13)
     np.testing.assert_allclose(published_determinant(roll, pitch), surface, rtol=0, atol=1e-14)
 
