@@ -6,7 +6,10 @@ Pausing it can only lower the coverage that is reported, never raise it.
 
 from __future__ import annotations
 
+import difflib
+import email
 import sys
+import tomllib
 import warnings
 from contextlib import suppress
 from functools import wraps
@@ -56,6 +59,7 @@ def trace_seldom():
     """Have a tracer see samples of flights, and nothing of what other packages do at length."""
     _import_others_untraced()
     import sympy
+    import tomli_w
     from _pytest.assertion import rewrite
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
@@ -75,6 +79,10 @@ def trace_seldom():
         motion.flown = seldom_traced(motion.flown)
     elsewhere = {
         compiler: ["compile_extra"],
+        difflib: ["get_close_matches"],
+        email: ["message_from_string"],  # of a distribution's metadata
+        tomllib: ["load", "loads"],
+        tomli_w: ["dump", "dumps"],
         Figure: ["add_subplot", "draw", "legend", "savefig"],
         Axes: ["legend", "plot"],
         rewrite: ["rewrite_asserts"],
