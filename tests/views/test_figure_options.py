@@ -70,9 +70,9 @@ def test_panels_are_drawn_in_the_order_and_size_asked_for():
     np.testing.assert_array_equal(line.get_ydata(), flight("trot")["vx"])
 
 
-@pytest.mark.parametrize("size", [None, "85mm"])
 @pytest.mark.parametrize(
-    "names", [("position_error", "path", "margin"), ("path", "margin", "position_error")]
+    ("names", "size"),
+    [(("position_error", "path", "margin"), None), (("path", "margin", "position_error"), "85mm")],
 )
 def test_squares_keep_their_place_among_panels_over_time(names, size):
     figure = plot(flight("trot"), panels=names, size=size)
@@ -144,7 +144,8 @@ def test_an_unknown_panel_is_one_line(tmp_path, capsys):
 
 
 def test_too_small_a_figure_is_one_line(tmp_path, capsys):
-    assert main(["plot", str(saved("fixed", tmp_path)), "--size", "20x15mm"]) == 2
+    words = ["plot", str(saved("fixed", tmp_path)), "--panels", "margin", "--size", "20x15mm"]
+    assert main(words) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert "20 mm x 15 mm are too small for these panels" in line
 
@@ -289,7 +290,8 @@ def test_the_label_of_a_single_flight_is_its_title():
 
 
 def test_a_label_of_nothing_is_one_line(tmp_path, capsys):
-    words = ["plot", str(saved("fixed", tmp_path)), "--label", "altitud=Height"]
+    words = ["plot", str(saved("fixed", tmp_path)), "--panels", "altitude"]
+    words += ["--label", "altitud=Height"]
     assert main(words) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert "label 'altitud': " in line

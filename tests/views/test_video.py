@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 from ctypes.util import find_library
+from functools import cache
 
 import mujoco
 import numpy as np
@@ -20,7 +21,7 @@ from tests.refusals import refusal
 from tiltsim.cli import main
 from tiltsim.errors import InputError
 from tiltsim.views.attitude_plane import MOVING_TRAIL_TIME, torque_free_directions
-from tiltsim.views.video import encoding, has_display, inset, offscreen, overlay
+from tiltsim.views.video import encoding, has_display, inset, offscreen, overlay, rendering
 from tiltsim.views.video.encoding import write_video
 from tiltsim.views.video.inset import PlaneInset, overlay_inset
 from tiltsim.views.video.offscreen import make_contexts
@@ -98,10 +99,14 @@ def test_the_insets_trail_is_short_if_the_curve_moves(name, whole, monkeypatch):
 # --- frames and videos -------------------------------------------------------------------------
 
 
+@cache
+def rendered_frames():
+    return [*frames(flight("trot"), SMALL)]
+
+
 @needs_gl
 def test_frames_come_at_the_videos_rate_and_show_motion():
-    this = flight("trot")
-    shown = list(frames(this, SMALL))
+    shown = rendered_frames()
     times = [time for time, _ in shown]
     np.testing.assert_allclose(times, np.arange(0.0, 1.2 + 1e-9, 0.2), atol=0.011)
     images = [image for _, image in shown]
@@ -110,21 +115,20 @@ def test_frames_come_at_the_videos_rate_and_show_motion():
     assert np.abs(images[0].astype(int) - images[-1]).mean() > 1.0
 
 
-@needs_gl
 @pytest.mark.parametrize(
     ("speed", "clock"), [(1.0, "1.2 s"), (10.0, "1.2 s, 10x"), (0.5, "1.2 s, 0.5x")]
 )
-def test_a_video_faster_or_slower_than_the_flight_says_so(speed, clock):
+def test_a_video_faster_or_slower_than_the_flight_says_so(speed, clock, monkeypatch):
+    monkeypatch.setattr(rendering, "Canvas", lambda *_, **__: None)
     stage = FlightRenderer(flight("fixed"), VideoFormat(width=320, height=180, speed=speed))
-    with stage.canvas:
-        names, values = stage._table(-1)
+    names, values = stage._table(-1)
     assert names.splitlines()[0] == "time"
     assert values.splitlines()[0] == clock
 
 
 @needs_gl
 def test_every_flight_can_be_rendered():
-    for name in ("fixed", "limited", "free"):
+    for name in ("limited", "free"):
         stage = FlightRenderer(flight(name), SMALL)
         with stage.canvas as canvas:
             assert stage.frame(len(flight(name)) - 1).std() > 10.0
@@ -143,26 +147,28 @@ def test_an_arrow_is_drawn_as_long_as_a_line_between_the_same_ends():
     camera.distance, camera.elevation = 2.0, 0.0
     start, end = np.array([0.0, 0.0, -0.3]), np.array([0.0, 0.0, 0.3])
     heights = []
-    for shape in (mujoco.mjtGeom.mjGEOM_ARROW, mujoco.mjtGeom.mjGEOM_CAPSULE):
-        stage = FlightRenderer(flight("fixed"), VideoFormat(width=400, height=400))
-        with stage.canvas as canvas:
-            canvas.compose(stage._data, camera)
+    stage = FlightRenderer(flight("fixed"), VideoFormat(width=400, height=400))
+    with stage.canvas as canvas:
+        canvas.compose(stage._data, camera)
+        canvas.scene.ngeom = 0
+        blank = canvas.draw(*words).astype(int)
+        for shape in (mujoco.mjtGeom.mjGEOM_ARROW, mujoco.mjtGeom.mjGEOM_CAPSULE):
             canvas.scene.ngeom = 0
-            blank = canvas.draw(*words).astype(int)
             stage._connect(shape, 0.008, start, end, (1.0, 0.0, 0.0, 1.0))
             drawn = canvas.draw(*words).astype(int)
-        rows = np.flatnonzero(np.abs(drawn - blank).sum(axis=2).any(axis=1))
-        heights.append(rows[-1] - rows[0])
+            rows = np.flatnonzero(np.abs(drawn - blank).sum(axis=2).any(axis=1))
+            heights.append(rows[-1] - rows[0])
     assert heights[0] == pytest.approx(heights[1], rel=0.08)
 
 
 @needs_gl
-def test_the_video_plays(tmp_path):
+def test_the_video_plays(tmp_path, monkeypatch):
     import av
 
     path = tmp_path / "flight.mp4"
     counts = []
-    write_video(flight("fixed"), path, SMALL, counts.append)
+    monkeypatch.setattr(encoding, "frames", lambda *_: rendered_frames())
+    write_video(flight("trot"), path, SMALL, counts.append)
     assert [file.name for file in tmp_path.iterdir()] == ["flight.mp4"]
     with av.open(str(path)) as video:
         stream = video.streams.video[0]
@@ -223,7 +229,8 @@ def test_the_command_works_without_a_display(tmp_path):
 def test_a_terminated_command_leaves_no_file(tmp_path):
     folder = saved("fixed", tmp_path)
     before = sorted(folder.iterdir())
-    command = [sys.executable, "-m", "tiltsim", "video", str(folder), "--speed", "0.01"]
+    options = ["--speed", "0.01", "--size", "160x120", "--quality", "draft"]
+    command = [sys.executable, "-m", "tiltsim", "video", str(folder), *options]
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
         while sorted(folder.iterdir()) == before and process.poll() is None:
             time.sleep(0.02)
