@@ -805,7 +805,7 @@ def test_flights_of_a_users_own_read_back(law, model, tmp_path):
     back = load_flight(tmp_path)
     np.testing.assert_array_equal(back.samples, flight.samples)
     assert back.metrics() == flight.metrics()
-    assert main(["plot", str(tmp_path), "--out", str(tmp_path / "flight.png")]) == 0
+    assert main(["plot", str(tmp_path), "--panels", "rotor_speeds,path"]) == 0
 
 
 # --- documentation -------------------------------------------------------------------------------

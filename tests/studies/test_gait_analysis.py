@@ -567,7 +567,8 @@ def test_every_kind_of_figure_is_written_by_the_command(tmp_path, capsys, name) 
     assert capsys.readouterr().out
 
 
-def test_an_empty_attainable_set_is_a_warning(tmp_path, capsys) -> None:
+def test_an_empty_attainable_set_is_a_warning(tmp_path, capsys, monkeypatch) -> None:
+    monkeypatch.setattr(style, "save", lambda *_: None)
     figure = ["--figure", "attainable", "--plot", str(tmp_path / "attainable.png")]
     words = "nothing is attainable: no rotor speeds from 305.27 to 394.10 rad/s hover"
     for gait, expected in (("ch09_gait_1", True), ("ch09_gait_2", False)):
@@ -645,7 +646,7 @@ def test_cases_on_the_command_line_are_those_of_the_thesis() -> None:
 
 
 def test_plot_option_writes_a_file(tmp_path, capsys) -> None:
-    for words in (["gait", "--angles", "0.1,0.2,0.3,0.4"], ["map"]):
+    for words in (["gait", "--angles", "0.1,0.2,0.3,0.4", "--panels", "margin"], ["map"]):
         target = tmp_path / f"{words[0]}.png"
         assert run(*words, "--plot", str(target)) == 0
         assert target.read_bytes().startswith(b"\x89PNG")
