@@ -144,10 +144,9 @@ def test_a_recording_is_small(recorded):
 
 
 def test_two_runs_compare_equal(tmp_path):
-    scenario = flight("trot").scenario
     paths = [tmp_path / name for name in ("a.rrd", "b.rrd")]
-    for path in paths:
-        save_recording([simulate(scenario)], path)
+    for path, this in zip(paths, (flight("trot"), simulate(flight("trot").scenario))):
+        save_recording([this], path)
     done = rerun_rrd("compare", *paths)
     assert done.returncode == 0, done.stderr
 
@@ -199,17 +198,9 @@ def test_several_flights_share_a_recording_under_distinct_names(tmp_path):
         assert len(rows(path, f"/world/{name}/vehicle", "Transform3D:translation")[0]) == len(times)
         _, texts = rows(path, f"/events/{name}", "TextLog:text")
         assert all(text.startswith(f"{name}: ") for (text,) in texts)
-
-
-def test_compared_flights_have_a_plane_each(tmp_path):
-    compared = tmp_path / "compared.rrd"
-    save_recording([flight("fixed"), flight("trot")], compared)
-    for name in ("fixed", "trot"):
-        _, labels = rows(compared, f"/plane/{name}/attitude", "Points2D:labels")
+        _, labels = rows(path, f"/plane/{name}/attitude", "Points2D:labels")
         assert len(labels) == len(flight(name))
-        assert {f"/plane/{name}/{part}" for part in ("forbidden", "axes/grid")} <= entities(
-            compared
-        )
+        assert {f"/plane/{name}/{part}" for part in ("forbidden", "axes/grid")} <= entities(path)
 
 
 def test_vehicle_and_reference_are_visible_from_any_distance(recorded):
