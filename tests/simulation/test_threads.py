@@ -11,7 +11,15 @@ import numpy as np
 import pytest
 
 import tiltsim
-from tests.simulation.test_batch import ALL_LAWS, EVERY_LAYER, EXACT, LATE, layered, scenario
+from tests.simulation.test_batch import (
+    ALL_LAWS,
+    EVERY_LAYER,
+    EXACT,
+    LATE,
+    WITH_ACTUATORS,
+    layered,
+    scenario,
+)
 from tiltsim.engines.callback import control_callback
 from tiltsim.env.environment import TiltrotorEnv
 from tiltsim.plants.command import Command
@@ -85,13 +93,14 @@ def test_sixteen_threads_fly_what_each_flies_alone():
 @pytest.mark.slow(longest=True)
 def test_two_hundred_flights_of_all_kinds_are_the_same_in_threads():
     engines, plants = ("python", "native"), ("mujoco", "thesis")
+    layered_on = ("mujoco", EVERY_LAYER, LATE), ("thesis", WITH_ACTUATORS, {})
     scenarios = [
         scenario(table, engine=engine, plant=plant, control_timestep=held, duration=0.1)
         for table, engine, plant, held in product(ALL_LAWS.values(), engines, plants, (0.0, 0.004))
     ]
     scenarios += [
-        layered(*EVERY_LAYER, seed=seed, engine=engine, plant=plant, **LATE)
-        for engine, plant, seed in product(engines, plants, (1, 2))
+        layered(*layers, seed=seed, engine=engine, plant=plant, **timing)
+        for engine, (plant, layers, timing), seed in product(engines, layered_on, (1, 2))
     ]
     flights = [lambda flown=flown: samples(flown) for flown in scenarios]
     flights += [flown_by_own_controller, flown_in_the_environment, flown_in_a_batch]
