@@ -31,13 +31,13 @@ type = "linspace"
 key = "initial.attitude[0]"
 start = 0.0
 stop = 0.4
-count = 4
+count = 3
 [[axis]]
 type = "linspace"
 key = "initial.attitude[1]"
 start = 0.0
 stop = 0.3
-count = 3
+count = 2
 [[axis]]
 type = "list"
 key = "controller.decoupler"
@@ -56,11 +56,11 @@ def test_sweep_writes_one_dataset_and_prints_a_summary(grid, tmp_path, capsys):
     out = tmp_path / "out"
     assert main(["sweep", str(grid), "--out", str(out), "--jobs", "1"]) == 0
     printed = capsys.readouterr()
-    assert "A grid: 24 flights" in printed.err
-    assert "24 flights: 24 completed" in printed.out
+    assert "A grid: 12 flights" in printed.err
+    assert "12 flights: 12 completed" in printed.out
     table = pq.read_table(out / "sweep.parquet")
-    assert table.num_rows == 24
-    assert table["index"].to_pylist() == list(range(24))
+    assert table.num_rows == 12
+    assert table["index"].to_pylist() == list(range(12))
     assert main(["sweep", str(grid), "--out", str(out), "--jobs", "1", "--quiet"]) == 0
     assert capsys.readouterr() == ("", "")
 
@@ -69,11 +69,11 @@ def test_a_continued_sweep_prints_how_much_is_finished(grid, tmp_path, capsys):
     command = ["sweep", str(grid), "--out", str(tmp_path / "out"), "--jobs", "1"]
     assert main([*command, "--quiet"]) == 0
     assert main(command) == 0
-    assert capsys.readouterr().err == "A grid: all 24 flights finished, nothing to fly\n"
+    assert capsys.readouterr().err == "A grid: all 12 flights finished, nothing to fly\n"
     for number in (3, 7):
         (tmp_path / "out" / "parts" / f"{number:06d}.parquet").unlink()
     assert main(command) == 0
-    assert capsys.readouterr().err == "A grid: 22 of 24 flights finished, 2 to fly\n"
+    assert capsys.readouterr().err == "A grid: 10 of 12 flights finished, 2 to fly\n"
 
 
 def test_the_dataset_has_its_own_folder_by_default(grid, tmp_path, monkeypatch):
@@ -91,11 +91,11 @@ def test_set_changes_the_base(grid, tmp_path):
 def test_a_changed_sweep_is_refused(grid, tmp_path, capsys):
     options = ["--out", str(tmp_path / "out"), "--jobs", "1", "--quiet"]
     assert main(["sweep", str(grid), *options]) == 0
-    grid.write_text(GRID.replace("count = 3", "count = 5"), encoding="utf-8")
+    grid.write_text(GRID.replace("count = 2", "count = 5"), encoding="utf-8")
     assert main(["sweep", str(grid), *options]) == 2
     error = capsys.readouterr().err
     assert error.count("\n") == 1
-    assert "axis[1].count was 3 and is 5" in error
+    assert "axis[1].count was 2 and is 5" in error
 
 
 @pytest.mark.parametrize(
@@ -167,7 +167,7 @@ def test_plot_draws_a_map_of_two_axes(grid, tmp_path, capsys):
     left, right = figure.axes[:2]
     assert (left.get_title(loc="left"), right.get_title(loc="left")) == ("conventional", "modified")
     cells = left.collections[0].get_array()
-    assert cells.shape == (3, 4)
+    assert cells.shape == (2, 3)
     rows = pq.read_table(out / "sweep.parquet").to_pylist()
     expected = [r["max_abs_roll"] for r in rows if r["controller.decoupler"] == "conventional"]
     assert sorted(cells.ravel().tolist()) == sorted(expected)
@@ -177,7 +177,7 @@ def test_plot_draws_a_map_of_two_axes(grid, tmp_path, capsys):
 
 
 def test_plot_draws_lines_and_counts_lost_flights(grid, tmp_path):
-    text = GRID.replace("stop = 0.4", "stop = 3.1").replace("count = 3", "count = 2")
+    text = GRID.replace("stop = 0.4", "stop = 3.1")
     grid.write_text(
         text + '[plot]\nkind = "lines"\nx = "initial.attitude[0]"\nlog = ["y"]\n', encoding="utf-8"
     )
@@ -188,7 +188,7 @@ def test_plot_draws_lines_and_counts_lost_flights(grid, tmp_path):
 
 
 def test_lost_flights_lie_below_the_lines_in_the_order_of_the_legend(grid, tmp_path):
-    text = GRID.replace("count = 3", "count = 2").replace("stop = 0.4", "stop = 3.1")
+    text = GRID.replace("stop = 0.4", "stop = 3.1")
     plot = '[plot]\nkind = "lines"\nx = "initial.attitude[0]"\nlines = "controller.decoupler"\n'
     grid.write_text(text + plot, encoding="utf-8")
     results = load_results(swept(grid, tmp_path / "out"))

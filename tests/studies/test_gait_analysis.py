@@ -599,7 +599,8 @@ def test_the_legend_explains_only_what_is_drawn(gait, marks, bar) -> None:
 
 
 def test_equal_figures_give_equal_files(tmp_path) -> None:
-    figures = [gait_figure(plans.fixed([0.1, 0.2, 0.3, 0.4]), AR_DRONE) for _ in range(2)]
+    gait = plans.fixed([0.1, 0.2, 0.3, 0.4])
+    figures = [gait_figure(gait, AR_DRONE, ["margin"]) for _ in range(2)]
     for ending in style.FORMATS:
         files = [tmp_path / f"{index}{ending}" for index in range(2)]
         for figure, file in zip(figures, files):
