@@ -252,8 +252,10 @@ HEAVY = {"model_error": {"mass": 1.07, "inertia": [1.1, 0.9, 1.0], "thrust_coeff
 WATCHED = {"controller": {"supervisor": {"min_margin": 0.3, "min_determinant": 3.9}}}
 MEASURED = {"controller": {"angular_acceleration": "measured"}}
 EVERY_LAYER = (EVERYTHING, STORMY, HINGED, HEAVY, WATCHED, MEASURED)
-WITH_ACTUATORS = ({"vehicle": {"rotor_time_constant": 0.02}}, STORMY, HINGED, HEAVY)
+ACTUATION = {key: table for key, table in EVERYTHING.items() if key != "controller"}
+WITH_ACTUATORS = (ACTUATION, STORMY, HINGED, HEAVY)
 """The layers whose actuators move the equations, which compile their controls five times."""
+HELD = {"control_timestep": 0.004}
 FED_FORWARD = {"controller": {"gait_rate_feedforward": True, "gains": {
     "attitude": {"bandwidth": 25.0},
     "altitude": {"bandwidth": 10.0, "integral": 0.5},
@@ -313,7 +315,7 @@ def test_rotors_with_inertia_fly_the_same_three_ways():
             layered(HINGED, FED_FORWARD, knowing),
             layered({"vehicle": {"rotor_inertia": 2e-5}}, FED_FORWARD, knowing),
             layered(HINGED, LAWS["full_pose"]),
-            layered(*WITH_ACTUATORS, plant="thesis"),
+            layered(*WITH_ACTUATORS, plant="thesis", **HELD),
         ]
     )
     assert all(row.end.kind == "completed" for row in rows)

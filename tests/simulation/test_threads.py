@@ -15,6 +15,7 @@ from tests.simulation.test_batch import (
     ALL_LAWS,
     EVERY_LAYER,
     EXACT,
+    HELD,
     LATE,
     WITH_ACTUATORS,
     layered,
@@ -93,7 +94,7 @@ def test_sixteen_threads_fly_what_each_flies_alone():
 @pytest.mark.slow(longest=True)
 def test_two_hundred_flights_of_all_kinds_are_the_same_in_threads():
     engines, plants = ("python", "native"), ("mujoco", "thesis")
-    layered_on = ("mujoco", EVERY_LAYER, LATE), ("thesis", WITH_ACTUATORS, {})
+    layered_on = ("mujoco", EVERY_LAYER, LATE), ("thesis", WITH_ACTUATORS, HELD)
     scenarios = [
         scenario(table, engine=engine, plant=plant, control_timestep=held, duration=0.1)
         for table, engine, plant, held in product(ALL_LAWS.values(), engines, plants, (0.0, 0.004))
