@@ -254,7 +254,7 @@ MEASURED = {"controller": {"angular_acceleration": "measured"}}
 EVERY_LAYER = (EVERYTHING, STORMY, HINGED, HEAVY, WATCHED, MEASURED)
 ACTUATION = {key: table for key, table in EVERYTHING.items() if key != "controller"}
 WITH_ACTUATORS = (ACTUATION, STORMY, HINGED, HEAVY)
-"""The layers whose actuators move the equations, which compile their controls five times."""
+"""On the equations, whose solver compiles the controls at each of its stages."""
 HELD = {"control_timestep": 0.004}
 FED_FORWARD = {"controller": {"gait_rate_feedforward": True, "gains": {
     "attitude": {"bandwidth": 25.0},
