@@ -9,7 +9,7 @@ import sys
 import pytest
 from hypothesis import settings
 
-from tests.tracing import trace_seldom
+from tests.tracing import trace_few_rows, trace_seldom
 
 # A busy machine may take long for an example; nothing that is tested depends on it.
 settings.register_profile("tiltsim", deadline=None)
@@ -41,6 +41,8 @@ def pytest_collection_finish():
 
 def pytest_collection_modifyitems(items):
     """The longest of the slow tests begin first: at the end, one process would fly them alone."""
+    if sys.gettrace() is not None:
+        trace_few_rows(items)
     markers = [item.get_closest_marker("slow") for item in items]
     longest = [bool(marker and marker.kwargs.get("longest")) for marker in markers]
     items[:] = [item for _, item in sorted(zip(longest, items), key=lambda pair: not pair[0])]
