@@ -409,19 +409,18 @@ def test_compiled_callbacks_are_loaded_by_the_next_process():
     import sys
 
     from tiltsim.engines.cache import native_code_is_cacheable
-    from tiltsim.engines.native_engine import compile_control
 
     if not native_code_is_cacheable():
         pytest.skip("the cache folder is not writable")
-    compile_control(TILTROTOR)
     program = (
         "from tiltsim.laws.attitude_altitude import TILTROTOR\n"
         "from tiltsim.engines.native_engine import compile_control\n"
         "print(compile_control(TILTROTOR).cache_hits)"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", program], capture_output=True, text=True, check=True
-    )
+    for _ in range(2):
+        done = subprocess.run(
+            [sys.executable, "-c", program], capture_output=True, text=True, check=True
+        )
     assert done.stdout.strip() == "1"
 
 
