@@ -40,7 +40,10 @@ def pytest_collection_finish():
 
 
 def pytest_collection_modifyitems(items):
-    """The longest of the slow tests begin first: at the end, one process would fly them alone."""
+    """Order the tests, and choose those that coverage traces.
+
+    The longest of the slow tests begin first: at the end, one process would fly them alone.
+    """
     if sys.gettrace() is not None:
         trace_few_rows(items)
     markers = [item.get_closest_marker("slow") for item in items]

@@ -254,7 +254,8 @@ MEASURED = {"controller": {"angular_acceleration": "measured"}}
 EVERY_LAYER = (EVERYTHING, STORMY, HINGED, HEAVY, WATCHED, MEASURED)
 ACTUATION = {key: table for key, table in EVERYTHING.items() if key != "controller"}
 WITH_ACTUATORS = (ACTUATION, STORMY, HINGED, HEAVY)
-"""On the equations, whose solver compiles the controls at each of its stages."""
+"""Without the controller's own layers (supervisor, measured acceleration, latency, prioritized
+allocation): on the equations, the solver would compile them again at each of its stages."""
 HELD = {"control_timestep": 0.004}
 FED_FORWARD = {"controller": {"gait_rate_feedforward": True, "gains": {
     "attitude": {"bandwidth": 25.0},

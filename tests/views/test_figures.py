@@ -41,6 +41,7 @@ def page(name):
     return plot(flight(name))
 
 
+# "jumps" is drawn by the comparisons below.
 @pytest.mark.parametrize("name", [name for name in RECIPES if name != "jumps"])
 def test_every_flight_can_be_drawn(name):
     figure = page(name)
