@@ -777,7 +777,7 @@ def test_a_failing_controller_exits_3_and_leaves_its_log(tmp_path, capsys):
             ["TypeError", "when it was made"],
         ),
         ("import sys; sys.exit(3)", "law", ["raised SystemExit: 3", "broken.py, line 1"]),
-        ("\0", "law", ["null bytes (broken.py)"]),
+        ("\0", "law", ["null bytes", "broken.py:law"]),
     ],
 )
 def test_files_that_hold_no_controller_exit_2(tmp_path, capsys, text, name, words):
