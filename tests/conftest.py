@@ -42,10 +42,15 @@ def pytest_collection_finish():
 def pytest_collection_modifyitems(items):
     """Order the tests, and choose those that coverage traces.
 
-    The longest of the slow tests begin first: at the end, one process would fly them alone.
+    The longest of the slow tests begin first, and those that wait for the viewer: at the end, one
+    process would run them alone.
     """
     if sys.gettrace() is not None:
         trace_few_rows(items)
-    markers = [item.get_closest_marker("slow") for item in items]
-    longest = [bool(marker and marker.kwargs.get("longest")) for marker in markers]
-    items[:] = [item for _, item in sorted(zip(longest, items), key=lambda pair: not pair[0])]
+
+    def is_late(item):
+        slow = item.get_closest_marker("slow")
+        long = slow is not None and slow.kwargs.get("longest")
+        return not (long or item.get_closest_marker("viewer"))
+
+    items.sort(key=is_late)

@@ -102,7 +102,7 @@ def trace_seldom():
 
 
 def trace_few_rows(items):
-    """Have a tracer see three rows of every test with many, and every fourth of the others.
+    """Have a tracer see three rows of every test with many, and every eighth of the others.
 
     The control laws and their analysis are traced in all of them.
     """
@@ -110,7 +110,7 @@ def trace_few_rows(items):
     for item in items:
         test = item.nodeid.partition("[")[0]
         rows[test] += 1
-        if rows[test] > ROWS and rows[test] % 4 and not test.startswith("tests/controllers/"):
+        if rows[test] > ROWS and rows[test] % 8 and not test.startswith("tests/controllers/"):
             item.obj = untraced(item.obj)
 
 

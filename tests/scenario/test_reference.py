@@ -63,7 +63,7 @@ def fly(case, **simulation):
     ("case", "plant"),
     [
         *((case, "mujoco") for case in CASES),
-        *(("keyframes", "thesis"), ("trot", "thesis"), ("tables", "thesis")),
+        *(("keyframes", "thesis"), ("trot", "thesis")),
         pytest.param("quadrotor", "thesis", marks=pytest.mark.slow),  # compiles for seconds
     ],
 )

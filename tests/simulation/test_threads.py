@@ -96,7 +96,7 @@ def test_two_hundred_flights_of_all_kinds_are_the_same_in_threads():
     engines, plants = ("python", "native"), ("mujoco", "thesis")
     layered_on = ("mujoco", EVERY_LAYER, LATE), ("thesis", WITH_ACTUATORS, HELD)
     scenarios = [
-        scenario(table, engine=engine, plant=plant, control_timestep=held, duration=0.1)
+        scenario(table, engine=engine, plant=plant, control_timestep=held, duration=0.05)
         for table, engine, plant, held in product(ALL_LAWS.values(), engines, plants, (0.0, 0.004))
     ]
     scenarios += [
