@@ -180,6 +180,13 @@ def check_pip(arguments):
         assert set(named.split(",")) <= extras["optional-dependencies"].keys()
 
 
+def check_mutation(arguments):
+    """Look for the module that a command names."""
+    option, module = arguments
+    assert option == "--only"
+    assert (ROOT / "controllers" / "tiltsim_controllers" / f"{module}.py").exists()
+
+
 def check_python(arguments):
     """Look for a script, or pass on to the module."""
     if arguments[0] == "-m":
@@ -192,6 +199,7 @@ CHECKS = {
     "tiltsim": check_tiltsim,
     "pytest": check_tests,
     "pip": check_pip,
+    "tests.mutation": check_mutation,
     "python": check_python,
     "python3": check_python,
     **dict.fromkeys(("venv", "sphinx", "ruff", "mypy", "git", "dask", "rerun"), lambda _: None),

@@ -1,9 +1,10 @@
 """Mutation score of `controllers`: ``python -m tests.mutation --count 300 --seed 1``.
 
 Each mutant (`tests.mutation.mutants`) runs in a fork of a process that has loaded the heavy
-packages, against only the tests that execute its lines, quickest first, until one fails. Mutants
-that no test can tell from the original are listed with the reason in ``equivalent.toml`` and are
-not drawn.
+packages, against only the tests that execute its lines, quickest first, until one fails. Only tests
+that run the source as Python count: compiled or on arrays, a mutant would be compared with itself.
+Mutants that no test can tell from the original are listed with the reason in ``equivalent.toml``
+and are not drawn.
 
 Why a script: cosmic-ray writes every mutant to disk and starts the whole suite for it (a minute
 each), mutmut and pytest-gremlins compile all mutants of a function into it behind a switch, which
@@ -33,8 +34,7 @@ from pathlib import Path
 os.environ["OPENBLAS_NUM_THREADS"] = "1"  # before numpy loads
 
 import hypothesis
-import numba  # noqa: F401  # loaded once for all forks, like the next three
-import numpy  # noqa: F401
+import numpy  # noqa: F401  # loaded once for all forks, like the next four
 import pytest
 import scipy.integrate
 import scipy.optimize
@@ -42,13 +42,15 @@ import scipy.signal
 import scipy.spatial.transform  # noqa: F401
 import sympy  # noqa: F401
 from coverage import Coverage, CoverageData
+from numba.core.ccallback import CFunc
+from numba.core.dispatcher import Dispatcher
 
 from tests.mutation.mutants import Mutant, find_mutants
 
 ROOT = Path(__file__).parents[2]
 SOURCE_ROOT = ROOT / "controllers"
 PACKAGE = "tiltsim_controllers"
-TESTS = "tests/controllers"
+TESTS = ("tests/controllers", "tests/laws", "tests/linear")
 PYTEST = ["-q", "-o", "addopts=", "-p", "no:cacheprovider", "-p", "no:xdist", "--strict-markers"]
 PYTEST += [
     "--hypothesis-seed=0",
@@ -58,7 +60,7 @@ PYTEST += [
     "--no-header",
     "--tb=no",
 ]
-PYTEST += [f"--ignore={TESTS}/test_scalar_is_pure.py"]  # of how the code is written
+PYTEST += ["--ignore=tests/controllers/test_scalar_is_pure.py"]  # of how the code is written
 PYTEST += ["-W", "ignore::pytest.PytestAssertRewriteWarning"]  # hypothesis is loaded already
 SHARE_AT_IMPORT = 0.4  # of the tests, by time, for a line that nearly all of them depend on
 SURVIVED = {int(pytest.ExitCode.OK), int(pytest.ExitCode.NO_TESTS_COLLECTED)}
@@ -70,6 +72,7 @@ class TestMap:
     def __init__(self) -> None:
         self.seconds: dict[str, float] = {}
         self.failed: set[str] = set()
+        self.skipped: set[str] = set()
         self.by_line: dict[str, dict[int, list[str]]] = {}
         self._coverage: Coverage | None = None
 
@@ -81,24 +84,28 @@ class TestMap:
         self.seconds[report.nodeid] = self.seconds.get(report.nodeid, 0.0) + report.duration
         if report.failed:
             self.failed.add(report.nodeid)
+        if report.skipped:
+            self.skipped.add(report.nodeid)
 
     def measure(self, file: Path) -> int:
         """Run all tests once, in a process of their own."""
+        skip_what_is_compiled()
         data = file.with_suffix(".coverage")
         self._coverage = Coverage(data, source=[str(SOURCE_ROOT / PACKAGE)], config_file=False)
         self._coverage.start()
-        pytest.main([*PYTEST, TESTS], plugins=[self])
+        pytest.main([*PYTEST, *TESTS], plugins=[self])
         self._coverage.stop()
         self._coverage.save()
         contexts = CoverageData(data)
         contexts.read()
+        left_out = self.failed | self.skipped
         for name in contexts.measured_files():
             lines = contexts.contexts_by_lineno(name)
             self.by_line[str(Path(name).relative_to(SOURCE_ROOT))] = {
-                line: sorted(set(tests) - self.failed) for line, tests in lines.items()
+                line: sorted(set(tests) - left_out) for line, tests in lines.items()
             }
         data.unlink()
-        passed = {test: self.seconds[test] for test in self.seconds.keys() - self.failed}
+        passed = {test: self.seconds[test] for test in self.seconds.keys() - left_out}
         file.write_text(json.dumps([passed, self.by_line, sorted(self.failed)]))
         return 0
 
@@ -124,20 +131,13 @@ class TestMap:
 
 
 class Selection:
-    """A pytest plugin that keeps the tests named, in this order, but for those of compiled code.
-
-    They compare it with the same source run as Python, which a mutant changes alike.
-    """
+    """A pytest plugin that keeps the tests named, in this order."""
 
     def __init__(self, tests: list[str]) -> None:
         self.rank = {test: index for index, test in enumerate(tests)}
 
     def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
-        kept = [
-            item
-            for item in items
-            if item.nodeid in self.rank and "native" not in getattr(item, "fixturenames", ())
-        ]
+        kept = (item for item in items if item.nodeid in self.rank)
         items[:] = sorted(kept, key=lambda item: self.rank[item.nodeid])
 
 
@@ -157,6 +157,24 @@ class Finder(importlib.abc.MetaPathFinder, importlib.abc.Loader):
 
     def exec_module(self, module: object) -> None:
         exec(compile(self.tree, str(self.path), "exec"), module.__dict__)
+
+
+class WithoutJax(importlib.abc.MetaPathFinder):
+    """Finds no JAX, as where it is not installed."""
+
+    def find_spec(self, fullname: str, path: object, target: object = None) -> None:
+        if fullname == "jax":
+            raise ModuleNotFoundError(name=fullname)
+
+
+def skip_what_is_compiled() -> None:
+    """From now on in this process, tests that compile with numba or JAX skip themselves."""
+
+    def skip(*_: object, **__: object) -> None:
+        pytest.skip("compiles")
+
+    Dispatcher.compile = CFunc.compile = skip
+    sys.meta_path.insert(0, WithoutJax())
 
 
 def in_a_fork(work, seconds: float) -> int:
@@ -188,7 +206,7 @@ def try_mutant(path: Path, tree: ast.Module, mutant: Mutant, tests: list[str]) -
 def measured_map() -> TestMap:
     """The map of the tests, kept between runs as long as neither code nor tests change."""
     content = hashlib.sha256()
-    for folder in (SOURCE_ROOT / PACKAGE, ROOT / TESTS):
+    for folder in (SOURCE_ROOT / PACKAGE, Path(__file__).parent, *(ROOT / room for room in TESTS)):
         for path in sorted(folder.rglob("*.py")):
             content.update(path.read_bytes())
     file = Path(tempfile.gettempdir()) / f"tiltsim-mutation-{content.hexdigest()[:16]}.json"
@@ -197,7 +215,7 @@ def measured_map() -> TestMap:
         print("running all tests once, to see which lines each executes", flush=True)
         child = in_a_fork(lambda: tests.measure(file), 1800.0)
         if os.waitpid(child, 0)[1]:
-            sys.exit(f"the tests in {TESTS} could not be run")
+            sys.exit(f"the tests in {', '.join(TESTS)} could not be run")
     tests.read(file)
     return tests
 

@@ -35,6 +35,7 @@ SYMMETRIC = {
     "isclose",
     "gcd",
     "dot",
+    "jet_product",
     "isinstance",
     "issubclass",
     "NamedTuple",

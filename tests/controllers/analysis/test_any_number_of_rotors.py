@@ -15,7 +15,10 @@ import pytest
 from tiltsim_controllers.analysis import singularity
 from tiltsim_controllers.analysis.torque_free import (
     SINGULAR_ATTITUDES,
+    TorqueFreeForces,
+    controlled_axes,
     hover_direction,
+    margin_over_flight,
     singularity_margin,
     torque_free_forces,
 )
@@ -181,3 +184,42 @@ def test_many_tilt_angles_at_once_are_one_after_another():
         np.testing.assert_allclose(every[2, 4], one, atol=1e-12)
     assert np.isnan(hover_direction(alone)).all()
     assert singularity_margin(alone) == 0.0
+
+
+def test_controlled_axes_are_up_and_across_it_among_the_torque_free_forces():
+    rng = np.random.default_rng(20)
+    for _ in range(10):
+        basis = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+        up = rng.normal(size=3)
+        up /= np.linalg.norm(up)
+        plane = TorqueFreeForces(np.array(3), np.array(2), basis[:, :2] @ basis[:, :2].T)
+        found = controlled_axes(plane, up, 2)
+        np.testing.assert_allclose(found @ found.T, np.eye(2), atol=1e-12)
+        np.testing.assert_allclose(found[0], up)
+        assert abs(found[1] @ basis[:, 2]) < 1e-12
+        everything = TorqueFreeForces(np.array(3), np.array(3), np.eye(3))
+        forward = controlled_axes(everything, up, 2)[1]
+        assert forward[1] == 0.0
+        assert forward @ up == pytest.approx(0.0, abs=1e-12)
+        np.testing.assert_array_equal(controlled_axes(plane, up, 1), [up])
+        np.testing.assert_array_equal(controlled_axes(plane, up, 3), np.eye(3))
+
+
+def test_over_a_flight_the_margin_changes_its_sign_at_a_great_circle():
+    """The only torque-free force turns with the tilts; each flight begins on the positive side."""
+    lean = np.linspace(0.0, 0.8 * np.pi, 9)  # past pi/2, perpendicular to up
+    axes = np.stack([np.sin(lean), 0.0 * lean, np.cos(lean)], axis=-1)
+    whole = np.concatenate([axes, -axes[::-1]])  # the second begins beyond
+    projector = whole[:, :, np.newaxis] * whole[:, np.newaxis, :]
+    count = len(whole)
+    forces = TorqueFreeForces(np.full(count, 3), np.full(count, 1), projector)
+    begins = np.zeros(count, bool)
+    begins[[0, 9]] = True
+    up = np.tile((0.0, 0.0, 1.0), (count, 1))
+    expected = np.r_[0.5 * np.pi - lean, -(0.5 * np.pi - lean[::-1])]
+    found = margin_over_flight(forces, up, begins)
+    np.testing.assert_allclose(found, expected, atol=1e-9)
+    # A flight of two dimensions goes past its two directions.
+    plane = forces._replace(dimension=np.where(np.arange(count) < 9, 1, 2))
+    mixed = margin_over_flight(plane, up, begins)
+    np.testing.assert_allclose(mixed, np.r_[expected[:9], np.abs(expected[9:])], atol=1e-9)

@@ -22,6 +22,7 @@ from tiltsim_controllers.laws.full_pose import (
     Limits,
     Parameters,
     attitude_error,
+    desired_jerks,
     force_balanced_tilt_weight,
     full_pose_inputs,
     limited_tilt_rate,
@@ -30,7 +31,11 @@ from tiltsim_controllers.laws.full_pose import (
 )
 from tiltsim_controllers.laws.gains import GAIN_SETS as ATTITUDE_GAINS
 from tiltsim_controllers.mathematics.rotation import rotation_from_euler
-from tiltsim_controllers.references.trajectories import REFERENCE_TYPES, ReferenceParameters
+from tiltsim_controllers.references.trajectories import (
+    REFERENCE_TYPES,
+    ReferenceParameters,
+    reference_derivatives,
+)
 from tiltsim_controllers.vehicle.decoupling_matrix import (
     body_force,
     sines_and_cosines,
@@ -62,6 +67,33 @@ def random_state(random):
 
 def start(tilts):
     return (*[0.0] * 12, *tilts, *(300.0 * sign for sign in SPIN))
+
+
+# --- what is desired ---------------------------------------------------------------------------
+
+
+def test_desired_jerks_are_those_of_the_reference_and_its_errors():
+    reference = ReferenceParameters(
+        REFERENCE_TYPES["lissajous"], amplitude_x=1.0, amplitude_y=0.7, amplitude_z=0.4,
+        frequency_x=0.5, frequency_y=0.8, frequency_z=1.1, phase_y=0.3, phase_z=1.0,
+        roll=0.2, pitch=-0.1, yaw=0.6,
+    )  # fmt: skip
+    random = np.random.default_rng(1)
+    state = np.array(random_state(random))
+    linear, angular = random.normal(size=(2, 3))
+    rotation = rotation_from_euler(*state[6:9])
+    now = parameters(reference=reference)
+    found = desired_jerks(2.0, tuple(state), rotation, (tuple(linear), tuple(angular)), now, ())
+    position, velocity, acceleration, jerk = np.reshape(
+        reference_derivatives(2.0, reference)[:12], (4, 3)
+    )
+    feedback = GAINS.position_3 * (position - state[:3])
+    feedback += GAINS.position_2 * (velocity - state[3:6])
+    feedback += GAINS.position_1 * (acceleration - linear)
+    np.testing.assert_allclose(found[0], jerk + feedback, rtol=1e-12)
+    error = np.array(attitude_error(rotation, rotation_from_euler(0.2, -0.1, 0.6)))
+    turning = GAINS.attitude_3 * error - GAINS.attitude_2 * state[9:12] - GAINS.attitude_1 * angular
+    np.testing.assert_allclose(found[1], turning, rtol=1e-12)
 
 
 # --- the solve ---------------------------------------------------------------------------------

@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tiltsim_controllers.laws import yaw_position
 from tiltsim_controllers.laws.gains import GAIN_SETS, Poles, gains_from_rows
+from tiltsim_controllers.tilt_car import fourth_derivative, planned_direction, third_derivative
 
 AXES = ("roll", "pitch", "yaw", "altitude")
 
@@ -43,6 +45,21 @@ def test_the_published_sets_are_as_printed():
     ch03, ch04 = GAIN_SETS["ch03"], GAIN_SETS["ch04"]
     assert ch03 == (*[1] * 9, 10, 5, 10, 1, 1)
     assert ch04 == (1, 10, 50, 1, 10, 50, 1, 1, 1, 10, 5, 10, 1, 1)
+
+
+def test_other_sets_are_as_printed_and_ours_have_the_poles_that_they_say():
+    """Ch. 2, App. B; ch. 11, Sec. 4.2; of ch. 10, which prints none, multiple poles."""
+    assert yaw_position.GAIN_SETS["ch02"] == (10.0, 20.0, 50.0, 500.0, 5.0, 5.0)
+    assert yaw_position.GAIN_SETS["stable"][4:] == (5.0, 5.0)
+    assert planned_direction.GAIN_SETS["ch11"] == (12.0, 6.0, 9.0, 18.0)
+    loops = (
+        (planned_direction.GAIN_SETS["ch10"][:2], -2.0),
+        (planned_direction.GAIN_SETS["ch10"][2:], -2.0),
+        (third_derivative.GAIN_SETS["ch10"], -2.0),
+        (fourth_derivative.GAIN_SETS["ch10"], -3.0),
+    )
+    for gains, pole in loops:
+        np.testing.assert_allclose([1.0, *gains], np.poly([pole] * len(gains)), rtol=1e-12)
 
 
 def test_rows_are_diagonals_of_roll_pitch_and_yaw():

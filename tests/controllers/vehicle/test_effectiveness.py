@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from tests.controllers.multirotors import FOUR, random_states, tiltrotor
+from tests.controllers.multirotors import FOUR, random_states, ring, tiltrotor
 from tiltsim.equations import tiltrotor as printed
 from tiltsim_controllers.mathematics.rotation import rotation_from_euler
 from tiltsim_controllers.vehicle.effectiveness import (
@@ -14,6 +14,7 @@ from tiltsim_controllers.vehicle.effectiveness import (
     rotor_entries,
     tilt_of_rotor,
     tilts_of,
+    without_rotor,
 )
 from tiltsim_controllers.vehicle.multirotor import equations_of_motion_of
 
@@ -92,3 +93,13 @@ def test_equations_of_motion_are_those_of_chapter_3_for_its_tiltrotor():
         found = motion(state, tilts, inputs, vehicle.body, vehicle.table, 0, gust, 0.0)
         expected = printed.equations_of_motion(state, tilts, inputs, FOUR, gust)
         np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-11)
+
+
+@pytest.mark.parametrize("lost", [1, 3, 6])
+def test_a_lost_rotor_makes_nothing_and_the_others_what_they_made(lost):
+    table, tilts = ring(6, 0.2, hinged=True), (0.1, -0.2, 0.3, -0.4, 0.5, -0.6)
+    whole = np.vstack(force_and_torque(table, tilts))
+    whole[:, lost - 1] = 0.0
+    without = without_rotor(table, lost)
+    np.testing.assert_array_equal(np.vstack(force_and_torque(without, tilts)), whole)
+    assert tilt_of_rotor(without) == tilt_of_rotor(table)

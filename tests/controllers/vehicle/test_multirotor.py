@@ -1,0 +1,47 @@
+"""Any body's inertia against NumPy, and its equation of motion against its own derivative."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tiltsim_controllers.vehicle.multirotor import (
+    body_acceleration,
+    body_of,
+    body_torque_rate,
+    inertia_times,
+    inverse_inertia_times,
+)
+
+INERTIA = np.array([[2.0e-3, 3.0e-4, -4.0e-4], [3.0e-4, 3.0e-3, 5.0e-4], [-4.0e-4, 5.0e-4, 4.0e-3]])
+BODY = body_of(0.5, INERTIA, 9.81)
+CASES = 5
+
+
+def random_triples(seed, count):
+    return np.random.default_rng(seed).uniform(-2.0, 2.0, (CASES, count, 3))
+
+
+def test_products_of_inertia_count():
+    for (vector,) in random_triples(0, 1):
+        np.testing.assert_allclose(inertia_times(BODY, tuple(vector)), INERTIA @ vector, rtol=1e-12)
+        back = inverse_inertia_times(BODY, tuple(INERTIA @ vector))
+        np.testing.assert_allclose(back, vector, rtol=1e-12)
+
+
+@pytest.mark.parametrize("gyroscopic", [0.0, 0.5, 1.0])
+def test_the_torque_makes_the_acceleration_and_changes_as_the_motion_needs(gyroscopic):
+    """Along ``omega(t) = omega + t omega' + t^2 omega'' / 2``, by central differences."""
+    h = 1e-4
+
+    def torque(t, omega, rate, jerk):
+        now = omega + t * rate + 0.5 * t * t * jerk
+        return INERTIA @ (rate + t * jerk) + gyroscopic * np.cross(now, INERTIA @ now)
+
+    for omega, rate, jerk in random_triples(1, 3):
+        needed = tuple(torque(0.0, omega, rate, jerk))
+        found = body_acceleration(BODY, needed, tuple(omega), gyroscopic)
+        np.testing.assert_allclose(found, rate, rtol=1e-12)
+        expected = (torque(h, omega, rate, jerk) - torque(-h, omega, rate, jerk)) / (2.0 * h)
+        found = body_torque_rate(BODY, tuple(omega), tuple(rate), tuple(jerk), gyroscopic)
+        np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-9)

@@ -1,0 +1,73 @@
+"""The torques of the rotors' spin against derivatives of their angular momentum."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.controllers.vehicle.test_rotor_code import each_case
+from tiltsim_controllers.vehicle.rotor_inertia import (
+    acceleration_within_limits,
+    accelerations_within_limits_of,
+    spin_torque_of,
+)
+
+H = 1e-4
+
+
+@each_case
+def test_the_spin_torque_is_what_the_momentum_loses(case):
+    code, vehicle, axes, tilts = case.code, case.vehicle, case.axes, case.tilts
+    rotors, rng = len(case.thrusts), np.random.default_rng(1)
+    for _ in range(5):
+        angles, rates = rng.uniform(-2.0, 2.0, (2, tilts))
+        speeds, faster = rng.uniform(-2.0, 2.0, (2, rotors))
+        omega = rng.uniform(-2.0, 2.0, 3)
+
+        def momentum(time, angles=angles, rates=rates, speeds=speeds, faster=faster):
+            return (speeds + time * faster) @ axes(angles + time * rates)
+
+        found = spin_torque_of(code)(
+            code.axes(tuple(angles), vehicle), *map(tuple, (rates, speeds, faster, omega))
+        )
+        lost = -(momentum(H) - momentum(-H)) / (2.0 * H) - np.cross(omega, momentum(0.0))
+        np.testing.assert_allclose(found, lost, rtol=0.0, atol=1e-6)
+
+
+@each_case
+def test_a_turning_body_pushes_the_hinges_of_spinning_rotors(case):
+    """By the work of a tilt: ``d/d alpha (varpi omega . d)``."""
+    code, vehicle, axes, tilts = case.code, case.vehicle, case.axes, case.tilts
+    rotors, rng = len(case.thrusts), np.random.default_rng(2)
+    for _ in range(5):
+        angles, speeds = rng.uniform(-2.0, 2.0, tilts), rng.uniform(-2.0, 2.0, rotors)
+        omega = rng.uniform(-2.0, 2.0, 3)
+        found = code.on_hinges(code.axes(tuple(angles), vehicle), tuple(speeds), tuple(omega))
+        ends = [
+            np.array([speeds @ axes(angles + h * one) @ omega for one in np.eye(tilts)])
+            for h in (H, -H)
+        ]
+        np.testing.assert_allclose(found, (ends[0] - ends[1]) / (2.0 * H), rtol=0.0, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("speed", "acceleration", "expected"),
+    [
+        (5.0, 0.5, 0.5),
+        (5.0, -0.5, -0.5),
+        (10.0, 0.5, 0.0),
+        (11.0, 0.5, 0.0),
+        (10.0, -0.5, -0.5),
+        (1.0, -0.5, 0.0),
+        (0.5, -0.5, 0.0),
+        (1.0, 0.5, 0.5),
+    ],
+)
+def test_no_rotor_accelerates_beyond_a_limit(speed, acceleration, expected):
+    assert acceleration_within_limits(speed, acceleration, 1.0, 10.0) == expected
+    # The other rotor turns the other way, and so do its limits.
+    for spins in ((1.0, -1.0), (-1.0, 1.0), (0.5, -0.5)):
+        signed = tuple(np.sign(spin) * speed for spin in spins)
+        demanded = tuple(np.sign(spin) * acceleration for spin in spins)
+        found = accelerations_within_limits_of(spins)(signed, demanded, 1.0, 10.0)
+        assert found == tuple(np.sign(spin) * expected for spin in spins)
