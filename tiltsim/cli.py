@@ -12,7 +12,7 @@ from io import TextIOWrapper
 from traceback import walk_tb
 from typing import Final, NoReturn
 
-from tiltsim.arrays.jax_arrays import MERGES_LOOPS
+from tiltsim.arrays.xla_flags import let_xla_merge_loops
 from tiltsim.errors import InputError
 from tiltsim.exit_codes import DONE, INTERRUPTED, INVALID_INPUT, TERMINATED
 from tiltsim.system.interrupts import terminations_as_interrupts
@@ -91,17 +91,6 @@ def reduce_garbage_collection() -> None:
     """
     gc.set_threshold(GARBAGE_THRESHOLD)
     atexit.register(gc.freeze)
-
-
-def let_xla_merge_loops() -> None:
-    """Have JAX compute values once for several results, in this process and those it starts.
-
-    The option doubles the speed of flights on arrays. It is not set where tiltsim is a library:
-    XLA may fail with it on programs that are not ours.
-    """
-    flags = os.environ.get("XLA_FLAGS", "")
-    if "xla_backend_extra_options" not in flags:
-        os.environ["XLA_FLAGS"] = f"{flags} --xla_backend_extra_options={MERGES_LOOPS}=true"
 
 
 def main(arguments: list[str] | None = None) -> int:

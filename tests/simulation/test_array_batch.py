@@ -11,8 +11,7 @@ import pytest
 import tiltsim
 from tests.laws.test_laws import LAWS
 from tests.simulation.test_batch import EXACT, without_speed
-from tiltsim import cli
-from tiltsim.arrays import jax_arrays
+from tiltsim.arrays.xla_flags import MERGES_LOOPS, let_xla_merge_loops
 from tiltsim.flight.flight import Flight
 from tiltsim.laws.assembling import assemble
 from tiltsim.scenario.loading import merge
@@ -101,10 +100,10 @@ def test_batches_have_few_sizes_since_each_is_compiled():
 
 def test_the_command_line_adds_its_option_to_those_of_the_user(monkeypatch):
     monkeypatch.setenv("XLA_FLAGS", "--xla_dump_to=here")
-    cli.let_xla_merge_loops()
+    let_xla_merge_loops()
     assert os.environ["XLA_FLAGS"].split() == [
         "--xla_dump_to=here",
-        f"--xla_backend_extra_options={jax_arrays.MERGES_LOOPS}=true",
+        f"--xla_backend_extra_options={MERGES_LOOPS}=true",
     ]
-    cli.let_xla_merge_loops()
+    let_xla_merge_loops()
     assert os.environ["XLA_FLAGS"].count("xla_backend_extra_options") == 1

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 import operator
-import os
 from collections.abc import Callable, Mapping
 from functools import cache
 from typing import Any, Final
 
 import numpy as np
 
+from tiltsim.arrays.xla_flags import merges_loops
 from tiltsim.system.optional import optional_package
 
 Function = Callable[..., Any]
@@ -21,15 +21,11 @@ def require_jax(purpose: str) -> Any:
     return optional_package("jax", purpose, "'tiltsim[jax]'")
 
 
-MERGES_LOOPS: Final = "xla_cpu_use_multi_output_fusion"
-"""An option of XLA, with which it computes an intermediate value once for several results."""
-
-
 def recomputes() -> bool:
     """Whether XLA computes an intermediate value anew wherever it is used."""
     import jax
 
-    return jax.default_backend() == "cpu" and MERGES_LOOPS not in os.environ.get("XLA_FLAGS", "")
+    return jax.default_backend() == "cpu" and not merges_loops()
 
 
 class JaxArrays:

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
-import platform
 from collections.abc import Callable
 from contextlib import suppress
 from functools import cache
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Final
 
@@ -34,6 +31,10 @@ def native_code_folder() -> Path:
 
     The sources' places count, too: numba finds code by the path of its source.
     """
+    import hashlib  # like the next two, costs start-up time
+    import platform
+    from importlib.metadata import version
+
     versions = [version(name) for name in ("numba", "llvmlite", "numpy", "mujoco")]
     machine = platform.python_version(), platform.platform()
     digest = hashlib.sha256(repr([*versions, *machine]).encode())

@@ -7,9 +7,7 @@ import os
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from hashlib import sha256
 from pathlib import Path
-from secrets import token_hex
 from typing import Final
 
 from tiltsim.errors import InputError
@@ -23,6 +21,8 @@ _RANDOM_BYTES: Final = 8
 
 def digest(content: bytes) -> str:
     """The SHA-256 of the content of a file, in hexadecimal digits."""
+    from hashlib import sha256  # loads OpenSSL, which costs start-up time
+
     return sha256(content).hexdigest()
 
 
@@ -109,7 +109,7 @@ def replacing(path: Path, *, durable: bool = False) -> Iterator[Path]:
     special = path.exists() and not path.is_file()
     # A name that nobody can guess and make a link of. Unlike tempfile's, the file gets the
     # permissions of the umask.
-    temporary = path.with_name(f".{path.name}.{token_hex(_RANDOM_BYTES)}{TEMPORARY_SUFFIX}")
+    temporary = path.with_name(f".{path.name}.{os.urandom(_RANDOM_BYTES).hex()}{TEMPORARY_SUFFIX}")
     try:
         yield path if special else temporary
         if not special:

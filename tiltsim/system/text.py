@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 import unicodedata
 from collections.abc import Iterable, Sequence
-from html import escape
 from typing import Final
 
 LONGEST_WORD: Final = 300
@@ -63,6 +62,8 @@ def _escaped(character: str) -> str:
 
 def printable_html(text: object) -> str:
     """`printable` text for HTML, attributes included."""
+    from html import escape  # costs start-up time
+
     return escape(printable(text))
 
 
