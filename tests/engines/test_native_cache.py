@@ -44,7 +44,7 @@ def test_processes_that_compile_at_once_find_what_they_compiled(tmp_path, monkey
         assert other.stdout.read(1)  # it has saved the first of its entries
         for entry in range(ENTRIES):
             index.save(("this", entry), ("this", entry))
-        other.stdout.read()  # until it ends, whoever ends first
+        other.stdout.read()  # to the end, so that it never writes to a closed pipe
     assert other.returncode == 0
     keys = [(name, entry) for name in ("this", "other") for entry in range(ENTRIES)]
     assert [index.load(key) for key in keys] == keys

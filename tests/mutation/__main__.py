@@ -28,13 +28,13 @@ import tempfile
 import time
 import tomllib
 from collections import Counter, defaultdict
-from importlib.machinery import ModuleSpec
+from importlib.machinery import ModuleSpec, PathFinder
 from pathlib import Path
 
 os.environ["OPENBLAS_NUM_THREADS"] = "1"  # before numpy loads
 
 import hypothesis
-import numpy  # noqa: F401  # loaded once for all forks, like the next four
+import numpy  # noqa: F401  # loaded once for all forks, like the next five
 import pytest
 import scipy.integrate
 import scipy.optimize
@@ -45,6 +45,7 @@ from coverage import Coverage, CoverageData
 from numba.core.ccallback import CFunc
 from numba.core.dispatcher import Dispatcher
 
+from tests import tracing
 from tests.mutation.mutants import Mutant, find_mutants
 
 ROOT = Path(__file__).parents[2]
@@ -88,31 +89,43 @@ class TestMap:
             self.skipped.add(report.nodeid)
 
     def measure(self, file: Path) -> int:
-        """Run all tests once, in a process of their own."""
-        skip_what_is_compiled()
+        """Run all tests under a tracer that sees every line."""
+        tracing.trace_seldom = tracing.trace_few_rows = lambda *_: None
         data = file.with_suffix(".coverage")
         self._coverage = Coverage(data, source=[str(SOURCE_ROOT / PACKAGE)], config_file=False)
         self._coverage.start()
-        pytest.main([*PYTEST, *TESTS], plugins=[self])
+        code = pytest.main([*PYTEST, *TESTS], plugins=[self])
         self._coverage.stop()
         self._coverage.save()
+        if code not in {pytest.ExitCode.OK, pytest.ExitCode.TESTS_FAILED}:
+            return int(code)
         contexts = CoverageData(data)
         contexts.read()
-        left_out = self.failed | self.skipped
         for name in contexts.measured_files():
             lines = contexts.contexts_by_lineno(name)
-            self.by_line[str(Path(name).relative_to(SOURCE_ROOT))] = {
-                line: sorted(set(tests) - left_out) for line, tests in lines.items()
-            }
+            self.by_line[str(Path(name).relative_to(SOURCE_ROOT))] = lines
         data.unlink()
-        passed = {test: self.seconds[test] for test in self.seconds.keys() - left_out}
-        file.write_text(json.dumps([passed, self.by_line, sorted(self.failed)]))
+        self.write(file)
         return 0
+
+    def confirm(self, file: Path) -> int:
+        """Run those that passed once more, as against a mutant: untraced, quickest first."""
+        self.read(file)
+        ranked = sorted(self.seconds, key=self.seconds.__getitem__)
+        self.seconds.clear()
+        pytest.main([*PYTEST, *TESTS], plugins=[self, Selection(ranked)])
+        self.write(file)
+        return 0
+
+    def write(self, file: Path) -> None:
+        """The times of the tests that passed, the lines, and the tests that failed."""
+        passed = self.seconds.keys() - self.failed - self.skipped
+        seconds = {test: self.seconds[test] for test in passed}
+        file.write_text(json.dumps([seconds, self.by_line, sorted(self.failed)]))
 
     def read(self, file: Path) -> None:
         self.seconds, self.by_line, failed = json.loads(file.read_text())
-        for test in failed:
-            print(f"left out, as it fails without any mutant: {test}")
+        self.failed = set(failed)
 
     def tests_of(self, path: str, mutant: Mutant) -> list[str]:
         """Tests that execute the mutant's lines, quickest first.
@@ -122,7 +135,7 @@ class TestMap:
         lines = self.by_line.get(path, {})
         found = {test for line in mutant.lines for test in lines.get(str(line), [])}
         if "" not in found:
-            return sorted(found, key=lambda test: self.seconds[test])
+            return sorted(found & self.seconds.keys(), key=self.seconds.__getitem__)
         own = {test for tests in lines.values() for test in tests}
         ranked = sorted(self.seconds, key=lambda test: (test not in own, self.seconds[test]))
         ends = itertools.accumulate(self.seconds[test] for test in ranked)
@@ -159,12 +172,12 @@ class Finder(importlib.abc.MetaPathFinder, importlib.abc.Loader):
         exec(compile(self.tree, str(self.path), "exec"), module.__dict__)
 
 
-class WithoutJax(importlib.abc.MetaPathFinder):
+class WithoutJax(PathFinder):
     """Finds no JAX, as where it is not installed."""
 
-    def find_spec(self, fullname: str, path: object, target: object = None) -> None:
-        if fullname == "jax":
-            raise ModuleNotFoundError(name=fullname)
+    @classmethod
+    def find_spec(cls, fullname: str, path: object = None, target: object = None) -> object:
+        return None if fullname == "jax" else super().find_spec(fullname, path, target)
 
 
 def skip_what_is_compiled() -> None:
@@ -174,7 +187,7 @@ def skip_what_is_compiled() -> None:
         pytest.skip("compiles")
 
     Dispatcher.compile = CFunc.compile = skip
-    sys.meta_path.insert(0, WithoutJax())
+    sys.meta_path[sys.meta_path.index(PathFinder)] = WithoutJax
 
 
 def in_a_fork(work, seconds: float) -> int:
@@ -188,6 +201,8 @@ def in_a_fork(work, seconds: float) -> int:
         silence = os.open(os.devnull, os.O_WRONLY)
         os.dup2(silence, 1)
         os.dup2(silence, 2)
+        os.environ["XDG_CACHE_HOME"] = os.devnull  # compiled mutants must not be found by others
+        skip_what_is_compiled()
         code = int(work())
     finally:
         os._exit(code)
@@ -195,7 +210,6 @@ def in_a_fork(work, seconds: float) -> int:
 
 def try_mutant(path: Path, tree: ast.Module, mutant: Mutant, tests: list[str]) -> int:
     """Run tests against a mutant; pytest's exit code."""
-    os.environ["XDG_CACHE_HOME"] = os.devnull  # compiled mutants must not be found by others
     mutant.apply()
     name = ".".join(path.relative_to(SOURCE_ROOT).with_suffix("").parts).removesuffix(".__init__")
     sys.meta_path.insert(0, Finder(name, path, tree))
@@ -204,19 +218,24 @@ def try_mutant(path: Path, tree: ast.Module, mutant: Mutant, tests: list[str]) -
 
 
 def measured_map() -> TestMap:
-    """The map of the tests, kept between runs as long as neither code nor tests change."""
+    """The map of the tests, kept between runs as long as no source changes."""
     content = hashlib.sha256()
-    for folder in (SOURCE_ROOT / PACKAGE, Path(__file__).parent, *(ROOT / room for room in TESTS)):
-        for path in sorted(folder.rglob("*.py")):
-            content.update(path.read_bytes())
+    for folder in ("controllers", "tests", "tiltsim"):
+        for path in sorted((ROOT / folder).rglob("*")):
+            if path.suffix in {".py", ".toml", ".xml"}:
+                content.update(path.read_bytes())
     file = Path(tempfile.gettempdir()) / f"tiltsim-mutation-{content.hexdigest()[:16]}.json"
     tests = TestMap()
     if not file.exists():
-        print("running all tests once, to see which lines each executes", flush=True)
-        child = in_a_fork(lambda: tests.measure(file), 1800.0)
-        if os.waitpid(child, 0)[1]:
-            sys.exit(f"the tests in {', '.join(TESTS)} could not be run")
+        print("running all tests twice, to see which lines each executes", flush=True)
+        for work in (tests.measure, tests.confirm):
+            child = in_a_fork(lambda work=work: work(file), 1800.0)
+            if os.waitpid(child, 0)[1]:
+                file.unlink(missing_ok=True)
+                sys.exit(f"the tests in {', '.join(TESTS)} could not be run")
     tests.read(file)
+    for test in sorted(tests.failed):
+        print(f"left out, as it fails without any mutant: {test}")
     return tests
 
 
@@ -253,7 +272,7 @@ def main() -> int:
     running: dict[int, Mutant] = {}
     outcomes: dict[str, list[str]] = defaultdict(list)
     queue = drawn[::-1]
-    began = time.monotonic()
+    timeouts, began = 0, time.monotonic()
     while queue or running:
         while queue and len(running) < options.jobs:
             path, tree, mutant = queue.pop()
@@ -264,6 +283,7 @@ def main() -> int:
         child, status = os.wait()
         mutant = running.pop(child)
         survived = os.WIFEXITED(status) and os.WEXITSTATUS(status) in SURVIVED
+        timeouts += os.WIFSIGNALED(status)
         if survived:
             print(f"survived ({len(drawn) - len(queue)}) {mutant.key}", flush=True)
         outcomes[mutant.key.partition(":")[0]].append("survived" if survived else "killed")
@@ -273,7 +293,8 @@ def main() -> int:
         print(f"{module:40} {found.count('killed'):4} of {len(found):4}")
     for key in sorted(stale):
         print(f"no such mutant any more: {key}")
-    print(f"killed {score:.1f} % of {total.total()} in {time.monotonic() - began:.0f} s")
+    by_time = f", {timeouts} of them by time" if timeouts else ""
+    print(f"killed {score:.1f} % of {total.total()}{by_time} in {time.monotonic() - began:.0f} s")
     return int(score < options.min_score)
 
 

@@ -1,4 +1,7 @@
-"""The option of XLA that makes flights on arrays faster; the command line sets it as it starts."""
+"""The option of XLA that makes flights on arrays faster; the command line sets it.
+
+Loaded at every start: imports the standard library only.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +13,7 @@ MERGES_LOOPS: Final = "xla_cpu_use_multi_output_fusion"
 
 
 def merges_loops() -> bool:
-    """Whether the option is in the environment."""
+    """Whether ``XLA_FLAGS`` names the option."""
     return MERGES_LOOPS in os.environ.get("XLA_FLAGS", "")
 
 

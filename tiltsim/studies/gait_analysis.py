@@ -147,8 +147,8 @@ def gait_warnings(gait: Gait, vehicle: Vehicle) -> list[str]:
     if (signs > 0.0).any() and (signs < 0.0).any():
         reversed_ = (np.sign(R) == -np.sign(signs[0])) & (R != 0.0)
         warnings.append(
-            f"R changes sign before t = {times[reversed_][0]:.3f} s: the decoupling matrix is "
-            "singular in between"
+            f"R changes sign before t = {times[reversed_][0]:.3f} s: where R = 0, the "
+            "decoupling matrix is singular at level attitude"
         )
     return warnings
 

@@ -209,7 +209,7 @@ def test_over_a_flight_the_margin_changes_its_sign_at_a_great_circle():
     """The only torque-free force turns with the tilts; each flight begins on the positive side."""
     lean = np.linspace(0.0, 0.8 * np.pi, 9)  # past pi/2, perpendicular to up
     axes = np.stack([np.sin(lean), 0.0 * lean, np.cos(lean)], axis=-1)
-    whole = np.concatenate([axes, -axes[::-1]])  # the second begins beyond
+    whole = np.concatenate([axes, -axes[::-1]])  # the second flight: the axis reversed
     projector = whole[:, :, np.newaxis] * whole[:, np.newaxis, :]
     count = len(whole)
     forces = TorqueFreeForces(np.full(count, 3), np.full(count, 1), projector)

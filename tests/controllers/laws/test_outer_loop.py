@@ -1,4 +1,4 @@
-"""What the laws that demand a wrench or thrusts share, and what `pid` and `indi` make of it."""
+"""The outer loop of laws that demand a wrench or thrusts, the inner ones of `pid` and `indi`."""
 
 from __future__ import annotations
 

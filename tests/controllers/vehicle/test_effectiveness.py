@@ -96,7 +96,7 @@ def test_equations_of_motion_are_those_of_chapter_3_for_its_tiltrotor():
 
 
 @pytest.mark.parametrize("lost", [1, 3, 6])
-def test_a_lost_rotor_makes_nothing_and_the_others_what_they_made(lost):
+def test_a_failed_rotor_makes_no_force_or_torque_and_leaves_the_others_unchanged(lost):
     table, tilts = ring(6, 0.2, hinged=True), (0.1, -0.2, 0.3, -0.4, 0.5, -0.6)
     whole = np.vstack(force_and_torque(table, tilts))
     whole[:, lost - 1] = 0.0

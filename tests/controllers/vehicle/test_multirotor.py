@@ -1,4 +1,4 @@
-"""Any body's inertia against NumPy, and its equation of motion against its own derivative."""
+"""Any body's inertia against NumPy, its rotational equation of motion against differences."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def random_triples(seed, count):
     return np.random.default_rng(seed).uniform(-2.0, 2.0, (CASES, count, 3))
 
 
-def test_products_of_inertia_count():
+def test_products_of_inertia_are_included():
     for (vector,) in random_triples(0, 1):
         np.testing.assert_allclose(inertia_times(BODY, tuple(vector)), INERTIA @ vector, rtol=1e-12)
         back = inverse_inertia_times(BODY, tuple(INERTIA @ vector))
@@ -30,7 +30,7 @@ def test_products_of_inertia_count():
 
 
 @pytest.mark.parametrize("gyroscopic", [0.0, 0.5, 1.0])
-def test_the_torque_makes_the_acceleration_and_changes_as_the_motion_needs(gyroscopic):
+def test_angular_acceleration_and_torque_rate_obey_the_equation_of_motion(gyroscopic):
     """Along ``omega(t) = omega + t omega' + t^2 omega'' / 2``, by central differences."""
     h = 1e-4
 

@@ -1,4 +1,4 @@
-"""The named vehicles as printed."""
+"""The named vehicles, compared with the print by hand."""
 
 from __future__ import annotations
 

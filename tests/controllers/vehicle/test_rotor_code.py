@@ -1,4 +1,4 @@
-"""What layers ask of a vehicle's rotors, in closed form on the cross and of any rotors."""
+"""Places, lift, torque and momentum of rotors: the cross in closed form, and any rotors."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from tiltsim_controllers.vehicle.rotor_code import (
 CROSS = PRESETS["ar_drone_2"]
 ARMS = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
 HINGES = ARMS[[0, 1, 0, 3]]
-"""Of the first four of five rotors; two of them share one."""
+"""Hinge axes of the first four of five rotors; the first and the third share a hinge."""
 LAST = Rotor((0.1, 0.1, 0.3), (0.6, 0.0, 0.8), 9e-6, 3e-7, -1.0)
 
 
@@ -96,7 +96,7 @@ each_case = pytest.mark.parametrize("case", CASES.values(), ids=CASES)
 
 
 @each_case
-def test_heights_lift_and_torque_are_numpy_s(case):
+def test_heights_lift_and_torque_match_numpy(case):
     rng = np.random.default_rng(0)
     code, vehicle, rotors = case.code, case.vehicle, len(case.thrusts)
     spins = np.array([*SPIN, LAST.spin])[:rotors]
@@ -118,7 +118,7 @@ def test_heights_lift_and_torque_are_numpy_s(case):
 
 
 @each_case
-def test_pods_and_the_body_have_their_momentum(case):
+def test_angular_momentum_of_pods_and_body(case):
     code, vehicle = case.code, case.vehicle
     rng = np.random.default_rng(1)
     hinges = {0: np.empty((0, 3)), 3: HINGES[[0, 1, 3]], 4: ARMS}[case.tilts]

@@ -16,7 +16,7 @@ H = 1e-4
 
 
 @each_case
-def test_the_spin_torque_is_what_the_momentum_loses(case):
+def test_the_spin_torque_is_minus_the_rate_of_angular_momentum(case):
     code, vehicle, axes, tilts = case.code, case.vehicle, case.axes, case.tilts
     rotors, rng = len(case.thrusts), np.random.default_rng(1)
     for _ in range(5):
@@ -35,8 +35,8 @@ def test_the_spin_torque_is_what_the_momentum_loses(case):
 
 
 @each_case
-def test_a_turning_body_pushes_the_hinges_of_spinning_rotors(case):
-    """By the work of a tilt: ``d/d alpha (varpi omega . d)``."""
+def test_the_gyroscopic_torque_about_the_hinges(case):
+    """By virtual work: ``d/d alpha (varpi omega . d)``."""
     code, vehicle, axes, tilts = case.code, case.vehicle, case.axes, case.tilts
     rotors, rng = len(case.thrusts), np.random.default_rng(2)
     for _ in range(5):
