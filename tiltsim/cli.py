@@ -10,7 +10,7 @@ import sys
 from importlib import import_module
 from io import TextIOWrapper
 from traceback import walk_tb
-from typing import Final, NoReturn
+from typing import Any, Final, NoReturn
 
 from tiltsim.arrays.xla_flags import let_xla_merge_loops
 from tiltsim.errors import InputError
@@ -50,6 +50,13 @@ class Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         """Print the line and exit."""
         self.exit(INVALID_INPUT, f"tiltsim: {_one_line(message)} (see {self.prog} --help)\n")
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """Refuse unknown arguments: those of a command here, where its name is known."""
+        known, unknown = super().parse_known_args(args, namespace)
+        if unknown:
+            self.error(f"unrecognized arguments: {' '.join(unknown)}")
+        return known, unknown
 
 
 class _Version(argparse.Action):

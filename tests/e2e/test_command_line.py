@@ -74,6 +74,14 @@ def expecting(tmp_path):
     return write
 
 
+def test_a_command_refuses_an_option_that_it_does_not_have(capsys):
+    with pytest.raises(SystemExit) as stopped:
+        main(["run", SETPOINT, "--json"])
+    assert stopped.value.code == 2
+    line = "tiltsim: unrecognized arguments: --json (see tiltsim run --help)\n"
+    assert capsys.readouterr().err == line
+
+
 def test_run_writes_the_three_files_and_prints_a_summary(tmp_path, capsys):
     out = tmp_path / "new" / "a folder"
     assert main(["run", SETPOINT, *SHORT, "--set", "expect=[]", "--out", str(out)]) == 0
