@@ -21,7 +21,8 @@ from tiltsim.errors import InputError
 from tiltsim.flight.reading import load_flight
 from tiltsim.laws.assembling import assemble, loop_of
 from tiltsim.laws.commanded import COMMANDED_LOOPS
-from tiltsim.laws.tiltrotor import tiltrotor_state
+from tiltsim.laws.rotorcraft import seen_of
+from tiltsim.laws.tiltrotor import TILTROTOR_LAYOUT
 from tiltsim.plants.built_in_command import BuiltInController
 from tiltsim.plants.command import Command, check_command
 from tiltsim.plants.commanded_plant import CommandedPlant
@@ -187,8 +188,10 @@ def test_a_shipped_law_flown_as_a_users_own_flies_the_same_flight(layers):
     while not isinstance(parameters, Parameters):
         parameters = getattr(parameters, "inner", None) or parameters.law
 
+    seen = seen_of(TILTROTOR_LAYOUT.places, 0, measured=False)
+
     def own(observation):
-        state = tiltrotor_state(
+        state, _, _ = seen(
             [*observation.position, *observation.quaternion, *observation.tilt_angles],
             [*observation.velocity, *observation.body_rates, *observation.tilt_rates],
             np.array(SPIN) * observation.rotor_speeds,

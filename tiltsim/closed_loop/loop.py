@@ -177,9 +177,9 @@ class SupervisedLaw(NamedTuple):
     """``(qpos, qvel, act)``: state, that of the body first, tilt rates and the controller's own
     states."""
     inputs: Callable[..., Values]
-    """``(time, *seen, motion, parameters, knots)``: the controls from rotor accelerations on."""
+    """``(time, *seen, parameters, knots, motion)``: the controls from rotor accelerations on."""
     references: Callable[..., Values]
-    """``(time, sample, motion, parameters, knots)``: columns of references, those of the tilts
+    """``(time, sample, parameters, knots, motion)``: columns of references, those of the tilts
     left out."""
     names: tuple[str, ...]  # of these columns
     fields: tuple[str, ...]  # of a sample, those that the references need

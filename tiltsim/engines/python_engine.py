@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from math import nan
 from struct import Struct
 from typing import Any
@@ -40,7 +41,7 @@ class PythonEngine(Engine):
         timestep, per_step, period = (
             header[index] for index in (TIMESTEP, EVALUATIONS_PER_STEP, CONTROL_PERIOD)
         )
-        write_controls = Struct(f"{len(ctrl)}d").pack_into
+        write_controls = partial(Struct(f"{len(ctrl)}d").pack_into, ctrl, 0)
 
         def evaluate(_model: mujoco.MjModel, called: mujoco.MjData) -> None:
             if called is not data:
@@ -48,16 +49,16 @@ class PythonEngine(Engine):
             count = header[EVALUATIONS]
             header[EVALUATIONS] = count + 1.0
             time = evaluation_time(count, per_step, timestep)
-            state = time, qpos.tolist(), qvel.tolist(), act.tolist()
+            q, v, a = qpos.tolist(), qvel.tolist(), act.tolist()
             try:
                 if period == 0.0 or count % period == 0.0:
-                    values = controls(*state, parameters, knots)
+                    values = controls(time, q, v, a, parameters, knots)
                 else:
-                    values = hold(*state, ctrl.tolist(), parameters)
+                    values = hold(time, q, v, a, ctrl.tolist(), parameters)
             except (ArithmeticError, ValueError):
                 # Where floats raise (sin of infinity), native code has NaN; MuJoCo reports both.
                 values = (nan,) * len(ctrl)
-            write_controls(ctrl, 0, *values)
+            write_controls(*values)
 
         self._callback = evaluate
 

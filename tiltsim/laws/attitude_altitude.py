@@ -27,6 +27,7 @@ from tiltsim_controllers.laws.attitude_altitude import (
     rotor_accelerations,
 )
 from tiltsim_controllers.laws.decouplers import DECOUPLERS
+from tiltsim_controllers.laws.supervisor import SUPERVISOR_AT_REST
 from tiltsim_controllers.laws.tiltrotor_supervisor import SUPERVISION
 from tiltsim_controllers.mathematics.scalar import Quad, Triple, Values, Vector, scalar
 from tiltsim_controllers.references.trajectories import position_reference
@@ -44,9 +45,9 @@ def _inputs(
     state: Values,
     moving: Values,
     states: Values,
-    motion: Triple,
     parameters: Any,
     knots: Vector,
+    motion: Triple = SUPERVISOR_AT_REST,
 ) -> Quad:
     """Rotor accelerations (rad/s^2); see `tiltsim.closed_loop.loop.SupervisedLaw`."""
     return rotor_accelerations(time, state, parameters.law, knots)
@@ -58,9 +59,9 @@ def _measured_inputs(
     state: Values,
     moving: Values,
     states: Values,
-    motion: Triple,
     parameters: Any,
     knots: Vector,
+    motion: Triple = SUPERVISOR_AT_REST,
 ) -> Quad:
     """The same by the measured angular acceleration, which follows the four tilt rates."""
     measured = moving[4], moving[5], moving[6]
@@ -83,7 +84,7 @@ def _setup(plan: FlightPlan) -> tuple[Parameters, Values]:
 
 @scalar
 def _references(
-    time: float, state: Values, motion: Triple, parameters: Any, knots: Vector
+    time: float, state: Values, parameters: Any, knots: Vector, motion: Triple = SUPERVISOR_AT_REST
 ) -> Values:
     """Position and attitude; see `tiltsim.closed_loop.loop.SupervisedLaw`."""
     law = parameters.law

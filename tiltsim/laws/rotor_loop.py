@@ -29,15 +29,14 @@ from tiltsim.laws.rotorcraft import (
     held_controls_of,
     observed_of,
     reference_columns,
-    servo_commands_of,
+    seen_of,
     servo_lead,
-    state_of,
     thrust_controls_of,
     torque_free_columns,
 )
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.vehicles.rotorcraft import initial_rotor_speeds, rotorcraft_kind
-from tiltsim.vehicles.rotorcraft.layout import CROSS, TILT_RATE_1
+from tiltsim.vehicles.rotorcraft.layout import CROSS
 from tiltsim.vehicles.rotorcraft.layout import Layout as Places
 from tiltsim_controllers.gaits.any_tilts import tilt_motion_of
 from tiltsim_controllers.mathematics.records import make_record_type
@@ -104,7 +103,7 @@ class RotorLaw(NamedTuple):
     name: str  # of compiled code
     inputs: Callable[..., Values]
     """Scalar code ``(time, state, tilt_rates, states, parameters, knots)``: rotor accelerations
-    (rad/s^2), then rates of the controller's ``states``. ``state`` is the vehicle's (`state_of`),
+    (rad/s^2), then rates of the controller's ``states``. ``state`` is the vehicle's (`seen_of`),
     ``parameters`` the whole record."""
     parameters: type[tuple[Any, ...]]
     setup: Callable[[FlightPlan], tuple[Any, Values]]  # these, and knots after those of the flight
@@ -181,40 +180,25 @@ def _integrated_of(tilts: int, state_1: int, rate_1: int) -> _Tilts:
     return commanded, commanded_motion
 
 
-@cache
-def seen_of(places: Places, states: int, measured: bool) -> Callable[..., tuple[Values, ...]]:
-    """Scalar code ``(qpos, qvel, act)`` of what a law sees of MuJoCo's vectors.
-
-    That is the vehicle's state, its tilt rates and the controller's states; see `RotorLaw`.
-    """
-    state_in, states_in = state_of(places), entries_of(places.rotors, states)
-    tilt_rates_in = entries_of(TILT_RATE_1, places.tilts + 3 * measured)
-
-    @scalar
-    def seen(qpos: Vector, qvel: Vector, act: Vector) -> tuple[Values, ...]:
-        return state_in(qpos, qvel, act), tilt_rates_in(qvel), states_in(act)
-
-    return seen
-
-
 def _sampling_of(layout: RotorLayout, law: RotorLaw) -> Sampling:
     """The control step in MuJoCo."""
     rotors, tilts = layout.places
     seen, inputs_of = seen_of(layout.places, len(law.states), law.measured), law.inputs
-    thrusts, ahead = thrust_controls_of(layout.spins), servo_commands_of(tilts)
+    thrusts, ahead = thrust_controls_of(layout.spins), ahead_of(tilts)
     if law.commands is None:
+        planned = tilt_motion_of(tilts).moving
 
         @scalar
         def servos(time: float, act: Vector, inputs: Values, head: Any, knots: Vector) -> Values:
-            return ahead(time, head.servo_lead, head.law.gait, knots)
+            angles, rates = planned(time, head.law.gait, knots)
+            return ahead(angles, rates, head.servo_lead)
 
     else:
         commanded = entries_of(rotors + law.commands, tilts)  # of activations, and their rates
-        led = ahead_of(tilts)
 
         @scalar
         def servos(time: float, act: Vector, inputs: Values, head: Any, knots: Vector) -> Values:
-            return led(commanded(act), commanded(inputs), head.servo_lead)
+            return ahead(commanded(act), commanded(inputs), head.servo_lead)
 
     @scalar
     def controls(
@@ -222,7 +206,7 @@ def _sampling_of(layout: RotorLayout, law: RotorLaw) -> Sampling:
     ) -> Values:
         state, moving, states = seen(qpos, qvel, act)
         inputs = inputs_of(time, state, moving, states, parameters, knots)
-        return (*servos(time, act, inputs, parameters, knots), *thrusts(act), *inputs)
+        return servos(time, act, inputs, parameters, knots) + thrusts(act) + inputs
 
     return Sampling(controls, held_controls_of(layout.spins, tilts))
 

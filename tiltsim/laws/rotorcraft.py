@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cache
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -30,18 +30,17 @@ if TYPE_CHECKING:
     from tiltsim.scenario.rotorcraft import ServoTable
 
 
-def _written_state(name: str, numbers: tuple[str, ...]) -> Callable[..., Values]:
-    """Scalar code ``(qpos, qvel, act)`` of a vector, roll, pitch and yaw being ``angles``.
+def _written_state(name: str, numbers: Iterable[str]) -> Callable[..., Any]:
+    """Scalar code ``(qpos, qvel, act)`` of a tuple, roll, pitch and yaw being ``angles``.
 
-    In one tuple: to join some costs Python a third of the function.
+    In one expression: to join some costs Python a third of the function.
     """
     joined = written_out(name, "angles, qpos, qvel, act", tuple_text(numbers))
 
     @scalar
-    def state(qpos: Vector, qvel: Vector, act: Vector) -> Values:
+    def state(qpos: Vector, qvel: Vector, act: Vector) -> Any:
         angles = euler_from_quaternion(qpos[QW], qpos[QX], qpos[QY], qpos[QZ])
-        found: Values = joined(angles, qpos, qvel, act)
-        return found
+        return joined(angles, qpos, qvel, act)
 
     return state
 
@@ -60,14 +59,22 @@ _BODY: Final = (
 
 
 @cache
-def state_of(layout: Layout) -> Callable[..., Values]:
-    """Scalar code of the vehicle's state that control laws know: ``(qpos, qvel, act)``.
+def seen_of(layout: Layout, states: int, measured: bool) -> Callable[..., tuple[Values, ...]]:
+    """Scalar code ``(qpos, qvel, act)`` of what a law sees of MuJoCo's vectors.
 
-    It has twelve numbers of the body, the tilt angles (rad) and the rotor speeds (rad/s).
+    That is the vehicle's state (twelve numbers of the body, then tilt angles, rad, and rotor
+    speeds, rad/s), its tilt rates (rad/s) and the controller's states.
+
+    Args:
+        layout: Of the vehicle.
+        states: How many states the controller has.
+        measured: Whether the plant's angular acceleration follows the tilt rates.
     """
     rotors, tilts = layout
-    moved = (*_entries("qpos", TILT_1, tilts), *_entries("act", 0, rotors))
-    return _written_state(f"state_{rotors}_{tilts}", (*_BODY, *moved))
+    rates = _entries("qvel", TILT_RATE_1, tilts + 3 * measured)
+    state = (*_BODY, *_entries("qpos", TILT_1, tilts), *_entries("act", 0, rotors))
+    parts = map(tuple_text, (state, rates, _entries("act", rotors, states)))
+    return _written_state(f"seen_{rotors}_{tilts}_{len(rates)}_{states}", parts)
 
 
 @cache

@@ -11,7 +11,7 @@ from tiltsim.closed_loop.loop import ControlSetup
 from tiltsim.engines.sample_evaluation import flights_in
 from tiltsim.equations.tiltrotor import equations_of_motion
 from tiltsim.laws.rotor_loop import RotorLayout
-from tiltsim.laws.rotorcraft import rotor_stops, singular_attitude, state_of
+from tiltsim.laws.rotorcraft import rotor_stops, singular_attitude
 from tiltsim_controllers.analysis.singularity import determinant, margin_over_gait
 from tiltsim_controllers.mathematics.rotation import world_up_in_body
 from tiltsim_controllers.mathematics.scalar import Floats, Quad, Triple, Values, Vector, scalar
@@ -27,9 +27,6 @@ TILT_REFERENCE_COLUMNS: Final = tuple(f"alpha_ref_{rotor}" for rotor in ROTORS)
 
 
 TILTROTOR_LAYOUT: Final = RotorLayout((0, 1, 2, 3), SPIN, "tiltrotor")
-
-tiltrotor_state: Final = state_of(TILTROTOR_LAYOUT.places)
-"""State of the control laws, `TILTROTOR_FIELDS`, from MuJoCo's."""
 
 
 @scalar

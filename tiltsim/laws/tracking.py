@@ -14,8 +14,8 @@ from functools import cache
 from typing import TYPE_CHECKING, Any, Final
 
 from tiltsim.closed_loop.loop import ClosedLoop, SupervisedLaw
-from tiltsim.laws.rotor_loop import RotorLaw, RotorLayout, rotor_loop, seen_of
-from tiltsim.laws.rotorcraft import REFERENCE_COLUMNS
+from tiltsim.laws.rotor_loop import RotorLaw, RotorLayout, rotor_loop
+from tiltsim.laws.rotorcraft import REFERENCE_COLUMNS, seen_of
 from tiltsim.scenario.multirotor_controllers import AttitudeForceController
 from tiltsim.scenario.tiltrotor_controllers import AttitudeAltitudeController
 from tiltsim_controllers.laws.decouplers import DECOUPLERS
@@ -72,9 +72,9 @@ def _inputs_of(
         state: Values,
         moving: Values,
         states: Values,
-        motion: Triple,
         parameters: Any,
         knots: Vector,
+        motion: Triple = SUPERVISOR_AT_REST,
     ) -> Values:
         rates, acceleration = tilt_rates_in(moving), acceleration_in(moving)
         found: Values = inputs_in(
@@ -98,7 +98,11 @@ def _references_of(
 
     @scalar
     def references(
-        time: float, values: Vector, motion: Triple, parameters: Any, knots: Vector
+        time: float,
+        values: Vector,
+        parameters: Any,
+        knots: Vector,
+        motion: Triple = SUPERVISOR_AT_REST,
     ) -> Values:
         own = parameters.law
         x, y, z, _, _, _, _, _, _ = position_reference(time, own.reference, knots)
@@ -127,32 +131,22 @@ def supervised_loop(
         supervision: The supervisor's code.
         watched: What this reads of a vehicle: ``(time, parameters)``.
     """
-    inputs, references, margins = law.inputs, law.references, law.margins
+    references, margins = law.references, law.margins
     assert references is not None
     assert margins is not None
-
-    @scalar
-    def inputs_at_rest(
-        time: float, state: Values, moving: Values, states: Values, parameters: Any, knots: Vector
-    ) -> Values:
-        return inputs(time, state, moving, states, SUPERVISOR_AT_REST, parameters, knots)
-
-    @scalar
-    def references_at_rest(time: float, values: Vector, parameters: Any, knots: Vector) -> Values:
-        return references(time, values, SUPERVISOR_AT_REST, parameters, knots)
-
-    loop = rotor_loop(layout, law._replace(inputs=inputs_at_rest, references=references_at_rest))
     supervised = SupervisedLaw(
         code=supervision,
         vehicle=watched,
         seen=seen_of(layout.places, len(law.states), law.measured),
-        inputs=inputs,
+        inputs=law.inputs,
         references=references,
         names=law.names,
         fields=(*layout.places.observed_fields, *law.states),
         margins=margins,
     )
-    return replace(loop, supervised=supervised, follows_position=follows_position)
+    return replace(
+        rotor_loop(layout, law), supervised=supervised, follows_position=follows_position
+    )
 
 
 def tracking_loop(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from tiltsim_controllers.gaits.parameters import FIXED, TABLE, TWO_COLOR_CIRCLE, GaitParameters
-from tiltsim_controllers.gaits.tilts import planned_jets, tilt_reference
+from tiltsim_controllers.gaits.tilts import moving_tilts, planned_jets
 from tiltsim_controllers.mathematics.jets import Jet, Jets4
 from tiltsim_controllers.mathematics.scalar import Vector, clipped, scalar
 
@@ -71,8 +71,8 @@ def anticipated_tilts(time: float, gait: GaitParameters, knots: Vector, half: fl
     smooth = gait.type == FIXED or gait.type == TWO_COLOR_CIRCLE or gait.type == TABLE
     if half <= 0.0 or smooth:
         return planned_jets(time, gait, knots)
-    a1, a2, a3, a4, v1, v2, v3, v4 = tilt_reference(time - half, gait, knots)
-    b1, b2, b3, b4, w1, w2, w3, w4 = tilt_reference(time + half, gait, knots)
+    (a1, a2, a3, a4), (v1, v2, v3, v4) = moving_tilts(time - half, gait, knots)
+    (b1, b2, b3, b4), (w1, w2, w3, w4) = moving_tilts(time + half, gait, knots)
     return (
         rounded_corner(a1, v1, b1, w1, half),
         rounded_corner(a2, v2, b2, w2, half),

@@ -14,9 +14,9 @@ from tiltsim_controllers.gaits.anticipation import anticipated_tilts, rounded_co
 from tiltsim_controllers.gaits.keyframes import keyframe_segment
 from tiltsim_controllers.gaits.parameters import FIXED, KEYFRAMES, TABLE, GaitParameters
 from tiltsim_controllers.gaits.tabulated import COEFFICIENTS, segment_jet
-from tiltsim_controllers.gaits.tilts import planned_jets, tilt_reference
+from tiltsim_controllers.gaits.tilts import moving_tilts, planned_jets
 from tiltsim_controllers.mathematics.jets import Jet, jet_scaled
-from tiltsim_controllers.mathematics.scalar import Quad, Values, Vector, scalar
+from tiltsim_controllers.mathematics.scalar import Values, Vector, scalar
 from tiltsim_controllers.mathematics.splines import row_at
 from tiltsim_controllers.mathematics.vectors import componentwise
 
@@ -32,13 +32,7 @@ class TiltMotion(NamedTuple):
     moving: Callable[..., tuple[Values, Values]]  # (time, gait, knots): planned angles and rates
 
 
-@scalar
-def _four_moving(time: float, gait: GaitParameters, knots: Vector) -> tuple[Quad, Quad]:
-    a1, a2, a3, a4, rate_1, rate_2, rate_3, rate_4 = tilt_reference(time, gait, knots)
-    return (a1, a2, a3, a4), (rate_1, rate_2, rate_3, rate_4)
-
-
-CLOSED_FORMS: Final = {4: TiltMotion(planned_jets, anticipated_tilts, _four_moving)}
+CLOSED_FORMS: Final = {4: TiltMotion(planned_jets, anticipated_tilts, moving_tilts)}
 """By the number of tilts: those with the gaits of the thesis."""
 
 

@@ -47,6 +47,14 @@ def planned_angles(time: float, gait: GaitParameters, knots: Vector) -> TiltsAnd
 
 
 @scalar
+def moving_tilts(time: float, gait: GaitParameters, knots: Vector) -> tuple[Quad, Quad]:
+    """The planned tilt angles (rad), and their rates (rad/s); arguments as `tilt_reference`."""
+    a1, a2, a3, a4, v1, v2, v3, v4 = planned_angles(time, gait, knots)
+    f, b = gait.scale, gait.scale * gait.bias  # of the front and back pods
+    return (f * a1, f * a2, b * a3, b * a4), (f * v1, f * v2, b * v3, b * v4)
+
+
+@scalar
 def tilt_reference(time: float, gait: GaitParameters, knots: Vector = NO_KNOTS) -> TiltsAndRates:
     """The planned tilt angles (rad) and their rates (rad/s).
 
@@ -63,9 +71,8 @@ def tilt_reference(time: float, gait: GaitParameters, knots: Vector = NO_KNOTS) 
     Returns:
         ``(alpha_1, ..., alpha_4, rate_1, ..., rate_4)``.
     """
-    a1, a2, a3, a4, v1, v2, v3, v4 = planned_angles(time, gait, knots)
-    f, b = gait.scale, gait.scale * gait.bias  # of the front and back pods
-    return f * a1, f * a2, b * a3, b * a4, f * v1, f * v2, b * v3, b * v4
+    (a1, a2, a3, a4), (v1, v2, v3, v4) = moving_tilts(time, gait, knots)
+    return a1, a2, a3, a4, v1, v2, v3, v4
 
 
 @scalar
@@ -90,6 +97,6 @@ def tilt_acceleration(time: float, gait: GaitParameters, knots: Vector = NO_KNOT
 @scalar
 def planned_jets(time: float, gait: GaitParameters, knots: Vector) -> Jets4:
     """The planned tilt angles with rates and accelerations; arguments as for `tilt_reference`."""
-    a1, a2, a3, a4, v1, v2, v3, v4 = tilt_reference(time, gait, knots)
+    (a1, a2, a3, a4), (v1, v2, v3, v4) = moving_tilts(time, gait, knots)
     b1, b2, b3, b4 = tilt_acceleration(time, gait, knots)
     return (a1, v1, b1), (a2, v2, b2), (a3, v3, b3), (a4, v4, b4)

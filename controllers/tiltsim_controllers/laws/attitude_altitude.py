@@ -122,32 +122,6 @@ def attitude_reference(
 
 
 @scalar
-def _torque_rates(
-    errors: Triple, omega: Triple, torque: Triple, per_torque: Triple, gains: Gains
-) -> Triple:
-    """Rates of the torques about the body axes, by the error dynamics of ch. 4, Eq. (26).
-
-    The references of roll, pitch and yaw are treated as constant.
-
-    Args:
-        errors: of roll, pitch and yaw, rad
-        omega: body rates, rad/s
-        torque: moments of inertia times angular acceleration, in units of ``L K_f``
-        per_torque: moments of inertia in the same units
-        gains: of the controller
-    """
-    roll_error, pitch_error, yaw_error = errors
-    p, q, r = omega
-    roll_torque, pitch_torque, yaw_torque = torque
-    return (
-        per_torque[0] * (gains.roll_3 * roll_error - gains.roll_2 * p) - gains.roll_1 * roll_torque,
-        per_torque[1] * (gains.pitch_3 * pitch_error - gains.pitch_2 * q)
-        - gains.pitch_1 * pitch_torque,
-        per_torque[2] * (gains.yaw_3 * yaw_error - gains.yaw_2 * r) - gains.yaw_1 * yaw_torque,
-    )
-
-
-@scalar
 def rotor_accelerations(
     time: float,
     state: Values,
@@ -183,21 +157,24 @@ def rotor_accelerations(
     size_1, size_2, size_3, size_4 = abs(s1), abs(s2), abs(s3), abs(s4)
     w1, w2, w3, w4 = s1 * size_1, s2 * size_2, s3 * size_3, s4 * size_4
     unit = 1.0 / (vehicle.arm_length * vehicle.thrust_coefficient)
-    inertia = (vehicle.inertia_xx * unit, vehicle.inertia_yy * unit, vehicle.inertia_zz * unit)
+    ix, iy, iz = vehicle.inertia_xx * unit, vehicle.inertia_yy * unit, vehicle.inertia_zz * unit
     if angular_acceleration is None:
-        body_torques = body_torque(torque, w1, w2, w3, w4)
+        tx, ty, tz = body_torque(torque, w1, w2, w3, w4)
     else:
         p_rate, q_rate, r_rate = angular_acceleration
-        body_torques = (inertia[0] * p_rate, inertia[1] * q_rate, inertia[2] * r_rate)
+        tx, ty, tz = ix * p_rate, iy * q_rate, iz * r_rate
     lift = h1 * w1 + h2 * w2 + h3 * w3 + h4 * w4
 
     # Ma, Eq. (18): the thrust direction turns with the body, r3^T (omega x F w).
     fx, fy, fz = body_force(trig, w1, w2, w3, w4)
     turning = ux * (q * fz - r * fy) + uy * (r * fx - p * fz) + uz * (p * fy - q * fx)
 
-    # Third-order error dynamics, Eqs. (26)-(27), as rates of those torques and of the lift.
-    errors = (roll_ref - roll, pitch_ref - pitch, wrap_angle(yaw_ref - yaw))
-    roll_rate, pitch_rate, yaw_rate = _torque_rates(errors, (p, q, r), body_torques, inertia, gains)
+    # Third-order error dynamics, Eqs. (26)-(27), as rates of those torques and of the lift; the
+    # references of roll, pitch and yaw are treated as constant.
+    yaw_error = wrap_angle(yaw_ref - yaw)
+    roll_rate = ix * (gains.roll_3 * (roll_ref - roll) - gains.roll_2 * p) - gains.roll_1 * tx
+    pitch_rate = iy * (gains.pitch_3 * (pitch_ref - pitch) - gains.pitch_2 * q) - gains.pitch_1 * ty
+    yaw_rate = iz * (gains.yaw_3 * yaw_error - gains.yaw_2 * r) - gains.yaw_1 * tz
     lift_rate = (
         vehicle.mass
         / vehicle.thrust_coefficient

@@ -25,7 +25,7 @@ from typing import Any, Final, NamedTuple
 
 from tiltsim_controllers.gaits.anticipation import anticipated_tilts
 from tiltsim_controllers.gaits.parameters import NO_KNOTS, GaitParameters
-from tiltsim_controllers.gaits.tilts import tilt_reference
+from tiltsim_controllers.gaits.tilts import moving_tilts
 from tiltsim_controllers.laws.attitude_altitude import Gains
 from tiltsim_controllers.laws.decouplers import NONE
 from tiltsim_controllers.laws.feedback import (
@@ -117,8 +117,8 @@ def _planned_force(
     roll, pitch = attitude
     ratio = drag_ratio(parameters.vehicle)
     clock = gait_time(time, supervisor_motion, supervisor)
-    planned = tilt_reference(clock, gait, knots)
-    scale = _gait_scale(planned[:4], roll, pitch, supervisor, ratio, knots)
+    planned, _ = moving_tilts(clock, gait, knots)
+    scale = _gait_scale(planned, roll, pitch, supervisor, ratio, knots)
     tilts = anticipated_tilts(clock, gait, knots, parameters.anticipation)
     a1, a2, a3, a4 = _supervised_tilts(tilts, scale, supervisor_motion, supervisor, ratio)
     return torque_free_force_jet((a1, a2, a3, a4), ratio)

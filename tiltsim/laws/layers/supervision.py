@@ -152,7 +152,7 @@ def _with_states(loop: ClosedLoop, units: tuple[str, ...]) -> Layer:
         return (
             *servo_commands(time, motion, gait, knots, supervisor, vehicle, lead),
             *thrusts(act),
-            *inputs(time, state, moving, states, motion, inner, knots),
+            *inputs(time, state, moving, states, inner, knots, motion),
             motion[1],
             motion[2],
         )
@@ -163,7 +163,7 @@ def _with_states(loop: ClosedLoop, units: tuple[str, ...]) -> Layer:
         motion = (state[seen], state[seen + 1], 0.0)
         gait, vehicle = inner.law.gait, vehicle_of(time, inner)
         return (
-            *references(time, state, motion, inner, knots),
+            *references(time, state, inner, knots, motion),
             *servo_commands(time, motion, gait, knots, supervisor, vehicle, 0.0),
         )
 
