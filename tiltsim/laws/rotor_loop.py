@@ -185,20 +185,10 @@ def _sampling_of(layout: RotorLayout, law: RotorLaw) -> Sampling:
     rotors, tilts = layout.places
     seen, inputs_of = seen_of(layout.places, len(law.states), law.measured), law.inputs
     thrusts, ahead = thrust_controls_of(layout.spins), ahead_of(tilts)
-    if law.commands is None:
-        planned = tilt_motion_of(tilts).moving
-
-        @scalar
-        def servos(time: float, act: Vector, inputs: Values, head: Any, knots: Vector) -> Values:
-            angles, rates = planned(time, head.law.gait, knots)
-            return ahead(angles, rates, head.servo_lead)
-
-    else:
-        commanded = entries_of(rotors + law.commands, tilts)  # of activations, and their rates
-
-        @scalar
-        def servos(time: float, act: Vector, inputs: Values, head: Any, knots: Vector) -> Values:
-            return ahead(commanded(act), commanded(inputs), head.servo_lead)
+    _, moving_tilts = _gait_of(tilts)
+    if law.commands is not None:
+        first = rotors + law.commands  # of activations, and of their rates
+        _, moving_tilts = _integrated_of(tilts, first, first)
 
     @scalar
     def controls(
@@ -206,7 +196,8 @@ def _sampling_of(layout: RotorLayout, law: RotorLaw) -> Sampling:
     ) -> Values:
         state, moving, states = seen(qpos, qvel, act)
         inputs = inputs_of(time, state, moving, states, parameters, knots)
-        return servos(time, act, inputs, parameters, knots) + thrusts(act) + inputs
+        angles, rates = moving_tilts(time, act, inputs, parameters, knots)
+        return ahead(angles, rates, parameters.servo_lead) + thrusts(act) + inputs
 
     return Sampling(controls, held_controls_of(layout.spins, tilts))
 
