@@ -24,7 +24,10 @@ def test_every_scalar_function_is_translated():
 def test_slices_of_tuples_have_constant_bounds():
     """Numba types a slice of a tuple by its bounds, and does not evaluate them."""
     for function in scalar_functions():
-        tree = ast.parse(textwrap.dedent(inspect.getsource(function)))
+        if not function.__module__.startswith("tiltsim"):
+            continue  # of another test, whose file may be gone
+        text = getattr(function, "__source__", None) or inspect.getsource(function)
+        tree = ast.parse(textwrap.dedent(text))
         slices = [node for node in ast.walk(tree) if isinstance(node, ast.Slice)]
         bounds = [bound for s in slices for bound in (s.lower, s.upper) if bound is not None]
         assert all(isinstance(bound, ast.Constant | ast.Name) for bound in bounds), function
