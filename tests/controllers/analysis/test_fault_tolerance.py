@@ -78,11 +78,18 @@ def test_the_pose_matrix_is_the_derivative_of_force_and_torque(lost):
     found = pose_matrix(hover.tilts, hover.rotor_speeds, VEHICLE, lost)
     np.testing.assert_allclose(found, slopes[:, sound], atol=1e-9)
     assert found.shape == (6, 6)
+    values = np.linalg.svd(slopes[:, sound])[1]
+    assert hover.authority == pytest.approx(values[5] / values[0], rel=1e-7)
 
 
-@pytest.mark.parametrize("speed", [-1.0, 1e4])
+HEAVIEST = (WEIGHT / cos(DELTA)) ** 0.5
+"""The speed (rad/s) at which the opposite rotor alone carries the vehicle."""
+
+
+@pytest.mark.parametrize("speed", [-1.0, 1.0001 * HEAVIEST])
 def test_speeds_that_outweigh_the_vehicle_are_refused(speed):
-    with pytest.raises(ValueError, match="opposite_speed"):
+    three_rotor_hover(1, VEHICLE, opposite_speed=0.9999 * HEAVIEST)
+    with pytest.raises(ValueError, match=f"between 0 and {HEAVIEST:.4g} rad/s"):
         three_rotor_hover(1, VEHICLE, opposite_speed=speed)
 
 

@@ -35,6 +35,7 @@ from tiltsim_controllers.vehicle.parameters import PRESETS, SPIN, drag_ratio
 AR_DRONE = PRESETS["ar_drone_2"]
 STATES = 25  # random states for each combination
 TIME = 3.7
+ACCELERATIONS = ("acceleration_x", "acceleration_y", "acceleration_z")
 POSITION_DECOUPLERS = ("conventional", "modified", "exact")
 
 
@@ -68,7 +69,7 @@ def side_forces(vehicle, alpha):
     return force[:2] @ np.linalg.inv(level) @ [0, 0, 0, vehicle.gravity]
 
 
-def attitude_for(parameters, alpha, ax, ay):
+def attitude_for(parameters, alpha, ax, ay, az):
     """Roll and pitch to reach a horizontal acceleration, ch. 4, Eqs. (7)-(11), or exactly."""
     vehicle, yaw, g = parameters.vehicle, parameters.reference.yaw, parameters.vehicle.gravity
     sy, cy = np.sin(yaw), np.cos(yaw)
@@ -81,7 +82,7 @@ def attitude_for(parameters, alpha, ax, ay):
     # The force that hovers without torque, turned by some roll and pitch onto the desired one.
     n = force_matrix(vehicle, alpha) @ np.linalg.svd(torque_matrix(vehicle, alpha))[2][3]
     n *= np.sign(n[2]) / np.linalg.norm(n)
-    desired = rotation(0, 0, -yaw) @ [ax, ay, g]
+    desired = rotation(0, 0, -yaw) @ [ax, ay, g + az]
     desired /= np.linalg.norm(desired)
     # Rx(roll) n has the desired y; Ry(pitch) then turns its x and z onto the desired ones.
     across = hypot(n[1], n[2])
@@ -111,6 +112,7 @@ def random_case(seed, decoupling, decoupler):
             *random.uniform(0.1, 0.3, 2),
             *spread(3, 0.4),
             acceleration_feedforward=float(random.integers(2)),
+            **dict(zip(ACCELERATIONS, spread(3, 0.2))),
         ),
         decoupler=DECOUPLERS[decoupler],
         decoupling=DECOUPLINGS[decoupling],
@@ -137,7 +139,9 @@ def reference_motion(reference):
         passed_on = reference.acceleration_feedforward
         return centre + out, rate * turn @ [0, radius, 0], -passed_on * rate**2 * out
     velocity = np.array([reference.velocity_x, reference.velocity_y, reference.velocity_z])
-    return centre + velocity * TIME, velocity, np.zeros(3)
+    rate = np.array([getattr(reference, name) for name in ACCELERATIONS])
+    position = centre + velocity * TIME + 0.5 * rate * TIME**2
+    return position, velocity + rate * TIME, reference.acceleration_feedforward * rate
 
 
 def demanded_third_derivatives(parameters, state):
@@ -150,12 +154,12 @@ def demanded_third_derivatives(parameters, state):
     if parameters.decoupler == DECOUPLERS["none"]:
         lean = np.array([reference.roll, reference.pitch])
     else:
-        ax, ay = (
+        ax, ay, _ = (
             demanded_acceleration
             + gains.position_1 * (wanted_velocity - velocity)
             + gains.position_2 * (wanted_position - position)
-        )[:2]
-        lean = attitude_for(parameters, alpha, ax, ay)
+        )
+        lean = attitude_for(parameters, alpha, ax, ay, demanded_acceleration[2])
     k1 = np.array([gains.roll_1, gains.pitch_1, gains.yaw_1, gains.altitude_1])
     k2 = np.array([gains.roll_2, gains.pitch_2, gains.yaw_2, gains.altitude_2])
     k3 = np.array([gains.roll_3, gains.pitch_3, gains.yaw_3, gains.altitude_3])

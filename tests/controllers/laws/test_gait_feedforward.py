@@ -101,11 +101,12 @@ def test_the_exact_decouplers_attitude_moves_with_its_arguments(side):
             np.testing.assert_allclose(value, desired, rtol=0, atol=tolerance)
 
 
-def test_out_of_reach_the_decoupler_rests_at_the_nearest_roll():
-    n = ((3.0, 0.1, 0.0), (0.2, 0.0, 0.0), (1.0, 0.0, 0.0))
-    still = [(value, 0.0, 0.0) for value in (1.0, 12.0, VEHICLE.gravity, 0.4)]
+@pytest.mark.parametrize("ay", [12.0, -12.0])
+def test_out_of_reach_the_decoupler_rests_at_the_nearest_roll(ay):
+    n = ((3.0, 0.1, -2.0), (0.2, 0.0, 0.0), (1.0, 0.0, 0.0))
+    still = [(value, 0.0, 0.0) for value in (1.0, ay, VEHICLE.gravity, 0.4)]
     roll, _ = exact_decoupler_jet(*still, n)
-    expected, _ = exact_decoupler(1.0, 12.0, 0.0, 0.4, VEHICLE.gravity, (3.0, 0.2, 1.0))
+    expected, _ = exact_decoupler(1.0, ay, 0.0, 0.4, VEHICLE.gravity, (3.0, 0.2, 1.0))
     assert roll == pytest.approx((expected, 0.0, 0.0), abs=1e-14)
 
 

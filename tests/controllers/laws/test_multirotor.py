@@ -38,6 +38,7 @@ from tiltsim_controllers.laws.multirotor_steps import (
     Form,
     SideGains,
     rotation_control,
+    side_control,
     turned,
 )
 from tiltsim_controllers.mathematics.rotation import rotation_from_euler
@@ -239,6 +240,17 @@ def test_an_octorotor_turns_upside_down_and_hovers_there():
     assert flight.up[-1, 2] < -1.0 + 1e-6
     assert np.abs(flight.position).max() < 1e-3
     assert (np.diff(np.sign(flight.speeds), axis=0) != 0).any(axis=0).all()  # every rotor reverses
+
+
+def test_force_control_of_x_and_y_is_third_order_with_an_integrator():
+    law, _ = parameters_of(CANTED)
+    law = law._replace(
+        side=SideGains(5.0, 8.0, 6.0, 2.0), terms=law.terms._replace(integral_action=0.5)
+    )
+    errors, accelerations, integrals = np.random.default_rng(5).uniform(-0.1, 0.1, (3, 3, 3))
+    found = side_control(*np.array((errors, accelerations)).tolist(), integrals[0].tolist(), law)
+    jerks = accelerations[:, 1] + errors @ (6.0, 8.0, 5.0) + 0.5 * 2.0 * integrals[0]
+    np.testing.assert_allclose(found, (*jerks[:2], *errors[:2, 0]), rtol=1e-12)
 
 
 def test_attitude_control_feeds_the_motion_of_its_reference_forward():

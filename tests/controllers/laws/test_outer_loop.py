@@ -9,6 +9,8 @@ import pytest
 
 from tests.controllers.vehicle.test_multirotor import BODY, INERTIA
 from tiltsim_controllers.laws.full_pose import attitude_error
+from tiltsim_controllers.laws.geometric import Parameters as GeometricParameters
+from tiltsim_controllers.laws.geometric import attitude_torque
 from tiltsim_controllers.laws.indi import Parameters as IndiParameters
 from tiltsim_controllers.laws.indi import filtered, indi_law_of
 from tiltsim_controllers.laws.observed import Desired, Observed
@@ -90,6 +92,21 @@ def test_the_torque_turns_the_body(gyroscopic):
     rates, angular = np.array([0.3, -0.4, 0.5]), np.array([2.0, 3.0, -5.0])
     found = torque_for(BODY, tuple(rates), tuple(angular), gyroscopic)
     expected = INERTIA @ angular + gyroscopic * np.cross(rates, INERTIA @ rates)
+    np.testing.assert_allclose(found, expected, rtol=1e-12)
+
+
+@pytest.mark.parametrize("gyroscopic", [0.0, 1.0])
+def test_the_geometric_torque_is_eq_16(gyroscopic):
+    """Of Lee et al., with the desired angular acceleration zero."""
+    seen, rates = observed(10), np.array([0.6, -0.2, 0.4])
+    gains = GeometricParameters(0.0, 0.0, 6.0, 0.9, inf, gyroscopic)
+    omega = np.array(seen.body_rates)
+    turn, desired = matrix(seen.rotation), rotation_from_euler(0.3, -0.2, 0.5)
+    skew = 0.5 * (matrix(desired).T @ turn - turn.T @ matrix(desired))
+    error = np.array([skew[2, 1], skew[0, 2], skew[1, 0]])
+    expected = -6.0 * error - 0.9 * (omega - rates) - INERTIA @ np.cross(omega, rates)
+    expected += gyroscopic * np.cross(omega, INERTIA @ omega)
+    found = attitude_torque(seen, desired, tuple(rates.tolist()), gains)
     np.testing.assert_allclose(found, expected, rtol=1e-12)
 
 
