@@ -52,7 +52,7 @@ class Parser(argparse.ArgumentParser):
         self.exit(INVALID_INPUT, f"tiltsim: {_one_line(message)} (see {self.prog} --help)\n")
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
-        """Refuse unknown arguments: those of a command here, where its name is known."""
+        """Refuse unknown arguments at once, so that a command names its own ``--help``."""
         known, unknown = super().parse_known_args(args, namespace)
         if unknown:
             self.error(f"unrecognized arguments: {' '.join(unknown)}")

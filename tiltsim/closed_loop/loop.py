@@ -168,7 +168,8 @@ class Equations:
 class SupervisedLaw(NamedTuple):
     """A controller as a supervisor (`tiltsim.laws.layers.supervision`) uses it, in scalar code.
 
-    ``motion`` is the supervisor's state with its rate and acceleration.
+    ``motion``, the supervisor's state with its rate and acceleration, is the last argument: at rest
+    by default, as an unsupervised loop calls the same functions without it.
     """
 
     code: Supervision

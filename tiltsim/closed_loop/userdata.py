@@ -65,7 +65,7 @@ def evaluation_time(evaluations: float, evaluations_per_step: float, timestep: f
     step = floor(evaluations / evaluations_per_step)
     stage = evaluations - step * evaluations_per_step
     if stage == 0.0:
-        return _AFTER * (step * timestep)  # `just_after`, as Python pays for each call
+        return _AFTER * (step * timestep)  # `just_after`, written out: a call takes time in Python
     if stage == 3.0:
         return _BEFORE * ((step + 1.0) * timestep)  # `just_before`
     return (step + 0.5) * timestep

@@ -63,7 +63,7 @@ def _measured_inputs(
     knots: Vector,
     motion: Triple = SUPERVISOR_AT_REST,
 ) -> Quad:
-    """The same by the measured angular acceleration, which follows the four tilt rates."""
+    """The same by the measured angular acceleration, which comes after the four tilt rates."""
     measured = moving[4], moving[5], moving[6]
     return rotor_accelerations(time, state, parameters.law, knots, measured)
 

@@ -185,10 +185,10 @@ def _sampling_of(layout: RotorLayout, law: RotorLaw) -> Sampling:
     rotors, tilts = layout.places
     seen, inputs_of = seen_of(layout.places, len(law.states), law.measured), law.inputs
     thrusts, ahead = thrust_controls_of(layout.spins), ahead_of(tilts)
-    _, moving_tilts = _gait_of(tilts)
+    _, tilt_motion = _gait_of(tilts)
     if law.commands is not None:
         first = rotors + law.commands  # of activations, and of their rates
-        _, moving_tilts = _integrated_of(tilts, first, first)
+        _, tilt_motion = _integrated_of(tilts, first, first)
 
     @scalar
     def controls(
@@ -196,7 +196,7 @@ def _sampling_of(layout: RotorLayout, law: RotorLaw) -> Sampling:
     ) -> Values:
         state, moving, states = seen(qpos, qvel, act)
         inputs = inputs_of(time, state, moving, states, parameters, knots)
-        angles, rates = moving_tilts(time, act, inputs, parameters, knots)
+        angles, rates = tilt_motion(time, act, inputs, parameters, knots)
         return ahead(angles, rates, parameters.servo_lead) + thrusts(act) + inputs
 
     return Sampling(controls, held_controls_of(layout.spins, tilts))

@@ -30,19 +30,20 @@ if TYPE_CHECKING:
     from tiltsim.scenario.rotorcraft import ServoTable
 
 
-def _written_state(name: str, numbers: Iterable[str]) -> Callable[..., Any]:
-    """Scalar code ``(qpos, qvel, act)`` of a tuple, roll, pitch and yaw being ``angles``.
+def _reading(name: str, entries: Iterable[str]) -> Callable[..., Any]:
+    """Scalar code ``(qpos, qvel, act)`` of a tuple.
 
-    In one expression: to join some costs Python a third of the function.
+    Its entries may also read ``angles``: roll, pitch and yaw (rad). It is one expression: several
+    tuples, joined, would take Python half as much time again.
     """
-    joined = written_out(name, "angles, qpos, qvel, act", tuple_text(numbers))
+    joined = written_out(name, "angles, qpos, qvel, act", tuple_text(entries))
 
     @scalar
-    def state(qpos: Vector, qvel: Vector, act: Vector) -> Any:
+    def reading(qpos: Vector, qvel: Vector, act: Vector) -> Any:
         angles = euler_from_quaternion(qpos[QW], qpos[QX], qpos[QY], qpos[QZ])
         return joined(angles, qpos, qvel, act)
 
-    return state
+    return reading
 
 
 def _entries(vector: str, first: int, count: int) -> tuple[str, ...]:
@@ -68,13 +69,13 @@ def seen_of(layout: Layout, states: int, measured: bool) -> Callable[..., tuple[
     Args:
         layout: Of the vehicle.
         states: How many states the controller has.
-        measured: Whether the plant's angular acceleration follows the tilt rates.
+        measured: Whether the tilt rates end with the plant's angular acceleration (rad/s^2).
     """
     rotors, tilts = layout
     rates = _entries("qvel", TILT_RATE_1, tilts + 3 * measured)
     state = (*_BODY, *_entries("qpos", TILT_1, tilts), *_entries("act", 0, rotors))
     parts = map(tuple_text, (state, rates, _entries("act", rotors, states)))
-    return _written_state(f"seen_{rotors}_{tilts}_{len(rates)}_{states}", parts)
+    return _reading(f"seen_{rotors}_{tilts}_{len(rates)}_{states}", parts)
 
 
 @cache
@@ -90,7 +91,7 @@ def observed_of(layout: Layout, shown: Layout, further: int) -> Callable[..., Va
     idle = ("0.0",) * (shown.tilts - tilts)
     angles, rates = _entries("qpos", TILT_1, tilts), _entries("qvel", TILT_RATE_1, tilts)
     speeds, states = _entries("act", 0, rotors), _entries("act", rotors, further)
-    return _written_state(
+    return _reading(
         f"observed_{rotors}_{tilts}_{shown.tilts}_{further}",
         (*_BODY, *angles, *idle, *speeds, *rates, *idle, *states),
     )

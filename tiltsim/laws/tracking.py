@@ -127,7 +127,8 @@ def supervised_loop(
 
     Args:
         layout: Of the vehicles.
-        law: Its ``inputs`` and ``references`` are those of a `SupervisedLaw`.
+        law: Its ``inputs`` and ``references`` are those of a `SupervisedLaw`, with the
+            supervisor at rest by default.
         supervision: The supervisor's code.
         watched: What this reads of a vehicle: ``(time, parameters)``.
     """

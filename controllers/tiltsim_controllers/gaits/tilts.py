@@ -48,7 +48,7 @@ def planned_angles(time: float, gait: GaitParameters, knots: Vector) -> TiltsAnd
 
 @scalar
 def moving_tilts(time: float, gait: GaitParameters, knots: Vector) -> tuple[Quad, Quad]:
-    """The planned tilt angles (rad), and their rates (rad/s); arguments as `tilt_reference`."""
+    """The planned tilt angles (rad), and their rates (rad/s); arguments as for `tilt_reference`."""
     a1, a2, a3, a4, v1, v2, v3, v4 = planned_angles(time, gait, knots)
     f, b = gait.scale, gait.scale * gait.bias  # of the front and back pods
     return (f * a1, f * a2, b * a3, b * a4), (f * v1, f * v2, b * v3, b * v4)

@@ -219,7 +219,7 @@ def test_over_a_flight_the_margin_changes_its_sign_at_a_great_circle():
     expected = np.r_[0.5 * np.pi - lean, -(0.5 * np.pi - lean[::-1])]
     found = margin_over_flight(forces, up, begins)
     np.testing.assert_allclose(found, expected, atol=1e-9)
-    # As `n`, the projector's column may point down where a flight begins.
+    # The direction read from the projector may point down where a flight begins.
     aside = np.array([0.8, 0.0, -0.6])
     still = TorqueFreeForces(np.array([3]), np.array([1]), np.outer(aside, aside)[np.newaxis])
     assert margin_over_flight(still, up[:1], begins[9:10]) == pytest.approx(np.arcsin(0.6))

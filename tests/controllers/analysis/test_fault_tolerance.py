@@ -82,14 +82,14 @@ def test_the_pose_matrix_is_the_derivative_of_force_and_torque(lost):
     assert hover.authority == pytest.approx(values[5] / values[0], rel=1e-7)
 
 
-HEAVIEST = (WEIGHT / cos(DELTA)) ** 0.5
+GREATEST_SPEED = (WEIGHT / cos(DELTA)) ** 0.5
 """The speed (rad/s) at which the opposite rotor alone carries the vehicle."""
 
 
-@pytest.mark.parametrize("speed", [-1.0, 1.0001 * HEAVIEST])
-def test_speeds_that_outweigh_the_vehicle_are_refused(speed):
-    three_rotor_hover(1, VEHICLE, opposite_speed=0.9999 * HEAVIEST)
-    with pytest.raises(ValueError, match=f"between 0 and {HEAVIEST:.4g} rad/s"):
+@pytest.mark.parametrize("speed", [-1.0, 1.0001 * GREATEST_SPEED])
+def test_negative_speeds_and_those_that_outweigh_the_vehicle_are_refused(speed):
+    three_rotor_hover(1, VEHICLE, opposite_speed=0.9999 * GREATEST_SPEED)
+    with pytest.raises(ValueError, match=f"between 0 and {GREATEST_SPEED:.4g} rad/s"):
         three_rotor_hover(1, VEHICLE, opposite_speed=speed)
 
 

@@ -139,9 +139,9 @@ def reference_motion(reference):
         passed_on = reference.acceleration_feedforward
         return centre + out, rate * turn @ [0, radius, 0], -passed_on * rate**2 * out
     velocity = np.array([reference.velocity_x, reference.velocity_y, reference.velocity_z])
-    rate = np.array([getattr(reference, name) for name in ACCELERATIONS])
-    position = centre + velocity * TIME + 0.5 * rate * TIME**2
-    return position, velocity + rate * TIME, reference.acceleration_feedforward * rate
+    steady = np.array([getattr(reference, name) for name in ACCELERATIONS])
+    position = centre + velocity * TIME + 0.5 * steady * TIME**2
+    return position, velocity + steady * TIME, reference.acceleration_feedforward * steady
 
 
 def demanded_third_derivatives(parameters, state):

@@ -97,7 +97,7 @@ def test_the_torque_turns_the_body(gyroscopic):
 
 @pytest.mark.parametrize("gyroscopic", [0.0, 1.0])
 def test_the_geometric_torque_is_eq_16(gyroscopic):
-    """Of Lee et al., with the desired angular acceleration zero."""
+    """Lee et al. (2010), with zero desired angular acceleration."""
     seen, rates = observed(10), np.array([0.6, -0.2, 0.4])
     gains = GeometricParameters(0.0, 0.0, 6.0, 0.9, inf, gyroscopic)
     omega = np.array(seen.body_rates)
