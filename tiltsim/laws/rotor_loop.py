@@ -180,15 +180,25 @@ def _integrated_of(tilts: int, state_1: int, rate_1: int) -> _Tilts:
     return commanded, commanded_motion
 
 
+def _tilts_of(law: RotorLaw, tilts: int, state_1: int, rate_1: int) -> _Tilts:
+    """The gait's tilts, or those that a law commands.
+
+    Args:
+        law: Its ``commands`` tell which.
+        tilts: Number of tilts.
+        state_1, rate_1: Where the controller's states begin in a state, and their rates in inputs.
+    """
+    if law.commands is None:
+        return _gait_of(tilts)
+    return _integrated_of(tilts, state_1 + law.commands, rate_1 + law.commands)
+
+
 def _sampling_of(layout: RotorLayout, law: RotorLaw) -> Sampling:
     """The control step in MuJoCo."""
     rotors, tilts = layout.places
     seen, inputs_of = seen_of(layout.places, len(law.states), law.measured), law.inputs
     thrusts, ahead = thrust_controls_of(layout.spins), ahead_of(tilts)
-    _, tilt_motion = _gait_of(tilts)
-    if law.commands is not None:
-        first = rotors + law.commands  # of activations, and of their rates
-        _, tilt_motion = _integrated_of(tilts, first, first)
+    _, tilt_motion = _tilts_of(law, tilts, rotors, rotors)
 
     @scalar
     def controls(
@@ -215,10 +225,8 @@ def _columns_of(layout: RotorLayout, law: RotorLaw) -> Columns:
     places, shown, references = layout.places, layout.shown, law.references or _constant_attitude
     fields, names = (*shown.observed_fields, *law.states), (*law.names, *shown.names("alpha_ref"))
     observed, idle = observed_of(places, shown, len(law.states)), (0.0,) * (shown[1] - places[1])
-    tilts, _ = _gait_of(places.tilts)
-    if law.commands is not None:
-        first = len(shown.observed_fields) + law.commands
-        tilts, _ = _integrated_of(places.tilts, first, first)
+    first = len(shown.observed_fields)
+    tilts, _ = _tilts_of(law, places.tilts, first, first)
 
     @scalar
     def observe(qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector) -> Values:
@@ -275,10 +283,7 @@ def _equations_of(layout: RotorLayout, law: RotorLaw) -> Equations:
     idle = (0.0,) * (layout.shown.tilts - tilts)
     speeds_in, states_in = entries_of(BODY_STATES, rotors), entries_of(BODY_STATES + rotors, own)
     state_rates, at_rest = entries_of(rotors, own), (0.0,) * (rotors + own)
-    tilts_of, moving_tilts = _gait_of(tilts)
-    if law.commands is not None:
-        rate_1 = rotors + law.commands
-        tilts_of, moving_tilts = _integrated_of(tilts, BODY_STATES + rate_1, rate_1)
+    tilts_of, moving_tilts = _tilts_of(law, tilts, BODY_STATES + rotors, rotors)
 
     @scalar
     def inputs(time: float, state: Vector, parameters: Any, knots: Vector) -> Values:
