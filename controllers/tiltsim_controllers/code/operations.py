@@ -1,0 +1,114 @@
+"""The operations of a program: their counterparts in NumPy, Python and LLVM."""
+
+from __future__ import annotations
+
+import math
+import operator
+from collections.abc import Callable
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+from tiltsim_controllers.mathematics.noise import uniform
+
+
+class Operation(NamedTuple):
+    """One operation on numbers.
+
+    Attributes:
+        ufunc: NumPy's function, by which arrays of traced numbers find it; None without one.
+        python: Expression in Python; ``{}`` stands for an argument.
+        llvm: Instruction, in which ``{T}`` is the type of numbers and ``{B}`` that of conditions;
+            the name of an intrinsic; or else the name of a function of the C library.
+        value: The operation on floats. It returns what IEEE 754 defines where Python raises.
+    """
+
+    ufunc: np.ufunc | None
+    python: str
+    llvm: str
+    value: Callable[..., Any]
+
+
+def _ieee(python: Callable[..., Any], ufunc: np.ufunc) -> Callable[..., float]:
+    """A function of `math` that returns NumPy's infinity or NaN where Python raises."""
+
+    def value(*args: float) -> float:
+        try:
+            return float(python(*args))
+        except (ArithmeticError, ValueError):
+            with np.errstate(all="ignore"):
+                return float(ufunc(*args))
+
+    return value
+
+
+def _infix(ufunc: np.ufunc, symbol: str, llvm: str, value: Callable[..., Any]) -> Operation:
+    return Operation(ufunc, f"{{}} {symbol} {{}}", f"{llvm} {{T}} {{}}, {{}}", value)
+
+
+def _called(ufunc: np.ufunc, name: str) -> Operation:
+    text = f"{name}({', '.join(['{}'] * ufunc.nin)})"
+    return Operation(ufunc, text, name, _ieee(getattr(math, name), ufunc))
+
+
+def _select(condition: bool, yes: Any, no: Any) -> Any:
+    return yes if condition else no
+
+
+def _uniform(*integers: float) -> float:
+    """`uniform`, where 0 replaces numbers that exceed 64 bits."""
+    return uniform(*(value if abs(value) < 2.0**63 else 0.0 for value in integers))
+
+
+_FLOOR: Final = "({0} // 1.0 if {0} - {0} == 0.0 else {0})"
+"""Unlike `math.floor` it returns a float, keeps the sign of zero and takes infinity."""
+
+
+def _floor(value: float) -> float:
+    return value // 1.0 if value - value == 0.0 else value
+
+
+OPERATIONS: Final = {
+    "add": _infix(np.add, "+", "fadd", operator.add),
+    "sub": _infix(np.subtract, "-", "fsub", operator.sub),
+    "mul": _infix(np.multiply, "*", "fmul", operator.mul),
+    "div": _infix(np.divide, "/", "fdiv", _ieee(operator.truediv, np.divide)),
+    "neg": Operation(np.negative, "-{}", "fneg {T} {}", operator.neg),
+    "lt": _infix(np.less, "<", "fcmp olt", operator.lt),
+    "le": _infix(np.less_equal, "<=", "fcmp ole", operator.le),
+    "gt": _infix(np.greater, ">", "fcmp ogt", operator.gt),
+    "ge": _infix(np.greater_equal, ">=", "fcmp oge", operator.ge),
+    "eq": _infix(np.equal, "==", "fcmp oeq", operator.eq),
+    "ne": _infix(np.not_equal, "!=", "fcmp une", operator.ne),
+    "and": Operation(np.logical_and, "({} and {})", "and {B} {}, {}", operator.and_),
+    "or": Operation(np.logical_or, "({} or {})", "or {B} {}, {}", operator.or_),
+    "not": Operation(np.logical_not, "(not {})", "xor {B} {}, {true}", operator.not_),
+    "where": Operation(None, "({1} if {0} else {2})", "select {B} {}, {T} {}, {T} {}", _select),
+    "abs": Operation(np.absolute, "fabs({})", "llvm.fabs", abs),
+    "sqrt": Operation(np.sqrt, "sqrt({})", "llvm.sqrt", _ieee(math.sqrt, np.sqrt)),
+    "floor": Operation(np.floor, _FLOOR, "llvm.floor", _floor),
+    "copysign": Operation(
+        np.copysign, "copysign({}, {})", "llvm.copysign", _ieee(math.copysign, np.copysign)
+    ),
+    "uniform": Operation(None, "uniform({}, {}, {})", "uniform", _uniform),
+    **{
+        name: _called(ufunc, name)
+        for name, ufunc in {
+            "sin": np.sin,
+            "cos": np.cos,
+            "tan": np.tan,
+            "asin": np.arcsin,
+            "acos": np.arccos,
+            "atan": np.arctan,
+            "atan2": np.arctan2,
+            "exp": np.exp,
+            "log": np.log,
+            "pow": np.power,
+            "fmod": np.fmod,
+        }.items()
+    },
+}
+"""By name."""
+
+CONDITIONS: Final = frozenset({"lt", "le", "gt", "ge", "eq", "ne", "and", "or", "not"})
+"""Operations whose result is true or false."""

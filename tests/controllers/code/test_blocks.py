@@ -1,0 +1,147 @@
+"""Branches, loops, arrays: alike in Python, machine code, NumPy and JAX."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from tests.controllers.code.test_programs import SPECIAL, same
+from tests.natively import machine_code
+from tiltsim_controllers.code.arrays import flatten, xp
+from tiltsim_controllers.code.blocks import branch, repeat, signal, take
+from tiltsim_controllers.code.messages import TraceError
+from tiltsim_controllers.code.program import trace_vectors
+from tiltsim_controllers.code.python_source import python_function, python_source
+
+TABLE = np.array([1.0, 4.0, 9.0, 16.0])
+
+
+def everything(x):
+    """A matrix product, domain errors, tables, a branch and a search."""
+    A = xp.array([[x[0], 0.0], [0.5, x[1]]])
+    root = signal("root", xp.sqrt(x[0] - x[1]))
+    looked_up = take(TABLE, x[2])
+    lazy = branch(
+        x[1] > 0.0,
+        lambda: xp.array([xp.log(x[1]), x[0]]),
+        lambda: xp.array([xp.exp(x[0]), 1.0 / (x[0] - 2.0)]),
+    )
+
+    def halve(_, low, high):
+        middle = 0.5 * (low + high)
+        below = middle * middle < 2.0
+        return xp.where(below, middle, low), xp.where(below, high, middle)
+
+    low, high = repeat(60, halve, 0.0 * x[0], 2.0 + 0.0 * x[0], until=lambda a, b: b - a < 1e-9)
+    numbers = xp.array([root, looked_up, low, high, xp.floor(x[0]), xp.arctan2(x[0], x[1])])
+    return xp.concatenate([A @ x[:2], numbers, lazy, xp.minimum(x, 0.5), xp.clip(x, -1.0, 1.0)])
+
+
+def nested(x):
+    """A search in a branch in a loop, an early end, conditions of conditions."""
+
+    def newton(_, c):
+        return (0.5 * (c + 2.0 / c),)
+
+    def body(i, a, b):
+        step = branch(
+            (a > b) & ~(i < 1.0) | xp.isnan(a),
+            lambda: repeat(5, newton, a + i)[0],
+            lambda: xp.sin(a) * 2.0,
+        )
+        return a + 0.1 * step, xp.where(xp.isfinite(step) & (b < 3.0), b + 0.5, b)
+
+    a, b = repeat(x[2], body, x[0], x[1], until=lambda a, b: a > 50.0)
+    return xp.array([a, b, xp.sin(x[0])])  # a sine that the loop has computed, too
+
+
+def traced(function, size):
+    def on_vector(x):
+        return list(function(xp.array([x[i] for i in range(size)])).ravel())
+
+    return trace_vectors(on_vector, {"x": size})
+
+
+def points(function):
+    rng = np.random.default_rng(0)
+    own = [*(3.0 * rng.normal(size=(200, 3)))]
+    if function is nested:
+        return [np.array([a, b, abs(c) + 2.0]) for a, b, c in own]
+    return own + [np.array([a, b, c]) for a in SPECIAL for b in SPECIAL for c in SPECIAL[:4]]
+
+
+@pytest.mark.parametrize("function", [everything, nested])
+def test_python_machine_code_and_numpy_agree(function):
+    program = traced(function, 3)
+    law, native = python_function(program), machine_code(program)
+    for x in points(function):
+        result = law(x.tolist())
+        assert same(result, native(x)), x
+        with np.errstate(all="ignore"):
+            eager = np.asarray(function(x), float)
+        if not np.isfinite(x).all():
+            continue  # zeros of matrices hide infinity and NaN from programs
+        np.testing.assert_allclose(eager, result, rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize("function", [everything, nested])
+def test_jax_agrees_and_differentiates(function):
+    jax = pytest.importorskip("jax")
+    program = traced(function, 3)
+    law = python_function(program)
+    with jax.enable_x64(True):
+        compiled = jax.jit(function)
+        for x in points(function)[:20]:
+            np.testing.assert_allclose(compiled(x), law(x.tolist()), rtol=1e-12, atol=1e-12)
+        assert jax.jacfwd(function)(np.array([1.0, 0.5, 3.0])).shape[1] == 3
+
+
+def test_only_one_side_of_a_branch_is_evaluated():
+    def one_side(x):
+        return [branch(x[0] > 0.0, lambda: xp.sqrt(x[0]), lambda: 1.0 / x[1])]
+
+    program = trace_vectors(one_side, {"x": 2})
+    text = python_source(program)
+    assert text.index("if t") < text.index("sqrt(") < text.index("else:") < text.index(" / ")
+    law = python_function(program)
+    assert law([4.0, 0.0]) == (2.0,)
+    assert machine_code(program)([-1.0, 0.0]) == [math.inf]
+
+
+def test_a_known_condition_leaves_no_branch():
+    program = trace_vectors(lambda x: [branch(True, lambda: x[0], lambda: x[1])], {"x": 2})
+    assert [o.op for o in program.block.operations] == ["in"]
+
+
+def test_a_number_that_leaves_its_branch_is_refused():
+    def leaks(x):
+        kept = []
+        branch(x[0] > 0.0, lambda: kept.append(xp.sin(x[1])) or x[0], lambda: x[1])
+        return [kept[0]]
+
+    with pytest.raises(TraceError, match=r"a number leaves the branch or loop that computes it"):
+        trace_vectors(leaks, {"x": 2})
+
+
+def test_sides_of_different_shapes_are_refused():
+    def unequal(x):
+        return branch(x[0] > 0.0, lambda: (x[0], x[1]), lambda: (x[0],))
+
+    with pytest.raises(TraceError, match="results of different shapes; return the same from both"):
+        trace_vectors(unequal, {"x": 2})
+
+
+def test_functions_that_cannot_be_traced_are_named():
+    with pytest.raises(TraceError, match=r"numpy.sinh cannot be traced"):
+        traced(lambda x: xp.sinh(x), 2)
+
+
+def test_numbers_of_nested_values_are_put_back_in_their_places():
+    value = (np.arange(6.0).reshape(2, 3), [1.0, (2.0,)])
+    leaves, build = flatten(value)
+    assert leaves == [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 1.0, 2.0]
+    matrix, rest = build([10.0 * leaf for leaf in leaves])
+    np.testing.assert_array_equal(matrix, 10.0 * value[0])
+    assert rest == [10.0, (20.0,)]
