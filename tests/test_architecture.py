@@ -47,7 +47,7 @@ ORDER = {
 FLYING_PREFIXES = tuple(f"tiltsim.{folder}." for folder in FLYING)
 HEAVY = {
     *("av", "casadi", "dm_control", "gymnasium", "jax", "matplotlib", "mujoco"),
-    *("numba", "pandas", "pyarrow", "pydantic", "rerun"),
+    *("llvmlite", "pandas", "pyarrow", "pydantic", "rerun"),
 }
 
 SLOW = {"email", "hashlib", "html", "numpy", "platform", "scipy"}
@@ -183,7 +183,7 @@ def test_few_modules_lie_directly_in_the_package():
 
 def test_controllers_know_neither_mujoco_nor_the_testbed():
     modules = [module for module in FILES if module.startswith("tiltsim_controllers")]
-    assert not set().union(*map(roots, modules)) & {"mujoco", "dm_control", "tiltsim", "numba"}
+    assert not set().union(*map(roots, modules)) & {"mujoco", "dm_control", "tiltsim", "llvmlite"}
 
 
 def test_flying_needs_no_library_for_screens():
@@ -300,7 +300,7 @@ POSIX_ONLY = {
 """Modules, attributes and beginnings of paths that Windows does not have."""
 
 GUARDED = {
-    "tiltsim.engines.cache": {"os.getuid"},
+    "tiltsim.engines.code_folder": {"os.getuid"},
     "tiltsim.report.made": {"/proc/"},
     "tiltsim.studies.benchmark": {"/proc/", "resource"},
     "tiltsim.system.locks": {"fcntl", "os.O_NOFOLLOW"},

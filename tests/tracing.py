@@ -65,8 +65,9 @@ def trace_seldom():
     from _pytest.assertion import rewrite
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from numba.core import compiler
 
+    from tiltsim.arrays import traced_numbers
+    from tiltsim.engines import programs
     from tiltsim.linear.motion import EquationMotion, MujocoMotion
     from tiltsim.plants.equations_plant import EquationsPlant
     from tiltsim.plants.mujoco_plant import MujocoPlant
@@ -80,7 +81,8 @@ def trace_seldom():
     for motion in (EquationMotion, MujocoMotion):
         motion.flown = seldom_traced(motion.flown)
     elsewhere = {
-        compiler: ["compile_extra"],
+        traced_numbers: ["trace_scalar_code"],
+        programs: ["trace_scalar_code"],
         difflib: ["get_close_matches"],
         email: ["message_from_string"],  # of a distribution's metadata
         tomllib: ["load", "loads"],

@@ -6,6 +6,7 @@ from typing import Final
 
 CONTROLLERS: Final = (
     "mathematics",
+    "code",
     "vehicle",
     "gaits",
     "references",
@@ -22,8 +23,8 @@ FLYING: Final = (
     "closed_loop",
     "vehicles",
     "equations",
-    "engines",
     "arrays",
+    "engines",
     "laws",
     "plants",
     "flight",

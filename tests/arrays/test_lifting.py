@@ -10,10 +10,11 @@ import pytest
 
 from tests.arrays.recorded_calls import described, flown, frozen, mapped, record, short_flights
 from tests.laws.test_laws import LAWS
-from tiltsim.arrays.flying import CODES, double_precision
+from tiltsim.arrays.flying import double_precision
 from tiltsim.arrays.jax_arrays import JaxArrays
 from tiltsim.arrays.lifting import Lifting
 from tiltsim.arrays.values import LiftError
+from tiltsim.closed_loop.choices import CHOICES
 from tiltsim.closed_loop.loop import Equations
 from tiltsim.equations.solvers import Integration, make_step
 from tiltsim_controllers.mathematics.scalar import scalar, scalar_functions
@@ -55,11 +56,11 @@ def numbers(values):
 
 
 COUNTS = {"rows", "size", "start", "offset"}
-"""Arguments that choose an entry or a length, as `CODES` among the fields."""
+"""Arguments that choose an entry or a length, as `CHOICES` among the fields."""
 
 
 def varies(value, name):
-    return isinstance(value, float) and isfinite(value) and name not in CODES | COUNTS
+    return isinstance(value, float) and isfinite(value) and name not in CHOICES | COUNTS
 
 
 def changed(change, function, arguments):

@@ -20,8 +20,6 @@ from tests.sweeps.files import short_sweep
 from tiltsim.cli import main
 from tiltsim.commands import progress
 from tiltsim.commands.progress import show_progress
-from tiltsim.engines.cache import before_compiling
-from tiltsim.laws.attitude_altitude import TILTROTOR
 
 pty = pytest.importorskip("pty")
 
@@ -125,39 +123,6 @@ def test_without_a_terminal_lines_tell_how_far_it_is(monkeypatch, capsys):
         "tiltsim: starting, 0:30",
         "tiltsim: flights: 1234020 of 1234100, 0:30, about 4:00 left",
     ]
-
-
-def test_without_a_terminal_lines_tell_of_compilation_which_no_time_left_counts(
-    monkeypatch, capsys
-):
-    monkeypatch.setattr(progress._Lines, "interval", 1e6)
-    clock = iter([0, 0, 60, 90, 110])
-    monkeypatch.setattr(progress, "monotonic", lambda: next(clock))
-    with show_progress(shown=True) as lines:
-        lines.begin("flights", 12)
-        (announce,) = before_compiling
-        announce(TILTROTOR.native_name("thesis"))
-        lines.tick()
-        lines.move(2)
-        lines.move(4)
-        lines.tick()
-    assert before_compiling == []
-    assert capsys.readouterr().err.splitlines() == [
-        "tiltsim: flights: 0 of 12, compiling, 1:00",
-        "tiltsim: flights: 4 of 12, 1:50, about 1:20 left",
-    ]
-
-
-def test_a_terminal_tells_of_compilation_which_no_rate_counts(monkeypatch):
-    with terminal_as_stderr(monkeypatch) as shown, show_progress(shown=True) as bars:
-        bars.begin("flights", 12)
-        start = bars._bar.start_t
-        before_compiling[0](TILTROTOR.native_name("thesis"))
-        time.sleep(0.01)
-        bars.move(1)
-        assert bars._bar.start_t > start
-    assert before_compiling == []
-    assert "tiltsim: compiling attitude_altitude for the thesis plant, once" in shown.text
 
 
 def test_without_a_terminal_a_line_comes_every_interval(monkeypatch):

@@ -1,15 +1,12 @@
-"""The scalar functions' own source, run otherwise: compiled, or on symbols."""
+"""The scalar functions' own source, run on symbols."""
 
 from __future__ import annotations
 
 import math
 from types import FunctionType, SimpleNamespace
 
-import numba
-import numpy as np
 import sympy
 
-from tiltsim_controllers.mathematics.records import flatten, record_dtype
 from tiltsim_controllers.mathematics.scalar import scalar_functions
 
 
@@ -29,20 +26,10 @@ def rebuilt(make, replaced=()):
     return known
 
 
-def compiled():
-    """Every scalar function under numba; each compiles when first called."""
-    return rebuilt(numba.njit(error_model="numpy"))
-
-
 def symbolic():
     """Every scalar function with sympy's functions for those of ``math``."""
     names = ("sin", "cos", "tan", "sqrt")
     return rebuilt(lambda f: f, {getattr(math, name): getattr(sympy, name) for name in names})
-
-
-def as_native(record):
-    """A parameter record as native code sees it."""
-    return np.array(list(flatten(record))).view(record_dtype(type(record)))[0]
 
 
 def fields(**values):

@@ -15,7 +15,7 @@ import pytest
 
 from tests.docs.pages import ROOT, code
 from tests.environments import new_environment
-from tiltsim.engines.cache import native_code_folder
+from tiltsim.engines.code_folder import code_folder
 
 yaml = pytest.importorskip("yaml")
 
@@ -49,10 +49,8 @@ def test_its_files_and_folders_are_those_of_a_clone(monkeypatch):
     assert (ROOT / setup["cache-dependency-path"]).is_file()
     assert (ROOT / WORKFLOW["env"]["SCENARIOS"]).is_dir()
     monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
-    native_code_folder.cache_clear()
     cached = Path(STEPS["Cache compiled code"]["with"]["path"]).expanduser()
-    assert cached == native_code_folder().parent
-    native_code_folder.cache_clear()
+    assert cached == code_folder().parent
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     python = f"Programming Language :: Python :: {setup['python-version']}"
     assert python in project["classifiers"]

@@ -22,8 +22,6 @@ import pytest
 from tiltsim.cli import main
 from tiltsim.commands import run as run_command
 from tiltsim.commands.progress import Progress
-from tiltsim.engines.native_engine import compile_control
-from tiltsim.laws.attitude_altitude import TILTROTOR
 from tiltsim.scenario.loading import is_changed_from_library, load_scenario
 from tiltsim.scenario.metric_names import METRICS
 from tiltsim.studies import benchmark
@@ -393,7 +391,6 @@ def test_check_survives_a_file_that_cannot_be_read_as_toml(tmp_path, capsys):
 def test_interrupt_ends_a_whole_check_at_once_and_keeps_what_is_finished(
     tmp_path, jobs, signal_, code
 ):
-    compile_control(TILTROTOR)  # so that the interrupt falls into the flights
     (tmp_path / "a.toml").write_text("[simulation]\nduration = 0.01\n")
     for name in ("b", "c"):
         endless = "[simulation]\nduration = 20000.0\nrecord_timestep = 10.0\n"
@@ -426,7 +423,6 @@ def test_interrupt_ends_a_whole_check_at_once_and_keeps_what_is_finished(
 
 
 def test_interrupted_run_keeps_its_files_and_says_so(tmp_path, capsys, monkeypatch):
-    compile_control(TILTROTOR)  # so that the interrupt falls into the flight
 
     @contextmanager
     def no_bar(**_options):

@@ -191,16 +191,15 @@ def damaged_sweep(random, folder):
 
 def damaged_cache(random, folder):
     """A file of the cache of compiled code, which counts as missing."""
-    from tiltsim.engines.compiling import _SafeIndex
+    from tiltsim.engines.machine_code import _load, _save
 
-    files = _SafeIndex(str(folder), "code", "stamp")
-    content = {"index": list(range(random.randrange(50)))}
-    whole = files._dump(content)
-    file = folder / "code"
+    code, file = random.randbytes(random.randrange(200)), folder / "code.o"
+    _save(file, code)
+    whole = file.read_bytes()
     file.write_bytes(damaged(whole, random))
 
     def read():
-        assert files._read(str(file)) is None or file.read_bytes() == whole
+        assert _load(file) is None or file.read_bytes() == whole
 
     return read
 

@@ -12,8 +12,6 @@ import tiltsim
 from tests.refusals import refusal
 from tiltsim.errors import InputError
 from tiltsim.laws.assembling import assemble
-from tiltsim.laws.multirotor import multirotor_loop
-from tiltsim.laws.rotor_loop import RotorLayout
 from tiltsim.laws.rotorcraft import torque_free_columns
 from tiltsim.models.hover import hover_speeds
 from tiltsim.plants.factory import make_plant
@@ -23,7 +21,6 @@ from tiltsim.vehicles.rotorcraft.layout import Layout
 from tiltsim_controllers.analysis.singularity import world_up
 from tiltsim_controllers.analysis.torque_free import hover_direction, torque_free_forces
 from tiltsim_controllers.laws.failures import Failure
-from tiltsim_controllers.laws.multirotor_steps import Form
 from tiltsim_controllers.vehicle.effectiveness import force_and_torque
 
 TILTS = {"type": "waypoints", "angles": [[0.2, -0.2] * 3, [0.3, -0.3] * 3], "period": 2.0}
@@ -317,15 +314,6 @@ def test_native_code_notices_at_which_sample_the_others_are_singular():
     assembly = assemble(tiltsim.load_scenario(document("pentarotor", PENTAROTOR, **tables)))
     for samples, ends in ((8, False), (9, True)):
         assert (make_plant(assembly).record(samples, 1) is None) == ends
-
-
-def test_compiled_code_has_the_same_name_beside_a_loop_that_measures():
-    layout, form = RotorLayout((0, 1, 0, 1), (1.0, -1.0, 1.0, -1.0)), Form(1)
-    loop = multirotor_loop.__wrapped__(layout, form)
-    names = [loop.native_name(plant) for plant in ("mujoco", "thesis")]
-    measuring = multirotor_loop.__wrapped__(layout, form, measured=True)
-    assert [loop.native_name(plant) for plant in ("mujoco", "thesis")] == names
-    assert measuring.native_name("mujoco") not in names
 
 
 @pytest.mark.parametrize(

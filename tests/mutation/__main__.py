@@ -8,7 +8,7 @@ and are not drawn.
 
 Why a script: cosmic-ray writes every mutant to disk and starts the whole suite for it (a minute
 each), mutmut and pytest-gremlins compile all mutants of a function into it behind a switch, which
-neither numba nor the tests of the scalar source accept, and neither draws a seeded sample.
+the tests of the scalar source do not accept, and neither draws a seeded sample.
 """
 
 from __future__ import annotations
@@ -42,8 +42,6 @@ import scipy.signal
 import scipy.spatial.transform  # noqa: F401
 import sympy  # noqa: F401
 from coverage import Coverage, CoverageData
-from numba.core.ccallback import CFunc
-from numba.core.dispatcher import Dispatcher
 
 from tests import tracing
 from tests.mutation.mutants import Mutant, find_mutants
@@ -181,12 +179,14 @@ class WithoutJax(PathFinder):
 
 
 def skip_what_is_compiled() -> None:
-    """From now on in this process, tests that compile with numba or JAX skip themselves."""
+    """From now on in this process, tests that compile machine code or use JAX skip themselves."""
+
+    from tiltsim.engines import machine_code
 
     def skip(*_: object, **__: object) -> None:
         pytest.skip("compiles")
 
-    Dispatcher.compile = CFunc.compile = skip
+    machine_code.MachineCode.__init__ = skip
     sys.meta_path[sys.meta_path.index(PathFinder)] = WithoutJax
 
 

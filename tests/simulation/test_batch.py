@@ -452,7 +452,6 @@ def test_all_kinds_of_flights_together():
 @pytest.mark.parametrize("plant", ["mujoco", "thesis"])
 def test_many_short_flights_are_worth_the_native_engine(plant, monkeypatch):
     scenarios = [scenario({}, engine="auto", plant=plant, duration=0.05)] * 6
-    monkeypatch.setattr(tiltsim.plants.engine_choice, "MIN_STEPS_TO_LOAD", 300)
     monkeypatch.setattr(tiltsim.plants.engine_choice, "MIN_STEPS_TO_COMPILE", 300)
     results = list(fly(scenarios, keep_samples=True))
     assert {result.flight.engine for result in results} == {"native"}

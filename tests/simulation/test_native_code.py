@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
-from inspect import unwrap
 
 import numpy as np
 import pytest
@@ -13,16 +11,10 @@ import tiltsim
 import tiltsim.engines.sample_evaluation
 from tests.laws.test_laws import LAWS
 from tests.simulation.test_batch import ALL_LAWS, GAITS, scenario
-from tiltsim.engines.native_engine import compile_control
-from tiltsim.engines.native_stepper import compile_stepper
-from tiltsim.equations.actuator_level import actuator_plant
+from tiltsim.closed_loop.choices import program_key
 from tiltsim.flight.end import End
-from tiltsim.laws.assembling import LOOPS, assemble, loop_of
-from tiltsim.laws.layers.actuation import with_actuation
-from tiltsim.laws.layers.air import with_air
-from tiltsim.laws.layers.on_equations import on_equations
-from tiltsim.laws.layers.rotor_inertia import with_rotor_inertia
-from tiltsim.laws.layers.supervision import with_supervisor
+from tiltsim.laws.assembling import LOOPS, assemble
+from tiltsim.plants.engine_choice import choose_engine
 from tiltsim.plants.factory import make_plant
 
 
@@ -78,128 +70,22 @@ def test_a_row_without_a_result_is_no_number():
     np.testing.assert_array_equal(rows, [[np.nan, np.nan], [4.0, 0.5]])
 
 
-def test_compilation_is_announced_unless_the_code_is_cached(monkeypatch, tmp_path):
-    import tiltsim.engines.cache as cache
-
-    monkeypatch.setattr(cache, "native_code_folder", lambda: tmp_path)
-    announced = []
-    monkeypatch.setattr(cache, "before_compiling", [announced.append])
-    cache.announce_native_code("mujoco.some.law")
-    assert announced == ["mujoco.some.law"]
-    cache.mark_native_code_compiled("mujoco.some.law")
-    cache.announce_native_code("mujoco.some.law")
-    assert announced == ["mujoco.some.law"]
+def test_a_flight_of_many_steps_is_compiled():
+    chosen = [choose_engine(scenario({}, engine="auto", duration=d)) for d in (3.9, 4.0)]
+    assert chosen == ["python", "native"]
+    assert choose_engine(scenario({}, engine="python", duration=9.0)) == "python"
 
 
-@pytest.mark.parametrize("plant", ["mujoco", "thesis", "rigid_body"])
-def test_each_plant_announces_its_compilation(monkeypatch, tmp_path, plant):
-    import tiltsim.engines.cache as cache
+def test_flights_share_a_program_unless_they_differ_in_choices_or_knots():
+    def key(**tables):
+        return program_key(assemble(scenario(tables)))
 
-    class AnnouncedError(Exception):
-        pass
-
-    def stop(name):
-        raise AnnouncedError(name)
-
-    monkeypatch.setattr(cache, "native_code_folder", lambda: tmp_path)
-    monkeypatch.setattr(cache, "before_compiling", [stop])
-    loop = LOOPS["attitude_altitude"]
-    compiling, more = compile_stepper, (plant, "ode3")
-    if plant == "mujoco":
-        compiling, more = compile_control, ()
-    with pytest.raises(AnnouncedError, match=re.escape(loop.native_name(plant, *more[1:]))):
-        unwrap(compiling)(loop, *more)
-
-
-def test_all_that_processes_fly_with_is_compiled_for_them_once(monkeypatch):
-    import tiltsim.simulation.shared_engine as shared_engine
-
-    calls = []
-
-    class Recorded:
-        def __init__(self, assembly, engine):
-            assert engine == "native"
-            calls.append(assembly.scenario.simulation.plant)
-
-        def record(self, samples, steps):
-            calls.append("record")
-
-    monkeypatch.setattr(shared_engine, "make_plant", Recorded)
-    flights = [scenario({}, plant="thesis", duration=1.0) for _ in range(2)]
-    assert shared_engine.shared_engine(flights, 99_999) is None
-    assert shared_engine.shared_engine(flights, 100_000) == "native"
-    assert calls == ["thesis", "record"]
-    on_arrays = [flight.replace({"simulation.engine": "jax"}) for flight in flights]
-    shared_engine.shared_engine(on_arrays, 100_000)
-    assert len(calls) == 2
-
-
-def test_only_loops_that_fly_long_are_compiled_together(monkeypatch, tmp_path):
-    import tiltsim.engines.cache as cache
-    import tiltsim.simulation.shared_engine as shared_engine
-
-    compiled = []
-
-    def in_processes(work, groups, jobs):
-        compiled.append(([[_plant_and_law(one) for one in group] for group in groups], jobs))
-        return iter(())
-
-    def _plant_and_law(one):
-        return one.simulation.plant, one.controller.law
-
-    monkeypatch.setattr(cache, "native_code_folder", lambda: tmp_path)
-    monkeypatch.setattr(shared_engine, "in_processes", in_processes)
-    long = [scenario({}, engine="auto", plant=p, duration=45.0) for p in ("thesis", "mujoco")]
-    two = [scenario(ALL_LAWS["full_pose"], engine="auto", duration=d) for d in (7.0, 7.999)]
-    names = shared_engine.compile_together([*long, *two], 2)
-    assert names == {loop_of(one).native_name(one.simulation.plant) for one in long}
-    assert compiled == [([[("thesis", "attitude_altitude"), ("mujoco", "attitude_altitude")]], 2)]
-    flown = [shared_engine.with_compiled(one, names).simulation.engine for one in (*long, *two)]
-    assert flown == ["native", "native", "auto", "auto"]
-
-    third = scenario(ALL_LAWS["full_pose"], engine="auto", duration=0.001)
-    assert len(shared_engine.compile_together([*long, *two, third], 2)) == 3
-    assert shared_engine.compile_together([long[0], *two], 2) == frozenset()  # 60,000 steps
-    compiled.clear()
-    assert shared_engine.compile_together([*long, *two], 1) == names
-    cache.mark_native_code_compiled(loop_of(long[0]).native_name("thesis"))
-    cache.mark_native_code_compiled(loop_of(long[1]).native_name("mujoco"))
-    shared_engine.compile_together([*long, *two], 2)
-    assert [groups for groups, _ in compiled] == [[]]
-    cache.mark_native_code_compiled(loop_of(two[0]).native_name("mujoco"))
-    assert len(shared_engine.compile_together([*long, *two], 2)) == 3
-
-
-def test_whether_native_code_is_cached_is_known_by_law_and_plant(monkeypatch, tmp_path):
-    import tiltsim.engines.cache as cache
-    from tiltsim.plants.engine_choice import choose_engine
-
-    monkeypatch.setattr(cache, "native_code_folder", lambda: tmp_path)
-    flown = scenario({}, engine="auto", duration=20.0)  # 20,000 steps: worth loading only
-    assert choose_engine(flown, loop_of(flown)) == "python"
-    cache.mark_native_code_compiled(LOOPS["full_pose"].native_name("mujoco"))
-    cache.mark_native_code_compiled(LOOPS["attitude_altitude"].native_name("thesis"))
-    assert choose_engine(flown, loop_of(flown)) == "python"
-    cache.mark_native_code_compiled(LOOPS["attitude_altitude"].native_name("mujoco"))
-    assert choose_engine(flown, loop_of(flown)) == "native"
-
-
-@pytest.mark.parametrize("plant", ["mujoco", "thesis"])
-def test_no_two_control_steps_share_a_name_of_native_code(plant):
-    """Else an automatic engine takes one law for compiled where another is."""
-    tilting = [LOOPS["attitude_altitude"], LOOPS["gait_feedforward"]]
-    laws = [*LOOPS.values(), *(with_supervisor(loop, "hold") for loop in tilting)]
-    tiltrotors = [loop for loop in laws if loop.dynamics.model == "tiltrotor"]
-    real = [with_actuation(loop, steps) for loop in tiltrotors for steps in (0, 2)]
-    aired = [with_air(loop) for loop in [*laws, *real] if loop.dynamics.model != "tilt_car"]
-    spinning = [with_rotor_inertia(loop) for loop in [*tiltrotors, *real]]
-    loops = [*laws, *real, *aired, *spinning]
-    if plant == "thesis":
-        moved = [loop for loop in loops[len(LOOPS) :] if loop.equations is None]
-        loops = [
-            *laws[: len(LOOPS)],
-            *spinning[: len(tiltrotors) - 2],
-            *(on_equations(loop, actuator_plant(loop.dynamics)) for loop in moved),
-        ]
-    names = [loop.native_name(plant) for loop in loops]
-    assert len(set(names)) == len(names) == len(loops) > 30
+    trot = {"type": "trot_continuous", "amplitude": 0.3, "period": 2.0}
+    assert key(gait=trot) == key(gait={**trot, "amplitude": 0.4}, vehicle={"mass": 0.5})
+    others = [
+        key(gait={**trot, "type": "trot_instant"}),
+        key(gait=trot, controller={"decoupler": "exact"}),
+        key(gait=trot, reference={"type": "circle", "radius": 1.0, "angular_frequency": 1.0}),
+        key(),
+    ]
+    assert len({key(gait=trot), *others}) == 5

@@ -10,7 +10,6 @@ import pytest
 import tiltsim
 from tests.statics import setpoint_error
 from tiltsim.laws.assembling import assemble
-from tiltsim.laws.attitude_altitude import TILTROTOR
 from tiltsim.plants.factory import make_plant
 from tiltsim.plants.mujoco_plant import MujocoPlant
 from tiltsim.system import progress
@@ -364,7 +363,8 @@ def test_foreign_model_is_left_alone_by_the_callbacks(userdata):
     from tiltsim.engines.callback import control_callback
     from tiltsim.engines.factory import make_engine
 
-    plant = MujocoPlant(assemble(scenario()))
+    assembly = assemble(scenario())
+    plant = MujocoPlant(assembly)
     other = mujoco.MjModel.from_xml_string(
         "<mujoco><worldbody><body><freejoint/><geom size='1'/><site name='s'/></body></worldbody>"
         "<actuator><general name='a' site='s'/></actuator>"
@@ -372,7 +372,7 @@ def test_foreign_model_is_left_alone_by_the_callbacks(userdata):
     )
     data = mujoco.MjData(other)
     for name in ENGINES:
-        engine = make_engine(name, TILTROTOR, plant.model, plant.data)
+        engine = make_engine(name, assembly, plant.model, plant.data)
         with control_callback(engine.callback()):
             mujoco.mj_step(other, data)
         assert data.ctrl.tolist() == [0.0]
@@ -401,27 +401,6 @@ def test_state_of_another_flight_brings_its_parameters_along():
         np.testing.assert_array_equal(plants[0].state, plants[1].state)
         ends.append(plants[0].state)
     np.testing.assert_array_equal(*ends)
-
-
-def test_compiled_callbacks_are_loaded_by_the_next_process():
-    """Compiling takes seconds; a new process must find what the last one compiled."""
-    import subprocess
-    import sys
-
-    from tiltsim.engines.cache import native_code_is_cacheable
-
-    if not native_code_is_cacheable():
-        pytest.skip("the cache folder is not writable")
-    program = (
-        "from tiltsim.laws.attitude_altitude import TILTROTOR\n"
-        "from tiltsim.engines.native_engine import compile_control\n"
-        "print(compile_control(TILTROTOR).cache_hits)"
-    )
-    for _ in range(2):
-        done = subprocess.run(
-            [sys.executable, "-c", program], capture_output=True, text=True, check=True
-        )
-    assert done.stdout.strip() == "1"
 
 
 def test_samples_cannot_be_changed_behind_the_columns():

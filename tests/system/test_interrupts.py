@@ -11,12 +11,10 @@ import threading
 import time
 
 import pytest
-from numba.core.dispatcher import Dispatcher
 
 import tiltsim.commands.run
 from tests.flights import flight as flight_named
 from tiltsim.cli import main
-from tiltsim.engines.compiling import compiled
 from tiltsim.flight.reading import load_flight
 from tiltsim.system.interrupts import (
     defer_interrupts,
@@ -74,15 +72,6 @@ def test_an_interrupt_swallowed_by_c_comes_before_what_fails_of_it():
 
     with pytest.raises(KeyboardInterrupt):
         work()
-
-
-def test_an_interrupt_while_the_first_call_compiles_is_raised(monkeypatch):
-    def raises():
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(Dispatcher, "compile", lambda *_: call_from_c(raises))
-    with pytest.raises(KeyboardInterrupt):
-        compiled(lambda x: x)(1.0)
 
 
 def test_other_exceptions_swallowed_by_c_are_reported_as_usual(monkeypatch):

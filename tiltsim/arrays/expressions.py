@@ -264,6 +264,8 @@ class Expressions:
         """The value of a function at arguments."""
         lifting = self.lifting
         if isinstance(function, FunctionType) and lifting.is_scalar(function):
+            if function in lifting.arrays.functions:
+                return lifting.apply(function, *args)
             return lifting.run(function, args, keywords)
         if function in STRUCTURAL or (isinstance(function, type) and issubclass(function, tuple)):
             return function(*args, **keywords)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from functools import lru_cache, partial
-from typing import Any, Final, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -19,25 +19,6 @@ from tiltsim.system.locks import one_thread_at_a_time
 from tiltsim_controllers.mathematics.records import flatten, record_size, unflatten
 from tiltsim_controllers.mathematics.scalar import Floats, Triple, Values
 from tiltsim_controllers.references.trajectories import ReferenceParameters
-
-CODES: Final = frozenset(
-    {
-        "signature",
-        "type",
-        "keyframes",
-        "repeats",
-        "color",
-        "segments",
-        "offset",
-        "decoupler",
-        "decoupling",
-        "strategy",
-        "active",
-        "rotor",
-        "extension",
-    }
-)
-"""Fields of records that choose code or count; they are the same for all flights of a batch."""
 
 
 @contextmanager

@@ -227,17 +227,6 @@ class ClosedLoop:
         layout = (self.dynamics.model, self.dynamics.sizes, record_dtype(self.parameters))
         return float(zlib.crc32(repr(layout).encode()))
 
-    def native_name(self, plant: str, solver: str = "RK4") -> str:
-        """File name of the loop's compiled code on a plant of ``simulation.plant``.
-
-        The solver is part of the code on the plant ``rigid_body``, which has more than one.
-        """
-        step = self.sampling.controls
-        if plant != "mujoco" and self.equations is not None:
-            step = self.equations.inputs
-        place = f"{plant}.{solver}" if plant == "rigid_body" else plant
-        return f"{place}.{step.__module__}.{step.__qualname__}"
-
     @cached_property
     def record_size(self) -> int:
         """Number of floats of the parameter record."""

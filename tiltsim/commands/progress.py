@@ -11,7 +11,6 @@ from time import monotonic
 from typing import TYPE_CHECKING, Final
 
 from tiltsim.commands.text import print_line
-from tiltsim.engines.cache import before_compiling
 from tiltsim.system.text import printable
 
 if TYPE_CHECKING:
@@ -55,9 +54,6 @@ class Progress:
         self.expect(total)
         self.move(done)
 
-    def compile(self, name: str) -> None:
-        """Tell that native code of this name is compiled, until `move`; no rate counts that."""
-
     def print(self, line: str, *, error: bool = False) -> None:
         """Print a line, of results or to standard error."""
         print_line(line, error=error)
@@ -75,7 +71,6 @@ class _Bars(Progress):
     def __init__(self) -> None:
         super().__init__()
         self._bar: tqdm | None = None
-        self._compiling = False
 
     def begin(self, stage: str, total: float = 0, done: float = 0) -> None:
         super().begin(stage)
@@ -91,17 +86,7 @@ class _Bars(Progress):
         if self._bar is not None:
             if not self._bar.total:
                 self._bar.bar_format = self._stage + ": {n} [{elapsed}]"
-            if self._compiling:
-                self._bar.unpause()
-                self._compiling = False
             self._bar.update(done - self._bar.n)
-
-    def compile(self, name: str) -> None:
-        self._compiling = True
-        plant, _, step = name.partition(".")
-        law = step.rpartition(".")[0].rpartition(".")[2]
-        line = f"tiltsim: compiling {law} for the {plant} plant, once: some ten seconds"
-        self.print(line, error=True)
 
     def print(self, line: str, *, error: bool = False) -> None:
         from tqdm import tqdm
@@ -133,16 +118,10 @@ class _Lines(Progress):
     def begin(self, stage: str, total: float = 0, done: float = 0) -> None:
         super().begin(stage)
         self._total, self._done, self._initial = total, done, done
-        self._start = self._since = monotonic()
-        self._compiling = False
+        self._start = monotonic()
 
     def move(self, done: float) -> None:
-        if self._compiling:
-            self._since, self._initial, self._compiling = monotonic(), done, False
         self._done = done
-
-    def compile(self, name: str) -> None:
-        self._compiling = True
 
     def expect(self, total: float) -> None:
         self._total = total
@@ -154,9 +133,9 @@ class _Lines(Progress):
             line += f": {done:.0f} of {_total(total)}"
         elif done:
             line += f": {done:.0f}"
-        line += ", compiling" * self._compiling + f", {_clock(now - self._start)}"
-        if self._initial < done < total and not self._compiling:
-            left = (now - self._since) * (total - done) / (done - self._initial)
+        line += f", {_clock(now - self._start)}"
+        if self._initial < done < total:
+            left = (now - self._start) * (total - done) / (done - self._initial)
             line += f", about {_clock(left)} left"
         print_line(line, error=True)
 
@@ -176,11 +155,9 @@ def show_progress(*, shown: bool) -> Iterator[Progress]:
 
     ticking = threading.Thread(target=tick, daemon=True)
     ticking.start()
-    before_compiling.append(progress.compile)
     try:
         yield progress
     finally:
-        before_compiling.remove(progress.compile)
         finished.set()
         ticking.join()
         progress.end()

@@ -18,5 +18,5 @@ def control_callback(callback: Any) -> AbstractContextManager[None]:
     if hasattr(callback, "argtypes"):  # a C function, as ctypes shows them
         from tiltsim.engines.native_engine import compile_stopped_clock
 
-        clock = compile_stopped_clock().ctypes
+        clock = compile_stopped_clock()
     return mujoco_hooks(callback, clock)

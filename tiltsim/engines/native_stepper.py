@@ -1,73 +1,84 @@
-"""Compiled integration of the equations of motion."""
+"""Integration of the equations of motion as machine code."""
 
 from __future__ import annotations
 
+import ctypes
 from functools import cache
 from typing import Any
 
 import numpy as np
 
-from tiltsim.closed_loop.loop import ClosedLoop
-from tiltsim.engines.cache import announce_native_code
-from tiltsim.engines.compiling import callable_natively, compiled, register_scalar_functions
-from tiltsim.engines.recorder import record_sample, recording_is_over
-from tiltsim.equations.solvers import make_stepper
+from tiltsim.closed_loop.choices import ProgramKey
+from tiltsim.engines.glue import RECORDER, STEPPER, filled
+from tiltsim.engines.machine_code import MachineCode
+from tiltsim.engines.programs import HEAD_SIZE, SIDES, LoopPrograms
+from tiltsim.engines.recorder import Recorder
 from tiltsim.system.locks import one_thread_at_a_time
-from tiltsim_controllers.mathematics.records import record_dtype
-from tiltsim_controllers.mathematics.scalar import Floats
+from tiltsim_controllers.code.llvm_text import llvm_functions
+from tiltsim_controllers.mathematics.scalar import Floats, Triple
 
 
 @one_thread_at_a_time
 @cache
-def compile_stepper(loop: ClosedLoop, plant: str, solver: str) -> Any:
-    """Compile a solver of a loop's equations, or load it from the cache on disk.
+def _compile(key: ProgramKey, states: int, solver: str, held: bool) -> Any:
+    kind = "held" if held else "sampled"
+    glue = filled(
+        STEPPER + RECORDER,
+        step_held=f"step_{kind}",
+        sample_held=f"sample_{kind}",
+        width=len(key.loop.sample_fields),
+        rows_at=HEAD_SIZE + SIDES,
+    )
+    programs = LoopPrograms(key).on_equations(states, solver, held)
+    code = MachineCode(llvm_functions(programs) + glue)
+    return code.function("advance", None, *[ctypes.c_int64] * 3, *[ctypes.c_void_p] * 5)
+
+
+class NativeStepper:
+    """Integrates the equations of a flight.
 
     Args:
-        loop: A closed loop with equations.
-        plant, solver: As in `tiltsim.closed_loop.loop.ClosedLoop.native_name`.
-
-    Returns:
-        ``(recorder, samples, step_index, state, held, steps, integration) -> state, held``: the
-        stepper of `tiltsim.equations.solvers.make_stepper` with an array for the state, so many
-        times over. ``recorder`` is the address of a `Recorder`, which takes a sample after each
-        time and stops when the recording is over; 0 for none. Python's lock is not held.
+        key: Of its programs.
+        states: Number of states.
+        solver: See `tiltsim.equations.solvers.SOLVERS`.
+        timestep: s.
+        control_steps: Steps for which the inputs are held; 0: evaluated at every stage.
+        user: Parameters and knots, see `tiltsim.closed_loop.loop.ControlSetup.userdata`.
+        disturbance: m/s^2, world axes.
     """
-    announce_native_code(loop.native_name(plant, solver))
-    assert loop.equations is not None
-    stepper = make_stepper(loop.equations, solver)  # defines a scalar function
-    register_scalar_functions()
-    callable_natively(stepper)
-    inputs, observe = loop.equations.inputs, loop.equations.observe
-    watch = loop.monitoring.sign_check_values
-    limit_exceeded = loop.kind.limit_exceeded
 
-    # One function with and without a recorder: each would compile the whole loop.
-    @compiled
-    def advance(  # type: ignore[no-untyped-def]
-        recorder, samples, step_index, state, held, steps, integration
-    ):
-        timestep, control_steps, parameters, knots, _ = integration
-        values = list(state)
-        for _ in range(samples):
-            values, held = stepper(step_index, values, held, steps, integration)
-            step_index += steps
-            if recorder == 0:
-                continue
-            time = step_index * timestep
-            force = held
-            if control_steps == 0 or step_index % control_steps == 0:
-                force = inputs(time, values, parameters, knots)
-            sample = observe(time, values, force, parameters, knots)
-            checked = watch(time, sample, parameters, knots)
-            record_sample(recorder, time, sample, checked, limit_exceeded, knots)
-            if recording_is_over(recorder):
-                break
-        return np.array(values), held
+    def __init__(
+        self,
+        key: ProgramKey,
+        states: int,
+        solver: str,
+        timestep: float,
+        control_steps: int,
+        user: Floats,
+        disturbance: Triple,
+    ) -> None:
+        self._advance = _compile(key, states, solver, control_steps > 0)
+        self._every = control_steps or 1
+        self._settings = np.array([timestep, *disturbance])
+        self._user = np.ascontiguousarray(user)
 
-    return advance
+    def advance(
+        self, step_index: int, now: Floats, samples: int, steps: int, recorder: Recorder | None
+    ) -> int:
+        """Integrate some intervals; a recorder takes a sample after each and may stop it early.
 
+        Args:
+            step_index: Number of steps so far.
+            now: State and inputs in force, shape (states + inputs,); changed in place.
+            samples: Number of intervals.
+            steps: Steps of an interval.
+            recorder: Takes samples, or None.
 
-def native_record(loop: ClosedLoop, userdata: Floats) -> tuple[Any, Floats]:
-    """The parameter record and the knots of a flight as compiled code reads them."""
-    head = loop.record_size
-    return userdata[:head].view(record_dtype(loop.parameters))[0], userdata[head:]
+        Returns:
+            The number of steps so far.
+        """
+        index = np.array([float(step_index)])
+        memory = None if recorder is None else int(recorder.address)
+        arrays = (index, now, self._settings, self._user)
+        self._advance(samples, steps, self._every, *(a.ctypes.data for a in arrays), memory)
+        return int(index[0])

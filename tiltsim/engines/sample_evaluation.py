@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from functools import cache
@@ -11,9 +12,11 @@ from typing import Any, Final
 
 import numpy as np
 
+from tiltsim.closed_loop.choices import Choices, choices_of
 from tiltsim.closed_loop.loop import ControlSetup
+from tiltsim.engines.glue import ROWS, filled
 from tiltsim.system.locks import one_thread_at_a_time
-from tiltsim_controllers.mathematics.records import leaves, record_dtype, record_size, unflatten
+from tiltsim_controllers.mathematics.records import leaves, record_size, unflatten
 from tiltsim_controllers.mathematics.scalar import Floats, Values
 
 MIN_ROWS_TO_COMPILE: Final = 20_000
@@ -48,7 +51,7 @@ def evaluate_over_samples(
     rows = np.full((len(time), width), nan)
     for part, own in _flights(setup, len(time)):
         if natively:
-            rows[part] = _evaluate_natively(function, time[part], states[part], own)
+            rows[part] = _evaluate_natively(function, width, time[part], states[part], own)
             continue
         for row, t, state in zip(rows[part], time[part].tolist(), states[part].tolist()):
             with suppress(ArithmeticError, ValueError):
@@ -72,31 +75,33 @@ def _flights(setup: ControlSetup, samples: int) -> Iterator[tuple[slice, Control
 
 
 def _evaluate_natively(
-    function: Callable[..., Values], time: Floats, states: Floats, setup: ControlSetup
+    function: Callable[..., Values], width: int, time: Floats, states: Floats, setup: ControlSetup
 ) -> Floats:
     """`evaluate_over_samples` for at least one row."""
     record: Any = type(setup.parameters)
-    parameters = setup.userdata[: record_size(record)].view(record_dtype(record))[0]
-    time, states = np.ascontiguousarray(time), np.ascontiguousarray(states)
-    values: Floats = _compile_rows(function)(time, states, parameters, np.array(setup.knots))
+    choices = choices_of(setup.parameters)
+    rows = _compile_rows(function, record, choices, states.shape[1], width, len(setup.knots))
+    values = np.empty((len(time), width))
+    arrays = [np.ascontiguousarray(array) for array in (time, states, setup.userdata)]
+    rows(len(time), *(array.ctypes.data for array in (*arrays, values)))
     return values
 
 
 @one_thread_at_a_time
 @cache
-def _compile_rows(function: Callable[..., Values]) -> Any:
-    from tiltsim.engines.compiling import compiled, register_scalar_functions
+def _compile_rows(
+    function: Callable[..., Values],
+    record: type[tuple[Any, ...]],
+    choices: Choices,
+    state: int,
+    width: int,
+    knots: int,
+) -> Any:
+    from tiltsim.engines.machine_code import MachineCode
+    from tiltsim.engines.programs import row_program
+    from tiltsim_controllers.code.llvm_text import llvm_functions
 
-    register_scalar_functions()
-
-    @compiled
-    def rows(time, states, parameters, knots):  # type: ignore[no-untyped-def]
-        width = len(function(time[0], states[0], parameters, knots))
-        values = np.empty((len(time), width))
-        for index in range(len(time)):
-            row = function(time[index], states[index], parameters, knots)
-            for column in range(width):
-                values[index, column] = row[column]
-        return values
-
-    return rows
+    sizes = {"time": 1, "state": state, "user": record_size(record) + knots}
+    text = llvm_functions({"row": row_program(function, record, choices, sizes)})
+    code = MachineCode(text + filled(ROWS, state=state, width=width))
+    return code.function("rows", None, ctypes.c_int64, *[ctypes.c_void_p] * 4)

@@ -323,10 +323,8 @@ def rotor_loop(layout: RotorLayout, law: RotorLaw) -> ClosedLoop:
     """The closed loop of a control law with all vehicles of a layout."""
     places, record = layout.places, head_of(law.parameters)
     sampling, equations = _sampling_of(layout, law), None
-    sampling.controls.__qualname__ = f"{'measured.' * law.measured}{law.name}.{layout.name}"
     if not law.measured:  # the equations have no other acceleration than the law's
         equations = _equations_of(layout, law)
-        equations.inputs.__qualname__ = sampling.controls.__qualname__
 
     def setup(plan: FlightPlan, signature: float) -> ControlSetup:
         parameters, further = law.setup(plan)

@@ -1,19 +1,12 @@
-"""Scalar laws of scenarios: those of tables, and functions of the user's, checked before flights.
-
-Compiled code of a law from outside this package is kept by a checksum of its source.
-"""
+"""Scalar laws of scenarios: built-in ones, and functions of users, checked before flights."""
 
 from __future__ import annotations
 
 import traceback
-import zlib
 from collections.abc import Callable
 from functools import cache
-from pathlib import Path
-from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
-from tiltsim.engines.cache import is_core_code
 from tiltsim.errors import InputError
 from tiltsim.laws.airframe import airframe_of
 from tiltsim.laws.rotor_loop import layout_of_vehicle
@@ -27,40 +20,11 @@ from tiltsim.scenario.scenario import plan_flight
 from tiltsim.vehicles.rotorcraft import initial_tilts
 from tiltsim_controllers.laws.observed import Observed
 from tiltsim_controllers.mathematics.rotation import quaternion_from_euler
-from tiltsim_controllers.mathematics.scalar import Values, is_scalar, scalar
+from tiltsim_controllers.mathematics.scalar import Values, scalar
 
 if TYPE_CHECKING:
     from tiltsim.closed_loop.loop import ClosedLoop
     from tiltsim.scenario.scenario import FlightPlan, Scenario
-
-
-def foreign_code(law: Callable[..., Any]) -> str:
-    """A checksum of a law's code outside this package, by which compiled code is kept; else none.
-
-    It covers the files of all scalar functions that the law may call.
-    """
-    found: dict[str, bytes] = {}
-    _collect(law, found)
-    return f"_{zlib.crc32(b''.join(found.values())):08x}" if found else ""
-
-
-def _collect(function: Callable[..., Any], found: dict[str, bytes]) -> None:
-    """Add the code of a function and of those that it calls, by file or by name without one."""
-    if is_core_code(function):
-        return
-    code = function.__code__
-    name, file = f"{code.co_filename}:{code.co_qualname}", Path(code.co_filename)
-    if name in found:
-        return
-    text = getattr(function, "__source__", "").encode()
-    found[name] = text or (file.read_bytes() if file.is_file() else b"")
-    known = [function.__globals__.get(name) for name in code.co_names]
-    known += [cell.cell_contents for cell in function.__closure__ or ()]
-    modules = [value for value in known if isinstance(value, ModuleType)]
-    known += [getattr(module, name, None) for module in modules for name in code.co_names]
-    for value in known:
-        if value is not None and is_scalar(value):
-            _collect(value, found)
 
 
 @cache
@@ -74,20 +38,6 @@ def _without_parameters(function: Callable[..., Any]) -> Callable[..., Any]:
     return own_law
 
 
-@cache
-def _with_checksum(law: Callable[..., Any], checksum: str) -> Callable[..., Any]:
-    """The law under a name with its checksum, so that stale compiled code is not found."""
-    if not checksum:
-        return law
-
-    @scalar
-    def checked(observed: Observed, parameters: Any) -> tuple[Values, Values, Values]:
-        return law(observed, parameters)  # type: ignore[no-any-return]
-
-    checked.__qualname__ = checked.__name__ = f"law{checksum}"
-    return checked
-
-
 def loop_of_scalar_law(scenario: Scenario) -> ClosedLoop:
     """The closed loop of a scenario's scalar law, without layers.
 
@@ -98,26 +48,26 @@ def loop_of_scalar_law(scenario: Scenario) -> ClosedLoop:
     if isinstance(controller, ScalarFunctionController):
         address = scenario.address or "scenario"
         function = load_scalar_function(address, controller, scenario.own_controller)
-        law, checksum = _without_parameters(function), foreign_code(function)
+        law, is_foreign = _without_parameters(function), True
     else:
         assert isinstance(controller, ScalarController)
         law = controller.scalar_law(airframe)
-        checksum = foreign_code(law)
+        is_foreign = not law.__module__.startswith(("tiltsim.", "tiltsim_controllers."))
     try:
         parameters = controller.law_parameters(airframe)
     except InvalidValueError as error:  # found only with the vehicle and its gait at hand
         raise InputError(f"{scenario.address or 'scenario'}: {error}") from error
     key = Key(
         layout_of_vehicle(airframe.vehicle, scenario.vehicle.model),
-        _with_checksum(law, checksum),
-        f"{controller.law}{checksum}",
+        law,
+        controller.law,
         type(parameters),
         tuple(controller.state_units(airframe).items()),
         controller.commands_tilts,
         scenario.simulation.latency_steps > 0,
     )
     loop = scalar_loop(key)
-    if checksum:
+    if is_foreign:
         _try_once(loop, plan)
     return loop
 
@@ -142,7 +92,7 @@ def _try_once(loop: ClosedLoop, plan: FlightPlan) -> None:
     try:
         ctrl = loop.sampling.controls(0.0, qpos, qvel, act, setup.parameters, setup.knots)
     except Exception as error:
-        calls = 4 + isinstance(scenario.controller, ScalarFunctionController)  # before the law
+        calls = 3 + isinstance(scenario.controller, ScalarFunctionController)  # before the law
         if len(traceback.extract_tb(error.__traceback__)) <= calls:
             raise InputError(f"{requirement} ({describe(error, calls)})") from error
         raise InputError(f"{start}: the law raised {describe(error, calls)}") from error

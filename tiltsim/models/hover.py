@@ -18,6 +18,9 @@ from tiltsim_controllers.vehicle.effectiveness import force_and_torque
 TOLERANCE = 1e-9
 """Relative, of the singular values of force and torque and of the limits."""
 
+REST = 1e-12
+"""A rotor with this part of the largest input is at rest."""
+
 
 def hover_speeds(
     vehicle: Multirotor, tilts: Values, limits: tuple[float, float], dimension: int = 3
@@ -64,6 +67,8 @@ def hover_speeds(
                 "vehicle.max_rotor_speed or the gait"
             )
         inputs = found
+    # Otherwise rounding, which depends on the processor, decides whether a rotor is at rest.
+    inputs = np.where(np.abs(inputs) > REST * np.abs(inputs).max(), inputs, 0.0)
     return tuple((np.sign(inputs) * np.sqrt(np.abs(inputs))).tolist())
 
 

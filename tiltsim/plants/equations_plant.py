@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import partial
 from math import nan
 from typing import Any
 
 import numpy as np
 
 from tiltsim.closed_loop.assembly import Assembly
+from tiltsim.closed_loop.choices import program_key
 from tiltsim.engines.base import EngineName
-from tiltsim.engines.cache import mark_native_code_compiled
 from tiltsim.equations.solvers import Integration, Stepper, make_stepper
-from tiltsim.plants.engine_choice import choose_engine, native_name
+from tiltsim.plants.engine_choice import choose_engine
 from tiltsim.plants.flight_model import disturbance_acceleration
 from tiltsim.plants.plant import Plant
 from tiltsim_controllers.mathematics.records import slotted
-from tiltsim_controllers.mathematics.scalar import Floats
+from tiltsim_controllers.mathematics.scalar import Floats, Values
 
 
 class EquationsPlant(Plant):
@@ -36,27 +35,27 @@ class EquationsPlant(Plant):
         self._state = list(map(float, self._equations.initial(assembly, setup)))
         self._held = (0.0,) * self._equations.inputs_size
         self._fault = ""
-        self.engine: EngineName = engine or choose_engine(scenario, loop)
+        self.engine: EngineName = engine or choose_engine(scenario)
+        simulation, disturbance = scenario.simulation, disturbance_acceleration(scenario)
+        solver, numbers = simulation.solver, (simulation.timestep, simulation.control_steps)
+        record: tuple[Any, Any] = setup
         self._advance: Stepper
-        solver, plant = scenario.simulation.solver, scenario.simulation.plant
         if self.engine == "native":
-            from tiltsim.engines.native_stepper import compile_stepper, native_record
+            from tiltsim.engines.native_stepper import NativeStepper
 
-            self._record = compile_stepper(loop, plant, solver)
-            self._advance = partial(self._record, 0, 1)
-            record: tuple[Any, Any] = native_record(loop, setup.userdata)
+            states = len(self._state)
+            self._native = NativeStepper(
+                program_key(assembly), states, solver, *numbers, setup.userdata, disturbance
+            )
+            self._advance = self._advance_natively
         elif self.engine == "jax":
             from tiltsim.arrays.flying import course_of, stepper_on_arrays
 
             self._advance = stepper_on_arrays(course_of(assembly))
-            record = setup
         else:
             self._advance = make_stepper(self._equations, solver)
             record = slotted(setup.parameters), setup.knots
-        simulation, disturbance = scenario.simulation, disturbance_acceleration(scenario)
-        self._integration = Integration(
-            simulation.timestep, simulation.control_steps, *record, disturbance
-        )
+        self._integration = Integration(*numbers, *record, disturbance)
 
     @property
     def time(self) -> float:
@@ -79,10 +78,9 @@ class EquationsPlant(Plant):
         self._fault = ""
 
     def advance(self, steps: int) -> None:
-        state: Any = np.array(self._state) if self.engine == "native" else self._state
         try:
             state, self._held = self._advance(
-                self._step_index, state, self._held, steps, self._integration
+                self._step_index, self._state, self._held, steps, self._integration
             )
             self._state = list(map(float, state))  # numpy's own floats would warn of infinity
         except (ArithmeticError, ValueError):
@@ -101,19 +99,22 @@ class EquationsPlant(Plant):
 
         checked = self._assembly.sign_check_values(self.time, self.observe())
         recorder = Recorder(self._assembly, samples, steps, steps, checked)
-        state, self._held = self._record(
-            int(recorder.address),
-            samples,
-            self._step_index,
-            np.array(self._state),
-            self._held,
-            steps,
-            self._integration,
-        )
-        self._state = state.tolist()
-        mark_native_code_compiled(native_name(self._assembly.scenario, self._assembly.loop))
-        self._step_index += samples * steps
+        now = np.array([*self._state, *self._held])
+        self._step_index = self._native.advance(self._step_index, now, samples, steps, recorder)
+        self._state, self._held = self._split(now)
         return None if recorder.terminated else recorder.samples
+
+    def _advance_natively(
+        self, step_index: int, state: list[float], held: Values, steps: int, _: Integration
+    ) -> tuple[list[float], Values]:
+        now = np.array([*state, *held])
+        self._native.advance(step_index, now, 1, steps, None)
+        return self._split(now)
+
+    def _split(self, now: Floats) -> tuple[list[float], Values]:
+        """State and inputs in force."""
+        values = now.tolist()
+        return values[: len(self._state)], tuple(values[len(self._state) :])
 
     def observe(self) -> tuple[float, ...]:
         setup = self._setup

@@ -52,7 +52,7 @@ class MujocoPlant(Plant):
         self.data = mujoco.MjData(self.model)
         self._evaluations_per_step = evaluations_per_step(self.model)
         self._set_initial_state()
-        self.engine: EngineName = engine or choose_engine(assembly.scenario, self._loop)
+        self.engine: EngineName = engine or choose_engine(assembly.scenario)
         self._prepare_engine()
 
     def _set_initial_state(self) -> None:
@@ -96,7 +96,7 @@ class MujocoPlant(Plant):
 
     def _prepare_engine(self) -> None:
         """Build the engine, which reads the parameters in ``userdata`` once."""
-        self._engine = make_engine(self.engine, self._loop, self.model, self.data)
+        self._engine = make_engine(self.engine, self._assembly, self.model, self.data)
 
     def advance(self, steps: int) -> None:
         with control_callback(self._engine.callback()):

@@ -17,7 +17,6 @@ from tiltsim.errors import InputError
 from tiltsim.report.store import flight_key, results, store
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.metric_names import WALL_CLOCK_METRICS
-from tiltsim.simulation.shared_engine import compile_together, with_compiled
 
 if TYPE_CHECKING:
     from tiltsim.flight.flight import Flight
@@ -132,18 +131,17 @@ def fly(
     # The longest first, so that no process ends up alone with one of them.
     tasks = sorted(missing, key=lambda task: -missing[task].simulation.steps)
     jobs = min(jobs, len(tasks))
-    compiled = compile_together(list(missing.values()), jobs)
-    work = partial(_fly_one, folder=folder, compiled=compiled)
+    work = partial(_fly_one, folder=folder)
     for task, record in results(work, tasks, jobs, lambda t: f"{t.address} on the {t.plant} plant"):
         flights[task.address, task.plant] = record
         progress(len(flights), total)
     return flights
 
 
-def _fly_one(task: _Task, folder: Path, compiled: frozenset[str]) -> FlightRecord:
+def _fly_one(task: _Task, folder: Path) -> FlightRecord:
     from tiltsim.simulation.simulate import simulate
 
-    flight = simulate(with_compiled(variant_for(task.address, task.plant), compiled))
+    flight = simulate(variant_for(task.address, task.plant))
     if flight.end.kind == "interrupted":
         raise KeyboardInterrupt
     record = make_record(task.address, task.plant, flight)

@@ -11,7 +11,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Final, Self
 
-PACKAGES: Final = ("tiltsim", "mujoco", "numpy", "numba", "scipy")
+PACKAGES: Final = ("tiltsim", "mujoco", "numpy", "llvmlite", "scipy")
 
 
 @dataclass(frozen=True)

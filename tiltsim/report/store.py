@@ -15,8 +15,9 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
-from tiltsim.engines.cache import core_sources
+import tiltsim_controllers
 from tiltsim.errors import InputError
+from tiltsim.folders import FLYING
 from tiltsim.resources import shipped_folder
 from tiltsim.scenario.scenario_tables import DESCRIPTIVE
 from tiltsim.system.files import replacing
@@ -46,8 +47,11 @@ def flight_key(scenario: Scenario) -> str:
 @cache
 def code_digest() -> bytes:
     """Digest of the sources of core and models, and of the versions of the numeric packages."""
-    versions = [version(name) for name in ("tiltsim", "mujoco", "numpy", "numba")]
-    sources = [*core_sources(), *shipped_folder("mjcf").rglob("*.xml")]
+    versions = [version(name) for name in ("tiltsim", "mujoco", "numpy", "llvmlite")]
+    package = Path(__file__).parents[1]
+    own = [file for name in FLYING for file in (package / name).rglob("*.py")]
+    controllers = Path(tiltsim_controllers.__file__).parent.rglob("*.py")
+    sources = [*own, *controllers, *shipped_folder("mjcf").rglob("*.xml")]
     return sources_digest(sources, *versions)
 
 

@@ -10,31 +10,23 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
-from operator import attrgetter
 from time import perf_counter
-from typing import Any, Final, Generic, TypeVar
+from typing import Final, Generic, TypeVar
 
 import numpy as np
 
-from tiltsim.arrays.flying import (
-    CODES,
-    Batch,
-    Recording,
-    compile_batch,
-    course_of,
-    double_precision,
-)
+from tiltsim.arrays.flying import Batch, Recording, compile_batch, course_of, double_precision
 from tiltsim.arrays.jax_arrays import require_jax
 from tiltsim.closed_loop.assembly import Assembly
+from tiltsim.closed_loop.choices import program_key
 from tiltsim.flight.end import End
 from tiltsim.flight.flight import Flight
 from tiltsim.flight.metrics import Metrics, metrics_of_rows
 from tiltsim.plants.flight_model import disturbance_acceleration
 from tiltsim.simulation.monitor import TerminationMonitor
 from tiltsim.simulation.simulate import simulate_assembly
-from tiltsim_controllers.mathematics.records import flatten, paths_of, record_size
+from tiltsim_controllers.mathematics.records import flatten, record_size
 from tiltsim_controllers.mathematics.scalar import Floats
-from tiltsim_controllers.references.trajectories import ReferenceParameters
 
 MEMORY: Final = 256 * 2**20
 """Bytes of the samples of all rows that fly together."""
@@ -55,12 +47,6 @@ class _Sound:
         return ""
 
 
-@cache
-def _codes_of(record: type[tuple[Any, ...]]) -> Callable[[Any], Any]:
-    """Reads the `CODES` in a record of a type."""
-    return attrgetter(*(path for path in paths_of(record) if path.rpartition(".")[2] in CODES))
-
-
 def numbers_of(assembly: Assembly) -> tuple[float, ...]:
     """What `tiltsim.arrays.flying.Batch` takes of a flight, knots aside."""
     equations = assembly.loop.equations
@@ -75,10 +61,7 @@ def numbers_of(assembly: Assembly) -> tuple[float, ...]:
 
 def batch_key(assembly: Assembly) -> object:
     """Equal for flights that may share a batch."""
-    parameters, knots = assembly.setup
-    own = _codes_of(assembly.loop.parameters)(parameters)
-    of_reference = _codes_of(ReferenceParameters)(assembly.reference)
-    return course_of(assembly), len(knots), own, of_reference
+    return course_of(assembly), program_key(assembly)
 
 
 def _padded(rows: int) -> int:

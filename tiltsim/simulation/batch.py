@@ -14,6 +14,7 @@ from typing import Any, Final, TypeVar
 from warnings import warn
 
 from tiltsim.closed_loop.assembly import Assembly
+from tiltsim.closed_loop.choices import program_key
 from tiltsim.errors import InputError
 from tiltsim.flight.end import End
 from tiltsim.flight.flight import Flight
@@ -178,7 +179,7 @@ def _fly_window(
 
             flown = ArrayBatch(chosen, threads, pool, result).results()
         elif way == "equations":
-            for one_of_each in {assembly.loop: assembly for assembly in chosen}.values():
+            for one_of_each in {program_key(assembly): assembly for assembly in chosen}.values():
                 make_plant(one_of_each, engine="native")  # prepares native code before threads do
             flown = enumerate(
                 _in_order(
@@ -192,7 +193,7 @@ def _fly_window(
 
 def _way_to_fly(assembly: Assembly, native: bool) -> object:
     """``alone``, ``equations`` for threads without MuJoCo, or what a batch has in common."""
-    scenario, loop = assembly.scenario, assembly.loop
+    scenario = assembly.scenario
     simulation = scenario.simulation
     if simulation.engine == "jax":
         from tiltsim.simulation.array_batch import batch_key
@@ -207,7 +208,8 @@ def _way_to_fly(assembly: Assembly, native: bool) -> object:
     # has states and controls of its own; a user's file may have other bodies.
     vehicle = scenario.vehicle
     file = vehicle.mjcf if isinstance(vehicle, VehicleTable) else None
-    return loop, vehicle.tilt_servo.angle_limit is not None, scenario.ground is not None, file
+    key = program_key(assembly)
+    return key, vehicle.tilt_servo.angle_limit is not None, scenario.ground is not None, file
 
 
 def _in_order(

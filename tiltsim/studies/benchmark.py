@@ -19,12 +19,12 @@ from typing import Any, Final
 import mujoco
 import numpy as np
 
+from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.engines.base import EngineName
 from tiltsim.engines.callback import control_callback
 from tiltsim.engines.factory import make_engine
 from tiltsim.engines.native_engine import compile_empty
 from tiltsim.laws.assembling import assemble
-from tiltsim.laws.attitude_altitude import TILTROTOR
 from tiltsim.plants.mujoco_plant import MujocoPlant
 from tiltsim.scenario.loading import parse_scenario
 from tiltsim.scenario.scenario import Scenario
@@ -54,12 +54,13 @@ Variants = dict[tuple[str, str], Callable[[], float]]
 """Seconds per step of one timing, by case and engine."""
 
 
-def flying_plant(integrator: str) -> MujocoPlant:
+def flying_plant(integrator: str) -> tuple[Assembly, MujocoPlant]:
     """A tiltrotor in steady flight with tilted rotors, so that every part of the loop is active."""
     simulation = {"integrator": integrator, "engine": "native"}
-    plant = MujocoPlant(assemble(parse_scenario({"simulation": simulation, "gait": TROT})))
+    assembly = assemble(parse_scenario({"simulation": simulation, "gait": TROT}))
+    plant = MujocoPlant(assembly)
     plant.advance(10_000)
-    return plant
+    return assembly, plant
 
 
 def bench_single(integrator: str, rounds: int = ROUNDS) -> Rows:
@@ -69,10 +70,10 @@ def bench_single(integrator: str, rounds: int = ROUNDS) -> Rows:
     callbacks disable. The cost of a controller is the difference from ``empty`` to ``native``.
     ``recorded`` takes a sample every tenth step. Rows as in ``tiltsim bench --json``.
     """
-    plant = flying_plant(integrator)
+    assembly, plant = flying_plant(integrator)
     model, data, state = plant.model, plant.data, plant.state
-    callbacks = {"bare": None, "empty": compile_empty().ctypes} | {
-        name: make_engine(name, TILTROTOR, model, data).callback() for name in ENGINES
+    callbacks = {"bare": None, "empty": compile_empty()} | {
+        name: make_engine(name, assembly, model, data).callback() for name in ENGINES
     }
 
     def stepping(callback: Any, steps: int) -> Callable[[], float]:
@@ -101,7 +102,7 @@ def bench_batch(integrator: str, threads: int, rounds: int = BATCH_ROUNDS) -> Ro
     """Time a batch of vehicles: open loop with constant controls, and the native engine."""
     from mujoco.batch import Batch
 
-    plant = flying_plant(integrator)
+    _, plant = flying_plant(integrator)
     batch = Batch(plant.model, BATCH_ROWS, threads)
     state, steps = plant.state, BATCH_ROWS * BATCH_STEPS
 

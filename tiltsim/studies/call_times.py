@@ -50,7 +50,7 @@ def compiled_time_per_call(scenario: Scenario) -> float:
         return nan
     plant = MujocoPlant(assemble(scenario), engine="native")
     plant.data.userdata[PERIOD_IN_USERDATA] = 0.0  # the control step at every evaluation
-    callbacks = plant.callback, compile_empty().ctypes
+    callbacks = plant.callback, compile_empty()
     rounds = []
     for _ in range(ROUNDS):  # by turns, as the speed of a machine changes
         for callback in callbacks:

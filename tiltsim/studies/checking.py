@@ -22,7 +22,6 @@ from tiltsim.scenario.library import (
 )
 from tiltsim.scenario.loading import load_scenario, variant_names
 from tiltsim.scenario.scenario import Scenario
-from tiltsim.simulation.shared_engine import compile_together, with_compiled
 from tiltsim.simulation.simulate import simulate
 from tiltsim.studies.check_results import CheckResult, Status
 from tiltsim.system.processes import in_processes
@@ -154,8 +153,7 @@ def check_all(
         except InputError as error:
             yield CheckResult(address, "invalid", str(error))
     jobs = min(jobs, len(scenarios))
-    compiled = compile_together([*scenarios.values()], jobs)
-    loaded = [(address, with_compiled(one, compiled)) for address, one in scenarios.items()]
+    loaded = [*scenarios.items()]
     work = partial(check_one, trusted=trusted)
     if jobs <= 1:
         yield from map(work, loaded)

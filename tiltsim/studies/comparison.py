@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from math import isclose, nan
@@ -13,14 +12,13 @@ import numpy as np
 
 from tiltsim.errors import InputError
 from tiltsim.flight.flight import Flight
-from tiltsim.laws.assembling import assemble, loop_of
+from tiltsim.laws.assembling import assemble
 from tiltsim.plants.engine_choice import MIN_STEPS_TO_COMPILE
 from tiltsim.plants.trust import require_trust
 from tiltsim.scenario.controller import CONTROLLERS
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.messages import choose
 from tiltsim.scenario.scenario import Scenario
-from tiltsim.simulation.shared_engine import compile_together, with_compiled
 from tiltsim.simulation.simulate import simulate
 from tiltsim.studies.call_times import compiled_time_per_call, time_per_call
 from tiltsim.sweeps.search import boundary
@@ -184,14 +182,7 @@ def fly_entries(
         timed: Whether control steps are timed.
         jobs: Processes.
     """
-    scenarios = []
-    for entry in () if searches else entries:
-        with suppress(InputError):  # a refusal is part of the result
-            scenario = entry.scenario()
-            loop_of(scenario)
-            scenarios.append(scenario)
-    compiled = compile_together(scenarios, jobs)
-    work = partial(compare_one, searches=searches, timed=timed, compiled=compiled)
+    work = partial(compare_one, searches=searches, timed=timed)
     if jobs == 1:
         yield from map(work, entries)
         return
@@ -206,22 +197,19 @@ def refusal(row: Mapping[str, Any]) -> str | None:
     return None if reason is None else reason.removeprefix(f"{row['scenario']}: ")
 
 
-def compare_one(
-    entry: Entry, *, searches: bool, timed: bool = True, compiled: frozenset[str] = frozenset()
-) -> Compared:
+def compare_one(entry: Entry, *, searches: bool, timed: bool = True) -> Compared:
     """One controller on one scenario; a scenario that refuses it is part of the result.
 
     Args:
         entry: What to fly.
         searches: Whether robustness is sought.
         timed: Whether control steps are timed.
-        compiled: Loops to fly natively, of `compile_together`.
     """
     row: dict[str, Any] = {"controller": entry.name, "scenario": entry.address}
     try:
         scenario = entry.scenario()
         assembly = assemble(scenario)
-        flight = simulate(with_compiled(_engine(scenario, searches), compiled))
+        flight = simulate(_engine(scenario, searches))
     except InputError as error:
         refused = {"end": "refused", "refused": str(error), **dict.fromkeys(MEASURES)}
         return Compared(row | refused | {"latency_refused": None}, np.zeros(0), np.zeros(0))

@@ -6,9 +6,10 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Final
 
+from tiltsim.engines.base import EngineName
 from tiltsim.errors import InputError
+from tiltsim.plants.engine_choice import MIN_STEPS_TO_COMPILE
 from tiltsim.plants.trust import require_trust
-from tiltsim.simulation.shared_engine import shared_engine
 from tiltsim.sweeps.checks import check_points
 from tiltsim.sweeps.chunks import ChunkWork, FinishedChunk
 from tiltsim.sweeps.definition import SweepDefinition
@@ -70,8 +71,7 @@ def _fly(
         require_trust(example, trusted)
     count = sum(len(points.chunk(number)) for number in numbers)
     steps = count * max(example.simulation.steps for example in examples)
-    # A cluster's workers compile their own native code; nothing is compiled here.
-    engine = shared_engine([] if cluster is not None else examples, steps)
+    engine: EngineName | None = "native" if steps >= MIN_STEPS_TO_COMPILE else None
     work = ChunkWork(points.definition.to_json(), engine, trusted)
     if cluster is not None:
         from tiltsim.sweeps.cluster import fly_on_cluster

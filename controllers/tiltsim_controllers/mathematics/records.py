@@ -35,10 +35,12 @@ def flatten(record: Iterable[Any]) -> Iterator[float]:
 
 
 def paths_of(record_type: type[tuple[Any, ...]]) -> Iterator[str]:
-    """The dotted names of the fields of a record and of those within, in order."""
+    """The dotted names of the numbers of a record, in order; entries of vectors have an index."""
     for name, kind in _fields(record_type).items():
         if _is_record(kind):
             yield from (f"{name}.{inner}" for inner in paths_of(kind))
+        elif issubclass(kind, tuple):
+            yield from (f"{name}[{index}]" for index in range(kind.length))
         else:
             yield name
 

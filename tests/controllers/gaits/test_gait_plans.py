@@ -6,27 +6,21 @@ from math import inf, pi
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
+from tests.natively import natively
 from tests.tracing import untraced
 from tiltsim_controllers.analysis.published_gaits import smallest_margin
 from tiltsim_controllers.analysis.singularity import residuals
 from tiltsim_controllers.gaits import plans
 from tiltsim_controllers.gaits.anticipation import anticipated_tilts
 from tiltsim_controllers.gaits.cat import FOOTFALLS, FORWARD, SWINGS, Footfall, cat_keyframes
-from tiltsim_controllers.gaits.parameters import (
-    GAIT_TYPES,
-    KEYFRAMES,
-    TROT_CONTINUOUS,
-    GaitParameters,
-)
+from tiltsim_controllers.gaits.parameters import GAIT_TYPES, KEYFRAMES, TROT_CONTINUOUS
 from tiltsim_controllers.gaits.plans import Gait
 from tiltsim_controllers.gaits.tilts import planned_jets, tilt_acceleration, tilt_reference
 from tiltsim_controllers.gaits.trot import continuous_trot as scalar_trot
 from tiltsim_controllers.gaits.two_color import BLUE, RED, colored_angles
-from tiltsim_controllers.mathematics.records import flatten, record_dtype
-from tiltsim_controllers.mathematics.scalar import scalar_functions
 from tiltsim_controllers.vehicle.parameters import PRESETS, drag_ratio
 
 AR_DRONE = PRESETS["ar_drone_2"]
@@ -264,49 +258,19 @@ def test_bad_names_list_the_choices() -> None:
         plans.waypoints([[0] * 4, [1] * 4], 1.0, [0.0])
 
 
-NEEDED_BY_GAITS = ("tiltsim_controllers.gaits", "tiltsim_controllers.mathematics.splines")
-
-
-@pytest.fixture(scope="module")
-def native():
-    """`tilt_reference` compiled from the registered source, fed as the native engine feeds it."""
-    numba = pytest.importorskip("numba")
-    for function in scalar_functions():
-        if function.__module__.startswith(NEEDED_BY_GAITS):
-            numba.extending.register_jitable(function)
-    reference = numba.njit(tilt_reference)
-
-    @numba.njit
-    def evaluate(time, records, table):
-        return reference(time, records[0], table)
-
-    @numba.njit
-    def without_table(time, records):
-        return reference(time, records[0])
-
-    return {"with": evaluate, "without": without_table}
-
-
-def native_record(gait: Gait) -> np.ndarray:
-    values = np.array(tuple(flatten(gait.parameters)), dtype=float)
-    return values.view(record_dtype(GaitParameters))
-
-
-@pytest.mark.slow
-@settings(deadline=None, max_examples=200)
-@given(name=st.sampled_from(sorted(GAITS)), time=st.floats(-100, 100))
-def test_native_code_gives_the_same_bits(native, name, time) -> None:
+@pytest.mark.parametrize("name", sorted(GAITS))
+def test_machine_code_gives_the_same_bits(name) -> None:
     gait = GAITS[name]
-    table = np.array([*gait.knots, *[np.nan] * 7])  # longer than the rows in use
-    evaluated = native["with"](time, native_record(gait), table)
-    assert evaluated == tilt_reference(time, gait.parameters, gait.knots)
+    knots = (*gait.knots, *[np.nan] * 7)  # longer than the rows in use
+    for time in np.random.default_rng(4).uniform(-100.0, 100.0, 3).tolist():
+        evaluated = natively(tilt_reference, time, gait.parameters, knots)
+        assert evaluated == [*tilt_reference(time, gait.parameters, gait.knots)]
 
 
-@pytest.mark.slow
-def test_native_code_needs_no_table_for_gaits_without_keyframes(native) -> None:
-    for name in ("fixed", "trot_instant", "trot_continuous", "red_circle"):
-        gait = GAITS[name]
-        assert native["without"](0.7, native_record(gait)) == tilt_reference(0.7, gait.parameters)
+@pytest.mark.parametrize("name", ["fixed", "trot_instant", "trot_continuous", "red_circle"])
+def test_machine_code_needs_no_table_for_gaits_without_keyframes(name) -> None:
+    gait = GAITS[name].parameters
+    assert natively(tilt_reference, 0.7, gait) == [*tilt_reference(0.7, gait)]
 
 
 def test_a_table_that_does_not_repeat_holds_its_last_row() -> None:

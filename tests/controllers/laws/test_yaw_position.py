@@ -9,7 +9,8 @@ import pytest
 import sympy
 
 from tests.controllers.flights import fly, quadrotor_rates, rk4_step
-from tests.controllers.scalar_sources import as_native, fields, symbolic
+from tests.controllers.scalar_sources import fields, symbolic
+from tests.natively import natively
 from tiltsim_controllers.analysis.quadrotor_singularity import (
     normalized_determinant,
     published_determinant,
@@ -281,12 +282,7 @@ def test_stable_gains_fly_the_circle_through_the_published_curve():
 # --- compiled ----------------------------------------------------------------------------------
 
 
-@pytest.mark.slow
-def test_compiled_code_gives_the_same_bits(native):
-    law = native[yaw_position_inputs]
-    random = np.random.default_rng(6)
-    parameters = PARAMETERS["stable"]
-    record = as_native(parameters)
-    for _ in range(CASES):
-        state = random_state(random)
-        assert law(1.7, state, record) == yaw_position_inputs(1.7, state, parameters)
+def test_machine_code_gives_the_same_bits():
+    state, parameters = random_state(np.random.default_rng(6)), PARAMETERS["stable"]
+    expected = yaw_position_inputs(1.7, state, parameters)
+    assert natively(yaw_position_inputs, 1.7, state, parameters) == [*expected]

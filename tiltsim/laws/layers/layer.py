@@ -87,7 +87,6 @@ def wrap_loop(inner: ClosedLoop, layer: Layer) -> ClosedLoop:
     )
     controls, hold, observe, sign_check_values = _functions_within(inner, len(layer.fields))
     controls = layer.controls or controls
-    controls.__qualname__ = f"{layer.name}.{inner.sampling.controls.__qualname__}"
 
     def setup(plan: FlightPlan, signature: float) -> ControlSetup:
         parameters, knots = inner.setup(plan, inner.signature)

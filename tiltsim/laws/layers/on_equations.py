@@ -141,7 +141,6 @@ def on_equations(loop: ClosedLoop, plant: ActuatorPlant) -> ClosedLoop:
         inner = ControlSetup(setup.parameters.inner, setup.knots)
         return (*plant.initial(plan), *dynamics.initial_activations(plan, inner))
 
-    equation_inputs.__qualname__ = f"{plant.name}.{controls.__qualname__}"
     equations = Equations(
         inputs=equation_inputs,
         inputs_size=dynamics.sizes.ctrl,

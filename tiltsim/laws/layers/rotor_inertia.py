@@ -182,6 +182,4 @@ def _momentum_equations(equations: Equations, dynamics: Dynamics) -> Equations:
         spin = spin_rates(angles, speeds_in(own), setup.parameters.layer)
         return _with_body_rates_ahead(own, spin, 1.0)
 
-    law = f"{inner_inputs.__module__}.{inner_inputs.__qualname__}"
-    inputs.__qualname__ = f"with_rotor_inertia.{law}"
     return replace(equations, inputs=inputs, rates=rates, observe=observe, initial=initial)

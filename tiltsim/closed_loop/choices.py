@@ -1,0 +1,63 @@
+"""Parameters that choose code: compiled programs and batches on arrays have them as constants."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any, Final, NamedTuple
+
+from tiltsim.closed_loop.assembly import Assembly
+from tiltsim.closed_loop.loop import ClosedLoop
+from tiltsim_controllers.mathematics.records import flatten, paths_of
+
+CHOICES: Final = frozenset(
+    {
+        "signature",
+        "type",
+        "keyframes",
+        "repeats",
+        "color",
+        "segments",
+        "offset",
+        "decoupler",
+        "decoupling",
+        "strategy",
+        "active",
+        "rotor",
+        "rotors",
+        "extension",
+    }
+)
+"""Fields of records that choose code or count; they are the same for all flights of a batch."""
+
+
+@cache
+def _places(record: type[tuple[Any, ...]]) -> tuple[int, ...]:
+    """Where the choices lie in a flattened record."""
+    names = (path.rpartition(".")[2] for path in paths_of(record))
+    return tuple(place for place, name in enumerate(names) if name in CHOICES)
+
+
+Choices = tuple[tuple[int, float], ...]
+"""Places in a flattened record, and the numbers there."""
+
+
+def choices_of(record: tuple[Any, ...]) -> Choices:
+    """The choices in a record."""
+    numbers = [*flatten(record)]
+    return tuple((place, numbers[place]) for place in _places(type(record)))
+
+
+class ProgramKey(NamedTuple):
+    """Flights with equal keys share their compiled programs."""
+
+    loop: ClosedLoop
+    parameters: Choices  # of the loop's record
+    reference: Choices
+    knots: int
+
+
+def program_key(assembly: Assembly) -> ProgramKey:
+    """The choices of a flight."""
+    parameters, knots = assembly.setup
+    own, reference = choices_of(parameters), choices_of(assembly.reference)
+    return ProgramKey(assembly.loop, own, reference, len(knots))

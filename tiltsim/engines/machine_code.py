@@ -1,0 +1,88 @@
+"""LLVM text as machine code, which is kept on disk."""
+
+from __future__ import annotations
+
+import ctypes
+import tempfile
+from collections.abc import Mapping
+from functools import cache
+from hashlib import sha256
+from pathlib import Path
+from typing import Any, Final
+
+from tiltsim.engines.code_folder import code_folder, is_usable
+
+OPTIMIZATION: Final = 1
+"""Of LLVM's levels 0 to 3; higher ones take longer to compile and run no faster."""
+
+_DIGEST: Final = sha256().digest_size
+
+
+class MachineCode:
+    """Compiled functions. Its code lives as long as this object.
+
+    Args:
+        text: LLVM's assembly language, which is also what compiled code is kept by.
+    """
+
+    def __init__(self, text: str) -> None:
+        import llvmlite.binding as llvm
+
+        target, options, identity = _target()
+        machine = target.create_target_machine(**options)  # which the engine will own
+        file = code_folder() / f"{sha256(f'{identity}{text}'.encode()).hexdigest()}.o"
+        keeps = is_usable(file.parent)
+        code = _load(file) if keeps else None
+        self.compiled = code is None
+        if code is None:
+            module = llvm.parse_assembly(text)
+            tuning = llvm.create_pipeline_tuning_options(speed_level=OPTIMIZATION)
+            builder = llvm.create_pass_builder(machine, tuning)
+            builder.getModulePassManager().run(module, builder)
+            code = machine.emit_object(module)
+            if keeps:
+                _save(file, code)
+        self._engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
+        self._engine.add_object_file(llvm.ObjectFileRef.from_data(code))
+        self._engine.finalize_object()
+
+    def function(self, name: str, result: Any, *arguments: Any) -> Any:
+        """A function with `ctypes` types; while it runs, Python's lock is free."""
+        address = self._engine.get_function_address(name)
+        function: Any = ctypes.CFUNCTYPE(result, *arguments)(address)
+        function.code = self  # it must live as long as the function
+        return function
+
+
+@cache
+def _target() -> tuple[Any, Mapping[str, Any], str]:
+    """LLVM's target, the options of its code generator, and the name of what that generates."""
+    import llvmlite
+    import llvmlite.binding as llvm
+
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
+    target = llvm.Target.from_default_triple()
+    name, features = llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()
+    options = {"cpu": name, "features": features, "opt": OPTIMIZATION}
+    return target, options, f"{llvmlite.__version__} {target.triple} {options}\n"
+
+
+def _load(file: Path) -> bytes | None:
+    """The content of a file; None if it is missing or damaged."""
+    try:
+        data = file.read_bytes()
+    except OSError:
+        return None
+    digest, code = data[:_DIGEST], data[_DIGEST:]
+    return code if sha256(code).digest() == digest else None
+
+
+def _save(file: Path, code: bytes) -> None:
+    """Write a file in one step; without space for it, the code is used without being kept."""
+    try:
+        with tempfile.NamedTemporaryFile(dir=file.parent, suffix=".new", delete=False) as own:
+            own.write(sha256(code).digest() + code)
+        Path(own.name).replace(file)
+    except OSError:
+        Path(own.name).unlink(missing_ok=True)

@@ -1,0 +1,197 @@
+"""The functions of a closed loop as programs of a few vectors."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from math import isfinite
+from typing import Any, Final, NamedTuple
+
+from tiltsim.arrays.lifting import Lifting
+from tiltsim.arrays.traced_numbers import FUNCTIONS, trace_scalar_code
+from tiltsim.closed_loop.choices import Choices, ProgramKey
+from tiltsim.closed_loop.limits import SINGULAR, WITHIN_LIMITS
+from tiltsim.closed_loop.userdata import (
+    EVALUATIONS,
+    EVALUATIONS_PER_STEP,
+    HEADER_SIZE,
+    TIMESTEP,
+    evaluation_time,
+)
+from tiltsim.equations.solvers import Integration, make_step
+from tiltsim_controllers.code.program import InputVector, Program
+from tiltsim_controllers.code.tracing import Number, make
+from tiltsim_controllers.mathematics.records import record_size, unflatten
+from tiltsim_controllers.references.trajectories import ReferenceParameters
+
+Traced = Callable[..., Iterable[Number]]
+
+SIDES: Final = 17
+"""How many sign checks a loop may have."""
+
+
+class RecorderHead(NamedTuple):
+    """The head of a recorder's memory; `SIDES` floats and the samples follow."""
+
+    left: float  # evaluations before the next sample
+    interval: float  # evaluations between samples
+    last_interval: float  # evaluations between the last two samples
+    samples: float  # taken so far
+    capacity: float  # maximum number of samples
+    terminated: float  # 1 once a sample has ended the flight
+    follows_position: float  # whether the horizontal position has a limit
+    reference: ReferenceParameters
+
+
+HEAD_SIZE: Final = record_size(RecorderHead)
+REFERENCE: Final = HEAD_SIZE - record_size(ReferenceParameters)
+
+
+class LoopPrograms:
+    """Traces the functions of a loop, whose choices are constants.
+
+    Args:
+        key: See `tiltsim.closed_loop.choices`.
+    """
+
+    def __init__(self, key: ProgramKey) -> None:
+        self._loop, self._key = key.loop, key
+
+    def _setup(self, user: InputVector) -> tuple[Any, InputVector]:
+        """Parameters and knots from their vector."""
+        record = self._loop.parameters
+        return _record(record, user, self._key.parameters), user[self._loop.record_size :]
+
+    @property
+    def user_size(self) -> int:
+        """Number of parameters and knots."""
+        return self._loop.record_size + self._key.knots
+
+    def in_mujoco(self) -> dict[str, Program]:
+        """The control step, sampled or held, and a sample, of MuJoCo's vectors."""
+        loop, sampling = self._loop, self._loop.sampling
+        sizes = loop.dynamics.sizes._asdict()
+        vectors = {"header": HEADER_SIZE, **sizes, "user": self.user_size}
+
+        def controls(lifting: Lifting, given: Sequence[InputVector]) -> Any:
+            header, qpos, qvel, act, _, user = given
+            time = _next_time(lifting, header)
+            return lifting(sampling.controls)(time, qpos, qvel, act, *self._setup(user))
+
+        def hold(lifting: Lifting, given: Sequence[InputVector]) -> Any:
+            header, qpos, qvel, act, ctrl, user = given
+            time, (parameters, _) = _next_time(lifting, header), self._setup(user)
+            return lifting(sampling.hold)(time, qpos, qvel, act, tuple(ctrl), parameters)
+
+        def sample(lifting: Lifting, given: Sequence[InputVector]) -> Iterable[Number]:
+            header, qpos, qvel, act, ctrl, user, recorder = given
+            count, per_step = header[EVALUATIONS], header[EVALUATIONS_PER_STEP]
+            start = make("mul", make("div", count, per_step), header[TIMESTEP])
+            values = lifting(loop.columns.observe)(qpos, qvel, act, tuple(ctrl))
+            return self._checked(lifting, start, values, user, recorder)
+
+        recorded = {**vectors, "recorder": HEAD_SIZE + SIDES}
+        return {
+            "controls": trace_scalar_code(controls, **vectors),
+            "hold": trace_scalar_code(hold, **vectors),
+            "sample": trace_scalar_code(sample, **recorded),
+        }
+
+    def on_equations(self, states: int, solver: str, held: bool) -> dict[str, Program]:
+        """A step and a sample of the equations, of their state with the inputs in force.
+
+        Args:
+            states: Number of states.
+            solver: See `tiltsim.equations.solvers.SOLVERS`.
+            held: Whether the controller is sampled and held, which takes two programs each: at a
+                control sample, and between two.
+        """
+        equations = self._loop.equations
+        assert equations is not None  # other loops do not fly on equations
+        step, size = make_step(equations, solver), states + equations.inputs_size
+
+        def stepped(samples: bool) -> Traced:
+            def run(lifting: Lifting, given: Sequence[InputVector]) -> Iterable[Number]:
+                (index,), now, (timestep, *disturbance), user = given
+                setup = *self._setup(user), tuple(disturbance)
+                integration = Integration(timestep, int(held), *setup)
+                time, force = make("mul", index, timestep), tuple(now[states:])
+                state, force = lifting(step)(time, list(now[:states]), force, samples, integration)
+                return (*state, *force)
+
+            return run
+
+        def sampled(samples: bool) -> Traced:
+            def run(lifting: Lifting, given: Sequence[InputVector]) -> Iterable[Number]:
+                (index,), now, (timestep, *_), user, recorder = given
+                time, setup = make("mul", index, timestep), self._setup(user)
+                state, force = tuple(now[:states]), now[states:]
+                if samples:
+                    force = lifting(equations.inputs)(time, state, *setup)
+                values = lifting(equations.observe)(time, state, tuple(force), *setup)
+                return self._checked(lifting, time, values, user, recorder)
+
+            return run
+
+        sizes = {"index": 1, "now": size, "settings": 4, "user": self.user_size}
+        recorded = {**sizes, "recorder": HEAD_SIZE + SIDES}
+        kinds = {"sampled": True, "held": False} if held else {"sampled": True}
+        return {
+            **{f"step_{k}": trace_scalar_code(stepped(s), **sizes) for k, s in kinds.items()},
+            **{f"sample_{k}": trace_scalar_code(sampled(s), **recorded) for k, s in kinds.items()},
+        }
+
+    def _checked(
+        self,
+        lifting: Lifting,
+        time: Number,
+        values: Iterable[Number],
+        user: InputVector,
+        recorder: InputVector,
+    ) -> Iterable[Number]:
+        """Time and values of a sample, and whether it ends the flight as the monitor would."""
+        loop, values, (parameters, knots) = self._loop, tuple(values), self._setup(user)
+        reference = _record(ReferenceParameters, recorder[REFERENCE:], self._key.reference)
+        checked = lifting(loop.monitoring.sign_check_values)(time, values, parameters, knots)
+        follows = make("ne", recorder[REFERENCE - 1], 0.0)
+        code = lifting(loop.kind.limit_exceeded)(time, values, reference, knots, follows)
+        ends = make("ne", code, float(WITHIN_LIMITS))
+        for value in values:
+            ends = make("or", ends, make("not", FUNCTIONS[isfinite](value)))
+        for number, before in zip(checked, recorder[HEAD_SIZE:]):
+            vanishes = make("lt", make("abs", number), SINGULAR)
+            crossed = make("ne", make("copysign", 1.0, number), before)
+            ends = make("or", ends, make("or", vanishes, crossed))
+        return (time, *values, ends)
+
+
+def _record(record: type[tuple[Any, ...]], numbers: InputVector, choices: Choices) -> Any:
+    """A record with some of its numbers known."""
+    known = dict(choices)
+    size = record_size(record)
+    return unflatten(record, (known[i] if i in known else numbers[i] for i in range(size)))
+
+
+def _next_time(lifting: Lifting, header: InputVector) -> Number:
+    """The time (s) of the next evaluation of the control step."""
+    numbers = header[EVALUATIONS], header[EVALUATIONS_PER_STEP], header[TIMESTEP]
+    return lifting(evaluation_time)(*numbers)
+
+
+def row_program(
+    function: Traced, record: type[tuple[Any, ...]], choices: Choices, sizes: dict[str, int]
+) -> Program:
+    """A scalar function over samples, see `tiltsim.engines.sample_evaluation`.
+
+    Args:
+        function: ``(time, state, parameters, knots) -> values``.
+        record: Type of the parameters.
+        choices: Parameters that are constants.
+        sizes: Of its vectors ``time``, ``state`` and ``user``.
+    """
+
+    def row(lifting: Lifting, given: Sequence[InputVector]) -> Any:
+        (time,), state, user = given
+        parameters, knots = _record(record, user, choices), user[record_size(record) :]
+        return lifting(function)(time, state, parameters, knots)
+
+    return trace_scalar_code(row, **sizes)
