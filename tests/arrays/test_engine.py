@@ -14,7 +14,7 @@ from tests.laws.test_laws import GUST, LAWS
 from tests.laws.test_multirotor import TILTS, document
 from tests.simulation.test_batch import CAR, CAR_GAITS, EXACT, GAITS
 from tiltsim.arrays.flying import Kernel, course_of, double_precision
-from tiltsim.equations.solvers import Integration, make_stepper
+from tiltsim.equations.solvers import Integration, make_step
 from tiltsim.errors import InputError
 from tiltsim.laws.assembling import assemble
 from tiltsim.plants.flight_model import disturbance_acceleration
@@ -93,15 +93,16 @@ def compare_steps(tables):
     simulation = assembly.scenario.simulation
     timing = simulation.timestep, simulation.control_steps
     integration = Integration(*timing, *assembly.setup, disturbance)
-    step, held = make_stepper(equations, simulation.solver), (0.0,) * equations.inputs_size
+    step, held = make_step(equations, simulation.solver), (0.0,) * equations.inputs_size
     start = [float(value) for value in equations.initial(assembly, assembly.setup)]
-    start, held = step(0, start, held, 1, integration)
+    start, held = step(0.0, start, held, True, integration)
     with double_precision():
         kernel = Kernel(course_of(assembly), assembly.setup, disturbance)
         carried, shape = jax.tree.flatten(kernel.at(1, start, held))
         program = jax.make_jaxpr(kernel.step)(jax.tree.unflatten(shape, carried))
         state = np.array(jax.tree.unflatten(shape, results(program, carried)).state)
-    python, _ = step(1, start, held, 1, integration)
+    samples = simulation.control_steps in (0, 1)
+    python, _ = step(simulation.timestep, start, held, samples, integration)
     scale = np.maximum(1.0, np.abs(python))
     np.testing.assert_array_less(np.abs(state - python) / scale, 1e-11)
 

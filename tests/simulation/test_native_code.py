@@ -16,6 +16,7 @@ from tiltsim.flight.end import End
 from tiltsim.laws.assembling import LOOPS, assemble
 from tiltsim.plants.engine_choice import choose_engine
 from tiltsim.plants.factory import make_plant
+from tiltsim_controllers.mathematics.scalar import scalar
 
 
 @pytest.mark.parametrize("law", LOOPS)
@@ -61,13 +62,19 @@ def test_columns_beside_a_state_out_of_all_bounds_raise_nothing():
     assert diverged.metrics()["diverged"] is True
 
 
-def test_a_row_without_a_result_is_no_number():
+@scalar
+def quotient(time, state, parameters, knots):
+    return state[0], time / state[0]
+
+
+def test_a_row_divides_by_zero_as_machine_code_does(monkeypatch):
     setup = assemble(scenario({})).setup
-    rows = tiltsim.engines.sample_evaluation.evaluate_over_samples(
-        lambda time, state, _parameters, _table: (state[0], time / state[0]),
-        *(2, np.array([1.0, 2.0]), np.array([[0.0], [4.0]]), setup),
-    )
-    np.testing.assert_array_equal(rows, [[np.nan, np.nan], [4.0, 0.5]])
+    samples = np.array([1.0, 2.0]), np.array([[0.0], [4.0]]), setup
+    for rows_to_compile in (20_000, 0):
+        name = "MIN_ROWS_TO_COMPILE"
+        monkeypatch.setattr(tiltsim.engines.sample_evaluation, name, rows_to_compile)
+        rows = tiltsim.engines.sample_evaluation.evaluate_over_samples(quotient, 2, *samples)
+        np.testing.assert_array_equal(rows, [[0.0, np.inf], [4.0, 0.5]])
 
 
 def test_a_flight_of_many_steps_is_compiled():

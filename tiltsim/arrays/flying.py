@@ -14,10 +14,10 @@ from tiltsim.arrays.lifting import Lifting
 from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.closed_loop.limits import SINGULAR, WITHIN_LIMITS
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup
-from tiltsim.equations.solvers import Integration, Stepper, make_step
+from tiltsim.equations.solvers import Integration, make_step
 from tiltsim.system.locks import one_thread_at_a_time
 from tiltsim_controllers.mathematics.records import flatten, record_size, unflatten
-from tiltsim_controllers.mathematics.scalar import Floats, Triple, Values
+from tiltsim_controllers.mathematics.scalar import Floats, Triple
 from tiltsim_controllers.references.trajectories import ReferenceParameters
 
 
@@ -326,18 +326,29 @@ def _split(course: Course, numbers: Any) -> tuple[Any, Any]:
     return numbers[:size], numbers[size:]
 
 
-def stepper_on_arrays(course: Course) -> Stepper:
-    """The solver for one flight in JAX, as `tiltsim.equations.solvers.make_stepper` makes it."""
-    require_jax('simulation.engine = "jax"')
+class JaxStepper:
+    """Integrates one flight in JAX.
 
-    def advance(
-        step_index: int, state: list[float], held: Values, steps: int, integration: Integration
-    ) -> tuple[list[float], Values]:
-        _, _, parameters, knots, disturbance = integration
+    Args:
+        course: See there.
+        setup: Parameters and knots.
+        disturbance: m/s^2, world axes.
+    """
+
+    def __init__(self, course: Course, setup: ControlSetup, disturbance: Triple) -> None:
+        require_jax('simulation.engine = "jax"')
+        numbers = tuple(flatten(setup.parameters)), tuple(setup.knots), disturbance
+        self._dtype = course.dtype
+        self._many = partial(_compiled_steps, course, *numbers)
+
+    def advance(self, step_index: int, now: Floats, steps: int) -> Floats:
+        """State and inputs in force some steps later, see `tiltsim.engines.steppers`.
+
+        Args:
+            step_index: Number of steps so far.
+            now: State and inputs in force, shape (states + inputs,).
+            steps: How many steps to take.
+        """
         with double_precision():
-            many = _compiled_steps(course, tuple(flatten(parameters)), tuple(knots), disturbance)
-            numbers = np.array([*state, *held], course.dtype)
-            state, held = _split(course, np.asarray(many(step_index, numbers, steps)).tolist())
-        return state, tuple(held)
-
-    return advance
+            later = self._many()(step_index, now.astype(self._dtype), steps)
+            return np.asarray(later, float)

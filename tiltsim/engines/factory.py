@@ -23,7 +23,7 @@ def make_engine(
         ValueError: If model and data do not belong to a flight of its loop.
     """
     if name == "python":
-        return PythonEngine(assembly.loop, model, data)
+        return PythonEngine(assembly, model, data)
     from tiltsim.engines.native_engine import NativeEngine
 
     return NativeEngine(assembly, model, data)

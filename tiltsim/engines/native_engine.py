@@ -49,7 +49,9 @@ def compile_control(key: ProgramKey) -> Any:
         width=width,
         rows_at=HEAD_SIZE + SIDES,
     )
-    code = MachineCode(llvm_functions(LoopPrograms(key).in_mujoco()) + glue)
+    code = MachineCode(
+        llvm_functions(LoopPrograms(key).in_mujoco("controls", "hold", "sample")) + glue
+    )
     return code.function("callback", None, _POINTER, _POINTER)
 
 

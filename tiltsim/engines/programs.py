@@ -59,15 +59,22 @@ class LoopPrograms:
     def _setup(self, user: InputVector) -> tuple[Any, InputVector]:
         """Parameters and knots from their vector."""
         record = self._loop.parameters
-        return _record(record, user, self._key.parameters), user[self._loop.record_size :]
+        return record_with_choices(record, user, self._key.parameters), user[
+            self._loop.record_size :
+        ]
 
     @property
     def user_size(self) -> int:
         """Number of parameters and knots."""
         return self._loop.record_size + self._key.knots
 
-    def in_mujoco(self) -> dict[str, Program]:
-        """The control step, sampled or held, and a sample, of MuJoCo's vectors."""
+    def in_mujoco(self, *names: str) -> dict[str, Program]:
+        """Programs of MuJoCo's vectors.
+
+        Args:
+            names: "controls" and "hold", the control step at and between the samples of the
+                controller, and "sample".
+        """
         loop, sampling = self._loop, self._loop.sampling
         sizes = loop.dynamics.sizes._asdict()
         vectors = {"header": HEADER_SIZE, **sizes, "user": self.user_size}
@@ -89,12 +96,9 @@ class LoopPrograms:
             values = lifting(loop.columns.observe)(qpos, qvel, act, tuple(ctrl))
             return self._checked(lifting, start, values, user, recorder)
 
-        recorded = {**vectors, "recorder": HEAD_SIZE + SIDES}
-        return {
-            "controls": trace_scalar_code(controls, **vectors),
-            "hold": trace_scalar_code(hold, **vectors),
-            "sample": trace_scalar_code(sample, **recorded),
-        }
+        functions = {"controls": controls, "hold": hold, "sample": sample}
+        sizes = {"sample": {**vectors, "recorder": HEAD_SIZE + SIDES}}
+        return {n: trace_scalar_code(functions[n], **sizes.get(n, vectors)) for n in names}
 
     def on_equations(self, states: int, solver: str, held: bool) -> dict[str, Program]:
         """A step and a sample of the equations, of their state with the inputs in force.
@@ -150,7 +154,9 @@ class LoopPrograms:
     ) -> Iterable[Number]:
         """Time and values of a sample, and whether it ends the flight as the monitor would."""
         loop, values, (parameters, knots) = self._loop, tuple(values), self._setup(user)
-        reference = _record(ReferenceParameters, recorder[REFERENCE:], self._key.reference)
+        reference = record_with_choices(
+            ReferenceParameters, recorder[REFERENCE:], self._key.reference
+        )
         checked = lifting(loop.monitoring.sign_check_values)(time, values, parameters, knots)
         follows = make("ne", recorder[REFERENCE - 1], 0.0)
         code = lifting(loop.kind.limit_exceeded)(time, values, reference, knots, follows)
@@ -164,8 +170,16 @@ class LoopPrograms:
         return (time, *values, ends)
 
 
-def _record(record: type[tuple[Any, ...]], numbers: InputVector, choices: Choices) -> Any:
-    """A record with some of its numbers known."""
+def record_with_choices(
+    record: type[tuple[Any, ...]], numbers: InputVector, choices: Choices
+) -> Any:
+    """A record whose choices are constants.
+
+    Args:
+        record: Its type.
+        numbers: The numbers of the flattened record, or more.
+        choices: See `tiltsim.closed_loop.choices`.
+    """
     known = dict(choices)
     size = record_size(record)
     return unflatten(record, (known[i] if i in known else numbers[i] for i in range(size)))
@@ -175,23 +189,3 @@ def _next_time(lifting: Lifting, header: InputVector) -> Number:
     """The time (s) of the next evaluation of the control step."""
     numbers = header[EVALUATIONS], header[EVALUATIONS_PER_STEP], header[TIMESTEP]
     return lifting(evaluation_time)(*numbers)
-
-
-def row_program(
-    function: Traced, record: type[tuple[Any, ...]], choices: Choices, sizes: dict[str, int]
-) -> Program:
-    """A scalar function over samples, see `tiltsim.engines.sample_evaluation`.
-
-    Args:
-        function: ``(time, state, parameters, knots) -> values``.
-        record: Type of the parameters.
-        choices: Parameters that are constants.
-        sizes: Of its vectors ``time``, ``state`` and ``user``.
-    """
-
-    def row(lifting: Lifting, given: Sequence[InputVector]) -> Any:
-        (time,), state, user = given
-        parameters, knots = _record(record, user, choices), user[record_size(record) :]
-        return lifting(function)(time, state, parameters, knots)
-
-    return trace_scalar_code(row, **sizes)

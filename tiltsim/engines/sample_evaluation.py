@@ -3,19 +3,24 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable, Iterator
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Sequence
 from functools import cache
 from itertools import pairwise
-from math import nan
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from tiltsim.arrays.lifting import Lifting
+from tiltsim.arrays.traced_numbers import trace_scalar_code
 from tiltsim.closed_loop.choices import Choices, choices_of
 from tiltsim.closed_loop.loop import ControlSetup
 from tiltsim.engines.glue import ROWS, filled
+from tiltsim.engines.machine_code import MachineCode
+from tiltsim.engines.programs import record_with_choices
 from tiltsim.system.locks import one_thread_at_a_time
+from tiltsim_controllers.code.llvm_text import llvm_functions
+from tiltsim_controllers.code.program import InputVector, Program
+from tiltsim_controllers.code.python_source import python_function
 from tiltsim_controllers.mathematics.records import leaves, record_size, unflatten
 from tiltsim_controllers.mathematics.scalar import Floats, Values
 
@@ -43,20 +48,35 @@ def evaluate_over_samples(
         setup: Parameters and knots; parameters may be arrays (N,), for samples of several flights.
 
     Returns:
-        The values, shape (N, width), equal for Python and native code. Where an operation on floats
-        has no result, as beside the state of a diverged flight, Python's whole row is NaN.
+        The values, shape (N, width), equal for Python and machine code.
     """
     evaluated = _evaluated[function] = _evaluated.get(function, 0) + len(time)
-    natively = evaluated >= MIN_ROWS_TO_COMPILE
-    rows = np.full((len(time), width), nan)
+    evaluate = _natively if evaluated >= MIN_ROWS_TO_COMPILE else _in_python
+    rows = np.empty((len(time), width))
     for part, own in _flights(setup, len(time)):
-        if natively:
-            rows[part] = _evaluate_natively(function, width, time[part], states[part], own)
-            continue
-        for row, t, state in zip(rows[part], time[part].tolist(), states[part].tolist()):
-            with suppress(ArithmeticError, ValueError):
-                row[:] = function(t, state, own.parameters, own.knots)
+        record: Any = type(own.parameters)
+        sizes = states.shape[1], record_size(record) + len(own.knots)
+        row = Row(function, record, choices_of(own.parameters), *sizes)
+        rows[part] = evaluate(row, width, time[part], states[part], own.userdata)
     return rows
+
+
+class Row(NamedTuple):
+    """A scalar function ``(time, state, parameters, knots) -> values``, and what it is traced with.
+
+    Attributes:
+        function: The function.
+        record: Type of the parameters.
+        choices: Parameters that are constants.
+        state: Number of states.
+        user: Number of parameters and knots.
+    """
+
+    function: Callable[..., Values]
+    record: type[tuple[Any, ...]]
+    choices: Choices
+    state: int
+    user: int
 
 
 def _flights(setup: ControlSetup, samples: int) -> Iterator[tuple[slice, ControlSetup]]:
@@ -74,34 +94,33 @@ def _flights(setup: ControlSetup, samples: int) -> Iterator[tuple[slice, Control
         yield slice(first, end), ControlSetup(parameters, setup.knots)
 
 
-def _evaluate_natively(
-    function: Callable[..., Values], width: int, time: Floats, states: Floats, setup: ControlSetup
-) -> Floats:
-    """`evaluate_over_samples` for at least one row."""
-    record: Any = type(setup.parameters)
-    choices = choices_of(setup.parameters)
-    rows = _compile_rows(function, record, choices, states.shape[1], width, len(setup.knots))
+@one_thread_at_a_time
+@cache
+def _program(row: Row) -> Program:
+    def traced(lifting: Lifting, given: Sequence[InputVector]) -> Any:
+        (time,), state, user = given
+        parameters = record_with_choices(row.record, user, row.choices)
+        return lifting(row.function)(time, state, parameters, user[record_size(row.record) :])
+
+    return trace_scalar_code(traced, time=1, state=row.state, user=row.user)
+
+
+def _in_python(row: Row, _width: int, time: Floats, states: Floats, user: Floats) -> Floats:
+    function = python_function(_program(row), "row", fixed={"user": user.tolist()})
+    rows = [function((t,), state) for t, state in zip(time.tolist(), states.tolist())]
+    return np.array(rows)
+
+
+def _natively(row: Row, width: int, time: Floats, states: Floats, user: Floats) -> Floats:
     values = np.empty((len(time), width))
-    arrays = [np.ascontiguousarray(array) for array in (time, states, setup.userdata)]
-    rows(len(time), *(array.ctypes.data for array in (*arrays, values)))
+    arrays = [np.ascontiguousarray(array) for array in (time, states, user)]
+    _compiled(row, width)(len(time), *(array.ctypes.data for array in (*arrays, values)))
     return values
 
 
 @one_thread_at_a_time
 @cache
-def _compile_rows(
-    function: Callable[..., Values],
-    record: type[tuple[Any, ...]],
-    choices: Choices,
-    state: int,
-    width: int,
-    knots: int,
-) -> Any:
-    from tiltsim.engines.machine_code import MachineCode
-    from tiltsim.engines.programs import row_program
-    from tiltsim_controllers.code.llvm_text import llvm_functions
-
-    sizes = {"time": 1, "state": state, "user": record_size(record) + knots}
-    text = llvm_functions({"row": row_program(function, record, choices, sizes)})
-    code = MachineCode(text + filled(ROWS, state=state, width=width))
+def _compiled(row: Row, width: int) -> Any:
+    glue = filled(ROWS, state=row.state, width=width)
+    code = MachineCode(llvm_functions({"row": _program(row)}) + glue)
     return code.function("rows", None, ctypes.c_int64, *[ctypes.c_void_p] * 4)

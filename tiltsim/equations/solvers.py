@@ -13,8 +13,6 @@ from tiltsim.closed_loop.loop import Equations
 from tiltsim.closed_loop.userdata import just_after, just_before
 from tiltsim_controllers.mathematics.scalar import Triple, Values, Vector, scalar
 
-Stepper = Callable[..., tuple[list[float], Values]]
-
 
 class Integration(NamedTuple):
     """Constants of the integration of one flight."""
@@ -153,25 +151,3 @@ def make_step(equations: Equations, solver: str) -> Callable[..., tuple[list[flo
         return project_onto_limits(state, integration.parameters), held
 
     return step
-
-
-def make_stepper(equations: Equations, solver: str) -> Stepper:
-    """The solver for a loop's equations, as scalar code.
-
-    Returns:
-        ``(step_index, state, held, steps, integration) -> state, held``: as many steps of
-        `make_step`, from a step on.
-    """
-    step = make_step(equations, solver)
-
-    def advance(
-        step_index: int, state: list[float], held: Values, steps: int, integration: Integration
-    ) -> tuple[list[float], Values]:
-        control_steps = integration.control_steps
-        for index in range(step_index, step_index + steps):
-            samples = control_steps == 0 or index % control_steps == 0
-            time = index * integration.timestep
-            state, held = step(time, state, held, samples, integration)
-        return state, held
-
-    return advance

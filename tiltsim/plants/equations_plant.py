@@ -4,19 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import nan
-from typing import Any
 
 import numpy as np
 
 from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.closed_loop.choices import program_key
 from tiltsim.engines.base import EngineName
-from tiltsim.equations.solvers import Integration, Stepper, make_stepper
+from tiltsim.engines.steppers import Integrated, NativeStepper, PythonStepper, Stepper
 from tiltsim.plants.engine_choice import choose_engine
 from tiltsim.plants.flight_model import disturbance_acceleration
 from tiltsim.plants.plant import Plant
-from tiltsim_controllers.mathematics.records import slotted
-from tiltsim_controllers.mathematics.scalar import Floats, Values
+from tiltsim_controllers.mathematics.scalar import Floats
 
 
 class EquationsPlant(Plant):
@@ -34,32 +32,31 @@ class EquationsPlant(Plant):
         self._step_index = 0
         self._state = list(map(float, self._equations.initial(assembly, setup)))
         self._held = (0.0,) * self._equations.inputs_size
-        self._fault = ""
         self.engine: EngineName = engine or choose_engine(scenario)
-        simulation, disturbance = scenario.simulation, disturbance_acceleration(scenario)
-        solver, numbers = simulation.solver, (simulation.timestep, simulation.control_steps)
-        record: tuple[Any, Any] = setup
-        self._advance: Stepper
+        simulation = scenario.simulation
+        self._timestep, self._every = simulation.timestep, simulation.control_steps
+        flight = Integrated(
+            program_key(assembly),
+            len(self._state),
+            simulation.solver,
+            self._timestep,
+            self._every,
+            setup.userdata,
+            disturbance_acceleration(scenario),
+        )
+        self._stepper: Stepper
         if self.engine == "native":
-            from tiltsim.engines.native_stepper import NativeStepper
-
-            states = len(self._state)
-            self._native = NativeStepper(
-                program_key(assembly), states, solver, *numbers, setup.userdata, disturbance
-            )
-            self._advance = self._advance_natively
+            self._native = self._stepper = NativeStepper(flight)
         elif self.engine == "jax":
-            from tiltsim.arrays.flying import course_of, stepper_on_arrays
+            from tiltsim.arrays.flying import JaxStepper, course_of
 
-            self._advance = stepper_on_arrays(course_of(assembly))
+            self._stepper = JaxStepper(course_of(assembly), setup, flight.disturbance)
         else:
-            self._advance = make_stepper(self._equations, solver)
-            record = slotted(setup.parameters), setup.knots
-        self._integration = Integration(*numbers, *record, disturbance)
+            self._stepper = PythonStepper(flight)
 
     @property
     def time(self) -> float:
-        return self._step_index * self._integration.timestep
+        return self._step_index * self._timestep
 
     @property
     def state(self) -> Floats:
@@ -75,18 +72,19 @@ class EquationsPlant(Plant):
         self._step_index = int(value[0])
         self._held = tuple(value[1:split].tolist())
         self._state = value[split:].tolist()
-        self._fault = ""
+
+    @property
+    def _now(self) -> Floats:
+        """State and inputs in force."""
+        return np.array([*self._state, *self._held])
+
+    @_now.setter
+    def _now(self, values: Floats) -> None:
+        numbers, size = values.tolist(), len(self._state)
+        self._state, self._held = numbers[:size], tuple(numbers[size:])
 
     def advance(self, steps: int) -> None:
-        try:
-            state, self._held = self._advance(
-                self._step_index, self._state, self._held, steps, self._integration
-            )
-            self._state = list(map(float, state))  # numpy's own floats would warn of infinity
-        except (ArithmeticError, ValueError):
-            # Where floats raise, native code has NaN.
-            self._state = [nan] * len(self._state)
-            self._fault = "the control law left the range of floating-point numbers"
+        self._now = self._stepper.advance(self._step_index, self._now, steps)
         self._step_index += steps
 
     def record(self, samples: int, steps: int) -> Floats | None:
@@ -99,22 +97,9 @@ class EquationsPlant(Plant):
 
         checked = self._assembly.sign_check_values(self.time, self.observe())
         recorder = Recorder(self._assembly, samples, steps, steps, checked)
-        now = np.array([*self._state, *self._held])
-        self._step_index = self._native.advance(self._step_index, now, samples, steps, recorder)
-        self._state, self._held = self._split(now)
+        found = self._native.record(self._step_index, self._now, samples, steps, recorder)
+        self._step_index, self._now = found
         return None if recorder.terminated else recorder.samples
-
-    def _advance_natively(
-        self, step_index: int, state: list[float], held: Values, steps: int, _: Integration
-    ) -> tuple[list[float], Values]:
-        now = np.array([*state, *held])
-        self._native.advance(step_index, now, 1, steps, None)
-        return self._split(now)
-
-    def _split(self, now: Floats) -> tuple[list[float], Values]:
-        """State and inputs in force."""
-        values = now.tolist()
-        return values[: len(self._state)], tuple(values[len(self._state) :])
 
     def observe(self) -> tuple[float, ...]:
         setup = self._setup
@@ -126,7 +111,7 @@ class EquationsPlant(Plant):
             return (nan,) * (len(self._assembly.loop.sample_fields) - 1)
 
     def _inputs_in_force(self) -> Sequence[float]:
-        every = self._integration.control_steps
+        every = self._every
         if every > 0 and self._step_index % every != 0:
             return self._held
         try:
@@ -136,4 +121,4 @@ class EquationsPlant(Plant):
             return [nan] * len(self._held)
 
     def fault(self) -> str:
-        return self._fault
+        return ""

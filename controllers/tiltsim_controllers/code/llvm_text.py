@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 from tiltsim_controllers.code.operations import OPERATIONS
@@ -54,7 +54,7 @@ define internal double @uniform(double %seed, double %channel, double %index) {
 _PURE: Final = "nounwind willreturn memory(none)"
 
 
-def llvm_functions(programs: dict[str, Program]) -> str:
+def llvm_functions(programs: Mapping[str, Program]) -> str:
     """The text of ``void name(double *argument, ..., double *results)`` for every program."""
     declared: dict[str, str] = {}
     tables: list[str] = []

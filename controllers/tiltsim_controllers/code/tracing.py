@@ -311,6 +311,10 @@ def _logical(graph: Graph, op: str, *args: Number) -> Number:
     return args[0] if args[0] is args[1] else graph.known(op, args)
 
 
+def _is_negative(value: Number) -> bool:
+    return isinstance(value, Expr) and value.op == "neg"
+
+
 _FOLDED: Final = frozenset({"add", "sub", "mul", "div", "neg", "pow"})
 
 
@@ -321,10 +325,16 @@ def _folded(op: str, x: Number, y: Number = None) -> Number | None:
     the only rules that are not IEEE's.
     """
     if op == "neg":
-        return x.args[0] if x.op == "neg" else None
+        return x.args[0] if _is_negative(x) else None
     a, b = (None if isinstance(value, Expr) else value for value in (x, y))
     if op == "add" and 0.0 in (a, b):
         return y if a == 0.0 else x
+    if op == "add" and _is_negative(y):
+        return make("sub", x, y.args[0])
+    if op == "add" and _is_negative(x):
+        return make("sub", y, x.args[0])
+    if op == "sub" and _is_negative(y):
+        return make("add", x, y.args[0])
     if op == "sub" and b == 0.0:
         return x
     if op == "sub" and a == 0.0:
