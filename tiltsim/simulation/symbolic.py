@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from os import PathLike
 from typing import Any, NamedTuple
 
-from tiltsim.arrays.casadi_symbols import CasadiSymbols
 from tiltsim.arrays.lifting import Lifting
-from tiltsim.errors import InputError
+from tiltsim.arrays.traced_numbers import trace_scalar_code
+from tiltsim.engines.programs import Traced
+from tiltsim.errors import InputError, TiltsimError
 from tiltsim.laws.assembling import assemble
 from tiltsim.plants.flight_model import disturbance_acceleration
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.scenario import Scenario
+from tiltsim.system.optional import optional_package
+from tiltsim_controllers.code.casadi_function import casadi_function
+from tiltsim_controllers.code.messages import TraceError
+from tiltsim_controllers.code.program import InputVector
 
 
 class Symbolic(NamedTuple):
@@ -50,32 +55,45 @@ def symbolic(scenario: Scenario | str | PathLike[str] | Mapping[str, Any]) -> Sy
         raise InputError(
             'simulation.plant = "mujoco": symbolic supports "thesis" and "rigid_body" only'
         )
-    symbols = CasadiSymbols()
+    optional_package("casadi", "tiltsim.symbolic", "'tiltsim[casadi]'")
     assembly = assemble(scenario)
-    equations, (parameters, knots) = assembly.loop.equations, assembly.setup
+    equations, setup = assembly.loop.equations, assembly.setup
     assert equations is not None  # mujoco is refused
-    disturbance = disturbance_acceleration(scenario)
-    initial = tuple(map(float, equations.initial(assembly, assembly.setup)))
-    lifting, sx = Lifting(symbols), symbols.casadi.SX
-    law, rates = lifting(equations.inputs), lifting(equations.rates)
-    observe = lifting(equations.observe)
-    time, state = sx.sym("time"), sx.sym("state", len(initial))
-    inputs = sx.sym("inputs", equations.inputs_size)
-    states = [state[index] for index in range(len(initial))]
-    free = tuple(inputs[index] for index in range(equations.inputs_size))
-    chosen = law(time, states, parameters, knots)
+    initial = tuple(map(float, equations.initial(assembly, setup)))
+    moved = *setup, disturbance_acceleration(scenario)
 
-    def function(name: str, values: Any, result: str, *arguments: Any) -> Any:
-        vector = symbols.casadi.vertcat(*values)
-        names = [str(argument[0]).rpartition("_")[0] or "time" for argument in arguments]
-        return symbols.casadi.Function(name, [*arguments], [vector], names, [result])
+    def dynamics(lifting: Lifting, given: Sequence[InputVector]) -> Any:
+        (time,), state, inputs = given
+        return lifting(equations.rates)(time, [*state], tuple(inputs), *moved)
 
-    moved = (parameters, knots, disturbance)
+    def controller(lifting: Lifting, given: Sequence[InputVector]) -> Any:
+        (time,), state = given
+        return lifting(equations.inputs)(time, [*state], *setup)
+
+    def closed_loop(lifting: Lifting, given: Sequence[InputVector]) -> Any:
+        (time,), state = given
+        chosen = tuple(controller(lifting, given))
+        return lifting(equations.rates)(time, [*state], chosen, *moved)
+
+    def sample(lifting: Lifting, given: Sequence[InputVector]) -> Any:
+        (time,), state = given
+        chosen = tuple(controller(lifting, given))
+        return lifting(equations.observe)(time, [*state], chosen, *setup)
+
+    sizes = {"time": 1, "state": len(initial)}
+
+    def function(traced: Traced, result: str, **more: int) -> Any:
+        program = trace_scalar_code(traced, **sizes, **more)
+        try:
+            return casadi_function(program, traced.__name__, result)
+        except TraceError as error:
+            raise TiltsimError(str(error)) from error
+
     return Symbolic(
-        function("dynamics", rates(time, states, free, *moved), "rates", time, state, inputs),
-        function("controller", chosen, "inputs", time, state),
-        function("closed_loop", rates(time, states, chosen, *moved), "rates", time, state),
-        function("sample", observe(time, states, chosen, parameters, knots), "sample", time, state),
+        function(dynamics, "rates", inputs=equations.inputs_size),
+        function(controller, "inputs"),
+        function(closed_loop, "rates"),
+        function(sample, "sample"),
         initial,
         assembly.loop.sample_fields[1:],
     )

@@ -11,6 +11,7 @@ from tests.controllers.code.test_programs import SPECIAL, same
 from tests.natively import machine_code
 from tiltsim_controllers.code.arrays import flatten, xp
 from tiltsim_controllers.code.blocks import branch, repeat, signal, take
+from tiltsim_controllers.code.casadi_function import casadi_function
 from tiltsim_controllers.code.messages import TraceError
 from tiltsim_controllers.code.program import trace_vectors
 from tiltsim_controllers.code.python_source import python_function, python_source
@@ -145,3 +146,24 @@ def test_numbers_of_nested_values_are_put_back_in_their_places():
     matrix, rest = build([10.0 * leaf for leaf in leaves])
     np.testing.assert_array_equal(matrix, 10.0 * value[0])
     assert rest == [10.0, (20.0,)]
+
+
+@pytest.mark.parametrize("function", [everything, nested])
+def test_casadi_agrees(function):
+    pytest.importorskip("casadi")
+    turns = 4.0
+
+    def fixed(x):
+        return function(xp.array([x[0], x[1], turns]))
+
+    program = traced(fixed, 2)
+    symbolic, law = casadi_function(program, "law", "y"), python_function(program)
+    for x in points(function)[:50]:
+        result = symbolic(x[:2]).full().ravel()
+        np.testing.assert_allclose(result, law(x[:2].tolist()), rtol=1e-12, atol=1e-12)
+
+
+def test_a_loop_of_unknown_length_has_no_form_in_casadi():
+    pytest.importorskip("casadi")
+    with pytest.raises(TraceError, match="the number of turns of a loop has to be known"):
+        casadi_function(traced(nested, 3), "law", "y")
