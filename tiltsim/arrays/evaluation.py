@@ -41,10 +41,12 @@ class Frame(Expressions):
     def block(self, statements: list[ast.stmt], variables: dict[str, Any]) -> Ends:
         """Evaluate statements one after the other."""
         ends: Ends = {NEXT: (True, variables)}
-        for statement in statements:
+        for place, statement in enumerate(statements):
             if NEXT not in ends:
                 break
             condition, variables = ends.pop(NEXT)
+            if condition is not True and set(ends) == {RETURN}:
+                return self.otherwise(ends, condition, statements[place:], variables)
             self.line = statement.lineno
             with self.lifting.under(condition):
                 try:
@@ -56,6 +58,20 @@ class Frame(Expressions):
                     kind = PlainNumberError if refused else LiftError
                     raise self.error(text, kind) from error
         return ends
+
+    def otherwise(
+        self, ends: Ends, condition: Any, statements: list[ast.stmt], variables: dict[str, Any]
+    ) -> Ends:
+        """Evaluate statements after an early return, lazily where the arrays can."""
+        arrays, lifting = self.lifting.arrays, self.lifting
+        with arrays.side() as side, lifting.under(condition):
+            later = self.block(statements, variables)
+        if set(later) == {RETURN} and later[RETURN][0] is True:
+            with arrays.joined(condition, side):
+                value = lifting.select(condition, later[RETURN][1], ends[RETURN][1])
+            return {RETURN: (True, value)}
+        arrays.keep(side)
+        return self.follow(ends, condition, later)
 
     def follow(self, ends: Ends, condition: Any, later: Ends) -> Ends:
         """Ends of a block so far, and those of what comes next under a condition."""

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager
 from functools import partial, reduce
 from typing import Any, Final
 
@@ -12,7 +13,16 @@ from tiltsim.arrays.values import Function
 from tiltsim_controllers.code.blocks import take
 from tiltsim_controllers.code.messages import TraceError
 from tiltsim_controllers.code.program import InputVector, Program, trace_vectors
-from tiltsim_controllers.code.tracing import COMPOSED, Expr, Graph, Number, make
+from tiltsim_controllers.code.tracing import (
+    COMPOSED,
+    Block,
+    Expr,
+    Graph,
+    Number,
+    as_real,
+    graph_in_use,
+    make,
+)
 from tiltsim_controllers.mathematics.noise import uniform
 
 
@@ -48,13 +58,16 @@ FUNCTIONS: Final[Mapping[Function, Function]] = {
 }
 
 
+LAZY_FROM: Final = 50
+"""Operations that are skipped, rather than evaluated and dropped: a branch costs a few of them."""
+
+
 class TracedNumbers:
     """Symbolic numbers as `tiltsim.arrays.values.Arrays`."""
 
     domains: Final[Mapping[Function, float]] = {}
     refusals = (TraceError,)
     functions = FUNCTIONS
-    where = staticmethod(partial(make, "where"))
     both = staticmethod(partial(make, "and"))
     either = staticmethod(partial(make, "or"))
     negated = staticmethod(partial(make, "not"))
@@ -63,6 +76,39 @@ class TracedNumbers:
     def is_array(self, value: Any) -> bool:
         """Whether a value is known only when the program runs."""
         return isinstance(value, Expr)
+
+    def __init__(self) -> None:
+        self._joining: list[tuple[Number, Expr]] = []
+
+    def where(self, condition: Number, yes: Number, no: Number) -> Number:
+        """Select by a condition."""
+        if self._joining and self._joining[-1][0] is condition:
+            branch = self._joining[-1][1]
+            for block, value in zip(branch.blocks, (yes, no)):
+                block.results.append(as_real(value))
+            return graph_in_use().add("get", [branch, len(branch.blocks[0].results) - 1])
+        return make("where", condition, yes, no)
+
+    def side(self) -> AbstractContextManager[Block]:
+        """Collect operations in a block."""
+        return graph_in_use().block()
+
+    @contextmanager
+    def joined(self, condition: Number, side: Block) -> Iterator[None]:
+        """Make a branch of a block that is long enough."""
+        if len(side.operations) < LAZY_FROM:
+            self.keep(side)
+            yield
+            return
+        self._joining.append(
+            (condition, graph_in_use().add("branch", [condition], (side, Block())))
+        )
+        yield
+        self._joining.pop()
+
+    def keep(self, side: Block) -> None:
+        """Append a block to the one around it."""
+        graph_in_use().extend(side)
 
     def vector(self, values: Any) -> Any:
         """Numbers as they are."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import AbstractContextManager
 from typing import Any, Protocol
 
 from tiltsim.errors import TiltsimError
@@ -47,6 +48,20 @@ class Arrays(Protocol):
 
     def separately(self, function: Function, args: Any, key: Any) -> Any:
         """Call a function in a way that it is compiled on its own."""
+
+    def side(self) -> AbstractContextManager[Any]:
+        """Collect what is computed, for `joined` or `keep`."""
+
+    def joined(self, condition: Any, side: Any) -> AbstractContextManager[None]:
+        """Within this block, `where` by the condition is what a side computes only where it holds.
+
+        Args:
+            condition: Whether the side is computed.
+            side: From `side`.
+        """
+
+    def keep(self, side: Any) -> None:
+        """Compute a side in any case."""
 
     def both(self, first: Any, second: Any) -> Any:
         """Conjunction."""

@@ -205,6 +205,11 @@ class Graph:
                 return scope.known[key]
         return self.add(op, args, key=key)
 
+    def extend(self, block: Block) -> None:
+        """Append the operations of a block to the innermost one."""
+        self.scopes[-1].operations += block.operations
+        self.scopes[-1].known |= block.known
+
     @contextmanager
     def block(self) -> Iterator[Block]:
         """Collect operations in a block of their own."""
@@ -234,8 +239,16 @@ def tracing_into(graph: Graph) -> Iterator[Graph]:
 
 
 def current_graph() -> Graph | None:
-    """The graph that is being traced."""
+    """The graph that is being traced, if any."""
     return _current.get()
+
+
+def graph_in_use() -> Graph:
+    """The graph that is being traced; raises `TraceError` without one."""
+    graph = _current.get()
+    if graph is None:
+        refuse("a traced number outside its trace", "return it from the function instead")
+    return graph
 
 
 def make(op: str, *args: Any) -> Number:
@@ -247,9 +260,7 @@ def make(op: str, *args: Any) -> Number:
     """
     if not any(isinstance(a, Expr) for a in args):
         return OPERATIONS[op].value(*map(_number, args))
-    graph = _current.get()
-    if graph is None:
-        refuse("a traced number outside its trace", "return it from the function instead")
+    graph = graph_in_use()
     if op == "where":
         return _where(graph, *args)
     if op in ("and", "or", "not"):
@@ -277,9 +288,7 @@ def is_condition(value: Any) -> bool:
 
 def as_condition(value: Any) -> Number:
     """A number as a condition: whether it differs from zero."""
-    if is_condition(value):
-        return value
-    return make("ne", value, 0.0)
+    return value if is_condition(value) else make("ne", value, 0.0)
 
 
 def as_real(value: Any) -> Number:
@@ -329,12 +338,10 @@ def _folded(op: str, x: Number, y: Number = None) -> Number | None:
     a, b = (None if isinstance(value, Expr) else value for value in (x, y))
     if op == "add" and 0.0 in (a, b):
         return y if a == 0.0 else x
-    if op == "add" and _is_negative(y):
-        return make("sub", x, y.args[0])
+    if op in ("add", "sub") and _is_negative(y):
+        return make("sub" if op == "add" else "add", x, y.args[0])
     if op == "add" and _is_negative(x):
         return make("sub", y, x.args[0])
-    if op == "sub" and _is_negative(y):
-        return make("add", x, y.args[0])
     if op == "sub" and b == 0.0:
         return x
     if op == "sub" and a == 0.0:
@@ -347,11 +354,8 @@ def _folded(op: str, x: Number, y: Number = None) -> Number | None:
         return y
     if op == "mul" and -1.0 in (a, b):
         return make("neg", y if a == -1.0 else x)
-    if op == "pow" and b in (2.0, 3.0, 0.5):
-        if b == 0.5:
-            return make("sqrt", x)
-        square = make("mul", x, x)
-        return square if b == 2.0 else make("mul", square, x)
+    if op == "pow" and b == 2.0:
+        return make("mul", x, x)
     return None
 
 
@@ -372,15 +376,11 @@ def _larger(a: Number, b: Number) -> Number:
     return make("where", make("gt", b, a), b, a)
 
 
-def _distance(a: Number, b: Number) -> Number:
-    return make("sqrt", make("add", make("mul", a, a), make("mul", b, b)))
-
-
 COMPOSED: Final[dict[str, Callable[..., Number]]] = {
     "minimum": _smaller,
     "maximum": _larger,
     "remainder": remainder,
-    "hypot": _distance,
+    "hypot": lambda a, b: make("sqrt", a * a + b * b),
     "square": lambda a: make("mul", a, a),
     "positive": lambda a: a,
     "isnan": lambda a: make("ne", a, a),
