@@ -62,7 +62,14 @@ class Frame(Expressions):
     def otherwise(
         self, ends: Ends, condition: Any, statements: list[ast.stmt], variables: dict[str, Any]
     ) -> Ends:
-        """Evaluate statements after an early return, lazily where the arrays can."""
+        """Evaluate statements after an early return, lazily where the arrays can.
+
+        Args:
+            ends: The early return.
+            condition: Whether there was none.
+            statements: What follows it.
+            variables: As they are without it.
+        """
         arrays, lifting = self.lifting.arrays, self.lifting
         with arrays.side() as side, lifting.under(condition):
             later = self.block(statements, variables)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import ast
 import builtins
+import linecache
 import operator
 from collections.abc import Iterable, Iterator, Mapping
 from functools import cache, reduce
-from pathlib import Path
 from types import FunctionType
 from typing import Any, Final
 
@@ -50,7 +50,7 @@ class Borrowed(list[Any]):
 @cache
 def _definitions(file: str) -> dict[int, list[ast.FunctionDef | ast.Lambda]]:
     """The functions of a source file by their first line."""
-    tree = ast.parse(Path(file).read_text(encoding="utf-8"))
+    tree = ast.parse("".join(linecache.getlines(file)))  # of a file, or a cell of a notebook
     found: dict[int, list[ast.FunctionDef | ast.Lambda]] = {}
     for node in ast.walk(tree):
         if isinstance(node, ast.FunctionDef | ast.Lambda):
@@ -66,10 +66,9 @@ def _definition(function: FunctionType) -> ast.FunctionDef | ast.Lambda:
         (node,) = ast.parse(text).body
         assert isinstance(node, ast.FunctionDef)
         return node
-    if Path(code.co_filename).is_file():
-        for node in _definitions(code.co_filename).get(code.co_firstlineno, []):
-            if getattr(node, "name", "<lambda>") == code.co_name:
-                return node
+    for node in _definitions(code.co_filename).get(code.co_firstlineno, []):
+        if getattr(node, "name", "<lambda>") == code.co_name:
+            return node
     raise LiftError(f"{code.co_name}: its source is not in {code.co_filename}")
 
 

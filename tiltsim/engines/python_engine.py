@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache, partial
 from struct import Struct
 from typing import Any
@@ -10,18 +11,48 @@ import mujoco
 
 from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.closed_loop.choices import ProgramKey, program_key
-from tiltsim.closed_loop.userdata import CONTROL_PERIOD, EVALUATIONS, HEADER_SIZE
+from tiltsim.closed_loop.userdata import (
+    CONTROL_PERIOD,
+    EVALUATIONS,
+    EVALUATIONS_PER_STEP,
+    HEADER_SIZE,
+    TIMESTEP,
+    evaluation_time,
+)
 from tiltsim.engines.base import Callback, Engine, EngineName, check_model
 from tiltsim.engines.programs import LoopPrograms
 from tiltsim.system.locks import one_thread_at_a_time
 from tiltsim_controllers.code.program import Program
 from tiltsim_controllers.code.python_source import python_function
+from tiltsim_controllers.mathematics.records import unflatten
+from tiltsim_controllers.mathematics.scalar import Values, Vector, is_scalar
 
 
 @one_thread_at_a_time
 @cache
 def _program(key: ProgramKey, name: str) -> Program:
     return LoopPrograms(key).in_mujoco(name)[name]
+
+
+def _control_step(assembly: Assembly, user: list[float], name: str) -> Callable[..., Values]:
+    """A control step ``(header, qpos, qvel, act, ctrl) -> ctrl``, with parameters and knots bound.
+
+    What depends on these alone is evaluated once. A step that is no scalar code, as one that keeps
+    a state of its own, runs as it is.
+    """
+    loop = assembly.loop
+    if name == "hold" or is_scalar(loop.sampling.controls):
+        return python_function(_program(program_key(assembly), name), name, fixed={"user": user})
+    parameters = unflatten(loop.parameters, user)
+    knots = tuple(user[loop.record_size :])
+
+    def controls(
+        header: list[float], qpos: Vector, qvel: Vector, act: Vector, _ctrl: Vector
+    ) -> Values:
+        numbers = header[EVALUATIONS], header[EVALUATIONS_PER_STEP], header[TIMESTEP]
+        return loop.sampling.controls(evaluation_time(*numbers), qpos, qvel, act, parameters, knots)
+
+    return controls
 
 
 class PythonEngine(Engine):
@@ -31,16 +62,14 @@ class PythonEngine(Engine):
 
     def __init__(self, assembly: Assembly, model: mujoco.MjModel, data: mujoco.MjData) -> None:
         check_model(assembly.loop, model, data)
-        key = program_key(assembly)
-        # Parameters do not change during a flight; what depends on them alone is evaluated once.
-        fixed = {"user": data.userdata[HEADER_SIZE:].tolist()}
-        controls = python_function(_program(key, "controls"), "controls", fixed=fixed)
+        user = data.userdata[HEADER_SIZE:].tolist()
+        controls = _control_step(assembly, user, "controls")
         # Views of MuJoCo's memory; a look-up at every call would take a tenth of the callback.
         vectors = data.qpos, data.qvel, data.act, data.ctrl
         qpos, qvel, act, ctrl = (memoryview(vector) for vector in vectors)
         header: Any = memoryview(data.userdata[:HEADER_SIZE])
         period = header[CONTROL_PERIOD]
-        hold = python_function(_program(key, "hold"), "hold", fixed=fixed) if period else controls
+        hold = _control_step(assembly, user, "hold") if period else controls
         write_controls = partial(Struct(f"{len(ctrl)}d").pack_into, ctrl, 0)
 
         def evaluate(_model: mujoco.MjModel, called: mujoco.MjData) -> None:

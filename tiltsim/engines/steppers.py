@@ -3,22 +3,25 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
 from tiltsim.closed_loop.choices import ProgramKey
+from tiltsim.closed_loop.loop import Equations
 from tiltsim.engines.glue import RECORDER, STEPPER, filled
 from tiltsim.engines.machine_code import MachineCode
 from tiltsim.engines.programs import HEAD_SIZE, SIDES, LoopPrograms
 from tiltsim.engines.recorder import Recorder
+from tiltsim.equations.solvers import Integration, make_step
 from tiltsim.system.locks import one_thread_at_a_time
 from tiltsim_controllers.code.llvm_text import llvm_functions
 from tiltsim_controllers.code.program import Program
 from tiltsim_controllers.code.python_source import python_function
-from tiltsim_controllers.mathematics.scalar import Floats, Triple
+from tiltsim_controllers.mathematics.records import record_size, unflatten
+from tiltsim_controllers.mathematics.scalar import Floats, Triple, is_scalar
 
 
 class Integrated(NamedTuple):
@@ -41,6 +44,13 @@ class Integrated(NamedTuple):
     control_steps: int
     user: Floats
     disturbance: Triple
+
+    @property
+    def equations(self) -> Equations:
+        """Its equations."""
+        equations = self.key.loop.equations
+        assert equations is not None  # other loops do not fly on equations
+        return equations
 
     @property
     def settings(self) -> tuple[float, ...]:
@@ -68,16 +78,14 @@ def _programs(key: ProgramKey, states: int, solver: str, held: bool) -> Mapping[
 
 
 class PythonStepper(Stepper):
-    """Integrates on Python's floats."""
+    """Integrates on Python's floats. A controller that is no scalar code runs as it is."""
 
     def __init__(self, flight: Integrated) -> None:
-        held = flight.control_steps > 0
-        programs = _programs(flight.key, flight.states, flight.solver, held)
-        fixed = {"settings": flight.settings, "user": flight.user.tolist()}
         self._every = flight.control_steps or 1
-        self._sampled = python_function(programs["step_sampled"], "step_sampled", fixed=fixed)
-        if held:
-            self._held = python_function(programs["step_held"], "step_held", fixed=fixed)
+        traced = is_scalar(flight.equations.inputs)
+        step = _traced_step if traced else _plain_step
+        self._sampled = step(flight, True)
+        self._held = step(flight, False) if flight.control_steps else self._sampled
 
     def advance(self, step_index: int, now: Floats, steps: int) -> Floats:
         values: Any = now.tolist()
@@ -85,6 +93,33 @@ class PythonStepper(Stepper):
             step = self._held if index % self._every else self._sampled
             values = step((float(index),), values)
         return np.array(values)
+
+
+Step = Callable[[tuple[float], list[float]], Sequence[float]]
+"""``((index,), now) -> now``: one step."""
+
+
+def _traced_step(flight: Integrated, samples: bool) -> Step:
+    programs = _programs(flight.key, flight.states, flight.solver, flight.control_steps > 0)
+    name = "step_sampled" if samples else "step_held"
+    fixed = {"settings": flight.settings, "user": flight.user.tolist()}
+    return python_function(programs[name], name, fixed=fixed)
+
+
+def _plain_step(flight: Integrated, samples: bool) -> Step:
+    one_step = make_step(flight.equations, flight.solver)
+    record, size = flight.key.loop.parameters, record_size(flight.key.loop.parameters)
+    numbers = flight.user.tolist()
+    setup = unflatten(record, numbers), tuple(numbers[size:])
+    timing = flight.timestep, flight.control_steps
+    integration = Integration(*timing, *setup, flight.disturbance)
+
+    def step(index: tuple[float], now: list[float]) -> list[float]:
+        time, state, held = index[0] * flight.timestep, now[: flight.states], now[flight.states :]
+        state, force = one_step(time, state, tuple(held), samples, integration)
+        return [*state, *force]
+
+    return step
 
 
 @one_thread_at_a_time
