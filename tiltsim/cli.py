@@ -7,6 +7,7 @@ import atexit
 import gc
 import os
 import sys
+import warnings
 from importlib import import_module
 from io import TextIOWrapper
 from traceback import walk_tb
@@ -105,6 +106,8 @@ def main(arguments: list[str] | None = None) -> int:
     if arguments is None:
         reduce_garbage_collection()
         let_xla_merge_loops()
+        # Python's form shows a line of tiltsim's code below.
+        warnings.formatwarning = lambda message, *_: f"tiltsim: warning: {_one_line(message)}\n"
     if isinstance(sys.stdout, TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")  # as Python has it for standard error
     with terminations_as_interrupts() as terminated:

@@ -34,6 +34,15 @@ def shortened(text: str, length: int = 80) -> str:
     return text if len(text) <= length else text[: length - 3] + "..."
 
 
+def error_text(error: BaseException) -> str:
+    """The type and the message of an error in other people's code, on one line."""
+    try:
+        text = " ".join(str(error).split())[:200]
+    except Exception:
+        text = ""
+    return f"{type(error).__name__}{f': {text}' if text else ''}"
+
+
 def short_repr(value: object) -> str:
     """A value in at most 60 characters of one line, even if its ``repr`` raises."""
     try:
