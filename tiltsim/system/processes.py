@@ -74,10 +74,28 @@ def _begin(work: Callable[[Item], Result]) -> tuple[BaseProcess, Connection]:
     context = multiprocessing.get_context("spawn")
     here, there = context.Pipe()
     process = context.Process(target=_serve, args=(there, work), daemon=True)
-    with _interrupts_blocked():
+    with _without_working_folder(), _interrupts_blocked():
         process.start()
     there.close()  # only the process holds it now, so its death closes the pipe
     return process, here
+
+
+@contextmanager
+def _without_working_folder() -> Iterator[None]:
+    """Let processes that start within the block take no modules from the working folder.
+
+    Until it has the path of this process, Python's own ``python -c`` finds a signal.py there.
+    """
+    name = "PYTHONSAFEPATH"
+    before = os.environ.get(name)
+    os.environ[name] = before or "1"
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ[name]
+        else:
+            os.environ[name] = before
 
 
 @contextmanager
