@@ -59,3 +59,14 @@ def test_every_public_name_is_in_the_api_reference():
     documented = re.findall(r"^\.\. auto\w+:: tiltsim\.(\w+)$", text, re.MULTILINE)
     assert sorted(documented) == sorted(tiltsim.__all__)
     assert {*CONTROLLERS} <= {page.stem for page in API.glob("*.md")}
+
+
+def test_the_tests_that_the_security_page_names_exist():
+    rows = (ROOT / "SECURITY.md").read_text(encoding="utf-8").partition("Such Python code")[0]
+    named = set(re.findall(r"`(test_\w+)`", rows))
+    sources = (file.read_text(encoding="utf-8") for file in (ROOT / "tests").rglob("test_*.py"))
+    known = {name for text in sources for name in re.findall(r"def (test_\w+)", text)}
+    assert len(named) >= 10
+    assert named <= known
+    _heading, _line, *table = [row for row in rows.splitlines() if row.startswith("|")]
+    assert [row for row in table if "test_" not in row.split("|")[3]] == []

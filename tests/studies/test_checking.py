@@ -77,9 +77,9 @@ def test_scenarios_are_read_once_and_invalid_ones_reported_before_any_is_flown(
 ):
     read = []
 
-    def read_one(*arguments):
+    def read_one(*arguments, **options):
         read.append(arguments)
-        return load_scenario(*arguments)
+        return load_scenario(*arguments, **options)
 
     monkeypatch.setattr(checking, "load_scenario", read_one)
     (tmp_path / "good.toml").write_text("[simulation]\nduration = 0.01\n")

@@ -6,7 +6,7 @@ import argparse
 from typing import TYPE_CHECKING, Any
 
 from tiltsim.commands.figure_options import add_plot, check_plot, save_figure
-from tiltsim.commands.options import add_json, add_overrides, add_quiet
+from tiltsim.commands.options import add_json, add_overrides, add_quiet, add_trust
 from tiltsim.commands.text import json_text, print_figure_path
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def add_analysis(parser: argparse.ArgumentParser, figure: str, example: str) -> None:
-    """Declare the scenario, ``--set``, ``--json``, ``--quiet`` and the options of the figure.
+    """Declare the scenario, ``--set``, ``--json``, ``--quiet``, ``--trust``, the figure's options.
 
     Args:
         parser: Of the command.
@@ -29,6 +29,7 @@ def add_analysis(parser: argparse.ArgumentParser, figure: str, example: str) -> 
     add_overrides(parser, "the scenario", example)
     add_json(parser)
     add_quiet(parser, "show no progress")
+    add_trust(parser)
     add_plot(parser, figure)
 
 
@@ -39,7 +40,10 @@ def requested_scenarios(arguments: argparse.Namespace, *more: str) -> list[Scena
 
     check_plot(arguments)
     overrides = dict(parse_override(text) for text in arguments.overrides)
-    return [load_scenario(address, overrides) for address in (arguments.scenario, *more)]
+    return [
+        load_scenario(address, overrides, trusted=arguments.trust)
+        for address in (arguments.scenario, *more)
+    ]
 
 
 def print_analysis(

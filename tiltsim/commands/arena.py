@@ -13,6 +13,7 @@ from tiltsim.commands.options import (
     add_jobs,
     add_json,
     add_quiet,
+    add_trust,
     positive_integer,
 )
 from tiltsim.commands.progress import Progress, show_progress
@@ -66,6 +67,7 @@ def add_parser(subparsers: Subparsers) -> None:
     add_jobs(parser)
     add_json(parser)
     add_quiet(parser, "show no progress")
+    add_trust(parser)
     parser.set_defaults(run=run)
 
 
@@ -101,7 +103,8 @@ def run(arguments: argparse.Namespace) -> int:
             for name, vehicle in vehicles.items()
         )
         progress.begin("flights", total)
-        for vehicle, row in fly_tasks(vehicles, tables, tuned, arguments.jobs):
+        flown = fly_tasks(vehicles, tables, tuned, arguments.jobs, trusted=arguments.trust)
+        for vehicle, row in flown:
             rows[vehicle].append(row)
             progress.tell("flights", sum(map(len, rows.values())), total)
     made = Made.now()

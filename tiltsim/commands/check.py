@@ -84,7 +84,6 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _check(arguments: argparse.Namespace, progress: Progress) -> list[CheckResult]:
     """Fly and report everything; the files are written even when that is interrupted."""
-    from tiltsim.plants.trust import is_trusted
     from tiltsim.resources import shipped_folder
     from tiltsim.scenario.override_keys import parse_override
     from tiltsim.studies.check_results import not_flown
@@ -103,9 +102,7 @@ def _check(arguments: argparse.Namespace, progress: Progress) -> list[CheckResul
     reason: Literal["interrupted", "skipped"] = "interrupted"
     progress.begin("scenarios", len(addresses))
     try:
-        for result in check_all(
-            addresses, arguments.jobs, overrides, trusted=is_trusted(arguments.trust)
-        ):
+        for result in check_all(addresses, arguments.jobs, overrides, trusted=arguments.trust):
             finished[result.address] = result
             progress.tell("scenarios", len(finished), len(addresses))
             if result.status != "passed" or not arguments.quiet:

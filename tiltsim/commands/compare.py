@@ -66,7 +66,6 @@ def add_parser(subparsers: Subparsers) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Fly, print, draw."""
     from tiltsim.commands.controllers import chosen_controllers
-    from tiltsim.plants.trust import is_trusted
     from tiltsim.scenario.override_keys import parse_override
     from tiltsim.studies.checking import collect
     from tiltsim.studies.comparison import compare, refusal
@@ -82,7 +81,7 @@ def run(arguments: argparse.Namespace) -> int:
         dict(map(parse_override, arguments.overrides)),
         searches=not arguments.nominal,
         jobs=arguments.jobs,
-        trusted=is_trusted(arguments.trust),
+        trusted=arguments.trust,
     )
     try:
         with show_progress(shown=not arguments.quiet) as progress:

@@ -51,11 +51,11 @@ def add_overrides(parser: argparse.ArgumentParser, target: str, example: str) ->
 
 
 def add_trust(parser: argparse.ArgumentParser) -> None:
-    """Declare ``--trust``, which `tiltsim.plants.trust` reads."""
+    """Declare ``--trust``, see `tiltsim.scenario.trust`."""
     parser.add_argument(
         "--trust",
         action="store_true",
-        help="execute the Python controllers that scenario files name; so does TILTSIM_TRUST=1",
+        help="execute the Python controllers that files name; so does TILTSIM_TRUST=1",
     )
 
 

@@ -43,7 +43,6 @@ def add_parser(subparsers: Subparsers) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Fly the points that are not yet finished, and print a summary."""
-    from tiltsim.plants.trust import is_trusted
     from tiltsim.scenario.override_keys import parse_override
     from tiltsim.sweeps.loading import load_sweep
     from tiltsim.sweeps.points import SweepPoints
@@ -73,7 +72,7 @@ def run(arguments: argparse.Namespace) -> int:
                 jobs=arguments.jobs,
                 cluster=arguments.cluster,
                 report=report,
-                trusted=is_trusted(arguments.trust),
+                trusted=arguments.trust,
             )
         except KeyboardInterrupt:
             progress.print(

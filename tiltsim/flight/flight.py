@@ -68,13 +68,13 @@ class Flight:
     def of_scenario(
         cls, scenario: Scenario, samples: Floats, end: End, engine: EngineName, wall_time: float
     ) -> Self:
-        """A flight of a scenario that is assembled here.
+        """A recorded flight of a scenario that is assembled here, without executing its code.
 
         Args:
             scenario: what was flown
             samples, end, engine, wall_time: fields of the flight
         """
-        return cls(assemble(scenario), samples, end, engine, wall_time)
+        return cls(assemble(scenario, recorded=True), samples, end, engine, wall_time)
 
     def __reduce__(self) -> tuple[object, ...]:
         fields = (self.scenario, self.samples, self.end, self.engine, self.wall_time)

@@ -48,7 +48,8 @@ def load_flight(path: str | PathLike[str]) -> Flight:
     except (KeyError, ValueError, TypeError, RecursionError) as error:
         raise InputError(f"{file}: not a flight of tiltsim: {_first_line(error)}") from error
     try:
-        assembly = assemble(parse_scenario(without_none(document), origin.get("address", "")))
+        scenario = parse_scenario(without_none(document), origin.get("address", ""))
+        assembly = assemble(scenario, recorded=True)
     except InputError as error:
         raise InputError(f"{file}: its scenario is invalid: {error}") from error
     samples = _samples(file, table, assembly.loop.sample_fields)

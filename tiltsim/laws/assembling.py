@@ -66,11 +66,17 @@ def _unchanged(loop: ClosedLoop) -> ClosedLoop:
 
 @one_thread_at_a_time
 def loop_of(
-    scenario: Scenario, adapted: Callable[[ClosedLoop], ClosedLoop] = _unchanged
+    scenario: Scenario,
+    adapted: Callable[[ClosedLoop], ClosedLoop] = _unchanged,
+    *,
+    recorded: bool = False,
 ) -> ClosedLoop:
     """The closed loop of a scenario: its controller inside layers for all that is not ideal.
 
-    ``adapted`` may change the controller before layers go around it.
+    Args:
+        scenario: What is flown.
+        adapted: May change the controller before layers go around it.
+        recorded: See `assemble`.
     """
     controller, external = scenario.controller, scenario.controller.is_external
     plant = scenario.simulation.plant
@@ -80,7 +86,7 @@ def loop_of(
     if external:
         loop = commanded_loop(scenario)
     elif isinstance(controller, ScalarTable):
-        loop = loop_of_scalar_law(scenario)
+        loop = loop_of_scalar_law(scenario, recorded=recorded)
     elif scenario.vehicle.model == "multirotor":
         loop = MULTIROTOR_LOOPS[controller.loop_name](scenario, measured)
     else:
@@ -111,10 +117,20 @@ def _plant_of(scenario: Scenario, loop: ClosedLoop) -> ActuatorPlant:
 
 
 def assemble(
-    scenario: Scenario, adapted: Callable[[ClosedLoop], ClosedLoop] = _unchanged
+    scenario: Scenario,
+    adapted: Callable[[ClosedLoop], ClosedLoop] = _unchanged,
+    *,
+    recorded: bool = False,
 ) -> Assembly:
-    """Plan the flight of a scenario and set up its closed loop; see `loop_of`."""
-    plan, loop = plan_flight(scenario), loop_of(scenario, adapted)
+    """Plan the flight of a scenario and set up its closed loop.
+
+    Args:
+        scenario: What is flown.
+        adapted: See `loop_of`.
+        recorded: Whether its samples are there already: all of the loop but a user's function is
+            then at hand, and no code that the scenario names is executed.
+    """
+    plan, loop = plan_flight(scenario), loop_of(scenario, adapted, recorded=recorded)
     return Assembly(
         **vars(plan),
         loop=loop,

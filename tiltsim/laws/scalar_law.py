@@ -38,17 +38,24 @@ def _without_parameters(function: Callable[..., Any]) -> Callable[..., Any]:
     return own_law
 
 
-def loop_of_scalar_law(scenario: Scenario) -> ClosedLoop:
-    """The closed loop of a scenario's scalar law, without layers.
+def _not_read(_observed: Observed, _parameters: Any) -> tuple[Values, Values, Values]:
+    """In place of the user's function in a recorded flight, which needs no law any more."""
+    raise AssertionError("a recorded flight was flown")
+
+
+def loop_of_scalar_law(scenario: Scenario, *, recorded: bool = False) -> ClosedLoop:
+    """The closed loop of a scenario's scalar law, without layers; see `assemble` on ``recorded``.
 
     Raises `InputError` for a law of a package or of the user's that does not return what it should.
     """
     plan = plan_flight(scenario)
     controller, airframe = scenario.controller, airframe_of(plan)
-    if isinstance(controller, ScalarFunctionController):
-        address = scenario.address or "scenario"
-        function = load_scalar_function(address, controller, scenario.own_controller)
-        law, is_foreign = _without_parameters(function), True
+    law: Callable[..., Any]
+    is_foreign = True
+    if isinstance(controller, ScalarFunctionController) and recorded:
+        law, is_foreign = _not_read, False
+    elif isinstance(controller, ScalarFunctionController):
+        law = _without_parameters(load_scalar_function(scenario))
     else:
         assert isinstance(controller, ScalarController)
         law = controller.scalar_law(airframe)

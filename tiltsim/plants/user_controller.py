@@ -66,7 +66,7 @@ def load_controller(scenario: Scenario) -> UserController:
     assert isinstance(table, PythonController)
     name = table.function
     if controller is None:
-        controller = load_function(scenario.address or "scenario", table)
+        controller = load_function(scenario)
         name = f"{table.file.name}:{table.attribute}" if table.file is not None else name
     if isinstance(controller, type):
         try:

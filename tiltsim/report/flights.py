@@ -21,6 +21,7 @@ from tiltsim.scenario.metric_names import WALL_CLOCK_METRICS
 if TYPE_CHECKING:
     from tiltsim.flight.flight import Flight
     from tiltsim.scenario.scenario import Scenario
+from tiltsim.scenario.trust import require_trust
 
 Plant = Literal["thesis", "mujoco"]
 PLANTS: Final[tuple[Plant, ...]] = ("thesis", "mujoco")
@@ -73,10 +74,11 @@ class _Task:
 
 
 def report_entries(addresses: list[str]) -> list[ReportEntry]:
-    """Load scenarios for both plants. Raises `InputError` if one is invalid."""
+    """Load scenarios for both plants. Raises `InputError` if one is invalid or names code."""
     entries = []
     for address in addresses:
         scenario = load_scenario(address)
+        require_trust(scenario)
         plants: dict[Plant, Scenario | Unsupported] = {}
         for plant in PLANTS:
             if plant == scenario.simulation.plant:

@@ -27,6 +27,7 @@ from tiltsim.scenario.own_parts import (
 )
 from tiltsim.scenario.scenario import Scenario, Variant
 from tiltsim.scenario.scenario_tables import DESCRIPTIVE
+from tiltsim.scenario.trust import is_trusted, with_trust
 from tiltsim.system.text import short_repr, shortened, valid_unicode
 from tiltsim_controllers.mathematics.scalar import is_scalar
 
@@ -49,6 +50,7 @@ def load_scenario(
     controller: object = None,
     reference: object = None,
     gait: object = None,
+    trusted: bool = False,
 ) -> Scenario:
     """Read a scenario.
 
@@ -74,6 +76,8 @@ def load_scenario(
         gait: A gait of your own in place of the scenario's ``[gait]``, as the reference: a function
             that returns four tilt angles (rad), or a table with the columns time and alpha_1 to
             alpha_4.
+        trusted: Whether the Python file that the scenario names may be executed, by whatever takes
+            the scenario. The file of ``controller`` may in any case.
 
     Raises:
         InputError: In one line: the file, the key, the value and what is allowed.
@@ -100,7 +104,8 @@ def load_scenario(
     locate_named_files(document, Path())
     scenario = parse_scenario(document, address, emptied)
     scenario._own = own
-    return scenario
+    named = controller is not None or (isinstance(source, Scenario) and source._trusted)
+    return with_trust(scenario, named or is_trusted(trusted))
 
 
 def _title_in_file(source: object, address: str) -> object:

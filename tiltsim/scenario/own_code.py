@@ -6,14 +6,15 @@ import importlib.util
 import sys
 import traceback
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from tiltsim.errors import InputError
+from tiltsim.scenario.controller import OwnFunctionController
+from tiltsim.scenario.scenario import Scenario
+from tiltsim.scenario.trust import require_trust
 from tiltsim.system.files import digest, is_file
+from tiltsim.system.text import error_text
 from tiltsim_controllers.mathematics.scalar import is_scalar
-
-if TYPE_CHECKING:
-    from tiltsim.scenario.controller import OwnFunctionController
 
 
 def describe(error: BaseException, own_frames: int = 1) -> str:
@@ -21,11 +22,7 @@ def describe(error: BaseException, own_frames: int = 1) -> str:
 
     The first ``own_frames`` calls of its traceback are ours.
     """
-    try:
-        text = " ".join(str(error).split())[:200]
-    except Exception:
-        text = ""
-    return f"{type(error).__name__}{f': {text}' if text else ''}{_place(error, own_frames)}"
+    return error_text(error) + _place(error, own_frames)
 
 
 def _place(error: BaseException, own_frames: int) -> str:
@@ -43,14 +40,20 @@ def _place(error: BaseException, own_frames: int) -> str:
     return f" ({file.name}, line {last.lineno})"
 
 
-def load_function(address: str, table: OwnFunctionController) -> Any:
-    """The callable that a file defines under a name."""
-    start = f'{address}: controller.function = "{table.function}"'
+def load_function(scenario: Scenario) -> Any:
+    """The callable that the file of a scenario defines under a name.
+
+    Raises `InputError` if there is none, or the scenario may not execute code.
+    """
+    table = scenario.controller
+    assert isinstance(table, OwnFunctionController)
+    start = f'{scenario.address or "scenario"}: controller.function = "{table.function}"'
     if table.file is None:
         raise InputError(
             f"{start}: a controller that was given in Python, which no file holds; give it again "
             "as controller= to tiltsim.load_scenario or simulate, or write FILE.py:NAME"
         )
+    require_trust(scenario)
     if not is_file(table.file):
         raise InputError(f"{start}: no such file")
     module = _run_file(start, table.file)
@@ -83,22 +86,24 @@ def _run_file(start: str, file: Path) -> Any:
     return module
 
 
-def load_scalar_function(address: str, table: OwnFunctionController, given: Any) -> Any:
+def load_scalar_function(scenario: Scenario) -> Any:
     """The scalar function of a law ``scalar``: given in Python, or in a file.
 
-    Raises `InputError` if there is none, or it is not marked as scalar code.
+    Raises `InputError` as `load_function`, or if it is not marked as scalar code.
     """
-    function = given
-    if given is None:
+    table, function = scenario.controller, scenario.own_controller
+    assert isinstance(table, OwnFunctionController)
+    if function is None:
+        require_trust(scenario)  # though it may be loaded already
         content = table.file.read_bytes() if table.file and is_file(table.file) else b""
         known = str(table.file), table.attribute, digest(content)
         if known not in _loaded:
-            _loaded[known] = load_function(address, table)
+            _loaded[known] = load_function(scenario)
         function = _loaded[known]
     if not is_scalar(function):
         raise InputError(
-            f'{address}: controller.function = "{table.function}": is not marked with '
-            '@tiltsim.scalar; controller.law = "python" flies any function'
+            f'{scenario.address or "scenario"}: controller.function = "{table.function}": is not '
+            'marked with @tiltsim.scalar; controller.law = "python" flies any function'
         )
     return function
 

@@ -80,6 +80,7 @@ class ScenarioTables(Table):
 
     _address: str = PrivateAttr("")
     _own: dict[str, Any] = PrivateAttr({})  # what was given in Python, by name
+    _trusted: bool = PrivateAttr(False)  # see `tiltsim.scenario.trust`
 
     @property
     def address(self) -> str:

@@ -23,6 +23,7 @@ from tiltsim.plants.engine_choice import native_pays_off
 from tiltsim.plants.factory import make_plant
 from tiltsim.scenario.loading import as_scenario
 from tiltsim.scenario.scenario import Scenario
+from tiltsim.scenario.trust import require_trust
 from tiltsim.scenario.vehicle import VehicleTable
 from tiltsim.simulation.native_batch import NativeBatch
 from tiltsim.simulation.simulate import simulate_assembly
@@ -88,8 +89,9 @@ def fly(
         Of the first whose own controller fails Python warns as there.
 
     Raises:
-        InputError: At once, if an argument or a scenario is invalid; later, if a vehicle cannot be
-            built or a controller of your own cannot be used.
+        InputError: At once, if an argument or a scenario is invalid, or a scenario names Python
+            code and was not loaded with ``trusted=True``; later, if a vehicle cannot be built or a
+            controller of your own cannot be used.
         KeyboardInterrupt: If interrupted; results yielded before are complete.
     """
     if isinstance(scenarios, str | Mapping | Scenario) or not isinstance(scenarios, Iterable):
@@ -97,6 +99,8 @@ def fly(
     threads = (os.cpu_count() or 1) if threads is None else whole_number("threads", threads)
     check_progress(progress)
     chosen = [as_scenario(scenario) for scenario in scenarios]
+    for scenario in chosen:
+        require_trust(scenario)
 
     def result(flight: Flight) -> FlightResult:
         kept = flight if keep_samples else None

@@ -51,7 +51,9 @@ def simulate(
     other flights in MuJoCo take turns, after each recorded sample or up to 0.1 s of native code.
 
     Args:
-        scenario: What to fly: anything that `tiltsim.load_scenario` takes.
+        scenario: What to fly: anything that `tiltsim.load_scenario` takes. The Python code that a
+            file or dict names is executed; that of a scenario, if it was loaded with
+            ``trusted=True``.
         observer: Called with every sample (floats in the order of `ClosedLoop.sample_fields`) as it
             is recorded.
         controller: A controller of your own in place of the scenario's; see
@@ -78,7 +80,10 @@ def simulate(
         raise InputError(f"observer = {short_repr(observer)}: must be callable{hint}")
     replaced = any(own is not None for own in (controller, reference, gait))
     if replaced or not isinstance(scenario, Scenario):
-        scenario = load_scenario(scenario, controller=controller, reference=reference, gait=gait)
+        named = not isinstance(scenario, Scenario)
+        scenario = load_scenario(
+            scenario, controller=controller, reference=reference, gait=gait, trusted=named
+        )
     with reported(progress, "flight", scenario.simulation.duration) as report:
         flight = simulate_assembly(assemble(scenario), observer, report=report)
     if flight.end.kind == "failed" and scenario.own_controller is not None:

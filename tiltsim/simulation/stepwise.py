@@ -37,7 +37,7 @@ class Simulation:
     go on beyond ``simulation.duration``, unless a function of time was sampled up to there.
 
     Args:
-        scenario: Anything that `tiltsim.load_scenario` takes.
+        scenario: As in `tiltsim.simulate`.
         controller: A controller of your own in place of the scenario's; see
             `tiltsim.load_scenario`.
         reference: A motion of your own, as a function of time or a table; see
@@ -57,8 +57,9 @@ class Simulation:
         reference: object = None,
         gait: object = None,
     ) -> None:
+        named = not isinstance(scenario, Scenario)
         self.scenario = load_scenario(
-            scenario, controller=controller, reference=reference, gait=gait
+            scenario, controller=controller, reference=reference, gait=gait, trusted=named
         )
         simulation = self.scenario.simulation
         if simulation.plant != "mujoco":

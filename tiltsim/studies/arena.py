@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from statistics import mean
 from types import MappingProxyType
 from typing import Any, Final
@@ -126,6 +126,8 @@ def fly_tasks(
     controllers: Mapping[str, Mapping[str, Mapping[str, Any]]],
     tuned: Mapping[str, Mapping[str, Mapping[str, Any]]],
     jobs: int,
+    *,
+    trusted: bool = False,
 ) -> Iterator[tuple[str, dict[str, Any]]]:
     """Fly the tasks of every vehicle; yields the vehicle's name and a row with its score.
 
@@ -134,6 +136,10 @@ def fly_tasks(
         controllers: Their tables by vehicle and name.
         tuned: Tables with tuned gains of some of them, flown, too.
         jobs: Processes.
+        trusted: Whether to execute Python code that only tuned tables name.
+
+    Raises:
+        InputError: If they name some and are not trusted.
     """
     places, entries = [], []
     for name, vehicle in chosen.items():
@@ -142,8 +148,10 @@ def fly_tasks(
                 gains = tuned.get(name, {}).get(controller)
                 for kind, keys in (("default", table), ("tuned", gains)):
                     if keys is not None:
+                        named = "function" in table and keys.get("function") == table["function"]
+                        entry = entry_of(vehicle, address, controller, keys)
                         places.append((name, kind))
-                        entries.append(entry_of(vehicle, address, controller, keys))
+                        entries.append(replace(entry, trusted=trusted or named))
     flown = fly_entries(entries, searches=False, timed=False, jobs=jobs)
     for (name, kind), one in zip(places, flown, strict=True):
         yield name, one.row | {"gains": kind, "score": score(one.row)}

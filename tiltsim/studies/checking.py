@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from concurrent.futures import Future
-from functools import partial
 from pathlib import Path
 from time import perf_counter
 from typing import Any
 
 from tiltsim.errors import InputError
 from tiltsim.flight.expectations import check_expectations
-from tiltsim.plants.trust import require_trust
+from tiltsim.laws.assembling import loop_of
 from tiltsim.resources import shipped_folder
 from tiltsim.scenario.library import (
     closest_in_library,
@@ -22,6 +21,7 @@ from tiltsim.scenario.library import (
 )
 from tiltsim.scenario.loading import load_scenario, variant_names
 from tiltsim.scenario.scenario import Scenario
+from tiltsim.scenario.trust import require_trust
 from tiltsim.simulation.simulate import simulate
 from tiltsim.studies.check_results import CheckResult, Status
 from tiltsim.system.processes import in_processes
@@ -95,17 +95,16 @@ def _find(name: str) -> Path:
     )
 
 
-def check_one(loaded: tuple[str, Scenario], *, trusted: bool = False) -> CheckResult:
+def check_one(loaded: tuple[str, Scenario]) -> CheckResult:
     """Fly one scenario and evaluate its expectations; errors become part of the result.
 
     Args:
         loaded: The scenario and its address.
-        trusted: Whether to execute Python code that the scenario names.
     """
     start = perf_counter()
     address, scenario = loaded
     try:
-        require_trust(scenario, trusted)
+        require_trust(scenario)
         flight = simulate(scenario)
     except InputError as error:
         return CheckResult(address, "invalid", str(error))
@@ -149,18 +148,20 @@ def check_all(
     scenarios = {}
     for address in addresses:
         try:
-            scenarios[address] = load_scenario(address, overrides)
+            scenario = load_scenario(address, overrides, trusted=trusted)
+            require_trust(scenario)
+            loop_of(scenario)
+            scenarios[address] = scenario
         except InputError as error:
             yield CheckResult(address, "invalid", str(error))
     jobs = min(jobs, len(scenarios))
     loaded = [*scenarios.items()]
-    work = partial(check_one, trusted=trusted)
     if jobs <= 1:
-        yield from map(work, loaded)
+        yield from map(check_one, loaded)
         return
     # The longest first, so that none of them is still running when all others have finished.
     by_length = sorted(loaded, key=lambda one: -one[1].simulation.steps)
-    for (address, _), future in in_processes(work, by_length, jobs):
+    for (address, _), future in in_processes(check_one, by_length, jobs):
         yield _result(address, future)
 
 

@@ -14,11 +14,11 @@ from tiltsim.errors import InputError
 from tiltsim.flight.flight import Flight
 from tiltsim.laws.assembling import assemble
 from tiltsim.plants.engine_choice import MIN_STEPS_TO_COMPILE
-from tiltsim.plants.trust import require_trust
 from tiltsim.scenario.controller import CONTROLLERS
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.messages import choose
 from tiltsim.scenario.scenario import Scenario
+from tiltsim.scenario.trust import require_trust
 from tiltsim.simulation.simulate import simulate
 from tiltsim.studies.call_times import compiled_time_per_call, time_per_call
 from tiltsim.sweeps.search import boundary
@@ -101,16 +101,19 @@ class Entry:
         name: Of the controller in the results.
         table: Its keys in place of the scenario's ``[controller]``; empty for the scenario's own.
         overrides: Further values by dotted key.
+        trusted: Whether to execute Python code that the flight names.
     """
 
     address: str
     name: str
     table: Mapping[str, Any]
     overrides: Mapping[str, Any]
+    trusted: bool = False
 
     def scenario(self) -> Scenario:
         """The scenario under this controller. Raises InputError if it refuses the controller."""
-        return load_scenario(self.address, {**self._controller(), **self.overrides})
+        changes = {**self._controller(), **self.overrides}
+        return load_scenario(self.address, changes, trusted=self.trusted)
 
     def _controller(self) -> Mapping[str, Any]:
         """A whole table, even of the scenario's own law, which has gains of its own."""
@@ -154,7 +157,8 @@ def compare(
         overrides: Values by dotted key, for all flights.
         searches: Whether robustness is sought, which takes some forty flights each.
         jobs: Processes.
-        trusted: Whether Python code that scenario files name may be executed.
+        trusted: Whether Python code that scenario files name may be executed, as is that which
+            the tables name.
 
     Raises:
         InputError: If no controller is given, a scenario does not exist, or code is not trusted.
@@ -162,12 +166,12 @@ def compare(
     if not controllers:
         raise InputError("--controllers: name one at least")
     entries = [
-        Entry(address, name, table, overrides)
+        Entry(address, name, table, overrides, trusted or "function" in table)
         for address in addresses
         for name, table in controllers.items()
     ]
     for address in addresses:
-        require_trust(load_scenario(address, overrides), trusted)
+        load_scenario(address, overrides)
     yield from fly_entries(entries, searches=searches, jobs=jobs)
 
 
@@ -181,7 +185,16 @@ def fly_entries(
         searches: Whether robustness is sought.
         timed: Whether control steps are timed.
         jobs: Processes.
+
+    Raises:
+        InputError: If one names Python code and is not trusted.
     """
+    for entry in entries:
+        try:
+            scenario = entry.scenario()
+        except InputError:  # a refusal is part of the result
+            continue
+        require_trust(scenario)
     work = partial(compare_one, searches=searches, timed=timed)
     if jobs == 1:
         yield from map(work, entries)

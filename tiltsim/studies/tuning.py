@@ -12,7 +12,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from math import log
 from pathlib import Path as FilePath
@@ -163,7 +163,10 @@ def tuning_entries(vehicle: Vehicle, name: str, table: Mapping[str, Any]) -> lis
     """The flights of one evaluation, of those tasks that the vehicle has."""
     shorter = {"simulation.duration": DURATION, "simulation.engine": "native", "expect": []}
     return [
-        entry_of(vehicle, address, name, table, {**TASKS[task], **shorter})
+        replace(
+            entry_of(vehicle, address, name, table, {**TASKS[task], **shorter}),
+            trusted="function" in table,
+        )
         for address in vehicle.tasks
         if (task := address.partition("#")[2]) in TASKS
     ]

@@ -12,8 +12,8 @@ from tiltsim.engines.base import EngineName
 from tiltsim.errors import InputError
 from tiltsim.flight.expectations import Verdict
 from tiltsim.plants.engine_choice import with_engine
-from tiltsim.plants.trust import require_trust
 from tiltsim.scenario.scenario import Scenario
+from tiltsim.scenario.trust import require_trust, with_trust
 from tiltsim.sweeps.columns import installed_versions, make_row, rows_to_table
 from tiltsim.sweeps.definition import SweepDefinition
 from tiltsim.sweeps.executing import FEW, ScenarioResult, fly_scenarios
@@ -95,11 +95,11 @@ def _fly_values(
     scenarios: dict[int, Scenario] = {}
     for position, values in enumerate(batch):
         try:
-            scenario = points.scenario(values)
+            scenario = with_trust(points.scenario(values), trusted)
         except InputError as error:
             results[position] = ScenarioResult({}, "invalid", None, str(error))
             continue
-        require_trust(scenario, trusted)
+        require_trust(scenario)
         asked[position] = scenario
         if engine is not None and scenario.simulation.engine == "auto":
             scenario = with_engine(scenario, engine)
@@ -120,8 +120,8 @@ def _valid(
     """The scenarios of points that have one, without code that is not trusted."""
     for values in several:
         with suppress(InputError):
-            scenario = points.scenario(values)
-            require_trust(scenario, trusted)
+            scenario = with_trust(points.scenario(values), trusted)
+            require_trust(scenario)
             yield scenario
 
 

@@ -9,7 +9,7 @@ from typing import Final
 from tiltsim.engines.base import EngineName
 from tiltsim.errors import InputError
 from tiltsim.plants.engine_choice import MIN_STEPS_TO_COMPILE
-from tiltsim.plants.trust import require_trust
+from tiltsim.scenario.trust import is_trusted, require_trust, with_trust
 from tiltsim.sweeps.checks import check_points
 from tiltsim.sweeps.chunks import ChunkWork, FinishedChunk
 from tiltsim.sweeps.definition import SweepDefinition
@@ -66,9 +66,10 @@ def run_sweep(
 def _fly(
     points: SweepPoints, numbers: list[int], jobs: int, cluster: str | None, trusted: bool
 ) -> Iterator[FinishedChunk]:
-    examples = check_points(points)
+    trusted = is_trusted(trusted)
+    examples = [with_trust(example, trusted) for example in check_points(points)]
     for example in examples:
-        require_trust(example, trusted)
+        require_trust(example)
     count = sum(len(points.chunk(number)) for number in numbers)
     steps = count * max(example.simulation.steps for example in examples)
     engine: EngineName | None = "native" if steps >= MIN_STEPS_TO_COMPILE else None

@@ -44,7 +44,7 @@ class LiveStream:
         from tiltsim.views.rerun.flight_recorder import FlightRecorder
         from tiltsim.views.rerun.recording_file import new_recording
 
-        self._assembly = assemble(scenario)
+        self._assembly = assemble(scenario, recorded=True)
         # A unique name: a viewer would merge two flights of one scenario into one recording.
         self._recording = new_recording([scenario], salt=uuid4().hex)
         self._recorder = FlightRecorder(self._recording, self._assembly)

@@ -100,7 +100,7 @@ def serve() -> None:
         from tiltsim.views.rerun.recording_file import RecordingFile
 
         try:
-            file = RecordingFile([assemble(pickle.load(sys.stdin.buffer))])
+            file = RecordingFile([assemble(pickle.load(sys.stdin.buffer), recorded=True)])
             flight, path = pickle.load(sys.stdin.buffer)
         except (EOFError, pickle.UnpicklingError):  # the latter for an incomplete message
             os._exit(0)
