@@ -24,6 +24,9 @@ if TYPE_CHECKING:
     from tiltsim.views.rerun.live import LiveStream
     from tiltsim_controllers.mathematics.scalar import Floats
 
+GREATEST_DEFLECTION: Final = 0.01
+"""Angle (rad) of a pod against its servo at hover, beyond which `tiltsim run` warns."""
+
 
 def add_parser(subparsers: Subparsers) -> None:
     """Declare the command."""
@@ -85,7 +88,8 @@ def run(arguments: argparse.Namespace) -> int:
         gait = scenario.gait.plan(vehicle)
         for warning in gait_warnings(gait, vehicle) if standard else ():
             print_line(f"tiltsim: warning: gait: {warning}", error=True)
-        _warn_unmodeled_properties(scenario)
+    if not arguments.quiet:
+        _warn_of_own_vehicle(scenario)
     if arguments.rerun is None:
         flight = fly(scenario, arguments)
         _save(flight, arguments)
@@ -134,14 +138,33 @@ def run(arguments: argparse.Namespace) -> int:
     return EXPECTATION_FAILED if failed else DONE
 
 
-def _warn_unmodeled_properties(scenario: Scenario) -> None:
-    """Warn of properties of a user's vehicle that the built-in controllers do not model."""
-    own = scenario.rotorcraft.user_vehicle
-    if own is not None and own.unmodeled_properties and not scenario.controller.is_external:
+def _warn_of_own_vehicle(scenario: Scenario) -> None:
+    """Warn of properties of a user's vehicle that controllers do not model, and of soft servos."""
+    from tiltsim.scenario.rotorcraft import RotorcraftTable
+
+    vehicle = scenario.vehicle
+    own = vehicle.user_vehicle if isinstance(vehicle, RotorcraftTable) else None
+    if own is None:
+        return
+    if own.unmodeled_properties and not scenario.controller.is_external:
+        diagonal = "" if vehicle.model == "multirotor" else " and a diagonal inertia"
         print_line(
             f"tiltsim: warning: vehicle.mjcf: the {scenario.controller.law} controller assumes the "
-            "centre of mass at the body's origin and a diagonal inertia; not modeled: "
+            f"centre of mass at the body's origin{diagonal}; not modeled: "
             f"{own.unmodeled_properties}",
+            error=True,
+        )
+    deflections = scenario.any_rotorcraft.hinge_deflections
+    tilt = max(range(len(deflections)), key=lambda i: abs(deflections[i]), default=0)
+    if deflections and abs(deflections[tilt]) > GREATEST_DEFLECTION:
+        follows = (
+            scenario.simulation.plant == "thesis" and scenario.has_ideal_actuators_in_still_air
+        )
+        print_line(
+            f"tiltsim: warning: vehicle.mjcf: the rotors turn joint 'tilt_{tilt + 1}' by about "
+            f"{abs(deflections[tilt]):.2g} rad against its servo at hover"
+            + (", which the ideal pods of the thesis plant neglect" if follows else "")
+            + "; more armature or a higher vehicle.tilt_servo.natural_frequency stiffens it",
             error=True,
         )
 

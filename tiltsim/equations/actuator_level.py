@@ -19,6 +19,7 @@ from tiltsim.equations.quadrotor import rigid_body as quadrotor_body
 from tiltsim.equations.solvers import identity
 from tiltsim.equations.tiltrotor import rigid_body, rotation_of, velocity_of
 from tiltsim.models.parts import WRENCH_SIZE
+from tiltsim.models.rotor_table import Multirotor
 from tiltsim.vehicles.rotorcraft import initial_tilts
 from tiltsim.vehicles.rotorcraft.layout import Layout, layout_of
 from tiltsim.vehicles.rotorcraft.rotors import true_rotors
@@ -36,7 +37,7 @@ from tiltsim_controllers.mathematics.vectors import (
     tuple_text,
     written_out,
 )
-from tiltsim_controllers.vehicle.effectiveness import effectiveness_of
+from tiltsim_controllers.vehicle.effectiveness import TiltOfRotor, effectiveness_of
 from tiltsim_controllers.vehicle.multirotor import BODY_STATES, body_rates, inverse_inertia_times
 from tiltsim_controllers.vehicle.parameters import Vehicle
 from tiltsim_controllers.vehicle.rotor_code import rotor_code_of
@@ -50,7 +51,7 @@ Loads = Values
 
 
 @cache
-def mechanics_record(vehicle: Any, tilts: int) -> Any:
+def mechanics_record(vehicle: Any, rotors: int, tilts: int) -> Any:
     """The type of the true vehicle's and its actuators' parameters."""
     return make_record_type(
         "Mechanics",
@@ -58,6 +59,7 @@ def mechanics_record(vehicle: Any, tilts: int) -> Any:
         servo_frequency=float,  # rad/s, natural
         servo_damping=float,  # ratio
         hinge_inertias=vector_of(tilts),  # kg m^2, of servo and pod
+        hinge_loads=vector_of(rotors),  # see `Rotor.hinge_load`
         max_tilt=float,  # rad, at the stops of the servos
         min_speed=float,  # rad/s, along a rotor's spin
         max_speed=float,
@@ -74,11 +76,15 @@ def mechanics_around(vehicle: Any, plan: FlightPlan) -> Any:
     rotorcraft = plan.scenario.any_rotorcraft
     servo, tilts = rotorcraft.tilt_servo, rotorcraft.tilt_count
     kind: Any = type(vehicle)
-    return mechanics_record(kind, tilts)(
+    true = plan.scenario.true_vehicle
+    return mechanics_record(kind, rotorcraft.rotor_count, tilts)(
         vehicle,
         servo.natural_frequency,
         servo.damping_ratio,
         rotorcraft.hinge_inertias[:tilts],
+        tuple(rotor.hinge_load for rotor in true.rotors)
+        if isinstance(true, Multirotor)
+        else (0.0,) * rotorcraft.rotor_count,
         inf if servo.max_angle is None else servo.max_angle,
         *rotorcraft.speeds_along_spin,
     )
@@ -138,23 +144,41 @@ def servo_acceleration(command: float, angle: float, rate: float, mechanics: Any
 
 
 @cache
-def servo_accelerations_of(tilts: int) -> Callable[..., Values]:
+def servo_accelerations_of(tilt_of_rotor: TiltOfRotor, tilts: int) -> Callable[..., Values]:
     """Scalar code of what torques about the hinges add to the tilts on a body at rest, rad/s^2.
 
-    It is ``(ctrl, angles, rates, loads, mechanics) -> accelerations``.
+    It is ``(ctrl, thrusts, angles, rates, loads, mechanics) -> accelerations``, where ``thrusts``
+    are the rotors' controls, (rad/s)^2. On the cross, without a table of rotors, they pass through
+    the hinges at a right angle.
     """
+    name = "_".join(str(tilt) if tilt >= 0 else "f" for tilt in tilt_of_rotor)
+    hinges = written_out(
+        f"torques_about_hinges_{tilts}_{name}",
+        "loads, thrusts, per_thrust",
+        tuple_text(
+            " + ".join(
+                [f"loads[{WRENCH_SIZE + tilt}]"]
+                + [
+                    f"per_thrust[{i}] * thrusts[{i}]"
+                    for i, o in enumerate(tilt_of_rotor)
+                    if o == tilt
+                ]
+            )
+            for tilt in range(tilts)
+        ),
+    )
     accelerations: Callable[..., Values] = componentwise(
         "servo_accelerations", "ctrl, angles, rates, hinges, mechanics",
         "by_servo(ctrl#, angles#, rates#, mechanics) + hinges# / mechanics.hinge_inertias#", tilts,
         by_servo=servo_acceleration,
     )  # fmt: skip
-    hinges = entries_of(WRENCH_SIZE, tilts)
 
     @scalar
     def servo_accelerations(
-        ctrl: Vector, angles: Values, rates: Values, loads: Loads, mechanics: Any
+        ctrl: Vector, thrusts: Values, angles: Values, rates: Values, loads: Loads, mechanics: Any
     ) -> Values:
-        return accelerations(ctrl, angles, rates, hinges(loads), mechanics)
+        torques = hinges(loads, thrusts, mechanics.hinge_loads)
+        return accelerations(ctrl, angles, rates, torques, mechanics)
 
     return servo_accelerations
 
@@ -214,7 +238,7 @@ def _tiltrotor_body(
 
 
 @cache
-def _body_motion_of(spins: Values, tilt_of_rotor: tuple[int, ...]) -> Callable[..., Values]:
+def _body_motion_of(spins: Values, tilt_of_rotor: TiltOfRotor) -> Callable[..., Values]:
     """Scalar code of the rates of the rigid body's eighteen numbers, without gyroscopic torque.
 
     It is ``(state, tilts, thrusts, loads, vehicle, disturbance) -> rates``, where ``thrusts`` are
@@ -248,13 +272,14 @@ def _body_motion_of(spins: Values, tilt_of_rotor: tuple[int, ...]) -> Callable[.
 
 
 @cache
-def _tilting_plant(layout: Layout, spins: Values, tilt_of_rotor: tuple[int, ...]) -> ActuatorPlant:
+def _tilting_plant(layout: Layout, spins: Values, tilt_of_rotor: TiltOfRotor) -> ActuatorPlant:
     """The plant of the tiltrotor, or of a multirotor."""
     rotors, tilts = layout
     angles, rates = entries_of(BODY_STATES, tilts), entries_of(BODY_STATES + tilts, tilts)
     thrusts = entries_of(layout.thrust_1, rotors)
     motion = BODY_STATES + 2 * tilts
-    body_motion, servos = _body_motion_of(spins, tilt_of_rotor), servo_accelerations_of(tilts)
+    body_motion = _body_motion_of(spins, tilt_of_rotor)
+    servos = servo_accelerations_of(tilt_of_rotor, tilts)
     limit_speeds = limit_speeds_of(spins, motion)
 
     @scalar
@@ -270,12 +295,12 @@ def _tilting_plant(layout: Layout, spins: Values, tilt_of_rotor: tuple[int, ...]
     def motion_rates(
         state: Vector, ctrl: Vector, loads: Loads, mechanics: Any, disturbance: Triple
     ) -> Values:
-        alpha, alpha_rates = angles(state), rates(state)
+        alpha, alpha_rates, pushed = angles(state), rates(state), thrusts(ctrl)
         vehicle = mechanics.vehicle
         return (
-            *body_motion(state, alpha, thrusts(ctrl), loads, vehicle, disturbance),
+            *body_motion(state, alpha, pushed, loads, vehicle, disturbance),
             *alpha_rates,
-            *servos(ctrl, alpha, alpha_rates, loads, mechanics),
+            *servos(ctrl, pushed, alpha, alpha_rates, loads, mechanics),
         )
 
     @scalar
@@ -291,7 +316,7 @@ def _tilting_plant(layout: Layout, spins: Values, tilt_of_rotor: tuple[int, ...]
         return (*body, *start.angular_velocity, *tilts, *tilt_rates)
 
     record = rotor_code_of(tilt_of_rotor).record if tilt_of_rotor else Vehicle
-    kind = mechanics_record(record, tilts)
+    kind = mechanics_record(record, rotors, tilts)
     return ActuatorPlant(motion, qpos, qvel, motion_rates, project, initial, kind)
 
 
@@ -341,7 +366,7 @@ QUADROTOR_PLANT: Final = ActuatorPlant(
     rates=_quadrotor_rates,
     project_onto_limits=identity,  # the rotors make any thrust
     initial=lambda plan: initial_state(plan.scenario),
-    mechanics=mechanics_record(Vehicle, 0),
+    mechanics=mechanics_record(Vehicle, 4, 0),
 )
 
 

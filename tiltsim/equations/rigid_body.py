@@ -130,7 +130,7 @@ def rigid_body_of(form: Form) -> ActuatorPlant:
         rates=rates_of,
         project_onto_limits=within_limits if form.has_limits else identity,
         initial=initial,
-        mechanics=mechanics_record(_rotors_record(len(layout)), tilts),
+        mechanics=mechanics_record(_rotors_record(len(layout)), len(layout), tilts),
         read=lambda plan: mechanics_around(_rotors(plan.scenario), plan),
         name="rigid_body.limited" if form.has_limits else "rigid_body",
         finish=normalized,
@@ -145,13 +145,11 @@ def _rates_of(form: Form) -> Callable[..., Values]:
     quaternion_in, tilts_in = entries_of(QW, 4), entries_of(TILT_1, tilts)
     tilt_rates_in = entries_of(qvel_1 + TILT_RATE_1, tilts)
     # The controls are s varpi |varpi| with the spins s, the table's wrench is of varpi |varpi|.
-    squares_of = componentwise(
-        f"squares_of_thrusts_{places.thrust_1}",
-        "ctrl, spins",
-        f"spins# * ctrl[{places.thrust_1} + @]",
-        places.rotors,
+    squares_of = componentwise("squares_of_thrusts", "x, spins", "spins# * x#", places.rotors)
+    thrusts_in, servos = (
+        entries_of(places.thrust_1, places.rotors),
+        servo_accelerations_of(layout, tilts),
     )
-    servos = servo_accelerations_of(tilts)
     wrench_of, spins = effectiveness_of(layout).wrench, form.spins
 
     @scalar
@@ -161,8 +159,8 @@ def _rates_of(form: Form) -> Callable[..., Values]:
         body = mechanics.vehicle.body
         (qw, qx, qy, qz), (p, q, r) = quaternion_in(state), omega_in(state)
         angles, rates = tilts_in(state), tilt_rates_in(state)
-        squares = squares_of(ctrl, spins)
-        fx, fy, fz, tx, ty, tz = wrench_of(angles, squares, mechanics.vehicle.effects, 0)
+        thrusts, effects = thrusts_in(ctrl), mechanics.vehicle.effects
+        fx, fy, fz, tx, ty, tz = wrench_of(angles, squares_of(thrusts, spins), effects, 0)
         rotation = rotation_from_quaternion(qw, qx, qy, qz)
         ax, ay, az = to_world(rotation, (fx, fy, fz))
         extra_x, extra_y, extra_z = external_acceleration(rotation, loads, body.mass, disturbance)
@@ -175,7 +173,7 @@ def _rates_of(form: Form) -> Callable[..., Values]:
             ay / body.mass + extra_y,
             az / body.mass - body.gravity + extra_z,
             *body_acceleration(body, torque, (p, q, r), 1.0),
-            *servos(ctrl, angles, rates, loads, mechanics),
+            *servos(ctrl, thrusts, angles, rates, loads, mechanics),
         )
 
     return motion_rates

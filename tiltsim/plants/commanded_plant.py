@@ -95,7 +95,9 @@ class CommandedPlant(MujocoPlant):
             tilts = data.qpos[TILT_1 : TILT_1 + self.layout.tilts].tolist()
             jump = (speeds - data.act[: self.layout.rotors]).tolist()
             impulse, turned = np.zeros((1, model.nv)), np.empty((1, model.nv))
-            impulse[0, 3:6] = self._code.along(self._code.axes(tilts, self._rotors), jump)
+            axes, still = self._code.axes(tilts, self._rotors), (0.0,) * len(jump)
+            impulse[0, 3:6] = self._code.along(axes, jump)
+            impulse[0, 6:] = -np.array(self._code.on_hinges(axes, still, jump, (0.0,) * 3))
             mujoco.mj_fwdPosition(model, data)  # the mass matrix of the present tilts
             mujoco.mj_solveM(model, data, turned, impulse)
             data.qvel[:] -= self._rotor_inertia * turned[0]

@@ -142,6 +142,19 @@ class RotorcraftTable(AnyVehicleTable, ABC):
         """The pods' own share of `hinge_inertias`."""
 
     @property
+    def hinge_deflections(self) -> Values:
+        """Angles (rad) by which thrust and drag at hover turn the hinges against their servos."""
+        vehicle, stiffness = self.resolve(), self.tilt_servo.natural_frequency**2
+        if isinstance(vehicle, Vehicle):
+            return (0.0,) * self.tilt_count
+        torques, square = [0.0] * self.tilt_count, vehicle.hover_rotor_speed**2
+        for rotor in vehicle.rotors:
+            if rotor.tilt >= 0:
+                torques[rotor.tilt] += rotor.hinge_load * square
+        inertias = self.hinge_inertias
+        return tuple(t / (stiffness * i) for t, i in zip(torques, inertias, strict=True))
+
+    @property
     def speeds_along_spin(self) -> tuple[float, float]:
         """Lowest and highest speed (rad/s) of a rotor along its spin; infinite without limits."""
         low, high = self.min_rotor_speed, self.max_rotor_speed

@@ -68,6 +68,21 @@ class Rotor(NamedTuple):
         )
 
     @property
+    def along_hinge(self) -> float:
+        """The component of its thrust axis along its hinge, the same at all tilts; 0 if fixed."""
+        return float(np.dot(self.axis, self.hinge_axis))
+
+    @property
+    def hinge_load(self) -> float:
+        """Torque about its hinge (N m s^2/rad^2) of thrust and drag per unit of ``spin w``.
+
+        The same at all tilts; 0 where the thrust passes through the hinge at a right angle.
+        """
+        lever = np.cross(np.subtract(self.place, self.hinge), self.axis)
+        pushed = float(np.dot(lever, self.hinge_axis))
+        return self.thrust * pushed - self.spin * self.drag * self.along_hinge
+
+    @property
     def place_entries(self) -> Values:
         """Its place as `VECTOR_FLOATS`."""
         arm = np.asarray(self.hinge)

@@ -61,8 +61,9 @@ class RotorCode(NamedTuple):
     turning: Callable[..., Any]  # (axes, tilt rates): the axes' rates, 1/s
     along: Callable[..., Triple]  # (axes, values): sum of values_i d_i
     on_hinges: Callable[..., Values]
-    """``(axes, speeds, omega)``: about each hinge, the sum of ``varpi_i omega . d d_i / d alpha``
-    over its rotors, rad^2/s^2: the torque on the pod per unit of spin inertia."""
+    """``(axes, speeds, accelerations, omega)``: about each hinge along ``a``, the sum of ``varpi_i
+    omega . d d_i / d alpha - varpi_i' a . d_i`` over its rotors, rad/s^2: the torque on the pod per
+    unit of spin inertia."""
     inertia: Callable[..., Triple]  # (omega, vehicle): inertia times a vector
     inverse: Callable[..., Triple]  # (momentum, vehicle): its inverse times a vector
 
@@ -102,7 +103,8 @@ def sum_along_thrust_axes(trig: Octet, values: Quad) -> Triple:
 
 
 @scalar
-def _cross_on_hinges(trig: Octet, speeds: Quad, omega: Triple) -> Quad:
+def _cross_on_hinges(trig: Octet, speeds: Quad, accelerations: Quad, omega: Triple) -> Quad:
+    """The thrust axes are perpendicular to the hinges."""
     s1, c1, s2, c2, s3, c3, s4, c4 = trig
     p, q, r = omega
     return (
@@ -114,7 +116,7 @@ def _cross_on_hinges(trig: Octet, speeds: Quad, omega: Triple) -> Quad:
 
 
 @scalar
-def _no_hinges(axes: Any, speeds: Values, omega: Triple) -> Values:
+def _no_hinges(axes: Any, speeds: Values, accelerations: Values, omega: Triple) -> Values:
     return ()
 
 
@@ -233,6 +235,7 @@ def rotors_record(count: int, tilts: int) -> Any:
         axes=vector_of(VECTOR_FLOATS * count),
         thrusts=vector_of(count),  # K_f of each, N s^2/rad^2
         hinges=vector_of(3 * tilts),  # unit vectors along them
+        along_hinges=vector_of(count),  # of each rotor's thrust axis, its component along its hinge
     )
 
 
@@ -246,6 +249,7 @@ def rotors_of(body: Body, rotors: tuple[Rotor, ...]) -> Any:
         tuple(entry for rotor in rotors for entry in rotor.axis_entries),
         tuple(rotor.thrust for rotor in rotors),
         tuple(entry for tilt in sorted(hinges) for entry in hinges[tilt]),
+        tuple(rotor.along_hinge for rotor in rotors),
     )
 
 
@@ -294,6 +298,33 @@ def _pods_of(tilts: int) -> Callable[..., Triple]:
 
 
 @cache
+def _on_hinges_of(layout: TiltOfRotor) -> Callable[..., Values]:
+    name = "_".join(str(tilt) if tilt >= 0 else "f" for tilt in layout)
+    on_each = componentwise(
+        "on_each", "x, y, z, a, w, f, o",
+        "w# * (x# * o[0] + y# * o[1] + z# * o[2]) - f# * a#", len(layout),
+    )  # fmt: skip
+    summed = written_out(
+        f"by_hinge_{name}",
+        "torques",
+        tuple_text(
+            " + ".join(f"torques[{i}]" for i, own in enumerate(layout) if own == tilt)
+            for tilt in range(tilts_of(layout))
+        ),
+    )
+
+    @scalar
+    def on_hinges(
+        axes: tuple[Values, ...], speeds: Values, accelerations: Values, omega: Triple
+    ) -> Values:
+        _, _, _, dx, dy, dz, along_hinges = axes
+        torques: Values = summed(on_each(dx, dy, dz, along_hinges, speeds, accelerations, omega))
+        return torques
+
+    return on_hinges
+
+
+@cache
 def rotor_code_of(layout: TiltOfRotor) -> RotorCode:
     """The functions for any rotors of a layout."""
     count, code, vectors = len(layout), effectiveness_of(layout), turning_vectors_of(layout)
@@ -307,17 +338,6 @@ def rotor_code_of(layout: TiltOfRotor) -> RotorCode:
     rates = [f"rates[{tilt}]" if tilt >= 0 else "0.0" for tilt in layout]
     turned = written_out(
         f"turned_{name}", "d, rates", tuple_text(f"d[{i}] * {rate}" for i, rate in enumerate(rates))
-    )
-    on_each = componentwise(
-        "on_each", "x, y, z, w, o", "w# * (x# * o[0] + y# * o[1] + z# * o[2])", count
-    )
-    summed = written_out(
-        f"by_hinge_{name}",
-        "torques",
-        tuple_text(
-            " + ".join(f"torques[{i}]" for i, own in enumerate(layout) if own == tilt)
-            for tilt in range(tilts_of(layout))
-        ),
     )
 
     @scalar
@@ -344,7 +364,7 @@ def rotor_code_of(layout: TiltOfRotor) -> RotorCode:
         x, y, z = vectors(1.0, cosines, sines, rotors.axes, 0)
         # Their derivatives by the tilt angles.
         dx, dy, dz = vectors(0.0, negative(sines), cosines, rotors.axes, 0)
-        return x, y, z, dx, dy, dz
+        return x, y, z, dx, dy, dz, rotors.along_hinges
 
     @scalar
     def turning(axes: tuple[Values, ...], tilt_rates: Values) -> tuple[Values, ...]:
@@ -353,11 +373,6 @@ def rotor_code_of(layout: TiltOfRotor) -> RotorCode:
     @scalar
     def along(axes: tuple[Values, ...], values: Values) -> Triple:
         return dot(axes[0], values), dot(axes[1], values), dot(axes[2], values)
-
-    @scalar
-    def on_hinges(axes: tuple[Values, ...], speeds: Values, omega: Triple) -> Values:
-        torques: Values = summed(on_each(axes[3], axes[4], axes[5], speeds, omega))
-        return torques
 
     return RotorCode(
         rotors_record(count, tilts_of(layout)),
@@ -369,7 +384,7 @@ def rotor_code_of(layout: TiltOfRotor) -> RotorCode:
         axes,
         turning,
         along,
-        on_hinges,
+        _on_hinges_of(layout),
         _inertia,
         _inverse,
     )

@@ -21,6 +21,8 @@ CROSS = PRESETS["ar_drone_2"]
 ARMS = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
 HINGES = ARMS[[0, 1, 0, 3]]
 """Hinge axes of the first four of five rotors; the first and the third share a hinge."""
+AXIS = (0.48, 0.64, 0.6)
+"""Thrust axis of these at zero tilt, inclined along and across their hinges."""
 LAST = Rotor((0.1, 0.1, 0.3), (0.6, 0.0, 0.8), 9e-6, 3e-7, -1.0)
 
 
@@ -32,6 +34,7 @@ class Case(NamedTuple):
     axes: Any  # (tilts): thrust axes, shape (N, 3)
     places: Any  # (tilts): of the rotors, m, shape (N, 3)
     tilts: int
+    hinges: Any  # unit vectors along them, shape (tilts, 3)
     thrusts: Any  # K_f, shape (N,)
     drags: Any  # K_m
 
@@ -49,18 +52,24 @@ def on_cross(name):
     arms = CROSS.arm_length * ARMS
     if name == "upright cross":
         return Case(
-            UPRIGHT_CROSS, CROSS, lambda tilts: upright, lambda tilts: arms, 0, *coefficients
+            UPRIGHT_CROSS,
+            CROSS,
+            lambda tilts: upright,
+            lambda tilts: arms,
+            0,
+            ARMS[:0],
+            *coefficients,
         )
     axes = lambda tilts: turned(upright, ARMS, tilts)  # noqa: E731
-    return Case(TILTING_CROSS, CROSS, axes, lambda tilts: arms, 4, *coefficients)
+    return Case(TILTING_CROSS, CROSS, axes, lambda tilts: arms, 4, ARMS, *coefficients)
 
 
 def any_rotors(hinged):
-    """Four rotors that lie a little above their hinges or are fixed, and a canted one."""
+    """Four rotors a little above their hinges and inclined to them, or fixed, and a canted one."""
     layout = (0, 1, 0, 2) if hinged else (-1,) * 4
     rotors = [
         Rotor(
-            tuple(0.2 * arm + (0.0, 0.0, 0.05)), (0.0, 0.0, 1.0), 8e-6, 2e-7, SPIN[i], layout[i],
+            tuple(0.2 * arm + (0.0, 0.0, 0.05)), AXIS, 8e-6, 2e-7, SPIN[i], layout[i],
             tuple(0.2 * arm), tuple(HINGES[i]),
         )
         for i, arm in enumerate(ARMS)
@@ -78,9 +87,10 @@ def any_rotors(hinged):
     return Case(
         rotor_code_of((*layout, -1)),
         rotors_of(SMALL, rotors),
-        lambda tilts: around((0.0, 0.0, 1.0), LAST.axis, tilts),
+        lambda tilts: around(AXIS, LAST.axis, tilts),
         places,
         max(layout) + 1,
+        HINGES[[0, 1, 3]] if hinged else HINGES[:0],
         np.array([rotor.thrust for rotor in rotors]),
         np.array([rotor.drag for rotor in rotors]),
     )
@@ -121,10 +131,9 @@ def test_heights_lift_and_torque_match_numpy(case):
 def test_angular_momentum_of_pods_and_body(case):
     code, vehicle = case.code, case.vehicle
     rng = np.random.default_rng(1)
-    hinges = {0: np.empty((0, 3)), 3: HINGES[[0, 1, 3]], 4: ARMS}[case.tilts]
     inertias, rates = np.full(case.tilts, 2e-5), rng.normal(size=case.tilts)
     found = code.pods(tuple(inertias), tuple(rates), vehicle)
-    np.testing.assert_allclose(found, inertias * rates @ hinges, atol=1e-18)
+    np.testing.assert_allclose(found, inertias * rates @ case.hinges, atol=1e-18)
     omega = tuple(rng.normal(size=3))
     moments = CROSS.moments if vehicle is CROSS else 0.012  # of `SMALL`
     np.testing.assert_allclose(

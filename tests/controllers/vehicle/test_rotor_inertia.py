@@ -35,19 +35,26 @@ def test_the_spin_torque_is_minus_the_rate_of_angular_momentum(case):
 
 
 @each_case
-def test_the_gyroscopic_torque_about_the_hinges(case):
-    """By virtual work: ``d/d alpha (varpi omega . d)``."""
+def test_the_torque_about_the_hinges(case):
+    """By virtual work: ``d/d alpha (varpi omega . d)``, and the reaction along the hinges."""
     code, vehicle, axes, tilts = case.code, case.vehicle, case.axes, case.tilts
     rotors, rng = len(case.thrusts), np.random.default_rng(2)
     for _ in range(5):
-        angles, speeds = rng.uniform(-2.0, 2.0, tilts), rng.uniform(-2.0, 2.0, rotors)
+        angles, (speeds, faster) = (
+            rng.uniform(-2.0, 2.0, tilts),
+            rng.uniform(-2.0, 2.0, (2, rotors)),
+        )
         omega = rng.uniform(-2.0, 2.0, 3)
-        found = code.on_hinges(code.axes(tuple(angles), vehicle), tuple(speeds), tuple(omega))
-        ends = [
-            np.array([speeds @ axes(angles + h * one) @ omega for one in np.eye(tilts)])
-            for h in (H, -H)
-        ]
-        np.testing.assert_allclose(found, (ends[0] - ends[1]) / (2.0 * H), rtol=0.0, atol=1e-6)
+        found = code.on_hinges(
+            code.axes(tuple(angles), vehicle), *map(tuple, (speeds, faster, omega))
+        )
+        for tilt, (hinge, one) in enumerate(zip(case.hinges, np.eye(tilts), strict=True)):
+            beyond, before = axes(angles + H * one), axes(angles - H * one)
+            turns = np.any(beyond != before, axis=1)
+            expected = speeds @ (beyond - before) @ omega / (2.0 * H)
+            expected -= turns * faster @ axes(angles) @ hinge
+            assert found[tilt] == pytest.approx(expected, rel=0.0, abs=1e-6)
+        assert len(found) == tilts
 
 
 @pytest.mark.parametrize(

@@ -48,10 +48,11 @@ EVERYTHING = (TILTROTOR, TROT, SPINNING, STORM, LATE, SENSORS, SLOW, WEAK, WRONG
 HEAVY_ROTORS = {"vehicle": {"rotor_inertia": 1e-5}}
 
 
-def hexarotor(folder, inertial):
-    """Six tilting arms with other pods than the shipped ones."""
+def hexarotor(folder, inertial, rotor_4=""):
+    """Six tilting arms with other pods than the shipped ones, and where a rotor is in its pod."""
     for name in ("scene.xml", "tilt_hexarotor.xml"):
         text = (shipped_folder("mjcf") / name).read_text()
+        text = text.replace('name="rotor_4"', f'name="rotor_4" {rotor_4}')
         (folder / name).write_text(text.replace(LIGHT_POD, inertial))
     vehicle = {"model": "multirotor", "mjcf": str(folder / "tilt_hexarotor.xml")}
     controller = {"law": "attitude_force", "allow_unstable": True}
@@ -61,8 +62,10 @@ def hexarotor(folder, inertial):
 LIGHT_POD = '<inertial pos="0 0 0" mass="1e-9" diaginertia="1e-13 1e-13 1e-13"/>'
 HEAVY_POD = '<inertial pos="0 0 0" mass="0.02" diaginertia="2e-5 2e-5 2e-5"/>'
 BENT_POD = '<inertial pos="0 0 0.001" mass="0.02" diaginertia="2e-5 2e-5 2e-5"/>'
+ASIDE = 'pos="0.003 0.01 0" axisangle="0 1 0 0.3"'
 MASS = {"model_error": {"mass": 1.05, "inertia": [1.05, 1.02, 1.0]}}
 SIX = {"simulation": {"timestep": 0.002, "engine": "python", "duration": 0.2}}
+FINE = {"simulation": {"timestep": 0.0005}}
 
 
 @pytest.mark.parametrize(
@@ -71,11 +74,12 @@ SIX = {"simulation": {"timestep": 0.002, "engine": "python", "duration": 0.2}}
         (TILTROTOR, TROT, SPINNING, HEAVY),
         (*EVERYTHING, HEAVY),
         (*EVERYTHING, HEAVY_ROTORS, HEAVY),
-        (SIX, HEAVY_POD, SPINNING, STORM, SLOW, WEAK, MASS),
+        (SIX, (HEAVY_POD,), SPINNING, STORM, SLOW, WEAK, MASS),
+        (SIX, (HEAVY_POD, ASIDE), FINE, SPINNING, STORM, SLOW, MASS, HEAVY_ROTORS),
     ],
 )
 def test_it_is_the_acceleration_that_mujoco_integrates(changes, tmp_path):
-    tables = [hexarotor(tmp_path, this) if isinstance(this, str) else this for this in changes]
+    tables = [hexarotor(tmp_path, *this) if isinstance(this, tuple) else this for this in changes]
     plant = make_plant(assemble(scenario(*tables, MEASURED)))
     loop, parameters = plant._loop, plant._setup.parameters
     _, wrench = read_actuators(loop.dynamics)

@@ -36,10 +36,10 @@ if TYPE_CHECKING:
 @cache
 def motion_record(dynamics: Dynamics) -> Any:
     """The type of what the angular acceleration depends on besides state and controls."""
-    code, tilts = rotor_code(dynamics), layout_of(dynamics).tilts
+    code, (rotors, tilts) = rotor_code(dynamics), layout_of(dynamics)
     return make_record_type(
         "Motion",
-        mechanics=mechanics_record(code.record, tilts),
+        mechanics=mechanics_record(code.record, rotors, tilts),
         least_thrust=float,  # (rad/s)^2, limits of the thrusts' controls
         greatest_thrust=float,
         gyroscopic=float,  # factor of the gyroscopic torque, 0 on the thesis plant
@@ -70,7 +70,7 @@ def plant_angular_acceleration_of(dynamics: Dynamics) -> Callable[..., Triple]:
         rotors,
         clipped=clipped,
     )
-    servo_accelerations = servo_accelerations_of(tilts)
+    servo_accelerations = servo_accelerations_of(dynamics.tilt_of_rotor, tilts)
 
     @scalar
     def plant_angular_acceleration(
@@ -85,7 +85,7 @@ def plant_angular_acceleration_of(dynamics: Dynamics) -> Callable[..., Triple]:
         ix, iy, iz = inertia_times(omega, vehicle)
         px, py, pz = pods_of(pods, rates, vehicle)
         gx, gy, gz = cross(omega, (ix + px, iy + py, iz + pz))
-        servos = servo_accelerations(ctrl, angles, rates, loads, own)
+        servos = servo_accelerations(ctrl, thrusts, angles, rates, loads, own)
         sx, sy, sz = pods_of(pods, servos, vehicle)
         remaining = (
             tx + loads[3] - gyroscopic * gx - sx,

@@ -51,7 +51,7 @@ def _loads_of(dynamics: Dynamics) -> Callable[..., Values]:
         accelerations = within_limits(speeds, demanded_in(ctrl), layer.slowest, layer.fastest)
         axes = axes_of(tilts_in(qpos), layer.vehicle)
         x, y, z = spin_torque(axes, rates_in(qvel), speeds, accelerations, omega)
-        hinges = scaled(inertia, on_hinges(axes, speeds, omega))
+        hinges = scaled(inertia, on_hinges(axes, speeds, accelerations, omega))
         return (0.0, 0.0, 0.0, inertia * x, inertia * y, inertia * z, *hinges)
 
     return loads
