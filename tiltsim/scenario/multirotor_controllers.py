@@ -95,9 +95,10 @@ class AttitudeForceController(GaitFollowingController, FailureAwareController):
     )
     restoring: NonNegative | None = Field(
         None,
-        description="rate towards the rotor speeds of least power among those that do the same; "
-        f"default: {RESTORING:g} where they would drift, which is with moving tilts and more "
-        "rotors than outputs, else 0 [1/s]",
+        description="rate towards the rotor speeds of least power among those that do the same, "
+        "with norm = thrust to those whose thrusts have the least sum of squares; default: "
+        f"{RESTORING:g} where they would drift, which is with moving tilts and more rotors than "
+        "outputs, else 0 [1/s]",
         examples=[0.5],
     )
     turn_time: NonNegative = Field(

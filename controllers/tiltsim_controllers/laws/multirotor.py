@@ -14,7 +14,8 @@ wherever the margin is positive, for any number of rotors. Of all inputs that gi
 derivatives, the controller takes those nearest to zero or, with ``restoring``, to a motion towards
 the least power; what the outputs do not see would otherwise drift where the pods move. The norm is
 that of the rotor accelerations (``speed``), in which no rotor comes to rest while the others can do
-its part, or of the rates of ``w = varpi |varpi|`` (``thrust``), for rotors that reverse.
+its part, or of the rates of ``w = varpi |varpi|`` (``thrust``), for rotors that reverse;
+``restoring`` then leads to the least sum of ``w^2``.
 
 The decoupler is that of four rotors: the side of the torque-free force is used that points up in
 body axes. So the z axis of a vehicle has to be its upper side.

@@ -96,7 +96,7 @@ class Parameters(NamedTuple):
     rotors: float  # where in the knots the table of the rotors begins
     decoupling: float = EXACT_DECOUPLING  # published: rows of the torque as in ch. 3
     attitude: float = ROTATION
-    restoring: float = 0.0  # 1/s, rate towards the least power in the null space
+    restoring: float = 0.0  # 1/s, rate towards the least power or sum of w^2
     slowest: float = 0.0  # rad/s, thrust norm: a slower rotor is accelerated as if it were so fast
     failure: Failure = Failure()
     turn_time: float = 0.0  # s in which a reference of roll and pitch is reached, smoothly

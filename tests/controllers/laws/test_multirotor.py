@@ -19,6 +19,7 @@ from tests.controllers.multirotors import (
     ring,
     tiltrotor,
 )
+from tiltsim_controllers.analysis.singularity import world_up
 from tiltsim_controllers.analysis.torque_free import (
     controlled_axes,
     hover_direction,
@@ -230,6 +231,41 @@ def test_restoring_stops_the_drift_of_what_position_and_attitude_do_not_see():
     for flight in (drifting, restored):
         assert np.abs(flight.position).max() < 1e-8
     assert drifting.null_part[-30:].min() > 3.0 * restored.null_part[-30:].max()
+
+
+@pytest.mark.parametrize("norm", ["speed", "thrust"])
+@pytest.mark.parametrize("dimension", [1, 2, 3])
+@pytest.mark.parametrize("rotors", [6, 7, 8])
+def test_of_all_inputs_that_do_the_same_it_takes_those_nearest_to_restoring(
+    rotors, dimension, norm
+):
+    """Rotor accelerations, or rates of ``w``; by pseudo-inverses."""
+    rng, rate = np.random.default_rng(rotors), 0.7
+    vehicle = Vehicle(ring(rotors, hinged=True), HEXAROTOR, dimension, norm)
+    inputs = multirotor_law_of(tilt_of_rotor(vehicle.table), Form(dimension, norm, dimension == 2))
+    for senses in (1.0, rng.choice([-1.0, 1.0], rotors)):
+        angles = tuple(rng.uniform(-0.5, 0.5, rotors).tolist())
+        speeds = rng.uniform(250.0, 600.0, rotors) * (-1.0) ** np.arange(rotors) * senses
+        body = 0.2 * rng.normal(size=12)
+        state = (*body.tolist(), *angles, *speeds.tolist())
+        law, knots = parameters_of(vehicle, plans.fixed(angles), restoring=rate)
+        found, plain = (
+            np.array(inputs(0.1, state, (0.3,) * rotors, (0.0,) * 3, own, knots)[:rotors])
+            for own in (law, law._replace(restoring=0.0))
+        )
+        force, torque = force_and_torque(vehicle.table, angles)
+        up = np.array(world_up(*body[6:8]))
+        across = np.cross((0.0, 1.0, 0.0), up)
+        axes = {1: up[None], 2: [up, across / np.linalg.norm(across)], 3: np.eye(3)}[dimension]
+        rows, w = np.vstack([torque / 1e-6, axes @ force / 1e-5]), speeds * np.abs(speeds)
+        turns = 2.0 * np.abs(speeds)  # rates of w per acceleration
+        if norm == "speed":
+            rows, start = rows * turns, -rate * rotors * w / np.abs(speeds).sum()
+        else:
+            found, plain, start = turns * found, turns * plain, -rate * w
+        seen = np.linalg.pinv(rows) @ rows
+        np.testing.assert_allclose(seen @ plain, plain, rtol=1e-7, atol=1e-7)
+        np.testing.assert_allclose(found - plain, start - seen @ start, rtol=1e-6, atol=1e-6)
 
 
 def test_an_octorotor_turns_upside_down_and_hovers_there():
