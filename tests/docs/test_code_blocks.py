@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import json
+import linecache
 import re
 import shlex
 import tomllib
@@ -299,6 +300,8 @@ def run_python(text, names):
     if "import polars" not in text:
         for package in re.findall(r"^import (\w+)", text, re.MULTILINE):
             pytest.importorskip(package)
+        lines = text.splitlines(keepends=True)
+        linecache.cache["<block>"] = len(text), None, lines, "<block>"  # as notebooks do
         exec(compile(text, "<block>", "exec"), names)
 
 

@@ -128,7 +128,7 @@ class LoopPrograms:
             def run(lifting: Lifting, given: Sequence[InputVector]) -> Iterable[Number]:
                 (index,), now, (timestep, *_), user, recorder = given
                 time, setup = make("mul", index, timestep), self._setup(user)
-                state, force = tuple(now[:states]), now[states:]
+                state, force = list(now[:states]), now[states:]
                 if samples:
                     force = lifting(equations.inputs)(time, state, *setup)
                 values = lifting(equations.observe)(time, state, tuple(force), *setup)

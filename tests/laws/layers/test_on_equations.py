@@ -91,8 +91,8 @@ def with_gyroscopic_torque(loop):
 def gyroscopic_torque(monkeypatch):
     """Give the tiltrotor on the thesis plant the gyroscopic torque that MuJoCo's body has."""
 
-    def found(desired, *more):
-        loop = loop_of(desired, *more)
+    def found(desired, *more, **options):
+        loop = loop_of(desired, *more, **options)
         turns = desired.simulation.plant == "thesis" and desired.vehicle.model == "tiltrotor"
         return with_gyroscopic_torque(loop) if turns else loop
 
