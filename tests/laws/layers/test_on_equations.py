@@ -16,6 +16,7 @@ from tiltsim.laws.assembling import LOOPS, assemble, loop_of
 from tiltsim.plants.factory import make_plant
 from tiltsim.scenario.loading import merge
 from tiltsim_controllers.laws.yaw_position import gyroscopic_acceleration
+from tiltsim_controllers.mathematics.scalar import scalar
 
 MOTION = ("x", "y", "z", "roll", "pitch", "yaw")
 TILTROTOR = {
@@ -77,12 +78,13 @@ def with_gyroscopic_torque(loop):
     """A loop on the thesis's equations with the torque that chapter 3 leaves out."""
     rates = loop.equations.rates
 
+    @scalar
     def turning(time, state, inputs, parameters, table, disturbance):
-        found = list(rates(time, state, inputs, parameters, table, disturbance))
+        found = rates(time, state, inputs, parameters, table, disturbance)
         vehicle = parameters.layer.vehicle
         torque = gyroscopic_acceleration(state[15], state[16], state[17], vehicle)
-        found[15:18] = [rate + more for rate, more in zip(found[15:18], torque, strict=True)]
-        return tuple(found)
+        moved = [rate + more for rate, more in zip(found[15:18], torque)]
+        return (*found[:15], *moved, *found[18:])
 
     return replace(loop, equations=replace(loop.equations, rates=turning))
 
