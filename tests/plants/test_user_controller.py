@@ -781,6 +781,11 @@ def test_a_failing_controller_exits_3_and_leaves_its_log(tmp_path, capsys):
         ),
         ("import sys; sys.exit(3)", "law", ["raised SystemExit: 3", "broken.py, line 1"]),
         ("\0", "law", ["null bytes", "broken.py:law"]),
+        (
+            "import tiltsim\n@tiltsim.scalar\ndef law(seen): return (1.0,) * 4, (), ()",
+            "law",
+            ["broken.py:law", 'is scalar code; fly it by this key and controller.law = "scalar"'],
+        ),
     ],
 )
 def test_files_that_hold_no_controller_exit_2(tmp_path, capsys, text, name, words):

@@ -26,6 +26,7 @@ from tiltsim.scenario.controller import PythonController
 from tiltsim.scenario.own_code import describe, load_function
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.vehicles.rotorcraft.layout import Layout
+from tiltsim_controllers.mathematics.scalar import is_scalar
 
 
 class UserController:
@@ -67,6 +68,11 @@ def load_controller(scenario: Scenario) -> UserController:
     name = table.function
     if controller is None:
         controller = load_function(scenario)
+        if is_scalar(controller):
+            raise InputError(
+                f'{scenario.address or "scenario"}: controller.function = "{table.function}": '
+                'is scalar code; fly it by this key and controller.law = "scalar"'
+            )
         name = f"{table.file.name}:{table.attribute}" if table.file is not None else name
     if isinstance(controller, type):
         try:
