@@ -19,7 +19,11 @@ from tiltsim.resources import shipped_folder
 from tiltsim.scenario.loading import merge
 from tiltsim.vehicles.rotorcraft.layout import Layout
 from tiltsim_controllers.analysis.singularity import world_up
-from tiltsim_controllers.analysis.torque_free import hover_direction, torque_free_forces
+from tiltsim_controllers.analysis.torque_free import (
+    hover_direction,
+    singularity_margin,
+    torque_free_forces,
+)
 from tiltsim_controllers.laws.failures import Failure
 from tiltsim_controllers.vehicle.effectiveness import force_and_torque
 
@@ -199,6 +203,25 @@ def test_margins_of_flights_that_lose_rotors_at_other_times_are_those_of_each():
         assert (values[~known] > 0.5).all()  # of all rotors, which have two directions
 
 
+def test_the_margin_under_full_pose_is_that_of_the_rotors_that_are_known_to_work():
+    flight = fly(
+        "tilt_hexarotor",
+        controller={"law": "full_pose", "failed_rotor": 2, "failure_known_from": 0.1},
+        gait={"type": "fixed", "angles": [0.2, -0.2] * 3},
+        initial={"attitude": [0.2, -0.1, 0.0]},
+        simulation={"duration": 0.2, "timestep": 0.002},
+    )
+    force, torque = force_and_torque(flight.scenario.vehicle.resolve().table, flight["tilt_angles"])
+    up = world_up(flight["roll"], flight["pitch"])
+    everyone = np.ones(6)
+    others = np.array([1.0, 0.0, 1.0, 1.0, 1.0, 1.0])
+    known, margin = flight["time"] >= 0.1, flight["singularity_margin"]
+    for rows, works in ((~known, everyone), (known, others)):
+        expected = singularity_margin(torque_free_forces(force * works, torque * works), up)
+        np.testing.assert_allclose(np.abs(margin[rows]), expected[rows], atol=1e-9)
+    assert margin[known].max() < margin[~known].min() - 0.01
+
+
 @pytest.mark.parametrize("aware", [True, False])
 def test_seven_of_eight_rotors_hold_the_pose_if_the_controller_knows(aware):
     controller = {"law": "attitude_force", "norm": "thrust"}
@@ -370,6 +393,13 @@ HEXAROTOR = {"model": "multirotor", "mjcf": mjcf("hexarotor")}
         "too much force": (
             {"controller": {"law": "attitude_force", "dimension": 3}},
             "controller.dimension = 3: the vehicle has 1 only, as its rotors are placed",
+        ),
+        "more force than as published": (
+            {
+                "vehicle": {"model": "multirotor", "mjcf": mjcf("omni_octorotor")},
+                "controller": {"law": "attitude_force", "decoupling": "published"},
+            },
+            "the vehicle has 3; controller.decoupling = 'published' needs 1",
         ),
         "allocation without limits": (
             {"controller": {"law": "attitude_force", "allocation": "prioritized"}},

@@ -14,8 +14,9 @@ from tiltsim.laws.rotor_loop import (
     body_of_vehicle,
     layout_of_vehicle,
     rotor_loop,
+    table_of,
 )
-from tiltsim.laws.rotorcraft import rotor_stops
+from tiltsim.laws.rotorcraft import rotor_stops, torque_free_columns
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.tiltrotor_controllers import FullPoseController
 from tiltsim.vehicles.rotorcraft import initial_tilts
@@ -94,6 +95,9 @@ def full_pose_loop(layout: RotorLayout) -> ClosedLoop:
         states=dict.fromkeys(places.names("tilt_command"), "rad"),
         initial=lambda plan: initial_tilts(plan)[0],
         commands=0,
+        margins=lambda samples, setup: torque_free_columns(
+            places, table_of(places, setup), samples, failure=setup.parameters.law.failure
+        ),
     )
     return replace(
         rotor_loop(layout, law),

@@ -69,9 +69,10 @@ def check_dimension(
         key = "roll" if reference.roll else "pitch"
         reason = f"is no output with {dimension} components of force; needs a vehicle with 3"
         raise scenario.mistake(f"reference.{key}", reason)
-    if dimension == 1:
-        return
-    if controller.decoupling != "exact" or controller.decoupler != "exact":
-        raise scenario.mistake(
-            "controller.dimension", f"the vehicle has {dimension}; set it to 1 for this decoupler"
-        )
+    for key in ("decoupling", "decoupler"):
+        value = getattr(controller, key)
+        if dimension > 1 and value != "exact":
+            raise scenario.mistake(
+                "controller.dimension",
+                f"the vehicle has {dimension}; controller.{key} = {value!r} needs 1",
+            )
