@@ -25,7 +25,7 @@ from tiltsim.views.video import encoding, has_display, inset, offscreen, overlay
 from tiltsim.views.video.encoding import write_video
 from tiltsim.views.video.inset import PlaneInset, overlay_inset
 from tiltsim.views.video.offscreen import make_contexts
-from tiltsim.views.video.overlay import RotorcraftOverlay
+from tiltsim.views.video.overlay import PlaneOverlay
 from tiltsim.views.video.rendering import FlightRenderer, VideoFormat, frame_times, frames
 from tiltsim_controllers.vehicle.parameters import PRESETS
 
@@ -90,7 +90,7 @@ def test_the_insets_trail_is_short_if_the_curve_moves(name, whole, monkeypatch):
     monkeypatch.setattr(PlaneInset, "paint", lambda _self, _n, trail, _margin: trails.append(trail))
     monkeypatch.setattr(overlay, "overlay_inset", lambda *_: None)
     last = len(this) - 1
-    RotorcraftOverlay(this, 180).paint(np.zeros((180, 320, 3), dtype=np.uint8), last)
+    PlaneOverlay(this, 180).paint(np.zeros((180, 320, 3), dtype=np.uint8), last)
     began = 0.0 if whole else this["time"][last] - MOVING_TRAIL_TIME
     (first,) = np.flatnonzero(np.isclose(this["time"], began))
     np.testing.assert_array_equal(trails[0][0], [this["roll"][first], this["pitch"][first]])

@@ -1,7 +1,4 @@
-"""Kinds of vehicles.
-
-A kind is a folder of `tiltsim.vehicles` and an entry of `tiltsim.views.vehicle_views.VIEWS`.
-"""
+"""Kinds of vehicles, each a folder of `tiltsim.vehicles`."""
 
 from __future__ import annotations
 

@@ -58,7 +58,9 @@ def curve_is_constant(scenario: Scenario) -> bool:
     """Whether the curve of singular attitudes is the same throughout a scenario's flights."""
     if not scenario.vehicle.has_tilting_rotors:
         return True
-    return scenario.controller.law == "attitude_altitude" and scenario.gait.type == "fixed"
+    controller = scenario.controller
+    follows = not (controller.commands_tilts or controller.is_external)
+    return follows and scenario.gait.type == "fixed"
 
 
 def torque_free_directions(columns: Mapping[str, Floats], vehicle: Vehicle) -> Floats:

@@ -23,7 +23,7 @@ from tiltsim.views.figures.panels import (
     vector_panel,
 )
 from tiltsim.views.titles import common_title, describe_controller, describe_gait, flight_names
-from tiltsim.views.vehicle_views import views_of
+from tiltsim.views.vehicle_views import panels_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -165,7 +165,7 @@ def _chosen(flights: Sequence[Flight], names: Sequence[str]) -> dict[str, Panel]
     """The panels to draw, by name."""
     available = dict(COMPARED)
     if len(flights) == 1:
-        available = dict(views_of(flights[0].assembly).panels())
+        available = dict(panels_of(flights[0].assembly))
     fitting = {
         name: panel
         for name, panel in available.items()

@@ -165,14 +165,9 @@ ROTORCRAFT_PANELS: Final[dict[str, Panel]] = {
     "altitude": of_one(_altitude),
     "margin": of_one(_margin, scaled=True, needs="singularity_margin"),
     "attitude": of_one(_attitude),
-    "tilt_angles": of_one(_tilt_angles, needs="alpha_1"),
+    "tilt_angles": of_one(_tilt_angles),
     "rotor_speeds": of_one(_rotor_speeds),
     "path": of_one(plan_view, over_time=False),
-    "attitude_plane": of_one(_roll_pitch_plane, over_time=False, needs="singularity_margin"),
+    "attitude_plane": of_one(_roll_pitch_plane, over_time=False),
 }
 """The panels of a rotorcraft's page, by name."""
-
-MULTIROTOR_PANELS: Final = {
-    name: panel for name, panel in ROTORCRAFT_PANELS.items() if name != "attitude_plane"
-}
-"""Those of a multirotor, whose singular attitudes need not be a curve."""

@@ -14,7 +14,7 @@ from tiltsim.views.rerun.display import Series
 from tiltsim.views.rerun.scene import Scene
 from tiltsim.views.rerun.time_series import TimeSeries
 from tiltsim.views.rerun.timeline import send_rows
-from tiltsim.views.vehicle_views import views_of
+from tiltsim.views.vehicle_views import display_of
 
 if TYPE_CHECKING:
     from tiltsim.closed_loop.assembly import Assembly
@@ -55,7 +55,7 @@ class FlightRecorder:
         self.scenario = scenario = assembly.scenario
         self.assembly = assembly
         self.model = visible_model(assembly)
-        self.display = display = views_of(assembly).display()
+        self.display = display = display_of(assembly)
         self.scene = Scene(recording, assembly, self.model, f"world{suffix}", color, name)
         self.plane = None
         if display.plane is not None:

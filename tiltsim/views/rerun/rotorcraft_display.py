@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
-from typing import TYPE_CHECKING, Final, TypeVar
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -29,8 +28,6 @@ if TYPE_CHECKING:
     from tiltsim.flight.flight import Flight
     from tiltsim.views.rerun.palette import Color
     from tiltsim_controllers.mathematics.scalar import Floats
-
-_Plotted = TypeVar("_Plotted", Series, Level)
 
 _ROTOR_COLORS: Final = (AMBER, SKY, PINK, GREEN)
 # Lines of equal angles and speeds would cover each other: later ones are thinner.
@@ -95,9 +92,16 @@ PANELS: Final = (
 
 
 def panels(assembly: Assembly) -> tuple[Panel, ...]:
-    """The plots of a flight; a quadrotor has no tilt angles."""
-    tilts = assembly.scenario.vehicle.has_tilting_rotors
-    return tuple(panel for panel in PANELS if tilts or panel.path != "tilt_angles")
+    """The plots of a flight, but those of tilt angles and margins that it has not."""
+    shown = {
+        "tilt_angles": assembly.scenario.vehicle.has_tilting_rotors,
+        "singularity": _has_margin(assembly),
+    }
+    return tuple(panel for panel in PANELS if shown.get(panel.path, True))
+
+
+def _has_margin(assembly: Assembly) -> bool:
+    return "singularity_margin" in assembly.loop.units
 
 
 def rotorcraft_series(assembly: Assembly) -> list[Series]:
@@ -115,7 +119,8 @@ def rotorcraft_series(assembly: Assembly) -> list[Series]:
             series.append(Series(f"tilt_angles/{tilt}", f"α{rotor}", color, tilt, width))
             series.append(_reference(f"tilt_angles/alpha_ref_{rotor}", f"α{rotor} ref", color))
         series.append(Series(f"rotor_speeds/rotor_{rotor}", f"rotor {rotor}", color, speed, width))
-    series.append(Series("singularity/margin", "margin", AMBER, "singularity_margin", 2.5))
+    if _has_margin(assembly):
+        series.append(Series("singularity/margin", "margin", AMBER, "singularity_margin", 2.5))
     if SUPERVISION in assembly.loop.columns.units:
         path, label = f"singularity/{SUPERVISION}", "supervisor, 0 to 1"
         series.append(Series(path, label, SKY, SUPERVISION))
@@ -131,11 +136,11 @@ def _reference(path: str, label: str, color: Color) -> Series:
 
 def rotorcraft_levels(assembly: Assembly) -> list[Level]:
     """Rotor speed limits, singularity, and the threshold of the singularity margin."""
-    threshold = margin_threshold(assembly.scenario)
-    levels = [
-        Level("singularity/threshold", f"threshold {threshold:g}", RED, threshold),
-        Level("singularity/singular", "singular", GREY, 0.0),
-    ]
+    levels = []
+    if _has_margin(assembly):
+        threshold = margin_threshold(assembly.scenario)
+        levels.append(Level("singularity/threshold", f"threshold {threshold:g}", RED, threshold))
+        levels.append(Level("singularity/singular", "singular", GREY, 0.0))
     vehicle = assembly.scenario.any_rotorcraft
     for name, label, limit in (
         ("min", "lower limit", vehicle.min_rotor_speed),
@@ -161,19 +166,3 @@ ROTORCRAFT_DISPLAY: Final = VehicleDisplay(
     up=(0.0, 0.0, 1.0),
     overview=False,
 )
-
-MULTIROTOR_DISPLAY: Final = replace(ROTORCRAFT_DISPLAY, plane=None)
-"""For a multirotor, whose singular attitudes need not be a curve of the roll-pitch plane."""
-
-OTHER_LAYOUT_DISPLAY: Final = replace(
-    ROTORCRAFT_DISPLAY,
-    panels=lambda assembly: tuple(p for p in panels(assembly) if p.path != "singularity"),
-    series=lambda assembly: _without_margin(rotorcraft_series(assembly)),
-    levels=lambda assembly: _without_margin(rotorcraft_levels(assembly)),
-    plane=None,
-)
-"""For a layout whose singular attitudes are not known."""
-
-
-def _without_margin(entities: list[_Plotted]) -> list[_Plotted]:
-    return [entity for entity in entities if not entity.path.startswith("singularity/")]

@@ -43,35 +43,31 @@ class Overlay(Protocol):
 
 
 class AttitudeOverlay(Overlay):
-    """The attitude of a rotorcraft."""
+    """The attitude of a rotorcraft and, if it is known, its singularity margin."""
 
     camera = CameraPose(7.5, 130.0, -24.0)
     caption = Caption("", 0, 0)
 
-    def __init__(self, flight: Flight, _height: int) -> None:
+    def __init__(self, flight: Flight) -> None:
         self._flight = flight
 
     def rows(self, sample: int) -> dict[str, str]:
-        roll, pitch = (self._flight[name][sample] for name in ("roll", "pitch"))
-        return {"roll, pitch": f"{roll:+.2f}, {pitch:+.2f} rad"}
+        flight, rows = self._flight, {}
+        if "singularity_margin" in flight:
+            margin = abs(flight["singularity_margin"][sample])
+            rows["singularity margin"] = f"{margin:.2f} rad"
+        roll, pitch = (flight[name][sample] for name in ("roll", "pitch"))
+        return {**rows, "roll, pitch": f"{roll:+.2f}, {pitch:+.2f} rad"}
 
     def paint(self, image: Image, sample: int) -> None:
-        """Paint nothing: without singular attitudes there is no inset."""
+        """Paint nothing: without a curve of singular attitudes there is no inset."""
 
 
-class MarginOverlay(AttitudeOverlay):
-    """Singularity margin and attitude."""
-
-    def rows(self, sample: int) -> dict[str, str]:
-        margin = abs(self._flight["singularity_margin"][sample])
-        return {"singularity margin": f"{margin:.2f} rad", **super().rows(sample)}
-
-
-class RotorcraftOverlay(MarginOverlay):
-    """Singularity margin, attitude, and the roll-pitch plane in the corner."""
+class PlaneOverlay(AttitudeOverlay):
+    """The same, and the roll-pitch plane in the corner."""
 
     def __init__(self, flight: Flight, height: int) -> None:
-        super().__init__(flight, height)
+        super().__init__(flight)
         self._n = torque_free_directions(flight.columns, flight.scenario.rotorcraft.resolve())
         self._attitude = np.stack([flight["roll"], flight["pitch"]], axis=1)
         side = float(np.sign(flight["singularity_margin"][0])) or 1.0
@@ -101,7 +97,7 @@ class TiltCarOverlay(Overlay):
     camera = CameraPose(9.0, 90.0, -62.0)
     caption = Caption("", 0, 0)
 
-    def __init__(self, flight: Flight, _height: int) -> None:
+    def __init__(self, flight: Flight) -> None:
         self._flight = flight
 
     def rows(self, sample: int) -> dict[str, str]:

@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 
 from tiltsim.views import replay
-from tiltsim.views.vehicle_views import views_of
+from tiltsim.views.vehicle_views import overlay_of
 from tiltsim.views.video.offscreen import Canvas, Image
 from tiltsim.views.video.overlay import CameraPose
 from tiltsim_controllers.mathematics.scalar import Floats
@@ -97,7 +97,7 @@ class FlightRenderer:
             self._reference = path if np.ptp(path, axis=0).max() > 0.0 else path[:1]
         self._targets = replay.reference_positions(flight.columns)
         self._position = replay.positions(flight.columns)
-        self._overlay = views_of(flight.assembly).overlay(flight, self._video.height)
+        self._overlay = overlay_of(flight, self._video.height)
         self._camera = mujoco.MjvCamera()
         self._camera.type = mujoco.mjtCamera.mjCAMERA_TRACKING
         self._camera.trackbodyid = replay.first_free_body(self._model)
