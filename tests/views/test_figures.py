@@ -263,7 +263,33 @@ def test_vehicles_of_several_kinds_are_compared_by_what_they_have():
 
 
 def test_text_in_any_script_is_drawn_without_a_warning(tmp_path):
-    figure = style.new_figure(2.0, 1.0)
-    figure.suptitle("四旋翼 🚁")
-    style.save(figure, tmp_path / "figure.png")  # any warning is an error
-    assert (tmp_path / "figure.png").is_file()
+    figure = plot(flight("fixed"), panels="altitude", title="四旋翼 🚁")  # any warning is an error
+    style.save(figure, tmp_path / "figure.png")
+    figure.savefig(tmp_path / "own.png")
+    assert (tmp_path / "own.png").is_file()
+
+
+@pytest.mark.parametrize("title", ["a" * 100_000, "a b\n" * 25_000, "$" * 100_000])
+def test_a_title_of_any_length_is_drawn_as_far_as_there_is_room(title, tmp_path):
+    scenario = flight("fixed").scenario.model_copy(update={"title": title})
+    figure = plot(replace(flight("fixed"), assembly=assemble(scenario)), panels="altitude")
+    assert heading(figure).replace("\n", "").endswith("...")
+    assert len(heading(figure)) < 700
+    style.save(figure, tmp_path / "figure.png")
+
+
+@pytest.mark.parametrize("name", ["fixed", "tilt_car"])
+@pytest.mark.parametrize("values", [(1e308, -1e308), (1e308, 1e308), (1e200, -1e200)])
+def test_values_near_overflow_are_drawn(name, values, tmp_path):
+    whole = flight(name)
+    samples = whole.samples.copy()
+    samples[-2:, 1:] = np.reshape(values, (2, 1))
+    torn = replace(whole, samples=samples)
+    for shown in ([torn], [torn, whole]):
+        figure = plot(shown, labels=["torn", "whole"][: len(shown)])
+        style.save(figure, tmp_path / "figure.png")
+
+
+def test_a_quadrotor_has_no_panel_of_tilt_angles():
+    tables = BASE | {"vehicle": {"model": "quadrotor"}, "controller": {"law": "pid"}}
+    assert {*axes_by_title(plot(tiltsim.simulate(tables)))} == PANELS - {"Tilt angles"}

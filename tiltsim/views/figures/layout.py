@@ -130,7 +130,6 @@ def _heights(page: Page) -> tuple[float, int]:
     """Height (inches) of the lowest panel, and the rows of panels; zeros if they do not fit."""
     layout: Any = page.figure.get_layout_engine()
     with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", r"Glyph \d+ .* missing from font")
         warnings.filterwarnings("error", "constrained_layout not applied")
         try:
             layout.execute(page.figure)  # as drawing does first

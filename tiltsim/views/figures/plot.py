@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
 
 from tiltsim.errors import InputError
 from tiltsim.flight.flight import as_flights
@@ -32,6 +35,9 @@ if TYPE_CHECKING:
     from tiltsim.flight.flight import Flight
 
 MAX_FLIGHTS: Final = len(style.CYCLE)
+
+LARGEST: Final = 1e100
+"""Magnitude up to which values are drawn: a diverged flight may end just below overflow."""
 
 WIDE: Final = 6.0
 """Width (inches) from which a page names gait, controller, plant and end below its title."""
@@ -92,6 +98,7 @@ def draw_flights(
     """
     if len(flights) > MAX_FLIGHTS:
         raise InputError(f"plot: {len(flights)} flights: at most {MAX_FLIGHTS} fit on one page")
+    flights = [_within_range(flight) for flight in flights]
     others = dict(texts)
     names = [others.pop(name, name) if name else "" for name in names]
     longest = max(len(flight) for flight in flights)
@@ -100,6 +107,12 @@ def draw_flights(
     chosen = _chosen(flights, panels)
     heading = partial(_heading, shown, title)
     return fitting(lambda: _page(shown, chosen, heading, others))
+
+
+def _within_range(flight: Flight) -> Flight:
+    """The flight with samples that axes can have."""
+    samples = np.clip(flight.samples, -LARGEST, LARGEST)
+    return flight if np.array_equal(samples, flight.samples) else replace(flight, samples=samples)
 
 
 def _page(
@@ -201,7 +214,8 @@ def _heading(shown: Sequence[Shown], title: str | None, width: float) -> tuple[s
     if len(flights) > 1:
         return style.verbatim(common_title(scenarios) or f"{len(flights)} flights compared"), ""
     scenario, end = scenarios[0], flights[0].end
-    text = style.verbatim(shown[0].name or scenario.title or scenario.address or "Flight")
+    own = shown[0].name or " ".join(scenario.title.split())
+    text = style.verbatim(own or scenario.address or "Flight")
     if width < WIDE:
         return text, ""
     parts = [style.verbatim(scenario.address.partition("#")[2])]

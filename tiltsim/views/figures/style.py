@@ -16,6 +16,7 @@ from tiltsim.errors import InputError
 from tiltsim.system.files import replacing
 from tiltsim.system.numbers import is_finite
 from tiltsim.system.text import short_repr, shortened
+from tiltsim.views.figures.glyphs import missing_glyphs_as_boxes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -195,7 +196,7 @@ def paper_style(file: Path | None = None, size: Size | None = None) -> Iterator[
             del common[key]
         inner = _styled.set(True)
         try:
-            with rc_context({**common, **own}):
+            with rc_context({**common, **own}), missing_glyphs_as_boxes():
                 families = dict.fromkeys([*rcParams["font.family"], _GLYPHS])
                 rcParams["font.family"] = list(families)
                 yield
@@ -285,9 +286,13 @@ def cycle_color(number: int) -> str:
     return str(colors[number % len(colors)])
 
 
+LONGEST_TEXT: Final = 300
+"""Letters of a user's text that a figure has room for."""
+
+
 def verbatim(text: str) -> str:
-    """A user's text with dollar signs escaped, so that matplotlib finds no formula in it."""
-    return text.replace("$", r"\$")
+    """A user's text, not too long, with dollar signs escaped: matplotlib finds no formula in it."""
+    return shortened(text, LONGEST_TEXT).replace("$", r"\$")
 
 
 def new_figure(width: float, height: float) -> Figure:
@@ -380,8 +385,6 @@ def save(figure: Figure, path: Path) -> None:
     suffix = path.suffix.lower()
     undated = {".pdf": {"CreationDate": None}, ".svg": {"Date": None}}
     with paper_style(), replacing(path) as temporary, warnings.catch_warnings():
-        # Text in scripts that the font lacks, such as Chinese, is drawn as boxes.
-        warnings.filterwarnings("ignore", r"Glyph \d+ .* missing from font")
         warnings.filterwarnings("error", "constrained_layout not applied")
         try:
             figure.savefig(temporary, format=suffix[1:], metadata=undated.get(suffix))

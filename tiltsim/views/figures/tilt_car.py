@@ -58,6 +58,7 @@ def _inputs(axes: Axes, flight: Flight) -> None:
     style.zero_lines(axes, "x")
     later = time >= min(2.0, 0.5 * time[-1])  # the values at the start may be far larger
     top = max(float((flight[f"rotor_speed_{rotor}"] ** 2)[later].max()) for rotor in (1, 2))
+    top = top or 1.0  # of a car at rest
     axes.set_ylim(-0.04 * top, 1.6 * top)
     show_last_periods(axes, [flight])
     axes.set_ylabel("rad²/s²")
