@@ -1,0 +1,397 @@
+"""Every law with every vehicle, table of the scenario, plant and use: it works, or in one line not.
+
+Nobody lists combinations here: laws, vehicles, tables with their examples, plants, engines and the
+public interface are the product's own registries. What is added to them is tested with the rest.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from functools import cache
+from itertools import product
+from types import FunctionType
+from typing import get_args
+
+import numpy as np
+import pytest
+from pydantic import TypeAdapter
+
+import tiltsim
+import tiltsim.env
+from tiltsim.commands.key_tables import key_tables
+from tiltsim.commands.schema import scenario_schema
+from tiltsim.errors import TiltsimError
+from tiltsim.scenario.arguments import leaves
+from tiltsim.scenario.controller import CONTROLLERS, OwnFunctionController
+from tiltsim.scenario.scenario_tables import DESCRIPTIVE
+from tiltsim.scenario.simulation_table import SimulationTable
+from tiltsim.scenario.vehicle import VehicleUnion
+from tiltsim.studies.fleet import FLEET, fleet_file
+from tiltsim.views.figures.style import save
+from tiltsim.views.rerun.recording_file import save_recording
+from tiltsim.views.vehicle_views import overlay_of
+
+SHORT = {"duration": 0.02, "timestep": 0.002, "engine": "python"}
+TABLES = key_tables(scenario_schema())
+PLANTS, ENGINES = (
+    get_args(SimulationTable.model_fields[key].annotation) for key in ("plant", "engine")
+)
+MODELS = dict.fromkeys(model for table in CONTROLLERS.values() for model in table.vehicle_models)
+SHIPPED = {model: {"model": model} for model in MODELS if model != "multirotor"}
+MULTIROTORS = {
+    f"multirotor {name}": {"model": "multirotor", "mjcf": str(fleet_file(name))} for name in FLEET
+}
+VEHICLES = SHIPPED | MULTIROTORS
+FEW = [*SHIPPED, "multirotor tilt_hexarotor"]
+"""Vehicles of the fast tests: all models, and of multirotors one with tilts."""
+
+
+@pytest.fixture(autouse=True)
+def strict(monkeypatch):
+    """Let Rerun raise where it would only warn."""
+    monkeypatch.setenv("RERUN_STRICT", "1")
+
+
+def attempt(use, *arguments):
+    """What a use returns and no line, or nothing and the line of its refusal; else it raises."""
+    try:
+        return use(*arguments), ""
+    except TiltsimError as error:
+        line = str(error)
+        assert len(line.splitlines()) == 1, line
+        assert 10 < len(line) < 600, line
+        return None, line
+
+
+# --- laws and vehicles -------------------------------------------------------------------------
+
+OWN = {
+    "python": "def law(seen):\n"
+    "    return tiltsim.Command(rotor_accelerations=[0.0] * len(seen.rotor_speeds))\n",
+    "scalar": "@tiltsim.scalar\ndef law(seen):\n    return ({thrusts}), (), ()\n",
+}
+"""Functions of the user's, by the law that they fly with."""
+
+
+@pytest.fixture(scope="session", autouse=True)
+def own_laws(tmp_path_factory):
+    """Write these, for every number of rotors, where `fitting` finds them."""
+    folder = tmp_path_factory.mktemp("own")
+    for (law, text), rotors in product(OWN.items(), range(2, 17)):
+        code = "import tiltsim\n\n\n" + text.format(thrusts="1.0, " * rotors)
+        (folder / f"{law}_{rotors}.py").write_text(code)
+    FOLDER.append(folder)
+
+
+FOLDER = []
+
+
+def kinds(name):
+    """A document for each kind of a table that has several, such as gait, after none at all."""
+    of_table = [table for table in TABLES if [step.name for step in table.places[0]] == [name]]
+    return [{}, *(tomllib.loads(table.toml) for table in of_table)]
+
+
+@cache
+def fitting(law, vehicle):
+    """A scenario of a law and vehicle, with the first gait and reference that suit; or a line."""
+    model, why = VEHICLES[vehicle], []
+    controller = {"law": law}
+    if issubclass(CONTROLLERS[law], OwnFunctionController):
+        rotors = TypeAdapter(VehicleUnion).validate_python(model).rotor_count
+        controller["function"] = f"{FOLDER[0] / law}_{rotors}.py:law"
+    tables = {"vehicle": model, "controller": controller, "simulation": SHORT}
+    for reference, gait in product(kinds("reference"), kinds("gait")):
+        scenario, line = attempt(tiltsim.parse_scenario, tables | reference | gait)
+        if scenario:
+            return scenario
+        why.append(line)
+    return why[0]
+
+
+def fits(law, vehicle):
+    """Whether a law flies a vehicle."""
+    return not isinstance(fitting(law, vehicle), str)
+
+
+@cache
+def flown(law, vehicle):
+    """The flight of `fitting`."""
+    return tiltsim.simulate(fitting(law, vehicle))
+
+
+def claimed(vehicles):
+    """Laws with the vehicles whose model they claim to control."""
+    return [
+        (law, vehicle)
+        for law, vehicle in product(CONTROLLERS, vehicles)
+        if VEHICLES[vehicle]["model"] in CONTROLLERS[law].vehicle_models
+    ]
+
+
+PAIRS = [
+    pytest.param(law, vehicle, marks=[] if vehicle in FEW else pytest.mark.slow)
+    for law, vehicle in claimed(VEHICLES)
+]
+each_pair = pytest.mark.parametrize(("law", "vehicle"), PAIRS)
+
+
+def test_every_law_flies_all_that_it_claims_and_nothing_else():
+    assert {law for law in CONTROLLERS if law in OWN} == {
+        law for law, table in CONTROLLERS.items() if issubclass(table, OwnFunctionController)
+    }
+    for law, vehicle in product(CONTROLLERS, SHIPPED):
+        assert fits(law, vehicle) == (vehicle in CONTROLLERS[law].vehicle_models), (law, vehicle)
+    for law, table in CONTROLLERS.items():
+        several = "multirotor" in table.vehicle_models
+        assert any(fits(law, vehicle) for vehicle in MULTIROTORS) == several, law
+
+
+# --- uses of a flight and of a scenario --------------------------------------------------------
+
+
+def of_file(flight, folder):
+    """Save and load: the same columns, bit for bit, and the same metrics but for the speed."""
+    flight.save(folder)
+    loaded = tiltsim.load_flight(folder)
+    assert list(loaded) == list(flight)
+    for column in flight:
+        np.testing.assert_array_equal(loaded[column], flight[column])
+    assert loaded.metrics().keys() == flight.metrics().keys()
+
+
+def paint(flight, _folder):
+    """Text and inset of a frame of a video, whose rendering takes long."""
+    overlay = overlay_of(flight, 90)
+    assert overlay.rows(0)
+    overlay.paint(np.zeros((90, 160, 3), dtype=np.uint8), 0)
+
+
+USES_OF_FLIGHTS = {
+    "plot": lambda flight, _folder: tiltsim.plot(flight),
+    "several": lambda flight, _folder: tiltsim.plot([flight] * 2, labels=["a", "b"]),
+    "view": lambda flight, folder: save_recording([flight], folder / "flight.rrd"),
+    "video": paint,
+    "metrics": lambda flight, _folder: flight.metrics(),
+    "_repr_html_": lambda flight, _folder: flight._repr_html_(),
+    "to_pandas": lambda flight, _folder: flight.to_pandas(),
+    "to_arrow": lambda flight, _folder: flight.to_arrow(),
+    "origin": lambda flight, _folder: flight.origin(),
+    "save": of_file,
+}
+SLOW_USES_OF_FLIGHTS = {
+    "plot": lambda flight, folder: save(tiltsim.plot(flight), folder / "flight.png"),
+    "video": lambda flight, folder: flight.video(folder / "flight.mp4", quality="draft"),
+}
+
+
+def step(scenario):
+    """Fly half of it, step by step."""
+    simulation = tiltsim.Simulation(scenario)
+    while simulation.time < 0.5 * SHORT["duration"]:
+        simulation.step()
+
+
+def learn(scenario):
+    """One step of an environment."""
+    env = tiltsim.env.TiltrotorEnv(scenario)
+    env.reset()
+    action = env.action_spec()
+    env.step(0.5 * (action.minimum + action.maximum))
+    env.flight().metrics()
+
+
+def learn_on_arrays(scenario):
+    """The same on arrays, without compiling it."""
+    jax = pytest.importorskip("jax")
+    changed = scenario.replace({"simulation.integrator": "implicitfast"})
+    env = tiltsim.env.TiltrotorEnv(changed)
+    functions = tiltsim.env.EnvFunctions(env.task)
+    episode, _ = jax.eval_shape(functions.reset, functions.draw([env.generator])[0])
+    jax.eval_shape(functions.step, episode, np.zeros(env.action_spec().shape))
+
+
+def sweep(scenario):
+    """Two points along an axis."""
+    axis = {"type": "list", "key": "initial.position[0]", "values": [0.0, 0.1]}
+    tiltsim.sweep({"scenario": scenario, "axis": [axis]}, trusted=True)
+
+
+def on_arrays(scenario):
+    """Lift all code onto arrays, without compiling it."""
+    from tiltsim.arrays.flying import double_precision
+
+    jax = pytest.importorskip("jax")
+    with double_precision():
+        jax.eval_shape(tiltsim.vectorized(scenario).fly, {})
+
+
+def document(scenario):
+    return scenario.model_dump(mode="json", exclude_unset=True)
+
+
+USES_OF_SCENARIOS = {
+    "load_scenario": tiltsim.load_scenario,
+    "parse_scenario": lambda scenario: tiltsim.parse_scenario(document(scenario)),
+    "simulate": lambda scenario: tiltsim.simulate(scenario).metrics(),
+    "Simulation": step,
+    "airframe": tiltsim.airframe,
+    "fly": lambda scenario: [row.metrics for row in tiltsim.fly([scenario])],
+    "stability": tiltsim.stability,
+    "symbolic": tiltsim.symbolic,
+    "TiltrotorEnv": learn,
+}
+SLOW_USES_OF_SCENARIOS = {
+    "attraction": lambda scenario: tiltsim.attraction(
+        scenario, ("x", "y"), ranges=((-0.1, 0.1), (-0.1, 0.1)), coarse=2, refinements=0
+    ),
+    "linearize": lambda scenario: tiltsim.linearize(scenario, loop="open"),
+    "margins": tiltsim.margins,
+    "sweep": sweep,
+    "vectorized": on_arrays,
+    "EnvFunctions": learn_on_arrays,
+}
+
+
+def on(plant, use):
+    """A use on a plant."""
+    return lambda scenario: use(scenario.replace({"simulation.plant": plant}))
+
+
+def test_the_whole_public_interface_is_here():
+    public = {name for name in tiltsim.__all__ if name.islower()} | {"Simulation"}
+    methods = {
+        name
+        for name, value in vars(tiltsim.Flight).items()
+        if isinstance(value, FunctionType) and (name[0] != "_" or name == "_repr_html_")
+    } - {*tiltsim.Flight.__dataclass_fields__}
+    environments = {name for name in tiltsim.env.__all__ if "Env" in name}
+    known = {*USES_OF_FLIGHTS, *USES_OF_SCENARIOS, *SLOW_USES_OF_SCENARIOS}
+    # Loading is a part of saving; the base of environments and many of them are used by the others.
+    known |= {"scalar", "load_flight", "Environment", "VectorEnv"}
+    assert public | methods | environments <= known
+
+
+@each_pair
+def test_every_flight_can_be_used(law, vehicle, tmp_path):
+    if fits(law, vehicle):
+        for use in USES_OF_FLIGHTS.values():
+            use(flown(law, vehicle), tmp_path)
+
+
+@pytest.mark.slow
+@each_pair
+def test_every_flight_can_be_rendered(law, vehicle, tmp_path):
+    if fits(law, vehicle):
+        for use in SLOW_USES_OF_FLIGHTS.values():
+            _, line = attempt(use, flown(law, vehicle), tmp_path)
+            assert not line or "OpenGL" in line
+
+
+@each_pair
+def test_every_scenario_can_be_used_or_is_refused_in_a_line(law, vehicle):
+    if fits(law, vehicle):
+        scenario = fitting(law, vehicle)
+        lines = {name: attempt(use, scenario)[1] for name, use in USES_OF_SCENARIOS.items()}
+        assert not any(lines[name] for name in ("load_scenario", "parse_scenario", "fly"))
+        for plant in PLANTS:
+            attempt(on(plant, USES_OF_SCENARIOS["simulate"]), scenario)
+        attempt(on("thesis", tiltsim.symbolic), scenario)
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:.* is short:RuntimeWarning")  # for a region of attraction
+@pytest.mark.parametrize("plant", PLANTS)
+@each_pair
+def test_every_scenario_can_be_analyzed_or_is_refused_in_a_line(law, vehicle, plant):
+    if fits(law, vehicle):
+        for use in (USES_OF_SCENARIOS | SLOW_USES_OF_SCENARIOS).values():
+            attempt(on(plant, use), fitting(law, vehicle))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize(("law", "vehicle"), dict(reversed(claimed(FEW))).items())
+def test_every_engine_flies_every_law_or_refuses_it_in_a_line(law, vehicle, engine):
+    plant = "thesis" if engine == "jax" else "mujoco"
+    change = {"simulation.engine": engine, "simulation.plant": plant}
+    if fits(law, vehicle):
+        attempt(lambda: tiltsim.simulate(fitting(law, vehicle).replace(change)).metrics())
+
+
+# --- tables and their keys ---------------------------------------------------------------------
+
+NOT_FLOWN = {*DESCRIPTIVE, "variant"}
+"""Tables that change nothing in a flight."""
+
+
+def changes(table, key=None):
+    """The example of a table, and of one of its keys, as values by dotted key."""
+    document = at = tomllib.loads(table.toml)
+    for place in table.places[0]:
+        at = at.setdefault(place.name, {})
+        at = at[0] if isinstance(at, list) else at
+    if key is not None:
+        at[key.name] = tomllib.loads(f"value = {key.example}")["value"]
+    needed = dict(leaves(document))
+    return {key: needed[key] for key in needed.keys() - {"controller.function", "vehicle.mjcf"}}
+
+
+LAYERS = {
+    table.addresses()[-1]: changes(table)
+    for table in TABLES
+    if table.places[0] and table.places[0][0].name not in NOT_FLOWN
+}
+KEYS = {
+    f"{table.addresses()[-1]}.{key.name}": changes(table, key)
+    for table in TABLES
+    if table.addresses()[-1] in LAYERS
+    for key in table.keys
+    if key.example
+}
+
+
+def fly(law, vehicle, change, plant="mujoco"):
+    """Fly a pair with these values; None if they are of another law or vehicle."""
+    own = {"controller.law": law, "vehicle.model": VEHICLES[vehicle]["model"]}
+    if not fits(law, vehicle) or any(change.get(key, value) != value for key, value in own.items()):
+        return None
+    short = {f"simulation.{key}": value for key, value in SHORT.items()}
+    scenario = fitting(law, vehicle).replace({**change, "simulation.plant": plant, **short})
+    return tiltsim.simulate(scenario)
+
+
+FITTING = claimed(FEW)
+
+
+@pytest.mark.parametrize("layer", LAYERS)
+def test_every_table_is_flown_by_some_law(layer):
+    """With one pair of those that take it, another one for each table."""
+    first = 5 * [*LAYERS].index(layer) % len(FITTING)
+    for pair in FITTING[first:] + FITTING[:first]:
+        flight, _ = attempt(fly, *pair, LAYERS[layer])
+        if flight is not None:
+            assert flight.metrics()
+            return
+    raise AssertionError("no law takes the example of this table")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("plant", PLANTS)
+@pytest.mark.parametrize(("law", "vehicle"), FITTING)
+def test_every_pair_takes_every_table_or_refuses_it_in_a_line(law, vehicle, plant, tmp_path):
+    shown = ("metrics", "plot", "view", "video") if plant == "mujoco" else ("metrics",)
+    for change in LAYERS.values():
+        flight, _ = attempt(fly, law, vehicle, change, plant)
+        if flight is not None:
+            for use in shown:
+                USES_OF_FLIGHTS[use](flight, tmp_path)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("law", "vehicle"), FITTING)
+def test_every_pair_takes_every_key_or_refuses_it_in_a_line(law, vehicle):
+    for number, change in enumerate(KEYS.values()):
+        flight, _ = attempt(fly, law, vehicle, change, PLANTS[number % len(PLANTS)])
+        if flight is not None:
+            flight.metrics()
