@@ -10,7 +10,14 @@ import pytest
 import tiltsim
 from tests.linear.test_rest import SETPOINT, random_hover
 from tiltsim.linear.linearization import Linearization, Signal, linearize
-from tiltsim.linear.margins import Margin, broken_loops, frequency_grid, margins_of
+from tiltsim.linear.margins import (
+    BrokenLoop,
+    Margin,
+    _margin,
+    broken_loops,
+    frequency_grid,
+    margins_of,
+)
 
 
 def third_order(gains):
@@ -175,3 +182,21 @@ def test_the_delay_margin_is_the_smallest_latency_that_loses_the_flight(name):
     steps = floor(predicted / STEP)
     assert steps > 0
     assert [is_lost(scenario, latency) for latency in (steps, steps + 1)] == [False, True]
+
+
+OSCILLATOR = np.array([[0.0, 1.0], [-1.0, 0.0]])
+"""With poles at 1 rad/s, the middle of the frequencies below."""
+
+
+def test_a_pole_at_a_frequency_of_the_search_is_no_obstacle():
+    loop = BrokenLoop("input", OSCILLATOR, np.array([[0.0], [1.5]]), np.array([[-1.0, 0.0]]), None)
+    found = _margin(loop, np.array([0.5, 2.0]))  # 1.5 / (1 - w^2)
+    assert found.frequency == pytest.approx(2.5**0.5)
+    assert found.phase == pytest.approx(0.0, abs=1e-9)
+
+
+def test_a_loop_without_any_gain_has_every_margin():
+    loop = BrokenLoop("input", OSCILLATOR, np.array([[0.0], [1.5]]), np.zeros((1, 2)), None)
+    found = _margin(loop, np.array([0.5, 2.0]))
+    assert found.gain == (0.0, np.inf)
+    assert found.phase == found.delay == np.inf

@@ -115,7 +115,10 @@ class BrokenLoop:
         if self.timestep is not None:
             s = np.exp(s * self.timestep)
         pencil = s[:, None, None] * np.eye(len(self.A)) - self.A
-        return -self.C @ np.linalg.solve(pencil, self.B.astype(complex))
+        try:
+            return -self.C @ np.linalg.solve(pencil, self.B.astype(complex))
+        except np.linalg.LinAlgError:  # one of them is a pole, which is seen from beside it
+            return self.transfer(frequencies * (1.0 + 1e-9))
 
 
 def broken_loops(system: Linearization) -> Iterator[BrokenLoop]:
@@ -177,7 +180,7 @@ def _margin(loop: BrokenLoop, grid: Floats) -> Margin:
     low, high, phase, delay, at = 0.0, inf, inf, inf, float("nan")
     loci = _tracked(np.linalg.eigvals(transfer))
     for locus in loci.T:
-        for frequency, value in _crossings(loop, grid, locus, np.log(np.abs(locus)), _size):
+        for frequency, value in _crossings(loop, grid, locus, np.abs(locus) - 1.0, _size):
             from_minus_one = abs(np.angle(-value))
             if from_minus_one < phase:
                 phase, at = float(from_minus_one), frequency
@@ -218,7 +221,7 @@ def _real_ends(loop: BrokenLoop) -> list[complex]:
 
 
 def _size(value: complex) -> float:
-    return float(np.log(abs(value)))
+    return abs(value) - 1.0
 
 
 def _tracked(eigenvalues: Any) -> Any:
