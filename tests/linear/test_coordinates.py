@@ -76,4 +76,4 @@ def test_a_vehicle_with_fewer_tilts_than_rotors_has_as_many_tilt_rates_as_tilts(
     names = equation_inputs(assembly, assembly.loop.equations.inputs_size)
     rates = [f"alpha_rate_{arm}" for arm in range(1, 6)]
     expected = [f"rotor_acceleration_{rotor}" for rotor in range(1, 7)] + rates
-    assert names == tuple((name, index) for index, name in enumerate(expected))
+    assert names == tuple((name, index, 1.0) for index, name in enumerate(expected))

@@ -91,6 +91,90 @@ def test_opening_a_loop_leaves_the_others_closed():
         assert closed == pytest.approx(system.A, abs=1e-9)
 
 
+INTEGRAL = {"gait": {"type": "fixed", "angles": [0.0, 0.0, 0.0, 0.0]}}
+
+
+def test_a_broken_measurement_reaches_no_integrator_either():
+    """At zero gain of a measured position nothing of the controller moves with it."""
+    system = linearize(tiltsim.load_scenario("beyond/constant_disturbance#with_integral", INTEGRAL))
+    names = [signal.name for signal in system.states]
+    opened = {loop.place: loop.A for loop in broken_loops(system)}
+    for axis in "xyz":
+        row, column = names.index(f"integral_{axis}"), names.index(axis)
+        assert system.A[row, column] == pytest.approx(-1.0)
+        assert np.abs(opened[axis][:, column]).max() < 1e-6
+
+
+def test_the_position_of_an_integral_law_bears_any_smaller_gain():
+    """The loop is stable at all factors below the upper limit, which python-control finds, too."""
+    system = linearize(tiltsim.load_scenario("beyond/constant_disturbance#with_integral", INTEGRAL))
+    margin = next(margin for margin in margins_of(system) if margin.place == "x")
+    loop = next(loop for loop in broken_loops(system) if loop.place == "x")
+    low, high = margin.gain
+    assert low == 0.0
+
+    def growth(factor):
+        return np.linalg.eigvals(loop.A + factor * loop.B @ loop.C).real.max()
+
+    assert growth(0.01) < 1e-6
+    assert growth(0.999 * high) < 1e-6 < growth(1.001 * high)
+    control = pytest.importorskip("control")
+    space = control.ss(loop.A, loop.B, -loop.C, 0.0)
+    gain, phase, *_ = control.margin(space)
+    assert (gain, np.radians(phase)) == (pytest.approx(high, rel=1e-3), pytest.approx(margin.phase))
+
+
+QUADROTOR = {
+    "vehicle": {"model": "quadrotor"},
+    "controller": {"law": "quadrotor_attitude_altitude"},
+    "reference": {"type": "attitude_altitude"},
+}
+
+
+@pytest.mark.parametrize("plant", ["mujoco", "rigid_body"])
+def test_thrusts_of_the_quadrotor_are_in_newtons(plant):
+    system = linearize({**QUADROTOR, "simulation": {"plant": plant}})
+    vehicle = tiltsim.parse_scenario(QUADROTOR).vehicle.resolve()
+    states = [signal.name for signal in system.states]
+    assert [signal.text for signal in system.inputs] == [f"thrust_{i} [N]" for i in (1, 2, 3, 4)]
+    weight = vehicle.mass * vehicle.gravity
+    assert [*system.command.values()] == pytest.approx([0.25 * weight] * 4)
+    assert system.B[states.index("vz")] == pytest.approx(1.0 / vehicle.mass)
+    push = vehicle.arm_length / vehicle.inertia_xx
+    assert system.B[states.index("p")] == pytest.approx([0.0, push, 0.0, -push], abs=1e-9)
+
+
+@pytest.mark.parametrize("law", ["pid", "indi", "geometric", "lqr"])
+@pytest.mark.parametrize("plant", ["mujoco", "rigid_body"])
+def test_a_baseline_of_the_quadrotor_is_opened_at_its_rotors(law, plant):
+    scenario = tiltsim.load_scenario(f"beyond/baselines#{law}_quadrotor")
+    system = linearize(scenario.replace({"simulation.plant": plant}))
+    opened = system.opened()
+    rotors = [i for i, state in enumerate(system.states) if state.name.startswith("rotor_speed")]
+    assert [signal.name for signal in system.inputs] == [
+        f"rotor_acceleration_{rotor}" for rotor in (1, 2, 3, 4)
+    ]
+    assert np.abs(system.A[rotors]).max() > 1e3
+    assert np.abs(opened.A[rotors]).max() < 1e-6
+    assert opened.B[rotors] == pytest.approx(np.eye(4))
+
+
+def test_disk_margins_are_worst_between_the_frequencies_of_the_grid():
+    """Near instability, where the peak is narrower than the grid."""
+    changes = {"vehicle.rotor_time_constant": 0.052, "simulation.control_timestep": 0.0}
+    allowed = {"reference.type": "setpoint", "controller.allow_unstable": True}
+    scenario = tiltsim.load_scenario("beyond/actuators#rotor_lag", {**changes, **allowed})
+    system = linearize(scenario)
+    swing = np.abs(system.poles[np.abs(system.poles.imag) > 1.0]).astype(float)
+    fine = np.concatenate([near + np.linspace(-0.3, 0.3, 1201) for near in np.unique(swing)])
+    for margin, loop in list(zip(margins_of(system), broken_loops(system), strict=True))[:2]:
+        transfer = loop.transfer(fine[fine > 0.0])
+        eye = np.eye(transfer.shape[-1])
+        sizes = np.linalg.norm(2.0 * np.linalg.inv(eye + transfer) - eye, ord=2, axis=(1, 2))
+        assert margin.disk == pytest.approx(2.0 / sizes.max(), rel=1e-3)
+        assert margin.disk <= 2.0 / sizes.max() * (1.0 + 1e-9)
+
+
 def scalar_loop(pole, gain, timestep):
     """``x' = pole x + u`` with ``u = -gain x``, or from sample to sample."""
     one, signal = np.ones((1, 1)), Signal("x", "m")
@@ -150,13 +234,45 @@ STEP = 0.002
 
 
 def is_lost(scenario, latency):
-    """Whether a flight from a small offset, with a latency of so many steps, grows or ends."""
-    flight = tiltsim.simulate(scenario.replace({"simulation.control_latency": latency * STEP}))
+    """Whether a flight from a small offset, with a latency (s), grows or ends."""
+    flight = tiltsim.simulate(scenario.replace({"simulation.control_latency": latency}))
     if flight.end.kind != "completed":
         return True
     moving = np.abs([flight[name] for name in ("p", "q", "r", "vz")])
     _, early, _, late = np.array_split(moving, 4, axis=1)
     return bool((late.max(axis=1) > np.maximum(early.max(axis=1), 1e-7)).any())
+
+
+def offset_flight(name, step, changes):
+    """A set-point flight from a small offset, with physics and control steps of a length."""
+    offset = {"initial.position": [0, 0, 0], "initial.velocity": [0, 0, 0.01]}
+    steps = {"simulation.timestep": step, "simulation.control_timestep": step}
+    leaning = {"initial.attitude": [0.01, -0.01, 0.01], "simulation.engine": "python"}
+    return tiltsim.load_scenario(name, {**offset, **steps, **leaning, **changes})
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("law", "step"), [("pid", 0.002), ("indi", 0.002), ("geometric", 0.002), ("lqr", 0.004)]
+)
+@pytest.mark.parametrize("vehicle", ["tiltrotor", "hexarotor"])
+def test_the_delay_margin_of_a_baseline_is_a_latency_too(law, step, vehicle):
+    """Latency delays what the rotors are sent; the loop of their speeds follows a model."""
+    rest = {"reference.position": [0, 0, 0], "simulation.duration": 8.0}
+    scenario = offset_flight(f"beyond/baselines#{law}_{vehicle}", step, rest)
+    steps = floor(tiltsim.margins(scenario)[0].delay / step)
+    assert steps > 5
+    assert [is_lost(scenario, late * step) for late in (steps, steps + 1)] == [False, True]
+
+
+def test_a_baseline_with_a_latency_has_that_much_less_delay_margin():
+    """Without flights: the loop is the same as the one with commands under way."""
+    rest = {"reference.position": [0, 0, 0], "simulation.plant": "rigid_body"}
+    scenario = offset_flight("beyond/baselines#geometric_tiltrotor", 0.004, rest)
+    late = scenario.replace({"simulation.control_latency": 0.004})
+    margin, left = (tiltsim.margins(each)[0].delay for each in (scenario, late))
+    assert left == pytest.approx(margin - 0.004, rel=1e-6)
+    assert margin > 0.02
 
 
 @pytest.mark.slow
@@ -172,16 +288,13 @@ def is_lost(scenario, latency):
 )
 def test_the_delay_margin_is_the_smallest_latency_that_loses_the_flight(name):
     """In MuJoCo it is the first whole step beyond the margin."""
-    offset = {"initial.position": [0, 0, 0], "initial.velocity": [0, 0, 0.01]}
-    steps = {"simulation.timestep": STEP, "simulation.control_timestep": STEP}
-    changes = {"reference.type": "setpoint", "initial.attitude": [0.01, -0.01, 0.01]}
-    short = {"simulation.duration": 6.0, "simulation.engine": "python"}
     allowed = {"controller.allow_unstable": True} if name.startswith("beyond") else {}
-    scenario = tiltsim.load_scenario(name, {**offset, **steps, **changes, **short, **allowed})
+    changes = {"reference.type": "setpoint", "simulation.duration": 6.0, **allowed}
+    scenario = offset_flight(name, STEP, changes)
     predicted = tiltsim.margins(scenario)[0].delay
     steps = floor(predicted / STEP)
     assert steps > 0
-    assert [is_lost(scenario, latency) for latency in (steps, steps + 1)] == [False, True]
+    assert [is_lost(scenario, late * STEP) for late in (steps, steps + 1)] == [False, True]
 
 
 OSCILLATOR = np.array([[0.0, 1.0], [-1.0, 0.0]])

@@ -72,6 +72,8 @@ def test_modes_lost_in_the_rounding_of_a_period_are_not_listed():
         names=("z", "alpha_1"),
         is_orbit=True,
         root=SimpleNamespace(residual=0.0),
+        left_out=(),
+        corners=(),
     )
     found = stability_at(orbit)
     assert [mode.name for mode in found.modes] == ["altitude"]
@@ -256,3 +258,17 @@ def test_what_does_not_return_is_refused():
     lost = gait("trot_continuous").replace({"gait.amplitude": 1.5})
     with pytest.raises(tiltsim.InputError, match="found no periodic orbit near its flight"):
         tiltsim.stability(lost)
+
+
+def test_an_orbit_at_the_edge_of_a_dead_zone_says_so():
+    """A tilt-car that moves as wanted wants no thrust: its rotors push, and cannot pull."""
+    car = {
+        "vehicle": {"model": "tilt_car"},
+        "controller": {"law": "tilt_car_planned_direction"},
+        "gait": {"type": "penguin_small", "period": 0.5},
+        "reference": {"type": "line", "velocity": [0.5, 0.0, 0.0]},
+        "simulation": {"plant": "thesis"},
+    }
+    found = tiltsim.stability(car)
+    assert found.corners == ("x", "y", "vx", "vy")
+    assert "a limit or dead zone" in stability_text(found)

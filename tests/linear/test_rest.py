@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import tiltsim
+from tiltsim.commands.stability import stability_text
 from tiltsim.linear.differences import ERROR
 from tiltsim.linear.equilibrium import equilibrium_of
 from tiltsim.linear.modes import exponents, is_stable, modes_of, spectrum
@@ -360,3 +361,78 @@ def test_baselines_and_own_laws_have_the_altitude_poles_of_their_gains(law):
         assert np.abs(found.poles - pole).min() < 1e-6 * abs(pole)
     # The own law leaves x and y, and yaw, where they are put.
     assert (found.neutral > 0) == (law == "own")
+
+
+EXACT_HOVER = "beyond/setpoint_exact_decoupler#rho_0"
+
+
+def limited(speed, plant="rigid_body"):
+    """A hover with rotors that turn at most at a speed."""
+    changes = {"simulation.plant": plant, "vehicle.max_rotor_speed": speed}
+    return tiltsim.load_scenario(EXACT_HOVER, changes)
+
+
+def test_a_rotor_just_below_its_limit_is_not_slowed_by_it():
+    """Hover takes 361.383 rad/s."""
+    expected = tiltsim.stability(limited(None)).poles
+    assert distance(tiltsim.stability(limited(361.39)).poles, expected) < 1e-6
+
+
+@pytest.mark.parametrize("plant", [pytest.param("rigid_body", marks=pytest.mark.slow), "mujoco"])
+def test_a_rotor_at_its_limit_has_no_linear_system(plant):
+    state = tiltsim.linearize(limited(None, plant)).state
+    speed = max(abs(value) for name, value in state.items() if name.startswith("rotor")) + 1e-7
+    at_limit = tiltsim.stability(limited(speed, plant))
+    assert {f"rotor_speed_{rotor}" for rotor in (1, 2, 3, 4)} <= set(at_limit.corners)
+    assert at_limit.report()["corners"] == list(at_limit.corners)
+    assert "corners" in stability_text(at_limit)
+    with pytest.raises(tiltsim.InputError, match="rests at a limit or at the edge of a dead zone"):
+        tiltsim.linearize(limited(speed, plant))
+
+
+@pytest.mark.parametrize("plant", ["rigid_body", "mujoco"])
+def test_no_rest_point_lies_beyond_a_limit(plant):
+    with pytest.raises(tiltsim.InputError, match="found no rest point"):
+        tiltsim.stability(limited(361.38, plant))
+
+
+GAIT_1 = "ch03_gaits/stabilization#gait_1"
+
+
+def test_the_attitude_of_a_vehicle_that_drifts_sideways_rests():
+    """Nothing holds x and y of ch. 3's gait 1; the other states move as a flight's do."""
+    scenario = tiltsim.load_scenario(GAIT_1, THESIS)
+    found = tiltsim.stability(scenario)
+    assert found.left_out == ("x", "y", "vx", "vy")
+    assert found.report()["left_out"] == list(found.left_out)
+    assert "left out  x, y, vx, vy: nothing holds them" in stability_text(found)
+    assert not set(found.states) & set(found.left_out)
+    assert found.stable
+    motion, start = found.equilibrium.motion, found.equilibrium.root.state
+    coordinates, kept, steps = motion.coordinates, found.equilibrium.kept, 1000
+    offset = 1e-5 * np.random.default_rng(0).standard_normal(len(kept))
+    whole = np.zeros(coordinates.size)
+    whole[kept] = offset
+    moved = motion.flown(0, coordinates.moved(start, whole), steps)
+    values, vectors = np.linalg.eig(found.matrix)
+    time = steps * scenario.simulation.timestep
+    expected = (vectors * np.exp(values * time)) @ np.linalg.solve(vectors, offset.astype(complex))
+    apart = coordinates.between(motion.flown(0, start, steps), moved)[kept]
+    assert apart == pytest.approx(expected.real, rel=1e-3, abs=1e-8)
+
+
+@pytest.mark.slow
+def test_drag_gives_a_drifting_vehicle_its_airspeed():
+    """Then its velocity rests, too: where drag is what drives it sideways."""
+    drag = {"simulation.plant": "rigid_body", "air": {"drag": {"linear": [0.1, 0.1, 0.1]}}}
+    scenario = tiltsim.load_scenario(GAIT_1, drag)
+    found = tiltsim.stability(scenario)
+    assert found.left_out == ("x", "y")
+    assert {"vx", "vy"} < set(found.states)
+    slowest = -0.1 / scenario.vehicle.resolve().mass
+    assert found.poles[:2].real == pytest.approx([slowest, slowest], rel=1e-3)
+
+
+def test_a_flight_with_nothing_to_hold_it_up_says_that_x_and_y_were_left_out():
+    with pytest.raises(tiltsim.InputError, match="also without x and y, which nothing holds"):
+        tiltsim.stability(tiltsim.load_scenario("ch09_input_limits/hover#gait_5", THESIS))

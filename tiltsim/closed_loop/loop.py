@@ -60,6 +60,8 @@ class Dynamics:
         controller_states: Number of activations that are states of the controller.
         extra_actuators: Actuators that layers around the controller append to the model, innermost
             first.
+        commands_thrusts: Whether the controller commands thrusts, not rates of the rotor speeds:
+            these activations are then idle.
     """
 
     model: str
@@ -69,6 +71,7 @@ class Dynamics:
     spins: Values = ()
     tilt_of_rotor: tuple[int, ...] = ()
     extra_actuators: tuple[ExtraActuators, ...] = ()
+    commands_thrusts: bool = False
 
 
 @scalar
@@ -206,6 +209,8 @@ class ClosedLoop:
         uses_gait: Whether the scenario's gait has a part in the flight.
         within: The loop that a layer of `tiltsim.laws.layers` goes around; None for a controller
             itself, its supervisor and allocation included.
+        with_latency: The controller as it flies with a latency of its commands; None if it is the
+            same.
     """
 
     kind: VehicleKind
@@ -220,6 +225,7 @@ class ClosedLoop:
     follows_position: Callable[[Scenario], bool] = lambda _scenario: True
     uses_gait: bool = True
     within: ClosedLoop | None = None
+    with_latency: Callable[[], ClosedLoop] | None = None
 
     @cached_property
     def signature(self) -> float:

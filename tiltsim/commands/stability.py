@@ -68,14 +68,13 @@ def run(arguments: argparse.Namespace) -> int:
     report, text = found.report(), stability_text(found)
     draw = partial(_draw, found)
     if arguments.margins:
-        from tiltsim.linear.linearization import linearization_at
-        from tiltsim.linear.margins import margins_of
+        from tiltsim.linear.margins import loop_for_margins, margins_of
 
         if found.multipliers is not None:
             raise InputError(
                 f"--margins: {scenarios[0].address} is periodic; margins need a rest point"
             )
-        system = linearization_at(found.equilibrium)
+        system = loop_for_margins(scenarios[0])
         margins = margins_of(system)
         report["margins"] = [margin.report() for margin in margins]
         text = f"{text}\n\n{margins_text(margins)}"
@@ -222,6 +221,11 @@ def stability_text(found: Stability) -> str:
     forgotten = len(found.states) - sum(mode.count for mode in found.modes)
     if forgotten:
         rows.append(("not listed", f"{forgotten} states, forgotten within a period or sample"))
+    if found.left_out:
+        rows.append(("left out", f"{', '.join(found.left_out)}: nothing holds them"))
+    if found.corners:
+        text = "the rates have a corner there, a limit or dead zone, so poles say little"
+        rows.append(("corners", f"{', '.join(found.corners)}: {text}"))
     header = ["mode", "frequency (rad/s)", "damping", "count", "states"]
     modes = [
         (

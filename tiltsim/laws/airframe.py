@@ -50,11 +50,10 @@ def airframe_of(plan: FlightPlan) -> Airframe:
     )
 
 
-def initial_states(plan: FlightPlan) -> Values:
-    """The states of the controller at time zero."""
+def initial_states(plan: FlightPlan, *, models_rotors: bool) -> Values:
+    """The states of the controller at time zero, with those of a model of its rotors or without."""
     controller, airframe = plan.scenario.controller, airframe_of(plan)
     assert isinstance(controller, ScalarTable)
     tilts = airframe.initial_tilts if controller.commands_tilts else ()
-    late = plan.scenario.simulation.latency_steps > 0
-    speeds = airframe.initial_speeds if late else ()
+    speeds = airframe.initial_speeds if models_rotors else ()
     return (*controller.initial_states(airframe), *tilts, *speeds)

@@ -179,6 +179,7 @@ def extended_loop(
             Sizes(qpos=7, qvel=6, act=6, ctrl=10),
             lambda plan, _setup: (0.0, 0.0, 0.0, 0.0, *_hover_thrust(plan)),
             controller_states=2,
+            commands_thrusts=True,
             spins=SPIN,
         ),
         sampling=Sampling(controls),

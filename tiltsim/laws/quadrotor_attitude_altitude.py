@@ -105,6 +105,7 @@ QUADROTOR_ATTITUDE_ALTITUDE: Final = ClosedLoop(
         "quadrotor",
         Sizes(qpos=7, qvel=6, act=4, ctrl=8),
         lambda _plan, _setup: (0.0, 0.0, 0.0, 0.0),
+        commands_thrusts=True,
         spins=SPIN,
     ),
     sampling=Sampling(_attitude_altitude_controls),

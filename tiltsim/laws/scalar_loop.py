@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from math import sqrt
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
@@ -190,6 +190,7 @@ def scalar_loop(key: Key) -> ClosedLoop:
     record, shown = record_of(key.parameters), key.layout.shown
     commands = shown.names("tilt_command") if key.tilts else ()
     modelled = shown.names("modelled_rotor_speed") if key.models_rotors else ()
+    late = key._replace(models_rotors=True)
     law = RotorLaw(
         key.code_name,
         _inputs_of(key),
@@ -200,10 +201,11 @@ def scalar_loop(key: Key) -> ClosedLoop:
             **dict.fromkeys(commands, "rad"),
             **dict.fromkeys(modelled, "rad/s"),
         },
-        initial=initial_states,
+        initial=partial(initial_states, models_rotors=key.models_rotors),
         commands=len(key.states) if key.tilts else None,
     )
     return replace(
         rotor_loop(key.layout, law),
         follows_position=lambda scenario: scenario.reference.kind != "attitude_altitude",
+        with_latency=None if key.models_rotors else partial(scalar_loop, late),
     )

@@ -171,7 +171,10 @@ PLANNED_DIRECTION: Final = ClosedLoop(
     parameters=LoopParameters,
     setup=_setup,
     dynamics=Dynamics(
-        "tilt_car", Sizes(qpos=4, qvel=4, act=2, ctrl=5), lambda _plan, _setup: (0.0, 0.0)
+        "tilt_car",
+        Sizes(qpos=4, qvel=4, act=2, ctrl=5),
+        lambda _plan, _setup: (0.0, 0.0),
+        commands_thrusts=True,
     ),
     sampling=Sampling(_planned_direction_controls),
     columns=Columns(

@@ -1,32 +1,74 @@
-"""Derivatives of functions of a vector by central differences of sixth order.
+"""Derivatives of functions of a vector by central differences.
 
-The functions are smooth code on doubles. A stencil of sixth order leaves of its step of 5e-3 a
-relative error of some 1e-16, and rounding one of 1e-12 to 1e-10: on every plant and with every
-layer, derivatives about as good as exact ones.
+A stencil of sixth order leaves of its step of 5e-3 a relative error of some 1e-16, and rounding one
+of 1e-12 to 1e-10: on every plant and with every layer, derivatives about as good as exact ones.
+That holds where the function is smooth within the stencil. A limit or a dead zone within it shows
+in the highest differences, which a smooth function hardly has: there the steps are shortened until
+the corner lies outside, or else it is reported.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tiltsim_controllers.mathematics.scalar import Floats
 
 STEP: Final = 5e-3
 """For coordinates of order one; larger ones are moved by this share of them."""
 
-HALF_STENCIL: Final = ((1.0, 3.0 / 4.0), (2.0, -3.0 / 20.0), (3.0, 1.0 / 60.0))
-"""Offsets in steps, and weights; those on the other side are the negative ones."""
+
+class Stencil(NamedTuple):
+    """Where a function is evaluated, and weights of its differences and sums from side to side."""
+
+    offsets: tuple[float, ...]  # in steps, either way
+    weights: tuple[float, ...]  # of differences: the derivative
+    odd: tuple[float, ...]  # of differences, and of sums: these vanish for smooth functions
+    even: tuple[float, ...]
+    smooth: float  # share of what a step changes at most up to which they count as vanished
+
+
+HALF_STENCIL: Final = Stencil(
+    (1.0, 2.0, 3.0), (3.0 / 4.0, -3.0 / 20.0, 1.0 / 60.0), (5.0, -4.0, 1.0), (15.0, -6.0, 1.0), 1e-6
+)
+"""Sixth order; its fifth and sixth differences vanish."""
 
 ERROR: Final = 2e-11
 """Of derivatives by it, as a share of the largest of their row; measured against symbolic ones."""
 
-CENTRAL: Final = ((0.02, 25.0),)
+AVERAGED: Final = HALF_STENCIL._replace(smooth=0.1)
+"""For flights over a period: an event within it that passes from one time step to the next is a
+small corner, which the stencil averages out."""
+
+CENTRAL: Final = Stencil((0.02,), (25.0,), (0.0,), (1.0,), AVERAGED.smooth)
 """The same with a third of the evaluations, for long flights: second order at a step of 1e-4."""
 
-Stencil = tuple[tuple[float, float], ...]
+SHORTER: Final = (1.0, 0.1, 0.01, 1e-3, 1e-4)
+"""Shares of a step that are tried until the function is smooth within it."""
+
+BETTER: Final = 0.2
+"""Shorter steps count where they leave this share of the highest differences, else are rounding."""
+
+QUIET: Final = 1e-10  # SI units; smaller values may be rounding
+
+CORNER: Final = 1e-3
+"""Larger shares of the highest differences, at every step, are a corner at the point itself."""
+
+
+class Derivative(NamedTuple):
+    """The derivative of a function of a vector at a point.
+
+    Attributes:
+        matrix: Shape (values, entries).
+        corners: Whether a value has a corner along an entry there, so that its derivative is the
+            mean of both sides; the same shape.
+    """
+
+    matrix: Floats
+    corners: NDArray[np.bool_]
 
 
 def steps_at(values: Floats) -> Floats:
@@ -38,22 +80,38 @@ def jacobian(
     function: Callable[[list[Floats]], Iterable[Floats]],
     steps: Floats,
     stencil: Stencil = HALF_STENCIL,
-) -> Floats:
-    """Derivative at zero of a function of a vector, shape (values, len(steps)).
+) -> Derivative:
+    """Derivative at zero of a function of a vector.
 
     Args:
         function: Of several vectors as long as ``steps``, each on its own: their values in turn.
         steps: By which each entry is moved.
-        stencil: `HALF_STENCIL` or `CENTRAL`.
+        stencil: `HALF_STENCIL`, `AVERAGED` or `CENTRAL`.
     """
-    moved = np.diag(steps)
-    offsets = [sign * offset for offset, _ in stencil for sign in (1.0, -1.0)]
-    values = iter(function([offset * row for row in moved for offset in offsets]))
-    columns = []
-    for step in steps.tolist():
-        column: Floats = np.zeros(1)
-        for _, weight in stencil:
-            ahead, behind = next(values), next(values)
-            column = column + weight / step * (ahead - behind)
-        columns.append(column)
-    return np.array(columns).T
+    offsets = [sign * offset for offset in stencil.offsets for sign in (1.0, -1.0)]
+    matrix = roughness = reach = np.zeros(0)
+    left = np.arange(len(steps))
+    for share in SHORTER:
+        moved = [share * at * row for row in np.diag(steps)[left] for at in offsets]
+        here, *values = function([np.zeros(len(steps)), *moved])
+        sides = np.reshape(values, (len(left), len(stencil.offsets), 2, len(here)))
+        differences, sums = sides[:, :, 0] - sides[:, :, 1], sides.sum(axis=2) - 2.0 * here
+        if share == 1.0:
+            reach = np.fmax.reduce(np.abs(differences[:, 0]), initial=QUIET)[:, None]
+            matrix = np.full((len(here), len(steps)), np.nan)
+            roughness = np.full(matrix.shape, np.inf)
+        slopes = _weighted(stencil.weights, differences) / (share * steps[left])
+        odd, even = _weighted(stencil.odd, differences), _weighted(stencil.even, sums)
+        rough = np.maximum(0.0, np.maximum(np.abs(odd), np.abs(even)) - QUIET) / (share * reach)
+        better = rough < BETTER * roughness[:, left]  # not where it is NaN
+        matrix[:, left] = np.where(better, slopes, matrix[:, left])
+        roughness[:, left] = np.where(better, rough, roughness[:, left])
+        left = left[~(rough.max(axis=0) <= stencil.smooth)]
+        if not len(left):
+            break
+    return Derivative(matrix, roughness > max(CORNER, stencil.smooth))
+
+
+def _weighted(weights: tuple[float, ...], of: Floats) -> Floats:
+    """A sum over the offsets, values in rows and entries in columns."""
+    return np.asarray(np.einsum("j,ijk->ki", weights, of))

@@ -9,14 +9,16 @@ from math import ceil
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tiltsim.engines.base import EngineName
 from tiltsim.errors import InputError
 from tiltsim.laws.assembling import assemble
-from tiltsim.linear.differences import CENTRAL, HALF_STENCIL
+from tiltsim.linear.differences import AVERAGED, CENTRAL, HALF_STENCIL, SHORTER
 from tiltsim.linear.forcing import Forcing, forcing_of
 from tiltsim.linear.motion import LONG, Motion, make_motion
-from tiltsim.linear.newton import Root, solve
+from tiltsim.linear.naming import PLANE
+from tiltsim.linear.newton import Root, coordinate_steps, solve
 from tiltsim.plants.engine_choice import native_pays_off
 from tiltsim.scenario.scenario import Scenario
 from tiltsim_controllers.mathematics.scalar import Floats
@@ -51,6 +53,8 @@ class Equilibrium:
             their derivative.
         step: The physics step at which it is considered.
         steps: After which it returns; 0 where it rests in continuous time.
+        left_out: Names of coordinates that nothing holds and that no other depends on: they move
+            on while the others rest.
     """
 
     motion: Motion
@@ -58,6 +62,7 @@ class Equilibrium:
     root: Root
     step: int
     steps: int
+    left_out: tuple[str, ...] = ()
 
     @property
     def time(self) -> float:
@@ -77,13 +82,30 @@ class Equilibrium:
 
     @cached_property
     def kept(self) -> Any:
-        """Indices of the coordinates but those that nothing depends on.
+        """Indices of the coordinates but those left out and those that nothing depends on.
 
         Such are integrals without a gain; a position counts, though, even if no law follows it.
         """
         names, derivative = self.motion.coordinates.names, self.root.derivative
         used = [name in "xyz" or column.any() for name, column in zip(names, derivative.T)]
-        return np.flatnonzero(used)
+        return np.flatnonzero(np.array(used) & ~np.isin(names, self.left_out))
+
+    @property
+    def corners(self) -> tuple[str, ...]:
+        """Names of the coordinates kept that are at a limit, or whose rates have a corner there."""
+        rates = self.root.corners[np.ix_(self.kept, self.kept)].any(axis=1)
+        found = zip(self.names, self._at_limits[self.kept] | rates, strict=True)
+        return tuple(name for name, corner in found if corner)
+
+    @property
+    def _at_limits(self) -> NDArray[np.bool_]:
+        """Whether coordinates would pass a limit in the shortest step of a difference."""
+        coordinates, state = self.motion.coordinates, self.root.state
+        steps = SHORTER[-1] * coordinate_steps(coordinates, state)
+        moved = [coordinates.moved(state, by) for step in (steps, -steps) for by in np.diag(step)]
+        kept = [coordinates.between(at, self.motion.limited(at)) for at in moved]
+        passed = np.abs(kept).max(axis=1) > 0.1 * np.concatenate((steps, steps))
+        return np.asarray(passed.reshape(2, -1).any(axis=0))
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -101,6 +123,7 @@ def equilibrium_of(
     scenario: Scenario,
     *,
     at_rest: bool = False,
+    late: bool = False,
     near: Floats | None = None,
     progress: Callable[[int], None] = lambda _flights: None,
 ) -> Equilibrium:
@@ -109,6 +132,7 @@ def equilibrium_of(
     Args:
         scenario: The scenario.
         at_rest: Demands a rest point.
+        late: Has the controller as it flies with a latency; see `tiltsim.linear.motion.Motion`.
         near: A state near the orbit, such as one of a neighbouring scenario's; tried first.
         progress: Called with the number of periods or samples flown so far.
 
@@ -136,7 +160,7 @@ def equilibrium_of(
             )
     flights = FLIGHTS if forcing.period is not None else 1
     settling = ceil(min(SETTLING_TIME, simulation.duration) / simulation.timestep)
-    motion = make_motion(scenario, _engine(scenario, max(settling, flights * steps)))
+    motion = make_motion(scenario, _engine(scenario, max(settling, flights * steps)), late)
     step = ceil(forcing.start / simulation.timestep - 1e-9)
     step = ceil(step / steps) * steps if steps else step
     fewest = 1 if forcing.period is None else RETURNS
@@ -144,7 +168,8 @@ def equilibrium_of(
     search = _Search(motion, forcing, step, steps, returns, progress)
     if forcing.period is None or (near is not None and near.shape != motion.initial.shape):
         near = None  # at rest, neutral states stay where the scenario puts them
-    return Equilibrium(motion, forcing, search.root(near), step, steps)
+    root, left_out = search.root(near)
+    return Equilibrium(motion, forcing, root, step, steps, left_out)
 
 
 def _engine(scenario: Scenario, steps: int) -> EngineName:
@@ -191,29 +216,47 @@ class _Search:
         self._returns, self._progress, self._flights = returns, progress, 0
         self._timestep = motion.assembly.scenario.simulation.timestep
         self._start = step * self._timestep
+        self._held = np.ones(motion.coordinates.size, dtype=bool)
         self._sides = self._signs(motion.initial)
 
-    def root(self, near: Floats | None = None) -> Root:
-        """The state, sought near another one first, or an `InputError`."""
+    def root(self, near: Floats | None = None) -> tuple[Root, tuple[str, ...]]:
+        """The state, sought near another one first, and names left out, or an `InputError`.
+
+        Where no law holds x and y, a vehicle that drifts rests in its other coordinates: in air in
+        all but these, for its airspeed becomes steady, else in all but these and their rates.
+        """
+        assembly = self._motion.assembly
         tolerance = ORBIT if self._forcing.period is not None else REST
+        drifting = ("x", "y") if assembly.scenario.has_air else PLANE
         best = None
-        for state in self._starts(near):
-            root = self._solve(state, tolerance)
-            if root is not None and root.residual <= tolerance:
-                return root
-            if root is not None and (best is None or root.residual < best.residual):
-                best = root
-        address = self._motion.assembly.scenario.address or "scenario"
+        for left_out in ((),) if assembly.follows_position else ((), drifting):
+            self._held = ~np.isin(self._motion.coordinates.names, left_out)
+            for state in self._starts(near):
+                root = self._solve(state, tolerance)
+                if root is not None and root.residual <= tolerance and self._is_apart(root):
+                    return root, left_out
+                if root is not None and (best is None or root.residual < best.residual):
+                    best = root
+        address = assembly.scenario.address or "scenario"
         what = "rest point" if self._forcing.period is None else "periodic orbit"
         left = "" if best is None else f" (the best leaves {best.residual:.2g}, in SI units)"
-        raise InputError(f"{address}: found no {what} near its flight{left}")
+        drifts = "" if assembly.follows_position else ", also without x and y, which nothing holds"
+        raise InputError(f"{address}: found no {what} near its flight{drifts}{left}")
+
+    def _is_apart(self, root: Root) -> bool:
+        """Whether no other coordinate depends on those left out."""
+        rows = np.abs(root.derivative[self._held])
+        largest = np.maximum(1.0, rows.max(axis=1, keepdims=True))
+        return bool((rows[:, ~self._held] < REST * largest).all())
 
     def _solve(self, state: Floats, tolerance: float) -> Root | None:
-        stencil = CENTRAL if self._steps > LONG else HALF_STENCIL
+        of_period = CENTRAL if self._steps > LONG else AVERAGED
+        stencil = HALF_STENCIL if self._forcing.period is None else of_period
         root = solve(self._changes, self._motion.coordinates, state, 1e-4 * tolerance, stencil)
         regular = np.array_equal(self._signs(root.state), self._sides)
-        if not (regular and np.isfinite(root.derivative).all()):
-            return None  # beyond a singular attitude, or with a rotor that turns backwards
+        passed = self._motion.coordinates.between(root.state, self._motion.limited(root.state))
+        if not (regular and np.abs(passed).max() <= REST and np.isfinite(root.derivative).all()):
+            return None  # beyond a singular attitude or a limit, or a rotor turns backwards
         return root
 
     def _starts(self, near: Floats | None) -> Iterator[Floats]:
@@ -239,7 +282,8 @@ class _Search:
         for _ in range(count):
             after = self._flown(step, state, between)
             moved = self._frame(step * self._timestep, (step + between) * self._timestep)
-            change = np.linalg.norm(self._motion.coordinates.between(state, after) - moved)
+            apart = self._motion.coordinates.between(state, after) - moved
+            change = np.linalg.norm(apart * self._held)
             step += between
             state = after
             if not np.isfinite(change):
@@ -269,13 +313,13 @@ class _Search:
         motion, start = self._motion, self._start
         if self._steps == 0:
             frame = self._forcing.rates(motion.coordinates.names, start)
-            yield from (self._rates(state) - frame for state in states)
+            yield from ((self._rates(state) - frame) * self._held for state in states)
             return
         moved = self._frame(start, start + self._steps * self._timestep)
         ends = motion.flown_each(self._step, states, self._steps)
         for state, after in zip(states, ends, strict=True):
             self._count()
-            yield motion.coordinates.between(state, after) - moved
+            yield (motion.coordinates.between(state, after) - moved) * self._held
 
     def _rates(self, state: Floats) -> Floats:
         try:

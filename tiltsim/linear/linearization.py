@@ -13,7 +13,7 @@ from tiltsim.errors import InputError
 from tiltsim.linear.coordinates import QUATERNION
 from tiltsim.linear.differences import jacobian, steps_at
 from tiltsim.linear.equilibrium import Equilibrium, equilibrium_of
-from tiltsim.linear.naming import unit_of
+from tiltsim.linear.naming import ROTOR_INPUT, unit_of
 from tiltsim.linear.newton import derivative_at
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.scenario import Scenario
@@ -21,7 +21,7 @@ from tiltsim.system.optional import optional_package
 from tiltsim_controllers.mathematics.scalar import Floats
 
 INPUT_SCALE: Final = 100.0
-"""Rotor accelerations (rad/s^2) are of this order; their steps in differences are, too."""
+"""Rotor accelerations (rad/s^2) are of this order, and their steps in differences; others of 1."""
 
 
 class Signal(NamedTuple):
@@ -119,6 +119,11 @@ def linearize(
 def linearization_at(found: Equilibrium) -> Linearization:
     """The closed loop at a rest point."""
     motion, state, time = found.motion, found.root.state, found.time
+    if found.corners:
+        raise InputError(
+            f"{motion.scenario.address or 'scenario'}: rests at a limit or at the edge of a dead "
+            f"zone of {', '.join(found.corners)}: there is no linear system; move it off"
+        )
     closed_loop = motion.assembly.loop
 
     def varied(offsets: Floats) -> Floats:
@@ -135,8 +140,9 @@ def linearization_at(found: Equilibrium) -> Linearization:
 
     coordinates = motion.coordinates
     count = coordinates.size
-    scales = INPUT_SCALE * steps_at(np.zeros(len(motion.inputs)))
-    by_input = jacobian(lambda each: map(varied, each), scales)
+    driven = [name.startswith(ROTOR_INPUT) for name in motion.inputs]
+    scales = np.where(driven, INPUT_SCALE, 1.0) * steps_at(np.zeros(len(driven)))
+    by_input = jacobian(lambda each: map(varied, each), scales).matrix
     observed = derivative_at(lambda at: motion.observed(time, at), coordinates, state)
     feedback = derivative_at(lambda at: motion.commanded(time, at), coordinates, state)
     level = coordinates.between(_level(found), state)

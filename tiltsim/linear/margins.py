@@ -7,7 +7,7 @@ loop's transfer matrix: ``det(I + g exp(-i w tau) L(i w)) = 0`` where one of the
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from math import atan, inf, isfinite, pi
 from os import PathLike
@@ -16,8 +16,11 @@ from typing import Any, Final
 import numpy as np
 
 from tiltsim.errors import InputError
-from tiltsim.linear.linearization import Linearization, linearize
+from tiltsim.linear.equilibrium import equilibrium_of
+from tiltsim.linear.linearization import Linearization, linearization_at
 from tiltsim.linear.modes import NEUTRAL, exponents
+from tiltsim.linear.naming import is_of_vehicle
+from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.scenario import Scenario
 from tiltsim_controllers.mathematics.scalar import Floats
 
@@ -44,6 +47,9 @@ DECADES_BEYOND: Final = 1.0  # of the slowest and of the fastest pole
 GROWTH: Final = 1e-4  # rad/s; slower growth is that of a multiple pole at zero, by rounding
 NEGLIGIBLE: Final = 1e-6  # a loop's transfer below this is rounding, one above its inverse a pole
 BISECTIONS: Final = 48
+REFINED: Final = np.linspace(-1.0, 1.0, 21)  # frequencies about a peak between those of the grid
+REFINEMENTS: Final = 5  # each ten times finer
+NEAR_WORST: Final = 0.9  # of the largest value, smaller peaks are not refined
 REGULAR: Final = 1e12  # condition of a matrix whose inverse is more than rounding
 
 
@@ -124,6 +130,7 @@ class BrokenLoop:
 def broken_loops(system: Linearization) -> Iterator[BrokenLoop]:
     """The closed loop of a linear system, broken at all inputs, each input, each measured state."""
     gains, b, timestep = system.feedback, system.B, system.timestep
+    memory = [i for i, signal in enumerate(system.states) if not is_of_vehicle(signal.name)]
     driven = [index for index in range(len(gains)) if np.abs(gains[index]).max() > 0.0]
     if driven:
         these, rows = b[:, driven], gains[driven]
@@ -136,6 +143,7 @@ def broken_loops(system: Linearization) -> Iterator[BrokenLoop]:
         measured = name in MEASURED or name.startswith("rotation_")
         if measured and np.abs(gains[:, index]).max() > 0.0:
             column = b @ gains[:, [index]]
+            column[memory] = system.A[np.ix_(memory, [index])]
             row = np.zeros((1, len(system.states)))
             row[0, index] = 1.0
             yield BrokenLoop(name, system.A - column @ row, column, row, timestep)
@@ -148,7 +156,11 @@ def frequency_grid(system: Linearization) -> Floats:
     low, high = np.log10(sizes.min()) - DECADES_BEYOND, np.log10(sizes.max()) + DECADES_BEYOND
     if system.timestep is not None:
         high = min(high, float(np.log10(pi / system.timestep)))
-    return np.asarray(np.logspace(low, high, int((high - low) * PER_DECADE)))
+    grid = np.logspace(low, high, int((high - low) * PER_DECADE))
+    # A lightly damped pole is a peak that is narrower than the grid.
+    poles = exponents(system.poles, system.timestep).imag
+    within = poles[(poles > grid[0]) & (poles < grid[-1])]
+    return np.unique(np.concatenate((grid, within)))
 
 
 def margins(scenario: Scenario | str | PathLike[str] | Mapping[str, Any]) -> list[Margin]:
@@ -160,7 +172,15 @@ def margins(scenario: Scenario | str | PathLike[str] | Mapping[str, Any]) -> lis
     Raises:
         InputError: If it is invalid, has no rest point, or is unstable there.
     """
-    return margins_of(linearize(scenario))
+    return margins_of(loop_for_margins(load_scenario(scenario)))
+
+
+def loop_for_margins(scenario: Scenario) -> Linearization:
+    """The closed loop at rest, broken where a latency acts, at the commands to the vehicle.
+
+    What the controller does against a latency, such as a model of its rotors, is part of it.
+    """
+    return linearization_at(equilibrium_of(scenario, at_rest=True, late=True))
 
 
 def margins_of(system: Linearization) -> list[Margin]:
@@ -173,12 +193,9 @@ def margins_of(system: Linearization) -> list[Margin]:
 
 
 def _margin(loop: BrokenLoop, grid: Floats) -> Margin:
-    transfer = loop.transfer(grid)
-    eye = np.eye(transfer.shape[-1])
-    difference = 2.0 * np.linalg.inv(eye + transfer) - eye  # sensitivity less its complement
-    disk = 2.0 / float(np.linalg.norm(difference, ord=2, axis=(1, 2)).max())
+    disk = 2.0 / _largest(lambda frequencies: _skewed_sensitivity(loop.transfer(frequencies)), grid)
     low, high, phase, delay, at = 0.0, inf, inf, inf, float("nan")
-    loci = _tracked(np.linalg.eigvals(transfer))
+    loci = _tracked(np.linalg.eigvals(loop.transfer(grid)))
     for locus in loci.T:
         for frequency, value in _crossings(loop, grid, locus, np.abs(locus) - 1.0, _size):
             from_minus_one = abs(np.angle(-value))
@@ -190,6 +207,29 @@ def _margin(loop: BrokenLoop, grid: Floats) -> Margin:
         low, high = _between_gains((low, high), real)
     low, high = _between_gains((low, high), _real_ends(loop))
     return Margin(loop.place, (low, high), phase, delay, at, disk)
+
+
+def _skewed_sensitivity(transfer: Any) -> Floats:
+    """The size of the sensitivity less its complement, of transfer matrices."""
+    eye = np.eye(transfer.shape[-1])
+    difference = 2.0 * np.linalg.inv(eye + transfer) - eye
+    return np.asarray(np.linalg.norm(difference, ord=2, axis=(1, 2)))
+
+
+def _largest(function: Callable[[Floats], Floats], grid: Floats) -> float:
+    """The largest value of a function of frequency, also between the frequencies of a grid."""
+    values = function(grid)
+    padded = np.pad(values, 1)
+    peak = (values >= padded[:-2]) & (values >= padded[2:]) & (values > NEAR_WORST * values.max())
+    found = float(values.max())
+    for index in np.flatnonzero(peak):
+        middle, reach = grid[index], np.ptp(grid[max(index - 1, 0) : index + 2])
+        for _ in range(REFINEMENTS):
+            near = np.clip(middle + reach * REFINED, grid[0], grid[-1])
+            values = function(near)
+            middle, reach = near[values.argmax()], 0.1 * reach
+            found = max(found, float(values.max()))
+    return found
 
 
 def _between_gains(

@@ -24,7 +24,8 @@ from tiltsim.engines.callback import control_callback
 from tiltsim.laws.assembling import assemble
 from tiltsim.linear.coordinates import Coordinates
 from tiltsim.linear.naming import (
-    control_names,
+    Input,
+    control_inputs,
     equation_coordinates,
     equation_inputs,
     mujoco_coordinates,
@@ -51,21 +52,29 @@ class Motion(ABC):
         coordinates: Of its state.
         inputs: Names of the vehicle's inputs.
         offsets: Added to the inputs; zero unless they are varied.
+
+    Args:
+        scenario, engine: To fly, and how.
+        late: Has the controller as it flies with a latency, though there may be none.
     """
 
-    def __init__(self, scenario: Scenario, engine: EngineName | None) -> None:
-        self.scenario, self.engine = scenario, engine
+    def __init__(self, scenario: Scenario, engine: EngineName | None, late: bool = False) -> None:
+        self.scenario, self.engine, self._late = scenario, engine, late
         self._asked: Values = ()
-        self._places: list[int] = []
+        self._inputs: tuple[Input, ...] = ()
         self.offsets = np.zeros(0)
         self.assembly = assemble(scenario, self._adapted)
-        self.coordinates, inputs = self._names()
-        self.inputs = tuple(name for name, _ in inputs)
-        self._places = [index for _, index in inputs]
-        self.offsets = np.zeros(len(inputs))
+        self.coordinates, self._inputs = self._names()
+        self.inputs = tuple(each.name for each in self._inputs)
+        self.offsets = np.zeros(len(self._inputs))
+
+    def _as_flown(self, loop: ClosedLoop) -> ClosedLoop:
+        """A controller without layers, or what replaces it with a latency."""
+        return loop.with_latency() if self._late and loop.with_latency else loop
 
     def _adapted(self, loop: ClosedLoop) -> ClosedLoop:
         """A controller without layers, to whose inputs of the vehicle the offsets are added."""
+        loop = self._as_flown(loop)
         sampling, equations = loop.sampling, loop.equations
         if equations is not None:
             equations = replace(equations, inputs=self._with_offsets(equations.inputs))
@@ -78,8 +87,8 @@ class Motion(ABC):
         def step(*args: Any) -> Values:
             self._asked = function(*args)
             values = list(self._asked)
-            for place, offset in zip(self._places, self.offsets.tolist(), strict=True):
-                values[place] += offset
+            for each, offset in zip(self._inputs, self.offsets.tolist(), strict=True):
+                values[each.place] += offset * each.per_unit
             return tuple(values)
 
         return step
@@ -87,11 +96,11 @@ class Motion(ABC):
     def commanded(self, time: float, state: Floats) -> Floats:
         """The inputs that the controller asks for, shape (inputs,)."""
         self.observed(time, state)
-        return np.array(self._asked)[self._places]
+        return np.array([self._asked[each.place] / each.per_unit for each in self._inputs])
 
     @abstractmethod
-    def _names(self) -> tuple[Coordinates, tuple[tuple[str, int], ...]]:
-        """The coordinates, and names and places of the inputs among those of the controller."""
+    def _names(self) -> tuple[Coordinates, tuple[Input, ...]]:
+        """The coordinates, and the inputs."""
 
     @property
     @abstractmethod
@@ -101,6 +110,10 @@ class Motion(ABC):
     @abstractmethod
     def rates(self, time: float, state: Floats) -> Floats:
         """Rates of the coordinates at a time, shape (coordinates,)."""
+
+    @abstractmethod
+    def limited(self, state: Floats) -> Floats:
+        """The state as the end of a step leaves it: no rotor beyond its limits."""
 
     @abstractmethod
     def flown(self, step: int, state: Floats, steps: int) -> Floats:
@@ -134,7 +147,7 @@ class Motion(ABC):
 class EquationMotion(Motion):
     """On equations of motion."""
 
-    def _names(self) -> tuple[Coordinates, tuple[tuple[str, int], ...]]:
+    def _names(self) -> tuple[Coordinates, tuple[Input, ...]]:
         inputs = equation_inputs(self.assembly, self._equations.inputs_size)
         return equation_coordinates(self.assembly, len(self.initial)), inputs
 
@@ -146,7 +159,7 @@ class EquationMotion(Motion):
 
     @cached_property
     def _plant_assembly(self) -> Assembly:
-        return assemble(self.scenario)
+        return assemble(self.scenario, self._as_flown)
 
     @cached_property
     def _plant(self) -> EquationsPlant:
@@ -166,6 +179,11 @@ class EquationMotion(Motion):
         inputs = self._equations.inputs(time, values, parameters, knots)
         moved = self._equations.rates(time, values, inputs, parameters, knots, disturbance)
         return self.coordinates.rates(state, np.array(moved))
+
+    def limited(self, state: Floats) -> Floats:
+        project = self._equations.project_onto_limits
+        parameters, _ = self.assembly.setup
+        return state if project is None else np.array(project(state.tolist(), parameters))
 
     def flown(self, step: int, state: Floats, steps: int) -> Floats:
         plant = self._varied if self.offsets.any() else self._plant
@@ -196,8 +214,8 @@ class EquationMotion(Motion):
 class MujocoMotion(Motion):
     """In MuJoCo; a state is `qpos`, `qvel` and `act`."""
 
-    def _names(self) -> tuple[Coordinates, tuple[tuple[str, int], ...]]:
-        return mujoco_coordinates(self.assembly.loop), control_names(self.assembly.loop)
+    def _names(self) -> tuple[Coordinates, tuple[Input, ...]]:
+        return mujoco_coordinates(self.assembly.loop), control_inputs(self.assembly)
 
     @cached_property
     def _varied(self) -> MujocoPlant:
@@ -205,7 +223,8 @@ class MujocoMotion(Motion):
 
     @cached_property
     def _plant(self) -> MujocoPlant:
-        return MujocoPlant(assemble(self.scenario), self._varied.model, self.engine)
+        flown = assemble(self.scenario, self._as_flown)
+        return MujocoPlant(flown, self._varied.model, self.engine)
 
     @cached_property
     def _whole(self) -> Floats:
@@ -239,6 +258,14 @@ class MujocoMotion(Motion):
         with control_callback(None):
             mujoco.mj_forward(plant.model, data)
         return np.concatenate((qvel, data.qacc, data.act_dot))
+
+    def limited(self, state: Floats) -> Floats:
+        model, parts = self._varied.model, self._split(state)
+        own = model.actuator_actadr[model.actuator_actlimited > 0]
+        low, high = model.actuator_actrange[model.actuator_actlimited > 0].T
+        activations = parts[-1].copy()
+        activations[own] = np.clip(activations[own], low, high)
+        return np.concatenate((*parts[:-1], activations))
 
     def flown(self, step: int, state: Floats, steps: int) -> Floats:
         plant = self._varied if self.offsets.any() else self._plant
@@ -279,8 +306,7 @@ class MujocoMotion(Motion):
         return np.array(self.assembly.loop.columns.observe(*parts, controls))
 
 
-def make_motion(scenario: Scenario, engine: EngineName | None = None) -> Motion:
-    """The motion of a scenario on the plant that it requests."""
-    if scenario.simulation.plant == "mujoco":
-        return MujocoMotion(scenario, engine)
-    return EquationMotion(scenario, engine)
+def make_motion(scenario: Scenario, engine: EngineName | None = None, late: bool = False) -> Motion:
+    """The motion of a scenario on the plant that it requests; see `Motion`."""
+    kind = MujocoMotion if scenario.simulation.plant == "mujoco" else EquationMotion
+    return kind(scenario, engine, late)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Final, NamedTuple
 
 from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.closed_loop.loop import ClosedLoop
@@ -30,7 +30,6 @@ KINDS: Final = {
     "rotor_speed": "rad/s",
     "speed_command": "rad/s",
     ROTOR_INPUT: "rad/s^2",
-    "thrust": "rad^2/s^2",
     "tilt_command": "rad",
 }
 """Units of numbered quantities."""
@@ -46,6 +45,11 @@ def unit_of(name: str, loop: ClosedLoop) -> str:
 def numbered(kind: str, count: int) -> tuple[str, ...]:
     """``kind_1``, ``kind_2`` and so on."""
     return tuple(f"{kind}_{index}" for index in range(1, count + 1))
+
+
+def is_of_vehicle(state: str) -> bool:
+    """Whether a state is the vehicle's, not one of its controller or of commands under way."""
+    return state in BODY_FIELDS or state.startswith(("rotation_", "alpha", "rotor_speed"))
 
 
 def activation_names(loop: ClosedLoop) -> tuple[str, ...]:
@@ -116,9 +120,17 @@ def _coordinates(names: tuple[str, ...], loop: ClosedLoop, rotation: int) -> Coo
     return Coordinates(names, tuple(unit_of(name, loop) for name in names), rotation, first)
 
 
-def control_names(loop: ClosedLoop) -> tuple[tuple[str, int], ...]:
-    """Inputs of the vehicle among the controls of its model: names and indices."""
-    dynamics = loop.dynamics
+class Input(NamedTuple):
+    """An input of the vehicle, as a controller commands it."""
+
+    name: str
+    place: int  # among the controls of the model or the inputs of the equations
+    per_unit: float = 1.0  # of these, a unit of the input
+
+
+def control_inputs(assembly: Assembly) -> tuple[Input, ...]:
+    """Inputs of the vehicle among the controls of its model."""
+    dynamics = assembly.loop.dynamics
     rotors, sizes = len(dynamics.spins), dynamics.sizes
     if dynamics.model == "tilt_car":
         rotors = 2
@@ -126,18 +138,19 @@ def control_names(loop: ClosedLoop) -> tuple[tuple[str, int], ...]:
     else:
         named = numbered("tilt_command", sizes.qpos - len(POSITION) - QUATERNION)
     tilts = len(named)
-    driven = loop.kind.rotors and dynamics.model != "quadrotor"
-    kind = ROTOR_INPUT if driven else "thrust"
-    first = tilts + rotors if driven else tilts
-    speeds = ((name, first + index) for index, name in enumerate(numbered(kind, rotors)))
-    return (*speeds, *((name, index) for index, name in enumerate(named)))
+    kind, first, per_unit = ROTOR_INPUT, tilts + rotors, 1.0
+    if dynamics.commands_thrusts:  # as squared rotor speeds
+        per_unit = 1.0 / assembly.scenario.rotorcraft.resolve().thrust_coefficient
+        kind, first = "thrust", tilts
+    speeds = (Input(n, first + i, per_unit) for i, n in enumerate(numbered(kind, rotors)))
+    return (*speeds, *(Input(name, index) for index, name in enumerate(named)))
 
 
-def equation_inputs(assembly: Assembly, size: int) -> tuple[tuple[str, int], ...]:
-    """Inputs of the vehicle among those of the equations: names and indices."""
+def equation_inputs(assembly: Assembly, size: int) -> tuple[Input, ...]:
+    """Inputs of the vehicle among those of the equations, of which there are so many."""
     loop, model = assembly.loop, assembly.scenario.vehicle.model
     if model != "tilt_car" and loop.within is not None:
-        return control_names(loop)
+        return control_inputs(assembly)
     if model == "quadrotor":
         names: tuple[str, ...] = ("force", "torque_x", "torque_y", "torque_z")
     elif model == "tilt_car":
@@ -149,4 +162,4 @@ def equation_inputs(assembly: Assembly, size: int) -> tuple[tuple[str, int], ...
         commands = (f for f in loop.columns.fields if f.startswith("tilt_command"))
         rates = (command.replace("tilt_command", "alpha_rate") for command in commands)
         names = (*numbered(ROTOR_INPUT, len(loop.dynamics.spins)), *rates)
-    return tuple((name, index) for index, name in enumerate(names))
+    return tuple(Input(name, index) for index, name in enumerate(names))

@@ -6,9 +6,10 @@ from collections.abc import Callable, Iterable
 from typing import Final, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tiltsim.linear.coordinates import Coordinates
-from tiltsim.linear.differences import HALF_STENCIL, Stencil, jacobian, steps_at
+from tiltsim.linear.differences import HALF_STENCIL, Derivative, Stencil, jacobian, steps_at
 from tiltsim_controllers.mathematics.scalar import Floats
 
 ITERATIONS: Final = 30
@@ -24,11 +25,12 @@ OfEach = Callable[[list[Floats]], Iterable[Floats]]
 
 
 class Root(NamedTuple):
-    """A state, the value there, and the function's derivative by coordinates."""
+    """A state, the value there, and the function's derivative by coordinates, with its corners."""
 
     state: Floats
     value: Floats
     derivative: Floats
+    corners: NDArray[np.bool_]
 
     @property
     def residual(self) -> float:
@@ -52,14 +54,14 @@ def derivative_at(
     """
     return _derivative_of_each(
         lambda states: [function(each) for each in states], coordinates, state, stencil
-    )
+    ).matrix
 
 
 def _derivative_of_each(
     function: OfEach, coordinates: Coordinates, state: Floats, stencil: Stencil
-) -> Floats:
+) -> Derivative:
     """As `derivative_at`, of a function of several states."""
-    steps = _steps(coordinates, state)
+    steps = coordinate_steps(coordinates, state)
     return jacobian(
         lambda moved: function([coordinates.moved(state, by) for by in moved]), steps, stencil
     )
@@ -67,11 +69,11 @@ def _derivative_of_each(
 
 def _is_near(coordinates: Coordinates, start: Floats, end: Floats) -> bool:
     """Whether the derivatives at two states are the same."""
-    moved = coordinates.between(start, end) / _steps(coordinates, start)
+    moved = coordinates.between(start, end) / coordinate_steps(coordinates, start)
     return bool(np.abs(moved).max() <= NEAR)
 
 
-def _steps(coordinates: Coordinates, state: Floats) -> Floats:
+def coordinate_steps(coordinates: Coordinates, state: Floats) -> Floats:
     """Steps of the differences; a turn is of order one whatever the attitude."""
     values = state
     if coordinates.rotation:
@@ -102,7 +104,7 @@ def solve(
         stencil: Of the differences.
     """
 
-    def derivative_here() -> Floats:
+    def derivative_here() -> Derivative:
         return _derivative_of_each(function, coordinates, state, stencil)
 
     (value,), derived_at = function([state]), state
@@ -112,10 +114,10 @@ def solve(
             break
         if renew:
             derived_at, derivative = state, derivative_here()
-        if not np.isfinite(derivative).all():
+        if not np.isfinite(derivative.matrix).all():
             break
-        scale = _steps(coordinates, state)
-        step = scale * np.linalg.lstsq(derivative * scale, -value, rcond=NEUTRAL)[0]
+        scale = coordinate_steps(coordinates, state)
+        step = scale * np.linalg.lstsq(derivative.matrix * scale, -value, rcond=NEUTRAL)[0]
         for _ in range(HALVINGS):
             moved = coordinates.moved(state, step)
             (its_value,) = function([moved])
@@ -131,4 +133,4 @@ def solve(
         state, value = moved, its_value
     if not _is_near(coordinates, derived_at, state):
         derivative = derivative_here()
-    return Root(state, value, derivative)
+    return Root(state, value, *derivative)

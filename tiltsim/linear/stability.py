@@ -40,6 +40,10 @@ class Stability:
         matrix: Of the linear system, shape (states, states): rates by coordinates, or the
             coordinates after a control sample or period by those before.
         equilibrium: The state itself.
+        left_out: Names of states that nothing holds and that no other depends on, x and y of a
+            vehicle that drifts: they are not analyzed.
+        corners: Names of states whose rates have a corner there, at a limit or at the edge of a
+            dead zone: the matrix is the mean of both sides, and poles say little.
     """
 
     kind: str
@@ -53,6 +57,8 @@ class Stability:
     states: tuple[str, ...]
     matrix: Floats
     equilibrium: Equilibrium
+    left_out: tuple[str, ...] = ()
+    corners: tuple[str, ...] = ()
 
     @property
     def growth(self) -> float:
@@ -76,6 +82,8 @@ class Stability:
             name: [[float(value.real), float(value.imag)] for value in values],
             "modes": [mode.report() for mode in self.modes],
             "states": list(self.states),
+            "left_out": list(self.left_out),
+            "corners": list(self.corners),
         }
 
 
@@ -123,4 +131,6 @@ def stability_at(found: Equilibrium) -> Stability:
         states=found.names,
         matrix=matrix,
         equilibrium=found,
+        left_out=found.left_out,
+        corners=found.corners,
     )
