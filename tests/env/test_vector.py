@@ -176,14 +176,74 @@ def test_episodes_are_those_of_single_environments_step_for_step(task):
     np.testing.assert_array_equal(vector.reset(seed=3)[0], several.reset(seed=3)[0])
     for _ in range(100):
         actions = generator.normal([-1.0, 0.0, 0.0], 0.02, (entries, 3)).T  # the first one falls
-        *mine, _ = vector.step(actions)
-        *theirs, _ = several.step(actions)
+        *mine, infos = vector.step(actions)
+        *theirs, expected = several.step(actions)
+        assert infos.keys() == expected.keys()
+        for key, value in expected.items():
+            np.testing.assert_array_equal(infos[key], value)
+        assert mine[1].dtype == theirs[1].dtype
         np.testing.assert_allclose(mine[0], theirs[0], rtol=0.0, atol=2e-7)  # single precision
         np.testing.assert_allclose(mine[1], theirs[1], rtol=0.0, atol=1e-9)
         np.testing.assert_array_equal(mine[2:], theirs[2:])
         ends = [end + theirs[2 + kind].sum() for kind, end in enumerate(ends)]
     assert vector.observation_space.contains(mine[0])
     assert all(ends)  # lost, and over in time
+
+
+@pytest.fixture(scope="module")
+def two():
+    """The hover task by ``gymnasium.make_vec``, lost as soon as it is 1 cm off."""
+    pytest.importorskip("jax")
+    gymnasium = pytest.importorskip("gymnasium")
+    return gymnasium.make_vec(
+        "tiltsim.env:tiltsim/Hover-v0", num_envs=2, max_position_error=0.01, domain=()
+    )
+
+
+def test_make_vec_flies_a_task_on_arrays(two):
+    from tiltsim.env import VectorEnv
+
+    assert isinstance(two, VectorEnv)
+    assert (two.num_envs, two.functions.scenario.simulation.steps) == (2, 2500)
+    assert two.spec.id == "tiltsim/Hover-v0"
+
+
+def test_a_termination_says_why(two):
+    two.reset(seed=0)
+    fall, hover = -np.ones(8), np.zeros(8)
+    for _ in range(10):
+        _, rewards, terminated, _, infos = two.step(np.array([fall, hover]))
+        assert rewards.dtype == np.float64
+        if terminated.any():
+            break
+        assert infos == {}
+    assert terminated.tolist() == infos["_cause"].tolist() == [True, False]
+    assert infos["cause"][0].startswith("0.01")
+    assert infos["cause"][0].endswith("m away from the reference")
+    assert infos["cause"][1] is None
+    actions = np.array([np.full(8, np.nan), hover])
+    two.step(actions)  # that of the first is not used: its episode begins
+    with pytest.raises(ValueError, match=r"actions\[0, 0\] = nan: must be finite"):
+        two.step(actions)
+
+
+def test_seeds_are_whole_numbers_of_any_kind(two):
+    states = []
+    for seed in (3, np.int64(3), [3, 4], [np.int64(3), np.uint8(4)]):
+        two.reset(seed=seed)
+        states.append([generator.random() for generator in two._generators])
+    assert states[1:] == states[:1] * 3
+    with pytest.raises(InputError, match="1 seeds for 2 episodes"):
+        two.reset(seed=[3])
+
+
+def test_make_vec_ends_episodes_after_fewer_steps_and_only_flat_ones():
+    pytest.importorskip("jax")
+    gymnasium = pytest.importorskip("gymnasium")
+    env = gymnasium.make_vec("tiltsim.env:tiltsim/Hover-v0", max_episode_steps=20)
+    assert env.functions.scenario.simulation.duration == pytest.approx(0.4)
+    with pytest.raises(InputError, match="flat = False: arrays have flat observations only"):
+        gymnasium.make_vec("tiltsim.env:tiltsim/Hover-v0", flat=False)
 
 
 @pytest.mark.slow

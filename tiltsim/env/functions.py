@@ -37,6 +37,9 @@ if TYPE_CHECKING:
     from tiltsim.closed_loop.loop import ClosedLoop
     from tiltsim.scenario.scenario import Scenario
 
+NOT_FINITE: Final = -1
+"""In place of the code of a limit."""
+
 LEAST_THRUST: Final = 1e-30  # N; a root has no derivative at zero
 
 
@@ -60,6 +63,8 @@ class Outcome(NamedTuple):
     reward: Any
     terminated: Any  # whether the vehicle is lost
     truncated: Any  # whether the time is over
+    limit: Any  # the code of the limit exceeded, of `tiltsim.closed_loop.limits`, or `NOT_FINITE`
+    distance: Any  # m, from the reference
 
 
 class EnvFunctions:
@@ -175,10 +180,12 @@ class EnvFunctions:
         )
         now = now._replace(state=kept)
         observation = self._observed(now, planned)
-        lost = ~finite | self._is_lost(now, planned)
+        code, distance = self._limits(now, planned)
+        lost = ~finite | (code != WITHIN_LIMITS) | (distance > self._task.max_position_error)
+        limit = jnp.where(finite, code, NOT_FINITE)
         reward = jnp.where(lost, 0.0, self._task.reward(observation, clipped))
         truncated = ~lost & (now.index >= self._simulation.steps)
-        return now, Outcome(self._flat(observation), reward, lost, truncated)
+        return now, Outcome(self._flat(observation), reward, lost, truncated, limit, distance)
 
     def _planned(self, numbers: Any) -> PlannedFlight:
         """The plan of an episode."""
@@ -250,8 +257,8 @@ class EnvFunctions:
         )
         return self._task.observed.arrays(seen, jnp.stack(rotation).reshape(3, 3), jnp)
 
-    def _is_lost(self, episode: Episode, planned: PlannedFlight) -> Any:
-        """Whether a finite state is beyond the limits of the task or of all flights."""
+    def _limits(self, episode: Episode, planned: PlannedFlight) -> tuple[Any, Any]:
+        """The code of the limit of all flights that a state exceeds, and its `Outcome.distance`."""
         episode = self._jax.lax.stop_gradient(episode)
         time, (_, parameters, knots, _, _) = self._time(episode.index), planned
         inputs = self._inputs(time, episode.state, parameters, knots)
@@ -260,7 +267,7 @@ class EnvFunctions:
         code = self._limit(time, values, reference, knots, self._follows)
         target = self._reference_at(time, reference, knots)
         squares = sum((episode.state[axis] - target[axis]) ** 2 for axis in range(3))
-        return (code != WITHIN_LIMITS) | (squares > self._task.max_position_error**2)
+        return code, self._numpy.sqrt(squares)
 
     def _flat(self, observation: Mapping[str, Any]) -> Any:
         jnp = self._numpy

@@ -11,6 +11,7 @@ ID: Final = "tiltsim/Tiltrotor-v0"
 """Of `tiltsim.env.TiltrotorEnv` with its defaults; the tasks are called ``tiltsim/NAME-v0``."""
 
 ENTRY_POINT: Final = "tiltsim.env.gymnasium:GymnasiumEnv"
+VECTOR_ENTRY_POINT: Final = "tiltsim.env.vector:task_of_registry"
 
 
 def register() -> None:
@@ -26,6 +27,7 @@ def register() -> None:
         gymnasium.register(
             f"tiltsim/{name}-v0",
             entry_point=ENTRY_POINT,
+            vector_entry_point=VECTOR_ENTRY_POINT if find_spec("jax") else None,
             kwargs={**arguments, "flat": True},
             max_episode_steps=EPISODE_STEPS,
         )

@@ -11,10 +11,12 @@ import numpy as np
 import numpy.typing as npt
 
 from tiltsim.arrays.flying import double_precision
+from tiltsim.closed_loop.limits import BODY_RATE, MAX_BODY_RATE, MAX_ROTOR_SPEED, ROTOR_SPEED
 from tiltsim.env.environment import TiltrotorEnv
-from tiltsim.env.functions import EnvFunctions, Episode
+from tiltsim.env.functions import NOT_FINITE, EnvFunctions, Episode
 from tiltsim.env.tasks import TASKS
 from tiltsim.errors import InputError
+from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.messages import choose
 from tiltsim.system.numbers import is_number
 from tiltsim.system.optional import optional_package
@@ -36,7 +38,8 @@ class VectorEnv(gymnasium.vector.VectorEnv):  # type: ignore[misc]
 
     Environment ``i`` of ``reset(seed=s)`` draws the same episodes as the single environment does
     with seed ``s + i``, and has the same observations and rewards, but for rounding. An episode
-    that has ended begins anew at the next step, whose action is not used.
+    that has ended begins anew at the next step, whose action is not used. Rewards are float64, as
+    those of Gymnasium's own vectors, but for ``arrays``, where they have the ``precision``.
 
     Args:
         task: The id of a task, such as ``"tiltsim/Hover-v0"``, or any scenario.
@@ -103,12 +106,13 @@ class VectorEnv(gymnasium.vector.VectorEnv):  # type: ignore[misc]
             later, outcome = functions.step(episode, action)
             begun, first = functions.reset(numbers)
             choose_new = partial(jnp.where, over)
-            observation, reward, terminated, truncated = outcome
+            observation, reward, terminated, truncated, *causes = outcome
             return jax.tree.map(choose_new, begun, later), (
                 choose_new(first, observation),
                 choose_new(0.0, reward),
                 ~over & terminated,
                 ~over & truncated,
+                *causes,
             )
 
         self._begin = jax.jit(jax.vmap(functions.reset))
@@ -117,7 +121,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):  # type: ignore[misc]
     def reset(
         self,
         *,
-        seed: int | list[int | None] | None = None,
+        seed: int | np.integer[Any] | list[int | None] | None = None,
         options: Mapping[str, Any] | None = None,
     ) -> tuple[Any, dict[str, Any]]:
         """Begin all episodes. There are no options.
@@ -128,12 +132,14 @@ class VectorEnv(gymnasium.vector.VectorEnv):  # type: ignore[misc]
             options: Not used.
         """
         if seed is not None:
-            seeds = range(seed, seed + self.num_envs) if isinstance(seed, int) else seed
+            seeds: Any = seed
+            if isinstance(seed, int | np.integer):
+                seeds = range(int(seed), int(seed) + self.num_envs)
             if len(seeds) != self.num_envs:
                 raise InputError(f"environment: {len(seeds)} seeds for {self.num_envs} episodes")
             for row, its in enumerate(seeds):
                 if its is not None:
-                    self._generators[row] = seeding.np_random(its)[0]
+                    self._generators[row] = seeding.np_random(int(its))[0]
         self._fresh = self.functions.draw(self._generators)
         with self._numbers():
             self._episodes, observation = self._begin(self._fresh)
@@ -142,20 +148,33 @@ class VectorEnv(gymnasium.vector.VectorEnv):  # type: ignore[misc]
         return self._returned(observation), {}
 
     def step(self, actions: npt.ArrayLike) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
-        """Hold actions, shape (environments, entries), for one control step."""
+        """Hold actions, shape (environments, entries), for one control step.
+
+        ``infos["cause"]`` has the causes of terminations, None for the other environments.
+
+        Raises ValueError if the actions have the wrong shape or one that is used is not finite.
+        """
         if self._episodes is None:
             raise InputError("environment: no episode has begun; call reset() first")
         shape = self.action_space.shape
         if np.shape(actions) != shape:
             raise ValueError(f"actions of shape {np.shape(actions)}; expected {shape}")
         begun = self._over
+        wrong = ~np.isfinite(np.asarray(actions)) & ~begun[:, None]
+        if wrong.any():
+            row, entry = np.argwhere(wrong)[0]
+            shown = np.asarray(actions)[row, entry]
+            raise ValueError(f"actions[{row}, {entry}] = {shown}: must be finite")
         with self._numbers():
             self._episodes, outcome = self._advance(self._episodes, begun, actions, self._fresh)
-        observation, reward, terminated, truncated = outcome
-        self._over = np.asarray(terminated) | np.asarray(truncated)
+        observation, reward, terminated, truncated, limit, distance = outcome
+        lost = np.asarray(terminated)
+        self._over = lost | np.asarray(truncated)
         self._draw_again(begun)
+        if not self._arrays:
+            reward = np.asarray(reward, np.float64)
         returned = map(self._returned, (observation, reward, terminated, truncated))
-        return (*returned, {})
+        return (*returned, _infos(lost, limit, distance) if lost.any() else {})
 
     def _draw_again(self, rows: npt.NDArray[np.bool_]) -> None:
         """Draw the next episodes of environments whose last draw is in use."""
@@ -165,3 +184,45 @@ class VectorEnv(gymnasium.vector.VectorEnv):  # type: ignore[misc]
 
     def _returned(self, values: Any) -> Any:
         return values if self._arrays else np.asarray(values)
+
+
+def _infos(lost: npt.NDArray[np.bool_], limit: Any, distance: Any) -> dict[str, Any]:
+    """The causes of terminations as Gymnasium's own vectors have them, with a mask."""
+    causes = np.full(len(lost), None, dtype=object)
+    codes, distances = np.asarray(limit), np.asarray(distance)
+    for row in np.flatnonzero(lost):
+        causes[row] = _cause(int(codes[row]), float(distances[row]))
+    return {"cause": causes, "_cause": lost}
+
+
+def _cause(code: int, distance: float) -> str:
+    """Why an episode terminated, by the code of a limit and the distance (m) from the reference."""
+    if code == NOT_FINITE:
+        return "the state is no longer finite"
+    if code >= ROTOR_SPEED:
+        return f"rotor {code - ROTOR_SPEED + 1} faster than {MAX_ROTOR_SPEED:g} rad/s"
+    if code >= BODY_RATE:
+        return f"body rate {'pqr'[code - BODY_RATE]} above {MAX_BODY_RATE:g} rad/s"
+    return f"{distance:.3g} m away from the reference"
+
+
+def task_of_registry(
+    num_envs: int = 1, *, scenario: Any, flat: bool, max_episode_steps: int, **arguments: Any
+) -> VectorEnv:
+    """A registered task for ``gymnasium.make_vec``, which knows its arguments.
+
+    Args:
+        num_envs, **arguments: As of `VectorEnv`.
+        scenario: Of the task.
+        flat: Whether observations are vectors, as they are here.
+        max_episode_steps: Control steps after which an episode is over, if its time is not before.
+
+    Raises:
+        InputError: As `VectorEnv`, and if observations are not to be flat.
+    """
+    if not flat:
+        raise InputError("environment: flat = False: arrays have flat observations only")
+    scenario = load_scenario(scenario)
+    step = arguments.get("control_timestep") or scenario.simulation.control_timestep
+    duration = min(scenario.simulation.duration, max_episode_steps * step)
+    return VectorEnv(scenario.replace({"simulation.duration": duration}), num_envs, **arguments)
