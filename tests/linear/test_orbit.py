@@ -261,7 +261,7 @@ def test_what_does_not_return_is_refused():
 
 
 def test_an_orbit_at_the_edge_of_a_dead_zone_says_so():
-    """A tilt-car that moves as wanted wants no thrust: its rotors push, and cannot pull."""
+    """A tilt-car that follows its line needs no thrust: its rotors push, and cannot pull."""
     car = {
         "vehicle": {"model": "tilt_car"},
         "controller": {"law": "tilt_car_planned_direction"},
