@@ -20,11 +20,13 @@ class Assembly(FlightPlan):
         loop: The controller around the vehicle, with all layers.
         setup: What the control step reads besides the state.
         follows_position: Whether the controller follows the reference's horizontal position.
+        traced: Whether the loop can be traced; else it runs as plain Python.
     """
 
     loop: ClosedLoop
     setup: ControlSetup
     follows_position: bool
+    traced: bool = True
 
     def sign_check_values(self, time: float, values: Vector) -> Values:
         """The numbers of `Monitoring.sign_check_values`, from a sample."""

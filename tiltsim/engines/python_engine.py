@@ -25,7 +25,7 @@ from tiltsim.system.locks import one_thread_at_a_time
 from tiltsim_controllers.code.program import Program
 from tiltsim_controllers.code.python_source import python_function
 from tiltsim_controllers.mathematics.records import unflatten
-from tiltsim_controllers.mathematics.scalar import Values, Vector, is_scalar
+from tiltsim_controllers.mathematics.scalar import Values, Vector
 
 
 @one_thread_at_a_time
@@ -37,11 +37,10 @@ def _program(key: ProgramKey, name: str) -> Program:
 def _control_step(assembly: Assembly, user: list[float], name: str) -> Callable[..., Values]:
     """A control step ``(header, qpos, qvel, act, ctrl) -> ctrl``, with parameters and knots bound.
 
-    What depends on these alone is evaluated once. A step that is no scalar code, as one that keeps
-    a state of its own, runs as it is.
+    What depends on these alone is evaluated once.
     """
     loop = assembly.loop
-    if name == "hold" or is_scalar(loop.sampling.controls):
+    if name == "hold" or assembly.traced:
         return python_function(_program(program_key(assembly), name), name, fixed={"user": user})
     parameters = unflatten(loop.parameters, user)
     knots = tuple(user[loop.record_size :])

@@ -21,7 +21,7 @@ from tiltsim_controllers.code.llvm_text import llvm_functions
 from tiltsim_controllers.code.program import Program
 from tiltsim_controllers.code.python_source import python_function
 from tiltsim_controllers.mathematics.records import record_size, unflatten
-from tiltsim_controllers.mathematics.scalar import Floats, Triple, is_scalar
+from tiltsim_controllers.mathematics.scalar import Floats, Triple
 
 
 class Integrated(NamedTuple):
@@ -35,6 +35,7 @@ class Integrated(NamedTuple):
         control_steps: Steps for which the inputs are held; 0: evaluated at every stage.
         user: Parameters and knots, see `tiltsim.closed_loop.loop.ControlSetup.userdata`.
         disturbance: m/s^2, world axes.
+        traced: See `tiltsim.closed_loop.assembly.Assembly`.
     """
 
     key: ProgramKey
@@ -44,6 +45,7 @@ class Integrated(NamedTuple):
     control_steps: int
     user: Floats
     disturbance: Triple
+    traced: bool
 
     @property
     def equations(self) -> Equations:
@@ -78,12 +80,11 @@ def _programs(key: ProgramKey, states: int, solver: str, held: bool) -> Mapping[
 
 
 class PythonStepper(Stepper):
-    """Integrates on Python's floats. A controller that is no scalar code runs as it is."""
+    """Integrates on Python's floats."""
 
     def __init__(self, flight: Integrated) -> None:
         self._every = flight.control_steps or 1
-        traced = is_scalar(flight.equations.inputs)
-        step = _traced_step if traced else _plain_step
+        step = _traced_step if flight.traced else _plain_step
         self._sampled = step(flight, True)
         self._held = step(flight, False) if flight.control_steps else self._sampled
 

@@ -75,7 +75,8 @@ def loop_of(
 
     Args:
         scenario: What is flown.
-        adapted: May change the controller before layers go around it.
+        adapted: May change the controller before layers go around it, to functions that keep a
+            state of their own: the loop then runs as plain Python.
         recorded: See `assemble`.
     """
     controller, external = scenario.controller, scenario.controller.is_external
@@ -136,4 +137,5 @@ def assemble(
         loop=loop,
         setup=loop.setup(plan, loop.signature),
         follows_position=loop.follows_position(scenario),
+        traced=adapted is _unchanged,
     )

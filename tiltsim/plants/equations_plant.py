@@ -43,6 +43,7 @@ class EquationsPlant(Plant):
             self._every,
             setup.userdata,
             disturbance_acceleration(scenario),
+            assembly.traced,
         )
         self._stepper: Stepper
         if self.engine == "native":
