@@ -32,8 +32,9 @@ class SupervisorTable(Table):
 
     strategy: Literal["scale", "hold", "return_to_red"] = Field(
         "scale",
-        description="what it does: scale shrinks the gait, hold stops its clock, return_to_red "
-        "goes to the nearest red gait, in which opposite rotors have equal angles",
+        description="what it does where the limits require it: scale shrinks the gait as little as "
+        "possible, hold stops its clock, return_to_red goes to the nearest red gait, in which "
+        "opposite rotors have equal angles",
     )
     min_margin: Annotated[float, Field(ge=0.0, lt=pi / 2)] = Field(
         0.2,
@@ -50,8 +51,8 @@ class SupervisorTable(Table):
     )
     horizon: Annotated[float, Field(gt=0.0, le=10.0)] = Field(
         0.5,
-        description="how far to look ahead along the gait; needs strategy hold or return_to_red "
-        "[s]",
+        description="how far to look ahead along the gait, at eight instants; needs strategy hold "
+        "or return_to_red [s]",
         examples=[1.0],
     )
     max_tilt_rate: Positive = Field(

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from tiltsim_controllers.laws.force_directions import combination_of, factors_of, share_of
-from tiltsim_controllers.laws.supervisor import UNTILTED, Supervision, supervision_of
+from tiltsim_controllers.laws.supervisor import UNTILTED, Assessment, Supervision, supervision_of
 from tiltsim_controllers.mathematics.scalar import Triple, Values, Vector, scalar
 from tiltsim_controllers.mathematics.vectors import vectors_of
 from tiltsim_controllers.vehicle.effectiveness import (
@@ -93,9 +93,7 @@ def multirotor_supervision_of(
         return asin(min(1.0, along))
 
     @scalar
-    def margin_and_determinant(
-        tilts: Values, up: Triple, vehicle: Watched, knots: Vector
-    ) -> tuple[float, float]:
+    def assess(tilts: Values, up: Triple, vehicle: Watched, knots: Vector) -> Assessment:
         rows = effect(1.0, cosines(tilts), sines(tilts), knots, int(vehicle.rotors))
         forces = rows[0], rows[1], rows[2]
         _, lifts, units, direction = factors_of_rows(rows, forces, up)
@@ -105,12 +103,12 @@ def multirotor_supervision_of(
         for k in range(dimension):
             size *= share_of_row(lifts[k], units[3 + k])
         if not size > 0.0:
-            return 0.0, 0.0
+            return 0.0, 0.0, up
         margin = margin_of(up, direction)
         if dimension == 1:
             side = (vehicle.side_x, vehicle.side_y, vehicle.side_z)
             if dot(units[3], combination(side, *forces)) < 0.0:
-                return -margin, -size
-        return margin, size
+                return -margin, -size, direction
+        return margin, size, direction
 
-    return supervision_of(tilts_of(layout), margin_and_determinant)
+    return supervision_of(tilts_of(layout), assess)

@@ -10,14 +10,16 @@ strategies.
 * ``SCALE`` scales all tilt angles towards zero as little as satisfies both thresholds. A function
   of planned angles and attitude, without memory.
 * ``HOLD`` looks ahead and slows the gait's clock until it stops where the thresholds would be
-  violated at the present attitude; it continues when they would not. Its state is the delay (s) of
-  the gait behind its plan.
+  violated; it continues when they would not. Its state is the delay (s) of the gait behind its
+  plan.
 * ``RETURN_TO_RED`` looks ahead, too, and moves the tilts from the planned gait towards the nearest
   red one (`gaits.red_gait`), at a rate that servos can follow, and back when the thresholds allow.
   Its state is the fraction of the path. Only the tiltrotor has red gaits.
 
 The last two have a state and its rate, which start at rest and stay exactly zero while the
-thresholds are not approached: such a flight is bit-identical to the unsupervised one. Both are
+thresholds are not approached: such a flight is bit-identical to the unsupervised one. They look at
+tilts ahead at the attitude that the vehicle will have there: it leans with the direction of its
+force as the tilts move, but not within a jump, which it meets as it leans before. Both are
 states of the simulation, and everything else is a pure function of them, time and attitude, so that
 a saved state restarts and the same source runs in every engine. The rate has a lag, so that the
 tilts have accelerations for the controllers that use them.
@@ -26,7 +28,7 @@ tilts have accelerations for the controllers that use them.
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import pi
+from math import inf, pi, sqrt
 from typing import Any, Final, NamedTuple
 
 from tiltsim_controllers.gaits.any_tilts import Jets, tilt_motion_of
@@ -35,6 +37,7 @@ from tiltsim_controllers.mathematics.jets import Jet, jet_scaled
 from tiltsim_controllers.mathematics.rotation import world_up_in_body
 from tiltsim_controllers.mathematics.scalar import Triple, Values, Vector, scalar
 from tiltsim_controllers.mathematics.vectors import componentwise, vectors_of
+from tiltsim_controllers.vehicle.rigid_body import cross
 
 SCALE: Final = 0.0
 HOLD: Final = 1.0
@@ -44,13 +47,16 @@ STRATEGIES: Final = {"scale": SCALE, "hold": HOLD, "return_to_red": RETURN_TO_RE
 """Strategies by their name in a scenario."""
 
 SCALE_GRID: Final = 16
-"""Intervals of the scale that are checked, from zero to the whole gait."""
+"""Intervals of the scale that are checked, from the whole gait to none."""
 
 BISECTIONS: Final = 20
 """Bisections of the last interval: the scale is exact to 1e-7."""
 
 LOOKAHEAD_SAMPLES: Final = 8
 """Instants ahead at which the gait is checked, evenly spaced up to the horizon."""
+
+FOLLOWED: Final = 0.0625
+"""Time (s of the gait) by which the lean follows the tilts; less if samples are closer."""
 
 BAND: Final = 0.1
 """`threshold_clearance` from which the clock of ``HOLD`` slows down, to stop at zero.
@@ -80,6 +86,11 @@ class Supervisor(NamedTuple):
     clearance: float = 0.0  # rad, of red gaits from the curve L
 
 
+Assessment = tuple[float, float, Triple]
+"""Margin (rad), determinant (`UNTILTED` at best), and the direction (body axes, of any length and
+sense) that keeps its attitude in hover."""
+
+
 class WayBack(NamedTuple):
     """Scalar code of the gait to which a vehicle's tilts can return."""
 
@@ -106,19 +117,19 @@ NO_WAY_BACK: Final = WayBack(_as_planned, _standing)
 class Supervision(NamedTuple):
     """Scalar code of a supervisor of vehicles with the same tilts.
 
-    ``vehicle`` is what ``margin_and_determinant`` reads of a vehicle besides the ``knots``; tilt
-    angles, roll and pitch are in rad.
+    ``vehicle`` is what ``assess`` reads of a vehicle besides the ``knots``; tilt angles, roll and
+    pitch are in rad.
     """
 
-    margin_and_determinant: Callable[..., tuple[float, float]]
-    """``(tilts, up, vehicle, knots)``: rad, and `UNTILTED` at best; ``up`` as `world_up_in_body`
-    returns it."""
+    assess: Callable[..., Assessment]
+    """``(tilts, up, vehicle, knots)``; ``up`` as `world_up_in_body` returns it."""
     clearance: Callable[..., float]
     """``(tilts, up, supervisor, vehicle, knots)``: distance above the thresholds relative to the
     largest possible; negative below them."""
     allowed_scale: Callable[..., float]
-    """``(tilts, roll, pitch, supervisor, vehicle, knots)``: the largest scale such that it and
-    every smaller one satisfy the thresholds; 0 where not even the untilted vehicle does."""
+    """``(tilts, roll, pitch, supervisor, vehicle, knots)``: the largest scale in [0, 1] that
+    satisfies the thresholds, or that of the grid which comes nearest where none does. A range of
+    scales between two of the grid may pass unseen."""
     gait_scale: Callable[..., float]
     """As ``allowed_scale``, and 1 unless the strategy is `SCALE`."""
     tilts: Callable[..., Jets]
@@ -143,33 +154,54 @@ def _on_clock(tilt: Jet, motion: Triple) -> Jet:
     return tilt[0], tilt[1] * speed, tilt[2] * speed * speed - tilt[1] * motion[2]
 
 
-def _clearance_of(margin_and_determinant: Callable[..., tuple[float, float]]) -> Any:
+@scalar
+def _relative_clearance(margin: float, determinant: float, supervisor: Supervisor) -> float:
+    """The distance above the thresholds, as `Supervision.clearance`."""
+    return min(
+        (margin - supervisor.min_margin) / (0.5 * pi - supervisor.min_margin),
+        (determinant - supervisor.min_determinant) / (UNTILTED - supervisor.min_determinant),
+    )
+
+
+@scalar
+def turned_along(up: Triple, start: Triple, end: Triple) -> Triple:
+    """A direction turned by the least rotation between two lines, if both have a length."""
+    size = sqrt(
+        (start[0] * start[0] + start[1] * start[1] + start[2] * start[2])
+        * (end[0] * end[0] + end[1] * end[1] + end[2] * end[2])
+    )
+    if not size > 0.0:
+        return up
+    along = (start[0] * end[0] + start[1] * end[1] + start[2] * end[2]) / size
+    if along < 0.0:
+        along, size = -along, -size
+    x, y, z = cross(start, end)
+    axis = x / size, y / size, z / size  # times the sine of the angle
+    turned = cross(axis, up)
+    share = (axis[0] * up[0] + axis[1] * up[1] + axis[2] * up[2]) / (1.0 + along)
+    return (
+        along * up[0] + turned[0] + share * axis[0],
+        along * up[1] + turned[1] + share * axis[1],
+        along * up[2] + turned[2] + share * axis[2],
+    )
+
+
+def _clearance_of(assess: Callable[..., Assessment]) -> Any:
     @scalar
     def clearance(
         tilts: Values, up: Triple, supervisor: Supervisor, vehicle: Any, knots: Vector = NO_KNOTS
     ) -> float:
-        margin, determinant = margin_and_determinant(tilts, up, vehicle, knots)
-        return min(
-            (margin - supervisor.min_margin) / (0.5 * pi - supervisor.min_margin),
-            (determinant - supervisor.min_determinant) / (UNTILTED - supervisor.min_determinant),
-        )
+        margin, determinant, _ = assess(tilts, up, vehicle, knots)
+        return _relative_clearance(margin, determinant, supervisor)
 
     return clearance
 
 
 def _scales_of(
-    tilts: int, margin_and_determinant: Callable[..., tuple[float, float]]
+    tilts: int, clearance: Callable[..., float]
 ) -> tuple[Callable[..., float], Callable[..., float]]:
     """``allowed_scale`` and ``gait_scale``."""
     scaled = vectors_of(tilts).scaled
-
-    @scalar
-    def is_allowed(
-        scale: float, tilts: Values, up: Triple, supervisor: Supervisor, vehicle: Any, knots: Vector
-    ) -> bool:
-        """Whether the tilts times ``scale`` satisfy the thresholds."""
-        margin, determinant = margin_and_determinant(scaled(scale, tilts), up, vehicle, knots)
-        return margin >= supervisor.min_margin and determinant >= supervisor.min_determinant
 
     @scalar
     def allowed_scale(
@@ -181,17 +213,23 @@ def _scales_of(
         knots: Vector = NO_KNOTS,
     ) -> float:
         up = world_up_in_body(roll, pitch)
-        low, high = 0.0, 1.0
+        low = high = nearest = 1.0
+        left, most = 0.0, -inf
         for step in range(SCALE_GRID + 1):
-            high = step / SCALE_GRID
-            if not is_allowed(high, tilts, up, supervisor, vehicle, knots):
+            low = 1.0 - step / SCALE_GRID
+            left = clearance(scaled(low, tilts), up, supervisor, vehicle, knots)
+            if left >= 0.0:
                 break
-            low = high
-        if low == high or high == 0.0:
+            if left > most:
+                most, nearest = left, low
+            high = low
+        if left < 0.0:
+            return nearest
+        if low == 1.0:
             return low
         for _ in range(BISECTIONS):
             middle = 0.5 * (low + high)
-            if is_allowed(middle, tilts, up, supervisor, vehicle, knots):
+            if clearance(scaled(middle, tilts), up, supervisor, vehicle, knots) >= 0.0:
                 low = middle
             else:
                 high = middle
@@ -237,16 +275,25 @@ def _tilts_of(tilts: int, way_back: WayBack) -> Callable[..., Jets]:
     return supervised_tilts
 
 
-def supervision_of(
-    tilts: int,
-    margin_and_determinant: Callable[..., tuple[float, float]],
-    way_back: WayBack = NO_WAY_BACK,
-) -> Supervision:
-    """The supervisor of vehicles with so many tilts; see `Supervision`."""
-    planned_of, return_speed = tilt_motion_of(tilts).planned, way_back.speed
-    clearance = _clearance_of(margin_and_determinant)
-    supervised_tilts = _tilts_of(tilts, way_back)
-    angles = componentwise("angles_of_jets", "jets", "jets#[0]", tilts)
+def _lookahead_of(
+    tilts: int, assess: Callable[..., Assessment], supervised_tilts: Callable[..., Jets]
+) -> Callable[..., float]:
+    """``min_clearance_ahead``."""
+    planned_of = tilt_motion_of(tilts).planned
+    angles: Callable[..., Values] = componentwise("angles_of_jets", "jets", "jets#[0]", tilts)
+
+    @scalar
+    def tilts_at(
+        clock: float,
+        state: float,
+        gait: GaitParameters,
+        knots: Vector,
+        supervisor: Supervisor,
+        vehicle: Any,
+    ) -> Values:
+        """The tilts at a time of the gait's clock in the supervisor's present state."""
+        planned, motion = planned_of(clock, gait, knots), (state, 0.0, 0.0)
+        return angles(supervised_tilts(planned, 1.0, motion, supervisor, vehicle))
 
     @scalar
     def min_clearance_ahead(
@@ -258,17 +305,38 @@ def supervision_of(
         supervisor: Supervisor,
         vehicle: Any,
     ) -> float:
-        """The smallest clearance up to the horizon at the supervisor's present state."""
-        smallest = 1.0
-        frozen = (state, 0.0, 0.0)
-        start = gait_time(time, frozen, supervisor)
+        """The smallest clearance up to the horizon at the supervisor's present state.
+
+        The vehicle meets each sample's tilts with the lean of a moment before. In hover it leans
+        with their direction; it stays as far away from that as it is now.
+        """
+        smallest, start, before = 1.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+        clock = gait_time(time, (state, 0.0, 0.0), supervisor)
+        spacing = supervisor.horizon / LOOKAHEAD_SAMPLES
         for sample in range(LOOKAHEAD_SAMPLES + 1):
-            ahead = start + supervisor.horizon * sample / LOOKAHEAD_SAMPLES
-            jets = supervised_tilts(
-                planned_of(ahead, gait, knots), 1.0, frozen, supervisor, vehicle
-            )
-            smallest = min(smallest, clearance(angles(jets), up, supervisor, vehicle, knots))
+            ahead = clock + spacing * sample
+            if sample > 0 and spacing > FOLLOWED:
+                tilts = tilts_at(ahead - FOLLOWED, state, gait, knots, supervisor, vehicle)
+                before = assess(tilts, up, vehicle, knots)[2]
+            lean = turned_along(up, start, before)
+            tilts = tilts_at(ahead, state, gait, knots, supervisor, vehicle)
+            margin, determinant, before = assess(tilts, lean, vehicle, knots)
+            smallest = min(smallest, _relative_clearance(margin, determinant, supervisor))
+            if sample == 0:
+                start = before
         return smallest
+
+    return min_clearance_ahead
+
+
+def supervision_of(
+    tilts: int, assess: Callable[..., Assessment], way_back: WayBack = NO_WAY_BACK
+) -> Supervision:
+    """The supervisor of vehicles with so many tilts; see `Supervision`."""
+    planned_of, return_speed = tilt_motion_of(tilts).planned, way_back.speed
+    clearance = _clearance_of(assess)
+    supervised_tilts = _tilts_of(tilts, way_back)
+    min_clearance_ahead = _lookahead_of(tilts, assess, supervised_tilts)
 
     @scalar
     def derivative(
@@ -299,9 +367,5 @@ def supervision_of(
         return state, rate, (desired - rate) / LAG
 
     return Supervision(
-        margin_and_determinant,
-        clearance,
-        *_scales_of(tilts, margin_and_determinant),
-        supervised_tilts,
-        derivative,
+        assess, clearance, *_scales_of(tilts, clearance), supervised_tilts, derivative
     )

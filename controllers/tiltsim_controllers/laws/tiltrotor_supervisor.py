@@ -13,7 +13,7 @@ from typing import Final
 
 from tiltsim_controllers.gaits.parameters import NO_KNOTS
 from tiltsim_controllers.gaits.red_gait import nearest_red_angles
-from tiltsim_controllers.laws.supervisor import Supervisor, WayBack, supervision_of
+from tiltsim_controllers.laws.supervisor import Assessment, Supervisor, WayBack, supervision_of
 from tiltsim_controllers.mathematics.jets import Jet, Jets4, jet_product, jet_sum
 from tiltsim_controllers.mathematics.scalar import Quad, Triple, Vector, scalar
 from tiltsim_controllers.vehicle.decoupling_matrix import (
@@ -27,10 +27,8 @@ NEAR: Final = 0.05
 
 
 @scalar
-def margin_and_determinant(
-    tilts: Quad, up: Triple, drag_ratio: float, knots: Vector = NO_KNOTS
-) -> tuple[float, float]:
-    """Singularity margin (rad) and determinant.
+def assess(tilts: Quad, up: Triple, drag_ratio: float, knots: Vector = NO_KNOTS) -> Assessment:
+    """Singularity margin (rad), determinant and ``n``, along which the vehicle hovers.
 
     Args:
         tilts: rad
@@ -43,8 +41,8 @@ def margin_and_determinant(
     along = nx * up[0] + ny * up[1] + nz * up[2]
     length = sqrt(nx * nx + ny * ny + nz * nz)
     if length == 0.0:
-        return 0.0, 0.0
-    return asin(min(1.0, max(-1.0, along / length))), along
+        return 0.0, 0.0, up
+    return asin(min(1.0, max(-1.0, along / length))), along, (nx, ny, nz)
 
 
 @scalar
@@ -73,5 +71,5 @@ def _return_speed(planned: Jets4, supervisor: Supervisor, drag_ratio: float) -> 
     return supervisor.max_rate / max(front, rear, NEAR)
 
 
-SUPERVISION: Final = supervision_of(4, margin_and_determinant, WayBack(_towards_red, _return_speed))
+SUPERVISION: Final = supervision_of(4, assess, WayBack(_towards_red, _return_speed))
 """Its scalar code; the ``vehicle`` is the drag ratio ``r = K_m / (L K_f)``."""

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
 from tests.controllers.multirotors import ring
 from tiltsim_controllers.analysis.singularity import (
@@ -14,18 +15,19 @@ from tiltsim_controllers.analysis.singularity import (
     torque_free_direction,
     world_up,
 )
+from tiltsim_controllers.gaits.plans import continuous_trot as trot
 from tiltsim_controllers.gaits.plans import fixed, waypoints
 from tiltsim_controllers.gaits.plans import instant_trot as trot_instant
 from tiltsim_controllers.gaits.tilts import planned_jets, tilt_reference
 from tiltsim_controllers.laws.decouplers import exact_decoupler
 from tiltsim_controllers.laws.multirotor_supervisor import multirotor_supervision_of, watched
-from tiltsim_controllers.laws.supervisor import BAND, LAG, STRATEGIES, Supervisor
+from tiltsim_controllers.laws.supervisor import BAND, LAG, STRATEGIES, Supervisor, turned_along
 from tiltsim_controllers.laws.tiltrotor_supervisor import SUPERVISION
 from tiltsim_controllers.vehicle.effectiveness import cross_table, tilt_of_rotor
 from tiltsim_controllers.vehicle.parameters import PRESETS, drag_ratio
 
 (
-    margin_and_determinant,
+    assess,
     threshold_clearance,
     allowed_scale,
     supervised_gait_scale,
@@ -41,17 +43,13 @@ leans = st.floats(-0.5, 0.5)
 
 
 def regular(scales, tilts, roll, pitch):
-    """Whether scaled tilts meet the thresholds, by the array code.
-
-    The sign of a margin is that of a gait that begins without tilt: leaning, it may pass where the
-    level vehicle could not.
-    """
-    scaled = np.multiply.outer([0.0, *scales], tilts)
-    margins = margin_over_gait(scaled, VEHICLE, roll, pitch)
-    allowed = (margins >= WATCH.min_margin) & (
-        determinant(scaled, roll, pitch, VEHICLE) >= WATCH.min_determinant
+    """Whether scaled tilts meet the thresholds, by the array code."""
+    scaled = np.multiply.outer(scales, tilts)
+    determinants = determinant(scaled, roll, pitch, VEHICLE)
+    margins = np.abs([margin_over_gait(row[None], VEHICLE, roll, pitch)[0] for row in scaled])
+    return (np.sign(determinants) * margins >= WATCH.min_margin) & (
+        determinants >= WATCH.min_determinant
     )
-    return allowed[1:]
 
 
 @settings(deadline=None, max_examples=150)
@@ -59,13 +57,50 @@ def regular(scales, tilts, roll, pitch):
 @given(angles, leans, leans)
 def test_what_passes_is_regular_and_a_little_more_is_not(tilts, roll, pitch):
     scale = allowed_scale(tilts, roll, pitch, WATCH, RATIO)
-    assert 0.0 <= scale <= 1.0
-    if scale == 0.0 and not regular([0.0], tilts, roll, pitch)[0]:
-        return  # the vehicle leans too far for any gait
+    sixteenths = regular(np.arange(17) / 16, tilts, roll, pitch)
+    if not sixteenths.any():
+        return  # the vehicle leans too far for any share of this gait
     assert regular([max(0.0, scale - 1e-9)], tilts, roll, pitch).all()
-    assert regular(np.arange(17)[np.arange(17) / 16 <= scale] / 16, tilts, roll, pitch).all()
+    assert scale >= np.flatnonzero(sixteenths).max() / 16
     if scale < 1.0:
-        assert not regular([min(1.0, scale + 1e-6)], tilts, roll, pitch).all()
+        assert not regular([min(1.0, scale + 1e-6)], tilts, roll, pitch).any()
+
+
+def random_cases(random):
+    """Supervisions, vehicles, tilts and leans: tiltrotors of any drag, and rings of six arms."""
+    for _ in range(120):
+        ratio, tilts = random.uniform(0.05, 0.4), random.uniform(-1.5, 1.5, 4)
+        yield SUPERVISION, (ratio,), tuple(tilts), random.uniform(-0.9, 0.9, 2)
+    table = ring(6, hinged=True)
+    watch_all = multirotor_supervision_of(tilt_of_rotor(table), 1)
+    vehicle = watched(table, 0, (0.0, 0.0, 1.0))
+    for _ in range(40):
+        tilts = random.uniform(-1.5, 1.5, 6)
+        yield watch_all, (vehicle, table), tuple(tilts), random.uniform(-0.9, 0.9, 2)
+
+
+def test_the_scale_is_the_largest_that_is_allowed():
+    """Of a dense grid, but for a range of scales that lies between two sixteenths."""
+    dense, unseen, partial, beyond = 128, 0, 0, 0
+    for code, seen, tilts, lean in random_cases(np.random.default_rng(5)):
+        scale, up = code.allowed_scale(tilts, *lean, WATCH, *seen), tuple(world_up(*lean))
+        scales = np.arange(dense + 1) / dense
+        left = [code.clearance(tuple(k * np.array(tilts)), up, WATCH, *seen) for k in scales]
+        allowed, sixteenths = np.array(left) >= 0.0, np.array(left)[:: dense // 16]
+        if not (sixteenths >= 0.0).any():
+            assert scale == 1.0 - np.argmax(sixteenths[::-1]) / 16  # the nearest
+            unseen += bool(allowed.any())
+            continue
+        coarse, largest = np.flatnonzero(sixteenths >= 0.0).max() / 16, scales[allowed].max()
+        assert coarse <= scale < coarse + 1 / 16
+        assert code.clearance(tuple(scale * np.array(tilts)), up, WATCH, *seen) >= 0.0
+        unseen += largest >= scale + 1 / dense
+        assert scale < largest + 1 / dense
+        partial += 0.0 < scale < 1.0
+        beyond += not allowed[scales < scale].all()
+    assert unseen < 5
+    assert partial > 30
+    assert beyond > 3  # smaller scales are not all allowed
 
 
 def test_without_thresholds_everything_passes():
@@ -174,6 +209,37 @@ def test_the_clock_slows_down_within_the_band():
     assert asked_rates == pytest.approx(1.0)
 
 
+def lean_of(time, gait):
+    """Roll and pitch of the vehicle in hover at a time of a gait."""
+    n = torque_free_direction(tilt_reference(time, gait)[:4], VEHICLE)
+    return exact_decoupler(0.0, 0.0, 0.0, 0.0, 9.8, tuple(n))
+
+
+@pytest.mark.parametrize("horizon", [0.5, 4.0])
+def test_a_gait_with_which_the_vehicle_leans_is_flown(horizon):
+    """At the present lean its tilts a quarter of a period ahead would violate the threshold."""
+    gait, supervisor = trot(0.9, 1.6).parameters, watch("hold", min_margin=1.0, horizon=horizon)
+    blocked = 0
+    for time in np.arange(0.0, 1.6, 0.05):
+        roll, pitch = lean_of(time, gait)
+        later, up = tilt_reference(time + 0.4, gait)[:4], tuple(world_up(roll, pitch))
+        blocked += threshold_clearance(later, up, supervisor, RATIO) < 0.0
+        assert demand(time, roll, pitch, 0.0, 0.0, supervisor, gait) == 0.0
+    assert blocked > 10
+
+
+def test_a_direction_is_turned_from_one_line_to_another():
+    random = np.random.default_rng(1)
+    for _ in range(20):
+        start, end, up = random.normal(size=(3, 3))
+        turned = turned_along(tuple(up), tuple(start), tuple(end))
+        sense = np.sign(start @ end)
+        rotation, _ = Rotation.align_vectors([sense * end], [start])
+        np.testing.assert_allclose(turned, rotation.apply(up), atol=1e-9)
+        np.testing.assert_allclose(turned_along(tuple(up), tuple(start), tuple(-end)), turned)
+        assert turned_along(tuple(up), (0.0, 0.0, 0.0), tuple(end)) == tuple(up)
+
+
 @pytest.mark.parametrize("strategy", WITH_STATES)
 def test_only_the_scaling_strategy_scales(strategy):
     planned = (1.2, -0.9, 0.7, 1.1)
@@ -252,12 +318,12 @@ def test_the_way_to_red_undershoots_a_threshold_by_less_than_the_band():
 
 
 def test_what_meets_its_threshold_exactly_is_allowed():
-    untilted = (0.0, 0.0, 0.0, 0.0)
-    margin, determinant_there = margin_and_determinant(untilted, (0.0, 0.0, 1.0), RATIO)
+    tilts, lean = (0.4, -0.2, 0.1, 0.3), (0.2, -0.3)
+    margin, determinant_there, _ = assess(tilts, tuple(world_up(*lean)), RATIO)
     for threshold in ({"min_margin": margin}, {"min_determinant": determinant_there}):
-        assert allowed_scale(untilted, 0.0, 0.0, Supervisor(**threshold), RATIO) == 1.0
+        assert allowed_scale(tilts, *lean, Supervisor(**threshold), RATIO) == 1.0
         above = {name: value * (1.0 + 1e-15) for name, value in threshold.items()}
-        assert allowed_scale(untilted, 0.0, 0.0, Supervisor(**above), RATIO) == 0.0
+        assert allowed_scale(tilts, *lean, Supervisor(**above), RATIO) < 1.0
 
 
 # --- any multirotor ------------------------------------------------------------------------------
@@ -267,11 +333,11 @@ def test_what_meets_its_threshold_exactly_is_allowed():
 @given(angles, leans, leans)
 def test_four_rotors_of_a_table_have_the_tiltrotor_s_margin_and_determinant(tilts, roll, pitch):
     table, up = cross_table(VEHICLE, tilting=True), tuple(world_up(roll, pitch))
-    known = margin_and_determinant(tilts, up, RATIO)
+    known = assess(tilts, up, RATIO)[:2]
     n = np.array(torque_free_direction(tilts, VEHICLE))
     side = tuple(np.sign(known[1]) * np.sign(n @ up) * n)  # that of the determinant
-    general = multirotor_supervision_of(tilt_of_rotor(table), 1).margin_and_determinant
-    found = general(tilts, up, watched(table, 0, side), table)
+    general = multirotor_supervision_of(tilt_of_rotor(table), 1).assess
+    found = general(tilts, up, watched(table, 0, side), table)[:2]
     np.testing.assert_allclose(found, known, rtol=0.0, atol=1e-7)
 
 
@@ -283,7 +349,7 @@ def test_it_is_zero_where_the_outputs_depend_on_each_other(dimension, forward):
     vehicle, up = watched(table, 0, (0.0, 0.0, 1.0)), (0.0, 0.0, 1.0)
 
     def determinant_at(*tilts):
-        return watch_all.margin_and_determinant(tilts, up, vehicle, table)[1]
+        return watch_all.assess(tilts, up, vehicle, table)[1]
 
     level = determinant_at(*[0.0] * 6)
     assert level == pytest.approx(4.0) if dimension == 1 else abs(level) < 1e-6

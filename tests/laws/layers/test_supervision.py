@@ -107,6 +107,27 @@ def test_scaling_shows_the_share_of_the_gait_that_it_takes_away():
     np.testing.assert_allclose(flown, np.outer(1.0 - flight["supervision"], angles), rtol=1e-12)
 
 
+@pytest.mark.parametrize("strategy", ["scale", "hold"])
+def test_a_gait_that_keeps_its_margin_where_it_is_flown_is_flown(strategy):
+    """The vehicle leans with its tilts: untilted, or at tilts of another time, it would not."""
+    tables = tiltrotor(
+        gait={"type": "trot_continuous", "amplitude": 0.9, "period": 2.0},
+        controller={
+            **FEEDFORWARD,
+            "gains": "exact",
+            "supervisor": {"strategy": strategy, "min_margin": 0.9, "min_determinant": 0.0},
+        },
+        reference={"type": "circle", "radius": 1.0, "angular_frequency": 0.6},
+        initial={"position": [1.0, 0.1, 0.0], "velocity": [0.0, 0.6, 0.0]},
+    )
+    tables["simulation"] |= {"duration": 2.2, "timestep": 0.004}
+    flight = tiltsim.simulate(tiltsim.parse_scenario(tables))
+    settled = flight["time"] > 0.4
+    assert flight["singularity_margin"][settled].min() > 1.3
+    assert np.abs(flight["supervision"][settled]).max() < 1e-6
+    assert flight.metrics()["max_tilt_rate"] < 5.0
+
+
 @pytest.mark.parametrize("strategy", ["scale", *WITH_STATES])
 def test_both_plants_fly_it_alike(strategy):
     tables = tiltrotor(
