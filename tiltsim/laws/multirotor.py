@@ -13,9 +13,9 @@ from tiltsim.laws.rotorcraft import CONDITION
 from tiltsim.laws.tracking import tracking_fields, tracking_loop
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.multirotor_controllers import AttitudeForceController, upper_side
+from tiltsim_controllers.laws.allocation import RotorRange
 from tiltsim_controllers.laws.attitude_altitude import DECOUPLINGS
 from tiltsim_controllers.laws.multirotor import multirotor_law_of
-from tiltsim_controllers.laws.multirotor_allocation import RotorRange
 from tiltsim_controllers.laws.multirotor_steps import (
     ATTITUDE_ERRORS,
     Direction,

@@ -119,8 +119,8 @@ class GaitFollowingController(ControllerTable):
     allocation: Literal["inversion", "prioritized"] = Field(
         "inversion",
         description="at rotor limits: inversion saturates each rotor alone, prioritized gives up "
-        "the least important outputs first: of the tiltrotor altitude, then yaw, then roll and "
-        "pitch; of a multirotor side forces, then lift, then torque",
+        "the least important outputs first: side forces, then lift, then yaw, then roll and "
+        "pitch",
     )
     allocation_horizon: Positive = Field(
         0.02, description="time for which prioritized allocation keeps within the limits [s]"

@@ -31,6 +31,7 @@ from typing import Any
 
 from tiltsim_controllers.gaits.any_tilts import Jets, tilt_motion_of
 from tiltsim_controllers.gaits.parameters import FIXED, NO_KNOTS
+from tiltsim_controllers.laws.allocation import limited_of
 from tiltsim_controllers.laws.decouplers import NONE
 from tiltsim_controllers.laws.failures import health_of, masked_of
 from tiltsim_controllers.laws.feedback import attitude_motion
@@ -42,7 +43,6 @@ from tiltsim_controllers.laws.gait_feedforward import (
     horizontal_control,
     tracking_errors,
 )
-from tiltsim_controllers.laws.multirotor_allocation import limited_of
 from tiltsim_controllers.laws.multirotor_inputs import (
     null_part_of,
     pushing_of,

@@ -6,6 +6,7 @@ from math import cos, sin
 from typing import Any, Final, NamedTuple
 
 from tiltsim_controllers.gaits.parameters import GaitParameters
+from tiltsim_controllers.laws.allocation import RotorRange
 from tiltsim_controllers.laws.attitude_altitude import EXACT_DECOUPLING, Gains
 from tiltsim_controllers.laws.decouplers import (
     CONVENTIONAL,
@@ -19,7 +20,6 @@ from tiltsim_controllers.laws.feedback import attitude_jerk, force_control
 from tiltsim_controllers.laws.full_pose import attitude_error
 from tiltsim_controllers.laws.gains import IntegralGains
 from tiltsim_controllers.laws.gait_feedforward import FeedforwardTerms, decoupled_attitude
-from tiltsim_controllers.laws.multirotor_allocation import RotorRange
 from tiltsim_controllers.laws.multirotor_supervisor import Watched
 from tiltsim_controllers.laws.supervisor import Supervisor
 from tiltsim_controllers.mathematics.jets import (
@@ -51,7 +51,7 @@ class Form(NamedTuple):
     norm: str = "speed"  # in `tiltsim_controllers.laws.multirotor_inputs.NORMS`
     forward: bool = False  # two components are those along x and z, of a vehicle that has three
     losses: bool = False  # whether the controller knows of failures
-    prioritized: bool = False  # whether it keeps within rotor limits (`multirotor_allocation`)
+    prioritized: bool = False  # whether it keeps within rotor limits (`allocation`)
     supervised: bool = False  # whether a supervisor changes its gait
 
     @property

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import atan, inf
+from math import atan, inf, nan, pi
 
 import numpy as np
 import pytest
@@ -12,12 +12,18 @@ from scipy.optimize import linprog
 from scipy.sparse import block_diag, csr_array, eye_array, hstack, vstack
 
 from tiltsim_controllers.analysis.singularity import force_matrix, torque_matrix, world_up
-from tiltsim_controllers.laws.allocation import allocate_accelerations
+from tiltsim_controllers.laws.allocation import (
+    RotorRange,
+    acceleration_range,
+    allocated_of,
+    limited_tiltrotor,
+)
 from tiltsim_controllers.vehicle.parameters import PRESETS, SPIN, drag_ratio
 
 VEHICLE = PRESETS["ar_drone_2"]
 LIMITS = (200.0, 400.0)
 HORIZON = 0.02
+RANGE = RotorRange(*LIMITS, HORIZON)
 
 tilts = st.tuples(*[st.floats(-0.5, 0.5)] * 4)
 speeds = st.tuples(*[st.floats(*LIMITS)] * 4)
@@ -39,7 +45,7 @@ def test_roll_and_pitch_keep_their_direction_and_come_before_yaw(angles, magnitu
     signed = tuple(s * m for s, m in zip(SPIN, magnitudes, strict=True))
     matrix = decoupling(angles, signed, r, p)
     assume(np.linalg.cond(matrix) < 1e4)
-    found = allocate_accelerations(desired, angles, signed, r, p, VEHICLE, LIMITS, HORIZON)
+    found = limited_tiltrotor(desired, angles, signed, r, p, VEHICLE, RANGE)
     requested, allocated = matrix @ desired, matrix @ found
     # What an allocation leaves of one rotor it takes from another: all are good to the largest.
     scale = np.abs(matrix).sum(axis=1) * np.abs([*desired, *found]).max() + 1e-9
@@ -60,18 +66,13 @@ def test_what_the_limits_allow_comes_back_untouched():
     desired = (10.0, -20.0, 5.0, 1.0)
     speeds_now = (-300.0, 300.0, -300.0, 300.0)
     tilts_now = (0.1, -0.1, 0.2, 0.0)
-    assert (
-        allocate_accelerations(desired, tilts_now, speeds_now, 0.1, 0.2, VEHICLE, LIMITS, 0.02)
-        == desired
-    )
+    assert limited_tiltrotor(desired, tilts_now, speeds_now, 0.1, 0.2, VEHICLE, RANGE) == desired
 
 
 def test_a_climb_beyond_the_limit_costs_no_attitude():
     speeds_now = (-395.0, 390.0, -395.0, 390.0)
     desired = (-9000.0, 9500.0, -8800.0, 9000.0)
-    found = allocate_accelerations(
-        desired, (0.0,) * 4, speeds_now, 0.0, 0.0, VEHICLE, LIMITS, HORIZON
-    )
+    found = limited_tiltrotor(desired, (0.0,) * 4, speeds_now, 0.0, 0.0, VEHICLE, RANGE)
     matrix = decoupling((0.0,) * 4, speeds_now, 0.0, 0.0)
     np.testing.assert_allclose((matrix @ found)[:3], (matrix @ desired)[:3], rtol=1e-9, atol=1e-6)
     assert (matrix @ found)[3] < (matrix @ desired)[3]
@@ -83,23 +84,23 @@ def sequential_program(matrices, requested, low, high):
     The cases share no variable: the optimum of the sum is the optimum of each.
 
     Args:
-        matrices: decoupling matrices, shape (cases, 4, 4)
+        matrices: decoupling matrices, shape (cases, 4, rotors)
         requested: rates of roll, pitch, yaw and lift, shape (cases, 4)
-        low, high: limits of the rotor accelerations, shape (cases, 4)
+        low, high: limits of the rotor accelerations, shape (cases, rotors)
 
     Returns:
         The attainable rates, shape (cases, 4).
     """
-    cases = len(matrices)
+    cases, _, rotors = matrices.shape
     box = np.stack([low, high], axis=-1).reshape(-1, 2)
 
     def solve(objective, ends, equal, known, limited=None, limits=None):
         """Optimal accelerations, and the one further variable of each case, between its ends."""
-        cost = np.repeat([0.0, objective], [4 * cases, cases])
+        cost = np.repeat([0.0, objective], [rotors * cases, cases])
         bounds = np.vstack([box, np.tile(ends, (cases, 1))])
         found = linprog(cost, limited, limits, equal, known, bounds)
         assert found.success, found.message
-        return np.split(found.x, [4 * cases])
+        return np.split(found.x, [rotors * cases])
 
     rows = block_diag(matrices[:, :2])
     tilting = block_diag(requested[:, :2, None])
@@ -130,7 +131,7 @@ def test_roll_and_pitch_come_before_yaw_and_yaw_before_lift():
     requested = random.uniform(-1.0, 1.0, (cases, 4)) * 10.0 ** random.uniform(-2, 0.5, (cases, 1))
     found = np.array(
         [
-            allocate_accelerations(w, a, s, *lean, VEHICLE, (least, LIMITS[1]), HORIZON)
+            limited_tiltrotor(w, a, s, *lean, VEHICLE, RANGE._replace(slowest=least))
             for w, a, s, lean, (least,) in zip(
                 *(map(tuple, table.tolist()) for table in (unit * requested, angles, signed)),
                 *(leans.tolist(), slowest.tolist()),
@@ -155,10 +156,10 @@ def test_roll_and_pitch_come_before_yaw_and_yaw_before_lift():
 def test_one_limit_is_enough(limits):
     desired, signed = (-9e3, -9e3, 9e3, 9e3), (-360.0, 360.0, -361.0, 361.0)
     arguments = (0.1, 0.2, 0.0, -0.1), signed, 0.1, 0.2, VEHICLE
-    found = allocate_accelerations(desired, *arguments, limits, HORIZON)
+    found = limited_tiltrotor(desired, *arguments, RotorRange(*limits, HORIZON))
     finite = (limits[0], min(limits[1], 1e6))
     np.testing.assert_allclose(
-        found, allocate_accelerations(desired, *arguments, finite, HORIZON), rtol=1e-9
+        found, limited_tiltrotor(desired, *arguments, RotorRange(*finite, HORIZON)), rtol=1e-9
     )
     assert all(
         limits[0] - 1e-9 <= s * v <= limits[1] + 1e-9
@@ -171,23 +172,118 @@ def test_a_pair_without_yaw_torque_does_not_hang_on_rounding():
     delta, signed = atan(drag_ratio(VEHICLE)), (-390.0, 400.0, -390.0, 390.0)
     for yaw in (-1.0, 1.0):
         found = [
-            allocate_accelerations(
+            limited_tiltrotor(
                 (-8e3 * yaw, 9e3, -8e3 * yaw, 9e3),
                 (0.1, 0.2, -0.1, -2.0 * delta - 0.2 + rounding),
-                *(signed, 0.0, 0.0, VEHICLE, LIMITS, HORIZON),
+                *(signed, 0.0, 0.0, VEHICLE, RANGE),
             )
             for rounding in (-1e-15, 0.0, 1e-15)
         ]
         np.testing.assert_allclose(found, [found[1]] * 3, atol=1e-6)
 
 
-def test_a_singular_matrix_gives_back_what_was_requested():
-    """A rotor that stands still has no acceleration that moves its thrust."""
-    requested = (9000.0, -9000.0, 9000.0, -9000.0)
-    for stopped in range(4):
-        speeds_now = [-300.0, 300.0, -300.0, 300.0]
-        speeds_now[stopped] = 0.0
-        found = allocate_accelerations(
-            requested, (0.0,) * 4, tuple(speeds_now), 0.0, 0.0, VEHICLE, LIMITS, HORIZON
+@pytest.mark.parametrize("stopped", range(4))
+def test_a_rotor_that_stands_still_does_not_stop_the_others(stopped):
+    """Its acceleration moves no thrust: they make the requested roll and pitch alone."""
+    requested, speeds_now = (9000.0, -9000.0, 9000.0, -9000.0), [-300.0, 300.0, -300.0, 300.0]
+    speeds_now[stopped] = 0.0
+    limits = RANGE._replace(slowest=0.0)
+    found = limited_tiltrotor(requested, (0.0,) * 4, tuple(speeds_now), 0.0, 0.0, VEHICLE, limits)
+    matrix = decoupling((0.0,) * 4, speeds_now, 0.0, 0.0)
+    along = np.abs(speeds_now) + HORIZON * np.array(found) * SPIN
+    assert (along > -1e-9).all()
+    assert (along < LIMITS[1] + 1e-9).all()
+    asked = matrix[:2] @ requested
+    assert np.abs(asked).max() > 1e6
+    np.testing.assert_allclose(matrix[:2] @ found, asked, rtol=1e-9, atol=1e-3)
+
+
+def test_what_is_no_number_comes_back():
+    for value in (nan, inf):
+        requested = (value, 0.0, 0.0, 0.0)
+        found = limited_tiltrotor(
+            requested, (0.0,) * 4, (-300.0, 300.0, -300.0, 300.0), 0.0, 0.0, VEHICLE, RANGE
         )
-        assert found == requested
+        assert found is requested
+
+
+# --- any number of rotors ------------------------------------------------------------------------
+
+
+def random_vehicles(rotors, cases):
+    """Torque and lift per acceleration, requests and boxes with zero, of orders as of vehicles.
+
+    A third of the boxes have a rotor at its limit. A fifth of the vehicles are symmetric and so are
+    their boxes, in which rotors meet their limits at the same time.
+    """
+    random, found = np.random.default_rng(rotors), []
+    while len(found) < cases:
+        rows = random.uniform(-1.0, 1.0, (4, rotors)) * [[1.0], [1.0], [0.1], [1.0]]
+        rows[3] = 0.6 + 0.4 * rows[3]
+        box = np.sort(random.uniform(0.0, 1.0, (rotors, 2)) * [-1.0, 1.0])
+        requested = random.uniform(-1.0, 1.0, rotors) * random.choice([1.0, 3.0, 10.0])
+        if len(found) % 3 == 0:
+            box[random.integers(rotors), random.integers(2)] = 0.0
+        if len(found) % 5 == 0:
+            angle, turn = 2.0 * pi * np.arange(rotors) / rotors, (-1.0) ** np.arange(rotors)
+            rows = np.array([np.sin(angle), -np.cos(angle), 0.1 * turn, np.ones(rotors)])
+            box, requested = np.tile([-0.5, 0.5], (rotors, 1)), np.round(requested)
+        if np.linalg.matrix_rank(rows, 1e-6) == 4:
+            found.append((rows, requested, box))
+    return found
+
+
+def allocated(rows, requested, box):
+    found = allocated_of(len(requested))(
+        tuple(requested.tolist()),
+        tuple(map(tuple, rows[:3].tolist())),
+        tuple(rows[3].tolist()),
+        tuple(map(tuple, box.tolist())),
+    )
+    return np.array(found)
+
+
+@pytest.mark.parametrize("rotors", range(4, 13))
+def test_any_number_of_rotors_reaches_the_optima_of_the_linear_programs(rotors):
+    vehicles = random_vehicles(rotors, 200)
+    rows, requests, boxes = (np.array(part) for part in zip(*vehicles, strict=True))
+    found = np.array([allocated(*vehicle) for vehicle in vehicles])
+    assert (found >= boxes[..., 0]).all()
+    assert (found <= boxes[..., 1]).all()
+    requirement, achieved = (np.einsum("nij,nj->ni", rows, w) for w in (requests, found))
+    attainable = sequential_program(rows, requirement, boxes[..., 0], boxes[..., 1])
+    limited = (np.abs(attainable - requirement) > 1e-6).sum(axis=0)
+    assert (limited > 10).all(), limited
+    np.testing.assert_allclose(achieved, attainable, rtol=0, atol=1e-5)
+
+
+@pytest.mark.parametrize("rotors", [5, 6, 8, 12])
+def test_the_rest_is_nearest_to_the_request(rotors):
+    """No other accelerations in the box with the same torque and lift are nearer."""
+    apart = 0
+    for rows, requested, box in random_vehicles(rotors, 40):
+        found = allocated(rows, requested, box)
+        towards = requested - found
+        # Along the gradient of the distance none goes further: the condition of an optimum.
+        best = linprog(-towards, A_eq=rows, b_eq=rows @ found, bounds=box)
+        assert best.status == 0
+        assert towards @ best.x <= towards @ found + 1e-6 * (towards @ towards)
+        apart += np.abs(rows @ towards).max() < 1e-9 < np.abs(towards).max()
+    assert apart > 0 or rotors == 5
+
+
+def test_what_the_box_contains_comes_back_and_its_edge_is_no_jump():
+    for rows, requested, box in random_vehicles(6, 40):
+        edge = np.clip(requested, *box.T)
+        np.testing.assert_array_equal(allocated(rows, edge, box), edge)
+        beyond = edge + 1e-9 * requested
+        np.testing.assert_allclose(allocated(rows, beyond, box), edge, atol=1e-6)
+
+
+def test_limits_hold_along_the_spin_and_zero_is_always_allowed():
+    limits = RotorRange(100.0, 400.0, 0.5)
+    assert acceleration_range(300.0, 1.0, limits) == (-400.0, 200.0)
+    assert acceleration_range(-300.0, -1.0, limits) == (-200.0, 400.0)
+    assert acceleration_range(500.0, 1.0, limits) == (-800.0, 0.0)
+    assert acceleration_range(50.0, 1.0, limits) == (0.0, 700.0)
+    assert acceleration_range(-300.0, 1.0, RotorRange(-400.0, 400.0, 0.5)) == (-200.0, 1400.0)

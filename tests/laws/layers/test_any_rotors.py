@@ -168,12 +168,14 @@ def test_stiff_servos_approach_pods_that_follow_exactly():
     assert furthest(exact, light) > 1e-6
 
 
-# --- a supervisor, and the measured angular acceleration ---------------------------------------
+# --- a supervisor, the measured angular acceleration, and allocation within limits -------------
 
 SWINGS = {"type": "trot_continuous", "amplitude": 0.9, "period": 0.8}
 HOLD = {"supervisor": {"strategy": "hold", "min_margin": 1.3}}
 SCALE = {"supervisor": {"strategy": "scale", "min_margin": 1.3}}
 MEASURED = {"angular_acceleration": "measured"}
+PRIORITIZED = {"allocation": "prioritized"}
+NARROW = {"min_rotor_speed": 345.0, "max_rotor_speed": 372.0}
 WEAK = [{"type": "partial_thrust", "rotor": 1, "time": 0.02, "factor": 0.95}]
 """Unknown to the law: what is measured is not its model's."""
 
@@ -186,17 +188,21 @@ WEAK = [{"type": "partial_thrust", "rotor": 1, "time": 0.02, "factor": 0.95}]
         ("rigid_body", SCALE),
         ("mujoco", MEASURED),
         ("rigid_body", MEASURED),
+        ("mujoco", PRIORITIZED),
+        ("rigid_body", PRIORITIZED | SCALE),
     ],
 )
-def test_supervised_and_measured_the_tiltrotor_flies_as_a_multirotor_does(plant, layer):
+def test_with_further_parts_the_tiltrotor_flies_as_a_multirotor_does(plant, layer):
     tables = {
         "gait": SWINGS,
         "fault": WEAK,
         "initial": {"attitude": [0.1, 0.05, 0.0], "rotor_speed": 361.0},
     }
     law = {"gait_rate_feedforward": True, "decoupling": "exact", "decoupler": "exact"}
+    limits = NARROW if "allocation" in layer else {}
     general = fly(
         "tiltrotor",
+        limits,
         simulation={"plant": plant, "timestep": 0.002},
         controller={
             **{"law": "attitude_force", "gains": "feedforward", "attitude_error": "euler_angles"},
@@ -206,13 +212,20 @@ def test_supervised_and_measured_the_tiltrotor_flies_as_a_multirotor_does(plant,
     )
     simulation = general.scenario.simulation.model_dump()
     special = tiltsim.simulate(
-        {"controller": {**law, "gains": "feedforward", **layer}, "simulation": simulation, **tables}
+        {
+            **{"controller": {**law, "gains": "feedforward", **layer}, "vehicle": limits},
+            **{"simulation": simulation, **tables},
+        }
     )
     names = (*MOTION, "tilt_angles", "reference_tilt_angles", "reference_attitude")
     assert furthest(general, special, names) < 1e-9
     if "supervisor" in layer:
         assert 0.2 < special["supervision"].max() <= 1.0
         np.testing.assert_allclose(general["supervision"], special["supervision"], atol=1e-9)
+    if limits:
+        speeds = np.abs(special["rotor_speeds"])
+        assert 345.0 - 1e-9 <= speeds.min() < 346.0
+        assert 371.0 < speeds.max() <= 372.0 + 1e-9
 
 
 def test_six_arms_hold_a_gait_that_would_push_aside_before_the_vehicle_leans():

@@ -1,7 +1,4 @@
-"""Rotor accelerations of a controller within speed limits, where its law does not see to that.
-
-Each vehicle has its own closed form, in `ALLOCATIONS`.
-"""
+"""Rotor accelerations of a controller within speed limits, where its law does not see to that."""
 
 from __future__ import annotations
 
@@ -14,7 +11,7 @@ from tiltsim.closed_loop.loop import ClosedLoop
 from tiltsim.laws.layers.layer import Layer, wrap_loop
 from tiltsim.scenario.gait_following import GaitFollowingController
 from tiltsim.vehicles.rotorcraft.layout import QW, QX, QY, QZ, TILT_1, layout_of
-from tiltsim_controllers.laws.allocation import allocate_accelerations
+from tiltsim_controllers.laws.allocation import RotorRange, limited_tiltrotor
 from tiltsim_controllers.mathematics.rotation import euler_from_quaternion
 from tiltsim_controllers.mathematics.scalar import Values, Vector, scalar
 from tiltsim_controllers.mathematics.vectors import entries_of
@@ -23,16 +20,14 @@ from tiltsim_controllers.vehicle.parameters import Vehicle
 if TYPE_CHECKING:
     from tiltsim.scenario.scenario import FlightPlan
 
-ALLOCATIONS: Final[dict[str, Callable[..., Values]]] = {"tiltrotor": allocate_accelerations}
-"""By model: ``(accelerations, tilts, speeds, roll, pitch, vehicle, limits, horizon)``."""
+ALLOCATIONS: Final[dict[str, Callable[..., Values]]] = {"tiltrotor": limited_tiltrotor}
+"""By model: ``(accelerations, tilts, speeds, roll, pitch, vehicle, limits)``."""
 
 
 class Allocation(NamedTuple):
     """How rotor accelerations are kept within the speed limits."""
 
-    horizon: float  # s
-    min_speed: float  # rad/s, absolute
-    max_speed: float
+    limits: RotorRange
     vehicle: Vehicle
 
 
@@ -40,8 +35,8 @@ def _read(plan: FlightPlan) -> Allocation:
     controller, vehicle = plan.scenario.controller, plan.scenario.rotorcraft
     assert isinstance(controller, GaitFollowingController)
     low, high = vehicle.min_rotor_speed or 0.0, vehicle.max_rotor_speed
-    limits = low, inf if high is None else high
-    return Allocation(controller.allocation_horizon, *limits, vehicle.resolve())
+    limits = RotorRange(low, inf if high is None else high, controller.allocation_horizon)
+    return Allocation(limits, vehicle.resolve())
 
 
 @cache
@@ -61,14 +56,7 @@ def with_allocation(loop: ClosedLoop) -> ClosedLoop:
         ctrl, own = inner_controls(time, qpos, qvel, act, parameters.inner, knots), parameters.layer
         roll, pitch, _yaw = euler_from_quaternion(qpos[QW], qpos[QX], qpos[QY], qpos[QZ])
         accelerations = allocated(
-            demanded_in(ctrl),
-            tilts_in(qpos),
-            speeds_in(act),
-            roll,
-            pitch,
-            own.vehicle,
-            (own.min_speed, own.max_speed),
-            own.horizon,
+            demanded_in(ctrl), tilts_in(qpos), speeds_in(act), roll, pitch, own.vehicle, own.limits
         )
         return (*ctrl[:first], *accelerations, *ctrl[further:])
 
