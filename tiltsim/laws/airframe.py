@@ -45,6 +45,7 @@ def airframe_of(plan: FlightPlan) -> Airframe:
         plan.gait,
         initial_tilts(plan)[0] if tilting else (),
         tuple(spin * speed for spin, speed in zip(table.spins, speeds, strict=True)),
+        scenario.initial.angular_velocity,
         # The thesis's equations omit the gyroscopic torque but for the quadrotor's.
         float(scenario.simulation.plant != "thesis" or table.model == "quadrotor"),
     )

@@ -193,4 +193,5 @@ class IndiController(ScalarController):
     def initial_states(self, airframe: Airframe) -> Values:
         pairs = zip(airframe.vehicle.thrust_coefficients, airframe.initial_speeds, strict=True)
         thrusts = (k * speed * abs(speed) for k, speed in pairs)
-        return (*(0.0,) * 6, *thrusts, *(0.0,) * airframe.rotors)
+        filtered = (*airframe.initial_body_rates, 0.0, 0.0, 0.0)
+        return (*filtered, *thrusts, *(0.0,) * airframe.rotors)

@@ -22,7 +22,7 @@ from tiltsim.scenario.controller_table import ControllerTable, ReferenceKind
 from tiltsim.scenario.table import Positive
 from tiltsim_controllers.analysis.stability import ErrorLoop, linear_loop
 from tiltsim_controllers.gaits.plans import Gait
-from tiltsim_controllers.mathematics.scalar import Values
+from tiltsim_controllers.mathematics.scalar import Triple, Values
 from tiltsim_controllers.mathematics.scalar import scalar as register
 
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -55,6 +55,7 @@ class Airframe:
         gait: Of its tilts.
         initial_tilts: Its tilt angles at time zero, rad.
         initial_speeds: Its rotor speeds at time zero, rad/s along the spin.
+        initial_body_rates: Its body rates at time zero, rad/s.
         gyroscopic: 1 where the plant has gyroscopic torque, else 0.
     """
 
@@ -62,6 +63,7 @@ class Airframe:
     gait: Gait
     initial_tilts: Values
     initial_speeds: Values
+    initial_body_rates: Triple
     gyroscopic: float
 
     @property
