@@ -46,8 +46,9 @@ class TimeTable(Table):
     file: str | None = Field(None)
     hold: bool = Field(
         True,
-        description="after the last row, hold it; false: the flight must not be longer than the "
-        "table, as where a function of time in Python was sampled",
+        description="after the last row, hold it, at rest: the velocity jumps there unless the "
+        "table ends at rest; false: the flight must not be longer than the table, as where a "
+        "function of time in Python was sampled",
     )
     _rows: Rows = PrivateAttr(())
 
