@@ -97,9 +97,9 @@ def _way(value: float, free: float, slope: float, least: float, box: Pair) -> fl
 
 
 @scalar
-def _loss(value: float, free: float, loose: float, slope: float, least: float, box: Pair) -> float:
+def _loss(value: float, free: float, slope: float, least: float, box: Pair) -> float:
     """Minus the multiplier of a rotor that stopped and gains by leaving its limit; 0 for others."""
-    stopped = free == 0.0 and loose > 0.0 and abs(slope) > least
+    stopped = free == 0.0 and abs(slope) > least
     return -abs(slope) if stopped and _room(value, slope, box) > 0.0 else 0.0
 
 
@@ -109,12 +109,6 @@ def _after(value: float, free: float, slope: float, step: float, is_met: bool, b
     if is_met:
         return box[1] if slope > 0.0 else box[0]
     return value + step * slope if free > 0.0 else value
-
-
-@scalar
-def _still_loose(free: float, loose: float, slope: float, least: float) -> float:
-    """Whether a rotor may be let go without loss to an objective that limits kept from its goal."""
-    return loose if free > 0.0 or abs(slope) <= least else 0.0
 
 
 @cache
@@ -154,7 +148,6 @@ class _Rotors(NamedTuple):
     ways: Callable[..., Values]
     losses: Callable[..., Values]
     after: Callable[..., Values]
-    still_loose: Callable[..., Values]
     let_go: Callable[..., Values]  # (free, which, now): 1 or 0 for one of them
     smallest: Callable[..., tuple[float, int]]  # (values): and which it is
 
@@ -179,8 +172,8 @@ def _rotors_of(length: int) -> _Rotors:
         ),
         componentwise(
             "losses",
-            "a, free, loose, rest, least, box",
-            "loss(a#, free#, loose#, rest#, least, box#)",
+            "a, free, rest, least, box",
+            "loss(a#, free#, rest#, least, box#)",
             length,
             loss=_loss,
         ),
@@ -190,13 +183,6 @@ def _rotors_of(length: int) -> _Rotors:
             "after(a#, free#, rest#, step, met == @, box#)",
             length,
             after=_after,
-        ),
-        componentwise(
-            "still_loose",
-            "free, loose, rest, least",
-            "still(free#, loose#, rest#, least)",
-            length,
-            still=_still_loose,
         ),
         componentwise("let_go", "free, which, now", "now if which == @ else free#", length),
         smallest,
@@ -214,7 +200,7 @@ def allocated_of(length: int) -> Callable[..., Values]:
     dot, scaled, add_scaled, product, _ = vectors_of(length)
     nothing, each = (0.0,) * length, (1.0,) * length
     remainder, steps = _remainder_of(length), 3 * length + 8
-    ways, losses, after, still_loose, let_go, smallest = _rotors_of(length)
+    ways, losses, after, let_go, smallest = _rotors_of(length)
     # Rounding may take the sum past the active limit.
     within: Callable[..., Values] = componentwise(
         "within", "a, box", "clipped(a#, box#[0], box#[1])", length, clipped=clipped
@@ -243,7 +229,7 @@ def allocated_of(length: int) -> Callable[..., Values]:
         across = unit(add_scaled(scaled(pitch, torque[0]), -roll, torque[1]))
         leaning = unit(add_scaled(scaled(roll, torque[0]), pitch, torque[1]))
         turning, rising = unit(torque[2]), unit(lift)
-        a, free, loose, level = nothing, each, each, 0
+        a, free, level = nothing, each, 0
         for _ in range(steps):
             objective, kept, kept_yaw, kept_lift = leaning, nothing, nothing, nothing
             if level > 0:
@@ -259,7 +245,7 @@ def allocated_of(length: int) -> Callable[..., Values]:
             least = NEGLIGIBLE * sqrt(dot(gradient, gradient))
             if along > least * least:
                 enough = abs(gap) / along if level < 3 else 1.0
-                step, which = smallest(ways(a, free, rest, NEGLIGIBLE * sqrt(along), box))
+                step, which = smallest(ways(a, free, rest, least, box))
                 if step < enough:
                     a = after(a, free, rest, step, which, box)
                     free = let_go(free, which, 0.0)
@@ -267,15 +253,12 @@ def allocated_of(length: int) -> Callable[..., Values]:
                     a = after(a, free, rest, enough, -1, box)
                     level = min(3, level + 1)
             else:
-                reached = level < 3 and abs(gap) <= NEGLIGIBLE * size
-                loss, which = smallest(losses(a, free, loose, rest, least, box))
-                if loss < 0.0 and not reached:
+                loss, which = smallest(losses(a, free, rest, least, box))
+                if loss < 0.0:
                     free = let_go(free, which, 1.0)
                 elif level == 3:
                     break
                 else:
-                    if not reached:
-                        loose = still_loose(free, loose, rest, least)
                     level += 1
         return within(a, box)
 

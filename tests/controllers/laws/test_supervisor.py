@@ -81,24 +81,27 @@ def random_cases(random):
 
 def test_the_scale_is_the_largest_that_is_allowed():
     """Of a dense grid, but for a range of scales that lies between two sixteenths."""
-    dense, unseen, partial, beyond = 128, 0, 0, 0
-    for code, seen, tilts, lean in random_cases(np.random.default_rng(5)):
-        scale, up = code.allowed_scale(tilts, *lean, WATCH, *seen), tuple(world_up(*lean))
+    dense, unseen, nearest, partial, beyond = 128, 0, 0, 0, 0
+    for number, (code, seen, tilts, lean) in enumerate(random_cases(np.random.default_rng(5))):
+        limits = WATCH._replace(min_margin=0.3 if number % 2 else 1.1)
+        scale, up = code.allowed_scale(tilts, *lean, limits, *seen), tuple(world_up(*lean))
         scales = np.arange(dense + 1) / dense
-        left = [code.clearance(tuple(k * np.array(tilts)), up, WATCH, *seen) for k in scales]
+        left = [code.clearance(tuple(k * np.array(tilts)), up, limits, *seen) for k in scales]
         allowed, sixteenths = np.array(left) >= 0.0, np.array(left)[:: dense // 16]
         if not (sixteenths >= 0.0).any():
             assert scale == 1.0 - np.argmax(sixteenths[::-1]) / 16  # the nearest
             unseen += bool(allowed.any())
+            nearest += scale > 0.0
             continue
         coarse, largest = np.flatnonzero(sixteenths >= 0.0).max() / 16, scales[allowed].max()
         assert coarse <= scale < coarse + 1 / 16
-        assert code.clearance(tuple(scale * np.array(tilts)), up, WATCH, *seen) >= 0.0
+        assert code.clearance(tuple(scale * np.array(tilts)), up, limits, *seen) >= 0.0
         unseen += largest >= scale + 1 / dense
         assert scale < largest + 1 / dense
         partial += 0.0 < scale < 1.0
         beyond += not allowed[scales < scale].all()
     assert unseen < 5
+    assert nearest > 10
     assert partial > 30
     assert beyond > 3  # smaller scales are not all allowed
 
