@@ -142,6 +142,84 @@ def test_an_interrupt_while_files_are_written_loses_none(tmp_path, monkeypatch, 
     assert "interrupted" in capsys.readouterr().err
 
 
+DURING_A_BATCH = """
+import signal
+import mujoco
+from mujoco.batch import Batch
+from tiltsim.system.hooks import mujoco_hooks
+
+FALLING = "<mujoco><worldbody><body><freejoint/><geom size='1'/></body></worldbody></mujoco>"
+batch = Batch(mujoco.MjModel.from_xml_string(FALLING), 2, 1)
+batch.bind("qvel")[1] = 1e30  # MuJoCo warns of this row, after the long flight of the first
+signal.signal(signal.SIGALRM, signal.default_int_handler)
+signal.setitimer(signal.ITIMER_REAL, 0.02)
+try:
+    with mujoco_hooks():
+        batch.rollout(500_000, record=())
+except KeyboardInterrupt:
+    print("interrupted", int(batch.warning[1].sum()))
+"""
+
+
+@pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="needs a timer of POSIX")
+def test_an_interrupt_while_mujoco_warns_in_a_batch_is_raised_after_it():
+    command = [sys.executable, "-c", DURING_A_BATCH]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "interrupted 1\n", "")
+
+
+@pytest.mark.parametrize("keyboard", [signal.default_int_handler, signal.SIG_IGN])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_swallowed_interrupt_of_a_command_is_sent_again(keyboard, number, capsys):
+    if (keyboard, number) == (signal.SIG_IGN, signal.SIGINT):
+        return
+    swallowed = []
+
+    def interrupted():
+        try:
+            os.kill(os.getpid(), number)
+            time.sleep(1.0)
+        except KeyboardInterrupt:
+            swallowed.append(True)
+            raise
+
+    def work():
+        call_from_c(interrupted)
+        if len(swallowed) == 1:
+            call_from_c(lambda: time.sleep(1.0))  # the second is swallowed, too
+        time.sleep(20.0)
+
+    before = signal.signal(signal.SIGINT, keyboard)
+    try:
+        with terminations_as_interrupts() as terminated, pytest.raises(KeyboardInterrupt):
+            work()
+        assert signal.getsignal(signal.SIGINT) is keyboard
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert terminated() is (number == signal.SIGTERM)
+    assert capsys.readouterr().err == ""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="other signals")
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_the_exit_code_is_the_same_if_text_is_executed(number, code):
+    script = f"""
+import signal, sys
+import tiltsim.commands.list
+from tiltsim.__main__ import main
+
+def run(_arguments):
+    exec("signal.raise_signal({int(number)})")
+
+tiltsim.commands.list.run = run
+sys.argv = ["tiltsim", "list"]
+sys.exit(main())
+"""
+    command = [sys.executable, "-c", script]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (code, "tiltsim: interrupted\n")
+
+
 def terminate():
     os.kill(os.getpid(), signal.SIGTERM)
 

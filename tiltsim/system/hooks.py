@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import sys
 from collections import deque
 from collections.abc import Iterator
@@ -74,6 +75,10 @@ _inside: Final[dict[int, _Block]] = {}
 _replaced: Final[list[tuple[Any, Any, Any]]] = []
 """Callback, clock and handler of warnings as they were before the first of those blocks."""
 
+_IGNORE: Final = ctypes.pythonapi.Py_IsInitialized
+"""A C function without effect, as handler of warnings: in one in Python a handler of signals would
+run and raise, and an exception that reaches MuJoCo's batch aborts the process."""
+
 
 def _leave_queue(block: _Block) -> None:
     if block in _waiting:
@@ -88,7 +93,7 @@ def _install(control: Any, clock: Any) -> None:
     if not _replaced:
         before = mujoco.get_mjcb_control(), mujoco.get_mjcb_time(), mujoco.get_mju_user_warning()
         _replaced.append(before)
-    mujoco.set_mju_user_warning(_ignore)
+    mujoco.set_mju_user_warning(_IGNORE)
     mujoco.set_mjcb_time(clock or _replaced[0][1])
     mujoco.set_mjcb_control(control)
 
@@ -101,7 +106,3 @@ def _restore() -> None:
     mujoco.set_mjcb_time(clock)
     mujoco.set_mju_user_warning(warning)
     _replaced.clear()
-
-
-def _ignore(_warning: str) -> None:
-    """Ignore a warning of MuJoCo's."""

@@ -5,14 +5,30 @@ from __future__ import annotations
 import signal
 import sys
 import threading
+from _thread import interrupt_main
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 if TYPE_CHECKING:
     from types import FrameType
 
     Handler = Callable[[int, FrameType | None], object] | int | None
+
+SOON: Final = 0.01
+"""Time (s) after which a swallowed interrupt is sent again."""
+
+
+class _Interrupt(KeyboardInterrupt):
+    """An interrupt of the command line.
+
+    Once a KeyboardInterrupt itself has passed through ``exec`` of a text, as dataclasses call it,
+    CPython ends by SIGINT, whatever the exit code.
+    """
+
+
+def _raise(_number: int, _frame: FrameType | None) -> None:
+    raise _Interrupt
 
 
 @contextmanager
@@ -86,7 +102,7 @@ _deferring: list[Callable[[int, FrameType | None], None]] = []
 def _interrupt(handler: Handler, frame: FrameType | None) -> None:
     """Call a handler of SIGINT, or raise KeyboardInterrupt if SIGINT is ignored or the default."""
     if not callable(handler):
-        raise KeyboardInterrupt
+        raise _Interrupt
     handler(signal.SIGINT, frame)
 
 
@@ -94,8 +110,10 @@ def _interrupt(handler: Handler, frame: FrameType | None) -> None:
 def terminations_as_interrupts() -> Iterator[Callable[[], bool]]:
     """Treat SIGTERM, as sent by schedulers and ``kill``, as an interrupt within the block.
 
-    A second SIGTERM ends the process immediately. Yields a function that returns whether there was
-    one. In threads other than the main one this has no effect.
+    A second SIGTERM ends the process immediately. Interrupts that Python reports as unraisable, as
+    in a destructor or while an extension module is imported, are sent again until one passes.
+    Yields a function that returns whether there was a SIGTERM. In threads other than the main one
+    this has no effect.
     """
     terminated = False
     if threading.current_thread() is not threading.main_thread():
@@ -108,8 +126,26 @@ def terminations_as_interrupts() -> Iterator[Callable[[], bool]]:
         signal.signal(signal.SIGTERM, signal.SIG_DFL)
         _interrupt(_deferring[-1] if _deferring else signal.getsignal(signal.SIGINT), frame)
 
+    def send_again(unraisable: sys.UnraisableHookArgs) -> None:
+        if not issubclass(unraisable.exc_type, KeyboardInterrupt):
+            report(unraisable)
+            return
+        if not callable(signal.getsignal(signal.SIGINT)):  # ignored; it was a SIGTERM
+            signal.signal(signal.SIGINT, _raise)
+        timers.append(threading.Timer(SOON, interrupt_main))
+        timers[-1].start()
+
+    timers: list[threading.Timer] = []
+    report, sys.unraisablehook = sys.unraisablehook, send_again
+    keyboard = signal.getsignal(signal.SIGINT)
+    if keyboard is signal.default_int_handler:
+        signal.signal(signal.SIGINT, _raise)
     before = signal.signal(signal.SIGTERM, interrupt)
     try:
         yield lambda: terminated
     finally:
+        for timer in timers:
+            timer.cancel()
+        sys.unraisablehook = report
         signal.signal(signal.SIGTERM, before)
+        signal.signal(signal.SIGINT, keyboard)

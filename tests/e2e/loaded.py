@@ -1,0 +1,7 @@
+"""Loads what sweeps load, for processes forked from the one that has imported this."""
+
+import tiltsim.cli
+import tiltsim.commands.sweep
+import tiltsim.plants.engine_choice
+import tiltsim.simulation.native_batch
+import tiltsim.sweeps.running  # noqa: F401
