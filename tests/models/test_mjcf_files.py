@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 
 import pytest
@@ -12,7 +13,7 @@ from tiltsim.models.mjcf_files import check_mjcf
 from tiltsim.resources import shipped_folder
 
 SHIPPED = sorted(shipped_folder("mjcf").glob("*.xml"))
-MANY = "<geom size='1'/>" * 6_000
+MANY = "<geom size='1'/>" * 2_001
 
 
 @pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.stem)
@@ -23,9 +24,10 @@ def test_shipped_vehicles_are_within_the_limits(path):
 @pytest.mark.parametrize(
     ("inside", "words"),
     [
-        (MANY, "more than 5000 elements"),
-        ("<replicate count='99'><replicate count='99'><a/></replicate></replicate>", "more than 5"),
-        ("<composite count='20 20 20'/>", "more than 5000 elements"),
+        (MANY, "more than 2000 elements"),
+        ("<replicate count='99'><replicate count='99'><a/></replicate></replicate>", "more than 2"),
+        ("<composite count='20 20 20'/>", "more than 2000 elements"),
+        ("<sensor><user dim='100000000'/></sensor>", "user dim = 100000000: at most 1000"),
         ("<include file='own.xml'/>", "more than"),
         ("<hfield nrow='60000' ncol='60000'/>", "hfield nrow x ncol: more than"),
         ("<texture width='60000' height='60000'/>", "texture width x height: more than"),
@@ -61,5 +63,17 @@ def test_what_an_included_file_includes_counts(tmp_path):
     (tmp_path / "parts" / "many.xml").write_text(f"<mujoco>{MANY}</mujoco>")
     (tmp_path / "parts" / "one.xml").write_text("<mujoco><include file='many.xml'/></mujoco>")
     (tmp_path / "own.xml").write_text("<mujoco><include file='parts/one.xml'/></mujoco>")
-    with pytest.raises(ValueError, match="more than 5000 elements"):
+    with pytest.raises(ValueError, match="more than 2000 elements"):
         check_mjcf(tmp_path / "own.xml")
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="pipes are files on POSIX only")
+@pytest.mark.parametrize(
+    "inside", ["<include file='a.xml'/>", "<asset><mesh name='m' file='a.xml'/></asset>"]
+)
+def test_a_pipe_is_refused_before_anything_waits_for_it(tmp_path, inside):
+    os.mkfifo(tmp_path / "a.xml")
+    file = tmp_path / "own.xml"
+    file.write_text(f"<mujoco>{inside}</mujoco>")
+    with pytest.raises(ValueError, match=r"a.xml: no file to read, but a pipe"):
+        check_mjcf(file)

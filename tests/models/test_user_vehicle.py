@@ -383,6 +383,15 @@ def rename(name):
         ),
         (lambda: changed('dyntype="integrator"', 'dyntype="none"'), ["dyntype integrator"]),
         (lambda: changed('gravity="0 0 -9.81"', 'gravity="1 0 -9.81"'), ["must point down z"]),
+        (
+            lambda: edited(("8e-6 0 0", "1e308 0 0")),
+            ["gear of an actuator: 1e+308: must be at most 1e+09, at least 1e-12"],
+        ),
+        (lambda: edited(("8e-6 0 0", "1e-320 0 0")), ["gear of an actuator", "at least 1e-12"]),
+        (
+            lambda: changed('gravity="0 0 -9.81"', 'gravity="0 0 -1e300"'),
+            ["option gravity: 1e+300"],
+        ),
         (lambda: "<mujoco", ["not XML"]),
         (lambda: "<mujoco><worldbody/></mujoco>", ["no body 'vehicle'"]),
         (lambda: changed('pos="0 0.2 0"', 'pos="0 0.25 0"'), ["'rotor_2' lies at (0, 0.25, 0)"]),

@@ -27,6 +27,10 @@ from tiltsim_controllers.vehicle.states import ROTORS
 if TYPE_CHECKING:
     import mujoco
 
+SMALLEST: Final = 1e-12
+LARGEST: Final = 1e9
+"""Magnitudes (SI units) of a vehicle's numbers that are not zero, as in a scenario."""
+
 ALIGNMENT_TOLERANCE: Final = 1e-4
 """Largest misalignment, as a fraction of the arm or of a unit vector."""
 
@@ -168,6 +172,7 @@ def _read(path: str, model: str, _version: object) -> UserVehicle:
             compiled = mujoco.MjModel.from_xml_path(path)
     except (ValueError, RuntimeError) as error:  # the latter where it lacks memory
         raise ValueError(f"MuJoCo says: {' '.join(str(error).split())}") from None
+    _check_magnitudes(compiled)
     parts = check_parts(compiled, model)
     gravity = float(-compiled.opt.gravity[2])
     if gravity <= 0.0 or np.any(compiled.opt.gravity[:2]):
@@ -204,6 +209,22 @@ def _read(path: str, model: str, _version: object) -> UserVehicle:
         products=(float(inertia[0, 1]), float(inertia[0, 2]), float(inertia[1, 2])),
         has_contact_geoms=_has_contact_geoms(compiled),
     )
+
+
+def _check_magnitudes(compiled: mujoco.MjModel) -> None:
+    """Raise ValueError for numbers with which sums of squares would overflow or vanish."""
+    of_bodies = compiled.body_mass, compiled.body_inertia, compiled.body_pos, compiled.body_ipos
+    for name, values, least in (
+        ("mass, inertia or position of a body", np.hstack([*map(np.ravel, of_bodies)]), 0.0),
+        ("position of a site", compiled.site_pos, 0.0),
+        ("actrange of an actuator", compiled.actuator_actrange, 0.0),
+        ("gear of an actuator", compiled.actuator_gear, SMALLEST),
+        ("option gravity", compiled.opt.gravity, SMALLEST),
+    ):
+        sizes = np.abs(values[values != 0.0])
+        if wrong := [*sizes[(sizes < least) | (sizes > LARGEST)]]:
+            allowed = f"at most {LARGEST:g}" + (f", at least {least:g}" if least else "")
+            raise ValueError(f"{name}: {wrong[0]:g}: must be {allowed}")
 
 
 def _pods_are_balanced(pose: VehiclePose, tilts: int, bodies: list[int], untilted: Moments) -> bool:
