@@ -111,3 +111,11 @@ def test_the_next_process_loads_what_the_last_one_compiled(tmp_path):
         )
         assert done.stdout.strip() == expected, done.stderr
     assert Path(tmp_path / "tiltsim" / "machine_code").is_dir()
+
+
+def test_a_relative_folder_of_caches_is_ignored(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    assert code_folder.code_folder().parent == tmp_path / "tiltsim"
+    for relative in ("rel", "./rel", ""):
+        monkeypatch.setenv("XDG_CACHE_HOME", relative)
+        assert code_folder.code_folder().parent == Path.home() / ".cache" / "tiltsim"

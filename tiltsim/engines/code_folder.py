@@ -9,8 +9,10 @@ from pathlib import Path
 
 def code_folder() -> Path:
     """Where compiled code is kept: in the user's folder for caches."""
-    base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    return Path(base) / "tiltsim" / "machine_code"
+    base = Path(os.environ.get("XDG_CACHE_HOME", ""))
+    if not base.is_absolute():  # to be ignored, as the specification of XDG_CACHE_HOME says
+        base = Path.home() / ".cache"
+    return base / "tiltsim" / "machine_code"
 
 
 def is_usable(folder: Path) -> bool:
