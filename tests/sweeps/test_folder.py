@@ -272,3 +272,16 @@ def test_a_sweep_whose_file_name_is_not_utf_8_is_flown_and_read(tmp_path):
     results = load_results(folder / "out")
     assert len(results) == 2
     assert results.points.definition.address == rf"{tmp_path}/\udcff/sweep.toml"
+
+
+@pytest.mark.parametrize(
+    "name", ["parts/5 copy.parquet", "parts/000099.parquet", "flights/a.parquet"]
+)
+def test_other_tables_among_those_of_a_sweep_are_refused(copy, name):
+    definition, folder = copy
+    foreign = folder / name
+    foreign.parent.mkdir(exist_ok=True)
+    shutil.copy(folder / "parts" / "000000.parquet", foreign)
+    before = contents(folder)
+    assert refused(definition, folder).startswith(f"{foreign}: not written by this sweep")
+    assert contents(folder) == before

@@ -56,6 +56,13 @@ class SweepFolder:
 
         A damaged dataset is no mistake: it follows from the parts.
         """
+        tables = {part_file(self.path, number) for number in range(self._points.chunks)}
+        tables |= {self._flight_file(index) for index in range(len(self._points))}
+        for foreign in sorted(
+            {*self.path.glob(f"{PARTS}/*.parquet"), *self.path.glob(f"{FLIGHTS}/*.parquet")}
+            - tables
+        ):
+            raise InputError(f"{foreign}: not written by this sweep; delete it or move it away")
         expected = schema(self._points)
         for number, file in finished_parts(self.path, self._points).items():
             found = read_rows(file, self._points, self._points.chunk(number)).schema
@@ -66,6 +73,9 @@ class SweepFolder:
                     f"differs in column {min(differing)}; choose another folder, or delete this one"
                 )
         self.is_joined = self._has_dataset()
+
+    def _flight_file(self, index: int) -> Path:
+        return self.path / FLIGHTS / f"{index:07d}.parquet"
 
     def _has_dataset(self) -> bool:
         if self.dataset.exists():
@@ -81,7 +91,7 @@ class SweepFolder:
     def save(self, part: FinishedChunk) -> None:
         """Save a finished chunk durably: after this returns, no crash can lose it."""
         for index, flight in part.flights.items():
-            _write(self.path / FLIGHTS / f"{index:07d}.parquet", flight)
+            _write(self._flight_file(index), flight)
         # Last, because the part marks the chunk as finished.
         _write(part_file(self.path, part.number), part.table)
 
