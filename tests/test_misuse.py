@@ -26,6 +26,16 @@ class Aimed:
         return hover(observation)
 
 
+class Speechless:
+    def __repr__(self):
+        raise RuntimeError("no repr")
+
+
+class Unreadable:
+    def __array__(self, *_args, **_options):
+        raise ValueError("two\nlines")
+
+
 def scenario():
     return tiltsim.load_scenario(ADDRESS)
 
@@ -177,11 +187,44 @@ MISUSES = {
     ),
     "a number as folder": (lambda: tiltsim.sweep(SWEEP, out=3), "out = 3: must be"),
     "no steps": (lambda: simulation().step(0), "steps = 0: must be a whole number from 1"),
+    "a class of steps": (lambda: simulation().step(int), "steps = <class 'int'>: must be"),
+    "an array of steps": (
+        lambda: simulation().step(np.ones(2, int)),
+        "steps = array([1, 1]): must",
+    ),
+    "more steps than MuJoCo counts": (
+        lambda: simulation().step(10**400),
+        "000...: must be a whole",
+    ),
     "half a step": (lambda: simulation().step(0.5), "steps = 0.5: must be"),
     "steps on the thesis plant": (
         lambda: tiltsim.Simulation({"simulation": {"plant": "thesis"}}),
         'stepwise simulation needs "mujoco"',
     ),
+    "a number beyond floats as reference": (
+        lambda: tiltsim.simulate(SHORT, reference=lambda time: (10**400, 0, 0)),
+        "must be 3 finite numbers",
+    ),
+    "a number beyond floats in a column": (
+        lambda: tiltsim.simulate(
+            SHORT, reference={"time": [0, 1], **{key: [0, 10**400] for key in "xyz"}}
+        ),
+        "reference: column x must be numbers: a number is too large",
+    ),
+    "a column whose error has two lines": (
+        lambda: tiltsim.simulate(SHORT, reference=dict.fromkeys(("time", *"xyz"), Unreadable())),
+        "reference: column time must be numbers: two lines",
+    ),
+    "a value without a repr": (
+        lambda: scenario().replace({"vehicle.mass": Speechless()}),
+        "vehicle.mass = a Speechless: must be a number",
+    ),
+    "an array of samples to keep": (
+        lambda: list(tiltsim.fly([SHORT], keep_samples=np.ones(2))),
+        "keep_samples = array([1., 1.]): must be True or False",
+    ),
+    "a word as trust": (lambda: tiltsim.sweep(SWEEP, trusted="no"), "trusted = 'no': must be True"),
+    "an array of jobs": (lambda: tiltsim.sweep(SWEEP, jobs=np.ones(2, int)), "jobs = array"),
     "an unknown column": (lambda: flight("fixed")["height"], "'height': no column"),
     "a vector that a tilt-car has not": (
         lambda: flight("tilt_car")["tilt_angles"],

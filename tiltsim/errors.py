@@ -6,7 +6,11 @@ from collections.abc import Iterable
 
 
 class TiltsimError(Exception):
-    """Base of all errors that tiltsim raises deliberately."""
+    """Base of all errors that tiltsim raises deliberately; the message is one line."""
+
+    def __init__(self, message: object = "") -> None:
+        """Join the lines of a message, which may quote an error of another library."""
+        super().__init__(" ".join(map(str.strip, str(message).splitlines())))
 
 
 class InputError(TiltsimError):

@@ -245,6 +245,7 @@ def test_actions_have_the_vehicles_bounds_and_are_clipped_there(vehicle, low, hi
     [
         (np.zeros(7), r"action of shape \(7,\); expected \(8,\) \(thrusts, tilt_angles\)"),
         (np.array([0.0] * 7 + [np.nan]), r"action\[7\] = nan: must be finite"),
+        (np.full(8, 1.0 + 2.0j), r"action of type complex128: must be real numbers"),
     ],
 )
 def test_invalid_actions_are_refused(action, words):

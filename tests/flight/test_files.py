@@ -230,6 +230,8 @@ def test_a_foreign_parquet_file_is_an_input_error(tmp_path):
         ("engine", "steam", "engine 'steam' is unknown"),
         ("end", "bored", "end 'bored' is unknown"),
         ("end_time", "late", "not a flight"),
+        ("end_time", "nan", "end_time = nan: must be from 0 to 1e+09"),
+        ("end_time", "1e300", r"end_time = 1e+300: must be from 0 to 1e+09"),
         ("wall_time", None, "no 'wall_time' in its metadata"),
     ],
 )

@@ -121,6 +121,23 @@ def test_numbers_of_a_rigid_body_are_parameters():
     assert needed < set(flown.parameters["vehicle"])
 
 
+@pytest.mark.parametrize(
+    ("tree", "words"),
+    [
+        (5, "parameters = 5: must be a dict"),
+        (None, "parameters = None: must be a dict"),
+        ({"gait": 5}, "parameters.gait = 5: must be a dict"),
+        ({"gait": {"period": 0.0}}, "parameters: period = 0.0: must be positive and finite"),
+        ({"gait": {"period": float("nan")}}, "parameters: period = nan: must be positive"),
+    ],
+)
+def test_what_is_no_tree_of_numbers_is_refused(tree, words):
+    with double_precision():
+        flown = tiltsim.vectorized(tiltsim.parse_scenario({**LAWS["attitude_altitude"], **THESIS}))
+        with pytest.raises(InputError, match=words):
+            flown.fly(tree)
+
+
 def test_it_needs_equations():
     with pytest.raises(InputError, match=r'plant = "mujoco".*vectorized supports "thesis" and'):
         tiltsim.vectorized({})

@@ -15,7 +15,7 @@ from tiltsim.models.rotor_table import Multirotor
 from tiltsim.plants.command import Observation
 from tiltsim.scenario.messages import choose
 from tiltsim.scenario.scenario import Scenario
-from tiltsim.system.numbers import is_finite
+from tiltsim.system.numbers import is_finite, real_array
 from tiltsim.system.text import short_repr
 from tiltsim_controllers.mathematics.scalar import Floats
 
@@ -103,8 +103,14 @@ def action_spec(scenario: Scenario, max_tilt_angle: float | None = None) -> spec
 
 
 def clip_action(action: npt.ArrayLike, spec: specs.BoundedArray) -> Floats:
-    """An action within its bounds. Raises ValueError for a wrong shape or a non-finite entry."""
-    array = np.asarray(action, dtype=np.float64)
+    """An action within its bounds.
+
+    Raises ValueError for a wrong shape, a non-finite entry, or other entries than real numbers.
+    """
+    try:
+        array = real_array(action)
+    except TypeError as error:
+        raise ValueError(f"action {error}: must be real numbers") from None
     if array.shape != spec.shape:
         raise ValueError(f"action of shape {array.shape}; expected {spec.shape} ({spec.name})")
     if not np.isfinite(array).all():

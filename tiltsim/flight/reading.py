@@ -6,7 +6,7 @@ import json
 from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, get_args
+from typing import TYPE_CHECKING, Any, Final, get_args
 
 import numpy as np
 
@@ -24,6 +24,9 @@ from tiltsim_controllers.mathematics.scalar import Floats
 
 if TYPE_CHECKING:
     import pyarrow
+
+LATEST: Final = 1e9
+"""Latest time (s) of a flight, as of a scenario."""
 
 
 def load_flight(path: str | PathLike[str]) -> Flight:
@@ -70,6 +73,8 @@ def _samples(file: Path, table: pyarrow.Table, fields: Sequence[str]) -> Floats:
     for name, values in zip(fields, columns, strict=True):
         if not np.isfinite(values).all():
             raise InputError(f"{file}: damaged: {name} contains non-finite values")
+    if np.abs(columns[0]).max() > LATEST:
+        raise InputError(f"{file}: damaged: timestamps exceed {LATEST:g} s")
     if (np.diff(columns[0]) <= 0.0).any():
         raise InputError(f"{file}: damaged: timestamps are not strictly increasing")
     return np.column_stack(columns)
@@ -104,7 +109,10 @@ def _engine_and_end(origin: dict[str, str]) -> tuple[Any, End]:
     kind: Any = origin["end"]
     if kind not in get_args(EndKind):
         raise ValueError(f"end {kind!r} is unknown")
-    return origin["engine"], End(kind, float(origin["end_time"]), origin["cause"])
+    end_time = float(origin["end_time"])
+    if not 0.0 <= end_time <= LATEST:
+        raise ValueError(f"end_time = {end_time:g}: must be from 0 to {LATEST:g}")
+    return origin["engine"], End(kind, end_time, origin["cause"])
 
 
 def _first_line(error: Exception) -> str:

@@ -10,7 +10,7 @@ from math import pi
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, get_args, get_origin
 
-from tiltsim.system.text import LONGEST_WORD, shortened
+from tiltsim.system.text import LONGEST_WORD, short_repr, shortened
 
 if TYPE_CHECKING:
     from pydantic import BaseModel, ValidationError
@@ -53,7 +53,10 @@ def show(value: object) -> str:
     """A value as the user wrote it, shortened to 80 characters unless it is a path."""
     is_path = isinstance(value, str) and Path(value).name != value
     length = LONGEST_WORD if is_path else 80
-    return shortened(json.dumps(value, default=str), length)
+    try:
+        return shortened(json.dumps(value, default=str), length)
+    except Exception:  # of an object that has no text
+        return short_repr(value)
 
 
 def did_you_mean(name: object, names: Iterable[str]) -> str:
@@ -207,7 +210,7 @@ def _describe(
     if kind == "string_pattern_mismatch" and detail["loc"][-1] == "[key]":
         return f"{key}: the name must match {context['pattern']}"
     unit = _unit(schema, detail["loc"])
-    if kind == "float_type" and unit and re.match(r"[-+.]*\d", str(value)):
+    if kind == "float_type" and unit and isinstance(value, str) and re.match(r"[-+.]*\d", value):
         return f"{key} = {show(value)}: must be a number in {unit}, without the unit"
     if kind in _PLAIN_TYPES:
         return f"{key} = {show(value)}: {_PLAIN_TYPES[kind]}"

@@ -27,7 +27,7 @@ from tiltsim.scenario.trust import require_trust
 from tiltsim.scenario.vehicle import VehicleTable
 from tiltsim.simulation.native_batch import NativeBatch
 from tiltsim.simulation.simulate import simulate_assembly
-from tiltsim.system.numbers import whole_number
+from tiltsim.system.numbers import true_or_false, whole_number
 from tiltsim.system.processes import in_order
 from tiltsim.system.progress import Report, check_progress, reported
 from tiltsim.system.text import short_repr
@@ -97,6 +97,7 @@ def fly(
     if isinstance(scenarios, str | Mapping | Scenario) or not isinstance(scenarios, Iterable):
         raise InputError(f"scenarios = {short_repr(scenarios)}: must be a list of scenarios")
     threads = (os.cpu_count() or 1) if threads is None else whole_number("threads", threads)
+    true_or_false("keep_samples", keep_samples)
     check_progress(progress)
     chosen = [as_scenario(scenario) for scenario in scenarios]
     for scenario in chosen:

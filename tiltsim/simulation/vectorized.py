@@ -14,16 +14,19 @@ from tiltsim.laws.assembling import assemble
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.simulation.array_plan import ArrayPlan, Tree, in_full
+from tiltsim.system.text import short_repr
 
 
-def _check_keys(tree: Mapping[str, Any], known: Tree, path: str = "parameters") -> None:
-    """Refuse keys that are no parameters of a scenario."""
+def _check_keys(tree: Any, known: Tree, path: str = "parameters") -> None:
+    """Refuse what is no tree of parameters of a scenario."""
+    if not isinstance(tree, Mapping):
+        raise InputError(f"{path} = {short_repr(tree)}: must be a dict")
     for key, value in tree.items():
         if key not in known:
             raise InputError(
                 f"{path}.{key}: no parameter of this scenario; choose {', '.join(known)}"
             )
-        if isinstance(value, Mapping):
+        if isinstance(known[key], dict):
             _check_keys(value, known[key], f"{path}.{key}")
 
 
@@ -52,12 +55,15 @@ class Vectorized:
         self.parameters = self._planned.parameters
 
     def _kernel(self, tree: Mapping[str, Any]) -> tuple[Kernel, Any]:
+        _check_keys(tree, self.parameters)
         if self._jax.numpy.result_type(float) != "float64" and self._course.dtype == "float64":
             raise InputError(
                 'simulation.precision = "float64": needs jax.config.update("jax_enable_x64", True)'
             )
-        _check_keys(tree, self.parameters)
-        _, parameters, knots, disturbance, state = self._planned(tree)
+        try:
+            _, parameters, knots, disturbance, state = self._planned(tree)
+        except ValueError as error:  # of numbers that make no flight, such as a period of 0
+            raise InputError(f"parameters: {error}") from error
         setup = ControlSetup(parameters, knots)
         return Kernel(self._course, setup, disturbance, guarded=True), state
 

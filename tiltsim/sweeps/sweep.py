@@ -13,7 +13,7 @@ from tiltsim.sweeps.dataset import SweepResults, load_results
 from tiltsim.sweeps.loading import load_sweep
 from tiltsim.sweeps.points import SweepPoints
 from tiltsim.sweeps.running import run_sweep
-from tiltsim.system.numbers import whole_number
+from tiltsim.system.numbers import true_or_false, whole_number
 from tiltsim.system.progress import Report, reported
 from tiltsim.system.text import short_repr
 
@@ -46,7 +46,7 @@ def sweep(
     Raises:
         InputError: In one line: the sweep, the key, the value and what is allowed.
     """
-    jobs = whole_number("jobs", jobs)
+    jobs, trusted = whole_number("jobs", jobs), true_or_false("trusted", trusted)
     if out is not None and not isinstance(out, str | PathLike):
         raise InputError(f"out = {short_repr(out)}: must be the name of a folder")
     definition = load_sweep(source, overrides)

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from math import isfinite
+import sys
 from numbers import Real
 from operator import index
-from typing import Any, TypeGuard
+from typing import Any, Final, TypeGuard
 
 import numpy as np
 
 from tiltsim.errors import InputError
 from tiltsim.system.text import short_repr
 from tiltsim_controllers.mathematics.scalar import Floats
+
+MOST: Final = 2**31 - 1
+"""Largest whole number that compiled code takes, as a number of steps for example."""
 
 
 def is_number(value: object) -> TypeGuard[int | float]:
@@ -20,8 +23,8 @@ def is_number(value: object) -> TypeGuard[int | float]:
 
 
 def is_finite(value: object) -> TypeGuard[int | float]:
-    """Whether a value is a number other than NaN and infinity."""
-    return is_number(value) and isfinite(value)
+    """Whether a value is a number other than NaN and infinity, and no integer beyond floats."""
+    return is_number(value) and abs(value) <= sys.float_info.max
 
 
 def real_array(values: Any) -> Floats:
@@ -32,7 +35,10 @@ def real_array(values: Any) -> Floats:
     """
     array = np.asarray(values)
     if array.dtype == object and all(_is_real(value) for value in array.flat):
-        array = array.astype(float)
+        try:
+            array = array.astype(float)
+        except OverflowError:
+            raise ValueError("a number is too large") from None
     if array.dtype.kind not in "iuf":
         raise TypeError(f"of type {array.dtype}")
     return array.astype(float, copy=False)
@@ -45,6 +51,17 @@ def _is_real(value: object) -> bool:
 
 def whole_number(name: str, value: Any) -> int:
     """An argument that is a whole number from 1, of numpy too. Raises `InputError` otherwise."""
-    if isinstance(value, bool) or not hasattr(value, "__index__") or index(value) < 1:
-        raise InputError(f"{name} = {short_repr(value)}: must be a whole number from 1")
-    return index(value)
+    try:
+        number = 0 if isinstance(value, bool) else index(value)
+    except TypeError:
+        number = 0
+    if not 1 <= number <= MOST:
+        raise InputError(f"{name} = {short_repr(value)}: must be a whole number from 1 to {MOST}")
+    return number
+
+
+def true_or_false(name: str, value: object) -> bool:
+    """An argument that is true or false, of numpy too. Raises `InputError` otherwise."""
+    if not isinstance(value, bool | np.bool_):
+        raise InputError(f"{name} = {short_repr(value)}: must be True or False")
+    return bool(value)
