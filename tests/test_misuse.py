@@ -82,6 +82,21 @@ MISUSES = {
         lambda: tiltsim.attraction(ADDRESS, ("roll", "roll")),
         "axes = roll,roll: choose two of",
     ),
+    "attraction over a number": (lambda: tiltsim.attraction(ADDRESS, 0.5), "axes = 0.5: choose"),
+    "attraction over a range of words": (
+        lambda: tiltsim.attraction(ADDRESS, ranges=("ab", None)),
+        "range of roll = 'ab': must be two numbers",
+    ),
+    "attraction over one range": (
+        lambda: tiltsim.attraction(ADDRESS, ranges=3),
+        "ranges = 3: must be a range or None for each axis",
+    ),
+    "a loop without a repr": (lambda: tiltsim.linearize({}, loop=Speechless()), "a Speechless: ch"),
+    "a number as address": (lambda: tiltsim.parse_scenario({}, 3), "address = 3: must be text"),
+    "stability near a number": (
+        lambda: tiltsim.stability({}, near=3),
+        "near = 3: must be a result",
+    ),
     "stability of nothing": (lambda: tiltsim.stability(None), "scenario = None: must be"),
     "symbolic in MuJoCo": (lambda: tiltsim.symbolic({}), 'symbolic supports "thesis" and'),
     "a family without a member": (lambda: tiltsim.simulate("ch04_tracking/setpoint"), "choose a"),

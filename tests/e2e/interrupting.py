@@ -20,8 +20,8 @@ from time import monotonic
 
 MEANT = {signal.SIGINT: 130, signal.SIGTERM: 143}
 
-PATIENCE = 10.0
-"""Time (s) within which an interrupted sweep ends: that of a batch or of XLA's compiler."""
+PATIENCE = 60.0
+"""Time (s) within which an interrupted sweep ends: beyond that of XLA's compiler."""
 
 SWEEPS = {"native": ("mujoco", 20.0, 40, 8), "jax": ("thesis", 0.1, 6, 3)}
 """Of an engine: plant, duration (s) of a flight, flights and those of a chunk."""
@@ -173,7 +173,7 @@ class Interrupting:
         return "" if code == -number and outside else shown  # while Python itself begins or ends
 
 
-def interrupt_sweeps(engine, count, seed, report=lambda mistake: None):
+def interrupt_sweeps(engine, count, seed, report=lambda mistake, sweeps: None):
     """Send ``count`` signals; return the mistakes and what happened how often."""
     folder = Path(mkdtemp(prefix="interrupting"))
     mistakes = []
@@ -183,7 +183,7 @@ def interrupt_sweeps(engine, count, seed, report=lambda mistake: None):
             mistake = sweeps.interrupt()
             if mistake:
                 mistakes.append(mistake)
-                report(mistake)
+            report(mistake, sweeps)
     finally:
         shutil.rmtree(folder)
     return mistakes, sweeps
@@ -195,9 +195,12 @@ if __name__ == "__main__":
     parser.add_argument("--count", type=int, default=500)
     parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_args()
-    found, done = interrupt_sweeps(
-        options.engine, options.count, options.seed, lambda text: sys.stdout.write(f"{text}\n")
-    )
-    counted = f"{len(found)} mistakes; {dict(done.counts)}; slowest end {done.slowest:.1f} s"
-    sys.stdout.write(f"{counted}\n")
-    sys.exit(bool(found))
+
+    def show(mistake, sweeps):
+        """Print a mistake, and what has happened so far."""
+        counted = f"{dict(sweeps.counts)}; slowest end {sweeps.slowest:.1f} s"
+        sys.stdout.write(f"{mistake}\n{counted}\n" if mistake else f"{counted}\n")
+        sys.stdout.flush()
+
+    found, _ = interrupt_sweeps(options.engine, options.count, options.seed, show)
+    sys.exit(f"{len(found)} mistakes" if found else 0)

@@ -574,3 +574,9 @@ def test_a_multirotor_has_a_thrust_for_each_rotor_and_an_angle_for_each_servo(na
         step = env.step(np.array([*(signs * thrusts), *[0.0] * tilts]))
     assert step.reward == pytest.approx(1.0, abs=1e-9)
     np.testing.assert_allclose(step.observation["position"], 0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("seed", [-1, 0.5, "a"])
+def test_a_seed_that_is_no_whole_number_is_refused(seed):
+    with pytest.raises(InputError, match=f"environment: seed = {seed!r}: must be a whole number"):
+        TiltrotorEnv(seed=seed)

@@ -290,6 +290,7 @@ def test_without_opengl_one_line_says_what_to_install(monkeypatch):
         ({"max_tilt_angle": "0.5"}, "max_tilt_angle = '0.5': must be a number"),
         ({"reward": 1.0}, "reward = 1.0: must be a function"),
         ({"domain": "initial.position"}, "domain = .*: must be a list of axes"),
+        ({"domain": 3}, "domain = 3: must be a list of axes"),
         ({"render_mode": "human"}, "render_mode = 'human': must be 'rgb_array' or None"),
     ],
 )

@@ -7,6 +7,7 @@ import shutil
 from functools import cache
 from random import Random
 
+from tests.fuzz.calls import python_call
 from tests.fuzz.documents import STRANGE, Documents, damaged, dotted, toml_document, toml_text
 from tiltsim.cli import build_parser, main
 from tiltsim.commands.schema import scenario_schema, sweep_schema
@@ -45,16 +46,26 @@ def known_values():
     return sorted(found.items())
 
 
+REACHES_OUT = {"--help", "--live", "--cluster", "--connect"}
+"""Options that are not drawn: of other programs, which may answer late."""
+
+
 @cache
-def options_of(command):
-    """A command's own options, but those that name files to write."""
+def parsers():
+    """The parser of each command of the command line."""
     (subparsers,) = (
         action
         for action in build_parser()._actions
         if isinstance(action, argparse._SubParsersAction)
     )
-    actions = subparsers.choices[command]._actions
-    return [a for a in actions if a.metavar != "FILE" and "--help" not in a.option_strings]
+    return subparsers.choices
+
+
+@cache
+def options_of(command):
+    """A command's own options, but those that name files to write."""
+    actions = parsers()[command]._actions
+    return [a for a in actions if a.metavar != "FILE" and not REACHES_OUT & {*a.option_strings}]
 
 
 def scenario_file(random, folder):
@@ -130,6 +141,53 @@ def arguments(random, folder):
             count = {None: 1, "+": 2, "?": 1}.get(action.nargs, action.nargs)
             given += [action.option_strings[0], *(_word(random, action) for _ in range(count))]
     return lambda: main([command, *given])
+
+
+def any_command(random, folder):
+    """A command with words for what it takes, and any of its options; long ones are interrupted."""
+    command, parser = random.choice(sorted(parsers().items()))
+    given = []
+    for action in parser._actions:
+        if REACHES_OUT & {*action.option_strings}:
+            continue
+        if not action.option_strings:
+            given += [_given(random, folder, action) for _ in range(random.choice((1, 1, 2)))]
+        elif random.random() < 2.0 / len(parser._actions):
+            count = {None: 1, "+": 2, "?": 1, "*": 1}.get(action.nargs, action.nargs)
+            values = [_given(random, folder, action) for _ in range(count)]
+            given += [action.option_strings[0], *values]
+    if "--quiet" in parser._option_string_actions:
+        given.append("--quiet")
+    if "--jobs" in parser._option_string_actions:  # the last one counts
+        given += ["--jobs", "1"]
+    if command == "view":  # else a window opens
+        given += ["--rerun", str(folder / "a.rrd")]
+    if "--out" in parser._option_string_actions and command != "check":
+        given += ["--out", str(folder / random.choice(("out", "out.png", "a/b")))]
+    return lambda: main([command, *given])
+
+
+def _given(random, folder, action):
+    """A value of an option or argument, by the name of what it takes."""
+    names = action.metavar if isinstance(action.metavar, str) else ""
+    likely = {
+        "SCENARIO": (SETPOINT, "beyond/baselines#pid_quadrotor", "ch04_tracking/setpoint", "a"),
+        "SWEEP": ("beyond/sweeps/monte_carlo", SETPOINT, "a.toml"),
+        "PATH": (SETPOINT, "ch02", str(folder)),
+        "FLIGHT": (str(folder), "flight.parquet"),
+        "FILE": (str(folder / "a.json"), str(folder / "a.png"), str(folder / "none" / "a")),
+        "DIR": (str(folder / "new"), "/dev/null"),
+        "FILE.rrd": (str(folder / "a.rrd"), str(folder)),
+        "TABLE": ("gait", "controller", "vehicle.mass"),
+        "KEY=VALUE": ("vehicle.mass=1", "gait.period=nan", "expect=[]", "=", "a=["),
+        "KEY[=FROM:TO[:POINTS]]": ("vehicle.mass", "vehicle.mass=0.4:0.5:2", "gait=1:2", "x=::"),
+        "NAME=TABLE": ("a={law='pid'}", "a={}", "a=[", "=", "a={law='python'}"),
+        "A,B,...": ("pid,lqr", "tiltrotor", "margin,position", ",", "x"),
+        "N": ("1", "0", "-1", "1.5", "9" * 30),
+    }.get(names)
+    if likely and random.random() < 0.7:
+        return random.choice(likely)
+    return _word(random, action)
 
 
 def _word(random, action):
@@ -226,5 +284,6 @@ def _results(folder):
 KINDS = (
     *(scenario_file, scenario_file, scenario_file, sweep_file, sweep_file, override, override),
     *(arguments, mjcf_file, damaged_flight, damaged_sweep, damaged_cache),
+    *(any_command, any_command, python_call, python_call, python_call),
 )
 """Kinds of inputs, by turns; those that matter most more often."""

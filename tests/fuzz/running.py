@@ -5,13 +5,16 @@ from __future__ import annotations
 import ctypes
 import io
 import os
+import re
 import resource
 import shutil
 import signal
 import sys
 import warnings
 from contextlib import ExitStack, chdir, contextmanager, redirect_stderr, redirect_stdout
+from importlib import import_module
 from pathlib import Path
+from pkgutil import walk_packages
 from random import Random
 from tempfile import TemporaryFile, mkdtemp
 from time import perf_counter
@@ -19,14 +22,24 @@ from traceback import format_exception
 
 import mujoco
 
+import tiltsim
 from tests.fuzz.inputs import KINDS
-from tiltsim.errors import InputError
+from tiltsim.errors import TiltsimError
+from tiltsim.system.interrupts import terminations_as_interrupts
 
 TIME_LIMIT = 30
 """Seconds per input."""
 
 MEMORY_LIMIT = 2**30  # bytes beyond the largest that the process had before
 """Bytes of the process."""
+
+
+ENOUGH = 1.0
+"""Seconds after which calls and commands are interrupted, some of which fly for minutes."""
+
+
+PROGRESS = re.compile(r"tiltsim: [a-z ]+(: .*)?, \d+:\d\d.*")
+"""A line every few seconds of a command that takes long."""
 
 
 class HangError(Exception):
@@ -39,6 +52,9 @@ def fuzz(count, seed, report=lambda done, mistake: None):
     Input number n of a seed is always the same, however many are run.
     """
     mistakes = []
+    for module in walk_packages(tiltsim.__path__, "tiltsim."):
+        import_module(module.name)  # half a module would remain of an import that is interrupted
+    import_module("matplotlib.backends.backend_agg")
     with ExitStack() as stack:
         folder = Path(mkdtemp(prefix="fuzz"))
         stack.callback(shutil.rmtree, folder)
@@ -73,6 +89,12 @@ def _hang(_number, _frame):
     raise HangError
 
 
+def _interrupt(number, _frame):
+    signal.signal(number, _hang)
+    signal.alarm(TIME_LIMIT)
+    raise KeyboardInterrupt
+
+
 def run_one(number, seed, folder):
     """Run one input; what is wrong, or an empty text."""
     random = Random(f"{seed}:{number}")
@@ -83,17 +105,29 @@ def run_one(number, seed, folder):
     start, before = perf_counter(), _peak_memory()
     try:
         with (
+            terminations_as_interrupts(),
             _native_output(native),
             redirect_stdout(out),
             redirect_stderr(err),
             warnings.catch_warnings(),
         ):
             warnings.simplefilter("error")
-            signal.alarm(TIME_LIMIT)
-            run()
+            warnings.simplefilter("ignore", ResourceWarning)  # of files that an interrupt left open
+            for documented in ("flight terminated early", ".*simulation.duration = .* is short"):
+                warnings.filterwarnings("ignore", documented, RuntimeWarning)
+            is_long = _kind(number) in {"any_command", "python_call"}
+            signal.signal(signal.SIGALRM, _interrupt if is_long else _hang)
+            signal.setitimer(signal.ITIMER_REAL, ENOUGH if is_long else TIME_LIMIT)
+            try:
+                run()
+            finally:
+                signal.setitimer(signal.ITIMER_REAL, 0.0)
     except SystemExit:
         pass
-    except InputError as error:  # as `tiltsim.cli` prints it
+    except KeyboardInterrupt:
+        if not is_long:
+            raise
+    except TiltsimError as error:  # as `tiltsim.cli` prints it
         from tiltsim.cli import _one_line
 
         print(_one_line(error), file=err)
@@ -102,7 +136,6 @@ def run_one(number, seed, folder):
     except BaseException as error:
         return "".join(format_exception(error))
     finally:
-        signal.alarm(0)
         shutil.rmtree(place)
     if any(native):
         return f"native code prints {native[0][:500]!r}"
@@ -139,8 +172,9 @@ def _peak_memory():
 def _wrong_output(out, err, seconds, memory):
     if memory > MEMORY_LIMIT:
         return f"{memory / 2**20:.0f} MiB of memory"
-    if err.count("\n") > 1:
-        return f"{err.count(chr(10))} lines: {err[:500]!r}"
+    lines = [line for line in err.splitlines() if not PROGRESS.fullmatch(line)]
+    if len(lines) > 1:
+        return f"{len(lines)} lines: {err[:2000]!r}"
     raw = {c for c in (out + err) if not (c.isprintable() or c in "\n\u00a0")}
     if raw:
         return f"control characters {raw!r} in {(out + err)[:500]!r}"

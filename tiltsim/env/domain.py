@@ -43,7 +43,8 @@ class Domain:
     @classmethod
     def from_axes(cls, scenario: Scenario, axes: Sequence[Mapping[str, Any]]) -> Domain:
         """The domain around a scenario. Raises `InputError` if an axis is invalid."""
-        if isinstance(axes, str) or not all(isinstance(axis, Mapping) for axis in axes):
+        several = isinstance(axes, Sequence) and not isinstance(axes, str)
+        if not (several and all(isinstance(axis, Mapping) for axis in axes)):
             raise InputError(f"domain = {short_repr(axes)}: must be a list of axes, each a dict")
         drawn = any(axis.get("type") in {"uniform", "normal", "seed"} for axis in axes)
         document = {

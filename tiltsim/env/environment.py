@@ -31,6 +31,7 @@ from tiltsim.plants.plant import take_sample
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.simulation.monitor import TerminationMonitor
+from tiltsim.system.text import short_repr
 from tiltsim_controllers.mathematics.scalar import Floats
 
 if TYPE_CHECKING:
@@ -132,9 +133,15 @@ class Environment(dm_env.Environment):  # type: ignore[misc]
 
     def reseed(self, seed: int | np.random.Generator | None = None) -> None:
         """Restart the random draws of later episodes; None takes the scenario's seed."""
-        self._generator = np.random.default_rng(
-            self.task.scenario.simulation.seed if seed is None else seed
-        )
+        try:
+            self._generator = np.random.default_rng(
+                self.task.scenario.simulation.seed if seed is None else seed
+            )
+        except (TypeError, ValueError):
+            shown = short_repr(seed)
+            raise InputError(
+                f"environment: seed = {shown}: must be a whole number from 0"
+            ) from None
 
     @property
     def generator(self) -> np.random.Generator:

@@ -77,7 +77,8 @@ class Task:
         self.controller = scenario.controller  # in the place of which actions are taken
         self.scenario = self._commanded(scenario)
         self.domain = domain if isinstance(domain, Domain) else None
-        if domain and not isinstance(domain, Domain):
+        varies = not (domain is None or (isinstance(domain, Sequence) and not domain))
+        if varies and not isinstance(domain, Domain):
             self.domain = Domain.from_axes(self.scenario, domain)
         vehicle = scenario.vehicle
         self._rotors = vehicle.rotor_count

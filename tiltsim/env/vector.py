@@ -71,7 +71,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):  # type: ignore[misc]
             raise InputError(f"environment: num_envs = {shown}: must be a whole number above 0")
         if isinstance(task, str) and task.startswith("tiltsim/"):
             if task not in _TASK_IDS:
-                raise InputError(f"environment: {task!r}: {choose(task, _TASK_IDS)}")
+                raise InputError(f"environment: {short_repr(task)}: {choose(task, _TASK_IDS)}")
             arguments = {**_TASK_IDS[task], **arguments}
         else:
             arguments["scenario"] = task

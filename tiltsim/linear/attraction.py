@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import permutations
 from math import inf, pi
 from os import PathLike
 from typing import Any, Final
@@ -19,6 +20,8 @@ from tiltsim.linear.map_size import COARSE, REFINEMENTS
 from tiltsim.linear.settling import SlowestMode, advice_on_duration, slowest_mode
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.scenario import Scenario
+from tiltsim.system.numbers import is_number
+from tiltsim.system.text import short_repr
 from tiltsim_controllers.analysis.singularity import determinant
 from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.vehicle.parameters import Vehicle
@@ -141,6 +144,8 @@ def attraction(
     _check(scenario, axes, coarse, refinements)
     size = 2**refinements
     cells = coarse * size
+    if not isinstance(ranges, Sequence) or len(ranges) != 2:
+        raise InputError(f"ranges = {short_repr(ranges)}: must be a range or None for each axis")
     edges = tuple(_edges(*pair, cells) for pair in zip(axes, ranges, strict=True))
     slowest = slowest_mode(scenario)
     if slowest is not None:
@@ -176,21 +181,28 @@ def attraction(
 
 def _check(scenario: Scenario, axes: tuple[str, str], coarse: int, refinements: int) -> None:
     """Refuse what has no such map."""
-    if len(axes) != 2 or axes[0] == axes[1] or not set(axes) <= set(PLACES):
-        raise InputError(f"axes = {','.join(axes)}: choose two of {', '.join(PLACES)}")
+    if not isinstance(axes, Sequence) or [*axes] not in [[*two] for two in permutations(PLACES, 2)]:
+        texts = isinstance(axes, Sequence) and all(isinstance(axis, str) for axis in axes)
+        shown = ",".join(axes) if texts else short_repr(axes)
+        raise InputError(f"axes = {shown}: choose two of {', '.join(PLACES)}")
     if not (isinstance(refinements, int) and 0 <= refinements <= 6):
-        raise InputError(f"refinements = {refinements!r}: must be 0 to 6")
+        raise InputError(f"refinements = {short_repr(refinements)}: must be 0 to 6")
     most = MOST_CELLS // 2**refinements
     if not (isinstance(coarse, int) and 1 <= coarse <= most):
         raise InputError(
-            f"coarse = {coarse!r}: must be 1 to {most}, for {MOST_CELLS} cells across at most"
+            f"coarse = {short_repr(coarse)}: must be 1 to {most}, for {MOST_CELLS} cells across at "
+            "most"
         )
     if scenario.vehicle.model == "tilt_car":
         raise InputError(f"{scenario.address}: vehicle.model: attraction takes rotorcraft only")
 
 
 def _edges(axis: str, given: tuple[float, float] | None, cells: int) -> Floats:
-    low, high = given or (-SPANS[PLACES[axis][0]], SPANS[PLACES[axis][0]])
+    span = SPANS[PLACES[axis][0]]
+    given = (-span, span) if given is None else given
+    if not (isinstance(given, Sequence) and len(given) == 2 and all(map(is_number, given))):
+        raise InputError(f"range of {axis} = {short_repr(given)}: must be two numbers")
+    low, high = given
     if not -inf < low < high < inf:
         raise InputError(f"range of {axis} = {low:g}:{high:g}: must be finite and grow")
     if axis == "pitch" and not -0.5 * pi < low < high < 0.5 * pi:

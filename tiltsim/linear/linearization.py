@@ -18,6 +18,7 @@ from tiltsim.linear.newton import derivative_at
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.system.optional import optional_package
+from tiltsim.system.text import short_repr
 from tiltsim_controllers.mathematics.scalar import Floats
 
 INPUT_SCALE: Final = 100.0
@@ -110,7 +111,7 @@ def linearize(
         InputError: If it is invalid or has no rest point.
     """
     if loop not in ("closed", "open"):
-        raise InputError(f"loop = {loop!r}: choose closed or open")
+        raise InputError(f"loop = {short_repr(loop)}: choose closed or open")
     found = equilibrium_of(load_scenario(scenario), at_rest=True)
     closed = linearization_at(found)
     return closed if loop == "closed" else closed.opened()

@@ -10,11 +10,13 @@ from typing import Any, Final
 
 import numpy as np
 
+from tiltsim.errors import InputError
 from tiltsim.linear.differences import ERROR
 from tiltsim.linear.equilibrium import Equilibrium, equilibrium_of
 from tiltsim.linear.modes import Mode, exponents, is_stable, modes_of, spectrum
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.scenario import Scenario
+from tiltsim.system.text import short_repr
 from tiltsim_controllers.mathematics.scalar import Floats
 
 RESOLVED: Final = 1e-8
@@ -103,6 +105,8 @@ def stability(
     Raises:
         InputError: If it is invalid, neither at rest nor periodic, or has no such state nearby.
     """
+    if not (near is None or isinstance(near, Stability)):
+        raise InputError(f"near = {short_repr(near)}: must be a result of tiltsim.stability")
     state = None if near is None else near.equilibrium.root.state
     return stability_at(equilibrium_of(load_scenario(scenario), near=state, progress=progress))
 

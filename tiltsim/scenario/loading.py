@@ -267,6 +267,8 @@ def parse_scenario(
     """
     if not isinstance(document, Mapping):
         raise InputError(f"scenario = {short_repr(document)}: must be a dict")
+    if not isinstance(address, str):
+        raise InputError(f"address = {short_repr(address)}: must be text")
     document = plain(document)
     check_limits(document, address)
     scenario = Scenario.model_validate(document, address=address, emptied=emptied)

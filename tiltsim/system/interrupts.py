@@ -5,9 +5,10 @@ from __future__ import annotations
 import signal
 import sys
 import threading
-from _thread import interrupt_main
+from _thread import interrupt_main, start_new_thread
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from time import sleep
 from typing import TYPE_CHECKING, Final
 
 if TYPE_CHECKING:
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
 
     Handler = Callable[[int, FrameType | None], object] | int | None
 
-SOON: Final = 0.01
+SOON: Final = 0.1
 """Time (s) after which a swallowed interrupt is sent again."""
 
 
@@ -132,10 +133,15 @@ def terminations_as_interrupts() -> Iterator[Callable[[], bool]]:
             return
         if not callable(signal.getsignal(signal.SIGINT)):  # ignored; it was a SIGTERM
             signal.signal(signal.SIGINT, _raise)
-        timers.append(threading.Timer(SOON, interrupt_main))
-        timers[-1].start()
+        start_new_thread(send_soon, ())  # threading's own waits, and would be interrupted
 
-    timers: list[threading.Timer] = []
+    def send_soon() -> None:
+        sleep(SOON)
+        with turn:
+            if not ended:
+                interrupt_main()
+
+    turn, ended = threading.Lock(), False
     report, sys.unraisablehook = sys.unraisablehook, send_again
     keyboard = signal.getsignal(signal.SIGINT)
     if keyboard is signal.default_int_handler:
@@ -143,9 +149,9 @@ def terminations_as_interrupts() -> Iterator[Callable[[], bool]]:
     before = signal.signal(signal.SIGTERM, interrupt)
     try:
         yield lambda: terminated
+        with turn:  # what was sent before comes here, not after the block
+            ended = True
     finally:
-        for timer in timers:
-            timer.cancel()
         sys.unraisablehook = report
         signal.signal(signal.SIGTERM, before)
         signal.signal(signal.SIGINT, keyboard)
