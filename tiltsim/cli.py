@@ -16,7 +16,7 @@ from typing import Any, Final, NoReturn
 from tiltsim.arrays.xla_flags import let_xla_merge_loops
 from tiltsim.errors import InputError
 from tiltsim.exit_codes import DONE, INTERRUPTED, INVALID_INPUT, TERMINATED
-from tiltsim.system.interrupts import terminations_as_interrupts
+from tiltsim.system.interrupts import terminations_as_interrupts, was_interrupted
 from tiltsim.system.text import printable, without_long_words
 
 FLIGHT_COMMANDS: Final = ("run", "check", "sweep", "list", "view", "plot", "video")
@@ -134,7 +134,7 @@ def _run(arguments: list[str] | None) -> int:
         place = "." if isinstance(error, FileNotFoundError) else "output"
         return _refuse(f"{error.filename or place}: {reason(error)}")
     except Exception as error:
-        if _comes_from_interrupt(error):
+        if was_interrupted() or _comes_from_interrupt(error):
             return _end_interrupted()
         if not (_raised_while_loading_mujoco(error) and "MUJOCO_GL" in os.environ):
             raise

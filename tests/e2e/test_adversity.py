@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import os
 import resource
+import signal
 import subprocess
 import sys
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
 import pytest
 
@@ -123,6 +124,19 @@ def test_an_interrupt_that_became_another_error_stays_one(capsys, monkeypatch):
 
     monkeypatch.setenv("MUJOCO_GL", "egl")
     monkeypatch.setattr("tiltsim.commands.list.run", imported)
+    assert main(["list"]) == 130
+    assert capsys.readouterr() == ("", "tiltsim: interrupted\n")
+
+
+def test_an_interrupt_that_compiled_code_turns_into_another_error_stays_one(capsys, monkeypatch):
+    """As pydantic does, which names it in the text of its own error."""
+
+    def validated(_arguments):
+        with suppress(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+        raise RuntimeError("SchemaError")
+
+    monkeypatch.setattr("tiltsim.commands.list.run", validated)
     assert main(["list"]) == 130
     assert capsys.readouterr() == ("", "tiltsim: interrupted\n")
 

@@ -27,6 +27,18 @@ class _Interrupt(KeyboardInterrupt):
     CPython ends by SIGINT, whatever the exit code.
     """
 
+    raised = False
+
+    def __init__(self) -> None:
+        """Note that there was one: compiled code may turn it into another error."""
+        super().__init__()
+        _Interrupt.raised = True
+
+
+def was_interrupted() -> bool:
+    """Whether an interrupt was raised since `terminations_as_interrupts` began."""
+    return _Interrupt.raised
+
 
 def _raise(_number: int, _frame: FrameType | None) -> None:
     raise _Interrupt
@@ -116,7 +128,7 @@ def terminations_as_interrupts() -> Iterator[Callable[[], bool]]:
     Yields a function that returns whether there was a SIGTERM. In threads other than the main one
     this has no effect.
     """
-    terminated = False
+    terminated = _Interrupt.raised = False
     if threading.current_thread() is not threading.main_thread():
         yield lambda: terminated
         return
