@@ -117,7 +117,7 @@ def test_only_a_sweeps_own_leftovers_are_removed(copy):
         folder / ".sweep.parquet.new",
         folder / "parts" / ".000002.parquet.12.new",
         folder / "parts" / ".a.new",
-        folder / "parts" / "5 copy.parquet",
+        folder / "parts" / "5 copy.parquet.bak",
     }
     for file in own | others:
         file.write_bytes(b"x")

@@ -61,7 +61,7 @@ def show(value: object) -> str:
 
 def did_you_mean(name: object, names: Iterable[str]) -> str:
     """A suggestion of the closest of some names; empty if none is close."""
-    given = shortened(str(name))
+    given = shortened(name if isinstance(name, str) else short_repr(name))
     names = list(names)
     close = get_close_matches(given, names, n=max(1, len(names)))
     close += [known for known in names if _shared_words(given, known) > ALIKE]
