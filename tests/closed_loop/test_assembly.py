@@ -43,14 +43,14 @@ def calls(monkeypatch):
     counts = dict.fromkeys(ONCE, 0)
 
     def counted(name, function):
-        def count(*arguments):
+        def count(*arguments, **options):
             counts[name] += 1
-            return function(*arguments)
+            return function(*arguments, **options)
 
         return count
 
-    def loop_of(*arguments):
-        loop = choose(*arguments)
+    def loop_of(*arguments, **options):
+        loop = choose(*arguments, **options)
         return replace(loop, setup=counted("setup", loop.setup))
 
     choose = counted("loop_of", assembling.loop_of)

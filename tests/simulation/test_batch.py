@@ -400,8 +400,11 @@ def test_own_controllers_are_flown_one_by_one_among_others(tmp_path):
     )
     own = {"controller": {"law": "python", "function": f"{file}:law"}}
     scenarios = [
-        scenario(
-            {**own, "model_error": {"mass": mass}}, engine="auto", timestep=0.002, duration=0.1
+        tiltsim.load_scenario(
+            scenario(
+                {**own, "model_error": {"mass": mass}}, engine="auto", timestep=0.002, duration=0.1
+            ),
+            trusted=True,
         )
         for mass in (0.9, 1.0, 1.1)
     ]

@@ -18,6 +18,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import tiltsim
+from tiltsim.engines import steppers
 from tiltsim.laws import assembling
 from tiltsim.laws.assembling import loop_of
 from tiltsim_controllers.vehicle.parameters import PRESETS, SPIN
@@ -189,8 +190,8 @@ def accelerations(time):
 def open_loop(monkeypatch, scenario, plant, along_spin):
     """A flight with given rotor accelerations, whatever the state."""
 
-    def loop(*arguments):
-        found = loop_of(*arguments)
+    def loop(*arguments, **options):
+        found = loop_of(*arguments, **options)
         given = lambda time, *_: tuple((SPIN * along_spin(time)).tolist())  # noqa: E731
         return replace(found, equations=replace(found.equations, inputs=given))
 
@@ -198,6 +199,7 @@ def open_loop(monkeypatch, scenario, plant, along_spin):
         commanded = lambda seen: tiltsim.Command(rotor_accelerations=along_spin(seen.time))  # noqa: E731
         return fly(scenario, plant, controller=commanded)
     monkeypatch.setattr(assembling, "loop_of", loop)
+    monkeypatch.setattr(steppers, "_traced_step", steppers._plain_step)
     return fly(scenario, plant)
 
 

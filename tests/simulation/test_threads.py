@@ -25,7 +25,7 @@ from tiltsim.engines.callback import control_callback
 from tiltsim.env.environment import TiltrotorEnv
 from tiltsim.plants.command import Command
 from tiltsim.simulation.batch import fly
-from tiltsim.system.hooks import _ignore
+from tiltsim.system.hooks import _IGNORE
 
 THREADS = 16
 HOVER = 0.429 * 9.8 / 4.0
@@ -33,7 +33,7 @@ HOVER = 0.429 * 9.8 / 4.0
 
 def no_hooks():
     hooks = mujoco.get_mjcb_control(), mujoco.get_mjcb_time(), mujoco.get_mju_user_warning()
-    return hooks[:2] == (None, None) and hooks[2] is not _ignore
+    return hooks[:2] == (None, None) and hooks[2] is not _IGNORE
 
 
 def samples(flown):

@@ -7,6 +7,7 @@ from typing import Final, NamedTuple
 from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.closed_loop.loop import ClosedLoop
 from tiltsim.linear.coordinates import MATRIX, QUATERNION, ROTATION_NAMES, Coordinates
+from tiltsim.models.rotor_table import Multirotor
 from tiltsim.vehicles.rotorcraft.layout import layout_of
 from tiltsim_controllers.vehicle.states import BODY_FIELDS
 
@@ -140,7 +141,9 @@ def control_inputs(assembly: Assembly) -> tuple[Input, ...]:
     tilts = len(named)
     kind, first, per_unit = ROTOR_INPUT, tilts + rotors, 1.0
     if dynamics.commands_thrusts:  # as squared rotor speeds
-        per_unit = 1.0 / assembly.scenario.rotorcraft.resolve().thrust_coefficient
+        vehicle = assembly.scenario.vehicle.resolve()
+        assert not isinstance(vehicle, Multirotor)  # its controllers command rates of rotor speeds
+        per_unit = 1.0 / vehicle.thrust_coefficient
         kind, first = "thrust", tilts
     speeds = (Input(n, first + i, per_unit) for i, n in enumerate(numbered(kind, rotors)))
     return (*speeds, *(Input(name, index) for index, name in enumerate(named)))
