@@ -134,6 +134,11 @@ def claimed(vehicles):
     ]
 
 
+def in_turn(pairs):
+    """Pairs with a plant each, in turn."""
+    return [(*pair, PLANTS[place % len(PLANTS)]) for place, pair in enumerate(pairs)]
+
+
 PAIRS = [
     pytest.param(law, vehicle, marks=[] if vehicle in FEW else pytest.mark.slow)
     for law, vehicle in claimed(VEHICLES)
@@ -306,8 +311,7 @@ def test_every_scenario_can_be_used_or_is_refused_in_a_line(law, vehicle):
 
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:.* is short:RuntimeWarning")  # for a region of attraction
-@pytest.mark.parametrize("plant", PLANTS)
-@each_pair
+@pytest.mark.parametrize(("law", "vehicle", "plant"), in_turn(claimed(FEW)))
 def test_every_scenario_can_be_analyzed_or_is_refused_in_a_line(law, vehicle, plant):
     if fits(law, vehicle):
         for use in (USES_OF_SCENARIOS | SLOW_USES_OF_SCENARIOS).values():
@@ -382,8 +386,7 @@ def test_every_table_is_flown_by_some_law(layer):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("plant", PLANTS)
-@pytest.mark.parametrize(("law", "vehicle"), FITTING)
+@pytest.mark.parametrize(("law", "vehicle", "plant"), in_turn(FITTING))
 def test_every_pair_takes_every_table_or_refuses_it_in_a_line(law, vehicle, plant, tmp_path):
     shown = ("metrics", "plot", "view", "video") if plant == "mujoco" else ("metrics",)
     for change in LAYERS.values():

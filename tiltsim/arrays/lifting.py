@@ -13,6 +13,7 @@ import operator
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import is_dataclass, replace
+from functools import partial
 from types import FunctionType, MethodType
 from typing import Any
 
@@ -79,6 +80,9 @@ class Lifting:
 
     def plan(self, function: Function, args: Iterable[Any], keywords: Mapping[str, Any]) -> Any:
         """Call any function, as it is or else lifted."""
+        if isinstance(function, partial):
+            keywords = {**function.keywords, **keywords}
+            return self.plan(function.func, [*function.args, *args], keywords)
         args = list(args)
         try:
             return function(*args, **keywords)
