@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections import defaultdict
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -15,7 +16,10 @@ from tests.laws.test_baselines import BASELINES
 from tests.laws.test_laws import GUST, LAWS
 from tests.laws.test_multirotor import ASIDE, CLIMB, HELD, PRIORITIZED, TILTS, WEAK, document
 from tests.simulation.test_batch import CAR, CAR_GAITS, EXACT, GAITS
+from tiltsim.laws.assembling import assemble
 from tiltsim.scenario.loading import merge
+from tiltsim.simulation.simulate import simulate_assembly
+from tiltsim_controllers.mathematics.records import record_size, unflatten
 from tiltsim_controllers.mathematics.scalar import scalar_functions
 
 LATE = {"control_timestep": 0.004, "control_latency": 0.008}
@@ -83,9 +87,17 @@ for _tables in MULTIROTORS.values():
 
 
 def flown(tables, **simulation):
-    """A short flight in Python."""
+    """A short flight that calls the scalar functions themselves, as a traced program does not."""
     simulation = {"duration": 0.02, "engine": "python", "record_timestep": 0.01, **simulation}
-    return tiltsim.simulate(tiltsim.parse_scenario({**tables, "simulation": simulation}))
+    scenario = tiltsim.parse_scenario({**tables, "simulation": simulation})
+    return simulate_assembly(replace(assemble(scenario), traced=False))
+
+
+def called_rows(row, _width, time, states, user):
+    """In place of `tiltsim.engines.sample_evaluation._in_python`, for the same reason."""
+    numbers, size = user.tolist(), record_size(row.record)
+    setup = unflatten(row.record, numbers), tuple(numbers[size:])
+    return np.array([row.function(t, s, *setup) for t, s in zip(time.tolist(), states.tolist())])
 
 
 def short_flights():

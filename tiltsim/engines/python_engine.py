@@ -40,18 +40,22 @@ def _control_step(assembly: Assembly, user: list[float], name: str) -> Callable[
     What depends on these alone is evaluated once.
     """
     loop = assembly.loop
-    if name == "hold" or assembly.traced:
+    if assembly.traced:
         return python_function(_program(program_key(assembly), name), name, fixed={"user": user})
     parameters = unflatten(loop.parameters, user)
     knots = tuple(user[loop.record_size :])
 
-    def controls(
-        header: list[float], qpos: Vector, qvel: Vector, act: Vector, _ctrl: Vector
-    ) -> Values:
+    def time_of(header: list[float]) -> float:
         numbers = header[EVALUATIONS], header[EVALUATIONS_PER_STEP], header[TIMESTEP]
-        return loop.sampling.controls(evaluation_time(*numbers), qpos, qvel, act, parameters, knots)
+        return evaluation_time(*numbers)
 
-    return controls
+    def controls(header: list[float], *state: Vector) -> Values:
+        return loop.sampling.controls(time_of(header), *state[:3], parameters, knots)
+
+    def hold(header: list[float], *state: Vector) -> Values:
+        return loop.sampling.hold(time_of(header), *state, parameters)
+
+    return controls if name == "controls" else hold
 
 
 class PythonEngine(Engine):
