@@ -187,7 +187,9 @@ def _given(random, folder, action):
     }.get(names)
     if likely and random.random() < 0.7:
         return random.choice(likely)
-    return _word(random, action)
+    word = _word(random, action)
+    # A file with a strange name is written all the same, where it is removed.
+    return str(folder / word.replace("/", "_")) if names in {"DIR", "FILE", "FILE.rrd"} else word
 
 
 def _word(random, action):
