@@ -174,6 +174,10 @@ MISUSES = {
     "a number as progress": (lambda: tiltsim.simulate(SHORT, progress=3), "progress = 3: must be"),
     "one scenario to a batch": (lambda: tiltsim.fly(ADDRESS), "must be a list of scenarios"),
     "a number to a batch": (lambda: tiltsim.fly(3), "scenarios = 3: must be a list"),
+    "an array of one to a batch": (
+        lambda: tiltsim.fly(np.array("a")),
+        "scenarios = array('a', dtype='<U1'): must be a list",
+    ),
     "numbers in a batch": (lambda: tiltsim.fly([1, 2]), "scenario = 1: must be"),
     "no threads": (lambda: tiltsim.fly([SHORT], threads=0), "threads = 0: must be"),
     "true as threads": (lambda: tiltsim.fly([SHORT], threads=True), "threads = True: must be"),

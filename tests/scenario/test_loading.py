@@ -593,6 +593,8 @@ def test_a_type_that_is_set_already_keeps_its_table(write):
         ),
         ("simulation.duration", "long", 'simulation.duration = "long"', "must be a number"),
         ("gait", 5, "gait = 5", "must be a table"),
+        ("controller.law", {"a": 1}, 'controller.law = {"a": 1}', "choose attitude_altitude"),
+        ("controller.law", [1], "controller.law = [1]", "choose attitude_altitude"),
     ],
 )
 def test_a_mistake_in_an_override_is_one_line(write, key, value, shown, allowed):

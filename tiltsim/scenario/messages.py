@@ -281,6 +281,8 @@ def has_same_keys(schema: Any, path: Iterable[object], one: object, other: objec
         path: Where the table lies in it.
         one, other: The kinds, such as ``trot_instant``.
     """
+    if not (isinstance(one, str) and isinstance(other, str)):
+        return False  # no kind, such as a table that was given instead
     for part in path:
         schema = _member(schema, part)
     table = _member(schema, one)

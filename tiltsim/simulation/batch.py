@@ -94,7 +94,8 @@ def fly(
             controller of your own cannot be used.
         KeyboardInterrupt: If interrupted; results yielded before are complete.
     """
-    if isinstance(scenarios, str | Mapping | Scenario) or not isinstance(scenarios, Iterable):
+    is_one = isinstance(scenarios, str | Mapping | Scenario) or getattr(scenarios, "shape", 1) == ()
+    if is_one or not isinstance(scenarios, Iterable):
         raise InputError(f"scenarios = {short_repr(scenarios)}: must be a list of scenarios")
     threads = (os.cpu_count() or 1) if threads is None else whole_number("threads", threads)
     true_or_false("keep_samples", keep_samples)
