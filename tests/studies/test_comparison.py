@@ -108,7 +108,7 @@ def test_a_latency_is_sought_in_control_periods(monkeypatch):
         tried.append(flown.simulation.control_latency)
         return tiltsim.simulate(flown)
 
-    monkeypatch.setattr("tiltsim.studies.comparison.simulate", noticed)
+    monkeypatch.setattr("tiltsim.studies.comparison.simulate_to_end", noticed)
     found = _survived(scenario, search)
     assert tried[:2] == [0.0, pytest.approx(0.016)]
     assert found is not None

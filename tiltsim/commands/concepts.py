@@ -66,6 +66,6 @@ def drawings() -> dict[str, Callable[[], Figure]]:
 def fly_decouplers() -> dict[str, Flight]:
     """The flights that show the decouplers, by their names."""
     from tiltsim.scenario.loading import load_scenario
-    from tiltsim.simulation.simulate import simulate
+    from tiltsim.simulation.simulate import simulate_to_end
 
-    return {name: simulate(load_scenario(at)) for name, at in DECOUPLER_FLIGHTS.items()}
+    return {name: simulate_to_end(load_scenario(at)) for name, at in DECOUPLER_FLIGHTS.items()}

@@ -141,11 +141,9 @@ def fly(
 
 
 def _fly_one(task: _Task, folder: Path) -> FlightRecord:
-    from tiltsim.simulation.simulate import simulate
+    from tiltsim.simulation.simulate import simulate_to_end
 
-    flight = simulate(variant_for(task.address, task.plant))
-    if flight.end.kind == "interrupted":
-        raise KeyboardInterrupt
+    flight = simulate_to_end(variant_for(task.address, task.plant))
     record = make_record(task.address, task.plant, flight)
     store(folder / f"{task.key}.json", json.dumps(asdict(record), indent=1).encode())
     return record

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from tiltsim.report.attraction_maps import GAITS, attraction_map
 from tiltsim.report.claim import Metrics
 from tiltsim.report.flights import PLANTS, Plant, variant_for
-from tiltsim.simulation.simulate import simulate
+from tiltsim.simulation.simulate import simulate_to_end
 from tiltsim.views.figures.attainable import attainable_figure
 from tiltsim.views.figures.attraction import attraction_panels
 from tiltsim.views.figures.determinant import determinant_figure
@@ -51,7 +51,7 @@ def _flight_picture(chapter: int, name: str, caption: str, address: str) -> Pict
     """The page of one flight in MuJoCo, which is flown again."""
 
     def draw(metrics: object) -> Figure:
-        return plot(simulate(variant_for(address, "mujoco")))
+        return plot(simulate_to_end(variant_for(address, "mujoco")))
 
     return Picture(chapter, name, caption, draw, ((address, "mujoco"),))
 

@@ -91,6 +91,14 @@ def simulate(
     return flight
 
 
+def simulate_to_end(scenario: Scenario) -> Flight:
+    """As `simulate`, but raises `KeyboardInterrupt` when interrupted: for one flight of many."""
+    flight = simulate(scenario)
+    if flight.end.kind == "interrupted":
+        raise KeyboardInterrupt
+    return flight
+
+
 def simulate_assembly(
     assembly: Assembly,
     observer: Observer | None = None,

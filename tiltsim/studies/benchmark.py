@@ -29,7 +29,7 @@ from tiltsim.plants.mujoco_plant import MujocoPlant
 from tiltsim.scenario.loading import parse_scenario
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.simulation.batch import fly
-from tiltsim.simulation.simulate import simulate
+from tiltsim.simulation.simulate import simulate_to_end
 
 INTEGRATORS: Final = ("RK4", "implicitfast", "Euler")
 ROUNDS: Final = 15
@@ -222,7 +222,7 @@ def _circling(timestep: float) -> Scenario:
 
 
 def _positions(timestep: float) -> np.ndarray[Any, Any]:
-    flight = simulate(_circling(timestep))
+    flight = simulate_to_end(_circling(timestep))
     return np.stack([flight[axis] for axis in ("x", "y", "z")])
 
 

@@ -19,7 +19,7 @@ from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.messages import choose
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.scenario.trust import require_trust
-from tiltsim.simulation.simulate import simulate
+from tiltsim.simulation.simulate import simulate_to_end
 from tiltsim.studies.call_times import compiled_time_per_call, time_per_call
 from tiltsim.sweeps.search import boundary
 from tiltsim.system.processes import in_order, in_processes
@@ -222,7 +222,7 @@ def compare_one(entry: Entry, *, searches: bool, timed: bool = True) -> Compared
     try:
         scenario = entry.scenario()
         assembly = assemble(scenario)
-        flight = simulate(_engine(scenario, searches))
+        flight = simulate_to_end(_engine(scenario, searches))
     except InputError as error:
         refused = {"end": "refused", "refused": str(error), **dict.fromkeys(MEASURES)}
         return Compared(row | refused | {"latency_refused": None}, np.zeros(0), np.zeros(0))
@@ -313,7 +313,7 @@ def _survived(scenario: Scenario, search: Search) -> float | None:
         elif search.key.endswith("inertia"):
             given = [value] * 3
         try:
-            flight = simulate(scenario.replace({**latency, search.key: given}))
+            flight = simulate_to_end(scenario.replace({**latency, search.key: given}))
         except InputError:  # not for this vehicle, or not with such a sample time
             return False
         last = in_last_second(flight["time"], simulation.timestep)
