@@ -91,6 +91,19 @@ MISUSES = {
         lambda: tiltsim.attraction(ADDRESS, ranges=3),
         "ranges = 3: must be a range or None for each axis",
     ),
+    "nothing as progress of attraction": (
+        lambda: tiltsim.attraction(ADDRESS, progress=None),
+        "progress = None: must be a function",
+    ),
+    "a number as progress of stability": (
+        lambda: tiltsim.stability(ADDRESS, progress=3),
+        "progress = 3: must be a function",
+    ),
+    "arrays as axes of attraction": (
+        lambda: tiltsim.attraction(ADDRESS, (np.zeros(2), np.zeros(2))),
+        "choose two of",
+    ),
+    "an array as loop": (lambda: tiltsim.linearize({}, loop=np.zeros(2)), "choose closed or open"),
     "a loop without a repr": (lambda: tiltsim.linearize({}, loop=Speechless()), "a Speechless: ch"),
     "a number as address": (lambda: tiltsim.parse_scenario({}, 3), "address = 3: must be text"),
     "stability near a number": (
@@ -297,6 +310,10 @@ MISUSES = {
     "a video of a name that is too long": (
         lambda: flight("fixed").video(f"{LONG}.mp4"),
         "File name too long",
+    ),
+    "an array as quality": (
+        lambda: flight("fixed").video("x.mp4", quality=np.zeros(2)),
+        "quality array([0., 0.]): choose",
     ),
     "a list as quality": (lambda: flight("fixed").video("x.mp4", quality=[]), "quality []: choose"),
     "a video of a wrong format": (lambda: flight("fixed").video("x.avi"), "choose .mp4, .gif"),

@@ -292,6 +292,7 @@ def test_without_opengl_one_line_says_what_to_install(monkeypatch):
         ({"domain": "initial.position"}, "domain = .*: must be a list of axes"),
         ({"domain": 3}, "domain = 3: must be a list of axes"),
         ({"render_mode": "human"}, "render_mode = 'human': must be 'rgb_array' or None"),
+        ({"render_mode": np.zeros(2)}, "must be 'rgb_array' or None"),
     ],
 )
 def test_wrong_arguments_are_reported_in_one_line(arguments, words):

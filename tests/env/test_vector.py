@@ -129,6 +129,7 @@ def make(*args, **arguments):
         ("tiltsim/Hover-v0", {"num_envs": 0}, "num_envs = 0: must be a whole number above 0"),
         ("tiltsim/Hovver-v0", {}, "'tiltsim/Hovver-v0': did you mean tiltsim/Hover-v0"),
         ("tiltsim/Hover-v0", {"precision": "half"}, "precision = 'half': must be 'float32' or"),
+        ("tiltsim/Hover-v0", {"precision": np.zeros(2)}, "must be 'float32' or 'float64'"),
         ({}, {}, "simulation.integrator = 'RK4': only 'implicitfast' flies on arrays"),
         (
             {**TASKS["Hover"]["scenario"], "vehicle": {"rotor_inertia": 1e-5}},

@@ -67,6 +67,13 @@ class Outcome(NamedTuple):
     distance: Any  # m, from the reference
 
 
+def check_precision(precision: object) -> None:
+    """Raise `InputError` unless it is one that arrays have."""
+    if not isinstance(precision, str) or precision not in ("float32", "float64"):
+        shown = short_repr(precision)
+        raise InputError(f"environment: precision = {shown}: must be 'float32' or 'float64'")
+
+
 class EnvFunctions:
     """An environment as pure functions of arrays: `reset` and `step`.
 
@@ -91,9 +98,7 @@ class EnvFunctions:
         import jax
         import jax.numpy as jnp
 
-        if precision not in ("float32", "float64"):
-            shown = short_repr(precision)
-            raise InputError(f"environment: precision = {shown}: must be 'float32' or 'float64'")
+        check_precision(precision)
         self._jax, self._numpy, self._dtype, self._task = jax, jnp, precision, task
         self.scenario = scenario = task.scenario
         _check_supported(scenario)

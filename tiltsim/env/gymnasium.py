@@ -59,7 +59,7 @@ class GymnasiumEnv(gymnasium.Env):  # type: ignore[misc]
         render_mode: str | None = None,
         **arguments: Any,
     ) -> None:
-        if render_mode not in (None, "rgb_array"):
+        if not isinstance(render_mode, str | None) or render_mode not in (None, "rgb_array"):
             shown = short_repr(render_mode)
             raise InputError(f"environment: render_mode = {shown}: must be 'rgb_array' or None")
         self.env: Environment = TiltrotorEnv(**arguments) if env is None else env

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from tiltsim.arrays.flying import double_precision
 from tiltsim.closed_loop.limits import BODY_RATE, MAX_BODY_RATE, MAX_ROTOR_SPEED, ROTOR_SPEED
 from tiltsim.env.environment import TiltrotorEnv
-from tiltsim.env.functions import NOT_FINITE, EnvFunctions, Episode
+from tiltsim.env.functions import NOT_FINITE, EnvFunctions, Episode, check_precision
 from tiltsim.env.tasks import TASKS
 from tiltsim.errors import InputError
 from tiltsim.scenario.loading import load_scenario
@@ -69,6 +69,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):  # type: ignore[misc]
         if not (isinstance(num_envs, int) and is_number(num_envs) and num_envs > 0):
             shown = short_repr(num_envs)
             raise InputError(f"environment: num_envs = {shown}: must be a whole number above 0")
+        check_precision(precision)
         if isinstance(task, str) and task.startswith("tiltsim/"):
             if task not in _TASK_IDS:
                 raise InputError(f"environment: {short_repr(task)}: {choose(task, _TASK_IDS)}")

@@ -21,6 +21,7 @@ from tiltsim.linear.settling import SlowestMode, advice_on_duration, slowest_mod
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.system.numbers import is_number
+from tiltsim.system.progress import check_function
 from tiltsim.system.text import short_repr
 from tiltsim_controllers.analysis.singularity import determinant
 from tiltsim_controllers.mathematics.scalar import Floats
@@ -142,6 +143,7 @@ def attraction(
     """
     scenario = load_scenario(scenario)
     _check(scenario, axes, coarse, refinements)
+    check_function("progress", progress)
     size = 2**refinements
     cells = coarse * size
     if not isinstance(ranges, Sequence) or len(ranges) != 2:
@@ -181,8 +183,8 @@ def attraction(
 
 def _check(scenario: Scenario, axes: tuple[str, str], coarse: int, refinements: int) -> None:
     """Refuse what has no such map."""
-    if not isinstance(axes, Sequence) or [*axes] not in [[*two] for two in permutations(PLACES, 2)]:
-        texts = isinstance(axes, Sequence) and all(isinstance(axis, str) for axis in axes)
+    texts = isinstance(axes, Sequence) and all(isinstance(axis, str) for axis in axes)
+    if not texts or (*axes,) not in permutations(PLACES, 2):
         shown = ",".join(axes) if texts else short_repr(axes)
         raise InputError(f"axes = {shown}: choose two of {', '.join(PLACES)}")
     if not (isinstance(refinements, int) and 0 <= refinements <= 6):

@@ -110,7 +110,7 @@ def linearize(
     Raises:
         InputError: If it is invalid or has no rest point.
     """
-    if loop not in ("closed", "open"):
+    if not isinstance(loop, str) or loop not in ("closed", "open"):
         raise InputError(f"loop = {short_repr(loop)}: choose closed or open")
     found = equilibrium_of(load_scenario(scenario), at_rest=True)
     closed = linearization_at(found)

@@ -16,6 +16,7 @@ from tiltsim.linear.equilibrium import Equilibrium, equilibrium_of
 from tiltsim.linear.modes import Mode, exponents, is_stable, modes_of, spectrum
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.scenario import Scenario
+from tiltsim.system.progress import check_function
 from tiltsim.system.text import short_repr
 from tiltsim_controllers.mathematics.scalar import Floats
 
@@ -107,6 +108,7 @@ def stability(
     """
     if not (near is None or isinstance(near, Stability)):
         raise InputError(f"near = {short_repr(near)}: must be a result of tiltsim.stability")
+    check_function("progress", progress)
     state = None if near is None else near.equilibrium.root.state
     return stability_at(equilibrium_of(load_scenario(scenario), near=state, progress=progress))
 

@@ -48,6 +48,12 @@ def check_progress(progress: object) -> None:
         raise InputError(f"progress = {short_repr(progress)}: {allowed}")
 
 
+def check_function(name: str, value: object) -> None:
+    """Raise `InputError` unless an argument can be called."""
+    if not callable(value):
+        raise InputError(f"{name} = {short_repr(value)}: must be a function")
+
+
 def _seldom(report: Report, total: float) -> Report:
     """A report that passes on what comes after an interval, and the end."""
     last = -INTERVAL

@@ -136,9 +136,10 @@ def _format(options: _Options, flight_end: float, suffix: str) -> VideoFormat:
     from tiltsim.views.video.overlay import CameraPose
     from tiltsim.views.video.rendering import QUALITIES
 
-    if options.given("quality") not in [*QUALITIES]:  # a list, as not all that is given has a hash
-        raise options.mistake("quality", choose(options.given("quality"), QUALITIES))
-    base = QUALITIES[options.given("quality")]
+    quality = options.given("quality")
+    if not isinstance(quality, str) or quality not in QUALITIES:
+        raise options.mistake("quality", choose(quality, QUALITIES))
+    base = QUALITIES[quality]
     start, end = options.number("start", 0.0), inf
     if options.given("end") is not None:
         end = options.number("end", 0.0)
