@@ -5,6 +5,7 @@ import tomllib
 from pathlib import Path
 from typing import Annotated
 
+import pytest
 from pydantic import ConfigDict, TypeAdapter
 
 from tiltsim.cli import main
@@ -22,6 +23,14 @@ PROPERTIES = [
     for name, table in {**sweep_schema()["$defs"], "Sweep": sweep_schema(), **DEFINITIONS}.items()
     for key, value in table["properties"].items()
 ]
+
+
+@pytest.mark.parametrize(("address", "shown"), [("", "''"), ("[[]]", "[[]]"), ("gaits", "gaits")])
+def test_an_address_without_a_table_is_one_line(address, shown, capsys):
+    assert main(["schema", address]) == 2
+    line = capsys.readouterr().err
+    assert line.startswith(f"tiltsim: {shown}: no such table or key; ")
+    assert line.count("\n") == 1
 
 
 def test_every_key_is_described():

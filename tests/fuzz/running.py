@@ -38,8 +38,8 @@ ENOUGH = 1.0
 """Seconds after which calls and commands are interrupted, some of which fly for minutes."""
 
 
-PROGRESS = re.compile(r"tiltsim: [a-z ]+(: .*)?, \d+:\d\d.*")
-"""A line every few seconds of a command that takes long."""
+PROGRESS = re.compile(r"tiltsim: (interrupted|[a-z ]+(: .*)?, \d+:\d\d.*)")
+"""A line every few seconds of a command that takes long, and the last one of an interrupted one."""
 
 
 class HangError(Exception):

@@ -392,6 +392,7 @@ def rename(name):
             lambda: changed('gravity="0 0 -9.81"', 'gravity="0 0 -1e300"'),
             ["option gravity: 1e+300"],
         ),
+        (lambda: changed('pos="0.2 0 0"', 'pos="0 0 0"'), ["'rotor_1' lies in the middle"]),
         (lambda: "<mujoco", ["not XML"]),
         (lambda: "<mujoco><worldbody/></mujoco>", ["no body 'vehicle'"]),
         (lambda: changed('pos="0 0.2 0"', 'pos="0 0.25 0"'), ["'rotor_2' lies at (0, 0.25, 0)"]),

@@ -22,6 +22,18 @@ def test_a_peer_that_fails_is_told(monkeypatch):
         pass
 
 
+def test_a_peer_of_an_interrupted_benchmark_is_silent(monkeypatch, capfd):
+    def interrupted(_peer):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(peers, "find_spec", lambda name: name)
+    monkeypatch.setitem(peers.PEERS, "json", peers.PeerCase(None, 1, 1))
+    monkeypatch.setattr(peers.Peer, "_answer", interrupted)
+    with pytest.raises(KeyboardInterrupt), peers.running("json"):
+        pass
+    assert capfd.readouterr().err == ""
+
+
 @pytest.mark.slow
 def test_rotorpy_is_timed_in_its_own_process():
     pytest.importorskip("rotorpy")

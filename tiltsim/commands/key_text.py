@@ -57,7 +57,7 @@ def description(tables: Sequence[KeyTable], address: str) -> str:
     Raises `InputError`, with the closest address, if there are none.
     """
     plain = address.replace("[", "").replace("]", "")
-    found = [table for table in tables if plain in table.addresses()]
+    found = [table for table in tables if plain and plain in table.addresses()]
     if len(found) > FEW:
         lines = [f"{_narrow(table)}\n{_body(_plain(table.meaning))}" for table in found]
         return "\n".join([*lines, "\ntiltsim schema ADDRESS prints the keys of one of these"])
@@ -74,7 +74,7 @@ def description(tables: Sequence[KeyTable], address: str) -> str:
     if not keys:
         known = [name for table in tables for name in table.addresses() if name]
         hint = did_you_mean(plain, known) + "tiltsim schema --markdown prints them all"
-        raise InputError(f"{address}: no such table or key; {hint}")
+        raise InputError(f"{address or repr(address)}: no such table or key; {hint}")
     return "\n".join(keys)
 
 

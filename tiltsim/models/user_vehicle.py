@@ -259,6 +259,8 @@ def _cross(
     """The parameters of four rotors on a cross, and how the layout differs from one."""
     thrust = pose.compiled.actuator("thrust_1")
     arm = float(np.linalg.norm(pose.point(pose.data.site("rotor_1").xpos)))
+    if arm < SMALLEST:
+        raise ValueError("site 'rotor_1' lies in the middle of the vehicle, without an arm")
     coefficients = float(thrust.gear[2]), abs(float(thrust.gear[5]))
     xx, yy, zz = np.diag(inertia).tolist()
     vehicle = Vehicle(mass, xx, yy, zz, arm, *coefficients, gravity)

@@ -102,7 +102,7 @@ def load_scenario(
     own = kept_functions(source, overrides, given)
     sample_functions(document, own)
     locate_named_files(document, Path())
-    scenario = parse_scenario(document, address, emptied)
+    scenario = _parse(document, address, emptied)
     scenario._own = own
     named = controller is not None or (isinstance(source, Scenario) and source._trusted)
     return with_trust(scenario, named or is_trusted(trusted))
@@ -252,15 +252,12 @@ def apply_overrides(
     return [key for key, value in given if _override(address, document, key, value)]
 
 
-def parse_scenario(
-    document: Mapping[str, Any], address: str = "scenario", emptied: Collection[str] = ()
-) -> Scenario:
+def parse_scenario(document: Mapping[str, Any], address: str = "scenario") -> Scenario:
     """Validate a scenario's document.
 
     Args:
         document: Plain dicts and lists, as read from TOML.
         address: Name of the document in messages.
-        emptied: What `apply_overrides` returned.
 
     Raises:
         InputError: As `load_scenario` does.
@@ -269,8 +266,12 @@ def parse_scenario(
         raise InputError(f"scenario = {short_repr(document)}: must be a dict")
     if not isinstance(address, str):
         raise InputError(f"address = {short_repr(address)}: must be text")
-    document = plain(document)
-    check_limits(document, address)
+    return _parse(document, address)
+
+
+def _parse(document: Mapping[str, Any], address: str, emptied: Collection[str] = ()) -> Scenario:
+    """As `parse_scenario`; ``emptied`` is what `apply_overrides` returned."""
+    check_limits(document := plain(document), address)
     scenario = Scenario.model_validate(document, address=address, emptied=emptied)
     scenario._address = valid_unicode(address)
     return scenario
@@ -286,9 +287,8 @@ def variant_names(file: Path, document: Mapping[str, Any]) -> list[str]:
         try:
             names.append(Variant.model_validate(table).name)
         except ValidationError as error:
-            raise InputError(
-                f"{file}: variant: {one_line_message(error, table, Variant)}"
-            ) from None
+            mistake = one_line_message(error, table, Variant)
+            raise InputError(f"{file}: variant: {mistake}") from None
         if names[-1] in names[:-1]:
             raise InputError(f"{file}: variant.name = {names[-1]!r}: used twice")
     return names

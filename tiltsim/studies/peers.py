@@ -169,8 +169,12 @@ def running(name: str, devices: int = 1) -> Iterator[Peer]:
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         text=True,
+        start_new_session=True,  # keeps Ctrl-C from it
     ) as process:
-        yield Peer(name, process)
+        try:
+            yield Peer(name, process)
+        finally:
+            process.kill()
 
 
 def _serve(name: str) -> None:
