@@ -53,6 +53,16 @@ MISUSES = {
     "a list as scenario": (lambda: tiltsim.simulate([ADDRESS]), "must be a name of the library"),
     "an empty name": (lambda: tiltsim.simulate(""), "name a scenario"),
     "an unknown name": (lambda: tiltsim.simulate("ch04_trackin/setpoint"), "did you mean ch04"),
+    "a name of a table that is too long": (
+        lambda: tiltsim.parse_scenario({"gait": {"type": "table", "file": f"{LONG}.csv"}}),
+        ": cannot be read: ",
+    ),
+    "a name of a flight that is too long": (lambda: tiltsim.load_flight(LONG), "no such file"),
+    "an array as trusted": (
+        lambda: tiltsim.load_scenario(ADDRESS, trusted=np.zeros(2)),
+        "trusted = array([0., 0.]): must be True or False",
+    ),
+    "a text as trusted": (lambda: tiltsim.load_scenario(ADDRESS, trusted="no"), "trusted = 'no'"),
     "a name with a NUL": (lambda: tiltsim.load_scenario("ch04\0"), "no such file"),
     "a name that is too long": (lambda: tiltsim.load_scenario(LONG), "no such file"),
     "a scenario to validate": (

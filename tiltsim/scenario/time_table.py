@@ -13,6 +13,7 @@ from pydantic import Field, PrivateAttr, model_validator
 from tiltsim.errors import InputError
 from tiltsim.scenario.limits import MAX_FILE_SIZE, MAX_ROWS, read_text
 from tiltsim.scenario.table import Table
+from tiltsim.system.files import exists, is_file
 from tiltsim.system.numbers import real_array
 from tiltsim.system.parquet import open_parquet
 from tiltsim.system.text import short_repr
@@ -133,7 +134,7 @@ def _read_rows(file: Path, columns_among: ColumnsAmong) -> list[Values]:
     """Rows of a CSV or Parquet file."""
     if "\0" in str(file):
         raise InputError("a file name has no NUL")
-    if file.exists() and not file.is_file():
+    if exists(file) and not is_file(file):
         raise InputError("not a file")
     if file.suffix.lower() == ".parquet":
         return _read_parquet(file, columns_among)
@@ -154,7 +155,7 @@ def _read_rows(file: Path, columns_among: ColumnsAmong) -> list[Values]:
 
 
 def _read_parquet(file: Path, columns_among: ColumnsAmong) -> list[Values]:
-    if file.is_file() and file.stat().st_size > MAX_FILE_SIZE:
+    if is_file(file) and file.stat().st_size > MAX_FILE_SIZE:
         raise InputError(f"{file.stat().st_size} bytes; at most {MAX_FILE_SIZE}")
     with open_parquet(file) as opened:
         columns = columns_among(opened.schema_arrow.names)

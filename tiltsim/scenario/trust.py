@@ -13,6 +13,7 @@ from tiltsim.errors import InputError
 from tiltsim.scenario.controller import OwnFunctionController
 from tiltsim.scenario.messages import show
 from tiltsim.scenario.scenario import Scenario
+from tiltsim.system.numbers import true_or_false
 
 VARIABLE: Final = "TILTSIM_TRUST"
 """Environment variable that, set to 1, stands for ``--trust``."""
@@ -20,7 +21,7 @@ VARIABLE: Final = "TILTSIM_TRUST"
 
 def is_trusted(option: bool) -> bool:
     """Whether ``--trust`` is given, or the environment variable in its place."""
-    return option or os.environ.get(VARIABLE) == "1"
+    return true_or_false("trusted", option) or os.environ.get(VARIABLE) == "1"
 
 
 def with_trust(scenario: Scenario, trusted: bool = True) -> Scenario:

@@ -46,6 +46,11 @@ def is_folder(path: str | Path) -> bool:
     return os.path.isdir(path)  # noqa: PTH112
 
 
+def exists(path: str | Path) -> bool:
+    """Whether a path exists; no name is too long to ask, unlike with `Path.exists`."""
+    return os.path.exists(path)  # noqa: PTH110
+
+
 def prepare_folder(folder: Path) -> None:
     """Create a folder for results before the flight. Raises `InputError` if that is impossible."""
     _require_possible_name("", folder)

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO, Final
 
 from tiltsim.errors import InputError
+from tiltsim.system.files import exists, is_file
 
 if TYPE_CHECKING:
     import pyarrow
@@ -69,8 +70,8 @@ def open_parquet(file: Path) -> Iterator[Any]:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    if not file.is_file():
-        raise UnreadableError(f"{file}: {'not a file' if file.exists() else 'no such file'}")
+    if not is_file(file):
+        raise UnreadableError(f"{file}: {'not a file' if exists(file) else 'no such file'}")
     try:
         with file.open("rb") as content:  # Arrow itself opens no path that is not UTF-8
             if not _is_intact(content):
