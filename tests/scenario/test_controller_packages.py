@@ -21,7 +21,7 @@ class Table(tiltsim.ScalarController):
     law: Literal["LAW"]
 
     def scalar_law(self, airframe):
-        raise NotImplementedError
+        raise LookupError
 """
 BROKEN = {
     "sys.exit": ("import sys\nsys.exit(7)", "SystemExit: 7"),

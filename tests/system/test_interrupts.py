@@ -16,11 +16,7 @@ import tiltsim.commands.run
 from tests.flights import flight as flight_named
 from tiltsim.cli import main
 from tiltsim.flight.reading import load_flight
-from tiltsim.system.interrupts import (
-    defer_interrupts,
-    reraise_swallowed_interrupts,
-    terminations_as_interrupts,
-)
+from tiltsim.system.interrupts import defer_interrupts, terminations_as_interrupts
 
 CALLED_BACK = ctypes.CFUNCTYPE(None)
 TELLING = """
@@ -43,47 +39,6 @@ def interrupt():
 def call_from_c(function):
     """Call a function as compiled code does: what it raises is reported and dropped."""
     CALLED_BACK(function)()
-
-
-def test_an_interrupt_swallowed_by_c_is_raised_after_the_block():
-    def raises():
-        raise KeyboardInterrupt
-
-    reached = []
-
-    def work():
-        with reraise_swallowed_interrupts():
-            call_from_c(raises)
-            reached.append("goes on")
-
-    with pytest.raises(KeyboardInterrupt):
-        work()
-    assert reached == ["goes on"]
-
-
-def test_an_interrupt_swallowed_by_c_comes_before_what_fails_of_it():
-    def raises():
-        raise KeyboardInterrupt
-
-    def work():
-        with reraise_swallowed_interrupts():
-            call_from_c(raises)
-            raise LookupError
-
-    with pytest.raises(KeyboardInterrupt):
-        work()
-
-
-def test_other_exceptions_swallowed_by_c_are_reported_as_usual(monkeypatch):
-    def raises():
-        raise LookupError
-
-    reported = []
-    monkeypatch.setattr(sys, "unraisablehook", lambda found: reported.append(found.exc_type))
-    with reraise_swallowed_interrupts():
-        call_from_c(raises)
-    call_from_c(raises)
-    assert reported == [LookupError, LookupError]
 
 
 def test_an_interrupt_waits_for_the_block_and_is_raised_after_it():
@@ -116,7 +71,7 @@ def test_other_threads_are_unaffected():
     ran = []
 
     def work():
-        with defer_interrupts(), reraise_swallowed_interrupts():
+        with defer_interrupts():
             ran.append(True)
 
     thread = threading.Thread(target=work)

@@ -45,36 +45,6 @@ def _raise(_number: int, _frame: FrameType | None) -> None:
 
 
 @contextmanager
-def reraise_swallowed_interrupts() -> Iterator[None]:
-    """Raise KeyboardInterrupt after the block, whatever its end, if one was swallowed within it.
-
-    An exception cannot pass through compiled code that calls Python back, as LLVM does while it
-    compiles: Python reports it as unraisable and continues. Only the main thread receives
-    interrupts; in others this has no effect.
-    """
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    before = sys.unraisablehook
-    swallowed = False
-
-    def notice(unraisable: sys.UnraisableHookArgs) -> None:
-        nonlocal swallowed
-        if issubclass(unraisable.exc_type, KeyboardInterrupt):
-            swallowed = True
-        else:
-            before(unraisable)
-
-    sys.unraisablehook = notice
-    try:
-        yield
-    finally:
-        sys.unraisablehook = before
-        if swallowed:
-            raise KeyboardInterrupt
-
-
-@contextmanager
 def defer_interrupts() -> Iterator[None]:
     """Defer an interrupt to the end of the block; a second one is raised immediately.
 

@@ -26,8 +26,7 @@ def scalar(function: Function) -> Function:
 
     Scalar code works on floats, tuples of floats and parameter records; it uses only arithmetic,
     comparisons, the ``math`` module and other scalar functions. Called from Python it is ordinary
-    Python; the native engine compiles the same source, callees before callers, in the order of
-    registration. A marker, not a compiler: importing ``tiltsim_controllers`` never imports numba.
+    Python; for machine code the same source is traced (`tiltsim_controllers.code`).
     """
     _registry.append(function)
     return function
