@@ -132,7 +132,7 @@ def results(program, values):
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "timing"),
-    [("switching", {}), ("everything attitude_altitude", {"control_timestep": 0.004})],
+    [("switching", {}), ("heavy attitude_altitude", {"control_timestep": 0.004})],
     ids=["continuous", "held"],
 )
 def test_compiled_flights_are_those_in_python(name, timing):

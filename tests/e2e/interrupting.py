@@ -20,6 +20,12 @@ from time import monotonic
 
 MEANT = {signal.SIGINT: 130, signal.SIGTERM: 143}
 
+PEER = (
+    'Traceback (most recent call last):\n  File "<string>", line 36, in <module>\n'
+    "BrokenPipeError: [Errno 32] Broken pipe\n"
+)
+"""Last words of the interpreter that glfw starts while MuJoCo is imported, if interrupted."""
+
 PATIENCE = 60.0
 """Time (s) within which an interrupted sweep ends: beyond that of XLA's compiler."""
 
@@ -158,7 +164,7 @@ class Interrupting:
         return self._mistake(number, process.exitcode)
 
     def _mistake(self, number, code):
-        text = self._output.read_text(errors="replace")
+        text = self._output.read_text(errors="replace").removesuffix(PEER)
         self.counts[f"exit code {code}"] += 1
         shown = f"{number.name}: exit code {code}: {text}"
         if "Traceback" in text or "Exception ignored" in text:

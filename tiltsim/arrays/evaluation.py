@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 import inspect
 from collections.abc import Callable, Iterable, Mapping
-from typing import Any
+from typing import Any, cast
 
 from tiltsim.arrays.expressions import DATA_LENGTH, Borrowed, Expressions
 from tiltsim.arrays.values import LiftError, PlainNumberError
@@ -45,7 +45,7 @@ class Frame(Expressions):
             if NEXT not in ends:
                 break
             condition, variables = ends.pop(NEXT)
-            if condition is not True and set(ends) == {RETURN}:
+            if self.lifting.arrays.is_lazy and condition is not True and set(ends) == {RETURN}:
                 return self.otherwise(ends, condition, statements[place:], variables)
             self.line = statement.lineno
             with self.lifting.under(condition):
@@ -62,7 +62,7 @@ class Frame(Expressions):
     def otherwise(
         self, ends: Ends, condition: Any, statements: list[ast.stmt], variables: dict[str, Any]
     ) -> Ends:
-        """Evaluate statements after an early return, lazily where the arrays can.
+        """Evaluate statements after an early return only where they are reached.
 
         Args:
             ends: The early return.
@@ -70,7 +70,7 @@ class Frame(Expressions):
             statements: What follows it.
             variables: As they are without it.
         """
-        arrays, lifting = self.lifting.arrays, self.lifting
+        lifting, arrays = self.lifting, cast(Any, self.lifting.arrays)
         with arrays.side() as side, lifting.under(condition):
             later = self.block(statements, variables)
         if set(later) == {RETURN} and later[RETURN][0] is True:

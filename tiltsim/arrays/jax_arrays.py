@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import operator
 from collections.abc import Callable, Mapping
-from contextlib import AbstractContextManager, nullcontext
 from functools import cache
 from typing import Any, Final
 
@@ -43,6 +42,8 @@ class JaxArrays:
         math.asin: 0.0,
         math.acos: 0.0,
     }
+
+    is_lazy = False  # a batch needs both sides
 
     def __init__(self, dtype: str) -> None:
         import jax
@@ -116,17 +117,6 @@ class JaxArrays:
             return list(filter(self.is_array, found))
 
         return self._jax.jit(call), results
-
-    def side(self) -> AbstractContextManager[None]:
-        """Nothing is lazy: a batch needs both sides."""
-        return nullcontext()
-
-    def joined(self, condition: Any, side: Any) -> AbstractContextManager[None]:
-        """See `side`."""
-        return nullcontext()
-
-    def keep(self, side: Any) -> None:
-        """See `side`."""
 
     def vector(self, values: Any) -> Any:
         """Numbers as an array of one dimension."""

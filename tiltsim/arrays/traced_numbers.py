@@ -68,6 +68,7 @@ class TracedNumbers:
     domains: Final[Mapping[Function, float]] = {}
     refusals = (TraceError,)
     functions = FUNCTIONS
+    is_lazy = True
     both = staticmethod(partial(make, "and"))
     either = staticmethod(partial(make, "or"))
     negated = staticmethod(partial(make, "not"))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from contextlib import AbstractContextManager
 from typing import Any, Protocol
 
 from tiltsim.errors import TiltsimError
@@ -20,7 +19,14 @@ class PlainNumberError(LiftError):
 
 
 class Arrays(Protocol):
-    """The values that scalar functions are lifted to."""
+    """The values that scalar functions are lifted to.
+
+    Attributes:
+        is_lazy: Whether one side of a branch alone is computed; such arrays have the methods
+            ``side``, ``joined`` and ``keep`` of `tiltsim.arrays.traced_numbers.TracedNumbers`.
+    """
+
+    is_lazy: bool
 
     @property
     def functions(self) -> Mapping[Function, Function]:
@@ -48,20 +54,6 @@ class Arrays(Protocol):
 
     def separately(self, function: Function, args: Any, key: Any) -> Any:
         """Call a function in a way that it is compiled on its own."""
-
-    def side(self) -> AbstractContextManager[Any]:
-        """Collect what is computed, for `joined` or `keep`."""
-
-    def joined(self, condition: Any, side: Any) -> AbstractContextManager[None]:
-        """Within this block, `where` by the condition is what a side computes only where it holds.
-
-        Args:
-            condition: Whether the side is computed.
-            side: From `side`.
-        """
-
-    def keep(self, side: Any) -> None:
-        """Compute a side in any case."""
 
     def both(self, first: Any, second: Any) -> Any:
         """Conjunction."""
