@@ -58,10 +58,9 @@ class LoopPrograms:
 
     def _setup(self, user: InputVector) -> tuple[Any, InputVector]:
         """Parameters and knots from their vector."""
-        record = self._loop.parameters
-        return record_with_choices(record, user, self._key.parameters), user[
-            self._loop.record_size :
-        ]
+        loop, choices = self._loop, self._key.parameters
+        parameters = record_with_choices(loop.parameters, user, choices)
+        return parameters, user[loop.record_size :]
 
     @property
     def user_size(self) -> int:

@@ -15,6 +15,7 @@ from tiltsim_controllers.code.tracing import (
     as_condition,
     as_real,
     current_graph,
+    graph_in_use,
     make,
 )
 
@@ -46,8 +47,7 @@ def take(values: Sequence[Number], index: Number) -> Number:
 
 
 def _entry(values: Sequence[Number], place: Expr) -> Number:
-    graph = current_graph()
-    assert graph is not None  # an index is a traced number
+    graph = graph_in_use()
     if isinstance(values, InputVector):
         return graph.known("take_input", [place, values.argument, values.first])
     table: list[Any] = [as_real(value) for value in values]
@@ -66,8 +66,7 @@ def branch(condition: Number, then: Callable[[], Any], otherwise: Callable[[], A
     condition = as_condition(condition)
     if not isinstance(condition, Expr):
         return then() if condition else otherwise()
-    graph, blocks, sizes = current_graph(), [], []
-    assert graph is not None  # a condition is a traced number
+    graph, blocks, sizes = graph_in_use(), [], []
     for function in (then, otherwise):
         with graph.block() as block:
             leaves, build = flatten(function())
