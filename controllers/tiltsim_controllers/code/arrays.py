@@ -32,6 +32,7 @@ class _Namespace:
     It has NumPy's functions of numbers, matrix products, and functions that arrange entries.
     """
 
+    __name__ = "xp"
     pi, nan, inf = math.pi, math.nan, math.inf
 
     def __getattr__(self, name: str) -> Callable[..., Any]:
@@ -58,13 +59,14 @@ class _Namespace:
 
     def array(self, values: Any) -> Any:
         """An array of numbers, vectors or matrices."""
-        if any(map(is_jax, numbers_in(values))):
+        if "jax" in sys.modules and any(map(is_jax, numbers_in(values))):
             import jax.numpy
 
             return jax.numpy.array(values)
-        if any(isinstance(value, Expr | Array) for value in numbers_in(values)):
-            return np.array(values, object).view(Array)
-        return np.array(values, float)
+        made = np.array(values)  # finds out faster whether there are symbolic numbers
+        if made.dtype == object and any(isinstance(value, Expr) for value in made.flat):
+            return made.view(Array)
+        return made if made.dtype == float else np.array(values, float)
 
     def _selected(self, op: str, function: Callable[..., Any], *args: Any) -> Any:
         if any(map(is_jax, args)):
@@ -73,10 +75,14 @@ class _Namespace:
             return getattr(jax.numpy, op)(*args)
         if any(isinstance(value, Expr | Array) for value in args):
             return apply(op, *args)
-        return function(*args)
+        return function(*args)[()]  # a number where all are numbers
 
 
 xp: Final = _Namespace()
+
+for _ufunc, _op in UFUNCS.items():
+    if not hasattr(Expr, _ufunc.__name__):  # NumPy calls methods of the entries of plain arrays
+        setattr(Expr, _ufunc.__name__, lambda *args, op=_op: apply(op, *args))
 
 
 def flatten(value: Any) -> tuple[list[Any], Callable[[Iterable[Any]], Any]]:

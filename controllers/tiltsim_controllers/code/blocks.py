@@ -6,8 +6,11 @@ import sys
 from collections.abc import Callable, Sequence
 from typing import Any
 
+import numpy as np
+
 from tiltsim_controllers.code.arrays import flatten, is_jax, numbers_in, xp
 from tiltsim_controllers.code.messages import refuse
+from tiltsim_controllers.code.noise import WORD, hash_word
 from tiltsim_controllers.code.program import InputVector
 from tiltsim_controllers.code.tracing import (
     Expr,
@@ -35,23 +38,92 @@ def take(values: Sequence[Number], index: Number) -> Number:
         values: Numbers, shape (N,).
         index: From 0 on; NaN for a result of NaN.
     """
+    return take_row(values, index, 1)[0]
+
+
+def take_row(values: Sequence[Number], index: Number, width: int) -> Any:
+    """A row of a table at an index as in `take`, shape (width,).
+
+    Args:
+        values: The rows, one after the other.
+        index: From 0 on; NaN for a result of NaN.
+        width: Length of a row.
+    """
+    last = float(len(values) // width - 1)
     if is_jax(index) or is_jax(values):
         jnp = sys.modules["jax"].numpy
-        place = jnp.clip(jnp.floor(jnp.where(index == index, index, 0.0)), 0, len(values) - 1)
-        return jnp.where(index == index, jnp.asarray(values)[place.astype(int)], jnp.nan)
-    last = float(len(values) - 1)
+        place = jnp.clip(jnp.floor(jnp.where(index == index, index, 0.0)), 0, last)
+        rows = jnp.asarray(values).reshape(-1, width)
+        return jnp.where(index == index, rows[place.astype(int)], jnp.nan)
     place = make("where", make("gt", index, 0.0), index, 0.0)  # NaN becomes 0
     place = make("floor", make("where", make("lt", place, last), place, last))
-    found = _entry(values, place) if isinstance(place, Expr) else values[int(place)]
-    return make("where", make("eq", index, index), found, float("nan"))
+    first, nan = make("mul", place, float(width)), float("nan")
+    if not isinstance(first, Expr):
+        row = xp.array([*values[int(first) : int(first) + width]])
+        return row if index == index else nan * row
+    entries = (_entry(values, first, column) for column in range(width))
+    return xp.array([make("where", make("eq", index, index), entry, nan) for entry in entries])
 
 
-def _entry(values: Sequence[Number], place: Expr) -> Number:
+def take_span(values: Sequence[Number], start: Any, size: int) -> Any:
+    """Entries of a vector from an index on, which is limited to where they exist.
+
+    Args:
+        values: Numbers, shape (N,).
+        start: From 0 on, shape (...).
+        size: Number of entries.
+
+    Returns:
+        The entries, shape (size, ...).
+    """
+    last = len(values) - size
+    if isinstance(start, Expr):
+        place = xp.floor(xp.clip(start, 0.0, float(last)))
+        return xp.array([_entry(values, place, k) for k in range(size)])
+    if is_jax(start) or is_jax(values):
+        jnp = sys.modules["jax"].numpy
+        first = jnp.clip(jnp.asarray(start), 0, last).astype(int)
+        return jnp.asarray(values)[first + jnp.arange(size).reshape(-1, *[1] * first.ndim)]
+    first = np.clip(np.asarray(start), 0, last).astype(int)
+    offsets = np.arange(size).reshape(-1, *[1] * first.ndim)
+    if isinstance(values, np.ndarray):
+        return values[first + offsets]
+    return xp.array([values[int(first) + k] for k in range(size)])
+
+
+def _entry(values: Sequence[Number], first: Expr, column: int) -> Number:
+    """The entry of a column of the row that begins at a traced place."""
     graph = graph_in_use()
     if isinstance(values, InputVector):
-        return graph.known("take_input", [place, values.argument, values.first])
-    table: list[Any] = [as_real(value) for value in values]
-    return graph.known("take", [place, *table])
+        return graph.known("take_input", [first, values.argument, values.first + column])
+    return graph.known("take", [first, *map(as_real, values[column:])])
+
+
+def uniform(*integers: Number) -> Number:
+    """A uniform draw from (0, 1); see `tiltsim_controllers.code.noise.uniform`.
+
+    Args:
+        integers: Seed, channel and index.
+    """
+    if not any(map(is_jax, integers)):
+        return make("uniform", *integers)
+    jax = sys.modules["jax"]
+    whole = jax.numpy.int64 if jax.config.jax_enable_x64 else jax.numpy.uint32
+    word = whole(0)
+    for integer in integers:
+        word = hash_word((word + jax.numpy.asarray(integer).astype(whole)) & whole(WORD), whole)
+    return (word + 0.5) / 4294967296.0
+
+
+def normal(seed: Number, channel: Number, index: Number) -> Number:
+    """A draw from the standard normal distribution (Box and Muller, 1958), below 6.7 in magnitude.
+
+    Args:
+        seed, channel, index: Integers, of which the lowest 32 bits are used. It uses the channels
+            ``2 channel`` and ``2 channel + 1`` of `uniform`.
+    """
+    radius = xp.sqrt(-2.0 * xp.log(uniform(seed, 2.0 * channel, index)))
+    return radius * xp.cos(2.0 * xp.pi * uniform(seed, 2.0 * channel + 1.0, index))
 
 
 def branch(condition: Number, then: Callable[[], Any], otherwise: Callable[[], Any]) -> Any:

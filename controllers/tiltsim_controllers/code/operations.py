@@ -9,7 +9,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from tiltsim_controllers.mathematics.noise import uniform
+from tiltsim_controllers.code.noise import uniform
 
 
 class Operation(NamedTuple):

@@ -85,18 +85,19 @@ class Expr:
 
 def _binary(op: str, *, swapped: bool = False) -> Callable[[Expr, Any], Any]:
     def operator(self: Expr, other: Any) -> Any:
+        if not isinstance(other, Expr) and getattr(other, "__array_ufunc__", self) is None:
+            return NotImplemented  # a class that has operators with numbers
         return apply(op, other, self) if swapped else apply(op, self, other)
 
     return operator
 
 
-for _op in ("add", "sub", "mul", "and", "or", "pow"):
-    setattr(Expr, f"__{_op}__", _binary(_op))
-    setattr(Expr, f"__r{_op}__", _binary(_op, swapped=True))
+for _op in ("add", "sub", "mul", "and", "or", "pow", "div", "remainder"):
+    _name = {"div": "truediv", "remainder": "mod"}.get(_op, _op)
+    setattr(Expr, f"__{_name}__", _binary(_op))
+    setattr(Expr, f"__r{_name}__", _binary(_op, swapped=True))
 for _op in ("lt", "le", "gt", "ge", "eq", "ne"):
     setattr(Expr, f"__{_op}__", _binary(_op))
-Expr.__truediv__, Expr.__rtruediv__ = _binary("div"), _binary("div", swapped=True)
-Expr.__mod__, Expr.__rmod__ = _binary("remainder"), _binary("remainder", swapped=True)
 
 
 class Array(np.ndarray):
@@ -354,9 +355,9 @@ def _folded(op: str, x: Number, y: Number = None) -> Number | None:
         return y
     if op == "mul" and -1.0 in (a, b):
         return make("neg", y if a == -1.0 else x)
-    if op == "pow" and b == 2.0:
-        return make("mul", x, x)
-    return None
+    if op in ("mul", "div") and (_is_negative(x) or _is_negative(y)):  # the sign goes on to a sum
+        return make("neg", make(op, x.args[0], y) if _is_negative(x) else make(op, x, y.args[0]))
+    return make("mul", x, x) if op == "pow" and b == 2.0 else None
 
 
 def remainder(a: Number, b: Number) -> Number:

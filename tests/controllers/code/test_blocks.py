@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.controllers.code.test_programs import SPECIAL, same
-from tests.natively import machine_code
+from tests.natively import machine_code, machine_code_in_lanes
 from tiltsim_controllers.code.arrays import flatten, xp
 from tiltsim_controllers.code.blocks import branch, repeat, signal, take
 from tiltsim_controllers.code.casadi_function import casadi_function
@@ -85,6 +85,15 @@ def test_python_machine_code_and_numpy_agree(function):
         if not np.isfinite(x).all():
             continue  # zeros of matrices hide infinity and NaN from programs
         np.testing.assert_allclose(eager, result, rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize("lanes", [2, 4, 8])
+@pytest.mark.parametrize("function", [everything, nested])
+def test_lanes_that_take_different_ways_keep_the_bits_of_each(function, lanes):
+    program = traced(function, 3)
+    law, rows = python_function(program), [x.tolist() for x in points(function)]
+    for x, found in zip(rows, machine_code_in_lanes(program, lanes)(rows), strict=True):
+        assert same(law(x), found), x
 
 
 @pytest.mark.parametrize("function", [everything, nested])

@@ -8,7 +8,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from tests.natively import machine_code
+from tests.natively import machine_code, machine_code_in_lanes
 from tiltsim_controllers.code.blocks import take
 from tiltsim_controllers.code.messages import TraceError
 from tiltsim_controllers.code.operations import CONDITIONS, OPERATIONS
@@ -46,6 +46,8 @@ def test_python_and_machine_code_agree_in_every_bit(op):
         assert same(result, native(x)), (op, x)
         if op not in ("and", "or", "not", "where"):  # of conditions, here of numbers
             assert same(result, [float(value(*x))]), (op, x)
+    for x, found in zip(points, machine_code_in_lanes(program, 8)(points), strict=True):
+        assert same(law(list(x)), found), (op, x)
 
 
 def test_python_s_remainder():
@@ -87,6 +89,14 @@ def test_neutral_numbers_fold():
     assert python_function(program)([3.0]) == (3.0, 3.0, 3.0, 3.0, 3.0, 0.0, 9.0, 3.0)
 
 
+def test_signs_go_on_to_sums():
+    program = trace_vectors(lambda x: [x[2] + -x[0] * x[1], x[2] - x[0] / -x[1]], {"x": 3})
+    operations = [o.op for o in program.block.operations if o.op not in ("in", "neg")]
+    assert operations == ["mul", "sub", "div", "add"]
+    assert "neg" not in [o.op for o in program.block.operations]
+    assert python_function(program)([3.0, 2.0, 1.0]) == (-5.0, 2.5)
+
+
 def test_opposite_zeros_are_no_common_operation():
     program = trace_vectors(lambda x: [make("copysign", x[0], z) for z in (0.0, -0.0)], {"x": 1})
     assert python_function(program)([2.0]) == (2.0, -2.0)
@@ -109,6 +119,10 @@ def test_an_index_is_rounded_down_and_limited(index, entry):
     assert take(TABLE, index) == entry
     x[0] = math.nan
     assert all(map(math.isnan, machine_code(program)(x)))
+    others = [[one, 1.0, 1.0, 4.0, 9.0, 16.0] for one, _ in LOOKED_UP]
+    found = machine_code_in_lanes(program, 4)([*others, x])
+    assert found[:-1] == [[looked_up] * 3 for _, looked_up in LOOKED_UP]
+    assert all(map(math.isnan, found[-1]))
 
 
 def test_parts_of_an_input_are_parts_of_its_memory():
