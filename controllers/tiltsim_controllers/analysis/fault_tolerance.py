@@ -31,9 +31,10 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from tiltsim_controllers.analysis.singularity import force_matrix, torque_matrix
-from tiltsim_controllers.laws.full_pose import pose_rows
-from tiltsim_controllers.vehicle.decoupling_matrix import sines_and_cosines, torque_entries
+from tiltsim_controllers.laws.full_pose import input_matrix
+from tiltsim_controllers.vehicle.effectiveness import cross_table
 from tiltsim_controllers.vehicle.parameters import SPIN, drag_ratio
+from tiltsim_controllers.vehicle.rotors import rotors_in
 from tiltsim_controllers.vehicle.states import ROTORS
 
 if TYPE_CHECKING:
@@ -74,14 +75,13 @@ def pose_matrix(tilts: Quad, rotor_speeds: Quad, vehicle: Vehicle, lost: int | N
         vehicle: the tiltrotor
         lost: failed rotor, 1 to 4, or None
     """
-    w = [spin * speed * speed for spin, speed in zip(SPIN, rotor_speeds, strict=True)]
-    trig = sines_and_cosines(*tilts)
-    torque = torque_entries(trig, drag_ratio(vehicle))
-    weight = vehicle.mass * vehicle.gravity / vehicle.thrust_coefficient
-    rows = np.array(pose_rows(trig, torque, (w[0], w[1], w[2], w[3])))
+    w = np.array(SPIN) * np.square(rotor_speeds)
+    rotors = rotors_in(cross_table(vehicle, tilting=True), 0, (0, 1, 2, 3))
+    torque, force = np.split(input_matrix(rotors, np.array(tilts), w), 2)
+    rows = np.vstack([force, torque / vehicle.arm_length]) / (vehicle.mass * vehicle.gravity)
     rows[:, :4] *= w
     sound = [column for column in range(8) if lost is None or column % 4 != lost - 1]
-    return np.asarray(rows[:, sound] / weight)
+    return np.asarray(rows[:, sound])
 
 
 def _hover(tilts: Quad, rotor_speeds: Quad, vehicle: Vehicle, lost: int | None) -> Hover:

@@ -23,7 +23,7 @@ from tiltsim_controllers.analysis.two_color_planner import (
     rectangle,
 )
 from tiltsim_controllers.gaits import plans
-from tiltsim_controllers.gaits.two_color import BLUE, colored_angles
+from tiltsim_controllers.gaits.colors import colored_angles
 from tiltsim_controllers.vehicle.parameters import PRESETS, drag_ratio
 
 if TYPE_CHECKING:
@@ -92,7 +92,7 @@ def _fixed(key: str, angles: Sequence[float], color: str | None = None) -> Publi
 
 def _on_exact_lines(key: str, points: Sequence[tuple[float, float]]) -> Gait:
     ratio = drag_ratio(_AR_DRONE)
-    angles = [(a, b, *colored_angles(a, b, BLUE, ratio)) for a, b in points]
+    angles = [(a, b, *colored_angles(a, b, "blue", ratio)) for a, b in points]
     if len(angles) == 1:
         return plans.fixed(angles[0], name=f"{key}, exact blue")
     return plans.waypoints(angles, _PERIOD)

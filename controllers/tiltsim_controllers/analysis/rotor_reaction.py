@@ -55,7 +55,7 @@ def reaction_gains(
         rotor_inertia: Of one rotor about its axis, kg m^2.
         decoupling: The form of the decoupling matrix.
         dimension: How many components of force are controlled.
-        norm: In which the controller's inputs are the least, of `multirotor_inputs.NORMS`.
+        norm: In which the controller's inputs are the least, of `multirotor_steps.NORMS`.
     """
     turning = [(tilts, speeds) for tilts, speeds in hovers if np.all(speeds)]
     if not turning:

@@ -24,7 +24,7 @@ import numpy as np
 
 from tiltsim_controllers.analysis.two_color_map import point_p, red_residual
 from tiltsim_controllers.gaits import plans
-from tiltsim_controllers.gaits.two_color import colored_angles
+from tiltsim_controllers.gaits.colors import colored_angles, require_color
 from tiltsim_controllers.vehicle.parameters import drag_ratio
 
 if TYPE_CHECKING:
@@ -208,13 +208,13 @@ def four_angle_gait(
     rows: list[tuple[float, ...]] = []
     steps = iter(lengths)
     for leg in path.legs:
-        code = plans.color_code(leg.color)
+        require_color(leg.color)
         for index, (first, second) in enumerate(leg.vertices):
             if index:
                 covered += next(steps)
             elif rows:
                 continue  # the end of the previous leg, with the same four angles
-            back = colored_angles(first, second, code, ratio)
+            back = colored_angles(first, second, leg.color, ratio)
             rows.append((covered / total, first, second, *back))
     rows[-1] = (1.0, *rows[-1][1:])
     return plans.keyframes(rows, period, name=name, source=source)
@@ -228,7 +228,7 @@ class _Piece(NamedTuple):
 def _pieces(path: Path) -> list[_Piece]:
     """The path as smooth pieces; raises ValueError for an invalid path."""
     if isinstance(path, Circle):
-        plans.color_code(path.color)
+        require_color(path.color)
         if not (all(map(isfinite, (*path.centre, path.radius))) and path.radius > 0.0):
             raise ValueError(
                 f"circle at {path.centre}, radius {path.radius}: the radius must be positive, all "
@@ -244,7 +244,7 @@ def _pieces(path: Path) -> list[_Piece]:
 
     pieces = []
     for leg in path.legs:
-        plans.color_code(leg.color)
+        require_color(leg.color)
         if len(leg.vertices) < 2 or not np.isfinite(leg.vertices).all():
             raise ValueError(f"{leg.color} leg {list(leg.vertices)}: needs two finite points")
         for start, end in pairwise(leg.vertices):

@@ -1,7 +1,9 @@
 """Planned gaits with name, source and properties, and their constructors.
 
-A `Gait` combines the parameters and knots of `tiltsim_controllers.gaits.tilts.tilt_reference` with
-the gait's name and source, and computes its period, amplitude, continuity and largest rate.
+A `Gait` combines the parameters and knots of `tiltsim_controllers.gaits.motion` with the gait's
+name and source, and computes its period, amplitude, continuity and largest rate. Every constructor
+makes pieces of polynomials or a harmonic motion, so that a new type of gait needs no code that
+evaluates it.
 """
 
 from __future__ import annotations
@@ -9,26 +11,22 @@ from __future__ import annotations
 import itertools
 from dataclasses import dataclass, replace
 from math import inf, isfinite, pi
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from tiltsim_controllers.gaits import tabulated
-from tiltsim_controllers.gaits.any_tilts import Jets, tilt_motion_of
 from tiltsim_controllers.gaits.cat import FOOTFALLS, cat_keyframes
+from tiltsim_controllers.gaits.colors import colored_angles
+from tiltsim_controllers.gaits.motion import planned_tilts, tilt_motion_of
 from tiltsim_controllers.gaits.parameters import (
+    CUBIC,
     FIXED,
-    KEYFRAMES,
+    HARMONIC,
+    LINEAR,
     NO_KNOTS,
-    PENGUIN,
-    ROTATING,
-    TABLE,
-    TROT_CONTINUOUS,
-    TROT_INSTANT,
-    TWO_COLOR_CIRCLE,
+    POWERS,
     GaitParameters,
 )
-from tiltsim_controllers.gaits.two_color import COLORS
 from tiltsim_controllers.mathematics.splines import spline_knots
 from tiltsim_controllers.vehicle.parameters import drag_ratio
 
@@ -40,16 +38,22 @@ if TYPE_CHECKING:
     from tiltsim_controllers.mathematics.scalar import Floats
     from tiltsim_controllers.vehicle.parameters import Vehicle
 
+_JUMP: Final = 1e-9
+"""Change of an angle (rad) between two pieces that is more than rounding."""
 
-_TABLE_SAMPLES: Final = 20_000
-"""Samples in which the extremes of a table are sought."""
+_AFTER: Final = 1.0 + 2.0**-52
+"""Factor that moves a time just beyond itself: a trot's half period includes its end (ch. 4)."""
 
 
 @dataclass(frozen=True)
 class Gait:
-    """A gait ready to be flown: pass `parameters` and `knots` to `tilt_reference`.
+    """A gait ready to be flown.
 
-    Another number of tilts than four has `tilt_motion_of`.
+    Attributes:
+        name: Of the gait.
+        parameters, knots: As `planned_tilts` takes them.
+        source: Where it comes from.
+        tilts: Number of tilt angles.
     """
 
     name: str
@@ -67,63 +71,38 @@ class Gait:
     def period(self) -> float | None:
         """Seconds after which the gait repeats; None for a constant gait.
 
-        Of a table that does not repeat, its length.
+        For a table that does not repeat, its length.
         """
         return None if self.is_constant else self.parameters.period
 
     @property
     def is_continuous(self) -> bool:
         """Whether the tilt angles are continuous in time (ch. 6, Definition 1)."""
-        if self.parameters.type in {TROT_INSTANT, PENGUIN}:
-            return self.parameters.amplitude * self.parameters.scale == 0.0
-        rows = self._rows()
-        if rows is None:
+        if self.is_constant or self.parameters.type == HARMONIC:
             return True
-        closed = bool(np.array_equal(rows[0, 1:], rows[-1, 1:]))
-        jumps = np.diff(rows[:, 0]) == 0.0
-        return closed and not np.diff(rows[:, 1:], axis=0)[jumps].any()
+        starts, spans, pieces = self._pieces()
+        stops = np.array([np.polyval(piece, span) for piece, span in zip(pieces, spans)])
+        jumps = np.abs(np.roll(pieces[:, -1], -1, axis=0) - stops) > _JUMP
+        return not jumps[: None if self.parameters.repeats else len(starts) - 1].any()
 
     @property
     def amplitude(self) -> float:
         """The largest magnitude (rad) of any tilt angle."""
-        if self.parameters.type == ROTATING:
-            return inf
-        rows = self._rows()
-        if rows is not None:
-            return float(np.abs(rows[:, 1:]).max())
-        if self.parameters.type == TABLE:
-            return float(np.abs(self._table_motion()[0]).max())
-        # The other types reach their extremes at quarters of the period.
-        quarters = np.arange(4) / 4.0 * self.parameters.period
-        return float(np.abs(self.angles(quarters)).max())
+        return self._largest(0)
 
     @property
     def max_rate(self) -> float:
         """The largest magnitude (rad/s) of any tilt rate; infinite where angles jump."""
-        if not self.is_continuous:
-            return inf
-        rows = self._rows()
-        if rows is not None:
-            steps = np.diff(rows, axis=0)
-            steps = steps[steps[:, 0] > 0.0]
-            slopes = steps[:, 1:] / steps[:, :1] / self.parameters.period
-            return float(np.abs(slopes).max())
-        if self.parameters.type == TABLE:
-            return float(np.abs(self._table_motion()[1]).max())
-        eighths = np.arange(8) / 8.0 * self.parameters.period
-        return float(np.abs(self.rates(eighths)).max())
+        return self._largest(1) if self.is_continuous else inf
 
     @property
     def min_segment_time(self) -> float:
         """The shortest time (s) between two corners; infinite without corners, 0 with jumps."""
         if not self.is_continuous:
             return 0.0
-        rows = self._rows()
-        if rows is not None:
-            return float(np.diff(rows[:, 0]).min()) * self.parameters.period
-        return 0.5 * self.parameters.period if self.parameters.type == TROT_CONTINUOUS else inf
+        return float(self._pieces()[1].min()) if self.parameters.type == LINEAR else inf
 
-    def jets(self, time: float) -> Jets:
+    def jets(self, time: float) -> Any:
         """Tilt angles (rad), rates (rad/s) and accelerations (rad/s^2) at a time (s), by tilt."""
         return tilt_motion_of(self.tilts).planned(time, self.parameters, self.knots)
 
@@ -136,17 +115,14 @@ class Gait:
         return self._evaluate(time)[..., 1]
 
     def sample_times(self, samples: int = 201) -> Floats:
-        """Times (s) over one period, with ends and keyframes; only 0 for a constant gait."""
+        """Times (s) over one period, with ends and corners; only 0 for a constant gait."""
         if self.is_constant:
             return np.zeros(1)
-        phases = np.linspace(0.0, 1.0, samples)
-        rows = self._rows()
-        if rows is not None:
-            phases = np.union1d(phases, rows[:, 0])
-        if not self.is_continuous:
-            # The end of the period belongs to the next one, past the jump.
-            phases = phases[:-1]
-        return np.asarray(phases * self.parameters.period)
+        times = np.linspace(0.0, 1.0, samples) * self.parameters.period
+        if self.parameters.type == LINEAR:
+            times = np.union1d(times, self._pieces()[0])
+        # The end of the period belongs to the next one, past the jump.
+        return times if self.is_continuous else times[:-1]
 
     def scaled(self, divisor: float) -> Gait:
         """The gait with all tilt angles divided by ``divisor`` (ch. 5, Eq. 16).
@@ -167,65 +143,101 @@ class Gait:
         name = self.name if eta == 1.0 else f"{self.name}, biased {eta:.0%}"
         return replace(self, name=name, parameters=parameters)
 
-    def _rows(self) -> Floats | None:
-        """The keyframes as flown, shape (N, 1 + tilts); None for gaits without them."""
-        if self.parameters.type != KEYFRAMES:
-            return None
-        rows = np.reshape(self.knots, (-1, 1 + self.tilts))[: int(self.parameters.keyframes)].copy()
-        rows[:, 1:] *= self.parameters.scale
-        rows[:, 3:] *= self.parameters.bias
-        return rows
+    def _factors(self) -> Floats:
+        """Scale and bias of every tilt angle, shape (tilts,)."""
+        back = (np.arange(self.tilts) >= 2) & (self.tilts == 4)
+        return self.parameters.scale * np.where(back, self.parameters.bias, 1.0)
 
-    def _table_motion(self) -> tuple[Floats, Floats]:
-        """Tilt angles and rates of a table as flown, close together, each of shape (..., tilts)."""
-        rows = np.reshape(self.knots, (-1, 1 + self.tilts * tabulated.COEFFICIENTS))
-        pieces = rows[:-1, 1:].reshape(len(rows) - 1, 1, self.tilts, tabulated.COEFFICIENTS)
-        third, second, first, value = np.moveaxis(pieces, -1, 0)
-        parts = np.linspace(0.0, 1.0, 2 + _TABLE_SAMPLES // len(rows))
-        since = (np.diff(rows[:, 0])[:, np.newaxis] * parts)[..., np.newaxis]
-        angles = ((third * since + second) * since + first) * since + value
-        rates = (3.0 * third * since + 2.0 * second) * since + first
-        back = np.arange(self.tilts) >= 2
-        scale = self.parameters.scale * np.where(back, self.parameters.bias, 1.0)
-        return scale * angles, scale * rates
+    def _pieces(self) -> tuple[Floats, Floats, Floats]:
+        """Starts and lengths (s) of the pieces, and polynomials, shape (pieces, powers, tilts)."""
+        powers, count = POWERS[self.parameters.type], int(self.parameters.keyframes)
+        size = 1 + powers * self.tilts
+        rows = np.reshape(self.knots[: count * size], (count, size))
+        starts = rows[:, 0]
+        spans = np.diff([*starts, max(self.parameters.period, starts[-1])])
+        pieces = rows[:, 1:].reshape(count, self.tilts, powers).swapaxes(1, 2)
+        return starts, spans, pieces * self._factors()
+
+    def _largest(self, order: int) -> float:
+        """The largest magnitude of the angles, or of their derivatives of first order."""
+        if not self.tilts:
+            return 0.0
+        if self.parameters.type == HARMONIC:
+            mean, *sides = np.reshape(self.knots[: 3 * self.tilts], (-1, 3)).T
+            turning = (2.0 * pi / self.parameters.period) ** order
+            extremes = turning * np.hypot(*sides) + (np.abs(mean) if order == 0 else 0.0)
+            return float(np.abs(self._factors() * extremes).max())
+        _, spans, pieces = self._pieces()
+        found = [0.0]
+        for span, piece in zip(spans, pieces):
+            for polynomial in map(np.poly1d, piece.T):
+                curve = polynomial.deriv(order)
+                turns = curve.deriv().roots if curve.order > 1 else ()
+                inner = (t.real for t in turns if t.imag == 0.0 and 0.0 < t.real < span)
+                found += [abs(curve(t)) for t in (0.0, span, *inner)]
+        return (
+            inf if not (self.parameters.repeats or order) and pieces[-1][:-1].any() else max(found)
+        )
 
     def _evaluate(self, time: ArrayLike) -> Floats:
         times = np.asarray(time, dtype=float)
-        jets = [self.jets(t) for t in times.ravel().tolist()]
-        return np.reshape(np.asarray(jets, dtype=float), (*times.shape, self.tilts, 3))
+        motion = planned_tilts(times, self.parameters, np.array(self.knots), self.tilts)
+        return np.moveaxis(motion, (0, 1), (-2, -1))
 
 
 def fixed(angles: Sequence[float], *, name: str = "fixed", source: str = "") -> Gait:
     """Constant tilt angles (rad) (ch. 3; ch. 4, Eq. 32), of any number of tilts."""
-    values = tuple(map(float, angles))
-    if len(values) == 4:
-        return Gait(name, GaitParameters(FIXED, *values), source=source)
-    return Gait(name, GaitParameters(FIXED), values or NO_KNOTS, source, len(values))
+    knots = (0.0, *[float(angle) for angle in angles])
+    return Gait(name, GaitParameters(FIXED), knots, source, len(angles))
+
+
+def _swinging(
+    name: str, source: str, period: float, signs: Sequence[float], pieces: Sequence[Sequence[float]]
+) -> Gait:
+    """A gait whose tilt angles move together, up to their signs.
+
+    Args:
+        name, source: Of the gait.
+        period: s
+        signs: Of the tilt angles.
+        pieces: Start (s), rate (rad/s) and value (rad) of each.
+    """
+    knots = [
+        (start, *[entry for sign in signs for entry in (sign * rate, sign * value)])
+        for start, rate, value in pieces
+    ]
+    parameters = GaitParameters(LINEAR, period=_positive(period), keyframes=float(len(pieces)))
+    return Gait(name, parameters, tuple([v for row in knots for v in row]), source, len(signs))
+
+
+_TROT: Final = (-1.0, -1.0, 1.0, 1.0)
+"""Diagonal symmetry, ``-alpha_1 = -alpha_2 = alpha_3 = alpha_4 = rho`` (ch. 4, Eqs. 21-24)."""
 
 
 def instant_trot(amplitude: float, period: float) -> Gait:
-    """The trot that jumps between plus and minus the amplitude (rad) (ch. 4, Eq. 33)."""
-    parameters = GaitParameters(TROT_INSTANT, amplitude=amplitude, period=_positive(period))
-    return Gait("trot_instant", parameters, source="ch. 4, Sec. 4.2")
+    """``rho`` switches between plus and minus the amplitude (rad) (ch. 4, Eq. 33)."""
+    pieces = [(0.0, 0.0, amplitude), (0.5 * period * _AFTER, 0.0, -amplitude)]
+    return _swinging("trot_instant", "ch. 4, Sec. 4.2", period, _TROT, pieces)
 
 
 def continuous_trot(amplitude: float, period: float) -> Gait:
-    """The trot at constant rate between plus and minus the amplitude (rad) (ch. 4, Eq. 34)."""
-    parameters = GaitParameters(TROT_CONTINUOUS, amplitude=amplitude, period=_positive(period))
-    return Gait("trot_continuous", parameters, source="ch. 4, Sec. 4.3")
+    """``rho`` moves from plus to minus the amplitude (rad) and back (ch. 4, Eq. 34)."""
+    rate = 4.0 * amplitude / _positive(period)
+    pieces = [(0.0, -rate, amplitude), (0.5 * period * _AFTER, rate, -amplitude)]
+    return _swinging("trot_continuous", "ch. 4, Sec. 4.3", period, _TROT, pieces)
 
 
 def penguin(name: str, amplitude: float, period: float) -> Gait:
     """The tilt-car's swing between minus and plus the amplitude (rad) (ch. 11, Sec. 3)."""
-    parameters = GaitParameters(PENGUIN, amplitude=amplitude, period=_positive(period))
-    return Gait(name, parameters, source="ch. 11, Sec. 3, Figs. 7 and 8")
+    pieces = [(0.0, 0.0, -amplitude), (0.5 * period, 0.0, amplitude)]
+    return _swinging(name, "ch. 11, Sec. 3, Figs. 7 and 8", period, (1.0,), pieces)
 
 
 def rotating(start: float, rate: float) -> Gait:
     """A tilt that grows from ``start`` (rad) at a constant rate (rad/s) (ch. 10, Eq. 18)."""
     period = _positive(2.0 * pi / abs(rate)) if rate else 1.0
-    parameters = GaitParameters(ROTATING, angle_1=start, rate=rate, period=period)
-    return Gait("rotating", parameters, source="ch. 10, Eq. (18)")
+    gait = _swinging("rotating", "ch. 10, Eq. (18)", period, (1.0,), [(0.0, rate, start)])
+    return replace(gait, parameters=gait.parameters._replace(repeats=0.0))
 
 
 def cat(name: str, amplitude: float, period: float, lean: float = 0.0) -> Gait:
@@ -309,8 +321,20 @@ def keyframes(
         raise ValueError(f"keyframe phases {phases}: only one row may be at 0 and one at 1")
     if any(third == first for first, third in zip(phases, phases[2:], strict=False)):
         raise ValueError(f"keyframe phases {phases}: at most two rows may share a phase")
-    parameters = GaitParameters(KEYFRAMES, period=_positive(period), keyframes=float(len(frames)))
-    knots = tuple(value for frame in frames for value in frame)
+    pieces = [
+        (
+            first[0] * period,
+            *[
+                entry
+                for before, after in zip(first[1:], second[1:])
+                # Two rows at one phase make a jump, whose piece is never in force.
+                for entry in ((after - before) / max(second[0] - first[0], 1e-12) / period, before)
+            ],
+        )
+        for first, second in itertools.pairwise(frames)
+    ]
+    knots = tuple([value for row in pieces for value in row])
+    parameters = GaitParameters(LINEAR, period=_positive(period), keyframes=float(len(pieces)))
     return Gait(name, parameters, knots, source, tilts)
 
 
@@ -327,9 +351,9 @@ def table(times: Sequence[float], angles: Sequence[Sequence[float]], *, repeats:
     """
     ends = "periodic" if repeats else None
     degree = 3 if repeats else min(3, len(times) - 1)
-    knots = spline_knots(times, angles, tabulated.COEFFICIENTS, degree=degree, ends=ends)
+    knots = spline_knots(times, angles, POWERS[CUBIC], degree=degree, ends=ends)
     parameters = GaitParameters(
-        TABLE,
+        CUBIC,
         period=_positive(times[-1]),
         keyframes=float(len(times) - repeats),
         repeats=float(repeats),
@@ -347,7 +371,7 @@ def two_color_circle(
     name: str = "two_color",
     source: str = "",
 ) -> Gait:
-    """A circle in the alpha_1-alpha_2 plane on one colour (ch. 8, Sec. 4).
+    """A circle in the alpha_1-alpha_2 plane on one color (ch. 8, Sec. 4).
 
     Args:
         centre, radius: ``(alpha_1, alpha_2)`` of the centre and the radius, rad
@@ -357,25 +381,16 @@ def two_color_circle(
         name, source: name and origin of the gait
 
     Raises:
-        ValueError: If the colour is unknown or the period not positive.
+        ValueError: If the color is unknown or the period not positive.
     """
-    parameters = GaitParameters(
-        TWO_COLOR_CIRCLE,
-        period=_positive(period),
-        centre_1=centre[0],
-        centre_2=centre[1],
-        radius=radius,
-        color=color_code(color),
-        drag_ratio=drag_ratio(vehicle),
-    )
-    return Gait(name, parameters, source=source)
-
-
-def color_code(color: str) -> float:
-    """The code of a colour's name; raises ValueError for any other name."""
-    if color not in COLORS:
-        raise ValueError(f"{color!r} is not a color; choose {', '.join(COLORS)}")
-    return COLORS[color]
+    # Mean, cosine and sine; the lines of a color have an offset, which only the mean takes.
+    ratio = drag_ratio(vehicle)
+    third, fourth = colored_angles(centre[0], centre[1], color, ratio)
+    slope = 1.0 if color == "red" else -1.0
+    front = (centre[0], radius, 0.0, centre[1], 0.0, radius)
+    back = (third, slope * radius, 0.0, fourth, 0.0, slope * radius)
+    parameters = GaitParameters(HARMONIC, period=_positive(period))
+    return Gait(name, parameters, (*front, *back), source)
 
 
 def _positive(period: float) -> float:

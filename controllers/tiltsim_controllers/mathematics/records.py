@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from functools import cache
 from itertools import islice
-from typing import Any, NamedTuple, TypeVar, get_type_hints
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, get_type_hints
 
 import numpy as np
 
@@ -51,30 +51,27 @@ def unflatten(record_type: type[Record], values: Iterable[float]) -> Record:
     return record
 
 
-def slotted(record: Any) -> Any:
-    """Return the same fields in an object with slots, which Python reads several times faster.
-
-    For the parameters of a controller that is evaluated a hundred thousand times.
-    """
-    if not _is_record(type(record)):
-        return record
-    fields: tuple[str, ...] = record._fields
-    view = type(type(record).__name__, (), {"__slots__": fields})()
-    for name, value in zip(fields, record):
-        setattr(view, name, slotted(value))
-    return view
-
-
 def make_record_type(name: str, **fields: type) -> Any:
     """Create a record type with these fields, for records of types known only at run time."""
     made: Any = NamedTuple(name, list(fields.items()))  # type: ignore[misc]
     return made
 
 
+def changed_record(record: Any, **fields: type) -> Any:
+    """A record type whose fields are partly of other types."""
+    return make_record_type(record.__name__, **{**_fields(record), **fields})
+
+
 @cache
 def vector_of(length: int) -> type:
     """The type of a field with so many floats: a tuple in Python, an array in native code."""
     return type(f"Vector{length}", (tuple,), {"length": length})
+
+
+if TYPE_CHECKING:
+    Vector3 = Any
+else:
+    Vector3 = vector_of(3)  # the type of a field with three floats: an array in NumPy functions
 
 
 def _take(kind: Any, values: Iterator[float]) -> Any:

@@ -1,6 +1,6 @@
-"""Splines as knots: rows of the time at which a polynomial begins, and its coefficients.
+"""Splines as rows of the time at which a polynomial begins, and its coefficients.
 
-They are computed once; a flight evaluates them, in Python or in native code.
+`tiltsim_controllers.mathematics.pieces` evaluates them.
 """
 
 from __future__ import annotations
@@ -12,49 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tiltsim_controllers.mathematics.scalar import Values, Vector, affine_in, scalar
-
-
-@scalar
-def row_at(position: float, rows: int, begin: int, size: int, knots: Vector) -> int:
-    """Index of the last row that begins at or before a position; the first row if none does.
-
-    Args:
-        position: time, or a fraction of a period
-        rows: how many there are, in increasing order
-        begin: index of the first knot
-        size: floats per row, of which the first is where it begins
-        knots: contains the rows
-    """
-    row, left = 0, rows  # the row is one of so many
-    while left > 1:
-        half = left // 2
-        if knots[begin + size * (row + half)] <= position:
-            row = row + half
-        left = left - half
-    return row
-
-
-@scalar
-def polynomial_motion(
-    since: float, start: int, coefficients: int, knots: Vector
-) -> tuple[float, float, float, float, float]:
-    """A polynomial and its first four derivatives.
-
-    Args:
-        since: its beginning, s
-        start: index of its first coefficient, that of the highest power
-        coefficients: how many
-        knots: contains the coefficients
-    """
-    value = first = second = third = fourth = 0.0
-    for place in range(coefficients):
-        fourth = fourth * since + third
-        third = third * since + second
-        second = second * since + first
-        first = first * since + value
-        value = value * since + knots[start + place]
-    return value, first, 2.0 * second, 6.0 * third, 24.0 * fourth
+from tiltsim_controllers.mathematics.scalar import Values, affine_in
 
 
 @affine_in("points")

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from math import cos, sin
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
+from tiltsim_controllers.code.arrays import xp
+from tiltsim_controllers.code.traceable import traceable
 from tiltsim_controllers.gaits.parameters import NO_KNOTS
-from tiltsim_controllers.mathematics.scalar import Values, Vector, scalar
 from tiltsim_controllers.references.waypoints import waypoint_motion
 
 SETPOINT: Final = 0.0
@@ -61,102 +61,60 @@ class ReferenceParameters(NamedTuple):
     acceleration_z: float = 0.0
 
 
-_AT_REST: Final = (0.0,) * 12
-
-
-@scalar
-def sine_motion(
-    time: float, amplitude: float, frequency: float, phase: float
-) -> tuple[float, float, float, float, float]:
-    """``amplitude sin(frequency time + phase)`` and its first four derivatives.
-
-    Args:
-        time: s
-        amplitude: m
-        frequency, phase: rad/s and rad
-    """
-    along = amplitude * sin(frequency * time + phase)
-    across = amplitude * frequency * cos(frequency * time + phase)
-    square = frequency * frequency
-    return along, across, -square * along, -square * across, square * square * along
-
-
-@scalar
-def reference_derivatives(
-    time: float, reference: ReferenceParameters, knots: Vector = NO_KNOTS
-) -> Values:
+def reference_motion(time: Any, reference: ReferenceParameters, knots: Any = NO_KNOTS) -> Any:
     """A reference and its first four derivatives, for controllers of up to fourth order.
 
     Args:
         time: s
-        reference: type and parameters
-        knots: those of the flight; `ReferenceParameters.offset` is the index where those of
-            waypoints or of a table begin
+        reference: Type and parameters.
+        knots: Table data of the flight; `ReferenceParameters.offset` is the index where those of
+            waypoints or of a table begin.
 
     Returns:
-        Position, velocity, acceleration, jerk and snap, three floats each, m and s, world axes.
+        Position, velocity, acceleration, jerk and snap, m and s, world axes, shape (5, 3).
     """
-    if reference.type == CIRCLE:
-        radius = reference.radius
-        omega = reference.angular_frequency
-        across, along = radius * sin(omega * time), radius * cos(omega * time)
-        square = omega * omega
-        position = (reference.x + along, reference.y + across, reference.z)
-        velocity = (-omega * across, omega * along, 0.0)
-        acceleration = (-square * along, -square * across, 0.0)
-        jerk = (square * omega * across, -square * omega * along, 0.0)
-        snap = (square * square * along, square * square * across, 0.0)
-        return (*position, *velocity, *acceleration, *jerk, *snap)
-    if reference.type == LISSAJOUS:
-        x0, x1, x2, x3, x4 = sine_motion(
-            time, reference.amplitude_x, reference.frequency_x, reference.phase_x
+    r = reference
+    if r.type == WAYPOINTS:
+        return waypoint_motion(time, r.segments, r.offset, knots)
+    start, rest = xp.array([r.x, r.y, r.z]), xp.zeros(3)
+    if r.type == SETPOINT:
+        return xp.array([start, rest, rest, rest, rest])
+    if r.type in (CIRCLE, LISSAJOUS):
+        if r.type == CIRCLE:
+            amplitude = xp.array([r.radius, r.radius, 0.0])
+            turning, phase = xp.array([r.angular_frequency] * 3), xp.zeros(3)
+            quarter = xp.array([1.0, 0.0, 0.0])  # x is a cosine
+        else:
+            amplitude = xp.array([r.amplitude_x, r.amplitude_y, r.amplitude_z])
+            turning = xp.array([r.frequency_x, r.frequency_y, r.frequency_z])
+            phase = xp.array([r.phase_x, r.phase_y, r.phase_z])
+            quarter = rest
+        sine, cosine = xp.sin(turning * time + phase), xp.cos(turning * time + phase)
+        along = amplitude * (quarter * cosine + (1.0 - quarter) * sine)
+        across = amplitude * turning * ((1.0 - quarter) * cosine - quarter * sine)
+        square = turning * turning
+        return xp.array(
+            [start + along, across, -square * along, -square * across, square * square * along]
         )
-        y0, y1, y2, y3, y4 = sine_motion(
-            time, reference.amplitude_y, reference.frequency_y, reference.phase_y
-        )
-        z0, z1, z2, z3, z4 = sine_motion(
-            time, reference.amplitude_z, reference.frequency_z, reference.phase_z
-        )
-        position = (reference.x + x0, reference.y + y0, reference.z + z0)
-        return (*position, x1, y1, z1, x2, y2, z2, x3, y3, z3, x4, y4, z4)
-    if reference.type == WAYPOINTS:
-        return waypoint_motion(time, reference.segments, reference.offset, knots)
-    if reference.type == SETPOINT:
-        return (reference.x, reference.y, reference.z, *_AT_REST)
-    vx, vy, vz = reference.velocity_x, reference.velocity_y, reference.velocity_z
-    ax, ay, az = reference.acceleration_x, reference.acceleration_y, reference.acceleration_z
-    half = 0.5 * time * time
-    position = (
-        reference.x + vx * time + ax * half,
-        reference.y + vy * time + ay * half,
-        reference.z + vz * time + az * half,
-    )
-    velocity = (vx + ax * time, vy + ay * time, vz + az * time)
-    return (*position, *velocity, ax, ay, az, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    velocity = xp.array([r.velocity_x, r.velocity_y, r.velocity_z])
+    acceleration = xp.array([r.acceleration_x, r.acceleration_y, r.acceleration_z])
+    position = start + velocity * time + acceleration * (0.5 * time * time)
+    return xp.array([position, velocity + acceleration * time, acceleration, rest, rest])
 
 
-@scalar
-def position_reference(
-    time: float, reference: ReferenceParameters, knots: Vector = NO_KNOTS
-) -> Values:
-    """Position (m), velocity (m/s) and acceleration (m/s^2) to track, world axes.
+@traceable
+def reference_derivatives(time: Any, reference: ReferenceParameters, knots: Any = NO_KNOTS) -> Any:
+    """`reference_motion` as one vector, shape (15,)."""
+    return reference_motion(time, reference, knots).ravel()
 
-    Arguments as for `reference_derivatives`. Ch. 4 sets the acceleration to zero, for the circle
-    too (Sec. 6.3); `ReferenceParameters.acceleration_feedforward` restores it. Returns ``(x, y, z,
-    vx, vy, vz, ax, ay, az)``.
+
+@traceable
+def position_reference(time: Any, reference: ReferenceParameters, knots: Any = NO_KNOTS) -> Any:
+    """Position (m), velocity (m/s) and acceleration (m/s^2) to track, world axes, shape (9,).
+
+    Arguments as for `reference_motion`. Ch. 4 sets the acceleration to zero, for the circle
+    too (Sec. 6.3); `ReferenceParameters.acceleration_feedforward` restores it.
     """
-    if reference.type == SETPOINT:
-        return reference.x, reference.y, reference.z, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    if reference.type == CIRCLE:
-        radius = reference.radius
-        omega = reference.angular_frequency
-        along, across = cos(omega * time), sin(omega * time)
-        centripetal = -reference.acceleration_feedforward * radius * omega * omega
-        position = (reference.x + radius * along, reference.y + radius * across, reference.z)
-        velocity = (-radius * omega * across, radius * omega * along, 0.0)
-        return (*position, *velocity, centripetal * along, centripetal * across, 0.0)
-    x, y, z, vx, vy, vz, ax, ay, az, _, _, _, _, _, _ = reference_derivatives(
-        time, reference, knots
-    )
-    factor = reference.acceleration_feedforward
-    return x, y, z, vx, vy, vz, factor * ax, factor * ay, factor * az
+    position, velocity, acceleration = reference_motion(time, reference, knots)[:3]
+    feedforward = reference.acceleration_feedforward * acceleration
+    return xp.hstack([position, velocity, feedforward])

@@ -12,10 +12,12 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 from math import isfinite
-from typing import Final
+from typing import Any, Final
 
-from tiltsim_controllers.mathematics.scalar import Values, Vector, scalar
-from tiltsim_controllers.mathematics.splines import polynomial_motion, row_at, spline_knots
+from tiltsim_controllers.code.arrays import xp
+from tiltsim_controllers.mathematics.pieces import piece_at, polynomial_derivatives
+from tiltsim_controllers.mathematics.scalar import Values
+from tiltsim_controllers.mathematics.splines import spline_knots
 
 COEFFICIENTS: Final = 8
 """Coefficients of a polynomial of degree seven, highest power first."""
@@ -24,24 +26,18 @@ ROW: Final = 25
 """Floats per segment: the time at which it begins, and one polynomial per axis."""
 
 
-@scalar
-def waypoint_motion(time: float, rows: float, offset: float, knots: Vector) -> Values:
-    """Position, velocity, acceleration, jerk and snap, three floats each, m and s.
+def waypoint_motion(time: Any, rows: float, offset: float, knots: Any) -> Any:
+    """Position, velocity, acceleration, jerk and snap, shape (5, 3), m and s.
 
     Args:
         time: s
-        rows: number of segments
-        offset: index of the first knot
-        knots: contains the segments of `minimum_snap_knots` or `table_knots`
+        rows: Number of segments.
+        offset: Index of the first knot.
+        knots: Contains the segments of `minimum_snap_knots` or `table_knots`.
     """
-    begin = int(offset)
-    row = begin + ROW * row_at(time, int(rows), begin, ROW, knots)
-    x, y, z = row + 1, row + 1 + COEFFICIENTS, row + 1 + 2 * COEFFICIENTS
-    since = max(0.0, time - knots[row])
-    x0, x1, x2, x3, x4 = polynomial_motion(since, x, COEFFICIENTS, knots)
-    y0, y1, y2, y3, y4 = polynomial_motion(since, y, COEFFICIENTS, knots)
-    z0, z1, z2, z3, z4 = polynomial_motion(since, z, COEFFICIENTS, knots)
-    return x0, y0, z0, x1, y1, z1, x2, y2, z2, x3, y3, z3, x4, y4, z4
+    row = piece_at(time, int(rows), int(offset), ROW, knots)
+    coefficients = row[1:].reshape(3, COEFFICIENTS).T
+    return polynomial_derivatives(xp.maximum(time - row[0], 0.0), coefficients, 4)
 
 
 def minimum_snap_knots(

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from tiltsim_controllers.gaits import plans
-from tiltsim_controllers.gaits.any_tilts import tilt_motion_of
-from tiltsim_controllers.gaits.parameters import NO_KNOTS
+from tiltsim_controllers.gaits.motion import tilt_motion_of
 
 TIMES = np.linspace(-0.5, 4.5, 41)
 ANGLES = np.random.default_rng(2).uniform(-0.5, 0.5, (3, 6))
@@ -58,7 +57,6 @@ def test_six_tilts_move_as_the_first_and_the_last_four_of_them(kind):
 def test_a_vehicle_without_pods_has_a_gait_without_tilts():
     gait = plans.fixed(())
     assert gait.tilts == 0
-    assert gait.knots == NO_KNOTS
     assert gait.angles(0.0).shape == (0,)
 
 

@@ -14,7 +14,6 @@ from tiltsim_controllers.mathematics.records import (
     make_record_type,
     record_dtype,
     record_size,
-    slotted,
     unflatten,
 )
 from tiltsim_controllers.references.trajectories import ReferenceParameters
@@ -93,15 +92,6 @@ def test_unflatten_takes_only_what_it_needs():
     numbers = iter([*NUMBERS, 99.0])
     assert unflatten(Outer, numbers) == RECORD
     assert next(numbers) == 99.0
-
-
-def test_slotted_reads_like_the_record():
-    view = slotted(Outer(1.0, Middle(Inner(2.0, 3.0), 4.0), Inner(5.0, 6.0), 7.0))
-    assert (view.first, view.middle.c, view.last) == (1.0, 4.0, 7.0)
-    assert (view.middle.inner.a, view.middle.inner.b) == (2.0, 3.0)
-    assert (view.again.a, view.again.b) == (5.0, 6.0)
-    with pytest.raises(AttributeError):
-        view.misspelt = 1.0
 
 
 def test_a_record_type_made_at_run_time_reads_like_a_declared_one():

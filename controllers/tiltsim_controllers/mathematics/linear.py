@@ -1,0 +1,125 @@
+"""Vectors, and linear equations with fewer equations than unknowns, for traced functions."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import numpy as np
+
+from tiltsim_controllers.code.arrays import xp
+
+RANK_TOLERANCE: Final = 1e-24
+"""Squared share of a row that the earlier rows leave, below which it depends on them: rounding
+leaves about 1e-32, a flying vehicle 1e-11 or more."""
+
+
+def cross(a: Any, b: Any) -> Any:
+    """The vector product ``a x b``, shape (3,)."""
+    return xp.array(
+        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+    )
+
+
+def norm(vector: Any) -> Any:
+    """The length of a vector of any shape (N,)."""
+    return xp.sqrt(vector @ vector)
+
+
+def rejection(vector: Any, unit: Any) -> Any:
+    """A vector without its component along a unit vector, both of shape (N,)."""
+    return vector - (unit @ vector) * unit
+
+
+def unit_remainder(row: Any, units: Any) -> Any:
+    """The part of a row that is orthogonal to unit rows, scaled to length 1.
+
+    NaN where rounding is all that is left.
+
+    Args:
+        row: Shape (N,).
+        units: Orthonormal rows, each of shape (N,).
+    """
+    rest = row
+    for unit in units:
+        rest = rejection(rest, unit)
+    square = rest @ rest
+    independent = square > RANK_TOLERANCE * (row @ row)
+    return xp.where(independent, 1.0 / xp.sqrt(xp.where(independent, square, 1.0)), xp.nan) * rest
+
+
+def determinant(matrix: Any) -> Any:
+    """The determinant of a small square matrix, by expansion along its rows.
+
+    A trace finds equal minors and omits the entries that it knows to be zero.
+    """
+    return matrix[0] @ kernel(matrix[1:]) if len(matrix) else 1.0
+
+
+def kernel(matrix: Any) -> Any:
+    """The vector across the rows of a matrix (M - 1, M), as long as the volume that they span."""
+    columns = np.arange(matrix.shape[1])
+    minors = (determinant(matrix[:, np.delete(columns, j)]) for j in columns)
+    return xp.array([(-1.0) ** j * minor for j, minor in enumerate(minors)])
+
+
+def solved(matrix: Any, desired: Any) -> Any:
+    """The ``x`` with ``matrix x = desired`` by Cramer's rule; NaN where the matrix is singular.
+
+    Args:
+        matrix: Small, shape (M, M).
+        desired: Shape (M,).
+    """
+    rows = np.arange(len(matrix))
+    cofactors = xp.array([(-1.0) ** int(i) * kernel(matrix[np.delete(rows, i)]) for i in rows])
+    volume = matrix[0] @ cofactors[0]
+    return desired @ cofactors / xp.where(volume == 0.0, xp.nan, volume)
+
+
+def orthonormal_rows(matrix: Any) -> list[Any]:
+    """Orthonormal rows with the span of the rows of a matrix (modified Gram-Schmidt).
+
+    Normal equations would square the condition number.
+
+    Args:
+        matrix: Shape (M, N), M <= N.
+
+    Returns:
+        M unit rows of shape (N,), the first k of which span the first k rows of the matrix; NaN
+        from the first dependent row on.
+    """
+    units: list[Any] = []
+    for row in matrix:
+        units.append(unit_remainder(row, units))
+    return units
+
+
+def nearest_solution(matrix: Any, desired: Any, start: Any, units: Any = None) -> Any:
+    """The solution ``x`` of ``matrix x = desired`` that is nearest to a start.
+
+    It moves from the start along each unit row until the equation of that row holds, and so stays
+    in the span of the rows.
+
+    Args:
+        matrix: Shape (M, N), M <= N.
+        desired: Shape (M,).
+        start: Shape (N,).
+        units: `orthonormal_rows` of the matrix, where they are known.
+    """
+    x = start
+    for row, unit, value in zip(matrix, units or orthonormal_rows(matrix), desired):
+        x = x + (value - row @ x) / (row @ unit) * unit
+    return x
+
+
+def least_norm(matrix: Any, desired: Any) -> Any:
+    """The shortest ``x`` with ``matrix x = desired``; a second pass removes rounding errors.
+
+    NaN where the rows depend on each other.
+
+    Args:
+        matrix: Shape (M, N), M <= N.
+        desired: Shape (M,).
+    """
+    units = orthonormal_rows(matrix)
+    first = nearest_solution(matrix, desired, xp.zeros(matrix.shape[1]), units)
+    return nearest_solution(matrix, desired, first, units)
