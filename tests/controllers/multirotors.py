@@ -7,22 +7,23 @@ from typing import NamedTuple
 
 import numpy as np
 
+from tests.natively import compiled
 from tests.tracing import seldom_traced
 from tiltsim_controllers.gaits import plans
 from tiltsim_controllers.laws.decouplers import EXACT
 from tiltsim_controllers.laws.gains import GAIN_SETS, IntegralGains
-from tiltsim_controllers.laws.gait_feedforward import FeedforwardTerms
-from tiltsim_controllers.laws.multirotor import multirotor_law_of
-from tiltsim_controllers.laws.multirotor_steps import Form, Parameters, SideGains
+from tiltsim_controllers.laws.gait_feedforward import multirotor_law_of
+from tiltsim_controllers.laws.multirotor_steps import FeedforwardTerms, Form, Parameters, SideGains
 from tiltsim_controllers.mathematics.rotation import euler_from_quaternion, quaternion_from_rotation
 from tiltsim_controllers.references.trajectories import SETPOINT, ReferenceParameters
+from tiltsim_controllers.vehicle.body import body_of
 from tiltsim_controllers.vehicle.effectiveness import (
     force_and_torque,
     rotor_entries,
     tilt_of_rotor,
     tilts_of,
 )
-from tiltsim_controllers.vehicle.multirotor import body_of, equations_of_motion_of
+from tiltsim_controllers.vehicle.motion import equations_of_motion_of
 from tiltsim_controllers.vehicle.parameters import PRESETS, SPIN
 
 FOUR = PRESETS["ar_drone_2"]
@@ -129,10 +130,12 @@ def fly(vehicle, law, knots, duration, *, gait=None, step=0.005, start=(), wind=
     """Fly along a gait; ``start`` is position, velocity and acceleration, level and at rest."""
     layout = tilt_of_rotor(vehicle.table)
     rotors, tilts = len(layout), tilts_of(layout)
-    inputs = multirotor_law_of(layout, Form(vehicle.dimension, vehicle.norm))
     motion = equations_of_motion_of(layout)
     at = int(law.rotors)
     planned = gait or plans.fixed((0.0,) * tilts)
+    still = (0.0,) * (12 + tilts + rotors), (0.0,) * tilts, (0.0,) * 3
+    own = multirotor_law_of(layout, Form(vehicle.dimension, vehicle.norm))
+    inputs = compiled(own, 0.0, *still, law, knots)
     seen = []
 
     @seldom_traced

@@ -1,10 +1,10 @@
-"""The equations' vehicles at the level of their actuators: moved by controls of MuJoCo's model.
+"""Vehicles on equations of motion at the level of their actuators: moved by MuJoCo's controls.
 
 Vehicles of the thesis's equations have ideal actuators: pods follow the gait exactly, rotors take
 any speed. A layer around the controller (`tiltsim.laws.layers.layer`) changes that through controls
-and activations of the MuJoCo model. Here these controls act on the equations' rigid body, on
-massless pods that follow the equation of their servo, and on rotors with limits. Only the order of
-the controls is MuJoCo's, so these flights can check MuJoCo's.
+and activations of the MuJoCo model. Here these controls act on a rigid body with massless pods that
+follow the equation of their servo, and on rotors with limits. Only the order of the controls is
+MuJoCo's, so these flights can check MuJoCo's.
 """
 
 from __future__ import annotations
@@ -14,44 +14,40 @@ from functools import cache
 from math import inf
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
-from tiltsim.equations.quadrotor import equations_of_motion, initial_state
-from tiltsim.equations.quadrotor import rigid_body as quadrotor_body
-from tiltsim.equations.solvers import identity
-from tiltsim.equations.tiltrotor import rigid_body, rotation_of, velocity_of
+import numpy as np
+
 from tiltsim.models.parts import WRENCH_SIZE
-from tiltsim.models.rotor_table import Multirotor
 from tiltsim.vehicles.rotorcraft import initial_tilts
-from tiltsim.vehicles.rotorcraft.layout import Layout, layout_of
-from tiltsim.vehicles.rotorcraft.rotors import true_rotors
+from tiltsim.vehicles.rotorcraft.layout import layout_of, tilt_of_rotor
+from tiltsim.vehicles.rotorcraft.rotors import rotors_record, true_rotors
+from tiltsim_controllers.code.arrays import xp
+from tiltsim_controllers.code.traceable import traceable
+from tiltsim_controllers.mathematics.attitude import (
+    euler_rates,
+    quaternion_of_euler,
+    quaternion_of_rotation,
+    quaternion_product,
+    rotation_matrix,
+    rotation_of_quaternion,
+)
+from tiltsim_controllers.mathematics.linear import norm
 from tiltsim_controllers.mathematics.records import make_record_type, vector_of
-from tiltsim_controllers.mathematics.rotation import (
-    quaternion_from_euler,
-    quaternion_from_rotation,
-    rotation_from_euler,
-    to_world,
-)
-from tiltsim_controllers.mathematics.scalar import Quad, Triple, Values, Vector, clipped, scalar
-from tiltsim_controllers.mathematics.vectors import (
-    componentwise,
-    entries_of,
-    tuple_text,
-    written_out,
-)
-from tiltsim_controllers.vehicle.effectiveness import TiltOfRotor, effectiveness_of
-from tiltsim_controllers.vehicle.multirotor import BODY_STATES, body_rates, inverse_inertia_times
-from tiltsim_controllers.vehicle.parameters import Vehicle
-from tiltsim_controllers.vehicle.rotor_code import rotor_code_of
+from tiltsim_controllers.mathematics.scalar import Values
+from tiltsim_controllers.vehicle.craft import Craft, craft_of
+from tiltsim_controllers.vehicle.effectiveness import TiltOfRotor, tilts_of
+from tiltsim_controllers.vehicle.motion import accelerations, joined, rotation_rate
+from tiltsim_controllers.vehicle.rotors import of_tilts, wrench_map
 
 if TYPE_CHECKING:
     from tiltsim.closed_loop.loop import Dynamics
     from tiltsim.scenario.scenario import FlightPlan
 
-Loads = Values
-"""Force (N) and torque (N m) on the body, body axes, then torques (N m) about the hinges."""
+
+# --- parameters -------------------------------------------------------------------------------
 
 
 @cache
-def mechanics_record(vehicle: Any, rotors: int, tilts: int) -> Any:
+def mechanics_record(vehicle: Any, tilts: int) -> Any:
     """The type of the true vehicle's and its actuators' parameters."""
     return make_record_type(
         "Mechanics",
@@ -59,7 +55,6 @@ def mechanics_record(vehicle: Any, rotors: int, tilts: int) -> Any:
         servo_frequency=float,  # rad/s, natural
         servo_damping=float,  # ratio
         hinge_inertias=vector_of(tilts),  # kg m^2, of servo and pod
-        hinge_loads=vector_of(rotors),  # see `Rotor.hinge_load`
         max_tilt=float,  # rad, at the stops of the servos
         min_speed=float,  # rad/s, along a rotor's spin
         max_speed=float,
@@ -68,310 +63,298 @@ def mechanics_record(vehicle: Any, rotors: int, tilts: int) -> Any:
 
 def mechanics(plan: FlightPlan) -> Any:
     """The mechanics of a planned flight's rotorcraft."""
-    return mechanics_around(true_rotors(plan.scenario), plan)
-
-
-def mechanics_around(vehicle: Any, plan: FlightPlan) -> Any:
-    """The mechanics of a planned flight, around the parameters of its true vehicle."""
-    rotorcraft = plan.scenario.any_rotorcraft
+    rotorcraft, vehicle = plan.scenario.any_rotorcraft, true_rotors(plan.scenario)
+    record: Any = type(vehicle)
     servo, tilts = rotorcraft.tilt_servo, rotorcraft.tilt_count
-    kind: Any = type(vehicle)
-    true = plan.scenario.true_vehicle
-    return mechanics_record(kind, rotorcraft.rotor_count, tilts)(
+    return mechanics_record(record, tilts)(
         vehicle,
         servo.natural_frequency,
         servo.damping_ratio,
         rotorcraft.hinge_inertias[:tilts],
-        tuple(rotor.hinge_load for rotor in true.rotors)
-        if isinstance(true, Multirotor)
-        else (0.0,) * rotorcraft.rotor_count,
         inf if servo.max_angle is None else servo.max_angle,
         *rotorcraft.speeds_along_spin,
     )
 
 
-@scalar
-def external_acceleration(
-    rotation: Vector, loads: Loads, mass: float, disturbance: Triple
-) -> Triple:
-    """Acceleration (m/s^2, world axes) without rotors and weight.
+# --- states -----------------------------------------------------------------------------------
 
-    Args:
-        rotation: Body to world, rows first.
-        loads: Of all but rotors and weight.
-        mass: kg.
-        disturbance: m/s^2, world axes.
+
+class Motion(NamedTuple):
+    """The motion of a vehicle with M tilts, or its time derivative."""
+
+    position: Any  # m, world axes, shape (3,)
+    attitude: Any  # see `Attitude`
+    velocity: Any  # m/s, world axes, shape (3,)
+    omega: Any  # body rates, rad/s, shape (3,)
+    tilts: Any  # rad, shape (M,)
+    tilt_rates: Any  # rad/s, shape (M,)
+
+
+class Attitude(NamedTuple):
+    """How a state represents the attitude, as functions of arrays.
+
+    Attributes:
+        size: How many numbers it has.
+        rotation: ``(attitude)``: body to world, shape (3, 3).
+        quaternion: ``(attitude)``: scalar first, shape (4,).
+        rates: ``(attitude, omega)``: its time derivative at body rates (rad/s).
+        of_euler: ``(angles)``: from roll, pitch and yaw, rad.
     """
-    force_x, force_y, force_z = to_world(rotation, (loads[0], loads[1], loads[2]))
-    gust_x, gust_y, gust_z = disturbance
-    return gust_x + force_x / mass, gust_y + force_y / mass, gust_z + force_z / mass
+
+    size: int
+    rotation: Callable[[Any], Any]
+    quaternion: Callable[[Any], Any]
+    rates: Callable[[Any, Any], Any]
+    of_euler: Callable[[Any], Any]
+
+
+def _matrix(attitude: Any) -> Any:
+    return attitude.reshape(3, 3)
+
+
+MATRIX: Final = Attitude(
+    9,
+    _matrix,
+    lambda attitude: quaternion_of_rotation(_matrix(attitude)),
+    lambda attitude, omega: rotation_rate(_matrix(attitude), omega),
+    rotation_matrix,
+)
+QUATERNION: Final = Attitude(
+    4,
+    rotation_of_quaternion,
+    lambda attitude: attitude,
+    lambda attitude, omega: quaternion_product(attitude, xp.hstack([0.0, 0.5 * omega])),
+    quaternion_of_euler,
+)
+EULER: Final = Attitude(
+    3, rotation_matrix, quaternion_of_euler, euler_rates, lambda attitude: attitude
+)
+
+
+class StateLayout(NamedTuple):
+    """Where the parts of a motion lie at the head of a state."""
+
+    sizes: tuple[tuple[str, int], ...]  # of the fields of `Motion`, in the order of the state
+
+    @property
+    def size(self) -> int:
+        """How many numbers the motion has."""
+        return sum(size for _, size in self.sizes)
+
+    def split(self, state: Any) -> Motion:
+        """The parts of a state, shape (``size`` + any,)."""
+        ends = np.cumsum([size for _, size in self.sizes]).tolist()
+        parts = zip(self.sizes, ends, strict=True)
+        return Motion(**{name: state[end - size : end] for (name, size), end in parts})
+
+    def joined(self, motion: Motion) -> Any:
+        """The numbers of a motion, shape (``size``,)."""
+        return joined(getattr(motion, name) for name, _ in self.sizes)
+
+
+def as_in_mujoco(tilts: int) -> StateLayout:
+    """A state that begins with MuJoCo's ``qpos`` and ``qvel``."""
+    qpos = (("position", 3), ("attitude", QUATERNION.size), ("tilts", tilts))
+    return StateLayout((*qpos, ("velocity", 3), ("omega", 3), ("tilt_rates", tilts)))
+
+
+def as_printed(attitude: Attitude, tilts: int) -> StateLayout:
+    """A state that begins with the rigid body, as the thesis's equations have it."""
+    body = ("position", 3), ("velocity", 3), ("attitude", attitude.size), ("omega", 3)
+    return StateLayout((*body, ("tilts", tilts), ("tilt_rates", tilts)))
+
+
+# --- plants -----------------------------------------------------------------------------------
 
 
 class ActuatorPlant(NamedTuple):
-    """A vehicle whose state is its motion, followed by MuJoCo's activations."""
+    """A vehicle whose state is its motion, followed by MuJoCo's activations.
 
-    motion: int  # numbers before the activations
-    qpos: Callable[[Vector], Values]  # MuJoCo's, from the state
-    qvel: Callable[[Vector], Values]
-    rates: Callable[[Vector, Vector, Loads, Any, Triple], Values]
-    """Time derivative of the motion: state, controls, loads, mechanics, disturbance (m/s^2)."""
-    project_onto_limits: Callable[[list[float], Any], list[float]]
-    """See `tiltsim.closed_loop.loop.Equations`."""
-    initial: Callable[[FlightPlan], Values]  # motion
-    mechanics: Any  # the type of the parameters
-    read: Callable[[FlightPlan], Any] = mechanics  # these
-    name: str = "on_equations"  # part of the name of compiled code
-    finish: Callable[[list[float], Any], list[float]] = identity
-    """``(state, mechanics)``: what else is mended at the end of a step."""
+    Its functions are traceable; ``mechanics`` is a `mechanics_record`.
+
+    Attributes:
+        motion: How many numbers of the state come before the activations.
+        qpos, qvel: ``(state)``: MuJoCo's vectors.
+        rates: ``(state, ctrl, loads, mechanics, disturbance)``: time derivative of the motion.
+            ``loads`` are force (N) and torque (N m) on the body, body axes, and torques (N m) about
+            the hinges, without rotors and weight; the disturbance is in m/s^2, world axes.
+        project_onto_limits: ``(state, mechanics) -> state`` within limits of rotors and tilts; None
+            where there are no limits.
+        initial: ``(plan)``: the motion at time zero.
+        mechanics: The type of the parameters.
+        name: Part of the name of the layer.
+        finish: ``(state, mechanics) -> state``: corrections at the end of a step; None for none.
+    """
+
+    motion: int
+    qpos: Callable[[Any], Any]
+    qvel: Callable[[Any], Any]
+    rates: Callable[..., Any]
+    project_onto_limits: Callable[[Any, Any], Any] | None
+    initial: Callable[[FlightPlan], Values]
+    mechanics: Any
+    name: str = "on_equations"
+    finish: Callable[[Any, Any], Any] | None = None
 
 
-# --- vehicles with a rotation matrix ------------------------------------------------------------
-# The rigid body as in `tiltsim.equations.tiltrotor`, tilts, tilt rates, then the activations.
+class PlantForm(NamedTuple):
+    """The equations of a plant; all numbers of the vehicle are data.
+
+    Attributes:
+        attitude: How the state represents the attitude.
+        layout: Where the parts of the motion lie.
+        tilt_of_rotor, spins: See `tiltsim.closed_loop.loop.Dynamics`.
+        vehicle: The type of the vehicle's parameters.
+        gyroscopic: Factor of the gyroscopic torque: 0 or 1.
+        has_limits: Whether the rotors' speeds or the tilts have limits.
+        name: See `ActuatorPlant`.
+    """
+
+    attitude: Attitude
+    layout: StateLayout
+    tilt_of_rotor: TiltOfRotor
+    spins: Values
+    vehicle: Any
+    gyroscopic: float
+    has_limits: bool
+    name: str = "on_equations"
 
 
-@scalar
-def servo_acceleration(command: float, angle: float, rate: float, mechanics: Any) -> float:
-    """``omega^2 (command - alpha) - 2 zeta omega alpha'`` (rad/s^2) of a massless pod.
+def servo_accelerations(
+    craft: Craft, ctrl: Any, thrusts: Any, tilts: Any, rates: Any, loads: Any, mechanics: Any
+) -> Any:
+    """Accelerations (rad/s^2), shape (M,), of massless pods on a body at rest.
+
+    Each is ``omega^2 (command - alpha) - 2 zeta omega alpha'``, and the torque about the hinge over
+    its inertia.
 
     Args:
-        command, angle, rate: set point and tilt, rad, and its rate, rad/s
-        mechanics: of the vehicle
+        craft: N rotors on M pods.
+        ctrl: Begins with the set points of the servos, rad.
+        thrusts: Controls of the rotors, (rad/s)^2, shape (N,).
+        tilts, rates: rad and rad/s, shape (M,).
+        loads: See `ActuatorPlant.rates`.
+        mechanics: A `mechanics_record`.
     """
-    omega: float = mechanics.servo_frequency
-    damping: float = mechanics.servo_damping
-    command = clipped(command, -mechanics.max_tilt, mechanics.max_tilt)
-    return omega * omega * (command - angle) - 2.0 * damping * omega * rate
+    omega, stop = mechanics.servo_frequency, mechanics.max_tilt
+    command = xp.clip(ctrl[: len(tilts)], -stop, stop)
+    by_servo = omega * omega * (command - tilts) - 2.0 * mechanics.servo_damping * omega * rates
+    torques = loads[WRENCH_SIZE:] + of_tilts(craft.rotors, craft.hinge_loads * thrusts)
+    return by_servo + torques / mechanics.hinge_inertias
 
 
 @cache
-def servo_accelerations_of(tilt_of_rotor: TiltOfRotor, tilts: int) -> Callable[..., Values]:
-    """Scalar code of what torques about the hinges add to the tilts on a body at rest, rad/s^2.
+def limit_speeds_of(spins: Values, first: int) -> Callable[..., Any]:
+    """``(state, mechanics) -> state`` with rotor speeds, or commands of them, within their limits.
 
-    It is ``(ctrl, thrusts, angles, rates, loads, mechanics) -> accelerations``, where ``thrusts``
-    are the rotors' controls, (rad/s)^2. On the cross, without a table of rotors, they pass through
-    the hinges at a right angle.
+    Args:
+        spins: Signs of the rotor speeds.
+        first: Index of the first of these speeds.
     """
-    name = "_".join(str(tilt) if tilt >= 0 else "f" for tilt in tilt_of_rotor)
-    hinges = written_out(
-        f"torques_about_hinges_{tilts}_{name}",
-        "loads, thrusts, per_thrust",
-        tuple_text(
-            " + ".join(
-                [f"loads[{WRENCH_SIZE + tilt}]"]
-                + [
-                    f"per_thrust[{i}] * thrusts[{i}]"
-                    for i, o in enumerate(tilt_of_rotor)
-                    if o == tilt
-                ]
-            )
-            for tilt in range(tilts)
-        ),
-    )
-    accelerations: Callable[..., Values] = componentwise(
-        "servo_accelerations", "ctrl, angles, rates, hinges, mechanics",
-        "by_servo(ctrl#, angles#, rates#, mechanics) + hinges# / mechanics.hinge_inertias#", tilts,
-        by_servo=servo_acceleration,
-    )  # fmt: skip
+    signs, end = np.array(spins), first + len(spins)
 
-    @scalar
-    def servo_accelerations(
-        ctrl: Vector, thrusts: Values, angles: Values, rates: Values, loads: Loads, mechanics: Any
-    ) -> Values:
-        torques = hinges(loads, thrusts, mechanics.hinge_loads)
-        return accelerations(ctrl, angles, rates, torques, mechanics)
-
-    return servo_accelerations
-
-
-@cache
-def limit_speeds_of(spins: Values, first: int) -> Callable[..., list[float]]:
-    """Scalar code ``(state, mechanics) -> state`` that keeps rotor speeds within their limits.
-
-    They, or commands of them, are the state's entries from ``first`` on.
-    """
-
-    @scalar
-    def limit_speeds(state: list[float], mechanics: Any) -> list[float]:
-        low, high = mechanics.min_speed, mechanics.max_speed
-        limited = state[:]
-        for rotor in range(len(spins)):
-            spin = spins[rotor]
-            limited[first + rotor] = spin * clipped(spin * state[first + rotor], low, high)
-        return limited
+    @traceable
+    def limit_speeds(state: Any, mechanics: Any) -> Any:
+        speeds = signs * xp.clip(signs * state[first:end], mechanics.min_speed, mechanics.max_speed)
+        return xp.hstack([state[:first], speeds, state[end:]])
 
     return limit_speeds
 
 
-@scalar
-def stop_pods(state: list[float], tilt_1: int, rate_1: int, tilts: int, stop: float) -> list[float]:
-    """The state with its pods within their stops.
-
-    Args:
-        state: Of the vehicle.
-        tilt_1, rate_1: Index of the first tilt and of its rate.
-        tilts: How many there are.
-        stop: rad, to either side.
-    """
-    stopped = state[:]
-    for index in range(tilts):
-        tilt, rate = state[tilt_1 + index], state[rate_1 + index]
-        if abs(tilt) > stop:
-            stopped[tilt_1 + index] = stop if tilt > 0.0 else -stop
-            stopped[rate_1 + index] = 0.0 if tilt * rate > 0.0 else rate
-    return stopped
-
-
-@scalar
-def _tiltrotor_body(
-    state: Vector, tilts: Quad, thrusts: Quad, loads: Loads, vehicle: Vehicle, disturbance: Triple
-) -> Values:
-    """Chapter 3's rigid body; arguments as in `_body_motion_of`."""
-    angular_acceleration = (
-        loads[3] / vehicle.inertia_xx,
-        loads[4] / vehicle.inertia_yy,
-        loads[5] / vehicle.inertia_zz,
+def _stopped(motion: Motion, stop: Any) -> Motion:
+    """A motion with the pods within their stops (rad, to either side)."""
+    tilts, rates = motion.tilts, motion.tilt_rates
+    blocked = (abs(tilts) > stop) & (tilts * rates > 0.0)
+    return motion._replace(
+        tilts=xp.clip(tilts, -stop, stop), tilt_rates=xp.where(blocked, 0.0, rates)
     )
-    acceleration = external_acceleration(rotation_of(state), loads, vehicle.mass, disturbance)
-    # The controls are s varpi |varpi| with s = (-1, 1, -1, 1), the equations' are without s.
-    squares = (-thrusts[0], thrusts[1], -thrusts[2], thrusts[3])
-    return rigid_body(state, tilts, squares, vehicle, acceleration, angular_acceleration)
 
 
 @cache
-def _body_motion_of(spins: Values, tilt_of_rotor: TiltOfRotor) -> Callable[..., Values]:
-    """Scalar code of the rates of the rigid body's eighteen numbers, without gyroscopic torque.
+def plant_of(form: PlantForm) -> ActuatorPlant:
+    """The plant of a form."""
+    layout, tilt_of_rotor, spins = form.layout, form.tilt_of_rotor, np.array(form.spins)
+    rotors, tilts = len(tilt_of_rotor), tilts_of(tilt_of_rotor)
+    limit_speeds = limit_speeds_of(form.spins, layout.size)
 
-    It is ``(state, tilts, thrusts, loads, vehicle, disturbance) -> rates``, where ``thrusts`` are
-    controls, (rad/s)^2, and ``disturbance`` is in m/s^2.
-    """
-    if not tilt_of_rotor:
-        return _tiltrotor_body
-    wrench = effectiveness_of(tilt_of_rotor).wrench
-    senses = "".join("p" if spin > 0.0 else "m" for spin in spins)
-    signs = ["" if spin > 0.0 else "-" for spin in spins]
-    squares = written_out(
-        f"signed_{senses}", "thrusts", tuple_text(f"{s}thrusts[{i}]" for i, s in enumerate(signs))
-    )
+    @traceable
+    def qpos(state: Any) -> Any:
+        motion = layout.split(state)
+        return joined((motion.position, form.attitude.quaternion(motion.attitude), motion.tilts))
 
-    @scalar
-    def body_motion(
-        state: Vector,
-        tilts: Values,
-        thrusts: Values,
-        loads: Loads,
-        rotors: Any,
-        disturbance: Triple,
-    ) -> Values:
-        body = rotors.body
-        acceleration = external_acceleration(rotation_of(state), loads, body.mass, disturbance)
-        turning = inverse_inertia_times(body, (loads[3], loads[4], loads[5]))
-        pushed = wrench(tilts, squares(thrusts), rotors.effects, 0)
-        return body_rates(state, pushed, body, acceleration, turning, 0.0)
+    @traceable
+    def qvel(state: Any) -> Any:
+        motion = layout.split(state)
+        return joined((motion.velocity, motion.omega, motion.tilt_rates))
 
-    return body_motion
-
-
-@cache
-def _tilting_plant(layout: Layout, spins: Values, tilt_of_rotor: TiltOfRotor) -> ActuatorPlant:
-    """The plant of the tiltrotor, or of a multirotor."""
-    rotors, tilts = layout
-    angles, rates = entries_of(BODY_STATES, tilts), entries_of(BODY_STATES + tilts, tilts)
-    thrusts = entries_of(layout.thrust_1, rotors)
-    motion = BODY_STATES + 2 * tilts
-    body_motion = _body_motion_of(spins, tilt_of_rotor)
-    servos = servo_accelerations_of(tilt_of_rotor, tilts)
-    limit_speeds = limit_speeds_of(spins, motion)
-
-    @scalar
-    def qpos(state: Vector) -> Values:
-        qw, qx, qy, qz = quaternion_from_rotation(rotation_of(state))
-        return (state[0], state[1], state[2], qw, qx, qy, qz, *angles(state))
-
-    @scalar
-    def qvel(state: Vector) -> Values:
-        return (*velocity_of(state), *rates(state))
-
-    @scalar
-    def motion_rates(
-        state: Vector, ctrl: Vector, loads: Loads, mechanics: Any, disturbance: Triple
-    ) -> Values:
-        alpha, alpha_rates, pushed = angles(state), rates(state), thrusts(ctrl)
-        vehicle = mechanics.vehicle
-        return (
-            *body_motion(state, alpha, pushed, loads, vehicle, disturbance),
-            *alpha_rates,
-            *servos(ctrl, pushed, alpha, alpha_rates, loads, mechanics),
+    @traceable
+    def rates(state: Any, ctrl: Any, loads: Any, mechanics: Any, disturbance: Any) -> Any:
+        motion, craft = layout.split(state), craft_of(mechanics.vehicle, tilt_of_rotor)
+        thrusts = ctrl[tilts : tilts + rotors]
+        # The controls are s varpi |varpi| with the spins s, the map's factors are without s.
+        wrench = wrench_map(craft.rotors, motion.tilts) @ (spins * thrusts) + loads[:WRENCH_SIZE]
+        rotation = form.attitude.rotation(motion.attitude)
+        acceleration, turning = accelerations(
+            craft.body, rotation, motion.omega, wrench, disturbance, form.gyroscopic
         )
+        moved = Motion(
+            position=motion.velocity,
+            attitude=form.attitude.rates(motion.attitude, motion.omega),
+            velocity=acceleration,
+            omega=turning,
+            tilts=motion.tilt_rates,
+            tilt_rates=servo_accelerations(
+                craft, ctrl, thrusts, motion.tilts, motion.tilt_rates, loads, mechanics
+            ),
+        )
+        return layout.joined(moved)
 
-    @scalar
-    def project(state: list[float], mechanics: Any) -> list[float]:
-        limited = limit_speeds(state, mechanics)
-        return stop_pods(limited, BODY_STATES, BODY_STATES + tilts, tilts, mechanics.max_tilt)
+    @traceable
+    def project_onto_limits(state: Any, mechanics: Any) -> Any:
+        stopped = _stopped(layout.split(state), mechanics.max_tilt)
+        return limit_speeds(joined((layout.joined(stopped), state[layout.size :])), mechanics)
+
+    @traceable
+    def normalized(state: Any, mechanics: Any) -> Any:
+        """With a quaternion of length one, which no solver keeps."""
+        motion = layout.split(state)
+        unit = motion._replace(attitude=motion.attitude / norm(motion.attitude))
+        return joined((layout.joined(unit), state[layout.size :]))
 
     def initial(plan: FlightPlan) -> Values:
         """The motion at time zero; pods as in MuJoCo."""
         start = plan.scenario.initial
-        tilts, tilt_rates = initial_tilts(plan)
-        body = (*start.position, *start.velocity, *rotation_from_euler(*start.attitude))
-        return (*body, *start.angular_velocity, *tilts, *tilt_rates)
+        angles, angle_rates = initial_tilts(plan) if tilts else ((), ())
+        vectors = start.position, start.attitude, start.velocity, start.angular_velocity
+        motion = Motion(*map(xp.array, (*vectors, angles, angle_rates)))
+        attitude = form.attitude.of_euler(motion.attitude)
+        return (*layout.joined(motion._replace(attitude=attitude)),)
 
-    record = rotor_code_of(tilt_of_rotor).record if tilt_of_rotor else Vehicle
-    kind = mechanics_record(record, rotors, tilts)
-    return ActuatorPlant(motion, qpos, qvel, motion_rates, project, initial, kind)
-
-
-# --- quadrotor ---------------------------------------------------------------------------------
-# Twelve numbers of the rigid body as in `tiltsim.equations.quadrotor`.
-
-
-@scalar
-def quadrotor_qpos(state: Vector) -> Values:
-    """Position and quaternion."""
-    x, y, z, _, _, _, roll, pitch, yaw, _, _, _ = quadrotor_body(state)
-    qw, qx, qy, qz = quaternion_from_euler(roll, pitch, yaw)
-    return x, y, z, qw, qx, qy, qz
-
-
-@scalar
-def quadrotor_qvel(state: Vector) -> Values:
-    """Velocity and body rates."""
-    _, _, _, vx, vy, vz, _, _, _, p, q, r = quadrotor_body(state)
-    return vx, vy, vz, p, q, r
-
-
-@scalar
-def _quadrotor_rates(
-    state: Vector, ctrl: Vector, loads: Loads, mechanics: Any, disturbance: Triple
-) -> Values:
-    """Chapter 2's rigid body under thrusts and loads; see `ActuatorPlant.rates`."""
-    vehicle = mechanics.vehicle
-    torque_x, torque_y, torque_z = loads[3], loads[4], loads[5]
-    _, _, _, _, _, _, roll, pitch, yaw, _, _, _ = quadrotor_body(state)
-    rotation = rotation_from_euler(roll, pitch, yaw)
-    acceleration = external_acceleration(rotation, loads, vehicle.mass, disturbance)
-    lever = vehicle.arm_length * vehicle.thrust_coefficient
-    inputs = (
-        vehicle.thrust_coefficient * (ctrl[0] + ctrl[1] + ctrl[2] + ctrl[3]),
-        lever * (ctrl[1] - ctrl[3]) + torque_x,
-        lever * (ctrl[2] - ctrl[0]) + torque_y,
-        vehicle.drag_coefficient * (ctrl[0] - ctrl[1] + ctrl[2] - ctrl[3]) + torque_z,
+    return ActuatorPlant(
+        layout.size,
+        qpos,
+        qvel,
+        rates,
+        project_onto_limits if form.has_limits else None,
+        initial,
+        mechanics_record(form.vehicle, tilts),
+        form.name,
+        normalized if form.attitude is QUATERNION else None,
     )
-    return equations_of_motion(state, inputs, vehicle, acceleration)
-
-
-QUADROTOR_PLANT: Final = ActuatorPlant(
-    motion=12,
-    qpos=quadrotor_qpos,
-    qvel=quadrotor_qvel,
-    rates=_quadrotor_rates,
-    project_onto_limits=identity,  # the rotors make any thrust
-    initial=lambda plan: initial_state(plan.scenario),
-    mechanics=mechanics_record(Vehicle, 4, 0),
-)
 
 
 def actuator_plant(dynamics: Dynamics) -> ActuatorPlant:
-    """The plant of a model."""
-    if dynamics.model == "quadrotor":
-        return QUADROTOR_PLANT
-    return _tilting_plant(layout_of(dynamics), dynamics.spins, dynamics.tilt_of_rotor)
+    """The thesis's equations (ch. 2, Eq. 15; ch. 3, Eqs. 1-7) of a model."""
+    is_quadrotor = dynamics.model == "quadrotor"
+    attitude, tilts = EULER if is_quadrotor else MATRIX, layout_of(dynamics).tilts
+    return plant_of(
+        PlantForm(
+            attitude,
+            as_printed(attitude, tilts),
+            tilt_of_rotor(dynamics),
+            dynamics.spins,
+            rotors_record(dynamics),
+            gyroscopic=float(is_quadrotor),
+            has_limits=not is_quadrotor,  # whose rotors make any thrust
+        )
+    )

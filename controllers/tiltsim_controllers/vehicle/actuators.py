@@ -6,47 +6,59 @@ integrator stage and restarted anywhere.
 
 from __future__ import annotations
 
-from math import exp, inf
-from typing import NamedTuple
+from functools import cache
+from math import exp
+from typing import Any
 
-from tiltsim_controllers.mathematics.scalar import scalar
+from tiltsim_controllers.code.arrays import xp
+from tiltsim_controllers.mathematics.records import make_record_type, vector_of
 
 
-@scalar
-def rate_limited_command(command: float, angle: float, reach: float) -> float:
-    """The set point (rad) that drives a servo to its command within its rate limit.
+def rate_limited_command(command: Any, angle: Any, reach: float) -> Any:
+    """The set points (rad) that drive servos to their commands within their rate limit.
 
     The servo ``alpha'' = omega^2 (command - alpha) - 2 zeta omega alpha'`` is a velocity loop
     ``alpha'' = 2 zeta omega (v - alpha')`` inside a position loop ``v = omega / (2 zeta)
-    (command - alpha)``. Limiting ``v`` to ``max_rate`` keeps the set point within the ``reach``
-    ``2 zeta / omega max_rate`` (rad) of the present ``angle`` (rad).
+    (command - alpha)``. Limiting ``v`` to ``max_rate`` keeps the set point within the reach.
+
+    Args:
+        command, angle: Commands and present angles, rad, of equal shapes.
+        reach: ``2 zeta / omega max_rate``, rad; infinite without a limit.
     """
-    if command > angle + reach:
-        return angle + reach
-    if command < angle - reach:
-        return angle - reach
-    return command
+    return xp.clip(command, angle - reach, angle + reach)
 
 
-class RotorFault(NamedTuple):
-    """The faults of one rotor and their times; none by default."""
+@cache
+def faults_record(rotors: int) -> Any:
+    """The type of the faults of a number of rotors and of their times.
 
-    thrust_time: float = inf  # s, from which thrust and drag torque are reduced
-    thrust_factor: float = 1.0
-    stuck_time: float = inf  # s, from which the tilt servo holds one angle
-    stuck_angle: float = 0.0  # rad
+    The fault of a tilt servo is listed at the rotor with its number.
+    """
+    each = vector_of(rotors)
+    return make_record_type(
+        "Faults",
+        thrust_time=each,  # s, from which thrust and drag torque are reduced
+        thrust_factor=each,
+        stuck_time=each,  # s, from which the tilt servo holds one angle
+        stuck_angle=each,  # rad
+    )
 
 
-@scalar
-def thrust_factor(time: float, fault: RotorFault) -> float:
-    """Remaining fraction of a rotor's thrust and drag torque at a time (s), 1 without a fault."""
-    return fault.thrust_factor if time >= fault.thrust_time else 1.0
+def thrust_factors(time: Any, faults: Any) -> Any:
+    """Remaining fractions of the rotors' thrust and drag torque at a time (s), shape (N,)."""
+    return xp.where(time >= faults.thrust_time, faults.thrust_factor, 1.0)
 
 
-@scalar
-def servo_command(time: float, command: float, fault: RotorFault) -> float:
-    """The angle (rad) that a tilt servo turns to at a time (s): its command unless it is stuck."""
-    return fault.stuck_angle if time >= fault.stuck_time else command
+def servo_commands(time: Any, commands: Any, faults: Any) -> Any:
+    """The angles (rad) that tilt servos turn to: their commands unless they are stuck.
+
+    Args:
+        time: s.
+        commands: rad, shape (M,).
+        faults: See `faults_record`.
+    """
+    tilts = len(commands)
+    return xp.where(time >= faults.stuck_time[:tilts], faults.stuck_angle[:tilts], commands)
 
 
 def held_gain(bandwidth: float, step: float) -> float:

@@ -9,16 +9,19 @@ velocities are in world axes, z up.
 
 from __future__ import annotations
 
-from math import cos, pi, sqrt
+from math import cos, sin
 from typing import Any, Final, NamedTuple
 
-import numpy as np
-
-from tiltsim_controllers.mathematics.noise import normal
-from tiltsim_controllers.mathematics.scalar import Triple, scalar
+from tiltsim_controllers.code.arrays import xp
+from tiltsim_controllers.code.blocks import branch, normal
+from tiltsim_controllers.code.traceable import traceable
+from tiltsim_controllers.mathematics.linear import norm
+from tiltsim_controllers.mathematics.records import Vector3
 
 FOOT: Final = 0.3048
 """m; MIL-F-8785C is in feet, and its exponents do not carry over."""
+
+ROOT_3: Final = 1.7320508075688772
 
 # --- drag --------------------------------------------------------------------------------------
 
@@ -26,29 +29,23 @@ FOOT: Final = 0.3048
 class Drag(NamedTuple):
     """Drag coefficients along each body axis."""
 
-    linear_x: float = 0.0  # N s/m
-    linear_y: float = 0.0
-    linear_z: float = 0.0
-    area_x: float = 0.0  # m^2: drag coefficient times the area projected along the axis
-    area_y: float = 0.0
-    area_z: float = 0.0
+    linear: Vector3 = (0.0, 0.0, 0.0)  # N s/m
+    area: Vector3 = (0.0, 0.0, 0.0)  # m^2: drag coefficient times the projected area
     density: float = 1.225  # kg/m^3, of the standard atmosphere at sea level
 
 
-@scalar
-def drag_force(velocity: Triple, drag: Drag) -> Triple:
-    """Force (N) on a body that moves through the air at a velocity (m/s), body axes.
+@traceable
+def drag_force(velocity: Any, drag: Drag) -> Any:
+    """Force (N), body axes, on a body that moves through the air.
 
     ``F_i = -(linear_i + density / 2 area_i |v|) v_i``. The linear part models the drag of the
     rotors (H-force), the quadratic part that of the fuselage.
+
+    Args:
+        velocity: m/s, body axes, shape (3,).
+        drag: The coefficients.
     """
-    vx, vy, vz = velocity
-    pressure = 0.5 * drag.density * sqrt(vx * vx + vy * vy + vz * vz)
-    return (
-        -(drag.linear_x + drag.area_x * pressure) * vx,
-        -(drag.linear_y + drag.area_y * pressure) * vy,
-        -(drag.linear_z + drag.area_z * pressure) * vz,
-    )
+    return -(drag.linear + 0.5 * drag.density * norm(velocity) * drag.area) * velocity
 
 
 # --- gusts -------------------------------------------------------------------------------------
@@ -59,24 +56,16 @@ class Gust(NamedTuple):
 
     start: float = 0.0  # s
     rise: float = 1.0  # s, d_m over the speed of flight
-    duration: float = 0.0  # s, from start to the end of the fall; 0: it does not fall
-    x: float = 0.0  # m/s, at its peak
-    y: float = 0.0
-    z: float = 0.0
+    duration: float = 0.0  # s, at least twice the rise, from start to the end of the fall; 0: lasts
+    velocity: Vector3 = (0.0, 0.0, 0.0)  # m/s, at its peak
 
 
-@scalar
-def gust_profile(time: float, gust: Gust) -> float:
+def gust_profile(time: Any, gust: Gust) -> Any:
     """Fraction of the peak at a time (s): ``(1 - cos(pi t / rise)) / 2``, mirrored at the end."""
     since = time - gust.start
-    if since <= 0.0 or (gust.duration > 0.0 and since >= gust.duration):
-        return 0.0
-    if since < gust.rise:
-        return 0.5 * (1.0 - cos(pi * since / gust.rise))
-    left = gust.duration - since
-    if gust.duration > 0.0 and left < gust.rise:
-        return 0.5 * (1.0 - cos(pi * left / gust.rise))
-    return 1.0
+    left = xp.where(gust.duration > 0.0, gust.duration, xp.inf) - since
+    inside = xp.clip(xp.minimum(since, left), 0.0, gust.rise)  # s from the nearer end
+    return 0.5 * (1.0 - xp.cos(xp.pi * inside / gust.rise))
 
 
 # --- turbulence --------------------------------------------------------------------------------
@@ -85,9 +74,9 @@ def gust_profile(time: float, gust: Gust) -> float:
 class Turbulence(NamedTuple):
     """Dryden turbulence met at a constant airspeed; see `dryden_rates`."""
 
-    intensity_u: float = 0.0  # m/s, standard deviation along the mean wind
-    intensity_w: float = 0.0  # m/s, vertical; across the wind it is that of u
-    length_u: float = 1.0  # m, scale; across the wind it is the same
+    intensity_u: float = 0.0  # m/s, standard deviation along and across the mean wind
+    intensity_w: float = 0.0  # m/s, vertical
+    length_u: float = 1.0  # m, scale along and across the mean wind
     length_w: float = 1.0
     speed: float = 1.0  # m/s, through the turbulence
     along_x: float = 1.0  # unit vector of the mean wind, horizontal
@@ -115,12 +104,12 @@ def low_altitude_turbulence(
     ``sigma_u = sigma_v = sigma_w / (0.177 + 0.000823 h)^0.4``, ``h`` in feet.
 
     Args:
-        wind_at_20_ft: mean wind 6 m above the ground, m/s
-        height: above the ground, m; limited to 10 to 1000 ft
-        speed: airspeed of the vehicle, m/s; in hover that of the mean wind
-        direction: direction into which the mean wind blows, rad from +x towards +y
-        sample_time: time for which a draw of the noise is held, s
-        seed: an integer
+        wind_at_20_ft: Mean wind 6 m above the ground, m/s.
+        height: Above the ground, m; limited to 10 to 1000 ft.
+        speed: Airspeed of the vehicle, m/s; in hover that of the mean wind.
+        direction: Direction into which the mean wind blows, rad from +x towards +y.
+        sample_time: Time for which a draw of the noise is held, s.
+        seed: An integer.
     """
     feet = min(1000.0, max(10.0, height / FOOT))
     base = 0.177 + 0.000823 * feet
@@ -131,61 +120,78 @@ def low_altitude_turbulence(
         length_u=feet / base**1.2 * FOOT,
         length_w=feet * FOOT,
         speed=speed,
-        along_x=float(np.cos(direction)),
-        along_y=float(np.sin(direction)),
+        along_x=cos(direction),
+        along_y=sin(direction),
         sample_time=sample_time,
         seed=seed,
     )
 
 
-@scalar
-def white_noise(time: float, channel: float, turbulence: Turbulence) -> float:
+def white_noise(time: Any, channel: float, turbulence: Turbulence) -> Any:
     """Sampled white noise (1/s^0.5) at a time (s): its integral has the variance ``time``."""
     # Rounding may leave an exact multiple slightly too small; that must not delay the next draw.
-    index = float(int(time / turbulence.sample_time + 1e-6))
-    return normal(turbulence.seed, channel, index) / sqrt(turbulence.sample_time)
+    index = xp.floor(time / turbulence.sample_time + 1e-6)
+    return normal(turbulence.seed, channel, index) / xp.sqrt(turbulence.sample_time)
 
 
-@scalar
-def dryden_rates(
-    time: float, states: tuple[float, ...], turbulence: Turbulence
-) -> tuple[float, float, float, float, float]:
-    """Rates of the shaping filters' ``states`` at a time (s), driven by white noise.
+@traceable
+def dryden_rates(time: Any, states: Any, turbulence: Turbulence) -> Any:
+    """Rates of the shaping filters' states, driven by white noise.
 
     With ``T = L / V`` the filters are ``sigma sqrt(2 T) / (1 + T s)`` for u and
     ``sigma sqrt(T) (1 + sqrt(3) T s) / (1 + T s)^2`` for v and w. The states are outputs of
     first-order lags: one for u, two in series for v and for w.
+
+    Args:
+        time: s.
+        states: Shape (5,), 1/s^0.5.
+        turbulence: Where it is calm, the states rest.
     """
-    u, v1, v2, w1, w2 = states
-    if turbulence.intensity_u == 0.0 and turbulence.intensity_w == 0.0:
-        return 0.0, 0.0, 0.0, 0.0, 0.0
-    rate_u = turbulence.speed / turbulence.length_u
-    rate_w = turbulence.speed / turbulence.length_w
-    return (
-        rate_u * (white_noise(time, 20.0, turbulence) - u),
-        rate_u * (white_noise(time, 21.0, turbulence) - v1),
-        rate_u * (v1 - v2),
-        rate_w * (white_noise(time, 22.0, turbulence) - w1),
-        rate_w * (w1 - w2),
-    )
+    t = turbulence
+
+    def blowing() -> Any:
+        u, v1, v2, w1, w2 = states
+        noises = [white_noise(time, channel, t) for channel in (20.0, 21.0, 22.0)]
+        driven = [noises[0] - u, noises[1] - v1, v1 - v2, noises[2] - w1, w1 - w2]
+        rate_u, rate_w = t.speed / t.length_u, t.speed / t.length_w
+        return xp.array([rate_u, rate_u, rate_u, rate_w, rate_w]) * xp.array(driven)
+
+    calm = (t.intensity_u == 0.0) & (t.intensity_w == 0.0)
+    return branch(calm, lambda: 0.0 * states, blowing)
 
 
-@scalar
-def dryden_velocity(states: tuple[float, ...], turbulence: Turbulence) -> Triple:
-    """The turbulent velocity of the air (m/s, world) from the filters' states.
+@traceable
+def dryden_velocity(states: Any, turbulence: Turbulence) -> Any:
+    """The turbulent velocity of the air (m/s, world), shape (3,), from the filters' states.
 
     ``(1 + sqrt(3) T s)`` after two lags is ``sqrt(3)`` times the first lag's output minus
     ``sqrt(3) - 1`` times the second's.
     """
+    t = turbulence
     u, v1, v2, w1, w2 = states
-    root_3 = 1.7320508075688772
-    time_u = turbulence.length_u / turbulence.speed
-    time_w = turbulence.length_w / turbulence.speed
-    along = turbulence.intensity_u * sqrt(2.0 * time_u) * u
-    across = turbulence.intensity_u * sqrt(time_u) * (root_3 * v1 - (root_3 - 1.0) * v2)
-    up = turbulence.intensity_w * sqrt(time_w) * (root_3 * w1 - (root_3 - 1.0) * w2)
-    cx, cy = turbulence.along_x, turbulence.along_y
-    return cx * along - cy * across, cy * along + cx * across, up
+    root_u, root_w = xp.sqrt(t.length_u / t.speed), xp.sqrt(t.length_w / t.speed)
+    along = t.intensity_u * root_u * 2.0**0.5 * u
+    across = t.intensity_u * root_u * (ROOT_3 * v1 - (ROOT_3 - 1.0) * v2)
+    up = t.intensity_w * root_w * (ROOT_3 * w1 - (ROOT_3 - 1.0) * w2)
+    cx, cy = t.along_x, t.along_y
+    return xp.array([cx * along - cy * across, cy * along + cx * across, up])
+
+
+def stationary_states(turbulence: Turbulence) -> Any:
+    """A draw of the filters' initial states, shape (5,), from their stationary distribution.
+
+    A lag ``T`` of unit noise has the variance ``1 / 2T``, a second one in series ``1 / 4T``, which
+    is also their covariance.
+    """
+    t = turbulence
+    u, v1, v2, w1, w2 = (normal(t.seed, channel, 0.0) for channel in range(25, 30))
+    root_u, root_w = xp.sqrt(0.5 * t.speed / t.length_u), xp.sqrt(0.5 * t.speed / t.length_w)
+    return xp.array(
+        [
+            *(root_u * u, root_u * v1, 0.5 * root_u * (v1 + v2)),
+            *(root_w * w1, 0.5 * root_w * (w1 + w2)),
+        ]
+    )
 
 
 # --- ground effect -----------------------------------------------------------------------------
@@ -198,17 +204,19 @@ class GroundEffect(NamedTuple):
     height: float = 0.0  # m, z of the ground in the world
 
 
-@scalar
-def ground_effect(above: float, rotor_radius: float) -> float:
+def ground_effect(above: Any, rotor_radius: Any) -> Any:
     """Ratio of a rotor's thrust near the ground to its thrust far away, at equal power.
 
-    ``1 / (1 - (R / 4 h)^2)`` (Cheeseman and Bennett, at rest) with the rotor's height ``h``
-    (``above``, m) and radius ``R`` (m). Derived for single, level rotors from a source and its
-    image and valid above half a radius; below, the value at half a radius, 4/3, is used.
+    ``1 / (1 - (R / 4 h)^2)`` (Cheeseman and Bennett, at rest). Derived for single, level rotors
+    from a source and its image and valid above half a radius; below, the value at half a radius,
+    4/3, is used.
+
+    Args:
+        above: Height h of the rotors above the ground, m, of any shape.
+        rotor_radius: R, m; 0 for no ground effect.
     """
-    if rotor_radius == 0.0:
-        return 1.0
-    ratio = rotor_radius / (4.0 * max(above, 0.5 * rotor_radius))
+    lowest = xp.where(rotor_radius > 0.0, 0.5 * rotor_radius, 1.0)
+    ratio = rotor_radius / (4.0 * xp.maximum(above, lowest))
     return 1.0 / (1.0 - ratio * ratio)
 
 
@@ -218,45 +226,21 @@ def ground_effect(above: float, rotor_radius: float) -> float:
 class Air(NamedTuple):
     """The air around a vehicle."""
 
-    wind_x: float = 0.0  # m/s, world: velocity of the air
-    wind_y: float = 0.0
-    wind_z: float = 0.0
+    wind: Vector3 = (0.0, 0.0, 0.0)  # m/s, world: velocity of the air
     drag: Drag = Drag()
     gust: Gust = Gust()
     turbulence: Turbulence = Turbulence()
     ground: GroundEffect = GroundEffect()
 
 
-@scalar
-def air_velocity(time: float, states: tuple[float, ...], air: Any) -> Triple:
-    """Velocity of the air (m/s, world) at a time (s): wind, gust and turbulence.
+@traceable
+def air_velocity(time: Any, states: Any, air: Air) -> Any:
+    """Velocity of the air (m/s, world), shape (3,): wind, gust and turbulence.
 
-    ``states`` are those of the turbulence's filters; ``air`` is an `Air`.
+    Args:
+        time: s.
+        states: States of the turbulence's filters, shape (5,).
+        air: The air.
     """
-    share = gust_profile(time, air.gust)
-    x, y, z = dryden_velocity(states, air.turbulence)
-    return (
-        air.wind_x + share * air.gust.x + x,
-        air.wind_y + share * air.gust.y + y,
-        air.wind_z + share * air.gust.z + z,
-    )
-
-
-def stationary_states(turbulence: Turbulence) -> tuple[float, float, float, float, float]:
-    """A draw of the filters' initial states from their stationary distribution.
-
-    A lag ``T`` of unit noise has the variance ``1 / 2T``, a second one in series ``1 / 4T``, which
-    is also their covariance.
-    """
-    u, v1, v2, w1, w2 = (normal(turbulence.seed, channel, 0.0) for channel in range(25, 30))
-    scale_u = float(np.sqrt(turbulence.speed / turbulence.length_u))
-    scale_w = float(np.sqrt(turbulence.speed / turbulence.length_w))
-    root_2, root_8 = float(np.sqrt(0.5)), float(np.sqrt(0.125))
-    v1, w1 = root_2 * scale_u * v1, root_2 * scale_w * w1
-    return (
-        root_2 * scale_u * u,
-        v1,
-        0.5 * v1 + root_8 * scale_u * v2,
-        w1,
-        0.5 * w1 + root_8 * scale_w * w2,
-    )
+    gust = gust_profile(time, air.gust) * air.gust.velocity
+    return air.wind + gust + dryden_velocity(states, air.turbulence)

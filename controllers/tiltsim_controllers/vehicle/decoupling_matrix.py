@@ -18,7 +18,7 @@ arrays. Torques are in units of ``L K_f``, forces in units of ``K_f``; rotor inp
 
 from __future__ import annotations
 
-from math import cos, nan, sin
+from math import cos, sin
 
 from tiltsim_controllers.mathematics.scalar import Octet, Quad, Triple, scalar
 
@@ -115,16 +115,6 @@ def torque_free_inputs(torque: Octet) -> Quad:
 
 
 @scalar
-def unscaled_torque_free_force(trig: Octet, torque: Octet) -> Triple:
-    """A vector along `torque_free_force`, body axes, of arbitrary length.
-
-    ``trig`` are the `sines_and_cosines`, ``torque`` the `torque_entries` of the tilt angles.
-    """
-    w1, w2, w3, w4 = torque_free_inputs(torque)
-    return body_force(trig, w1, w2, w3, w4)
-
-
-@scalar
 def torque_free_force(trig: Octet, torque: Octet, drag_ratio: float) -> Triple:
     """The force at zero torque, ``n = (-R_theta, R_phi, R)``, body axes.
 
@@ -133,42 +123,7 @@ def torque_free_force(trig: Octet, torque: Octet, drag_ratio: float) -> Triple:
     forces of the two pairs cancel, as for red gaits on the curve L of the Two Color Map. ``trig``
     are the `sines_and_cosines`, ``torque`` the `torque_entries` of the tilt angles.
     """
-    nx, ny, nz = unscaled_torque_free_force(trig, torque)
+    w1, w2, w3, w4 = torque_free_inputs(torque)
+    nx, ny, nz = body_force(trig, w1, w2, w3, w4)
     scale = 0.5 / drag_ratio
     return nx * scale, ny * scale, nz * scale
-
-
-@scalar
-def solve_by_pairs(
-    torque: Octet, force: Quad, roll: float, pitch: float, yaw: float, lift: float
-) -> Quad:
-    """Solve the 4 x 4 system of the decoupling matrix for the rotor inputs (ch. 3, Eq. 16).
-
-    The input of each opposite pair of rotors is the sum of a part that produces its torque and a
-    part that does not: ``(v2, v4) = roll (x2, x4) / |(x2, x4)|^2 + mu (-x4, x2)``, likewise
-    ``(v1, v3)`` with pitch and ``nu``; yaw and lift then determine ``mu`` and ``nu``.
-
-    Args:
-        torque: `torque_entries` of the tilt angles
-        force: the four entries of the last row, `vertical_force_entries`
-        roll, pitch, yaw, lift: the right-hand side, in units of ``L K_f`` and ``K_f``
-
-    Returns:
-        ``(v1, v2, v3, v4)``, all NaN where the matrix is singular.
-    """
-    x2, x4, y1, y3, z1, z2, z3, z4 = torque
-    h1, h2, h3, h4 = force
-    norm_24 = x2 * x2 + x4 * x4
-    norm_13 = y1 * y1 + y3 * y3
-    yaw_13, yaw_24 = z3 * y1 - z1 * y3, z4 * x2 - z2 * x4
-    lift_13, lift_24 = h3 * y1 - h1 * y3, h4 * x2 - h2 * x4
-    determinant = yaw_13 * lift_24 - yaw_24 * lift_13
-    if norm_24 == 0.0 or norm_13 == 0.0 or determinant == 0.0:
-        return nan, nan, nan, nan
-    roll, pitch = roll / norm_24, pitch / norm_13
-    v1, v2, v3, v4 = pitch * y1, roll * x2, pitch * y3, roll * x4
-    yaw = yaw - (z1 * v1 + z2 * v2 + z3 * v3 + z4 * v4)
-    lift = lift - (h1 * v1 + h2 * v2 + h3 * v3 + h4 * v4)
-    nu = (yaw * lift_24 - yaw_24 * lift) / determinant
-    mu = (yaw_13 * lift - yaw * lift_13) / determinant
-    return v1 - y3 * nu, v2 - x4 * mu, v3 + y1 * nu, v4 + x2 * mu

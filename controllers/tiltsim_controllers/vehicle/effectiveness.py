@@ -1,4 +1,4 @@
-"""What each rotor of any vehicle does to the body: force F(alpha) and torque tau(alpha).
+"""Force F(alpha) and torque tau(alpha) of each rotor of any vehicle on the body.
 
 A pod turns about a fixed axis, so every vector fixed in it is a constant, a cosine and a sine of
 the tilt angle. So is the torque about a fixed point: with the rotor at ``h + Q p``, thrust axis
@@ -37,9 +37,8 @@ ROTOR_FLOATS: Final = 20
 TILT, SPIN_SIGN, CONSTANT, COSINE, SINE = 0, 1, 2, 8, 14
 """Where in them its tilt, its spin, A, B and C begin."""
 
-VECTOR_FLOATS: Final = 9
-"""Floats of a vector that turns with a rotor's pod, as its place and its thrust axis do: constant,
-cosine and sine, x, y, z each."""
+ARMS: Final = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (-1.0, 0.0, 0.0), (0.0, -1.0, 0.0))
+"""Directions of the arms of rotors 1 to 4 on a cross; pods of the tiltrotor turn about them."""
 
 TiltOfRotor = tuple[int, ...]
 """The number of every rotor's tilt, from 0; -1: fixed. Scalar code is made for a layout."""
@@ -51,7 +50,7 @@ Rows = tuple[Values, Values, Values, Values, Values, Values]
 class Rotor(NamedTuple):
     """A rotor at zero tilt, in body axes; the arguments of `rotor_entries`."""
 
-    place: Triple  # m, from the centre of mass
+    place: Triple  # m, from the center of mass
     axis: Triple  # of its thrust, a unit vector
     thrust: float  # K_f, N s^2/rad^2
     drag: float  # K_m, N m s^2/rad^2
@@ -76,32 +75,24 @@ class Rotor(NamedTuple):
     def hinge_load(self) -> float:
         """Torque about its hinge (N m s^2/rad^2) of thrust and drag per unit of ``spin w``.
 
-        The same at all tilts; 0 where the thrust passes through the hinge at a right angle.
+        It is equal at all tilts; 0 where the thrust passes through the hinge at a right angle.
         """
         lever = np.cross(np.subtract(self.place, self.hinge), self.axis)
         pushed = float(np.dot(lever, self.hinge_axis))
         return self.thrust * pushed - self.spin * self.drag * self.along_hinge
 
-    @property
-    def place_entries(self) -> Values:
-        """Its place as `VECTOR_FLOATS`."""
-        arm = np.asarray(self.hinge)
-        constant, cosine, sine = _turning(
-            np.asarray(self.place) - arm, np.asarray(self.hinge_axis), self.tilt
-        )
-        return tuple(map(float, (*(constant + arm), *cosine, *sine)))
 
-    @property
-    def axis_entries(self) -> Values:
-        """Its thrust axis as `VECTOR_FLOATS`."""
-        parts = _turning(np.asarray(self.axis), np.asarray(self.hinge_axis), self.tilt)
-        return tuple(map(float, np.concatenate(parts)))
+def turning_parts(vector: ArrayLike, along: ArrayLike, tilt: int) -> Floats:
+    """Constant, cosine and sine of a vector that turns with a pod, shape (3, 3).
 
-
-def _turning(vector: Floats, along: Floats, tilt: int) -> tuple[Floats, Floats, Floats]:
-    """Constant, cosine and sine of a vector that turns with a pod about ``along``."""
-    constant = along * (along @ vector) if tilt >= 0 else vector
-    return constant, vector - constant, np.cross(along, vector)
+    Args:
+        vector: At zero tilt.
+        along: Unit vector of the hinge.
+        tilt: The number of the pod's tilt; -1 for a fixed vector.
+    """
+    here, axis = np.asarray(vector, float), np.asarray(along, float)
+    constant = axis * (axis @ here) if tilt >= 0 else here
+    return np.array([constant, here - constant, np.cross(axis, here)])
 
 
 def rotor_entries(
@@ -118,7 +109,7 @@ def rotor_entries(
     """A rotor's part of the table.
 
     Args:
-        place: of the rotor at zero tilt, from the centre of mass, m, body axes
+        place: of the rotor at zero tilt, from the center of mass, m, body axes
         axis: unit vector of its thrust at zero tilt
         thrust: coefficient, N s^2/rad^2
         drag: coefficient of the torque against its rotation, N m s^2/rad^2
@@ -126,17 +117,17 @@ def rotor_entries(
         tilt: number of its tilt, from 0; -1 for a fixed rotor
         hinge, hinge_axis: a point of its hinge as ``place``, and its unit vector
     """
-    arm, n, along = np.asarray(hinge, float), np.asarray(axis, float), np.asarray(hinge_axis, float)
-    force = spin * thrust * n
+    n, arm = np.asarray(axis, float), np.asarray(hinge, float)
+    push = spin * thrust * n
     # About the point of the hinge; turns with the pod as the force does.
-    torque = np.cross(np.asarray(place, float) - arm, force) - drag * n
-    parts = _turning(force, along, tilt), _turning(torque, along, tilt)
-    wrenches = [np.r_[f, t + np.cross(arm, f)] for f, t in zip(*parts)]
-    return tuple(map(float, (tilt, spin, *np.concatenate(wrenches))))
+    about_hinge = np.cross(np.asarray(place, float) - arm, push) - drag * n
+    force = turning_parts(push, hinge_axis, tilt)
+    torque = turning_parts(about_hinge, hinge_axis, tilt) + np.cross(arm, force)
+    return (float(tilt), float(spin), *np.hstack([force, torque]).ravel().tolist())
 
 
 def table_per_newton(table: Sequence[float], coefficients: Sequence[float]) -> Values:
-    """A table in which force and torque are those of a thrust of 1 N, given K_f of each rotor."""
+    """A table of forces and torques for a thrust of 1 N, given K_f of each rotor."""
     rows = np.reshape(np.array(table, float), (-1, ROTOR_FLOATS))
     rows[:, CONSTANT:] /= (rows[:, SPIN_SIGN] * coefficients)[:, np.newaxis]
     return tuple(rows.ravel().tolist())
@@ -148,7 +139,7 @@ def cross_table(vehicle: Vehicle, *, tilting: bool) -> Values:
     In closed form, so that parameters of the vehicle may be numbers of any kind.
     """
     drag, table = vehicle.drag_coefficient, []
-    for rotor, (x, y) in enumerate(((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))):
+    for rotor, (x, y, _) in enumerate(ARMS):
         spin = SPIN[rotor]
         push = spin * vehicle.thrust_coefficient
         lever = vehicle.arm_length * push
@@ -211,16 +202,6 @@ def effectiveness_of(layout: TiltOfRotor) -> Effectiveness:
     return Effectiveness(cosines, sines, rows, squares, wrench)
 
 
-@cache
-def turning_vectors_of(layout: TiltOfRotor) -> Callable[..., tuple[Values, Values, Values]]:
-    """As `Effectiveness.rows`, of a table of `VECTOR_FLOATS`: x, y and z by rotor."""
-    name = "_".join(str(tilt) if tilt >= 0 else "f" for tilt in layout)
-    vectors: Callable[..., tuple[Values, Values, Values]] = written_out(
-        f"vectors_{name}", _ROW_ARGUMENTS, _rows(layout, VECTOR_FLOATS, 0, 3)
-    )
-    return vectors
-
-
 _ROW_ARGUMENTS: Final = "constant, cosines, sines, table, at"
 
 
@@ -249,10 +230,12 @@ def force_and_torque(table: Sequence[float], tilts: ArrayLike = ()) -> tuple[Flo
         table: of the rotors
         tilts: shape (..., tilts)
     """
-    angles = np.moveaxis(np.asarray(tilts, float), -1, 0)
-    # The scalar functions: those of arrays differ in the last bit.
-    cosines, sines = (np.frompyfunc(f, 1, 1)(angles).astype(float) for f in (cos, sin))
-    rows = effectiveness_of(tilt_of_rotor(table)).rows(1.0, cosines, sines, table, 0)
-    entries = [[np.broadcast_to(entry, angles.shape[1:]) for entry in row] for row in rows]
-    wrenches = np.moveaxis(np.array(entries), (0, 1), (-2, -1))
-    return wrenches[..., :3, :], wrenches[..., 3:, :]
+    rows = np.reshape(np.array(table, float), (-1, ROTOR_FLOATS)).T
+    angles = np.asarray(tilts, float)
+    layout, fixed = list(tilt_of_rotor(table)), np.zeros((*angles.shape[:-1], 1))
+    cosines, sines = (
+        np.concatenate([of(angles), fixed], axis=-1)[..., np.newaxis, layout]  # -1 is the last, 0
+        for of in (np.cos, np.sin)
+    )
+    wrench = rows[CONSTANT:COSINE] + rows[COSINE:SINE] * cosines + rows[SINE:] * sines
+    return wrench[..., :3, :], wrench[..., 3:, :]

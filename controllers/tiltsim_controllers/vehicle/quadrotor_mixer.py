@@ -8,37 +8,39 @@ ch. 3, Eqs. (3) and (5), without tilt.
 
 from __future__ import annotations
 
-from math import sqrt
+from typing import Any, Final
 
-from tiltsim_controllers.mathematics.scalar import Quad, scalar
+import numpy as np
+
+from tiltsim_controllers.code.arrays import xp
+from tiltsim_controllers.code.traceable import traceable
 from tiltsim_controllers.vehicle.parameters import Vehicle
 
+CROSS: Final = np.array(
+    [[1.0, 1.0, 1.0, 1.0], [0.0, 1.0, 0.0, -1.0], [-1.0, 0.0, 1.0, 0.0], [1.0, -1.0, 1.0, -1.0]]
+)
+"""Thrust and torques of the rotors, in the units of `wrench_units`."""
 
-@scalar
-def thrust_controls(
-    thrust: float, roll_torque: float, pitch_torque: float, yaw_torque: float, vehicle: Vehicle
-) -> Quad:
-    """The ``c_i`` (rad^2/s^2) that produce a thrust and torques.
+
+def wrench_units(vehicle: Vehicle) -> Any:
+    """Thrust (N) and torques (N m) of a rotor per (rad/s)^2: ``K_f, L K_f, L K_f, K_m``."""
+    lever = vehicle.arm_length * vehicle.thrust_coefficient
+    return xp.array([vehicle.thrust_coefficient, lever, lever, vehicle.drag_coefficient])
+
+
+@traceable
+def thrust_controls(wrench: Any, vehicle: Vehicle) -> Any:
+    """The ``c_i`` (rad^2/s^2), shape (4,), that produce a thrust and torques.
 
     Args:
-        thrust: N
-        roll_torque, pitch_torque, yaw_torque: n m, body axes, z up
-        vehicle: the quadrotor
+        wrench: Thrust (N) and torques (N m) about the body axes, z up, shape (4,).
+        vehicle: The quadrotor.
     """
-    lever = vehicle.arm_length * vehicle.thrust_coefficient
-    lift = thrust / vehicle.thrust_coefficient
-    roll, pitch = roll_torque / lever, pitch_torque / lever
-    yaw = yaw_torque / vehicle.drag_coefficient
-    along_x, along_y = 0.5 * (lift + yaw), 0.5 * (lift - yaw)  # sums of opposite rotors
-    return (
-        0.5 * (along_x - pitch),
-        0.5 * (along_y + roll),
-        0.5 * (along_x + pitch),
-        0.5 * (along_y - roll),
-    )
+    squares = (CROSS * CROSS).sum(axis=1)  # its rows are orthogonal
+    return CROSS.T @ (wrench / (squares * wrench_units(vehicle)))
 
 
-@scalar
-def speed_along_spin(thrust_control: float) -> float:
+@traceable
+def speed_along_spin(thrust_control: Any) -> Any:
     """The rotor speed (rad/s) of a ``c_i`` (rad^2/s^2), negative against the nominal spin."""
-    return sqrt(thrust_control) if thrust_control >= 0.0 else -sqrt(-thrust_control)
+    return xp.copysign(xp.sqrt(abs(thrust_control)), thrust_control)

@@ -6,20 +6,20 @@ integrator stage and restarted anywhere.
 
 from __future__ import annotations
 
-from math import floor, sqrt
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from tiltsim_controllers.mathematics.noise import normal
-from tiltsim_controllers.mathematics.scalar import Quad, Triple, scalar
+from tiltsim_controllers.code.arrays import xp
+from tiltsim_controllers.code.blocks import branch, normal
+from tiltsim_controllers.code.traceable import traceable
+from tiltsim_controllers.mathematics.attitude import quaternion_product
+from tiltsim_controllers.mathematics.records import Vector3
 
 
 class Sensor(NamedTuple):
     """Error of a measured vector: zero-mean normal noise on each axis, and a constant bias."""
 
     noise: float = 0.0  # standard deviation of a reading
-    bias_x: float = 0.0
-    bias_y: float = 0.0
-    bias_z: float = 0.0
+    bias: Vector3 = (0.0, 0.0, 0.0)
 
 
 class Sensors(NamedTuple):
@@ -34,46 +34,36 @@ class Sensors(NamedTuple):
     body_rates: Sensor = Sensor()  # rad/s, body
 
 
-@scalar
-def reading_error(sensor: Sensor, seed: float, channel: float, index: float) -> Triple:
-    """The error that a reading adds to the true vector, in the units of the sensor.
+@traceable
+def reading_error(sensor: Sensor, seed: float, channel: float, index: Any) -> Any:
+    """The error that a reading adds to the true vector, shape (3,), in the units of the sensor.
 
     Args:
-        sensor: noise and bias
-        seed, channel, index: as for `normal`; the sensor uses ``channel`` and the next two
+        sensor: Noise and bias.
+        seed, channel, index: As for `normal`; the sensor uses ``channel`` and the next two.
     """
-    x, y, z = sensor.bias_x, sensor.bias_y, sensor.bias_z
-    noise = sensor.noise
-    if noise > 0.0:
-        x += noise * normal(seed, channel, index)
-        y += noise * normal(seed, channel + 1.0, index)
-        z += noise * normal(seed, channel + 2.0, index)
-    return x, y, z
+
+    def noise() -> Any:
+        draws = [normal(seed, channel + axis, index) for axis in range(3)]
+        return sensor.bias + sensor.noise * xp.array(draws)
+
+    return branch(sensor.noise > 0.0, noise, lambda: sensor.bias + sensor.noise * xp.zeros(3))
 
 
-@scalar
-def reading_index(time: float, period: float) -> float:
+def reading_index(time: Any, period: Any) -> Any:
     """The number of the latest reading at ``time`` (s), with readings every ``period`` (s)."""
-    return float(floor(time / period + 1e-6))  # a time step's rounding must not delay one
+    return xp.floor(time / period + 1e-6)  # a time step's rounding must not delay one
 
 
-@scalar
-def rotate_by_small_angle(
-    qw: float, qx: float, qy: float, qz: float, x: float, y: float, z: float
-) -> Quad:
+@traceable
+def rotate_by_small_angle(quaternion: Any, vector: Any) -> Any:
     """A unit quaternion rotated by a small rotation vector, to third order in the angle.
 
     The exact rotation has ``tan(angle / 2) = |vector| / 2``.
 
     Args:
-        qw, qx, qy, qz: the quaternion, scalar first
-        x, y, z: the rotation vector in body axes, rad
+        quaternion: Shape (4,), scalar first.
+        vector: The rotation vector in body axes, rad, shape (3,).
     """
-    x, y, z = 0.5 * x, 0.5 * y, 0.5 * z
-    scale = 1.0 / sqrt(1.0 + x * x + y * y + z * z)
-    return (
-        scale * (qw - qx * x - qy * y - qz * z),
-        scale * (qx + qw * x + qy * z - qz * y),
-        scale * (qy + qw * y + qz * x - qx * z),
-        scale * (qz + qw * z + qx * y - qy * x),
-    )
+    half = 0.5 * vector
+    return quaternion_product(quaternion, xp.hstack([1.0, half])) / xp.sqrt(1.0 + half @ half)

@@ -10,12 +10,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from tiltsim_controllers.mathematics.noise import normal
+from tiltsim_controllers.code.blocks import normal
+from tiltsim_controllers.code.traceable import as_arrays
 from tiltsim_controllers.vehicle.actuators import (
-    RotorFault,
+    faults_record,
     rate_limited_command,
-    servo_command,
-    thrust_factor,
+    servo_commands,
+    thrust_factors,
 )
 from tiltsim_controllers.vehicle.sensors import (
     Sensor,
@@ -35,8 +36,9 @@ def test_a_reading_stands_from_its_own_multiple_on(period, number):
 
 
 def test_readings_have_the_noise_and_bias_given():
-    sensor = Sensor(0.3, 1.0, -2.0, 0.5)
-    errors = np.array([reading_error(sensor, 5.0, 6.0, float(i)) for i in range(4000)])
+    sensor = Sensor(0.3, (1.0, -2.0, 0.5))
+    given = as_arrays(sensor)
+    errors = np.array([reading_error(given, 5.0, 6.0, float(i)) for i in range(4000)])
     np.testing.assert_allclose(errors.mean(axis=0), [1.0, -2.0, 0.5], atol=0.02)
     np.testing.assert_allclose(np.cov(errors.T), 0.09 * np.eye(3), atol=0.008)
 
@@ -45,7 +47,7 @@ def test_readings_have_the_noise_and_bias_given():
 def test_an_attitude_is_turned_about_the_body_axes(attitude, vector):
     start = Rotation.from_euler("xyz", attitude)
     quaternion = start.as_quat(scalar_first=True).tolist()
-    found = Rotation.from_quat(rotate_by_small_angle(*quaternion, *vector), scalar_first=True)
+    found = Rotation.from_quat(rotate_by_small_angle(quaternion, vector), scalar_first=True)
     desired = start * Rotation.from_rotvec(vector)
     third_order = np.linalg.norm(vector) ** 3 / 12.0
     assert (found.inv() * desired).magnitude() < 1.01 * third_order + 1e-12
@@ -60,26 +62,27 @@ def test_a_set_point_leads_the_pod_by_its_reach_at_most(command, angle, reach):
 
 
 def test_faults_begin_at_their_time():
-    fault = RotorFault(thrust_time=2.0, thrust_factor=0.3, stuck_time=1.0, stuck_angle=0.2)
-    assert [thrust_factor(t, fault) for t in (0.0, 1.999, 2.0, 9.0)] == [1.0, 1.0, 0.3, 0.3]
-    assert [servo_command(t, 0.5, fault) for t in (0.999, 1.0)] == [0.5, 0.2]
-    assert thrust_factor(1e9, RotorFault()) == 1.0
+    faults = as_arrays(
+        faults_record(3)((2.0, inf, inf), (0.3, 1.0, 1.0), (1.0, 3.0, inf), (0.2, 0.4, 0.0))
+    )
+    times = (0.0, 1.999, 2.0, 9.0)
+    found = [thrust_factors(time, faults).tolist() for time in times]
+    assert found == [[1.0, 1.0, 1.0]] * 2 + [[0.3, 1.0, 1.0]] * 2
+    commands = np.array([0.5, 0.6])  # two servos, three rotors
+    found = [servo_commands(time, commands, faults).tolist() for time in (0.999, 1.0, 3.0)]
+    assert found == [[0.5, 0.6], [0.2, 0.6], [0.2, 0.4]]
 
 
 @pytest.mark.parametrize("channel", [0.0, 3.0])
 def test_every_axis_has_noise_of_its_own(channel):
     sensor = Sensor(0.3)
-    errors = reading_error(sensor, 5.0, channel, 17.0)
+    errors = tuple(reading_error(as_arrays(sensor), 5.0, channel, 17.0))
     alone = [0.3 * normal(5.0, channel + axis, 17.0) for axis in (0.0, 1.0, 2.0)]
     assert errors == pytest.approx(alone, rel=1e-15)
     assert len(set(errors)) == 3
 
 
-def test_by_default_nothing_errs_and_nothing_fails():
+def test_by_default_no_sensor_errs():
     for sensor in (Sensor(), Sensors().position, Sensors().velocity, Sensors().attitude):
-        assert reading_error(sensor, 5.0, 0.0, 1.0) == (0.0, 0.0, 0.0)
+        assert not reading_error(as_arrays(sensor), 5.0, 0.0, 1.0).any()
     assert (Sensors().active, Sensors().seed, Sensors().period) == (0.0, 0.0, 1.0)
-    fault = RotorFault()
-    assert (thrust_factor(1e9, fault), servo_command(1e9, 0.3, fault)) == (1.0, 0.3)
-    assert thrust_factor(1.0, RotorFault(thrust_time=0.5)) == 1.0
-    assert servo_command(1.0, 0.3, RotorFault(stuck_time=0.5)) == 0.0

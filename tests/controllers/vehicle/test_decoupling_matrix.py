@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from itertools import product
-from math import atan, isnan, pi
+from math import atan, pi
 
 import numpy as np
 import pytest
@@ -11,11 +11,11 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from tests.thesis import force_matrix, torque_matrix
+from tiltsim_controllers.mathematics.linear import solved
 from tiltsim_controllers.mathematics.rotation import world_up_in_body
 from tiltsim_controllers.vehicle.decoupling_matrix import (
     body_force,
     sines_and_cosines,
-    solve_by_pairs,
     torque_entries,
     torque_free_force,
     torque_free_inputs,
@@ -205,31 +205,11 @@ def test_blue_gaits_have_no_torque_free_force(vehicle, alpha_1, alpha_2):
 
 @quick
 @given(vehicles, angles, attitudes, st.tuples(*[st.floats(-100.0, 100.0)] * 4))
-def test_solving_by_pairs_solves_the_four_by_four_system(vehicle, alpha, attitude, right):
+def test_cramers_rule_solves_the_four_by_four_system(vehicle, alpha, attitude, right):
     up = world_up(*attitude)
     matrix = decoupling_matrix(vehicle, alpha, up)
     condition = np.linalg.cond(matrix)
     assume(condition < 1e3)
-    force = vertical_force_entries(sines_and_cosines(*alpha), *up)
-    solved = np.array(solve_by_pairs(torques(vehicle, alpha), force, *right))
     expected = np.linalg.solve(matrix, right)
     bound = 1e-14 * condition * max(1.0, np.linalg.norm(expected))
-    np.testing.assert_allclose(solved, expected, rtol=0, atol=bound)
-
-
-UNTILTED = torques(PRESETS["ar_drone_2"], (0.0, 0.0, 0.0, 0.0))
-LEVEL = (-1.0, 1.0, -1.0, 1.0)
-
-
-@pytest.mark.parametrize(
-    ("torque", "force"),
-    [
-        pytest.param(UNTILTED, (0.0, 0.0, 0.0, 0.0), id="no lift"),
-        pytest.param(UNTILTED, UNTILTED[4:], id="lift as yaw"),
-        pytest.param((0.0, 0.0, *UNTILTED[2:]), LEVEL, id="no roll torque"),
-        pytest.param((*UNTILTED[:2], 0.0, 0.0, *UNTILTED[4:]), LEVEL, id="no pitch torque"),
-        pytest.param((*UNTILTED[:4], 0.0, 0.0, 0.0, 0.0), LEVEL, id="no yaw torque"),
-    ],
-)
-def test_solution_of_a_singular_system_is_nan(torque, force):
-    assert all(isnan(value) for value in solve_by_pairs(torque, force, 1.0, 2.0, 3.0, 4.0))
+    np.testing.assert_allclose(solved(matrix, np.array(right)), expected, rtol=0, atol=bound)

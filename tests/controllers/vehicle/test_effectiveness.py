@@ -16,7 +16,7 @@ from tiltsim_controllers.vehicle.effectiveness import (
     tilts_of,
     without_rotor,
 )
-from tiltsim_controllers.vehicle.multirotor import equations_of_motion_of
+from tiltsim_controllers.vehicle.motion import equations_of_motion_of
 
 
 def numbers(values):

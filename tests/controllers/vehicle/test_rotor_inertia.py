@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.controllers.vehicle.test_rotor_code import each_case
+from tests.controllers.vehicle.test_craft import each_case
 from tiltsim_controllers.vehicle.rotor_inertia import (
-    acceleration_within_limits,
-    accelerations_within_limits_of,
-    spin_torque_of,
+    accelerations_within_limits,
+    hinge_torques,
+    spin_torque,
 )
 
 H = 1e-4
@@ -17,7 +17,7 @@ H = 1e-4
 
 @each_case
 def test_the_spin_torque_is_minus_the_rate_of_angular_momentum(case):
-    code, vehicle, axes, tilts = case.code, case.vehicle, case.axes, case.tilts
+    craft, axes, tilts = case.craft, case.axes, case.tilts
     rotors, rng = len(case.thrusts), np.random.default_rng(1)
     for _ in range(5):
         angles, rates = rng.uniform(-2.0, 2.0, (2, tilts))
@@ -27,9 +27,7 @@ def test_the_spin_torque_is_minus_the_rate_of_angular_momentum(case):
         def momentum(time, angles=angles, rates=rates, speeds=speeds, faster=faster):
             return (speeds + time * faster) @ axes(angles + time * rates)
 
-        found = spin_torque_of(code)(
-            code.axes(tuple(angles), vehicle), *map(tuple, (rates, speeds, faster, omega))
-        )
+        found = spin_torque(craft, angles, rates, speeds, faster, omega)
         lost = -(momentum(H) - momentum(-H)) / (2.0 * H) - np.cross(omega, momentum(0.0))
         np.testing.assert_allclose(found, lost, rtol=0.0, atol=1e-6)
 
@@ -37,7 +35,7 @@ def test_the_spin_torque_is_minus_the_rate_of_angular_momentum(case):
 @each_case
 def test_the_torque_about_the_hinges(case):
     """By virtual work: ``d/d alpha (varpi omega . d)``, and the reaction along the hinges."""
-    code, vehicle, axes, tilts = case.code, case.vehicle, case.axes, case.tilts
+    craft, axes, tilts = case.craft, case.axes, case.tilts
     rotors, rng = len(case.thrusts), np.random.default_rng(2)
     for _ in range(5):
         angles, (speeds, faster) = (
@@ -45,9 +43,7 @@ def test_the_torque_about_the_hinges(case):
             rng.uniform(-2.0, 2.0, (2, rotors)),
         )
         omega = rng.uniform(-2.0, 2.0, 3)
-        found = code.on_hinges(
-            code.axes(tuple(angles), vehicle), *map(tuple, (speeds, faster, omega))
-        )
+        found = hinge_torques(craft, angles, speeds, faster, omega)
         for tilt, (hinge, one) in enumerate(zip(case.hinges, np.eye(tilts), strict=True)):
             beyond, before = axes(angles + H * one), axes(angles - H * one)
             turns = np.any(beyond != before, axis=1)
@@ -71,10 +67,7 @@ def test_the_torque_about_the_hinges(case):
     ],
 )
 def test_no_rotor_accelerates_beyond_a_limit(speed, acceleration, expected):
-    assert acceleration_within_limits(speed, acceleration, 1.0, 10.0) == expected
-    # The other rotor turns the other way, and so do its limits.
-    for spins in ((1.0, -1.0), (-1.0, 1.0), (0.5, -0.5)):
-        signed = tuple(np.sign(spin) * speed for spin in spins)
-        demanded = tuple(np.sign(spin) * acceleration for spin in spins)
-        found = accelerations_within_limits_of(spins)(signed, demanded, 1.0, 10.0)
-        assert found == tuple(np.sign(spin) * expected for spin in spins)
+    for spins in ((1.0, 1.0), (1.0, -1.0), (-1.0, 1.0)):  # limits are along the spin
+        signs = np.array(spins)
+        found = accelerations_within_limits(signs, signs * speed, signs * acceleration, 1.0, 10.0)
+        np.testing.assert_array_equal(found, signs * expected)

@@ -34,6 +34,16 @@ class Layout(NamedTuple):
         return self.tilts
 
     @property
+    def thrusts(self) -> slice:
+        """In ``ctrl``: the thrusts follow the tilt servos."""
+        return slice(self.thrust_1, self.acceleration_1)
+
+    @property
+    def accelerations(self) -> slice:
+        """In ``ctrl``: the rotor accelerations follow the thrusts."""
+        return slice(self.acceleration_1, self.further_rates)
+
+    @property
     def acceleration_1(self) -> int:
         """In ``ctrl``: the rotor accelerations follow the thrusts."""
         return self.tilts + self.rotors
@@ -68,6 +78,13 @@ class Layout(NamedTuple):
 def layout_of(dynamics: Dynamics) -> Layout:
     """The layout of a model's vectors; the quadrotor's have no tilts."""
     return Layout(len(dynamics.spins), dynamics.sizes.qpos - TILT_1)
+
+
+def tilt_of_rotor(dynamics: Dynamics) -> tuple[int, ...]:
+    """The number, from 0, of each rotor's tilt; -1: fixed."""
+    rotors, tilts = layout_of(dynamics)
+    on_cross = tuple(range(rotors)) if tilts else (-1,) * rotors
+    return dynamics.tilt_of_rotor or on_cross
 
 
 CROSS: Final = Layout(4, 4)

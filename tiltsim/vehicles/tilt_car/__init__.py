@@ -16,7 +16,7 @@ from tiltsim.closed_loop.limits import (
 from tiltsim.closed_loop.vehicle_kind import VehicleKind
 from tiltsim.system.quantity import Quantity
 from tiltsim.vehicles.tilt_car.metrics import tilt_car_metrics
-from tiltsim_controllers.gaits.tilts import tilt_reference
+from tiltsim_controllers.gaits.motion import tilt_motion_of
 from tiltsim_controllers.mathematics.scalar import Floats, Vector, scalar
 from tiltsim_controllers.references.trajectories import ReferenceParameters
 from tiltsim_controllers.tilt_car.vehicle import counter_yaw_per_tilt
@@ -124,8 +124,8 @@ def _compile(
 
 def initial_tilt(plan: FlightPlan) -> tuple[float, float]:
     """Tilt angle (rad) and its rate (rad/s) at time zero: the gait's."""
-    angles = tilt_reference(0.0, plan.gait.parameters, plan.gait.knots)
-    return angles[0], angles[4]
+    (angle,), (rate,) = tilt_motion_of(1).moving(0.0, plan.gait.parameters, plan.gait.knots)
+    return angle, rate
 
 
 def _initial_motion(plan: FlightPlan) -> tuple[Vector, Vector]:

@@ -1,4 +1,4 @@
-"""Places, lift, torque and momentum of rotors: the cross in closed form, and any rotors."""
+"""Places, lift, torque and inertia of vehicles: the cross of the thesis, and any rotors."""
 
 from __future__ import annotations
 
@@ -8,14 +8,12 @@ import numpy as np
 import pytest
 
 from tests.controllers.multirotors import SMALL
+from tiltsim_controllers.code.traceable import as_arrays
+from tiltsim_controllers.vehicle.body import inertia_matrix, inverse_inertia_matrix
+from tiltsim_controllers.vehicle.craft import craft_of, craft_parameters, places, wrench_of_lift
 from tiltsim_controllers.vehicle.effectiveness import Rotor
 from tiltsim_controllers.vehicle.parameters import PRESETS, SPIN
-from tiltsim_controllers.vehicle.rotor_code import (
-    TILTING_CROSS,
-    UPRIGHT_CROSS,
-    rotor_code_of,
-    rotors_of,
-)
+from tiltsim_controllers.vehicle.rotors import wrench_map
 
 CROSS = PRESETS["ar_drone_2"]
 ARMS = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
@@ -27,10 +25,9 @@ LAST = Rotor((0.1, 0.1, 0.3), (0.6, 0.0, 0.8), 9e-6, 3e-7, -1.0)
 
 
 class Case(NamedTuple):
-    """Code for a vehicle, and what NumPy finds for it."""
+    """A vehicle, and its numbers by another way."""
 
-    code: Any
-    vehicle: Any
+    craft: Any
     axes: Any  # (tilts): thrust axes, shape (N, 3)
     places: Any  # (tilts): of the rotors, m, shape (N, 3)
     tilts: int
@@ -52,8 +49,7 @@ def on_cross(name):
     arms = CROSS.arm_length * ARMS
     if name == "upright cross":
         return Case(
-            UPRIGHT_CROSS,
-            CROSS,
+            craft_of(CROSS, (-1,) * 4),
             lambda tilts: upright,
             lambda tilts: arms,
             0,
@@ -61,7 +57,8 @@ def on_cross(name):
             *coefficients,
         )
     axes = lambda tilts: turned(upright, ARMS, tilts)  # noqa: E731
-    return Case(TILTING_CROSS, CROSS, axes, lambda tilts: arms, 4, ARMS, *coefficients)
+    craft = craft_of(CROSS, (0, 1, 2, 3))
+    return Case(craft, axes, lambda tilts: arms, 4, ARMS, *coefficients)
 
 
 def any_rotors(hinged):
@@ -85,8 +82,7 @@ def any_rotors(hinged):
         return arms + around((0.0, 0.0, 0.05), LAST.place, tilts)
 
     return Case(
-        rotor_code_of((*layout, -1)),
-        rotors_of(SMALL, rotors),
+        craft_of(as_arrays(craft_parameters(SMALL, rotors)), (*layout, -1)),
         lambda tilts: around(AXIS, LAST.axis, tilts),
         places,
         max(layout) + 1,
@@ -106,38 +102,48 @@ each_case = pytest.mark.parametrize("case", CASES.values(), ids=CASES)
 
 
 @each_case
-def test_heights_lift_and_torque_match_numpy(case):
+def test_places_lift_and_torque_match_sums_over_the_rotors(case):
     rng = np.random.default_rng(0)
-    code, vehicle, rotors = case.code, case.vehicle, len(case.thrusts)
+    craft, rotors = case.craft, len(case.thrusts)
     spins = np.array([*SPIN, LAST.spin])[:rotors]
     for _ in range(5):
-        tilts, up = rng.uniform(-2.0, 2.0, case.tilts), rng.normal(size=3)
+        tilts = rng.uniform(-2.0, 2.0, case.tilts)
         controls, gains = rng.uniform(1e4, 2e5, rotors), rng.uniform(0.0, 0.2, rotors)
-        axes, places, given = case.axes(tilts), case.places(tilts), tuple(tilts)
-        np.testing.assert_allclose(code.heights(given, tuple(up), vehicle), places @ up, atol=1e-15)
-        before = rng.normal(size=3)
+        axes, at = case.axes(tilts), case.places(tilts)
+        np.testing.assert_allclose(places(craft, tilts).T, at, atol=1e-15)
         pushes = (case.thrusts * controls * gains)[:, np.newaxis] * axes
-        found = code.lift(tuple(before), given, tuple(controls), tuple(gains), vehicle)
-        expected = np.r_[before + pushes.sum(axis=0), np.cross(places, pushes).sum(axis=0)]
+        found = wrench_of_lift(craft, tilts, craft.thrusts * controls * gains)
+        expected = np.r_[pushes.sum(axis=0), np.cross(at, pushes).sum(axis=0)]
         np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-14)
         pushes = (case.thrusts * controls)[:, np.newaxis] * axes
         drag = -(spins * case.drags * controls)[:, np.newaxis] * axes
-        expected = (np.cross(places, pushes) + drag).sum(axis=0)
-        found = code.torque(given, tuple(controls), vehicle)
+        expected = np.r_[pushes.sum(axis=0), (np.cross(at, pushes) + drag).sum(axis=0)]
+        found = wrench_map(craft.rotors, tilts) @ (spins * controls)
         np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-13)
 
 
 @each_case
-def test_angular_momentum_of_pods_and_body(case):
-    code, vehicle = case.code, case.vehicle
-    rng = np.random.default_rng(1)
-    inertias, rates = np.full(case.tilts, 2e-5), rng.normal(size=case.tilts)
-    found = code.pods(tuple(inertias), tuple(rates), vehicle)
-    np.testing.assert_allclose(found, inertias * rates @ case.hinges, atol=1e-18)
-    omega = tuple(rng.normal(size=3))
-    moments = CROSS.moments if vehicle is CROSS else 0.012  # of `SMALL`
-    np.testing.assert_allclose(
-        code.inertia(omega, vehicle), np.multiply(moments, omega), rtol=1e-12
-    )
-    back = code.inverse(code.inertia(omega, vehicle), vehicle)
-    np.testing.assert_allclose(back, omega, rtol=1e-12)
+def test_hinges_and_inertia(case):
+    craft, omega = case.craft, np.array([0.3, -0.2, 0.5])
+    np.testing.assert_allclose(craft.hinges, case.hinges, atol=1e-18)
+    moments = CROSS.moments if len(case.thrusts) == 4 else 0.012  # of `SMALL`
+    momentum = inertia_matrix(craft.body) @ omega
+    np.testing.assert_allclose(momentum, np.multiply(moments, omega), rtol=1e-12)
+    np.testing.assert_allclose(inverse_inertia_matrix(craft.body) @ momentum, omega, rtol=1e-12)
+
+
+@each_case
+def test_torque_about_the_hinges_of_thrust_and_drag(case):
+    """By virtual work: of the thrust on a rotor's place, of the drag torque on its axis."""
+    craft, step = case.craft, 1e-5
+    spins = np.array([*SPIN, LAST.spin])[: len(case.thrusts)]
+    for tilts in np.random.default_rng(3).uniform(-2.0, 2.0, (3, case.tilts)):
+        axes, layout = case.axes(tilts), craft.rotors.tilt_of_rotor
+        for rotor, tilt in enumerate(layout):
+            if tilt < 0:
+                continue
+            one = step * np.eye(case.tilts)[tilt]
+            moved = (case.places(tilts + one) - case.places(tilts - one))[rotor] / (2.0 * step)
+            drag = -spins[rotor] * case.drags[rotor] * axes[rotor] @ case.hinges[tilt]
+            expected = case.thrusts[rotor] * axes[rotor] @ moved + drag
+            assert craft.hinge_loads[rotor] == pytest.approx(expected, rel=1e-6, abs=1e-15)

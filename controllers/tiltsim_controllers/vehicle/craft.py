@@ -1,0 +1,169 @@
+"""A rigid body with any number of rotors, as arrays: the vehicle that a plant simulates.
+
+The cross of the thesis (ch. 3) is a table of rotors whose entries are mostly constants; a traced
+program has no operation for an entry that is zero.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cache
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from tiltsim_controllers.code.arrays import xp
+from tiltsim_controllers.mathematics.linear import cross
+from tiltsim_controllers.mathematics.records import make_record_type, vector_of
+from tiltsim_controllers.mathematics.scalar import Values
+from tiltsim_controllers.vehicle.body import Body, principal_body
+from tiltsim_controllers.vehicle.effectiveness import (
+    ARMS,
+    ROTOR_FLOATS,
+    Rotor,
+    TiltOfRotor,
+    cross_table,
+    turning_parts,
+)
+from tiltsim_controllers.vehicle.parameters import Vehicle
+from tiltsim_controllers.vehicle.rotors import Rotors, rotors_in, turned
+
+
+class Craft(NamedTuple):
+    """A rigid body with N rotors, on M tilting pods or fixed, in body axes.
+
+    Attributes:
+        body: Mass and inertia.
+        rotors: Their forces and torques.
+        places: From the center of mass, m, constant, cosine and sine of the tilt angle: shape
+            (3, 3, N).
+        axes: Thrust axes, as ``places``, dimensionless.
+        thrusts: Coefficients K_f, N s^2/rad^2, shape (N,).
+        along_hinges: Components of the thrust axes along their hinges, the same at all tilts,
+            shape (N,).
+        hinge_loads: See `Rotor.hinge_load`, shape (N,).
+        hinges: Unit vectors along the hinges, shape (M, 3).
+    """
+
+    body: Body
+    rotors: Rotors
+    places: Any
+    axes: Any
+    thrusts: Any
+    along_hinges: Any
+    hinge_loads: Any
+    hinges: Any
+
+
+@cache
+def craft_record(rotors: int, tilts: int) -> Any:
+    """The type of the parameters of a `Craft` with a number of rotors and hinges."""
+    return make_record_type(
+        "CraftParameters",
+        body=Body,
+        effects=vector_of(ROTOR_FLOATS * rotors),  # see `effectiveness`
+        places=vector_of(9 * rotors),
+        axes=vector_of(9 * rotors),
+        thrusts=vector_of(rotors),
+        along_hinges=vector_of(rotors),
+        hinge_loads=vector_of(rotors),
+        hinges=vector_of(3 * tilts),
+    )
+
+
+def craft_parameters(body: Body, rotors: Sequence[Rotor]) -> Any:
+    """The parameters of a vehicle, a `craft_record`."""
+    hinges = {rotor.tilt: rotor.hinge_axis for rotor in rotors if rotor.tilt >= 0}
+    axes = [turning_parts(rotor.axis, rotor.hinge_axis, rotor.tilt) for rotor in rotors]
+    places = [
+        turning_parts(np.subtract(rotor.place, rotor.hinge), rotor.hinge_axis, rotor.tilt)
+        + np.array([rotor.hinge, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)])
+        for rotor in rotors
+    ]
+    return craft_record(len(rotors), len(hinges))(
+        body,
+        tuple(entry for rotor in rotors for entry in rotor.entries),
+        _flat(np.stack(places, axis=-1)),
+        _flat(np.stack(axes, axis=-1)),
+        tuple(rotor.thrust for rotor in rotors),
+        tuple(rotor.along_hinge for rotor in rotors),
+        tuple(rotor.hinge_load for rotor in rotors),
+        _flat(np.array([hinges[tilt] for tilt in sorted(hinges)])),
+    )
+
+
+def _flat(array: Any) -> Values:
+    return tuple(array.ravel().tolist())
+
+
+def body_in(parameters: Any) -> Body:
+    """The body of a vehicle; see `craft_of`."""
+    return principal_body(parameters) if isinstance(parameters, Vehicle) else parameters.body
+
+
+def craft_of(parameters: Any, tilt_of_rotor: TiltOfRotor) -> Craft:
+    """A vehicle from its parameters.
+
+    Args:
+        parameters: A `craft_record`, or the `Vehicle` of a cross.
+        tilt_of_rotor: The layout of its rotors.
+    """
+    rotors = len(tilt_of_rotor)
+    if isinstance(parameters, Vehicle):
+        return _on_cross(parameters, tilt_of_rotor)
+    return Craft(
+        body_in(parameters),
+        rotors_in(parameters.effects, 0, tilt_of_rotor),
+        parameters.places.reshape(3, 3, rotors),
+        parameters.axes.reshape(3, 3, rotors),
+        parameters.thrusts,
+        parameters.along_hinges,
+        parameters.hinge_loads,
+        parameters.hinges.reshape(-1, 3),
+    )
+
+
+def _on_cross(vehicle: Vehicle, tilt_of_rotor: TiltOfRotor) -> Craft:
+    """Rotors 1 to 4 at the ends of the arms, about which their pods turn."""
+    tilting, arms, none = tilt_of_rotor[0] >= 0, np.transpose(ARMS), np.zeros((3, 4))
+    upright = np.outer((0.0, 0.0, 1.0), np.ones(4))
+    axes = [none, upright, cross(arms, upright)] if tilting else [upright, none, none]
+    table = cross_table(vehicle, tilting=tilting)
+    return Craft(
+        body_in(vehicle),
+        rotors_in(table, 0, tilt_of_rotor),
+        xp.array([vehicle.arm_length * arms, none, none]),
+        np.array(axes),
+        vehicle.thrust_coefficient * np.ones(4),
+        np.zeros(4),
+        np.zeros(4),
+        np.array(ARMS if tilting else np.zeros((0, 3))),
+    )
+
+
+def places(craft: Craft, tilts: Any) -> Any:
+    """Places of the rotors, m from the center of mass, shape (3, N), at tilts (rad, shape (M,))."""
+    return turned(craft.rotors, craft.places, tilts)
+
+
+def thrust_axes(craft: Craft, tilts: Any) -> Any:
+    """Thrust axes of the rotors, shape (3, N), at tilts (rad, shape (M,))."""
+    return turned(craft.rotors, craft.axes, tilts)
+
+
+def axis_slopes(craft: Craft, tilts: Any) -> Any:
+    """Derivatives of `thrust_axes` by the tilt of each rotor, 1/rad, shape (3, N)."""
+    _, cosine, sine = craft.axes
+    return turned(craft.rotors, (0.0, sine, -cosine), tilts)
+
+
+def wrench_of_lift(craft: Craft, tilts: Any, lifts: Any) -> Any:
+    """Force (N) and torque (N m) of additional thrusts without drag torque, shape (6,).
+
+    Args:
+        craft: N rotors on M pods.
+        tilts: rad, shape (M,).
+        lifts: N, shape (N,).
+    """
+    axes = thrust_axes(craft, tilts)
+    return xp.hstack([axes @ lifts, cross(places(craft, tilts), axes) @ lifts])
