@@ -10,8 +10,10 @@ import tiltsim
 from tests.laws.test_laws import GUST
 from tests.laws.test_multirotor import TILTS, mjcf
 from tiltsim.laws.assembling import assemble
-from tiltsim_controllers.laws.full_pose import attitude_error
+from tiltsim_controllers.laws.periodic_lqr import PeriodicVehicle, linear_orbit
+from tiltsim_controllers.mathematics.attitude import attitude_error, rotation_matrix
 from tiltsim_controllers.mathematics.rotation import rotation_from_euler
+from tiltsim_controllers.vehicle.effectiveness import force_and_torque, table_per_newton
 
 CIRCLE = {"type": "circle", "radius": 1.0, "angular_frequency": 0.5}
 ON_CIRCLE = {"position": [1.0, 0.0, 0.0], "velocity": [0.0, 0.5, 0.0]}
@@ -191,14 +193,17 @@ def regulated():
     }
     scenario = tiltsim.load_scenario({**tables, "simulation": {"plant": "thesis"}})
     airframe = tiltsim.airframe(scenario)
-    table = scenario.controller
-    return assemble(scenario), table.hover(airframe), airframe
+    return assemble(scenario), scenario.controller.solution(airframe), airframe
 
 
 def test_lqr_closes_the_loop_with_the_poles_of_the_riccati_solution(regulated):
-    assembly, (system, thrusts, lean), airframe = regulated
-    size = len(system)
-    a, b = system[:, :size], system[:, size:]
+    assembly, solution, airframe = regulated
+    (thrusts,), (hover,), vehicle = solution.thrusts, solution.states, airframe.vehicle
+    table = table_per_newton(vehicle.table, vehicle.thrust_coefficients)
+    rotors = (part[None] for part in force_and_torque(table, airframe.initial_tilts))
+    inertia = np.reshape(vehicle.inertia, (3, 3))
+    known = PeriodicVehicle(1.0, vehicle.mass, vehicle.gravity, inertia, 0.0, 100.0, *rotors)
+    a, b = (m[0] for m in linear_orbit(known, solution.states, solution.thrusts))
     # Half of the Hamiltonian's poles, those on the left, with Bryson's weights.
     errors = np.r_[np.repeat([0.5, 1.0, 0.3, 3.0], 3), np.full(4, np.inf)]
     weight = np.diag((0.3 * thrusts) ** 2)
@@ -209,7 +214,7 @@ def test_lqr_closes_the_loop_with_the_poles_of_the_riccati_solution(regulated):
 
     equations, setup = assembly.loop.equations, assembly.setup
     speeds = np.sqrt(thrusts / airframe.vehicle.thrust_coefficients) * airframe.vehicle.spins
-    rest = np.r_[np.zeros(6), rotation_from_euler(*lean, 0.0), np.zeros(3), speeds]
+    rest = np.r_[np.zeros(6), rotation_from_euler(*hover[6:9]), np.zeros(3), speeds]
 
     def rates(state):
         state = state.tolist()
@@ -238,7 +243,7 @@ def test_lqr_cost_decreases():
     }
     flight = fly(tables, plant="thesis", duration=1.0)
     airframe = tiltsim.airframe(flight.scenario)
-    _, cost = flight.scenario.controller.solution(airframe)
+    (cost,) = flight.scenario.controller.solution(airframe).cost
     errors = flight["position"] - flight["reference_position"]
     pushed = flight["thrusts"] - 0.25 * 0.429 * 9.8
     x = np.hstack([errors, flight["velocity"], flight["attitude"], flight["body_rates"], pushed])
@@ -258,7 +263,7 @@ def orbit():
     """The regulator about a trot's orbit, and the errors of a flight that starts near it."""
     scenario = tiltsim.load_scenario({**ORBITING, "simulation": {"plant": "thesis"}})
     airframe = tiltsim.airframe(scenario)
-    solution = scenario.controller.periodic_solution(airframe)
+    solution = scenario.controller.solution(airframe)
     thrust = np.array(airframe.vehicle.thrust_coefficients)
     nodes = len(solution.states)
 
@@ -281,8 +286,8 @@ def orbit():
         near = solution.states[np.arange(len(states)) % nodes]
         found = states - near
         for row, state, desired in zip(found, states, near, strict=True):
-            actual, planned = (rotation_from_euler(*values[6:9]) for values in (state, desired))
-            row[6:9] = -np.array(attitude_error(actual, planned))
+            actual, planned = (rotation_matrix(values[6:9]) for values in (state, desired))
+            row[6:9] = -attitude_error(actual, planned)
         return found
 
     return solution, errors
@@ -327,7 +332,7 @@ def test_the_multipliers_about_an_orbit_are_those_of_the_riccati_solution():
     scenario = tiltsim.load_scenario({**ORBITING, "simulation": {"duration": 4.0}})
     flown = tiltsim.stability(scenario).multipliers
     airframe = tiltsim.airframe(scenario)
-    designed = scenario.controller.periodic_solution(airframe).multipliers
+    designed = scenario.controller.solution(airframe).multipliers
     nearest = np.abs(flown[:, None] - designed[None, :]).min(axis=1)
     # The servos lag behind the gait's corners, which the design does not know: yaw feels it most.
     assert nearest.max() < 2e-3

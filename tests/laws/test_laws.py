@@ -17,11 +17,14 @@ from tiltsim.laws.assembling import LOOPS, assemble, loop_of
 from tiltsim.models.rotorcraft import RotorcraftSpec, compile_model
 from tiltsim.plants.factory import make_plant
 from tiltsim.plants.mujoco_plant import MujocoPlant
+from tiltsim.scenario.loading import merge
 from tiltsim_controllers.analysis.balance import balanced_gait
 from tiltsim_controllers.analysis.quadrotor_singularity import (
     normalized_determinant,
     published_determinant,
 )
+from tiltsim_controllers.analysis.singularity import force_matrix, torque_matrix, world_up
+from tiltsim_controllers.analysis.torque_free import singularity_margin, torque_free_forces
 from tiltsim_controllers.mathematics.rotation import rotation_from_euler
 from tiltsim_controllers.vehicle.parameters import PRESETS
 
@@ -204,6 +207,22 @@ def test_full_pose_holds_a_position_at_a_tilted_attitude():
     assert abs(metrics["final_position_error_x"]) < 1e-4
     assert abs(metrics["final_roll"] - 0.05) < 1e-4
     assert metrics["max_tilt_rate"] < 25.0
+
+
+def test_the_margin_under_full_pose_is_that_of_the_rotors_that_are_known_to_work():
+    """By singular values, as of any multirotor."""
+    changes = {"controller": {"failed_rotor": 2, "failure_known_from": 0.05}}
+    flight = tiltsim.simulate(
+        merge(LAWS["full_pose"], changes | {"simulation": {"duration": 0.1, "timestep": 0.002}})
+    )
+    tilts, vehicle = flight["tilt_angles"], flight.scenario.vehicle.resolve()
+    known = flight["time"] >= 0.05
+    works = np.where(known[:, np.newaxis], [1.0, 0.0, 1.0, 1.0], 1.0)[:, np.newaxis]
+    forces = torque_free_forces(force_matrix(tilts) * works, torque_matrix(tilts, vehicle) * works)
+    expected = singularity_margin(forces, world_up(flight["roll"], flight["pitch"]))
+    np.testing.assert_allclose(np.abs(flight["singularity_margin"]), expected, atol=1e-9)
+    assert ((flight["determinant"] == 0.0) == known).all()
+    assert flight.metrics()["min_singularity_margin"] == 0.0
 
 
 @pytest.mark.parametrize("law", ["full_pose", "attitude_altitude"])

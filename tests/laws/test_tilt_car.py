@@ -20,7 +20,6 @@ from tiltsim.views.figures.plot import plot
 from tiltsim.views.replay import thrust_sites, visible_model
 from tiltsim.views.rerun.geometry import ground_height
 from tiltsim.views.rerun.recording_file import save_recording
-from tiltsim_controllers.gaits.tilts import tilt_reference
 from tiltsim_controllers.tilt_car.penguin_cycle import Swing, limit_cycle, lyapunov, lyapunov_bound
 from tiltsim_controllers.tilt_car.planned_direction import GAIN_SETS
 from tiltsim_controllers.tilt_car.state_drift import orbit
@@ -68,7 +67,9 @@ def test_thrusts_pass_through_the_axis_at_the_half_angle():
     data.qpos[2:] = 0.3, 0.9
     data.ctrl[:3] = 0.9, 8000.0, 3000.0  # the servo is at its commanded angle
     mujoco.mj_forward(model, data)
-    np.testing.assert_allclose(data.qacc[:2], acceleration(1.2, 8000.0, 3000.0, car), rtol=1e-12)
+    np.testing.assert_allclose(
+        data.qacc[:2], acceleration(1.2, np.array([8000.0, 3000.0]), car), rtol=1e-12
+    )
     # No torque about the axis: neither disc turns for the thrusts.
     np.testing.assert_allclose(data.qfrc_actuator[2:], 0.0, atol=1e-12)
     for site in thrust_sites(model):
@@ -252,7 +253,7 @@ def test_the_thrusts_follow_the_planned_direction(plant):
     desired = flight["time"]  # psi + alpha = t, Eq. (18)
     np.testing.assert_allclose(flight["direction"], desired, atol=1e-6)
     gait = flight.scenario.gait.plan(THESIS_CAR)
-    assert tilt_reference(3.0, gait.parameters, gait.knots)[0] == pytest.approx(6.0)
+    assert gait.angles(3.0)[0] == pytest.approx(6.0)
 
 
 @on_both_plants
@@ -287,7 +288,7 @@ def test_the_page_has_the_chapters_panels():
     figure.canvas.draw()
     titles = {axes.get_title(loc="left") for axes in figure.axes}
     assert titles == {
-        "Position error, reference minus actual",
+        "Position error",
         "Inputs squared",
         "Direction",
         "Lyapunov candidate, ½ ė² + ½ K e², along y",

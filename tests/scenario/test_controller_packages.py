@@ -17,10 +17,11 @@ from typing import Annotated, Literal
 import tiltsim
 
 
-class Table(tiltsim.ScalarController):
+class Table(tiltsim.LawController):
     law: Literal["LAW"]
 
-    def scalar_law(self, airframe):
+    @staticmethod
+    def control(observed, p):
         raise LookupError
 """
 BROKEN = {

@@ -108,7 +108,7 @@ MISTAKES = {
         "did you mean max?",
     ),
     "name that does not fit": (
-        '[controller]\nlaw = "scalar"\nfunction = "law.py:law"\nstates = { height = "m" }',
+        '[controller]\nlaw = "numpy"\nfunction = "law.py:law"\nstates = { height = "m" }',
         "controller.states.height",
         "the name must match ^state_",
     ),

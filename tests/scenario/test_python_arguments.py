@@ -9,15 +9,11 @@ import numpy as np
 import pytest
 
 import tiltsim
+from tests.arguments import ADDRESS, hover
 from tiltsim.scenario.scenario import Scenario
 
-ADDRESS = "ch04_tracking/setpoint#rho_065_modified"
 COARSE = {"simulation.control_timestep": 0.05}
 """Too long for the law of `ADDRESS`."""
-
-
-def hover(observation):
-    return tiltsim.Command(thrusts=[1.0] * 4)
 
 
 def test_an_address_a_path_a_dict_and_a_scenario_give_the_same():

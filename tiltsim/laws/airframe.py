@@ -1,4 +1,4 @@
-"""What scalar laws know when a flight is planned."""
+"""Facts about a vehicle and its gait that laws may use when a flight is planned."""
 
 from __future__ import annotations
 
@@ -6,11 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 from tiltsim.errors import InputError
 from tiltsim.models.cross import as_multirotor
+from tiltsim.scenario.law_controller import Airframe
 from tiltsim.scenario.loading import load_scenario
-from tiltsim.scenario.scalar_controller import Airframe, ScalarTable
 from tiltsim.scenario.scenario import plan_flight
 from tiltsim.vehicles.rotorcraft import initial_rotor_speeds, initial_tilts
-from tiltsim_controllers.mathematics.scalar import Values
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -20,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def airframe(scenario: Scenario | str | PathLike[str] | Mapping[str, Any]) -> Airframe:
-    """What the controller of a scenario may know, as methods of a `ScalarController` take it.
+    """Facts that the controller of a scenario may use, as methods of a `LawController` take them.
 
     Args:
         scenario: Anything that `tiltsim.load_scenario` takes, of a rotorcraft.
@@ -35,7 +34,7 @@ def airframe(scenario: Scenario | str | PathLike[str] | Mapping[str, Any]) -> Ai
 
 
 def airframe_of(plan: FlightPlan) -> Airframe:
-    """What the controller may know."""
+    """The airframe of a planned flight."""
     scenario = plan.scenario
     table = scenario.any_rotorcraft
     vehicle, tilting = table.resolve(), table.has_tilting_rotors
@@ -49,12 +48,3 @@ def airframe_of(plan: FlightPlan) -> Airframe:
         # The thesis's equations omit the gyroscopic torque but for the quadrotor's.
         float(scenario.simulation.plant != "thesis" or table.model == "quadrotor"),
     )
-
-
-def initial_states(plan: FlightPlan, *, models_rotors: bool) -> Values:
-    """The states of the controller at time zero, with those of a model of its rotors or without."""
-    controller, airframe = plan.scenario.controller, airframe_of(plan)
-    assert isinstance(controller, ScalarTable)
-    tilts = airframe.initial_tilts if controller.commands_tilts else ()
-    speeds = airframe.initial_speeds if models_rotors else ()
-    return (*controller.initial_states(airframe), *tilts, *speeds)

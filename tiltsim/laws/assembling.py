@@ -6,10 +6,11 @@ from typing import TYPE_CHECKING, Final
 
 from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.equations.actuator_level import ActuatorPlant, actuator_plant
-from tiltsim.equations.rigid_body import form_of, rigid_body_of
+from tiltsim.equations.rigid_body import rigid_body
 from tiltsim.laws.attitude_altitude import MEASURED_TILTROTOR, TILTROTOR
 from tiltsim.laws.commanded import commanded_loop
-from tiltsim.laws.full_pose import FULL_POSE
+from tiltsim.laws.flown_law import loop_of_law
+from tiltsim.laws.full_pose import FULL_POSE, full_pose_loop_of
 from tiltsim.laws.gait_feedforward import GAIT_FEEDFORWARD, MEASURED_GAIT_FEEDFORWARD
 from tiltsim.laws.layers.actuation import with_actuation
 from tiltsim.laws.layers.air import with_air
@@ -19,15 +20,10 @@ from tiltsim.laws.layers.on_equations import on_equations
 from tiltsim.laws.layers.rotor_inertia import with_rotor_inertia
 from tiltsim.laws.layers.supervision import with_supervisor
 from tiltsim.laws.multirotor import loop_of_multirotor
-from tiltsim.laws.multirotor_full_pose import full_pose_loop_of
-from tiltsim.laws.quadrotor_attitude_altitude import QUADROTOR_ATTITUDE_ALTITUDE
-from tiltsim.laws.scalar_law import loop_of_scalar_law
-from tiltsim.laws.switching import SWITCHING
-from tiltsim.laws.tilt_car_fourth_derivative import FOURTH_DERIVATIVE
-from tiltsim.laws.tilt_car_planned_direction import PLANNED_DIRECTION
-from tiltsim.laws.tilt_car_third_derivative import THIRD_DERIVATIVE
-from tiltsim.laws.yaw_position import YAW_POSITION
-from tiltsim.scenario.scalar_controller import ScalarTable
+from tiltsim.laws.quadrotor import QUADROTOR_ATTITUDE_ALTITUDE, SWITCHING, YAW_POSITION
+from tiltsim.laws.tilt_car import FOURTH_DERIVATIVE, THIRD_DERIVATIVE
+from tiltsim.laws.tilt_car_planned import PLANNED_DIRECTION
+from tiltsim.scenario.law_controller import LawTable
 from tiltsim.scenario.scenario import plan_flight
 from tiltsim.system.locks import one_thread_at_a_time
 
@@ -75,8 +71,7 @@ def loop_of(
 
     Args:
         scenario: What is flown.
-        adapted: May change the controller before layers go around it, to functions that keep a
-            state of their own: the loop then runs as plain Python.
+        adapted: May change the controller before layers go around it.
         recorded: See `assemble`.
     """
     controller, external = scenario.controller, scenario.controller.is_external
@@ -86,8 +81,8 @@ def loop_of(
     measured = not as_printed and controller.measures_angular_acceleration
     if external:
         loop = commanded_loop(scenario)
-    elif isinstance(controller, ScalarTable):
-        loop = loop_of_scalar_law(scenario, recorded=recorded)
+    elif isinstance(controller, LawTable):
+        loop = loop_of_law(scenario, recorded=recorded)
     elif scenario.vehicle.model == "multirotor":
         loop = MULTIROTOR_LOOPS[controller.loop_name](scenario, measured)
     else:
@@ -113,7 +108,7 @@ def loop_of(
 def _plant_of(scenario: Scenario, loop: ClosedLoop) -> ActuatorPlant:
     """The equations on which the controls of MuJoCo's model act."""
     if scenario.simulation.plant == "rigid_body":
-        return rigid_body_of(form_of(scenario))
+        return rigid_body(scenario)
     return actuator_plant(loop.dynamics)
 
 
@@ -137,5 +132,5 @@ def assemble(
         loop=loop,
         setup=loop.setup(plan, loop.signature),
         follows_position=loop.follows_position(scenario),
-        traced=adapted is _unchanged,
+        traced=loop.is_traceable,
     )

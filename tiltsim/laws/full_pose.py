@@ -1,83 +1,141 @@
-"""Full-pose control of the tiltrotor: the tilt angles are inputs, too (ch. 3, Sec. 6.3)."""
+"""Full-pose control in closed loops: the tilt angles are inputs (ch. 3, Sec. 6.3)."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import cache
 from typing import TYPE_CHECKING, Any, Final
 
-from tiltsim.closed_loop.loop import Monitoring
-from tiltsim.laws.rotor_loop import RotorLaw, rotor_loop
-from tiltsim.laws.tiltrotor import (
-    ROTOR_STOPS,
-    TILTROTOR_LAYOUT,
-    rotor_speeds_along_spin,
-    singularity_margins,
-    tiltrotor_motion,
+import numpy as np
+
+from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Monitoring
+from tiltsim.laws.rotor_loop import (
+    RotorLaw,
+    RotorLayout,
+    body_of_vehicle,
+    layout_of_vehicle,
+    rotor_loop,
+    table_of,
 )
+from tiltsim.laws.rotorcraft import rotor_stops, torque_free_columns
+from tiltsim.laws.tiltrotor import TILTROTOR_LAYOUT, singularity_columns, tiltrotor_motion
+from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.tiltrotor_controllers import FullPoseController
 from tiltsim.vehicles.rotorcraft import ROTORCRAFT, initial_tilts
-from tiltsim_controllers.laws.full_pose import Parameters, full_pose_inputs, limited_tilt_rate
-from tiltsim_controllers.mathematics.scalar import Quad, Values, Vector, scalar
+from tiltsim_controllers.laws.full_pose import Parameters, full_pose
+from tiltsim_controllers.mathematics.records import changed_record
+from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector, scalar
+from tiltsim_controllers.mathematics.vectors import entries_of
+from tiltsim_controllers.references.trajectories import reference_derivatives
+from tiltsim_controllers.vehicle.parameters import Vehicle
 
 if TYPE_CHECKING:
-    from tiltsim.scenario.scenario import FlightPlan
+    from tiltsim.scenario.scenario import FlightPlan, Scenario
 
 
-@scalar
-def _inputs(
-    time: float, state: Values, tilt_rates: Values, states: Values, parameters: Any, knots: Vector
-) -> Values:
-    """Rotor accelerations and tilt rates, which the ``states`` integrate; see `RotorLaw.inputs`."""
-    limits = parameters.law.limits
-    u1, u2, u3, u4, rate_1, rate_2, rate_3, rate_4 = full_pose_inputs(
-        time, state, parameters.law, knots
-    )
-    # The law's limit sees a pod that stops at its servo's stop, but not the command beyond it.
-    a1, a2, a3, a4 = states
-    rate_1 = limited_tilt_rate(rate_1, a1, limits)
-    rate_2 = limited_tilt_rate(rate_2, a2, limits)
-    rate_3 = limited_tilt_rate(rate_3, a3, limits)
-    rate_4 = limited_tilt_rate(rate_4, a4, limits)
-    return u1, u2, u3, u4, rate_1, rate_2, rate_3, rate_4
+@cache
+def _inputs_of(layout: RotorLayout) -> Callable[..., Values]:
+    """Scalar code of `RotorLaw.inputs`: the ``states`` are the commands of the servos."""
+    rotors = layout.tilt_of_rotor
+
+    @scalar
+    def inputs(
+        time: float,
+        state: Values,
+        tilt_rates: Values,
+        states: Values,
+        parameters: Any,
+        knots: Vector,
+    ) -> Values:
+        reference = reference_derivatives(time, parameters.law.reference, knots)
+        found: Values = full_pose(time, state, reference, parameters.law, knots, rotors, states)
+        return found
+
+    return inputs
 
 
-@scalar
-def sign_check_values(time: float, values: Vector, parameters: Any, knots: Vector) -> Quad:
-    """The rotor speeds along their spin."""
-    return rotor_speeds_along_spin(values)
+def _margins(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
+    """`singularity_columns`; three rotors do not span torque and lift: singular at any attitude."""
+    law = setup.parameters.law
+    intact = samples["time"] < law.failure.known_from
+    columns = singularity_columns(samples, law.vehicle)
+    return {name: np.where(intact, column, 0.0) for name, column in columns.items()}
 
 
 def _setup(plan: FlightPlan) -> tuple[Parameters, Values]:
-    controller, vehicle = plan.scenario.controller, plan.scenario.rotorcraft.resolve()
+    controller = plan.scenario.controller
     assert isinstance(controller, FullPoseController)
+    vehicle: Any = plan.scenario.any_rotorcraft.resolve()
+    is_multirotor = isinstance(vehicle, Multirotor)
     law = Parameters(
-        vehicle,
-        controller.resolve_gains(),
-        plan.reference,
-        controller.resolve_limits(),
-        controller.resolve_tilt_weight(vehicle),
-        controller.resolve_failure(),
+        vehicle=body_of_vehicle(vehicle) if is_multirotor else vehicle,
+        gains=controller.resolve_gains(),
+        reference=plan.reference,
+        limits=controller.resolve_limits(),
+        tilt_weight=controller.resolve_tilt_weight(vehicle),
+        failure=controller.resolve_failure(),
+        rotors=float(len(plan.knots)),
     )
-    return law, ()
+    return law, vehicle.table if is_multirotor else ()
+
+
+def _loop(layout: RotorLayout, **options: Any) -> ClosedLoop:
+    """Full-pose control of all vehicles of a layout."""
+    places = layout.places
+    speeds_in, stops = entries_of(places.speed_1, places.rotors), rotor_stops(places.rotors)
+
+    @scalar
+    def speeds(time: float, values: Vector, parameters: Any, knots: Vector) -> Values:
+        # A pod that turns across its thrust spans one plane with it at any angle: the rank of such
+        # rotors' matrix changes only where one of them stops, whichever of them are lost.
+        return speeds_in(values)
+
+    law = RotorLaw(
+        "full_pose",
+        _inputs_of(layout),
+        setup=_setup,
+        states=dict.fromkeys(places.names("tilt_command"), "rad"),
+        initial=lambda plan: initial_tilts(plan)[0],
+        commands=0,
+        **options,
+    )
+    return replace(
+        rotor_loop(layout, law),
+        monitoring=Monitoring(speeds, lambda _sample, _setup: stops),
+        uses_gait=True,  # its angles at time zero
+    )
 
 
 FULL_POSE: Final = replace(
-    rotor_loop(
+    _loop(
         TILTROTOR_LAYOUT,
-        RotorLaw(
-            "full_pose",
-            _inputs,
-            Parameters,
-            _setup,
-            states=dict.fromkeys(TILTROTOR_LAYOUT.places.names("tilt_command"), "rad"),
-            initial=lambda plan: initial_tilts(plan)[0],
-            commands=0,
-            margins=singularity_margins,
-            motion=tiltrotor_motion,
-        ),
+        parameters=changed_record(Parameters, vehicle=Vehicle),
+        margins=_margins,
+        motion=tiltrotor_motion,
     ),
     kind=ROTORCRAFT,
-    monitoring=Monitoring(sign_check_values, lambda _sample, _setup: ROTOR_STOPS),
-    uses_gait=True,  # its angles at time zero
 )
 """Full-pose control of the tiltrotor."""
+
+
+@cache
+def full_pose_loop(layout: RotorLayout) -> ClosedLoop:
+    """Full-pose control of all multirotors of a layout."""
+    return _loop(
+        layout,
+        parameters=Parameters,
+        margins=lambda samples, setup: torque_free_columns(
+            layout.places,
+            table_of(layout.places, setup),
+            samples,
+            failure=setup.parameters.law.failure,
+        ),
+    )
+
+
+def full_pose_loop_of(scenario: Scenario, _measured: bool) -> ClosedLoop:
+    """The full-pose loop of a scenario's multirotor, without layers; it measures nothing."""
+    vehicle = scenario.vehicle.resolve()
+    assert isinstance(vehicle, Multirotor)
+    return full_pose_loop(layout_of_vehicle(vehicle))

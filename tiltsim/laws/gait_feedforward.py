@@ -2,24 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
-from tiltsim.closed_loop.loop import Monitoring
 from tiltsim.laws.rotor_loop import RotorLaw
-from tiltsim.laws.tiltrotor import (
-    TILTROTOR_LAYOUT,
-    determinant_and_speed_causes,
-    determinant_and_speeds,
-    singularity_margins,
-    tiltrotor_motion,
-    watched_vehicle,
-)
-from tiltsim.laws.tracking import tracking_fields, tracking_loop
+from tiltsim.laws.tiltrotor import tiltrotor_loops
+from tiltsim.laws.tracking import INTEGRALS, integrals_at_rest, tracking_fields
 from tiltsim.scenario.tiltrotor_controllers import AttitudeAltitudeController
-from tiltsim.vehicles.rotorcraft import ROTORCRAFT
 from tiltsim_controllers.laws.gait_feedforward import Parameters, tracking_inputs
-from tiltsim_controllers.laws.tiltrotor_supervisor import SUPERVISION
 from tiltsim_controllers.mathematics.scalar import Values
 
 if TYPE_CHECKING:
@@ -39,24 +28,15 @@ def _setup(plan: FlightPlan) -> tuple[Parameters, Values]:
     return law, ()
 
 
-_LAW: Final = RotorLaw(
-    "gait_feedforward",
-    tracking_inputs,
-    Parameters,
-    _setup,
-    margins=singularity_margins,
-    motion=tiltrotor_motion,
-)
-
-GAIT_FEEDFORWARD, MEASURED_GAIT_FEEDFORWARD = (
-    replace(
-        tracking_loop(
-            TILTROTOR_LAYOUT, _LAW._replace(measured=measured), SUPERVISION, watched_vehicle
-        ),
-        kind=ROTORCRAFT,
-        monitoring=Monitoring(determinant_and_speeds, determinant_and_speed_causes),
+GAIT_FEEDFORWARD, MEASURED_GAIT_FEEDFORWARD = tiltrotor_loops(
+    RotorLaw(
+        "gait_feedforward",
+        tracking_inputs,
+        Parameters,
+        _setup,
+        states=INTEGRALS,
+        initial=integrals_at_rest,
     )
-    for measured in (False, True)
 )
 """The attitude-altitude controller with tilt-rate feed-forward, of the tiltrotor; the second with
 the angular acceleration of the plant in place of the model's."""

@@ -10,12 +10,12 @@ from tiltsim.closed_loop.loop import ClosedLoop
 from tiltsim.laws.multirotor_columns import NULL_PART, REFERENCES, margins_of, monitoring_of
 from tiltsim.laws.rotor_loop import RotorLaw, RotorLayout, body_of_vehicle, layout_of_vehicle
 from tiltsim.laws.rotorcraft import CONDITION
-from tiltsim.laws.tracking import tracking_fields, tracking_loop
+from tiltsim.laws.tracking import INTEGRALS, integrals_at_rest, tracking_fields, tracking_loop
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.multirotor_controllers import AttitudeForceController, upper_side
 from tiltsim_controllers.laws.allocation import RotorRange
 from tiltsim_controllers.laws.attitude_altitude import DECOUPLINGS
-from tiltsim_controllers.laws.multirotor import multirotor_law_of
+from tiltsim_controllers.laws.gait_feedforward import multirotor_law_of
 from tiltsim_controllers.laws.multirotor_steps import (
     ATTITUDE_ERRORS,
     Direction,
@@ -50,7 +50,7 @@ def _setup(plan: FlightPlan) -> tuple[Parameters, Values]:
         side=SideGains(*controller.side_gains),
         rotors=float(len(plan.knots)),
         decoupling=DECOUPLINGS[controller.decoupling],
-        attitude=ATTITUDE_ERRORS[controller.attitude_error],
+        attitude_error=ATTITUDE_ERRORS[controller.attitude_error],
         restoring=controller.resolve_restoring(len(vehicle.spins), dimension, gait),
         slowest=controller.slowest_rotor,
         failure=controller.resolve_failure(),
@@ -74,7 +74,7 @@ def _setup(plan: FlightPlan) -> tuple[Parameters, Values]:
 
 @scalar
 def _watched(time: float, parameters: Any) -> Watched:
-    """What the supervisor reads of a vehicle."""
+    """Vehicle parameters that the supervisor reads."""
     return watched_at(time, parameters.law)
 
 
@@ -83,8 +83,8 @@ def multirotor_loop(layout: RotorLayout, form: Form, measured: bool = False) -> 
     """The controller of attitude and force of all multirotors of a layout.
 
     Args:
-        layout: Of the vehicles.
-        form: Of the law.
+        layout: Layout of the vehicles.
+        form: Options of the law.
         measured: Whether it feeds back the angular acceleration of the plant, which
             `tiltsim.laws.layers.measured_acceleration` measures.
     """
@@ -98,6 +98,8 @@ def multirotor_loop(layout: RotorLayout, form: Form, measured: bool = False) -> 
         margins=margins_of(layout, form.dimension),
         measured=measured,
         units={NULL_PART: "1", CONDITION: "1"},
+        states=INTEGRALS,
+        initial=integrals_at_rest,
     )
     supervision = multirotor_supervision_of(rotors, form.dimension, form.forward)
     return replace(

@@ -1,4 +1,4 @@
-"""What is recorded and watched of multirotors under the controller of attitude and force."""
+"""Columns and singularity checks of multirotors under the controller of attitude and force."""
 
 from __future__ import annotations
 
@@ -15,14 +15,10 @@ from tiltsim.laws.rotorcraft import (
     torque_free_columns,
 )
 from tiltsim_controllers.laws.attitude_altitude import PUBLISHED_DECOUPLING
-from tiltsim_controllers.laws.failures import health_of, masked_of
-from tiltsim_controllers.laws.multirotor_inputs import independence_of
+from tiltsim_controllers.laws.multirotor import independence, present_wrench
 from tiltsim_controllers.laws.multirotor_steps import Form
-from tiltsim_controllers.mathematics.rotation import world_up_in_body
 from tiltsim_controllers.mathematics.scalar import Values, Vector, scalar
 from tiltsim_controllers.mathematics.vectors import entries_of
-from tiltsim_controllers.vehicle.effectiveness import effectiveness_of
-from tiltsim_controllers.vehicle.states import PITCH, ROLL
 
 NULL_PART: Final = "null_part"
 """A column: the share of the rotors' ``varpi |varpi|`` that neither force nor torque show."""
@@ -44,26 +40,20 @@ def margins_of(layout: RotorLayout, dimension: int) -> Margins:
 def monitoring_of(layout: RotorLayout, form: Form) -> Monitoring:
     """Where the outputs depend on each other or, in the norm of the speeds, a rotor stops."""
     places = layout.places
-    tilts_in = entries_of(places.alpha_1, places.tilts)
     turning = places.rotors if form.norm == "speed" else 0
     speeds_in = entries_of(places.speed_1, turning)
-    cosines, sines, effect, _, _ = effectiveness_of(layout.tilt_of_rotor)
-    independence = independence_of(places.rotors, form.dimension, form.forward)
-    health, masked = health_of(places.rotors), masked_of(places.rotors)
-    losses, names, stops = form.losses, places.names("alpha"), rotor_stops(turning)
+    names, stops = places.names("alpha"), rotor_stops(turning)
+    rotors, state_in = layout.tilt_of_rotor, entries_of(0, places.speed_1 + places.rotors)
     harmless = (1.0,) * len(stops)  # as published, the factor 2 |varpi| is in rows of force only
 
     @scalar
     def sign_check_values(time: float, values: Vector, parameters: Any, knots: Vector) -> Values:
-        own, tilts = parameters.law, tilts_in(values)
+        own = parameters.law
         side = own.upper_side
-        rows = effect(1.0, cosines(tilts), sines(tilts), knots, int(own.rotors))
-        if losses:
-            rows = masked(health(time, own.failure), rows)
-            if time >= own.failure.known_from:
-                side = own.upper_side_without
-        up = world_up_in_body(values[ROLL], values[PITCH])
-        share = independence(rows, up, (side.x, side.y, side.z))
+        if time >= own.failure.known_from:
+            side = own.upper_side_without
+        rows, up = present_wrench(time, state_in(values), own, knots, rotors)
+        share = independence(rows, up, (side.x, side.y, side.z), form)
         if own.decoupling == PUBLISHED_DECOUPLING:
             return (share, *harmless)
         return (share, *speeds_in(values))

@@ -1,14 +1,14 @@
-"""Common parts of the closed loops with the quadrotor.
+"""The closed loops with the quadrotor under the laws of ch. 2.
 
-The control laws of ch. 2 demand thrust and torques, which the rotors make at once: their speeds
-follow from the controls and are not states. The model's four rotor speed states stay at zero.
+They demand thrust and torques, which the rotors make at once: their speeds follow from the controls
+and are not states. The model's four rotor speed states stay at zero.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from math import cos
-from typing import TYPE_CHECKING, Any, Final
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
@@ -23,17 +23,25 @@ from tiltsim.closed_loop.loop import (
     Sizes,
 )
 from tiltsim.engines.sample_evaluation import evaluate_over_samples
-from tiltsim.equations.quadrotor import equations_of_motion, initial_state, rigid_body
+from tiltsim.equations.quadrotor import equations_of_motion, initial_state
 from tiltsim.laws.rotorcraft import REFERENCE_COLUMNS
 from tiltsim.laws.tiltrotor import TILT_REFERENCE_COLUMNS
+from tiltsim.scenario.quadrotor_controllers import (
+    QuadrotorAttitudeAltitudeController,
+    SwitchingController,
+    YawPositionController,
+)
 from tiltsim.vehicles.rotorcraft import ROTORCRAFT
 from tiltsim_controllers.analysis.quadrotor_singularity import (
     normalized_determinant,
     published_determinant,
 )
-from tiltsim_controllers.mathematics.rotation import euler_from_quaternion
-from tiltsim_controllers.mathematics.scalar import Floats, Triple, Values, Vector, scalar
-from tiltsim_controllers.references.trajectories import ReferenceParameters, position_reference
+from tiltsim_controllers.code.arrays import xp
+from tiltsim_controllers.code.traceable import traceable
+from tiltsim_controllers.laws import quadrotor_attitude_altitude, switching, yaw_position
+from tiltsim_controllers.mathematics.attitude import euler_angles
+from tiltsim_controllers.mathematics.scalar import Floats, Vector
+from tiltsim_controllers.references.trajectories import ReferenceParameters, reference_motion
 from tiltsim_controllers.vehicle.parameters import SPIN, Vehicle
 from tiltsim_controllers.vehicle.quadrotor_mixer import speed_along_spin, thrust_controls
 from tiltsim_controllers.vehicle.states import PITCH, ROLL
@@ -51,164 +59,45 @@ EXTENSION_COLUMNS: Final = {
 }
 
 
-@scalar
-def rigid_body_state(qpos: Vector, qvel: Vector, thrust: float, thrust_rate: float) -> Values:
-    """State of the control laws.
+class AttitudeAltitudeParameters(NamedTuple):
+    """The law without states and its reference."""
 
-    Args:
-        qpos, qvel: MuJoCo's state
-        thrust, thrust_rate: N and N/s
-    """
-    x, y, z, qw, qx, qy, qz = qpos
-    vx, vy, vz, p, q, r = qvel
-    roll, pitch, yaw = euler_from_quaternion(qw, qx, qy, qz)
-    return x, y, z, vx, vy, vz, roll, pitch, yaw, p, q, r, thrust, thrust_rate
+    vehicle: Vehicle
+    gains: quadrotor_attitude_altitude.Gains
+    reference: ReferenceParameters
 
 
-@scalar
-def extended_controls(inputs: Values, vehicle: Vehicle) -> Values:
-    """The ten controls for a control law's `INPUT_FIELDS`: thrusts, idle rotors, its states."""
-    thrust, roll_torque, pitch_torque, yaw_torque, thrust_derivative, thrust_rate_derivative = (
-        inputs
-    )
-    thrusts = thrust_controls(thrust, roll_torque, pitch_torque, yaw_torque, vehicle)
-    return (*thrusts, 0.0, 0.0, 0.0, 0.0, thrust_derivative, thrust_rate_derivative)
+class YawPositionLoop(NamedTuple):
+    """The head of `userdata`."""
+
+    signature: float  # see `tiltsim.closed_loop.loop.ClosedLoop.signature`
+    vehicle: Vehicle
+    law: yaw_position.Parameters
 
 
-@scalar
-def sample_values(body: Vector, thrusts: Vector) -> Values:
-    """A sample, from the rigid body's twelve states and the thrust controls."""
-    return (
-        *rigid_body(body),
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        -speed_along_spin(thrusts[0]),
-        speed_along_spin(thrusts[1]),
-        -speed_along_spin(thrusts[2]),
-        speed_along_spin(thrusts[3]),
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-    )
+class SwitchingLoop(NamedTuple):
+    """The head of `userdata`."""
+
+    signature: float
+    vehicle: Vehicle
+    law: switching.Parameters
 
 
-@scalar
-def observe_quadrotor(qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector) -> Values:
-    """The rigid body, no tilt, rotor speeds from the thrusts in force."""
-    return sample_values(rigid_body_state(qpos, qvel, 0.0, 0.0), ctrl)
+class AttitudeAltitudeLoop(NamedTuple):
+    """The head of `userdata`."""
+
+    signature: float
+    vehicle: Vehicle
+    law: AttitudeAltitudeParameters
 
 
-@scalar
-def observe_extended_quadrotor(qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector) -> Values:
-    """The quadrotor and the controller's states."""
-    return (*observe_quadrotor(qpos, qvel, act, ctrl), act[4], act[5])
+# --- columns -----------------------------------------------------------------------------------
 
 
-@scalar
-def thrust_tilt_cosine(values: Vector) -> float:
-    """The cosine of the thrust axis's tilt, of a sample's ``values``."""
-    return cos(values[ROLL]) * cos(values[PITCH])
-
-
-@scalar
-def equation_rates(
-    time: float, state: Vector, inputs: Vector, parameters: Any, knots: Vector, disturbance: Triple
-) -> Values:
-    """Ch. 2's equations of motion."""
-    return equations_of_motion(state, inputs, parameters.vehicle, disturbance)
-
-
-@scalar
-def observe_equations(
-    time: float, state: Vector, inputs: Vector, parameters: Any, knots: Vector
-) -> Values:
-    """A sample of ch. 2's equations; the rotor speeds follow from thrust and torques."""
-    thrusts = thrust_controls(inputs[0], inputs[1], inputs[2], inputs[3], parameters.vehicle)
-    return sample_values(state, thrusts)
-
-
-@scalar
-def _extended_equation_rates(
-    time: float, state: Vector, inputs: Vector, parameters: Any, knots: Vector, disturbance: Triple
-) -> Values:
-    """Ch. 2's equations of motion, followed by the controller's own two states."""
-    body = equations_of_motion(state, inputs, parameters.vehicle, disturbance)
-    return (*body, inputs[4], inputs[5])
-
-
-@scalar
-def _observe_extended_equations(
-    time: float, state: Vector, inputs: Vector, parameters: Any, knots: Vector
-) -> Values:
-    """As `observe_equations`, followed by the controller's own states."""
-    return (*observe_equations(time, state, inputs, parameters, knots), state[12], state[13])
-
-
-@scalar
-def thrust_axis_value(
-    time: float, values: Vector, parameters: object, knots: Vector
-) -> tuple[float]:
-    """The cosine of the thrust axis's tilt."""
-    return (thrust_tilt_cosine(values),)
-
-
-def extended_loop(
-    parameters: type[tuple[Any, ...]],
-    setup: Callable[[FlightPlan, float], ControlSetup],
-    controls: Callable[..., Values],
-    inputs: Callable[..., Values],
-    columns: Columns,
-    monitoring: Monitoring,
-) -> ClosedLoop:
-    """A closed loop around a control law that integrates its thrust twice.
-
-    Args:
-        parameters: Record with the fields ``signature`` and ``vehicle`` at least.
-        setup, controls, columns, monitoring: As in `tiltsim.closed_loop.loop.ClosedLoop`.
-        inputs: The control law on ch. 2's equations; see `tiltsim.closed_loop.loop.Equations`.
-    """
-    return ClosedLoop(
-        kind=ROTORCRAFT,
-        parameters=parameters,
-        setup=setup,
-        dynamics=Dynamics(
-            "quadrotor",
-            Sizes(qpos=7, qvel=6, act=6, ctrl=10),
-            lambda plan, _setup: (0.0, 0.0, 0.0, 0.0, *_hover_thrust(plan)),
-            controller_states=2,
-            commands_thrusts=True,
-            spins=SPIN,
-        ),
-        sampling=Sampling(controls),
-        columns=columns,
-        monitoring=monitoring,
-        equations=Equations(
-            inputs=inputs,
-            inputs_size=6,
-            rates=_extended_equation_rates,
-            initial=lambda plan, _setup: (*initial_state(plan.scenario), *_hover_thrust(plan)),
-            observe=_observe_extended_equations,
-        ),
-        uses_gait=False,
-    )
-
-
-def _hover_thrust(plan: FlightPlan) -> tuple[float, float]:
-    """The extension starts with the thrust of hover (N), at rest."""
-    vehicle = plan.scenario.rotorcraft.resolve()
-    return vehicle.mass * vehicle.gravity, 0.0
-
-
-@scalar
-def _reference_position(
-    time: float, state: Vector, reference: ReferenceParameters, knots: Vector
-) -> Triple:
+@traceable
+def _reference_position(time: Any, state: Any, reference: ReferenceParameters, knots: Any) -> Any:
     """The position (m) to track."""
-    x, y, z, _, _, _, _, _, _ = position_reference(time, reference, knots)
-    return x, y, z
+    return reference_motion(time, reference, knots)[0]
 
 
 def references(
@@ -245,9 +134,7 @@ def upright_margin(samples: Mapping[str, Floats]) -> Floats:
     return np.asarray(np.arcsin(np.clip(upright, -1.0, 1.0)))
 
 
-def extended_singularity_columns(
-    samples: Mapping[str, Floats], vehicle: Vehicle
-) -> dict[str, Floats]:
+def _extended_singularity(samples: Mapping[str, Floats], vehicle: Vehicle) -> dict[str, Floats]:
     """Exact and published determinant of the yaw-position law, and the margin (rad)."""
     attitude = samples["roll"], samples["pitch"]
     exact = normalized_determinant(*attitude, samples["extension_thrust"], vehicle)
@@ -259,10 +146,250 @@ def extended_singularity_columns(
     }
 
 
-def thrust_axis_cause(sample: Mapping[str, float], _setup: ControlSetup) -> tuple[str]:
-    """Cause for `thrust_axis_value`: a roll or pitch of 90 degrees."""
+def _derive_yaw_position(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
+    law = setup.parameters.law
+    # Roll and pitch are not outputs: they follow from the position.
+    attitude = (samples["roll"], samples["pitch"], law.reference.yaw)
+    columns = references(samples, law.reference, setup.knots, attitude)
+    return columns | _extended_singularity(samples, law.vehicle)
+
+
+def _derive_attitude_altitude(
+    samples: Mapping[str, Floats], setup: ControlSetup
+) -> dict[str, Floats]:
+    return {
+        **references(samples, setup.parameters.law.reference, setup.knots),
+        # cos(roll) cos(pitch) of the altitude times 1 / cos(pitch) of the Euler angles
+        "determinant": np.cos(samples["roll"]),
+        "singularity_margin": upright_margin(samples),
+    }
+
+
+def _derive_switching(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
+    law = setup.parameters.law
+    reference = law.yaw_position.reference
+    inside = switching.in_attitude_zone(samples["roll"], samples["pitch"], law.zone)
+    # Outside the zone roll and pitch are not outputs: they follow from the position.
+    roll = np.where(inside, reference.roll, samples["roll"])
+    pitch = np.where(inside, reference.pitch, samples["pitch"])
+    return {
+        **references(samples, reference, setup.knots, (roll, pitch, reference.yaw)),
+        **_extended_singularity(samples, law.yaw_position.vehicle),
+        "attitude_zone": np.asarray(inside, float),
+    }
+
+
+# --- monitoring --------------------------------------------------------------------------------
+
+
+@traceable
+def _thrust_axis(time: Any, values: Any, parameters: Any, knots: Any) -> Any:
+    """The cosine of the thrust axis's tilt."""
+    return xp.array([xp.cos(values[ROLL]) * xp.cos(values[PITCH])])
+
+
+@traceable
+def _thrust_axis_and_thrust(time: Any, values: Any, parameters: Any, knots: Any) -> Any:
+    """The cosine of the thrust axis's tilt and the extension's thrust."""
+    return xp.hstack([xp.cos(values[ROLL]) * xp.cos(values[PITCH]), values[24]])
+
+
+def _thrust_axis_cause(sample: Mapping[str, float], _setup: ControlSetup) -> tuple[str]:
+    """Cause for `_thrust_axis`: a roll or pitch of 90 degrees."""
     roll, pitch = sample["roll"], sample["pitch"]
     return (
         "the decoupling matrix became singular: the thrust axis came level, "
         f"at roll = {roll:.3g} rad, pitch = {pitch:.3g} rad",
     )
+
+
+THRUST_AXIS: Final = Monitoring(_thrust_axis, _thrust_axis_cause)
+
+THRUST_AXIS_AND_THRUST: Final = Monitoring(
+    _thrust_axis_and_thrust,
+    lambda sample, setup: (
+        *_thrust_axis_cause(sample, setup),
+        "the decoupling matrix became singular: the thrust came to zero",
+    ),
+)
+
+
+# --- loops -------------------------------------------------------------------------------------
+
+Law = Callable[[Any, Any, Any, Any], Any]
+"""``(time, state, parameters, knots)``: thrust (N), torques (N m) and rates of own states."""
+
+
+def _body(qpos: Any, qvel: Any) -> Any:
+    """The rigid body's twelve states from MuJoCo's."""
+    return xp.hstack([qpos[:3], qvel[:3], euler_angles(qpos[3:7]), qvel[3:6]])
+
+
+def _sample(body: Any, controls: Any) -> Any:
+    """A sample from the rigid body's twelve states and the thrust controls; no tilts."""
+    speeds = xp.array(SPIN) * speed_along_spin(controls)
+    return xp.hstack([body, xp.zeros(4), speeds, xp.zeros(4)])
+
+
+@traceable
+def _observe(qpos: Any, qvel: Any, act: Any, ctrl: Any) -> Any:
+    return xp.hstack([_sample(_body(qpos, qvel), ctrl[:4]), act[4:]])
+
+
+@traceable
+def _rates(
+    time: Any, state: Any, inputs: Any, parameters: Any, knots: Any, disturbance: Any
+) -> Any:
+    """Ch. 2's equations of motion, followed by the law's own states."""
+    motion = equations_of_motion(state, inputs, parameters.vehicle, disturbance)
+    return xp.hstack([motion, inputs[4:]])
+
+
+@traceable
+def _observe_equations(time: Any, state: Any, inputs: Any, parameters: Any, knots: Any) -> Any:
+    thrusts = thrust_controls(inputs[:4], parameters.vehicle)
+    return xp.hstack([_sample(state[:12], thrusts), state[12:]])
+
+
+def _extension(plan: FlightPlan, own: int) -> tuple[float, ...]:
+    """The law's own states begin with the thrust of hover (N), at rest."""
+    vehicle = plan.scenario.rotorcraft.resolve()
+    return (vehicle.mass * vehicle.gravity, 0.0)[:own]
+
+
+def _quadrotor_loop(
+    record: Callable[..., Any],
+    setup: Callable[[FlightPlan], Any],
+    law: Law,
+    columns: Mapping[str, str],
+    derive: Callable[[Mapping[str, Floats], ControlSetup], dict[str, Floats]],
+    monitoring: Monitoring,
+    *,
+    own: int,
+) -> ClosedLoop:
+    """A closed loop around a law that demands thrust and torques.
+
+    Args:
+        record: Type of the head of `userdata`.
+        setup: ``plan -> parameters`` of the law.
+        law: See `Law`.
+        columns: Further columns of a flight, with their units.
+        derive, monitoring: See `Columns` and `Monitoring`.
+        own: Number of the law's own states: the thrust and its rate, or none.
+    """
+    fields = EXTENSION_FIELDS[:own]
+
+    def control_setup(plan: FlightPlan, signature: float) -> ControlSetup:
+        vehicle = plan.scenario.rotorcraft.resolve()
+        return ControlSetup(record(signature, vehicle, setup(plan)), plan.knots)
+
+    @traceable
+    def controls(time: Any, qpos: Any, qvel: Any, act: Any, parameters: Any, knots: Any) -> Any:
+        """Thrusts, idle rotor states, the law's states."""
+        state = xp.hstack([_body(qpos, qvel), act[4:]])
+        inputs = law(time, state, parameters.law, knots)
+        thrusts = thrust_controls(inputs[:4], parameters.vehicle)
+        return xp.hstack([thrusts, xp.zeros(4), inputs[4:]])
+
+    @traceable
+    def equation_inputs(time: Any, state: Any, parameters: Any, knots: Any) -> Any:
+        return law(time, state, parameters.law, knots)
+
+    return ClosedLoop(
+        kind=ROTORCRAFT,
+        parameters=record,  # type: ignore[arg-type]
+        setup=control_setup,
+        dynamics=Dynamics(
+            "quadrotor",
+            Sizes(qpos=7, qvel=6, act=4 + own, ctrl=8 + own),
+            lambda plan, _setup: (0.0, 0.0, 0.0, 0.0, *_extension(plan, own)),
+            controller_states=own,
+            commands_thrusts=True,
+            spins=SPIN,
+        ),
+        sampling=Sampling(controls),
+        columns=Columns(_observe, derive, fields, columns, observe_reads_controls=True),
+        monitoring=monitoring,
+        equations=Equations(
+            inputs=equation_inputs,
+            inputs_size=4 + own,
+            rates=_rates,
+            initial=lambda plan, _setup: (*initial_state(plan.scenario), *_extension(plan, own)),
+            observe=_observe_equations,
+        ),
+        uses_gait=False,
+    )
+
+
+def _yaw_position_setup(plan: FlightPlan) -> yaw_position.Parameters:
+    controller = plan.scenario.controller
+    assert isinstance(controller, YawPositionController)
+    vehicle = plan.scenario.rotorcraft.resolve()
+    return yaw_position.Parameters(vehicle, controller.resolve_gains(), plan.reference)
+
+
+def _switching_setup(plan: FlightPlan) -> switching.Parameters:
+    controller = plan.scenario.controller
+    assert isinstance(controller, SwitchingController)
+    vehicle = plan.scenario.rotorcraft.resolve()
+    return switching.Parameters(
+        yaw_position.Parameters(vehicle, controller.resolve_gains(), plan.reference),
+        controller.resolve_attitude_gains(),
+        switching.Zone(*controller.zone.roll, *controller.zone.pitch),
+        switching.EXTENSIONS[controller.extension],
+        controller.extension_rate,
+    )
+
+
+def _attitude_altitude_setup(plan: FlightPlan) -> AttitudeAltitudeParameters:
+    controller = plan.scenario.controller
+    assert isinstance(controller, QuadrotorAttitudeAltitudeController)
+    vehicle = plan.scenario.rotorcraft.resolve()
+    return AttitudeAltitudeParameters(vehicle, controller.resolve_gains(), plan.reference)
+
+
+def _attitude_altitude(
+    time: Any, state: Any, parameters: AttitudeAltitudeParameters, knots: Any
+) -> Any:
+    return quadrotor_attitude_altitude.attitude_altitude_inputs(time, state, *parameters, knots)
+
+
+YAW_POSITION: Final = _quadrotor_loop(
+    YawPositionLoop,
+    _yaw_position_setup,
+    yaw_position.yaw_position_inputs,
+    EXTENSION_COLUMNS,
+    _derive_yaw_position,
+    THRUST_AXIS_AND_THRUST,
+    own=2,
+)
+"""The yaw-position controller of the quadrotor."""
+
+QUADROTOR_ATTITUDE_ALTITUDE: Final = replace(
+    _quadrotor_loop(
+        AttitudeAltitudeLoop,
+        _attitude_altitude_setup,
+        _attitude_altitude,
+        {},
+        _derive_attitude_altitude,
+        THRUST_AXIS,
+        own=0,
+    ),
+    follows_position=lambda _scenario: False,
+)
+"""The attitude-altitude controller of the quadrotor (ch. 2, Appendix B)."""
+
+SWITCHING: Final = replace(
+    _quadrotor_loop(
+        SwitchingLoop,
+        _switching_setup,
+        switching.switching_inputs,
+        {**EXTENSION_COLUMNS, "attitude_zone": "1"},
+        _derive_switching,
+        THRUST_AXIS,  # the thrust may be anything while the other law is active
+        own=2,
+    ),
+    # In the zone, where the vehicle is meant to end up, the position is free.
+    follows_position=lambda _scenario: False,
+)
+"""Switching between yaw-position and attitude-altitude control of the quadrotor (ch. 2, Sec. 5)."""

@@ -3,7 +3,7 @@
 Native code wants to know how many rotors there are, which tilt together and which way they turn, so
 a loop is made for each such `RotorLayout`, once. All other numbers of the vehicle are data. The
 rotors' speeds are states whose accelerations a law commands; tilts follow the gait, or are commands
-that a law integrates as states of its own.
+that a law integrates as its states.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from tiltsim.closed_loop.loop import (
 from tiltsim.equations.tiltrotor import body_fields, initial_state
 from tiltsim.laws.rotorcraft import (
     REFERENCE_COLUMNS,
-    ahead_of,
+    ahead,
     held_controls_of,
     observed_of,
     reference_columns,
@@ -38,18 +38,14 @@ from tiltsim.models.rotor_table import Multirotor
 from tiltsim.vehicles.rotorcraft import initial_rotor_speeds, rotorcraft_kind
 from tiltsim.vehicles.rotorcraft.layout import CROSS
 from tiltsim.vehicles.rotorcraft.layout import Layout as Places
-from tiltsim_controllers.gaits.any_tilts import tilt_motion_of
+from tiltsim_controllers.gaits.motion import tilt_motion_of
 from tiltsim_controllers.mathematics.records import make_record_type
 from tiltsim_controllers.mathematics.scalar import Floats, Triple, Values, Vector, scalar
 from tiltsim_controllers.mathematics.vectors import entries_of
 from tiltsim_controllers.references.trajectories import position_reference
+from tiltsim_controllers.vehicle.body import Body, body_of
 from tiltsim_controllers.vehicle.effectiveness import ROTOR_FLOATS
-from tiltsim_controllers.vehicle.multirotor import (
-    BODY_STATES,
-    Body,
-    body_of,
-    equations_of_motion_of,
-)
+from tiltsim_controllers.vehicle.motion import BODY_STATES, equations_of_motion_of
 
 if TYPE_CHECKING:
     from tiltsim.scenario.scenario import FlightPlan
@@ -59,7 +55,7 @@ Margins = Callable[[Mapping[str, Floats], ControlSetup], dict[str, Floats]]
 
 
 class RotorLayout(NamedTuple):
-    """What a rotorcraft's compiled code is made for."""
+    """Layout of a rotorcraft, for which its programs are made."""
 
     tilt_of_rotor: tuple[int, ...]  # from 0; -1 for a fixed rotor
     spins: Values
@@ -72,7 +68,7 @@ class RotorLayout(NamedTuple):
 
     @property
     def shown(self) -> Places:
-        """The same of a sample, which may have tilts that are idle."""
+        """Places in a sample, which may have tilts that are idle."""
         return self.places if self.model == "multirotor" else CROSS
 
     @property
@@ -106,7 +102,7 @@ class RotorLaw(NamedTuple):
     (rad/s^2), then rates of the controller's ``states``. ``state`` is the vehicle's (`seen_of`),
     ``parameters`` the whole record."""
     parameters: type[tuple[Any, ...]]
-    setup: Callable[[FlightPlan], tuple[Any, Values]]  # these, and knots after those of the flight
+    setup: Callable[[FlightPlan], tuple[Any, Values]]  # parameters, and knots to append
     states: Mapping[str, str] = {}  # the controller's, with their units; part of a sample
     initial: Callable[[FlightPlan], Values] = _no_states  # these states at time zero
     commands: int | None = None  # which of them is the first commanded tilt; None: the gait's
@@ -121,7 +117,7 @@ class RotorLaw(NamedTuple):
     `tiltsim.laws.layers.measured_acceleration`."""
     motion: Callable[..., Values] | None = None
     """Scalar code ``(state, tilts, inputs, parameters, knots, disturbance)`` of the derivative of
-    body and rotor speeds on the thesis's equations; None for those of a table of rotors."""
+    body and rotor speeds on the thesis's equations; None for the equations of a rotor table."""
 
 
 @cache
@@ -140,65 +136,44 @@ def body_of_vehicle(vehicle: Multirotor) -> Body:
     return body_of(vehicle.mass, np.reshape(vehicle.inertia, (3, 3)), vehicle.gravity)
 
 
-_Tilts = tuple[Callable[..., Values], Callable[..., tuple[Values, Values]]]
+def _tilts_of(law: RotorLaw, tilts: int, state_1: int, rate_1: int) -> Callable[..., Any]:
+    """Scalar code of the tilts (rad) and their rates (rad/s), the gait's or a law's commands.
 
-
-@cache
-def _gait_of(tilts: int) -> _Tilts:
-    """Scalar code of a loop's planned tilt angles, and of them with their rates."""
-    moving = tilt_motion_of(tilts).moving
-
-    @scalar
-    def planned_angles(time: float, state: Vector, parameters: Any, knots: Vector) -> Values:
-        angles, _ = moving(time, parameters.law.gait, knots)
-        return angles
-
-    @scalar
-    def planned_motion(
-        time: float, state: Vector, inputs: Vector, parameters: Any, knots: Vector
-    ) -> tuple[Values, Values]:
-        return moving(time, parameters.law.gait, knots)
-
-    return planned_angles, planned_motion
-
-
-@cache
-def _integrated_of(tilts: int, state_1: int, rate_1: int) -> _Tilts:
-    """As `_gait_of`, of commanded tilts: states whose rates are inputs."""
-    angles, rates = entries_of(state_1, tilts), entries_of(rate_1, tilts)
-
-    @scalar
-    def commanded(time: float, state: Vector, parameters: Any, knots: Vector) -> Values:
-        return angles(state)
-
-    @scalar
-    def commanded_motion(
-        time: float, state: Vector, inputs: Vector, parameters: Any, knots: Vector
-    ) -> tuple[Values, Values]:
-        return angles(state), rates(inputs)
-
-    return commanded, commanded_motion
-
-
-def _tilts_of(law: RotorLaw, tilts: int, state_1: int, rate_1: int) -> _Tilts:
-    """The gait's tilts, or those that a law commands.
+    It is ``(time, state, inputs, parameters, knots) -> angles, rates``; commanded tilts are states
+    whose rates are inputs.
 
     Args:
         law: Its ``commands`` tell which.
         tilts: Number of tilts.
         state_1, rate_1: Where the controller's states begin in a state, and their rates in inputs.
     """
-    if law.commands is None:
-        return _gait_of(tilts)
-    return _integrated_of(tilts, state_1 + law.commands, rate_1 + law.commands)
+    moving, first = tilt_motion_of(tilts).moving, law.commands
+    if first is None:
+
+        @scalar
+        def planned(
+            time: float, state: Vector, inputs: Vector, parameters: Any, knots: Vector
+        ) -> tuple[Values, Values]:
+            return moving(time, parameters.law.gait, knots)
+
+        return planned
+    angles, rates = entries_of(state_1 + first, tilts), entries_of(rate_1 + first, tilts)
+
+    @scalar
+    def commanded(
+        time: float, state: Vector, inputs: Vector, parameters: Any, knots: Vector
+    ) -> tuple[Values, Values]:
+        return angles(state), rates(inputs)
+
+    return commanded
 
 
 def _sampling_of(layout: RotorLayout, law: RotorLaw) -> Sampling:
     """The control step in MuJoCo."""
     rotors, tilts = layout.places
     seen, inputs_of = seen_of(layout.places, len(law.states), law.measured), law.inputs
-    thrusts, ahead = thrust_controls_of(layout.spins), ahead_of(tilts)
-    _, tilt_motion = _tilts_of(law, tilts, rotors, rotors)
+    thrusts = thrust_controls_of(layout.spins)
+    tilt_motion = _tilts_of(law, tilts, rotors, rotors)
 
     @scalar
     def controls(
@@ -207,7 +182,7 @@ def _sampling_of(layout: RotorLayout, law: RotorLaw) -> Sampling:
         state, moving, states = seen(qpos, qvel, act)
         inputs = inputs_of(time, state, moving, states, parameters, knots)
         angles, rates = tilt_motion(time, act, inputs, parameters, knots)
-        return ahead(angles, rates, parameters.servo_lead) + thrusts(act) + inputs
+        return (*ahead(angles, rates, parameters.servo_lead), *thrusts(act), *inputs)
 
     return Sampling(controls, held_controls_of(layout.spins, tilts))
 
@@ -226,29 +201,30 @@ def _columns_of(layout: RotorLayout, law: RotorLaw) -> Columns:
     fields, names = (*shown.observed_fields, *law.states), (*law.names, *shown.names("alpha_ref"))
     observed, idle = observed_of(places, shown, len(law.states)), (0.0,) * (shown[1] - places[1])
     first = len(shown.observed_fields)
-    tilts, _ = _tilts_of(law, places.tilts, first, first)
+    tilts, at_rest = _tilts_of(law, places.tilts, first, 0), (0.0,) * len(law.states)
 
     @scalar
     def observe(qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector) -> Values:
         return observed(qpos, qvel, act)
 
     @scalar
-    def asked(time: float, values: Vector, parameters: Any, knots: Vector) -> Values:
+    def requested(time: float, values: Vector, parameters: Any, knots: Vector) -> Values:
         own = references(time, values, parameters, knots)
-        return (*own, *tilts(time, values, parameters, knots), *idle)
+        angles, _ = tilts(time, values, at_rest, parameters, knots)
+        return (*own, *angles, *idle)
 
     def margins(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
         return torque_free_columns(places, table_of(places, setup), samples)
 
     def derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
-        found = reference_columns(asked, fields, samples, setup, names)
+        found = reference_columns(requested, fields, samples, setup, names)
         return {**found, **(law.margins or margins)(samples, setup)}
 
     return Columns(observe, derive, fields=tuple(law.states), units={**law.states, **law.units})
 
 
 def table_of(places: Places, setup: ControlSetup) -> Values:
-    """The table of the rotors, in the knots after those of gait and reference."""
+    """The table of the rotors, in the knots after the data of gait and reference."""
     first = int(setup.parameters.law.rotors)
     return setup.knots[first : first + ROTOR_FLOATS * places.rotors]
 
@@ -283,7 +259,12 @@ def _equations_of(layout: RotorLayout, law: RotorLaw) -> Equations:
     idle = (0.0,) * (layout.shown.tilts - tilts)
     speeds_in, states_in = entries_of(BODY_STATES, rotors), entries_of(BODY_STATES + rotors, own)
     state_rates, at_rest = entries_of(rotors, own), (0.0,) * (rotors + own)
-    tilts_of, moving_tilts = _tilts_of(law, tilts, BODY_STATES + rotors, rotors)
+    moving_tilts = _tilts_of(law, tilts, BODY_STATES + rotors, rotors)
+
+    @scalar
+    def tilts_of(time: float, state: Vector, parameters: Any, knots: Vector) -> Values:
+        angles: Values = moving_tilts(time, state, at_rest, parameters, knots)[0]
+        return angles
 
     @scalar
     def inputs(time: float, state: Vector, parameters: Any, knots: Vector) -> Values:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from typing import TYPE_CHECKING, Any, Final
 
@@ -18,64 +18,49 @@ from tiltsim_controllers.analysis.torque_free import (
     margin_over_flight,
     torque_free_forces,
 )
-from tiltsim_controllers.gaits.any_tilts import tilt_motion_of
+from tiltsim_controllers.code.arrays import xp
+from tiltsim_controllers.code.traceable import traceable
+from tiltsim_controllers.gaits.motion import tilt_motion_of
 from tiltsim_controllers.gaits.parameters import GaitParameters
 from tiltsim_controllers.laws.failures import UNHARMED, Failure
+from tiltsim_controllers.mathematics.attitude import euler_angles
 from tiltsim_controllers.mathematics.rotation import euler_from_quaternion
 from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector, scalar
-from tiltsim_controllers.mathematics.vectors import componentwise, tuple_text, written_out
+from tiltsim_controllers.mathematics.vectors import entries_of
 from tiltsim_controllers.vehicle.effectiveness import force_and_torque
 
 if TYPE_CHECKING:
     from tiltsim.scenario.rotorcraft import ServoTable
 
 
-def _reading(name: str, entries: Iterable[str]) -> Callable[..., Any]:
-    """Scalar code ``(qpos, qvel, act)`` of a tuple.
-
-    Its entries may also read ``angles``: roll, pitch and yaw (rad). It is one expression: several
-    tuples, joined, would take Python half as much time again.
-    """
-    joined = written_out(name, "angles, qpos, qvel, act", tuple_text(entries))
-
-    @scalar
-    def reading(qpos: Vector, qvel: Vector, act: Vector) -> Any:
-        angles = euler_from_quaternion(qpos[QW], qpos[QX], qpos[QY], qpos[QZ])
-        return joined(angles, qpos, qvel, act)
-
-    return reading
-
-
-def _entries(vector: str, first: int, count: int) -> tuple[str, ...]:
-    return tuple(f"{vector}[{i}]" for i in range(first, first + count))
-
-
-_BODY: Final = (
-    *_entries("qpos", 0, 3),
-    *_entries("qvel", 0, 3),
-    *_entries("angles", 0, 3),
-    *_entries("qvel", 3, 3),
-)
-"""The rigid body, `tiltsim_controllers.vehicle.states.BODY_FIELDS`."""
+def _array(vector: Any) -> Any:
+    """A vector of MuJoCo as an array; a traced one is not an array yet."""
+    return vector if hasattr(vector, "shape") else xp.array([*vector])
 
 
 @cache
 def seen_of(layout: Layout, states: int, measured: bool) -> Callable[..., tuple[Values, ...]]:
-    """Scalar code ``(qpos, qvel, act)`` of what a law sees of MuJoCo's vectors.
+    """A law's view of MuJoCo's vectors: ``(qpos, qvel, act)``.
 
-    That is the vehicle's state (twelve numbers of the body, then tilt angles, rad, and rotor
-    speeds, rad/s), its tilt rates (rad/s) and the controller's states.
+    It returns the vehicle's state (`tiltsim_controllers.vehicle.states.RotorcraftState` in one
+    vector), its tilt rates (rad/s) and the controller's states.
 
     Args:
-        layout: Of the vehicle.
-        states: How many states the controller has.
+        layout: Layout of the vehicle.
+        states: Number of the controller's states.
         measured: Whether the tilt rates end with the plant's angular acceleration (rad/s^2).
     """
     rotors, tilts = layout
-    rates = _entries("qvel", TILT_RATE_1, tilts + 3 * measured)
-    state = (*_BODY, *_entries("qpos", TILT_1, tilts), *_entries("act", 0, rotors))
-    parts = map(tuple_text, (state, rates, _entries("act", rotors, states)))
-    return _reading(f"seen_{rotors}_{tilts}_{len(rates)}_{states}", parts)
+
+    @traceable
+    def seen(qpos: Any, qvel: Any, act: Any) -> tuple[Any, ...]:
+        qpos, qvel, act = _array(qpos), _array(qvel), _array(act)
+        attitude, angles = euler_angles(qpos[QW:TILT_1]), qpos[TILT_1 : TILT_1 + tilts]
+        state = qpos[0:3], qvel[0:3], attitude, qvel[3:6], angles, act[:rotors]
+        rates = qvel[TILT_RATE_1 : TILT_RATE_1 + tilts + 3 * measured]
+        return xp.hstack(state), rates, act[rotors : rotors + states]
+
+    return seen
 
 
 @cache
@@ -83,28 +68,36 @@ def observed_of(layout: Layout, shown: Layout, further: int) -> Callable[..., Va
     """Scalar code of a sample, `Columns.observe` without controls.
 
     Args:
-        layout: Of the vehicle.
-        shown: Of its samples, which may have tilts that are idle.
-        further: How many states of the controller they have.
+        layout: Layout of the vehicle.
+        shown: Layout of its samples, which may have tilts that are idle.
+        further: Number of the controller's states in a sample.
     """
     rotors, tilts = layout
-    idle = ("0.0",) * (shown.tilts - tilts)
-    angles, rates = _entries("qpos", TILT_1, tilts), _entries("qvel", TILT_RATE_1, tilts)
-    speeds, states = _entries("act", 0, rotors), _entries("act", rotors, further)
-    return _reading(
-        f"observed_{rotors}_{tilts}_{shown.tilts}_{further}",
-        (*_BODY, *angles, *idle, *speeds, *rates, *idle, *states),
-    )
+    idle = (0.0,) * (shown.tilts - tilts)
+    first, turning = entries_of(0, 3), entries_of(3, 3)
+    angles, rates = entries_of(TILT_1, tilts), entries_of(TILT_RATE_1, tilts)
+    speeds, states = entries_of(0, rotors), entries_of(rotors, further)
+
+    @scalar
+    def observed(qpos: Vector, qvel: Vector, act: Vector) -> Values:
+        attitude = euler_from_quaternion(qpos[QW], qpos[QX], qpos[QY], qpos[QZ])
+        body = (*first(qpos), *first(qvel), *attitude, *turning(qvel))
+        return (*body, *angles(qpos), *idle, *speeds(act), *rates(qvel), *idle, *states(act))
+
+    return observed
 
 
 @cache
 def thrust_controls_of(spins: Values) -> Callable[[Vector], Values]:
-    """Scalar code of the controls of the thrust actuators, ``s varpi |varpi|`` with the spin s."""
-    senses = "".join("p" if spin > 0.0 else "m" for spin in spins)
-    signs = ["" if spin > 0.0 else "-" for spin in spins]
-    terms = tuple_text(f"{sign}act[{i}] * abs(act[{i}])" for i, sign in enumerate(signs))
-    controls: Callable[[Vector], Values] = written_out(f"thrust_controls_{senses}", "act", terms)
-    return controls
+    """Controls of the thrust actuators, ``s varpi |varpi|`` with the spin s, from ``act``."""
+    signs = np.array(spins)
+
+    @traceable
+    def thrust_controls(act: Any) -> Any:
+        speeds = _array(act)[: len(signs)]
+        return signs * speeds * abs(speeds)
+
+    return thrust_controls
 
 
 @cache
@@ -131,27 +124,25 @@ def servo_lead(servo: ServoTable) -> float:
     return 2.0 * servo.damping_ratio / servo.natural_frequency
 
 
-@cache
-def ahead_of(tilts: int) -> Callable[..., Values]:
-    """Scalar code of angles ahead of themselves by a lag: ``(angles, rates, lead)``."""
-    ahead: Callable[..., Values] = componentwise(
-        "ahead", "angles, rates, lead", "angles# + lead * rates#", tilts
-    )
-    return ahead
+@traceable
+def ahead(angles: Any, rates: Any, lead: Any) -> Any:
+    """Angles (rad) ahead of themselves by a lag (s) at their rates (rad/s)."""
+    return angles + lead * rates
 
 
 @cache
 def servo_commands_of(tilts: int) -> Callable[..., Values]:
-    """Scalar code of the commands of so many tilt servos, ahead of a gait by their lag.
+    """Scalar code of the commands of tilt servos, ahead of a gait by their lag.
 
-    They are ``(time, lead, gait, knots) -> commands``, s and rad.
+    It is ``(time, lead, gait, knots) -> commands``, s and rad.
     """
-    moving, ahead = tilt_motion_of(tilts).moving, ahead_of(tilts)
+    moving = tilt_motion_of(tilts).moving
 
     @scalar
     def servo_commands(time: float, lead: float, gait: GaitParameters, knots: Vector) -> Values:
         angles, rates = moving(time, gait, knots)
-        return ahead(angles, rates, lead)
+        commands: Values = ahead(angles, rates, lead)
+        return commands
 
     return servo_commands
 
@@ -172,7 +163,7 @@ def torque_free_columns(
     """Angle (rad) to the nearest singular attitude, and how well the decoupling matrix inverts.
 
     Args:
-        layout: Of the vehicle.
+        layout: Layout of the vehicle.
         table: Of its rotors.
         samples: By field.
         dimension: How many components of force the controller controls; None for a controller
@@ -210,7 +201,7 @@ def reference_columns(
         fields: Fields of a sample, its ``values``.
         samples: By field.
         setup: The flight's parameters and knots.
-        names: Of the columns.
+        names: Names of the columns.
     """
     states = np.stack([samples[name] for name in fields], axis=-1)
     rows = evaluate_over_samples(in_force, len(names), samples["time"], states, setup)

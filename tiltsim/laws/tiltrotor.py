@@ -1,32 +1,43 @@
-"""What the thesis's laws of the tiltrotor have in common, in closed form."""
+"""Common parts of the closed loops of the thesis's laws with the tiltrotor."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
 
-from tiltsim.closed_loop.loop import ControlSetup
+from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Monitoring
 from tiltsim.engines.sample_evaluation import flights_in
 from tiltsim.equations.tiltrotor import equations_of_motion
-from tiltsim.laws.rotor_loop import RotorLayout
+from tiltsim.laws.rotor_loop import RotorLaw, RotorLayout
 from tiltsim.laws.rotorcraft import rotor_stops, singular_attitude
+from tiltsim.laws.tracking import tracking_loop
+from tiltsim.vehicles.rotorcraft import ROTORCRAFT
 from tiltsim_controllers.analysis.singularity import determinant, margin_over_gait
-from tiltsim_controllers.mathematics.rotation import world_up_in_body
+from tiltsim_controllers.code.arrays import xp
+from tiltsim_controllers.code.traceable import traceable
+from tiltsim_controllers.laws.attitude_altitude import PUBLISHED_DECOUPLING
+from tiltsim_controllers.laws.tiltrotor_supervisor import SUPERVISION
+from tiltsim_controllers.mathematics.attitude import rotation_matrix
+from tiltsim_controllers.mathematics.linear import kernel
 from tiltsim_controllers.mathematics.scalar import Floats, Quad, Triple, Values, Vector, scalar
-from tiltsim_controllers.vehicle.decoupling_matrix import (
-    sines_and_cosines,
-    torque_entries,
-    torque_free_force,
-)
+from tiltsim_controllers.mathematics.vectors import entries_of
 from tiltsim_controllers.vehicle.parameters import SPIN, Vehicle, drag_ratio
-from tiltsim_controllers.vehicle.states import ALPHA_1, PITCH, ROLL, ROTORS, SPEED_1, TILT_FIELDS
+from tiltsim_controllers.vehicle.rotors import airframe, wrench_map
+from tiltsim_controllers.vehicle.states import ROTORS, TILT_FIELDS, TILTROTOR_FIELDS, state_of
 
 TILT_REFERENCE_COLUMNS: Final = tuple(f"alpha_ref_{rotor}" for rotor in ROTORS)
 
 
 TILTROTOR_LAYOUT: Final = RotorLayout((0, 1, 2, 3), SPIN, "tiltrotor")
+
+
+CROSS: Final = TILTROTOR_LAYOUT.tilt_of_rotor
+
+state_in = entries_of(0, len(TILTROTOR_FIELDS))
+"""Scalar code of the vehicle's state in a sample."""
 
 
 @scalar
@@ -61,7 +72,7 @@ def singularity_columns(samples: Mapping[str, Floats], vehicle: Vehicle) -> dict
 
 @scalar
 def watched_vehicle(time: float, parameters: Any) -> float:
-    """What the tiltrotor's supervisor reads of it."""
+    """The vehicle parameter that the tiltrotor's supervisor reads."""
     return drag_ratio(parameters.law.vehicle)
 
 
@@ -70,37 +81,49 @@ def singularity_margins(samples: Mapping[str, Floats], setup: ControlSetup) -> d
     return singularity_columns(samples, setup.parameters.law.vehicle)
 
 
-ROTOR_STOPS: Final = rotor_stops(4)
-"""Causes for `rotor_speeds_along_spin`: the decoupling matrix has the factor ``2 |varpi|``."""
+@traceable
+def _determinant_and_speeds(values: Any, law: Any) -> Any:
+    """Determinant of the decoupling matrix by its scale, and the rotor speeds (rad/s), shape (5,).
+
+    ``det [tau; r3^T F] = 2 L^2 K_f^3 K_m (n . r3)`` with ``n . r3 = 4`` for a level untilted
+    vehicle, here in units of ``K_f``. The factors ``2 |varpi|`` of the exact matrix vanish with a
+    speed; as published they are in one row only, and a rotor at rest is harmless.
+    """
+    now, (_, rotors) = state_of(values, CROSS), airframe(law, (), CROSS)
+    wrench, vehicle = wrench_map(rotors, now.tilts), law.vehicle
+    arm, drag = vehicle.arm_length, vehicle.drag_coefficient / vehicle.thrust_coefficient
+    scale = 2.0 * arm * arm * drag
+    determinant = -(rotation_matrix(now.attitude)[2] @ wrench[:3] @ kernel(wrench[3:]))
+    speeds = xp.ones(4) if law.decoupling == PUBLISHED_DECOUPLING else now.speeds
+    return xp.hstack([determinant / scale, speeds])
 
 
 @scalar
-def rotor_speeds_along_spin(values: Vector) -> Quad:
-    """Rotor speeds (rad/s) along their spin, of a sample's ``values``."""
-    s1, s2, s3, s4 = four(values, SPEED_1)
-    return -s1, s2, -s3, s4
+def _sign_check_values(time: float, values: Vector, parameters: Any, knots: Vector) -> Values:
+    numbers: Values = _determinant_and_speeds(state_in(values), parameters.law)
+    return numbers
 
 
-@scalar
-def scaled_determinant(values: Vector, vehicle: Vehicle) -> float:
-    """Determinant of the decoupling matrix without the rotor speeds, of a sample's ``values``."""
-    ratio = drag_ratio(vehicle)
-    a1, a2, a3, a4 = four(values, ALPHA_1)
-    trig = sines_and_cosines(a1, a2, a3, a4)
-    nx, ny, nz = torque_free_force(trig, torque_entries(trig, ratio), ratio)
-    ux, uy, uz = world_up_in_body(values[ROLL], values[PITCH])
-    return nx * ux + ny * uy + nz * uz
+def _causes(sample: Mapping[str, float], _setup: ControlSetup) -> tuple[str, ...]:
+    return (singular_attitude(sample, TILT_FIELDS), *rotor_stops(4))
 
 
-@scalar
-def determinant_and_speeds(time: float, values: Vector, parameters: Any, knots: Vector) -> Values:
-    """`scaled_determinant` and `rotor_speeds_along_spin`."""
-    determinant = scaled_determinant(values, parameters.law.vehicle)
-    return (determinant, *rotor_speeds_along_spin(values))
+def tiltrotor_loops(law: RotorLaw) -> tuple[ClosedLoop, ClosedLoop]:
+    """The closed loops of a law that follows a gait, whose vehicle is the tiltrotor.
 
+    The second feeds back the angular acceleration of the plant in place of the model's.
 
-def determinant_and_speed_causes(
-    sample: Mapping[str, float], _setup: ControlSetup
-) -> tuple[str, ...]:
-    """Causes for `determinant_and_speeds`."""
-    return (singular_attitude(sample, TILT_FIELDS), *ROTOR_STOPS)
+    Args:
+        law: As `tiltsim.laws.tracking` takes it, without margins and motion.
+    """
+    own = law._replace(margins=singularity_margins, motion=tiltrotor_motion)
+
+    def loop(*, measured: bool) -> ClosedLoop:
+        measuring = own._replace(measured=measured)
+        return replace(
+            tracking_loop(TILTROTOR_LAYOUT, measuring, SUPERVISION, watched_vehicle),
+            kind=ROTORCRAFT,
+            monitoring=Monitoring(_sign_check_values, _causes),
+        )
+
+    return loop(measured=False), loop(measured=True)

@@ -1,9 +1,9 @@
 """Loops of the laws that follow a planned gait, which a supervisor may change.
 
-Those with feed-forward of the gait integrate the position error. Their control law is one function,
-``(time, state, tilt_rates, integrals, parameters, knots, supervisor_motion, measured)``: rotor
-accelerations (rad/s^2), rates of the integrals (m), the references of roll, pitch and yaw (rad),
-and further numbers that are columns.
+A law is one function ``(time, state, tilt_rates, states, parameters, knots, supervisor_motion,
+measured)``: rotor accelerations (rad/s^2), rates of its states, references of roll, pitch and
+yaw (rad), and further numbers that are columns. With feed-forward of the gait its states are
+integrals of the position error.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from tiltsim.laws.rotorcraft import REFERENCE_COLUMNS, seen_of
 from tiltsim.scenario.multirotor_controllers import AttitudeForceController
 from tiltsim.scenario.tiltrotor_controllers import AttitudeAltitudeController
 from tiltsim_controllers.laws.decouplers import DECOUPLERS
-from tiltsim_controllers.laws.gait_feedforward import INTEGRAL_FIELDS
+from tiltsim_controllers.laws.multirotor_steps import INTEGRAL_FIELDS
 from tiltsim_controllers.laws.supervisor import SUPERVISOR_AT_REST, Supervision
 from tiltsim_controllers.mathematics.scalar import Triple, Values, Vector, scalar
 from tiltsim_controllers.mathematics.vectors import entries_of
@@ -28,8 +28,13 @@ from tiltsim_controllers.references.trajectories import position_reference
 if TYPE_CHECKING:
     from tiltsim.scenario.scenario import FlightPlan, Scenario
 
-STATES: Final = len(INTEGRAL_FIELDS)
-"""The controller's own, after the rotor speeds."""
+INTEGRALS: Final = dict.fromkeys(INTEGRAL_FIELDS, "m s")
+"""States of a law that integrates the position error, with their units."""
+
+
+def integrals_at_rest(_plan: FlightPlan) -> Values:
+    """These states at time zero."""
+    return (0.0,) * len(INTEGRALS)
 
 
 def tracking_fields(plan: FlightPlan) -> dict[str, Any]:
@@ -59,11 +64,11 @@ def _by_model(moving: Values) -> None:
 
 @cache
 def _inputs_of(
-    layout: RotorLayout, law: Callable[..., Values], measured: bool
+    layout: RotorLayout, law: Callable[..., Values], states: int, measured: bool
 ) -> Callable[..., Values]:
-    """Scalar code of `SupervisedLaw.inputs`: the ``states`` are the integrals."""
+    """Scalar code of `SupervisedLaw.inputs`."""
     rotors, tilts = layout.places
-    tilt_rates_in, inputs_in = entries_of(0, tilts), entries_of(0, rotors + STATES)
+    tilt_rates_in, inputs_in = entries_of(0, tilts), entries_of(0, rotors + states)
     acceleration_in = entries_of(tilts, 3) if measured else _by_model
 
     @scalar
@@ -71,14 +76,14 @@ def _inputs_of(
         time: float,
         state: Values,
         moving: Values,
-        states: Values,
+        own: Values,
         parameters: Any,
         knots: Vector,
         motion: Triple = SUPERVISOR_AT_REST,
     ) -> Values:
         rates, acceleration = tilt_rates_in(moving), acceleration_in(moving)
         found: Values = inputs_in(
-            law(time, state, rates, states, parameters.law, knots, motion, acceleration)
+            law(time, state, rates, own, parameters.law, knots, motion, acceleration)
         )
         return found
 
@@ -87,14 +92,14 @@ def _inputs_of(
 
 @cache
 def _references_of(
-    layout: RotorLayout, law: Callable[..., Values], further: int
+    layout: RotorLayout, law: Callable[..., Values], states: int, further: int
 ) -> Callable[..., Values]:
     """Scalar code of position, attitude and further numbers; see `SupervisedLaw.references`."""
     rotors, tilts = layout.places
     first = layout.places.speed_1 + rotors
     state_in, rates_of_sample = entries_of(0, first), entries_of(first, tilts)
-    integrals_of_sample = entries_of(first + tilts, STATES)
-    asked_in = entries_of(rotors + STATES, 3 + further)  # roll, pitch, yaw and what follows
+    states_of_sample = entries_of(first + tilts, states)
+    tracked_in = entries_of(rotors + states, 3 + further)  # roll, pitch, yaw and what follows
 
     @scalar
     def references(
@@ -106,9 +111,9 @@ def _references_of(
     ) -> Values:
         own = parameters.law
         x, y, z, _, _, _, _, _, _ = position_reference(time, own.reference, knots)
-        moving, integrals = rates_of_sample(values), integrals_of_sample(values)
-        inputs = law(time, state_in(values), moving, integrals, own, knots, motion)
-        return (x, y, z, *asked_in(inputs))
+        moving, states_now = rates_of_sample(values), states_of_sample(values)
+        found = law(time, state_in(values), moving, states_now, own, knots, motion)
+        return (x, y, z, *tracked_in(found))
 
     return references
 
@@ -120,50 +125,32 @@ def follows_position(scenario: Scenario) -> bool:
     return controller.decoupler != "none"
 
 
-def supervised_loop(
+def tracking_loop(
     layout: RotorLayout, law: RotorLaw, supervision: Supervision, watched: Callable[..., Any]
 ) -> ClosedLoop:
     """The closed loop of a law whose planned gait a supervisor may change.
 
     Args:
-        layout: Of the vehicles.
-        law: Its ``inputs`` and ``references`` are those of a `SupervisedLaw`, with the
-            supervisor at rest by default.
+        layout: Layout of the vehicles.
+        law: Its ``inputs`` are the law itself; its ``names`` end with names of further numbers.
         supervision: The supervisor's code.
-        watched: What this reads of a vehicle: ``(time, parameters)``.
+        watched: Vehicle parameters that this reads: ``(time, parameters)``.
     """
-    references, margins = law.references, law.margins
-    assert references is not None
+    code, states, margins = law.inputs, len(law.states), law.margins
     assert margins is not None
+    inputs = _inputs_of(layout, code, states, law.measured)
+    references = _references_of(layout, code, states, len(law.names) - len(REFERENCE_COLUMNS))
     supervised = SupervisedLaw(
         code=supervision,
         vehicle=watched,
-        seen=seen_of(layout.places, len(law.states), law.measured),
-        inputs=law.inputs,
+        seen=seen_of(layout.places, states, law.measured),
+        inputs=inputs,
         references=references,
         names=law.names,
         fields=(*layout.places.observed_fields, *law.states),
         margins=margins,
     )
+    following = law._replace(inputs=inputs, references=references)
     return replace(
-        rotor_loop(layout, law), supervised=supervised, follows_position=follows_position
+        rotor_loop(layout, following), supervised=supervised, follows_position=follows_position
     )
-
-
-def tracking_loop(
-    layout: RotorLayout, law: RotorLaw, supervision: Supervision, watched: Callable[..., Any]
-) -> ClosedLoop:
-    """The closed loop of a law with feed-forward of the gait.
-
-    Args:
-        layout, supervision, watched: As of `supervised_loop`.
-        law: Its ``inputs`` are the law itself; its ``names`` end with those of further numbers.
-    """
-    code = law.inputs
-    following = law._replace(
-        inputs=_inputs_of(layout, code, law.measured),
-        states=dict.fromkeys(INTEGRAL_FIELDS, "m s"),
-        initial=lambda _plan: (0.0,) * STATES,
-        references=_references_of(layout, code, len(law.names) - len(REFERENCE_COLUMNS)),
-    )
-    return supervised_loop(layout, following, supervision, watched)

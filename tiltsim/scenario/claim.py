@@ -8,7 +8,9 @@ from pydantic import Field
 
 from tiltsim.scenario.table import Table
 
-Origin = Literal["path", "gains", "keyframes", "parameters", "flight"]
+Origin = Literal[
+    "path", "gains", "keyframes", "parameters", "flight", "start", "limits", "feedback"
+]
 """What of a flight does not come from its source."""
 
 NAME: Final = r"^[a-z0-9]+(-[a-z0-9]+)+$"
@@ -38,6 +40,11 @@ class ClaimTable(Table):
         examples=["The thesis does not give the mass."],
     )
     fitted: bool = Field(False, description="parameters were chosen so that it holds")
+    missing: str = Field(
+        "",
+        description="what the text leaves open, so that the statement is not testable",
+        examples=["the figure with the path is not available"],
+    )
     finding: str = Field(
         "",
         description="key of the finding that settles it, if one does",

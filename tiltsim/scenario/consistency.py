@@ -55,6 +55,10 @@ def _check_engine(scenario: ScenarioTables) -> None:
             raise scenario.mistake("simulation.plant", reason)
     elif simulation.precision != "float64":
         raise scenario.mistake("simulation.precision", 'needs simulation.engine = "jax"')
+    if simulation.batch_functions == "quick" and simulation.plant == "mujoco":
+        raise scenario.mistake(
+            "simulation.batch_functions", 'needs simulation.plant = "thesis" or "rigid_body"'
+        )
 
 
 def _check_rigid_body(scenario: ScenarioTables) -> None:

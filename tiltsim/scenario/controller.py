@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from functools import reduce
 from operator import or_
 from pathlib import Path
@@ -13,6 +12,7 @@ from pydantic import Discriminator, Field, Tag, model_validator
 from tiltsim.scenario.baseline_controllers import GeometricController, IndiController, PidController
 from tiltsim.scenario.controller_packages import installed_controllers
 from tiltsim.scenario.controller_table import ControllerTable
+from tiltsim.scenario.law_controller import TiltingTable
 from tiltsim.scenario.lqr_controller import LqrController
 from tiltsim.scenario.messages import InvalidValueError
 from tiltsim.scenario.multirotor_controllers import AttitudeForceController
@@ -21,7 +21,6 @@ from tiltsim.scenario.quadrotor_controllers import (
     SwitchingController,
     YawPositionController,
 )
-from tiltsim.scenario.scalar_controller import Airframe, TiltingTable
 from tiltsim.scenario.table import example
 from tiltsim.scenario.tilt_car_controllers import (
     FourthDerivativeController,
@@ -31,6 +30,9 @@ from tiltsim.scenario.tilt_car_controllers import (
 from tiltsim.scenario.tiltrotor_controllers import AttitudeAltitudeController, FullPoseController
 
 DEFAULT_LAW: Final = "attitude_altitude"
+
+StateUnits = dict[Annotated[str, Field(pattern="^state_[a-z0-9_]+$")], str]
+"""Names and units of states."""
 
 
 class OwnFunctionController(ControllerTable):
@@ -76,24 +78,32 @@ class PythonController(OwnFunctionController):
     law: Literal["python"] = Field(description="your own controller")
 
 
-class ScalarFunctionController(OwnFunctionController, TiltingTable):
-    """A user's own scalar function; see docs/controller_package.md."""
+class NumpyController(OwnFunctionController, TiltingTable):
+    """A user's own law on NumPy arrays; see docs/own_controller.md."""
 
-    model_config = example(law="scalar", function="my_law.py:hover")
+    model_config = example(law="numpy", function="my_law.py:hover")
 
     reference_kinds = ("position", "pose", "attitude_altitude")
 
-    law: Literal["scalar"] = Field(
-        description="your own function marked @tiltsim.scalar, which flies as compiled code"
+    law: Literal["numpy"] = Field(
+        description="your own law, a function of NumPy arrays, which flies as compiled code"
     )
-    states: dict[Annotated[str, Field(pattern="^state_[a-z0-9_]+$")], str] = Field(
+    parameters: dict[str, Any] = Field(
         {},
-        description="the law's own states, zero at the start: their names and units",
+        description="keys of the law, where it is a class, a tiltsim.LawController",
+        examples=[{"stiffness": 4.0}],
+    )
+    states: StateUnits = Field(
+        {},
+        description="the law's own states: their names and units",
         examples=[{"state_integral": "m s"}],
     )
-
-    def state_units(self, airframe: Airframe) -> Mapping[str, str]:
-        return self.states
+    discrete_states: StateUnits = Field(
+        {},
+        description="states that the law sets at control samples, such as flags and queues: their "
+        "names and units; needs simulation.control_timestep > 0",
+        examples=[{"state_flag": "1"}],
+    )
 
 
 def _law(value: Any) -> str:
@@ -115,7 +125,7 @@ _BUILT_IN: Final[dict[str, type[ControllerTable]]] = {
     "indi": IndiController,
     "lqr": LqrController,
     "python": PythonController,
-    "scalar": ScalarFunctionController,
+    "numpy": NumpyController,
     "tilt_car_third_derivative": ThirdDerivativeController,
     "tilt_car_fourth_derivative": FourthDerivativeController,
     "tilt_car_planned_direction": PlannedDirectionController,

@@ -1,7 +1,7 @@
 """Controllers that installed packages bring, by the entry-point group ``tiltsim.controllers``.
 
 An entry point names a law and its table, a subclass of
-`tiltsim.scenario.scalar_controller.ScalarController`. What cannot be used is left out with a
+`tiltsim.scenario.law_controller.LawController`. What cannot be used is left out with a
 warning, so that a broken package does not stop flights that do not need it.
 """
 
@@ -15,7 +15,7 @@ from inspect import isabstract
 from typing import Final, get_args
 
 from tiltsim.scenario.controller_table import ControllerTable
-from tiltsim.scenario.scalar_controller import ScalarController
+from tiltsim.scenario.law_controller import LawController
 from tiltsim.system.interrupts import defer_interrupts
 from tiltsim.system.text import error_text, printable
 
@@ -78,8 +78,8 @@ def _loaded(entry: EntryPoint, built_in: Container[str]) -> type[ControllerTable
     """The table of an entry point, or why it cannot be used, whatever its code raises."""
     try:
         table = entry.load()
-        if not (isinstance(table, type) and issubclass(table, ScalarController)):
-            return f"{entry.value} is no subclass of tiltsim.ScalarController"
+        if not (isinstance(table, type) and issubclass(table, LawController)):
+            return f"{entry.value} is no subclass of tiltsim.LawController"
         if entry.name in built_in:
             return "tiltsim has a law of this name"
         if isabstract(table):

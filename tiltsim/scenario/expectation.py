@@ -56,9 +56,6 @@ class Expectation(Table):
         "[the metric's]",
         examples=[[-0.5, -0.3]],
     )
-    wrong: bool = Field(
-        False, description="the claim is refuted, not merely not reproduced; needs why"
-    )
     why: str = Field(
         "",
         description="the reason why the claim is not reproduced",
@@ -98,13 +95,11 @@ class Expectation(Table):
             raise self.mistake("published", f"{self.metric} is true or false")
         if published is None:
             needs = "needs published: a number, true or false"
-            self.require_defaults(("claim", "case", "why", "wrong"), needs)
+            self.require_defaults(("claim", "case", "why"), needs)
         if published is None or isinstance(published, bool):
             self.require_defaults(("published_tolerance", "in_kind"), "needs a published number")
         if boolean or not isinstance(published, bool):
             self.require_defaults(("holds",), "needs a metric with a number, and true or false")
-        if self.wrong and not self.why:
-            raise self.mistake("wrong", "needs why")
         for key in ("holds", "in_kind"):
             bounds = getattr(self, key)
             if bounds is not None and not bounds[0] <= bounds[1]:

@@ -18,7 +18,7 @@ from tiltsim_controllers.laws.gains import (
     gains_from_poles,
     gains_from_rows,
 )
-from tiltsim_controllers.laws.gait_feedforward import FeedforwardTerms
+from tiltsim_controllers.laws.multirotor_steps import FeedforwardTerms
 from tiltsim_controllers.laws.supervisor import Supervisor
 from tiltsim_controllers.vehicle.parameters import Vehicle
 

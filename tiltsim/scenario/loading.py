@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import suppress
 from os import PathLike, fsdecode
 from pathlib import Path
@@ -13,23 +13,26 @@ from pydantic import ValidationError
 
 from tiltsim.errors import InputError
 from tiltsim.models.mjcf_files import check_mjcf
-from tiltsim.scenario.arguments import check_keys, check_no_other, controller_name, own_title, plain
+from tiltsim.scenario.arguments import check_keys, check_no_other, own_title, plain
 from tiltsim.scenario.controller import DEFAULT_LAW
 from tiltsim.scenario.library import find_scenario_file, library_name, read_toml
 from tiltsim.scenario.limits import check_limits
-from tiltsim.scenario.messages import choose, did_you_mean, has_same_keys, one_line_message, show
+from tiltsim.scenario.messages import choose, did_you_mean, one_line_message, show
 from tiltsim.scenario.override_keys import refuse_replaced, split_key
 from tiltsim.scenario.own_parts import (
+    controller_table,
     drop_what_own_controllers_ignore,
+    given_parts,
     kept_functions,
     replace_tables,
     sample_functions,
 )
 from tiltsim.scenario.scenario import Scenario, Variant
 from tiltsim.scenario.scenario_tables import DESCRIPTIVE
+from tiltsim.scenario.schema import share_keys
+from tiltsim.scenario.table import Table
 from tiltsim.scenario.trust import is_trusted, with_trust
 from tiltsim.system.text import short_repr, shortened, valid_unicode
-from tiltsim_controllers.mathematics.scalar import is_scalar
 
 KIND_KEYS: Final = {"type": None, "law": DEFAULT_LAW}
 """Keys that decide which other keys a table may have, with their defaults."""
@@ -63,9 +66,9 @@ def load_scenario(
             a dict. A family without ``#variant`` needs them or a controller, and is its base then.
         controller: A controller of your own, which replaces the scenario's before anything is
             checked; the overrides then have no other law or function. It is a function from
-            `tiltsim.Observation` to `tiltsim.Command`, or one marked `tiltsim.scalar`, an object
-            with ``__call__`` and, if it has a memory, ``reset(scenario)``, a class of such objects,
-            or ``"FILE.py:NAME"``.
+            `tiltsim.Observation` to `tiltsim.Command`, an object with ``__call__`` and maybe
+            ``reset(scenario)``, a class of these, or ``"FILE.py:NAME"``; or a function marked
+            `tiltsim.law`, or an object or subclass of `tiltsim.LawController`.
         reference: A motion of your own in place of the scenario's ``[reference]``, of which roll,
             pitch, yaw and acceleration_feedforward stay: a function of time (s) that returns a
             position ``(x, y, z)`` (m), sampled every 0.01 s over the duration of the flight, also
@@ -84,14 +87,12 @@ def load_scenario(
     """
     overrides = {} if overrides is None else overrides
     check_keys("overrides", overrides)
-    parts = {"controller": controller, "reference": reference, "gait": gait}
-    given = {name: part for name, part in parts.items() if part is not None}
+    given = given_parts(controller=controller, reference=reference, gait=gait)
     document, address = _document(source, with_base=bool(overrides) or controller is not None)
     check_no_other(overrides, given)
     title_before = own_title(document)
     if controller is not None:
-        law = "scalar" if is_scalar(controller) else "python"
-        document["controller"] = {"law": law, "function": controller_name(controller)}
+        document["controller"] = controller_table(controller)
     replace_tables(document, given)
     if given and document.get("title", "") in (title_before, _title_in_file(source, address)):
         document["title"] = own_title(document)
@@ -310,31 +311,25 @@ def _select_variant(file: Path, document: dict[str, Any], name: str) -> dict[str
     return merged
 
 
-def merge(
-    base: Mapping[str, Any], changes: Mapping[str, Any], path: tuple[str | int, ...] = ()
-) -> dict[str, Any]:
-    """A document with changes, table by table; a table with other keys replaces the old one.
-
-    ``path`` is where the documents lie in a scenario.
-    """
+def merge(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """A document with changes, table by table; a table with other keys replaces the old one."""
     merged = dict(base)
     for key, value in changes.items():
         old = merged.get(key)
         if isinstance(old, dict) and isinstance(value, dict):
-            place = (*path, key)
             other_kind = any(
-                tag in value and _has_other_keys(place, old.get(tag, default), value[tag])
+                tag in value and _has_other_keys(old.get(tag, default), value[tag])
                 for tag, default in KIND_KEYS.items()
             )
-            merged[key] = value if other_kind else merge(old, value, place)
+            merged[key] = value if other_kind else merge(old, value)
         else:
             merged[key] = value
     return merged
 
 
-def _has_other_keys(path: Sequence[str | int], old: object, new: object) -> bool:
+def _has_other_keys(old: object, new: object) -> bool:
     """Whether a table has other keys for another of its kinds, as a walk has for a trot."""
-    return old != new and not has_same_keys(Scenario, path, old, new)
+    return old != new and not share_keys(Table, old, new)
 
 
 def _kinds_first(overrides: Mapping[str, Any]) -> list[tuple[str, Any]]:
@@ -359,7 +354,7 @@ def _override(address: str, document: dict[str, Any], key: str, value: object) -
         is_list = isinstance(target, list)
         reason = f"is a list; write {name}[{last}]" if is_list else "is not a table"
         raise InputError(f"{address}: {key} = {show(value)}: {name} {reason}")
-    empties = last in KIND_KEYS and _has_other_keys(path, target.get(last, KIND_KEYS[last]), value)
+    empties = last in KIND_KEYS and _has_other_keys(target.get(last, KIND_KEYS[last]), value)
     if empties:
         target.clear()
     target[last] = value

@@ -2,66 +2,43 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import cache, lru_cache
+from functools import lru_cache
 from math import inf
-from typing import Any, Literal, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
-from pydantic import Field
 
 from tiltsim.models.rotor_table import Multirotor
+from tiltsim.scenario.law_controller import Airframe, LawController
 from tiltsim.scenario.messages import InvalidValueError
-from tiltsim.scenario.scalar_controller import Airframe, ScalarController
-from tiltsim.scenario.table import NonNegative, Positive
-from tiltsim_controllers.gaits.parameters import TABLE
+from tiltsim_controllers.gaits.parameters import CUBIC
 from tiltsim_controllers.gaits.plans import Gait
 from tiltsim_controllers.laws.decouplers import exact_decoupler
-from tiltsim_controllers.laws.lqr import BODY, linear_hover, lqr_law_of, regulator
+from tiltsim_controllers.laws.lqr import Lqr, Parameters, lqr
 from tiltsim_controllers.laws.periodic_lqr import (
     LONGEST_PERIOD,
     SUBSTEPS,
     PeriodicVehicle,
     Regulator,
     node_count,
-    periodic_lqr_law_of,
+    regulator_about_hover,
     regulator_about_orbit,
 )
-from tiltsim_controllers.mathematics.records import make_record_type, vector_of
-from tiltsim_controllers.mathematics.rotation import rotation_from_euler
 from tiltsim_controllers.mathematics.scalar import Floats, Values
 from tiltsim_controllers.vehicle.effectiveness import force_and_torque, table_per_newton
 
 
-class PeriodicParameters(NamedTuple):
-    """Of the law about an orbit."""
-
-    period: float  # s
-    nodes: float  # of its table, in a period
-
-
 class Weights(NamedTuple):
-    """What is acceptable."""
+    """Acceptable deviations."""
 
     errors: Values  # of each state
-    thrust_change: float  # as a part of the thrust in hover
+    thrust_change: float  # relative to the thrust in hover
 
 
-class LqrController(ScalarController):
+class LqrController(Lqr, LawController):
     """The linear-quadratic regulator about hover, or about the orbit of a moving gait."""
 
-    law: Literal["lqr"] = Field(
-        description="linear-quadratic regulator about hover with fixed tilts, or with gains that "
-        "repeat with a moving gait about its orbit; weights are one over the square of what is "
-        "acceptable (Bryson's rule)"
-    )
-    position_error: Positive = Field(0.5, description="acceptable [m]")
-    velocity_error: Positive = Field(1.0, description="acceptable [m/s]")
-    attitude_error: Positive = Field(0.3, description="acceptable [rad]")
-    rate_error: Positive = Field(3.0, description="acceptable [rad/s]")
-    thrust_change: NonNegative = Field(
-        0.3, gt=0.0, description="acceptable, of every rotor, as a part of its thrust in hover [-]"
-    )
+    control: ClassVar = staticmethod(lqr)
 
     def check_scenario(self, scenario: Any) -> None:
         if scenario.gait.type == "fixed":
@@ -69,7 +46,7 @@ class LqrController(ScalarController):
         gait = scenario.gait.plan(scenario.vehicle.resolve())
         if gait.is_constant:
             return
-        if gait.parameters.type == TABLE and not gait.parameters.repeats:
+        if gait.parameters.type == CUBIC and not gait.parameters.repeats:
             reason = "the lqr law needs a gait that repeats"
             raise InvalidValueError("gait.repeat", scenario.gait.repeat, reason)
         if not gait.is_continuous:
@@ -79,38 +56,12 @@ class LqrController(ScalarController):
             reason = f"the lqr law has gains for periods of at most {LONGEST_PERIOD:g} s"
             raise InvalidValueError("gait.period", gait.period, reason)
 
-    def scalar_law(self, airframe: Airframe) -> Callable[..., Any]:
-        if airframe.gait.is_constant:
-            return lqr_law_of(airframe.rotors)
-        return periodic_lqr_law_of(airframe.rotors)
-
-    def hover(self, airframe: Airframe) -> tuple[Floats, Floats, tuple[float, float]]:
-        """The linear system A, B about hover, thrusts (N), and roll and pitch (rad) there.
-
-        A and B are stacked side by side.
-        """
-        vehicle = airframe.vehicle
-        table = table_per_newton(vehicle.table, vehicle.thrust_coefficients)
-        force, torque = force_and_torque(table, airframe.initial_tilts)
-        thrusts, lean = _hover(vehicle, force, torque)
-        up = vehicle.gravity * np.reshape(rotation_from_euler(*lean, 0.0), (3, 3))[2]
-        inertia = np.reshape(vehicle.inertia, (3, 3))
-        a, b = linear_hover(force, torque, vehicle.mass, inertia, up, self.rotor_bandwidth)
-        return np.hstack([a, b]), thrusts, lean
-
-    def solution(self, airframe: Airframe) -> tuple[Floats, Floats]:
-        """Gains K about hover and the solution of the Riccati equation."""
-        system, thrusts, _ = self.hover(airframe)
-        size = BODY + airframe.rotors
-        acceptable, share = self._weights(airframe.rotors)
-        changes = share * np.abs(thrusts)
-        return regulator(system[:, :size], system[:, size:], np.array(acceptable), changes)
-
-    def periodic_solution(self, airframe: Airframe) -> Regulator:
-        """The orbit of a moving gait, the gains about it and the solution of their equation."""
+    def solution(self, airframe: Airframe) -> Regulator:
+        """The orbit of the gait, or hover, and the regulator about it."""
         return _regulator_of(
             airframe.vehicle,
             airframe.gait,
+            airframe.initial_tilts,
             airframe.gyroscopic,
             self.rotor_bandwidth,
             self._weights(airframe.rotors),
@@ -120,20 +71,12 @@ class LqrController(ScalarController):
         errors = (self.position_error, self.velocity_error, self.attitude_error, self.rate_error)
         return Weights((*np.repeat(errors, 3).tolist(), *(inf,) * rotors), self.thrust_change)
 
-    def law_parameters(self, airframe: Airframe) -> tuple[Any, ...]:
-        if not airframe.gait.is_constant:
-            nodes = float(len(self.periodic_solution(airframe).states))
-            return PeriodicParameters(airframe.gait.parameters.period, nodes)
-        _, thrusts, lean = self.hover(airframe)
-        gains, _ = self.solution(airframe)
-        record = _lqr_record(airframe.rotors)
-        made: tuple[Any, ...] = record(
-            *lean, tuple(thrusts.tolist()), tuple(gains.ravel().tolist())
-        )
-        return made
+    def law_parameters(self, airframe: Airframe) -> Parameters:
+        gait = airframe.gait
+        return Parameters() if gait.is_constant else Parameters(gait.parameters.period)
 
     def law_table(self, airframe: Airframe) -> Values:
-        return () if airframe.gait.is_constant else self.periodic_solution(airframe).table
+        return self.solution(airframe).table
 
 
 def _hover(
@@ -145,7 +88,8 @@ def _hover(
     axis = force @ lift
     weight = vehicle.mass * vehicle.gravity
     if np.linalg.matrix_rank(torque) < 3 or axis[2] < 1e-6 * np.abs(force).max():
-        raise InvalidValueError("controller.law", "lqr", "the vehicle cannot hover so")
+        reason = "the vehicle cannot hover with these tilts"
+        raise InvalidValueError("controller.law", "lqr", reason)
     x, y, z = axis.tolist()
     lean = exact_decoupler(0.0, 0.0, 0.0, 0.0, vehicle.gravity, (x, y, z))
     return lift * weight / np.linalg.norm(axis), lean
@@ -153,14 +97,15 @@ def _hover(
 
 @lru_cache(maxsize=64)
 def _regulator_of(
-    vehicle: Multirotor, gait: Gait, gyroscopic: float, lag: float, weights: Weights
+    vehicle: Multirotor, gait: Gait, tilts: Values, gyroscopic: float, lag: float, weights: Weights
 ) -> Regulator:
-    """The regulator about the orbit of a moving gait, kept: a flight asks for it several times."""
-    period = gait.parameters.period
-    places = node_count(period) * 2 * SUBSTEPS
+    """The regulator about the orbit of a gait, kept: a flight asks for it several times."""
+    moves = not gait.is_constant
+    period = gait.parameters.period if moves else 1.0
+    places = node_count(period) * 2 * SUBSTEPS if moves else 1
     table = table_per_newton(vehicle.table, vehicle.thrust_coefficients)
-    tilts = gait.angles(period * np.arange(places) / places)
-    force, torque = force_and_torque(table, tilts)
+    angles = gait.angles(period * np.arange(places) / places) if moves else np.array([tilts])
+    force, torque = force_and_torque(table, angles)
     nodes = range(0, places, 2 * SUBSTEPS)
     thrusts, lean = zip(*(_hover(vehicle, force[node], torque[node]) for node in nodes))
     known = PeriodicVehicle(
@@ -173,8 +118,9 @@ def _regulator_of(
         force,
         torque,
     )
+    design = regulator_about_orbit if moves else regulator_about_hover
     try:
-        return regulator_about_orbit(
+        return design(
             known,
             np.array(lean),
             np.array(thrusts),
@@ -184,15 +130,3 @@ def _regulator_of(
     except (ValueError, np.linalg.LinAlgError) as error:
         reason = "found no orbit of the gait about which it can regulate"
         raise InvalidValueError("controller.law", "lqr", reason) from error
-
-
-@cache
-def _lqr_record(rotors: int) -> Any:
-    """The type of the law's parameters."""
-    return make_record_type(
-        "LqrParameters",
-        roll=float,
-        pitch=float,
-        thrusts=vector_of(rotors),
-        gains=vector_of(rotors * (BODY + rotors)),
-    )

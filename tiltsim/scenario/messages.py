@@ -1,4 +1,4 @@
-"""Wording of errors: each is one line with the key, the value and what is allowed."""
+"""Wording of errors: each is one line with the key, the value and the allowed values."""
 
 from __future__ import annotations
 
@@ -8,8 +8,9 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from difflib import SequenceMatcher, get_close_matches
 from math import pi
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, get_args, get_origin
+from typing import TYPE_CHECKING, Any, Final
 
+from tiltsim.scenario.schema import TAG_KEYS, Node, schema_of
 from tiltsim.system.text import LONGEST_WORD, short_repr, shortened
 
 if TYPE_CHECKING:
@@ -21,7 +22,7 @@ class InvalidValueError(ValueError):
 
     Args:
         key, value: The dotted key and its value.
-        allowed: What is wrong with the value, or allowed instead.
+        allowed: The mistake, or the allowed values.
     """
 
     def __init__(self, key: str, value: object, allowed: str) -> None:
@@ -29,13 +30,10 @@ class InvalidValueError(ValueError):
 
 
 ALIKE: Final = 0.85
-"""Names whose words are this like those of another are close to it, whatever else they have."""
+"""Similarity from which the words of two names make them close, whatever else they have."""
 
 MAX_OTHERS: Final = 5
-"""So many keys with further mistakes are named."""
-
-UNIT: Final = re.compile(r"(.*) \[([^]]+)\]", re.DOTALL)
-"""A description that ends with a unit."""
+"""Most keys with further mistakes that are named."""
 
 _PLAIN_TYPES: Final = {
     "float_type": "must be a number",
@@ -95,13 +93,13 @@ def one_line_message(
     """The first mistake in one line, and the keys of others.
 
     Args:
-        error: What pydantic found.
+        error: The mistakes that pydantic found.
         document: The document that was validated.
         schema: The table that it was validated against.
         emptied: Dotted keys, such as ``gait.type``, whose change dropped other keys of the table.
     """
     details = error.errors(include_url=False)
-    # A misspelt key is often a missing key, too: the unknown one is more helpful.
+    # A misspelt key is often a missing key as well: the unknown one is more helpful.
     details.sort(key=lambda detail: detail["type"] != "extra_forbidden")
     # Missing entries of one list, and the options of one union, are one mistake each.
     missing = {_mistake(detail, document): detail["type"] == "missing" for detail in details}
@@ -120,7 +118,7 @@ def one_line_message(
 def missing_keys(
     error: ValidationError, document: Mapping[str, Any], schema: type[BaseModel]
 ) -> Iterator[str]:
-    """The dotted keys that a document lacks; the arguments are those of `one_line_message`."""
+    """The dotted keys that a document lacks; the arguments are described at `one_line_message`."""
     for detail in error.errors(include_url=False):
         if detail["type"] == "missing":
             yield _mistake(detail, document)
@@ -183,7 +181,7 @@ def _describe(
             for other in details
             if other["type"] == "missing" and [*other["loc"][:-1]] == table
         ]
-        known = _known_keys(schema, detail["loc"], key, missing)
+        known = _known_keys(schema_of(schema), detail["loc"], key, missing)
         return f"{key} = {show(value)}: unknown key; {known}"
     if kind == "missing":
         return f"{key}: missing, and required"
@@ -203,32 +201,20 @@ def _describe(
         return f"{key} = {show(value)}: must have {length} entries"
     if kind == "tuple_type" and isinstance(value, dict):
         return f"{key}: must be a list of tables; write [[{key}]]"
-    if kind in {"less_than_equal", "greater_than_equal"} and abs(_bound(context)) == pi:
+    node = schema_of(schema).at(detail["loc"])
+    if pi in {context.get("le"), -context.get("ge", 0.0)}:
         return f"{key} = {show(value)}: angles are in rad, from -3.14159 to 3.14159"
     if kind == "tuple_type":
-        return f"{key} = {show(value)}: must be a list{_entries(schema, detail['loc'])}"
+        return f"{key} = {show(value)}: must be a list{_entries(node)}"
     if kind == "string_pattern_mismatch" and detail["loc"][-1] == "[key]":
         return f"{key}: the name must match {context['pattern']}"
-    unit = _unit(schema, detail["loc"])
-    if kind == "float_type" and unit and isinstance(value, str) and re.match(r"[-+.]*\d", value):
+    unit = node.meaning_and_unit[1]
+    is_quantity = isinstance(value, str) and re.match(r"[-+.]*\d", value)
+    if kind == "float_type" and is_quantity and not re.match("$|-$|the |.*,", unit):
         return f"{key} = {show(value)}: must be a number in {unit}, without the unit"
     if kind in _PLAIN_TYPES:
         return f"{key} = {show(value)}: {_PLAIN_TYPES[kind]}"
     return f"{key} = {show(value)}: {detail['msg'].replace('Input should', 'must')}"
-
-
-def _unit(schema: Any, location: tuple[Any, ...]) -> str:
-    """The unit of a number, from the description of its key; empty without one."""
-    *path, name = "", *(part for part in location if not isinstance(part, int))
-    for part in path:
-        schema = _member(schema, part)
-    field = getattr(schema, "model_fields", {}).get(name)
-    match = UNIT.fullmatch((field and field.description) or "")
-    return match[2] if match and match[2] != "-" and "," not in match[2] else ""
-
-
-def _bound(context: Mapping[str, Any]) -> float:
-    return float(context.get("le", context.get("ge", 0.0)))
 
 
 def _locate(
@@ -249,7 +235,7 @@ def _locate(
         in_list = isinstance(value, list | tuple) and isinstance(part, int) and part < len(value)
         if in_table or in_list:
             value = value[part]
-            tag = value.get(_tag_key(value)) if isinstance(value, Mapping) else None
+            tag = _tag_of(value) if isinstance(value, Mapping) else None
         elif not (keep_last and position == len(location) - 1):
             continue
         keys.append(f"[{part}]" if isinstance(part, int) else f".{part}")
@@ -257,54 +243,35 @@ def _locate(
     return shortened(key) or "scenario", value
 
 
-def tags_of(schema: Any, location: tuple[Any, ...]) -> tuple[str, list[str]]:
+def _tag_of(table: Mapping[str, Any]) -> object:
+    """The kind that a table of a document has."""
+    return next((table[key] for key in TAG_KEYS if key in table), None)
+
+
+def tags_of(schema: type[BaseModel], location: tuple[Any, ...]) -> tuple[str, list[str]]:
     """The key that discriminates the tables of a union under a location, and its values."""
-    for part in location:
-        schema = _member(schema, part)
-    tables = [option.model_fields for option in _options(schema) if hasattr(option, "model_fields")]
-    keys = {_tag_key(fields) for fields in tables} - {""}
-    tag = keys.pop()
-    values = [value for fields in tables for value in get_args(fields[tag].annotation)]
-    return tag, list(dict.fromkeys(values))
+    tables = schema_of(schema).at(location).tables
+    tag = next(table.tag for table in tables if table.tag)
+    return tag, list(dict.fromkeys(kind for table in tables for kind in table.kinds))
 
 
-def _tag_key(fields: Mapping[str, Any]) -> str:
-    """The key that discriminates a table from others; empty if there is none."""
-    return next((key for key in ("type", "law", "model") if key in fields), "")
-
-
-def has_same_keys(schema: Any, path: Iterable[object], one: object, other: object) -> bool:
-    """Whether two kinds of a table have one declaration of their keys.
-
-    Args:
-        schema: The type of the whole document.
-        path: Where the table lies in it.
-        one, other: The kinds, such as ``trot_instant``.
-    """
-    if not (isinstance(one, str) and isinstance(other, str)):
-        return False  # no kind, such as a table that was given instead
-    for part in path:
-        schema = _member(schema, part)
-    table = _member(schema, one)
-    return table is not schema and table is _member(schema, other)
-
-
-def _known_keys(schema: Any, location: tuple[Any, ...], key: str, missing: Sequence[str]) -> str:
+def _known_keys(root: Node, location: tuple[Any, ...], key: str, missing: Sequence[str]) -> str:
     """The keys allowed instead of an unknown one, after a hint where it may belong.
 
     ``missing`` are the required keys that its table lacks.
     """
-    union, table, name = schema, schema, key.rpartition(".")[2]
+    name = key.rpartition(".")[2]
+    union, table = root, root
     for part in location[:-1]:
-        union, table = table, _member(table, part)
-    tables = [option for option in _options(table) if hasattr(option, "model_fields")]
-    if len(tables) == 1 and not hasattr(table, "model_fields"):  # it may be None
-        union, (table,) = table, tables
-    names = sorted(table.model_fields) if hasattr(table, "model_fields") else []
-    kinds = dict.fromkeys(kind for option in _options(union) for kind in _kinds_with(option, name))
-    elsewhere = [found for found in _dotted_keys(schema) if found.rpartition(".")[2] == name]
+        union, table = table, table.member(part)
+    if len(table.tables) == 1:
+        (table,) = table.tables
+    names = sorted(table.properties)
+    others = [one for one in union.tables if one is not union and name in one.properties]
+    kinds = dict.fromkeys(kind for option in others for kind in option.kinds)
+    elsewhere = [found for found in root.dotted_keys() if found.rpartition(".")[2] == name]
     if kinds and names:
-        hint = f"only for {_tag_key(table.model_fields)} {', '.join(kinds)}; "
+        hint = f"only for {table.tag} {', '.join(kinds)}; "
     elif elsewhere:
         hint = f"did you mean {' or '.join(elsewhere[:3])}? "
     else:
@@ -314,59 +281,14 @@ def _known_keys(schema: Any, location: tuple[Any, ...], key: str, missing: Seque
     return f"{hint}known: {', '.join(names)}"
 
 
-def _kinds_with(table: Any, name: str) -> tuple[str, ...]:
-    """The tags of a table of a union, if it has a key."""
-    fields = getattr(table, "model_fields", {})
-    tag = _tag_key(fields)
-    return get_args(fields[tag].annotation) if tag and name in fields else ()
-
-
-def _dotted_keys(schema: Any) -> list[str]:
-    """Every key in a table and the tables in it, dotted, once."""
-    keys = []
-    for table in (schema, *_options(schema)):
-        for name, field in getattr(table, "model_fields", {}).items():
-            keys += [name, *(f"{name}.{key}" for key in _dotted_keys(field.annotation))]
-    return list(dict.fromkeys(keys))
-
-
-def _entries(schema: Any, location: tuple[Any, ...]) -> str:
-    """What a list must contain, such as `` of 3 numbers``; empty if that is not plain."""
-    for part in location:
-        schema = _member(schema, part)
-    kinds = {float: "numbers", int: "whole numbers", tuple: "lists", Literal: "names"}
-    for option in (schema, *map(_bare, get_args(schema))):
-        entries = [_bare(entry) for entry in get_args(option)]
-        kind = (
-            kinds.get(get_origin(entries[0]) or entries[0]) if get_origin(option) is tuple else None
-        )
+def _entries(node: Node) -> str:
+    """The entries of a list, such as `` of 3 numbers``; empty if they are not plain."""
+    kinds = {"number": "numbers", "integer": "whole numbers", "array": "lists"}
+    for option in node.options:
+        entries = option.entries
+        value = entries[0].value if entries else {}
+        kind = "names" if "enum" in value else kinds.get(value.get("type", ""))
         if kind:
-            return f" of {kind}" if Ellipsis in entries else f" of {len(entries)} {kind}"
+            count = f"{len(entries)} " if "prefixItems" in option.value else ""
+            return f" of {count}{kind}"
     return ""
-
-
-def _bare(kind: Any) -> Any:
-    """A type without its annotations."""
-    return get_args(kind)[0] if get_origin(kind) is Annotated else kind
-
-
-def _member(schema: Any, part: object) -> Any:
-    """The type under one part of a location in a type; unions are searched by their tag."""
-    if part in getattr(schema, "model_fields", {}):
-        return schema.model_fields[part].annotation
-    if isinstance(part, int):
-        return get_args(schema)[0]
-    for option in _options(schema):
-        fields = getattr(option, "model_fields", {})
-        tag = _tag_key(fields)
-        tags = get_args(fields[tag].annotation) if tag else ("table",)
-        if fields and part in tags:
-            return option
-        if not tag and part in fields:
-            return fields[part].annotation
-    return schema
-
-
-def _options(schema: Any) -> list[Any]:
-    """The members of a union, without annotations."""
-    return [option for member in get_args(schema) for option in (member, *_options(member))]

@@ -8,7 +8,7 @@ from tiltsim.scenario.multirotor_controllers import AttitudeForceController
 from tiltsim.scenario.scenario_tables import ScenarioTables
 from tiltsim.scenario.tiltrotor_controllers import FullPoseController
 from tiltsim_controllers.gaits.plans import Gait, fixed
-from tiltsim_controllers.laws.multirotor_full_pose import pose_rank
+from tiltsim_controllers.laws.full_pose import pose_rank
 
 
 def _check_failed_rotor(scenario: ScenarioTables, failed: int | None) -> None:

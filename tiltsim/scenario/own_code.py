@@ -14,7 +14,6 @@ from tiltsim.scenario.scenario import Scenario
 from tiltsim.scenario.trust import require_trust
 from tiltsim.system.files import digest, is_file
 from tiltsim.system.text import error_text
-from tiltsim_controllers.mathematics.scalar import is_scalar
 
 
 def describe(error: BaseException, own_frames: int = 1) -> str:
@@ -38,6 +37,21 @@ def _place(error: BaseException, own_frames: int) -> str:
     if not is_file(file):
         return f" (line {last.lineno} of {last.name})"
     return f" ({file.name}, line {last.lineno})"
+
+
+_LIBRARIES: Final = ("numpy", "jax", "tiltsim", "tiltsim_controllers")
+
+
+def users_line(error: BaseException) -> str:
+    """File and line of the user's own code in the traceback of an error, as ``FILE:LINE: ``.
+
+    Empty where no such code was called.
+    """
+    loaded = (sys.modules[library] for library in _LIBRARIES if library in sys.modules)
+    libraries = tuple(str(Path(str(module.__file__)).parent) for module in loaded)
+    frames = traceback.extract_tb(error.__traceback__)
+    own = [frame for frame in frames if not frame.filename.startswith(libraries)]
+    return f"{own[-1].filename}:{own[-1].lineno}: " if own else ""
 
 
 def load_function(scenario: Scenario) -> Any:
@@ -86,27 +100,22 @@ def _run_file(start: str, file: Path) -> Any:
     return module
 
 
-def load_scalar_function(scenario: Scenario) -> Any:
-    """The scalar function of a law ``scalar``: given in Python, or in a file.
+def load_law(scenario: Scenario) -> Any:
+    """The function, or class of functions, of the law ``numpy``: given in Python, or in a file.
 
-    Raises `InputError` as `load_function`, or if it is not marked as scalar code.
+    Raises `InputError` as `load_function`.
     """
     table, function = scenario.controller, scenario.own_controller
     assert isinstance(table, OwnFunctionController)
-    if function is None:
-        require_trust(scenario)  # though it may be loaded already
-        content = table.file.read_bytes() if table.file and is_file(table.file) else b""
-        known = str(table.file), table.attribute, digest(content)
-        if known not in _loaded:
-            _loaded[known] = load_function(scenario)
-        function = _loaded[known]
-    if not is_scalar(function):
-        raise InputError(
-            f'{scenario.address or "scenario"}: controller.function = "{table.function}": is not '
-            'marked with @tiltsim.scalar; controller.law = "python" flies any function'
-        )
-    return function
+    if function is not None and not isinstance(function, str):
+        return function
+    require_trust(scenario)  # though it may be loaded already
+    content = table.file.read_bytes() if table.file and is_file(table.file) else b""
+    known = str(table.file), table.attribute, digest(content)
+    if known not in _loaded:
+        _loaded[known] = load_function(scenario)
+    return _loaded[known]
 
 
 _loaded: Final[dict[tuple[str, str, str], Any]] = {}
-"""Scalar functions by file, name and digest of the file, since each is compiled once."""
+"""Laws by file, name and digest of the file, since each is compiled once."""

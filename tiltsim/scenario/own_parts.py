@@ -11,8 +11,10 @@ import numpy as np
 
 from tiltsim.errors import InputError
 from tiltsim.models.vehicle_parts import MAX_ROTORS
-from tiltsim.scenario.arguments import given_keys
+from tiltsim.scenario.arguments import controller_name, given_keys
+from tiltsim.scenario.controller import NumpyController
 from tiltsim.scenario.gait import TableGait
+from tiltsim.scenario.law_controller import LawController, is_law
 from tiltsim.scenario.limits import MAX_ROWS
 from tiltsim.scenario.messages import tags_of
 from tiltsim.scenario.scenario import Scenario
@@ -48,13 +50,37 @@ def replace_tables(document: dict[str, Any], given: Mapping[str, object]) -> Non
         document[name] = _table(name, given[name], _is_multirotor(document)) | stays
 
 
+def given_parts(**parts: object) -> dict[str, object]:
+    """The arguments of `tiltsim.load_scenario` that are given; a law with its keys as its class."""
+    return {
+        name: type(part) if isinstance(part, LawController) else part
+        for name, part in parts.items()
+        if part is not None
+    }
+
+
+def controller_table(controller: object) -> dict[str, Any]:
+    """The table of a scenario for a controller given in Python; see `tiltsim.load_scenario`."""
+    if not is_law(controller):
+        return {"law": "python", "function": controller_name(controller)}
+    keys: dict[str, Any] = {}
+    if isinstance(controller, LawController):
+        keys = controller.model_dump(mode="json", exclude_unset=True, exclude={"law"})
+        controller = type(controller)
+    table: dict[str, Any] = {"law": "numpy", "function": controller_name(controller)}
+    if isinstance(controller, type) and issubclass(controller, LawController):
+        table |= {"states": controller.states, "discrete_states": controller.discrete_states}
+    table |= {name: keys.pop(name) for name in [*keys] if name in NumpyController.model_fields}
+    return table | {"parameters": keys}
+
+
 def drop_what_own_controllers_ignore(
     document: Mapping[str, Any], overrides: Mapping[str, Any]
 ) -> None:
-    """Leave it to a controller of one's own which derivatives it uses, unless overrides say it."""
+    """Leave it to a user's controller which derivatives it uses, unless overrides say it."""
     law, reference = document["controller"]["law"], document.get("reference")
     is_given = "reference.acceleration_feedforward" in overrides
-    if law in ("python", "scalar") and isinstance(reference, dict) and not is_given:
+    if law in ("python", "numpy") and isinstance(reference, dict) and not is_given:
         reference.pop("acceleration_feedforward", None)
 
 

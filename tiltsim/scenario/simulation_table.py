@@ -68,6 +68,11 @@ class SimulationTable(Table):
     precision: Literal["float64", "float32"] = Field(
         "float64", description="numbers of the jax engine; the others always have float64"
     )
+    batch_functions: Literal["exact", "quick"] = Field(
+        "exact",
+        description="sines and their inverses where native flights on equations fly side by side: "
+        "with the bits of a flight alone, or faster, with flights that differ by rounding",
+    )
     plant: Literal["mujoco", "thesis", "rigid_body"] = Field(
         "mujoco",
         description="what is simulated: the MuJoCo model; the thesis's equations of motion; or the "

@@ -12,20 +12,19 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validat
 from tiltsim.errors import InputError
 from tiltsim.scenario.messages import InvalidValueError
 from tiltsim.system.text import short_repr, valid_unicode
+from tiltsim_controllers.laws.keys import Coordinate as Coordinate
+from tiltsim_controllers.laws.keys import Gains2 as Gains2
+from tiltsim_controllers.laws.keys import NonNegative as NonNegative
+from tiltsim_controllers.laws.keys import Positive as Positive
+from tiltsim_controllers.laws.keys import Vector3 as Vector3
 
-# The outer bounds keep arithmetic far from overflow, and far beyond any real vehicle.
-Positive = Annotated[float, Field(gt=0.0, le=1e9)]
 NotTiny = Annotated[float, Field(ge=1e-12, le=1e9)]  # for divisors
-NonNegative = Annotated[float, Field(ge=0.0, le=1e9)]
 Period = Annotated[float, Field(ge=1e-3, le=1e9)]
 Factor = Annotated[float, Field(ge=-1e3, le=1e3)]
-Coordinate = Annotated[float, Field(ge=-1e6, le=1e6)]
 Angle = Annotated[float, Field(ge=-pi, le=pi)]
-Vector3 = Annotated[tuple[Coordinate, Coordinate, Coordinate], Field(strict=False)]
 Angles2 = Annotated[tuple[Angle, Angle], Field(strict=False)]
 Angles3 = Annotated[tuple[Angle, Angle, Angle], Field(strict=False)]
 AnglesEach = Annotated[tuple[Angle, ...], Field(strict=False, min_length=1, max_length=16)]
-Gains2 = Annotated[tuple[float, float], Field(strict=False)]
 Gains4 = Annotated[tuple[float, float, float, float], Field(strict=False)]
 PositiveEach = Annotated[tuple[Positive, ...], Field(strict=False, min_length=2, max_length=16)]
 Limit = Annotated[float, Field(allow_inf_nan=True)]

@@ -7,9 +7,10 @@ control law is one function of time and state; its steps follow the order of ch.
 
 from __future__ import annotations
 
-from math import nan
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
+from tiltsim_controllers.code.arrays import xp
+from tiltsim_controllers.code.traceable import traceable
 from tiltsim_controllers.gaits.parameters import NO_KNOTS, GaitParameters
 from tiltsim_controllers.laws.decouplers import (
     CONVENTIONAL,
@@ -19,26 +20,23 @@ from tiltsim_controllers.laws.decouplers import (
     exact_decoupler,
     modified_decoupler,
 )
-from tiltsim_controllers.mathematics.rotation import world_up_in_body, wrap_angle
-from tiltsim_controllers.mathematics.scalar import Octet, Quad, Triple, Values, Vector, scalar
+from tiltsim_controllers.mathematics.attitude import rotation_matrix, wrapped
+from tiltsim_controllers.mathematics.linear import cross, kernel, solved
+from tiltsim_controllers.mathematics.scalar import Triple, Values, Vector, scalar
 from tiltsim_controllers.references.trajectories import ReferenceParameters, position_reference
-from tiltsim_controllers.vehicle.decoupling_matrix import (
-    body_force,
-    body_torque,
-    sines_and_cosines,
-    solve_by_pairs,
-    torque_entries,
-    unscaled_torque_free_force,
-    vertical_force_entries,
-)
-from tiltsim_controllers.vehicle.parameters import Vehicle, drag_ratio
-from tiltsim_controllers.vehicle.states import VX, VY, X, Y
+from tiltsim_controllers.vehicle.body import inertia_matrix, inverse_inertia_matrix
+from tiltsim_controllers.vehicle.parameters import Vehicle
+from tiltsim_controllers.vehicle.rotors import airframe, rotor_accelerations, wrench_map
+from tiltsim_controllers.vehicle.states import RotorcraftState, state_of
 
 PUBLISHED_DECOUPLING: Final = 0.0
 EXACT_DECOUPLING: Final = 1.0
 
 DECOUPLINGS: Final = {"published": PUBLISHED_DECOUPLING, "exact": EXACT_DECOUPLING}
 """Forms of the decoupling matrix by their name in a scenario."""
+
+ROTORS: Final = (0, 1, 2, 3)
+"""Every rotor of the tiltrotor has its own tilt."""
 
 
 class Gains(NamedTuple):
@@ -63,6 +61,16 @@ class Gains(NamedTuple):
     position_1: float  # [K_X1 = K_Y1] 1/s
     position_2: float  # [K_X2 = K_Y2] 1/s^2
 
+    @property
+    def attitude(self) -> Any:
+        """Gains of roll, pitch and yaw, one row for each order, shape (3, 3)."""
+        return xp.array(self[:9]).reshape(3, 3).T
+
+    @property
+    def altitude(self) -> tuple[float, float, float]:
+        """Gains of the altitude, by order."""
+        return self.altitude_1, self.altitude_2, self.altitude_3
+
 
 class Parameters(NamedTuple):
     """Parameters of the controller."""
@@ -75,61 +83,39 @@ class Parameters(NamedTuple):
     decoupling: float
 
 
-@scalar
-def attitude_reference(
-    time: float,
-    state: Values,
-    trig: Octet,
-    torque: Octet,
-    parameters: Parameters,
-    knots: Vector = NO_KNOTS,
-) -> tuple[float, float, float, float, float, float]:
-    """Attitude and altitude to track, with the altitude's derivatives (ch. 4, Eqs. 28-30).
+def torque_free_force(force: Any, torque: Any) -> Any:
+    """The direction ``n`` in which four rotors push without torque, body axes, shape (3,).
 
     Args:
-        time: s
-        state: `tiltsim_controllers.vehicle.states.TILTROTOR_FIELDS`
-        trig, torque: `sines_and_cosines` and `torque_entries` of the tilt angles
-        parameters, knots: of the controller, and of gait and reference
-
-    Returns:
-        ``(roll, pitch, yaw, z, vz, az)``, rad, m and s.
+        force, torque: ``F(alpha)`` and ``tau(alpha)``, shape (3, 4) each (ch. 3, Eqs. 3, 5).
     """
-    reference = parameters.reference
-    x_ref, y_ref, z_ref, vx_ref, vy_ref, vz_ref, ax_ref, ay_ref, az_ref = position_reference(
-        time, reference, knots
+    return force @ kernel(torque)
+
+
+def _attitude_reference(now: RotorcraftState, target: Any, wrench: Any, parameters: Any) -> Any:
+    """Roll, pitch and yaw to track (rad), shape (3,); ch. 4, Eqs. 28-30."""
+    reference, gravity = parameters.reference, parameters.vehicle.gravity
+    yaw, decoupler, gains = reference.yaw, parameters.decoupler, parameters.gains
+    if decoupler == NONE:
+        return xp.array([reference.roll, reference.pitch, yaw])
+    p_ref, v_ref, a_ref = target
+    # Eq. 28: the desired acceleration.
+    ax, ay, _ = (
+        a_ref
+        + gains.position_1 * (v_ref - now.velocity)
+        + gains.position_2 * (p_ref - now.position)
     )
-    yaw_ref = reference.yaw
-    if parameters.decoupler == NONE:
-        return reference.roll, reference.pitch, yaw_ref, z_ref, vz_ref, az_ref
-
-    # Eq. (28): the desired horizontal acceleration.
-    gains = parameters.gains
-    ax = ax_ref + gains.position_1 * (vx_ref - state[VX]) + gains.position_2 * (x_ref - state[X])
-    ay = ay_ref + gains.position_1 * (vy_ref - state[VY]) + gains.position_2 * (y_ref - state[Y])
-
-    gravity = parameters.vehicle.gravity
-    if parameters.decoupler == CONVENTIONAL:
-        roll_ref, pitch_ref = conventional_decoupler(ax, ay, yaw_ref, gravity)
-        return roll_ref, pitch_ref, yaw_ref, z_ref, vz_ref, az_ref
-
-    n = unscaled_torque_free_force(trig, torque)
-    if parameters.decoupler == EXACT:
-        roll_ref, pitch_ref = exact_decoupler(ax, ay, az_ref, yaw_ref, gravity, n)
-    else:
-        roll_ref, pitch_ref = modified_decoupler(ax, ay, yaw_ref, gravity, n)
-    return roll_ref, pitch_ref, yaw_ref, z_ref, vz_ref, az_ref
+    if decoupler == CONVENTIONAL:
+        return xp.array([*conventional_decoupler(ax, ay, yaw, gravity), yaw])
+    n = torque_free_force(wrench[:3], wrench[3:])
+    if decoupler == EXACT:
+        return xp.array([*exact_decoupler(ax, ay, a_ref[2], yaw, gravity, n), yaw])
+    return xp.array([*modified_decoupler(ax, ay, yaw, gravity, n), yaw])
 
 
-@scalar
-def rotor_accelerations(
-    time: float,
-    state: Values,
-    parameters: Parameters,
-    knots: Vector = NO_KNOTS,
-    angular_acceleration: Triple | None = None,
-) -> Quad:
-    """The rotor accelerations (rad/s^2) of the feedback linearization.
+@traceable
+def attitude_altitude(state: Any, target: Any, parameters: Parameters, measured: Any = None) -> Any:
+    """The rotor accelerations (rad/s^2), 4, and the attitude that they track (rad), 3.
 
     Third-order error dynamics (ch. 4, Eqs. 26-27) give the desired third derivatives of the
     outputs; the decoupling matrix and ``Ma`` (Eq. 18) convert them to inputs (Eq. 19). Body rates
@@ -137,65 +123,64 @@ def rotor_accelerations(
     singular.
 
     Args:
-        time, state, parameters, knots: as for `attitude_reference`
-        angular_acceleration: measured, rad/s^2, body axes; None takes the model's, ``I^-1 tau w``
+        state: `tiltsim_controllers.vehicle.states.TILTROTOR_FIELDS`, shape (20,).
+        target: Position (m), velocity and acceleration to track, world axes, shape (9,).
+        parameters: Parameters of the controller.
+        measured: Angular acceleration, rad/s^2, body axes, shape (3,); None takes the model's,
+            ``I^-1 tau w``.
     """
-    _x, _y, z, _vx, _vy, vz, roll, pitch, yaw, p, q, r, a1, a2, a3, a4, s1, s2, s3, s4 = state
-    vehicle = parameters.vehicle
-    gains = parameters.gains
+    now, (body, rotors) = state_of(state, ROTORS), airframe(parameters, (), ROTORS)
+    target, gains = target.reshape(3, 3), parameters.gains
+    wrench = wrench_map(rotors, now.tilts)
+    force, torque = wrench[:3], wrench[3:]
+    w = now.speeds * abs(now.speeds)
 
-    trig = sines_and_cosines(a1, a2, a3, a4)
-    torque = torque_entries(trig, drag_ratio(vehicle))
-    roll_ref, pitch_ref, yaw_ref, z_ref, vz_ref, az_ref = attitude_reference(
-        time, state, trig, torque, parameters, knots
-    )
+    # Second derivatives of the outputs, Eq. 10.
+    up = rotation_matrix(now.attitude)[2]
+    lift = up @ force
+    omega_rate = inverse_inertia_matrix(body) @ (torque @ w) if measured is None else measured
+    climb_rate = lift @ w / body.mass - body.gravity
 
-    # Second derivatives of the outputs, Eq. (10), from w_i = varpi_i |varpi_i|: torques in units of
-    # L K_f and forces in units of K_f, those of the decoupling matrix.
-    ux, uy, uz = world_up_in_body(roll, pitch)
-    h1, h2, h3, h4 = vertical_force_entries(trig, ux, uy, uz)
-    size_1, size_2, size_3, size_4 = abs(s1), abs(s2), abs(s3), abs(s4)
-    w1, w2, w3, w4 = s1 * size_1, s2 * size_2, s3 * size_3, s4 * size_4
-    unit = 1.0 / (vehicle.arm_length * vehicle.thrust_coefficient)
-    ix, iy, iz = vehicle.inertia_xx * unit, vehicle.inertia_yy * unit, vehicle.inertia_zz * unit
-    if angular_acceleration is None:
-        tx, ty, tz = body_torque(torque, w1, w2, w3, w4)
-    else:
-        p_rate, q_rate, r_rate = angular_acceleration
-        tx, ty, tz = ix * p_rate, iy * q_rate, iz * r_rate
-    lift = h1 * w1 + h2 * w2 + h3 * w3 + h4 * w4
+    # Third-order error dynamics, Eqs. 26 and 27; the reference of the attitude is at rest.
+    k1, k2, k3 = gains.attitude
+    tracked = _attitude_reference(now, target, wrench, parameters)
+    error = tracked - now.attitude
+    error = xp.array([error[0], error[1], wrapped(error[2])])
+    omega_jerk = k3 * error - k2 * now.omega - k1 * omega_rate
+    k1, k2, k3 = gains.altitude
+    z, vz, az = target[:, 2]
+    jerk = k3 * (z - now.position[2]) + k2 * (vz - now.velocity[2]) + k1 * (az - climb_rate)
 
-    # Ma, Eq. (18): the thrust direction turns with the body, r3^T (omega x F w).
-    fx, fy, fz = body_force(trig, w1, w2, w3, w4)
-    turning = ux * (q * fz - r * fy) + uy * (r * fx - p * fz) + uz * (p * fy - q * fx)
+    # Ma, Eq. 18: the thrust direction turns with the body.
+    turning = up @ cross(now.omega, force @ w)
+    desired = xp.hstack([inertia_matrix(body) @ omega_jerk, body.mass * jerk - turning])
 
-    # Third-order error dynamics, Eqs. (26)-(27), as rates of those torques and of the lift; the
-    # references of roll, pitch and yaw are treated as constant.
-    yaw_error = wrap_angle(yaw_ref - yaw)
-    roll_rate = ix * (gains.roll_3 * (roll_ref - roll) - gains.roll_2 * p) - gains.roll_1 * tx
-    pitch_rate = iy * (gains.pitch_3 * (pitch_ref - pitch) - gains.pitch_2 * q) - gains.pitch_1 * ty
-    yaw_rate = iz * (gains.yaw_3 * yaw_error - gains.yaw_2 * r) - gains.yaw_1 * tz
-    lift_rate = (
-        vehicle.mass
-        / vehicle.thrust_coefficient
-        * (
-            gains.altitude_3 * (z_ref - z)
-            + gains.altitude_2 * (vz_ref - vz)
-            + gains.altitude_1 * (az_ref + vehicle.gravity)
-        )
-        - gains.altitude_1 * lift
-        - turning
-    )
-
-    # Eq. (19). The published matrix has the factor 2 |varpi_i| only in its last row, the exact one
-    # in every row, so that the solution can be divided by it instead.
-    f1, f2, f3, f4 = 2.0 * size_1, 2.0 * size_2, 2.0 * size_3, 2.0 * size_4
+    # Eq. 19. The published matrix has the factor 2 |varpi_i| in its last row only, the exact one in
+    # every row, so that the solution can be divided by it instead.
     if parameters.decoupling == PUBLISHED_DECOUPLING:
-        published = (h1 * f1, h2 * f2, h3 * f3, h4 * f4)
-        return solve_by_pairs(torque, published, roll_rate, pitch_rate, yaw_rate, lift_rate)
-    if f1 == 0.0 or f2 == 0.0 or f3 == 0.0 or f4 == 0.0:
-        return nan, nan, nan, nan
-    v1, v2, v3, v4 = solve_by_pairs(
-        torque, (h1, h2, h3, h4), roll_rate, pitch_rate, yaw_rate, lift_rate
-    )
-    return v1 / f1, v2 / f2, v3 / f3, v4 / f4
+        inputs = solved(xp.vstack([torque, lift * (2.0 * abs(now.speeds))]), desired)
+    else:
+        inputs = rotor_accelerations(solved(xp.vstack([torque, lift]), desired), now.speeds)
+    return xp.hstack([inputs, tracked])
+
+
+@scalar
+def attitude_altitude_inputs(
+    time: float,
+    state: Values,
+    parameters: Parameters,
+    knots: Vector = NO_KNOTS,
+    measured: Triple | None = None,
+) -> Values:
+    """Rotor accelerations (rad/s^2) that track the reference, and the attitude tracked (rad).
+
+    See `attitude_altitude`.
+
+    Args:
+        time: s.
+        state, parameters, measured: As for `attitude_altitude`.
+        knots: Table data of the reference.
+    """
+    target = position_reference(time, parameters.reference, knots)
+    inputs: Values = attitude_altitude(state, target, parameters, measured)
+    return inputs

@@ -8,10 +8,11 @@ them (ch. 4, Eqs. 7-8), the modified one has the side force at level attitude, t
 
 from __future__ import annotations
 
-from math import acos, atan2, cos, nan, sin, sqrt
-from typing import Final
+from typing import Any, Final
 
-from tiltsim_controllers.mathematics.scalar import Triple, scalar
+from tiltsim_controllers.code.arrays import xp
+from tiltsim_controllers.code.traceable import traceable
+from tiltsim_controllers.mathematics.moving import angle, cosine, sine, square_root, value_of, where
 
 NONE: Final = 0.0
 CONVENTIONAL: Final = 1.0
@@ -27,67 +28,64 @@ DECOUPLERS: Final = {
 """Decouplers by their name in a scenario."""
 
 
-@scalar
-def conventional_decoupler(ax: float, ay: float, yaw: float, gravity: float) -> tuple[float, float]:
+@traceable
+def conventional_decoupler(ax: Any, ay: Any, yaw: Any, gravity: Any) -> tuple[Any, Any]:
     """Roll and pitch (rad) of a plain quadrotor near hover (ch. 4, Eqs. 7-8).
 
     Args:
-        ax, ay: desired acceleration, m/s^2, world
-        yaw: rad
-        gravity: m/s^2
+        ax, ay: Desired acceleration, m/s^2, world axes.
+        yaw: rad.
+        gravity: m/s^2.
     """
-    sin_yaw, cos_yaw = sin(yaw), cos(yaw)
-    return (ax * sin_yaw - ay * cos_yaw) / gravity, (ax * cos_yaw + ay * sin_yaw) / gravity
+    s, c = xp.sin(yaw), xp.cos(yaw)
+    return (ax * s - ay * c) / gravity, (ax * c + ay * s) / gravity
 
 
-@scalar
-def modified_decoupler(
-    ax: float, ay: float, yaw: float, gravity: float, n: Triple
-) -> tuple[float, float]:
-    """Conventional roll and pitch plus the side force at level hover (ch. 4, Eqs. 9-11).
+@traceable
+def modified_decoupler(ax: Any, ay: Any, yaw: Any, gravity: Any, n: Any) -> tuple[Any, Any]:
+    """Conventional roll and pitch (rad) plus the side force at level hover (ch. 4, Eqs. 9-11).
 
     Eq. 11 determines the rotor inputs with zero torque whose vertical force is the weight at level
     attitude. Their force is parallel to ``n``, so ``F_X = m g n_x / n_z`` and ``F_Y = m g n_y /
     n_z``: the printed 4 x 4 inverse in closed form. NaN where no such inputs exist.
 
     Args:
-        ax, ay, yaw, gravity: as for `conventional_decoupler`
-        n: the torque-free force, of arbitrary unit, body axes
+        ax, ay, yaw, gravity: As for `conventional_decoupler`.
+        n: The torque-free force, of any unit, body axes, shape (3,).
     """
-    nx, ny, nz = n
-    if nz == 0.0:
-        return nan, nan
     roll, pitch = conventional_decoupler(ax, ay, yaw, gravity)
-    return roll + ny / nz, pitch - nx / nz
+    lift = xp.where(n[2] == 0.0, xp.nan, n[2])
+    return roll + n[1] / lift, pitch - n[0] / lift
 
 
-@scalar
-def exact_decoupler(
-    ax: float, ay: float, az: float, yaw: float, gravity: float, n: Triple
-) -> tuple[float, float]:
+@traceable
+def exact_decoupler(ax: Any, ay: Any, az: Any, yaw: Any, gravity: Any, n: Any) -> tuple[Any, Any]:
     """The roll and pitch (rad) that point the torque-free force along the desired one.
 
     Solves ``Ry(pitch) Rx(roll) n = d |n|`` with ``d`` the unit vector along ``Rz(-yaw) (ax, ay,
     g + az)``, on the branch that is level when ``n`` and ``d`` are vertical. Where no roll reaches
-    ``d`` the nearest one is returned; NaN where the torque-free force has neither a lateral nor a
-    vertical part, and in free fall, ``d = 0``.
+    ``d`` the nearest one is returned, at rest; NaN where the torque-free force has neither a
+    lateral nor a vertical part, and in free fall, ``d = 0``.
+
+    All arguments but gravity may be `Moving`; roll and pitch are then as well.
 
     Args:
-        ax, ay, az: desired acceleration, m/s^2, world
-        yaw, gravity, n: as for `modified_decoupler`
+        ax, ay, az: Desired acceleration, m/s^2, world axes.
+        yaw, gravity, n: As for `modified_decoupler`.
     """
-    sin_yaw, cos_yaw = sin(yaw), cos(yaw)
-    dx = ax * cos_yaw + ay * sin_yaw
-    dy = ay * cos_yaw - ax * sin_yaw
-    dz = gravity + az
+    s, c = sine(yaw), cosine(yaw)
+    dx, dy, dz = ax * c + ay * s, ay * c - ax * s, gravity + az
     # The rotors can push along n or against it; the side that points up is used.
-    side = 1.0 if n[2] >= 0.0 else -1.0
-    nx, ny, nz = side * n[0], side * n[1], side * n[2]
-    lateral = sqrt(ny * ny + nz * nz)
-    desired = dx * dx + dy * dy + dz * dz
-    if lateral == 0.0 or desired == 0.0:
-        return nan, nan
-    scale = sqrt((nx * nx + ny * ny + nz * nz) / desired)
-    roll = acos(min(1.0, max(-1.0, dy * scale / lateral))) - atan2(nz, ny)
-    pitch = atan2(dx, dz) - atan2(nx, ny * sin(roll) + nz * cos(roll))
+    n = n * xp.where(value_of(n[2]) >= 0.0, 1.0, -1.0)
+    lateral, desired = n[1] * n[1] + n[2] * n[2], dx * dx + dy * dy + dz * dz
+    none = (value_of(lateral) == 0.0) | (value_of(desired) == 0.0)
+    lateral, desired = where(none, xp.nan, lateral), where(none, xp.nan, desired)
+    # n_y cos(roll) - n_z sin(roll) = d_y |n| / |d|: the component along the pitch axis.
+    reach = dy * square_root((lateral + n[0] * n[0]) / desired)
+    rest, phase = lateral - reach * reach, angle(n[2], n[1])
+    reaches = value_of(rest) > 0.0
+    reached = angle(square_root(where(reaches, rest, 1.0)), reach) - phase
+    nearest = xp.arctan2(0.0, value_of(reach)) - value_of(phase)
+    roll = where(reaches, reached, nearest)
+    pitch = angle(dx, dz) - angle(n[0], n[1] * sine(roll) + n[2] * cosine(roll))
     return roll, pitch

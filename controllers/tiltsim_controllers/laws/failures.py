@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import cache
 from math import inf
 from typing import Any, Final, NamedTuple
 
-from tiltsim_controllers.mathematics.scalar import Values, scalar
-from tiltsim_controllers.mathematics.vectors import componentwise, vectors_of
-from tiltsim_controllers.vehicle.effectiveness import Rows
+from tiltsim_controllers.code.arrays import xp
 
 
 class Failure(NamedTuple):
@@ -23,24 +19,15 @@ UNHARMED: Final = Failure()
 """All rotors work, as far as is known."""
 
 
-@cache
-def health_of(length: int) -> Callable[..., Any]:
-    """Scalar code ``(time, failure)``: 1 for a rotor that works as far as is known, else 0."""
-    known = "time >= failure.known_from and failure.rotor == @ + 1.0"
-    return componentwise("health", "time, failure", f"0.0 if {known} else 1.0", length)
+def working(time: Any, failure: Failure, rotors: int) -> Any:
+    """1 for a rotor that works as far as is known, 0 for one that failed, shape (rotors,).
 
-
-@cache
-def masked_of(length: int) -> Callable[..., Rows]:
-    """Scalar code ``(works, rows)``: rows of F and tau without the columns of failed rotors."""
-    product = vectors_of(length).product
-
-    @scalar
-    def masked(works: Values, rows: Rows) -> Rows:
-        fx, fy, fz, tx, ty, tz = rows
-        return (
-            *(product(works, fx), product(works, fy), product(works, fz)),
-            *(product(works, tx), product(works, ty), product(works, tz)),
-        )
-
-    return masked
+    Args:
+        time: s.
+        failure: The failure that is known of.
+        rotors: Number of rotors.
+    """
+    known = time >= failure.known_from
+    return xp.array(
+        [xp.where(known & (failure.rotor == i), 0.0, 1.0) for i in range(1, rotors + 1)]
+    )

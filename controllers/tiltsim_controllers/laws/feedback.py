@@ -1,74 +1,65 @@
-"""Steps of the feedback around a moving reference, shared by the parts of gait feed-forward."""
+"""Steps of the feedback around a moving reference: position, force, attitude.
+
+Vectors have an entry for each axis; quantities with derivatives are
+`tiltsim_controllers.mathematics.moving.Moving`.
+"""
 
 from __future__ import annotations
 
-from tiltsim_controllers.mathematics.jets import (
-    Jet,
-    Jets3,
-    jet_product,
-    jet_quotient,
-    jet_square_root,
-    jet_sum,
-)
-from tiltsim_controllers.mathematics.scalar import Quad, Triple, clipped, scalar
-from tiltsim_controllers.vehicle.rigid_body import euler_derivatives
+from typing import Any
+
+from tiltsim_controllers.code.arrays import xp
+from tiltsim_controllers.mathematics.linear import cross
+from tiltsim_controllers.mathematics.moving import Moving, cosine, sine, square_root, stacked, where
 
 
-@scalar
-def limited_acceleration(x: Jet, y: Jet, limit: float) -> tuple[Jet, Jet]:
-    """A horizontal acceleration scaled back to ``limit`` (m/s^2) where it is longer."""
-    square = jet_sum(1.0, jet_product(x, x), 1.0, jet_product(y, y))
-    if square[0] <= limit * limit:
-        return x, y
-    scale = jet_quotient((limit, 0.0, 0.0), jet_square_root(square))
-    return jet_product(x, scale), jet_product(y, scale)
+def limited_acceleration(acceleration: Moving, limit: Any) -> Any:
+    """A moving vector scaled back to a limit (m/s^2) where it is longer."""
+    square = acceleration @ acceleration
+    within = square.value <= limit * limit
+    # Harmless numbers on the side that is not selected, as the limit may be infinite.
+    scale = xp.where(within, 1.0, limit) / square_root(where(within, 1.0, square))
+    return acceleration * where(within, 1.0, scale)
 
 
-@scalar
-def position_feedback(error: Jet, jerk_error: float, integral: float, gains: Triple) -> Jet:
+def position_feedback(error: Moving, jerk_error: Any, integral: Any, gains: Any) -> Any:
     """``k1 e' + k2 e + k3 integral`` of a position error, with its first two derivatives.
 
     Args:
-        error, jerk_error: the error ``e`` with its first two derivatives, and its third, m and s
-        integral: its integral, m s
-        gains: ``(k1, k2, k3)``, 1/s to 1/s^3
+        error: The error ``e`` (m), by axis.
+        jerk_error: Its third derivative, m/s^3.
+        integral: Its integral, m s.
+        gains: ``(k1, k2, k3)``, 1/s to 1/s^3.
     """
     k1, k2, k3 = gains
-    return (
-        k1 * error[1] + k2 * error[0] + k3 * integral,
-        k1 * error[2] + k2 * error[1] + k3 * error[0],
-        k1 * jerk_error + k2 * error[2] + k3 * error[1],
-    )
+    rate = Moving(error.rate, error.acceleration, jerk_error)
+    return k1 * rate + k2 * error + k3 * Moving(integral, error.value, error.rate)
 
 
-@scalar
-def integrator_rate(error: float, desired: float, limit: float) -> float:
-    """Rate of an integrator of ``error``: zero where ``desired`` is beyond ``limit`` and grows."""
-    if abs(desired) > limit and error * desired > 0.0:
-        return 0.0
-    return error
+def integrator_rate(error: Any, desired: Any, limit: Any) -> Any:
+    """Rates of integrators of errors: zero where ``desired`` is beyond a limit and grows."""
+    return xp.where((abs(desired) > limit) & (error * desired > 0.0), 0.0, error)
 
 
-@scalar
 def force_control(
-    error: Jet, acceleration: Jet, integral: float, gains: Quad, limit: float
-) -> tuple[float, float]:
-    """Desired jerk along an axis that the force moves (ch. 4, Eq. 27), and its integrator's rate.
+    error: Moving, jerk: Any, integral: Any, gains: Any, limit: Any
+) -> tuple[Any, Any]:
+    """Desired jerk (m/s^3) along axes that the force moves (ch. 4, Eq. 27), and integrator rates.
 
     Args:
-        error, acceleration: the position error and the reference's acceleration with derivatives
-        integral: of the error, m s
-        gains: ``(k1, k2, k3, k4)``, 1/s to 1/s^4, the last on the integral
-        limit: of the acceleration that the error may ask for before its integrator stops, m/s^2
+        error: The position error, m.
+        jerk: Jerk of the reference, m/s^3.
+        integral: Integral of the error, m s.
+        gains: ``(k1, k2, k3, k4)``, 1/s to 1/s^4, the last on the integral.
+        limit: Acceleration (m/s^2) that the error may demand before its integrator stops.
     """
     k1, k2, k3, k4 = gains
-    effort = k2 * error[1] + k3 * error[0] + k4 * integral
-    jerk = acceleration[1] + k1 * error[2] + k2 * error[1] + k3 * error[0] + k4 * integral
-    return jerk, integrator_rate(error[0], effort, k1 * limit)
+    effort = k2 * error.rate + k3 * error.value + k4 * integral
+    rate = integrator_rate(error.value, effort, k1 * limit)
+    return jerk + k1 * error.acceleration + effort, rate
 
 
-@scalar
-def attitude_jerk(desired: Jet, present: Jet, gains: Triple, limit: float) -> float:
+def attitude_jerk(desired: Moving, present: Moving, gains: Any, limit: Any) -> Any:
     """Third-order error dynamics (ch. 4, Eq. 26) around a moving reference, with bounded effort.
 
     ``k1 e'' + k2 e' + k3 e`` while nothing saturates. Read as a cascade (the angle commands a rate,
@@ -76,33 +67,67 @@ def attitude_jerk(desired: Jet, present: Jet, gains: Triple, limit: float) -> fl
     from which it brakes, so that a large error does not stop a rotor.
 
     Args:
-        desired, present: the angle with its first two derivatives, rad and s
-        gains: ``(k1, k2, k3)``, 1/s to 1/s^3
-        limit: largest acceleration, rad/s^2
+        desired, present: Angles, rad, by axis.
+        gains: ``(k1, k2, k3)``, 1/s to 1/s^3, by axis.
+        limit: Largest acceleration, rad/s^2.
     """
     k1, k2, k3 = gains
-    rate = clipped(k3 / k2 * (desired[0] - present[0]), -limit * k1 / k2, limit * k1 / k2)
-    acceleration = clipped(k2 / k1 * (rate + desired[1] - present[1]) + desired[2], -limit, limit)
-    return k1 * (acceleration - present[2])
+    fastest = limit * k1 / k2
+    rate = xp.clip(k3 / k2 * (desired.value - present.value), -fastest, fastest)
+    change = k2 / k1 * (rate + desired.rate - present.rate) + desired.acceleration
+    return k1 * (xp.clip(change, -limit, limit) - present.acceleration)
 
 
-@scalar
-def attitude_motion(attitude: Triple, omega: Triple, omega_rate: Triple, exact: float) -> Jets3:
-    """Roll, pitch and yaw with their first two derivatives.
+def body_rate_matrix(roll: Any, pitch: Any) -> Any:
+    """``M(roll, pitch)`` with ``omega = M eta'`` of the rates of roll, pitch and yaw, shape (3, 3).
+
+    Ch. 3, Eq. 8, takes it for the unit matrix.
 
     Args:
-        attitude: the angles, rad
-        omega, omega_rate: body rates (rad/s) and their rates (rad/s^2)
-        exact: 0 to use the body rates for the rates of the angles (ch. 3, Eq. 8).
+        roll, pitch: rad, moving.
     """
-    roll, pitch, yaw = attitude
-    if exact == 0.0:
-        return (
-            (roll, omega[0], omega_rate[0]),
-            (pitch, omega[1], omega_rate[1]),
-            (yaw, omega[2], omega_rate[2]),
-        )
-    d_roll, d_pitch, d_yaw, dd_roll, dd_pitch, dd_yaw = euler_derivatives(
-        roll, pitch, omega, omega_rate
-    )
-    return (roll, d_roll, dd_roll), (pitch, d_pitch, dd_pitch), (yaw, d_yaw, dd_yaw)
+    sr, cr, sp, cp = sine(roll), cosine(roll), sine(pitch), cosine(pitch)
+    rows = (1.0, 0.0, -sp), (0.0, cr, sr * cp), (0.0, -sr, cr * cp)
+    return stacked(*(stacked(*row) for row in rows))
+
+
+def attitude_motion(attitude: Any, omega: Any, omega_rate: Any, *, exact: bool) -> Moving:
+    """Roll, pitch and yaw (rad) with their first two derivatives.
+
+    Args:
+        attitude: The angles, rad, shape (3,).
+        omega, omega_rate: Body rates (rad/s) and their rates (rad/s^2), shape (3,) each.
+        exact: Whether to solve ``omega = M eta'`` and ``omega' = M eta'' + M' eta'``; else the body
+            rates count as rates of the angles (ch. 3, Eq. 8).
+    """
+    if not exact:
+        return Moving(attitude, omega, omega_rate)
+    (sr, sp, _), (cr, cp, _) = xp.sin(attitude), xp.cos(attitude)
+    inverse = xp.array([[1.0, sr * sp / cp, cr * sp / cp], [0.0, cr, -sr], [0.0, sr / cp, cr / cp]])
+    rate = inverse @ omega
+    matrix = body_rate_matrix(*(Moving(attitude[i], rate[i], 0.0) for i in range(2)))
+    return Moving(attitude, rate, inverse @ (omega_rate - matrix.rate @ rate))
+
+
+def angular_jerk(attitude: Moving, jerk: Any) -> Any:
+    """Second derivatives (rad/s^3) of the body rates: of ``omega = M eta'``, shape (3,).
+
+    Args:
+        attitude: Roll, pitch and yaw, rad, shape (3,).
+        jerk: Their third derivatives, rad/s^3, shape (3,).
+    """
+    rates = Moving(attitude.rate, attitude.acceleration, jerk)
+    turned: Moving = body_rate_matrix(attitude[0], attitude[1]) @ rates
+    return turned.acceleration
+
+
+def swept(vector: Moving, omega: Any, omega_rate: Any) -> Moving:
+    """The rate of a vector that rotates with the body, with its derivative; body axes.
+
+    Args:
+        vector: Moving in body axes, shape (3,).
+        omega, omega_rate: Body rates (rad/s) and their rates (rad/s^2), shape (3,) each.
+    """
+    rate = vector.rate + cross(omega, vector.value)
+    second = vector.acceleration + cross(omega_rate, vector.value)
+    return Moving(rate, second + cross(omega, vector.rate), 0.0)

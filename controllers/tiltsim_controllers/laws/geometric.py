@@ -2,108 +2,99 @@
 
 Lee, Leok and McClamroch (2010), "Geometric tracking control of a quadrotor UAV on SE(3)", Eqs. 10
 to 16. The force is that of Eq. 12 along the axis in which the rotors push without torque, or, where
-the tilts are the law's, in any direction. The torque is Eq. 16 with the desired angular
+the law commands the tilts, in any direction. The torque is Eq. 16 with the desired angular
 acceleration zero.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import cache
-from typing import NamedTuple
+from typing import Any, Literal
 
-from tiltsim_controllers.laws.full_pose import attitude_error
-from tiltsim_controllers.laws.observed import Observed
+from pydantic import Field
+
+from tiltsim_controllers.code.arrays import xp
+from tiltsim_controllers.laws.keys import Keys, Positive
+from tiltsim_controllers.laws.observed import Command, Observed
 from tiltsim_controllers.laws.outer_loop import (
+    UP,
     demanded_acceleration,
     pointing_attitude,
     pointing_rates,
     push_along,
 )
-from tiltsim_controllers.laws.rotor_allocation import planned_allocation_of, tilting_allocation_of
-from tiltsim_controllers.mathematics.rotation import rotation_from_euler, to_body
-from tiltsim_controllers.mathematics.scalar import Triple, Values, scalar
-from tiltsim_controllers.vehicle.effectiveness import TiltOfRotor
-from tiltsim_controllers.vehicle.multirotor import inertia_times
-from tiltsim_controllers.vehicle.rigid_body import cross
-
-Commands = tuple[Values, Values, Values]
-"""Thrusts (N), tilts (rad) and rates of the law's states."""
+from tiltsim_controllers.laws.rotor_allocation import (
+    allocated_thrusts,
+    allocated_with_tilts,
+    lift_without_torque,
+)
+from tiltsim_controllers.mathematics.attitude import attitude_error, rotation_matrix
+from tiltsim_controllers.mathematics.linear import cross
 
 
-class Parameters(NamedTuple):
-    """Gains; those of position per mass."""
+class Geometric(Keys):
+    """Keys of `geometric` and `geometric_with_tilts`."""
 
-    position: float  # k_x / m, 1/s^2
-    velocity: float  # k_v / m, 1/s
-    attitude: float  # k_R, N m
-    rates: float  # k_Omega, N m s
-    max_acceleration: float  # m/s^2
-    gyroscopic: float  # 1 where the vehicle has gyroscopic torque, else 0
-
-
-@scalar
-def attitude_torque(
-    observed: Observed, desired: Values, rates: Triple, parameters: Parameters
-) -> Triple:
-    """The torque (N m, body axes) of Eq. 16.
-
-    Args:
-        observed: by the law
-        desired: rotation, rows first
-        rates: desired, rad/s, the present body axes
-        parameters: of the law
-    """
-    omega = observed.body_rates
-    ex, ey, ez = attitude_error(observed.rotation, desired)  # minus Lee's
-    body, p = observed.vehicle, parameters
-    # Omega x J Omega - J (Omega x R^T R_d Omega_d): of the desired rates, seen from the body.
-    gx, gy, gz = cross(omega, inertia_times(body, omega))
-    tx, ty, tz = inertia_times(body, cross(omega, rates))
-    return (
-        p.attitude * ex - p.rates * (omega[0] - rates[0]) + p.gyroscopic * gx - tx,
-        p.attitude * ey - p.rates * (omega[1] - rates[1]) + p.gyroscopic * gy - ty,
-        p.attitude * ez - p.rates * (omega[2] - rates[2]) + p.gyroscopic * gz - tz,
+    law: Literal["geometric"] = Field(
+        description="tracking control on SE(3) (Lee et al. 2010), from any attitude; force and "
+        "torque are allocated to the rotors, or to rotors and tilts (Kamel et al. 2018)"
+    )
+    position_bandwidth: Positive = Field(
+        2.0, description="natural frequency of the position's error [rad/s]"
+    )
+    position_damping: Positive = Field(1.0, description="its damping ratio [-]")
+    attitude_bandwidth: Positive = Field(
+        10.0,
+        description="natural frequency of a small error of attitude, about an axis of the mean "
+        "moment of inertia [rad/s]",
+    )
+    attitude_damping: Positive = Field(1.0, description="its damping ratio [-]")
+    max_acceleration: Positive = Field(
+        1e9, description="largest acceleration that the feedback of position demands [m/s^2]"
     )
 
 
-@cache
-def geometric_law_of(rotors: int) -> Callable[..., Commands]:
-    """The law of vehicles with this many rotors, whose tilts follow a gait."""
-    lift_of, axis_of, thrusts_of = planned_allocation_of(rotors)
-
-    @scalar
-    def geometric(observed: Observed, parameters: Parameters) -> Commands:
-        acceleration = demanded_acceleration(
-            observed, parameters.position, parameters.velocity, parameters.max_acceleration
-        )
-        lift = lift_of(observed)
-        axis = axis_of(observed, lift)
-        desired = pointing_attitude(observed, acceleration, axis)
-        rates = pointing_rates(observed, acceleration, axis, desired)
-        torque = attitude_torque(observed, desired, rates, parameters)
-        push = push_along(observed, acceleration, axis)
-        return thrusts_of(observed, lift, axis, push, torque), (), ()
-
-    return geometric
+def geometric(observed: Observed, p: Geometric) -> Command:
+    """The law where the tilts follow a gait."""
+    acceleration = tracking_acceleration(observed, p)
+    lift = lift_without_torque(observed)
+    b = observed.force @ lift  # takes the place of Lee's third body axis
+    R_d = pointing_attitude(observed, acceleration, b)
+    Omega_d = pointing_rates(observed, acceleration, b, R_d)
+    M = moment(observed, p, R_d, Omega_d)
+    return Command(
+        thrusts=allocated_thrusts(observed, lift, push_along(observed, acceleration, b), M)
+    )
 
 
-@cache
-def free_geometric_law_of(layout: TiltOfRotor) -> Callable[..., Commands]:
-    """The law of vehicles of a layout whose tilts are its own: it tracks any attitude, too."""
-    allocated = tilting_allocation_of(layout)
+def geometric_with_tilts(observed: Observed, p: Geometric) -> Command:
+    """The law where it commands the tilts: it also tracks any attitude."""
+    acceleration = tracking_acceleration(observed, p)
+    m, g = observed.vehicle.mass, observed.vehicle.gravity
+    force = m * observed.rotation.T @ (acceleration + g * xp.array(UP))
+    M = moment(observed, p, rotation_matrix(observed.reference.attitude), xp.zeros(3))
+    thrusts, tilts = allocated_with_tilts(observed, force, M)
+    return Command(thrusts=thrusts, tilt_angles=tilts)
 
-    @scalar
-    def free_geometric(observed: Observed, parameters: Parameters) -> Commands:
-        body, attitude = observed.vehicle, observed.reference.attitude
-        ax, ay, az = demanded_acceleration(
-            observed, parameters.position, parameters.velocity, parameters.max_acceleration
-        )
-        mass = body.mass
-        force = to_body(observed.rotation, (mass * ax, mass * ay, mass * (az + body.gravity)))
-        desired = rotation_from_euler(attitude[0], attitude[1], attitude[2])
-        torque = attitude_torque(observed, desired, (0.0, 0.0, 0.0), parameters)
-        thrusts, tilts = allocated(observed, force, torque)
-        return thrusts, tilts, ()
 
-    return free_geometric
+def tracking_acceleration(observed: Observed, p: Geometric) -> Any:
+    """The parenthesis of Eq. 12 per mass, without gravity: m/s^2, world axes, shape (3,)."""
+    k_x = p.position_bandwidth**2  # per mass
+    k_v = 2.0 * p.position_damping * p.position_bandwidth
+    return demanded_acceleration(observed, k_x, k_v, p.max_acceleration)
+
+
+def moment(observed: Observed, p: Geometric, attitude: Any, rates: Any) -> Any:
+    """The torque (N m, body axes) of Eq. 16, shape (3,).
+
+    Args:
+        observed: By the law.
+        p: Its gains.
+        attitude: Desired, R_d, shape (3, 3).
+        rates: Desired, in the present body axes: ``R^T R_d Omega_d``, rad/s, shape (3,).
+    """
+    J, R, Omega = observed.inertia, observed.rotation, observed.body_rates
+    j = xp.trace(J) / 3.0
+    k_R, k_Omega = j * p.attitude_bandwidth**2, 2.0 * j * p.attitude_damping * p.attitude_bandwidth
+    e_R, e_Omega = -attitude_error(R, attitude), Omega - rates  # Eqs. 10 and 11
+    gyroscopic = observed.gyroscopic * cross(Omega, J @ Omega)
+    return -k_R * e_R - k_Omega * e_Omega + gyroscopic - J @ cross(Omega, rates)

@@ -1,41 +1,51 @@
 """Incremental nonlinear dynamic inversion of the attitude.
 
 Smeur, Chu and de Croon (2016), "Adaptive incremental nonlinear dynamic inversion for attitude
-control of micro air vehicles", Eqs. 10 to 21. The torque is a change of that which makes the
-present angular acceleration, so that no model of other torques is needed. The angular acceleration
-comes from filtered rates, and the thrusts that go with it pass the same filter; then it follows its
-demand as the rotors follow theirs.
+control of micro air vehicles", Eqs. 10 to 21. The torque is an increment of the torque that makes
+the present angular acceleration, so that no model of other torques is needed. The angular
+acceleration comes from filtered rates, and the thrusts that go with it pass the same filter; then
+it follows its demand as the rotors follow theirs.
 
-Increments are of the torque, not of each thrust. Of four thrusts that is the same; more would keep
-forever the part of them that makes neither torque nor push, and with tilts a force to the side.
+Increments are of the torque, not of each thrust, which is equivalent for four thrusts; more would
+keep forever the part of them that makes neither torque nor push, and with tilts a force to the
+side.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import cache
-from typing import NamedTuple
+from typing import Any, Literal
 
-from tiltsim_controllers.laws.full_pose import attitude_error
-from tiltsim_controllers.laws.geometric import Commands
-from tiltsim_controllers.laws.observed import Observed
+from pydantic import Field
+
+from tiltsim_controllers.code.arrays import xp
+from tiltsim_controllers.laws.keys import Keys, Positive
+from tiltsim_controllers.laws.observed import Command, Observed
 from tiltsim_controllers.laws.outer_loop import demanded_acceleration, pointing_attitude, push_along
-from tiltsim_controllers.laws.rotor_allocation import planned_allocation_of
-from tiltsim_controllers.mathematics.scalar import scalar
-from tiltsim_controllers.mathematics.vectors import componentwise, entries_of, vectors_of
-from tiltsim_controllers.vehicle.multirotor import inertia_times
+from tiltsim_controllers.laws.rotor_allocation import allocated_thrusts, lift_without_torque
+from tiltsim_controllers.mathematics.attitude import attitude_error
 
 
-class Parameters(NamedTuple):
-    """Gains and the filter."""
+class Indi(Keys):
+    """Keys of `indi`."""
 
-    position: float  # 1/s^2
-    velocity: float  # 1/s
-    max_acceleration: float  # m/s^2
-    attitude: float  # k_eta, 1/s
-    rates: float  # k_Omega, 1/s
-    filter_frequency: float  # rad/s
-    filter_damping: float
+    law: Literal["indi"] = Field(
+        description="incremental nonlinear dynamic inversion of the attitude (Smeur et al. 2016), "
+        "with filtered rates and thrusts"
+    )
+    position_bandwidth: Positive = Field(
+        2.0, description="natural frequency of the position's error, critically damped [rad/s]"
+    )
+    attitude_gain: Positive = Field(9.0, description="rates demanded per error of attitude [1/s]")
+    rate_gain: Positive = Field(
+        27.0, description="angular acceleration demanded per error of the rates [1/s]"
+    )
+    filter_frequency: Positive = Field(
+        50.0, description="natural frequency of the filter of rates and thrusts [rad/s]"
+    )
+    filter_damping: Positive = Field(0.55, description="its damping ratio [-]")
+    max_acceleration: Positive = Field(
+        5.0, description="largest acceleration that the feedback of position demands [m/s^2]"
+    )
 
 
 def state_units(rotors: int) -> dict[str, str]:
@@ -49,60 +59,33 @@ def state_units(rotors: int) -> dict[str, str]:
     }
 
 
-@scalar
-def filtered(value: float, state: float, rate: float, frequency: float, damping: float) -> float:
-    """Second derivative of a filter's state, of gain 1.
+def indi(observed: Observed, p: Indi) -> Command:
+    """The law, with the states `state_units`."""
+    omega, thrusts, N = observed.body_rates, observed.thrusts, len(observed.thrusts)
+    slow_omega, omega_rate = observed.states[:3], observed.states[3:6]
+    slow_thrusts, thrust_rates = observed.states[6 : 6 + N], observed.states[6 + N :]
 
-    Args:
-        value: of what is filtered
-        state, rate: of the filter
-        frequency: rad/s, natural
-        damping: ratio
-    """
-    return frequency * (frequency * (value - state) - 2.0 * damping * rate)
+    w = p.position_bandwidth
+    acceleration = demanded_acceleration(observed, w**2, 2.0 * w, p.max_acceleration)
+    lift = lift_without_torque(observed)
+    axis = observed.force @ lift
+    desired = pointing_attitude(observed, acceleration, axis)
+    error = attitude_error(observed.rotation, desired)
+    demand = p.rate_gain * (p.attitude_gain * error - omega)
+    torque = observed.torque @ slow_thrusts + observed.inertia @ (demand - omega_rate)
 
+    def filtered(value: Any, state: Any, rate: Any) -> Any:
+        """Second derivative of the state of a filter with gain 1."""
+        w, zeta = p.filter_frequency, p.filter_damping
+        return w * (w * (value - state) - 2.0 * zeta * rate)
 
-@cache
-def indi_law_of(rotors: int) -> Callable[..., Commands]:
-    """The law of vehicles with this many rotors, whose tilts follow a gait."""
-    lift_of, axis_of, thrusts_of = planned_allocation_of(rotors)
-    dot = vectors_of(rotors).dot
-    slow_in, rates_in = entries_of(6, rotors), entries_of(6 + rotors, rotors)
-    all_filtered = componentwise(
-        "all_filtered", "x, state, rate, f, d", "filtered(x#, state#, rate#, f, d)", rotors,
-        filtered=filtered,
-    )  # fmt: skip
-
-    @scalar
-    def indi(observed: Observed, parameters: Parameters) -> Commands:
-        c, states = parameters, observed.states
-        p, q, r = observed.body_rates
-        fp, fq, fr, dp, dq, dr = states[0], states[1], states[2], states[3], states[4], states[5]
-        slow, rates = slow_in(states), rates_in(states)
-        acceleration = demanded_acceleration(observed, c.position, c.velocity, c.max_acceleration)
-        lift = lift_of(observed)
-        axis = axis_of(observed, lift)
-        desired = pointing_attitude(observed, acceleration, axis)
-        ex, ey, ez = attitude_error(observed.rotation, desired)
-        tx, ty, tz = inertia_times(
-            observed.vehicle,
-            (
-                c.rates * (c.attitude * ex - p) - dp,
-                c.rates * (c.attitude * ey - q) - dq,
-                c.rates * (c.attitude * ez - r) - dr,
-            ),
-        )
-        rows = observed.torque
-        torque = tx + dot(rows[0], slow), ty + dot(rows[1], slow), tz + dot(rows[2], slow)
-        push = push_along(observed, acceleration, axis)
-        thrusts = thrusts_of(observed, lift, axis, push, torque)
-        f, d = c.filter_frequency, c.filter_damping
-        filters = (
-            dp, dq, dr,
-            filtered(p, fp, dp, f, d), filtered(q, fq, dq, f, d), filtered(r, fr, dr, f, d),
-            *rates,
-            *all_filtered(observed.thrusts, slow, rates, f, d),
-        )  # fmt: skip
-        return thrusts, (), filters
-
-    return indi
+    push = push_along(observed, acceleration, axis)
+    return Command(
+        thrusts=allocated_thrusts(observed, lift, push, torque),
+        rates=xp.hstack(
+            [
+                *(omega_rate, filtered(omega, slow_omega, omega_rate)),
+                *(thrust_rates, filtered(thrusts, slow_thrusts, thrust_rates)),
+            ]
+        ),
+    )

@@ -13,7 +13,7 @@ from math import nan, sqrt
 from typing import Final, NamedTuple
 
 from tiltsim_controllers.mathematics.scalar import Values, scalar
-from tiltsim_controllers.mathematics.vectors import tuple_text, vectors_of, written_out
+from tiltsim_controllers.mathematics.vectors import vectors_of, written_out
 
 RANK_TOLERANCE: Final = 1e-24
 """Squared share of a row that earlier rows leave it, below which it depends on them: rounding
@@ -86,14 +86,3 @@ def nearest_of(length: int, equations: int) -> Callable[..., Values]:
         name, "start, rows, units, desired", text, reached=reached
     )
     return nearest
-
-
-@cache
-def shares_of(length: int, equations: int) -> Callable[..., Values]:
-    """Components of a vector along unit rows: a scalar function ``(units, vector)``."""
-    texts = tuple_text(f"dot(units[{k}], vector)" for k in range(equations))
-    dot = vectors_of(length).dot
-    shares: Callable[..., Values] = written_out(
-        f"shares_{length}_{equations}", "units, vector", texts, dot=dot
-    )
-    return shares

@@ -1,102 +1,85 @@
-"""Linear-quadratic regulation about hover with fixed tilts.
+"""Linear-quadratic regulation about hover with fixed tilts, or about the orbit of a moving gait.
 
-In the axes of the body at hover, the errors of position, velocity and attitude, the body rates and
-the deviations of the thrusts obey ``x' = A x + B u``, the thrusts following their commands ``u``
-with a lag of first order. Anderson and Moore (1990), "Optimal Control", ch. 3; gains ``K`` from the
-algebraic Riccati equation, weights by Bryson's rule: one over the square of what is acceptable.
+The errors of position, velocity and attitude, the body rates and the deviations of the thrusts obey
+``x' = A x + B u``, the thrusts following their commands ``u`` with a lag of first order. Anderson
+and Moore (1990), "Optimal Control", ch. 3; gains ``K`` from the Riccati equation
+(`tiltsim_controllers.laws.periodic_lqr`), weights by Bryson's rule: one over the square of an
+acceptable value.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import cache
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final, Literal, NamedTuple
 
-import numpy as np
+from pydantic import Field
 
-from tiltsim_controllers.laws.full_pose import attitude_error
-from tiltsim_controllers.laws.geometric import Commands
-from tiltsim_controllers.laws.observed import Observed
+from tiltsim_controllers.code.arrays import xp
+from tiltsim_controllers.code.blocks import take_row
+from tiltsim_controllers.laws.keys import Keys, NonNegative, Positive
+from tiltsim_controllers.laws.observed import Command, Observed
 from tiltsim_controllers.laws.outer_loop import tracking_errors
-from tiltsim_controllers.mathematics.rotation import rotation_from_euler, to_body
-from tiltsim_controllers.mathematics.scalar import scalar
-from tiltsim_controllers.mathematics.vectors import componentwise, vectors_of
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-
-    from tiltsim_controllers.mathematics.scalar import Floats
+from tiltsim_controllers.mathematics.attitude import attitude_error, rotation_matrix
 
 BODY: Final = 12
 """States before the thrusts."""
 
 
-def linear_hover(
-    force: ArrayLike, torque: ArrayLike, mass: float, inertia: ArrayLike, up: Floats, lag: float
-) -> tuple[Floats, Floats]:
-    """The matrices A and B.
+class Lqr(Keys):
+    """Keys of the design."""
 
-    Args:
-        force, torque: of every rotor per newton, shape (3, N), body axes
-        mass: kg
-        inertia: kg m^2, shape (3, 3)
-        up: gravity, upward, in the body's axes at hover, m/s^2
-        lag: of the thrusts, 1/s
+    law: Literal["lqr"] = Field(
+        description="linear-quadratic regulator about hover with fixed tilts, or with gains that "
+        "repeat with a moving gait about its orbit; weights are one over the square of what is "
+        "acceptable (Bryson's rule)"
+    )
+    position_error: Positive = Field(0.5, description="acceptable [m]")
+    velocity_error: Positive = Field(1.0, description="acceptable [m/s]")
+    attitude_error: Positive = Field(0.3, description="acceptable [rad]")
+    rate_error: Positive = Field(3.0, description="acceptable [rad/s]")
+    thrust_change: NonNegative = Field(
+        0.3, gt=0.0, description="acceptable, of every rotor, as a part of its thrust in hover [-]"
+    )
+
+
+class Parameters(NamedTuple):
+    """Parameters of the law beside its table."""
+
+    period: float = 1.0  # s, of the table
+
+
+def lqr(observed: Observed, p: Parameters) -> Command:
+    """The law.
+
+    Its table has a row for each node of a period, linear in between, the first again at the end, or
+    a single row: states, thrusts (N, shape (N,)) and gains, shape (N, BODY + N), row by row. States
+    are position, velocity (axes of the world but for the yaw), roll, pitch, yaw, body rates and
+    thrusts.
     """
-    force, torque = np.asarray(force, float), np.asarray(torque, float)
-    size, rotors = BODY + force.shape[1], force.shape[1]
-    x, y, z = up
-    a, b = np.zeros((size, size)), np.zeros((size, rotors))
-    a[0:3, 3:6] = a[6:9, 9:12] = np.eye(3)
-    a[3:6, 6:9] = -np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])  # the attitude x up
-    a[3:6, BODY:] = force / mass
-    a[9:12, BODY:] = np.linalg.solve(np.asarray(inertia, float), torque)
-    a[BODY:, BODY:] = -lag * np.eye(rotors)
-    b[BODY:] = lag * np.eye(rotors)
-    return a, b
+    N, yaw = len(observed.thrusts), observed.reference.attitude[2]
+    row = _row_now(observed, p, (BODY + N) * (N + 1) + N)
+    states, thrusts, gains = row[: BODY + N], row[BODY + N : BODY + 2 * N], row[BODY + 2 * N :]
+    heading = rotation_matrix(xp.array([0.0, 0.0, yaw]))
+    error, speed = tracking_errors(observed)
+    desired = rotation_matrix(states[6:9] + yaw * xp.array([0.0, 0.0, 1.0]))
+    deviation = xp.hstack(
+        [
+            -heading.T @ error - states[0:3],
+            -heading.T @ speed - states[3:6],
+            -attitude_error(observed.rotation, desired),
+            observed.body_rates - states[9:BODY],
+            observed.thrusts - states[BODY:],
+        ]
+    )
+    return Command(thrusts=thrusts - gains.reshape(N, -1) @ deviation)
 
 
-def regulator(a: Floats, b: Floats, errors: Floats, inputs: Floats) -> tuple[Floats, Floats]:
-    """Gains K, shape (N, states), and the solution of the Riccati equation.
-
-    Args:
-        a, b: of the system
-        errors: acceptable, of each state; infinite ones have no weight
-        inputs: acceptable changes
-    """
-    from scipy.linalg import solve_continuous_are
-
-    weight = np.diag(inputs**-2.0)
-    cost = solve_continuous_are(a, b, np.diag(errors**-2.0), weight)
-    return np.linalg.solve(weight, b.T @ cost), cost
-
-
-@cache
-def lqr_law_of(rotors: int) -> Callable[..., Commands]:
-    """The law of vehicles with this many rotors.
-
-    Its parameters have the fields ``roll``, ``pitch`` (of hover, rad), ``thrusts`` (of hover, N)
-    and ``gains``, row by row.
-    """
-    size = BODY + rotors
-    less = vectors_of(rotors).add_scaled
-    products = " - ".join(f"k[@ * {size} + {j}] * x[{j}]" for j in range(size))
-    fed_back = componentwise("regulated", "hover, k, x", f"hover# - {products}", rotors)
-
-    @scalar
-    def lqr(observed: Observed, parameters: Any) -> Commands:
-        yaw = observed.reference.attitude[2]
-        hover = rotation_from_euler(parameters.roll, parameters.pitch, yaw)
-        error, speed = tracking_errors(observed)
-        ex, ey, ez = to_body(hover, error)
-        vx, vy, vz = to_body(hover, speed)
-        rx, ry, rz = attitude_error(observed.rotation, hover)
-        level = parameters.thrusts
-        x = (
-            -ex, -ey, -ez, -vx, -vy, -vz, -rx, -ry, -rz,
-            *observed.body_rates,
-            *less(observed.thrusts, -1.0, level),
-        )  # fmt: skip
-        return fed_back(level, parameters.gains, x), (), ()
-
-    return lqr
+def _row_now(observed: Observed, p: Parameters, width: int) -> Any:
+    """The row of the table at the present time, shape (width,)."""
+    nodes = len(observed.table) // width - 1
+    if nodes == 0:
+        return xp.array([*observed.table])
+    turns = observed.time / p.period
+    place = (turns - xp.floor(turns)) * nodes
+    node = xp.minimum(xp.floor(place), nodes - 1.0)
+    first, second = (take_row(observed.table, node + k, width) for k in (0.0, 1.0))
+    return first + (place - node) * (second - first)

@@ -1,384 +1,311 @@
-"""Feedback linearization of any multirotor: attitude, and as much of the force as it has.
+"""Feedback linearization of any rotorcraft: attitude, and as much of the force as it has.
 
 At zero torque the rotors push anywhere in ``V = F ker tau`` (body axes), of dimension 1, 2 or 3. So
 the outputs are the attitude and that many components of force:
 
 - 1: along world up. The horizontal position is controlled by leaning; with four rotors this is the
   attitude-altitude controller of ch. 3 and 4;
-- 2: along world up, and across it within V. What V leaves is controlled by leaning. A vehicle with
-  all three that is to use two (``forward``) pushes within its x-z plane;
+- 2: along world up, and across it within V. The rest is controlled by leaning. A vehicle with all
+  three that is to use two (``forward``) pushes within its x-z plane;
 - 3: all of it. The attitude is free: the vehicle flies level, or as the reference says.
 
 The decoupling matrix ``[tau; b^T F]`` with the directions ``b`` of the force has rank 3 + dimension
-wherever the margin is positive, for any number of rotors. Of all inputs that give the desired third
-derivatives, the controller takes those nearest to zero or, with ``restoring``, to a motion towards
-the least power; what the outputs do not see would otherwise drift where the pods move. The norm is
-that of the rotor accelerations (``speed``), in which no rotor comes to rest while the others can do
-its part, or of the rates of ``w = varpi |varpi|`` (``thrust``), for rotors that reverse;
-``restoring`` then leads to the least sum of ``w^2``.
+wherever the margin is positive, for any number of rotors. Among the inputs that give the desired
+third derivatives, the controller takes the ones nearest to zero or, with ``restoring``, to a motion
+towards the least power; the part that no output sees would otherwise drift where the pods move. The
+norm measures rotor accelerations (``speed``), in which no rotor comes to rest while the others can
+do its part, or rates of ``w = varpi |varpi|`` (``thrust``), for rotors that reverse; ``restoring``
+then leads to the least sum of ``w^2``.
 
-The decoupler is that of four rotors: the side of the torque-free force is used that points up in
-body axes. So the z axis of a vehicle has to be its upper side.
+As with four rotors, the decoupler uses the side of the torque-free force that points up in body
+axes. So the z axis of a vehicle has to be its upper side.
 
-The rest is that of `tiltsim_controllers.laws.gait_feedforward`, with its terms.
+The published controller (`tiltsim_controllers.laws.attitude_altitude`) treats the tilt angles and
+the references of roll and pitch as constant, so it lags behind a moving gait. But the gait is
+planned: its rates are known, and with them the derivatives of all that depends on it. This
+controller
+
+* includes the tilt rates in ``Ma``: torque and force change with the tilt, ``(d tau / d alpha)
+  alpha' w`` and ``(d F / d alpha) alpha' w``;
+* gives roll and pitch the velocity and acceleration with which the exact decoupler's solution moves
+  as the torque-free force ``n(alpha(t))`` turns in the body;
+* follows the position reference up to its snap;
+* differentiates Euler angles exactly, where ch. 3, Eq. (8), uses body rates for their rates, and
+  includes the gyroscopic torque;
+* integrates the position error, so that a constant disturbance leaves no steady error. The
+  integrators stop where the desired acceleration is at its limit (anti-windup).
+
+Each of these terms can be omitted, to measure its effect.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
-from tiltsim_controllers.gaits.any_tilts import Jets, tilt_motion_of
-from tiltsim_controllers.gaits.parameters import FIXED, NO_KNOTS
-from tiltsim_controllers.laws.allocation import limited_of
+from tiltsim_controllers.code.arrays import xp
+from tiltsim_controllers.code.traceable import traceable
+from tiltsim_controllers.laws.attitude_altitude import PUBLISHED_DECOUPLING
 from tiltsim_controllers.laws.decouplers import NONE
-from tiltsim_controllers.laws.failures import health_of, masked_of
-from tiltsim_controllers.laws.feedback import attitude_motion
-from tiltsim_controllers.laws.force_directions import direction_jet_of, factors_of, nearest_in_plane
-from tiltsim_controllers.laws.force_motion import jerk_along
-from tiltsim_controllers.laws.gait_feedforward import (
-    altitude_control,
-    attitude_control,
-    horizontal_control,
-    tracking_errors,
-)
-from tiltsim_controllers.laws.multirotor_inputs import (
-    null_part_of,
-    pushing_of,
-    scaled_rows_of,
-    solution_of,
+from tiltsim_controllers.laws.failures import working
+from tiltsim_controllers.laws.feedback import attitude_motion, swept
+from tiltsim_controllers.laws.force_directions import (
+    factors,
+    jerk_along,
+    moving_direction,
+    nearest_in_plane,
+    share,
 )
 from tiltsim_controllers.laws.multirotor_steps import (
     ROTATION,
     Form,
+    altitude_control,
     desired_direction,
+    euler_control,
+    horizontal_control,
     lean,
     rotation_control,
     side_control,
+    tracking,
     turned,
 )
-from tiltsim_controllers.laws.multirotor_supervisor import multirotor_supervision_of, watched_at
-from tiltsim_controllers.laws.supervisor import SUPERVISOR_AT_REST, gait_time
-from tiltsim_controllers.mathematics.jets import Jet, Jets3
-from tiltsim_controllers.mathematics.rotation import rotation_from_euler, to_body, to_world
-from tiltsim_controllers.mathematics.scalar import Triple, Values, Vector, scalar
-from tiltsim_controllers.mathematics.vectors import componentwise, entries_of, vectors_of
-from tiltsim_controllers.vehicle.effectiveness import Rows, TiltOfRotor, effectiveness_of, tilts_of
-from tiltsim_controllers.vehicle.multirotor import body_acceleration, body_torque_rate
-from tiltsim_controllers.vehicle.rigid_body import cross
-from tiltsim_controllers.vehicle.states import PITCH, ROLL, YAW, P, Q, R
-
-Forces = tuple[Triple, Triple]
-"""Force per mass (m/s^2, body axes), and its rate by the pods' motion."""
-
-Motion = tuple[Values, Triple, Triple]
-"""Rotation (body to world, rows first), body rates (rad/s) and their rates (rad/s^2)."""
-
-Tracking = tuple[Jets3, Jets3]
-"""What `tracking_errors` returns: errors of position, and the reference's accelerations."""
-
-Watching = tuple[float, float, Triple]
-"""Roll and pitch (rad) and the supervisor's state with its rate and acceleration."""
-
-Horizontal = tuple[Jet, Jet, float, float, float, float]
-"""References of roll and pitch, desired jerk of x and y (m/s^3), integrator rates of x and y."""
+from tiltsim_controllers.mathematics.attitude import rotation_matrix
+from tiltsim_controllers.mathematics.linear import cross, nearest_solution
+from tiltsim_controllers.mathematics.moving import Moving, at_rest, stacked
+from tiltsim_controllers.vehicle.body import angular_acceleration, torque_rate
+from tiltsim_controllers.vehicle.effectiveness import TiltOfRotor
+from tiltsim_controllers.vehicle.rotors import airframe, moving_wrench_map, rotor_accelerations
+from tiltsim_controllers.vehicle.states import RotorcraftState, state_of
 
 
-@scalar
-def told_attitude(time: float, parameters: Any) -> tuple[Jet, Jet]:
-    """References of roll and pitch with derivatives where nothing else needs the attitude."""
-    reference, duration = parameters.reference, parameters.turn_time
-    return turned(time, reference.roll, duration), turned(time, reference.pitch, duration)
+class Present(NamedTuple):
+    """The vehicle as the law sees it.
 
-
-@scalar
-def direction_at_rest(
-    time: float, up: Triple, present: Triple, watching: Watching, parameters: Any, knots: Vector
-) -> Jets3:
-    """The present ``direction``, for pods that do not move, or whose motion does not count.
-
-    Args:
-        time, up, watching, parameters, knots: as the planned one has them, without use here
-        present: the ``direction`` of the factors
+    Attributes:
+        state: State of the vehicle.
+        rotation: Body to world, shape (3, 3).
+        omega_rate: Rates of the body rates, rad/s^2, shape (3,).
+        specific: Force per mass, m/s^2, body axes, with its rate by the motion of the pods.
+        direction: The ``direction`` of `force_directions`, moving or not.
     """
-    return (present[0], 0.0, 0.0), (present[1], 0.0, 0.0), (present[2], 0.0, 0.0)
+
+    state: RotorcraftState
+    rotation: Any
+    omega_rate: Any
+    specific: Moving
+    direction: Any
 
 
-@cache
-def _tilts_of(layout: TiltOfRotor, form: Form) -> Callable[..., Jets]:
-    """Scalar code of the gait's tilts with derivatives: ``(time, watching, parameters, knots)``.
+def _horizontal(
+    time: Any, present: Present, motion: Any, yaw: Any, integrals: Any, parameters: Any, form: Form
+) -> tuple[Moving, Moving, Any, Any]:
+    """References of roll and pitch (rad), then of x and y jerk by force and integrator rates."""
+    terms, omega, dimension = parameters.terms, present.state.omega, form.dimension
+    jerk, rates = xp.zeros(2), xp.zeros(2)
+    if dimension > 1:
+        jerk, rates = side_control(motion, integrals, parameters)
+    if dimension == 3 or parameters.decoupler == NONE:
+        target, duration = parameters.reference, parameters.turn_time
+        angles = (turned(time, angle, duration) for angle in (target.roll, target.pitch))
+        return *angles, jerk, rates
+    force, specific = present.direction, present.specific
+    body_jerk = xp.zeros(3)  # counts only for the attitude's rates
+    if dimension == 2:
+        body_jerk = cross(omega, specific.value) + specific.rate
+    elif terms.attitude_rates:
+        body_jerk = jerk_along(force, specific.value, omega, terms.gait_rates)
+    leaning, rates = horizontal_control(motion, present.rotation @ body_jerk, integrals, parameters)
+    along = stacked(leaning[0], leaning[1], motion.acceleration[2])
+    if dimension == 2:
+        force = nearest_in_plane(desired_direction(along, yaw, parameters.vehicle.gravity), force)
+    return *lean(force, along, yaw, parameters), jerk, rates
 
-    They are the anticipated ones of the plan or, under a supervisor, of what it makes of it.
+
+def _control(
+    time: Any, present: Present, reference: Any, integrals: Any, parameters: Any, form: Form
+) -> tuple[Any, ...]:
+    """Position and attitude control.
+
+    Returns the desired jerk (m/s^3, world axes), the desired second derivatives of the body rates
+    (rad/s^3), the rates of the integrals (m) and the references of roll and pitch (rad).
     """
-    motion = tilt_motion_of(tilts_of(layout))
-    planned_of, anticipated = motion.planned, motion.anticipated
-    angles = componentwise("angles_of_jets", "jets", "jets#[0]", tilts_of(layout))
-
-    @scalar
-    def planned(time: float, watching: Watching, parameters: Any, knots: Vector) -> Jets:
-        return anticipated(time, parameters.gait, knots, parameters.anticipation)
-
-    if not form.supervised:
-        return planned
-    supervision = multirotor_supervision_of(layout, form.dimension, form.forward)
-    gait_scale, supervised_tilts = supervision.gait_scale, supervision.tilts
-
-    @scalar
-    def supervised(time: float, watching: Watching, parameters: Any, knots: Vector) -> Jets:
-        supervisor, vehicle = parameters.supervisor, watched_at(time, parameters)
-        roll, pitch, moving = watching
-        clock = gait_time(time, moving, supervisor)
-        now = angles(planned_of(clock, parameters.gait, knots))
-        scale = gait_scale(now, roll, pitch, supervisor, vehicle, knots)
-        ahead = planned(clock, watching, parameters, knots)
-        return supervised_tilts(ahead, scale, moving, supervisor, vehicle)
-
-    return supervised
-
-
-@cache
-def _direction_of(layout: TiltOfRotor, form: Form) -> Callable[..., Jets3]:
-    """Scalar code of the ``direction`` with derivatives, as `direction_at_rest`."""
-    if form.dimension == 3 or form.forward or not tilts_of(layout):
-        return direction_at_rest
-    over_gait, tilts_at = (
-        direction_jet_of(layout, form.dimension, form.losses),
-        _tilts_of(layout, form),
+    now, rotation, terms = present.state, present.rotation, parameters.terms
+    attitude = attitude_motion(
+        now.attitude, now.omega, present.omega_rate, exact=terms.euler_rates != 0.0
     )
-    supervised = form.supervised
-
-    @scalar
-    def moving_direction(
-        time: float, up: Triple, present: Triple, watching: Watching, parameters: Any, knots: Vector
-    ) -> Jets3:
-        still = parameters.gait.type == FIXED and not supervised
-        if parameters.terms.attitude_rates == 0.0 or still:
-            return direction_at_rest(time, up, present, watching, parameters, knots)
-        tilts, at = tilts_at(time, watching, parameters, knots), int(parameters.rotors)
-        return over_gait(time, up, tilts, knots, at, parameters.failure)
-
-    return moving_direction
-
-
-@cache
-def _horizontal_of(layout: TiltOfRotor, form: Form) -> Callable[..., Horizontal]:
-    """Scalar code of what moves x and y: force as far as it is controlled, and leaning."""
-    moving_direction, dimension = _direction_of(layout, form), form.dimension
-
-    @scalar
-    def horizontal(
-        time: float,
-        motion: Motion,
-        direction: Triple,
-        tracking: Tracking,
-        forces: Forces,
-        yaw: Jet,
-        integrals: Triple,
-        watching: Watching,
-        parameters: Any,
-        knots: Vector,
-    ) -> Horizontal:
-        """The attitude that is asked for, and what force does at this attitude.
-
-        Args:
-            time: s
-            motion: of the body
-            direction: the ``direction`` of the factors, where the dimension is below 3
-            tracking: errors and accelerations
-            forces: of the rotors
-            yaw: rad, with derivatives, for the decoupler
-            integrals: of the position errors, m s
-            watching: what the supervisor goes by
-            parameters, knots: of the controller
-        """
-        errors, accelerations = tracking
-        jerk_x = jerk_y = x_rate = y_rate = 0.0
-        if dimension > 1:
-            jerk_x, jerk_y, x_rate, y_rate = side_control(
-                errors, accelerations, integrals, parameters
-            )
-        if dimension == 3 or parameters.decoupler == NONE:
-            roll, pitch = told_attitude(time, parameters)
-            return roll, pitch, jerk_x, jerk_y, x_rate, y_rate
-        rotation, omega, _ = motion
-        up = (rotation[6], rotation[7], rotation[8])
-        force = moving_direction(time, up, direction, watching, parameters, knots)
-        jerk = (0.0, 0.0, 0.0)  # counts only for the attitude's rates
-        if dimension == 2:
-            x, y, z = cross(omega, forces[0])
-            jerk = (x + forces[1][0], y + forces[1][1], z + forces[1][2])
-        elif parameters.terms.attitude_rates != 0.0:
-            jerk = jerk_along(force, forces[0], omega, parameters.terms.gait_rates)
-        along_x, along_y, x_rate, y_rate = horizontal_control(
-            errors, accelerations, to_world(rotation, jerk), integrals, parameters
-        )
-        along_z = accelerations[2]
-        if dimension == 2:
-            gravity = parameters.vehicle.gravity
-            desired = desired_direction(along_x, along_y, along_z, yaw, gravity)
-            force = nearest_in_plane(desired, force)
-        roll, pitch = lean(force, along_x, along_y, along_z, yaw, parameters)
-        return roll, pitch, jerk_x, jerk_y, x_rate, y_rate
-
-    return horizontal
+    yaw = attitude[2]
+    if parameters.attitude_error == ROTATION or not (terms.attitude_rates or form.own_yaw):
+        yaw = parameters.reference.yaw
+    motion = tracking(now, reference, rotation @ present.specific.value, parameters)
+    roll, pitch, jerk, rates = _horizontal(time, present, motion, yaw, integrals, parameters, form)
+    climb, climb_rate = altitude_control(motion, integrals, parameters)
+    if parameters.attitude_error == ROTATION:
+        angular = rotation_control(roll, pitch, rotation, now.omega, present.omega_rate, parameters)
+    else:
+        angular = euler_control(roll, pitch, attitude, parameters)
+    jerk, rates = xp.hstack([jerk, climb]), xp.hstack([rates, climb_rate])
+    return jerk, angular, rates, xp.array([roll.value, pitch.value])
 
 
-@cache
-def _control_of(layout: TiltOfRotor, form: Form) -> Callable[..., tuple[Any, ...]]:
-    """Scalar code of position and attitude control.
+def _per_unknown(wrench: Any, speeds: Any, published: bool, form: Form) -> tuple[Any, Any]:
+    """Force and torque per unknown of the norm, and the force with the torque's factor.
 
-    ``(time, state, motion, direction, forces, integrals, supervisor_motion, parameters, knots)``;
-    it returns the desired jerk (m/s^3, world axes), the desired second derivatives of the body
-    rates (rad/s^3), the rates of the integrals (m) and the references of roll and pitch (rad).
+    A rotor acceleration changes ``w`` by ``2 |varpi|``. Ch. 3 prints that factor in rows of the
+    force only.
     """
-    horizontal = _horizontal_of(layout, form)
-
-    @scalar
-    def control(
-        time: float,
-        state: Values,
-        motion: Motion,
-        direction: Triple,
-        forces: Forces,
-        integrals: Triple,
-        supervisor_motion: Triple,
-        parameters: Any,
-        knots: Vector,
-    ) -> tuple[Triple, Triple, Triple, float, float]:
-        rotation, omega, omega_rate = motion
-        terms = parameters.terms
-        attitude = attitude_motion(
-            (state[ROLL], state[PITCH], state[YAW]), omega, omega_rate, terms.euler_rates
-        )
-        yaw = attitude[2]
-        if parameters.attitude == ROTATION or terms.attitude_rates == 0.0:
-            yaw = (parameters.reference.yaw, 0.0, 0.0)
-        tracking = tracking_errors(time, state, to_world(rotation, forces[0]), parameters, knots)
-        watching = (state[ROLL], state[PITCH], supervisor_motion)
-        roll, pitch, jerk_x, jerk_y, x_rate, y_rate = horizontal(
-            time, motion, direction, tracking, forces, yaw, integrals, watching, parameters, knots
-        )
-        errors, accelerations = tracking
-        jerk_z, z_rate = altitude_control(errors[2], accelerations[2], integrals[2], parameters)
-        if parameters.attitude == ROTATION:
-            angular = rotation_control(roll, pitch, rotation, omega, omega_rate, parameters)
-        else:
-            angular = attitude_control(roll, pitch, attitude, parameters)
-        rates = (x_rate, y_rate, z_rate)
-        return (jerk_x, jerk_y, jerk_z), angular, rates, roll[0], pitch[0]
-
-    return control
+    if form.norm == "thrust":
+        return wrench, wrench[:3]
+    gain = 2.0 * abs(speeds)
+    turns = xp.ones(len(speeds)) if published else gain
+    return xp.vstack([wrench[:3] * gain, wrench[3:] * turns]), wrench[:3] * turns
 
 
-@cache
-def _present_of(layout: TiltOfRotor, form: Form) -> Callable[..., tuple[Any, ...]]:
-    """Scalar code of what the rotors do now, and how it changes as the pods turn.
+def _start(w: Any, speeds: Any, parameters: Any, form: Form) -> Any:
+    """Unknowns from which the solution is the nearest: zero, or towards the least power.
 
-    ``(time, state, tilt_rates, parameters, knots)``; it returns ``w``, the rows of F and tau, the
-    wrench and its rate.
+    The power is proportional to the sum of ``|varpi|^3``.
     """
-    length, tilts, losses = len(layout), tilts_of(layout), form.losses
-    tilts_in, speeds_in = entries_of(12, tilts), entries_of(12 + tilts, length)
-    squares, pushing = effectiveness_of(layout).squares, pushing_of(layout)
-    health, masked, product = health_of(length), masked_of(length), vectors_of(length).product
-
-    @scalar
-    def present(
-        time: float, state: Values, tilt_rates: Values, parameters: Any, knots: Vector
-    ) -> tuple[Values, Rows, Values, Values]:
-        w = squares(speeds_in(state))
-        if losses:
-            works = health(time, parameters.failure)
-            w = product(works, w)
-        rows, wrench, change = pushing(
-            tilts_in(state), tilt_rates, w, knots, int(parameters.rotors)
-        )
-        if losses:
-            rows = masked(works, rows)
-        return w, rows, wrench, change
-
-    return present
+    count = len(speeds)
+    if count == 3 + form.dimension:
+        return xp.zeros(count)  # there is one solution
+    if form.norm == "thrust":
+        return -parameters.restoring * w
+    total = abs(speeds).sum()
+    return -parameters.restoring * count / xp.where(total == 0.0, xp.inf, total) * w
 
 
-@cache
-def multirotor_law_of(layout: TiltOfRotor, form: Form) -> Callable[..., Values]:
-    """The control law of vehicles of a layout.
+def null_part(wrench: Any, up: Any, w: Any, form: Form) -> Any:
+    """The share of ``w`` that the outputs do not see, whatever the norm, from 0 to 1.
 
-    It is a scalar function as `tiltsim_controllers.laws.gait_feedforward.tracking_inputs`, with the
-    parameters of `tiltsim_controllers.laws.multirotor_steps` and the table of the rotors in the
-    knots. It also returns the null part: the share, from 0 to 1, of ``w`` that the outputs do not
-    see; ``restoring`` keeps it near its least.
+    In the norm of rotor accelerations a rotor that comes to rest would take the share with it.
 
     Args:
-        layout: of the table of rotors
-        form: what the code is made for
+        wrench: Force and torque per unit of ``w``, shape (6, N).
+        up: World up in body axes, shape (3,).
+        w: ``varpi |varpi|`` of the rotors, shape (N,).
+        form: Options of the law.
     """
-    length, dimension, norm, forward = len(layout), form.dimension, form.norm, form.forward
-    present, speeds_in = _present_of(layout, form), entries_of(12 + tilts_of(layout), length)
-    scaled_rows = scaled_rows_of(length, norm)
-    factors_of_rows = factors_of(length, dimension, forward)
-    control, solution = _control_of(layout, form), solution_of(length, dimension, norm)
-    null_part, limited = null_part_of(length, dimension, forward), limited_of(length)
-    prioritized = form.prioritized
+    if len(w) <= 3 + form.dimension:
+        return 0.0
+    units = factors(wrench, wrench[:3], up, form.dimension, form.forward).units
+    seen, whole = xp.array([unit @ w for unit in units]), w @ w
+    rest = 1.0 - seen @ seen / xp.where(whole > 0.0, whole, 1.0)
+    return xp.where(whole > 0.0, xp.sqrt(xp.maximum(rest, 0.0)), 0.0)
 
-    @scalar
-    def inputs(
-        time: float,
-        state: Values,
-        tilt_rates: Values,
-        integrals: Triple,
-        parameters: Any,
-        knots: Vector = NO_KNOTS,
-        supervisor_motion: Triple = SUPERVISOR_AT_REST,
-        measured: Triple | None = None,
-    ) -> Values:
-        body, terms = parameters.vehicle, parameters.terms
-        mass, omega, speeds = body.mass, (state[P], state[Q], state[R]), speeds_in(state)
-        rotation = rotation_from_euler(state[ROLL], state[PITCH], state[YAW])
-        w, rows, wrench, change = present(time, state, tilt_rates, parameters, knots)
-        fx, fy, fz, tx, ty, tz = wrench
-        known = terms.gait_rates
-        gx, gy, gz = known * change[0], known * change[1], known * change[2]
-        if measured is None:
-            omega_rate = body_acceleration(body, (tx, ty, tz), omega, terms.gyroscopic_torque)
-        else:
-            omega_rate = measured
-        up = (rotation[6], rotation[7], rotation[8])
-        unseen = null_part(rows, up, w)
-        unknown_rows, pushes = scaled_rows(rows, speeds, parameters.decoupling)
-        factors = factors_of_rows(unknown_rows, pushes, up)
-        jerk, angular_jerk, rates, roll_ref, pitch_ref = control(
-            time,
-            state,
-            (rotation, omega, omega_rate),
-            factors[3],
-            ((fx / mass, fy / mass, fz / mass), (gx / mass, gy / mass, gz / mass)),
-            integrals,
-            supervisor_motion,
-            parameters,
-            knots,
-        )
 
-        # Rates of torque and force that remain for the rotors.
-        mx, my, mz = body_torque_rate(
-            body, omega, omega_rate, angular_jerk, terms.gyroscopic_torque
-        )
-        jx, jy, jz = to_body(rotation, (mass * jerk[0], mass * jerk[1], mass * jerk[2]))
-        sx, sy, sz = cross(omega, (fx, fy, fz))
-        accelerations = solution(
-            unknown_rows,
-            factors,
-            (mx - known * change[3], my - known * change[4], mz - known * change[5]),
-            (jx - sx - gx, jy - sy - gy, jz - sz - gz),
-            w,
-            speeds,
-            parameters,
-        )
-        if prioritized:
-            limits, at = parameters.limits, int(parameters.rotors)
-            accelerations = limited(accelerations, rows, up, speeds, limits, knots, at)
-        references = (roll_ref, pitch_ref, parameters.reference.yaw)
-        return (*accelerations, *rates, *references, unseen)
+@traceable
+def independence(wrench: Any, up: Any, side: Any, form: Form) -> Any:
+    """How independent the outputs are: 1 at best, 0 where the decoupling matrix is singular.
 
-    return inputs
+    It is the share of the force's rows that remains without the rows of the torque, and without
+    each other. With one component of force the number is negative where lift pushes against a side.
+
+    Args:
+        wrench: Force and torque per unit of ``w``, shape (6, N).
+        up: World up in body axes, shape (3,).
+        side: A direction of the force, body axes, shape (3,).
+        form: Options of the law.
+    """
+    found = factors(wrench, wrench[:3], up, form.dimension, form.forward)
+    product = 1.0
+    for row, unit in zip(found.rows, found.units[3:]):
+        product = product * share(row, unit)
+    if form.dimension == 1:
+        against = found.units[3] @ (side @ wrench[:3]) < 0.0
+        return xp.where(product > 0.0, xp.where(against, -product, product), 0.0)
+    return xp.where(product > 0.0, product, 0.0)
+
+
+@traceable
+def present_wrench(
+    time: Any, state: Any, parameters: Any, knots: Any, layout: TiltOfRotor
+) -> tuple[Any, Any]:
+    """Force and torque per unit of ``w`` (6, N) without failed rotors, and world up in body axes.
+
+    Args:
+        time, state, parameters, knots, layout: As for `attitude_force`.
+    """
+    now, (_, rotors) = state_of(state, layout), airframe(parameters, knots, layout)
+    works = working(time, parameters.failure, len(layout))
+    wrench = moving_wrench_map(rotors.masked(works), at_rest(now.tilts)).value
+    return wrench, rotation_matrix(now.attitude)[2]
+
+
+@traceable
+def attitude_force(
+    time: Any,
+    state: Any,
+    tilt_rates: Any,
+    integrals: Any,
+    reference: Any,
+    plan: Any,
+    parameters: Any,
+    knots: Any,
+    layout: TiltOfRotor,
+    form: Form,
+    measured: Any = None,
+) -> Any:
+    """Rotor accelerations (N), integrator rates (3), references of roll, pitch and yaw, null part.
+
+    They are in rad/s^2, m and rad; NaN where the decoupling matrix is singular. The null part is
+    the share, from 0 to 1, of ``w`` that the outputs do not see; ``restoring`` keeps it near its
+    least.
+
+    Args:
+        time: s.
+        state: `tiltsim_controllers.vehicle.states.RotorcraftState` in one vector.
+        tilt_rates: rad/s, shape (M,).
+        integrals: `INTEGRAL_FIELDS`, shape (3,).
+        reference: Position with four derivatives, m and s, world axes, shape (15,).
+        plan: Tilt angles (rad) with two derivatives by which the body is to turn, shape (M, 3);
+            None for pods that do not move, or whose motion does not count.
+        parameters: `Parameters` of `multirotor_steps` or of `gait_feedforward`.
+        knots: Table data of the flight, with the table of the rotors.
+        layout: Tilts of the rotors.
+        form: Options of the law.
+        measured: Angular acceleration, rad/s^2, body axes, shape (3,); None takes the model's.
+    """
+    now, (body, rotors) = state_of(state, layout), airframe(parameters, knots, layout)
+    terms, omega, w = parameters.terms, now.omega, now.speeds * abs(now.speeds)
+    if form.losses:
+        works = working(time, parameters.failure, len(layout))
+        rotors, w = rotors.masked(works), works * w
+
+    # Force and torque, and their rates as the pods turn at constant rotor speeds.
+    turning = moving_wrench_map(rotors, Moving(now.tilts, terms.gait_rates * tilt_rates, 0.0))
+    rows, wrench, change = turning.value, turning.value @ w, turning.rate @ w
+    force, torque = wrench[:3], wrench[3:]
+    momentum = Moving(*xp.zeros((3, 3)))  # of the rotors' spin
+    if form.spin:
+        per_rotor = parameters.rotor_inertia / parameters.vehicle.thrust_coefficient
+        momentum = turning[:3] @ (per_rotor * rotors.spins * now.speeds)
+
+    # Newton and Euler.
+    rotation = rotation_matrix(now.attitude)
+    omega_rate = measured
+    if measured is None:
+        remaining = torque - swept(momentum, omega, xp.zeros(3)).value
+        omega_rate = angular_acceleration(body, remaining, omega, terms.gyroscopic_torque)
+    spin = swept(momentum, omega, omega_rate)
+    published = parameters.decoupling == PUBLISHED_DECOUPLING
+    unknown, pushes = _per_unknown(rows, now.speeds, published, form)
+    found = factors(unknown, pushes, rotation[2], form.dimension, form.forward)
+    direction = found.direction
+    if plan is not None:
+        planned = moving_wrench_map(rotors, Moving(plan[:, 0], plan[:, 1], plan[:, 2]))
+        direction = moving_direction(planned, rotation[2], form.dimension)
+    specific = Moving(force / body.mass, change[:3] / body.mass, 0.0)
+    present = Present(now, rotation, omega_rate, specific, direction)
+    jerk, omega_jerk, rates, lean_ref = _control(
+        time, present, reference.reshape(5, 3), integrals, parameters, form
+    )
+
+    # Rates of torque and force that remain for the rotors.
+    twist = torque_rate(body, omega, omega_rate, omega_jerk, terms.gyroscopic_torque) + spin.rate
+    push = body.mass * (rotation.T @ jerk) - cross(omega, force)
+    desired = xp.hstack([twist - change[3:], found.axes @ (push - change[:3])])
+    matrix, start = xp.vstack([unknown[3:], found.rows]), _start(w, now.speeds, parameters, form)
+    inputs = nearest_solution(matrix, desired, start, found.units)
+    if form.norm == "thrust":
+        inputs = rotor_accelerations(inputs, now.speeds, parameters.slowest)
+    unseen = null_part(rows, rotation[2], w, form)
+    return xp.hstack([inputs, rates, lean_ref, parameters.reference.yaw, unseen])

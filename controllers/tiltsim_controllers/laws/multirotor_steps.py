@@ -1,10 +1,10 @@
-"""Parameters and steps of the multirotor's control law, `tiltsim_controllers.laws.multirotor`."""
+"""Parameters and steps of the control law of attitude and force, `multirotor`."""
 
 from __future__ import annotations
 
-from math import cos, sin
 from typing import Any, Final, NamedTuple
 
+from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.gaits.parameters import GaitParameters
 from tiltsim_controllers.laws.allocation import RotorRange
 from tiltsim_controllers.laws.attitude_altitude import EXACT_DECOUPLING, Gains
@@ -16,43 +16,61 @@ from tiltsim_controllers.laws.decouplers import (
     modified_decoupler,
 )
 from tiltsim_controllers.laws.failures import Failure
-from tiltsim_controllers.laws.feedback import attitude_jerk, force_control
-from tiltsim_controllers.laws.full_pose import attitude_error
+from tiltsim_controllers.laws.feedback import (
+    angular_jerk,
+    attitude_jerk,
+    body_rate_matrix,
+    force_control,
+    integrator_rate,
+    limited_acceleration,
+    position_feedback,
+)
 from tiltsim_controllers.laws.gains import IntegralGains
-from tiltsim_controllers.laws.gait_feedforward import FeedforwardTerms, decoupled_attitude
 from tiltsim_controllers.laws.multirotor_supervisor import Watched
 from tiltsim_controllers.laws.supervisor import Supervisor
-from tiltsim_controllers.mathematics.jets import (
-    Jet,
-    Jets3,
-    jet_cosine,
-    jet_product,
-    jet_sine,
-    jet_sum,
-)
-from tiltsim_controllers.mathematics.rotation import rotation_from_euler, to_body, to_world
-from tiltsim_controllers.mathematics.scalar import Triple, Values, scalar
+from tiltsim_controllers.mathematics.attitude import attitude_error, rotation_matrix, wrapped
+from tiltsim_controllers.mathematics.linear import cross
+from tiltsim_controllers.mathematics.moving import Moving, at_rest, cosine, sine, stacked, value_of
 from tiltsim_controllers.references.trajectories import ReferenceParameters
-from tiltsim_controllers.vehicle.multirotor import Body
-from tiltsim_controllers.vehicle.rigid_body import cross
+from tiltsim_controllers.vehicle.body import Body
+from tiltsim_controllers.vehicle.states import RotorcraftState
 
 EULER_ANGLES: Final = 0.0
 ROTATION: Final = 1.0
 
 ATTITUDE_ERRORS: Final = {"euler_angles": EULER_ANGLES, "rotation": ROTATION}
-"""What the attitude's error dynamics act on, by name: roll, pitch and yaw as in ch. 3, or the
-rotation that remains, which has no singular pitch."""
+"""Errors on which the attitude's error dynamics act, by name: of roll, pitch and yaw as in ch. 3,
+or the rotation that remains, which has no singular pitch."""
+
+NORMS: Final = ("speed", "thrust")
+"""Norms in which the inputs are the least: of rotor accelerations, or of the rates of ``w``."""
+
+INTEGRAL_FIELDS: Final = ("integral_x", "integral_y", "integral_z")
+"""The controller's own states: integrals of the position error, m s, world axes."""
+
+
+class FeedforwardTerms(NamedTuple):
+    """The terms that the controller includes: 1 or 0 each."""
+
+    gait_rates: float = 1.0  # tilt rates in Ma
+    attitude_rates: float = 1.0  # velocity and acceleration of the roll and pitch references
+    reference_derivatives: float = 1.0  # acceleration, jerk and snap of the position reference
+    euler_rates: float = 1.0  # exact derivatives of the Euler angles, else the body rates
+    gyroscopic_torque: float = 1.0  # omega x I omega
+    integral_action: float = 1.0
 
 
 class Form(NamedTuple):
-    """What the code of the law is made for; all else is data."""
+    """Options that a program of the law is made for; all else is data."""
 
     dimension: int  # components of force that are outputs, 1 to 3
-    norm: str = "speed"  # in `tiltsim_controllers.laws.multirotor_inputs.NORMS`
+    norm: str = "speed"  # in `NORMS`
     forward: bool = False  # two components are those along x and z, of a vehicle that has three
     losses: bool = False  # whether the controller knows of failures
     prioritized: bool = False  # whether it keeps within rotor limits (`allocation`)
     supervised: bool = False  # whether a supervisor changes its gait
+    own_yaw: bool = False  # whether its decoupler takes the present yaw even if references rest
+    spin: bool = False  # whether it takes along the angular momentum of the rotors
 
     @property
     def name(self) -> str:
@@ -95,7 +113,7 @@ class Parameters(NamedTuple):
     decoupler: float  # see `tiltsim_controllers.laws.decouplers`; dimension 1 knows all
     rotors: float  # where in the knots the table of the rotors begins
     decoupling: float = EXACT_DECOUPLING  # published: rows of the torque as in ch. 3
-    attitude: float = ROTATION
+    attitude_error: float = ROTATION
     restoring: float = 0.0  # 1/s, rate towards the least power or sum of w^2
     slowest: float = 0.0  # rad/s, thrust norm: a slower rotor is accelerated as if it were so fast
     failure: Failure = Failure()
@@ -108,134 +126,152 @@ class Parameters(NamedTuple):
     upper_side_without: Direction = Direction()  # the same once the failed rotor is known
 
 
-@scalar
-def turned(time: float, angle: float, duration: float) -> Jet:
+def turned(time: Any, angle: Any, duration: Any) -> Any:
     """An angle (rad) that is reached from zero within a duration (s), with continuous acceleration.
 
     ``angle s^3 (10 - 15 s + 6 s^2)``; without a duration the angle itself.
     """
-    if time >= duration:
-        return angle, 0.0, 0.0
-    s = time / duration
-    left = 1.0 - s
-    return (
-        angle * (s * s * s * (10.0 + s * (6.0 * s - 15.0))),
-        angle * (30.0 * s * s * left * left) / duration,
-        angle * (60.0 * s * left * (1.0 - 2.0 * s)) / (duration * duration),
+    turns = time < duration
+    period = xp.where(turns, duration, 1.0)
+    s = Moving(xp.where(turns, time / period, 1.0), xp.where(turns, 1.0 / period, 0.0), 0.0)
+    return angle * (s * s * s * (10.0 + s * (6.0 * s - 15.0)))
+
+
+class Tracking(NamedTuple):
+    """Motion to track, world axes.
+
+    Attributes:
+        error: Position error, m.
+        acceleration: Acceleration of the reference, m/s^2, as far as the law passes it on.
+    """
+
+    error: Moving
+    acceleration: Moving
+
+
+def tracking(now: RotorcraftState, reference: Any, specific: Any, parameters: Any) -> Tracking:
+    """The motion to track.
+
+    Args:
+        now: State of the vehicle.
+        reference: Position with four derivatives, m and s, world axes, shape (5, 3).
+        specific: Force per mass, m/s^2, world axes, shape (3,).
+        parameters: Parameters of the controller.
+    """
+    ahead = parameters.terms.reference_derivatives * reference[2:]
+    fall = xp.array([0.0, 0.0, parameters.vehicle.gravity])
+    error = Moving(
+        reference[0] - now.position, reference[1] - now.velocity, ahead[0] - (specific - fall)
     )
+    return Tracking(error, Moving(ahead[0], ahead[1], ahead[2]))
 
 
-@scalar
+def horizontal_control(
+    motion: Tracking, jerk: Any, integrals: Any, parameters: Any
+) -> tuple[Moving, Any]:
+    """Desired acceleration along x and y (m/s^2), shape (2,), and integrator rates (m).
+
+    Args:
+        motion: The motion to track.
+        jerk: Jerk of the body, m/s^3, world axes, shape (3,).
+        integrals: `INTEGRAL_FIELDS`, shape (3,).
+        parameters: Parameters of the controller.
+    """
+    gains, limit = parameters.gains, parameters.max_acceleration
+    k3 = parameters.terms.integral_action * parameters.integral.position
+    error, ahead = motion.error[:2], motion.acceleration[:2]
+    back = position_feedback(
+        error, ahead.rate - jerk[:2], integrals[:2], (gains.position_1, gains.position_2, k3)
+    )
+    rates = integrator_rate(error.value, back.value, limit)
+    return ahead + limited_acceleration(back, limit), rates
+
+
+def side_control(motion: Tracking, integrals: Any, parameters: Any) -> tuple[Any, Any]:
+    """Desired jerk (m/s^3) of x and y as far as force moves them, and integrator rates (m)."""
+    side = parameters.side
+    k4 = parameters.terms.integral_action * side.side_integral
+    gains = side.side_1, side.side_2, side.side_3, k4
+    error, limit = motion.error[:2], parameters.max_acceleration
+    return force_control(error, motion.acceleration.rate[:2], integrals[:2], gains, limit)
+
+
+def altitude_control(motion: Tracking, integrals: Any, parameters: Any) -> tuple[Any, Any]:
+    """Desired vertical jerk (m/s^3; ch. 4, Eq. 27, with an integral), and integrator rate (m)."""
+    k4 = parameters.terms.integral_action * parameters.integral.altitude
+    gains, limit = (*parameters.gains.altitude, k4), parameters.max_acceleration
+    return force_control(motion.error[2], motion.acceleration.rate[2], integrals[2], gains, limit)
+
+
+def euler_control(roll: Moving, pitch: Moving, attitude: Moving, parameters: Any) -> Any:
+    """Desired second derivatives (rad/s^3) of the body rates, shape (3,), by Euler angles.
+
+    Args:
+        roll, pitch: References, rad; the reference of yaw is at rest.
+        attitude: Roll, pitch and yaw, rad, shape (3,).
+        parameters: Parameters of the controller.
+    """
+    yaw = attitude.value[2]
+    desired = stacked(roll, pitch, yaw + wrapped(parameters.reference.yaw - yaw))
+    limit = parameters.max_angular_acceleration
+    jerk = attitude_jerk(desired, attitude, parameters.gains.attitude, limit)
+    return angular_jerk(attitude, jerk) if parameters.terms.euler_rates else jerk
+
+
 def rotation_control(
-    roll_ref: Jet,
-    pitch_ref: Jet,
-    rotation: Values,
-    omega: Triple,
-    omega_rate: Triple,
-    parameters: Any,
-) -> Triple:
+    roll: Moving, pitch: Moving, rotation: Any, omega: Any, omega_rate: Any, parameters: Any
+) -> Any:
     """Desired second derivatives (rad/s^3) of the body rates, by the rotation that remains.
 
     Args:
-        roll_ref, pitch_ref: references with derivatives, rad; that of yaw is at rest
-        rotation: body to world, rows first
-        omega, omega_rate: body rates (rad/s) and their rates (rad/s^2)
-        parameters: of the controller
+        roll, pitch: References, rad; the reference of yaw is at rest.
+        rotation: Body to world, shape (3, 3).
+        omega, omega_rate: Body rates (rad/s) and their rates (rad/s^2), shape (3,) each.
+        parameters: Parameters of the controller.
     """
-    gains, limit = parameters.gains, parameters.max_angular_acceleration
-    desired = rotation_from_euler(roll_ref[0], pitch_ref[0], parameters.reference.yaw)
-    error = attitude_error(rotation, desired)
-    # Rates of the desired attitude in its own axes, then in those of the body.
-    sin_roll, cos_roll = sin(roll_ref[0]), cos(roll_ref[0])
-    q, r = pitch_ref[1] * cos_roll, -pitch_ref[1] * sin_roll
-    p_rate = roll_ref[2]
-    q_rate = pitch_ref[2] * cos_roll + r * roll_ref[1]
-    r_rate = -pitch_ref[2] * sin_roll - q * roll_ref[1]
-    rate = to_body(rotation, to_world(desired, (roll_ref[1], q, r)))
-    swept = cross(omega, rate)
-    x, y, z = to_body(rotation, to_world(desired, (p_rate, q_rate, r_rate)))
-    second = (x - swept[0], y - swept[1], z - swept[2])
-    return (
-        attitude_jerk(
-            (error[0], rate[0], second[0]),
-            (0.0, omega[0], omega_rate[0]),
-            (gains.roll_1, gains.roll_2, gains.roll_3),
-            limit,
-        ),
-        attitude_jerk(
-            (error[1], rate[1], second[1]),
-            (0.0, omega[1], omega_rate[1]),
-            (gains.pitch_1, gains.pitch_2, gains.pitch_3),
-            limit,
-        ),
-        attitude_jerk(
-            (error[2], rate[2], second[2]),
-            (0.0, omega[2], omega_rate[2]),
-            (gains.yaw_1, gains.yaw_2, gains.yaw_3),
-            limit,
-        ),
+    desired = rotation_matrix(xp.array([roll.value, pitch.value, parameters.reference.yaw]))
+    # Rates of the desired attitude in its own axes, then in body axes.
+    rates = stacked(*(Moving(e.rate, e.acceleration, 0.0) for e in (roll, pitch, at_rest(0.0))))
+    turning = rotation.T @ (desired @ (body_rate_matrix(roll, pitch) @ rates))
+    second = turning.rate - cross(omega, turning.value)
+    return attitude_jerk(
+        Moving(attitude_error(rotation, desired), turning.value, second),
+        Moving(0.0, omega, omega_rate),
+        parameters.gains.attitude,
+        parameters.max_angular_acceleration,
     )
 
 
-@scalar
-def side_control(
-    errors: Jets3, accelerations: Jets3, integrals: Triple, parameters: Any
-) -> tuple[float, float, float, float]:
-    """Desired jerk (m/s^3) of x and y as far as force moves them, and the integrators' rates.
+def lean(force: Any, along: Moving, yaw: Any, parameters: Any) -> tuple[Moving, Moving]:
+    """References of roll and pitch (rad) by the controller's decoupler.
 
     Args:
-        errors, accelerations: as `tracking_errors` returns them
-        integrals: of the position errors, m s
-        parameters: of the controller
+        force: The torque-free force, of any unit, body axes, shape (3,).
+        along: The desired acceleration, m/s^2, world axes, shape (3,).
+        yaw: rad.
+        parameters: Parameters of the controller.
     """
-    side = parameters.side
-    gains = (
-        side.side_1,
-        side.side_2,
-        side.side_3,
-        parameters.terms.integral_action * side.side_integral,
-    )
-    limit = parameters.max_acceleration
-    x, x_rate = force_control(errors[0], accelerations[0], integrals[0], gains, limit)
-    y, y_rate = force_control(errors[1], accelerations[1], integrals[1], gains, limit)
-    return x, y, x_rate, y_rate
-
-
-@scalar
-def lean(force: Jets3, x: Jet, y: Jet, z: Jet, yaw: Jet, parameters: Any) -> tuple[Jet, Jet]:
-    """References of roll and pitch with derivatives by the controller's decoupler.
-
-    Args:
-        force: the torque-free force, of arbitrary unit, body axes
-        x, y, z: the desired acceleration, m/s^2, world axes
-        yaw: rad
-        parameters: of the controller
-    """
-    gravity = parameters.vehicle.gravity
-    n = (force[0][0], force[1][0], force[2][0])
+    gravity, moves = parameters.vehicle.gravity, parameters.terms.attitude_rates != 0.0
+    if parameters.decoupler == EXACT and moves:
+        roll, pitch = exact_decoupler(along[0], along[1], along[2], yaw, gravity, force)
+        return roll, pitch
+    (x, y, z), n, psi = along.value, value_of(force), value_of(yaw)
     if parameters.decoupler == EXACT:
-        if parameters.terms.attitude_rates != 0.0:
-            return decoupled_attitude(x, y, z, yaw, force, parameters)
-        roll, pitch = exact_decoupler(x[0], y[0], z[0], yaw[0], gravity, n)
+        roll, pitch = exact_decoupler(x, y, z, psi, gravity, n)
     elif parameters.decoupler == CONVENTIONAL:
-        roll, pitch = conventional_decoupler(x[0], y[0], yaw[0], gravity)
+        roll, pitch = conventional_decoupler(x, y, psi, gravity)
     else:
-        roll, pitch = modified_decoupler(x[0], y[0], yaw[0], gravity, n)
-    return (roll, 0.0, 0.0), (pitch, 0.0, 0.0)
+        roll, pitch = modified_decoupler(x, y, psi, gravity, n)
+    return at_rest(roll), at_rest(pitch)
 
 
-@scalar
-def desired_direction(x: Jet, y: Jet, z: Jet, yaw: Jet, gravity: float) -> Jets3:
-    """Where the rotors have to push: along ``(x, y, gravity + z)``, in axes of the yaw.
+def desired_direction(along: Moving, yaw: Any, gravity: Any) -> Moving:
+    """Direction in which the rotors have to push, in axes of the yaw, shape (3,).
 
     Args:
-        x, y, z: the desired acceleration, m/s^2, world axes
-        yaw: rad
-        gravity: m/s^2
+        along: The desired acceleration, m/s^2, world axes, shape (3,).
+        yaw: rad.
+        gravity: m/s^2.
     """
-    s, c = jet_sine(yaw), jet_cosine(yaw)
-    return (
-        jet_sum(1.0, jet_product(x, c), 1.0, jet_product(y, s)),
-        jet_sum(1.0, jet_product(y, c), -1.0, jet_product(x, s)),
-        (gravity + z[0], z[1], z[2]),
-    )
+    (x, y, z), s, c = (along[0], along[1], along[2]), sine(yaw), cosine(yaw)
+    return stacked(x * c + y * s, y * c - x * s, gravity + z)

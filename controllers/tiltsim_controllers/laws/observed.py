@@ -1,48 +1,80 @@
-"""What a control law for any rotorcraft sees, as scalar code.
+"""Observation and command of a control law for any rotorcraft.
 
-The law is a scalar function ``(observed, parameters) -> thrusts, tilts, rates``: what it sees, the
-record of its own parameters; the thrust (N) of every rotor along its axis, the tilt angles (rad)
-where the law moves them, else ``()``, and the rates of its own states, ``()`` without any.
+A law is a function ``(observed, parameters) -> Command`` of small NumPy arrays for a vehicle with N
+rotors and M tilts.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from dataclasses import dataclass
+from typing import Any, Final, NamedTuple
 
-from tiltsim_controllers.mathematics.scalar import Triple, Values, Vector
-from tiltsim_controllers.vehicle.multirotor import Body
+from tiltsim_controllers.vehicle.body import Body
+from tiltsim_controllers.vehicle.parameters import Vehicle
+from tiltsim_controllers.vehicle.rotors import Rotors
+
+ROTOR_COMMANDS: Final = ("thrusts", "rotor_speeds", "rotor_accelerations")
+"""Commands for the rotors; a `Command` gives one of them."""
 
 
 class Desired(NamedTuple):
     """The reference: motion in world axes, roll, pitch and yaw, and the planned gait."""
 
-    position: Triple  # m
-    velocity: Triple  # m/s
-    acceleration: Triple  # m/s^2
-    jerk: Triple  # m/s^3
-    attitude: Triple  # rad
-    tilt_angles: Values  # rad
-    tilt_rates: Values  # rad/s
+    position: Any  # (3,), m
+    velocity: Any  # (3,), m/s
+    acceleration: Any  # (3,), m/s^2
+    jerk: Any  # (3,), m/s^3
+    attitude: Any  # (3,), roll, pitch, yaw, rad
+    tilt_angles: Any  # (M,), rad
+    tilt_rates: Any  # (M,), rad/s
 
 
 class Observed(NamedTuple):
-    """The vehicle, as far as the sensors show it, and what is known about it."""
+    """The state of a vehicle as its sensors measure it, its reference and its parameters."""
 
-    time: float  # s
-    position: Triple  # m, world axes
-    velocity: Triple  # m/s, world axes
-    attitude: Triple  # roll, pitch, yaw, rad
-    rotation: Values  # body to world, nine entries, rows first
-    body_rates: Triple  # rad/s, body axes
-    tilt_angles: Values  # rad
-    tilt_rates: Values  # rad/s
-    rotor_speeds: Values  # rad/s, along the spin
-    thrusts: Values  # N, with which the rotors push now
-    states: Values  # the law's own
+    time: Any  # s
+    position: Any  # (3,), m, world axes
+    velocity: Any  # (3,), m/s, world axes
+    attitude: Any  # (3,), roll, pitch, yaw, rad
+    rotation: Any  # (3, 3), body to world
+    body_rates: Any  # (3,), rad/s, body axes
+    tilt_angles: Any  # (M,), rad
+    tilt_rates: Any  # (M,), rad/s
+    rotor_speeds: Any  # (N,), rad/s, along the spin
+    thrusts: Any  # (N,), N, of the rotors at these speeds
+    states: Any  # (S,), of the law
+    discrete: Any  # (D,), discrete states of the law
     reference: Desired
-    vehicle: Body  # mass, gravity, inertia
-    force: tuple[Values, Values, Values]  # x, y, z of every rotor per newton of its thrust, body
-    torque: tuple[Values, Values, Values]  # likewise, N m per newton
-    table: Vector  # of the rotors per newton from `at` on; see `vehicle.effectiveness`
-    at: int
-    own: int  # index in `table` of the law's own numbers, if it has a table
+    vehicle: Vehicle | Body  # mass (kg), gravity (m/s^2), moments of inertia (kg m^2)
+    inertia: Any  # (3, 3), kg m^2
+    gyroscopic: Any  # 1 where the plant has gyroscopic torque, else 0
+    force: Any  # (3, N), body axes, of each rotor per newton of its thrust
+    torque: Any  # (3, N), N m per newton, likewise
+    rotors: Rotors  # force and torque per newton at any tilts
+    table: Any  # further numbers of the law, such as gains over time
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Command:
+    """The output of a controller: one of three commands for the rotors, and tilt angles.
+
+    A controller in plain Python is called at the control samples; its command takes effect after
+    the scenario's latency, speeds then at once, or with the rotors' lag. The speeds commanded by a
+    law are approached with the lag ``controller.rotor_bandwidth``.
+
+    Attributes:
+        thrusts: (N,), N, along each rotor's axis; they set its speed.
+        rotor_speeds: (N,), rad/s, positive along each rotor's spin.
+        rotor_accelerations: (N,), rad/s^2, likewise, held until the next sample.
+        tilt_angles: (M,), rad, from -pi to pi, for the tilt servos; default: the planned gait. A
+            vehicle whose rotors are fixed has none.
+        rates: (S,), of a law's states, per second; plain Python has none.
+        discrete: (D,), a law's discrete states from this control sample on.
+    """
+
+    thrusts: Any = None
+    rotor_speeds: Any = None
+    rotor_accelerations: Any = None
+    tilt_angles: Any = None
+    rates: Any = None
+    discrete: Any = None

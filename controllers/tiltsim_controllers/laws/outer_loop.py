@@ -5,121 +5,87 @@ Shared by the laws that demand a wrench or thrusts: `geometric`, `pid` and `indi
 
 from __future__ import annotations
 
-from math import sqrt
+from typing import Any, Final
 
+from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.laws.decouplers import exact_decoupler
 from tiltsim_controllers.laws.observed import Observed
-from tiltsim_controllers.mathematics.rotation import rotation_from_euler, to_body, to_world
-from tiltsim_controllers.mathematics.scalar import Triple, Values, scalar
-from tiltsim_controllers.vehicle.multirotor import Body, inertia_times
-from tiltsim_controllers.vehicle.rigid_body import cross
+from tiltsim_controllers.mathematics.attitude import rotation_matrix
+from tiltsim_controllers.mathematics.linear import cross, norm
+
+UP: Final = (0.0, 0.0, 1.0)
 
 
-@scalar
-def shortened(vector: Triple, limit: float) -> Triple:
-    """A vector of the same direction, no longer than a limit."""
-    x, y, z = vector
-    length = sqrt(x * x + y * y + z * z)
-    scale = limit / length if length > limit else 1.0
-    return scale * x, scale * y, scale * z
+def shortened(vector: Any, limit: Any) -> Any:
+    """A vector of the same direction, shape (3,), no longer than a limit."""
+    square = vector @ vector
+    is_long = square > limit * limit
+    return xp.where(is_long, limit / xp.sqrt(xp.where(is_long, square, 1.0)), 1.0) * vector
 
 
-@scalar
-def tracking_errors(observed: Observed) -> tuple[Triple, Triple]:
-    """Reference minus actual position (m) and velocity (m/s), world axes."""
+def tracking_errors(observed: Observed) -> tuple[Any, Any]:
+    """Reference minus actual position (m) and velocity (m/s), world axes, shape (3,) each."""
     reference = observed.reference
-    x, y, z = observed.position
-    vx, vy, vz = observed.velocity
-    return (
-        (reference.position[0] - x, reference.position[1] - y, reference.position[2] - z),
-        (reference.velocity[0] - vx, reference.velocity[1] - vy, reference.velocity[2] - vz),
-    )
+    return reference.position - observed.position, reference.velocity - observed.velocity
 
 
-@scalar
 def demanded_acceleration(
-    observed: Observed, position_gain: float, velocity_gain: float, limit: float
-) -> Triple:
-    """The reference's acceleration plus feedback of position and velocity, m/s^2, world axes.
+    observed: Observed, position_gain: Any, velocity_gain: Any, limit: Any
+) -> Any:
+    """The reference's acceleration plus feedback of position and velocity, m/s^2, world, (3,).
 
     Args:
-        observed: by the law
-        position_gain, velocity_gain: 1/s^2 and 1/s
-        limit: of the feedback's length, m/s^2
+        observed: By the law.
+        position_gain, velocity_gain: 1/s^2 and 1/s.
+        limit: Of the length of the feedback, m/s^2.
     """
     error, speed = tracking_errors(observed)
-    x, y, z = shortened(
-        (
-            position_gain * error[0] + velocity_gain * speed[0],
-            position_gain * error[1] + velocity_gain * speed[1],
-            position_gain * error[2] + velocity_gain * speed[2],
-        ),
-        limit,
-    )
-    ax, ay, az = observed.reference.acceleration
-    return x + ax, y + ay, z + az
+    feedback = shortened(position_gain * error + velocity_gain * speed, limit)
+    return feedback + observed.reference.acceleration
 
 
-@scalar
-def pointing_attitude(observed: Observed, acceleration: Triple, axis: Triple) -> Values:
-    """The rotation, rows first, that points an axis of the body along the demanded force.
+def pointing_attitude(observed: Observed, acceleration: Any, axis: Any) -> Any:
+    """The rotation, shape (3, 3), that points a body axis along the force for an acceleration.
 
-    That of an ``acceleration`` (m/s^2, world axes); the yaw is the reference's.
+    Args:
+        observed: By the law; the yaw is that of its reference.
+        acceleration: m/s^2, world axes, shape (3,).
+        axis: Of the force, body axes, shape (3,).
     """
-    ax, ay, az = acceleration
-    yaw = observed.reference.attitude[2]
+    (ax, ay, az), yaw = acceleration, observed.reference.attitude[2]
     roll, pitch = exact_decoupler(ax, ay, az, yaw, observed.vehicle.gravity, axis)
-    return rotation_from_euler(roll, pitch, yaw)
+    return rotation_matrix(xp.array([roll, pitch, yaw]))
 
 
-@scalar
-def pointing_rates(
-    observed: Observed, acceleration: Triple, axis: Triple, attitude: Values
-) -> Triple:
+def pointing_rates(observed: Observed, acceleration: Any, axis: Any, attitude: Any) -> Any:
     """Rates (rad/s, the present body axes) of `pointing_attitude` as the reference accelerates.
 
-    The force turns with the reference's jerk, and the yaw stays. What the feedback adds to the
-    jerk is left out.
+    The force turns with the reference's jerk, and the yaw stays. The jerk of the feedback is left
+    out.
 
     Args:
-        observed: by the law
-        acceleration: demanded, m/s^2, world axes
-        axis: of the force, body axes
-        attitude: `pointing_attitude`
+        observed: By the law.
+        acceleration: Demanded, m/s^2, world axes, shape (3,).
+        axis: Of the force, body axes, shape (3,).
+        attitude: `pointing_attitude`, shape (3, 3).
     """
-    fx, fy, fz = acceleration
-    fz += observed.vehicle.gravity
-    square = fx * fx + fy * fy + fz * fz
-    wx, wy, wz = cross((fx, fy, fz), observed.reference.jerk)
-    wx, wy, wz = wx / square, wy / square, wz / square
+    force = acceleration + observed.vehicle.gravity * xp.array(UP)
+    turning = cross(force, observed.reference.jerk) / (force @ force)
     # Turning about the force as well keeps the yaw: no rate about the axis across pitch and roll.
-    dx, dy, dz = to_world(attitude, axis)
-    cos_pitch = sqrt(attitude[0] * attitude[0] + attitude[3] * attitude[3])
-    mx, my = -attitude[6] * attitude[0] / cos_pitch, -attitude[6] * attitude[3] / cos_pitch
-    along = (wx * mx + wy * my + wz * cos_pitch) / (dx * mx + dy * my + dz * cos_pitch)
-    return to_body(observed.rotation, (wx - along * dx, wy - along * dy, wz - along * dz))
+    direction, nose, cos_pitch = attitude @ axis, attitude[:, 0], norm(attitude[:2, 0])
+    across = (xp.array(UP) - nose[2] * nose) / cos_pitch
+    turning = turning - (turning @ across) / (direction @ across) * direction
+    return observed.rotation.T @ turning
 
 
-@scalar
-def push_along(observed: Observed, acceleration: Triple, axis: Triple) -> float:
-    """The part (N) along an axis of the body of the force for an acceleration (m/s^2, world)."""
+def push_along(observed: Observed, acceleration: Any, axis: Any) -> Any:
+    """The component (N) along a body axis of the force for an acceleration (m/s^2, world)."""
     body = observed.vehicle
-    ax, ay, az = acceleration
-    fx, fy, fz = to_body(observed.rotation, (ax, ay, az + body.gravity))
-    x, y, z = axis
-    return body.mass * (fx * x + fy * y + fz * z) / sqrt(x * x + y * y + z * z)
+    force = observed.rotation.T @ (acceleration + body.gravity * xp.array(UP))
+    return body.mass * (force @ axis) / norm(axis)
 
 
-@scalar
-def torque_for(body: Body, rates: Triple, angular: Triple, gyroscopic: float) -> Triple:
-    """The torque (N m) of an angular acceleration (rad/s^2), body axes.
-
-    Args:
-        body: its inertia counts
-        rates: of the body, rad/s
-        angular: the angular acceleration
-        gyroscopic: factor of the gyroscopic torque, 1 or 0
-    """
-    x, y, z = inertia_times(body, angular)
-    gx, gy, gz = cross(rates, inertia_times(body, rates))
-    return x + gyroscopic * gx, y + gyroscopic * gy, z + gyroscopic * gz
+def torque_for(observed: Observed, angular: Any) -> Any:
+    """The torque (N m) of an angular acceleration (rad/s^2), body axes, shape (3,) each."""
+    momentum = observed.inertia @ observed.body_rates
+    return observed.inertia @ angular + observed.gyroscopic * cross(observed.body_rates, momentum)

@@ -11,21 +11,11 @@ one from node to node of a table, backward until it repeats.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import cache
-from math import floor
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
-from tiltsim_controllers.laws.full_pose import attitude_error
-from tiltsim_controllers.laws.geometric import Commands
 from tiltsim_controllers.laws.lqr import BODY
-from tiltsim_controllers.laws.observed import Observed
-from tiltsim_controllers.laws.outer_loop import tracking_errors
-from tiltsim_controllers.mathematics.rotation import rotation_from_euler, to_body
-from tiltsim_controllers.mathematics.scalar import scalar
-from tiltsim_controllers.mathematics.vectors import componentwise, entries_of, vectors_of
 
 if TYPE_CHECKING:
     from tiltsim_controllers.mathematics.scalar import Floats
@@ -81,10 +71,10 @@ class Regulator(NamedTuple):
 
     @property
     def table(self) -> tuple[float, ...]:
-        """As `periodic_lqr_law_of` reads it, the first row again after the last."""
+        """Rows for `tiltsim_controllers.laws.lqr.lqr`; of several, the first again at the end."""
         count = len(self.states)
         rows = np.hstack([self.states, self.thrusts, self.gains.reshape(count, -1)])
-        return tuple(np.vstack([rows, rows[:1]]).ravel().tolist())
+        return tuple(np.vstack([rows, rows[: count > 1]]).ravel().tolist())
 
 
 def node_count(period: float) -> int:
@@ -292,6 +282,27 @@ def _orbit(
     raise ValueError("no orbit")
 
 
+def regulator_about_hover(
+    vehicle: PeriodicVehicle, lean: Floats, hover: Floats, errors: Floats, share: float
+) -> Regulator:
+    """The hover of a vehicle with fixed tilts and the regulator about it, as one node.
+
+    Args:
+        vehicle: With its tilts, ``force`` and ``torque`` of shape (1, 3, N).
+        lean, hover, errors, share: As for `regulator_about_orbit`.
+    """
+    from scipy.linalg import solve_continuous_are
+
+    states = np.zeros((1, BODY + hover.shape[1]))
+    states[:, 6:8], states[:, BODY:] = lean, hover
+    a, b = (matrices[0] for matrices in linear_orbit(vehicle, states, hover))
+    weight = np.diag((share * np.abs(hover[0])) ** -2.0)
+    cost = solve_continuous_are(a, b, np.diag(errors**-2.0), weight)
+    gains = np.linalg.solve(weight, b.T @ cost)
+    transitions = np.eye(len(a))  # of no time
+    return Regulator(states, hover, gains[None], cost[None], transitions[None])
+
+
 def regulator_about_orbit(
     vehicle: PeriodicVehicle, lean: Floats, hover: Floats, errors: Floats, share: float
 ) -> Regulator:
@@ -326,61 +337,3 @@ def regulator_about_orbit(
             raise ValueError("a rotor stops")
         last = riccati(*linear_orbit(vehicle, states, thrusts), errors, changes, vehicle.step)
     return Regulator(states, thrusts, *last)
-
-
-@cache
-def periodic_lqr_law_of(rotors: int) -> Callable[..., Commands]:
-    """The law of vehicles with this many rotors.
-
-    Its parameters have the fields ``period`` (s) and ``nodes``; its table is a `Regulator`'s.
-    """
-    size = BODY + rotors
-    planned, row = size + rotors, size + rotors + rotors * size
-    less = vectors_of(rotors).add_scaled
-    between = componentwise(
-        "between_nodes",
-        "table, first, second, part",
-        "table[first + @] + part * (table[second + @] - table[first + @])",
-        planned,
-    )
-    pushed_in, command_in = entries_of(BODY, rotors), entries_of(size, rotors)
-    products = " + ".join(f"k[at + {size} * i + {j}] * x[{j}]" for j in range(size))
-    turned_back: Callable[..., float] = componentwise(  # a tuple of one
-        f"fed_back_at_node_{size}", "k, at, i, x", products, 1
-    )
-    fed_back = componentwise(
-        f"periodically_regulated_{size}",
-        "command, k, first, second, part, x",
-        "command# - (1.0 - part) * at_node(k, first, @, x)[0] - part * at_node(k, second, @, x)[0]",
-        rotors,
-        at_node=turned_back,
-    )
-
-    @scalar
-    def periodic_lqr(observed: Observed, parameters: Any) -> Commands:
-        table, yaw = observed.table, observed.reference.attitude[2]
-        turns = observed.time / parameters.period
-        place = (turns - floor(turns)) * parameters.nodes
-        node = min(floor(place), parameters.nodes - 1.0)
-        first = observed.own + int(node) * row
-        second, part = first + row, place - node
-        orbit = between(table, first, second, part)
-        heading = rotation_from_euler(0.0, 0.0, yaw)
-        error, speed = tracking_errors(observed)
-        ex, ey, ez = to_body(heading, error)
-        vx, vy, vz = to_body(heading, speed)
-        desired = rotation_from_euler(orbit[6], orbit[7], yaw + orbit[8])
-        rx, ry, rz = attitude_error(observed.rotation, desired)
-        p, q, r = observed.body_rates
-        x = (
-            -ex - orbit[0], -ey - orbit[1], -ez - orbit[2],
-            -vx - orbit[3], -vy - orbit[4], -vz - orbit[5],
-            -rx, -ry, -rz,
-            p - orbit[9], q - orbit[10], r - orbit[11],
-            *less(observed.thrusts, -1.0, pushed_in(orbit)),
-        )  # fmt: skip
-        command = command_in(orbit)
-        gains = first + planned, second + planned
-        return fed_back(command, table, gains[0], gains[1], part, x), (), ()
-
-    return periodic_lqr

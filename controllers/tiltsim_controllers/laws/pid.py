@@ -7,22 +7,21 @@ stops while its demand is limited.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import cache
-from typing import Final, NamedTuple
+from typing import Final, Literal
 
-from tiltsim_controllers.laws.full_pose import attitude_error
-from tiltsim_controllers.laws.geometric import Commands
-from tiltsim_controllers.laws.observed import Observed
+from pydantic import Field
+
+from tiltsim_controllers.code.arrays import xp
+from tiltsim_controllers.laws.keys import Gains2, Keys, Positive, Vector3
+from tiltsim_controllers.laws.observed import Command, Observed
 from tiltsim_controllers.laws.outer_loop import (
     pointing_attitude,
     push_along,
     shortened,
     tracking_errors,
 )
-from tiltsim_controllers.laws.rotor_allocation import planned_allocation_of
-from tiltsim_controllers.mathematics.scalar import scalar
-from tiltsim_controllers.vehicle.multirotor import inertia_times
+from tiltsim_controllers.laws.rotor_allocation import allocated_thrusts, lift_without_torque
+from tiltsim_controllers.mathematics.attitude import attitude_error
 
 STATES: Final = {
     **{f"state_velocity_integral_{axis}": "m" for axis in "xyz"},
@@ -31,69 +30,56 @@ STATES: Final = {
 }
 
 
-class Parameters(NamedTuple):
-    """Gains and limits."""
+class Pid(Keys):
+    """Keys of `pid`."""
 
-    position: float  # 1/s
-    max_speed: float  # m/s
-    velocity: float  # 1/s
-    velocity_integral: float  # 1/s^2
-    max_acceleration: float  # m/s^2
-    attitude: float  # 1/s
-    rates: float  # 1/s
-    rates_integral: float  # 1/s^2
-    rates_derivative: float  # 1
-    derivative_filter: float  # 1/s
+    law: Literal["pid"] = Field(
+        description="cascade: position (P), velocity (PI), attitude (P) and rates (PID)"
+    )
+    position_gain: Positive = Field(
+        1.0, description="velocity demanded per error of position [1/s]"
+    )
+    max_speed: Positive = Field(
+        3.0, description="largest velocity that the error of position demands [m/s]"
+    )
+    velocity_gains: Gains2 = Field(
+        (3.0, 0.9),
+        description="acceleration demanded per error of velocity and per its integral [1/s, 1/s^2]",
+    )
+    max_acceleration: Positive = Field(
+        5.0, description="largest acceleration that the feedback demands [m/s^2]"
+    )
+    attitude_gain: Positive = Field(9.0, description="rates demanded per error of attitude [1/s]")
+    rate_gains: Vector3 = Field(
+        (27.0, 72.9, 0.1),
+        description="angular acceleration demanded per error of the rates, per its integral, and "
+        "per minus the derivative of the rates [1/s, 1/s^2, 1]",
+    )
+    derivative_filter: Positive = Field(
+        100.0, description="of the rates whose derivative is taken, a lag of first order [1/s]"
+    )
 
 
-@cache
-def pid_law_of(rotors: int) -> Callable[..., Commands]:
-    """The law of vehicles with this many rotors, whose tilts follow a gait."""
-    lift_of, axis_of, thrusts_of = planned_allocation_of(rotors)
+def pid(observed: Observed, p: Pid) -> Command:
+    """The law, with the states `STATES`."""
+    velocity_integral, rate_integral, slow_rates = observed.states.reshape(3, 3)
+    reference, omega = observed.reference, observed.body_rates
+    position_error, _ = tracking_errors(observed)
+    approach = shortened(p.position_gain * position_error, p.max_speed)
+    velocity_error = reference.velocity + approach - observed.velocity
+    demand = p.velocity_gains[0] * velocity_error + p.velocity_gains[1] * velocity_integral
+    is_limited = demand @ demand > p.max_acceleration**2
+    acceleration = shortened(demand, p.max_acceleration) + reference.acceleration
 
-    @scalar
-    def pid(observed: Observed, parameters: Parameters) -> Commands:
-        c, reference = parameters, observed.reference
-        sx, sy, sz, sp, sq, sr, fp, fq, fr = observed.states
-        (ex, ey, ez), _ = tracking_errors(observed)
-        ux, uy, uz = shortened((c.position * ex, c.position * ey, c.position * ez), c.max_speed)
-        vx, vy, vz = observed.velocity
-        ux, uy, uz = (
-            reference.velocity[0] + ux - vx,
-            reference.velocity[1] + uy - vy,
-            reference.velocity[2] + uz - vz,
-        )
-        demand = (
-            c.velocity * ux + c.velocity_integral * sx,
-            c.velocity * uy + c.velocity_integral * sy,
-            c.velocity * uz + c.velocity_integral * sz,
-        )
-        ax, ay, az = shortened(demand, c.max_acceleration)
-        goes_on = 1.0 if (ax, ay, az) == demand else 0.0
-        wx, wy, wz = reference.acceleration
-        acceleration = (ax + wx, ay + wy, az + wz)
-        lift = lift_of(observed)
-        axis = axis_of(observed, lift)
-        desired = pointing_attitude(observed, acceleration, axis)
-        rx, ry, rz = attitude_error(observed.rotation, desired)
-        p, q, r = observed.body_rates
-        ep, eq, er = c.attitude * rx - p, c.attitude * ry - q, c.attitude * rz - r
-        dp, dq, dr = (
-            c.derivative_filter * (p - fp),
-            c.derivative_filter * (q - fq),
-            c.derivative_filter * (r - fr),
-        )
-        turning = (
-            c.rates * ep + c.rates_integral * sp - c.rates_derivative * dp,
-            c.rates * eq + c.rates_integral * sq - c.rates_derivative * dq,
-            c.rates * er + c.rates_integral * sr - c.rates_derivative * dr,
-        )
-        torque = inertia_times(observed.vehicle, turning)
-        push = push_along(observed, acceleration, axis)
-        return (
-            thrusts_of(observed, lift, axis, push, torque),
-            (),
-            (goes_on * ux, goes_on * uy, goes_on * uz, ep, eq, er, dp, dq, dr),
-        )
-
-    return pid
+    lift = lift_without_torque(observed)
+    axis = observed.force @ lift
+    desired = pointing_attitude(observed, acceleration, axis)
+    rate_error = p.attitude_gain * attitude_error(observed.rotation, desired) - omega
+    omega_rate = p.derivative_filter * (omega - slow_rates)
+    k_p, k_i, k_d = p.rate_gains
+    turning = k_p * rate_error + k_i * rate_integral - k_d * omega_rate
+    push = push_along(observed, acceleration, axis)
+    return Command(
+        thrusts=allocated_thrusts(observed, lift, push, observed.inertia @ turning),
+        rates=xp.hstack([xp.where(is_limited, 0.0, velocity_error), rate_error, omega_rate]),
+    )

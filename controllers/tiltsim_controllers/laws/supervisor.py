@@ -31,7 +31,7 @@ from collections.abc import Callable
 from math import inf, pi, sqrt
 from typing import Any, Final, NamedTuple
 
-from tiltsim_controllers.gaits.any_tilts import Jets, tilt_motion_of
+from tiltsim_controllers.gaits.motion import Jets, tilt_motion_of
 from tiltsim_controllers.gaits.parameters import NO_KNOTS, GaitParameters
 from tiltsim_controllers.mathematics.jets import Jet, jet_scaled
 from tiltsim_controllers.mathematics.rotation import world_up_in_body

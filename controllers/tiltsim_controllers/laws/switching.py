@@ -11,17 +11,17 @@ controller, so that both are continuous when the yaw-position controller takes o
 
 from __future__ import annotations
 
-from math import cos, nan, tan
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import tiltsim_controllers.laws.quadrotor_attitude_altitude as attitude_altitude
 import tiltsim_controllers.laws.yaw_position as yaw_position
+from tiltsim_controllers.code.arrays import xp
+from tiltsim_controllers.code.blocks import branch
 from tiltsim_controllers.gaits.parameters import NO_KNOTS
 from tiltsim_controllers.laws.quadrotor_attitude_altitude import attitude_altitude_inputs
-from tiltsim_controllers.laws.yaw_position import Inputs, euler_rates, yaw_position_inputs
-from tiltsim_controllers.mathematics.scalar import Values, Vector, scalar
-from tiltsim_controllers.references.trajectories import reference_derivatives
-from tiltsim_controllers.vehicle.states import PITCH, ROLL, THRUST, THRUST_RATE
+from tiltsim_controllers.laws.yaw_position import yaw_position_inputs
+from tiltsim_controllers.mathematics.attitude import euler_rates
+from tiltsim_controllers.references.trajectories import reference_motion
 
 RUNNING: Final = 0.0
 HELD: Final = 1.0
@@ -59,63 +59,62 @@ class Parameters(NamedTuple):
     extension_rate: float = 100.0  # 1/s, at which bumpless states approach the active thrust
 
 
-@scalar
-def in_attitude_zone(roll: float, pitch: float, zone: Zone) -> bool:
+def in_attitude_zone(roll: Any, pitch: Any, zone: Zone) -> Any:
     """Whether the attitude-altitude controller is active at an attitude (rad; ch. 2, Eq. 47)."""
-    return zone.roll_min <= roll <= zone.roll_max and zone.pitch_min <= pitch <= zone.pitch_max
+    rolled = (zone.roll_min <= roll) & (roll <= zone.roll_max)
+    return rolled & (zone.pitch_min <= pitch) & (pitch <= zone.pitch_max)
 
 
-@scalar
 def attitude_altitude_thrust_rate(
-    time: float, state: Values, thrust: float, parameters: Parameters, knots: Vector = NO_KNOTS
-) -> float:
+    time: Any, state: Any, thrust: Any, parameters: Parameters, knots: Any = NO_KNOTS
+) -> Any:
     """Rate (N/s) of the attitude-altitude controller's thrust.
 
     Args:
         time: s
-        state: `tiltsim_controllers.vehicle.states.BODY_FIELDS`; what follows is not read
+        state: Begins with `tiltsim_controllers.vehicle.states.BODY_FIELDS`, shape (12,).
         thrust: N
-        parameters, knots: of the controller and of the reference
+        parameters: Of the controller.
+        knots: Table data of the reference.
     """
-    _, _, _, _, _, vz, roll, pitch, _, p, q, r = state[:12]
+    attitude, vz = state[6:9], state[5]
     vehicle, gains = parameters.yaw_position.vehicle, parameters.attitude_altitude
-    _, _, _, _, _, vz_ref, _, _, az_ref, _, _, _, _, _, _ = reference_derivatives(
-        time, parameters.yaw_position.reference, knots
-    )
-    upright = cos(roll) * cos(pitch)
-    if upright == 0.0:
-        return nan
+    motion = reference_motion(time, parameters.yaw_position.reference, knots)
+    upright = xp.cos(attitude[0]) * xp.cos(attitude[1])
+    upright = xp.where(upright == 0.0, xp.nan, upright)
     az = thrust * upright / vehicle.mass - vehicle.gravity
-    lift_rate = gains.altitude_1 * (az_ref - az) + gains.altitude_2 * (vz_ref - vz)
-    roll_rate, pitch_rate, _ = euler_rates(roll, pitch, p, q, r)
-    return vehicle.mass * lift_rate / upright + thrust * (
-        tan(roll) * roll_rate + tan(pitch) * pitch_rate
-    )
+    lift_rate = gains.altitude_1 * (motion[2, 2] - az) + gains.altitude_2 * (motion[1, 2] - vz)
+    leaning = xp.tan(attitude[:2]) @ euler_rates(attitude, state[9:12])[:2]
+    return vehicle.mass * lift_rate / upright + thrust * leaning
 
 
-@scalar
-def switching_inputs(
-    time: float, state: Values, parameters: Parameters, knots: Vector = NO_KNOTS
-) -> Inputs:
-    """`INPUT_FIELDS`: thrust, torques and rates of the extension's states, world z up.
+def switching_inputs(time: Any, state: Any, parameters: Parameters, knots: Any = NO_KNOTS) -> Any:
+    """`INPUT_FIELDS`: thrust, torques and rates of the extension's states, shape (6,).
 
     Args:
         time: s
-        state: `tiltsim_controllers.vehicle.states.EXTENDED_QUADROTOR_FIELDS`
-        parameters, knots: of the controllers and of the reference
+        state: `tiltsim_controllers.vehicle.states.EXTENDED_QUADROTOR_FIELDS`, shape (14,).
+        parameters: Of the controllers.
+        knots: Table data of the reference.
     """
     law = parameters.yaw_position
-    if not in_attitude_zone(state[ROLL], state[PITCH], parameters.zone):
+
+    def outside() -> Any:
         return yaw_position_inputs(time, state, law, knots)
-    thrust, roll_torque, pitch_torque, yaw_torque = attitude_altitude_inputs(
-        time, state, law.vehicle, parameters.attitude_altitude, law.reference, knots
-    )
-    zeta, xi = state[THRUST], state[THRUST_RATE]
-    zeta_rate, xi_rate = 0.0, 0.0
-    if parameters.extension == RUNNING:
-        _, _, _, _, zeta_rate, xi_rate = yaw_position_inputs(time, state, law, knots)
-    elif parameters.extension == BUMPLESS:
-        thrust_rate = attitude_altitude_thrust_rate(time, state, thrust, parameters, knots)
-        zeta_rate = thrust_rate + parameters.extension_rate * (thrust - zeta)
-        xi_rate = parameters.extension_rate * (thrust_rate - xi)
-    return thrust, roll_torque, pitch_torque, yaw_torque, zeta_rate, xi_rate
+
+    def inside() -> Any:
+        wrench = attitude_altitude_inputs(
+            time, state, law.vehicle, parameters.attitude_altitude, law.reference, knots
+        )
+        extension = xp.zeros(2)
+        if parameters.extension == RUNNING:
+            extension = outside()[4:]
+        elif parameters.extension == BUMPLESS:
+            thrust = wrench[0]
+            thrust_rate = attitude_altitude_thrust_rate(time, state, thrust, parameters, knots)
+            flown = xp.array([thrust, thrust_rate])
+            follow = parameters.extension_rate * (flown - state[12:14])
+            extension = xp.array([thrust_rate, 0.0]) + follow
+        return xp.hstack([wrench, extension])
+
+    return branch(in_attitude_zone(state[6], state[7], parameters.zone), inside, outside)

@@ -12,20 +12,20 @@ with ``anti_windup`` they stop at zero, and the other rotor and the tilt continu
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
-from tiltsim_controllers.mathematics.scalar import Pair, Quad, Triple, Values, scalar
-from tiltsim_controllers.references.trajectories import ReferenceParameters, reference_derivatives
-from tiltsim_controllers.tilt_car.third_derivative import input_columns, minimum_norm
+from tiltsim_controllers.code.arrays import xp
+from tiltsim_controllers.references.trajectories import ReferenceParameters, reference_motion
+from tiltsim_controllers.tilt_car.third_derivative import minimum_norm
 from tiltsim_controllers.tilt_car.vehicle import (
     STATE_FIELDS,
     TiltCar,
-    body_acceleration,
-    rotate,
+    input_matrix,
+    rotation,
+    thrust_map,
     turn_per_tilt,
 )
 
-SPEED_1: Final = STATE_FIELDS.index("rotor_speed_1")
 DERIVATIVE_FIELDS: Final = ("alpha_rate", "rotor_acceleration_1", "rotor_acceleration_2")
 EXTENDED_STATE_FIELDS: Final = (*STATE_FIELDS, *DERIVATIVE_FIELDS)
 """The state of the car and the controller's own first derivatives, rad/s and rad/s^2."""
@@ -62,66 +62,51 @@ GAIN_SETS: Final = {
 """Gains by name."""
 
 
-@scalar
-def body_derivatives(state: Values, car: TiltCar) -> Values:
-    """Acceleration, jerk and drift ``M_P``, two floats each, in the frame of the thrusts' bisector.
+def body_derivatives(state: Any, car: TiltCar) -> Any:
+    """Acceleration, jerk and drift ``M_P`` in the frame of the thrusts' bisector, shape (3, 2).
 
     Eq. (21) without its terms in the second derivatives of the inputs, written with the turn rate
     of the bisector, ``(1 - I_T / I_B) alpha'``, for the products of ``J_psi`` and ``J_alpha``.
+
+    Args:
+        state: `EXTENDED_STATE_FIELDS`, shape (11,).
+        car: The vehicle.
     """
-    speed_1, speed_2, tilt_rate, rate_1, rate_2 = state[SPEED_1:]
-    turn = turn_per_tilt(car) * tilt_rate
-    along, across = body_acceleration(speed_1 * speed_1, speed_2 * speed_2, car)
-    along_1, across_1 = body_acceleration(2.0 * speed_1 * rate_1, 2.0 * speed_2 * rate_2, car)
-    along_2, across_2 = body_acceleration(2.0 * rate_1 * rate_1, 2.0 * rate_2 * rate_2, car)
-    return (
-        along,
-        across,
-        along_1 - turn * across,
-        across_1 + turn * along,
-        along_2 - turn * turn * along - 2.0 * turn * across_1,
-        across_2 - turn * turn * across + 2.0 * turn * along_1,
+    speeds, tilt_rate, rates = state[6:8], state[8], state[9:11]
+    turn = turn_per_tilt(car) * tilt_rate * xp.array([[0.0, -1.0], [1.0, 0.0]])
+    pushed, push_rate, push_curve = (
+        thrust_map(car) @ squares
+        for squares in (speeds * speeds, 2.0 * speeds * rates, 2.0 * rates * rates)
     )
+    drift = push_curve + turn @ (turn @ pushed) + 2.0 * (turn @ push_rate)
+    return xp.array([pushed, push_rate + turn @ pushed, drift])
 
 
-@scalar
-def demanded_snap(time: float, state: Values, derivatives: Quad, parameters: Parameters) -> Pair:
-    """The desired fourth derivative of the position (m/s^4, world).
+def fourth_derivative_inputs(time: Any, state: Any, parameters: Parameters) -> Any:
+    """Second derivatives of the rotor speeds (rad/s^3) and of the tilt angle (rad/s^2); Eq. (29).
 
     Args:
         time: s
-        state: `EXTENDED_STATE_FIELDS`
-        derivatives: present acceleration and jerk, two floats each, world
-        parameters: of the controller
+        state: `EXTENDED_STATE_FIELDS`, shape (11,).
+        parameters: Of the controller.
+
+    Returns:
+        Shape (3,).
     """
-    gains = parameters.gains
-    k1, k2, k3, k4 = gains.jerk, gains.acceleration, gains.velocity, gains.position
-    ax, ay, jx, jy = derivatives
-    x, y, vx, vy = state[:4]
-    motion = reference_derivatives(time, parameters.reference)
-    x0, y0, _, x1, y1, _, x2, y2, _, x3, y3, _, x4, y4, _ = motion
-    return (
-        x4 + k1 * (x3 - jx) + k2 * (x2 - ax) + k3 * (x1 - vx) + k4 * (x0 - x),
-        y4 + k1 * (y3 - jy) + k2 * (y2 - ay) + k3 * (y1 - vy) + k4 * (y0 - y),
+    car, gains = parameters.car, parameters.gains
+    to_world = rotation(state[4] + state[5])
+    pushed, moved, drift = body_derivatives(state, car)
+    position, velocity, acceleration, jerk, snap = reference_motion(time, parameters.reference)[
+        :, :2
+    ]
+    demanded = (
+        snap
+        + gains.jerk * (jerk - to_world @ moved)
+        + gains.acceleration * (acceleration - to_world @ pushed)
+        + gains.velocity * (velocity - state[2:4])
+        + gains.position * (position - state[0:2])
     )
-
-
-@scalar
-def fourth_derivative_inputs(time: float, state: Values, parameters: Parameters) -> Triple:
-    """Second derivatives of the rotor speeds (rad/s^3) and of the tilt angle (rad/s^2); Eq. (29).
-
-    ``state`` is `EXTENDED_STATE_FIELDS`.
-    """
-    car = parameters.car
-    yaw, alpha, speed_1, speed_2 = state[4:8]
-    direction = yaw + alpha
-    along, across, jerk_along, jerk_across, drift_along, drift_across = body_derivatives(state, car)
-    ax, ay = rotate(along, across, direction)
-    jx, jy = rotate(jerk_along, jerk_across, direction)
-    snap_x, snap_y = demanded_snap(time, state, (ax, ay, jx, jy), parameters)
-    snap_along, snap_across = rotate(snap_x, snap_y, -direction)
-    x1, y1, x2, y2, x3, y3 = input_columns(speed_1, speed_2, car)
+    matrix = input_matrix(state[6:8], car)
     if parameters.decoupling == PUBLISHED:
-        x3, y3 = -across, along
-    desired = (snap_along - drift_along, snap_across - drift_across)
-    return minimum_norm((x1, y1, x2, y2, x3, y3), desired)
+        matrix = xp.hstack([matrix[:, :2], xp.array([[-pushed[1]], [pushed[0]]])])
+    return minimum_norm(matrix, to_world.T @ demanded - drift)

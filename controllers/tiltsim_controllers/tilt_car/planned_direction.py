@@ -7,11 +7,11 @@ Eq. 13), which ch. 11 writes with the switch matrix ``S_pq``.
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
-from tiltsim_controllers.mathematics.scalar import Pair, Values, scalar
-from tiltsim_controllers.references.trajectories import ReferenceParameters, reference_derivatives
-from tiltsim_controllers.tilt_car.vehicle import TiltCar, rotate, squared_speeds
+from tiltsim_controllers.code.arrays import xp
+from tiltsim_controllers.references.trajectories import ReferenceParameters, reference_motion
+from tiltsim_controllers.tilt_car.vehicle import TiltCar, rotation, squared_speeds
 
 
 class Gains(NamedTuple):
@@ -40,33 +40,38 @@ GAIN_SETS: Final = {
 """Gains by name."""
 
 
-@scalar
-def demanded_acceleration(time: float, state: Values, parameters: Parameters) -> Pair:
-    """The desired acceleration (m/s^2, world); ch. 10, Eq. (20) and ch. 11, Eqs. (9), (10)."""
+def demanded_acceleration(time: Any, state: Any, parameters: Parameters) -> Any:
+    """The desired acceleration (m/s^2, world), ch. 10, Eq. (20); ch. 11, Eqs. (9), (10).
+
+    Args:
+        time: s
+        state: Begins with `tiltsim_controllers.tilt_car.vehicle.STATE_FIELDS`.
+        parameters: Of the controller.
+
+    Returns:
+        Shape (2,).
+    """
     gains = parameters.gains
-    x, y, vx, vy = state[:4]
-    x0, y0, _, x1, y1, _, x2, y2, _ = reference_derivatives(time, parameters.reference)[:9]
-    return (
-        x2 + gains.x_velocity * (x1 - vx) + gains.x_position * (x0 - x),
-        y2 + gains.y_velocity * (y1 - vy) + gains.y_position * (y0 - y),
-    )
+    on_velocity = xp.array([gains.x_velocity, gains.y_velocity])
+    on_position = xp.array([gains.x_position, gains.y_position])
+    position, velocity, acceleration = reference_motion(time, parameters.reference)[:3, :2]
+    feedback = on_velocity * (velocity - state[2:4]) + on_position * (position - state[0:2])
+    return acceleration + feedback
 
 
-@scalar
-def demanded_squared_speeds(time: float, state: Values, parameters: Parameters) -> Pair:
-    """The desired squares of the rotor speeds (rad^2/s^2), of any sign; ch. 11, Eq. (12)."""
-    x, y = demanded_acceleration(time, state, parameters)
-    yaw, alpha = state[4:6]
-    along, across = rotate(x, y, -(yaw + alpha))
-    return squared_speeds(along, across, parameters.car)
+def demanded_squared_speeds(time: Any, state: Any, parameters: Parameters) -> Any:
+    """The desired squares of the rotor speeds (rad^2/s^2), of any sign; ch. 11, Eq. (12).
+
+    Arguments as for `demanded_acceleration`; shape (2,).
+    """
+    to_body = rotation(state[4] + state[5]).T
+    return squared_speeds(to_body @ demanded_acceleration(time, state, parameters), parameters.car)
 
 
-@scalar
-def planned_direction_inputs(time: float, state: Values, parameters: Parameters) -> Pair:
+def planned_direction_inputs(time: Any, state: Any, parameters: Parameters) -> Any:
     """The squares of the rotor speeds (rad^2/s^2), never below zero; ch. 11, Eqs. (12), (13)."""
-    square_1, square_2 = demanded_squared_speeds(time, state, parameters)
-    # Written so that NaN stays NaN.
-    return (0.0 if square_1 < 0.0 else square_1, 0.0 if square_2 < 0.0 else square_2)
+    squares = demanded_squared_speeds(time, state, parameters)
+    return xp.where(squares < 0.0, 0.0, squares)  # NaN stays NaN
 
 
 def lyapunov_candidate(error_y: float, error_rate_y: float, gains: Gains) -> float:

@@ -25,8 +25,8 @@ from typing import NamedTuple
 import numpy as np
 
 from tiltsim_controllers.mathematics.scalar import Floats
-from tiltsim_controllers.tilt_car.third_derivative import input_columns, null_space_input
-from tiltsim_controllers.tilt_car.vehicle import TiltCar, turn_per_tilt
+from tiltsim_controllers.tilt_car.third_derivative import null_space_input
+from tiltsim_controllers.tilt_car.vehicle import TiltCar, input_matrix, turn_per_tilt
 
 
 class Orbit(NamedTuple):
@@ -70,7 +70,7 @@ def twist(speed_1: float, speed_2: float, car: TiltCar) -> float:
     steps = 1e-5 * speed_1, 1e-5 * speed_2
 
     def direction(w1: float, w2: float) -> Floats:
-        n = np.array(null_space_input(input_columns(w1, w2, car)))
+        n = null_space_input(input_matrix(np.array([w1, w2]), car))
         return np.asarray(n / np.linalg.norm(n))
 
     by_1 = (direction(speed_1 + steps[0], speed_2) - direction(speed_1 - steps[0], speed_2)) / (

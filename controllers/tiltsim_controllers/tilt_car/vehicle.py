@@ -8,10 +8,10 @@ relative to it.
 
 from __future__ import annotations
 
-from math import cos, pi, sin
-from typing import Final, NamedTuple
+from math import pi
+from typing import Any, Final, NamedTuple
 
-from tiltsim_controllers.mathematics.scalar import Pair, scalar
+from tiltsim_controllers.code.arrays import xp
 
 
 class TiltCar(NamedTuple):
@@ -38,7 +38,6 @@ STATE_FIELDS: Final = ("x", "y", "vx", "vy", "yaw", "alpha", "rotor_speed_1", "r
 it, rad; [omega] rad/s, never negative."""
 
 
-@scalar
 def counter_yaw_per_tilt(car: TiltCar) -> float:
     """Counter-rotation of the bottom disc per tilt of the top disc: ``-d psi / d alpha``.
 
@@ -48,48 +47,60 @@ def counter_yaw_per_tilt(car: TiltCar) -> float:
     return car.top_inertia / (car.top_inertia + car.bottom_inertia)
 
 
-@scalar
 def turn_per_tilt(car: TiltCar) -> float:
     """Rotation of the thrusts per tilt of the top disc: ``1 - I_T / I_B`` of Eqs. (11), (18)."""
     return 1.0 - counter_yaw_per_tilt(car)
 
 
-@scalar
-def body_acceleration(square_1: float, square_2: float, car: TiltCar) -> Pair:
-    """Acceleration (m/s^2) along the thrusts' bisector and across it: ``J_theta`` of Eq. (5).
+def thrust_map(car: TiltCar) -> Any:
+    """Acceleration along the thrusts' bisector and across it per squared rotor speed.
 
-    ``square_1`` and ``square_2`` are the squares of the rotor speeds (rad^2/s^2).
+    ``J_theta / m`` of Eq. (5), m/s^2 per (rad/s)^2, shape (2, 2).
     """
-    per_mass = car.thrust_coefficient / car.mass
-    return (
-        per_mass * cos(car.half_angle) * (square_1 + square_2),
-        per_mass * sin(car.half_angle) * (square_1 - square_2),
-    )
+    along, across = xp.cos(car.half_angle), xp.sin(car.half_angle)
+    return car.thrust_coefficient / car.mass * xp.array([[along, along], [across, -across]])
 
 
-@scalar
-def squared_speeds(along: float, across: float, car: TiltCar) -> Pair:
-    """The squared rotor speeds (rad^2/s^2) for an acceleration (m/s^2), of any sign: Eq. (5)."""
-    mass = 0.5 * car.mass / car.thrust_coefficient
-    same, apart = along / cos(car.half_angle), across / sin(car.half_angle)
-    return mass * (same + apart), mass * (same - apart)
-
-
-@scalar
-def rotate(x: float, y: float, angle: float) -> Pair:
-    """A vector rotated by an angle (rad): ``J`` of Eq. (4)."""
-    along, across = cos(angle), sin(angle)
-    return along * x - across * y, across * x + along * y
-
-
-@scalar
-def acceleration(direction: float, square_1: float, square_2: float, car: TiltCar) -> Pair:
-    """Acceleration (m/s^2, world); Eq. (3).
+def squared_speeds(acceleration: Any, car: TiltCar) -> Any:
+    """The squared rotor speeds (rad^2/s^2) for an acceleration, of any sign: Eq. (5).
 
     Args:
-        direction: of the thrusts' bisector, rad
-        square_1, square_2: squared rotor speeds, rad^2/s^2
-        car: the tilt-car
+        acceleration: Along the bisector and across it, m/s^2, shape (2,).
+        car: The vehicle.
     """
-    along, across = body_acceleration(square_1, square_2, car)
-    return rotate(along, across, direction)
+    same = acceleration[0] / xp.cos(car.half_angle)
+    apart = acceleration[1] / xp.sin(car.half_angle)
+    return 0.5 * car.mass / car.thrust_coefficient * xp.array([same + apart, same - apart])
+
+
+def rotation(angle: Any) -> Any:
+    """The rotation of the plane by an angle (rad), ``J`` of Eq. (4), shape (2, 2)."""
+    c, s = xp.cos(angle), xp.sin(angle)
+    return xp.array([[c, -s], [s, c]])
+
+
+def acceleration(direction: Any, squares: Any, car: TiltCar) -> Any:
+    """Acceleration (m/s^2, world), shape (2,); Eq. (3).
+
+    Args:
+        direction: Of the thrusts' bisector, rad.
+        squares: Of the rotor speeds, rad^2/s^2, shape (2,).
+        car: The vehicle.
+    """
+    return rotation(direction) @ (thrust_map(car) @ squares)
+
+
+def input_matrix(speeds: Any, car: TiltCar) -> Any:
+    """``Delta`` of Eqs. (9)-(11) in the frame of the thrusts' bisector, shape (2, 3).
+
+    The third derivative of the position per rate of both rotor speeds and of the tilt angle. The
+    rotation to the world (Eq. 4) multiplies the whole matrix.
+
+    Args:
+        speeds: Of the rotors, rad/s, shape (2,).
+        car: The vehicle.
+    """
+    rotors = thrust_map(car) * (2.0 * speeds)
+    along, across = thrust_map(car) @ (speeds * speeds)
+    tilt = turn_per_tilt(car) * xp.array([-across, along])
+    return xp.hstack([rotors, tilt.reshape(2, 1)])

@@ -9,12 +9,12 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from tests.thesis import force_matrix, torque_matrix
-from tiltsim_controllers.gaits.parameters import GAIT_TYPES, GaitParameters
+from tiltsim_controllers.gaits.parameters import FIXED, GaitParameters
 from tiltsim_controllers.laws.attitude_altitude import (
     DECOUPLINGS,
     Gains,
     Parameters,
-    rotor_accelerations,
+    attitude_altitude_inputs,
 )
 from tiltsim_controllers.laws.decouplers import (
     DECOUPLERS,
@@ -104,7 +104,7 @@ def random_case(seed, decoupling, decoupler):
     parameters = Parameters(
         vehicle=PRESETS[vehicle],
         gains=Gains(*random.uniform(0.2, 60.0, len(Gains._fields))),
-        gait=GaitParameters(GAIT_TYPES["fixed"]),
+        gait=GaitParameters(FIXED),
         reference=ReferenceParameters(
             REFERENCE_TYPES[kind],
             *spread(3, 0.05),
@@ -192,7 +192,7 @@ def test_rotor_accelerations_follow_the_equations(decoupling, decoupler):
     for seed in range(STATES):
         parameters, state = random_case(seed, decoupling, decoupler)
         expected = expected_inputs(parameters, state)
-        inputs = rotor_accelerations(TIME, state, parameters)
+        inputs = attitude_altitude_inputs(TIME, state, parameters)[:4]
         np.testing.assert_allclose(
             inputs, expected, rtol=0, atol=1e-9 * np.abs(expected).max(), err_msg=f"seed {seed}"
         )
@@ -205,7 +205,7 @@ def test_third_derivatives_are_those_demanded_under_the_exact_matrix(decoupler):
     for seed in range(STATES):
         parameters, state = random_case(seed, "exact", decoupler)
         attitude, rates, alpha, speeds = np.split(np.array(state[6:]), [3, 6, 10])
-        inputs = np.array(rotor_accelerations(TIME, state, parameters))
+        inputs = np.array(attitude_altitude_inputs(TIME, state, parameters)[:4])
         ahead, behind = (
             second_derivatives(
                 parameters.vehicle,
@@ -228,14 +228,16 @@ def test_hover_at_the_setpoint_needs_no_rotor_acceleration(decoupling, decoupler
     parameters = Parameters(
         vehicle=AR_DRONE,
         gains=GAIN_SETS["ch04"],
-        gait=GaitParameters(GAIT_TYPES["fixed"]),
+        gait=GaitParameters(FIXED),
         reference=ReferenceParameters(REFERENCE_TYPES["setpoint"], 1.0, 2.0, 3.0, yaw=0.3),
         decoupler=DECOUPLERS[decoupler],
         decoupling=DECOUPLINGS[decoupling],
     )
     speed = (AR_DRONE.mass * AR_DRONE.gravity / (4 * AR_DRONE.thrust_coefficient)) ** 0.5
     state = (1.0, 2.0, 3.0, *[0.0] * 5, 0.3, *[0.0] * 7, *(speed * sign for sign in SPIN))
-    assert rotor_accelerations(0.0, state, parameters) == pytest.approx([0.0] * 4, abs=1e-9)
+    assert attitude_altitude_inputs(0.0, state, parameters)[:4] == pytest.approx(
+        [0.0] * 4, abs=1e-9
+    )
 
 
 @pytest.mark.parametrize("decoupling", DECOUPLINGS)
@@ -244,7 +246,7 @@ def test_inputs_are_nan_where_a_rotor_at_rest_makes_the_matrix_singular(decoupli
     # The published matrix has the speeds in its last row alone: singular when all four vanish.
     stopped = {"published": 4, "exact": 1}[decoupling]
     state = (*state[: 20 - stopped], *[0.0] * stopped)
-    assert any(isnan(value) for value in rotor_accelerations(TIME, state, parameters))
+    assert any(isnan(value) for value in attitude_altitude_inputs(TIME, state, parameters)[:4])
 
 
 @pytest.mark.parametrize("decoupler", DECOUPLERS)
@@ -253,7 +255,7 @@ def test_inputs_are_nan_where_the_tilt_angles_cost_the_torque_matrix_its_rank(de
     parameters = parameters._replace(vehicle=AR_DRONE)
     delta = np.arctan(drag_ratio(AR_DRONE))  # the point P of the two color map, on the blue plane
     state = (*state[:12], delta, -delta, delta, -delta, *state[16:])
-    assert all(isnan(value) for value in rotor_accelerations(TIME, state, parameters))
+    assert all(isnan(value) for value in attitude_altitude_inputs(TIME, state, parameters)[:4])
 
 
 # --- decouplers --------------------------------------------------------------------------------

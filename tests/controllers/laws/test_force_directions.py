@@ -10,12 +10,13 @@ from scipy.linalg import null_space
 
 from tests.controllers.multirotors import ring, tiltrotor
 from tiltsim_controllers.laws.force_directions import (
-    direction_jet_of,
-    jet_cross,
+    moving_direction,
     nearest_in_plane,
-    normal_of_rows,
+    normal_of_plane,
 )
+from tiltsim_controllers.mathematics.moving import Moving
 from tiltsim_controllers.vehicle.effectiveness import force_and_torque, tilt_of_rotor, tilts_of
+from tiltsim_controllers.vehicle.rotors import moving_wrench_map, rotors_in
 
 H = 1e-3
 
@@ -37,6 +38,11 @@ def random_jets(rng, count):
     return tuple(map(tuple, rng.uniform(-2.0, 2.0, (count, 3))))
 
 
+def derivatives(moving):
+    """Value and derivatives as columns."""
+    return np.transpose([moving.value, moving.rate, moving.acceleration])
+
+
 def unit(vector):
     return vector / np.linalg.norm(vector)
 
@@ -46,12 +52,13 @@ def test_the_direction_turns_as_the_null_space_of_the_torque(vehicle, dimension)
     """Of four rotors one force has no torque, of five those of a plane."""
     table = tiltrotor().table if vehicle == "four" else ring(5, hinged=True)
     layout = tilt_of_rotor(table)
-    direction = direction_jet_of(layout, dimension, False)
+    rotors = rotors_in(table, 0, layout)
     rng = np.random.default_rng(3)
     for _ in range(5):
         tilts = random_jets(rng, tilts_of(layout))
         up = unit(rng.normal(size=3))
-        found = direction(0.0, tuple(up), tilts, table, 0, None)
+        wrench = moving_wrench_map(rotors, Moving(*np.transpose(tilts)))
+        found = derivatives(moving_direction(wrench, up, dimension))
 
         def without_torque(time, tilts=tilts, found=found):
             force, torque = force_and_torque(table, at(tilts, time))
@@ -75,10 +82,9 @@ def test_the_projection_onto_a_moving_plane_has_the_right_derivatives():
             vector = at(desired, time)
             return vector - across * (across @ vector)
 
-        found, expected = nearest_in_plane(desired, normal), jets_of(nearest)
+        pair = (Moving(*np.transpose(jets)) for jets in (desired, normal))
+        found, expected = derivatives(nearest_in_plane(*pair)), jets_of(nearest)
         np.testing.assert_allclose(found, expected, rtol=1e-5, atol=1e-5)
-        crossed = jets_of(lambda time, a=desired, b=normal: np.cross(at(a, time), at(b, time)))
-        np.testing.assert_allclose(jet_cross(desired, normal), crossed, rtol=1e-6, atol=1e-6)
 
 
 def test_the_normal_is_perpendicular_to_the_plane_even_if_two_vectors_are_parallel():
@@ -86,9 +92,9 @@ def test_the_normal_is_perpendicular_to_the_plane_even_if_two_vectors_are_parall
     one, other = rng.normal(size=(2, 3))
     across = unit(np.cross(one, other))
     for vectors in ((one, 2.0 * one, other), (one, other, -other), (other, one, 3.0 * other)):
-        found = normal_of_rows(*map(tuple, vectors))
+        found = normal_of_plane(np.transpose(vectors))
         np.testing.assert_allclose(np.sign(found @ across) * np.array(found), across, atol=1e-12)
     # The best conditioned pair decides where all three differ a little.
     for vectors in permutations((one, one + 1e-9 * other, other)):
-        found = normal_of_rows(*map(tuple, vectors))
+        found = normal_of_plane(np.transpose(vectors))
         np.testing.assert_allclose(np.cross(found, across), 0.0, atol=1e-12)

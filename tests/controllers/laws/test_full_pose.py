@@ -10,38 +10,44 @@ from scipy.spatial.transform import Rotation
 
 from tests.controllers.flights import fly, rk4_step, tiltrotor_rates
 from tests.controllers.laws.test_tracking import PATH, TIME, reference
-from tests.natively import natively
+from tests.controllers.multirotors import FOUR, HEXAROTOR, Vehicle, random_states, ring, tiltrotor
+from tests.natively import compiled, natively
 from tiltsim_controllers.analysis.stability import is_hurwitz
-from tiltsim_controllers.gaits.parameters import GAIT_TYPES, GaitParameters
+from tiltsim_controllers.gaits.parameters import FIXED, GaitParameters
 from tiltsim_controllers.laws import attitude_altitude
-from tiltsim_controllers.laws.attitude_altitude import rotor_accelerations
+from tiltsim_controllers.laws.attitude_altitude import attitude_altitude_inputs
 from tiltsim_controllers.laws.full_pose import (
     GAIN_SETS,
     PUBLISHED_TILT_WEIGHT,
     Failure,
     Limits,
     Parameters,
-    attitude_error,
-    desired_jerks,
     force_balanced_tilt_weight,
-    full_pose_inputs,
+    full_pose,
+    input_matrix,
     limited_tilt_rate,
-    minimum_norm_inputs,
-    pose_rows,
+    pose_rank,
 )
 from tiltsim_controllers.laws.gains import GAIN_SETS as ATTITUDE_GAINS
+from tiltsim_controllers.mathematics.attitude import attitude_error, rotation_matrix
+from tiltsim_controllers.mathematics.linear import least_norm
 from tiltsim_controllers.mathematics.rotation import rotation_from_euler
+from tiltsim_controllers.mathematics.scalar import scalar
 from tiltsim_controllers.references.trajectories import (
+    CIRCLE,
     REFERENCE_TYPES,
     ReferenceParameters,
     reference_derivatives,
 )
-from tiltsim_controllers.vehicle.decoupling_matrix import (
-    body_force,
-    sines_and_cosines,
-    torque_entries,
+from tiltsim_controllers.vehicle.effectiveness import (
+    cross_table,
+    force_and_torque,
+    rotor_entries,
+    tilt_of_rotor,
+    tilts_of,
 )
 from tiltsim_controllers.vehicle.parameters import PRESETS, SPIN, drag_ratio
+from tiltsim_controllers.vehicle.rotors import rotors_in
 
 TILTROTOR = PRESETS["ar_drone_2_unrounded"]
 GAINS = GAIN_SETS["ch03"]
@@ -49,6 +55,14 @@ HERE = ReferenceParameters(REFERENCE_TYPES["setpoint"])
 WEIGHTS = {"published": PUBLISHED_TILT_WEIGHT, "even": force_balanced_tilt_weight(TILTROTOR)}
 GAITS = {1: (-0.1, 0.1, -0.2, 0.1), 2: (-0.15, -0.1, 0.3, -0.1)}
 CASES = 20
+ROTORS = rotors_in(cross_table(TILTROTOR, tilting=True), 0, (0, 1, 2, 3))
+
+
+@scalar
+def full_pose_inputs(time, state, parameters, knots=()):
+    """The law of the tiltrotor, with its reference."""
+    target = reference_derivatives(time, parameters.reference, knots)
+    return full_pose(time, state, target, parameters, knots, (0, 1, 2, 3))
 
 
 def parameters(weight="even", limits=None, reference=HERE):
@@ -69,33 +83,6 @@ def start(tilts):
     return (*[0.0] * 12, *tilts, *(300.0 * sign for sign in SPIN))
 
 
-# --- what is desired ---------------------------------------------------------------------------
-
-
-def test_desired_jerks_are_those_of_the_reference_and_its_errors():
-    reference = ReferenceParameters(
-        REFERENCE_TYPES["lissajous"], amplitude_x=1.0, amplitude_y=0.7, amplitude_z=0.4,
-        frequency_x=0.5, frequency_y=0.8, frequency_z=1.1, phase_y=0.3, phase_z=1.0,
-        roll=0.2, pitch=-0.1, yaw=0.6,
-    )  # fmt: skip
-    random = np.random.default_rng(1)
-    state = np.array(random_state(random))
-    linear, angular = random.normal(size=(2, 3))
-    rotation = rotation_from_euler(*state[6:9])
-    now = parameters(reference=reference)
-    found = desired_jerks(2.0, tuple(state), rotation, (tuple(linear), tuple(angular)), now, ())
-    position, velocity, acceleration, jerk = np.reshape(
-        reference_derivatives(2.0, reference)[:12], (4, 3)
-    )
-    feedback = GAINS.position_3 * (position - state[:3])
-    feedback += GAINS.position_2 * (velocity - state[3:6])
-    feedback += GAINS.position_1 * (acceleration - linear)
-    np.testing.assert_allclose(found[0], jerk + feedback, rtol=1e-12)
-    error = np.array(attitude_error(rotation, rotation_from_euler(0.2, -0.1, 0.6)))
-    turning = GAINS.attitude_3 * error - GAINS.attitude_2 * state[9:12] - GAINS.attitude_1 * angular
-    np.testing.assert_allclose(found[1], turning, rtol=1e-12)
-
-
 # --- the solve ---------------------------------------------------------------------------------
 
 
@@ -104,66 +91,59 @@ def test_the_solve_is_the_pseudo_inverse():
     for _ in range(CASES):
         rows = random.normal(size=(6, 8)) * 10.0 ** random.uniform(-3, 3, (6, 1))
         desired = random.normal(size=6)
-        found = minimum_norm_inputs(tuple(map(tuple, rows.tolist())), tuple(desired.tolist()))
         expected = np.linalg.pinv(rows, rcond=1e-14) @ desired
-        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9 * np.abs(expected).max())
+        bound = 1e-9 * np.abs(expected).max()
+        np.testing.assert_allclose(least_norm(rows, desired), expected, rtol=0, atol=bound)
 
 
 @pytest.mark.parametrize("weight", WEIGHTS)
 def test_the_solve_copes_with_the_vehicles_matrix(weight):
     """Columns of thrust and of tilt differ by 1e5 under the published weight."""
     random = np.random.default_rng(1)
-    ratio = drag_ratio(TILTROTOR)
+    units = np.repeat((TILTROTOR.arm_length, 1.0), 3)[:, np.newaxis] * TILTROTOR.thrust_coefficient
     for _ in range(CASES):
-        trig = sines_and_cosines(*random.uniform(-0.6, 0.6, 4))
-        w = tuple(random.uniform(4e4, 2e5, 4) * SPIN / WEIGHTS[weight])
-        rows = pose_rows(trig, torque_entries(trig, ratio), w)
+        w = random.uniform(4e4, 2e5, 4) * SPIN
+        tilts = random.uniform(-0.6, 0.6, 4)
+        rows = input_matrix(ROTORS, tilts, w, WEIGHTS[weight]) / units
         desired = random.normal(size=6)
-        found = np.array(minimum_norm_inputs(rows, tuple(desired)))
-        np.testing.assert_allclose(np.array(rows) @ found, desired, rtol=0, atol=1e-9)
-        expected = np.linalg.lstsq(np.array(rows), desired, rcond=1e-15)[0]
+        found = least_norm(rows, desired)
+        np.testing.assert_allclose(rows @ found, desired, rtol=0, atol=1e-9)
+        expected = np.linalg.lstsq(rows, desired, rcond=1e-15)[0]
         assert np.linalg.norm(found) <= np.linalg.norm(expected) * (1 + 1e-6)
 
 
-def test_the_solve_is_nan_where_rows_depend_on_each_other():
-    rows = np.random.default_rng(2).normal(size=(6, 8))
-    rows[4] = rows[0] - 2 * rows[3]
-    found = minimum_norm_inputs(tuple(map(tuple, rows.tolist())), (1.0,) * 6)
-    assert all(isnan(value) for value in found)
-
-
 @pytest.mark.parametrize("row", range(6))
-def test_a_row_of_zeros_has_no_solution(row):
+@pytest.mark.parametrize("dependent", [False, True], ids=["zero", "dependent"])
+def test_the_solve_is_nan_where_a_row_depends_on_the_others(row, dependent):
     rows = np.random.default_rng(2).normal(size=(6, 8))
-    rows[row] = 0.0
-    found = minimum_norm_inputs(tuple(map(tuple, rows.tolist())), (1.0,) * 6)
-    assert all(isnan(value) for value in found)
+    rows[row] = rows[row - 2] - 2 * rows[row - 3] if dependent else 0.0
+    assert np.isnan(least_norm(rows, np.ones(6))).all()
 
 
-def test_rows_are_derivatives_of_force_and_torque():
+def test_the_matrix_is_the_derivative_of_torque_and_force_in_closed_form():
+    """Tilting a pod converts roll or pitch torque to yaw torque and back (ch. 3, Eqs. 3, 5)."""
     random = np.random.default_rng(3)
-    ratio = drag_ratio(TILTROTOR)
-
-    def wrench(point):
-        trig = sines_and_cosines(*point[4:])
-        x2, x4, y1, y3, z1, z2, z3, z4 = torque_entries(trig, ratio)
-        w1, w2, w3, w4 = point[:4]
-        return np.array(
-            [
-                *body_force(trig, w1, w2, w3, w4),
-                x2 * w2 + x4 * w4,
-                y1 * w1 + y3 * w3,
-                z1 * w1 + z2 * w2 + z3 * w3 + z4 * w4,
-            ]
-        )
-
+    per_force = TILTROTOR.thrust_coefficient
+    per_torque = per_force * TILTROTOR.arm_length
     for _ in range(CASES):
-        point = np.array([*random.uniform(-2, 2, 4), *random.uniform(-3, 3, 4)])
-        trig = sines_and_cosines(*point[4:])
-        rows = pose_rows(trig, torque_entries(trig, ratio), tuple(point[:4]))
-        h = 1e-6
-        columns = [(wrench(point + h * e) - wrench(point - h * e)) / (2 * h) for e in np.eye(8)]
-        np.testing.assert_allclose(rows, np.stack(columns, axis=1), rtol=0, atol=1e-8)
+        tilts, w = random.uniform(-3, 3, 4), random.uniform(-2, 2, 4)
+        s, c, r = np.sin(tilts), np.cos(tilts), drag_ratio(TILTROTOR)
+        roll, yaw = c - r * s, s + r * c  # of rotors 2 and 4, by the side they are on
+        pitch, turn = c + r * s, s - r * c  # of rotors 1 and 3
+        expected = [
+            [0, roll[1], 0, -roll[3], 0, -yaw[1] * w[1], 0, yaw[3] * w[3]],
+            [pitch[0], 0, -pitch[2], 0, -turn[0] * w[0], 0, turn[2] * w[2], 0],
+            [
+                *(turn[0], -yaw[1], turn[2], -yaw[3]),
+                *(pitch[0] * w[0], -roll[1] * w[1], pitch[2] * w[2], -roll[3] * w[3]),
+            ],
+            [0, s[1], 0, -s[3], 0, c[1] * w[1], 0, -c[3] * w[3]],
+            [s[0], 0, -s[2], 0, c[0] * w[0], 0, -c[2] * w[2], 0],
+            [-c[0], c[1], -c[2], c[3], s[0] * w[0], -s[1] * w[1], s[2] * w[2], -s[3] * w[3]],
+        ]
+        units = np.repeat((per_torque, per_force), 3)[:, np.newaxis]
+        found = input_matrix(ROTORS, tilts, w) / units
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12)
 
 
 # --- the law -----------------------------------------------------------------------------------
@@ -177,7 +157,7 @@ def test_the_attitude_error_is_the_sine_of_the_angle_along_its_axis():
         axis /= np.linalg.norm(axis)
         angle = random.uniform(-3.0, 3.0)
         desired = now * Rotation.from_rotvec(angle * axis)
-        found = attitude_error(tuple(now.as_matrix().ravel()), tuple(desired.as_matrix().ravel()))
+        found = attitude_error(now.as_matrix(), desired.as_matrix())
         np.testing.assert_allclose(found, np.sin(angle) * axis, rtol=0, atol=1e-14)
 
 
@@ -201,7 +181,7 @@ def test_the_outputs_move_as_demanded(weight):
         )
         third = ((ahead - behind) / (2 * h))[[3, 4, 5, 9, 10, 11]]
         error = attitude_error(
-            rotation_from_euler(*state[6:9]), rotation_from_euler(0.1, -0.2, 0.3)
+            rotation_matrix(np.array(state[6:9])), rotation_matrix(np.array([0.1, -0.2, 0.3]))
         )
         desired = np.concatenate(
             [
@@ -236,7 +216,7 @@ def test_a_rotor_known_to_be_lost_is_counted_on_no_more(lost):
             np.array(rates(0.0, rk4_step(rates, 0.0, state, k * 1e-7))) for k in (0, 1, -1)
         )
         third = ((ahead - behind) / 2e-7)[[3, 4, 5, 9, 10, 11]]
-        error = attitude_error(rotation_from_euler(*state[6:9]), rotation_from_euler(0, 0, 0))
+        error = attitude_error(rotation_matrix(np.array(state[6:9])), np.eye(3))
         demanded = np.concatenate(
             [
                 -1562.0 * np.array(state[:3]) - 1875.0 * np.array(state[3:6]) - 750.0 * now[3:6],
@@ -272,7 +252,8 @@ def test_the_published_gains_are_stable():
 def test_inputs_are_nan_where_a_rotor_stands_still(stopped):
     state = list(start(GAITS[1]))
     state[16 + stopped] = 0.0
-    assert all(isnan(value) for value in full_pose_inputs(0.0, tuple(state), parameters()))
+    found = full_pose_inputs(0.0, tuple(state), parameters())
+    assert [isnan(value) for value in found[:4]] == [rotor == stopped for rotor in range(4)]
 
 
 def test_limits():
@@ -298,13 +279,14 @@ def planned(gait, duration, step):
     law = attitude_altitude.Parameters(
         TILTROTOR,
         ATTITUDE_GAINS["ch03"],
-        GaitParameters(GAIT_TYPES["fixed"], *GAITS[gait]),
+        GaitParameters(FIXED),
         ReferenceParameters(REFERENCE_TYPES["attitude_altitude"]),
         0.0,
         0.0,
     )
+    inputs = compiled(attitude_altitude_inputs, 0.0, start(GAITS[gait]), law)
     return fly(
-        lambda time, state: (*rotor_accelerations(time, state, law), 0.0, 0.0, 0.0, 0.0),
+        lambda time, state: (*inputs(time, state, law)[:4], 0.0, 0.0, 0.0, 0.0),
         tiltrotor_rates,
         TILTROTOR,
         start(GAITS[gait]),
@@ -315,8 +297,9 @@ def planned(gait, duration, step):
 
 def full(gait, duration, step, **options):
     law = parameters(**options)
+    inputs = compiled(full_pose_inputs, 0.0, start(GAITS[gait]), law)
     return fly(
-        lambda time, state: full_pose_inputs(time, state, law),
+        lambda time, state: inputs(time, state, law),
         tiltrotor_rates,
         TILTROTOR,
         start(GAITS[gait]),
@@ -361,7 +344,108 @@ def test_under_the_published_weight_tilting_is_faster_than_any_step():
 
 
 @pytest.mark.parametrize("weight", WEIGHTS)
-def test_machine_code_gives_the_same_bits(weight):
+def test_machine_code_gives_the_same_inputs(weight):
     random = np.random.default_rng(6)
     law, state = parameters(weight, Limits(3.0, 0.5)), random_state(random)
-    assert natively(full_pose_inputs, 1.7, state, law) == [*full_pose_inputs(1.7, state, law)]
+    found = natively(full_pose_inputs, 1.7, state, law)
+    np.testing.assert_allclose(found, full_pose_inputs(1.7, state, law), rtol=1e-9)
+
+
+# --- any rotors --------------------------------------------------------------------------------
+
+ON_CIRCLE = ReferenceParameters(
+    CIRCLE, x=0.3, y=-0.2, z=0.1, radius=2.0, angular_frequency=0.5, yaw=0.4
+)
+
+
+@pytest.mark.parametrize("failure", [Failure(), Failure(2.0, 10.0)], ids=["whole", "lost"])
+def test_the_tiltrotors_parameters_stand_for_a_table_of_its_rotors(failure):
+    vehicle, limits, weight = tiltrotor(), Limits(5.0, 1.0), force_balanced_tilt_weight(FOUR)
+    own = Parameters(FOUR, GAINS, ON_CIRCLE, limits, weight, failure)
+    general = own._replace(vehicle=vehicle.body)
+    for time, state in random_states(10):
+        expected = np.array(full_pose_inputs(time, state, own))
+        found = np.array(full_pose_inputs(time, state, general, vehicle.table))
+        for part in (slice(4), slice(4, 8)):
+            assert np.abs(found - expected)[part].max() <= 1e-12 * np.abs(expected[part]).max()
+
+
+def on_shared_pods():
+    """Eight rotors, two with opposite spins on each of four hinges."""
+    table = []
+    for i in range(8):
+        x, y = ((0.2, 0.0), (0.0, 0.2), (-0.2, 0.0), (0.0, -0.2))[i % 4]
+        spin = (-1.0) ** (i + i // 4)
+        table += rotor_entries(
+            (x, y, 0.03 * (i // 4)), (0.0, 0.0, 1.0), 8.5e-6, 1.4e-7, spin,
+            tilt=i % 4, hinge=(x, y, 0.0), hinge_axis=(5.0 * x, 5.0 * y, 0.0),
+        )  # fmt: skip
+    return tuple(table)
+
+
+@pytest.mark.parametrize("failure", [Failure(), Failure(3.0, 0.0)], ids=["whole", "lost"])
+@pytest.mark.parametrize(
+    "table", [ring(6, hinged=True), ring(7, 0.44), on_shared_pods()], ids=["arms", "fixed", "pods"]
+)
+def test_force_and_torque_change_as_desired_with_the_least_inputs(table, failure):
+    vehicle, layout = Vehicle(table, HEXAROTOR, 3), tilt_of_rotor(table)
+    rotors, tilts = len(layout), tilts_of(layout)
+    parameters = Parameters(vehicle.body, GAINS, ON_CIRCLE, Limits(), 3e5, failure)
+    target = np.array(reference_derivatives(1.0, ON_CIRCLE)).reshape(5, 3)
+    works = np.array([rotor + 1.0 != failure.rotor for rotor in range(rotors)], float)
+    rng = np.random.default_rng(4)
+    for _ in range(3):
+        body, angles = 0.3 * rng.normal(size=12), rng.uniform(-0.5, 0.5, tilts)
+        speeds = rng.uniform(300.0, 500.0, rotors) * rng.choice((-1.0, 1.0), rotors)
+        state = np.array([*body, *angles, *speeds])
+        inputs = np.array(full_pose(1.0, state, target.ravel(), parameters, table, layout))
+        turned, accelerations = inputs[rotors:], inputs[:rotors]
+
+        def wrench(step, angles=angles, speeds=speeds, inputs=(turned, accelerations)):
+            v = speeds + step * inputs[1]
+            w = works * v * np.abs(v)
+            return np.concatenate(
+                [part @ w for part in force_and_torque(table, angles + step * inputs[0])]
+            )
+
+        step = 1e-4 / max(1.0, np.abs(turned).max(initial=0.0), np.abs(accelerations).max())
+        rate = (wrench(step) - wrench(-step)) / (2.0 * step)
+        rotation = np.reshape(rotation_from_euler(*body[6:9]), (3, 3))
+        force, torque = np.split(wrench(0.0), 2)
+        inertia = np.diag((HEXAROTOR.inertia_xx, HEXAROTOR.inertia_yy, HEXAROTOR.inertia_zz))
+        present = rotation @ force / HEXAROTOR.mass - (0.0, 0.0, HEXAROTOR.gravity)
+        jerk = target[3] + np.dot(
+            GAINS[:3], (target[2] - present, target[1] - body[3:6], target[0] - body[:3])
+        )
+        yaw = rotation_from_euler(0.0, 0.0, ON_CIRCLE.yaw)
+        error = attitude_error(rotation, np.reshape(yaw, (3, 3)))
+        angular = -np.dot(GAINS[3:], (np.linalg.solve(inertia, torque), body[9:12], -error))
+        lift = HEXAROTOR.mass * rotation.T @ jerk - np.cross(body[9:12], force)
+        np.testing.assert_allclose(rate[:3], lift, rtol=1e-6, atol=1e-6 * np.abs(lift).max())
+        moment = inertia @ angular
+        np.testing.assert_allclose(rate[3:], moment, rtol=1e-6, atol=1e-6 * np.abs(moment).max())
+        assert (accelerations[works == 0.0] == 0.0).all()
+
+        # Least norm: orthogonal to all directions that leave force and torque alone.
+        x = np.concatenate([2.0 * np.abs(speeds) * accelerations, 3e5 * turned])
+        w = works * speeds * np.abs(speeds)
+        columns = [np.concatenate(force_and_torque(table, angles)) * works]
+        for tilt in range(tilts):
+            high, low = (
+                np.concatenate(force_and_torque(table, angles + h * np.eye(tilts)[tilt])) @ w
+                for h in (1e-6, -1e-6)
+            )
+            columns.append(((high - low) / 2e-6 / 3e5)[:, np.newaxis])
+        rows = np.hstack(columns)
+        rows /= np.linalg.norm(rows, axis=1, keepdims=True)
+        assert np.linalg.norm(x - np.linalg.pinv(rows) @ rows @ x) < 1e-6 * np.linalg.norm(x)
+
+
+def test_the_rank_counts_rotors_tilts_and_losses():
+    arms = ring(6, hinged=True)
+    w = np.ones(6) * (-1.0) ** np.arange(1, 7)
+    assert pose_rank(ring(6), (), w) == 4
+    assert pose_rank(ring(6, 0.44), (), w) == 6
+    assert pose_rank(ring(6, 0.44), (), w * (np.arange(6) > 0)) == 5
+    assert pose_rank(arms, (0.0,) * 6, w) == 6
+    assert pose_rank(arms, (0.0,) * 6, w * (np.arange(6) > 0)) == 6

@@ -12,18 +12,19 @@ from scipy.spatial.transform import Rotation
 
 from tests.thesis import force_matrix, torque_matrix
 from tiltsim_controllers.analysis.stability import feedforward_loops
-from tiltsim_controllers.gaits.anticipation import anticipated_tilts, rounded_corner, rounded_ramp
-from tiltsim_controllers.gaits.parameters import GAIT_TYPES, GaitParameters
-from tiltsim_controllers.gaits.plans import continuous_trot, fixed, keyframes, two_color_circle
-from tiltsim_controllers.gaits.tilts import tilt_acceleration, tilt_reference
+from tiltsim_controllers.gaits.parameters import FIXED, GaitParameters
+from tiltsim_controllers.gaits.plans import continuous_trot, fixed
 from tiltsim_controllers.laws.attitude_altitude import Gains
 from tiltsim_controllers.laws.decouplers import DECOUPLERS, exact_decoupler
-from tiltsim_controllers.laws.feedback import attitude_jerk, integrator_rate, limited_acceleration
-from tiltsim_controllers.laws.force_motion import (
-    exact_decoupler_jet,
-    jerk_along,
-    torque_free_force_jet,
+from tiltsim_controllers.laws.feedback import (
+    angular_jerk,
+    attitude_jerk,
+    attitude_motion,
+    integrator_rate,
+    limited_acceleration,
+    swept,
 )
+from tiltsim_controllers.laws.force_directions import jerk_along
 from tiltsim_controllers.laws.gains import (
     IntegralGains,
     Poles,
@@ -31,16 +32,18 @@ from tiltsim_controllers.laws.gains import (
     second_order_gains,
     third_order_gains,
 )
-from tiltsim_controllers.laws.gait_feedforward import FeedforwardTerms, Parameters, tracking_inputs
-from tiltsim_controllers.laws.rotor_spin import spin_momentum, spin_torques
+from tiltsim_controllers.laws.gait_feedforward import Parameters, tracking_inputs
+from tiltsim_controllers.laws.multirotor_steps import FeedforwardTerms
+from tiltsim_controllers.mathematics.moving import Moving
 from tiltsim_controllers.references.trajectories import REFERENCE_TYPES, ReferenceParameters
 from tiltsim_controllers.vehicle.decoupling_matrix import (
     sines_and_cosines,
     torque_entries,
     torque_free_force,
 )
+from tiltsim_controllers.vehicle.effectiveness import cross_table
 from tiltsim_controllers.vehicle.parameters import PRESETS, SPIN, drag_ratio
-from tiltsim_controllers.vehicle.rigid_body import angular_jerk, euler_derivatives
+from tiltsim_controllers.vehicle.rotors import moving_wrench_map, rotors_in
 
 VEHICLE = PRESETS["ar_drone_2"]
 INERTIA = np.diag([VEHICLE.inertia_xx, VEHICLE.inertia_yy, VEHICLE.inertia_zz])
@@ -63,23 +66,17 @@ def differences(function, step=1e-4):
     return f[0], first, second
 
 
+def moving(jets):
+    """A vector from the derivatives of its entries."""
+    return Moving(*np.transpose(jets))
+
+
+def derivatives(*quantities):
+    """Values, rates and accelerations of quantities."""
+    return np.transpose([(q.value, q.rate, q.acceleration) for q in quantities])
+
+
 # --- chain rules -------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("vehicle", PRESETS.values(), ids=PRESETS)
-def test_the_torque_free_force_moves_with_the_tilts(vehicle):
-    random, ratio = np.random.default_rng(1), drag_ratio(vehicle)
-
-    def force(alpha):
-        trig = sines_and_cosines(*alpha)
-        return torque_free_force(trig, torque_entries(trig, ratio), ratio)
-
-    for _ in range(CASES):
-        jets, paths = zip(*(path(random, 1.2, 3.0) for _ in range(4)))
-        expected = differences(lambda t, paths=paths: force([p(t) for p in paths]))
-        found = np.transpose(torque_free_force_jet(jets, ratio))
-        for value, desired, tolerance in zip(found, expected, (1e-12, 1e-8, 1e-5)):
-            np.testing.assert_allclose(value, desired, rtol=0, atol=tolerance * 100)
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0], ids=["along n", "against n"])
@@ -93,27 +90,27 @@ def test_the_exact_decouplers_attitude_moves_with_its_arguments(side):
             n = (side * nx(t), side * ny(t), side * (2.0 + nz(t)))
             return exact_decoupler(ax(t), ay(t), az(t), yaw(t), g, n)
 
-        n = [tuple(side * value for value in jet) for jet in jets[4:]]
-        n[2] = (n[2][0] + side * 2.0, *n[2][1:])
-        lift = (g + jets[2][0], *jets[2][1:])
-        found = np.transpose(exact_decoupler_jet(jets[0], jets[1], lift, jets[3], n))
+        n = moving(jets[4:])
+        n = (n + np.array([0.0, 0.0, 2.0])) * side
+        found = derivatives(*exact_decoupler(*(Moving(*jet) for jet in jets[:4]), g, n))
         for value, desired, tolerance in zip(found, differences(attitude), (1e-13, 1e-9, 1e-6)):
             np.testing.assert_allclose(value, desired, rtol=0, atol=tolerance)
 
 
 @pytest.mark.parametrize("ay", [12.0, -12.0])
 def test_out_of_reach_the_decoupler_rests_at_the_nearest_roll(ay):
-    n = ((3.0, 0.1, -2.0), (0.2, 0.0, 0.0), (1.0, 0.0, 0.0))
-    still = [(value, 0.0, 0.0) for value in (1.0, ay, VEHICLE.gravity, 0.4)]
-    roll, _ = exact_decoupler_jet(*still, n)
+    n = moving([(3.0, 0.1, -2.0), (0.2, 0.0, 0.0), (1.0, 0.0, 0.0)])
+    still = [Moving(value, 0.0, 0.0) for value in (1.0, ay, 0.0, 0.4)]
+    roll, _ = exact_decoupler(*still, VEHICLE.gravity, n)
     expected, _ = exact_decoupler(1.0, ay, 0.0, 0.4, VEHICLE.gravity, (3.0, 0.2, 1.0))
-    assert roll == pytest.approx((expected, 0.0, 0.0), abs=1e-14)
+    assert derivatives(roll)[:, 0] == pytest.approx([expected, 0.0, 0.0], abs=1e-14)
 
 
 def test_without_a_force_the_decoupler_has_no_answer():
-    still = [(value, 0.0, 0.0) for value in (1.0, 0.0, VEHICLE.gravity, 0.0)]
-    zero = (0.0, 0.0, 0.0)
-    assert isnan(exact_decoupler_jet(*still, ((1.0, 0.0, 0.0), zero, zero))[0][0])
+    still = [Moving(value, 0.0, 0.0) for value in (1.0, 0.0, 0.0, 0.0)]
+    force = moving([(1.0, 0.0, 0.0), (0.0,) * 3, (0.0,) * 3])
+    with np.errstate(invalid="ignore"):
+        assert isnan(exact_decoupler(*still, VEHICLE.gravity, force)[0].value)
 
 
 # --- rigid-body motion -------------------------------------------------------------------------
@@ -142,8 +139,8 @@ def test_euler_motion_inverts_the_body_rates():
     for _ in range(CASES):
         coefficients, body_rates = attitude_path(random)
         omega, omega_rate, _ = differences(body_rates, 1e-2)
-        roll, pitch = coefficients[:2, 0]
-        found = euler_derivatives(roll, pitch, tuple(omega), tuple(omega_rate))
+        motion = attitude_motion(coefficients[:, 0], omega, omega_rate, exact=True)
+        found = [*motion.rate, *motion.acceleration]
         expected = [*coefficients[:, 1], *coefficients[:, 2]]
         np.testing.assert_allclose(found, expected, rtol=0, atol=1e-6)
 
@@ -152,8 +149,7 @@ def test_body_jerk_is_the_second_derivative_of_the_body_rates():
     random = np.random.default_rng(4)
     for _ in range(CASES):
         coefficients, body_rates = attitude_path(random)
-        jets = [tuple(row[:3]) for row in coefficients]
-        found = angular_jerk(*jets, tuple(coefficients[:, 3]))
+        found = angular_jerk(moving(coefficients[:, :3]), coefficients[:, 3])
         np.testing.assert_allclose(found, differences(body_rates, 1e-2)[2], rtol=0, atol=1e-4)
 
 
@@ -174,7 +170,7 @@ def parameters(**changed):
         max_angular_acceleration=1e6,
         anticipation=0.1,
         terms=FeedforwardTerms(),
-        gait=GaitParameters(GAIT_TYPES["fixed"]),
+        gait=GaitParameters(FIXED),
         reference=HOVER,
         decoupler=DECOUPLERS["none"],
     )
@@ -279,14 +275,14 @@ def test_hover_on_the_reference_needs_nothing():
     law = law._replace(decoupler=DECOUPLERS["exact"])
     speeds = [VEHICLE.hover_rotor_speed * sign for sign in SPIN]
     state = (1.0, 2.0, 3.0, *[0.0] * 13, *speeds)
-    found = tracking_inputs(0.0, state, (0.0,) * 4, (0.0,) * 3, law)
+    found = tracking_inputs(0.0, state, (0.0,) * 4, (0.0,) * 3, law, fixed([0.0] * 4).knots)
     assert found == pytest.approx([0.0] * 10, abs=1e-8)
 
 
 def test_a_rotor_at_rest_is_singular():
     state = (*random_state(np.random.default_rng(7))[:19], 0.0)
     found = tracking_inputs(0.0, state, (0.0,) * 4, (0.0,) * 3, parameters())
-    assert all(isnan(value) for value in found[:4])
+    assert [isnan(value) for value in found[:4]] == [False, False, False, True]
 
 
 def test_the_attitude_asked_for_points_the_gaits_force_along_the_wanted_acceleration():
@@ -301,7 +297,7 @@ def test_the_attitude_asked_for_points_the_gaits_force_along_the_wanted_accelera
     alpha = gait.angles(time)
     speeds = [VEHICLE.hover_rotor_speed * sign for sign in SPIN]
     state = (*on_track, 0.0, 0.0, yaw, 0.0, 0.0, 0.0, *alpha, *speeds)
-    roll, pitch, _ = tracking_inputs(time, state, (0.0,) * 4, (0.0,) * 3, law)[7:]
+    roll, pitch, _ = tracking_inputs(time, state, (0.0,) * 4, (0.0,) * 3, law, gait.knots)[7:]
     trig = sines_and_cosines(*alpha)
     n = np.array(torque_free_force(trig, torque_entries(trig, drag_ratio(VEHICLE)), 1.0))
     force = Rotation.from_euler("ZYX", [yaw, pitch, roll]).apply(n)
@@ -317,7 +313,7 @@ def test_the_attitude_asked_for_points_the_gaits_force_along_the_wanted_accelera
 @given(small, small, small, small)
 def test_within_its_limit_the_attitude_law_is_linear(angle, rate, acceleration, desired):
     found = attitude_jerk(
-        (desired, 0.1, -0.2), (angle, rate, acceleration), (30.0, 300.0, 1e3), 1e4
+        Moving(desired, 0.1, -0.2), Moving(angle, rate, acceleration), (30.0, 300.0, 1e3), 1e4
     )
     expected = 30 * (-0.2 - acceleration) + 300 * (0.1 - rate) + 1e3 * (desired - angle)
     assert found == pytest.approx(expected, abs=1e-9)
@@ -326,14 +322,16 @@ def test_within_its_limit_the_attitude_law_is_linear(angle, rate, acceleration, 
 @quick
 @given(st.floats(-50, 50), st.floats(-50, 50), st.floats(-50, 50))
 def test_no_error_asks_for_more_than_the_limit(angle, rate, ahead):
-    found = attitude_jerk((angle, rate, ahead), (0.0, 0.0, 0.0), (30.0, 300.0, 1e3), 8.0)
+    found = attitude_jerk(
+        Moving(angle, rate, ahead), Moving(0.0, 0.0, 0.0), (30.0, 300.0, 1e3), 8.0
+    )
     assert abs(found) <= 30.0 * 8.0 * (1 + 1e-12)
 
 
 @quick
 @given(st.floats(-9, 9), st.floats(-9, 9))
 def test_a_wanted_acceleration_keeps_its_direction_and_no_more_than_the_limit(x, y):
-    (ax, _, _), (ay, _, _) = limited_acceleration((x, 1.0, 0.0), (y, 2.0, 0.0), 3.0)
+    ax, ay = limited_acceleration(moving([(x, 1.0, 0.0), (y, 2.0, 0.0)]), 3.0).value
     assert np.hypot(ax, ay) <= 3.0 * (1 + 1e-12)
     assert ax * y == pytest.approx(ay * x, abs=1e-9)
     if np.hypot(x, y) <= 3.0:
@@ -344,79 +342,6 @@ def test_integrators_stop_where_they_would_wind_up():
     assert integrator_rate(0.4, 2.9, 3.0) == 0.4
     assert integrator_rate(0.4, 3.1, 3.0) == 0.0
     assert integrator_rate(-0.4, 3.1, 3.0) == -0.4  # back from the limit
-
-
-# --- corners of the gait -------------------------------------------------------------------------
-
-
-@quick
-@given(st.floats(-0.3, 0.3))
-def test_the_rounded_ramp_has_its_derivatives_and_the_ramp_outside(x):
-    half = 0.2
-    value, first, second = rounded_ramp(x, half)
-    if abs(x) >= half:
-        assert (value, first, second) == (max(x, 0.0), float(x > 0), 0.0)
-    if min(abs(x - half), abs(x + half)) < 1e-3:
-        return
-    h = 1e-4
-    found = differences(lambda t: [rounded_ramp(x + t, half)[0]], h)
-    assert (first, second) == pytest.approx((found[1][0], found[2][0]), abs=1e-5)
-
-
-def test_the_kernel_of_the_ramp_is_even_so_that_what_is_missed_before_is_made_up_after():
-    x = np.linspace(-0.2, 0.2, 2001)
-    first = np.array([rounded_ramp(v, 0.2)[1] for v in x])
-    np.testing.assert_allclose(first + first[::-1], 1.0, atol=1e-14)
-
-
-@quick
-@given(st.floats(-2, 2), st.floats(-3, 3), st.floats(-3, 3), st.floats(0.0, 0.4))
-def test_a_corner_is_found_from_the_ends_of_its_window(start, before, after, at):
-    half = 0.2
-    stop = start + before * at + after * (2 * half - at)
-    found = rounded_corner(start, before, stop, after, half)
-    smooth = rounded_ramp(half - at, half)
-    line = start + before * half
-    expected = (line + (after - before) * smooth[0], before + (after - before) * smooth[1])
-    assert found[:2] == pytest.approx(expected, abs=1e-8)
-
-
-WALK = keyframes(
-    [(0.0, 0.1, 0.2, 0.0, 0.3), (0.4, 0.5, -0.2, 0.1, 0.3), (1.0, 0.1, 0.2, 0.0, 0.3)], 2.0
-)
-
-
-@pytest.mark.parametrize("gait", [continuous_trot(0.6, 1.0), WALK], ids=["trot", "keyframes"])
-def test_anticipated_tilts_are_smooth_and_the_gait_itself_away_from_corners(gait):
-    half = min(0.1, 0.5 * gait.min_segment_time)
-    for time in np.linspace(0.003, 1.99, 97):
-        jets = anticipated_tilts(float(time), gait.parameters, gait.knots, half)
-        expected = differences(
-            lambda t, time=time: [
-                jet[0] for jet in anticipated_tilts(time + t, gait.parameters, gait.knots, half)
-            ]
-        )
-        np.testing.assert_allclose([jet[1] for jet in jets], expected[1], atol=1e-4)
-        np.testing.assert_allclose([jet[2] for jet in jets], expected[2], atol=0.2)
-    straight = 0.5 * (WALK.sample_times(2)[0] + 0.8) if gait is WALK else 0.25
-    jets = anticipated_tilts(straight, gait.parameters, gait.knots, half)
-    np.testing.assert_allclose([jet[0] for jet in jets], gait.angles(straight), atol=1e-14)
-
-
-def test_jumps_and_smooth_gaits_are_left_alone():
-    circle = two_color_circle((0.1, -0.2), 0.3, "blue", 2.0, VEHICLE).biased(0.9).scaled(1.5)
-    for time in (0.0, 0.3, 1.7):
-        jets = anticipated_tilts(time, circle.parameters, circle.knots, 0.1)
-        found = differences(lambda t, time=time: circle.angles(time + t), 1e-3)
-        for order, tolerance in enumerate((1e-14, 1e-8, 1e-6)):
-            got = [jet[order] for jet in jets]
-            np.testing.assert_allclose(got, found[order], atol=tolerance)
-        acceleration = tilt_acceleration(time, circle.parameters)
-        np.testing.assert_array_equal([jet[2] for jet in jets], acceleration)
-    assert fixed([0.1] * 4).min_segment_time == float("inf")
-    plain = anticipated_tilts(0.3, circle.parameters, circle.knots, 0.0)
-    expected = tilt_reference(0.3, circle.parameters, circle.knots)
-    assert tuple(jet[0] for jet in plain) + tuple(jet[1] for jet in plain) == expected
 
 
 # --- gains by pole placement ---------------------------------------------------------------------
@@ -448,19 +373,22 @@ def test_the_closed_loops_are_those_of_the_poles():
 def test_a_reference_that_is_no_number_asks_for_no_number(place):
     desired = [0.1, 0.2, 0.3]
     desired[place] = float("nan")
-    assert isnan(attitude_jerk(tuple(desired), (0.0, 0.0, 0.0), (40.0, 600.0, 4000.0), 50.0))
+    assert isnan(
+        attitude_jerk(Moving(*desired), Moving(0.0, 0.0, 0.0), (40.0, 600.0, 4000.0), 50.0)
+    )
 
 
 def test_in_free_fall_the_decoupler_has_no_answer():
-    zero = (0.0, 0.0, 0.0)
-    force = ((0.1, 0.0, 0.0), (0.2, 0.0, 0.0), (3.0, 0.0, 0.0))
-    for jet in exact_decoupler_jet(zero, zero, zero, (0.3, 0.0, 0.0), force):
-        assert all(map(isnan, jet))
+    still = [Moving(value, 0.0, 0.0) for value in (0.0, 0.0, -VEHICLE.gravity, 0.3)]
+    force = moving([(0.1, 0.0, 0.0), (0.2, 0.0, 0.0), (3.0, 0.0, 0.0)])
+    with np.errstate(invalid="ignore"):
+        assert all(isnan(a.value) for a in exact_decoupler(*still, VEHICLE.gravity, force))
 
 
 def test_a_force_without_vertical_part_counts_as_along_its_direction():
-    turning = ((1.0, 0.0, 0.0), (0.0, 2.0, 0.0), (0.0, 0.0, 0.0))
-    assert jerk_along(turning, (10.0, 0.0, 0.0), (0.0, 0.0, 0.0), 1.0) == (0.0, 20.0, 0.0)
+    turning = moving([(1.0, 0.0, 0.0), (0.0, 2.0, 0.0), (0.0, 0.0, 0.0)])
+    found = jerk_along(turning, np.array([10.0, 0.0, 0.0]), np.zeros(3), 1.0)
+    assert found.tolist() == [0.0, 20.0, 0.0]
 
 
 @pytest.mark.parametrize("counted", [0.0, 0.5, 1.0])
@@ -478,8 +406,7 @@ def test_the_jerk_is_that_of_a_force_that_turns_with_the_body_and_with_its_direc
 
         now, rate, _ = differences(force)
         for side in (1.0, -1.0):  # a direction that points down is that of a force against it
-            turned = [tuple(side * value for value in jet) for jet in jets]
-            found = jerk_along(tuple(turned), tuple(now.tolist()), tuple(omega.tolist()), counted)
+            found = jerk_along(moving(jets) * side, now, omega, counted)
             np.testing.assert_allclose(found, rate, rtol=0, atol=1e-8)
 
 
@@ -500,10 +427,9 @@ def test_torques_of_the_rotors_spin_are_rates_of_its_momentum(seed):
         _, first, _ = differences(lambda s: momentum(t + s))
         return first + np.cross(omega + omega_rate * t, momentum(t))
 
-    trig = sines_and_cosines(*alpha)
-    spin = spin_momentum(trig, tuple(rates), tuple(speeds), inertia)
-    found = spin_torques(spin, tuple(omega), tuple(omega_rate))
-    np.testing.assert_allclose(found[0], torque(0.0), rtol=1e-7, atol=1e-12)
-    np.testing.assert_allclose(found[1], differences(torque)[1], rtol=1e-5, atol=1e-7)
-    unknown = spin_momentum(trig, tuple(rates), tuple(speeds), 0.0)
-    assert not np.any(spin_torques(unknown, tuple(omega), tuple(omega_rate)))
+    rotors = rotors_in(cross_table(VEHICLE, tilting=True), 0, (0, 1, 2, 3))
+    force = moving_wrench_map(rotors, Moving(alpha, rates, 0.0))[:3]
+    spin = force @ (inertia / VEHICLE.thrust_coefficient * rotors.spins * speeds)
+    found = swept(spin, omega, omega_rate)
+    np.testing.assert_allclose(found.value, torque(0.0), rtol=1e-7, atol=1e-12)
+    np.testing.assert_allclose(found.rate, differences(torque)[1], rtol=1e-5, atol=1e-7)

@@ -29,19 +29,21 @@ from tiltsim_controllers.gaits import plans
 from tiltsim_controllers.laws import attitude_altitude, gait_feedforward
 from tiltsim_controllers.laws.decouplers import DECOUPLERS
 from tiltsim_controllers.laws.failures import Failure
-from tiltsim_controllers.laws.full_pose import attitude_error
 from tiltsim_controllers.laws.gains import GAIN_SETS, Poles, gains_from_poles
-from tiltsim_controllers.laws.gait_feedforward import FeedforwardTerms
-from tiltsim_controllers.laws.multirotor import multirotor_law_of
-from tiltsim_controllers.laws.multirotor_inputs import independence_of
+from tiltsim_controllers.laws.gait_feedforward import multirotor_law_of
+from tiltsim_controllers.laws.multirotor import independence
 from tiltsim_controllers.laws.multirotor_steps import (
     EULER_ANGLES,
+    FeedforwardTerms,
     Form,
     SideGains,
+    Tracking,
     rotation_control,
     side_control,
     turned,
 )
+from tiltsim_controllers.mathematics.attitude import attitude_error
+from tiltsim_controllers.mathematics.moving import Moving
 from tiltsim_controllers.mathematics.rotation import rotation_from_euler
 from tiltsim_controllers.references.trajectories import CIRCLE, SETPOINT, ReferenceParameters
 from tiltsim_controllers.vehicle.effectiveness import (
@@ -77,11 +79,11 @@ def test_the_law_of_chapters_3_and_4_is_a_case(decoupler, decoupling):
     special = attitude_altitude.Parameters(FOUR, gains, gait.parameters, ON_CIRCLE, *codes)
     law, knots = parameters_of(
         vehicle, gait, ON_CIRCLE, gains=gains, terms=AS_PUBLISHED, decoupler=codes[0],
-        decoupling=codes[1], attitude=EULER_ANGLES,
+        decoupling=codes[1], attitude_error=EULER_ANGLES,
     )  # fmt: skip
     inputs, rest = multirotor_law_of(tilt_of_rotor(vehicle.table), Form(1)), (0.0,) * 4
     found = differences(
-        lambda time, state: attitude_altitude.rotor_accelerations(time, state, special),
+        lambda time, state: attitude_altitude.attitude_altitude_inputs(time, state, special)[:4],
         lambda time, state: inputs(time, state, rest, (0.0,) * 3, law, knots),
     )
     # Beside a singular attitude rounding grows without bound; it is rare among these states.
@@ -112,7 +114,7 @@ def test_gait_feedforward_is_a_case(gait):
     )  # fmt: skip
     law, knots = parameters_of(
         vehicle, gait, ON_CIRCLE, gains=gains, integral=integral, max_acceleration=3.0,
-        max_angular_acceleration=200.0, anticipation=0.05, attitude=EULER_ANGLES,
+        max_angular_acceleration=200.0, anticipation=0.05, attitude_error=EULER_ANGLES,
     )  # fmt: skip
     inputs = multirotor_law_of(tilt_of_rotor(vehicle.table), Form(1))
     found = differences(
@@ -135,9 +137,7 @@ def test_independence_is_what_the_other_outputs_leave_of_the_force(dimension):
     tilts = (0.3, -0.2, 0.1, 0.4) if dimension == 1 else ()
     force, torque = force_and_torque(table, tilts)
     forces = torque_free_forces(force, torque)
-    share = independence_of(len(table) // ROTOR_FLOATS, dimension)
-    effect = (*map(tuple, force.tolist()), *map(tuple, torque.tolist()))
-    side = tuple(hover_direction(forces).tolist())
+    wrench, form, side = np.vstack([force, torque]), Form(dimension), hover_direction(forces)
     for up in np.random.default_rng(2).normal(size=(5, 3)):
         up /= np.linalg.norm(up)
         axes, rows, expected = controlled_axes(forces, up, dimension), torque, 1.0
@@ -146,10 +146,9 @@ def test_independence_is_what_the_other_outputs_leave_of_the_force(dimension):
             expected *= np.linalg.norm(left) / np.linalg.norm(lift)
             rows = np.vstack([rows, lift])
         sign = np.sign(up @ side) if dimension == 1 else 1.0
-        found = share(effect, tuple(up.tolist()), side)
+        found = independence(wrench, up, side, form)
         assert found == pytest.approx(sign * expected, abs=1e-12)
-    across = tuple(np.cross(side, (0.6, 0.8, 0.0)).tolist())
-    singular = share(effect, across, side)
+    singular = independence(wrench, np.cross(side, (0.6, 0.8, 0.0)), side, form)
     assert abs(singular) < 1e-15 if dimension == 1 else singular > 0.1
 
 
@@ -284,7 +283,8 @@ def test_force_control_of_x_and_y_is_third_order_with_an_integrator():
         side=SideGains(5.0, 8.0, 6.0, 2.0), terms=law.terms._replace(integral_action=0.5)
     )
     errors, accelerations, integrals = np.random.default_rng(5).uniform(-0.1, 0.1, (3, 3, 3))
-    found = side_control(*np.array((errors, accelerations)).tolist(), integrals[0].tolist(), law)
+    motion = Tracking(Moving(*errors.T), Moving(*accelerations.T))
+    found = np.hstack(side_control(motion, integrals[0], law))
     jerks = accelerations[:, 1] + errors @ (6.0, 8.0, 5.0) + 0.5 * 2.0 * integrals[0]
     np.testing.assert_allclose(found, (*jerks[:2], *errors[:2, 0]), rtol=1e-12)
 
@@ -296,7 +296,7 @@ def test_attitude_control_feeds_the_motion_of_its_reference_forward():
 
     def desired(time):
         roll, pitch = turned(time, 0.8, 1.0), turned(time, -0.6, 1.3)
-        return np.reshape(rotation_from_euler(roll[0], pitch[0], 0.5), (3, 3))
+        return np.reshape(rotation_from_euler(roll.value, pitch.value, 0.5), (3, 3))
 
     def body(time):
         return desired(time - 0.2)
@@ -314,7 +314,7 @@ def test_attitude_control_feeds_the_motion_of_its_reference_forward():
         return omega
 
     present, demand = seen_from_body(body), seen_from_body(desired)
-    error = attitude_error(tuple(body(now).ravel()), tuple(desired(now).ravel()))
+    error = attitude_error(body(now), desired(now))
     gains = law.gains
     expected = (
         np.array((gains.roll_1, gains.pitch_1, gains.yaw_1))
@@ -322,7 +322,7 @@ def test_attitude_control_feeds_the_motion_of_its_reference_forward():
         + np.array((gains.roll_2, gains.pitch_2, gains.yaw_2)) * (demand(now) - present(now))
         + np.array((gains.roll_3, gains.pitch_3, gains.yaw_3)) * error
     )
-    motion = tuple(body(now).ravel()), tuple(present(now)), tuple(rate(present, now))
+    motion = body(now), present(now), rate(present, now)
     references = turned(now, 0.8, 1.0), turned(now, -0.6, 1.3)
     found = rotation_control(*references, *motion, law)
     # The differences are wrong by 1e-6 at most, which gains multiply by up to 2e3.

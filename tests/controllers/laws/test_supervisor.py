@@ -18,7 +18,6 @@ from tiltsim_controllers.analysis.singularity import (
 from tiltsim_controllers.gaits.plans import continuous_trot as trot
 from tiltsim_controllers.gaits.plans import fixed, waypoints
 from tiltsim_controllers.gaits.plans import instant_trot as trot_instant
-from tiltsim_controllers.gaits.tilts import planned_jets, tilt_reference
 from tiltsim_controllers.laws.decouplers import exact_decoupler
 from tiltsim_controllers.laws.multirotor_supervisor import multirotor_supervision_of, watched
 from tiltsim_controllers.laws.supervisor import BAND, LAG, STRATEGIES, Supervisor, turned_along
@@ -129,7 +128,7 @@ def test_a_gait_across_the_curve_l_stops_before_it():
 
 # --- hold and return to red ----------------------------------------------------------------------
 
-JUMPS = trot_instant(0.8, 2.0).parameters  # at 1 s the torque-free force turns by more than pi/2
+JUMPS = trot_instant(0.8, 2.0)  # at 1 s the torque-free force turns by more than pi/2
 WITH_STATES = ("hold", "return_to_red")
 PLAN = ((0.3, 0.2, 0.1), (-0.4, 0.5, -0.3), (0.6, -0.1, 0.2), (0.2, 0.3, 0.4))
 
@@ -140,7 +139,8 @@ def watch(strategy, **changes):
 
 
 def demand(time, roll, pitch, state, rate, supervisor, gait=JUMPS):
-    return supervised_derivative(time, roll, pitch, state, rate, gait, (), supervisor, RATIO)[2]
+    planned = gait.parameters, gait.knots
+    return supervised_derivative(time, roll, pitch, state, rate, *planned, supervisor, RATIO)[2]
 
 
 @given(angles, leans, leans)
@@ -180,7 +180,7 @@ def test_a_supervisor_with_room_to_spare_rests(strategy):
 @pytest.mark.parametrize("strategy", WITH_STATES)
 def test_it_acts_as_soon_as_the_jump_comes_into_sight(strategy):
     """In hover before the jump of the trot at 1 s, with the attitude that its tilts need."""
-    n = torque_free_direction(tilt_reference(0.65, JUMPS)[:4], VEHICLE)
+    n = torque_free_direction(JUMPS.angles(0.65), VEHICLE)
     roll, pitch = exact_decoupler(0.0, 0.0, 0.0, 0.0, 9.8, tuple(n))
     supervisor = watch(strategy, horizon=0.4, min_margin=0.5)
     assert demand(0.55, roll, pitch, 0.0, 0.0, supervisor) == 0.0
@@ -202,7 +202,7 @@ def test_the_clock_slows_down_within_the_band():
         acceleration = supervised_derivative(
             time, 0.0, 0.0, 0.0, 0.0, gait.parameters, gait.knots, supervisor, RATIO
         )[2]
-        ahead = tilt_reference(time + 0.5, gait.parameters, gait.knots)[:4]
+        ahead = tuple(gait.angles(time + 0.5))
         left = threshold_clearance(ahead, (0.0, 0.0, 1.0), supervisor, RATIO)
         state, asked_rates = left, acceleration * LAG
         assert asked_rates == pytest.approx(min(1.0, max(0.0, 1.0 - left / BAND)), abs=1e-9)
@@ -214,18 +214,18 @@ def test_the_clock_slows_down_within_the_band():
 
 def lean_of(time, gait):
     """Roll and pitch of the vehicle in hover at a time of a gait."""
-    n = torque_free_direction(tilt_reference(time, gait)[:4], VEHICLE)
+    n = torque_free_direction(gait.angles(time), VEHICLE)
     return exact_decoupler(0.0, 0.0, 0.0, 0.0, 9.8, tuple(n))
 
 
 @pytest.mark.parametrize("horizon", [0.5, 4.0])
 def test_a_gait_with_which_the_vehicle_leans_is_flown(horizon):
     """At the present lean its tilts a quarter of a period ahead would violate the threshold."""
-    gait, supervisor = trot(0.9, 1.6).parameters, watch("hold", min_margin=1.0, horizon=horizon)
+    gait, supervisor = trot(0.9, 1.6), watch("hold", min_margin=1.0, horizon=horizon)
     blocked = 0
     for time in np.arange(0.0, 1.6, 0.05):
         roll, pitch = lean_of(time, gait)
-        later, up = tilt_reference(time + 0.4, gait)[:4], tuple(world_up(roll, pitch))
+        later, up = tuple(gait.angles(time + 0.4)), tuple(world_up(roll, pitch))
         blocked += threshold_clearance(later, up, supervisor, RATIO) < 0.0
         assert demand(time, roll, pitch, 0.0, 0.0, supervisor, gait) == 0.0
     assert blocked > 10
@@ -269,7 +269,7 @@ def test_towards_either_end_of_the_way_to_red_the_motion_is_critically_damped(le
     never = eager._replace(min_determinant=3.99)  # leaning, not even red meets it
     there = [demand(0.9, 0.4, 0.0, 1.0 - left, rate, never) for rate in rates]
     np.testing.assert_allclose(there, left / (2 * LAG) ** 2 - rates / LAG, rtol=0, atol=1e-9)
-    calm = trot_instant(0.05, 2.0).parameters
+    calm = trot_instant(0.05, 2.0)
     back = [demand(0.3, 0.0, 0.0, left, rate, eager, calm) for rate in rates]
     np.testing.assert_allclose(back, -left / (2 * LAG) ** 2 - rates / LAG, rtol=0, atol=1e-9)
 
@@ -293,7 +293,7 @@ def test_on_the_way_to_red_the_tilt_with_the_longest_way_has_the_maximum_rate(ro
     """The other rotor of its pair has as long a way: each moves half of their difference."""
     angles = [-0.05, 0.05, -0.04, 0.06]
     angles[rotor] = (-0.9, 0.9)[rotor % 2]
-    gait = fixed(angles).parameters
+    gait = fixed(angles)
     supervisor = watch("return_to_red", min_determinant=3.99, max_rate=0.2, clearance=0.0)
     half = 0.5 * abs(angles[rotor] - angles[(rotor + 2) % 4])
     # Far from both ends and from rest the state is driven to that rate, with the lag.
@@ -309,7 +309,7 @@ def test_the_way_to_red_undershoots_a_threshold_by_less_than_the_band():
     state = rate = 0.0
     step, smallest = 0.005, 4.0
     for time in np.arange(0.8, 2.6, step).tolist():
-        planned = planned_jets(time, plan.parameters, plan.knots)
+        planned = plan.jets(time)
         tilts = np.array(supervised_tilts(planned, 1.0, (state, 0.0, 0.0), supervisor, RATIO))[:, 0]
         smallest = min(smallest, determinant(tilts, 0.0, 0.0, VEHICLE))
         _, rate_now, change = supervised_derivative(

@@ -24,7 +24,9 @@ from tests.thesis import force_matrix, torque_matrix
 from tiltsim_controllers.gaits.plans import keyframes
 from tiltsim_controllers.laws.decouplers import DECOUPLERS, exact_decoupler
 from tiltsim_controllers.laws.feedback import attitude_jerk
-from tiltsim_controllers.laws.gait_feedforward import FeedforwardTerms, tracking_inputs
+from tiltsim_controllers.laws.gait_feedforward import tracking_inputs
+from tiltsim_controllers.laws.multirotor_steps import FeedforwardTerms
+from tiltsim_controllers.mathematics.moving import Moving
 from tiltsim_controllers.references.trajectories import REFERENCE_TYPES, ReferenceParameters
 
 TIME = 0.7
@@ -215,9 +217,9 @@ def test_each_integrator_stops_where_its_own_axis_is_at_its_limit(axis, side):
 def test_far_from_its_reference_the_attitude_turns_at_the_rate_that_it_can_brake_from(side):
     k1, k2, k3, limit = 30.0, 300.0, 1000.0, 8.0
     cruise = side * limit * k1 / k2  # from here the limit stops the body within 1 / (k2 / k1)
-    far = (side * 50.0, 0.0, 0.0)
-    assert attitude_jerk(far, (0.0, cruise, 0.0), (k1, k2, k3), limit) == pytest.approx(0.0)
-    slower = attitude_jerk(far, (0.0, cruise - 0.1 * side, 0.0), (k1, k2, k3), limit)
+    far = Moving(side * 50.0, 0.0, 0.0)
+    assert attitude_jerk(far, Moving(0.0, cruise, 0.0), (k1, k2, k3), limit) == pytest.approx(0.0)
+    slower = attitude_jerk(far, Moving(0.0, cruise - 0.1 * side, 0.0), (k1, k2, k3), limit)
     assert slower == pytest.approx(side * 0.1 * k2)
-    at_limit = attitude_jerk(far, (0.0, -9.0 * side, 0.0), (k1, k2, k3), limit)
+    at_limit = attitude_jerk(far, Moving(0.0, -9.0 * side, 0.0), (k1, k2, k3), limit)
     assert at_limit == pytest.approx(side * k1 * limit)

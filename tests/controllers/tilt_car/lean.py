@@ -7,7 +7,7 @@ from math import copysign, cos, log, pi, sin, tan
 import numpy as np
 
 from tiltsim_controllers.tilt_car.state_drift import _scale, drift_rate
-from tiltsim_controllers.tilt_car.vehicle import body_acceleration, squared_speeds, turn_per_tilt
+from tiltsim_controllers.tilt_car.vehicle import squared_speeds, thrust_map, turn_per_tilt
 
 
 def turned_angle(lean, path, car):
@@ -62,13 +62,13 @@ def drift_time(start, end, path, car):
 
 def lean_of_split(split, acceleration, car):
     """The lean (rad) at which the squares of the rotor speeds differ by ``split`` (rad^2/s^2)."""
-    _, across = body_acceleration(split, 0.0, car)
+    _, across = thrust_map(car) @ (split, 0.0)
     return float(np.arcsin(across / acceleration))
 
 
 def split_of_lean(lean, acceleration, car):
     """``omega_1^2 - omega_2^2`` (rad^2/s^2) at a lean (rad) and acceleration (m/s^2)."""
-    square_1, square_2 = squared_speeds(acceleration * cos(lean), acceleration * sin(lean), car)
+    square_1, square_2 = squared_speeds((acceleration * cos(lean), acceleration * sin(lean)), car)
     return square_1 - square_2
 
 

@@ -21,7 +21,6 @@ from tests.controllers.tilt_car.lean import (
 )
 from tiltsim_controllers.tilt_car.state_drift import Orbit, drift_rate, lean_stiffness, orbit, twist
 from tiltsim_controllers.tilt_car.third_derivative import (
-    input_columns,
     minimum_norm,
     null_space_input,
     restoring_inputs,
@@ -29,9 +28,10 @@ from tiltsim_controllers.tilt_car.third_derivative import (
 from tiltsim_controllers.tilt_car.vehicle import (
     THESIS_CAR,
     TiltCar,
-    body_acceleration,
-    rotate,
+    input_matrix,
+    rotation,
     squared_speeds,
+    thrust_map,
     turn_per_tilt,
 )
 
@@ -45,13 +45,11 @@ def follow(jerk, inputs, time, steps, car, rate=0.0):
 
     def slope(at, values):
         w1, w2, alpha = values
-        columns = input_columns(w1, w2, car)
-        desired = rotate(*jerk(at), -turn_per_tilt(car) * alpha)
-        change = np.array(minimum_norm(columns, desired))
-        if rate:
-            along, across = body_acceleration(w1 * w1, w2 * w2, car)
-            change += restoring_inputs(atan2(across, along), rate, columns, car)
-        return change
+        columns = input_matrix(np.array([w1, w2]), car)
+        desired = rotation(turn_per_tilt(car) * alpha).T @ jerk(at)
+        along, across = thrust_map(car) @ (w1 * w1, w2 * w2)
+        restoring = restoring_inputs(atan2(across, along), rate, columns, car)
+        return minimum_norm(columns, desired) + restoring
 
     step, values = time / steps, np.array(inputs)
     for index in range(steps):
@@ -66,7 +64,7 @@ def follow(jerk, inputs, time, steps, car, rate=0.0):
 
 def inputs_of(lean, acceleration, car):
     """Inputs that make an acceleration along x at a lean."""
-    squares = squared_speeds(acceleration * cos(lean), acceleration * sin(lean), car)
+    squares = squared_speeds((acceleration * cos(lean), acceleration * sin(lean)), car)
     return np.array([squares[0] ** 0.5, squares[1] ** 0.5, -lean / turn_per_tilt(car)])
 
 
@@ -129,8 +127,8 @@ def test_a_lap_advances_the_lean_by_the_holonomy(omega, lean):
     assert advanced == pytest.approx(holonomy(lean, path, THESIS_CAR), rel=1e-6)
     assert np.sign(advanced) == np.sign(omega)
     # The acceleration is back, the inputs are not.
-    along, across = body_acceleration(end[0] ** 2, end[1] ** 2, THESIS_CAR)
-    made = rotate(along, across, turn_per_tilt(THESIS_CAR) * end[2])
+    pushed = thrust_map(THESIS_CAR) @ end[:2] ** 2
+    made = rotation(turn_per_tilt(THESIS_CAR) * end[2]) @ pushed
     np.testing.assert_allclose(made, (10.0, 0.0), atol=1e-6)
 
 
@@ -159,8 +157,7 @@ def small_loop(centre, size, car):
 def test_small_loops_miss_by_the_twist_times_their_area(lean):
     centre = inputs_of(lean, 10.0, THESIS_CAR)
     size = 0.02
-    columns = input_columns(centre[0], centre[1], THESIS_CAR)
-    n = np.array(null_space_input(columns))
+    n = null_space_input(input_matrix(centre[:2], THESIS_CAR))
     # The silent direction's length is the area of accelerations that a unit of inputs spans.
     area_of_inputs = size * size / np.linalg.norm(n)
     missed = small_loop(centre, size, THESIS_CAR) @ n / np.linalg.norm(n)
@@ -175,7 +172,7 @@ def test_restoring_holds_the_lean_where_drift_and_rate_balance():
     desired = restored_lean(PATH, THESIS_CAR, 1.0)
     assert lean_at(end, THESIS_CAR) == pytest.approx(desired, rel=1e-3)
     assert desired == pytest.approx(drift_rate(0.0, PATH, THESIS_CAR), rel=1e-5)
-    along, across = body_acceleration(end[0] ** 2, end[1] ** 2, THESIS_CAR)
+    along, across = thrust_map(THESIS_CAR) @ end[:2] ** 2
     assert hypot(along, across) == pytest.approx(10.0, rel=1e-7)
 
 

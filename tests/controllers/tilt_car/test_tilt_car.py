@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import cos, isnan, pi, sin
+from math import cos, pi, sin
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ from tiltsim_controllers.references.trajectories import (
     CIRCLE,
     LINE,
     ReferenceParameters,
-    reference_derivatives,
+    reference_motion,
 )
 from tiltsim_controllers.tilt_car import fourth_derivative as fourth
 from tiltsim_controllers.tilt_car import planned_direction as planned
@@ -23,10 +23,10 @@ from tiltsim_controllers.tilt_car.vehicle import (
     THESIS_CAR,
     TiltCar,
     acceleration,
-    body_acceleration,
     counter_yaw_per_tilt,
-    rotate,
+    input_matrix,
     squared_speeds,
+    thrust_map,
     turn_per_tilt,
 )
 
@@ -40,6 +40,10 @@ rates = st.floats(-50.0, 50.0)
 
 def rotation(angle):
     return np.array([[cos(angle), -sin(angle)], [sin(angle), cos(angle)]])
+
+
+def matrix_at(speed_1, speed_2):
+    return input_matrix(np.array([speed_1, speed_2]), CAR)
 
 
 def printed_j_theta(car):
@@ -62,15 +66,15 @@ def test_acceleration_is_eq_3(direction, speed_1, speed_2):
     squares = np.array([speed_1**2, speed_2**2])
     desired = rotation(direction) @ printed_j_theta(CAR) @ squares / CAR.mass
     np.testing.assert_allclose(
-        acceleration(direction, *squares.tolist(), CAR), desired, rtol=1e-12, atol=1e-10
+        acceleration(direction, squares, CAR), desired, rtol=1e-12, atol=1e-10
     )
 
 
 @given(st.floats(-1e4, 1e4), st.floats(-1e4, 1e4))
 def test_squares_invert_the_acceleration(square_1, square_2):
-    along, across = body_acceleration(square_1, square_2, CAR)
+    pushed = thrust_map(CAR) @ (square_1, square_2)
     np.testing.assert_allclose(
-        squared_speeds(along, across, CAR), (square_1, square_2), rtol=1e-10, atol=1e-8
+        squared_speeds(pushed, CAR), (square_1, square_2), rtol=1e-10, atol=1e-8
     )
 
 
@@ -107,9 +111,8 @@ INPUTS = ((90.0, 4.0, -3.0), (60.0, -7.0, 5.0), (0.8, 1.5, -2.0))
 def test_the_columns_are_the_third_derivative_of_the_position():
     desired = derivative_values(1, [values[:2] for values in INPUTS])
     (w1, d1, _), (w2, d2, _), (alpha, d3, _) = INPUTS
-    x1, y1, x2, y2, x3, y3 = third.input_columns(w1, w2, CAR)
-    body = x1 * d1 + x2 * d2 + x3 * d3, y1 * d1 + y2 * d2 + y3 * d3
-    np.testing.assert_allclose(rotate(*body, turn_per_tilt(CAR) * alpha), desired, rtol=1e-12)
+    body = matrix_at(w1, w2) @ (d1, d2, d3)
+    np.testing.assert_allclose(rotation(turn_per_tilt(CAR) * alpha) @ body, desired, rtol=1e-12)
 
 
 def test_the_columns_are_eqs_10_and_11():
@@ -118,55 +121,50 @@ def test_the_columns_are_eqs_10_and_11():
     delta_1 = j_theta @ np.diag([2 * w1, 2 * w2]) / CAR.mass
     quarter = np.array([[0.0, -1.0], [1.0, 0.0]])
     delta_2 = turn_per_tilt(CAR) * quarter @ j_theta @ np.array([w1**2, w2**2]) / CAR.mass
-    columns = np.reshape(third.input_columns(w1, w2, CAR), (3, 2)).T
-    np.testing.assert_allclose(columns, np.column_stack([delta_1, delta_2]), rtol=1e-12)
+    np.testing.assert_allclose(matrix_at(w1, w2), np.column_stack([delta_1, delta_2]), rtol=1e-12)
 
 
 def test_drift_and_columns_make_the_fourth_derivative():
     desired = derivative_values(2, INPUTS)
     (w1, d1, s1), (w2, d2, s2), (alpha, d3, s3) = INPUTS
     yaw = -counter_yaw_per_tilt(CAR) * alpha
-    state = (0.0, 0.0, 0.0, 0.0, yaw, alpha, w1, w2, d3, d1, d2)
-    *_, drift_along, drift_across = fourth.body_derivatives(state, CAR)
-    x1, y1, x2, y2, x3, y3 = third.input_columns(w1, w2, CAR)
-    body = (drift_along + x1 * s1 + x2 * s2 + x3 * s3, drift_across + y1 * s1 + y2 * s2 + y3 * s3)
-    np.testing.assert_allclose(rotate(*body, yaw + alpha), desired, rtol=1e-12)
+    state = np.array([0.0, 0.0, 0.0, 0.0, yaw, alpha, w1, w2, d3, d1, d2])
+    drift = fourth.body_derivatives(state, CAR)[2]
+    body = drift + matrix_at(w1, w2) @ (s1, s2, s3)
+    np.testing.assert_allclose(rotation(yaw + alpha) @ body, desired, rtol=1e-12)
 
 
 @given(speeds, speeds, rates, rates)
 def test_the_inverse_is_numpys(speed_1, speed_2, x, y):
-    columns = third.input_columns(speed_1, speed_2, CAR)
-    matrix = np.reshape(columns, (3, 2)).T
-    desired = np.linalg.pinv(matrix) @ (x, y)
+    matrix, outputs = matrix_at(speed_1, speed_2), np.array([x, y])
+    desired = np.linalg.pinv(matrix) @ outputs
     scale = np.abs(desired).max() + 1e-9
-    np.testing.assert_allclose(third.minimum_norm(columns, (x, y)), desired, atol=1e-9 * scale)
+    np.testing.assert_allclose(third.minimum_norm(matrix, outputs), desired, atol=1e-9 * scale)
 
 
 def test_one_rotor_at_rest_leaves_full_rank_two_do_not():
-    one = third.input_columns(80.0, 0.0, CAR)
-    assert np.linalg.matrix_rank(np.reshape(one, (3, 2))) == 2
-    rate_1, rate_2, tilt_rate = third.minimum_norm(one, (1.0, 2.0))
-    assert rate_2 == 0.0
-    np.testing.assert_allclose(one[0] * rate_1 + one[4] * tilt_rate, 1.0)
-    assert all(map(isnan, third.minimum_norm(third.input_columns(0.0, 0.0, CAR), (1.0, 2.0))))
+    one, outputs = matrix_at(80.0, 0.0), np.array([1.0, 2.0])
+    assert np.linalg.matrix_rank(one) == 2
+    inputs = third.minimum_norm(one, outputs)
+    assert inputs[1] == 0.0
+    np.testing.assert_allclose(one @ inputs, outputs)
+    assert np.isnan(third.minimum_norm(matrix_at(0.0, 0.0), outputs)).all()
 
 
 @given(speeds, speeds)
 def test_silent_inputs_are_not_felt(speed_1, speed_2):
-    columns = third.input_columns(speed_1, speed_2, CAR)
-    matrix = np.reshape(columns, (3, 2)).T
-    n = np.array(third.null_space_input(columns))
+    matrix = matrix_at(speed_1, speed_2)
+    n = third.null_space_input(matrix)
     scale = np.linalg.norm(matrix) * np.linalg.norm(n)
     np.testing.assert_allclose(matrix @ n, 0.0, atol=1e-12 * scale)
 
 
 @given(speeds, speeds, st.floats(0.1, 5.0))
 def test_restoring_turns_the_middle_and_nothing_else(speed_1, speed_2, rate):
-    columns = third.input_columns(speed_1, speed_2, CAR)
-    along, across = body_acceleration(speed_1**2, speed_2**2, CAR)
+    matrix = matrix_at(speed_1, speed_2)
+    along, across = thrust_map(CAR) @ (speed_1**2, speed_2**2)
     lean = np.arctan2(across, along)
-    inputs = np.array(third.restoring_inputs(lean, rate, columns, CAR))
-    matrix = np.reshape(columns, (3, 2)).T
+    inputs = third.restoring_inputs(lean, rate, matrix, CAR)
     scale = np.linalg.norm(matrix) * np.linalg.norm(inputs) + 1e-12
     np.testing.assert_allclose(matrix @ inputs, 0.0, atol=1e-10 * scale)
     # The acceleration stands still in the world, so the lean changes as the middle turns.
@@ -175,32 +173,29 @@ def test_restoring_turns_the_middle_and_nothing_else(speed_1, speed_2, rate):
 
 @pytest.mark.parametrize("restoring_rate", [0.0, 2.0])
 def test_the_third_derivative_law_makes_the_jerk_it_wants(restoring_rate):
-    state = (1.0, -2.0, 3.0, -4.0, -0.3, 0.9, 90.0, 70.0)
+    state = np.array([1.0, -2.0, 3.0, -4.0, -0.3, 0.9, 90.0, 70.0])
     parameters = third.Parameters(CAR, third.GAIN_SETS["ch10"], CIRCLE_10, restoring_rate)
-    inputs = np.array(third.third_derivative_inputs(0.7, state, parameters))
-    matrix = np.reshape(third.input_columns(90.0, 70.0, CAR), (3, 2)).T
-    made = rotation(0.6) @ matrix @ inputs
-    reference = reference_derivatives(0.7, CIRCLE_10)
-    ax, ay = acceleration(0.6, 90.0**2, 70.0**2, CAR)
-    desired = [
-        reference[9 + i]
-        + 6.0 * (reference[6 + i] - a)
-        + 12.0 * (reference[3 + i] - state[2 + i])
-        + 8.0 * (reference[i] - state[i])
-        for i, a in enumerate((ax, ay))
-    ]
+    inputs = third.third_derivative_inputs(0.7, state, parameters)
+    made = rotation(0.6) @ matrix_at(90.0, 70.0) @ inputs
+    reference = reference_motion(0.7, CIRCLE_10)[:, :2]
+    pushed = acceleration(0.6, np.array([90.0**2, 70.0**2]), CAR)
+    desired = (
+        reference[3]
+        + 6.0 * (reference[2] - pushed)
+        + 12.0 * (reference[1] - state[2:4])
+        + 8.0 * (reference[0] - state[:2])
+    )
     np.testing.assert_allclose(made, desired, rtol=1e-10)
 
 
 def test_nothing_restores_the_lean_where_a_rotor_rests():
-    columns = third.input_columns(80.0, 0.0, CAR)
-    assert third.restoring_inputs(0.3, 2.0, columns, CAR) == (0.0, 0.0, 0.0)
+    assert not third.restoring_inputs(0.3, 2.0, matrix_at(80.0, 0.0), CAR).any()
 
 
 def test_the_fourth_derivative_law_makes_the_snap_it_demands():
     (w1, d1, _), (w2, d2, _), (alpha, d3, _) = INPUTS
     yaw = -0.3
-    state = (1.0, -2.0, 3.0, -4.0, yaw, alpha, w1, w2, d3, d1, d2)
+    state = np.array([1.0, -2.0, 3.0, -4.0, yaw, alpha, w1, w2, d3, d1, d2])
     law = fourth.Parameters(CAR, fourth.GAIN_SETS["ch10"], CIRCLE_10, fourth.EXACT, 0.0)
     second = fourth.fourth_derivative_inputs(0.7, state, law)
     motion = [(*values[:2], last) for values, last in zip(INPUTS, second)]
@@ -209,7 +204,7 @@ def test_the_fourth_derivative_law_makes_the_snap_it_demands():
         frame @ derivative_values(order, [values[: order + 1] for values in motion])
         for order in (0, 1, 2)
     )
-    reference = np.reshape(reference_derivatives(0.7, CIRCLE_10), (5, 3))[:, :2]
+    reference = reference_motion(0.7, CIRCLE_10)[:, :2]
     demanded = (
         reference[4]
         + 12.0 * (reference[3] - jx)
@@ -221,7 +216,7 @@ def test_the_fourth_derivative_law_makes_the_snap_it_demands():
 
 
 def test_the_printed_tilt_column_lacks_the_yaws_answer():
-    state = (0.1, 0.2, 0.3, 0.4, -0.2, 0.5, 90.0, 70.0, 1.0, 2.0, -3.0)
+    state = np.array([0.1, 0.2, 0.3, 0.4, -0.2, 0.5, 90.0, 70.0, 1.0, 2.0, -3.0])
     gains = fourth.GAIN_SETS["ch10"]
     inputs = {
         name: fourth.fourth_derivative_inputs(
@@ -229,12 +224,10 @@ def test_the_printed_tilt_column_lacks_the_yaws_answer():
         )
         for name, code in fourth.DECOUPLINGS.items()
     }
-    x1, y1, x2, y2, x3, y3 = third.input_columns(90.0, 70.0, CAR)
-    share = turn_per_tilt(CAR)
     made = {}
-    for name, (s1, s2, s3) in inputs.items():
-        factor = 1.0 / share if name == "published" else 1.0
-        made[name] = (x1 * s1 + x2 * s2 + factor * x3 * s3, y1 * s1 + y2 * s2 + factor * y3 * s3)
+    for name, values in inputs.items():
+        factor = 1.0 / turn_per_tilt(CAR) if name == "published" else 1.0
+        made[name] = matrix_at(90.0, 70.0) @ (values * [1.0, 1.0, factor])
     # Each makes the same with its own columns: only the exact one's are the car's.
     np.testing.assert_allclose(made["published"], made["exact"], rtol=1e-9)
     assert abs(inputs["published"][2] - inputs["exact"][2]) > 1e-3
@@ -248,7 +241,7 @@ LAW = planned.Parameters(THESIS_CAR, planned.GAIN_SETS["ch11"], LINE_1)
 
 @given(angles, st.floats(-1.0, 1.0), st.floats(-1.0, 1.0), st.floats(-2.0, 2.0))
 def test_the_planned_law_is_eqs_12_and_13(direction, x, y, vy):
-    state = (x, y, 0.3, vy, direction, 0.0, 0.0, 0.0)
+    state = np.array([x, y, 0.3, vy, direction, 0.0])
     time = 1.7
     x_ref, vx_ref = 0.5 * time**2, time
     desired = np.array(
@@ -258,20 +251,19 @@ def test_the_planned_law_is_eqs_12_and_13(direction, x, y, vy):
     squares = planned.demanded_squared_speeds(time, state, LAW)
     np.testing.assert_allclose(squares, printed, rtol=1e-9, atol=1e-6)
     inputs = planned.planned_direction_inputs(time, state, LAW)
-    assert inputs == tuple(max(square, 0.0) for square in squares)
+    np.testing.assert_array_equal(inputs, np.maximum(squares, 0.0))
 
 
 def test_the_thrusts_direction_is_yaw_and_tilt_together():
-    direct, shared = (
-        (0.1, 0.2, 0.3, 0.4, *angles, 80.0, 70.0) for angles in ((0.5, 0), (0.8, -0.3))
-    )
+    direct, shared = (np.array([0.1, 0.2, 0.3, 0.4, *angles]) for angles in ((0.5, 0), (0.8, -0.3)))
     expected = planned.demanded_squared_speeds(1.7, direct, LAW)
-    assert planned.demanded_squared_speeds(1.7, shared, LAW) == pytest.approx(expected, rel=1e-12)
+    found = planned.demanded_squared_speeds(1.7, shared, LAW)
+    np.testing.assert_allclose(found, expected, rtol=1e-12)
 
 
 @given(st.floats(-0.5, 0.5), st.floats(-1.5, 1.5), st.sampled_from([-pi / 3, pi / 3]))
 def test_proposition_4_tells_which_rotors_push(error, error_rate, direction):
-    state = (0.5, -error, 1.0, -error_rate, direction, 0.0, 0.0, 0.0)  # e_x = e_x' = 0 at 1 s
+    state = np.array([0.5, -error, 1.0, -error_rate, direction, 0.0])  # e_x = e_x' = 0 at 1 s
     square_1, square_2 = planned.demanded_squared_speeds(1.0, state, LAW)
     push = 9.0 * error_rate + 18.0 * error
     if abs(abs(push) - 3**-0.5) < 1e-6:

@@ -82,7 +82,7 @@ def with_gyroscopic_torque(loop):
     def turning(time, state, inputs, parameters, table, disturbance):
         found = rates(time, state, inputs, parameters, table, disturbance)
         vehicle = parameters.layer.vehicle
-        torque = gyroscopic_acceleration(state[15], state[16], state[17], vehicle)
+        torque = gyroscopic_acceleration(np.array(state[15:18]), vehicle)
         moved = [rate + more for rate, more in zip(found[15:18], torque)]
         return (*found[:15], *moved, *found[18:])
 

@@ -27,8 +27,8 @@ from tiltsim.laws.assembling import assemble
 from tiltsim.plants.factory import make_plant
 from tiltsim.scenario.loading import merge
 from tiltsim.vehicles.rotorcraft.layout import QW
+from tiltsim_controllers.vehicle.body import body_of, principal_body
 from tiltsim_controllers.vehicle.effectiveness import cross_table, rotor_entries
-from tiltsim_controllers.vehicle.multirotor import body_of, principal_body
 from tiltsim_controllers.vehicle.parameters import PRESETS, SPIN
 
 VEHICLE = PRESETS["luukkonen"]
@@ -123,7 +123,7 @@ def test_half_the_step_leaves_the_error_of_the_order(solver, order):
 def test_solvers_keep_the_length_of_the_quaternion():
     plant = make_plant(assemble(scenario(TILTROTOR, TURNING, RIGID)))
     plant.advance(100)
-    held = plant._equations.inputs_size
+    held = plant._assembly.loop.equations.inputs_size
     quaternion = plant.state[1 + held + QW :][:4]
     assert np.linalg.norm(quaternion) == pytest.approx(1.0, abs=1e-15)
 

@@ -18,7 +18,7 @@ from tiltsim.resources import shipped_folder
 from tiltsim.scenario.loading import merge
 from tiltsim.vehicles.rotorcraft.layout import Layout
 from tiltsim_controllers.vehicle.parameters import PRESETS
-from tiltsim_controllers.vehicle.rotor_inertia import acceleration_within_limits
+from tiltsim_controllers.vehicle.rotor_inertia import accelerations_within_limits
 
 INERTIA = 2e-5  # kg m^2, of a rotor
 TROT = {
@@ -173,7 +173,7 @@ def test_a_rotor_at_its_limit_turns_nothing():
         (200.0, 5.0, 5.0),
         (201.0, -5.0, -5.0),
     ):
-        assert acceleration_within_limits(speed, demand, 200.0, 390.0) == expected
+        assert accelerations_within_limits(1.0, speed, demand, 200.0, 390.0) == expected
 
 
 def test_pods_that_jump_turn_the_body_at_once():

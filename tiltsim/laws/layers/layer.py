@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any, Final
 
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Equations, Monitoring, Sampling
 from tiltsim.models.parts import ExtraActuators
+from tiltsim_controllers.code.traceable import traceable
 from tiltsim_controllers.mathematics.records import make_record_type
 from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector, scalar
-from tiltsim_controllers.mathematics.vectors import entries_of
 
 if TYPE_CHECKING:
     from tiltsim.scenario.scenario import FlightPlan
@@ -27,17 +27,20 @@ Derive = Callable[[Callable[[], dict[str, Floats]], Samples, ControlSetup], dict
 
 @dataclass(frozen=True, eq=False)
 class Layer:
-    """The parts of a layer: what it adds to a closed loop or replaces in it.
+    """The parts of a layer, which it adds to a closed loop or replaces in it.
 
-    Its functions see parameters with the fields ``layer``, its own, and ``inner``, those of the
+    Its functions see parameters with the fields ``layer``, its own, and ``inner``, for the
     loop within. Where one is None, the loop within goes on unchanged.
 
     Attributes:
-        name: Part of the name of compiled code.
+        name: Part of the name of the record of parameters.
         parameters: The type of the layer's parameters.
         read: ``(plan) -> parameters``.
         controls, hold: As in `tiltsim.closed_loop.loop.Sampling`.
-        actuators: Appended to those of the model.
+        adds: Traceable function ``(time, qpos, qvel, act, ctrl, parameters) -> further controls``,
+            which follow the controls ``ctrl`` of the loop within, also while these are held. Its
+            parameters are the layer's.
+        actuators: Appended to the actuators of the model.
         initial_activations: ``(plan, parameters, inner activations) -> activations`` of these
             actuators at time zero.
         derive: ``(inner columns, samples by field, setup) -> columns``; the first is a function.
@@ -54,6 +57,7 @@ class Layer:
     read: Callable[[FlightPlan], Any]
     controls: Callable[..., Values] | None = None
     hold: Callable[..., Values] | None = None
+    adds: Callable[..., Values] | None = None
     actuators: ExtraActuators = _NO_ACTUATORS
     initial_activations: Callable[[FlightPlan, Any, Vector], Vector] = (
         lambda _plan, _parameters, _inner: ()
@@ -73,7 +77,7 @@ def wrap_loop(inner: ClosedLoop, layer: Layer) -> ClosedLoop:
         layer: The layer around it.
 
     Returns:
-        Its parameters hold the signature, the ``layer``'s and those of the ``inner`` loop.
+        A loop whose parameters are the signature, the ``layer``'s and the ``inner`` loop's.
     """
     record = make_record_type(
         f"{layer.parameters.__name__}Parameters",
@@ -85,8 +89,7 @@ def wrap_loop(inner: ClosedLoop, layer: Layer) -> ClosedLoop:
     sizes = dynamics.sizes._replace(
         act=dynamics.sizes.act + added.states, ctrl=dynamics.sizes.ctrl + added.controls
     )
-    controls, hold, observe, sign_check_values = _functions_within(inner, len(layer.fields))
-    controls = layer.controls or controls
+    controls, hold, observe, sign_check_values = _functions_within(inner, layer)
 
     def setup(plan: FlightPlan, signature: float) -> ControlSetup:
         parameters, knots = inner.setup(plan, inner.signature)
@@ -119,7 +122,7 @@ def wrap_loop(inner: ClosedLoop, layer: Layer) -> ClosedLoop:
             initial_activations=initial_activations,
             extra_actuators=(*dynamics.extra_actuators, *([added] if any(added) else ())),
         ),
-        sampling=Sampling(controls, layer.hold or hold),
+        sampling=Sampling(layer.controls or controls, layer.hold or hold),
         columns=columns,
         monitoring=Monitoring(
             sign_check_values, lambda sample, setup: inner.monitoring.causes(sample, within(setup))
@@ -130,34 +133,44 @@ def wrap_loop(inner: ClosedLoop, layer: Layer) -> ClosedLoop:
     )
 
 
-def _functions_within(inner: ClosedLoop, fields: int) -> tuple[Callable[..., Values], ...]:
+@traceable
+def _none_added(time: Any, qpos: Any, qvel: Any, act: Any, ctrl: Any, parameters: Any) -> tuple[()]:
+    return ()
+
+
+def _functions_within(inner: ClosedLoop, layer: Layer) -> tuple[Callable[..., Values], ...]:
     """Controls, hold, observe and sign check values of a loop, for a layer around it.
 
-    They read the parameters ``inner`` and the first entries of ``act`` and ``ctrl``, hold what the
-    layer adds to ``ctrl``, and observe as many ``fields`` of what it adds to ``act``.
+    They read the parameters ``inner`` and the first entries of ``act`` and ``ctrl``, add or hold
+    the layer's part of ``ctrl``, and observe its fields, which are part of ``act``.
     """
     inner_controls, inner_hold = inner.sampling.controls, inner.sampling.hold
     inner_observe = inner.columns.observe
     inner_check = inner.monitoring.sign_check_values
     act_size, ctrl_size = inner.dynamics.sizes.act, inner.dynamics.sizes.ctrl
-    activations = entries_of(act_size, fields)
+    end = act_size + len(layer.fields)
+    adds, held = layer.adds or _none_added, None if layer.adds else ctrl_size
 
     @scalar
     def controls(
         time: float, qpos: Vector, qvel: Vector, act: Vector, parameters: Any, knots: Vector
     ) -> Values:
-        return inner_controls(time, qpos, qvel, act, parameters.inner, knots)
+        ctrl = inner_controls(time, qpos, qvel, act, parameters.inner, knots)
+        return (*ctrl, *adds(time, (*qpos,), (*qvel,), (*act,), ctrl, parameters.layer))
 
     @scalar
     def hold(
         time: float, qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector, parameters: Any
     ) -> Values:
-        held = inner_hold(time, qpos, qvel, act, ctrl[:ctrl_size], parameters.inner)
-        return (*held, *ctrl[ctrl_size:])
+        inner = inner_hold(time, qpos, qvel, act, ctrl[:ctrl_size], parameters.inner)
+        if held is not None:
+            return (*inner, *ctrl[held:])
+        return (*inner, *adds(time, (*qpos,), (*qvel,), (*act,), inner, parameters.layer))
 
     @scalar
     def observe(qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector) -> Values:
-        return (*inner_observe(qpos, qvel, act[:act_size], ctrl[:ctrl_size]), *activations(act))
+        own = act[act_size:end]
+        return (*inner_observe(qpos, qvel, act[:act_size], ctrl[:ctrl_size]), *own)
 
     @scalar
     def sign_check_values(time: float, values: Vector, parameters: Any, knots: Vector) -> Values:

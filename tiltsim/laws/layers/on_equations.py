@@ -11,75 +11,69 @@ from collections.abc import Callable
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Dynamics, Equations
-from tiltsim.equations.actuator_level import ActuatorPlant, Loads, limit_speeds_of
+from tiltsim.equations.actuator_level import ActuatorPlant, limit_speeds_of, mechanics
 from tiltsim.laws.layers.layer import Layer, wrap_loop
 from tiltsim.models.parts import WRENCH_SIZE, ExtraActuators
 from tiltsim.vehicles.rotorcraft.layout import layout_of
+from tiltsim_controllers.code.arrays import xp
+from tiltsim_controllers.code.traceable import traceable
 from tiltsim_controllers.mathematics.scalar import Triple, Values, Vector, scalar
-from tiltsim_controllers.mathematics.vectors import tuple_text, written_out
 
 if TYPE_CHECKING:
     from tiltsim.scenario.scenario import FlightPlan
 
 
-def read_actuators(dynamics: Dynamics) -> tuple[Callable[..., Values], Callable[..., Loads]]:
-    """Scalar code that reads what a model's controls do besides thrusts and servos.
+@cache
+def read_actuators(dynamics: Dynamics) -> tuple[Callable[..., Any], Callable[..., Any]]:
+    """Functions of a model's controls, except thrusts and servos.
 
-    Returns ``rates(ctrl)`` of the activations, in their order, and ``loads(ctrl)``.
+    Returns:
+        ``rates(ctrl)`` of the activations, in their order, and ``loads(ctrl)``: force and torque on
+        the body, then torques about the hinges; see `ActuatorPlant.rates`.
     """
     layout = layout_of(dynamics)
     own = ExtraActuators(states=layout.rotors + dynamics.controller_states)
-    return _read_actuators(
-        (own, *dynamics.extra_actuators), layout.acceleration_1, WRENCH_SIZE + layout.tilts
-    )
-
-
-@cache
-def _read_actuators(
-    actuators: tuple[ExtraActuators, ...], first: int, loads: int
-) -> tuple[Callable[..., Values], Callable[..., Loads]]:
-    """`read_actuators` of these, whose controls begin at an index."""
-    rates: list[int] = []
-    sums: list[list[int]] = [[] for _ in range(loads)]  # the last layer's come first
-    for this in actuators:
-        rates += range(first, first + this.states)
+    first, wrenches, hinges = layout.acceleration_1, [], []
+    states: list[int] = []
+    for this in (own, *dynamics.extra_actuators):
+        states += range(first, first + this.states)
         force = first + this.states + this.memories
         hinge = force + WRENCH_SIZE * this.wrench
-        for load in range(WRENCH_SIZE * this.wrench):
-            sums[load].insert(0, force + load)
-        for load in range(this.hinge_torques):
-            sums[WRENCH_SIZE + load].insert(0, hinge + load)
+        wrenches += [slice(force, hinge)] if this.wrench else []
+        hinges += [slice(hinge, hinge + layout.tilts)] if this.hinge_torques else []
         first += this.controls
-    terms = [[f"ctrl[{index}]" for index in places] for places in sums]
-    name = "_".join("x".join(str(int(number)) for number in this) for this in actuators)
-    name = f"{first}_{loads}_{name}"  # distinguishes them from all others
-    return (
-        written_out(f"rates_{name}", "ctrl", tuple_text(f"ctrl[{index}]" for index in rates)),
-        written_out(
-            f"loads_{name}", "ctrl", tuple_text(" + ".join(["0.0", *added]) for added in terms)
-        ),
-    )
+    places = np.array(states, int)
+
+    @traceable
+    def rates(ctrl: Any) -> Any:
+        return ctrl[places]
+
+    @traceable
+    def loads(ctrl: Any) -> Any:
+        wrench = sum((ctrl[part] for part in wrenches), np.zeros(WRENCH_SIZE))
+        torques = sum((ctrl[part] for part in hinges), np.zeros(layout.tilts))
+        return xp.hstack([wrench, torques])
+
+    return rates, loads
 
 
-def _projection(
-    project_motion: Callable[..., list[float]], first: int, dynamics: Dynamics
-) -> Callable[..., list[float]]:
-    """A projection of the motion and of commanded rotor speeds onto their limits.
-
-    The states of the actuators begin at ``first``. In scalar code, ``(state, mechanics) -> state``.
-    """
+def _projection(plant: ActuatorPlant, dynamics: Dynamics) -> Callable[..., Vector]:
+    """Scalar code ``(state, mechanics) -> state`` with motion and speed commands within limits."""
+    first = plant.motion + len(dynamics.spins) + dynamics.controller_states
+    projections = [plant.project_onto_limits] if plant.project_onto_limits else []
     for this in dynamics.extra_actuators:
         if this.begins_with_rotor_speeds:
-            break
+            projections += [limit_speeds_of(dynamics.spins, first)]
         first += this.states
-    else:
-        return project_motion
-    limit_speeds = limit_speeds_of(dynamics.spins, first)
 
     @scalar
-    def project(state: list[float], mechanics: Any) -> list[float]:
-        return limit_speeds(project_motion(state, mechanics), mechanics)
+    def project(state: Vector, mechanics: Any) -> Vector:
+        for projection in projections:
+            state = projection(state, mechanics)
+        return state
 
     return project
 
@@ -96,8 +90,7 @@ def on_equations(loop: ClosedLoop, plant: ActuatorPlant) -> ClosedLoop:
     controls, held = loop.sampling.controls, loop.sampling.hold
     observe = loop.columns.observe
     activation_rates, loads = read_actuators(dynamics)
-    further = first + len(dynamics.spins) + dynamics.controller_states
-    project_motion = _projection(plant.project_onto_limits, further, dynamics)
+    project_motion = _projection(plant, dynamics)
 
     @scalar
     def equation_inputs(time: float, state: Vector, parameters: Any, knots: Vector) -> Values:
@@ -112,7 +105,7 @@ def on_equations(loop: ClosedLoop, plant: ActuatorPlant) -> ClosedLoop:
     @scalar
     def equation_rates(
         time: float,
-        state: list[float],
+        state: Vector,
         inputs: Vector,
         parameters: Any,
         knots: Vector,
@@ -134,8 +127,10 @@ def on_equations(loop: ClosedLoop, plant: ActuatorPlant) -> ClosedLoop:
         return observe(qpos_of(state), qvel_of(state), state[first:], ctrl)
 
     @scalar
-    def project_onto_limits(state: list[float], parameters: Any) -> list[float]:
-        return project_motion(finish(state, parameters.layer), parameters.layer)
+    def project_onto_limits(state: Vector, parameters: Any) -> Vector:
+        if finish is not None:
+            state = finish(state, parameters.layer)
+        return project_motion(state, parameters.layer)
 
     def initial(plan: FlightPlan, setup: ControlSetup) -> Vector:
         inner = ControlSetup(setup.parameters.inner, setup.knots)
@@ -149,4 +144,4 @@ def on_equations(loop: ClosedLoop, plant: ActuatorPlant) -> ClosedLoop:
         observe=observe_equations,
         project_onto_limits=project_onto_limits,
     )
-    return wrap_loop(loop, Layer(plant.name, plant.mechanics, plant.read, equations=equations))
+    return wrap_loop(loop, Layer(plant.name, plant.mechanics, mechanics, equations=equations))

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
-from tiltsim_controllers.mathematics.scalar import Values, Vector, scalar
+from tiltsim.vehicles.rotorcraft.layout import QW, TILT_1
+from tiltsim_controllers.code.arrays import xp
+from tiltsim_controllers.code.traceable import traceable
 from tiltsim_controllers.vehicle.sensors import (
     Sensor,
     Sensors,
@@ -20,39 +22,39 @@ DEFAULT_SAMPLE_TIME: Final = 0.01
 """s between readings of the sensors, if neither they nor a held controller define it."""
 
 
-@scalar
-def measured_qpos(time: float, qpos: Vector, sensors: Sensors) -> Values:
-    """The vehicle's ``qpos`` as its sensors read them; tilts are exact."""
-    x, y, z, qw, qx, qy, qz = qpos[:7]
-    if sensors.active == 0.0:
-        return (x, y, z, qw, qx, qy, qz, *qpos[7:])
-    index = reading_index(time, sensors.period)
-    ex, ey, ez = reading_error(sensors.position, sensors.seed, 0.0, index)
-    roll, pitch, yaw = reading_error(sensors.attitude, sensors.seed, 6.0, index)
-    qw, qx, qy, qz = rotate_by_small_angle(qw, qx, qy, qz, roll, pitch, yaw)
-    return (x + ex, y + ey, z + ez, qw, qx, qy, qz, *qpos[7:])
+@traceable
+def measured(time: Any, qpos: Any, qvel: Any, sensors: Sensors) -> tuple[Any, Any]:
+    """The vehicle's ``qpos`` and ``qvel`` as its sensors read them.
 
+    Tilts and their rates are exact, and so is an angular acceleration that follows these.
 
-@scalar
-def measured_qvel(time: float, qvel: Vector, sensors: Sensors) -> Values:
-    """The vehicle's ``qvel`` as its sensors read them.
-
-    Tilt rates are exact, and so is an angular acceleration that follows them.
+    Args:
+        time: s.
+        qpos, qvel: Shapes (7 + tilts,) and (6 + tilts + any,).
+        sensors: Errors of the measurements.
     """
-    vx, vy, vz, p, q, r = qvel[:6]
     if sensors.active == 0.0:
-        return (vx, vy, vz, p, q, r, *qvel[6:])
+        return qpos, qvel
     index = reading_index(time, sensors.period)
-    ex, ey, ez = reading_error(sensors.velocity, sensors.seed, 3.0, index)
-    ep, eq, er = reading_error(sensors.body_rates, sensors.seed, 9.0, index)
-    return (vx + ex, vy + ey, vz + ez, p + ep, q + eq, r + er, *qvel[6:])
+
+    def error(sensor: Sensor, channel: float) -> Any:
+        return reading_error(sensor, sensors.seed, channel, index)
+
+    position = qpos[:3] + error(sensors.position, 0.0)
+    velocity = qvel[:3] + error(sensors.velocity, 3.0)
+    quaternion = rotate_by_small_angle(qpos[QW:TILT_1], error(sensors.attitude, 6.0))
+    body_rates = qvel[3:6] + error(sensors.body_rates, 9.0)
+    return (
+        xp.hstack([position, quaternion, qpos[TILT_1:]]),
+        xp.hstack([velocity, body_rates, qvel[6:]]),
+    )
 
 
 def sensor_parameters(scenario: Scenario) -> Sensors:
     """The sensors of a scenario."""
     sensors, simulation = scenario.sensors, scenario.simulation
     vectors = {
-        name: Sensor(getattr(sensors, f"{name}_noise"), *getattr(sensors, f"{name}_bias"))
+        name: Sensor(getattr(sensors, f"{name}_noise"), getattr(sensors, f"{name}_bias"))
         for name in ("position", "velocity", "attitude", "body_rates")
     }
     return Sensors(

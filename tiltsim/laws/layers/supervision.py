@@ -15,7 +15,7 @@ from tiltsim.laws.rotorcraft import reference_columns, thrust_controls_of
 from tiltsim.models.parts import ExtraActuators
 from tiltsim.scenario.gait_following import GaitFollowingController
 from tiltsim.vehicles.rotorcraft.layout import QW, QX, QY, QZ, layout_of
-from tiltsim_controllers.gaits.any_tilts import tilt_motion_of
+from tiltsim_controllers.gaits.motion import tilt_motion_of
 from tiltsim_controllers.gaits.parameters import GaitParameters
 from tiltsim_controllers.laws.supervisor import HOLD, Supervisor, gait_time
 from tiltsim_controllers.mathematics.rotation import euler_from_quaternion

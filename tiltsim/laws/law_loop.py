@@ -1,0 +1,339 @@
+"""Closed loops around laws of arrays: baselines, and those of packages and users.
+
+One loop serves every rotorcraft: its rotors are a table, as those of multirotors, and its layout is
+compiled in. The rotors' speeds are states that approach the commanded ones; so are the tilts of a
+law that commands them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from functools import cache, partial
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+from tiltsim.closed_loop.loop import ClosedLoop
+from tiltsim.errors import TiltsimError
+from tiltsim.laws.airframe import airframe_of
+from tiltsim.laws.rotor_loop import RotorLaw, RotorLayout, body_of_vehicle, rotor_loop
+from tiltsim.scenario.law_controller import LawTable
+from tiltsim.scenario.own_code import users_line
+from tiltsim.system.text import short_repr
+from tiltsim_controllers.code.arrays import is_jax, xp
+from tiltsim_controllers.code.traceable import traceable
+from tiltsim_controllers.code.tracing import as_array
+from tiltsim_controllers.gaits.motion import tilt_motion_of
+from tiltsim_controllers.gaits.parameters import GaitParameters
+from tiltsim_controllers.laws.observed import ROTOR_COMMANDS, Command, Desired, Observed
+from tiltsim_controllers.mathematics.attitude import rotation_matrix
+from tiltsim_controllers.mathematics.records import make_record_type
+from tiltsim_controllers.mathematics.scalar import Values, Vector, scalar
+from tiltsim_controllers.references.trajectories import ReferenceParameters, reference_derivatives
+from tiltsim_controllers.vehicle.actuators import held_gain
+from tiltsim_controllers.vehicle.body import Body, inertia_matrix
+from tiltsim_controllers.vehicle.effectiveness import ROTOR_FLOATS, table_per_newton
+from tiltsim_controllers.vehicle.parameters import Vehicle
+from tiltsim_controllers.vehicle.rotors import rotors_in, wrench_map
+
+if TYPE_CHECKING:
+    from tiltsim.scenario.scenario import FlightPlan
+
+CORRECTION: Final = 5.0
+"""1/s: the rate at which rotor speeds approach those of their model, slow beside any latency."""
+
+
+REMEDY: Final = "write tiltsim.xp for functions of arrays, xp.where for an if"
+
+
+class LawError(TiltsimError):
+    """A law returned an invalid command."""
+
+
+class FlownLaw(NamedTuple):
+    """A law with the numbers of a flight.
+
+    Attributes:
+        function: ``(observed, parameters) -> command``.
+        parameters: A record.
+        table: Further numbers.
+        states, discrete: Names and units of its states.
+        initial: These at time zero.
+    """
+
+    function: Callable[..., Command]
+    parameters: tuple[Any, ...]
+    table: Values
+    states: Mapping[str, str]
+    discrete: Mapping[str, str]
+    initial: Values
+
+
+class Key(NamedTuple):
+    """All that a loop is compiled for."""
+
+    layout: RotorLayout
+    law: Callable[..., Command]
+    name: str
+    parameters: type[tuple[Any, ...]]  # of the law
+    states: tuple[tuple[str, str], ...]  # of the law, with their units
+    discrete: tuple[tuple[str, str], ...]  # likewise, discrete ones
+    tilts: bool  # whether the law commands the tilts
+    models_rotors: bool  # whether the rotors follow a model of theirs, as they do with latency
+    traced: bool = True  # see `ClosedLoop.traced`
+
+    @property
+    def code_name(self) -> str:
+        """Of the law, with its commands."""
+        return f"{self.name}{'_free' * self.tilts}{'_late' * self.models_rotors}"
+
+
+@cache
+def record_of(parameters: type[tuple[Any, ...]]) -> Any:
+    """The type of the parameters of every law's loop, with the law's own."""
+    return make_record_type(
+        "Known",
+        gait=GaitParameters,
+        reference=ReferenceParameters,
+        vehicle=Body,
+        cross=Vehicle,  # zeros for a multirotor
+        gyroscopic=float,  # 1 where the plant has gyroscopic torque, else 0
+        rotors=float,  # index in the knots of the table of rotors, then per newton, then K_f
+        rotor_gain=float,  # 1/s, of the rotor speeds' errors
+        tilt_gain=float,  # 1/s, of the errors of tilts that the law commands
+        control_period=float,  # s, between samples; 0: continuous
+        own=parameters,
+    )
+
+
+def _signed_root(value: Any) -> Any:
+    """The number whose product with its own size is the value."""
+    return xp.copysign(xp.sqrt(abs(value)), value)
+
+
+def _vector(command: Command, name: str, size: int) -> Any:
+    """A vector of a command; none is of size 0. Raises `LawError` for another shape."""
+    value = getattr(command, name)
+    if value is None and size == 0:
+        return xp.zeros(0)
+    try:
+        array = as_array(value) if hasattr(value, "shape") else xp.array(value)
+    except (TypeError, ValueError):
+        text = f"returned {name} = {short_repr(value)}; expected {size} numbers"
+        raise LawError(text) from None
+    if array.shape != (size,):
+        raise LawError(f"returned {name} of shape {array.shape}; expected shape ({size},)")
+    return array
+
+
+@cache
+def _control_of(key: Key) -> Callable[..., Any]:
+    """The NumPy part of `RotorLaw.inputs`."""
+    (rotors, tilts), spins = key.layout.places, xp.array(key.layout.spins)
+    own, discrete, layout = len(key.states), len(key.discrete), key.layout.tilt_of_rotor
+    per_newton, coefficients = ROTOR_FLOATS * rotors, 2 * ROTOR_FLOATS * rotors
+    is_cross = key.layout.model != "multirotor"
+
+    @traceable
+    def control(
+        time: Any,
+        state: Any,
+        tilt_rates: Any,
+        states: Any,
+        known: Any,
+        knots: Any,
+        motion: Any,
+        attitude: Any,
+        planned: Any,
+    ) -> Any:
+        at, angles = int(known.rotors), state[12 : 12 + tilts]
+        turning = spins * state[12 + tilts : 12 + tilts + rotors]
+        k = xp.array([*knots[at + coefficients : at + coefficients + rotors]])
+        pushing = rotors_in(knots, at + per_newton, layout)
+        wrench = wrench_map(pushing, angles)
+        observed = Observed(
+            time=time,
+            position=state[0:3],
+            velocity=state[3:6],
+            attitude=state[6:9],
+            rotation=rotation_matrix(state[6:9]),
+            body_rates=state[9:12],
+            tilt_angles=angles,
+            tilt_rates=tilt_rates[:tilts],
+            rotor_speeds=turning,
+            thrusts=k * turning * abs(turning),
+            states=states[:own],
+            discrete=states[own : own + discrete],
+            reference=Desired(*motion.reshape(4, 3), attitude, *planned.reshape(2, -1)),  # type: ignore[call-arg]
+            vehicle=known.cross if is_cross else known.vehicle,
+            inertia=inertia_matrix(known.vehicle),
+            gyroscopic=known.gyroscopic,
+            force=wrench[:3],
+            torque=wrench[3:],
+            rotors=pushing,
+            table=knots[at + coefficients + rotors :],
+        )
+        try:
+            command = key.law(observed, known.own)
+        except TypeError as error:
+            if not is_jax(state):
+                raise
+            raise LawError(
+                f"{users_line(error)}{type(error).__name__} on arrays of JAX; {REMEDY}"
+            ) from error
+        reached = states[len(states) - rotors :] if key.models_rotors else turning
+        along = _accelerations(command, known.rotor_gain, k, reached)
+        rates, moving = _state_rates(key, command, states, known)
+        if not key.models_rotors:
+            return xp.hstack([spins * along, rates, moving])
+        following = spins * (along + CORRECTION * (reached - turning))
+        return xp.hstack([following, rates, moving, along])
+
+    return control
+
+
+def _accelerations(command: Command, gain: Any, k: Any, speeds: Any) -> Any:
+    """Rotor accelerations (rad/s^2) along the spins, toward the commanded speeds.
+
+    Args:
+        command: One of its vectors for the rotors is given.
+        gain: Of the errors of speed, 1/s.
+        k: Thrust coefficients, N s^2, shape (N,).
+        speeds: rad/s along the spins, shape (N,).
+    """
+    if not isinstance(command, Command):
+        raise LawError(f"returned {short_repr(command)}; expected a tiltsim.Command")
+    given = [name for name in ROTOR_COMMANDS if getattr(command, name) is not None]
+    if len(given) != 1:
+        what = " and ".join(given) if given else "nothing for the rotors"
+        raise LawError(f"returned {what}; expected one of {', '.join(ROTOR_COMMANDS)}")
+    values = _vector(command, given[0], len(k))
+    if given[0] == "rotor_accelerations":
+        return values
+    return gain * ((_signed_root(values / k) if given[0] == "thrusts" else values) - speeds)
+
+
+def _state_rates(key: Key, command: Command, states: Any, known: Any) -> tuple[Any, Any]:
+    """Rates of the law's states, and of the tilts where it commands them."""
+    own, discrete, tilts = len(key.states), len(key.discrete), key.layout.places.tilts
+    if not key.tilts and command.tilt_angles is not None:
+        raise LawError("returned tilt_angles; needs controller.tilts = free")
+    rates, moving = _vector(command, "rates", own), xp.zeros(0)
+    if discrete:
+        # Held for a period, these rates carry the states to their next values.
+        change = _vector(command, "discrete", discrete) - states[own : own + discrete]
+        rates = xp.hstack([rates, change / known.control_period])
+    elif command.discrete is not None:
+        raise LawError("returned discrete; name these states in controller.discrete_states")
+    if key.tilts:
+        first = own + discrete
+        error = _vector(command, "tilt_angles", tilts) - states[first : first + tilts]
+        moving = known.tilt_gain * error
+    return rates, moving
+
+
+@cache
+def _inputs_of(key: Key) -> Callable[..., Values]:
+    """Scalar code of `RotorLaw.inputs`.
+
+    The ``states`` are the law's own, discrete ones last, the commanded tilts where it commands
+    them, and the rotor speeds of their model where they have one.
+    """
+    control, moving = _control_of(key), tilt_motion_of(key.layout.places.tilts).moving
+
+    @scalar
+    def inputs(
+        time: float,
+        state: Values,
+        tilt_rates: Values,
+        states: Values,
+        parameters: Any,
+        knots: Vector,
+    ) -> Values:
+        known = parameters.law
+        reference = known.reference
+        motion: Any = reference_derivatives(time, reference, knots)
+        angles, rates = moving(time, known.gait, knots)
+        attitude = reference.roll, reference.pitch, reference.yaw
+        planned = (*angles, *rates)
+        return control(
+            time, state, tilt_rates, states, known, knots, motion[:12], attitude, planned
+        )
+
+    return inputs
+
+
+def _setup_of(
+    record: Any, law_of: Callable[[FlightPlan], FlownLaw]
+) -> Callable[[FlightPlan], tuple[Any, Values]]:
+    """`RotorLaw.setup` of a law with a record of parameters."""
+
+    def setup(plan: FlightPlan) -> tuple[Any, Values]:
+        scenario, airframe, law = plan.scenario, airframe_of(plan), law_of(plan)
+        controller, vehicle = scenario.controller, airframe.vehicle
+        assert isinstance(controller, LawTable)
+        step, table = scenario.simulation.control_timestep, scenario.any_rotorcraft.resolve()
+        known = record(
+            plan.gait.parameters,
+            plan.reference,
+            body_of_vehicle(vehicle),
+            table if isinstance(table, Vehicle) else Vehicle(*(0.0,) * len(Vehicle._fields)),
+            airframe.gyroscopic,
+            float(len(plan.knots)),
+            held_gain(controller.rotor_bandwidth, step),
+            held_gain(controller.tilt_rate_gain, step),
+            step,
+            law.parameters,
+        )
+        per_newton = table_per_newton(vehicle.table, vehicle.thrust_coefficients)
+        tables = (*vehicle.table, *per_newton, *vehicle.thrust_coefficients)
+        return known, (*tables, *law.table)
+
+    return setup
+
+
+def _initial_of(
+    law_of: Callable[[FlightPlan], FlownLaw], *, models_rotors: bool
+) -> Callable[[FlightPlan], Values]:
+    """`RotorLaw.initial`, with the states of a model of the rotors or without."""
+
+    def initial(plan: FlightPlan) -> Values:
+        airframe = airframe_of(plan)
+        tilts = airframe.initial_tilts if plan.scenario.controller.commands_tilts else ()
+        speeds = airframe.initial_speeds if models_rotors else ()
+        return (*law_of(plan).initial, *tilts, *speeds)
+
+    return initial
+
+
+@cache
+def law_loop(key: Key, law_of: Callable[[FlightPlan], FlownLaw]) -> ClosedLoop:
+    """The closed loop of a law.
+
+    Args:
+        key: What it is compiled for.
+        law_of: Finds the law of a flight, whose numbers differ.
+    """
+    record, shown = record_of(key.parameters), key.layout.shown
+    commands = shown.names("tilt_command") if key.tilts else ()
+    modelled = shown.names("modelled_rotor_speed") if key.models_rotors else ()
+    law = RotorLaw(
+        key.code_name,
+        _inputs_of(key),
+        record,
+        _setup_of(record, law_of),
+        states={
+            **dict(key.states),
+            **dict(key.discrete),
+            **dict.fromkeys(commands, "rad"),
+            **dict.fromkeys(modelled, "rad/s"),
+        },
+        initial=_initial_of(law_of, models_rotors=key.models_rotors),
+        commands=len(key.states) + len(key.discrete) if key.tilts else None,
+    )
+    late = key._replace(models_rotors=True)
+    return replace(
+        rotor_loop(key.layout, law),
+        follows_position=lambda scenario: scenario.reference.kind != "attitude_altitude",
+        with_latency=None if key.models_rotors else partial(law_loop, late, law_of),
+        traced=key.traced,
+    )

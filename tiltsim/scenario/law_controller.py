@@ -1,0 +1,192 @@
+"""Controllers whose law is one function of arrays: baselines, and those of packages and users.
+
+A package adds one by a subclass of `LawController`, which the entry-point group
+``tiltsim.controllers`` names; see docs/controller_package.md.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cache
+from typing import Any, ClassVar, Literal, TypeVar, get_args, get_origin
+
+from pydantic import Field
+
+from tiltsim.models.rotor_table import Multirotor
+from tiltsim.scenario.controller_table import ControllerTable, ReferenceKind
+from tiltsim.scenario.table import Positive
+from tiltsim_controllers.analysis.stability import ErrorLoop, linear_loop
+from tiltsim_controllers.code.arrays import xp as xp
+from tiltsim_controllers.gaits.plans import Gait
+from tiltsim_controllers.laws.observed import Command as Command
+from tiltsim_controllers.laws.observed import Observed as Observed
+from tiltsim_controllers.mathematics.records import make_record_type, vector_of
+from tiltsim_controllers.mathematics.scalar import Triple, Values
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+
+def law(function: Function) -> Function:
+    """Mark a function of NumPy arrays from `tiltsim.Observed` to `tiltsim.Command` as a law.
+
+    A law remembers nothing but its states. It is compiled, and flies on every engine and plant. A
+    law that cannot be compiled, as with an ``if`` on numbers or a solver, flies as plain Python,
+    with a warning that names the line.
+    """
+    function.is_law = True  # type: ignore[attr-defined]
+    return function
+
+
+def is_law(controller: object) -> bool:
+    """Whether `law` marked a function, or it is a `LawController` or a class of these."""
+    if isinstance(controller, type):
+        return issubclass(controller, LawController)
+    return isinstance(controller, LawController) or getattr(controller, "is_law", False)
+
+
+@dataclass(frozen=True)
+class Airframe:
+    """What a controller knows when a flight is planned.
+
+    Attributes:
+        vehicle: All about it, its rotors as a table.
+        gait: Of its tilts.
+        initial_tilts: Its tilt angles at time zero, rad.
+        initial_speeds: Its rotor speeds at time zero, rad/s along the spin.
+        initial_body_rates: Its body rates at time zero, rad/s.
+        gyroscopic: 1 where the plant has gyroscopic torque, else 0.
+    """
+
+    vehicle: Multirotor
+    gait: Gait
+    initial_tilts: Values
+    initial_speeds: Values
+    initial_body_rates: Triple
+    gyroscopic: float
+
+    @property
+    def rotors(self) -> int:
+        """Their number."""
+        return len(self.vehicle.spins)
+
+
+class LawTable(ControllerTable):
+    """The common part of the tables of laws, wherever the function comes from."""
+
+    vehicle_models = ("tiltrotor", "quadrotor", "multirotor")
+    reference_kinds: ClassVar[tuple[ReferenceKind, ...]] = ("position",)
+    rotors_have_speeds = True
+
+    rotor_bandwidth: Positive = Field(
+        100.0,
+        description="of the rotors' speed controllers: the speeds approach the commanded ones as "
+        "a lag of first order [1/s]",
+    )
+
+    def error_loops(self, vehicle: Any) -> list[ErrorLoop]:
+        return [linear_loop("rotor speed", (self.rotor_bandwidth,))]
+
+    @property
+    def linearization(self) -> str:
+        return "exact allocation"
+
+    @property
+    def tilt_rate_gain(self) -> float:
+        """Rate (1/s) at which the tilts approach the commands of a law with `commands_tilts`."""
+        return 30.0
+
+
+class LawController(LawTable):
+    """A controller whose law is one function of arrays, and whose fields are its parameters.
+
+    The rotors take up the commanded speeds with a lag.
+
+    Attributes:
+        states: Names and units of the law's states, columns of the flight; names begin with
+            ``state_``.
+        discrete_states: Likewise, of states that change at control samples only, such as flags and
+            queues.
+    """
+
+    states: ClassVar[Mapping[str, str]] = {}
+    discrete_states: ClassVar[Mapping[str, str]] = {}
+
+    law: str = "numpy"
+
+    @staticmethod
+    @abstractmethod
+    def control(observed: Observed, p: Any) -> Command:
+        """The law.
+
+        Args:
+            observed: State and reference, see `tiltsim.Observed`.
+            p: What `law_parameters` returned, tuples as arrays.
+        """
+
+    def law_function(self, airframe: Airframe) -> Callable[..., Command]:
+        """The function of the law: `control`, or one that is chosen by a key or the vehicle."""
+        return self.control
+
+    def law_parameters(self, airframe: Airframe) -> tuple[Any, ...]:
+        """The law's parameters, a NamedTuple of floats and tuples: by default the numeric keys."""
+        names, record = _parameters_of(type(self))
+        made: tuple[Any, ...] = record(
+            *(getattr(self, name) for name in names) if names else (0.0,)
+        )
+        return made
+
+    def law_table(self, airframe: Airframe) -> Values:
+        """Any number of further floats: ``observed.table``."""
+        return ()
+
+    def state_units(self, airframe: Airframe) -> Mapping[str, str]:
+        """The law's states and their units: by default `states`."""
+        return self.states
+
+    def initial_states(self, airframe: Airframe) -> Values:
+        """The law's states at time zero, then its discrete ones."""
+        return (0.0,) * (len(self.state_units(airframe)) + len(self.discrete_states))
+
+
+class TiltingTable(LawTable):
+    """Tables of laws that may also command the tilts."""
+
+    tilts: Literal["gait", "free"] = Field(
+        "gait",
+        description="whether the tilts follow the gait, or are the law's, the gait being the "
+        "angles at the start",
+    )
+    tilt_bandwidth: Positive = Field(
+        30.0,
+        description="of the approach to the tilts that the law commands; needs tilts = free [1/s]",
+    )
+
+    @property
+    def commands_tilts(self) -> bool:  # type: ignore[override]
+        """Whether the tilt angles are the law's."""
+        return self.tilts == "free"
+
+    @property
+    def tilt_rate_gain(self) -> float:
+        return self.tilt_bandwidth
+
+    def check_scenario(self, scenario: Any) -> None:
+        if not self.commands_tilts:
+            self.require_defaults(("tilt_bandwidth",), "needs controller.tilts = free")
+        elif not scenario.vehicle.has_tilting_rotors:
+            raise self.mistake("tilts", f"the rotors of the {scenario.vehicle.model} do not tilt")
+
+
+@cache
+def _parameters_of(table: type[LawController]) -> tuple[tuple[str, ...], Any]:
+    """Names of the numeric keys of a law, and the type of their record."""
+    known = LawController.model_fields.keys() | TiltingTable.model_fields.keys()
+    fields: dict[str, type] = {}
+    for name, key in table.model_fields.items():
+        if name not in known and key.annotation in (float, int):
+            fields[name] = float
+        elif name not in known and get_origin(key.annotation) is tuple:
+            fields[name] = vector_of(len(get_args(key.annotation)))
+    return tuple(fields), make_record_type("Parameters", **(fields or {"none": float}))
