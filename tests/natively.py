@@ -19,6 +19,27 @@ define void @run(ptr %values, ptr %results) nounwind {
 """
 
 
+def machine_code_in_lanes(program, lanes, **options):
+    """A program of one vector as a function of rows, each in a lane."""
+    text, pointers = (
+        llvm_functions({"traced": program}, lanes, **options) + RUN,
+        [ctypes.c_void_p] * 2,
+    )
+    run = MachineCode(text).function("run", None, *pointers)
+
+    def call(rows):
+        results = []
+        for first in range(0, len(rows), lanes):
+            own = [rows[min(first + lane, len(rows) - 1)] for lane in range(lanes)]
+            values = np.ascontiguousarray(np.transpose(np.array(own, float)))
+            found = np.empty((len(program.block.results), lanes))
+            run(values.ctypes.data, found.ctypes.data)
+            results += np.transpose(found).tolist()[: len(rows) - first]
+        return results
+
+    return call
+
+
 def machine_code(program):
     """A program of one vector as a function of sequences."""
     pointers = [ctypes.c_void_p] * 2
@@ -32,37 +53,37 @@ def machine_code(program):
     return call
 
 
-def natively(function, *arguments):
-    """The numbers that a scalar function returns at arguments, as machine code computes them.
+def compiled(function, *like):
+    """A scalar function as machine code: of arguments as these, it returns a list of numbers.
 
     Choices are constants, as in flights; all other numbers are inputs.
     """
-    values = []
 
-    def collect(value, name=""):
-        if isinstance(value, tuple | list):
-            names = getattr(value, "_fields", [name] * len(value))
-            return [collect(entry, inner) for entry, inner in zip(value, names)]
-        if name in CHOICES or isinstance(value, bool | int):
-            return value
-        values.append(value)
-        return len(values) - 1, "input"
+    def restored(entry, name, entries):
+        if isinstance(entry, tuple | list):
+            names = getattr(entry, "_fields", [name] * len(entry))
+            parts = [restored(part, inner, entries) for part, inner in zip(entry, names)]
+            return type(entry)(*parts) if hasattr(entry, "_fields") else type(entry)(parts)
+        return entry if name in CHOICES or isinstance(entry, bool | int) else next(entries)
 
-    def restored(place, like, vector):
-        if not isinstance(like, tuple | list):
-            return vector[place[0]] if isinstance(place, tuple) else place
-        entries = [restored(one, inner, vector) for one, inner in zip(place, like)]
-        return type(like)(*entries) if hasattr(like, "_fields") else type(like)(entries)
-
-    places = [collect(argument) for argument in arguments]
+    def inputs(entry, name=""):
+        if isinstance(entry, tuple | list):
+            names = getattr(entry, "_fields", [name] * len(entry))
+            return [value for part, inner in zip(entry, names) for value in inputs(part, inner)]
+        return [] if name in CHOICES or isinstance(entry, bool | int) else [entry]
 
     def traced(lifting, given):
-        (vector,) = given
-        return numbers(
-            lifting(function)(*(restored(p, a, vector) for p, a in zip(places, arguments)))
-        )
+        entries = iter(given[0])
+        return numbers(lifting(function)(*(restored(entry, "", entries) for entry in like)))
 
-    return machine_code(trace_scalar_code(traced, values=len(values)))(values)
+    size = sum(len(inputs(entry)) for entry in like)
+    run = machine_code(trace_scalar_code(traced, values=size))
+    return lambda *arguments: run([value for entry in arguments for value in inputs(entry)])
+
+
+def natively(function, *arguments):
+    """The numbers that a scalar function returns at arguments, as machine code computes them."""
+    return compiled(function, *arguments)(*arguments)
 
 
 def numbers(values):

@@ -181,6 +181,32 @@ def change_a_columns_type(folder, _other):
     return part(folder, 0), "column max_abs_roll holds string instead of double"
 
 
+def set_in_a_part(folder, name, value):
+    """Set one row's value of a column, in an otherwise equal file."""
+    table = plain_table(part(folder, 0))
+    field, values = table.schema.field(name), table[name].to_pylist()
+    edited = pa.array([*values[:-1], value], field.type)
+    place = table.column_names.index(name)
+    pq.write_table(table.set_column(place, field, edited), part(folder, 0))
+    return part(folder, 0)
+
+
+def make_a_draw_nan(folder, _other):
+    """No figure can show it: each ended in another error of NumPy or matplotlib."""
+    file = set_in_a_part(folder, "initial.attitude[0]", float("nan"))
+    return file, "damaged: column initial.attitude[0] contains non-finite values"
+
+
+def make_a_metric_infinite(folder, _other):
+    file = set_in_a_part(folder, "max_abs_roll", float("inf"))
+    return file, "damaged: column max_abs_roll contains non-finite values"
+
+
+def remove_a_draw(folder, _other):
+    file = set_in_a_part(folder, "initial.attitude[0]", None)
+    return file, "damaged: column initial.attitude[0] has missing values"
+
+
 def repeat_a_column(folder, _other):
     table = plain_table(part(folder, 0))
     pq.write_table(table.append_column("end", table["end"]), part(folder, 0))
@@ -206,6 +232,9 @@ DAMAGES = (
     replace_the_dataset,
     put_a_flight_in_place_of_the_dataset,
     change_a_columns_type,
+    make_a_draw_nan,
+    make_a_metric_infinite,
+    remove_a_draw,
     repeat_a_column,
     drop_a_column,
     make_a_folder_of_a_part,

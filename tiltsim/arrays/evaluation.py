@@ -137,6 +137,8 @@ class Frame(Expressions):
                 return {CONTINUE: (True, variables)}
             case ast.Pass() | ast.Assert() | ast.Expr(value=ast.Constant()):
                 pass
+            case ast.ImportFrom():  # of a package that computes with plain numbers
+                raise self.error(f"{ast.unparse(node)} has no form on arrays", PlainNumberError)
             case _:
                 raise self.error(f"{type(node).__name__} has no form on arrays")
         return {NEXT: (True, variables)}

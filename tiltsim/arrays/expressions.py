@@ -69,7 +69,10 @@ def _definition(function: FunctionType) -> ast.FunctionDef | ast.Lambda:
     for node in _definitions(code.co_filename).get(code.co_firstlineno, []):
         if getattr(node, "name", "<lambda>") == code.co_name:
             return node
-    raise LiftError(f"{code.co_name}: its source is not in {code.co_filename}")
+    raise LiftError(
+        f"{code.co_name}: its source is not in {code.co_filename}; scalar code is compiled from "
+        "its text, in a file or a cell of a notebook"
+    )
 
 
 class Expressions:

@@ -22,6 +22,7 @@ import numpy as np
 from tiltsim.arrays.evaluation import Frame
 from tiltsim.arrays.expressions import Borrowed
 from tiltsim.arrays.values import Arrays, Function, PlainNumberError, rebuilt
+from tiltsim_controllers.code.traceable import as_tuples, is_traceable
 from tiltsim_controllers.mathematics.scalar import Floats, scalar_functions
 
 
@@ -62,9 +63,11 @@ class Lifting:
         return lifted
 
     def run(self, function: Any, args: Iterable[Any], keywords: Mapping[str, Any]) -> Any:
-        """Evaluate a function written in Python."""
+        """Evaluate a function written in Python; a function of arrays runs as it is."""
 
         def call(args: Iterable[Any], keywords: Mapping[str, Any]) -> Any:
+            if is_traceable(function):
+                return as_tuples(function(*args, **keywords))
             return Frame(self, function).call(args, keywords)
 
         if function in self._separate and self._active is True:
@@ -76,7 +79,7 @@ class Lifting:
         """Whether a function may be lifted."""
         if function not in self._known:
             self._known = set(scalar_functions())  # closures are registered when they are made
-        return function in self._known
+        return function in self._known or is_traceable(function)
 
     def plan(self, function: Function, args: Iterable[Any], keywords: Mapping[str, Any]) -> Any:
         """Call any function, as it is or else lifted."""

@@ -23,7 +23,6 @@ from tiltsim_controllers.code.tracing import (
     graph_in_use,
     make,
 )
-from tiltsim_controllers.mathematics.noise import uniform
 
 
 def _whole(value: Number) -> Number:
@@ -54,7 +53,6 @@ FUNCTIONS: Final[Mapping[Function, Function]] = {
     max: _largest,
     int: _whole,
     float: lambda value: value,
-    uniform: partial(make, "uniform"),
 }
 
 

@@ -5,8 +5,10 @@ The text is a template: words in ``<...>`` are numbers that are known when it is
 
 from __future__ import annotations
 
-import struct
 from typing import Final
+
+from tiltsim.engines.programs import HEAD_SIZE, SIDES, RecorderHead
+from tiltsim_controllers.code.lanes import Lanes
 
 CALLBACK: Final = """
 define void @callback(ptr %model, ptr %data) nounwind {
@@ -54,21 +56,26 @@ controlled:
 record:
   %place = fptoui double %address to i64
   %recorder = inttoptr i64 %place to ptr
-  %left = load double, ptr %recorder
-  %less = fsub double %left, 1.0
-  store double %less, ptr %recorder
+  %left = call double @entry(ptr %recorder, i64 <left>)
   %now = fcmp oeq double %left, 0.0
   br i1 %now, label %sample, label %recorded
 sample:
-  %row = call ptr @next_row(ptr %recorder)
-  %full = icmp eq ptr %row, null
-  br i1 %full, label %recorded, label %take
+  %finished = call i1 @is_over(ptr %recorder)
+  br i1 %finished, label %recorded, label %take
 take:
+  %taken = call double @entry(ptr %recorder, i64 <samples>)
+  %row_number = fptosi double %taken to i64
+  %numbers = mul i64 %row_number, <width>
+  %first = add i64 %numbers, <rows_at>
+  %row = getelementptr double, ptr %recorder, i64 %first
   call void @sample(ptr %header, ptr %qpos, ptr %qvel, ptr %act, ptr %ctrl, ptr %user,
                     ptr %recorder, ptr %row)
-  call void @took(ptr %recorder, ptr %row)
+  %ends_at = getelementptr double, ptr %row, i64 <width>
+  %ends = load double, ptr %ends_at
+  call void @took(ptr %recorder, i1 true, double %ends)
   br label %recorded
 recorded:
+  call void @count_down(ptr %recorder)
   %over = call i1 @is_over(ptr %recorder)
   br i1 %over, label %stop, label %count_on
 stop:
@@ -92,110 +99,225 @@ Once a recording is over, the controls are NaN: MuJoCo warns of them and a batch
 """
 
 RECORDER: Final = """
-define internal ptr @next_row(ptr %recorder) nounwind {
-  %over = call i1 @is_over(ptr %recorder)
-  %taken_at = getelementptr double, ptr %recorder, i64 3
-  %taken = load double, ptr %taken_at
-  %rows = fptosi double %taken to i64
-  %numbers = mul i64 %rows, <width>
-  %first = add i64 %numbers, <rows_at>
-  %place = getelementptr double, ptr %recorder, i64 %first
-  %row = select i1 %over, ptr null, ptr %place
-  ret ptr %row
+define internal <D> @entry(ptr %recorder, i64 %index) alwaysinline nounwind {
+  %place = getelementptr <D>, ptr %recorder, i64 %index
+  %value = load <D>, ptr %place, align 8
+  ret <D> %value
 }
-define internal void @took(ptr %recorder, ptr %row) nounwind {
-  %ends_at = getelementptr double, ptr %row, i64 <width>
-  %ends = load double, ptr %ends_at
-  %terminated_at = getelementptr double, ptr %recorder, i64 5
-  store double %ends, ptr %terminated_at
-  %taken_at = getelementptr double, ptr %recorder, i64 3
-  %taken = load double, ptr %taken_at
-  %more = fadd double %taken, 1.0
-  store double %more, ptr %taken_at
-  %capacity_at = getelementptr double, ptr %recorder, i64 4
-  %capacity = load double, ptr %capacity_at
-  %later = fadd double %taken, 2.0
-  %regular = fcmp olt double %later, %capacity
-  %interval_at = getelementptr double, ptr %recorder, i64 1
-  %interval = load double, ptr %interval_at
-  %last_at = getelementptr double, ptr %recorder, i64 2
-  %last = load double, ptr %last_at
-  %next = select i1 %regular, double %interval, double %last
-  %left = fsub double %next, 1.0
-  store double %left, ptr %recorder
+define internal void @set(ptr %recorder, i64 %index, <B> %where, <D> %value) alwaysinline nounwind {
+  %place = getelementptr <D>, ptr %recorder, i64 %index
+  %before = load <D>, ptr %place, align 8
+  %now = select <B> %where, <D> %value, <D> %before
+  store <D> %now, ptr %place, align 8
   ret void
 }
-define internal i1 @is_over(ptr %recorder) nounwind {
-  %taken_at = getelementptr double, ptr %recorder, i64 3
-  %taken = load double, ptr %taken_at
-  %capacity_at = getelementptr double, ptr %recorder, i64 4
-  %capacity = load double, ptr %capacity_at
-  %full = fcmp oeq double %taken, %capacity
-  %terminated_at = getelementptr double, ptr %recorder, i64 5
-  %terminated = load double, ptr %terminated_at
-  %ended = fcmp une double %terminated, 0.0
-  %over = or i1 %full, %ended
-  ret i1 %over
+define internal <B> @is_over(ptr %recorder) nounwind {
+  %taken = call <D> @entry(ptr %recorder, i64 <samples>)
+  %capacity = call <D> @entry(ptr %recorder, i64 <capacity>)
+  %full = fcmp oeq <D> %taken, %capacity
+  %terminated = call <D> @entry(ptr %recorder, i64 <terminated>)
+  %ended = fcmp une <D> %terminated, zeroinitializer
+  %over = or <B> %full, %ended
+  ret <B> %over
+}
+define internal void @took(ptr %recorder, <B> %where, <D> %ends) nounwind {
+  call void @set(ptr %recorder, i64 <terminated>, <B> %where, <D> %ends)
+  %taken = call <D> @entry(ptr %recorder, i64 <samples>)
+  %more = fadd <D> %taken, <0x3FF0000000000000>
+  call void @set(ptr %recorder, i64 <samples>, <B> %where, <D> %more)
+  %later = fadd <D> %more, <0x3FF0000000000000>
+  %capacity = call <D> @entry(ptr %recorder, i64 <capacity>)
+  %regular = fcmp olt <D> %later, %capacity
+  %interval = call <D> @entry(ptr %recorder, i64 <interval>)
+  %last = call <D> @entry(ptr %recorder, i64 <last_interval>)
+  %next = select <B> %regular, <D> %interval, <D> %last
+  call void @set(ptr %recorder, i64 <left>, <B> %where, <D> %next)
+  ret void
+}
+define internal void @count_down(ptr %recorder) nounwind {
+  %left = call <D> @entry(ptr %recorder, i64 <left>)
+  %less = fsub <D> %left, <0x3FF0000000000000>
+  call void @set(ptr %recorder, i64 <left>, <B> <1b>, <D> %less)
+  ret void
 }
 """
-"""Access to the memory of a `tiltsim.engines.recorder.Recorder`."""
+"""Access to the head of a `tiltsim.engines.recorder.Recorder`, or of one per lane."""
 
-STEPPER: Final = """
-define void @advance(i64 %samples, i64 %steps, i64 %every, ptr %index, ptr %now, ptr %settings,
-                     ptr %user, ptr %recorder) nounwind {
+CHOOSE: Final = """
+define internal void @choose(i64 %size, <B> %where, ptr %yes, ptr %no, ptr %out) nounwind {
 entry:
-  %records = icmp ne ptr %recorder, null
-  %begin = load double, ptr %index
-  %begun = fptosi double %begin to i64
-  br label %interval
-interval:
-  %taken = phi i64 [0, %entry], [%taken_on, %recorded]
-  %first = phi i64 [%begun, %entry], [%end, %recorded]
-  %end = add i64 %first, %steps
-  br label %step
-step:
-  %at = phi i64 [%first, %interval], [%on, %stepped]
-  %rest = srem i64 %at, %every
-  %due = icmp eq i64 %rest, 0
-  br i1 %due, label %sampling, label %holding
-sampling:
-  call void @step_sampled(ptr %index, ptr %now, ptr %settings, ptr %user, ptr %now)
-  br label %stepped
-holding:
-  call void @<step_held>(ptr %index, ptr %now, ptr %settings, ptr %user, ptr %now)
-  br label %stepped
-stepped:
-  %on = add i64 %at, 1
-  %count = sitofp i64 %on to double
-  store double %count, ptr %index
-  %again = icmp slt i64 %on, %end
-  br i1 %again, label %step, label %stop
-stop:
-  br i1 %records, label %record, label %recorded
-record:
-  %row = call ptr @next_row(ptr %recorder)
-  %end_rest = srem i64 %end, %every
-  %fresh = icmp eq i64 %end_rest, 0
-  br i1 %fresh, label %sample_fresh, label %sample_stale
-sample_fresh:
-  call void @sample_sampled(ptr %index, ptr %now, ptr %settings, ptr %user, ptr %recorder, ptr %row)
-  br label %took
-sample_stale:
-  call void @<sample_held>(ptr %index, ptr %now, ptr %settings, ptr %user, ptr %recorder, ptr %row)
-  br label %took
-took:
-  call void @took(ptr %recorder, ptr %row)
-  %over = call i1 @is_over(ptr %recorder)
-  br i1 %over, label %exit, label %recorded
-recorded:
-  %taken_on = add i64 %taken, 1
-  %more = icmp slt i64 %taken_on, %samples
-  br i1 %more, label %interval, label %exit
+  br label %entry_of
+entry_of:
+  %index = phi i64 [0, %entry], [%next, %entry_of]
+  %yes_at = getelementptr <D>, ptr %yes, i64 %index
+  %no_at = getelementptr <D>, ptr %no, i64 %index
+  %one = load <D>, ptr %yes_at, align 8
+  %other = load <D>, ptr %no_at, align 8
+  %chosen = select <B> %where, <D> %one, <D> %other
+  %out_at = getelementptr <D>, ptr %out, i64 %index
+  store <D> %chosen, ptr %out_at, align 8
+  %next = add i64 %index, 1
+  %more = icmp slt i64 %next, %size
+  br i1 %more, label %entry_of, label %exit
 exit:
   ret void
 }
 """
-"""Steps of the equations of motion, and a sample after every interval of them."""
+"""Entries of one of two vectors, lane by lane."""
+
+CONTINUOUS: Final = """
+define internal void @<name>(ptr %index, ptr %every, <vectors>, ptr %out) alwaysinline nounwind {
+  call void @<name>_sampled(ptr %index, <vectors>, ptr %out)
+  ret void
+}
+"""
+"""A program of a controller that is evaluated at every stage of a step."""
+
+HELD: Final = """
+define internal void @<name>(ptr %index, ptr %every, <vectors>, ptr %out) nounwind {
+entry:
+  %spare = alloca <D>, i64 <size>, align 8
+  %at = load <D>, ptr %index, align 8
+  %period = load <D>, ptr %every, align 8
+  %periods = fdiv <D> %at, %period
+  %whole = call <D> @llvm.floor.<f64>(<D> %periods)
+  %begin = fmul <D> %whole, %period
+  %samples = fcmp oeq <D> %begin, %at
+  %holds = xor <B> %samples, <1b>
+  %any_samples = call i1 @any(<B> %samples)
+  %any_holds = call i1 @any(<B> %holds)
+  br i1 %any_samples, label %sampling, label %sampled
+sampling:
+  call void @<name>_sampled(ptr %index, <vectors>, ptr %out)
+  br label %sampled
+sampled:
+  br i1 %any_holds, label %holding, label %exit
+holding:
+  %place = select i1 %any_samples, ptr %spare, ptr %out
+  call void @<name>_held(ptr %index, <vectors>, ptr %place)
+  br i1 %any_samples, label %join, label %exit
+join:
+  call void @choose(i64 <size>, <B> %samples, ptr %out, ptr %spare, ptr %out)
+  br label %exit
+exit:
+  ret void
+}
+"""
+"""A program of a held controller: at its samples, between them, or some lanes of each."""
+
+STEPPER: Final = """
+define void @advance(i64 %steps, i64 %returns, ptr %index, ptr %every, ptr %now, ptr %other,
+                     ptr %settings, ptr %user, ptr %recorder, ptr %rows, ptr %saved) nounwind {
+entry:
+  %row = alloca <D>, i64 <row_size>, align 8
+  %early = icmp ne i64 %returns, 0
+  br label %turn
+turn:
+  %taken = phi i64 [0, %entry], [%on, %stepped]
+  %state = phi ptr [%now, %entry], [%next, %stepped]
+  %next = phi ptr [%other, %entry], [%state, %stepped]
+  %was_over = call <B> @is_over(ptr %recorder)
+  %left = call <D> @entry(ptr %recorder, i64 <left>)
+  %at_sample = fcmp oeq <D> %left, zeroinitializer
+  %flies = xor <B> %was_over, <1b>
+  %due = and <B> %at_sample, %flies
+  %any_due = call i1 @any(<B> %due)
+  br i1 %any_due, label %record, label %check
+record:
+  call void @sample(ptr %index, ptr %every, ptr %state, ptr %settings, ptr %user, ptr %recorder,
+                    ptr %row)
+  call void @keep(<B> %due, ptr %row, ptr %recorder, ptr %rows)
+  %ended = call <B> @is_terminated(ptr %recorder)
+  %sound = xor <B> %ended, <1b>
+  %good = and <B> %due, %sound
+  %saved_state = getelementptr <D>, ptr %saved, i64 1
+  call void @choose(i64 1, <B> %good, ptr %index, ptr %saved, ptr %saved)
+  call void @choose(i64 <size>, <B> %good, ptr %state, ptr %saved_state, ptr %saved_state)
+  br label %check
+check:
+  %over = call <B> @is_over(ptr %recorder)
+  %active = xor <B> %over, <1b>
+  %any_active = call i1 @any(<B> %active)
+  %any_over = call i1 @any(<B> %over)
+  %returns_now = and i1 %early, %any_over
+  %more = icmp slt i64 %taken, %steps
+  %waits = xor i1 %returns_now, true
+  %goes_on = and i1 %more, %waits
+  %steps_on = and i1 %goes_on, %any_active
+  br i1 %steps_on, label %step, label %exit
+step:
+  call void @step(ptr %index, ptr %every, ptr %state, ptr %settings, ptr %user, ptr %next)
+  br i1 %any_over, label %rest, label %stepped
+rest:
+  call void @choose(i64 <size>, <B> %active, ptr %next, ptr %state, ptr %next)
+  br label %stepped
+stepped:
+  %count = load <D>, ptr %index, align 8
+  %counted = fadd <D> %count, <0x3FF0000000000000>
+  call void @set(ptr %index, i64 0, <B> %active, <D> %counted)
+  call void @count_down(ptr %recorder)
+  %on = add i64 %taken, 1
+  br label %turn
+exit:
+  call void @choose(i64 <size>, <B> <1b>, ptr %state, ptr %now, ptr %now)
+  ret void
+}
+define internal <B> @is_terminated(ptr %recorder) nounwind {
+  %terminated = call <D> @entry(ptr %recorder, i64 <terminated>)
+  %ended = fcmp une <D> %terminated, zeroinitializer
+  ret <B> %ended
+}
+define internal void @keep(<B> %due, ptr %row, ptr %recorder, ptr %rows) nounwind {
+entry:
+  %due_lanes = alloca <D>, align 8
+  %flags = uitofp <B> %due to <D>
+  store <D> %flags, ptr %due_lanes, align 8
+  br label %lane
+lane:
+  %number = phi i64 [0, %entry], [%next, %lane_done]
+  %flag_at = getelementptr double, ptr %due_lanes, i64 %number
+  %flag = load double, ptr %flag_at
+  %wants = fcmp une double %flag, 0.0
+  br i1 %wants, label %copies, label %lane_done
+copies:
+  %head = getelementptr <D>, ptr %recorder, i64 <samples>
+  %taken_at = getelementptr double, ptr %head, i64 %number
+  %taken = load double, ptr %taken_at
+  %row_number = fptosi double %taken to i64
+  %first = mul i64 %row_number, <width>
+  %own_at = getelementptr ptr, ptr %rows, i64 %number
+  %own = load ptr, ptr %own_at
+  %target = getelementptr double, ptr %own, i64 %first
+  br label %field
+field:
+  %index = phi i64 [0, %copies], [%further, %field]
+  %from_vector = getelementptr <D>, ptr %row, i64 %index
+  %from = getelementptr double, ptr %from_vector, i64 %number
+  %value = load double, ptr %from
+  %to = getelementptr double, ptr %target, i64 %index
+  store double %value, ptr %to
+  %further = add i64 %index, 1
+  %unfinished = icmp slt i64 %further, <width>
+  br i1 %unfinished, label %field, label %lane_done
+lane_done:
+  %next = add i64 %number, 1
+  %more = icmp slt i64 %next, <lanes>
+  br i1 %more, label %lane, label %exit
+exit:
+  %ends_at = getelementptr <D>, ptr %row, i64 <width>
+  %ends = load <D>, ptr %ends_at, align 8
+  call void @took(ptr %recorder, <B> %due, <D> %ends)
+  %sides = getelementptr <D>, ptr %recorder, i64 <head_size>
+  %new_sides = getelementptr <D>, ptr %ends_at, i64 1
+  call void @choose(i64 <checks>, <B> %due, ptr %new_sides, ptr %sides, ptr %sides)
+  ret void
+}
+"""
+"""Steps of the equations of motion, and samples of the lanes that are due for one.
+
+A lane whose recording is over stays at rest; the function returns after some steps, once all lanes
+are over, or, if requested, once any is. It also keeps index and state of the last good sample.
+"""
 
 ROWS: Final = """
 define void @rows(i64 %count, ptr %time, ptr %states, ptr %user, ptr %values) nounwind {
@@ -229,11 +351,46 @@ define double @clock() nounwind {
 """A callback that does nothing, and a clock for MuJoCo's timers that always reads zero."""
 
 
-def filled(template: str, **words: float | str) -> str:
-    """A template with its words replaced; floats are written bit by bit."""
-    for name, value in words.items():
-        if isinstance(value, float):
-            (bits,) = struct.unpack("Q", struct.pack("d", value))
-            value = f"0x{bits:016X}"
-        template = template.replace(f"<{name}>", str(value))
+_PLACES: Final = {name: place for place, name in enumerate(RecorderHead._fields)} | {
+    "head_size": HEAD_SIZE,
+    "rows_at": HEAD_SIZE + SIDES,
+}
+
+
+def filled(template: str, lanes: int = 1, **words: float | str) -> str:
+    """A template with its words replaced; floats are written bit by bit.
+
+    Args:
+        template: Also has placeholders of `tiltsim_controllers.code.lanes.Lanes.filled`, and the
+            places of the entries of a recorder's head by name.
+        lanes: Number of lanes.
+        words: By name.
+    """
+    template = Lanes(lanes).filled(template)
+    for name, value in {**words, **_PLACES}.items():
+        text = Lanes().constant(value) if isinstance(value, float) else str(value)
+        template = template.replace(f"<{name}>", text)
     return template
+
+
+def stepper_text(held: bool, lanes: int, size: int, width: int, checks: int) -> str:
+    """The text of `STEPPER` and of all that it calls but the programs.
+
+    Args:
+        held: Whether the controller is sampled and held.
+        lanes: Number of lanes.
+        size: Number of states and inputs in force.
+        width: Number of the fields of a sample.
+        checks: Number of sign checks.
+    """
+    pointers = "ptr %now, ptr %settings, ptr %user"
+    row_size = width + 1 + checks
+    template = HELD if held else CONTINUOUS
+    parts = [
+        template.replace("<name>", "step").replace("<size>", str(size)),
+        template.replace("<name>", "sample").replace("<size>", str(row_size)),
+    ]
+    calls = [parts[0].replace("<vectors>", pointers)]
+    calls.append(parts[1].replace("<vectors>", f"{pointers}, ptr %recorder"))
+    text = "".join([CHOOSE, RECORDER, *calls, STEPPER])
+    return filled(text, lanes, size=size, width=width, checks=checks, row_size=row_size)

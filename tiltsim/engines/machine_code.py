@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import platform
 import tempfile
 from collections.abc import Mapping
 from functools import cache
@@ -11,6 +12,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from tiltsim.engines.code_folder import code_folder, is_usable
+from tiltsim_controllers.code.lanes import LaneMath
 
 OPTIMIZATION: Final = 1
 """Of LLVM's levels 0 to 3; higher ones take longer to compile and run no faster."""
@@ -66,6 +68,34 @@ def _target() -> tuple[Any, Mapping[str, Any], str]:
     name, features = llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()
     options = {"cpu": name, "features": features, "opt": OPTIMIZATION}
     return target, options, f"{llvmlite.__version__} {target.triple} {options}\n"
+
+
+@cache
+def widest() -> int:
+    """How many numbers a vector register of this processor holds."""
+    import llvmlite.binding as llvm
+
+    has = llvm.get_host_cpu_features()
+    return 8 if has.get("avx512f") else 4 if has.get("avx2") else 2
+
+
+@cache
+def lane_math(*, quick: bool) -> LaneMath:
+    """The functions of lanes that this machine has.
+
+    Args:
+        quick: Whether their last digits may differ from the C library's.
+    """
+    import llvmlite.binding as llvm
+
+    fuses = llvm.get_host_cpu_features().get("fma") or platform.machine() in ("aarch64", "arm64")
+    if not fuses:
+        return "library"
+    if quick:
+        return "quick"
+    name, version = platform.libc_ver()
+    known = name == "glibc" and tuple(map(int, version.split(".")[:2])) >= (2, 28)
+    return "exact" if known else "library"
 
 
 def _load(file: Path) -> bytes | None:

@@ -8,7 +8,7 @@ lock.
 from __future__ import annotations
 
 import ctypes
-from functools import cache
+from functools import cache, lru_cache
 from math import nan
 from typing import Any, Final
 
@@ -22,7 +22,7 @@ from tiltsim.engines.glue import CALLBACK, EMPTY, filled
 from tiltsim.engines.glue import RECORDER as RECORDER_TEXT
 from tiltsim.engines.machine_code import MachineCode
 from tiltsim.engines.mjdata_layout import mjdata_layout
-from tiltsim.engines.programs import HEAD_SIZE, SIDES, LoopPrograms
+from tiltsim.engines.programs import KEPT, LoopPrograms
 from tiltsim.system.locks import one_thread_at_a_time
 from tiltsim_controllers.code.llvm_text import llvm_functions
 
@@ -30,7 +30,7 @@ _POINTER: Final = ctypes.c_void_p
 
 
 @one_thread_at_a_time
-@cache
+@lru_cache(maxsize=KEPT)
 def compile_control(key: ProgramKey) -> Any:
     """The control callback of a loop; keep it as long as MuJoCo may call it."""
     loop = key.loop
@@ -47,7 +47,6 @@ def compile_control(key: ProgramKey) -> Any:
         controls=loop.dynamics.sizes.ctrl,
         nan=nan,
         width=width,
-        rows_at=HEAD_SIZE + SIDES,
     )
     code = MachineCode(
         llvm_functions(LoopPrograms(key).in_mujoco("controls", "hold", "sample")) + glue

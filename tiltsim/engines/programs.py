@@ -25,6 +25,9 @@ from tiltsim_controllers.references.trajectories import ReferenceParameters
 
 Traced = Callable[..., Iterable[Number]]
 
+KEPT: Final = 64
+"""Programs of each kind that are kept; each closed loop, gait type and decoupler has its own."""
+
 SIDES: Final = 17
 """How many sign checks a loop may have."""
 
@@ -72,7 +75,8 @@ class LoopPrograms:
 
         Args:
             names: "controls" and "hold", the control step at and between the samples of the
-                controller, and "sample".
+                controller; "observe", the values of a sample; and "sample", a sample as the
+                recorder takes it.
         """
         loop, sampling = self._loop, self._loop.sampling
         sizes = loop.dynamics.sizes._asdict()
@@ -93,20 +97,27 @@ class LoopPrograms:
             count, per_step = header[EVALUATIONS], header[EVALUATIONS_PER_STEP]
             start = make("mul", make("div", count, per_step), header[TIMESTEP])
             values = lifting(loop.columns.observe)(qpos, qvel, act, tuple(ctrl))
-            return self._checked(lifting, start, values, user, recorder)
+            return self._checked(lifting, start, values, user, recorder)[0]
 
-        functions = {"controls": controls, "hold": hold, "sample": sample}
+        def observe(lifting: Lifting, given: Sequence[InputVector]) -> Iterable[Number]:
+            _, qpos, qvel, act, ctrl, _ = given
+            return lifting(loop.columns.observe)(qpos, qvel, act, tuple(ctrl))
+
+        functions = {"controls": controls, "hold": hold, "observe": observe, "sample": sample}
         sizes = {"sample": {**vectors, "recorder": HEAD_SIZE + SIDES}}
         return {n: trace_scalar_code(functions[n], **sizes.get(n, vectors)) for n in names}
 
-    def on_equations(self, states: int, solver: str, held: bool) -> dict[str, Program]:
-        """A step and a sample of the equations, of their state with the inputs in force.
+    def on_equations(self, states: int, solver: str, held: bool, *names: str) -> dict[str, Program]:
+        """Programs of the equations' state with the inputs in force.
 
         Args:
             states: Number of states.
             solver: See `tiltsim.equations.solvers.SOLVERS`.
-            held: Whether the controller is sampled and held, which takes two programs each: at a
-                control sample, and between two.
+            held: Whether the controller is sampled and held.
+            names: "step_sampled" and "sample_sampled", a step and a sample of the flight at a
+                sample of the controller; "step_held" and "sample_held", between two. The results
+                of a sample are its fields, whether it ends the flight, and the signs that the
+                next one has to keep.
         """
         equations = self._loop.equations
         assert equations is not None  # other loops do not fly on equations
@@ -131,17 +142,21 @@ class LoopPrograms:
                 if samples:
                     force = lifting(equations.inputs)(time, state, *setup)
                 values = lifting(equations.observe)(time, state, tuple(force), *setup)
-                return self._checked(lifting, time, values, user, recorder)
+                sample, checked = self._checked(lifting, time, values, user, recorder)
+                return *sample, *(make("copysign", 1.0, number) for number in checked)
 
             return run
 
         sizes = {"index": 1, "now": size, "settings": 4, "user": self.user_size}
         recorded = {**sizes, "recorder": HEAD_SIZE + SIDES}
-        kinds = {"sampled": True, "held": False} if held else {"sampled": True}
-        return {
-            **{f"step_{k}": trace_scalar_code(stepped(s), **sizes) for k, s in kinds.items()},
-            **{f"sample_{k}": trace_scalar_code(sampled(s), **recorded) for k, s in kinds.items()},
-        }
+        kinds = {"step": (stepped, sizes), "sample": (sampled, recorded)}
+
+        def traced(name: str) -> Program:
+            what, _, when = name.partition("_")
+            function, vectors = kinds[what]
+            return trace_scalar_code(function(when == "sampled"), **vectors)
+
+        return {name: traced(name) for name in names}
 
     def _checked(
         self,
@@ -150,13 +165,16 @@ class LoopPrograms:
         values: Iterable[Number],
         user: InputVector,
         recorder: InputVector,
-    ) -> Iterable[Number]:
-        """Time and values of a sample, and whether it ends the flight as the monitor would."""
+    ) -> tuple[tuple[Number, ...], tuple[Number, ...]]:
+        """A sample and whether it ends the flight as the monitor would; numbers with sign checks.
+
+        A sign that is zero in the recorder is not known yet.
+        """
         loop, values, (parameters, knots) = self._loop, tuple(values), self._setup(user)
         reference = record_with_choices(
             ReferenceParameters, recorder[REFERENCE:], self._key.reference
         )
-        checked = lifting(loop.monitoring.sign_check_values)(time, values, parameters, knots)
+        checked = tuple(lifting(loop.monitoring.sign_check_values)(time, values, parameters, knots))
         follows = make("ne", recorder[REFERENCE - 1], 0.0)
         code = lifting(loop.kind.limit_exceeded)(time, values, reference, knots, follows)
         ends = make("ne", code, float(WITHIN_LIMITS))
@@ -164,9 +182,10 @@ class LoopPrograms:
             ends = make("or", ends, make("not", FUNCTIONS[isfinite](value)))
         for number, before in zip(checked, recorder[HEAD_SIZE:]):
             vanishes = make("lt", make("abs", number), SINGULAR)
-            crossed = make("ne", make("copysign", 1.0, number), before)
+            differs = make("ne", make("copysign", 1.0, number), before)
+            crossed = make("and", make("ne", before, 0.0), differs)
             ends = make("or", ends, make("or", vanishes, crossed))
-        return (time, *values, ends)
+        return (time, *values, ends), checked
 
 
 def record_with_choices(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cache, partial
+from functools import lru_cache, partial
 from struct import Struct
 from typing import Any
 
@@ -20,7 +20,7 @@ from tiltsim.closed_loop.userdata import (
     evaluation_time,
 )
 from tiltsim.engines.base import Callback, Engine, EngineName, check_model
-from tiltsim.engines.programs import LoopPrograms
+from tiltsim.engines.programs import KEPT, LoopPrograms
 from tiltsim.system.locks import one_thread_at_a_time
 from tiltsim_controllers.code.program import Program
 from tiltsim_controllers.code.python_source import python_function
@@ -29,19 +29,26 @@ from tiltsim_controllers.mathematics.scalar import Values, Vector
 
 
 @one_thread_at_a_time
-@cache
-def _program(key: ProgramKey, name: str) -> Program:
+@lru_cache(maxsize=KEPT)
+def control_program(key: ProgramKey, name: str) -> Program:
+    """A program of `LoopPrograms.in_mujoco`."""
     return LoopPrograms(key).in_mujoco(name)[name]
 
 
-def _control_step(assembly: Assembly, user: list[float], name: str) -> Callable[..., Values]:
-    """A control step ``(header, qpos, qvel, act, ctrl) -> ctrl``, with parameters and knots bound.
+def control_step(assembly: Assembly, user: list[float], name: str) -> Callable[..., Values]:
+    """A function ``(header, qpos, qvel, act, ctrl)`` of a loop, with parameters and knots bound.
 
-    What depends on these alone is evaluated once.
+    Expressions of these alone are evaluated once.
+
+    Args:
+        assembly: The flight.
+        user: Parameters and knots.
+        name: As for `LoopPrograms.in_mujoco`.
     """
     loop = assembly.loop
     if assembly.traced:
-        return python_function(_program(program_key(assembly), name), name, fixed={"user": user})
+        program = control_program(program_key(assembly), name)
+        return python_function(program, name, fixed={"user": user})
     parameters = unflatten(loop.parameters, user)
     knots = tuple(user[loop.record_size :])
 
@@ -55,7 +62,10 @@ def _control_step(assembly: Assembly, user: list[float], name: str) -> Callable[
     def hold(header: list[float], *state: Vector) -> Values:
         return loop.sampling.hold(time_of(header), *state, parameters)
 
-    return controls if name == "controls" else hold
+    def observe(_header: list[float], *state: Vector) -> Values:
+        return loop.columns.observe(*state)
+
+    return {"controls": controls, "hold": hold, "observe": observe}[name]
 
 
 class PythonEngine(Engine):
@@ -66,13 +76,13 @@ class PythonEngine(Engine):
     def __init__(self, assembly: Assembly, model: mujoco.MjModel, data: mujoco.MjData) -> None:
         check_model(assembly.loop, model, data)
         user = data.userdata[HEADER_SIZE:].tolist()
-        controls = _control_step(assembly, user, "controls")
+        controls = control_step(assembly, user, "controls")
         # Views of MuJoCo's memory; a look-up at every call would take a tenth of the callback.
         vectors = data.qpos, data.qvel, data.act, data.ctrl
         qpos, qvel, act, ctrl = (memoryview(vector) for vector in vectors)
         header: Any = memoryview(data.userdata[:HEADER_SIZE])
         period = header[CONTROL_PERIOD]
-        hold = _control_step(assembly, user, "hold") if period else controls
+        hold = control_step(assembly, user, "hold") if period else controls
         write_controls = partial(Struct(f"{len(ctrl)}d").pack_into, ctrl, 0)
 
         def evaluate(_model: mujoco.MjModel, called: mujoco.MjData) -> None:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable, Iterator, Sequence
-from functools import cache
+from functools import lru_cache
 from itertools import pairwise
 from typing import Any, Final, NamedTuple
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from tiltsim.closed_loop.choices import Choices, choices_of
 from tiltsim.closed_loop.loop import ControlSetup
 from tiltsim.engines.glue import ROWS, filled
 from tiltsim.engines.machine_code import MachineCode
-from tiltsim.engines.programs import record_with_choices
+from tiltsim.engines.programs import KEPT, record_with_choices
 from tiltsim.system.locks import one_thread_at_a_time
 from tiltsim_controllers.code.llvm_text import llvm_functions
 from tiltsim_controllers.code.program import InputVector, Program
@@ -24,10 +25,11 @@ from tiltsim_controllers.code.python_source import python_function
 from tiltsim_controllers.mathematics.records import leaves, record_size, unflatten
 from tiltsim_controllers.mathematics.scalar import Floats, Values
 
-MIN_ROWS_TO_COMPILE: Final = 20_000
-"""Rows that one process evaluates in Python before it loads or compiles native code for them."""
+MIN_ROWS_TO_COMPILE: Final = 5_000
+"""Rows that one process evaluates in Python, in some 3 us each, before it loads or compiles native
+code for them, which takes 2 or 17 ms."""
 
-_evaluated: dict[Callable[..., Values], int] = {}
+_evaluated: Final[WeakKeyDictionary[Callable[..., Values], int]] = WeakKeyDictionary()
 
 
 def flights_in(time: Floats) -> int:
@@ -95,7 +97,7 @@ def _flights(setup: ControlSetup, samples: int) -> Iterator[tuple[slice, Control
 
 
 @one_thread_at_a_time
-@cache
+@lru_cache(maxsize=KEPT)
 def _program(row: Row) -> Program:
     def traced(lifting: Lifting, given: Sequence[InputVector]) -> Any:
         (time,), state, user = given
@@ -119,7 +121,7 @@ def _natively(row: Row, width: int, time: Floats, states: Floats, user: Floats) 
 
 
 @one_thread_at_a_time
-@cache
+@lru_cache(maxsize=KEPT)
 def _compiled(row: Row, width: int) -> Any:
     glue = filled(ROWS, state=row.state, width=width)
     code = MachineCode(llvm_functions({"row": _program(row)}) + glue)

@@ -3,34 +3,62 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable, Mapping, Sequence
-from functools import cache
-from typing import Any, NamedTuple, Protocol
+from collections.abc import Callable, Sequence
+from functools import cache, lru_cache
+from typing import Any, Literal, NamedTuple, Protocol
 
 import numpy as np
 
 from tiltsim.closed_loop.choices import ProgramKey
 from tiltsim.closed_loop.loop import Equations
-from tiltsim.engines.glue import RECORDER, STEPPER, filled
-from tiltsim.engines.machine_code import MachineCode
-from tiltsim.engines.programs import HEAD_SIZE, SIDES, LoopPrograms
-from tiltsim.engines.recorder import Recorder
+from tiltsim.engines.glue import stepper_text
+from tiltsim.engines.machine_code import MachineCode, lane_math
+from tiltsim.engines.programs import HEAD_SIZE, KEPT, SIDES, LoopPrograms
+from tiltsim.engines.recorder import UNLIMITED, Recorder
 from tiltsim.equations.solvers import Integration, make_step
 from tiltsim.system.locks import one_thread_at_a_time
 from tiltsim_controllers.code.llvm_text import llvm_functions
 from tiltsim_controllers.code.program import Program
 from tiltsim_controllers.code.python_source import python_function
 from tiltsim_controllers.mathematics.records import record_size, unflatten
-from tiltsim_controllers.mathematics.scalar import Floats, Triple
+from tiltsim_controllers.mathematics.scalar import Floats, Triple, Values, Vector
+
+
+class Layout(NamedTuple):
+    """Flights with equal layouts can fly side by side.
+
+    Attributes:
+        key: Of their programs.
+        states: Number of states.
+        solver: See `tiltsim.equations.solvers.SOLVERS`.
+        held: Whether the controller is sampled and held.
+        functions: Sines and their inverses of several lanes: exact or quick.
+    """
+
+    key: ProgramKey
+    states: int
+    solver: str
+    held: bool
+    functions: Literal["exact", "quick"] = "exact"
+
+    @property
+    def equations(self) -> Equations:
+        """The equations of the loop."""
+        equations = self.key.loop.equations
+        assert equations is not None  # other loops do not fly on equations
+        return equations
+
+    @property
+    def size(self) -> int:
+        """Number of states and inputs in force."""
+        return self.states + self.equations.inputs_size
 
 
 class Integrated(NamedTuple):
     """A flight whose equations are integrated.
 
     Attributes:
-        key: Of its programs.
-        states: Number of states.
-        solver: See `tiltsim.equations.solvers.SOLVERS`.
+        layout: Of its programs.
         timestep: s.
         control_steps: Steps for which the inputs are held; 0: evaluated at every stage.
         user: Parameters and knots, see `tiltsim.closed_loop.loop.ControlSetup.userdata`.
@@ -38,21 +66,12 @@ class Integrated(NamedTuple):
         traced: See `tiltsim.closed_loop.assembly.Assembly`.
     """
 
-    key: ProgramKey
-    states: int
-    solver: str
+    layout: Layout
     timestep: float
     control_steps: int
     user: Floats
     disturbance: Triple
     traced: bool
-
-    @property
-    def equations(self) -> Equations:
-        """Its equations."""
-        equations = self.key.loop.equations
-        assert equations is not None  # other loops do not fly on equations
-        return equations
 
     @property
     def settings(self) -> tuple[float, ...]:
@@ -74,9 +93,10 @@ class Stepper(Protocol):
 
 
 @one_thread_at_a_time
-@cache
-def _programs(key: ProgramKey, states: int, solver: str, held: bool) -> Mapping[str, Program]:
-    return LoopPrograms(key).on_equations(states, solver, held)
+@lru_cache(maxsize=KEPT)
+def _program(layout: Layout, name: str) -> Program:
+    key, states, solver, held, _ = layout
+    return LoopPrograms(key).on_equations(states, solver, held, name)[name]
 
 
 class PythonStepper(Stepper):
@@ -101,57 +121,153 @@ Step = Callable[[tuple[float], list[float]], Sequence[float]]
 
 
 def _traced_step(flight: Integrated, samples: bool) -> Step:
-    programs = _programs(flight.key, flight.states, flight.solver, flight.control_steps > 0)
     name = "step_sampled" if samples else "step_held"
     fixed = {"settings": flight.settings, "user": flight.user.tolist()}
-    return python_function(programs[name], name, fixed=fixed)
+    return python_function(_program(flight.layout, name), name, fixed=fixed)
 
 
 def _plain_step(flight: Integrated, samples: bool) -> Step:
-    one_step = make_step(flight.equations, flight.solver)
-    record, size = flight.key.loop.parameters, record_size(flight.key.loop.parameters)
+    loop, states = flight.layout.key.loop, flight.layout.states
+    one_step = make_step(flight.layout.equations, flight.layout.solver)
+    record, size = loop.parameters, loop.record_size
     numbers = flight.user.tolist()
     setup = unflatten(record, numbers), tuple(numbers[size:])
     timing = flight.timestep, flight.control_steps
     integration = Integration(*timing, *setup, flight.disturbance)
 
     def step(index: tuple[float], now: list[float]) -> list[float]:
-        time, state, held = index[0] * flight.timestep, now[: flight.states], now[flight.states :]
+        state: Vector
+        time, state, held = index[0] * flight.timestep, now[:states], now[states:]
         state, force = one_step(time, state, tuple(held), samples, integration)
         return [*state, *force]
 
     return step
 
 
+def observation(flight: Integrated) -> Callable[[int, Floats], Values]:
+    """Samples without their time: ``(step_index, now) -> values``, as machine code takes them.
+
+    Args:
+        flight: Its state and the inputs in force are ``now``, shape (states + inputs,).
+    """
+    every, observe = flight.control_steps or 1, cache(_observe_of(flight))
+    return lambda index, now: observe(index % every == 0)(index, now.tolist())
+
+
+def _observe_of(flight: Integrated) -> Callable[[bool], Callable[[int, list[float]], Values]]:
+    loop = flight.layout.key.loop
+
+    def traced(samples: bool) -> Callable[[int, list[float]], Values]:
+        name, fields = ("sample_sampled" if samples else "sample_held"), len(loop.sample_fields)
+        fixed = {"settings": flight.settings, "user": flight.user.tolist()}
+        fixed["recorder"] = [0.0] * (HEAD_SIZE + SIDES)
+        sample = python_function(_program(flight.layout, name), name, fixed=fixed)
+        return lambda index, now: tuple(sample((float(index),), now))[1:fields]
+
+    def plain(samples: bool) -> Callable[[int, list[float]], Values]:
+        equations, numbers = flight.layout.equations, flight.user.tolist()
+        record, states = loop.parameters, flight.layout.states
+        setup = unflatten(record, numbers), tuple(numbers[record_size(record) :])
+
+        def observe(index: int, now: list[float]) -> Values:
+            time, state, held = index * flight.timestep, now[:states], now[states:]
+            force = equations.inputs(time, state, *setup) if samples else tuple(held)
+            return equations.observe(time, state, force, *setup)
+
+        return observe
+
+    return traced if flight.traced else plain
+
+
 @one_thread_at_a_time
-@cache
-def _compile(key: ProgramKey, states: int, solver: str, held: bool) -> Any:
-    kind = "held" if held else "sampled"
-    glue = filled(
-        STEPPER + RECORDER,
-        step_held=f"step_{kind}",
-        sample_held=f"sample_{kind}",
-        width=len(key.loop.sample_fields),
-        rows_at=HEAD_SIZE + SIDES,
-    )
-    code = MachineCode(llvm_functions(_programs(key, states, solver, held)) + glue)
-    return code.function("advance", None, *[ctypes.c_int64] * 3, *[ctypes.c_void_p] * 5)
+@lru_cache(maxsize=KEPT)
+def compile_stepper(layout: Layout, lanes: int) -> Any:
+    """The function `tiltsim.engines.glue.STEPPER`."""
+    whens = ("sampled", "held") if layout.held else ("sampled",)
+    names = [f"{what}_{when}" for what in ("step", "sample") for when in whens]
+    programs = {name: _program(layout, name) for name in names}
+    width = len(layout.key.loop.sample_fields)
+    checks = len(programs["sample_sampled"].block.results) - width - 1
+    glue = stepper_text(layout.held, lanes, layout.size, width, checks)
+    functions = lane_math(quick=layout.functions == "quick")
+    code = MachineCode(llvm_functions(programs, lanes, functions) + glue)
+    return code.function("advance", None, *[ctypes.c_int64] * 2, *[ctypes.c_void_p] * 9)
+
+
+class LaneStepper:
+    """Flights side by side in the lanes of machine code, which does not hold Python's lock.
+
+    Args:
+        layout: That of all flights.
+        lanes: Number of lanes.
+        rows: Number of samples of a flight, at most.
+
+    Attributes:
+        now: State and inputs in force, shape (states + inputs, lanes).
+        index: Number of steps so far, shape (1, lanes).
+        heads: Heads of the recorders and signs to keep, shape (HEAD_SIZE + SIDES, lanes).
+        saved: Index, state and inputs in force at the last sample, shape (1 + size, lanes).
+    """
+
+    def __init__(self, layout: Layout, lanes: int) -> None:
+        self._advance = compile_stepper(layout, lanes)
+        key, size = layout.key, layout.size
+        self.index, self._every = np.zeros((1, lanes)), np.ones((1, lanes))
+        self.now, self._other = np.zeros((size, lanes)), np.zeros((size, lanes))
+        self._settings = np.zeros((4, lanes))
+        self._user = np.zeros((key.loop.record_size + key.knots, lanes))
+        self.heads, self.rows = np.zeros((HEAD_SIZE + SIDES, lanes)), np.zeros(lanes, np.int64)
+        self.saved = np.zeros((1 + size, lanes))
+        state = self.index, self._every, self.now, self._other
+        arrays = *state, self._settings, self._user, self.heads, self.rows, self.saved
+        self._addresses = [array.ctypes.data for array in arrays]
+
+    def place(
+        self,
+        lane: int,
+        flight: Integrated,
+        now: Sequence[float],
+        head: Sequence[float],
+        rows: Floats | None,
+    ) -> None:
+        """Put a flight at its first step into a lane.
+
+        Args:
+            lane: Which one.
+            flight: The flight.
+            now: State and inputs in force.
+            head: Head of its recorder; see `tiltsim.engines.recorder.recorder_head`.
+            rows: Memory for its samples, which has to live as long as it is in the lane.
+        """
+        self.index[:, lane] = 0.0
+        self._every[:, lane] = flight.control_steps or 1
+        self.now[:, lane], self._settings[:, lane] = now, flight.settings
+        self._user[:, lane] = flight.user
+        self.heads[:, lane] = 0.0
+        self.heads[: len(head), lane] = head
+        self.rows[lane] = 0 if rows is None else rows.ctypes.data
+
+    def advance(self, steps: int, *, until_one_is_over: bool = False) -> None:
+        """Take some steps; less if all recordings are over, or if requested once one is."""
+        self._advance(steps, until_one_is_over, *self._addresses)
 
 
 class NativeStepper(Stepper):
-    """Integrates as machine code, without holding Python's lock."""
+    """Integrates one flight as machine code, without holding Python's lock."""
 
     def __init__(self, flight: Integrated) -> None:
-        held = flight.control_steps > 0
-        self._advance = _compile(flight.key, flight.states, flight.solver, held)
-        self._every = flight.control_steps or 1
-        self._settings, self._user = np.array(flight.settings), np.ascontiguousarray(flight.user)
+        self._lane = LaneStepper(flight.layout, 1)
+        self._lane.place(0, flight, [0.0] * flight.layout.size, UNLIMITED, None)
+        self._unlimited = self._lane.heads.copy()
 
     def advance(self, step_index: int, now: Floats, steps: int) -> Floats:
-        return self.record(step_index, now, 1, steps, None)[1]
+        self._lane.heads[:] = self._unlimited
+        self._lane.index[:], self._lane.now[:, 0] = step_index, now
+        self._lane.advance(steps)
+        return self._lane.now[:, 0].copy()
 
     def record(
-        self, step_index: int, now: Floats, samples: int, steps: int, recorder: Recorder | None
+        self, step_index: int, now: Floats, samples: int, steps: int, recorder: Recorder
     ) -> tuple[int, Floats]:
         """Integrate some intervals; a recorder takes a sample after each and may stop it early.
 
@@ -160,13 +276,15 @@ class NativeStepper(Stepper):
             now: State and inputs in force.
             samples: Number of intervals.
             steps: Steps of an interval.
-            recorder: Takes samples, or None.
+            recorder: Takes samples.
 
         Returns:
             The number of steps so far, and state and inputs in force.
         """
-        index, now = np.array([float(step_index)]), now.copy()
-        memory = None if recorder is None else int(recorder.address)
-        arrays = (index, now, self._settings, self._user)
-        self._advance(samples, steps, self._every, *(a.ctypes.data for a in arrays), memory)
-        return int(index[0]), now
+        lane = self._lane
+        lane.index[:], lane.now[:, 0] = step_index, now
+        lane.heads[:, 0] = recorder.head
+        lane.rows[0] = recorder.rows.ctypes.data
+        lane.advance(samples * steps)
+        recorder.head[:] = lane.heads[:, 0]
+        return int(lane.index[0, 0]), lane.now[:, 0].copy()

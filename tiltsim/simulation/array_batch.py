@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from functools import cache
 from time import perf_counter
 from typing import Final, Generic, TypeVar
 
@@ -21,8 +20,9 @@ from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.closed_loop.choices import program_key
 from tiltsim.flight.end import End
 from tiltsim.flight.flight import Flight
-from tiltsim.flight.metrics import Metrics, metrics_of_rows
+from tiltsim.plants.equations_plant import initial_state
 from tiltsim.plants.flight_model import disturbance_acceleration
+from tiltsim.simulation.completed_flights import METRICS_ROWS, completed_flights
 from tiltsim.simulation.monitor import TerminationMonitor
 from tiltsim.simulation.simulate import simulate_assembly
 from tiltsim_controllers.mathematics.records import flatten, record_size
@@ -33,9 +33,6 @@ MEMORY: Final = 256 * 2**20
 
 ROUND_ROWS: Final = 1024
 """Large numbers of rows are multiples of it; it is also what fits the caches of a core."""
-
-METRICS_ROWS: Final = 128
-"""Rows whose metrics are computed together: as many as a core's caches hold."""
 
 Result = TypeVar("Result")
 
@@ -49,13 +46,11 @@ class _Sound:
 
 def numbers_of(assembly: Assembly) -> tuple[float, ...]:
     """What `tiltsim.arrays.flying.Batch` takes of a flight, knots aside."""
-    equations = assembly.loop.equations
-    assert equations is not None  # refused otherwise
     return (
         *flatten(assembly.setup.parameters),
         *map(float, assembly.reference),
         *disturbance_acceleration(assembly.scenario),
-        *map(float, equations.initial(assembly, assembly.setup)),
+        *initial_state(assembly),
     )
 
 
@@ -143,27 +138,19 @@ class ArrayBatch(Generic[Result]):
         samples = np.array(recording.samples[rows.start : rows.stop], float)
         steps = np.minimum(np.arange(samples.shape[1]) * course.record_steps, course.steps)
         samples[:, :, 0] = steps * course.timestep  # not rounded
-        completed = End("completed", float(samples[0, -1, 0]))
         indices = part[rows.start : rows.stop]
         whole = [i for i, row in enumerate(rows) if recording.alive[row].all()]
-
-        @cache
-        def together() -> dict[int, Metrics]:
-            """Metrics of completed flights, computed when the first of them is asked for."""
-            if len(whole) < 2 or len({*map(tuple, self._knots[indices])}) > 1:
-                return {}
-            assemblies = [self._assemblies[indices[i]] for i in whole]
-            numbers = self._numbers[indices][whole, : record_size(course.loop.parameters)]
-            found = metrics_of_rows(assemblies, numbers, samples[whole], completed, seconds)
-            return dict(zip(whole, found or ()))
-
+        completed = completed_flights(
+            [self._assemblies[indices[i]] for i in whole],
+            self._numbers[indices][whole, : record_size(course.loop.parameters)],
+            samples[whole],
+            "jax",
+            [seconds] * len(whole),
+        )
+        flights = dict(zip(whole, completed, strict=True))
         for i, (row, index) in enumerate(zip(rows, indices, strict=True)):
-            if recording.alive[row].all():
-                flight = Flight(
-                    *(self._assemblies[index], samples[i], completed, "jax", seconds),
-                    shared_metrics=lambda i=i: together().get(i),  # type: ignore[misc]
-                )
-            else:
+            flight = flights.get(i)
+            if flight is None:
                 flight = self._ended(index, row, samples[i], recording, closer, seconds)
             yield index, self._finish(flight)
 

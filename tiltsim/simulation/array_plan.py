@@ -113,7 +113,7 @@ class ArrayPlan:
         """
         try:
             traced = self._jax.make_jaxpr(lambda t: self(t)[1:])(tree).jaxpr
-        except PlainNumberError:
+        except (PlainNumberError, *self._lifting.arrays.refusals):
             return False
         reached = {*map(id, traced.invars)}
         for equation in traced.eqns:

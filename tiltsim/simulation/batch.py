@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 from itertools import count
@@ -20,11 +19,11 @@ from tiltsim.flight.end import End
 from tiltsim.flight.flight import Flight
 from tiltsim.laws.assembling import assemble
 from tiltsim.plants.engine_choice import native_pays_off
-from tiltsim.plants.factory import make_plant
 from tiltsim.scenario.loading import as_scenario
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.scenario.trust import require_trust
 from tiltsim.scenario.vehicle import VehicleTable
+from tiltsim.simulation.lane_batch import LaneBatch, lanes_for
 from tiltsim.simulation.native_batch import NativeBatch
 from tiltsim.simulation.simulate import simulate_assembly
 from tiltsim.system.numbers import true_or_false, whole_number
@@ -76,15 +75,16 @@ def fly(
 
     Args:
         scenarios: What to fly, each anything that `tiltsim.load_scenario` takes; they may differ in
-            anything. Those with one closed loop in MuJoCo that do not request the Python engine are
-            flown in batches if they are long enough together, those of the jax engine always.
+            anything. Those with one closed loop that do not request the Python engine are flown in
+            batches if they are long enough together, flights of the jax engine always.
         threads: Maximum number of threads; None takes all cores.
         keep_samples: Whether results hold their flights. Without them memory does not grow with the
             number of scenarios.
         progress: True for a bar; or a function, called with the number of finished flights.
 
     Yields:
-        Bit-identical to `tiltsim.simulate` of the scenario, but for rounding with the jax engine;
+        Bit-identical to `tiltsim.simulate` of the scenario, but for rounding with the jax engine
+        and with ``simulation.batch_functions = "quick"``;
         ``realtime_factor`` is computed from the time that the flight took of all threads together.
         Of the first whose own controller fails Python warns as there.
 
@@ -184,21 +184,15 @@ def _fly_window(
             from tiltsim.simulation.array_batch import ArrayBatch
 
             flown = ArrayBatch(chosen, threads, pool, result).results()
-        elif way == "equations":
-            for one_of_each in {program_key(assembly): assembly for assembly in chosen}.values():
-                make_plant(one_of_each, engine="native")  # prepares native code before threads do
-            flown = enumerate(
-                _in_order(
-                    lambda a: result(simulate_assembly(a, engine="native")), chosen, threads, pool
-                )
-            )
+        elif chosen[0].scenario.simulation.plant != "mujoco":
+            flown = LaneBatch(chosen, lanes_for(len(chosen)), threads, pool, result).results()
         else:
             flown = NativeBatch(chosen, threads, pool, result).results()
         yield from ((indices[place], outcome) for place, outcome in flown)
 
 
 def _way_to_fly(assembly: Assembly, native: bool) -> object:
-    """``alone``, ``equations`` for threads without MuJoCo, or what a batch has in common."""
+    """``alone``, or what the flights of a batch have in common."""
     scenario = assembly.scenario
     simulation = scenario.simulation
     if simulation.engine == "jax":
@@ -206,29 +200,17 @@ def _way_to_fly(assembly: Assembly, native: bool) -> object:
 
         return batch_key(assembly)
     natively = simulation.engine == "native" or (simulation.engine == "auto" and native)
-    if not natively or scenario.controller.is_external:
+    if (
+        not (natively and assembly.traced and assembly.loop.is_traceable)
+        or scenario.controller.is_external
+    ):
         return "alone"
+    key = program_key(assembly)
     if simulation.plant != "mujoco":
-        return "equations"
+        held = simulation.control_steps > 0
+        return key, simulation.solver, held, simulation.batch_functions
     # Stops of the tilt servos are constraints, which lengthen a state; ground adds geoms; a layer
     # has states and controls of its own; a user's file may have other bodies.
     vehicle = scenario.vehicle
     file = vehicle.mjcf if isinstance(vehicle, VehicleTable) else None
-    key = program_key(assembly)
     return key, vehicle.tilt_servo.angle_limit is not None, scenario.ground is not None, file
-
-
-def _in_order(
-    fly: Callable[[Assembly], Result],
-    assemblies: Sequence[Assembly],
-    threads: int,
-    pool: ThreadPoolExecutor,
-) -> Iterator[Result]:
-    """Results of flights that do not need MuJoCo's callback, several at a time."""
-    waiting: deque[Future[Result]] = deque()
-    for assembly in assemblies:
-        waiting.append(pool.submit(fly, assembly))
-        if len(waiting) > 2 * threads:
-            yield waiting.popleft().result()
-    while waiting:
-        yield waiting.popleft().result()

@@ -25,7 +25,7 @@ from tiltsim.plants.flight_model import flight_model, model_cache_key
 from tiltsim.plants.mujoco_plant import MujocoPlant
 from tiltsim.plants.plant import take_sample
 from tiltsim.simulation.monitor import TerminationMonitor
-from tiltsim.simulation.simulate import fly_chunk
+from tiltsim.simulation.simulate import fly_intervals, intervals_of
 from tiltsim_controllers.mathematics.scalar import Floats
 
 ROWS_PER_THREAD: Final = 24
@@ -48,10 +48,8 @@ class _Row:
         self.monitor = TerminationMonitor(assembly)
         self.first = take_sample(plant)
         self.end = self.monitor.check(plant, self.first)
-        simulation = assembly.scenario.simulation
-        self.interval = simulation.record_steps
-        full, rest = divmod(simulation.steps, self.interval)
-        self.intervals = [self.interval] * full + [rest] * (rest > 0)
+        self.interval = assembly.scenario.simulation.record_steps
+        self.intervals = intervals_of(assembly)
         last = self.intervals[-1]
         self.recorder = plant.recorder(len(self.intervals), self.interval, last)
         self.saved = [(0, plant.state)]  # steps and state at the start of the last two calls
@@ -81,12 +79,8 @@ class _Row:
         state[header + RECORDER] = 0.0
         plant.state = state
         plant.advance(sum(self.intervals[: len(samples)]) - steps)
-        for interval in self.intervals[len(samples) :]:
-            found, self.end = fly_chunk(plant, self.monitor, 1, interval)
-            samples.extend(found)
-            if self.end is not None:
-                break
-        return samples
+        found, self.end = fly_intervals(plant, self.monitor, self.intervals[len(samples) :])
+        return samples + found
 
 
 class NativeBatch(Generic[Result]):

@@ -212,6 +212,26 @@ def fly_chunk(
     return recorded, None
 
 
+def intervals_of(assembly: Assembly) -> list[int]:
+    """Numbers of steps between the samples of a flight."""
+    simulation = assembly.scenario.simulation
+    full, rest = divmod(simulation.steps, simulation.record_steps)
+    return [simulation.record_steps] * full + [rest] * (rest > 0)
+
+
+def fly_intervals(
+    plant: Plant, monitor: TerminationMonitor, intervals: Iterable[int]
+) -> tuple[list[Floats], End | None]:
+    """Fly recording intervals of some steps each; see `fly_chunk`."""
+    samples: list[Floats] = []
+    for interval in intervals:
+        found, end = fly_chunk(plant, monitor, 1, interval)
+        samples.extend(found)
+        if end is not None:
+            return samples, end
+    return samples, None
+
+
 def _first_bad_step(
     plant: Plant, monitor: TerminationMonitor, steps: int, sample: Floats, end: End
 ) -> tuple[Floats, End]:

@@ -11,7 +11,6 @@ from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
-from tiltsim.scenario.loading import without_none
 from tiltsim.scenario.metric_names import BOOLEAN_METRICS
 from tiltsim.sweeps.definition import VERSIONS
 from tiltsim.sweeps.executing import ScenarioResult
@@ -44,7 +43,7 @@ def make_row(
     if result.scenario is None:
         document = points.document(values)  # not valid, but it shows the mistake
     else:
-        document = without_none(result.scenario.model_dump(mode="json"))
+        document = result.scenario.model_dump(mode="json", exclude_none=True)
     return {
         "index": index,
         **values,

@@ -38,8 +38,8 @@ MAX_POINTS: Final = 10_000_000
 LARGEST_CHUNK: Final = 32
 """Points per chunk unless the file sets it: few enough that little is lost when killed."""
 
-LARGEST_ARRAY: Final = 1024
-"""The same with the jax engine, which flies a chunk at once: as many as its caches hold."""
+LARGEST_TOGETHER: Final = 1024
+"""Points per chunk on equations of motion, whose flights are short and computed side by side."""
 
 
 class SweepPoints:
@@ -67,20 +67,18 @@ class SweepPoints:
         """Number of points."""
         return prod(self._lengths)
 
-    @property
+    @cached_property
     def chunk_size(self) -> int:
         """Points per chunk."""
         if self.sweep.chunk_size is not None:
             return self.sweep.chunk_size
-        largest, parts = (LARGEST_ARRAY, 4) if self._on_arrays else (LARGEST_CHUNK, 64)
-        return max(1, min(largest, len(self) // parts))
-
-    @cached_property
-    def _on_arrays(self) -> bool:
         try:
-            return self.scenario(self.point(0)).simulation.engine == "jax"
+            simulation = self.scenario(self.point(0)).simulation
         except InputError:  # reported when it is flown
-            return False
+            return max(1, min(LARGEST_CHUNK, len(self) // 64))
+        largest = LARGEST_CHUNK if simulation.plant == "mujoco" else LARGEST_TOGETHER
+        parts = 4 if simulation.engine == "jax" else 64  # which compiles for every size
+        return max(1, min(largest, len(self) // parts))
 
     @property
     def chunks(self) -> int:

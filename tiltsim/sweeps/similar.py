@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from copy import deepcopy
-from typing import Any, NamedTuple
+from collections.abc import Callable, Mapping, Sequence
+from copy import copy
+from functools import cache
+from typing import Any, Final, NamedTuple
 
 from pydantic import BaseModel, ValidationError
 
@@ -77,15 +78,11 @@ def _similar(known: _Known, changes: Mapping[str, Any]) -> Scenario | None:
     """A known scenario with other numbers; None if it is not valid, or its tables have no keys."""
     changed: Document = {}
     for key, value in changes.items():
-        name, *path, last = split_key(key)
+        name, *path = _split(key)
         if not isinstance(getattr(known.scenario, str(name), None), BaseModel):
             return None
-        if name not in changed:
-            changed[str(name)] = deepcopy(known.document[str(name)])
-        target: Any = changed[str(name)]
-        for step in path:
-            target = target[step]
-        target[last] = value
+        table = changed.get(str(name), known.document[str(name)])
+        changed[str(name)] = _with(table, path, value)
     try:
         tables = {
             name: type(getattr(known.scenario, name)).model_validate(table)
@@ -96,3 +93,16 @@ def _similar(known: _Known, changes: Mapping[str, Any]) -> Scenario | None:
     except (ValidationError, InvalidValueError):  # in words of the whole document: by the caller
         return None
     return scenario
+
+
+_split: Final = cache(split_key)
+
+
+def _with(table: Any, path: Sequence[str | int], value: Any) -> Any:
+    """A table or list with another value at a path; it shares everything else."""
+    if not path:
+        return value
+    step, *rest = path
+    copied = copy(table)
+    copied[step] = _with(table[step] if rest else None, rest, value)
+    return copied

@@ -54,6 +54,7 @@ def read_rows(
     difference = difference or _wrong_column(found, points)
     if not difference and table["index"].to_pylist() != list(indices):
         difference = "holds the rows of other points"
+    difference = difference or _damaged_column(table, points)
     if difference:
         raise InputError(f"{file}: {difference}; delete it or move it away")
     return table
@@ -88,4 +89,25 @@ def _wrong_column(found: pyarrow.Schema, points: SweepPoints) -> str:
                 return f"column {field.name} holds {kind} instead of {field.type}"
         elif field.name not in points.metrics:
             return f"has no column {field.name}"
+    return ""
+
+
+def _damaged_column(table: pyarrow.Table, points: SweepPoints) -> str:
+    """The first column with a NaN or an infinity, which no sweep stores, or an axis without values.
+
+    What a flight does not have is stored as null.
+    """
+    import pyarrow as pa
+    import pyarrow.compute as pc
+
+    axes = {key for axis in points.sweep.axis for key in axis.targets}
+    for name in table.column_names:
+        values = table[name]
+        if name in axes and values.null_count:
+            return f"damaged: column {name} has missing values"
+        while pa.types.is_list(values.type):
+            values = pc.list_flatten(values)
+        is_float = pa.types.is_floating(values.type)
+        if is_float and not pc.all(pc.is_finite(values), min_count=0).as_py():
+            return f"damaged: column {name} contains non-finite values"
     return ""
