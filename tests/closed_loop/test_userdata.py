@@ -9,14 +9,13 @@ import tiltsim
 from tiltsim.closed_loop.userdata import EVALUATIONS, evaluation_time
 from tiltsim.laws.assembling import assemble
 from tiltsim.plants.factory import make_plant
-from tiltsim_controllers.gaits.keyframes import keyframe_gait
-from tiltsim_controllers.gaits.trot import continuous_trot, instant_trot
+from tiltsim_controllers.gaits.plans import continuous_trot, instant_trot, keyframes
 
-THIRDS = tuple(float(v) for k in range(3) for p in (k, k + 1) for v in (p / 3.0, k, 0, 0, 0))
+THIRDS = [(p / 3.0, k, 0, 0, 0) for k in range(3) for p in (k, k + 1)]
 GAITS = {
-    "instant": (2, lambda time, period: instant_trot(time, 0.5, period)[0]),
-    "continuous": (2, lambda time, period: continuous_trot(time, 0.5, period)[4]),
-    "keyframes": (3, lambda time, period: keyframe_gait(time, period, 6.0, THIRDS)[0]),
+    "instant": (2, lambda times, period: instant_trot(0.5, period).angles(times)[:, 0]),
+    "continuous": (2, lambda times, period: continuous_trot(0.5, period).rates(times)[:, 0]),
+    "keyframes": (3, lambda times, period: keyframes(THIRDS, period).angles(times)[:, 0]),
 }
 TILTROTOR = {
     "controller": {"decoupling": "exact", "decoupler": "exact", "gains": "exact"},
@@ -36,7 +35,7 @@ def test_a_corner_of_a_gait_lies_between_two_steps(name):
         period = float(f"{parts * steps * timestep:.10g}")
         count = 4.0 * steps * corner
         stages = [evaluation_time(count + stage, 4.0, timestep) for stage in range(-4, 4)]
-        values = [value(time, period) for time in stages]
+        values = value(stages, period)
         assert len(set(values[1:4])) == len(set(values[4:])) == 1
         assert values[3] != values[4]
         np.testing.assert_allclose(stages[3], steps * corner * timestep, rtol=1e-14)

@@ -10,10 +10,9 @@ import pytest
 
 import tiltsim
 from tests.laws.test_laws import LAWS
-from tiltsim.arrays.values import LiftError
 from tiltsim.flight.end import End
 from tiltsim.linear import attraction as module
-from tiltsim.linear import final_states, settling
+from tiltsim.linear import settling
 from tiltsim.linear.attraction import attraction
 from tiltsim.linear.final_states import FinalStates
 from tiltsim.linear.settling import SlowestMode, advice_on_duration, slowest_mode
@@ -117,37 +116,6 @@ def quadrotor(**simulation):
     return tiltsim.parse_scenario(
         merge(LAWS["quadrotor_attitude_altitude"], {"simulation": simulation})
     )
-
-
-@pytest.mark.parametrize(
-    ("simulation", "flights", "installed", "engine"),
-    [
-        ({}, 100_000, True, "jax"),
-        ({}, 10, True, "auto"),  # compiling would take longer
-        ({}, 100_000, False, "auto"),
-        ({"engine": "native"}, 100_000, True, "native"),  # as the scenario asks
-        ({"plant": "mujoco"}, 100_000, True, "auto"),
-        ({"plant": "rigid_body"}, 100_000, True, "jax"),
-    ],
-)
-def test_many_flights_on_equations_fly_in_jax(simulation, flights, installed, engine, monkeypatch):
-    monkeypatch.setattr(final_states, "find_spec", lambda name: installed or None)
-    monkeypatch.setattr(final_states, "fly_each", lambda scenarios, *_: iter(scenarios))
-    states = FinalStates(quadrotor(**simulation), flights, "z")
-    (scenario,) = states.fly([quadrotor(**simulation)])
-    assert scenario.simulation.engine == engine
-
-
-def test_what_has_no_form_on_arrays_flies_without(monkeypatch):
-    def refuse(scenarios, *_):
-        if scenarios[0].simulation.engine == "jax":
-            raise LiftError("noise: whole numbers")
-        yield from scenarios
-
-    monkeypatch.setattr(final_states, "find_spec", lambda name: True)
-    monkeypatch.setattr(final_states, "fly_each", refuse)
-    (scenario,) = FinalStates(quadrotor(), 100_000, "z").fly([quadrotor()])
-    assert scenario.simulation.engine == "auto"
 
 
 @pytest.mark.slow

@@ -328,7 +328,7 @@ def test_refusals(case):
         tiltsim.linearize(tiltsim.load_scenario(SETPOINT, {**THESIS, **changes}))
 
 
-@tiltsim.scalar
+@tiltsim.law
 def upright(observed):
     """Altitude with both poles at -3, attitude with both at -10; level rotors."""
     roll, pitch, _ = observed.attitude
@@ -340,7 +340,7 @@ def upright(observed):
     b = 0.5 / arm * body.inertia_yy * (-100.0 * pitch - 20.0 * q)
     c = 0.25 / drag * body.inertia_zz * (-10.0 * r)
     each = 0.25 * lift
-    return (each - b + c, each + a - c, each + b + c, each - a - c), (), ()
+    return tiltsim.Command(thrusts=[each - b + c, each + a - c, each + b + c, each - a - c])
 
 
 LAGGED = {  # s^2 times the rotors' lag, 1 + s / 100, and the law's polynomial in altitude

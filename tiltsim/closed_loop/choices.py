@@ -25,6 +25,13 @@ CHOICES: Final = frozenset(
         "rotor",
         "rotors",
         "extension",
+        "attitude_error",
+        "gait_rates",
+        "attitude_rates",
+        "reference_derivatives",
+        "euler_rates",
+        "gyroscopic_torque",
+        "integral_action",
     }
 )
 """Fields of records that choose code or count; they are the same for all flights of a batch."""

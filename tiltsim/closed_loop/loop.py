@@ -164,7 +164,7 @@ class Equations:
     rates: Callable[..., Values]
     initial: Callable[[FlightPlan, ControlSetup], Vector]
     observe: Callable[..., Values]
-    project_onto_limits: Callable[..., list[float]] | None = None
+    project_onto_limits: Callable[..., Vector] | None = None
     tilts: Callable[..., Values] | None = None
 
 
@@ -211,6 +211,7 @@ class ClosedLoop:
             itself, its supervisor and allocation included.
         with_latency: The controller as it flies with a latency of its commands; None if it is the
             same.
+        traced: Whether the controller can be traced; else it runs as plain Python.
     """
 
     kind: VehicleKind
@@ -226,6 +227,12 @@ class ClosedLoop:
     uses_gait: bool = True
     within: ClosedLoop | None = None
     with_latency: Callable[[], ClosedLoop] | None = None
+    traced: bool = True
+
+    @property
+    def is_traceable(self) -> bool:
+        """Whether it can be traced with all its layers."""
+        return self.traced and (self.within is None or self.within.is_traceable)
 
     @cached_property
     def signature(self) -> float:

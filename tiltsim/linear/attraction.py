@@ -236,12 +236,12 @@ class _Grid:
         self._across = len(edges[0]) - 1
         self.returned: dict[tuple[int, int], bool] = {}
         follows = assemble(scenario).follows_position
-        self._states = FinalStates(scenario, 8 * self._across, "xyz" if follows else "z")
+        self._states = FinalStates("xyz" if follows else "z")
         self._goal: Floats | None = None
 
     @property
     def engine(self) -> str | None:
-        """Which flew the last flight."""
+        """The engine of the last flight."""
         return self._states.engine
 
     def fly(self, points: set[tuple[int, int]], width: int) -> None:

@@ -12,7 +12,7 @@ import numpy as np
 from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.errors import InputError
 from tiltsim.scenario.scenario import Scenario
-from tiltsim_controllers.gaits.parameters import ROTATING, TABLE
+from tiltsim_controllers.gaits.parameters import CUBIC
 from tiltsim_controllers.mathematics.scalar import Floats, Triple
 from tiltsim_controllers.references.trajectories import (
     ATTITUDE_ALTITUDE,
@@ -76,11 +76,11 @@ def forcing_of(assembly: Assembly) -> Forcing:
         _check_line(scenario, velocity, acceleration)
     if assembly.loop.uses_gait and gait.period is not None:
         kind = gait.parameters
-        if kind.type == TABLE and not kind.repeats:
+        if kind.type == CUBIC and not kind.repeats:
             raise InputError(
                 f"{address}: gait.repeat = false: a table that does not repeat ends; set it to true"
             )
-        if kind.type == ROTATING and scenario.simulation.plant != "thesis":
+        if scenario.gait.type == "rotating" and scenario.simulation.plant != "thesis":
             raise InputError(
                 f'{address}: gait.type = "rotating": its tilt angles grow for ever; '
                 'choose simulation.plant = "thesis"'

@@ -73,13 +73,17 @@ class Motion(ABC):
         return loop.with_latency() if self._late and loop.with_latency else loop
 
     def _adapted(self, loop: ClosedLoop) -> ClosedLoop:
-        """A controller without layers, to whose inputs of the vehicle the offsets are added."""
+        """A controller without layers, to whose inputs of the vehicle the offsets are added.
+
+        It is not traced: offsets are not parameters.
+        """
         loop = self._as_flown(loop)
         sampling, equations = loop.sampling, loop.equations
         if equations is not None:
             equations = replace(equations, inputs=self._with_offsets(equations.inputs))
         controls = self._with_offsets(sampling.controls)
-        return replace(loop, sampling=replace(sampling, controls=controls), equations=equations)
+        sampling = replace(sampling, controls=controls)
+        return replace(loop, sampling=sampling, equations=equations, traced=False)
 
     def _with_offsets(self, function: Callable[..., Values]) -> Callable[..., Values]:
         """A control step that adds the offsets and remembers what was asked for without them."""

@@ -12,7 +12,7 @@ from tiltsim.errors import InputError
 from tiltsim.laws.assembling import assemble
 from tiltsim.laws.layers.measured_acceleration import plant_angular_acceleration_of
 from tiltsim.laws.layers.on_equations import read_actuators
-from tiltsim.laws.layers.sensing import measured_qpos, measured_qvel
+from tiltsim.laws.layers.sensing import measured
 from tiltsim.plants.command import Command, Observation
 from tiltsim.plants.mujoco_plant import MujocoPlant
 from tiltsim.plants.observing import flip_by_spin
@@ -37,11 +37,10 @@ def built_in_command(assembly: Assembly, plant: MujocoPlant) -> Command:
         if hasattr(layer, "pod_inertias"):  # of measured acceleration: a record for the model
             ctrl = within.sampling.controls(time, qpos, (*qvel, 0.0, 0.0, 0.0), act, inner, knots)
             loads = read_actuators(within.dynamics)[1](ctrl)
-            measured = plant_angular_acceleration_of(within.dynamics)
-            qvel = (*qvel, *measured(qpos, qvel, ctrl, loads, layer))
+            turning = plant_angular_acceleration_of(within.dynamics)
+            qvel = (*qvel, *turning(qpos, qvel, ctrl, loads, layer))
         elif hasattr(layer, "sensors"):  # of actuation: a record for the number of rotors
-            qpos = measured_qpos(time, qpos, layer.sensors)
-            qvel = measured_qvel(time, qvel, layer.sensors)
+            qpos, qvel = measured(time, qpos, qvel, layer.sensors)
         loop, parameters = within, inner
     ctrl = loop.sampling.controls(time, qpos, qvel, act, parameters, knots)
     return _command(assembly, loop.dynamics, ctrl)

@@ -5,20 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import isfinite, pi
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from tiltsim.errors import TiltsimError
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.system.text import short_repr
 from tiltsim.vehicles.rotorcraft.layout import Layout
+from tiltsim_controllers.laws.observed import ROTOR_COMMANDS
+from tiltsim_controllers.laws.observed import Command as Command
 from tiltsim_controllers.mathematics.scalar import Floats, Values
 from tiltsim_controllers.vehicle.parameters import Vehicle
-
-ROTOR_COMMANDS: Final = ("thrusts", "rotor_speeds", "rotor_accelerations")
-"""Commands for the rotors; a `Command` gives one of them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,26 +52,6 @@ class Observation:
     vehicle: Vehicle | Multirotor  # mass, inertia, gravity, and what its rotors do
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Command:
-    """The output of a controller: one of three commands for the rotors, and tilt angles.
-
-    It takes effect after the scenario's latency; speeds then at once, or with the rotors' lag.
-
-    Attributes:
-        thrusts: (N,), N, along each rotor's axis; they set its speed.
-        rotor_speeds: (N,), rad/s, positive along each rotor's spin.
-        rotor_accelerations: (N,), rad/s^2, likewise, held until the next sample.
-        tilt_angles: (M,), rad, from -pi to pi, for the tilt servos; default: the planned gait. A
-            vehicle whose rotors are fixed has none.
-    """
-
-    thrusts: npt.ArrayLike | None = None
-    rotor_speeds: npt.ArrayLike | None = None
-    rotor_accelerations: npt.ArrayLike | None = None
-    tilt_angles: npt.ArrayLike | None = None
-
-
 Controller = Callable[[Observation], Command]
 """A function from observation to command; one with a memory may have ``reset(scenario)``."""
 
@@ -101,6 +79,9 @@ def check_command(command: object, layout: Layout) -> CheckedCommand:
     """
     if not isinstance(command, Command):
         raise ControllerError(f"returned {short_repr(command)}; expected a tiltsim.Command")
+    for name in ("rates", "discrete"):
+        if getattr(command, name) is not None:
+            raise ControllerError(f"returned {name}; only a law, marked @tiltsim.law, has states")
     given = [name for name in ROTOR_COMMANDS if getattr(command, name) is not None]
     if len(given) != 1:
         what = " and ".join(given) if given else "nothing for the rotors"

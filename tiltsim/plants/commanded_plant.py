@@ -1,7 +1,7 @@
 """The MuJoCo plant under commands: from a user's own controller, or step by step from outside.
 
 Commands and observations pass the same layers as those of the shipped controllers. Only the delay
-line of `tiltsim.laws.layers.delay_line` is moved by this plant, as rotors may be commanded speeds
+line of `tiltsim.laws.layers.actuation` is moved by this plant, as rotors may be commanded speeds
 that they take at once.
 """
 
@@ -14,17 +14,23 @@ import mujoco
 import numpy as np
 
 from tiltsim.closed_loop.assembly import Assembly
-from tiltsim.closed_loop.userdata import EVALUATIONS
+from tiltsim.closed_loop.choices import program_key
+from tiltsim.closed_loop.userdata import EVALUATIONS, HEADER_SIZE
 from tiltsim.engines.callback import control_callback
+from tiltsim.engines.python_engine import control_program, control_step
 from tiltsim.laws.commanded import commanded_parameters, with_command
 from tiltsim.laws.rotorcraft import servo_commands_of
 from tiltsim.plants.command import CheckedCommand, ControllerError, Observation
 from tiltsim.plants.mujoco_plant import MujocoPlant
 from tiltsim.plants.observing import Observer, flip_by_spin
-from tiltsim.vehicles.rotorcraft.layout import TILT_1, layout_of
-from tiltsim.vehicles.rotorcraft.rotors import rotor_code, true_rotors
-from tiltsim_controllers.mathematics.records import slotted
+from tiltsim.vehicles.rotorcraft.layout import TILT_1, layout_of, tilt_of_rotor
+from tiltsim.vehicles.rotorcraft.rotors import true_rotors
+from tiltsim_controllers.code.python_source import python_function
+from tiltsim_controllers.code.traceable import as_arrays
+from tiltsim_controllers.mathematics.records import flatten
 from tiltsim_controllers.mathematics.scalar import Floats, Values, clipped
+from tiltsim_controllers.vehicle.craft import craft_of, thrust_axes
+from tiltsim_controllers.vehicle.rotor_inertia import hinge_torques
 
 
 class CommandedPlant(MujocoPlant):
@@ -45,14 +51,17 @@ class CommandedPlant(MujocoPlant):
         self._commanded = commanded_parameters(self._setup.parameters)
         self._servo_commands = servo_commands_of(layout.tilts)
         self._observer = Observer(assembly)
-        self._slotted = slotted(self._setup.parameters)
+        program = control_program(program_key(assembly), "controls")
+        self._controls = python_function(program, "controls")
+        self._held = control_step(assembly, self.data.userdata[HEADER_SIZE:].tolist(), "hold")
         self._layered = self._loop.within is not None
         self._rates = slice(layout.acceleration_1, layout.further_rates)
         # The activations that a commanded speed is written to: where rotors lag behind it, the ones
         # that the layer keeps after the rotor speeds.
         self._lagging = vehicle.rotor_time_constant is not None
         self._rotor_inertia = vehicle.rotor_inertia
-        self._code, self._rotors = rotor_code(self._loop.dynamics), true_rotors(assembly.scenario)
+        own = as_arrays(true_rotors(assembly.scenario))
+        self._craft = craft_of(own, tilt_of_rotor(self._loop.dynamics))
         first = rotors if self._lagging else 0
         self._speeds = slice(first, first + rotors)
         # The delay line in ``act``, the newest command first; without latency it is empty. A
@@ -92,12 +101,11 @@ class CommandedPlant(MujocoPlant):
         """Command signed rotor speeds (rad/s). A jump of the rotors' momentum turns the body."""
         model, data = self.model, self.data
         if self._rotor_inertia > 0.0 and not self._lagging:
-            tilts = data.qpos[TILT_1 : TILT_1 + self.layout.tilts].tolist()
-            jump = (speeds - data.act[: self.layout.rotors]).tolist()
+            tilts, jump = data.qpos[TILT_1:], speeds - data.act[: self.layout.rotors]
             impulse, turned = np.zeros((1, model.nv)), np.empty((1, model.nv))
-            axes, still = self._code.axes(tilts, self._rotors), (0.0,) * len(jump)
-            impulse[0, 3:6] = self._code.along(axes, jump)
-            impulse[0, 6:] = -np.array(self._code.on_hinges(axes, still, jump, (0.0,) * 3))
+            at_rest = np.zeros(len(jump)), jump, np.zeros(3)
+            impulse[0, 3:6] = thrust_axes(self._craft, tilts) @ jump
+            impulse[0, 6:] = -hinge_torques(self._craft, tilts, *at_rest)
             mujoco.mj_fwdPosition(model, data)  # the mass matrix of the present tilts
             mujoco.mj_solveM(model, data, turned, impulse)
             data.qvel[:] -= self._rotor_inertia * turned[0]
@@ -119,12 +127,10 @@ class CommandedPlant(MujocoPlant):
 
     def _hold_command(self, command: Values) -> None:
         data, knots = self.data, self._setup.knots
-        state = data.qpos.tolist(), data.qvel.tolist(), data.act.tolist()
-        parameters = with_command(self._setup.parameters, command)
+        vectors = data.userdata[:HEADER_SIZE], data.qpos, data.qvel, data.act, data.ctrl
+        user = [*flatten(with_command(self._setup.parameters, command)), *knots]
         try:
-            data.ctrl[:] = self._loop.sampling.controls(
-                self.evaluation_time, *state, parameters, knots
-            )
+            data.ctrl[:] = self._controls(*(vector.tolist() for vector in vectors), user)
         except (ArithmeticError, ValueError):
             data.ctrl[:] = nan  # as the engines do; MuJoCo reports it
 
@@ -162,11 +168,11 @@ class CommandedPlant(MujocoPlant):
         data = self.data
         if called is not data:
             return
-        time = self.evaluation_time
+        header = data.userdata[:HEADER_SIZE].tolist()
         data.userdata[EVALUATIONS] += 1.0
-        state = time, data.qpos.tolist(), data.qvel.tolist(), data.act.tolist()
+        state = data.qpos.tolist(), data.qvel.tolist(), data.act.tolist()
         try:
-            data.ctrl[:] = self._loop.sampling.hold(*state, data.ctrl.tolist(), self._slotted)
+            data.ctrl[:] = self._held(header, *state, data.ctrl.tolist())
         except (ArithmeticError, ValueError):
             data.ctrl[:] = nan
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Final
 
+from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.engines.base import EngineName
 from tiltsim.scenario.scenario import Scenario
 
@@ -13,14 +14,21 @@ MIN_STEPS_TO_COMPILE: Final = 4_000
 CPU, a step in Python 0.05 to 0.3 ms longer."""
 
 
-def choose_engine(scenario: Scenario) -> EngineName:
-    """The engine that a scenario requests.
+def choose_engine(assembly: Assembly, engine: EngineName | None = None) -> EngineName:
+    """The engine of a flight.
 
-    ``auto`` weighs the flight's length against the time to compile. A user's own controller always
-    flies in Python.
+    ``auto`` weighs the flight's length against the time to compile. A user's own controller that is
+    called at control samples, and a law that cannot be traced, always fly in Python.
+
+    Args:
+        assembly: The flight.
+        engine: In place of the scenario's.
     """
-    if scenario.controller.is_external:
+    scenario = assembly.scenario
+    if scenario.controller.is_external or not assembly.loop.is_traceable:
         return "python"
+    if engine is not None:
+        return engine
     if scenario.simulation.engine != "auto":
         return scenario.simulation.engine
     return "native" if native_pays_off([scenario]) else "python"

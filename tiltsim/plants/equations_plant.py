@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from math import nan
 
 import numpy as np
@@ -10,11 +9,46 @@ import numpy as np
 from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.closed_loop.choices import program_key
 from tiltsim.engines.base import EngineName
-from tiltsim.engines.steppers import Integrated, NativeStepper, PythonStepper, Stepper
+from tiltsim.engines.steppers import (
+    Integrated,
+    Layout,
+    NativeStepper,
+    PythonStepper,
+    Stepper,
+    observation,
+)
 from tiltsim.plants.engine_choice import choose_engine
 from tiltsim.plants.flight_model import disturbance_acceleration
 from tiltsim.plants.plant import Plant
 from tiltsim_controllers.mathematics.scalar import Floats
+
+
+def initial_state(assembly: Assembly) -> list[float]:
+    """The state at time zero of a flight whose loop has equations."""
+    equations = assembly.loop.equations
+    assert equations is not None  # other scenarios are refused
+    return [*map(float, equations.initial(assembly, assembly.setup))]
+
+
+def layout_of(assembly: Assembly, states: int) -> Layout:
+    """The layout of a flight whose loop has equations, by its number of states."""
+    simulation = assembly.scenario.simulation
+    key = program_key(assembly)
+    held = simulation.control_steps > 0
+    return Layout(key, states, simulation.solver, held, simulation.batch_functions)
+
+
+def integrated(assembly: Assembly, layout: Layout) -> Integrated:
+    """A flight as steppers need it."""
+    simulation = assembly.scenario.simulation
+    return Integrated(
+        layout,
+        simulation.timestep,
+        simulation.control_steps,
+        assembly.setup.userdata,
+        disturbance_acceleration(assembly.scenario),
+        assembly.traced,
+    )
 
 
 class EquationsPlant(Plant):
@@ -28,23 +62,14 @@ class EquationsPlant(Plant):
     def __init__(self, assembly: Assembly, engine: EngineName | None = None) -> None:
         scenario, loop, setup = assembly.scenario, assembly.loop, assembly.setup
         assert loop.equations is not None  # other scenarios are refused
-        self._assembly, self._equations, self._setup = assembly, loop.equations, setup
+        self._assembly = assembly
         self._step_index = 0
-        self._state = list(map(float, self._equations.initial(assembly, setup)))
-        self._held = (0.0,) * self._equations.inputs_size
-        self.engine: EngineName = engine or choose_engine(scenario)
-        simulation = scenario.simulation
-        self._timestep, self._every = simulation.timestep, simulation.control_steps
-        flight = Integrated(
-            program_key(assembly),
-            len(self._state),
-            simulation.solver,
-            self._timestep,
-            self._every,
-            setup.userdata,
-            disturbance_acceleration(scenario),
-            assembly.traced,
-        )
+        self._state = initial_state(assembly)
+        self._held = (0.0,) * loop.equations.inputs_size
+        self.engine: EngineName = choose_engine(assembly, engine)
+        self._timestep = scenario.simulation.timestep
+        flight = integrated(assembly, layout_of(assembly, len(self._state)))
+        self._observe = observation(flight)
         self._stepper: Stepper
         if self.engine == "native":
             self._native = self._stepper = NativeStepper(flight)
@@ -73,6 +98,10 @@ class EquationsPlant(Plant):
         self._step_index = int(value[0])
         self._held = tuple(value[1:split].tolist())
         self._state = value[split:].tolist()
+
+    def restart(self, saved: Floats) -> None:
+        """Go to a state as lanes save it: the step count, the state and the inputs in force."""
+        self._step_index, self._now = int(saved[0]), saved[1:]
 
     @property
     def _now(self) -> Floats:
@@ -103,23 +132,10 @@ class EquationsPlant(Plant):
         return None if recorder.terminated else recorder.samples
 
     def observe(self) -> tuple[float, ...]:
-        setup = self._setup
         try:
-            return self._equations.observe(
-                self.time, self._state, self._inputs_in_force(), setup.parameters, setup.knots
-            )
+            return self._observe(self._step_index, self._now)
         except (ArithmeticError, ValueError):
             return (nan,) * (len(self._assembly.loop.sample_fields) - 1)
-
-    def _inputs_in_force(self) -> Sequence[float]:
-        every = self._every
-        if every > 0 and self._step_index % every != 0:
-            return self._held
-        try:
-            setup = self._setup
-            return self._equations.inputs(self.time, self._state, setup.parameters, setup.knots)
-        except (ArithmeticError, ValueError):
-            return [nan] * len(self._held)
 
     def fault(self) -> str:
         return ""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cache, partial
 from math import nan
 from typing import TYPE_CHECKING, Any, Final
 
@@ -23,6 +24,7 @@ from tiltsim.closed_loop.userdata import (
 from tiltsim.engines.base import EngineName
 from tiltsim.engines.callback import control_callback
 from tiltsim.engines.factory import make_engine
+from tiltsim.engines.python_engine import control_step
 from tiltsim.plants.engine_choice import choose_engine
 from tiltsim.plants.flight_model import evaluations_per_step, flight_model
 from tiltsim.plants.plant import Plant
@@ -52,7 +54,8 @@ class MujocoPlant(Plant):
         self.data = mujoco.MjData(self.model)
         self._evaluations_per_step = evaluations_per_step(self.model)
         self._set_initial_state()
-        self.engine: EngineName = engine or choose_engine(assembly.scenario)
+        self.engine: EngineName = choose_engine(assembly, engine)
+        self._read_parameters()
         self._prepare_engine()
 
     def _set_initial_state(self) -> None:
@@ -92,7 +95,13 @@ class MujocoPlant(Plant):
         mujoco.mj_setState(self.model, self.data, value, _INTEGRATION)
         with control_callback(None):
             mujoco.mj_forward(self.model, self.data)
-        self._prepare_engine()  # the state brings its own parameters
+        self._read_parameters()
+        self._prepare_engine()
+
+    def _read_parameters(self) -> None:
+        """Bind the parameters in ``userdata`` to the functions of the loop, by name."""
+        user = self.data.userdata[HEADER_SIZE:].tolist()
+        self._evaluate = cache(partial(control_step, self._assembly, user))
 
     def _prepare_engine(self) -> None:
         """Build the engine, which reads the parameters in ``userdata`` once."""
@@ -162,17 +171,19 @@ class MujocoPlant(Plant):
         stale = period == 0.0 or data.userdata[EVALUATIONS] % period == 0.0
         reads_controls = self._loop.columns.observe_reads_controls
         ctrl = self.controls(*state) if reads_controls and stale else data.ctrl.tolist()
-        return self._loop.columns.observe(*state, ctrl)
+        header = data.userdata[:HEADER_SIZE].tolist()
+        try:
+            return tuple(self._evaluate("observe")(header, *state, ctrl))
+        except (ArithmeticError, ValueError):
+            return (nan,) * (len(self._loop.sample_fields) - 1)
 
     def controls(
         self, qpos: Sequence[float], qvel: Sequence[float], act: Sequence[float]
     ) -> Sequence[float]:
         """The controls for a state of MuJoCo's at the present time; NaN where there are none."""
-        setup = self._setup
+        header = self.data.userdata[:HEADER_SIZE].tolist()
         try:
-            return self._loop.sampling.controls(
-                self.evaluation_time, qpos, qvel, act, setup.parameters, setup.knots
-            )
+            return self._evaluate("controls")(header, qpos, qvel, act, ())
         except (ArithmeticError, ValueError):
             return [nan] * len(self.data.ctrl)
 

@@ -7,10 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from tiltsim.closed_loop.assembly import Assembly
-from tiltsim.laws.layers.sensing import measured_qpos, measured_qvel, sensor_parameters
+from tiltsim.laws.layers.sensing import measured, sensor_parameters
 from tiltsim.plants.command import Observation, Reference
 from tiltsim.plants.mujoco_plant import MujocoPlant
 from tiltsim.scenario.gait_table import tilts_of
+from tiltsim_controllers.code.traceable import as_arrays
 from tiltsim_controllers.mathematics.rotation import euler_from_quaternion
 from tiltsim_controllers.mathematics.scalar import Values
 from tiltsim_controllers.references.trajectories import reference_derivatives
@@ -27,17 +28,15 @@ class Observer:
         vehicle = assembly.scenario.any_rotorcraft
         self._vehicle, self._tilting = vehicle.resolve(), vehicle.has_tilting_rotors
         self._tilts, self._spins = tilts_of(self._vehicle), np.array(vehicle.spins)
-        self._assembly, self._sensors = assembly, sensor_parameters(assembly.scenario)
+        self._assembly, self._sensors = assembly, as_arrays(sensor_parameters(assembly.scenario))
 
     def observe(self, plant: MujocoPlant, rotor_speeds: Sequence[float]) -> Observation:
         """The plant's present state as a controller sees it, through the scenario's sensors.
 
         ``rotor_speeds`` are signed, one for each rotor, rad/s.
         """
-        time, qpos, qvel = plant.evaluation_time, plant.data.qpos, plant.data.qvel
-        if self._sensors.active:
-            qpos = np.array(measured_qpos(time, qpos.tolist(), self._sensors))
-            qvel = np.array(measured_qvel(time, qvel.tolist(), self._sensors))
+        time, data = plant.evaluation_time, plant.data
+        qpos, qvel = measured(time, data.qpos, data.qvel, self._sensors)
         tilts, tilt_rates = qpos[7 : 7 + self._tilts], qvel[6 : 6 + self._tilts]
         return Observation(
             time=plant.time,

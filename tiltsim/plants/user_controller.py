@@ -23,10 +23,10 @@ from tiltsim.plants.command import (
 )
 from tiltsim.plants.commanded_plant import CommandedPlant
 from tiltsim.scenario.controller import PythonController
+from tiltsim.scenario.law_controller import is_law
 from tiltsim.scenario.own_code import describe, load_function
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.vehicles.rotorcraft.layout import Layout
-from tiltsim_controllers.mathematics.scalar import is_scalar
 
 
 class UserController:
@@ -68,10 +68,10 @@ def load_controller(scenario: Scenario) -> UserController:
     name = table.function
     if controller is None:
         controller = load_function(scenario)
-        if is_scalar(controller):
+        if is_law(controller):
             raise InputError(
                 f'{scenario.address or "scenario"}: controller.function = "{table.function}": '
-                'is scalar code; fly it by this key and controller.law = "scalar"'
+                'is a law of arrays; fly it by this key and controller.law = "numpy"'
             )
         name = f"{table.file.name}:{table.attribute}" if table.file is not None else name
     if isinstance(controller, type):
