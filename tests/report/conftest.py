@@ -50,7 +50,6 @@ metric = "diverged"
 equals = false
 claim = "It flies | to the end"
 published = true
-wrong = true
 why = "It does `not` end <early>."
 """
 

@@ -13,8 +13,8 @@ from html import unescape
 
 import pytest
 
-from tiltsim.report.html_page import page
 from tiltsim.report.made import Made
+from tiltsim.report.pages import page
 
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 CHROMIUM = next(filter(None, map(shutil.which, NAMES)), "")
@@ -78,9 +78,9 @@ def test_verdicts_words_and_chapters_filter_the_rows(run, report):
     result = run(
         """
         result.all = seen();
-        for (const box of form.elements.verdict) box.checked = box.value === "wrong";
+        for (const box of form.elements.verdict) box.checked = box.value === "not-reproduced";
         set("words", "");
-        result.wrong = seen();
+        result.failed = seen();
         for (const box of form.elements.verdict) box.checked = true;
         set("words", "stays TILTED");
         result.words = seen();
@@ -94,8 +94,8 @@ def test_verdicts_words_and_chapters_filter_the_rows(run, report):
     )
     assert set(result["all"]["rows"]) == ids(report)
     assert result["all"]["found"] == f"{len(report.rows)} rows"
-    assert set(result["wrong"]["rows"]) == ids(report, "WRONG")
-    assert result["wrong"]["found"] == f"1 of {len(report.rows)} rows"
+    assert set(result["failed"]["rows"]) == ids(report, "NOT_REPRODUCED")
+    assert result["failed"]["found"] == f"2 of {len(report.rows)} rows"
     assert [name[-6:] for name in result["words"]["rows"]] == ["tilted"]
     assert {name[:3] for name in result["chapter"]["rows"]} == {"ch6"}
     assert result["origin"]["rows"] == []

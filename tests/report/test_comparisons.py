@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 from tiltsim.report.comparisons import other_address
-from tiltsim.report.html_page import page
 from tiltsim.report.made import Made
 from tiltsim.report.making import make_report
+from tiltsim.report.pages import page
 
 PUSHED = """
 title = "Pushed"

@@ -8,8 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tiltsim.report.findings import FINDINGS
-from tiltsim.report.findings.numbers import NUMBERS
+from tiltsim.report.findings import FINDINGS, NUMBERS
 from tiltsim.report.pictures import PICTURES
 from tiltsim.resources import shipped_folder
 from tiltsim.scenario.library import library_entries

@@ -9,7 +9,7 @@ import pytest
 
 import tiltsim
 from tiltsim.laws.assembling import assemble
-from tiltsim.report.attraction_maps import attraction_map
+from tiltsim.report.pictures import attraction_map
 from tiltsim_controllers.analysis.singularity import determinant
 
 pytestmark = pytest.mark.slow  # more laws to compile than to fly

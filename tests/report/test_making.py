@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import csv
 import dataclasses
+import io
+import json
 import re
 from html import escape
 from html.parser import HTMLParser
@@ -15,9 +18,11 @@ from PIL import Image
 from tiltsim.cli import main
 from tiltsim.exit_codes import EXPECTATION_FAILED, INVALID_INPUT
 from tiltsim.report import flights, store
-from tiltsim.report.claim import ClaimVerdict
-from tiltsim.report.claim_rows import count
+from tiltsim.report.claim import ClaimVerdict, scenario_claims
+from tiltsim.report.claim_rows import Cell, Row, count
+from tiltsim.report.claims import registered_claims
 from tiltsim.report.content import (
+    Report,
     criterion_text,
     failure_text,
     flights_of,
@@ -25,14 +30,16 @@ from tiltsim.report.content import (
     published_text,
 )
 from tiltsim.report.drawing import DPI, Drawing, png
+from tiltsim.report.errors import ERRORS
 from tiltsim.report.findings import FINDINGS
 from tiltsim.report.flights import FlightRecord, Unsupported, fly, report_entries
-from tiltsim.report.html_page import page
 from tiltsim.report.made import Made
 from tiltsim.report.making import make_report
-from tiltsim.report.markdown import markdown
+from tiltsim.report.pages import errors_page, markdown, page
 from tiltsim.report.pictures import Picture
+from tiltsim.report.sensitivity import Criterion
 from tiltsim.report.store import flight_key
+from tiltsim.report.table import rows_csv, rows_json
 from tiltsim.studies.checking import collect
 from tiltsim.views.figures.style import CYCLE, new_figure
 
@@ -62,7 +69,7 @@ def test_rows_hold_both_plants_and_their_verdicts(report):
             record = report.flights[row.claim.address, plant]
             assert cell.measured == record.metrics["final_position_error_x"]
     [flies] = rows_of(report, "It flies | to the end")
-    assert flies.verdict is ClaimVerdict.WRONG
+    assert flies.verdict is ClaimVerdict.NOT_REPRODUCED
     assert count(report.rows).total() == len(report.rows) == 6
 
 
@@ -264,8 +271,56 @@ def test_every_row_can_be_linked_to_and_checked(full):
         assert f'id="{row.statement.id}"' in text
         assert escape(criterion_text(row.claim), quote=False) in text.replace("<code>", "`")
         for address in flights_of(row.claim):
-            assert escape(f"tiltsim run '{address}'") in text
+            assert f"tiltsim run '{escape(address)}'" in text
     assert text.count('<details class="row"') == len(full.rows)
+
+
+def test_the_files_have_the_rows_of_the_page(full):
+    shown = re.findall(r"<dt>Id</dt><dd><code>([^<]+)</code></dd>", page(full, MADE))
+    table = list(csv.DictReader(io.StringIO(rows_csv(full))))
+    records = json.loads(rows_json(full))
+    assert sorted(shown) == sorted(row["id"] for row in table)
+    assert len(table) == len(full.rows)
+    by_id = {row.claim.id: row for row in full.rows}
+    for cells, record in zip(table, records, strict=True):
+        row = by_id[cells["id"]]
+        assert cells["verdict"] == record["verdict"] == row.verdict.value
+        assert cells["published"] == published_text(row)
+        for plant in ("thesis", "mujoco"):
+            cell = row.cell(plant)
+            assert cells[plant] == (measured_text(row.claim, cell) if cell else "")
+        assert record["flights"] == list(flights_of(row.claim)) == cells["flights"].split()
+
+
+def test_the_library_has_no_anchor_twice(scenarios):
+    """A statement stands once, even if its rows have different sources."""
+    claims = [claim for scenario in scenarios for claim in scenario_claims(scenario)]
+    rows = [Row(claim, Cell(None, ClaimVerdict.REPRODUCED)) for claim in claims]
+    rows += [Row(claim, Cell(None, ClaimVerdict.REPRODUCED)) for claim in registered_claims()]
+    full = Report([], {}, rows, [], [], [])
+    groups = [group for chapter in full.chapters for group in full.chapter_groups(chapter)]
+    names = [group.statement.id for group in groups]
+    assert len(set(names)) == len(names) == len({row.statement.id for row in rows})
+
+
+def test_a_criterion_and_an_error_stand_on_the_page(full):
+    row = dataclasses.replace(
+        full.rows[0],
+        claim=dataclasses.replace(
+            full.rows[0].claim, published=9.0, fault="refuted", error="routh", why="It is not."
+        ),
+        plants=(),
+        analysis=Cell(1.0, ClaimVerdict.REFUTED),
+    )
+    criterion = Criterion("short", "0.05 m", "As thick as a line.", 4, (1, 2))
+    changed = dataclasses.replace(full, rows=[row], criteria=[criterion])
+    text = page(changed, MADE)
+    assert 'id="error-routh"' in text
+    assert f'<a href="#{row.claim.id}">{row.claim.id}</a>' in text
+    assert "<td>0.05 m</td>" in text
+    assert "| short | 0.05 m | 4 | 1 | 2 | As thick as a line. |" in markdown(changed)
+    assert ERRORS["routh"].title in errors_page(changed)
+    assert "1 rows are refuted or misprints; they trace back to 1 errors" in text
 
 
 def test_drawings_have_a_palette():
@@ -292,7 +347,7 @@ def test_the_summary_is_stable_and_well_formed(full, library, kept):
     assert text == markdown(again)
     tables = [line for line in text.splitlines() if line.startswith("|")]
     widths = {len(re.findall(r"(?<!\\)\|", line)) for line in tables}
-    assert widths == {6, 10}  # claims and counts
+    assert widths == {6, 13}  # claims and counts
     assert "It flies \\| to the end" in text
     assert str(library) not in text
     for finding in FINDINGS:
@@ -311,6 +366,8 @@ def test_the_command_writes_both_and_tells_of_bounds(library, tmp_path, capsys):
     assert "max_rotor_speed" in shown
     assert (out / "report.html").read_text(encoding="utf-8").startswith("<!doctype html>")
     assert summary.read_text(encoding="utf-8").startswith("# Reproduction report\n")
+    assert len(json.loads((out / "rows.json").read_text(encoding="utf-8"))) == 3
+    assert (out / "rows.csv").read_text(encoding="utf-8").startswith("id,statement_id,chapter,")
 
 
 def test_mistakes_are_one_clear_line(tmp_path, capsys):

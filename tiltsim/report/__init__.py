@@ -8,16 +8,20 @@ A **statement** (`tiltsim.report.statement.Statement`) is one thing that the the
 * ``thesis``: the words that make it, quoted in “ ” or paraphrased, or what the figure shows;
 * ``criterion``: what counts as reproduced and what would not, in words; tolerances and ranges of
   the row are added by themselves;
-* ``note``: what a reader must know to judge it, whatever the verdict.
+* ``note``: what a reader must know to judge it, whatever the verdict;
+* ``missing``: what the text leaves open, if it is therefore not testable.
 
 A **row** (`tiltsim.report.claim.Claim`) is one case of a statement. Its id is that of the statement
-and its label. `Origin` says what of it does not come from the thesis: scenario files say it
-of their flights (``ours = ["path", "gains", "keyframes", "parameters", "flight"]``), statements and
-rows of what they compute (``origins``). Where the flight is ours the published value is shown as
-implied. A row that holds because parameters were chosen so (``fitted``) is no evidence and gets its
-own verdict. ``refuted`` is for a statement refuted by proof or by the thesis's own equations, not
-merely not observed, and ``finding`` names the finding that does it: rows settled by one finding are
-one error of the thesis. Rows come from two places.
+and its label; ids that are gone are in ``withdrawn.toml``. `Origin` says what of it does not come
+from the thesis: scenario files say it of their flights (``ours = ["path", "gains", "start"]``),
+statements and rows of what they compute. Where the flight is ours the published value is shown as
+implied. A row that holds because parameters were chosen so (``fitted``) is no evidence, and none
+against the thesis if it fails.
+
+A row that does not hold names its ``fault`` if a proof says why: ``refuted`` (the statement is
+false), ``misprint`` (of a formula or number), both with the ``error`` that it belongs to in the
+list of errors (`tiltsim.report.errors`, ``errors.toml``); or ``rounding``: true of the printed
+digits, which another row of the statement tests. What the thesis does not claim is no row.
 
 **One flight is enough.** The row is in the scenario file::
 
@@ -43,17 +47,17 @@ integer. ``source`` of the scenario is that of the row. Each plant gets its own 
 Expectations with the same claim and case but different ``plant`` are one row. ``claim`` may also be
 a sentence, which then is the whole statement; files of the library use tables.
 
-**Analysis or several flights are needed.** The row is in a module of `tiltsim.report.claims`, one
-per chapter, in a tuple ``CLAIMS`` of `AnalysisClaim` and `FlightClaim`::
+**Analysis or several flights are needed.** The row is in a file of `tiltsim.report.claims`, one
+per chapter, measured by a function of `tiltsim.report.measures`::
 
-    PERIOD = Statement(
-        id="ch4-period",
-        source="ch. 4, Sec. 7.2, Figs. 8-9",
-        text="The error grows with the period of the trot",
-        thesis="“…”",
-        criterion="The largest error after 20 s grows from T = 1 s to 2 s and from 2 s to 3 s",
-    )
-    FlightClaim(PERIOD, ("ch04_tracking/line#a", "ch04_tracking/line#b"), grows, case="line")
+    [ch4-period]
+    source = "ch. 4, Sec. 7.2, Figs. 8-9"
+    statement = "The error grows with the period of the trot"
+    thesis = "“…”"
+    criterion = "The largest error after 20 s grows from T = 1 s to 2 s and from 2 s to 3 s"
+    measure = "grows"
+    args = ["sup_position_error_after_20s"]
+    flights = ["ch04_tracking/line#instant_t{1,2,3}_modified"]
 
 No measured value is written down: verdicts are computed when the report is made. Texts may have
 `code` between backticks. ``tests/report/test_statements.py`` checks every row.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass
 from decimal import Decimal
 from enum import Enum
@@ -26,22 +26,50 @@ Published: TypeAlias = "float | str | bool | tuple[float | str, ...]"
 
 Metrics: TypeAlias = Mapping[str, float | bool]
 
+_FAULTS: Final = {"REFUTED", "MISPRINT", "ROUNDING"}
+
 ROUNDING: Final = 1.0 + 1e-9  # 0.345 is not exact in binary, but should round to 0.35
 
 
 class ClaimVerdict(Enum):
-    """The verdict on a claim, from best to worst."""
+    """The verdict on a claim, from best to worst, with its meaning."""
 
-    REPRODUCED = "reproduced"
-    QUALITATIVE = "reproduced qualitatively"
-    FITTED = "consistent with a fit"
-    NOT_REPRODUCED = "not reproduced"
-    WRONG = "published claim wrong"
+    meaning: str
+
+    def __new__(cls, words: str, meaning: str) -> ClaimVerdict:
+        """A verdict with its words as value."""
+        verdict = object.__new__(cls)
+        verdict._value_ = words
+        verdict.meaning = meaning
+        return verdict
+
+    REPRODUCED = "reproduced", "equal within the printed digits, or the same yes/no answer"
+    QUALITATIVE = "reproduced qualitatively", "the statement holds, but the number differs"
+    FITTED = (
+        "consistent with a fit",
+        "it holds, but parameters were chosen so that it does: no evidence",
+    )
+    NOT_TESTABLE = (
+        "not testable",
+        "the text leaves open what it depends on; no evidence for the statement or against it",
+    )
+    NOT_REPRODUCED = "not reproduced", "the result differs; the reason is given"
+    ROUNDING = (
+        "rounding artifact",
+        "true of the printed digits, not of the exact quantity: another row tests it as published",
+    )
+    MISPRINT = "misprint", "the formula or number has a slip; the list of errors has the mended one"
+    REFUTED = "refuted", "the statement is false, by proof; the list of errors has it"
 
     @property
     def rank(self) -> int:
         """Position in the order, 0 for the best."""
         return list(ClaimVerdict).index(self)
+
+    @property
+    def css(self) -> str:
+        """Name in the style sheet and in addresses."""
+        return self.name.lower().replace("_", "-")
 
 
 @dataclass(frozen=True)
@@ -68,8 +96,14 @@ class Claim:
     """Range in which the statement still holds although the number differs."""
     why: str = ""
     """The reason if it is not reproduced."""
-    refuted: str = ""
-    """The reason if proof or the thesis's own equations refute it, not merely our flights."""
+    fault: str = ""
+    """Verdict if it does not hold and a proof says why: ``refuted``, ``misprint``, ``rounding``."""
+    thresholds: tuple[str, ...] = ()
+    """Names of the numbers of ours in its criterion."""
+    missing: str = ""
+    """What the text leaves open, so that this row is not testable."""
+    error: str = ""
+    """Key of the entry in the list of errors that a refuted or misprinted row belongs to."""
     note: str = ""
     """What a reader must know to judge the row, whatever its verdict."""
     origins: tuple[Origin, ...] = ()
@@ -86,6 +120,10 @@ class Claim:
             raise ValueError(f"source {self.source!r}: must begin with 'ch. {self.chapter}'")
         if yes_or_no and (self.tolerance is not None or self.in_kind is not None):
             raise ValueError(f"{self.id}: yes or no has neither tolerance nor in_kind")
+        if self.fault and (self.fault.upper() not in _FAULTS or not self.why):
+            raise ValueError(f"{self.id}: fault is one of {sorted(_FAULTS)} and needs why")
+        if bool(self.error) != (self.fault in {"refuted", "misprint"}):
+            raise ValueError(f"{self.id}: error names the entry of a refuted or misprinted row")
         if not yes_or_no:
             self.numbers()
 
@@ -119,6 +157,13 @@ class Claim:
         """Key of the finding that settles it, empty if none does."""
         return self.finding or self.statement.finding
 
+    @property
+    def tolerances(self) -> str:
+        """Differences up to which numbers count as equal; empty for yes or no."""
+        if isinstance(self.published, bool):
+            return ""
+        return ", ".join(dict.fromkeys(f"{tolerance:g}" for _, tolerance in self.numbers()))
+
     def numbers(self) -> list[tuple[float, float]]:
         """The published numbers with their tolerances. Raises `ValueError` for other values."""
         several = self.published if isinstance(self.published, tuple) else (self.published,)
@@ -140,7 +185,8 @@ class Claim:
 class AnalysisClaim(Claim):
     """A claim that is computed, without a flight."""
 
-    measure: Callable[[], Value]
+    measure: Callable[[], Value] | None = None
+    """None if its statement is not testable."""
 
 
 @dataclass(frozen=True)
@@ -149,8 +195,8 @@ class FlightClaim(Claim):
 
     flights: tuple[str, ...]
     """Addresses in the scenario library."""
-    measure: Callable[[Mapping[str, Metrics]], Value]
-    """From the metrics of the flights, by address, to the measured value; called per plant."""
+    measure: Callable[[Sequence[Metrics]], Value]
+    """From the metrics of the flights, in order, to the measured value; called per plant."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -171,27 +217,36 @@ class ExpectationClaim(Claim):
         return low <= value <= high
 
 
-def verdict_on(claim: Claim, measured: Value | None) -> ClaimVerdict:
-    """The verdict on a claim; ``measured`` is None if there is no value."""
-    if measured is not None and _agrees(claim, measured):
+def verdict_on(claim: Claim, measured: Value | None, widened: float = 1.0) -> ClaimVerdict:
+    """The verdict on a claim.
+
+    Args:
+        claim: What the thesis says.
+        measured: The measured value; None if there is none.
+        widened: Factor on the tolerances of numbers.
+    """
+    if claim.missing or claim.statement.missing:
+        return ClaimVerdict.NOT_TESTABLE
+    if measured is not None and _agrees(claim, measured, widened):
         return ClaimVerdict.FITTED if claim.is_fit else ClaimVerdict.REPRODUCED
-    if claim.refuted:
-        return ClaimVerdict.WRONG
+    if claim.fault:
+        return ClaimVerdict[claim.fault.upper()]
     if claim.in_kind is not None and measured is not None:
         low, high = claim.in_kind
         values = measured if isinstance(measured, tuple) else (measured,)
         if all(low <= value <= high for value in values):
             return ClaimVerdict.FITTED if claim.is_fit else ClaimVerdict.QUALITATIVE
-    return ClaimVerdict.NOT_REPRODUCED
+    # What does not hold with settings fitted by us is no evidence against the thesis, either.
+    return ClaimVerdict.NOT_TESTABLE if claim.is_fit else ClaimVerdict.NOT_REPRODUCED
 
 
-def _agrees(claim: Claim, measured: Value) -> bool:
+def _agrees(claim: Claim, measured: Value, widened: float) -> bool:
     if isinstance(claim.published, bool) or isinstance(measured, bool):
         return claim.published is measured
     values = measured if isinstance(measured, tuple) else (measured,)
     numbers = claim.numbers()
     return len(values) == len(numbers) and all(
-        isfinite(value) and abs(value - printed) <= tolerance * ROUNDING
+        isfinite(value) and abs(value - printed) <= tolerance * widened * ROUNDING
         for value, (printed, tolerance) in zip(values, numbers)
     )
 
@@ -227,7 +282,6 @@ def scenario_claims(scenario: Scenario) -> list[ExpectationClaim]:
             tolerance=expectation.published_tolerance,
             in_kind=expectation.in_kind,
             why=expectation.why,
-            refuted=expectation.why if expectation.wrong else "",
             origins=tuple(Origin[name.upper()] for name in scenario.ours),
             address=scenario.address,
             expectation=expectation,

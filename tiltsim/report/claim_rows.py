@@ -58,8 +58,9 @@ class Row:
 
     @property
     def on_the_thesis_alone(self) -> bool:
-        """Whether it is reproduced, and nothing in it is ours."""
-        return self.verdict is ClaimVerdict.REPRODUCED and not self.origins
+        """Whether it is reproduced, with no number of ours in its setting or its criterion."""
+        ours = self.origins or self.claim.thresholds
+        return self.verdict is ClaimVerdict.REPRODUCED and not ours
 
     @property
     def cells(self) -> list[Cell]:
@@ -70,6 +71,11 @@ class Row:
     def verdict(self) -> ClaimVerdict:
         """The worst verdict of the cells."""
         return worst([cell.verdict for cell in self.cells])
+
+    @property
+    def splits(self) -> bool:
+        """Whether the plants have different verdicts."""
+        return len({cell.verdict for cell in self.cells}) > 1
 
     def cell(self, plant: Plant) -> Cell | None:
         """The cell of a plant, None if it has none."""
@@ -93,7 +99,10 @@ def analyze(
     They are stored in the folder until the core or the report changes. ``progress`` is called with
     the number of computed claims and of those to compute: seconds in all, not worth processes.
     """
-    digest = sources_digest([*Path(__file__).parent.rglob("*.py")], code_digest().hex()).hex()
+    digest = sources_digest(
+        [*Path(__file__).parent.rglob("measures/*.py"), *Path(__file__).parent.rglob("*.toml")],
+        code_digest().hex(),
+    ).hex()
     path = folder / f"analysis-{digest[:24]}.json"
     try:
         stored = json.loads(path.read_bytes())
@@ -106,6 +115,7 @@ def analyze(
     if missing:
         progress(0, len(missing))
         for done, (key, claim) in enumerate(missing.items(), start=1):
+            assert claim.measure is not None
             values[key] = plain(claim.measure())
             progress(done, len(missing))
         folder.mkdir(parents=True, exist_ok=True)
@@ -114,7 +124,11 @@ def analyze(
 
 
 def _computed() -> dict[str, AnalysisClaim]:
-    return {claim.id: claim for claim in registered_claims() if isinstance(claim, AnalysisClaim)}
+    return {
+        claim.id: claim
+        for claim in registered_claims()
+        if isinstance(claim, AnalysisClaim) and claim.measure
+    }
 
 
 def make_rows(
@@ -133,12 +147,9 @@ def make_rows(
     rows = _expectation_rows(entries, flights)
     ours = {entry.address: entry.scenario.ours for entry in entries}
     for claim in registered_claims():
-        if isinstance(claim, FlightClaim):
-            if whole or all((address, "mujoco") in flights for address in claim.flights):
-                rows.append(_flight_row(claim, flights))
-        elif whole:
-            value = values[claim.id]
-            rows.append(Row(claim, analysis=Cell(value, verdict_on(claim, value))))
+        flown = claim.flights if isinstance(claim, FlightClaim) else ()
+        if whole or (flown and all((address, "mujoco") in flights for address in flown)):
+            rows.append(row_of(claim, flights, values.get(claim.id)))
     return [
         replace(row, origins=_origins(row.claim, ours))
         for row in sorted(rows, key=lambda row: row.claim.chapter)
@@ -182,16 +193,18 @@ def _ending(record: FlightRecord) -> str:
     return f"terminated at {time} s"
 
 
-def _flight_row(claim: FlightClaim, flights: Flights) -> Row:
+def row_of(claim: AnalysisClaim | FlightClaim, flights: Flights, value: Value | None) -> Row:
+    """The row of a claim, with the measured value of a computed one."""
+    if isinstance(claim, AnalysisClaim):
+        return Row(claim, analysis=Cell(value, verdict_on(claim, value)))
     cells: list[tuple[Plant, Cell]] = []
     for plant in PLANTS:
         records = [flights[address, plant] for address in claim.flights]
         flown = [record for record in records if isinstance(record, FlightRecord)]
         if len(flown) < len(records):
             continue
-        metrics = {record.address: record.metrics for record in flown}
         try:
-            value: Value | None = plain(claim.measure(metrics))
+            value = plain(claim.measure([record.metrics for record in flown]))
         except KeyError:  # a flight that terminates early has no final values
             value = None
         ended_early = any(record.ended_early for record in flown)
@@ -227,6 +240,6 @@ def count_statements(rows: Iterable[Row]) -> Counter[ClaimVerdict]:
 
 
 def errors(rows: Iterable[Row]) -> set[str]:
-    """The distinct errors of the thesis: findings, or statements that no finding settles."""
-    wrong = (row for row in rows if row.verdict is ClaimVerdict.WRONG)
-    return {row.claim.settled_by or row.statement.id for row in wrong}
+    """Keys of the entries in the list of errors that a refuted or misprinted row names."""
+    wrong = {ClaimVerdict.REFUTED, ClaimVerdict.MISPRINT}
+    return {row.claim.error for row in rows if row.verdict in wrong}

@@ -7,9 +7,7 @@ key only its own values are shown.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import groupby
 from typing import Final
 
 from tiltsim.report.flights import PLANTS, FlightRecord, Flights, Plant, ReportEntry
@@ -39,6 +37,12 @@ class Comparison:
     def file(self) -> str:
         """Address of the family."""
         return self.address.partition("#")[0]
+
+    @property
+    def quantity(self) -> str:
+        """Name and unit of the metric, as text."""
+        unit = METRICS[self.metric].unit
+        return self.metric.replace("_", " ") + (f", {unit}" if unit else "")
 
 
 def compare(entries: list[ReportEntry], flights: Flights) -> list[Comparison]:
@@ -73,18 +77,6 @@ def other_address(address: str, without: str) -> str:
     """The full address of the flight to compare with; empty if that is the flight itself."""
     full = address.partition("#")[0] + without if without.startswith("#") else without
     return "" if full == address else full
-
-
-def families(comparisons: list[Comparison]) -> Iterator[tuple[str, list[Comparison]]]:
-    """Comparisons by the file of their scenario."""
-    for file, members in groupby(comparisons, lambda one: one.file):
-        yield file, list(members)
-
-
-def quantity(comparison: Comparison) -> str:
-    """Name and unit of the compared metric, as text."""
-    unit = METRICS[comparison.metric].unit
-    return comparison.metric.replace("_", " ") + (f", {unit}" if unit else "")
 
 
 def _text(record: FlightRecord, metric: str) -> str:

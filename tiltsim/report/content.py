@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 from itertools import groupby
@@ -13,7 +14,10 @@ from tiltsim.report.claim import Claim, ClaimVerdict, ExpectationClaim, FlightCl
 from tiltsim.report.claim_rows import Cell, Failure, Row, count, count_statements, errors
 from tiltsim.report.comparisons import Comparison
 from tiltsim.report.drawing import Drawing
+from tiltsim.report.errors import ERRORS, PublishedError
 from tiltsim.report.findings import FINDINGS, Finding
+from tiltsim.report.pictures import Picture
+from tiltsim.report.sensitivity import Criterion
 from tiltsim.report.statement import Origin, Statement
 from tiltsim.scenario.metric_names import METRICS
 from tiltsim.scenario.scenario import Scenario
@@ -23,9 +27,15 @@ if TYPE_CHECKING:
 
 TITLE: Final = "Reproduction report"
 SUBJECT: Final = (
-    "Every claim with a number or a yes/no answer in the doctoral thesis “Advanced Feedback "
-    "Linearization Control for Tiltrotor UAVs: Gait Plan, Controller Design, and Stability "
-    "Analysis” by Zhe Shen, compared with the results of tiltsim."
+    "What the doctoral thesis “Advanced Feedback Linearization Control for Tiltrotor UAVs: Gait "
+    "Plan, Controller Design, and Stability Analysis” by Zhe Shen (The University of Tokyo, 2023) "
+    "states, with a number or a yes/no answer, compared with the results of tiltsim."
+)
+PROVENANCE: Final = (
+    "We worked from a conversion of the thesis into text, without its figures: paths, curves and "
+    "values that only a figure shows are not known here. Dots above symbols, brackets and indices "
+    "may be errors of that conversion; before citing a misprint, compare the article. The author "
+    "has not been asked to comment."
 )
 CHAPTERS: Final = {
     1: "Hovering in a gust",
@@ -40,19 +50,14 @@ CHAPTERS: Final = {
     10: "State drift of a tilt-car",
     11: "Saturation of a tilt-car",
     12: "The map of another vehicle",
-}
-MEANINGS: Final = {
-    ClaimVerdict.REPRODUCED: "equal within the printed digits, or the same yes/no answer",
-    ClaimVerdict.QUALITATIVE: "the statement holds, but the number differs",
-    ClaimVerdict.FITTED: "it holds, but parameters were chosen so that it does: no evidence",
-    ClaimVerdict.NOT_REPRODUCED: "the result differs; the reason is given",
-    ClaimVerdict.WRONG: "refuted by proof or by the thesis's own equations",
+    13: "Outlook",
 }
 METHOD: Final = (
     "Every scenario is simulated on two plants with the same controller. The thesis plant "
     "integrates the printed equations, which have no gyroscopic torque, with a fixed-step "
     "third-order method. MuJoCo integrates a multibody model with a fourth-order method. Claims "
-    "that need no flight are computed. A row gets the worse of its two verdicts.",
+    "that need no flight are computed. A row gets the worse of its two verdicts. Flights of ch. 3 "
+    "to 9 use the decoupling matrix as printed, except that K_f, printed twice, is counted once.",
     "A number is reproduced if it rounds to the printed digits, unless the row states another "
     "tolerance. All values and verdicts are computed from the scenario library and cached only "
     "until a source or a version changes.",
@@ -74,18 +79,48 @@ class Report:
     drawings: list[Drawing]
     comparisons: list[Comparison]
     findings: tuple[Finding, ...] = FINDINGS
+    criteria: Sequence[Criterion] = ()
+
+    @property
+    def errors(self) -> list[tuple[PublishedError, list[Row]]]:
+        """The entries of the list of errors that rows name, with these rows."""
+        named = errors(self.rows)
+        return [
+            (entry, [row for row in self.rows if row.claim.error == key])
+            for key, entry in ERRORS.items()
+            if key in named
+        ]
 
     @property
     def chapters(self) -> list[int]:
         """Chapters with rows, in order."""
         return sorted({row.claim.chapter for row in self.rows})
 
+    def of_chapter(self, chapter: int) -> list[Row]:
+        """The rows of a chapter."""
+        return [row for row in self.rows if row.claim.chapter == chapter]
+
     def chapter_groups(self, chapter: int) -> list[Group]:
         """The rows of a chapter grouped by statement, section by section."""
-        rows = [row for row in self.rows if row.claim.chapter == chapter]
+        rows = self.of_chapter(chapter)
         order = list(dict.fromkeys(row.statement.id for row in rows))
-        rows.sort(key=lambda row: (row.statement.place, order.index(row.statement.id)))
+        places = {row.statement.id: row.statement.place for row in reversed(rows)}
+        rows.sort(key=lambda row: (places[row.statement.id], order.index(row.statement.id)))
         return [Group(list(group)) for _, group in groupby(rows, lambda row: row.statement.id)]
+
+    def failing_groups(self, chapter: int) -> list[Group]:
+        """The same without the rows that are reproduced."""
+        groups = [group.without(ClaimVerdict.REPRODUCED) for group in self.chapter_groups(chapter)]
+        return [group for group in groups if group.rows]
+
+    def drawings_of(self, finding: Finding) -> list[Drawing]:
+        """The pictures that show a finding."""
+        return [drawing for drawing in self.drawings if drawing.picture.name in finding.pictures]
+
+    def settled_by(self, finding: Finding) -> list[str]:
+        """Ids of the statements of which a finding settles a row."""
+        rows = (row for row in self.rows if row.claim.settled_by == finding.key)
+        return list(dict.fromkeys(row.statement.id for row in rows))
 
 
 @dataclass(frozen=True)
@@ -98,6 +133,51 @@ class Group:
     def statement(self) -> Statement:
         """What all rows are cases of."""
         return self.rows[0].statement
+
+    @property
+    def rank(self) -> int:
+        """Rank of the worst verdict."""
+        return max(row.verdict.rank for row in self.rows)
+
+    @property
+    def by_verdict(self) -> list[tuple[ClaimVerdict, list[Row]]]:
+        """The rows with each verdict, the worst first."""
+        ordered = sorted(self.rows, key=lambda row: -row.verdict.rank)
+        return [(kind, list(rows)) for kind, rows in groupby(ordered, lambda row: row.verdict)]
+
+    @property
+    def settled_by(self) -> list[str]:
+        """Keys of the findings that settle rows."""
+        keys = (row.claim.settled_by for row in self.rows)
+        return list(dict.fromkeys(filter(None, keys)))
+
+    @property
+    def described(self) -> str:
+        """Statement, criterion and notes in one cell of Markdown."""
+        statement = self.statement
+        text = f"**{statement.text}** ({self.sources}; `{statement.id}`)"
+        criterion = f"Criterion: {statement.criterion.rstrip('.')}." if statement.criterion else ""
+        return "\n".join(filter(None, (text, criterion, statement.note, self.shared_why)))
+
+    @property
+    def many_fits(self) -> int:
+        """The number of rows consistent with a fit, from three on."""
+        fits = sum(row.verdict is ClaimVerdict.FITTED for row in self.rows)
+        return fits if fits >= 3 else 0
+
+    def without(self, verdict: ClaimVerdict) -> Group:
+        """The group without the rows of this verdict."""
+        return Group([row for row in self.rows if row.verdict is not verdict])
+
+    def shown(self, drawings: list[Drawing]) -> list[Drawing]:
+        """The pictures that the statement names, and those of a flight of its rows."""
+        flown = {flight for row in self.rows for flight in flights_of(row.claim)}
+
+        def shows(picture: Picture) -> bool:
+            alone = len(picture.flights) == 1 and picture.flights[0][0] in flown
+            return alone or picture.name in self.statement.pictures
+
+        return [drawing for drawing in drawings if shows(drawing.picture)]
 
     @property
     def sources(self) -> str:
@@ -119,7 +199,11 @@ class Group:
 
 def why_of(row: Row) -> str:
     """The reason of a row that is not reproduced."""
-    return "" if row.verdict is ClaimVerdict.REPRODUCED else row.claim.refuted or row.claim.why
+    return (
+        ""
+        if row.verdict is ClaimVerdict.REPRODUCED
+        else row.claim.why or row.claim.missing or row.statement.missing
+    )
 
 
 def flights_of(claim: Claim) -> tuple[str, ...]:
@@ -142,6 +226,8 @@ def test_of(claim: Claim) -> str:
 
 def criterion_text(claim: Claim) -> str:
     """What would have made the row fail, in words, with its tolerance or range."""
+    if not claim.statement.criterion:
+        return ""
     parts = [claim.statement.criterion.rstrip(".")]
     if not isinstance(claim.published, bool):
         tolerances = dict.fromkeys(f"{tolerance:g}" for _, tolerance in claim.numbers())
@@ -253,19 +339,18 @@ def lead_text(rows: list[Row]) -> str:
     """The first sentences of the summary."""
     counts, statements = count(rows), count_statements(rows)
     alone = sum(row.on_the_thesis_alone for row in rows)
-    whole: dict[str, bool] = {}
-    for row in rows:
-        whole[row.statement.id] = whole.get(row.statement.id, True) and row.on_the_thesis_alone
+    flown = sum(row.analysis is None for row in rows)
+    wrong = counts[ClaimVerdict.REFUTED] + counts[ClaimVerdict.MISPRINT]
     return (
-        f"{alone} rows are reproduced on the thesis's own numbers alone: nothing in their tests "
-        f"is ours. They complete {sum(whole.values())} of {len(whole)} distinct statements. Of all "
-        f"{len(rows)} rows, {counts[ClaimVerdict.REPRODUCED]} are reproduced, "
-        f"{counts[ClaimVerdict.QUALITATIVE]} qualitatively, {counts[ClaimVerdict.FITTED]} are "
-        "consistent with a fit, which is no evidence, "
-        f"{counts[ClaimVerdict.NOT_REPRODUCED]} are not reproduced "
-        f"({statements[ClaimVerdict.NOT_REPRODUCED]} statements), and in "
-        f"{counts[ClaimVerdict.WRONG]} the published claim is wrong "
-        f"({len(errors(rows))} distinct errors)."
+        f"{statements.total()} statements in {len(rows)} rows, {flown} of them flown, the others "
+        f"computed. {counts[ClaimVerdict.REPRODUCED]} rows are reproduced, {alone} of them with no "
+        f"number of ours in setting or criterion; {counts[ClaimVerdict.QUALITATIVE]} are "
+        f"reproduced qualitatively, and {counts[ClaimVerdict.FITTED]} are consistent with a fit, "
+        f"which is no evidence. {counts[ClaimVerdict.NOT_REPRODUCED]} are not reproduced, and "
+        f"{counts[ClaimVerdict.NOT_TESTABLE]} are not testable, as the text leaves something "
+        f"open. {counts[ClaimVerdict.ROUNDING]} are one rounding artifact: true of the printed "
+        "digits of the blue angles and of P, not of the exact ones. "
+        f"{wrong} rows are refuted or misprints; they trace back to {len(errors(rows))} errors."
     )
 
 

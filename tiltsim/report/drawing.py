@@ -20,6 +20,7 @@ from tiltsim.scenario.scenario import Scenario
 from tiltsim.views.figures.style import paper_style
 
 DPI: Final = 144
+SHOWN_DPI: Final = 108
 COLORS: Final = 256
 
 
@@ -29,6 +30,19 @@ class Drawing:
 
     picture: Picture
     png: bytes
+
+    @property
+    def width(self) -> int:
+        """As shown, pixels; drawn at a higher resolution, for dense screens and print."""
+        return self._shown(16)
+
+    @property
+    def height(self) -> int:
+        """As shown, pixels."""
+        return self._shown(20)
+
+    def _shown(self, offset: int) -> int:
+        return round(int.from_bytes(self.png[offset : offset + 4], "big") * SHOWN_DPI / DPI)
 
 
 def draw_all(
@@ -54,7 +68,7 @@ def draw_all(
     """
     own = Path(__file__).parent
     folders = own.parent / "views" / "figures", own.parent / "linear"
-    sources = [own / f"{name}.py" for name in ("drawing", "pictures", "attraction_maps")]
+    sources = [own / name for name in ("drawing.py", "pictures.py", "pictures.toml")]
     sources += [file for folder in folders for file in folder.glob("*.py")]
     style = sources_digest(sources, code_digest().hex())
     scenarios = {

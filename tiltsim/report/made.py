@@ -50,7 +50,7 @@ class Made:
                 "@misc{tiltsim-reproduction-report,",
                 "  title = {tiltsim: a reproduction report on ``Advanced Feedback Linearization",
                 "           Control for Tiltrotor UAVs''},",
-                "  author = {{The tiltsim maintainers}},",
+                "  author = {{The tiltsim developers}},",
                 f"  year = {{{self.date[:4]}}},",
                 f"  note = {{Version {self.versions['tiltsim']}{commit}, made on {self.date};",
                 "          cite a row by its id, such as ch4-rest}",

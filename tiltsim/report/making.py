@@ -12,6 +12,7 @@ from tiltsim.report.content import Report
 from tiltsim.report.drawing import draw_all
 from tiltsim.report.findings import FINDINGS
 from tiltsim.report.flights import fly, report_entries
+from tiltsim.report.sensitivity import criteria
 from tiltsim.resources import shipped_folder
 from tiltsim.studies.checking import collect
 
@@ -41,6 +42,7 @@ def make_report(
     rows = make_rows(entries, flights, values, whole=whole)
     drawing = partial(progress, "figures")
     return Report(
+        criteria=criteria(rows, flights) if whole else (),
         entries=entries,
         flights=flights,
         rows=rows,

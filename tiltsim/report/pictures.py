@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from itertools import product
-from typing import Final, TypeAlias
+from pathlib import Path
+from typing import Any, Final, TypeAlias
 
 from matplotlib.figure import Figure
 
-from tiltsim.report.attraction_maps import GAITS, attraction_map
+from tiltsim.linear.attraction import Attraction, attraction
 from tiltsim.report.claim import Metrics
 from tiltsim.report.flights import PLANTS, Plant, variant_for
+from tiltsim.scenario.loading import load_scenario
 from tiltsim.simulation.simulate import simulate_to_end
 from tiltsim.views.figures.attainable import attainable_figure
 from tiltsim.views.figures.attraction import attraction_panels
@@ -47,15 +50,6 @@ class Picture:
     """Flights that it shows; one without flights needs only analysis."""
 
 
-def _flight_picture(chapter: int, name: str, caption: str, address: str) -> Picture:
-    """The page of one flight in MuJoCo, which is flown again."""
-
-    def draw(metrics: object) -> Figure:
-        return plot(simulate_to_end(variant_for(address, "mujoco")))
-
-    return Picture(chapter, name, caption, draw, ((address, "mujoco"),))
-
-
 _RHOS: Final = ("rho_065", "rho_0325", "rho_0", "rho_minus_0325", "rho_minus_065")
 _LETTERS: Final = {"conventional": "A", "modified": "B"}
 _PANELS: Final = tuple(product(("line", "circle"), ("instant", "continuous")))
@@ -74,7 +68,8 @@ FIG_4: Final = {
 """The errors that ch. 4, Fig. 4, prints (m), for rho = 0.65, 0 and -0.65."""
 
 
-def _setpoint_errors(metrics: FlightMetrics) -> Figure:
+def setpoint_errors(metrics: FlightMetrics) -> Figure:
+    """Ch. 4, Fig. 4."""
     families = []
     for decoupler, letter in _LETTERS.items():
         flown = [metrics[f"ch04_tracking/setpoint#{r}_{decoupler}", "mujoco"] for r in _RHOS]
@@ -88,7 +83,9 @@ def _setpoint_errors(metrics: FlightMetrics) -> Figure:
     return setpoint_figure(families)
 
 
-def _trot_errors(metrics: FlightMetrics) -> Figure:
+def trot_errors(metrics: FlightMetrics) -> Figure:
+    """Ch. 4, Figs. 8, 9, 13, 14."""
+
     def series(reference: str, form: str, decoupler: str, plant: Plant) -> PeriodErrors:
         errors: list[float | None] = []
         for period in _PERIODS:
@@ -108,7 +105,8 @@ def _trot_errors(metrics: FlightMetrics) -> Figure:
     return period_figure(panels)
 
 
-def _gait_and_biased(key: str) -> Figure:
+def gait_and_biased(metrics: FlightMetrics, key: str) -> Figure:
+    """A published gait beside its biased twin."""
     published = PUBLISHED_GAITS[key]
     assert published.biased is not None
     biased = f"biased, η = {published.bias:.0%}"
@@ -117,134 +115,85 @@ def _gait_and_biased(key: str) -> Figure:
     )
 
 
-PICTURES: Final[tuple[Picture, ...]] = (
-    _flight_picture(
-        1,
-        "gust",
-        "Tiltrotor with the perfect gait in a gust of 1 m/s² along x (MuJoCo): it hovers level.",
-        "ch01_gust/hover#perfect_gait",
+def singular_surface(metrics: FlightMetrics) -> Figure:
+    """Ch. 2, Figs. 1 to 3, and the exact determinant."""
+    return singularity_figure(PRESETS["ar_drone_2_unrounded"])
+
+
+def determinants(metrics: FlightMetrics) -> Figure:
+    """Ch. 3, Figs. 2, 3, 10."""
+    return determinant_figure("equal", _VEHICLE)
+
+
+def two_color_map(metrics: FlightMetrics, vehicle: str) -> Figure:
+    """The map of a vehicle; that of ch. 3 with the examples of ch. 8."""
+    paths = list(PATHS.items()) if vehicle == "ar_drone_2" else None
+    return map_figure(PRESETS[vehicle], paths)
+
+
+def attainable(metrics: FlightMetrics) -> Figure:
+    """Ch. 9, Figs. 2, 8."""
+    return attainable_figure(PUBLISHED_GAITS["ch09_gait_2"].gait, _VEHICLE)
+
+
+def attraction_maps(metrics: FlightMetrics) -> Figure:
+    """From which attitudes gaits come back."""
+    return attraction_panels({name: attraction_map(name) for name in GAITS})
+
+
+GAITS: Final[dict[str, tuple[str, dict[str, Any]]]] = {
+    "ch. 3, gait 1": ("ch03_gaits/stabilization#gait_1", {}),
+    "ch. 4, fixed at 0.65": ("ch04_tracking/setpoint#rho_065_modified", {}),
+    "ch. 4, trot to 0.65, T = 2 s": (
+        "ch04_tracking/line#continuous_t2_modified",
+        {"reference.type": "setpoint"},
     ),
-    Picture(
-        2,
-        "singular-surface",
-        "The determinant surface S(θ, φ) as published with its curve S = 0 through level attitude, "
-        "and the exact determinant of the same matrix, which has no zero.",
-        lambda _: singularity_figure(PRESETS["ar_drone_2_unrounded"]),
-    ),
-    _flight_picture(
-        2,
-        "through-the-curve",
-        "Yaw-position control with gains that satisfy the Routh-Hurwitz criterion: the flight from "
-        "(0.5, 0.5, 0) crosses S = 0 and continues to the circle.",
-        "ch02_singular_zone/exact_law#stable_gains",
-    ),
-    Picture(
-        3,
-        "determinant",
-        "The determinant at level attitude for the five pairs with α₁ = α₃ (ch. 3, Figs. 2, 3 and "
-        "10): surfaces, their zero curves with the triangle U, V, M, and sections.",
-        lambda _: determinant_figure("equal", _VEHICLE),
-    ),
-    _flight_picture(
-        3,
-        "over-actuated",
-        "Over-actuated control from gait 1 (ch. 3, Figs. 24-27), in MuJoCo.",
-        "ch03_gaits/over_actuated#gait_1",
-    ),
-    Picture(
-        4,
-        "setpoint-errors",
-        "Steady-state errors at the set point (ch. 4, Fig. 4): dots measured in MuJoCo, squares "
-        "published. A is the conventional decoupler, B the modified one; 1 to 5 run from ρ = 0.65 "
-        "to -0.65.",
-        _setpoint_errors,
-        tuple(product(_SETPOINTS, PLANTS)),
-    ),
-    Picture(
-        4,
-        "trot-errors",
-        "Largest error after 20 s against the period of the trot (ch. 4, Figs. 8, 9, 13, 14), with "
-        "the angular acceleration of the law's model: the crossed flights are lost in MuJoCo, and "
-        "complete with the measured one.",
-        _trot_errors,
-        tuple(product(_TROTS, PLANTS)),
-    ),
-    _flight_picture(
-        5,
-        "walk",
-        "The walk at 1/3 with a period of 1 s along the line, modified decoupler (MuJoCo).",
-        "ch05_gaits/line#walk_third_t1_modified",
-    ),
-    Picture(
-        6,
-        "map",
-        "The Two Color Map for the vehicle of ch. 3 and the examples E1 to E4 of ch. 8.",
-        lambda _: map_figure(_VEHICLE, list(PATHS.items())),
-    ),
-    Picture(
-        6,
-        "red-and-biased",
-        "Gait 3 (red) and its biased twin (ch. 6, Figs. 24, 25): the singular attitudes "
-        "over a period. On red there are none.",
-        lambda _: _gait_and_biased("ch06_gait_3"),
-    ),
-    Picture(
-        6,
-        "blue-and-biased",
-        "Gait 1 (blue) as printed and its biased twin (ch. 6, Figs. 20, 21). The curves of "
-        "the printed gait result from the rounding of its angles: on the exact blue lines the "
-        "matrix is singular at every attitude.",
-        lambda _: _gait_and_biased("ch06_gait_1"),
-    ),
-    _flight_picture(
-        7,
-        "red-circle",
-        "Gait 2 (red) on the circle, modified decoupler (MuJoCo).",
-        "ch07_robust_gaits/circle#gait_2",
-    ),
-    Picture(
-        8,
-        "circle-and-biased",
-        "Gait 2 of ch. 8, a circle on red, and its biased twin.",
-        lambda _: _gait_and_biased("ch08_gait_2"),
-    ),
-    Picture(
-        8,
-        "attraction",
-        "Initial attitudes from which gaits of ch. 3 to 8 come back, on the thesis's equations, "
-        "and the curves beyond which the thesis calls attitudes unacceptable. In the titles the "
-        "shares of the acceptable and of the other attitudes that come back.",
-        lambda _: attraction_panels({name: attraction_map(name) for name in GAITS}),
-    ),
-    Picture(
-        9,
-        "attainable",
-        "Gait 2 of ch. 9: torques and thrust within the rotor limits at zero yaw torque.",
-        lambda _: attainable_figure(PUBLISHED_GAITS["ch09_gait_2"].gait, _VEHICLE),
-    ),
-    _flight_picture(
-        9,
-        "ellipse",
-        "The circle at 1.5 rad/s with gait 2: the vehicle flies an ellipse (MuJoCo).",
-        "ch09_input_limits/circle#omega_15",
-    ),
-    _flight_picture(
-        10,
-        "drift",
-        "Two thousand seconds on the circle: no error, and diverging rotor speeds (MuJoCo).",
-        "ch10_state_drift/third_derivative#two_thousand_seconds",
-    ),
-    _flight_picture(
-        11,
-        "penguin",
-        "The large swing: the error along y ends in a limit cycle (MuJoCo).",
-        "ch11_penguin/straight_line#large",
-    ),
-    Picture(
-        12,
-        "map-luukkonen",
-        "The Two Color Map for the vehicle of ch. 12.",
-        lambda _: map_figure(PRESETS["luukkonen"], None),
-    ),
+    "ch. 5, walk at 1/3, T = 1 s": ("ch05_gaits/line#walk_third_t1_modified", {}),
+    "ch. 6, gait 3, red": ("ch06_two_color/stabilization#gait_3", {}),
+    "ch. 7, gait 2, red": ("ch07_robust_gaits/circle#gait_2", {}),
+    "ch. 8, E1": ("ch08_generalized_map/stabilization#E1", {}),
+}
+"""Scenarios with overrides, by what a reader calls them."""
+
+SETTLED: Final[dict[str, Any]] = {
+    "simulation.plant": "thesis",
+    "simulation.engine": "native",
+    "simulation.duration": 16.0,  # the altitude decays as exp(-0.2 t)
+}
+
+
+def attraction_map(name: str, coarse: int = 10, refinements: int = 1) -> Attraction:
+    """The map of one of `GAITS`; see `tiltsim.linear.attraction.attraction`."""
+    address, overrides = GAITS[name]
+    scenario = load_scenario(address, SETTLED | overrides)
+    return attraction(scenario, coarse=coarse, refinements=refinements)
+
+
+_FLIGHTS: Final = {
+    "setpoint_errors": tuple(product(_SETPOINTS, PLANTS)),
+    "trot_errors": tuple(product(_TROTS, PLANTS)),
+}
+"""The flights whose metrics a function needs."""
+
+
+def _picture(name: str, chapter: int, caption: str, **how: Any) -> Picture:
+    if "flight" in how:
+        address = how["flight"]
+
+        def draw(metrics: object) -> Figure:
+            return plot(simulate_to_end(variant_for(address, "mujoco")))
+
+        return Picture(chapter, name, caption, draw, ((address, "mujoco"),))
+    function = globals()[how["draw"]]
+    args = how.get("args", ())
+    flights = _FLIGHTS.get(how["draw"], ())
+    return Picture(chapter, name, caption, lambda metrics: function(metrics, *args), flights)
+
+
+PICTURES: Final[tuple[Picture, ...]] = tuple(
+    _picture(name, **table)
+    for name, table in tomllib.loads(
+        (Path(__file__).parent / "pictures.toml").read_text(encoding="utf-8")
+    ).items()
 )
 """All figures, in order."""

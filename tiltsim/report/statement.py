@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import re
-import tomllib
 import unicodedata
 from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import Enum
-from pathlib import Path
 from typing import Any, Final, Self
 
 CHAPTER: Final = re.compile(r"ch\. (\d+)")
@@ -28,6 +26,9 @@ class Origin(Enum):
     KEYFRAMES = "keyframes fitted"
     PARAMETERS = "parameters ours"
     FLIGHT = "flight ours"
+    START = "start ours"
+    LIMITS = "no rotor limits"
+    FEEDBACK = "feedback ours"
 
     @property
     def meaning(self) -> str:
@@ -41,6 +42,9 @@ _MEANINGS: Final = {
     Origin.KEYFRAMES: "its keyframes are not available: ours were fitted to its statements",
     Origin.PARAMETERS: "the thesis does not give all masses or coefficients: we chose them",
     Origin.FLIGHT: "the thesis flies nothing here: the flight tests what its statement implies",
+    Origin.START: "the thesis does not print the initial state: we chose it",
+    Origin.LIMITS: "the flight ignores the rotor limits that its chapter states",
+    Origin.FEEDBACK: "the thesis does not say whether a derivative is measured or modelled",
 }
 
 
@@ -59,8 +63,8 @@ class Statement:
     """The statement in one sentence of ours."""
     thesis: str
     """The sentence that makes it, quoted or paraphrased, or what the figure shows."""
-    criterion: str
-    """What counts as reproduced, and what would not, in words."""
+    criterion: str = ""
+    """What counts as reproduced, and what would not, in words; none if it is not testable."""
     note: str = ""
     """What a reader must know to judge it, shown with every row."""
     origins: tuple[Origin, ...] = ()
@@ -69,6 +73,8 @@ class Statement:
     """Whether parameters were chosen so that it holds."""
     finding: str = ""
     """Key of the finding that settles it; rows refuted by one finding are one error."""
+    missing: str = ""
+    """What the text leaves open, so that the statement is not testable."""
     pictures: tuple[str, ...] = ()
     """Names of pictures that show it, beside those of its flights."""
     tests: tuple[str, ...] = ()
@@ -89,7 +95,7 @@ class Statement:
 
     def __post_init__(self) -> None:
         for name in ("text", "thesis", "criterion"):
-            if not getattr(self, name).strip():
+            if not (getattr(self, name).strip() or (name == "criterion" and self.missing)):
                 raise ValueError(f"{self.id}: {name} is empty")
         chapter, named = CHAPTER.match(self.source), ID.fullmatch(self.id)
         if chapter is None:
@@ -118,26 +124,3 @@ def slug(text: str) -> str:
     spelled = re.sub(r"-(?=\d)", " minus ", "".join(_SPELLED.get(c, c) for c in text))
     plain = unicodedata.normalize("NFKD", spelled).encode("ascii", "ignore").decode().lower()
     return re.sub(r"[^a-z0-9]+", "-", plain).strip("-")
-
-
-def read_statements(chapter: str, **words: object) -> dict[str, Statement]:
-    """The statements of a module of `claims`, by id: the tables of the TOML file beside it.
-
-    Words in braces stand for the text of that name in the file's table ``[shared]`` or in
-    ``words``: what several statements say, and bounds that measures need, too.
-    """
-    file = Path(__file__).parent / "claims" / f"{chapter}.toml"
-    tables = tomllib.loads(file.read_text(encoding="utf-8"))
-    shared = tables.pop("shared", {}) | words
-
-    def complete(value: Any) -> Any:
-        if isinstance(value, list):
-            return tuple(value)
-        if not isinstance(value, str):
-            return value
-        return re.sub(r"{(\w+)}", lambda found: str(shared[found[1]]), value)
-
-    return {
-        name: Statement.of_table(name, **{key: complete(value) for key, value in table.items()})
-        for name, table in tables.items()
-    }

@@ -1,36 +1,132 @@
-"""Claims that need more than one flight, or none: computed, or derived from several flights.
+"""Claims that need no flight or several: rows in the files of this folder, one per chapter.
 
-One module per chapter, found by its name, with a tuple ``CLAIMS`` of rows in the order of the text.
-What the thesis states is in the TOML file beside it, like the ``[claim.NAME]`` of scenarios::
+A table is a statement, like the ``[claim.NAME]`` of scenarios, with the keys of its row::
 
     [ch6-blue-offset]
     source = "ch. 6, Sec. 3, Eq. (13)"
     statement = "On blue α₁ + α₃ is"
     ...
+    measure = "offset_over"       # a function of `tiltsim.report.measures`
+    args = [1]
+    published = "0.334198"        # digits as printed: good to 0.0000005; default: true, yes
+    unit = "rad"
 
-    AnalysisClaim(THESIS["ch6-blue-offset"], lambda: 2.0 * delta(AR_DRONE_2), published="0.334198")
-
-A number written as a string keeps its digits: this one is good to 0.0000005. ``published`` is True
-by default: the thesis says yes. ``measure`` returns a number, several numbers or a bool, always
-computed, never a constant, within about a second; that of a `FlightClaim` gets {address: metrics}
-of one plant. A flight that terminates early has ``diverged`` true in its metrics and may lack
-others. A statement with several cases has one row for each, with different ``case``. Import heavy
-modules (scipy, mujoco) inside the functions.
+A row with ``flights``, addresses in the scenario library, is measured on them. A statement with
+several rows has them in ``[[ch6-blue-offset.row]]``; keys of the table are their defaults. ``each``
+repeats a row over lists of values, whose names stand in braces in its texts. Braces also stand for
+the words of the file's table ``[shared]``, of ``shared.toml``, and for the numbers of
+``thresholds.toml``; ``{a,b}`` in an address for both.
 """
 
 from __future__ import annotations
 
-from importlib import import_module
-from pkgutil import iter_modules
-from typing import TYPE_CHECKING
+import re
+import tomllib
+from collections.abc import Iterator, Mapping
+from functools import cache, partial
+from itertools import product
+from pathlib import Path
+from typing import Any, Final, TypeAlias
 
-if TYPE_CHECKING:
-    from tiltsim.report.claim import AnalysisClaim, FlightClaim
+from tiltsim.report.claim import AnalysisClaim, FlightClaim
+from tiltsim.report.measures import measures
+from tiltsim.report.statement import Origin, Statement
+
+RegisteredClaim: TypeAlias = AnalysisClaim | FlightClaim
+
+_NAME: Final = re.compile(r"{(\w+)(?:\.(\w+))?}")
+_OF_ROWS: Final = (
+    "args", "case", "each", "flights", "in_kind", "key", "measure", "published",
+    "error", "fault", "tolerance", "unit", "where", "why",
+)  # fmt: skip
+"""Keys of rows that a statement's table may have, too, as defaults."""
 
 
-def registered_claims() -> list[AnalysisClaim | FlightClaim]:
-    """All claims of the modules of this package, chapter by chapter."""
-    claims = []
-    for module in sorted(iter_modules(__path__), key=lambda found: found.name):
-        claims += import_module(f"{__name__}.{module.name}").CLAIMS
-    return claims
+@cache
+def registered_claims(scaled: str = "", factor: float = 1.0) -> tuple[RegisteredClaim, ...]:
+    """All claims of the files of this folder, chapter by chapter.
+
+    Args:
+        scaled: Name of a threshold of ``thresholds.toml`` to change.
+        factor: By which it is multiplied, or its distance from the number ``from``.
+    """
+    values = {
+        name: _scaled(one["value"], one.get("from", 0.0), factor)
+        if name == scaled
+        else one["value"]
+        for name, one in words("thresholds").items()
+    }
+    files = sorted(Path(__file__).parent.glob("ch*.toml"))
+    shared = words("shared") | values
+    return tuple(claim for file in files for claim in _chapter(words(file.stem), shared))
+
+
+def _scaled(value: float, start: float, factor: float) -> float:
+    return start + (value - start) * factor
+
+
+@cache
+def words(name: str) -> dict[str, Any]:
+    """A file of this folder."""
+    text = (Path(__file__).parent / f"{name}.toml").read_text(encoding="utf-8")
+    return tomllib.loads(text)
+
+
+def _chapter(tables: dict[str, Any], shared: Mapping[str, Any]) -> Iterator[RegisteredClaim]:
+    known = {**shared, **tables.get("shared", {})}
+    for name, full in tables.items():
+        if name == "shared":
+            continue
+        table = dict(full)
+        rows = table.pop("row", [{}])
+        defaults = {key: table.pop(key) for key in _OF_ROWS if key in table}
+        statement = Statement.of_table(name, **_filled(table, known))
+        for row in rows:
+            row = defaults | row
+            each = _filled(row.pop("each", {}), known)
+            used = tuple(n for n in words("thresholds") if f"{{{n}}}" in row.get("args", ()))
+            for values in product(*each.values()):
+                filled = _filled(row, {**known, **dict(zip(each, values))})
+                yield _claim(statement, filled | {"thresholds": used})
+
+
+def _filled(value: Any, known: Mapping[str, Any]) -> Any:
+    """A value with the words that stand for names in braces; lists become tuples."""
+    if isinstance(value, dict):
+        return {key: _filled(one, known) for key, one in value.items()}
+    if isinstance(value, list | tuple):
+        return tuple(_filled(one, known) for one in value)
+    if not isinstance(value, str):
+        return value
+
+    def word(found: re.Match[str]) -> Any:
+        return known[found[1]][found[2]] if found[2] else known[found[1]]
+
+    alone = _NAME.fullmatch(value)
+    if alone:
+        return _filled(word(alone), known)
+    return _NAME.sub(lambda found: str(_filled(word(found), known)), value)
+
+
+def _claim(statement: Statement, row: dict[str, Any]) -> RegisteredClaim:
+    if statement.missing and "measure" not in row:
+        return AnalysisClaim(statement, **row)
+    measure, args = measures()[row.pop("measure")], row.pop("args", ())
+    origins = tuple(Origin[name.upper()] for name in row.pop("ours", ()))
+    flights = tuple(one for pattern in row.pop("flights", ()) for one in _expanded(pattern))
+    if not flights:
+        return AnalysisClaim(statement, measure=partial(measure, *args), origins=origins, **row)
+    return FlightClaim(
+        statement,
+        flights=flights,
+        measure=lambda flown: measure(flown, *args),
+        origins=origins,
+        **row,
+    )
+
+
+def _expanded(pattern: str) -> list[str]:
+    """The addresses that a pattern with ``{a,b}`` stands for, in order."""
+    parts = re.split(r"{([^{}]*,[^{}]*)}", pattern)
+    choices = (part.split(",") if index % 2 else [part] for index, part in enumerate(parts))
+    return ["".join(chosen) for chosen in product(*choices)]

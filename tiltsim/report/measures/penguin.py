@@ -9,6 +9,7 @@ from typing import Final
 
 import numpy as np
 
+from tiltsim.report.measures.flown import Flown
 from tiltsim_controllers.mathematics.scalar import Pair
 from tiltsim_controllers.references.trajectories import LINE, ReferenceParameters
 from tiltsim_controllers.tilt_car.penguin_cycle import (
@@ -46,8 +47,9 @@ def _zone() -> tuple[Pair, ...]:
     return tuple((e, rate) for e in grid for rate in grid if SWING.both_push((e, rate)))
 
 
-def for_all(holds: Callable[[Pair], bool]) -> bool:
-    """Whether it holds for every state of a grid in the zone of Eq. (39)."""
+def in_the_zone(statement: str) -> bool:
+    """Whether a function of this module holds for every state of a grid in the zone of Eq. (39)."""
+    holds: Callable[[Pair], bool] = globals()[statement]
     return all(holds(state) for state in _zone())
 
 
@@ -122,7 +124,7 @@ def grows_by_three_quarters_at_most(state: Pair) -> bool:
 
 
 @cache
-def bound() -> LyapunovBound:
+def _bound() -> LyapunovBound:
     """L_critical of Eq. (76) and the largest growth, Eq. (71)."""
     return lyapunov_bound(SWING, points=33)
 
@@ -138,7 +140,7 @@ def eq_27_holds() -> bool:
     scale = THESIS_CAR.mass / THESIS_CAR.thrust_coefficient
     rng = np.random.default_rng(11)
     return all(
-        np.allclose(scale * inverse @ (m, n), squared_speeds(m, n, THESIS_CAR), rtol=1e-12)
+        np.allclose(scale * inverse @ (m, n), squared_speeds((m, n), THESIS_CAR), rtol=1e-12)
         for m, n in rng.uniform(-5.0, 5.0, (200, 2)).tolist()
     )
 
@@ -211,20 +213,12 @@ def slope_matches(side: float) -> bool:
     return True
 
 
-def eq_66_holds() -> bool:
-    """On the bound of Eq. (40), with the second derivative that Eq. (66) prints."""
-    rates = np.linspace(0.0, 2.0, 21)
-    errors = 0.5 * (1.0 / (9.0 * _SQRT_3) - rates)
-    second = -_GAINS.y_velocity * rates - _GAINS.y_position * errors
-    return bool(np.abs(second + 2.0 * errors - 1.0 / (9.0 * _SQRT_3)).max() < 1e-9)
-
-
-def eq_72_holds() -> bool:
-    """Whether the candidate is larger after half a period wherever its change is negative."""
-    falling = [state for state in _zone() if lyapunov_growth(SWING, state) < 0.0]
-    return all(
-        lyapunov(SWING, state) < lyapunov(SWING, half_period(SWING, state).end) for state in falling
-    )
+def falling_states() -> list[Pair]:
+    """The candidate now and half a period later, at the states of the grid where it falls."""
+    states = [state for state in _zone() if lyapunov_growth(SWING, state) < 0.0]
+    return [
+        (lyapunov(SWING, state), lyapunov(SWING, half_period(SWING, state).end)) for state in states
+    ]
 
 
 def inputs_repeat_after_a_period() -> bool:
@@ -234,3 +228,71 @@ def inputs_repeat_after_a_period() -> bool:
     again = half_period(SWING, (-half[0], -half[1])).end
     back = max(abs(-a - b) for a, b in zip(again, start, strict=True))
     return back < 1e-9 and min(half) < 0.0 < min(start)
+
+
+def largest_growth() -> float:
+    """The candidate's largest growth over half a period, m^2/s^2."""
+    return _bound().largest_gain
+
+
+def stays_below_the_bound(flights: Flown) -> bool:
+    """Prop. 7: whether the flight's largest candidate is at most L_critical + 3/4."""
+    return float(flights[0]["max_lyapunov"]) <= _bound().published
+
+
+def candidates_fall_as_printed() -> bool:
+    """Eqs. (18), (20): the slopes of both candidates along Eq. (16)."""
+    step = 1e-6
+    pairs = ((_GAINS.x_velocity, _GAINS.x_position), (_GAINS.y_velocity, _GAINS.y_position))
+    for error, rate in np.random.default_rng(13).uniform(-1.0, 1.0, (100, 2)).tolist():
+        for damping, stiffness in pairs:
+            second = -damping * rate - stiffness * error
+            ends = [
+                0.5 * (rate + s * second) ** 2 + 0.5 * stiffness * (error + s * rate) ** 2
+                for s in (step, -step)
+            ]
+            if abs((ends[0] - ends[1]) / (2.0 * step) + damping * rate**2) > 1e-6:
+                return False
+    return True
+
+
+def only_the_printed_switches_occur() -> bool:
+    """Lemma 4: which rotors push where the demand along x is 1 m/s^2, and what comes out of it."""
+    for turn in (-pi / 3, pi / 3):
+        for along_y in np.linspace(-20.0, 20.0, 401).tolist():
+            m, n = cos(turn) + sin(turn) * along_y, -sin(turn) + cos(turn) * along_y
+            squares = np.array(squared_speeds((m, n), THESIS_CAR))
+            pushing = squares > 0.0
+            if not pushing[0 if turn < 0.0 else 1]:
+                return False
+            scale = THESIS_CAR.thrust_coefficient / THESIS_CAR.mass
+            first, second = scale * np.maximum(squares, 0.0)
+            half = THESIS_CAR.half_angle
+            along, across = cos(half) * (first + second), sin(half) * (first - second)
+            if abs(cos(turn) * along - sin(turn) * across - 1.0) > 1e-9:
+                return False
+    return True
+
+
+def slope_has_the_printed_signs() -> bool:
+    """Cases a to c of Prop. 6: the sign of Eq. (61) changes at most once, from below to above."""
+    times = np.linspace(0.0, 1.0, 202)[1:-1]
+    for rate in [0.0, -1.0 / _SQRT_3, *np.linspace(-3.0, 3.0, 199).tolist()]:
+        line = times / _SQRT_3 + rate
+        rising = line * (times * times / _SQRT_3 + 2.0 * rate * times - rate) > 0.0
+        expected = {0.0: [True], -1.0 / _SQRT_3: [False]}.get(rate)
+        if (np.diff(rising.astype(int)) < 0).any() or (
+            expected is not None and rising.tolist() != expected * len(times)
+        ):
+            return False
+    return True
+
+
+def candidate_is_the_ellipse() -> bool:
+    """Eqs. (74), (75) at random states."""
+    states = np.random.default_rng(14).uniform(-1.0, 1.0, (100, 2)).tolist()
+    values = [(state, lyapunov(SWING, state)) for state in states]
+    return all(
+        abs(error**2 / (sqrt(value) / 3.0) ** 2 + rate**2 / (2.0 * value) - 1.0) < 1e-12
+        for (error, rate), value in values
+    )

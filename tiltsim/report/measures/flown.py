@@ -1,0 +1,216 @@
+"""Measures of one flight or several, from their metrics."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from itertools import pairwise, product
+from math import hypot, inf
+from typing import Final, TypeAlias
+
+import numpy as np
+
+from tiltsim.report.claim import Metrics
+from tiltsim_controllers.analysis.published_gaits import DETERMINANT_CASES
+
+Flown: TypeAlias = Sequence[Metrics]
+
+_COMPUTED: Final[dict[str, Callable[[Metrics], float]]] = {
+    "attitude": lambda m: hypot(*(float(m[f"final_{a}"]) for a in ("roll", "pitch", "yaw"))),
+    "resting_error": lambda m: hypot(*(float(m[f"final_position_error_{a}"]) for a in "xy")),
+    "rotor_speed_range": lambda m: float(m["max_rotor_speed"]) - float(m["min_rotor_speed"]),
+}
+"""Quantities that are no metric themselves."""
+
+
+def _values(flights: Iterable[Metrics], quantity: str) -> list[float]:
+    """A metric, one of `_COMPUTED`, or with a leading ``abs `` its absolute value, by flight."""
+    name = quantity.removeprefix("abs ")
+    of = _COMPUTED.get(name)
+    values = [of(metrics) if of else float(metrics[name]) for metrics in flights]
+    return values if name == quantity else [abs(value) for value in values]
+
+
+def _means(flights: Flown, quantity: str, size: int) -> list[float]:
+    """The means of successive groups of ``size`` flights."""
+    return [float(mean) for mean in np.reshape(_values(flights, quantity), (-1, size)).mean(1)]
+
+
+def grows(flights: Flown, quantity: str) -> bool:
+    """Whether it increases from each flight to the next."""
+    return all(first < second for first, second in pairwise(_values(flights, quantity)))
+
+
+def falls(flights: Flown, quantity: str) -> bool:
+    """Whether it decreases from each flight to the next."""
+    return grows(flights[::-1], quantity)
+
+
+def grows_until_lost(flights: Flown, quantity: str) -> bool:
+    """Whether it increases from each flight to the next, where a lost flight has the largest."""
+    errors = [inf if m["diverged"] else _values([m], quantity)[0] for m in flights]
+    return all(slower < faster for slower, faster in pairwise(errors))
+
+
+def grows_in_both_decouplers(flights: Flown, quantity: str) -> bool:
+    """Whether it increases along every second flight, from the first and from the second on."""
+    return all(grows(flights[start::2], quantity) for start in (0, 1))
+
+
+def remains_above(flights: Flown, quantity: str, limit: float) -> bool:
+    """Whether it is above a limit in all flights."""
+    return min(_values(flights, quantity)) > limit
+
+
+def remains_below(flights: Flown, quantity: str, limit: float) -> bool:
+    """Whether it is below a limit in all flights."""
+    return max(_values(flights, quantity)) < limit
+
+
+def stable_corners(small: float) -> float:
+    """Number of `stable_flights` at the corners S, T, M of ch. 3's triangle, for its 20 pairs.
+
+    Flown on the thesis's equations.
+    """
+    from tiltsim.scenario.loading import load_scenario
+    from tiltsim.simulation.batch import fly
+
+    keys = {"simulation.plant": "thesis", "simulation.engine": "native"}
+    base = load_scenario("ch03_gaits/corners#equal_s", keys)
+    pairs = [pair for case in DETERMINANT_CASES.values() for pair in case.pairs]
+    corners = ((-1.3, 1.3), (1.3, -1.3), (1.0, 1.0))
+    gaits = [[first, a, third, b] for (first, third), (a, b) in product(pairs, corners)]
+    flights = fly([base.replace({"gait.angles": angles}) for angles in gaits])
+    return stable_flights([flight.metrics for flight in flights], small)
+
+
+def falls_along_both_axes(family: str) -> bool:
+    """Whether the modified decoupler has the smaller errors after 20 s along x and along y.
+
+    Flown on the thesis's equations; ``family`` is the address without the decoupler.
+    """
+    from tiltsim.scenario.loading import load_scenario
+    from tiltsim.simulation.simulate import simulate_to_end
+
+    keys = {"simulation.plant": "thesis", "simulation.engine": "native"}
+    largest = []
+    for decoupler in ("conventional", "modified"):
+        flight = simulate_to_end(load_scenario(f"{family}_{decoupler}", keys))
+        error = (flight["position"] - flight["reference_position"])[flight["time"] >= 20.0]
+        largest.append(np.abs(error[:, :2]).max(axis=0).tolist())
+    return all(modified < conventional for conventional, modified in zip(*largest))
+
+
+def first_is_least(flights: Flown, quantity: str) -> bool:
+    """Whether it is smallest in the first flight."""
+    values = _values(flights, quantity)
+    return values.index(min(values)) == 0
+
+
+def exceeds(flights: Flown, quantity: str, factor: float) -> bool:
+    """Whether it is more than ``factor`` times as large in the first flight as in the last."""
+    values = _values(flights, quantity)
+    return values[0] > factor * values[-1]
+
+
+def differs_little(flights: Flown, quantity: str, share: float) -> bool:
+    """Whether the first two flights differ by less than a share of the largest of all."""
+    values = _values(flights, quantity)
+    return abs(values[0] - values[1]) < share * max(values)
+
+
+def second_half_is_smaller(flights: Flown, quantity: str) -> bool:
+    """Whether each flight of the second half has less than the one in its place in the first."""
+    values = _values(flights, quantity)
+    half = len(values) // 2
+    return all(second < first for first, second in zip(values[:half], values[half:], strict=True))
+
+
+def saves_most_where_largest(flights: Flown, quantity: str) -> bool:
+    """Of pairs, whether the one with the largest first value is the one that falls the most."""
+    values = _values(flights, quantity)
+    saved = np.subtract(values[::2], values[1::2])
+    return int(np.argmax(values[::2])) == int(np.argmax(saved))
+
+
+def least_mean_is_first(flights: Flown, quantity: str, size: int) -> bool:
+    """Of groups of ``size`` flights, whether the first has the smallest mean."""
+    return int(np.argmin(_means(flights, quantity, size))) == 0
+
+
+def largest_mean_is_second(flights: Flown, quantity: str, size: int) -> bool:
+    """Of groups of ``size`` flights, whether the second has the largest mean."""
+    return int(np.argmax(_means(flights, quantity, size))) == 1
+
+
+def means_are_alike(flights: Flown, quantity: str, size: int, share: float) -> bool:
+    """Whether the means of groups of flights differ by less than a share of the largest.
+
+    Args:
+        flights: The metrics.
+        quantity: What is averaged.
+        size: Flights of a group.
+        share: Of the largest mean.
+    """
+    means = _means(flights, quantity, size)
+    return max(means) - min(means) < share * max(means)
+
+
+def ratio_is_below(flights: Flown, larger: str, smaller: str, limit: float) -> bool:
+    """Whether a metric is less than a multiple of another one in the only flight.
+
+    Args:
+        flights: The metrics.
+        larger, smaller: Names of the metrics.
+        limit: The multiple.
+    """
+    [metrics] = flights
+    return float(metrics[larger]) < limit * float(metrics[smaller])
+
+
+def ratio_is_above(flights: Flown, larger: str, smaller: str, limit: float) -> bool:
+    """Whether a metric is more than a multiple of another one in the only flight.
+
+    Args:
+        flights: The metrics.
+        larger, smaller: Names of the metrics.
+        limit: The multiple.
+    """
+    [metrics] = flights
+    return float(metrics[larger]) > limit * float(metrics[smaller])
+
+
+def all_complete(flights: Flown) -> bool:
+    """Whether no flight is lost."""
+    return not any(metrics["diverged"] for metrics in flights)
+
+
+def no_rotor_stops(flights: Flown) -> bool:
+    """Whether all rotors keep turning in all flights."""
+    return all(float(metrics["min_rotor_speed"]) > 0.0 for metrics in flights)
+
+
+def all_complete_and_turn(flights: Flown) -> bool:
+    """Whether no flight is lost and no rotor stops or reverses."""
+    return all_complete(flights) and no_rotor_stops(flights)
+
+
+def lost_at_the_published_curve(flights: Flown) -> bool:
+    """Whether the flight that crosses S = 0 of ch. 2 is lost there."""
+    [metrics] = flights
+    crossed = metrics["min_published_determinant"] < 0.0 < metrics["max_published_determinant"]
+    return bool(metrics["diverged"]) or not crossed
+
+
+def stable_flights(flights: Flown, small: float) -> float:
+    """Number of flights at rest at the end, without a reversed rotor (ch. 3, Sec. 4).
+
+    ``small`` is the largest remaining angle (rad) and height (m).
+    """
+    resting = ("final_roll", "final_pitch", "final_yaw", "final_position_error_z")
+    return float(
+        sum(
+            all_complete_and_turn([metrics])
+            and all(abs(float(metrics[name])) < small for name in resting)
+            for metrics in flights
+        )
+    )

@@ -1,0 +1,220 @@
+"""Singularity margins of the gaits of ch. 5 to 8, exact and with the printed digits."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from itertools import pairwise
+from math import pi
+from typing import Final
+
+import numpy as np
+
+from tiltsim.report.measures.determinant import value_of_terms
+from tiltsim_controllers.analysis.published_gaits import (
+    PUBLISHED_GAITS,
+    robustness,
+    smallest_margin,
+)
+from tiltsim_controllers.analysis.singularity import margin_over_gait, residuals
+from tiltsim_controllers.analysis.two_color_map import delta
+from tiltsim_controllers.gaits import plans
+from tiltsim_controllers.gaits.cat import SWINGS
+from tiltsim_controllers.mathematics.scalar import Floats
+from tiltsim_controllers.vehicle.parameters import PRESETS
+
+_VEHICLE: Final = PRESETS["ar_drone_2"]
+_ZERO: Final = 1e-9
+
+
+@cache
+def _cat_margin(gait: str, scale: int) -> float:
+    swing = SWINGS[gait]
+    return smallest_margin(
+        plans.cat(gait, swing.amplitude, 1.0, swing.lean).scaled(scale), _VEHICLE
+    )
+
+
+def cat_gait_is_singular(gait: str) -> bool:
+    """Whether R of an unscaled gait of ch. 5 vanishes or changes its sign within a period."""
+    return _cat_margin(gait, 1) <= 0.0
+
+
+def scaling_enlarges(gait: str) -> bool:
+    """Whether the margin grows from 1 over 1/2 to 1/3, where a gait whose R vanishes has none."""
+    margins = [max(0.0, _cat_margin(gait, scale)) for scale in (1, 2, 3)]
+    return all(first < second for first, second in pairwise(margins))
+
+
+def beats_its_biased_twin(key: str) -> bool:
+    """Whether a published gait, on the exact lines, is more robust than its biased twin.
+
+    ``key`` of the gait in `PUBLISHED_GAITS`.
+    """
+    return bool(robustness(PUBLISHED_GAITS[key]).claim_holds)
+
+
+def margin_exceeds(key: str, limit: float) -> bool:
+    """Whether the smallest margin (rad) of a gait with its printed angles exceeds a limit."""
+    return robustness(PUBLISHED_GAITS[key]).margin > limit
+
+
+def exact_margin_exceeds(key: str, limit: float) -> bool:
+    """The same on the exact lines."""
+    return robustness(PUBLISHED_GAITS[key]).margin_exact > limit
+
+
+def biased_margin_exceeds(key: str, limit: float) -> bool:
+    """The same of its biased twin."""
+    margin = robustness(PUBLISHED_GAITS[key]).margin_biased
+    return margin is not None and margin > limit
+
+
+def biased_margin_is_below(key: str, limit: float) -> bool:
+    """Whether the smallest margin (rad) of its biased twin is below a limit."""
+    margin = robustness(PUBLISHED_GAITS[key]).margin_biased
+    return margin is not None and margin < limit
+
+
+def has_no_singular_attitude(key: str) -> bool:
+    """Whether the margin of a gait is a right angle all along."""
+    return margin_exceeds(key, 0.5 * pi - 1e-9)
+
+
+def angles_as_printed(key: str, offset: float) -> Floats:
+    """A gait of `PUBLISHED_GAITS` with the printed P and offset, over a period, shape (N, 4)."""
+    gait = PUBLISHED_GAITS[key].gait
+    first, second, third, _ = gait.angles(gait.sample_times(401)).T
+    blue = np.abs(third - first) > 1e-12
+    aside = 0.5 * offset - delta(_VEHICLE)  # so that a path through P passes the printed one
+    first, second = first + aside, second - aside
+    return np.stack(
+        [
+            first,
+            second,
+            np.where(blue, offset - first, first),
+            np.where(blue, -offset - second, second),
+        ],
+        axis=-1,
+    )
+
+
+def _margins_as_printed(key: str, offset: float) -> tuple[float, float]:
+    """Smallest margins (rad) of `angles_as_printed` and of its twin with a bias of 80 %."""
+    angles = angles_as_printed(key, offset)
+    biased = angles * (1.0, 1.0, 0.8, 0.8)
+    own, twin = (margin_over_gait(a, _VEHICLE).min() for a in (angles, biased))
+    return float(own), float(twin)
+
+
+def printed_beats_its_biased_twin(key: str, offset: float) -> bool:
+    """Whether a gait with the printed offset is more robust than its biased twin."""
+    own, twin = _margins_as_printed(key, offset)
+    return own > twin
+
+
+def printed_margin_exceeds(key: str, offset: float, limit: float) -> bool:
+    """Whether the margin (rad) of a gait with the printed offset exceeds a limit."""
+    return _margins_as_printed(key, offset)[0] > limit
+
+
+def red_is_more_robust_than_blue(blue: str, red: list[str], offset: float) -> bool:
+    """Whether red gaits have larger margins than a blue one with the printed offset."""
+    margin, _ = _margins_as_printed(blue, offset)
+    return all(margin_exceeds(key, margin) for key in red)
+
+
+def printed_is_regular(key: str, offset: float) -> bool:
+    """Whether R of a gait with the printed P and offset keeps its sign and never vanishes."""
+    R = residuals(angles_as_printed(key, offset), _VEHICLE).R
+    return bool((R > 0.0).all() or (R < 0.0).all())
+
+
+def sign_on_exact_lines(key: str) -> float:
+    """1, -1, or 0 where R is zero or changes sign over the gait on the exact lines."""
+    published = PUBLISHED_GAITS[key]
+    gait = published.exact or published.gait
+    R = residuals(gait.angles(gait.sample_times(401)), _VEHICLE).R
+    return 0.0 if np.abs(R).min() < _ZERO or np.ptp(np.sign(R)) else float(np.sign(R[0]))
+
+
+def _as_published(
+    key: str, offset: float, formulas: list[str], bias: float = 1.0
+) -> tuple[float, float]:
+    """Smallest margin of a blue gait, and the sign of its R (0 if it changes), as ch. 6 has them.
+
+    The offset is the printed one, the formulas are the printed R, R_phi and R_theta. A margin is
+    negative where R has another sign than at the start.
+    """
+    gait = PUBLISHED_GAITS[key].gait
+    angles = gait.angles(gait.sample_times(401))
+    angles[:, 2], angles[:, 3] = offset - angles[:, 0], -offset - angles[:, 1]
+    angles[:, 2:] *= bias
+    R, R_phi, R_theta = (value_of_terms(formula, angles) for formula in formulas)
+    margin = np.arcsin(R / np.sqrt(R**2 + R_phi**2 + R_theta**2)) * np.sign(R[0])
+    return float(margin.min()), 0.0 if np.ptp(np.sign(R)) else float(np.sign(R[0]))
+
+
+def sign_as_published(key: str, offset: float, formulas: list[str]) -> float:
+    """The sign of R with the printed offset and formulas."""
+    return _as_published(key, offset, formulas)[1]
+
+
+def is_more_robust_as_published(key: str, offset: float, formulas: list[str]) -> bool:
+    """Whether a gait beats its biased twin with the printed offset and formulas."""
+    bias = PUBLISHED_GAITS[key].bias or 1.0
+    own, twin = (_as_published(key, offset, formulas, eta)[0] for eta in (1.0, bias))
+    return own > twin
+
+
+def _greater_advantage_over_99(margin: Callable[[float], float]) -> bool:
+    """Whether a gait exceeds its 99 % twin by more than its 80 % twin."""
+    own, near, far = (margin(eta) for eta in (1.0, 0.99, 0.8))
+    return own > near and own - near > own - far
+
+
+def advantage_as_published(key: str, offset: float, formulas: list[str]) -> bool:
+    """The same with the printed offset and formulas."""
+    return _greater_advantage_over_99(lambda bias: _as_published(key, offset, formulas, bias)[0])
+
+
+def advantage_on_exact_lines(key: str) -> bool:
+    """The same on the exact lines."""
+    exact = PUBLISHED_GAITS[key].exact
+    assert exact is not None
+    return _greater_advantage_over_99(
+        lambda bias: max(0.0, smallest_margin(exact.biased(bias), _VEHICLE))
+    )
+
+
+def is_more_robust_than(key: str, other: str) -> bool:
+    """Whether a gait has the larger margin on the exact lines."""
+    own, others = (robustness(PUBLISHED_GAITS[name]).margin_exact for name in (key, other))
+    return own > others
+
+
+def red_beats_blue_as_published(red: str, blue: str, offset: float, formulas: list[str]) -> bool:
+    """Whether a red gait has a larger margin than a blue one as printed.
+
+    Args:
+        red, blue: Keys of `PUBLISHED_GAITS`.
+        offset: The printed offset of blue, rad.
+        formulas: The printed R, R_phi and R_theta.
+    """
+    return margin_exceeds(red, _as_published(blue, offset, formulas)[0])
+
+
+def partial_scaling_can_harm(keys: list[str]) -> bool:
+    """Whether a gait's biased twin has a smaller margin than the gait."""
+    rows = [robustness(PUBLISHED_GAITS[key]) for key in keys]
+    return any(row.margin_biased is not None and row.margin_biased < row.margin for row in rows)
+
+
+def printed_angles_lie_on_the_lines(key: str) -> bool:
+    """Whether the printed angles lie on the lines of their color, to half their last digit."""
+    published = PUBLISHED_GAITS[key]
+    first, second, third, fourth = published.gait.angles(np.arange(4) / 4.0).T
+    if published.color == "blue":
+        offset = 2.0 * delta(_VEHICLE)
+        first, second = offset - first, -offset - second
+    return bool(np.abs(np.stack([third - first, fourth - second])).max() < 0.0005)

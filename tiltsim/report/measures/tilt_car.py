@@ -1,0 +1,117 @@
+"""The tilt-car, and the state drift of its over-actuated control (ch. 10)."""
+
+from __future__ import annotations
+
+from math import asin, cos, inf, sin
+
+import numpy as np
+
+from tiltsim.report.claim import Metrics
+from tiltsim.report.measures.flown import Flown
+from tiltsim_controllers.tilt_car.vehicle import (
+    THESIS_CAR,
+    acceleration,
+    counter_yaw_per_tilt,
+    input_matrix,
+    thrust_map,
+    turn_per_tilt,
+)
+
+_RADIUS, _OMEGA = 10.0, 1.0  # m, rad/s
+
+
+def counter_yaw(bottom_inertia: float = THESIS_CAR.bottom_inertia) -> float:
+    """Yaw of the bottom disc, of this own inertia (kg m^2), over the tilt of the top disc."""
+    return -counter_yaw_per_tilt(THESIS_CAR._replace(bottom_inertia=bottom_inertia))
+
+
+def thrusts_can_be_inverted() -> bool:
+    """Whether J_theta, times any rotation, is regular (Eqs. 4-6)."""
+    theta, thrust = THESIS_CAR.half_angle, THESIS_CAR.thrust_coefficient
+    matrix = np.diag([cos(theta), sin(theta)]) @ (thrust * np.array([[1.0, 1.0], [1.0, -1.0]]))
+    return bool(abs(np.linalg.det(matrix)) > 1e-9)
+
+
+def _rank(speed_1: float, speed_2: float, *, tilting: bool) -> int:
+    columns = input_matrix(np.array([speed_1, speed_2]), THESIS_CAR)
+    return int(np.linalg.matrix_rank(columns if tilting else columns[:, :2]))
+
+
+def full_rank_needs_both(tilting: bool) -> bool:
+    """Whether the rank is full where both rotors turn, and only there."""
+    both = _rank(200.0, 150.0, tilting=tilting) == 2
+    one = _rank(200.0, 0.0, tilting=tilting) == 2 or _rank(0.0, 200.0, tilting=tilting) == 2
+    return both and not one
+
+
+def full_rank_if_both_turn() -> bool:
+    """Eq. (28), read as: rank 2 of the two columns of the rotors when neither is at rest."""
+    return _rank(200.0, 150.0, tilting=False) == 2
+
+
+def thrust_points_to_the_center() -> bool:
+    """Eq. (18), alpha = t / (1 - I_T / I_B): the thrusts turn with the circle, 1 rad/s."""
+    tilt_rate = 1.0 / turn_per_tilt(THESIS_CAR)
+    yaw_rate = -counter_yaw_per_tilt(THESIS_CAR) * tilt_rate
+    return abs(tilt_rate + yaw_rate - _OMEGA) < 1e-12
+
+
+def third_derivative_columns_are_right() -> bool:
+    """Eqs. (9)-(11): the columns of the rotors and of the tilt, by difference quotients."""
+    speeds, step = (150.0, 120.0), 1e-6
+    turn = turn_per_tilt(THESIS_CAR)
+
+    def at(first: float, second: float, tilt: float) -> np.ndarray:
+        return np.array(acceleration(turn * tilt, np.array([first**2, second**2]), THESIS_CAR))
+
+    columns = input_matrix(np.array(speeds), THESIS_CAR).T
+    for column, shift in zip(columns, step * np.eye(3)):
+        ahead, behind = (at(*(np.append(speeds, 0.0) + sign * shift)) for sign in (1.0, -1.0))
+        if np.abs((ahead - behind) / (2.0 * step) - column).max() > 1e-6:
+            return False
+    return True
+
+
+def tilt_column_off(mended: bool) -> float:
+    """By how much Eq. (27), or it times 1 - I_T/I_B, is not the column of the tilt, relatively.
+
+    The column of the tilt's second derivative in the fourth derivative of the position is that of
+    the tilt in the acceleration, yaw answering by Eq. (2): no other term contains it.
+    """
+    tilt, step, squares = 0.7, 1e-6, np.array([150.0**2, 120.0**2])
+    turn = turn_per_tilt(THESIS_CAR)
+
+    def at(alpha: float) -> np.ndarray:
+        return np.array(acceleration(turn * alpha, squares, THESIS_CAR))
+
+    ahead, behind, (x, y) = at(tilt + step), at(tilt - step), at(tilt)
+    exact = np.subtract(ahead, behind) / (2.0 * step)
+    printed = np.array((-y, x)) * (turn if mended else 1.0)
+    return max(0.0, float(np.abs(exact - printed).max() / np.hypot(x, y)) - 1e-6)
+
+
+def _lean(flight: Metrics) -> float:
+    """Angle (rad) from the middle of the thrusts to the center, in steady motion."""
+    _, across = thrust_map(THESIS_CAR) @ (float(flight["final_input_split"]), 0.0)
+    return abs(asin(across / (_RADIUS * _OMEGA**2)))
+
+
+def thrusts_point_to_the_center(flights: Flown, aligned: float) -> bool:
+    """Whether the middle of the thrusts is less than an angle (rad) from the center."""
+    return _lean(flights[0]) < aligned
+
+
+def thrusts_point_elsewhere(flights: Flown, share: float) -> bool:
+    """Whether it is more than a share of the thrusts' half angle from the center."""
+    return _lean(flights[0]) > share * THESIS_CAR.half_angle
+
+
+def inputs_saturate_for_a_while(flights: Flown) -> bool:
+    """Whether a rotor rests in some samples, but not in all."""
+    return 0.0 < float(flights[0]["saturated_fraction"]) < 1.0
+
+
+def fails_after_a_rotor_stops(flights: Flown, small: float) -> bool:
+    """Whether a rotor stops and the error (m) from 20 s on is not small."""
+    error = float(flights[0].get("sup_position_error_after_20s", inf))
+    return flights[0]["min_rotor_speed"] == 0.0 and error > small

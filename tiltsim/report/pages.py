@@ -1,0 +1,192 @@
+"""The report as one self-contained HTML page, and as Markdown for the repository.
+
+The page has everything inside: style, script and figures. Every row is a ``details`` element, so
+that without JavaScript everything can be opened and linked to; only the filter is missing. The
+Markdown is reproducible, without machine details: the summary, the findings, and the rows that are
+not reproduced. The templates are in the folder ``templates``.
+"""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from base64 import b64encode
+from collections.abc import Iterable
+from html import escape
+from io import BytesIO
+from itertools import groupby
+from operator import attrgetter
+from pathlib import Path
+from typing import Any, Final
+
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from markupsafe import Markup
+from PIL import Image
+
+from tiltsim.report import comparisons, content
+from tiltsim.report.claim import Claim, ClaimVerdict
+from tiltsim.report.claim_rows import Row, count, count_statements
+from tiltsim.report.content import Group, Report
+from tiltsim.report.drawing import Drawing
+from tiltsim.report.flights import PLANTS
+from tiltsim.report.made import Made
+from tiltsim.report.statement import Origin
+from tiltsim.system.text import printable_markdown
+
+_TEMPLATES: Final = Path(__file__).parent / "templates"
+
+THUMBNAIL: Final = (240, 150)
+"""Largest width and height, pixels."""
+
+
+def page(report: Report, made: Made) -> str:
+    """The whole HTML page."""
+    style = (_TEMPLATES / "page.css").read_text(encoding="utf-8")
+    return _rendered(
+        "page.html",
+        report,
+        made=made,
+        style=Markup(style + _thumbnail_styles(report.drawings)),
+        script=Markup((_TEMPLATES / "page.js").read_text(encoding="utf-8")),
+        bar=_bar(report.rows),
+        choices=_choices(report),
+    )
+
+
+def markdown(report: Report) -> str:
+    """The whole summary; equal results give equal text."""
+    return _rendered("page.md", report).rstrip() + "\n"
+
+
+def errors_page(report: Report) -> str:
+    """The list of errors as Markdown; equal results give equal text."""
+    rounding = [row for row in report.rows if row.verdict is ClaimVerdict.ROUNDING]
+    return _rendered("errors.md", report, rounding=rounding).rstrip() + "\n"
+
+
+def _toml(name: str) -> dict[str, Any]:
+    return tomllib.loads((_TEMPLATES.parent / name).read_text(encoding="utf-8"))
+
+
+def _rendered(template: str, report: Report, **more: Any) -> str:
+    environment = Environment(
+        loader=FileSystemLoader(_TEMPLATES),
+        autoescape=template.endswith(".html"),
+        trim_blocks=True,
+        lstrip_blocks=True,
+        undefined=StrictUndefined,
+    )
+    environment.filters |= {
+        "alone": lambda rows: sum(row.on_the_thesis_alone for row in rows),
+        "cell": markdown_cell,
+        "count_rows": count,
+        "described": _described,
+        "files": lambda flights: dict.fromkeys(one.partition("#")[0] for one in flights),
+        "groupby_in_order": lambda items, name: [
+            (key, list(group)) for key, group in groupby(items, attrgetter(name))
+        ],
+        "measured": _measured,
+        "number": _number,
+        "png_data": _png_data,
+        "prose": _prose,
+        "statements": lambda rows: sum(count_statements(rows).values()),
+    }
+    thesis = _toml("thesis.toml")
+    return environment.get_template(template).render(
+        vars(content)
+        | {
+            "report": report,
+            "title": content.TITLE,
+            "subject": content.SUBJECT,
+            "method": content.METHOD,
+            "provenance": content.PROVENANCE,
+            "thesis": thesis["thesis"],
+            "thesis_bibtex": thesis["bibtex"].strip(),
+            "journals": {int(number): text for number, text in thesis["chapters"].items()},
+            "withdrawn": _toml("withdrawn.toml") if report.findings else {},
+            "chapters": content.CHAPTERS,
+            "verdicts": list(ClaimVerdict),
+            "origins": list(Origin),
+            "plants": PLANTS,
+            "beyond_title": comparisons.TITLE,
+            "beyond_text": comparisons.EXPLANATION,
+        }
+        | more
+    )
+
+
+def _bar(rows: list[Row]) -> list[tuple[str, int]]:
+    """Classes and lengths of the parts of the bar over all rows."""
+    alone, counts = sum(row.on_the_thesis_alone for row in rows), count(rows)
+    rest = counts[ClaimVerdict.REPRODUCED] - alone
+    parts = [("reproduced", alone), ("reproduced ours", rest)]
+    parts += [(verdict.css, counts[verdict]) for verdict in list(ClaimVerdict)[1:]]
+    return [part for part in parts if part[1]]
+
+
+def _choices(report: Report) -> dict[str, list[tuple[str, str]]]:
+    """Values and texts of the filter's lists."""
+    origins = [(origin.name.lower(), origin.value) for origin in Origin]
+    chapters = [(str(number), f"ch. {number}") for number in report.chapters]
+    return {
+        "origin": [("", "any origin"), ("thesis", "thesis alone"), *origins],
+        "chapter": [("", "all chapters"), *chapters],
+        "order": [("", "in order of the text"), ("failures", "failures first")],
+    }
+
+
+def _prose(text: str) -> Markup:
+    """Text with `code` between backticks."""
+    return Markup(re.sub(r"`([^`]+)`", r"<code>\1</code>", escape(text, quote=False)))
+
+
+def _number(text: str, claim: Claim) -> Markup:
+    """A value with its unit, which is set smaller."""
+    unit = claim.unit
+    if not unit or not text.endswith(f" {unit}"):
+        return Markup(escape(text))
+    number = escape(text.removesuffix(f" {unit}"))
+    return Markup(f'{number}&nbsp;<span class="unit">{escape(unit)}</span>')
+
+
+def _png_data(png: bytes) -> str:
+    """An image as an address."""
+    return f"data:image/png;base64,{b64encode(png).decode()}"
+
+
+def _thumbnail_styles(drawings: list[Drawing]) -> str:
+    """Style rules with small versions of the figures, each in the page once."""
+    rules = []
+    for drawing in drawings:
+        with Image.open(BytesIO(drawing.png)) as image:
+            small = image.convert("RGB")
+        small.thumbnail(THUMBNAIL, Image.Resampling.LANCZOS)
+        packed = BytesIO()
+        small.quantize(64).save(packed, format="PNG", optimize=True)
+        width, height = (round(size / 2) for size in small.size)
+        rules.append(
+            f".thumb-{drawing.picture.name} {{ width: {width}px; height: {height}px; "
+            f"background-image: url({_png_data(packed.getvalue())}); }}"
+        )
+    return "\n".join(rules)
+
+
+def _measured(row: Row) -> list[str]:
+    """The two cells of Markdown with measured values."""
+    if row.analysis is not None:
+        return [f"{content.measured_text(row.claim, row.analysis)} (computed)", ""]
+    cells = [row.cell(plant) for plant in PLANTS]
+    return ["" if cell is None else content.measured_text(row.claim, cell) for cell in cells]
+
+
+def _described(row: Row, group: Group) -> str:
+    """The verdict of a row, what is ours, and the reason."""
+    tags = f" (*{', '.join(origin.value for origin in row.origins)}*)" if row.origins else ""
+    why = content.why_of(row) if not group.shared_why else ""
+    return f"{row.verdict.value}{tags}{f': {why}' if why else ''}"
+
+
+def markdown_cell(text: str) -> str:
+    """Text in a cell of a table, whose lines are separated there."""
+    lines: Iterable[str] = (printable_markdown(line) for line in text.split("\n"))
+    return "<br>".join(lines).replace("|", "\\|")
