@@ -7,13 +7,11 @@ import sys
 
 
 def main() -> int:
-    """Run the command line; an interrupt is one line from the first import on.
-
-    Processes that it and its libraries start import nothing from the working folder, where a
-    struct.py may lie beside downloaded scenarios.
-    """
-    os.environ.setdefault("PYTHONSAFEPATH", "1")
+    """Run the command line; an interrupt is one line from the first import on."""
     try:
+        from tiltsim.system.environment import variables_for_processes
+
+        os.environ |= variables_for_processes()
         from tiltsim.cli import main as command_line
 
         return command_line()

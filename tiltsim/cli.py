@@ -6,6 +6,7 @@ import argparse
 import atexit
 import gc
 import os
+import re
 import sys
 import warnings
 from importlib import import_module
@@ -14,27 +15,44 @@ from traceback import walk_tb
 from typing import Any, Final, NoReturn
 
 from tiltsim.arrays.xla_flags import let_xla_merge_loops
+from tiltsim.commands.declaring import call, declare
 from tiltsim.errors import InputError
 from tiltsim.exit_codes import DONE, INTERRUPTED, INVALID_INPUT, TERMINATED
 from tiltsim.system.interrupts import terminations_as_interrupts, was_interrupted
 from tiltsim.system.text import printable, without_long_words
 
-FLIGHT_COMMANDS: Final = ("run", "check", "sweep", "list", "view", "plot", "video")
-OTHER_COMMANDS: Final = (
-    "arena",
-    "attraction",
-    "compare",
-    "concepts",
-    "fleet",
-    "gait",
-    "map",
-    "singularity",
-    "stability",
-    "report",
-    "bench",
-    "schema",
-)
+COMMANDS: Final = """\
+fly:
+  run          fly one scenario
+  check        fly all scenarios under some paths and check their expectations
+  sweep        fly a scenario along axes: grids, random sets, stability boundaries
+  list         list the scenario library
 
+look:
+  view         show flights in the Rerun viewer
+  plot         draw a flight, several, or a sweep as a figure
+  video        render a video of a flight
+
+analyze:
+  gait         analyze the singularities of a gait or of a multirotor's tilt angles
+  stability    poles of a rest point or multipliers of a periodic flight
+  attraction   from which initial states a flight comes back
+  compare      fly scenarios under several controllers
+  arena        score controllers on fixed tasks
+  fleet        list the vehicles that ship as MJCF files
+
+thesis:
+  map          draw the Two Color Map and check a path on it
+  singularity  compare the quadrotor's published and exact determinants
+  concepts     draw the vehicle, gaits, decouplers and singularities explained in the docs
+  report       compare the whole library with the published claims on one HTML page
+
+tool:
+  schema       print the keys of the scenario file, or its JSON Schema
+  bench        measure the speed of the closed loop relative to bare MuJoCo
+
+exit codes: 0 done, 1 an expectation failed, 2 invalid input, 3 vehicle lost"""
+"""The end of ``tiltsim --help``; each command is ``run`` of a module of its name."""
 
 LONGEST_MESSAGE: Final = 1000
 """Characters of a message, which may show a name or value of any length."""
@@ -47,6 +65,11 @@ def _one_line(message: object) -> str:
 
 class Parser(argparse.ArgumentParser):
     """Reports a mistake in one line, like every other mistake."""
+
+    def __init__(self, **settings: Any) -> None:
+        super().__init__(**settings)
+        # Accept -0.5,0.5 as a value, not an option, as argparse does for plain -0.5.
+        self._negative_number_matcher = re.compile(r"-\.?\d")
 
     def error(self, message: str) -> NoReturn:
         """Print the line and exit."""
@@ -70,17 +93,28 @@ class _Version(argparse.Action):
         parser.exit()
 
 
-def build_parser() -> argparse.ArgumentParser:
-    """The parser of the whole command line."""
+def build_parser(only: str | None = None) -> argparse.ArgumentParser:
+    """The parser of the command line.
+
+    Args:
+        only: The command whose arguments are declared; by default the arguments of all
+            commands, which imports all modules of `tiltsim.commands`.
+    """
     parser = Parser(
         prog="tiltsim",
+        usage="%(prog)s [-h] [--version] COMMAND ...",
         description="A MuJoCo testbed for thrust-vectoring vehicles: fly scenarios, check flights.",
-        epilog="exit codes: 0 done, 1 an expectation failed, 2 invalid input, 3 vehicle lost",
+        epilog=COMMANDS,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--version", action=_Version, nargs=0, help="show the version and exit")
-    subparsers = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
-    for name in (*FLIGHT_COMMANDS, *OTHER_COMMANDS):
-        import_module(f"tiltsim.commands.{name}").add_parser(subparsers)
+    subparsers = parser.add_subparsers(
+        prog="tiltsim", metavar="COMMAND", required=True, help=argparse.SUPPRESS
+    )
+    for name in re.findall(r"^  (\w+)", COMMANDS, re.MULTILINE):
+        subparser = subparsers.add_parser(name)
+        if only in {None, name}:
+            declare(subparser, import_module(f"tiltsim.commands.{name}").run)
     return parser
 
 
@@ -102,14 +136,14 @@ def reduce_garbage_collection() -> None:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run one command, by default that of ``sys.argv``, and return its exit code."""
+    """Run one command, by default the command of ``sys.argv``, and return its exit code."""
     if arguments is None:
         reduce_garbage_collection()
         let_xla_merge_loops()
-        # Python's form shows a line of tiltsim's code below.
+        # Python's own format also prints a line of the code.
         warnings.formatwarning = lambda message, *_: f"tiltsim: warning: {_one_line(message)}\n"
     if isinstance(sys.stdout, TextIOWrapper):
-        sys.stdout.reconfigure(errors="backslashreplace")  # as Python has it for standard error
+        sys.stdout.reconfigure(errors="backslashreplace")  # as Python does for standard error
     with terminations_as_interrupts() as terminated:
         code = _run(arguments)
     return TERMINATED if code == INTERRUPTED and terminated() else code
@@ -118,8 +152,11 @@ def main(arguments: list[str] | None = None) -> int:
 def _run(arguments: list[str] | None) -> int:
     """Parse and run; every mistake becomes one line and an exit code."""
     try:
-        parsed = build_parser().parse_args(arguments)
-        return int(parsed.run(parsed))
+        words = sys.argv[1:] if arguments is None else arguments
+        parsed = build_parser(next((word for word in words if word[:1] != "-"), "")).parse_args(
+            words
+        )
+        return int(call(parsed.command, parsed))
     except InputError as error:
         return _refuse(error)
     except KeyboardInterrupt:

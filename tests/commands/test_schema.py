@@ -9,9 +9,10 @@ import pytest
 from pydantic import ConfigDict, TypeAdapter
 
 from tiltsim.cli import main
-from tiltsim.commands.key_tables import UNIT, has_numbers, key_tables
+from tiltsim.commands.key_tables import key_tables
 from tiltsim.commands.schema import scenario_schema, sweep_schema
 from tiltsim.scenario.scenario_tables import ScenarioTables
+from tiltsim.scenario.schema import Node
 from tiltsim.scenario.table import Table
 
 SCHEMA = scenario_schema()
@@ -42,7 +43,8 @@ def test_every_number_has_a_unit():
     missing = [
         f"{name}.{key}"
         for name, key, value in PROPERTIES
-        if has_numbers(value) and not UNIT.fullmatch(value["description"])
+        if (node := Node(value, {**sweep_schema()["$defs"], **DEFINITIONS})).has_numbers
+        and not node.meaning_and_unit[1]
     ]
     assert not missing, "end these descriptions with the unit in brackets, or with [-]"
 

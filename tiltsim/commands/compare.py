@@ -2,26 +2,35 @@
 
 from __future__ import annotations
 
-import argparse
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from tiltsim.commands.options import (
-    Subparsers,
-    add_controllers,
-    add_jobs,
-    add_json,
-    add_overrides,
-    add_quiet,
-    add_trust,
+    CORES,
+    Jobs,
+    Json,
+    Names,
+    Overrides,
+    OwnControllers,
+    Quiet,
+    Trust,
 )
 from tiltsim.commands.progress import show_progress
-from tiltsim.commands.text import json_text, number, print_line, require_flown, table
+from tiltsim.commands.text import (
+    Columns,
+    json_text,
+    number,
+    print_line,
+    require_flown,
+    table,
+    write_text,
+)
 
 if TYPE_CHECKING:
     from tiltsim.studies.comparison import Compared
 
-COLUMNS: Final = {
+MEASURES: Final = {
     "rms_position_error": ("rms error (m)", ".3g", 1.0),
     "max_position_error": ("largest (m)", ".3g", 1.0),
     "final_position_error": ("final (m)", ".3g", 1.0),
@@ -40,95 +49,80 @@ COLUMNS: Final = {
 """Measures in the table: heading, form and factor."""
 
 
-def add_parser(subparsers: Subparsers) -> None:
-    """Declare the command."""
-    description = """Fly scenarios under several controllers, and compare tracking error, effort,
-    smallest margin, and the largest latency and errors of mass, thrust and inertia that each
+def run(
+    scenarios: tuple[str, ...],
+    *,
+    controllers: Names = (),
+    own: OwnControllers = (),
+    nominal: bool = False,
+    out: Path | None = None,
+    overrides: Overrides = (),
+    jobs: Jobs = CORES,
+    json: Json = False,
+    quiet: Quiet = False,
+    trust: Trust = False,
+) -> int:
+    """Fly scenarios under several controllers, and compare their errors, effort and robustness.
+
+    Robustness is the largest latency and the largest errors of mass, thrust and inertia that each
     survives: flights that end regularly, in the last second within 1 m of the reference; with +,
     nothing beyond was tried, lost where a flight fails without any error, refused where the law
-    cannot be sampled. The times of a call are those of a control step in Python and compiled."""
-    parser = subparsers.add_parser(
-        "compare", help="fly scenarios under several controllers", description=description
-    )
-    add = parser.add_argument
-    add("scenarios", nargs="+", metavar="SCENARIO", help="files, folders or names of the library")
-    add_controllers(parser, "laws, with their default gains; given: the scenario's own controller")
-    add("--nominal", action="store_true", help="leave out what each survives, forty flights each")
-    add("--out", type=Path, metavar="DIR", help="also write comparison.json and comparison.png")
-    add_overrides(parser, "all flights", "simulation.duration=10")
-    add_jobs(parser)
-    add_json(parser)
-    add_quiet(parser, "show no progress")
-    add_trust(parser)
-    parser.set_defaults(run=run)
+    cannot be sampled. The times of a call are measured for a control step in Python and compiled.
 
-
-def run(arguments: argparse.Namespace) -> int:
-    """Fly, print, draw."""
+    Args:
+        scenarios (SCENARIO): files, folders or names of the library
+        controllers: laws, with their default gains; given: the scenario's own controller
+        nominal: leave out the search for robustness, forty flights each
+        out (DIR): also write comparison.json and comparison.png
+    """
     from tiltsim.commands.controllers import chosen_controllers
-    from tiltsim.scenario.override_keys import parse_override
     from tiltsim.studies.checking import collect
-    from tiltsim.studies.comparison import compare, refusal
+    from tiltsim.studies.comparison import SEARCHES, compare, refusal
     from tiltsim.system.files import prepare_folder
 
-    if arguments.out is not None:
-        prepare_folder(arguments.out)
-    controllers = chosen_controllers(arguments)
-    addresses, compared = collect(arguments.scenarios), []
-    flown = compare(
-        addresses,
-        controllers,
-        dict(map(parse_override, arguments.overrides)),
-        searches=not arguments.nominal,
-        jobs=arguments.jobs,
-        trusted=arguments.trust,
-    )
+    if out is not None:
+        prepare_folder(out)
+    tables = chosen_controllers(controllers, own)
+    addresses = collect(scenarios)
+    compared: list[Compared] = []
+    changes = dict(overrides)
+    flown = compare(addresses, tables, changes, searches=not nominal, jobs=jobs, trusted=trust)
     try:
-        with show_progress(shown=not arguments.quiet) as progress:
-            total = len(addresses) * len(controllers)
+        with show_progress(shown=not quiet) as progress:
+            total = len(addresses) * len(tables)
             progress.begin("comparisons", total)
             for one in flown:
                 compared.append(one)
                 progress.tell("comparisons", len(compared), total)
-    finally:  # what is flown is shown, even if the rest is interrupted
-        if compared:
-            _show(compared, arguments)
+    finally:  # finished flights are shown, even if the rest is interrupted
+        rows = [one.row for one in compared]
+        if rows and json:
+            print(json_text(rows))
+        elif rows:
+            searched = (*SEARCHES, "compiled_time_per_call")
+            _print(rows, [key for key in MEASURES if not (nominal and key in searched)])
+        if rows and out is not None:
+            from tiltsim.views.figures import style
+            from tiltsim.views.figures.controllers_compared import comparison_figure
+
+            write_text(out / "comparison.json", json_text(rows))
+            style.save(comparison_figure(compared), out / "comparison.png")
+            if not json:
+                print_line(f"comparison written to {out}")
     require_flown([refusal(one.row) for one in compared])
     return 0
 
 
-def _show(compared: list[Compared], arguments: argparse.Namespace) -> None:
-    """Print the rows, and write them with their figure into the folder."""
-    rows = [one.row for one in compared]
-    if arguments.json:
-        print(json_text(rows))
-    else:
-        _print(rows, searched=not arguments.nominal)
-    if arguments.out is None:
-        return
-    from tiltsim.system.files import replacing
-    from tiltsim.views.figures import style
-    from tiltsim.views.figures.controllers_compared import comparison_figure
-
-    with replacing(arguments.out / "comparison.json") as file:
-        file.write_text(json_text(rows) + "\n", encoding="utf-8")
-    style.save(comparison_figure(compared), arguments.out / "comparison.png")
-    if not arguments.json:
-        print_line(f"comparison written to {arguments.out}")
-
-
-def _print(rows: list[dict[str, Any]], *, searched: bool) -> None:
+def _print(rows: list[dict[str, Any]], shown: list[str]) -> None:
     """A table for every scenario, and below it why flights ended or were refused."""
-    from tiltsim.studies.comparison import SEARCHES
-
-    with_searches = (*SEARCHES, "compiled_time_per_call")
-    shown = [key for key in COLUMNS if searched or key not in with_searches]
-    header = ("controller", *(COLUMNS[key][0] for key in shown))
+    columns: Columns = {
+        "controller": ("controller", ""),
+        **{MEASURES[key][0]: (partial(_cell, key), ">") for key in shown},
+    }
     for scenario in dict.fromkeys(row["scenario"] for row in rows):
         chosen = [row for row in rows if row["scenario"] == scenario]
-        cells = [(row["controller"], *(_cell(row, key) for key in shown)) for row in chosen]
         print_line(scenario)
-        print(table(header, cells, frozenset(range(1, len(header)))))
+        print(table(columns, chosen))
         for row in chosen:
             if row["end"] != "completed":
                 print_line(f"{row['controller']}: {row['refused'] or row['end']}")
@@ -137,10 +131,10 @@ def _print(rows: list[dict[str, Any]], *, searched: bool) -> None:
         print_line("")
 
 
-def _cell(row: dict[str, Any], key: str) -> str:
+def _cell(key: str, row: dict[str, Any]) -> str:
     from tiltsim.studies.comparison import is_last_tried, why_none
 
-    _, form, factor = COLUMNS[key]
+    _, form, factor = MEASURES[key]
     if row[key] is None:
         return why_none(row, key)
     return number(factor * row[key], form) + "+" * is_last_tried(row, key)

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from tiltsim.commands.options import Subparsers
 from tiltsim.commands.progress import show_progress
 
 if TYPE_CHECKING:
@@ -24,27 +22,23 @@ DECOUPLER_FLIGHTS: Final = {
 """Addresses of the flights that show the decouplers."""
 
 
-def add_parser(subparsers: Subparsers) -> None:
-    """Declare the command."""
-    description = """Draw what docs/concepts.md explains: the vehicle with its axes and signs,
-    gaits, decouplers (flown), singular attitudes and their margin, red and blue gaits."""
-    summary = "draw the vehicle, gaits, decouplers and singularities explained in the docs"
-    parser = subparsers.add_parser("concepts", help=summary, description=description)
-    out = "folder for the SVG files concepts_*.svg (default: concepts)"
-    parser.add_argument("--out", type=Path, default=Path("concepts"), metavar="DIR", help=out)
-    parser.set_defaults(run=run)
+def run(*, out: Path = Path("concepts")) -> int:
+    """Draw the pictures of docs/concepts.md.
 
+    They show the vehicle with its axes and signs, gaits, decouplers (flown), singular attitudes and
+    their margin, red and blue gaits.
 
-def run(arguments: argparse.Namespace) -> int:
-    """Draw and save one picture after the other."""
+    Args:
+        out (DIR): folder for the SVG files concepts_*.svg (default: concepts)
+    """
     from tiltsim.system.files import prepare_folder
     from tiltsim.views.figures.style import save
 
-    prepare_folder(arguments.out)
+    prepare_folder(out)
     with show_progress(shown=True) as progress:
         for name, draw in drawings().items():
             progress.begin(f"drawing {name}")
-            file = arguments.out / f"concepts_{name}.svg"
+            file = out / f"concepts_{name}.svg"
             save(draw(), file)
             progress.print(f"figure written to {file}")
     return 0

@@ -1,153 +1,210 @@
-"""``tiltsim gait``: analyzes the singularities of a gait."""
+"""``tiltsim gait``: analyzes the singularities of a gait, or of a multirotor's tilt angles."""
 
 from __future__ import annotations
 
-import argparse
+from dataclasses import asdict, replace
 from functools import partial
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Annotated, Final, NamedTuple
 
-from tiltsim.commands.angles import allow_negative_lists, parse_angle, parse_vehicle
-from tiltsim.commands.figure_options import add_plot, check_plot, save_figure
-from tiltsim.commands.options import Subparsers, add_json, add_vehicle
-from tiltsim.commands.text import json_text, print_figure_path
+from tiltsim.commands.angles import DEFAULT_VEHICLE, parse_vehicle
+from tiltsim.commands.declaring import Option, mistakes_in
+from tiltsim.commands.gait_options import GaitFigure, GaitOptions
+from tiltsim.commands.options import Json
+from tiltsim.commands.text import json_text
+from tiltsim.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from matplotlib.figure import Figure
 
-FIGURES: Final = ("roll_pitch", "comparison", "margin", "attainable", "determinant", "faults")
-CASES: Final = ("equal", "half", "negative", "negative_half")
+    from tiltsim.scenario.scenario import Scenario
+    from tiltsim_controllers.gaits.plans import Gait
+    from tiltsim_controllers.vehicle.parameters import Vehicle
 
 OPPOSITE_SPEED_RATIO: Final = 0.7
 """Speed of the rotor opposite a failed one, relative to hover, in the fault report."""
 
 
-def add_parser(subparsers: Subparsers) -> None:
-    """Declare the command."""
-    description = """Print rank and singular values of the torque matrix, the residuals R, R_phi and
-    R_theta, the singularity margin and the singular attitudes of a gait; for a moving gait over one
-    period."""
-    summary = "analyze the singularities of a gait"
-    parser = subparsers.add_parser("gait", help=summary, description=description)
-    allow_negative_lists(parser)
-    add = parser.add_argument
-    add("scenario", nargs="?", metavar="SCENARIO", help="take gait and vehicle from a scenario")
-    add("--angles", metavar="A1,A2,A3,A4", help="tilt angles in rad, instead of a scenario")
-    mjcf = "the MJCF file of a vehicle of 4 to 16 rotors; --angles are those of its tilt hinges"
-    add("--mjcf", metavar="FILE", help=mjcf)
-    add("--published", metavar="NAME", help="a gait of the thesis, such as ch06_gait_3")
-    balance = "the gait of least tilt that hovers level under an acceleration, m/s^2, world"
-    add("--balance", metavar="AX,AY,AZ", help=balance)
-    add("--list", action="store_true", help="list the thesis's gaits and their robustness claims")
-    add_vehicle(parser)
-    add("--roll", metavar="RAD", help="attitude to analyze (default: level)")
-    add("--pitch", metavar="RAD")
-    add("--faults", action="store_true", help="also print which rotor losses allow hovering")
-    add_json(parser)
-    add_plot(parser, "a figure", panels=True)
-    figure = """roll_pitch (default); comparison, two roll-pitch diagrams, with and without bias;
-    margin over a period; attainable torques, thrusts and accelerations (ch. 9); determinant
-    surfaces and zero curves (ch. 3), without a gait; faults: rotor speeds that hover needs after a
-    rotor loss, for any gait"""
-    add("--figure", choices=FIGURES, help=figure)
-    case = "for --figure determinant: relation of alpha_1 and alpha_3 (default: equal)"
-    add("--case", choices=CASES, help=case)
-    limits = """rotor speeds in rad/s: for --figure attainable (default: those of ch. 9), and with
-    --mjcf (default: those of the file)"""
-    add("--speed-limits", metavar="MIN,MAX", help=limits)
-    parser.set_defaults(run=run)
+class SelectedGait(NamedTuple):
+    """The gait to analyze, its vehicle, and the gait to compare it with, if any."""
+
+    gait: Gait
+    vehicle: Vehicle
+    title: str = "gait"
+    twin: Gait | None = None
+    twin_title: str = ""
 
 
-def run(arguments: argparse.Namespace) -> int:
-    """Analyze, draw, print."""
-    from tiltsim.commands.multirotor_gait import flies_multirotor, run_multirotor
+def run(
+    scenario: str | None = None,
+    *,
+    list_gaits: Annotated[bool, Option("--list")] = False,
+    json: Json = False,
+    gait: GaitOptions,
+    figure: GaitFigure,
+) -> int:
+    """Analyze the singularities of a gait; a moving gait over one period.
 
-    if arguments.mjcf is not None:
-        return run_multirotor(arguments)
-    from tiltsim.commands.gait_figures import attainable_warnings, draw_gait
-    from tiltsim.commands.gait_selection import select_gait
-    from tiltsim.commands.gait_text import gait_text, list_text
+    Prints rank and singular values of the torque matrix, the residuals R, R_phi and R_theta, the
+    singularity margin and the singular attitudes.
 
-    _check_options(arguments)
-    if arguments.list:
-        _print(arguments, _list_report(), list_text)
+    Args:
+        scenario (SCENARIO): take gait and vehicle from a scenario
+        list_gaits: list the thesis's gaits and their robustness claims
+    """
+    from tiltsim.commands.gait_text import determinant_text, gait_text, list_text
+    from tiltsim.commands.multirotor_gait import run_multirotor
+    from tiltsim.studies.gait_analysis import determinant_report, fault_report, gait_report
+
+    if list_gaits:
+        from tiltsim_controllers.analysis.published_gaits import robustness_table
+
+        if scenario is not None or gait != GaitOptions() or figure != GaitFigure():
+            raise InputError("--list: takes no other option than --json")
+        rows = robustness_table()
+        print(json_text([asdict(row) for row in rows]) if json else list_text(rows))
         return 0
-    if arguments.figure == "determinant":
-        return _run_determinant(arguments)
-    if flies_multirotor(arguments.scenario):
-        return run_multirotor(arguments)
-    selected = select_gait(arguments)
-    roll = None if arguments.roll is None else parse_angle("--roll", arguments.roll)
-    pitch = None if arguments.pitch is None else parse_angle("--pitch", arguments.pitch)
+    if gait.mjcf is not None:
+        return run_multirotor(scenario, None, gait, figure, json=json)
+    _check_options(scenario, gait, figure)
+    if figure.kind == "determinant":
+        vehicle, case = gait.vehicle or parse_vehicle(DEFAULT_VEHICLE), figure.case or "equal"
+        report = determinant_report(case, vehicle)
+        draw = partial(_draw_determinant, case, vehicle)
+        figure.show(draw, report, determinant_text(report), json=json)
+        return 0
+    loaded = None
+    if scenario is not None:
+        from tiltsim.scenario.loading import load_scenario
 
-    from tiltsim.studies.gait_analysis import fault_report, gait_report
-
-    if arguments.plot is not None:
-        kind, limits = arguments.figure, arguments.speed_limits
-        draw = partial(draw_gait, selected, kind, limits, arguments.panels)
-        save_figure(draw, arguments.plot, arguments)
-    report = gait_report(selected.gait, selected.vehicle, roll=roll, pitch=pitch)
-    if arguments.faults:
+        loaded = load_scenario(scenario)
+        if gait.vehicle is not None:
+            raise InputError("--vehicle: the scenario defines its own vehicle; remove one of them")
+        if loaded.vehicle.model == "multirotor":
+            return run_multirotor(scenario, loaded, gait, figure, json=json)
+    selected = _select(gait) if loaded is None else _of_scenario(str(scenario), loaded)
+    report = gait_report(selected.gait, selected.vehicle, roll=gait.roll, pitch=gait.pitch)
+    if gait.faults:
         a1, a2, a3, a4 = selected.gait.angles(0.0).tolist()
         opposite_speed = OPPOSITE_SPEED_RATIO * selected.vehicle.hover_rotor_speed
         report["faults"] = fault_report((a1, a2, a3, a4), selected.vehicle, opposite_speed)
-    if arguments.figure == "attainable":
-        report["warnings"] += attainable_warnings(selected, arguments.speed_limits)
-    _print(arguments, report, gait_text)
-    print_figure_path(arguments)
+    if figure.kind == "attainable":
+        report["warnings"] += _attainable_warnings(selected, figure)
+    figure.show(partial(_draw, selected, figure), report, gait_text(report), json=json)
     return 0
 
 
-def _check_options(arguments: argparse.Namespace) -> None:
+def _check_options(scenario: str | None, gait: GaitOptions, figure: GaitFigure) -> None:
     """Refuse incompatible options, and files that cannot be written."""
-    from tiltsim.errors import InputError
-
-    gaits = [arguments.scenario, arguments.angles, arguments.published, arguments.balance]
-    given = sum(gait is not None for gait in gaits)
-    kind = arguments.figure
-    if arguments.list:
-        others = [*gaits, arguments.vehicle, arguments.roll, arguments.pitch]
-        others += [arguments.plot, kind, arguments.case, arguments.speed_limits]
-        if any(other is not None for other in others):
-            raise InputError("--list: takes no other option than --json")
-    elif kind == "determinant":
-        if given:
+    given = [scenario, gait.angles, gait.published, gait.balance]
+    count = sum(one is not None for one in given)
+    if figure.kind == "determinant":
+        if count:
             raise InputError("--figure determinant: takes --case instead of a gait")
-        if arguments.roll is not None or arguments.pitch is not None:
+        if gait.roll is not None or gait.pitch is not None:
             raise InputError("--figure determinant: is drawn at level attitude")
-    elif given != 1:
+    elif count != 1:
         raise InputError(
             "gait: give one of SCENARIO, --angles A1,A2,A3,A4, --published NAME and "
             "--balance AX,AY,AZ"
         )
-    if kind is not None and arguments.plot is None:
-        raise InputError(f"--figure {kind}: needs --plot FILE")
-    if arguments.case is not None and kind != "determinant":
-        raise InputError(f"--case {arguments.case}: needs --figure determinant")
-    if arguments.speed_limits is not None and kind != "attainable":
+    if figure.speed_limits is not None and figure.kind != "attainable":
         raise InputError("--speed-limits: needs --figure attainable")
-    check_plot(arguments, has_panels=kind in (None, "roll_pitch"))
+    figure.check_kind()
 
 
-def _run_determinant(arguments: argparse.Namespace) -> int:
-    """Draw the restrictions of ch. 3, Sec. 5.1, and print how far from singular they are."""
-    from tiltsim.commands.gait_text import determinant_text
-    from tiltsim.studies.gait_analysis import determinant_report
+def _select(options: GaitOptions) -> SelectedGait:
+    """The gait and the vehicle that the options select. Raises `InputError` if one is unknown."""
+    from tiltsim_controllers.analysis.balance import balanced_gait
+    from tiltsim_controllers.analysis.published_gaits import PUBLISHED_GAITS
+    from tiltsim_controllers.gaits import plans
+
+    vehicle = options.vehicle or parse_vehicle(DEFAULT_VEHICLE)
+    if options.angles is not None:
+        return SelectedGait(plans.fixed(options.read_angles(4)), vehicle)
+    if options.balance is not None:
+        with mistakes_in(f"--balance {options.acceleration}"):
+            fixed = plans.fixed(balanced_gait(options.balance, vehicle))
+        source = f"balances {options.acceleration} m/s^2 at level attitude"
+        return SelectedGait(replace(fixed, source=source), vehicle)
+    if options.published not in PUBLISHED_GAITS:
+        raise InputError(
+            f"--published {options.published}: unknown; choose {', '.join(PUBLISHED_GAITS)}"
+        )
+    published = PUBLISHED_GAITS[options.published]
+    title = f"{published.key}, as printed" if published.printed else published.key
+    twin_title = "" if published.bias is None else f"biased, η = {published.bias:.0%}"
+    return SelectedGait(published.gait, vehicle, title, published.biased, twin_title)
+
+
+def _of_scenario(address: str, scenario: Scenario) -> SelectedGait:
+    """The gait and the vehicle of a scenario, and its gait without bias."""
+    from tiltsim_controllers.vehicle.parameters import Vehicle
+
+    vehicle = scenario.vehicle.resolve()
+    if not isinstance(vehicle, Vehicle):
+        raise InputError(
+            f"{address}: vehicle.model = {scenario.vehicle.model!r}: does not have a gait of four "
+            "tilt angles"
+        )
+    if not scenario.rotorcraft.has_standard_layout:
+        raise InputError(
+            f"{address}: vehicle.mjcf = {scenario.rotorcraft.mjcf!r}: its rotors are not on four "
+            "equal arms at right angles, which the analysis assumes"
+        )
+    gait = replace(scenario.gait.plan(vehicle), source=scenario.source)
+    if scenario.gait.bias == 1.0:
+        return SelectedGait(gait, vehicle, gait.name)
+    unbiased = scenario.gait.model_copy(update={"bias": 1.0}).plan(vehicle)
+    return SelectedGait(gait, vehicle, gait.name, unbiased, "without bias")
+
+
+def _attainable_warnings(selected: SelectedGait, figure: GaitFigure) -> list[str]:
+    """A warning if the attainable figure is empty."""
+    from tiltsim_controllers.analysis.attainable import attainable_torque_thrust
+
+    low, high = _speed_limits(selected, figure)
+    angles = selected.gait.angles(0.0)
+    if not attainable_torque_thrust(angles, selected.vehicle, (low, high)).is_empty:
+        return []
+    return [
+        f"nothing is attainable: no rotor speeds from {low:.2f} to {high:.2f} rad/s hover without "
+        "yaw torque; the figure is empty"
+    ]
+
+
+def _speed_limits(selected: SelectedGait, figure: GaitFigure) -> tuple[float, float]:
+    """Minimum and maximum rotor speed (rad/s) of the attainable figure."""
+    from tiltsim_controllers.analysis.attainable import published_speed_limits
+
+    return figure.speed_limits or published_speed_limits(selected.vehicle)
+
+
+def _draw_determinant(case: str, vehicle: Vehicle) -> Figure:
     from tiltsim.views.figures.determinant import determinant_figure
 
-    vehicle, case = parse_vehicle(arguments.vehicle), arguments.case or "equal"
-    save_figure(partial(determinant_figure, case, vehicle), arguments.plot, arguments)
-    _print(arguments, determinant_report(case, vehicle), determinant_text)
-    print_figure_path(arguments)
-    return 0
+    return determinant_figure(case, vehicle)
 
 
-def _print(arguments: argparse.Namespace, report: Any, text: Callable[[Any], str]) -> None:
-    print(json_text(report) if arguments.json else text(report))
+def _draw(selected: SelectedGait, options: GaitFigure) -> Figure:
+    """The ``--figure`` of a gait, by default its roll-pitch diagram."""
+    from tiltsim.views.figures import attainable, faults, gait
 
-
-def _list_report() -> list[dict[str, Any]]:
-    from dataclasses import asdict
-
-    from tiltsim_controllers.analysis.published_gaits import robustness_table
-
-    return [asdict(row) for row in robustness_table()]
+    chosen, vehicle = selected.gait, selected.vehicle
+    compared = [(selected.title, chosen)]
+    if selected.twin is not None:
+        compared.append((selected.twin_title, selected.twin))
+    match options.kind:
+        case "faults":
+            return faults.fault_figure(vehicle)
+        case "attainable":
+            if not chosen.is_constant:
+                raise InputError(f"--figure attainable: {chosen.name} moves; give fixed angles")
+            limits = _speed_limits(selected, options)
+            return attainable.attainable_figure(chosen, vehicle, limits)
+        case "comparison":
+            if len(compared) == 1:
+                raise InputError(f"--figure comparison: {chosen.name} has no bias to compare with")
+            return gait.comparison_figure(compared, vehicle)
+        case "margin":
+            return gait.margin_figure(compared, vehicle)
+    return gait.gait_figure(chosen, vehicle, tuple(options.panels))

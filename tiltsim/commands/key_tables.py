@@ -4,16 +4,12 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import product
 from math import pi
 from typing import Any, Final, NamedTuple
 
-from tiltsim.scenario.messages import UNIT
-
-TAG_KEYS: Final = ("type", "law", "model")
-"""Keys whose value decides which other keys a table has."""
+from tiltsim.scenario.schema import TAG_KEYS, Node
 
 PLURAL: Final = re.compile(r"^(number|whole number|list|table)")
 
@@ -80,99 +76,70 @@ def key_tables(schema: dict[str, Any]) -> list[KeyTable]:
     """The tables of a schema, each after the one that contains it; the document itself first."""
     tables: dict[str, KeyTable] = {}
 
-    def visit(name: str, place: Place, above: str) -> None:
-        table = schema["$defs"].get(name, schema)
-        toml = above + _toml(table, place, table.get("examples", [{}])[0])
-        if name in tables:
-            known = tables[name]
-            tables[name] = replace(known, places=(*known.places, place))
+    def visit(table: Node, place: Place, above: str) -> None:
+        if table.name in tables:
+            known = tables[table.name]
+            tables[table.name] = replace(known, places=(*known.places, place))
         else:
-            tables[name] = KeyTable(name, (place,), *_contents(table), toml)
-        for key, value in table["properties"].items():
-            if name == "Variant" and key in schema["properties"]:
+            toml = above + _toml(table, place, table.value.get("examples", [{}])[0])
+            tables[table.name] = KeyTable(table.name, (place,), *_contents(table), toml)
+        for key, node in table.properties.items():
+            if table.name == "Variant" and key in schema["properties"]:
                 continue  # a variant may have every key of the document
-            members = list(_references(value))
+            members = node.all_tables
             for member in members:
-                tags = _tags(schema["$defs"][member]) if len(members) > 1 else ()
-                step = Step(key, tags, value.get("type") == "array", "patternProperties" in value)
+                tags = tuple(member.kinds) if len(members) > 1 else ()
+                is_list = node.value.get("type") == "array"
+                step = Step(key, tags, is_list, "patternProperties" in node.value)
                 visit(member, (*place, step), _needed_by(key, table, place))
 
-    visit("", (), "")
+    visit(Node(schema, schema["$defs"]), (), "")
     return list(tables.values())
 
 
-def _contents(table: dict[str, Any]) -> tuple[str, tuple[Key, ...]]:
-    required = table.get("required", ())
-    keys = [_key(name, value, name in required) for name, value in table["properties"].items()]
+def _contents(table: Node) -> tuple[str, tuple[Key, ...]]:
+    required = table.value.get("required", ())
+    keys = [_key(name, node, name in required) for name, node in table.properties.items()]
     keys.sort(key=lambda key: (key.name not in TAG_KEYS, key.default != "required"))
-    return table.get("description", ""), tuple(keys)
+    return table.value.get("description", ""), tuple(keys)
 
 
-def _key(name: str, value: dict[str, Any], required: bool) -> Key:
-    meaning, unit = value.get("description", ""), ""
-    if has_numbers(value) and (match := UNIT.fullmatch(meaning)):
-        meaning, unit = match.groups()
-    default = value.get("default")
+def _key(name: str, node: Node, required: bool) -> Key:
+    meaning, unit = node.meaning_and_unit
+    if not node.has_numbers:
+        meaning, unit = node.value.get("description", ""), ""
+    default = node.value.get("default")
     shown = "" if isinstance(default, dict) else _written(default)
-    example = _written(_example(value))
-    return Key(name, _values(value), unit, "required" if required else shown, example, meaning)
+    return Key(
+        name,
+        _values(node),
+        unit,
+        "required" if required else shown,
+        _written(_example(node)),
+        meaning,
+    )
 
 
-def has_numbers(value: dict[str, Any]) -> bool:
-    """Whether a key takes numbers that may have a unit; whole numbers count or name something."""
-    parts = [*_options(value), *value.get("prefixItems", ())]
-    parts += [value["items"]] if "items" in value else []
-    return value.get("type") == "number" or any(map(has_numbers, parts))
-
-
-def _references(value: dict[str, Any]) -> Iterator[str]:
-    """Names of the tables that a key may have."""
-    if "$ref" in value:
-        yield value["$ref"].rpartition("/")[2]
-    entries = [value["items"]] if "items" in value else []
-    for option in (*_options(value), *entries, *value.get("patternProperties", {}).values()):
-        yield from _references(option)
-
-
-def _options(value: dict[str, Any]) -> list[dict[str, Any]]:
-    return [*value.get("anyOf", ()), *value.get("oneOf", ())]
-
-
-def _tags(table: dict[str, Any]) -> tuple[str, ...]:
-    tags = [_choices(table["properties"][key]) for key in TAG_KEYS if key in table["properties"]]
-    return tuple(tags[0]) if tags else ()
-
-
-def _choices(value: dict[str, Any]) -> list[str]:
-    """The names that a key may have as its value."""
-    if "const" in value:
-        return [value["const"]]
-    choices = list(value.get("enum", ()))
-    return choices + [choice for option in _options(value) for choice in _choices(option)]
-
-
-def _example(value: dict[str, Any]) -> Any:
+def _example(node: Node) -> Any:
     """A value to show: as declared, or another than the default, or the default.
 
     None for tables, whose keys have examples of their own.
     """
-    default, choices = value.get("default"), _choices(value)
-    if "examples" in value:
-        return value["examples"][0]
+    default, choices = node.value.get("default"), node.choices
+    if "examples" in node.value:
+        return node.value["examples"][0]
     if isinstance(default, bool):
         return not default
-    if next(_references(value), None) and not choices:
+    if node.all_tables and not choices:
         return None
     return next((choice for choice in choices if choice != default), default)
 
 
-def _needed_by(key: str, table: dict[str, Any], place: Place) -> str:
-    """What a scenario needs of a table for the one under a key: its kind, or else its example."""
+def _needed_by(key: str, table: Node, place: Place) -> str:
+    """The part of a scenario that a table needs above it: its owner's kind, or else an example."""
     tagged = bool(place) and bool(place[-1].tags)
-    example = {} if tagged else table.get("examples", [{}])[0]
-    example = {name: value for name, value in example.items() if name != key}
-    required = [name for name in table.get("required", ()) if name != key]
-    toml = _toml(table | {"required": required}, place, example)
+    example = {} if tagged else table.value.get("examples", [{}])[0]
+    toml = _toml(table, place, example, without=key)
     return f"{toml}\n" if toml.count("\n") > 1 else ""
 
 
@@ -182,16 +149,15 @@ def head_of(place: Place) -> str:
     return f"[[{name}]]" if place[-1].is_list else f"[{name}]"
 
 
-def _toml(table: dict[str, Any], place: Place, example: dict[str, Any]) -> str:
-    """A table as it is written, with the keys that it requires and those of an example."""
+def _toml(table: Node, place: Place, example: dict[str, Any], without: str = "") -> str:
+    """A table as it is written, with the keys that it requires and the keys of an example."""
     if not place:
         return ""
-    head = head_of(place)
-    shown = {*table.get("required", ()), *example}
-    values = {key: _example(value) for key, value in table["properties"].items()} | example
+    shown = {*table.value.get("required", ()), *example} - {without}
+    values = {key: _example(node) for key, node in table.properties.items()} | example
     lines = [f"{key} = {_written(values[key])}" for key in values if key in shown]
     lines.sort(key=lambda line: not line.startswith(TAG_KEYS))
-    return "\n".join([head, *lines]) + "\n"
+    return "\n".join([head_of(place), *lines]) + "\n"
 
 
 def _written(value: Any) -> str:
@@ -203,23 +169,20 @@ def _written(value: Any) -> str:
     return "" if value is None else json.dumps(value)
 
 
-def _values(value: dict[str, Any]) -> str:
+def _values(node: Node) -> str:
     """Type and allowed values of a key in words."""
-    if "const" in value or "enum" in value:
-        names = [f'"{choice}"' for choice in _choices(value)]
+    names = [f'"{choice}"' for choice in node.choices if node.options == [node]]
+    if names:
         return ", ".join(names if len(names) <= 12 else [*names[:2], "..."])
-    if "$ref" in value:
-        return "table"
-    if options := dict.fromkeys(filter(None, map(_values, _options(value)))):
-        return ", or ".join(options)
-    kind = value.get("type", "any value")
+    if node.options != [node]:
+        return ", or ".join(dict.fromkeys(filter(None, map(_values, node.options))))
+    kind = node.value.get("type", "any value")
     if kind == "array":
-        entries = value.get("prefixItems") or [value["items"]]
-        count = f"{len(entries)} " if "prefixItems" in value else ""
-        return f"list of {count}" + PLURAL.sub(r"\1s", _values(entries[0]), count=1)
+        count = f"{len(node.entries)} " if "prefixItems" in node.value else ""
+        return f"list of {count}" + PLURAL.sub(r"\1s", _values(node.entries[0]), count=1)
     number = {"number": "number", "integer": "whole number"}.get(kind)
     words = {"boolean": "true, false", "string": "text", "null": "", "object": "table"}
-    return number + _bounds(value) if number else words.get(kind, kind)
+    return number + _bounds(node.value) if number else words.get(kind, kind)
 
 
 def _bounds(value: dict[str, Any]) -> str:

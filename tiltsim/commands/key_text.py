@@ -7,7 +7,8 @@ from collections.abc import Iterable, Sequence
 from textwrap import fill, indent
 from typing import Final
 
-from tiltsim.commands.key_tables import Key, KeyTable, Place, head_of
+from tiltsim.commands.key_tables import Key, KeyTable, head_of
+from tiltsim.commands.text import markdown_table
 from tiltsim.errors import InputError
 from tiltsim.scenario.messages import did_you_mean
 
@@ -20,15 +21,18 @@ with which editors complete and check the file. `tiltsim schema --markdown` prin
 
 A key that is left out has its default. Units are SI, angles are in radians; [-] marks numbers
 without a unit. [Concepts](concepts.md) explains words, axes and signs. Numbers beyond a billion,
-and coordinates beyond a million meters, are refused. Chapters (ch.) are those of the thesis.
+and coordinates beyond a million meters, are refused. Chapters (ch.) are chapters of the thesis.
 
 `--set simulation.duration=20` on the command line and `{"simulation.duration": 20}` in Python
 change a key without editing the file; entries of lists are counted from 0:
 `--set 'gait.angles[0]=0.2'`.
 """
 
+NOT_IN_ANCHOR: Final = re.compile(r"[^\w-]")
+"""Characters that the anchor of a heading leaves out."""
+
 FEW: Final = 2
-"""So many tables of one address are printed in full; more are listed."""
+"""Most tables of one address that are printed in full; more are listed."""
 
 
 def page(tables: Sequence[KeyTable]) -> str:
@@ -37,10 +41,10 @@ def page(tables: Sequence[KeyTable]) -> str:
     chapters = {table.places[0][0].name: table.places[0][:1] for table in others}
     meanings = {key.name: _sentence(key.meaning) for key in document.keys}
     overview = [
-        (f"[`{head_of(place)}`](#{_anchor(place)})", meanings[name])
+        (f"[`{head_of(place)}`](#{NOT_IN_ANCHOR.sub('', head_of(place))})", meanings[name])
         for name, place in chapters.items()
     ]
-    parts = [INTRODUCTION, *_grid(("table", "meaning"), overview)]
+    parts = [INTRODUCTION, *markdown_table(("table", "meaning"), overview)]
     parts += ["", "## Keys before all tables", ""]
     parts += _key_grid(key for key in document.keys if key.name not in chapters)
     for name, place in chapters.items():
@@ -78,11 +82,6 @@ def description(tables: Sequence[KeyTable], address: str) -> str:
     return "\n".join(keys)
 
 
-def _anchor(place: Place) -> str:
-    """The anchor that a chapter's heading gets."""
-    return re.sub(r"[^\w-]", "", head_of(place))
-
-
 def _section(table: KeyTable) -> list[str]:
     """Lines of the page about one table."""
     place = table.places[0]
@@ -92,7 +91,7 @@ def _section(table: KeyTable) -> list[str]:
 
 
 def _title(table: KeyTable) -> str:
-    """The heads of a table, with its kinds, and those of the table that contains it."""
+    """The heads of a table, with its kinds and the kinds of the table that contains it."""
     heads = dict.fromkeys(f"`{head_of(place)}`" for place in table.places)
     kinds = [f"`{tag}`" for tag in table.places[0][-1].tags]
     owners = dict.fromkeys(f"`{t}`" for place in table.places for s in place[:-1] for t in s.tags)
@@ -106,7 +105,7 @@ def _narrow(table: KeyTable) -> str:
 
 
 def _key_grid(keys: Iterable[Key]) -> list[str]:
-    return _grid(("key", "value and default", "meaning and example"), map(_row, keys))
+    return markdown_table(("key", "value and default", "meaning and example"), map(_row, keys))
 
 
 def _row(key: Key) -> tuple[str, str, str]:
@@ -115,12 +114,6 @@ def _row(key: Key) -> tuple[str, str, str]:
     default = "<br>required" if required else f"<br>default `{key.default}`" if key.default else ""
     example = f"<br>`{key.name} = {key.example}`" if key.example else ""
     return f"`{key.name}`", key.values + unit + default, key.meaning + example
-
-
-def _grid(header: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
-    """A Markdown table."""
-    cells = [[cell.replace("|", "\\|") for cell in row] for row in rows]
-    return [f"| {' | '.join(row)} |" for row in (header, ["---"] * len(header), *cells)]
 
 
 def _text(table: KeyTable) -> str:

@@ -2,109 +2,98 @@
 
 from __future__ import annotations
 
-import argparse
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from tiltsim.commands.angles import (
-    allow_negative_lists,
-    parse_angle,
+    DEFAULT_VEHICLE,
+    VehicleOption,
     parse_angles,
     parse_vehicle,
     vehicle_text,
 )
-from tiltsim.commands.figure_options import add_plot, check_plot, save_figure
-from tiltsim.commands.options import Subparsers, add_json, add_vehicle
-from tiltsim.commands.text import aligned, json_text, print_figure_path, tally
+from tiltsim.commands.declaring import mistakes_in
+from tiltsim.commands.options import Json, PlotOptions, refuse_both
+from tiltsim.commands.text import aligned, tally
+from tiltsim.errors import InputError
 from tiltsim.exit_codes import DONE, EXPECTATION_FAILED
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from tiltsim_controllers.analysis.two_color_planner import Circle, Polyline
     from tiltsim_controllers.vehicle.parameters import Vehicle
 
 
-def add_parser(subparsers: Subparsers) -> None:
-    """Declare the command."""
-    description = """Print the Two Color Map of a vehicle: delta, P, the exact red and blue lines,
-    the curve L and the grid search of ch. 6. With --leg or --circle, also check a path."""
-    parser = subparsers.add_parser(
-        "map",
-        help="draw the Two Color Map and check a path on it",
-        description=description,
-        epilog="exit codes: 0 done, 1 both theorems reject the path, or it is singular although "
-        "they accept it, as every blue path is, 2 invalid input",
-    )
-    allow_negative_lists(parser)
-    add_vehicle(parser)
-    leg = "COLOR A1,A2 A1,A2 ...: part of a closed path, vertices in rad or P; repeatable"
-    parser.add_argument("--leg", action="append", nargs="+", metavar="WORD", help=leg)
-    circle = "a circular path: centre and radius in rad"
-    parser.add_argument("--circle", nargs=3, metavar=("COLOR", "A1,A2", "RADIUS"), help=circle)
-    add_json(parser)
-    add_plot(parser, "the map")
-    parser.set_defaults(run=run)
+def run(
+    *,
+    vehicle: VehicleOption = None,
+    leg: tuple[tuple[str, ...], ...] = (),
+    circle: tuple[str, str, str] | None = None,
+    json: Json = False,
+    figure: PlotOptions,
+) -> int:
+    """Print the Two Color Map of a vehicle, and check a path with --leg or --circle.
 
+    The map has delta, P, the exact red and blue lines, the curve L and the grid search of ch. 6.
 
-def run(arguments: argparse.Namespace) -> int:
-    """Compute, draw, print."""
-    from tiltsim.errors import InputError
+    Note:
+        exit codes: 0 done, 1 both theorems reject the path, or it is singular although they accept
+        it, as every blue path is, 2 invalid input
+
+    Args:
+        leg (WORD): COLOR A1,A2 A1,A2 ...: part of a closed path, vertices in rad or P; repeatable
+        circle (COLOR A1,A2 RADIUS): a circular path: center and radius in rad
+    """
     from tiltsim.studies.gait_analysis import map_report
 
-    check_plot(arguments)
-    vehicle = parse_vehicle(arguments.vehicle)
-    path = _path(arguments, vehicle)
-    try:
-        report = map_report(vehicle, path)
-    except ValueError as error:
-        place = "path" if path is not None else f"--vehicle {arguments.vehicle}"
-        raise InputError(f"{place}: {error}") from None
-    if arguments.plot is not None:
+    figure.check()
+    refuse_both(leg=leg, circle=circle)
+    parameters = vehicle or parse_vehicle(DEFAULT_VEHICLE)
+    path = _path(leg, circle, parameters)
+    with mistakes_in("path" if path else f"--vehicle {vehicle_text(parameters._asdict())}"):
+        report = map_report(parameters, path)
+
+    def draw() -> Figure:
         from tiltsim.views.figures.two_color_map import map_figure
 
-        draw = partial(map_figure, vehicle, [("path", path)] if path else None)
-        save_figure(draw, arguments.plot, arguments)
-    print(json_text(report) if arguments.json else _summary(report))
-    print_figure_path(arguments)
+        return map_figure(parameters, [("path", path)] if path else None)
+
+    figure.show(draw, report, _summary(report), json=json)
     return DONE if path is None or report["path"]["sound"] else EXPECTATION_FAILED
 
 
-def _path(arguments: argparse.Namespace, vehicle: Vehicle) -> Polyline | Circle | None:
-    from tiltsim.errors import InputError
+def _path(
+    legs: tuple[tuple[str, ...], ...], circle: tuple[str, str, str] | None, vehicle: Vehicle
+) -> Polyline | Circle | None:
+    from tiltsim_controllers.analysis.two_color_map import point_p
     from tiltsim_controllers.analysis.two_color_planner import Circle, Leg, Polyline
+    from tiltsim_controllers.gaits.colors import COLORS
 
-    if arguments.leg and arguments.circle:
-        raise InputError("map: give either --leg or --circle")
-    if arguments.circle:
-        color, centre, radius = arguments.circle
-        size = parse_angle("--circle radius", radius)
-        first, second = parse_angles("--circle centre", centre, 2)
-        return Circle(_color("--circle", color), (first, second), size)
-    if not arguments.leg:
+    def color(option: str, name: str) -> str:
+        if name not in COLORS:
+            raise InputError(f"{option} {name}: unknown color; choose {', '.join(COLORS)}")
+        return name
+
+    def read(option: str, text: str, count: int) -> Any:
+        with mistakes_in(f"{option} {text}"):
+            return parse_angles(text, count)
+
+    if circle is not None:
+        name, center, size = circle
+        (radius,) = read("--circle radius", size, 1)
+        return Circle(color("--circle", name), read("--circle center", center, 2), radius)
+    if not legs:
         return None
+    at_p = point_p(vehicle)
     return Polyline(
         tuple(
-            Leg(_color("--leg", color), tuple(_vertex(text, vehicle) for text in vertices))
-            for color, *vertices in arguments.leg
+            Leg(
+                color("--leg", name),
+                tuple(at_p if text == "P" else read("--leg", text, 2) for text in vertices),
+            )
+            for name, *vertices in legs
         )
     )
-
-
-def _vertex(text: str, vehicle: Vehicle) -> tuple[float, float]:
-    from tiltsim_controllers.analysis.two_color_map import point_p
-
-    if text == "P":
-        return point_p(vehicle)
-    first, second = parse_angles("--leg", text, 2)
-    return first, second
-
-
-def _color(option: str, name: str) -> str:
-    from tiltsim.errors import InputError
-    from tiltsim_controllers.gaits.two_color import COLORS
-
-    if name not in COLORS:
-        raise InputError(f"{option} {name}: unknown color; choose {', '.join(COLORS)}")
-    return name
 
 
 def _summary(report: dict[str, Any]) -> str:
@@ -127,10 +116,9 @@ def _summary(report: dict[str, Any]) -> str:
         ),
         ("their classes", tally(report["roots"]["classes"])),
     ]
-    lines = aligned(rows)
-    lines += [f"warning: {text}" for text in report["warnings"]]
-    if "path" in report:
-        path = report["path"]
+    lines = [*aligned(rows), *(f"warning: {text}" for text in report["warnings"])]
+    path = report.get("path")
+    if path is not None:
         if path["accepted"]:
             lines.append(f"path: accepted by the {path['theorem']} theorem")
         lines += [f"path: rejected: {reason}" for reason in path["reasons"]]

@@ -27,31 +27,29 @@ class Progress:
     """The stages of a command, one after the other; this class shows nothing."""
 
     interval = TICK
-
-    def __init__(self) -> None:
-        self._stage = ""
+    _stage = ""
+    _total = _done = _initial = _start = 0.0
 
     def begin(self, stage: str, total: float = 0, done: float = 0) -> None:
         """Begin a stage.
 
         Args:
-            stage: Its name; if it counts, what it counts, as in ``flights``.
+            stage: Its name; if it counts, the things counted, as in ``flights``.
             total: How many there are, or seconds if it is a float; 0 if that is not known.
             done: How many an earlier run has finished, which the rate leaves out.
         """
-        self._stage = stage
+        self._stage, self._total, self._done, self._initial = stage, total, done, done
+        self._start = monotonic()
 
     def move(self, done: float) -> None:
-        """Tell how much of the stage is done."""
-
-    def expect(self, total: float) -> None:
-        """Tell how many there will be, where that becomes known during the stage."""
+        """Report how much of the stage is done."""
+        self._done = done
 
     def tell(self, stage: str, done: int, total: int) -> None:
         """Report how much of a stage is done; the first report begins the stage."""
         if stage != self._stage:
             self.begin(stage, total, done)
-        self.expect(total)
+        self._total = total
         self.move(done)
 
     def print(self, line: str, *, error: bool = False) -> None:
@@ -62,29 +60,39 @@ class Progress:
         """Called every ``interval``, from another thread."""
 
     def end(self) -> None:
-        """Remove what is shown."""
+        """Remove the display."""
 
 
 class _Bars(Progress):
-    """A bar per stage."""
+    """A bar per stage, as wide as the terminal, or 80 columns if that reports no size."""
 
-    def __init__(self) -> None:
-        super().__init__()
-        self._bar: tqdm | None = None
+    _bar: tqdm | None = None
 
     def begin(self, stage: str, total: float = 0, done: float = 0) -> None:
-        super().begin(stage)
+        from tqdm import tqdm
+
+        super().begin(stage, total, done)
         self.end()
         if isinstance(total, float):
             values = "{n:.1f}/{total:g} s [{elapsed}<{remaining}]"
         else:
             values = "{n}/{total} [{elapsed}<{remaining}, {rate_noinv_fmt}]"
         shown = ": {percentage:3.0f}%|{bar}| " + values if total else " [{elapsed}]"
-        self._bar = _bar(total, stage + shown, done)
+        try:
+            columns, lines = os.get_terminal_size(sys.stderr.fileno())
+        except OSError:
+            columns, lines = 0, 0
+        # On a terminal of unknown size tqdm's default is to show no bar at all.
+        size = {"ncols": columns or 80, "nrows": lines or 24}
+        self._bar = tqdm(
+            total=total, initial=done, unit="", leave=False, bar_format=stage + shown, **size
+        )
 
     def move(self, done: float) -> None:
+        super().move(done)
         if self._bar is not None:
-            if not self._bar.total:
+            self._bar.total = self._total
+            if not self._total:
                 self._bar.bar_format = self._stage + ": {n} [{elapsed}]"
             self._bar.update(done - self._bar.n)
 
@@ -92,10 +100,6 @@ class _Bars(Progress):
         from tqdm import tqdm
 
         tqdm.write(printable(line), file=sys.stderr if error else sys.stdout)
-
-    def expect(self, total: float) -> None:
-        if self._bar is not None:
-            self._bar.total = total
 
     def tick(self) -> None:
         if self._bar is not None:
@@ -112,30 +116,20 @@ class _Lines(Progress):
     interval = LINE_INTERVAL
 
     def __init__(self) -> None:
-        super().__init__()
         self.begin("starting")
 
-    def begin(self, stage: str, total: float = 0, done: float = 0) -> None:
-        super().begin(stage)
-        self._total, self._done, self._initial = total, done, done
-        self._start = monotonic()
-
-    def move(self, done: float) -> None:
-        self._done = done
-
-    def expect(self, total: float) -> None:
-        self._total = total
-
     def tick(self) -> None:
-        now, done, total = monotonic(), self._done, self._total
+        elapsed, done, total = monotonic() - self._start, self._done, self._total
         line = f"tiltsim: {self._stage}"
         if total:
-            line += f": {done:.0f} of {_total(total)}"
+            line += f": {done:.0f} of " + (
+                f"{total:g} s" if isinstance(total, float) else str(total)
+            )
         elif done:
             line += f": {done:.0f}"
-        line += f", {_clock(now - self._start)}"
+        line += f", {_clock(elapsed)}"
         if self._initial < done < total:
-            left = (now - self._start) * (total - done) / (done - self._initial)
+            left = elapsed * (total - done) / (done - self._initial)
             line += f", about {_clock(left)} left"
         print_line(line, error=True)
 
@@ -163,31 +157,6 @@ def show_progress(*, shown: bool) -> Iterator[Progress]:
         progress.end()
 
 
-def _total(total: float) -> str:
-    """Seconds in a few digits, a count in all of its own."""
-    return f"{total:g} s" if isinstance(total, float) else str(total)
-
-
 def _clock(seconds: float) -> str:
     minutes, rest = divmod(round(seconds), 60)
     return f"{minutes}:{rest:02d}"
-
-
-def _bar(total: float, layout: str, initial: float) -> tqdm:
-    """A bar as wide as the terminal, or 80 columns if that reports no size."""
-    from tqdm import tqdm
-
-    try:
-        size = os.get_terminal_size(sys.stderr.fileno())
-    except OSError:
-        size = os.terminal_size((0, 0))
-    # On a terminal of unknown size tqdm's default is to show no bar at all.
-    return tqdm(
-        total=total,
-        initial=initial,
-        unit="",
-        leave=False,
-        bar_format=layout,
-        ncols=size.columns or 80,
-        nrows=size.lines or 24,
-    )

@@ -2,65 +2,75 @@
 
 from __future__ import annotations
 
-import argparse
+import os
 from pathlib import Path
 
-from tiltsim.commands.options import Subparsers, add_jobs, add_quiet
+from tiltsim.commands.options import CORES, Jobs, Quiet, Trust
 from tiltsim.commands.progress import show_progress
 from tiltsim.commands.text import print_line, tally
 from tiltsim.exit_codes import DONE, EXPECTATION_FAILED
 
 
-def add_parser(subparsers: Subparsers) -> None:
-    """Declare the command."""
-    description = """Fly scenarios on both plants, check every published claim, and write one
-    self-contained HTML page. Flights are cached: a second report takes seconds, and an interrupted
-    one continues."""
-    parser = subparsers.add_parser(
-        "report",
-        help="compare the whole library with the published claims on one HTML page",
-        description=description,
-        epilog="exit codes: 0 done, 1 an expectation of a scenario failed, 2 invalid input",
-    )
-    add = parser.add_argument
-    paths = "files, folders or library names; default: the library and all claims"
-    add("paths", nargs="*", metavar="PATH", help=paths)
-    out = "folder for report.html and the cached flights (default: report)"
-    add("--out", type=Path, default=Path("report"), metavar="DIR", help=out)
-    add("--markdown", type=Path, metavar="FILE", help="also write a summary")
-    add_jobs(parser)
-    add_quiet(parser, "print only what failed")
-    parser.set_defaults(run=run)
+def run(
+    paths: tuple[str, ...] = (),
+    *,
+    out: Path = Path("report"),
+    markdown: Path | None = None,
+    errors: Path | None = None,
+    jobs: Jobs = CORES,
+    trust: Trust = False,
+    quiet: Quiet = False,
+) -> int:
+    """Fly scenarios on both plants, check every published claim, and write one HTML page.
 
+    The page is self-contained. Flights are cached: a second report takes seconds, and an
+    interrupted one continues.
 
-def run(arguments: argparse.Namespace) -> int:
-    """Fly, evaluate, write."""
-    with show_progress(shown=not arguments.quiet) as progress:
+    Note:
+        exit codes: 0 done, 1 an expectation of a scenario failed, 2 invalid input
+
+    Args:
+        paths (PATH): files, folders or library names; default: the library and all claims
+        out (DIR): folder for report.html, rows.csv, rows.json and the cached flights (default:
+            report)
+        markdown (FILE): also write a summary
+        errors (FILE): also write the list of errors, as Markdown
+        quiet: print only what failed
+    """
+    with show_progress(shown=not quiet) as progress:
         from tiltsim.report.claim_rows import count
         from tiltsim.report.content import failure_text
-        from tiltsim.report.html_page import page
         from tiltsim.report.made import Made
         from tiltsim.report.making import make_report
-        from tiltsim.report.markdown import markdown
+        from tiltsim.report.pages import errors_page, page
+        from tiltsim.report.pages import markdown as markdown_of
         from tiltsim.report.store import store
+        from tiltsim.report.table import rows_csv, rows_json
+        from tiltsim.scenario.trust import VARIABLE
         from tiltsim.system.files import prepare_file, prepare_folder
 
-        out: Path = arguments.out
+        if trust:
+            os.environ[VARIABLE] = "1"  # its processes load the scenarios again
         target = out / "report.html"
         prepare_folder(out)
         prepare_file("--out", target)
-        if arguments.markdown is not None:
-            prepare_file("--markdown", arguments.markdown)
-        report = make_report(arguments.paths, out / "kept", arguments.jobs, progress.tell)
+        for option, file in (("--markdown", markdown), ("--errors", errors)):
+            if file is not None:
+                prepare_file(option, file)
+        report = make_report([*paths], out / "kept", jobs, progress.tell)
         progress.begin("writing the page")
         store(target, page(report, Made.now()).encode())
-        if arguments.markdown is not None:
-            store(arguments.markdown, markdown(report).encode())
-    counts = sorted(count(report.rows).items(), key=lambda item: item[0].rank)
-    if not arguments.quiet:
+        store(out / "rows.csv", rows_csv(report).encode())
+        store(out / "rows.json", rows_json(report).encode())
+        if markdown is not None:
+            store(markdown, markdown_of(report).encode())
+        if errors is not None:
+            store(errors, errors_page(report).encode())
+    if not quiet:
+        counts = sorted(count(report.rows).items(), key=lambda item: item[0].rank)
         print(f"{len(report.rows)} rows: {tally({kind.value: number for kind, number in counts})}")
     for failure in report.failures:
         print_line(f"FAILED  {failure_text(failure)}")
-    if not arguments.quiet:
+    if not quiet:
         print_line(f"report written to {target}")
     return EXPECTATION_FAILED if report.failures else DONE

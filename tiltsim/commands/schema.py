@@ -2,40 +2,29 @@
 
 from __future__ import annotations
 
-import argparse
 import json
 from typing import Any, Final
-
-from tiltsim.commands.options import Subparsers
 
 DIALECT: Final = "https://json-schema.org/draft/2020-12/schema"
 
 
-def add_parser(subparsers: Subparsers) -> None:
-    """Declare the command."""
-    parser = subparsers.add_parser(
-        "schema",
-        help="print the keys of the scenario file, or its JSON Schema",
-        description="Print the JSON Schema of the scenario file, with which editors complete TOML; "
-        "or the keys of one of its tables, for people.",
-    )
-    add = parser.add_argument
-    address = "a table or key such as gait, gait.walk or simulation.duration, to read"
-    add("address", nargs="?", metavar="TABLE", help=address)
-    add("--sweep", action="store_true", help="of the sweep file instead")
-    add("--markdown", action="store_true", help="all keys as a page; docs/scenario.md")
-    parser.set_defaults(run=run)
+def run(address: str | None = None, *, sweep: bool = False, markdown: bool = False) -> int:
+    """Print the JSON Schema of the scenario file, with which editors complete TOML.
 
+    With a table or key, print its keys for people.
 
-def run(arguments: argparse.Namespace) -> int:
-    """Print the schema, or what it says about a table."""
+    Args:
+        address (TABLE): a table or key such as gait, gait.walk or simulation.duration, to read
+        sweep: print the keys of the sweep file instead
+        markdown: print all keys as a page, docs/scenario.md
+    """
     from tiltsim.commands.key_tables import key_tables
     from tiltsim.commands.key_text import description, page
 
-    schema = sweep_schema() if arguments.sweep else scenario_schema()
-    if arguments.address is not None:
-        print(description(key_tables(schema), arguments.address))
-    elif arguments.markdown:
+    schema = sweep_schema() if sweep else scenario_schema()
+    if address is not None:
+        print(description(key_tables(schema), address))
+    elif markdown:
         print(page(key_tables(schema)), end="")
     else:
         print(json.dumps(schema, indent=2))

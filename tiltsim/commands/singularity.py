@@ -2,50 +2,46 @@
 
 from __future__ import annotations
 
-import argparse
-import json
-from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
-from tiltsim.commands.angles import allow_negative_lists, parse_angle, parse_vehicle
-from tiltsim.commands.figure_options import add_plot, check_plot, save_figure
-from tiltsim.commands.options import Subparsers, add_json
-from tiltsim.commands.text import aligned, print_figure_path
+from tiltsim.commands.angles import Pitch, Roll, VehicleOption, parse_vehicle
+from tiltsim.commands.options import Json, PlotOptions
+from tiltsim.commands.text import aligned
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from tiltsim_controllers.vehicle.parameters import Vehicle
 
 
-def add_parser(subparsers: Subparsers) -> None:
-    """Declare the command."""
-    description = """Compare ch. 2's determinant surface S(theta, phi) of yaw-position control and
-    its singular curve with the exact determinant, which is not zero in hover up to 90 degrees."""
-    summary = "compare the quadrotor's published and exact determinants"
-    parser = subparsers.add_parser("singularity", help=summary, description=description)
-    allow_negative_lists(parser)
-    parser.add_argument("vehicle_model", metavar="quadrotor", choices=("quadrotor",))
-    parser.add_argument("--vehicle", metavar="PRESET", help="default: ar_drone_2_unrounded")
-    parser.add_argument(
-        "--roll", metavar="RAD", default="0", help="attitude to evaluate (default 0)"
-    )
-    parser.add_argument("--pitch", metavar="RAD", default="0")
-    add_json(parser)
-    add_plot(parser, "surfaces, curve and zone")
-    parser.set_defaults(run=run)
+def run(
+    vehicle_model: Literal["quadrotor"],
+    *,
+    vehicle: VehicleOption = None,
+    roll: Roll = None,
+    pitch: Pitch = None,
+    json: Json = False,
+    figure: PlotOptions,
+) -> int:
+    """Compare ch. 2's determinant of yaw-position control with the exact one.
 
+    Ch. 2 has a surface S(theta, phi) and a singular curve. The exact determinant is not zero in
+    hover up to 90 degrees.
 
-def run(arguments: argparse.Namespace) -> int:
-    """Compute, draw, print."""
-    vehicle = parse_vehicle(arguments.vehicle or "ar_drone_2_unrounded")
-    attitude = (parse_angle("--roll", arguments.roll), parse_angle("--pitch", arguments.pitch))
-    check_plot(arguments)
-    report = _report(vehicle, *attitude)
-    if arguments.plot is not None:
+    Args:
+        vehicle_model (quadrotor): the only vehicle of ch. 2
+        vehicle (PRESET): default: ar_drone_2_unrounded
+    """
+    parameters = vehicle or parse_vehicle("ar_drone_2_unrounded")
+    figure.check()
+    report = _report(parameters, roll or 0.0, pitch or 0.0)
+
+    def draw() -> Figure:
         from tiltsim.views.figures.quadrotor_singularity import singularity_figure
 
-        save_figure(partial(singularity_figure, vehicle), arguments.plot, arguments)
-    print(json.dumps(report, indent=2) if arguments.json else _summary(report))
-    print_figure_path(arguments)
+        return singularity_figure(parameters)
+
+    figure.show(draw, report, _summary(report), json=json)
     return 0
 
 

@@ -2,72 +2,93 @@
 
 from __future__ import annotations
 
-import argparse
 import itertools
-from functools import partial
 from math import degrees, isfinite
 from typing import TYPE_CHECKING, Any, Final
 
-from tiltsim.commands.analysis import add_analysis, print_analysis, requested_scenarios
-from tiltsim.commands.options import Subparsers
+from tiltsim.commands.options import Json, Overrides, PlotOptions, Quiet, Trust, load_scenarios
 from tiltsim.commands.progress import show_progress
-from tiltsim.commands.text import aligned, number, table
+from tiltsim.commands.text import Columns, aligned, number, table
 from tiltsim.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Sequence
 
     from matplotlib.figure import Figure
 
     from tiltsim.linear.linearization import Linearization
-    from tiltsim.linear.margins import Margin
     from tiltsim.linear.stability import Stability
     from tiltsim.linear.sweeping import Point
     from tiltsim.scenario.scenario import Scenario
 
-
 SHORT_KEYS: Final = {"period": "gait.period", "amplitude": "gait.amplitude"}
 POINTS: Final = 16
-FLIGHTS: Final = "flights over a period or sample"
 MOST_POINTS: Final = 1000
 
+MARGINS: Final[Columns] = {
+    "broken at": (lambda margin: margin.place, ""),
+    "gain": (lambda m: f"{number(m.gain[0], '.3g')} to {number(m.gain[1], '.4g')}", ""),
+    "phase (deg)": (lambda margin: degrees(margin.phase), ".1f"),
+    "at (rad/s)": (lambda margin: margin.frequency, ".4g"),
+    "delay (s)": (lambda margin: margin.delay, ".4g"),
+    "disk": (lambda margin: margin.disk, ".3f"),
+    "any gain, phase": (
+        lambda m: f"x {number(m.disk_gain, '.3g')}, {number(degrees(m.disk_phase), '.1f')} deg",
+        "",
+    ),
+}
 
-def add_parser(subparsers: Subparsers) -> None:
-    """Declare the command."""
-    description = """Print the poles of a scenario's rest point, or the Floquet multipliers of its
-    periodic orbit, with the states that take part in each mode: controller, gait, servos, rotors,
-    sampling and latency included, on the plant of the scenario."""
-    summary = "poles of a rest point or multipliers of a periodic flight"
-    parser = subparsers.add_parser("stability", help=summary, description=description)
-    add_analysis(parser, "the poles or multipliers, or the sweep", "gait.period=1.5")
-    add = parser.add_argument
-    add("more", nargs="*", metavar="SCENARIO", help="further ones, with --sweep")
-    sweep = """how the largest multiplier moves with a number: period, amplitude or any key;
-    default: from half to twice its value at 16 points, spaced evenly by ratio"""
-    add("--sweep", metavar="KEY[=FROM:TO[:POINTS]]", help=sweep)
-    margins = "at rest: gain, phase, delay and disk margins of the loop broken at one place"
-    add("--margins", action="store_true", help=margins)
-    parser.set_defaults(run=run)
+MODES: Final[Columns] = {
+    "mode": (lambda mode: mode.name, ""),
+    "frequency (rad/s)": (lambda mode: mode.frequency, ".5g"),
+    "damping": (lambda mode: mode.damping, ".4f"),
+    "count": (lambda mode: mode.count, "d"),
+    "states": (lambda mode: ", ".join([*mode.states[:6], *["..."] * (len(mode.states) > 6)]), ""),
+}
 
 
-def run(arguments: argparse.Namespace) -> int:
-    """Analyze, draw, print."""
-    scenarios = requested_scenarios(arguments, *arguments.more)
-    if arguments.sweep is not None:
-        if arguments.margins:
-            raise InputError("--margins: of one rest point, not with --sweep")
-        return _run_sweep(arguments, scenarios)
-    if len(scenarios) > 1:
+def run(
+    scenario: str,
+    more: tuple[str, ...] = (),
+    *,
+    sweep: str | None = None,
+    margins: bool = False,
+    overrides: Overrides = (),
+    json: Json = False,
+    quiet: Quiet = False,
+    trust: Trust = False,
+    figure: PlotOptions,
+) -> int:
+    """Print the poles of a scenario's rest point, or the Floquet multipliers of its periodic orbit.
+
+    Each mode is listed with the states that take part in it: controller, gait, servos, rotors,
+    sampling and latency included, on the plant of the scenario.
+
+    Args:
+        scenario (SCENARIO): a TOML file or a library name
+        more (SCENARIO): further ones, with --sweep
+        sweep (KEY[=FROM:TO[:POINTS]]): how the largest multiplier moves with a number: period,
+            amplitude or any key; default: from half to twice its value at 16 points, spaced evenly
+            by ratio
+        margins: at rest: gain, phase, delay and disk margins of the loop broken at one place
+    """
+    figure.check()
+    scenarios = load_scenarios([scenario, *more], overrides, trust)
+    if sweep is not None and margins:
+        raise InputError("--margins: not with --sweep, which has many points")
+    if sweep is not None:
+        return _run_sweep(sweep, scenarios, figure, quiet=quiet, json=json)
+    if more:
         raise InputError(f"stability: {len(scenarios)} scenarios need --sweep KEY")
 
     from tiltsim.linear.stability import stability
 
-    with show_progress(shown=not arguments.quiet) as progress:
-        progress.begin(FLIGHTS)
+    with show_progress(shown=not quiet) as progress:
+        progress.begin("flights over a period or sample")
         found = stability(scenarios[0], progress=progress.move)
     report, text = found.report(), stability_text(found)
-    draw = partial(_draw, found)
-    if arguments.margins:
+    system: Linearization | None = None
+    if margins:
         from tiltsim.linear.margins import loop_for_margins, margins_of
 
         if found.multipliers is not None:
@@ -75,56 +96,17 @@ def run(arguments: argparse.Namespace) -> int:
                 f"--margins: {scenarios[0].address} is periodic; margins need a rest point"
             )
         system = loop_for_margins(scenarios[0])
-        margins = margins_of(system)
-        report["margins"] = [margin.report() for margin in margins]
-        text = f"{text}\n\n{margins_text(margins)}"
-        draw = partial(_draw_loop, system)
-    print_analysis(arguments, report, text, draw)
+        measured = margins_of(system)
+        report["margins"] = [margin.report() for margin in measured]
+        text = f"{text}\n\n{table(MARGINS, measured)}"
+
+    def draw() -> Figure:
+        from tiltsim.views.figures.stability import loop_figure, stability_figure
+
+        return stability_figure(found) if system is None else loop_figure(system)
+
+    figure.show(draw, report, text, json=json)
     return 0
-
-
-def _draw(found: Stability) -> Figure:
-    from tiltsim.views.figures.stability import stability_figure
-
-    return stability_figure(found)
-
-
-def _draw_loop(system: Linearization) -> Figure:
-    from tiltsim.views.figures.stability import loop_figure
-
-    return loop_figure(system)
-
-
-def _draw_sweep(key: str, sweeps: Mapping[str, Sequence[Point]]) -> Figure:
-    from tiltsim.views.figures.stability import sweep_figure
-
-    return sweep_figure(key, sweeps)
-
-
-def margins_text(margins: Sequence[Margin]) -> str:
-    """Margins as a table."""
-    header = [
-        "broken at",
-        "gain",
-        "phase (deg)",
-        "at (rad/s)",
-        "delay (s)",
-        "disk",
-        "any gain, phase",
-    ]
-    rows = [
-        (
-            margin.place,
-            f"{number(margin.gain[0], '.3g')} to {number(margin.gain[1], '.4g')}",
-            number(degrees(margin.phase), ".1f"),
-            number(margin.frequency, ".4g"),
-            number(margin.delay, ".4g"),
-            number(margin.disk, ".3f"),
-            f"x {number(margin.disk_gain, '.3g')}, {number(degrees(margin.disk_phase), '.1f')} deg",
-        )
-        for margin in margins
-    ]
-    return table(header, rows, frozenset({2, 3, 4, 5}))
 
 
 def parse_sweep(text: str, scenarios: Sequence[Scenario]) -> tuple[str, list[float]]:
@@ -158,15 +140,17 @@ def parse_sweep(text: str, scenarios: Sequence[Scenario]) -> tuple[str, list[flo
     return key, [first + (last - first) * share for share in shares]
 
 
-def _run_sweep(arguments: argparse.Namespace, scenarios: Sequence[Scenario]) -> int:
+def _run_sweep(
+    text: str, scenarios: Sequence[Scenario], figure: PlotOptions, *, quiet: bool, json: bool
+) -> int:
     """Sweep, draw, print."""
     from tiltsim.linear.sweeping import crossings, sweep_stability
 
-    key, values = parse_sweep(arguments.sweep, scenarios)
+    key, values = parse_sweep(text, scenarios)
     sweeps: dict[str, list[Point]] = {}
-    with show_progress(shown=not arguments.quiet) as progress:
-        found, total = itertools.count(1), len(scenarios) * len(values)
-        progress.begin("points", total)
+    with show_progress(shown=not quiet) as progress:
+        found = itertools.count(1)
+        progress.begin("points", len(scenarios) * len(values))
         for one in scenarios:
             sweeps[one.address] = sweep_stability(
                 one, key, values, lambda _point: progress.move(next(found))
@@ -180,32 +164,38 @@ def _run_sweep(arguments: argparse.Namespace, scenarios: Sequence[Scenario]) -> 
         }
         for address, points in sweeps.items()
     ]
-    text = "\n\n".join(_sweep_text(key, *item) for item in sweeps.items())
-    print_analysis(arguments, report, text, partial(_draw_sweep, key, sweeps))
+
+    def draw() -> Figure:
+        from tiltsim.views.figures.stability import sweep_figure
+
+        return sweep_figure(key, sweeps)
+
+    lines = "\n\n".join(_sweep_text(key, *item) for item in sweeps.items())
+    figure.show(draw, report, lines, json=json)
     return 0
 
 
 def _sweep_text(key: str, address: str, points: Sequence[Point]) -> str:
     from tiltsim.linear.sweeping import crossings
 
-    rows = [
-        (
-            number(point.value, ".4g"),
-            "-" if point.largest is None else number(point.largest, ".4f"),
-            {True: "stable", False: "unstable", None: point.reason}[
-                None if point.found is None else point.found.stable
-            ],
-        )
-        for point in points
-    ]
+    rests = any(point.found is not None and point.found.period is None for point in points)
+    columns: Columns = {
+        key: (lambda point: point.value, ".4g"),
+        "left after 1 s" if rests else "largest multiplier": (lambda point: point.largest, ".4f"),
+        "verdict": (_verdict, ""),
+    }
     lines = [
         f"{key} = {number(crossing.value, '.4g')}: stability is "
         f"{'lost' if crossing.leaves else 'gained'} {crossing.how}"
         for crossing in crossings(points)
     ]
-    rests = any(point.found is not None and point.found.period is None for point in points)
-    header = (key, "left after 1 s" if rests else "largest multiplier", "verdict")
-    return "\n".join([address, table(header, rows, frozenset({0, 1})), *lines])
+    return "\n".join([address, table(columns, points), *lines])
+
+
+def _verdict(point: Point) -> str:
+    if point.found is None:
+        return point.reason
+    return "stable" if point.found.stable else "unstable"
 
 
 def stability_text(found: Stability) -> str:
@@ -226,15 +216,4 @@ def stability_text(found: Stability) -> str:
     if found.corners:
         text = "the rates have a corner there, a limit or dead zone, so poles say little"
         rows.append(("corners", f"{', '.join(found.corners)}: {text}"))
-    header = ["mode", "frequency (rad/s)", "damping", "count", "states"]
-    modes = [
-        (
-            mode.name,
-            number(mode.frequency, ".5g"),
-            number(mode.damping, ".4f"),
-            str(mode.count),
-            ", ".join(mode.states[:6]) + (", ..." if len(mode.states) > 6 else ""),
-        )
-        for mode in found.modes
-    ]
-    return "\n".join([*aligned(rows), "", table(header, modes, frozenset({1, 2, 3}))])
+    return "\n".join([*aligned(rows), "", table(MODES, found.modes)])

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import argparse
 import json
 import shlex
 import shutil
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from textwrap import fill
 from typing import Any, Final
@@ -16,7 +15,7 @@ from tiltsim.errors import InputError
 from tiltsim.system.text import alike, printable, shortened
 
 LONGEST_REASON: Final = 300
-"""Characters of a reason; messages that list what is allowed can be long."""
+"""Characters of a reason; messages that list the allowed values can be long."""
 
 
 def number(value: float, form: str = ".6g") -> str:
@@ -41,9 +40,9 @@ def tally(counts: Mapping[str, int]) -> str:
 
 
 def most_frequent(reasons: Sequence[str]) -> str:
-    """Of some reasons the most frequent one, in a line that says how many have it.
+    """The most frequent reason, in a line that says how many rows have it.
 
-    Those that differ in nothing but numbers count as one, and the first of them is shown.
+    Reasons that differ only in numbers count as one, and the first of them is shown.
     """
     kinds = alike(reasons)
     reason = max(kinds, key=lambda first: len(kinds[first]))
@@ -63,15 +62,14 @@ def print_line(text: str, *, error: bool = False) -> None:
     print(printable(text), file=sys.stderr if error else sys.stdout, flush=True)
 
 
+def warn(text: str) -> None:
+    """Print a warning on standard error."""
+    print_line(f"tiltsim: warning: {text}", error=True)
+
+
 def viewing(path: Path) -> str:
     """A flight's folder or a recording, and the command that shows it."""
     return f"{path}; see it with tiltsim view {shlex.quote(str(path))}"
-
-
-def print_figure_path(arguments: argparse.Namespace) -> None:
-    """Print the path of the ``--plot`` figure, unless the output is JSON."""
-    if arguments.plot is not None and not arguments.json:
-        print_line(f"figure written to {arguments.plot}")
 
 
 def json_text(report: Any) -> str:
@@ -85,6 +83,14 @@ def _unsigned_zeros(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [_unsigned_zeros(item) for item in value]
     return value + 0.0 if isinstance(value, float) else value
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text file as a whole or not at all; it ends with a line break."""
+    from tiltsim.system.files import replacing
+
+    with replacing(path) as temporary:
+        temporary.write_text(text.rstrip("\n") + "\n", encoding="utf-8")
 
 
 def aligned(rows: Sequence[tuple[str, str]]) -> list[str]:
@@ -106,14 +112,36 @@ def fitted(line: str, indent: int) -> str:
     )
 
 
-def table(header: Sequence[str], rows: Sequence[Sequence[str]], numeric: frozenset[int]) -> str:
-    """A table; the columns in ``numeric`` are right-aligned."""
-    widths = [max(map(len, column)) for column in zip(header, *rows, strict=True)]
-    lines = []
-    for row in (header, *rows):
-        cells = [
-            f"{cell:>{width}}" if column in numeric else f"{cell:<{width}}"
-            for column, (cell, width) in enumerate(zip(row, widths, strict=True))
-        ]
-        lines.append("  ".join(cells).rstrip())
-    return "\n".join(lines)
+Columns = Mapping[str, tuple[str | Callable[[Any], Any], str]]
+"""By heading, the key of a row or a function of it, and the format of its numbers."""
+
+
+def table(columns: Columns, rows: Sequence[Any]) -> str:
+    """A table; columns with a format are right-aligned, and a cell without a value has a dash."""
+    lines = cells(columns, rows)
+    widths = [max(map(len, column)) for column in zip(*lines)]
+    signs = [">" if form else "<" for _, form in columns.values()]
+    return "\n".join(
+        "  ".join(
+            f"{cell:{sign}{width}}" for cell, sign, width in zip(line, signs, widths)
+        ).rstrip()
+        for line in lines
+    )
+
+
+def cells(columns: Columns, rows: Sequence[Any]) -> list[list[str]]:
+    """The text of a table, its headings first."""
+    return [[*columns], *([_cell(row, *column) for column in columns.values()] for row in rows)]
+
+
+def _cell(row: Any, key: str | Callable[[Any], Any], form: str) -> str:
+    value = row[key] if isinstance(key, str) else key(row)
+    if value is None:
+        return "-"
+    return number(value, form) if form and not isinstance(value, str) else str(value)
+
+
+def markdown_table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
+    """Lines of a Markdown table."""
+    lines = [[cell.replace("|", "\\|") for cell in row] for row in rows]
+    return [f"| {' | '.join(line)} |" for line in (header, ["---"] * len(header), *lines)]
