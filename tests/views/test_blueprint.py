@@ -2,23 +2,28 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
-from tests.flights import flight
+from tests.flights import SAMPLE_FIELDS, flight
 from tests.views.recordings import entities
 from tiltsim.cli import main
+from tiltsim.flight.end import End
 from tiltsim.laws.assembling import assemble
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.views.attitude_plane import MOVING_TRAIL_TIME
 from tiltsim.views.rerun.blueprint import flight_blueprint
-from tiltsim.views.rerun.recording_file import make_recorders, new_recording
+from tiltsim.views.rerun.recording_file import new_recording
+from tiltsim.views.signals import signals_of
 
 
-def views_of(*scenarios, names=()):
+def views_of(*scenarios, names=(), flights=()):
     """The views of flights of these scenarios, by their titles."""
     assemblies = [assemble(scenario) for scenario in scenarios]
-    recorders = make_recorders(new_recording(scenarios, names), assemblies, names)
-    blueprint = flight_blueprint(recorders)
+    recorders = new_recording(assemblies, names)[1]
+    blueprint = flight_blueprint(recorders, flights)
     found, waiting = {}, [blueprint.root_container]
     while waiting:
         part = waiting.pop()
@@ -30,21 +35,55 @@ def views_of(*scenarios, names=()):
 def test_a_vehicle_without_tilt_angles_has_no_plot_of_them():
     tilts = "Tilt angles (rad)"
     quadrotor = views_of(load_scenario("ch01_gust/hover#quadrotor")).keys()
-    assert views_of(flight("fixed").scenario).keys() - quadrotor == {tilts}
+    assert tilts in views_of(flight("fixed").scenario).keys() - quadrotor
 
 
 def test_compared_flights_have_a_vehicle_and_a_plane_each():
-    views = views_of(flight("fixed").scenario, flight("trot").scenario)
-    for name in ("fixed", "trot"):
-        assert views[name].origin == f"world/{name}/camera"
-        assert views[f"Unreachable: {name}"].origin == f"plane/{name}"
+    scenarios = [flight(name).scenario for name in ("fixed", "trot")]
+    recorders = new_recording([assemble(each) for each in scenarios])[1]
+    rows = flight_blueprint(recorders).root_container.contents[0].contents
+    origins = [{view.name: view.origin for view in row.contents} for row in rows]
+    assert origins[0] == {name: f"world/{name}/camera" for name in ("fixed", "trot")}
+    assert origins[1] == {name: f"plane/{name}" for name in ("fixed", "trot")}
+
+
+def range_of(view):
+    ((low, high),) = view.properties["ScalarAxis"].range.as_arrow_array().to_pylist()
+    return low, high
 
 
 def test_a_diverging_rotor_does_not_flatten_the_plot():
-    axis = views_of(flight("fixed").scenario)["Rotor speeds along their spins (rad/s)"]
-    ((low, high),) = axis.properties["ScalarAxis"].range.as_arrow_array().to_pylist()
-    hover = flight("fixed").scenario.rotorcraft.resolve().hover_rotor_speed
-    assert (low, high) == pytest.approx((0.0, 2.0 * hover))
+    this = flight("fixed")
+    samples = this.samples.copy()
+    samples[-1, SAMPLE_FIELDS.index("rotor_speed_2")] = 1e8
+    title, speeds = "Rotor speeds along the spin (rad/s)", this["rotor_speeds"]
+    for kind, least, most in (("diverged", 1.0, 2.0), ("completed", 1e5, 1e6)):
+        lost = replace(this, samples=samples, end=End(kind, 1.2))
+        high = range_of(views_of(this.scenario, flights=[lost])[title])[1]
+        assert least < high / np.abs(speeds).max() < most
+
+
+def test_rounding_does_not_fill_a_plot():
+    this = flight("fixed")
+    samples = this.samples.copy()
+    for name in "pqr":
+        samples[:, SAMPLE_FIELDS.index(name)] = 1e-16 * np.sin(9.0 * this["time"])
+    level = replace(this, samples=samples)
+    low, high = range_of(views_of(this.scenario, flights=[level])["Body rates (rad/s)"])
+    assert high - low == pytest.approx(0.02)
+
+
+def test_every_column_is_plotted():
+    """Those of a control law, too: in the main plots or in the second tab."""
+    for name in ("supervised", "tilt_car"):
+        scenario = flight(name).scenario
+        signals = signals_of(assemble(scenario)).values()
+        drawn = {line.values for each in signals for line in each.lines}
+        drawn |= {line.reference for each in signals for line in each.lines}
+        drawn |= {bound for each in signals for bound in each.bounds}
+        speeds = {f"rotor_speed_{rotor}" for rotor in (1, 2, 3, 4)}  # along the spins
+        assert drawn >= flight(name).units.keys() - {"time"} - speeds
+        assert {each.text for each in signals} <= views_of(scenario).keys()
 
 
 def test_compared_flights_have_one_legend():
@@ -53,8 +92,15 @@ def test_compared_flights_have_one_legend():
         plots = [view.properties["PlotLegend"] for view in views if "PlotLegend" in view.properties]
         return [legend.visible.as_arrow_array().to_pylist() == [True] for legend in plots]
 
-    assert legends("fixed") == [True] * 5
+    assert legends("fixed")[:5] == [True] * 5
     assert sorted(legends("fixed", "trot")) == [False] * 4 + [True]
+
+
+def test_legends_lie_before_the_flight():
+    view = views_of(flight("fixed").scenario)["Attitude (rad)"]
+    (shown,) = view.properties["TimeAxis"].view_range.as_arrow_array().to_pylist()
+    assert shown["start"] < -0.25e9 * flight("fixed").end.time
+    assert shown["end"] == pytest.approx(1e9 * flight("fixed").end.time)
 
 
 @pytest.mark.parametrize(("name", "whole"), [("fixed", True), ("trot", False)])

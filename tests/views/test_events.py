@@ -11,12 +11,12 @@ from tests.flights import SAMPLE_FIELDS, flight
 from tiltsim.flight.end import End
 from tiltsim.laws.assembling import assemble
 from tiltsim.scenario.loading import load_scenario
-from tiltsim.views.events import EventDetector, rotorcraft_conditions, tilt_car_conditions
+from tiltsim.views.events import EventDetector, conditions
 
 
 def flight_events(flight):
     """All events of a rotorcraft's flight, in order of time."""
-    detector = EventDetector(flight.assembly, rotorcraft_conditions)
+    detector = EventDetector(flight.assembly)
     return [detector.opening(), *detector.observe(flight), *detector.closing(flight.end)]
 
 
@@ -35,7 +35,7 @@ def test_a_flight_without_incidents_has_an_opening_its_margin_and_an_end():
 
 def test_the_opening_of_a_quadrotor_names_no_gait():
     scenario = load_scenario("ch01_gust/hover#quadrotor")
-    opening = EventDetector(assemble(scenario), rotorcraft_conditions).opening()
+    opening = EventDetector(assemble(scenario)).opening()
     assert opening.text == "Quadrotor: yaw-position controller, mujoco plant"
 
 
@@ -82,7 +82,7 @@ def test_a_flight_that_terminates_early_ends_with_its_cause():
 
 def test_a_flight_in_pieces_has_the_events_of_a_complete_one():
     this = flight("limited")
-    detector = EventDetector(this.assembly, rotorcraft_conditions)
+    detector = EventDetector(this.assembly)
     pieces = [replace(this, samples=this.samples[at : at + 7]) for at in range(0, len(this), 7)]
     found = [detector.opening(), *(e for piece in pieces for e in detector.observe(piece))]
     assert [*found, *detector.closing(this.end)] == flight_events(this)
@@ -103,6 +103,6 @@ def test_switches_between_control_laws_are_reported():
 def test_a_tilt_cars_rotor_at_rest_is_saturated():
     this = flight("tilt_car")
     resting = this["rotor_speed_1"] <= 0.0
-    texts, _, holds = zip(*tilt_car_conditions(this), strict=True)
+    texts, _, holds = zip(*conditions(this), strict=True)
     assert texts == ("rotor 1 saturated at zero", "rotor 2 saturated at zero")
     assert (holds[0] == resting).all()

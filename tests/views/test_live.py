@@ -20,9 +20,6 @@ class BlockedRecorder:
         self.error = error
         self.continued = False
 
-    def begin(self):
-        pass
-
     def draw_references(self, _until):
         pass
 

@@ -24,6 +24,7 @@ from tiltsim.flight.reading import load_flight
 from tiltsim.simulation.simulate import simulate
 from tiltsim.views.rerun.live import LiveStream
 from tiltsim.views.rerun.recording_file import save_recording
+from tiltsim.views.signals import signals_of
 
 needs_driver = pytest.mark.skipif(bool(missing_driver()), reason=missing_driver())
 
@@ -36,8 +37,9 @@ def test_the_viewer_reports_no_errors(names, tmp_path):
     save_recording([flight(name) for name in names], path)
     shot = shoot(path, 1.0, "800x500")
     assert shot.reports == []
-    of_each = 2 * (len(names) - 1)  # flights that are compared have a vehicle and a plane each
-    assert len(shot.views) == (8 if names == ["tilt_car"] else 9 + of_each)
+    plots = len(signals_of(flight(names[0]).assembly)) if len(names) == 1 else 5
+    others = 2 if names == ["tilt_car"] else 2 + len(names)  # trajectory, events and planes
+    assert len(shot.views) == plots + others + len(names)
     assert shot.png.startswith(b"\x89PNG")
 
 

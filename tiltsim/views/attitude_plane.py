@@ -26,9 +26,7 @@ if TYPE_CHECKING:
     from tiltsim.scenario.scenario import Scenario
     from tiltsim_controllers.vehicle.parameters import Vehicle
 
-HALF_WIDTH: Final = pi / 2
-"""Largest absolute roll and pitch in the plane, rad."""
-
+HALF_WIDTH: Final = pi / 2  # largest absolute roll and pitch in the plane, rad
 MARGIN_THRESHOLD: Final = 0.2
 """Singularity margin (rad) below which an attitude counts as close to singular."""
 
@@ -41,11 +39,8 @@ MIN_DIRECTION_TILT: Final = 1e-3
 The curve is as close to the border of the plane as that.
 """
 
-MOVING_TRAIL_TIME: Final = 1.0
-"""Length (s) of the attitude's trail where the singular curve moves."""
-
-_TINY: Final = 1e-12
-"""Threshold below which a component of the unit vector ``n`` counts as zero."""
+MOVING_TRAIL_TIME: Final = 1.0  # length (s) of the attitude's trail where the singular curve moves
+_TINY: Final = 1e-12  # threshold below which a component of the unit vector ``n`` counts as zero
 
 
 def margin_threshold(scenario: Scenario) -> float:
@@ -70,6 +65,11 @@ def torque_free_directions(columns: Mapping[str, Floats], vehicle: Vehicle) -> F
     """
     angles = np.stack([columns[name] for name in TILT_FIELDS], axis=-1)
     return np.nan_to_num(torque_free_direction(angles, vehicle))
+
+
+def side_of(margin: Floats) -> float:
+    """The sign of the singularity margin at the start of a flight: its reachable attitudes."""
+    return float(np.sign(margin[0])) or 1.0
 
 
 def singular_curves(n: Floats, points: int = 61) -> Floats:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, Literal
 
@@ -45,16 +45,10 @@ class Event:
 
 
 class EventDetector:
-    """Finds the events of one flight, which may be given in pieces.
+    """Finds the events of one flight, which may be given in pieces."""
 
-    ``conditions`` yields the conditions to report for a piece of the flight, in a fixed order.
-    """
-
-    def __init__(
-        self, assembly: Assembly, conditions: Callable[[Flight], Iterator[Condition]]
-    ) -> None:
+    def __init__(self, assembly: Assembly) -> None:
         self._assembly = assembly
-        self._conditions = conditions
         self._last_true: dict[str, float] = {}
         self._minimum_margin = (float("inf"), 0.0)  # rad, and its time in s
 
@@ -68,7 +62,12 @@ class EventDetector:
 
     def observe(self, piece: Flight) -> list[Event]:
         """The events within the next piece of the flight, in order of time."""
-        events = [event for found in self._conditions(piece) for event in self._onsets(*found)]
+        events = []
+        for text, times, holds in conditions(piece):
+            for time in times[holds].tolist():
+                if time - self._last_true.get(text, -np.inf) > QUIET_TIME:
+                    events.append(Event(time, "WARN", text))
+                self._last_true[text] = time
         if "singularity_margin" in piece.columns:
             margin = np.abs(piece["singularity_margin"])
             at = int(np.argmin(margin))
@@ -89,23 +88,9 @@ class EventDetector:
         text = f"minimum singularity margin: {margin:.3f} rad at {time:.2f} s"
         return [Event(end.time, "INFO", text), ending]
 
-    def _onsets(self, text: str, times: Floats, holds: npt.NDArray[np.bool_]) -> Iterator[Event]:
-        """An event whenever a condition becomes true after it has been false for a while."""
-        for time in times[holds].tolist():
-            if time - self._last_true.get(text, -np.inf) > QUIET_TIME:
-                yield Event(time, "WARN", text)
-            self._last_true[text] = time
 
-
-def tilt_car_conditions(piece: Flight) -> Iterator[Condition]:
-    """The conditions to report for a tilt-car."""
-    for rotor in (1, 2):
-        stopped = at_lower_limit(piece[f"rotor_speed_{rotor}"], 0.0)
-        yield f"rotor {rotor} saturated at zero", piece["time"], stopped
-
-
-def rotorcraft_conditions(piece: Flight) -> Iterator[Condition]:
-    """The conditions to report for a rotorcraft."""
+def conditions(piece: Flight) -> Iterator[Condition]:
+    """The conditions to report for a piece of a flight, in a fixed order."""
     time, scenario = piece["time"], piece.scenario
     threshold = margin_threshold(scenario)
     if "singularity_margin" in piece.columns:
@@ -119,6 +104,11 @@ def rotorcraft_conditions(piece: Flight) -> Iterator[Condition]:
         inside = piece["attitude_zone"] > 0.5
         yield "switched to attitude-altitude control", time, inside
         yield "switched to yaw-position control", time, ~inside
+    if scenario.vehicle.is_planar:
+        for rotor in piece.assembly.loop.kind.rotors:
+            stopped = at_lower_limit(piece[f"rotor_speed_{rotor}"], 0.0)
+            yield f"rotor {rotor} saturated at zero", time, stopped
+        return
     vehicle = scenario.any_rotorcraft
     for rotor, spin in enumerate(vehicle.spins, start=1):
         speed = spin * piece[f"rotor_speed_{rotor}"]

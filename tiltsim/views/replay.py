@@ -8,24 +8,48 @@ the model's default.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from math import floor, log10
+from math import cos, floor, log10, radians, sin
+from pathlib import Path
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import mujoco
 import numpy as np
 
 from tiltsim.plants.flight_model import build_model
+from tiltsim.views.dressing import dressed
 from tiltsim_controllers.mathematics.rotation import quaternion_from_euler
 from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.references.trajectories import position_reference
 
 if TYPE_CHECKING:
     from tiltsim.closed_loop.assembly import Assembly
+    from tiltsim.scenario.scenario import Scenario
 
 Columns = Mapping[str, Floats]
 
 COLUMN_OF_JOINT: Final = {f"tilt_{i}": f"alpha_{i}" for i in (1, 2, 3, 4)} | {"tilt": "alpha"}
 """Columns of the joints whose names differ from the column's."""
+
+
+class CameraPose(NamedTuple):
+    """The pose of a camera relative to the vehicle, at which it looks."""
+
+    distance: float  # vehicle radii
+    azimuth: float  # of its direction, degrees
+    elevation: float  # degrees, negative from above
+
+    @property
+    def away(self) -> Floats:
+        """The unit vector from the vehicle to the camera, shape (3,)."""
+        azimuth, elevation = radians(self.azimuth), radians(self.elevation)
+        level = cos(elevation)
+        return -np.array([level * cos(azimuth), level * sin(azimuth), sin(elevation)])
+
+
+def camera_of(scenario: Scenario) -> CameraPose:
+    """The camera that suits a vehicle: above one that moves in a plane."""
+    planar = scenario.vehicle.is_planar
+    return CameraPose(9.0, 90.0, -62.0) if planar else CameraPose(7.5, 130.0, -24.0)
 
 
 class Poses(NamedTuple):
@@ -36,8 +60,10 @@ class Poses(NamedTuple):
 
 
 def visible_model(assembly: Assembly) -> mujoco.MjModel:
-    """The compiled model of a flight's vehicle, visual geometry included."""
-    return build_model(assembly, visuals=True)
+    """The compiled model of a flight's vehicle; a user's file is dressed for the picture."""
+    scenario, model = assembly.scenario, build_model(assembly, visuals=True)
+    own = None if scenario.vehicle.is_planar else scenario.any_rotorcraft.user_vehicle
+    return model if own is None else dressed(model, Path(own.path))
 
 
 def joint_positions(model: mujoco.MjModel, columns: Columns) -> Floats:

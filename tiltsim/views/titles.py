@@ -18,9 +18,7 @@ if TYPE_CHECKING:
     from tiltsim.closed_loop.assembly import Assembly
     from tiltsim.scenario.scenario import Scenario
 
-MIN_WORDS: Final = 4
-"""Words that titles must share to make a title of their own."""
-
+MIN_WORDS: Final = 4  # words that titles must share to make a title of their own
 _MARKS: Final = ",:;."
 
 
@@ -33,7 +31,8 @@ def flight_names(scenarios: Sequence[Scenario], paths: Sequence[Path] = ()) -> l
     ``paths`` are the folders or files of the flights; empty for flights in memory.
     """
     addresses = [scenario.address for scenario in scenarios]
-    short = [_short(address) for address in addresses]
+    parts = [address.partition("#") for address in addresses]
+    short = [variant or file.rpartition("/")[2].removesuffix(".toml") for file, _, variant in parts]
     folders = [_folder(path) for path in paths]
     candidates = chain([short], _endings(addresses), _endings(folders), _differences(scenarios))
     for names in candidates:
@@ -49,14 +48,10 @@ def _differences(scenarios: Sequence[Scenario]) -> Iterator[list[str]]:
     own = [getattr(s.controller, "attribute", "").rpartition(".")[2] for s in scenarios]
     for key in dict.fromkeys(key for given in tables for key, _ in leaves(given)):
         values = [name or keys.get(key) for name, keys in zip(own, whole, strict=True)]
-        yield [_in_words(key, value) for value in values]
-
-
-def _in_words(key: str, value: object) -> str:
-    """A value with its key, which names speak without; empty for none."""
-    if value is None or isinstance(value, str):
-        return value or ""
-    return f"{in_words(key.rpartition('.')[2])} {value}"
+        values = ["" if value is None else value for value in values]
+        # Names speak without their key.
+        word = in_words(key.rpartition(".")[2])
+        yield [value if isinstance(value, str) else f"{word} {value}" for value in values]
 
 
 def common_title(scenarios: Sequence[Scenario]) -> str:
@@ -69,12 +64,6 @@ def common_title(scenarios: Sequence[Scenario]) -> str:
     families = {file for file, _, _ in (one.address.rpartition("#") for one in scenarios)}
     words = in_words(families.pop().rpartition("/")[2]) if len(families) == 1 else ""
     return words[:1].upper() + words[1:]
-
-
-def _short(address: str) -> str:
-    """The variant, or the file's name without folder and suffix."""
-    file, _, variant = address.partition("#")
-    return variant or file.rpartition("/")[2].removesuffix(".toml")
 
 
 def _folder(path: Path) -> str:

@@ -9,6 +9,7 @@ from tiltsim.errors import InputError
 from tiltsim.scenario.messages import did_you_mean
 from tiltsim.scenario.metric_names import METRICS
 from tiltsim.views.figures import style
+from tiltsim.views.figures.layout import HEADING
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -19,6 +20,10 @@ if TYPE_CHECKING:
 def retitle(figure: Figure, title: str | None) -> None:
     """Replace the title of a figure, or of its only panel; empty for none, None for no change."""
     if title is None:
+        return
+    headings = [text for text in figure.texts if text.get_gid() == HEADING]
+    if headings:
+        headings[0].set_text(style.verbatim(title))
         return
     single = [axes for axes in figure.axes if axes.get_title(loc="left")]
     if len(figure.axes) == 1 and single:

@@ -10,75 +10,67 @@ import numpy as np
 
 from tiltsim.studies.arena import Standing
 from tiltsim.studies.arena_page import cell
+from tiltsim.system.quantity import in_words
 from tiltsim.views.figures import style
+from tiltsim.views.figures.layout import add_heading
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-DETAILED: Final = 2
-"""Vehicles with a panel of their own, the first ones; all have a row in the panel of totals."""
+DETAILED: Final = 2  # vehicles with a panel of their own; all have a row in the panel of totals
+WIDE: Final = 9  # letters of a controller's name that fit above its column
+ALL: Final = "all tasks"
+LEGEND: Final = "100 without error; default → tuned gains; – where refused"
 
 Cells = dict[str, dict[str, tuple[float | None, float | None]]]
 """Scores with default and tuned gains, by row and controller."""
 
 
+@style.paper_style()
 def arena_figure(every: Mapping[str, Sequence[Standing]]) -> Figure:
     """Every score as numbers on the shade of the one with tuned gains; the best first."""
-    panels = {
-        f"{vehicle}: score, 100 without error, – where refused": _by_task(ranked)
-        for vehicle, ranked in islice(every.items(), DETAILED)
-    }
+    panels: dict[str, Cells] = {}
+    for vehicle, ranked in islice(every.items(), DETAILED):
+        panels[vehicle] = {
+            task: {one.controller: (one.scores[task], one.tuned[task]) for one in ranked}
+            for task in ranked[0].scores
+        } | {ALL: {one.controller: (one.total, one.tuned_total) for one in ranked}}
     if len(every) > DETAILED:
         panels["all tasks of every vehicle"] = {
             vehicle: {one.controller: (one.total, one.tuned_total) for one in ranked}
             for vehicle, ranked in every.items()
         }
-    with style.paper_style():
-        heights = [1 + len(cells) for cells in panels.values()]
-        width = 1.6 + 0.9 * max(len(_columns(cells)) for cells in panels.values())
-        figure = style.new_figure(max(4.0, width), 0.9 * len(heights) + 0.26 * sum(heights))
-        grid: Any = figure.subplots(
-            len(heights), 1, squeeze=False, gridspec_kw={"height_ratios": heights}
-        )
-        for axes, (title, cells) in zip(grid[:, 0], panels.items(), strict=True):
-            _draw(axes, cells)
-            axes.set_title(title)
-        return figure
+    # The same columns in all panels.
+    names = [*dict.fromkeys(one.controller for ranked in every.values() for one in ranked)]
+    heights = [1 + len(cells) for cells in panels.values()]
+    height = 1.1 + 0.5 * len(heights) + 0.24 * sum(heights)
+    figure = style.new_figure(max(4.5, 1.4 + 0.72 * len(names)), height)
+    grid: Any = figure.subplots(
+        len(heights), 1, squeeze=False, gridspec_kw={"height_ratios": heights}
+    )
+    for axes, (title, cells) in zip(grid[:, 0], panels.items(), strict=True):
+        _draw(axes, cells, names)
+        axes.set_title(style.verbatim(in_words(title)))
+    add_heading(figure, "Scores", LEGEND)
+    return figure
 
 
-def _by_task(ranked: Sequence[Standing]) -> Cells:
-    rows: Cells = {
-        task: {one.controller: (one.scores[task], one.tuned[task]) for one in ranked}
-        for task in ranked[0].scores
-    }
-    return rows | {"all tasks": {one.controller: (one.total, one.tuned_total) for one in ranked}}
-
-
-def _columns(cells: Cells) -> list[str]:
-    return list(dict.fromkeys(name for row in cells.values() for name in row))
-
-
-def _draw(axes: Any, cells: Cells) -> None:
-    names, rows = _columns(cells), [*cells]
+def _draw(axes: Any, cells: Cells, names: Sequence[str]) -> None:
+    rows = [*cells]
     pairs = [[cells[row].get(name) for name in names] for row in rows]
     values = np.array([[None if p is None else p[1] for p in line] for line in pairs], dtype=float)
     axes.imshow(values, cmap="Blues", vmin=0.0, vmax=100.0, aspect="auto")
     for (place, column), value in np.ndenumerate(values):
         pair = pairs[place][column]
-        axes.text(
-            column,
-            place,
-            "" if pair is None else cell(*pair).replace("-", "–"),
-            ha="center",
-            va="center",
-            color="white" if value > 60.0 else "black",
-            weight="bold" if rows[place] == "all tasks" else "normal",
-            size="small",
-        )
-    if rows[-1] == "all tasks":
-        axes.axhline(len(rows) - 1.5, color="black", lw=1.0)
-    labels = [style.verbatim(name) for name in names]
-    axes.set_xticks(range(len(names)), labels, rotation=20, ha="right", rotation_mode="anchor")
-    axes.set_yticks(range(len(rows)), list(map(style.verbatim, rows)))
+        text = "" if pair is None else cell(*pair).replace("-", "–")
+        look = {"ha": "center", "va": "center", "size": "small"}
+        look["color"] = "white" if value > 60.0 else style.INK
+        axes.text(column, place, text, weight="bold" if rows[place] == ALL else "normal", **look)
+    if rows[-1] == ALL:
+        axes.axhline(len(rows) - 1.5, color=style.INK, lw=1.0)
+    words = [in_words(name) for name in names]
+    labels = [word.replace(" ", "\n") if len(word) > WIDE else word for word in words]
+    axes.set_xticks(range(len(names)), [*map(style.verbatim, labels)])
+    axes.set_yticks(range(len(rows)), [style.verbatim(in_words(row)) for row in rows])
     axes.grid(visible=False)
     axes.tick_params(length=0)

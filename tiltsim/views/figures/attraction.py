@@ -22,50 +22,49 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 UNITS: Final = {"position": "m", "velocity": "m/s", "attitude": "rad", "angular_velocity": "rad/s"}
-CURVES: Final = 8
-"""Curves of singular attitudes of a moving gait."""
+CURVES: Final = 8  # curves of singular attitudes of a moving gait
 
 
+@style.paper_style()
 def attraction_figure(found: Attraction) -> Figure:
     """Where a flight comes back from, with the gait's singular attitudes."""
-    with style.paper_style():
-        figure = style.new_figure(5.0, 5.0)
-        axes: Any = figure.subplots()
-        handles = _draw_map(axes, found)
-        places = [PLACES[name] for name in found.axes]
-        start = [getattr(found.scenario.initial, key)[index] for key, index in places]
-        axes.plot(*start, "+", color=style.INK, ms=8, mew=1.2)
-        handles.append(Line2D([], [], color=style.INK, marker="+", ls="", label="the scenario"))
-        labels = [f"{in_words(name)} ({UNITS[PLACES[name][0]]})" for name in found.axes]
-        axes.set(xlabel=f"initial {labels[0]}", ylabel=f"initial {labels[1]}")
-        axes.set_title(f"{100.0 * found.share.mean():.1f} % come back")
-        figure.legend(handles=handles, loc="outside lower center", ncols=3)
-        return figure
+    figure = style.new_figure(5.0, 5.0)
+    axes: Any = figure.subplots()
+    handles = _draw_map(axes, found)
+    places = [PLACES[name] for name in found.axes]
+    start = [getattr(found.scenario.initial, key)[index] for key, index in places]
+    axes.plot(*start, "+", color=style.INK, ms=8, mew=1.2)
+    handles.append(Line2D([], [], color=style.INK, marker="+", ls="", label="the scenario"))
+    labels = [f"{in_words(name)} ({UNITS[PLACES[name][0]]})" for name in found.axes]
+    axes.set(xlabel=f"initial {labels[0]}", ylabel=f"initial {labels[1]}")
+    axes.set_title(f"{100.0 * found.share.mean():.1f} % come back")
+    figure.legend(handles=handles, loc="outside lower center", ncols=3)
+    return figure
 
 
+@style.paper_style()
 def attraction_panels(maps: Mapping[str, Attraction], columns: int = 4) -> Figure:
     """Maps of roll and pitch side by side, by title, with what comes back of which attitudes."""
-    with style.paper_style():
-        rows = -(-len(maps) // columns)
-        figure = style.new_figure(2.5 * columns, 2.9 * rows)
-        grid: Any = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
-        handles: dict[str, Artist] = {}
-        for axes, (title, found) in zip(grid.flat, maps.items(), strict=False):
-            drawn = _draw_map(axes, found)
-            # Curves of fixed and of moving gaits look the same: one entry.
-            handles |= {str(handle.get_label()).partition(",")[0]: handle for handle in drawn}
-            report = found.report()
-            shares = [report["acceptable_returned"], report["unacceptable_returned"]]
-            texts = ["-" if share is None else f"{100.0 * share:.1f} %" for share in shares]
-            axes.set_title(f"{title}\n{' | '.join(texts)}")
-        for axes in grid[-1]:
-            axes.set_xlabel("initial roll (rad)")
-        for axes in grid[:, 0]:
-            axes.set_ylabel("initial pitch (rad)")
-        for axes in grid.flat[len(maps) :]:
-            axes.axis("off")
-        figure.legend(handles=list(handles.values()), loc="outside lower center", ncols=3)
-        return figure
+    rows = -(-len(maps) // columns)
+    figure = style.new_figure(2.5 * columns, 2.9 * rows)
+    grid: Any = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
+    handles: dict[str, Artist] = {}
+    for axes, (title, found) in zip(grid.flat, maps.items(), strict=False):
+        drawn = _draw_map(axes, found)
+        # Curves of fixed and of moving gaits look the same: one entry.
+        handles |= {str(handle.get_label()).partition(",")[0]: handle for handle in drawn}
+        report = found.report()
+        shares = [report["acceptable_returned"], report["unacceptable_returned"]]
+        texts = ["-" if share is None else f"{100.0 * share:.1f} %" for share in shares]
+        axes.set_title(f"{title}\n{' | '.join(texts)}")
+    for axes in grid[-1]:
+        axes.set_xlabel("initial roll (rad)")
+    for axes in grid[:, 0]:
+        axes.set_ylabel("initial pitch (rad)")
+    for axes in grid.flat[len(maps) :]:
+        axes.axis("off")
+    figure.legend(handles=list(handles.values()), loc="outside lower center", ncols=3)
+    return figure
 
 
 def _draw_map(axes: Any, found: Attraction) -> list[Artist]:

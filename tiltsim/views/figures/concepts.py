@@ -1,4 +1,4 @@
-"""The drawings of docs/concepts.md: vehicle, gaits, decouplers, singular attitudes, colours."""
+"""The drawings of docs/concepts.md: vehicle, gaits, decouplers, singular attitudes, colors."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ from tiltsim.views.figures.vehicle_drawing import (
 from tiltsim_controllers.analysis.singularity import singularity_margin, torque_free_direction
 from tiltsim_controllers.analysis.two_color_map import curve_l, delta, point_p, red_residual
 from tiltsim_controllers.gaits.cat import FORWARD, SWINGS
+from tiltsim_controllers.gaits.colors import colored_angles
 from tiltsim_controllers.gaits.plans import cat, continuous_trot
-from tiltsim_controllers.gaits.two_color import COLORS, colored_angles
 from tiltsim_controllers.laws.decouplers import (
     conventional_decoupler,
     exact_decoupler,
@@ -49,21 +49,11 @@ if TYPE_CHECKING:
     from tiltsim_controllers.mathematics.scalar import Floats
     from tiltsim_controllers.vehicle.parameters import Vehicle
 
-_WIDTH: Final = 6.4
-"""Inches: about the width of a page of text."""
-
-POSITIVE_TILT: Final = 0.5
-"""Tilt angle (rad) of all rotors in the drawing of the vehicle."""
-
-BESIDE: Final = View(azimuth=-0.65, elevation=0.6)
-"""From the right, in front and above."""
-
-TROT_ANGLES: Final = (-0.65, -0.65, 0.65, 0.65)
-"""Tilt angles (rad) of the trot at rho = 0.65."""
-
-LEANING: Final = (-0.45, -0.41)
-"""Roll and pitch (rad) of the vehicle whose margin is drawn."""
-
+_WIDTH: Final = 6.4  # inches: about the width of a page of text
+POSITIVE_TILT: Final = 0.5  # tilt angle (rad) of all rotors in the drawing of the vehicle
+BESIDE: Final = View(azimuth=-0.65, elevation=0.6)  # from the right, in front and above
+TROT_ANGLES: Final = (-0.65, -0.65, 0.65, 0.65)  # tilt angles (rad) of the trot at rho = 0.65
+LEANING: Final = (-0.45, -0.41)  # roll and pitch (rad) of the vehicle whose margin is drawn
 _LEGS: Final = ("right fore", "left fore", "left hind", "right hind")
 """Legs of a cat that rotors 1 to 4 stand for."""
 
@@ -77,10 +67,9 @@ _SHOWN_GAITS: Final = (
 """Gaits of the drawing, with a period of 1 s."""
 
 _RED_GAITS: Final = "#B0122B"
-"""Redder than the colour of what is singular."""
+"""Redder than the color of what is singular."""
 
-_LEANS: Final = "BrBG"
-"""Colour map of forward and backward leans."""
+_LEANS: Final = "BrBG"  # color map of forward and backward leans
 
 
 @contextmanager
@@ -101,25 +90,25 @@ def _new_figure(height: float) -> Figure:
     return figure
 
 
+@_drawing_style()
 def vehicle_figure() -> Figure:
     """Body axes, rotor numbers, spins and positive tilts, as the compiled model has them."""
     pose = Pose((POSITIVE_TILT,) * 4)
-    with _drawing_style():
-        figure = _new_figure(3.7)
-        row: Any = figure.subplots(1, 2, width_ratios=[1.12, 1.0])
-        beside, above = row
+    figure = _new_figure(3.7)
+    row: Any = figure.subplots(1, 2, width_ratios=[1.12, 1.0])
+    beside, above = row
+    for axes, view in ((beside, BESIDE), (above, ABOVE)):
+        blank(axes)
+        pose.draw(axes, view)
+    _body_axes(beside, pose, BESIDE)
+    _body_axes(above, pose, ABOVE)
+    for number, rotor in enumerate(pose.rotors, 1):
+        _tilt_arrow(beside, rotor, pose, BESIDE)
+        _spin_arrow(above, rotor)
         for axes, view in ((beside, BESIDE), (above, ABOVE)):
-            blank(axes)
-            pose.draw(axes, view)
-        _body_axes(beside, pose, BESIDE)
-        _body_axes(above, pose, ABOVE)
-        for number, rotor in enumerate(pose.rotors, 1):
-            _tilt_arrow(beside, rotor, pose, BESIDE)
-            _spin_arrow(above, rotor)
-            for axes, view in ((beside, BESIDE), (above, ABOVE)):
-                badge(axes, view.project(rotor.hub), number)
-        _vehicle_legend(figure, pose)
-        return figure
+            badge(axes, view.project(rotor.hub), number)
+    _vehicle_legend(figure, pose)
+    return figure
 
 
 def _body_axes(axes: Axes, pose: Pose, view: View) -> None:
@@ -169,68 +158,68 @@ def _vehicle_legend(figure: Figure, pose: Pose) -> None:
     figure.legend(handles=handles, loc="outside lower center", ncols=2)
 
 
+@_drawing_style()
 def gait_figure() -> Figure:
     """Two gaits over two periods: the four tilt angles, and who leans forward when."""
     times = np.linspace(0.0, 2.0, 801)
-    with _drawing_style():
-        figure = _new_figure(4.3)
-        grid: Any = figure.subplots(2, 2, sharex=True, sharey="row", height_ratios=[1.25, 1.0])
-        for column, (name, gait) in zip(grid.T, _SHOWN_GAITS, strict=True):
-            angles = gait.angles(times)
-            upper, lower = column
-            for rotor, angle, line in zip(ROTORS, angles.T, style.ROTOR_LINES, strict=True):
-                upper.plot(times, angle, label=f"α{'₁₂₃₄'[rotor - 1]}", **line)
-            upper.set_title(name)
-            lean = (angles * FORWARD).T
-            largest = float(np.abs(lean).max())
-            colors = lower.pcolormesh(
-                times, ROTORS, lean, cmap=_LEANS, vmin=-largest, vmax=largest, rasterized=True
-            )
-            lower.grid(False)
-            for border in (1.5, 2.5, 3.5):
-                lower.axhline(border, color="white", lw=3.0)
-            lower.set(xlabel="time / period", xticks=[0.0, 0.5, 1.0, 1.5, 2.0], ylim=(4.5, 0.5))
-        bar = figure.colorbar(colors, ax=list(grid[1]), pad=0.02, ticks=[-largest, 0.0, largest])
-        bar.ax.set_yticklabels(["backward", "upright", "forward"])
-        bar.outline.set_visible(False)
-        names = [f"{rotor}  {leg}" for rotor, leg in zip(ROTORS, _LEGS, strict=True)]
-        grid[1, 0].set_yticks(ROTORS, names)
-        grid[0, 0].set_ylabel("tilt angle (rad)")
-        handles, labels = grid[0, 0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside upper center", ncols=4)
-        return figure
+    figure = _new_figure(4.3)
+    grid: Any = figure.subplots(2, 2, sharex=True, sharey="row", height_ratios=[1.25, 1.0])
+    for column, (name, gait) in zip(grid.T, _SHOWN_GAITS, strict=True):
+        angles = gait.angles(times)
+        upper, lower = column
+        for rotor, angle, line in zip(ROTORS, angles.T, style.ROTOR_LINES, strict=True):
+            upper.plot(times, angle, label=f"α{'₁₂₃₄'[rotor - 1]}", **line)
+        upper.set_title(name)
+        lean = (angles * FORWARD).T
+        largest = float(np.abs(lean).max())
+        colors = lower.pcolormesh(
+            times, ROTORS, lean, cmap=_LEANS, vmin=-largest, vmax=largest, rasterized=True
+        )
+        lower.grid(False)
+        for border in (1.5, 2.5, 3.5):
+            lower.axhline(border, color="white", lw=3.0)
+        lower.set(xlabel="time / period", xticks=[0.0, 0.5, 1.0, 1.5, 2.0], ylim=(4.5, 0.5))
+    bar = figure.colorbar(colors, ax=list(grid[1]), pad=0.02, ticks=[-largest, 0.0, largest])
+    bar.ax.set_yticklabels(["backward", "upright", "forward"])
+    bar.outline.set_visible(False)
+    names = [f"{rotor}  {leg}" for rotor, leg in zip(ROTORS, _LEGS, strict=True)]
+    grid[1, 0].set_yticks(ROTORS, names)
+    grid[0, 0].set_ylabel("tilt angle (rad)")
+    handles, labels = grid[0, 0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=4)
+    return figure
 
 
+@_drawing_style()
 def decoupler_figure(flights: Mapping[str, Flight]) -> Figure:
     """What each decoupler, given by its name, does at the set point (0, 0)."""
     first = next(iter(flights.values()))
     vehicle, tilts = first.scenario.true_rotorcraft, first.assembly.gait.angles(0.0)
     n = torque_free_direction(tilts, vehicle)
-    with _drawing_style():
-        figure = _new_figure(5.6)
-        halves: Any = figure.subfigures(2, 1, height_ratios=[1.0, 1.2])
-        above, below = halves
-        sketches: Any = above.subplots(1, len(flights), sharex=True, sharey=True)
-        plan, error = below.subplots(1, 2)
-        for sketch, (name, flight), line in zip(
-            sketches, flights.items(), style.AXIS_LINES, strict=True
-        ):
-            _lean(sketch, name, Pose(tuple(tilts), _lean_at_rest(name, n, vehicle)), n)
-            away = np.hypot(flight["x_ref"] - flight["x"], flight["y_ref"] - flight["y"])
-            plan.plot(flight["x"], flight["y"], label=name, **line)
-            plan.plot(flight["x"][-1], flight["y"][-1], "o", ms=6, color=line["color"])
-            error.semilogy(flight["time"], away, **line)
-        plan.plot(0.0, 0.0, "+", color=style.INK, ms=13, mew=1.6)
-        plan.annotate("set point", (0.0, 0.0), (-12, -5), textcoords="offset points", ha="right")
-        plan.set(xlabel="x (m)", ylabel="y (m)", title="Path, from above")
-        plan.set_aspect("equal", adjustable="datalim")
-        plan.margins(0.15)
-        error.set(xlabel="time (s)", title="Distance from the set point (m)")
-        error.set(yticks=[1e-6, 1e-4, 1e-2, 1.0], ylim=(1e-8, 20.0), xlim=(0.0, first["time"][-1]))
-        error.yaxis.minorticks_off()
-        handles, labels = plan.get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=len(flights))
-        return figure
+    figure = _new_figure(5.6)
+    halves: Any = figure.subfigures(2, 1, height_ratios=[1.0, 1.2])
+    above, below = halves
+    sketches: Any = above.subplots(1, len(flights), sharex=True, sharey=True)
+    plan, error = below.subplots(1, 2)
+    for sketch, (name, flight), line in zip(
+        sketches, flights.items(), style.AXIS_LINES, strict=True
+    ):
+        _lean(sketch, name, Pose(tuple(tilts), _lean_at_rest(name, n, vehicle)), n)
+        away = np.hypot(flight["x_ref"] - flight["x"], flight["y_ref"] - flight["y"])
+        plan.plot(flight["x"], flight["y"], label=name, **line)
+        plan.plot(flight["x"][-1], flight["y"][-1], "o", ms=6, color=line["color"])
+        error.semilogy(flight["time"], away, **line)
+    plan.plot(0.0, 0.0, "+", color=style.INK, ms=13, mew=1.6)
+    plan.annotate("set point", (0.0, 0.0), (-12, -5), textcoords="offset points", ha="right")
+    plan.set(xlabel="x (m)", ylabel="y (m)", title="Path, from above")
+    plan.set_aspect("equal", adjustable="datalim")
+    plan.margins(0.15)
+    error.set(xlabel="time (s)", title="Distance from the set point (m)")
+    error.set(yticks=[1e-6, 1e-4, 1e-2, 1.0], ylim=(1e-8, 20.0), xlim=(0.0, first["time"][-1]))
+    error.yaxis.minorticks_off()
+    handles, labels = plan.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=len(flights))
+    return figure
 
 
 def _lean_at_rest(name: str, n: Floats, vehicle: Vehicle) -> tuple[float, float, float]:
@@ -263,16 +252,16 @@ def _lean(axes: Axes, name: str, pose: Pose, n: Floats) -> None:
     text(axes, (0.0, -0.2), f"force {np.degrees(np.arccos(force[2])):.1f}° off vertical")
 
 
+@_drawing_style()
 def attitude_figure() -> Figure:
     """The singularity margin of a leaning vehicle, from the side and in the roll-pitch plane."""
     vehicle = PRESETS["ar_drone_2"]
     n = torque_free_direction(TROT_ANGLES, vehicle)[np.newaxis]
-    with _drawing_style():
-        figure = _new_figure(3.6)
-        row: Any = figure.subplots(1, 2, width_ratios=[1.0, 1.1])
-        _side_view(row[0], n[0])
-        _roll_pitch_plane(row[1], n, vehicle)
-        return figure
+    figure = _new_figure(3.6)
+    row: Any = figure.subplots(1, 2, width_ratios=[1.0, 1.1])
+    _side_view(row[0], n[0])
+    _roll_pitch_plane(row[1], n, vehicle)
+    return figure
 
 
 def _side_view(axes: Axes, n: Floats) -> None:
@@ -319,40 +308,40 @@ def _roll_pitch_plane(axes: Axes, n: Floats, vehicle: Vehicle) -> None:
         axes.annotate(label, attitude, (2, -5), textcoords="offset points", va="top")
 
 
+@_drawing_style()
 def color_figure() -> Figure:
     """Where red and blue gaits lie, and where red ones are singular (ch. 6 to 8)."""
     vehicle = PRESETS["ar_drone_2"]
     angle = delta(vehicle)
     side = np.linspace(-pi / 2, pi / 2, 401)
-    with _drawing_style():
-        figure = _new_figure(3.4)
-        row: Any = figure.subplots(1, 2)
-        lines, plane = row
-        red, blue = [
-            np.transpose([colored_angles(a, 0.0, COLORS[name], drag_ratio(vehicle)) for a in side])
-            for name in ("red", "blue")
-        ]
-        lines.plot(side, red[0], color=_RED_GAITS, lw=2.4)
-        lines.plot(side, blue[0], color=style.BLUE, lw=2.4, ls=(0, (4, 1.5)))
-        lines.plot(angle, angle, "o", color=style.AMBER, mec=style.INK, ms=7, zorder=5)
-        lines.annotate("α₁ = α₃ = δ", (angle, angle), (10, -4), textcoords="offset points")
-        text(lines, (0.75, 1.2), "red", color=_RED_GAITS, fontweight="bold")
-        text(lines, (-0.95, 0.35), "blue:\nsingular", color=style.BLUE, fontweight="bold")
-        lines.set(xlabel="α₁ (rad)", ylabel="α₃ (rad)", title="Two families of gaits")
+    figure = _new_figure(3.4)
+    row: Any = figure.subplots(1, 2)
+    lines, plane = row
+    red, blue = [
+        np.transpose([colored_angles(a, 0.0, name, drag_ratio(vehicle)) for a in side])
+        for name in ("red", "blue")
+    ]
+    lines.plot(side, red[0], color=_RED_GAITS, lw=2.4)
+    lines.plot(side, blue[0], color=style.BLUE, lw=2.4, ls=(0, (4, 1.5)))
+    lines.plot(angle, angle, "o", color=style.AMBER, mec=style.INK, ms=7, zorder=5)
+    lines.annotate("α₁ = α₃ = δ", (angle, angle), (10, -4), textcoords="offset points")
+    text(lines, (0.75, 1.2), "red", color=_RED_GAITS, fontweight="bold")
+    text(lines, (-0.95, 0.35), "blue:\nsingular", color=style.BLUE, fontweight="bold")
+    lines.set(xlabel="α₁ (rad)", ylabel="α₃ (rad)", title="Two families of gaits")
 
-        first, second = np.meshgrid(side, side)
-        beyond = red_residual(first, second, vehicle) < 0.0
-        plane.contourf(side, side, beyond, levels=[0.5, 1.5], colors=[style.UNREACHABLE])
-        plane.plot(side[1:-1], curve_l(side[1:-1], vehicle), color=style.SINGULAR, lw=1.8)
-        plane.plot(*point_p(vehicle), "o", color=style.AMBER, mec=style.INK, ms=7, zorder=5)
-        plane.annotate("P", point_p(vehicle), (7, -3), textcoords="offset points")
-        plane.plot(0.0, 0.0, "+", color=style.INK, ms=9, mew=1.4)
-        plane.annotate("untilted", (0.0, 0.0), (-5, 5), textcoords="offset points", ha="right")
-        text(plane, (0.75, -0.9), "unreachable\nR < 0", color=style.SINGULAR)
-        text(plane, (-0.8, 0.95), "R > 0")
-        plane.set(xlabel="α₁ = α₃ (rad)", ylabel="α₂ = α₄ (rad)", title="Red gaits")
-        for axes in row:
-            for axis in "xy":
-                style.angle_axis(axes, axis, pi / 2)
-            axes.set_aspect("equal")
-        return figure
+    first, second = np.meshgrid(side, side)
+    beyond = red_residual(first, second, vehicle) < 0.0
+    plane.contourf(side, side, beyond, levels=[0.5, 1.5], colors=[style.UNREACHABLE])
+    plane.plot(side[1:-1], curve_l(side[1:-1], vehicle), color=style.SINGULAR, lw=1.8)
+    plane.plot(*point_p(vehicle), "o", color=style.AMBER, mec=style.INK, ms=7, zorder=5)
+    plane.annotate("P", point_p(vehicle), (7, -3), textcoords="offset points")
+    plane.plot(0.0, 0.0, "+", color=style.INK, ms=9, mew=1.4)
+    plane.annotate("untilted", (0.0, 0.0), (-5, 5), textcoords="offset points", ha="right")
+    text(plane, (0.75, -0.9), "unreachable\nR < 0", color=style.SINGULAR)
+    text(plane, (-0.8, 0.95), "R > 0")
+    plane.set(xlabel="α₁ = α₃ (rad)", ylabel="α₂ = α₄ (rad)", title="Red gaits")
+    for axes in row:
+        for axis in "xy":
+            style.angle_axis(axes, axis, pi / 2)
+        axes.set_aspect("equal")
+    return figure

@@ -30,27 +30,27 @@ LEFT_OUT: Final = 0.02
 """Share of the smallest errors, as those at the start, that the scale leaves out."""
 
 
+@style.paper_style()
 def comparison_figure(rows: Sequence[Compared]) -> Figure:
     """One line of panels for every scenario."""
     scenarios = list(dict.fromkeys(compared.row["scenario"] for compared in rows))
     names = list(dict.fromkeys(compared.row["controller"] for compared in rows))
     searched = any(c.row[key] is not None for c in rows for key in SURVIVED)
-    with style.paper_style():
-        looks = {name: style.line_style(number) for number, name in enumerate(names)}
-        figure = style.new_figure(9.0 if searched else 5.6, 2.9 * len(scenarios) + 0.5)
-        ratios = {"width_ratios": [1.1, 1.0]} if searched else {}
-        grid: Any = figure.subplots(
-            len(scenarios), 1 + searched, squeeze=False, gridspec_kw=ratios or None
-        )
-        for line, scenario in zip(grid, scenarios, strict=True):
-            chosen = [c for c in rows if c.row["scenario"] == scenario]
-            _draw_errors(line[0], chosen, looks)
-            line[0].set_title(style.verbatim(scenario))
-            if searched:
-                _draw_survived(line[1], chosen, looks)
-        handles = [grid[0][0].plot([], [], label=name, **looks[name])[0] for name in names]
-        add_legend(figure, handles)
-        return figure
+    looks = {name: style.line_style(number) for number, name in enumerate(names)}
+    figure = style.new_figure(9.0 if searched else 5.6, 2.9 * len(scenarios) + 0.5)
+    ratios = {"width_ratios": [1.1, 1.0]} if searched else {}
+    grid: Any = figure.subplots(
+        len(scenarios), 1 + searched, squeeze=False, gridspec_kw=ratios or None
+    )
+    for line, scenario in zip(grid, scenarios, strict=True):
+        chosen = [c for c in rows if c.row["scenario"] == scenario]
+        _draw_errors(line[0], chosen, looks)
+        line[0].set_title(style.verbatim(scenario))
+        if searched:
+            _draw_survived(line[1], chosen, looks)
+    handles = [grid[0][0].plot([], [], label=name, **looks[name])[0] for name in names]
+    add_legend(figure, handles)
+    return figure
 
 
 def _draw_errors(axes: Axes, rows: Sequence[Compared], looks: Mapping[str, Any]) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from math import pi
 from typing import TYPE_CHECKING, Any, Final
 
@@ -13,7 +13,7 @@ from tiltsim.scenario.messages import choose
 from tiltsim.studies.gait_analysis import NEARLY_SINGULAR
 from tiltsim.views.attitude_plane import MIN_DIRECTION_TILT
 from tiltsim.views.figures import style
-from tiltsim.views.figures.layout import add_legend, legend_over, new_page
+from tiltsim.views.figures.layout import Page, add_legend, new_page, place_legends
 from tiltsim_controllers.analysis.singularity import (
     determinant,
     margin_over_gait,
@@ -29,20 +29,18 @@ if TYPE_CHECKING:
     from tiltsim_controllers.gaits.plans import Gait
     from tiltsim_controllers.vehicle.parameters import Vehicle
 
-_CURVES: Final = 24
-"""Instants of a period for which the curve of singular attitudes is drawn."""
+_CURVES: Final = 24  # instants of a period for which the curve of singular attitudes is drawn
+_LAST_SHADE: Final = 0.92  # of the color map; the rest is too bright on white
 
 AREA, CURVE = "area", "curve"
 """Optional contents of a roll-pitch diagram."""
-
-_LAST_SHADE: Final = 0.92
-"""Part of the colour map in use; the rest is too bright on white."""
 
 ATTITUDES: Final = "attitude_plane"
 PANELS: Final = ("tilt_angles", "margin", ATTITUDES)
 """Panels of the figure of a gait."""
 
 
+@style.paper_style()
 def gait_figure(gait: Gait, vehicle: Vehicle, panels: Sequence[str] = ()) -> Figure:
     """Roll-pitch diagram of a gait and, if it moves, its angles and margin over a period.
 
@@ -55,60 +53,56 @@ def gait_figure(gait: Gait, vehicle: Vehicle, panels: Sequence[str] = ()) -> Fig
         if name not in PANELS:
             raise InputError(f"panels: {name!r}: {choose(name, PANELS)}")
     chosen = [*dict.fromkeys(panels)] or ([ATTITUDES] if gait.is_constant else [*PANELS])
-    with style.paper_style():
-        page = new_page([name != ATTITUDES for name in chosen])
-
-        def attitudes(axes: Axes) -> None:
+    page = new_page([name != ATTITUDES for name in chosen])
+    for name, axes in zip(chosen, page.panels, strict=True):
+        if name == ATTITUDES:
             shown = _roll_pitch(axes, gait, vehicle)
-            if CURVE in shown:
-                _time_bar(axes.figure, [axes], gait)
-            _roll_pitch_legend(page.figure, shown, constant=gait.is_constant)
+            _roll_pitch_legend(page.figure, [axes], gait, shown, alone=gait.is_constant)
+        elif name == "margin":
+            _margin(axes, [(gait, "")], vehicle)
+        else:
+            times = gait.sample_times(401)
+            lines = zip("₁₂₃₄", gait.angles(times).T, style.ROTOR_LINES, strict=True)
+            for rotor, angle, line in lines:
+                axes.plot(times, angle, label=f"α{rotor}", **line)
+            axes.set(xlim=(0.0, times[-1]), ylabel="rad", title="Tilt angles")
+    place_legends(page)
+    for column in page.columns:
+        for axes in column:
+            axes.tick_params(labelbottom=axes is column[-1])
+            axes.set_xlabel("time (s)" if axes is column[-1] else "")
+    return page.figure
 
-        draw: dict[str, Callable[[Axes], None]] = {
-            ATTITUDES: attitudes,
-            "tilt_angles": lambda axes: _angles(axes, gait),
-            "margin": lambda axes: _margin(axes, [(gait, "")], vehicle),
-        }
-        for name, axes in zip(chosen, page.panels, strict=True):
-            draw[name](axes)
-        for column in page.columns:
-            for axes in column:
-                axes.tick_params(labelbottom=axes is column[-1])
-                axes.set_xlabel("time (s)" if axes is column[-1] else "")
-        return page.figure
 
-
+@style.paper_style()
 def comparison_figure(gaits: list[tuple[str, Gait]], vehicle: Vehicle) -> Figure:
     """Roll-pitch diagrams of gaits, given with their titles (ch. 6, Figs. 21-28; ch. 8, 10-14)."""
-    with style.paper_style():
-        figure = style.new_figure(3.5 * len(gaits) + 0.8, 4.2)
-        row = figure.subplots(1, len(gaits), squeeze=False, sharey=True)[0]
-        shown: set[str] = set()
-        for axes, (title, gait) in zip(row, gaits, strict=True):
-            shown |= _roll_pitch(axes, gait, vehicle)
-            axes.set_title(title.replace("_", " "))
-            if axes is not row[0]:
-                axes.set_ylabel("")
-        if CURVE in shown:
-            _time_bar(figure, list(row), gaits[-1][1])
-        _roll_pitch_legend(figure, shown)
-        return figure
+    figure = style.new_figure(3.5 * len(gaits) + 0.8, 4.2)
+    row = figure.subplots(1, len(gaits), squeeze=False, sharey=True)[0]
+    shown: set[str] = set()
+    for axes, (title, gait) in zip(row, gaits, strict=True):
+        shown |= _roll_pitch(axes, gait, vehicle)
+        axes.set_title(title.replace("_", " "))
+        if axes is not row[0]:
+            axes.set_ylabel("")
+    _roll_pitch_legend(figure, [*row], gaits[-1][1], shown)
+    return figure
 
 
+@style.paper_style()
 def margin_figure(gaits: list[tuple[str, Gait]], vehicle: Vehicle) -> Figure:
     """Singularity margin over a period for several gaits, given with their labels."""
-    with style.paper_style():
-        figure = style.new_figure(5.4, 3.2)
-        axes: Any = figure.subplots()
-        _margin(axes, [(gait, label) for label, gait in gaits], vehicle)
-        legend_over(axes, "Singularity margin", len(gaits))
-        return figure
+    figure = style.new_figure(5.4, 3.2)
+    axes: Any = figure.subplots()
+    _margin(axes, [(gait, label) for label, gait in gaits], vehicle)
+    place_legends(Page(figure, [axes], [[axes]]))
+    return figure
 
 
 def _roll_pitch(axes: Axes, gait: Gait, vehicle: Vehicle) -> set[str]:
     """Curves of singular attitudes, and the attitudes beyond them, shaded.
 
-    Returns those of `AREA` and `CURVE` that the diagram contains.
+    Returns which of `AREA` and `CURVE` the diagram contains.
     """
     from matplotlib import colormaps
 
@@ -118,19 +112,16 @@ def _roll_pitch(axes: Axes, gait: Gait, vehicle: Vehicle) -> set[str]:
     edges = np.linspace(-pi / 2, pi / 2, 302)
     roll, pitch = np.meshgrid(*[0.5 * (edges[1:] + edges[:-1])] * 2)
     level = determinant(angles[0], 0.0, 0.0, vehicle)
-    share = np.zeros_like(roll)
-    for instant in angles:
-        share += (determinant(instant, roll, pitch, vehicle) * level <= 0.0) / len(angles)
+    beyond = [determinant(instant, roll, pitch, vehicle) * level <= 0.0 for instant in angles]
+    share = np.mean(beyond, axis=0)
     curves = [unacceptable_attitudes(instant, vehicle, 721) for instant in angles]
     singular = sum(curve.kind == "everywhere" for curve in curves)
-
     values = singular_values(angles, vehicle)
     conditioning = float((values[:, 2] / values[:, 0]).min())
     nearly = not singular and conditioning < NEARLY_SINGULAR
     if singular or nearly:
         share = np.full_like(share, singular / len(curves) or 1.0)
     style.shade_share(axes, edges, share)
-    axes.grid(False)
     colors = colormaps[style.SEQUENTIAL](np.arange(len(curves)) / len(curves) * _LAST_SHADE)
     n = np.nan_to_num(torque_free_direction(angles, vehicle))
     drawn = np.hypot(n[:, 0], n[:, 1]) > MIN_DIRECTION_TILT
@@ -138,46 +129,44 @@ def _roll_pitch(axes: Axes, gait: Gait, vehicle: Vehicle) -> set[str]:
         if is_drawn:
             line = style.SINGULAR if len(curves) == 1 else color
             axes.plot(curve.roll, curve.pitch, color=line, lw=1.3)
+    note, height = "", 0.35
     if nearly:
         ratio = f"{conditioning:.0e}".replace("e-0", "e−")
-        _note(axes, 0.75, f"nearly singular at every attitude:\nσ₃/σ₁ of τ is {ratio}")
-    elif not singular and not drawn.any():
-        _note(axes, 0.35, "no singular attitudes")
-    if singular:
-        text = "singular at every attitude"
-        if singular < len(curves):
-            text += f",\nat {singular} of {len(curves)} instants"
-        _note(axes, 0.75 if singular < len(curves) else 0.35, text)
+        note, height = f"nearly singular at every attitude:\nσ₃/σ₁ of τ is {ratio}", 0.75
+    elif singular == len(curves):
+        note = "singular at every attitude"
+    elif singular:
+        note = f"singular at every attitude,\nat {singular} of {len(curves)} instants"
+        height = 0.75
+    elif not drawn.any():
+        note = "no singular attitudes"
+    if note:
+        box = {"facecolor": "white", "edgecolor": style.GREY, "linewidth": 0.6}
+        axes.text(0.0, height, note, ha="center", va="center", bbox=box, zorder=8)
     axes.plot(0.0, 0.0, "+", color=style.INK, ms=8, mew=1.2)
     style.roll_pitch_axes(axes)
     axes.set_title(f"Singular attitudes, {gait.name.replace('_', ' ')}")
-    shown = {CURVE} if drawn.any() else set()
-    return shown | ({AREA} if share.any() and not nearly and singular < len(curves) else set())
+    shaded = share.any() and not nearly and singular < len(curves)
+    return ({CURVE} if drawn.any() else set()) | ({AREA} if shaded else set())
 
 
-def _note(axes: Axes, height: float, text: str) -> None:
-    box = {"facecolor": "white", "edgecolor": style.GREY, "linewidth": 0.6}
-    axes.text(0.0, height, text, ha="center", va="center", color=style.INK, bbox=box, zorder=8)
-
-
-def _time_bar(figure: Any, diagrams: list[Axes], gait: Gait) -> None:
+def _roll_pitch_legend(
+    figure: Figure, diagrams: list[Axes], gait: Gait, shown: set[str], *, alone: bool = False
+) -> None:
+    """The legend and, of a moving gait, the time bar; ``alone`` for a single constant gait."""
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
-
-    if gait.period is None:
-        return
-    mapping = ScalarMappable(Normalize(0.0, gait.period / _LAST_SHADE), style.SEQUENTIAL)
-    bar: Any = figure.colorbar(mapping, ax=diagrams, shrink=0.8, pad=0.02, label="time (s)")
-    bar.ax.set_ylim(0.0, gait.period)
-    bar.outline.set_linewidth(0.5)
-
-
-def _roll_pitch_legend(figure: Figure, shown: set[str], *, constant: bool = False) -> None:
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
-    line = style.SINGULAR if constant else style.GREY
-    unreachable = "unreachable" if constant else "unreachable (darker: for longer)"
+    if CURVE in shown and gait.period is not None:
+        mapping = ScalarMappable(Normalize(0.0, gait.period / _LAST_SHADE), style.SEQUENTIAL)
+        look: dict[str, Any] = {"shrink": 0.8, "pad": 0.02, "label": "time (s)"}
+        bar: Any = diagrams[0].figure.colorbar(mapping, ax=diagrams, **look)
+        bar.ax.set_ylim(0.0, gait.period)
+        bar.outline.set_linewidth(0.5)
+    line = style.SINGULAR if alone else style.GREY
+    unreachable = "unreachable" if alone else "unreachable (darker: for longer)"
     marks = {
         AREA: Patch(facecolor=style.UNREACHABLE, label=unreachable),
         CURVE: Line2D([], [], color=line, lw=1.3, label="singular"),
@@ -187,30 +176,15 @@ def _roll_pitch_legend(figure: Figure, shown: set[str], *, constant: bool = Fals
     add_legend(figure, handles)
 
 
-def _angles(axes: Axes, gait: Gait) -> None:
-    times = gait.sample_times(401)
-    for name, angle, line in zip("₁₂₃₄", gait.angles(times).T, style.ROTOR_LINES, strict=True):
-        axes.plot(times, angle, label=f"α{name}", **line)
-    axes.set_xlim(0.0, times[-1])
-    axes.set_ylabel("rad")
-    legend_over(axes, "Tilt angles")
-
-
 def _margin(axes: Axes, gaits: list[tuple[Gait, str]], vehicle: Vehicle) -> None:
-    looks = ["-", "--", "-.", ":"]
-    longest = 0.0
-    for index, (gait, label) in enumerate(gaits):
-        period = gait.period or 1.0
+    longest = lowest = 0.0
+    for (gait, label), look in zip(gaits, ["-", "--", "-.", ":"] * len(gaits), strict=False):
         times = np.array([0.0, 1.0]) if gait.is_constant else gait.sample_times(401)
         margin = margin_over_gait(gait.angles(times), vehicle)
-        longest = max(longest, period)
-        axes.plot(times, margin, looks[index % 4], label=label.replace("_", " "))
+        longest, lowest = max(longest, gait.period or 1.0), min(lowest, float(margin.min()))
+        axes.plot(times, margin, look, label=label.replace("_", " "))
     axes.axhline(0.0, color=style.INK, lw=0.8)
     style.angle_axis(axes, "y", pi / 2)
-    low, _ = axes.get_ylim()
-    lowest = min((float(np.min(line.get_ydata())) for line in axes.get_lines()), default=0.0)
-    axes.set_ylim(low * 1.05 if lowest < -0.05 else -0.12, pi / 2 * 1.05)
-    axes.set_xlim(0.0, longest)
-    axes.set_xlabel("time (s)")
-    axes.set_ylabel("rad")
+    low = -pi / 2 * 1.05 if lowest < -0.05 else -0.12
+    axes.set(xlim=(0.0, longest), ylim=(low, pi / 2 * 1.05), xlabel="time (s)", ylabel="rad")
     axes.set_title("Singularity margin")

@@ -17,21 +17,15 @@ if TYPE_CHECKING:
     from matplotlib.legend import Legend
     from matplotlib.text import Text
 
-MIN_COLUMN: Final = 2.9
-"""Width (inches) that a column of panels needs."""
-
-ROW: Final = 1.75
-"""Height (inches) of a panel over time, unless the height of the figure is given."""
-
-_TRIES: Final = 5
-"""Heights that are tried for a page of a given width."""
-
+HEADING: Final = "heading"  # identifies the title of a figure
+MIN_COLUMN: Final = 2.9  # width (inches) that a column of panels needs
+ROW: Final = 1.75  # height (inches) of a panel over time, unless the height of the figure is given
+_TRIES: Final = 5  # heights that are tried for a page of a given width
 MAX_STACK: Final = 3
 """Panels over time in one column before a second one is begun, if there is room."""
 
 
-MIN_PANEL: Final = 0.6
-"""Height (inches) that a panel needs for its scale and label."""
+MIN_PANEL: Final = 0.6  # height (inches) that a panel needs for its scale and label
 
 
 class Page(NamedTuple):
@@ -60,32 +54,31 @@ def new_page(over_time: Sequence[bool]) -> Page:
     beside = len(blocks) > 1 and width >= sum(parts) * MIN_COLUMN
     across = 1 if beside else max(1, min(square, int(width / MIN_COLUMN)))
     side = width / sum(parts) if beside else min(width / across, 4.2)
-    shapes = [
-        (ceil(n / columns), columns) if kind else (ceil(n / across), across) for kind, n in blocks
-    ]
+    rows = [ceil(n / (columns if kind else across)) for kind, n in blocks]
     heights = [
-        rows * (ROW if kind else 0.92 * side)
-        for (rows, _), (kind, _) in zip(shapes, blocks, strict=True)
+        number * (ROW if kind else 0.92 * side)
+        for number, (kind, _) in zip(rows, blocks, strict=True)
     ]
     figure = style.new_figure(width, (max(heights) if beside else sum(heights)) + 0.85)
     parents: Any = [figure]
     if beside:
-        shares = [
-            1.05 * part if kind else 1.0 for part, (kind, _) in zip(parts, blocks, strict=True)
-        ]
+        shares = [1.05 * n if kind else 1.0 for n, (kind, _) in zip(parts, blocks, strict=True)]
         parents = figure.subfigures(1, len(blocks), width_ratios=shares)
     elif len(blocks) > 1:
         parents = figure.subfigures(len(blocks), 1, height_ratios=heights)
     page = Page(figure, [], [])
-    for parent, shape, (kind, number) in zip(parents, shapes, blocks, strict=True):
-        cells = parent.subplots(*shape, squeeze=False)
-        placed = [*(cells.T if kind else cells).flat]
-        page.panels.extend(placed[:number])
-        for axes in placed[number:]:
-            axes.remove()
-        if kind:
-            rows = shape[0]
-            page.columns.extend(placed[k : min(k + rows, number)] for k in range(0, number, rows))
+    for parent, number, (kind, count) in zip(parents, rows, blocks, strict=True):
+        if kind:  # columns of their own, so that the shorter one leaves no hole
+            lengths = [count - number * (columns - 1), *[number] * (columns - 1)]
+            stacks = parent.subfigures(1, len(lengths), squeeze=False)[0]
+            for stack, length in zip(stacks, lengths, strict=True):
+                page.columns.append([*stack.subplots(length, 1, squeeze=False)[:, 0]])
+                page.panels.extend(page.columns[-1])
+        else:
+            placed = [*parent.subplots(number, across, squeeze=False).flat]
+            page.panels.extend(placed[:count])
+            for axes in placed[count:]:
+                axes.remove()
     return page
 
 
@@ -157,8 +150,9 @@ def add_heading(figure: Figure, title: str, more: str = "", legend: Sequence[Any
     width, height = figure.get_size_inches() * figure.dpi
     gap = 0.07 * figure.dpi
     top = height - gap
+    bold = {"size": rcParams["figure.titlesize"], "weight": rcParams["figure.titleweight"]}
     looks: list[tuple[str, dict[str, Any]]] = [
-        (title, {"size": rcParams["figure.titlesize"], "weight": rcParams["figure.titleweight"]}),
+        (title, {**bold, "gid": HEADING}),
         (more, {"color": "#555555"}),
     ]
     for text, look in looks:
@@ -210,19 +204,36 @@ def wrap(text: Text, width: float) -> None:
     text.set_text("\n".join(lines))
 
 
-def legend_over(axes: Axes, title: str, columns: int = 4) -> None:
-    """A title at the left above a panel and its legend at the right, or below the title."""
-    axes.set_title(title)
-    if not axes.get_legend_handles_labels()[0]:
-        return
-    look: dict[str, Any] = {"borderaxespad": 0.0, "handlelength": 1.4, "columnspacing": 0.9}
-    look |= {"loc": "lower right", "bbox_to_anchor": (1.0, 0.985), "handletextpad": 0.4}
-    width = axes.get_window_extent().width
-    for fewer in range(columns, 0, -1):
-        box = axes.legend(ncols=fewer, **look).get_window_extent()
-        if box.width <= 1.12 * width:
+def place_legends(page: Page) -> None:
+    """The legends of the panels: over those over time, at the right, and below the squares.
+
+    The layout is made first, so that legends know the room that they have.
+    """
+    layout: Any = page.figure.get_layout_engine()
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "constrained_layout not applied")
+        layout.execute(page.figure)
+    over_time = [axes for column in page.columns for axes in column]
+    for axes in page.panels:
+        labels = axes.get_legend_handles_labels()[1]
+        if labels:
+            _place_legend(axes, len(labels), below=axes not in over_time)
+
+
+def _place_legend(axes: Axes, entries: int, *, below: bool) -> None:
+    from matplotlib import rcParams
+
+    box, points = axes.get_window_extent(), 72.0 / axes.figure.dpi
+    look: dict[str, Any] = {"handlelength": 1.4, "columnspacing": 0.9, "handletextpad": 0.4}
+    if below:
+        low = -4.2 * rcParams["font.size"] / points / box.height
+        look |= {"loc": "upper center", "bbox_to_anchor": (0.5, low)}
+    else:
+        look |= {"loc": "lower right", "bbox_to_anchor": (1.0, 0.985), "borderaxespad": 0.0}
+    title = axes.get_title(loc="left")
+    for columns in range(min(entries, 4 if below else 8), 0, -1):
+        drawn = axes.legend(ncols=columns, **look).get_window_extent()
+        if drawn.width <= (1.15 if below else 1.0) * box.width:
             break
-    written = axes.set_title(title).get_window_extent()
-    if box.width + written.width > 1.12 * width:
-        points = 72.0 / axes.figure.dpi
-        axes.set_title(title, pad=box.height * points)
+    if not below and drawn.width + axes.set_title(title).get_window_extent().width > box.width:
+        axes.set_title(title, pad=drawn.height * points)

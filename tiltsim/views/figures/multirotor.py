@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from tiltsim.views.figures import style
+from tiltsim.views.signals import FLOORS
 from tiltsim_controllers.analysis.attainable import (
     ALMOST_FLAT,
     attainable_forces,
@@ -32,22 +33,26 @@ if TYPE_CHECKING:
 _POINTS: Final = 241
 
 
+@style.paper_style()
 def multirotor_figure(rotors: TiltedRotors, kind: str) -> Figure:
     """``roll_pitch``, the margin of every attitude, or ``attainable``, forces and torques."""
-    with style.paper_style():
-        if kind == "roll_pitch":
-            figure = style.new_figure(4.4, 3.6)
-            _margins(figure.subplots(), rotors)
-            return figure
-        figure = style.new_figure(8.0, 3.4)
-        spaces: Any = [figure.add_subplot(1, 2, i, projection="3d") for i in (1, 2)]
-        spaces[0].set_title("Force without torque, by weight")
-        _polytope(spaces[0], attainable_forces(rotors), rotors.weight, "$F_{}/mg$")
-        found = hover(rotors)
-        up = LEVEL if found is None else found.force / rotors.weight
-        spaces[1].set_title("Torque while the lift carries the weight")
-        _polytope(spaces[1], attainable_torques(rotors, np.array(up)), 1.0, "{} (N m)")
+    if kind == "roll_pitch":
+        figure = style.new_figure(4.4, 3.6)
+        _margins(figure.subplots(), rotors)
         return figure
+    figure = style.new_figure(8.0, 3.4)
+    found = hover(rotors)
+    up = LEVEL if found is None else found.force / rotors.weight
+    sets = (
+        ("Force without torque, by weight", attainable_forces(rotors), rotors.weight, "$F_{}/mg$"),
+        ("Torque while the lift carries the weight", attainable_torques(rotors, np.array(up)), 1.0,
+         "{} (N m)"),
+    )  # fmt: skip
+    for place, (title, attainable, unit, label) in enumerate(sets, start=1):
+        space: Any = figure.add_subplot(1, 2, place, projection="3d")
+        space.set_title(title)
+        _polytope(space, attainable, unit, label)
+    return figure
 
 
 def _margins(axes: Axes, rotors: TiltedRotors) -> None:
@@ -56,11 +61,20 @@ def _margins(axes: Axes, rotors: TiltedRotors) -> None:
     angles = np.linspace(-pi / 2, pi / 2, _POINTS)
     roll, pitch = np.meshgrid(angles, angles)
     margin = singularity_margin(forces, world_up(roll, pitch))
+    name = SINGULAR_ATTITUDES[int(forces.dimension)]
+    axes.set_title(f"Singular attitudes: {name}")
+    axes.plot(0.0, 0.0, "+", color=style.INK, ms=8, mew=1.2)
+    if float(np.ptp(margin)) < FLOORS["rad"]:  # of one shade
+        axes.grid(visible=False)
+        angle = float(margin.max())
+        text = f"the singularity margin is\n{angle:.3g} rad at every attitude"
+        axes.text(0.0, 0.35, text, ha="center", va="center")
+        style.roll_pitch_axes(axes)
+        return
     levels = np.linspace(0.0, pi / 2, 13)
     shades: Any = axes.contourf(roll, pitch, margin, levels, cmap=style.SEQUENTIAL)
     bar: Any = axes.figure.colorbar(shades, ax=axes, label="singularity margin (rad)")
     bar.set_ticks([0.0, pi / 4, pi / 2], labels=["0", "π/4", "π/2"])
-    name = SINGULAR_ATTITUDES[int(forces.dimension)]
     if name == "great circle":
         normal = np.linalg.svd(forces.projector)[0][:, 0]
         axes.contour(roll, pitch, world_up(roll, pitch) @ normal, [0.0], colors=style.SINGULAR)
@@ -68,29 +82,17 @@ def _margins(axes: Axes, rotors: TiltedRotors) -> None:
         up = np.linalg.svd(forces.projector)[0][:, 2]
         up = up if up[2] >= 0.0 else -up
         axes.plot(np.arctan2(up[1], up[2]), -np.arcsin(up[0]), "o", color=style.SINGULAR)
-    axes.plot(0.0, 0.0, "+", color=style.INK, ms=8, mew=1.2)
     style.roll_pitch_axes(axes)
-    axes.set_title(f"Singular attitudes: {name}")
 
 
 def _polytope(space: Any, found: AttainableSet, unit: float, label: str) -> None:
-    """The faces of a set, or the polygon or line that it is; its coordinates are over ``unit``."""
-    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
-
-    vertices = found.vertices / unit
+    """A set whose coordinates are over ``unit``."""
     if found.is_empty:
         space.set_axis_off()
         space.text2D(0.5, 0.5, "none", transform=space.transAxes, ha="center")
         return
-    if found.dimension == 3:
-        faces = Poly3DCollection(_faces(vertices), facecolor=style.SKY, alpha=0.25)
-        faces.set_edgecolor(style.BLUE)
-        faces.set_linewidth(0.6)
-        space.add_collection3d(faces)
-    elif found.dimension == 2:
-        space.add_collection3d(Poly3DCollection([vertices], facecolor=style.BLUE, alpha=0.45))
-    else:
-        space.plot(*vertices.T, color=style.BLUE, lw=2.2)
+    solid = found.dimension == 3
+    draw_set(space, found, style.SKY if solid else style.BLUE, 0.25 if solid else 0.45, unit)
     low, high = (bound / unit for bound in (found.lower, found.upper))
     across = max(1.1 * float(np.abs([low[:2], high[:2]]).max()), 0.05 * float(high[2] - low[2]))
     space.set(xlim=(-across, across), ylim=(-across, across))
@@ -99,6 +101,37 @@ def _polytope(space: Any, found: AttainableSet, unit: float, label: str) -> None
     space.locator_params(nbins=5)
     space.view_init(elev=18, azim=-60)
     space.set_box_aspect(None, zoom=0.95)
+
+
+def draw_set(
+    space: Any,
+    found: AttainableSet,
+    color: str,
+    alpha: float,
+    unit: float = 1.0,
+    *,
+    edge: bool = True,
+) -> None:
+    """Draw the faces of a set that is not empty, or the polygon or line that it is.
+
+    Args:
+        space: Axes in three dimensions.
+        found: The set.
+        color, alpha: Of the faces.
+        unit: Of the coordinates.
+        edge: Whether edges are drawn.
+    """
+    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+
+    vertices = found.vertices / unit
+    if found.dimension < 2:
+        space.plot(*vertices.T, color=style.BLUE, lw=2.2)
+        return
+    polygons = _faces(vertices) if found.dimension == 3 else [vertices]
+    faces = Poly3DCollection(polygons, facecolor=color, alpha=alpha)
+    faces.set_edgecolor(style.BLUE if edge else "none")
+    faces.set_linewidth(0.6)
+    space.add_collection3d(faces)
 
 
 def _faces(vertices: NDArray[np.float64]) -> list[NDArray[np.float64]]:

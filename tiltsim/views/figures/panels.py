@@ -1,19 +1,39 @@
-"""Panels over time and plan views, of one flight or of several in the same axes."""
+"""The panels of a page of flights: signals over time, paths from above, planes."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from math import pi
+from dataclasses import dataclass, replace
+from functools import partial
+from math import ceil, log10, pi
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
 from tiltsim.laws.layers.supervision import SUPERVISION
-from tiltsim.system.quantity import in_words
-from tiltsim.views.attitude_plane import margin_threshold
+from tiltsim.scenario.gait import PenguinGait
+from tiltsim.system.quantity import Quantity
+from tiltsim.views.attitude_plane import (
+    HALF_WIDTH,
+    SUPERVISION_THRESHOLD,
+    margin_threshold,
+    nearest_singular,
+    side_of,
+    singular_curves,
+    torque_free_directions,
+    unreachable_pitch,
+)
 from tiltsim.views.figures import style
-from tiltsim.views.figures.layout import legend_over
+from tiltsim.views.signals import (
+    AXES,
+    FLOORS,
+    Signals,
+    distance,
+    has_attitude_plane,
+    scale,
+    signals_of,
+    vector_signals,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -21,24 +41,13 @@ if TYPE_CHECKING:
     from tiltsim.flight.flight import Flight
     from tiltsim_controllers.mathematics.scalar import Floats
 
-END_FRACTION: Final = 0.02
-"""Share of the samples, at the end of a diverged flight, that the scale of a panel ignores."""
-
-MAX_WIDENING: Final = 4.0
-"""Factor by which these samples may widen the scale of a panel before they are ignored."""
-
-MAX_PERIODS: Final = 10
-"""Periods of a gait above which what moves with it would be a solid band."""
-
-SHOWN_PERIODS: Final = 4
-"""Number of periods that are shown instead, the last ones."""
-
-NARROW: Final = 8.0
-"""Ratio of a path's extents above which its plan view has a scale of its own for each axis."""
-
-
-SMALLEST_ANGLES: Final = 1e-3
-"""Smallest range (rad) of an axis of angles: what is far smaller is as good as zero."""
+MAX_PERIODS: Final = 10  # of a gait: more of what moves with it would be a solid band
+SHOWN_PERIODS: Final = 4  # the last ones, shown instead
+NARROW: Final = 8.0  # ratio of a path's extents above which its axes have different scales
+INSTANTS: Final = 120  # whose unreachable attitudes the roll-pitch plane shows
+SETTLED: Final = 0.01  # share of the largest error below which errors have settled
+SHORT: Final = 0.1  # share of a flight below which only the time until then is shown
+ROUNDING: Final = 1e-9  # m, below which errors are rounding
 
 
 class Shown(NamedTuple):
@@ -56,85 +65,151 @@ class Panel:
     Attributes:
         draw: ``(axes, shown)``: draws the flights, one or several, and labels the axes.
         over_time: Whether its x axis is the time; else it is a square.
-        scaled: Whether `draw` chooses the scale of the y axis for any values.
+        signals: Over time: they decide the part of the time and the scale; without, `draw` does.
         needs: A column that the flights must have.
-        unless: A column with which the panel is only drawn on request.
+        on_request: Whether it is only drawn if asked for.
     """
 
     draw: Callable[[Axes, Sequence[Shown]], None]
     over_time: bool = True
-    scaled: bool = False
+    signals: Signals | None = None
     needs: str = "time"
-    unless: str = ""
+    on_request: bool = False
 
 
-def of_one(draw: Callable[[Axes, Flight], None], **about: Any) -> Panel:
-    """A panel of a single flight."""
-    return Panel(lambda axes, shown: draw(axes, shown[0].flight), **about)
+def panels_of(flights: Sequence[Flight]) -> dict[str, Panel]:
+    """The panels of a page by their names, in their order."""
+    units = {column for flight in flights for column in flight.units}
+    supervised = SUPERVISION in units
+    margin = Panel(_margins, needs="singularity_margin")
+    several = len(flights) > 1
+    common = {
+        "determinant": Panel(
+            _determinant, needs="determinant", on_request=not (several and supervised)
+        ),
+        "supervisor": Panel(_supervisor, needs=SUPERVISION, on_request=not several),
+    }
+    path = {"path": Panel(_path, over_time=False)}
+    if several:
+        away = Panel(_distance, signals=Signals("position_error", "", "m", ()))
+        found = {"position_error": away, "margin": margin, **common}
+        found |= {name: column_panel(flights, name) for name in ("roll", "pitch", "yaw")} | path
+    else:
+        assembly = flights[0].assembly
+        signals = signals_of(assembly)
+        order = ("position_error", "altitude", "margin", "attitude", "tilt_angles")
+        names = [name for name in order if name in signals]
+        names += [name for name in signals if name not in order]
+        found = {name: signals_panel(signals[name]) for name in names}
+        if "lyapunov" in found:  # which says the same
+            found["direction_error"] = replace(found["direction_error"], on_request=True)
+        found |= ({"margin": margin} if "margin" in found else {}) | common | path
+        if has_attitude_plane(assembly):
+            found["attitude_plane"] = Panel(_attitude_plane, over_time=False)
+        if "direction" in units:
+            found["portrait"] = Panel(_portrait, over_time=False)
+    return {name: panel for name, panel in found.items() if panel.needs in units}
 
 
-def column_panel(name: str) -> Panel:
+def column_panel(flights: Sequence[Flight], name: str) -> Panel:
     """A column over time with, if the flights have it, its reference."""
+    one = next((flight for flight in flights if name in flight.units), None)
+    about = None if one is None else vector_signals(one.assembly, name, [name])
 
     def draw(axes: Axes, shown: Sequence[Shown]) -> None:
         for one in shown:
             time, values = one.flight["time"], one.flight[name]
             axes.plot(time, values, **one.look, lw=1.2)
             if f"{name}_ref" in one.flight.columns:
-                color = one.look["color"] if len(shown) > 1 else style.INK
+                color = one.look["color"] if "marker" in one.look else style.INK
                 axes.plot(time, one.flight[f"{name}_ref"], color=color, ls=":", lw=0.8)
             _mark_end(axes, one, values)
-        label = shown[0].flight.assembly.loop.label(name)
-        axes.set_ylabel(label.text)
-        show_last_periods(axes, [one.flight for one in shown])
-        widen(axes, SMALLEST_ANGLES if label.unit == "rad" else 1e-6)
+        axes.set_ylabel(shown[0].flight.assembly.loop.label(name).text)
 
-    return Panel(draw, needs=name)
+    return Panel(draw, signals=about, needs=name)
 
 
-def vector_panel(name: str, columns: Sequence[str]) -> Panel:
-    """The components of a vector of one flight over time."""
+def signals_panel(signals: Signals) -> Panel:
+    """Signals of one flight with their references, levels and bounds."""
+    draw = partial(_signals, signals=signals)
+    return Panel(draw, signals=signals, on_request=signals.on_request)
 
-    def draw(axes: Axes, flight: Flight) -> None:
-        known = [flight.assembly.loop.label(column) for column in columns]
-        looks = style.AXIS_LINES if len(columns) <= 3 else style.ROTOR_LINES
-        for column, (label, _), line in zip(columns, known, looks, strict=False):
-            axes.plot(flight["time"], flight[column], label=label, **line)
-        widen(axes, 1e-6)
-        show_last_periods(axes, [flight])
-        axes.set_ylabel(known[0].unit)
-        legend_over(axes, in_words(name).capitalize())
 
-    return of_one(draw)
+def _signals(axes: Axes, shown: Sequence[Shown], signals: Signals) -> None:
+    flight = shown[0].flight
+    time, lines = flight["time"], signals.lines
+    numbered = len(lines) > 3 or lines[0].name[-1:].isdigit()
+    looks = style.rotor_lines(len(lines)) if numbered else style.AXIS_LINES
+    if signals.path == "position_error":
+        style.zero_lines(axes, "x")
+    for line, look in zip(lines, looks, strict=False):
+        axes.plot(time, line.of(flight), label=line.label, **look)
+    # Those of tilt angles would cover the angles that follow them.
+    references = [line.reference for line in lines if line.reference in flight.units]
+    for number, name in enumerate([] if numbered else references):
+        look = {"color": style.INK, "ls": ":", "lw": 0.8}
+        axes.plot(time, flight[name], label="" if number else "reference", **look)
+    for number, level in enumerate(level for level in signals.levels if level.value or numbered):
+        axes.axhline(level.value, color=style.RED, ls="--", lw=0.9, label="" if number else "limit")
+    bounds = [flight[name] for name in signals.bounds]
+    for values, far, label in zip(bounds, (-2.0, 2.0), ("inadmissible", ""), strict=False):
+        axes.plot(time, values, color=style.UNREACHABLE, lw=0.8)
+        beyond = far * (1.0 + np.abs(bounds).max())
+        shade: dict[str, Any] = {"color": style.UNREACHABLE, "lw": 0.0, "zorder": 0.5}
+        axes.fill_between(time, values, beyond, **shade, label=label)
+    label = Quantity(signals.detail, signals.unit).text
+    axes.set_ylabel(label if signals.detail else label.strip(" ()"))
+    axes.set_title(signals.title)
+    if signals.path == "position_error" and "direction" in flight.units:
+        _zoom_to_start(axes, flight)
+
+
+def _zoom_to_start(axes: Axes, flight: Flight) -> None:
+    """Show only the start of errors that settle soon, and say how small they are later."""
+    time, names = flight["time"], [axis for axis in AXES if f"{axis}_ref" in flight.units]
+    size = np.max(np.abs([flight[f"{axis}_ref"] - flight[axis] for axis in names]), axis=0)
+    settled = time[np.flatnonzero(size > SETTLED * size.max())[-1]] if size.any() else time[-1]
+    if 2.0 * settled < SHORT * time[-1]:
+        axes.set_xlim(0.0, 2.0 * settled)
+        axes.set_xlabel(f"time (s), the first {2.0 * settled:.0f} s")
+        later = max(float(size[time > 2.0 * settled].max()), ROUNDING)
+        axes.set_title(f"Position error, later below $10^{{{ceil(log10(later))}}}$ m")
 
 
 def _distance(axes: Axes, shown: Sequence[Shown]) -> None:
     """The distance of every flight from its reference."""
     for one in shown:
-        names = "xyz" if one.flight.assembly.follows_position else "z"
-        errors = [
-            one.flight[f"{axis}_ref"] - one.flight[axis]
-            for axis in names
-            if axis in one.flight.columns
-        ]
-        distance = np.asarray(np.linalg.norm(errors, axis=0))
-        axes.plot(one.flight["time"], distance, **one.look)
-        _mark_end(axes, one, distance)
-    axes.set_ylim(bottom=0.0)
+        names = AXES if one.flight.assembly.follows_position else "z"
+        values = distance(one.flight, [axis for axis in names if axis in one.flight.columns])
+        _plot(axes, one, values)
     axes.set_ylabel("position error (m)")
 
 
 def _margins(axes: Axes, shown: Sequence[Shown]) -> None:
-    """The singularity margin of every flight, and what of it counts as nearly singular."""
+    """The singularity margin of every flight, and how much of it counts as nearly singular."""
     threshold = max(margin_threshold(one.flight.scenario) for one in shown)
-    shade_below(axes, threshold, f"margin below {threshold:g} rad")
+    single = "marker" not in shown[0].look
+    text = f"below {threshold:g}" if single else f"margin below {threshold:g} rad"
+    axes.axhspan(0.0, threshold, color=style.UNREACHABLE, lw=0.0, label=text)
     for one in shown:
-        margin = np.maximum(one.flight["singularity_margin"], 0.0)
-        axes.plot(one.flight["time"], margin, **one.look, lw=line_width([one.flight]))
-        _mark_end(axes, one, margin)
+        flight = one.flight
+        margin = flight["singularity_margin"]
+        _plot(axes, one, np.abs(margin) if single else np.maximum(margin, 0.0))
+        if single and SUPERVISION in flight.columns:
+            active = flight[SUPERVISION] > SUPERVISION_THRESHOLD
+            look: dict[str, Any] = {"color": style.PALE, "lw": 0.0, "zorder": 0.5}
+            look |= {"transform": axes.get_xaxis_transform(), "label": "supervisor active"}
+            axes.fill_between(flight["time"], 0.0, 1.0, where=active, **look)
+    if single:
+        closest = int(np.argmin(np.abs(margin)))
+        least = abs(margin[closest])
+        dot: dict[str, Any] = {"color": style.SINGULAR, "ms": 5, "zorder": 5}
+        text = f"minimum, {least:.2f}"
+        axes.plot(flight["time"][closest], least, "o", **dot, clip_on=False, label=text)
+        axes.set_title("Singularity margin")
     style.angle_axis(axes, "y", pi / 2)
-    axes.set_ylim(0.0, pi / 2 * 1.02)
-    axes.set_ylabel("singularity margin (rad)")
+    axes.set_ylim(0.0, pi / 2 * 1.03)
+    axes.set_ylabel("rad" if single else "singularity margin (rad)")
 
 
 def _determinant(axes: Axes, shown: Sequence[Shown]) -> None:
@@ -142,89 +217,134 @@ def _determinant(axes: Axes, shown: Sequence[Shown]) -> None:
     thresholds = [one.flight.scenario.controller.supervision for one in shown]
     lowest = max((t.min_determinant for t in thresholds if t is not None), default=0.0)
     if lowest > 0.0:
-        shade_below(axes, lowest, f"determinant below {lowest:g}")
-    top = 4.0
-    for one in shown:
-        values = np.maximum(one.flight["determinant"], 0.0)
-        top = max(top, 1.05 * float(values.max()))
-        axes.plot(one.flight["time"], values, **one.look, lw=line_width([one.flight]))
-        _mark_end(axes, one, values)
-    axes.set_ylim(0.0, top)
+        text = f"determinant below {lowest:g}"
+        axes.axhspan(0.0, lowest, color=style.UNREACHABLE, lw=0.0, label=text)
+    values = [np.maximum(one.flight["determinant"], 0.0) for one in shown]
+    for one, determinant in zip(shown, values, strict=True):
+        _plot(axes, one, determinant)
+    axes.set_ylim(0.0, max(4.0, *(1.05 * float(each.max()) for each in values)))
     axes.set_ylabel("determinant n · r₃")
 
 
 def _supervisor(axes: Axes, shown: Sequence[Shown]) -> None:
     """How far each supervisor intervenes."""
     for one in shown:
-        axes.plot(one.flight["time"], one.flight[SUPERVISION], **one.look)
-        _mark_end(axes, one, one.flight[SUPERVISION])
-    axes.set_ylim(-0.03, 1.03)
-    axes.set_ylabel("supervisor (0 to 1)")
+        _plot(axes, one, one.flight[SUPERVISION])
+    axes.set(ylim=(-0.03, 1.03), ylabel="supervisor (0 to 1)")
+
+
+def _plot(axes: Axes, one: Shown, values: Floats) -> None:
+    """A line over a whole flight; where it would be a solid band, its range over every period."""
+    time, period = one.flight["time"], many_periods([one.flight])
+    if period > 0.0:
+        starts = np.searchsorted(time, np.arange(0.0, time[-1], period))
+        low, high = np.minimum.reduceat(values, starts), np.maximum.reduceat(values, starts)
+        color, middle = one.look["color"], time[starts] + 0.5 * period
+        label = "range over each period"
+        axes.fill_between(middle, low, high, color=color, alpha=0.3, lw=0.0, label=label)
+        axes.plot(middle, 0.5 * (low + high), **{**one.look, "markevery": None, "marker": ""})
+    else:
+        axes.plot(time, values, **one.look)
+    if "marker" in one.look:
+        _mark_end(axes, one, values)
+
+
+def _mark_end(axes: Axes, one: Shown, values: Floats) -> None:
+    """A cross where a flight terminated early."""
+    if one.flight.end.kind != "completed":
+        at, color = (one.flight["time"][-1], values[-1]), one.look["color"]
+        axes.plot(*at, "X", color=color, ms=6, zorder=6, clip_on=False)
 
 
 def _path(axes: Axes, shown: Sequence[Shown]) -> None:
     """The paths from above."""
     known: list[Floats] = []
+    single = "marker" not in shown[0].look
     for one in shown:
-        flight = one.flight
+        flight, color = one.flight, one.look["color"]
         if flight.assembly.follows_position:
             reference = np.stack([flight["x_ref"], flight["y_ref"]])
             if not any(np.array_equal(reference, other) for other in known):
-                _reference(axes, reference, "" if known else "reference")
+                label = "" if known else "reference"
+                look: dict[str, Any] = {"color": style.INK, "label": label}
+                if np.ptp(reference, axis=1).sum() > 0.0:
+                    axes.plot(*reference, ls=":", lw=1.1, zorder=1.5, **look)
+                else:
+                    axes.plot(*reference[:, 0], "+", ms=7, mew=1.4, **look)
                 known.append(reference)
         x, y = flight["x"], flight["y"]
-        axes.plot(x, y, **one.look, label="path" if len(shown) == 1 else "")
-        first, single = one is shown[0], len(shown) == 1
-        label = "start" if first else ""
+        axes.plot(x, y, **one.look, label="path" if single else "")
+        label = "start" if one is shown[0] else ""
         axes.plot(x[0], y[0], "o", color=style.INK, mfc="white", ms=5, label=label, zorder=3)
         if flight.end.kind != "completed":
             text = "terminated early" if single else ""
-            axes.plot(x[-1], y[-1], "X", color=one.look["color"], ms=7, zorder=6, label=text)
+            axes.plot(x[-1], y[-1], "X", color=color, ms=7, zorder=6, label=text)
         else:
-            color = style.INK if single else one.look["color"]
-            axes.plot(x[-1], y[-1], "s", color=color, ms=4.5, zorder=4)
-            axes.plot([], [], "s", color=style.INK, ms=4.5, label="end" if first else "")
+            axes.plot(x[-1], y[-1], "s", color=style.INK if single else color, ms=4.5, zorder=4)
+            axes.plot([], [], "s", color=style.INK, ms=4.5, label=label and "end")
     axes.margins(0.08)
     axes.set(xlabel="x (m)", ylabel="y (m)", title="Plan view")
     data = axes.dataLim
-    if min(data.width, data.height) * NARROW < max(data.width, data.height):
-        widen(axes, 1e-3)
+    short, long = sorted((data.width, data.height))
+    if short > FLOORS["m"] and short * NARROW < long:
         axes.set_title("Plan view, x and y to different scales")
-    elif len(shown) > 1:
-        axes.set_aspect("equal", anchor="N")
     else:
         axes.set_aspect("equal", adjustable="datalim")
+        if long < FLOORS["m"]:
+            axes.set_xlim(data.x0 - FLOORS["m"], data.x1 + FLOORS["m"])
 
 
-def plan_view(axes: Axes, flight: Flight) -> None:
-    """The path of one flight from above."""
-    _path(axes, [Shown(flight, "", {"color": style.BLUE})])
-    style.legend_below(axes)
+def _attitude_plane(axes: Axes, shown: Sequence[Shown]) -> None:
+    """The attitudes flown, unreachable ones, and the closest approach to a singular one."""
+    flight = shown[0].flight
+    n = torque_free_directions(flight.columns, flight.scenario.rotorcraft.resolve())
+    margin = flight["singularity_margin"]
+    closest = int(np.argmin(np.abs(margin)))
+    instants = np.unique(np.linspace(0, len(n) - 1, INSTANTS).round().astype(int))
+    edges = np.linspace(-HALF_WIDTH, HALF_WIDTH, 361)
+    centres = 0.5 * (edges[1:] + edges[:-1])
+    intervals = unreachable_pitch(n[instants], side_of(margin), centres)[:, np.newaxis]
+    pitch = centres[:, np.newaxis]
+    share = ((pitch > intervals[..., 0]) & (pitch < intervals[..., 1])).mean(axis=0)
+    style.shade_share(axes, edges, share)
+    attitude = np.stack([flight["roll"], flight["pitch"]], axis=1)
+    axes.plot(*attitude.T, color=style.BLUE, lw=0.9, label="flown")
+    curve, here = singular_curves(n[[closest]], 181)[0], attitude[closest]
+    if np.isfinite(curve).any():
+        axes.plot(*curve.T, color=style.SINGULAR, lw=1.8, label="singular")
+        there = nearest_singular(n[[closest]], attitude[[closest]])[0]
+        text = f"minimum margin, at {flight['time'][closest]:.2f} s"
+        axes.plot(*np.stack([here, there]).T, color=style.INK, lw=1.0, ls="--", label=text)
+    axes.plot(*here, "o", color=style.SINGULAR, ms=5, zorder=5)
+    if share.any():
+        axes.fill([], [], color=style.UNREACHABLE, label="unreachable")
+    style.roll_pitch_axes(axes)
+    axes.set_title("Attitudes flown")
 
 
-def _reference(axes: Axes, reference: Floats, label: str) -> None:
-    if np.ptp(reference, axis=1).sum() > 0.0:
-        axes.plot(*reference, color=style.INK, ls=":", lw=1.1, label=label, zorder=1.5)
-    else:
-        axes.plot(*reference[:, 0], "+", color=style.INK, ms=7, mew=1.4, label=label)
-
-
-def show_last_periods(axes: Axes, flights: Sequence[Flight]) -> None:
-    """Show only the last periods of moving gaits where all of them would be a solid band.
-
-    Of flights of different lengths they are the last ones that all flights have.
-    """
-    longest = many_periods(flights)
-    if longest > 0.0:
-        ends = [float(flight["time"][-1]) for flight in flights]
-        begin = max(0.0, min(ends) - SHOWN_PERIODS * longest)
-        show_part(axes, begin, begin + SHOWN_PERIODS * longest)
-        shared = "" if min(ends) == max(ends) else " of all flights"
-        axes.set_xlabel(f"time (s), the last {SHOWN_PERIODS} periods{shared}")
+def _portrait(axes: Axes, shown: Sequence[Shown]) -> None:
+    """The phase portrait of the error along y."""
+    flight = shown[0].flight
+    error, rate = flight["y_ref"] - flight["y"], flight["vy_ref"] - flight["vy"]
+    style.zero_lines(axes)
+    axes.plot(error, rate, color=style.BLUE, lw=1.0, label="path")
+    gait = flight.scenario.gait
+    if isinstance(gait, PenguinGait):
+        half = flight["time"] / (0.5 * gait.period)
+        at = (np.abs(half - np.round(half)) < 1e-6) & (half > 0.5)
+        axes.plot(error[at], rate[at], "o", color=style.RED, ms=4.5, zorder=4, label="at n T/2")
+    axes.plot(error[0], rate[0], "o", color=style.INK, mfc="white", ms=5, label="start")
+    axes.plot(error[-1], rate[-1], "s", color=style.INK, ms=4, label="end")
+    axes.margins(0.08)
+    title = "Error along y and its rate"
+    axes.set(xlabel="error along y (m)", ylabel="rate of the error (m/s)", title=title)
+    for part, least in (("x", FLOORS["m"]), ("y", FLOORS["m/s"])):
+        low, high = scale([np.array(getattr(axes, f"get_{part}lim")())], [False], least)[:2]
+        getattr(axes, f"set_{part}lim")(low, high)
 
 
 def many_periods(flights: Sequence[Flight]) -> float:
-    """The longest period (s) of gaits with so many of them that they are a solid band, else 0."""
+    """The longest period (s) of gaits whose periods would be a solid band, else 0."""
     end = max(float(flight["time"][-1]) for flight in flights)
     if any(SUPERVISION in flight.units for flight in flights):
         return 0.0
@@ -236,82 +356,37 @@ def many_periods(flights: Sequence[Flight]) -> float:
     return max((period for period in periods if end > MAX_PERIODS * period), default=0.0)
 
 
-def line_width(flights: Sequence[Flight]) -> float:
-    """The width (points) of lines over whole flights: thin where they oscillate densely."""
-    return 0.7 if many_periods(flights) else 1.4
+def set_scale(axes: Axes, signals: Signals, shown: Sequence[Shown]) -> None:
+    """Limits of a panel over time: the last periods of moving gaits, the range of what is seen.
 
-
-def show_part(axes: Axes, begin: float, end: float) -> None:
-    """Limit a panel to a part of the time (s), with the scale of what it shows."""
-    axes.set_xlim(begin, end)
-    shown = []
-    for line in axes.get_lines():
-        time, values = np.asarray(line.get_xdata()), np.asarray(line.get_ydata())
-        shown.append(values[(time >= begin) & (time <= end)] if len(time) > 2 else values)
-    seen = np.concatenate(shown)
-    pad = 0.08 * float(np.ptp(seen)) or 0.05
-    axes.set_ylim(float(seen.min()) - pad, float(seen.max()) + pad)
-
-
-def shade_below(axes: Axes, value: float, label: str) -> None:
-    """Shade what is as good as singular: everything below a threshold."""
-    axes.axhspan(0.0, value, color=style.UNREACHABLE, lw=0.0, label=label)
-
-
-def _mark_end(axes: Axes, one: Shown, values: Floats) -> None:
-    """A cross where a flight terminated early."""
-    if one.flight.end.kind != "completed":
-        at, color = (one.flight["time"][-1], values[-1]), one.look["color"]
-        axes.plot(*at, "X", color=color, ms=6, zorder=6, clip_on=False)
-
-
-def widen(axes: Axes, minimum: float) -> None:
-    """Widen the y axis to a minimum range, so that noise does not fill the panel."""
-    low, high = axes.get_ylim()
-    if high - low < minimum:
-        middle = 0.5 * (low + high)
-        axes.set_ylim(middle - 0.5 * minimum, middle + 0.5 * minimum)
-
-
-def exclude_divergence_from_scale(axes: Axes, shown: Sequence[Shown]) -> None:
-    """Ignore the last samples of diverged flights in the scale of a panel.
-
-    They can be of any magnitude, which would make the rest of the flights a flat line.
+    Of flights of different lengths the periods are the last ones that all flights have.
     """
-    if all(one.flight.end.kind == "completed" for one in shown):
-        return
-    lows, highs = [], []
-    last_samples = {
-        len(one.flight): max(1, round(END_FRACTION * len(one.flight)))
-        for one in shown
-        if one.flight.end.kind != "completed"
-    }
-    lines = [
-        np.asarray(line.get_ydata()) for line in axes.get_lines() if np.size(line.get_xdata()) > 2
-    ]
-    for values in lines:
-        before = values[: -last_samples.get(len(values), 0) or None]
-        lows.append(float(before.min(initial=np.inf)))
-        highs.append(float(before.max(initial=-np.inf)))
-    low, high = min(lows, default=np.inf), max(highs, default=-np.inf)
-    whole = np.ptp(np.concatenate(lines)) if lines else 0.0
-    if np.isfinite(low) and whole > MAX_WIDENING * max(high - low, 1e-3 * abs(high), 1e-6):
-        pad = 0.3 * max(high - low, 0.1 * abs(high), 1e-2)
-        axes.set_ylim(low - pad, high + pad)
+    flights = [one.flight for one in shown]
+    ends = [float(flight["time"][-1]) for flight in flights]
+    begin, end = min(signals.settling, 0.5 * max(ends)), max(ends)
+    longest = many_periods(flights) if signals.moves else 0.0
+    if 0.0 < signals.latest < 0.5 * end:
+        begin = end - signals.latest
+        axes.set_xlim(begin, end)
+        axes.set_xlabel(f"time (s), the last {signals.latest:g} s")
+    elif longest > 0.0:
+        begin = max(0.0, min(ends) - SHOWN_PERIODS * longest)
+        end = begin + SHOWN_PERIODS * longest
+        axes.set_xlim(begin, end)
+        shared = "" if min(ends) == max(ends) else " of all flights"
+        axes.set_xlabel(f"time (s), the last {SHOWN_PERIODS} periods{shared}")
+    terminated = {len(one) for one in flights if one.end.kind != "completed"}
+    drawn, ended = [], []
+    for line in axes.get_lines():
+        time, values = (np.asarray(part, float) for part in line.get_data())
+        if len(time) != 1:  # a cross at the end follows its line
+            whole = len(time) <= 2
+            drawn.append(values if whole else values[(time >= begin) & (time <= end)])
+            ended.append(not whole and len(time) in terminated)
+    low, high, off = scale(drawn, ended, signals.least)
+    axes.set_ylim(low, high)
+    if off:
         for line in axes.get_lines():
             line.set_clip_on(True)
         look: dict[str, Any] = {"ha": "right", "size": "x-small", "transform": axes.transAxes}
         axes.text(0.995, 0.02, "ends off scale", **look)
-
-
-COMPARED: Final[dict[str, Panel]] = {
-    "position_error": Panel(_distance),
-    "margin": Panel(_margins, scaled=True, needs="singularity_margin"),
-    "determinant": Panel(_determinant, scaled=True, needs="determinant"),
-    "supervisor": Panel(_supervisor, scaled=True, needs=SUPERVISION),
-    "roll": column_panel("roll"),
-    "pitch": column_panel("pitch"),
-    "yaw": column_panel("yaw"),
-    "path": Panel(_path, over_time=False),
-}
-"""The panels of a comparison, by name."""

@@ -16,17 +16,17 @@ from tiltsim.scenario.messages import choose
 from tiltsim.system.text import short_repr
 from tiltsim.views.figures import style
 from tiltsim.views.figures.adjusting import relabel
-from tiltsim.views.figures.layout import Page, add_heading, fitting, new_page, wrap
+from tiltsim.views.figures.layout import Page, add_heading, fitting, new_page, place_legends, wrap
 from tiltsim.views.figures.panels import (
-    COMPARED,
     Panel,
     Shown,
     column_panel,
-    exclude_divergence_from_scale,
-    vector_panel,
+    panels_of,
+    set_scale,
+    signals_panel,
 )
+from tiltsim.views.signals import stems, vector_signals
 from tiltsim.views.titles import common_title, describe_controller, describe_gait, flight_names
-from tiltsim.views.vehicle_views import panels_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -65,7 +65,7 @@ def plot(
             dict, texts instead of their names and of other texts of the figure.
 
     Raises:
-        InputError: If an argument is wrong, there are more flights than colours, or the size is too
+        InputError: If an argument is wrong, there are more flights than colors, or the size is too
             small.
     """
     flights = as_flights(flights)
@@ -98,21 +98,20 @@ def draw_flights(
     """
     if len(flights) > MAX_FLIGHTS:
         raise InputError(f"plot: {len(flights)} flights: at most {MAX_FLIGHTS} fit on one page")
-    flights = [_within_range(flight) for flight in flights]
+    clipped = [np.clip(flight.samples, -LARGEST, LARGEST) for flight in flights]
+    flights = [
+        flight if np.array_equal(samples, flight.samples) else replace(flight, samples=samples)
+        for flight, samples in zip(flights, clipped, strict=True)
+    ]
     others = dict(texts)
     names = [others.pop(name, name) if name else "" for name in names]
     longest = max(len(flight) for flight in flights)
     looks = [style.marked_line(number, longest) for number in range(len(flights))]
+    looks = looks if len(flights) > 1 else [{"color": style.BLUE}]
     shown = [Shown(*one) for one in zip(flights, names, looks, strict=True)]
     chosen = _chosen(flights, panels)
     heading = partial(_heading, shown, title)
     return fitting(lambda: _page(shown, chosen, heading, others))
-
-
-def _within_range(flight: Flight) -> Flight:
-    """The flight with samples that axes can have."""
-    samples = np.clip(flight.samples, -LARGEST, LARGEST)
-    return flight if np.array_equal(samples, flight.samples) else replace(flight, samples=samples)
 
 
 def _page(
@@ -131,12 +130,14 @@ def _page(
     """
     page = new_page([panel.over_time for panel in chosen.values()])
     for axes, panel in zip(page.panels, chosen.values(), strict=True):
-        drawn = _with(shown, panel)
+        drawn = [one for one in shown if panel.needs in one.flight.units]
         if panel.over_time:
             style.time_axis(axes, max(float(one.flight["time"][-1]) for one in shown))
         panel.draw(axes, drawn)
-        if panel.over_time and not panel.scaled:
-            exclude_divergence_from_scale(axes, drawn)
+        if panel.signals is not None:
+            set_scale(axes, panel.signals, drawn)
+    if len(shown) == 1:
+        place_legends(page)
     for column in page.columns:
         _label_time(column)
     marks = [*_handles(shown, page.figure.axes)] if len(shown) > 1 else []
@@ -169,38 +170,26 @@ def _names_and_texts(
     return (names, dict(labels)) if isinstance(labels, Mapping) else (texts, {})
 
 
-def _with(shown: Sequence[Shown], panel: Panel) -> list[Shown]:
-    """Those flights that a panel can show."""
-    return [one for one in shown if panel.needs in one.flight.units]
-
-
 def _chosen(flights: Sequence[Flight], names: Sequence[str]) -> dict[str, Panel]:
     """The panels to draw, by name."""
-    available = dict(COMPARED)
-    if len(flights) == 1:
-        available = dict(panels_of(flights[0].assembly))
-    fitting = {
-        name: panel
-        for name, panel in available.items()
-        if any(panel.needs in flight.units for flight in flights)
-    }
-    columns = dict.fromkeys(column for flight in flights for column in flight.units)
+    available = panels_of(flights)
     if not names:
-        return {name: panel for name, panel in fitting.items() if panel.unless not in columns}
+        return {name: panel for name, panel in available.items() if not panel.on_request}
+    columns = dict.fromkeys(column for flight in flights for column in flight.units)
+    vectors = stems(columns) | {name: components(name, columns) for name in VECTORS}
+    vectors = {name: parts for name, parts in vectors.items() if parts}
     chosen: dict[str, Panel] = {}
     for name in names:
-        parts = components(name, columns)
-        if name in fitting:
-            chosen[name] = fitting[name]
+        if name in available:
+            chosen[name] = available[name]
         elif name in columns:
-            chosen[name] = column_panel(name)
-        elif len(flights) == 1 and parts:
-            chosen[name] = vector_panel(name, parts)
-        elif parts:
-            chosen |= {part: column_panel(part) for part in parts}
+            chosen[name] = column_panel(flights, name)
+        elif name in vectors and len(flights) == 1:
+            chosen[name] = signals_panel(vector_signals(flights[0].assembly, name, vectors[name]))
+        elif name in vectors:
+            chosen |= {part: column_panel(flights, part) for part in vectors[name]}
         else:
-            vectors = [vector for vector in VECTORS if components(vector, columns)]
-            known = dict.fromkeys([*fitting, *vectors, *columns])
+            known = dict.fromkeys([*available, *vectors, *columns])
             raise InputError(f"panels: {name!r}: {choose(name, known)}")
     return chosen
 

@@ -1,13 +1,22 @@
-"""Figures that a notebook shows."""
+"""Figures that a notebook shows, with letters that their fonts lack."""
 
 from __future__ import annotations
 
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from io import BytesIO
 
 from matplotlib.backend_bases import RendererBase
 from matplotlib.figure import Figure
 
-from tiltsim.views.figures.glyphs import missing_glyphs_as_boxes
+
+@contextmanager
+def missing_glyphs_as_boxes() -> Iterator[None]:
+    """Let matplotlib draw letters without a glyph, such as Chinese ones, without a warning."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", r"Glyph \d+ .* missing from font")
+        yield
 
 
 class ShownFigure(Figure):

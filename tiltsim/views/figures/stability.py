@@ -10,7 +10,7 @@ import numpy as np
 
 from tiltsim.linear.linearization import Linearization
 from tiltsim.linear.margins import TOGETHER, broken_loops, frequency_grid
-from tiltsim.linear.modes import EQUAL, NEUTRAL
+from tiltsim.linear.modes import NEUTRAL
 from tiltsim.linear.stability import Stability
 from tiltsim.scenario.key_units import quantity_of_key
 from tiltsim.system.quantity import in_words
@@ -25,119 +25,124 @@ if TYPE_CHECKING:
     from tiltsim_controllers.mathematics.scalar import Floats
 
 
-ALIKE: Final = 30.0
-"""Parts of poles that differ by a smaller factor share a linear axis."""
-
+SWINGS: Final = 0.01  # imaginary part, as a share of a pole, below which it counts as real
+ALIKE: Final = 30.0  # parts of poles that differ by a smaller factor share a linear axis
 MOST: Final = 1e4
 """Between the largest part of a pole and those that a logarithmic axis does not resolve."""
 
 
+@style.paper_style()
 def stability_figure(found: Stability) -> Figure:
     """The poles of a rest point in the complex plane, or the multipliers of an orbit."""
-    with style.paper_style():
-        figure = style.new_figure(5.2, 4.2)
-        axes: Any = figure.subplots()
-        if found.poles is not None:
-            _draw_poles(axes, found.poles)
-        else:
-            assert found.multipliers is not None  # it is an orbit
-            _draw_multipliers(axes, found.multipliers)
-        verdict = "stable" if found.stable else "unstable"
-        if found.period is None:
-            axes.set_title(f"Poles of the rest point: {verdict}")
-        else:
-            axes.set_title(f"Multipliers of the orbit of {found.period:.4g} s: {verdict}")
-        return figure
+    figure = style.new_figure(5.2, 4.2)
+    axes: Any = figure.subplots()
+    values = found.poles if found.poles is not None else found.multipliers
+    assert values is not None  # it is an orbit, if not a rest point
+    if found.poles is not None:
+        grows = values.real > NEUTRAL
+        _frame_poles(axes, values)
+    else:
+        grows = np.abs(values) > 1.0
+        _unit_circle(axes, style.INK)
+        axes.set(xlabel="real part", ylabel="imaginary part", aspect="equal")
+    for shown, color, marker in ((~grows, style.BLUE, "x"), (grows, style.RED, "X")):
+        look = {"color": color, "ms": 6.0, "mew": 1.4}
+        axes.plot(values[shown].real, values[shown].imag, marker, **look)
+    verdict = "stable" if found.stable else "unstable"
+    if found.period is None:
+        axes.set_title(f"Poles of the rest point: {verdict}")
+    else:
+        axes.set_title(f"Multipliers of the orbit of {found.period:.4g} s: {verdict}")
+    return figure
 
 
+@style.paper_style()
 def sweep_figure(key: str, sweeps: Mapping[str, Sequence[Point]]) -> Figure:
     """The largest multiplier over a key, and the slowest mode but altitude, a line a scenario."""
-    with style.paper_style():
-        figure = style.new_figure(6.4, 6.0)
-        upper, lower = figure.subplots(2, 1, sharex=True)
-        looks = zip(cycle(style.CYCLE), cycle(style.DASHES), cycle(style.MARKERS))
-        for (address, points), (color, dashes, marker) in zip(sweeps.items(), looks):
-            found = [(point.value, point.found) for point in points if point.found is not None]
-            values = [value for value, _ in found]
-            largest = [each.growth for _, each in found]
-            rates = [
-                max(
-                    (mode.growth_rate for mode in each.modes if mode.name != "altitude"),
-                    default=nan,
-                )
-                for _, each in found
-            ]
-            label = address.rpartition("/")[2]
-            line: Any = {"color": color, "ls": dashes, "marker": marker, "ms": 3.5, "label": label}
-            upper.plot(values, largest, **line)
-            lower.plot(values, rates, **line)
-        for axes, limit in ((upper, 1.0), (lower, 0.0)):
-            low, high = axes.get_ylim()
-            axes.set_ylim(low, max(high, limit + 0.1 * (limit - low)))
-            axes.axhspan(limit, axes.get_ylim()[1], color=style.UNREACHABLE, lw=0, zorder=0)
-            axes.axhline(limit, color=style.INK, lw=0.8)
-            axes.margins(x=0.02)
-        upper.set(ylabel="largest multiplier", title="What is left of a disturbance after a period")
-        lower.set(ylabel="growth rate (1/s)", xlabel=quantity_of_key(key).text)
-        lower.set_title("Slowest mode other than altitude")
-        handles, labels = upper.get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=2)
-        return figure
+    figure = style.new_figure(6.4, 6.0)
+    upper, lower = figure.subplots(2, 1, sharex=True)
+    looks = zip(cycle(style.CYCLE), cycle(style.DASHES), cycle(style.MARKERS))
+    for (address, points), (color, dashes, marker) in zip(sweeps.items(), looks):
+        found = [(point.value, point.found) for point in points if point.found is not None]
+        values = [value for value, _ in found]
+        largest = [each.growth for _, each in found]
+        rates = [
+            max((mode.growth_rate for mode in each.modes if mode.name != "altitude"), default=nan)
+            for _, each in found
+        ]
+        label = address.rpartition("/")[2]
+        line: Any = {"color": color, "ls": dashes, "marker": marker, "ms": 3.5, "label": label}
+        upper.plot(values, largest, **line)
+        lower.plot(values, rates, **line)
+    for axes, limit in ((upper, 1.0), (lower, 0.0)):
+        low, high = axes.get_ylim()
+        axes.set_ylim(low, max(high, limit + 0.1 * (limit - low)))
+        axes.axhspan(limit, axes.get_ylim()[1], color=style.UNREACHABLE, lw=0, zorder=0)
+        axes.axhline(limit, color=style.INK, lw=0.8)
+        axes.margins(x=0.02)
+    upper.set(ylabel="largest multiplier", title="What is left of a disturbance after a period")
+    lower.set(ylabel="growth rate (1/s)", xlabel=quantity_of_key(key).text)
+    lower.set_title("Slowest mode other than altitude")
+    handles, labels = upper.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=2)
+    return figure
 
 
+@style.paper_style()
 def loop_figure(system: Linearization) -> Figure:
     """Bode and Nyquist diagrams of loops broken at one input, and sensitivities of all inputs."""
     grid, places = frequency_grid(system), {TOGETHER, *(signal.name for signal in system.inputs)}
     together, *single = [loop for loop in broken_loops(system) if loop.place in places]
-    with style.paper_style():
-        figure = style.new_figure(8.4, 6.0)
-        (gain, nyquist), (phase, sensitivity) = figure.subplots(2, 2)
-        angle = np.linspace(0.0, 2.0 * np.pi, 361)
-        nyquist.plot(np.cos(angle), np.sin(angle), color=style.GREY, lw=0.8)
-        for loop, line in zip(single, style.rotor_lines(len(single)), strict=True):
-            transfer = loop.transfer(grid)[:, 0, 0]
-            gain.loglog(grid, np.abs(transfer), label=in_words(loop.place), **line)
-            degrees = np.degrees(np.unwrap(np.angle(transfer)))
-            phase.semilogx(grid, degrees - 360.0 * np.ceil(degrees.max() / 360.0 - 0.5), **line)
-            nyquist.plot(transfer.real, transfer.imag, **line)
-        nyquist.plot([-1.0], [0.0], "+", color=style.RED, ms=9.0, mew=1.6)
-        gain.axhline(1.0, color=style.INK, lw=0.8)
-        phase.axhline(-180.0, color=style.INK, lw=0.8)
-        transfer = together.transfer(grid)
-        inverse = np.linalg.inv(np.eye(transfer.shape[-1]) + transfer)
-        for name, matrices, line in (
-            ("sensitivity", inverse, style.AXIS_LINES[0]),
-            ("complement", np.eye(transfer.shape[-1]) - inverse, style.AXIS_LINES[1]),
-        ):
-            sizes = np.linalg.norm(matrices, ord=2, axis=(1, 2))
-            sensitivity.loglog(grid, sizes, label=name, **line)
-        sensitivity.axhline(1.0, color=style.INK, lw=0.8)
-        sensitivity.legend(loc="lower center")
-        gain.set(ylabel="gain", title="Loops broken at one input")
-        phase.set(xlabel="frequency (rad/s)", ylabel="phase (deg)")
-        nyquist.set(xlim=(-3.0, 1.5), ylim=(-2.0, 2.0), aspect="equal", title="Nyquist diagram")
-        nyquist.set(xlabel="real part", ylabel="imaginary part")
-        sensitivity.set(xlabel="frequency (rad/s)", ylabel="largest singular value")
-        sensitivity.set_title("All inputs together")
-        handles, labels = gain.get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=4)
-        return figure
+    figure = style.new_figure(8.4, 6.0)
+    (gain, nyquist), (phase, sensitivity) = figure.subplots(2, 2)
+    _unit_circle(nyquist, style.GREY)
+    for loop, line in zip(single, style.rotor_lines(len(single)), strict=True):
+        transfer = loop.transfer(grid)[:, 0, 0]
+        gain.loglog(grid, np.abs(transfer), label=in_words(loop.place), **line)
+        degrees = np.degrees(np.unwrap(np.angle(transfer)))
+        phase.semilogx(grid, degrees - 360.0 * np.ceil(degrees.max() / 360.0 - 0.5), **line)
+        nyquist.plot(transfer.real, transfer.imag, **line)
+    nyquist.plot([-1.0], [0.0], "+", color=style.RED, ms=9.0, mew=1.6)
+    gain.axhline(1.0, color=style.INK, lw=0.8)
+    phase.axhline(-180.0, color=style.INK, lw=0.8)
+    transfer = together.transfer(grid)
+    inverse = np.linalg.inv(np.eye(transfer.shape[-1]) + transfer)
+    for name, matrices, line in (
+        ("sensitivity", inverse, style.AXIS_LINES[0]),
+        ("complement", np.eye(transfer.shape[-1]) - inverse, style.AXIS_LINES[1]),
+    ):
+        sizes = np.linalg.norm(matrices, ord=2, axis=(1, 2))
+        sensitivity.loglog(grid, sizes, label=name, **line)
+    sensitivity.axhline(1.0, color=style.INK, lw=0.8)
+    sensitivity.legend(loc="lower center")
+    gain.set(ylabel="loop gain (1)", title="Loops broken at one input")
+    phase.set(xlabel="frequency (rad/s)", ylabel="phase (deg)")
+    nyquist.set(xlim=(-3.2, 2.0), ylim=(-1.6, 1.6), title="Nyquist diagram")
+    nyquist.set_aspect("equal", anchor="N")
+    nyquist.set(xlabel="real part", ylabel="imaginary part")
+    sensitivity.set(xlabel="frequency (rad/s)", ylabel="largest singular value (1)")
+    sensitivity.set_title("All inputs together")
+    handles, labels = gain.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=4)
+    return figure
 
 
-def _draw_poles(axes: Any, poles: Floats) -> None:
-    grows = poles.real > 0.0
-    # Rounding splits equal real poles into pairs with tiny imaginary parts.
-    swings = np.where(np.abs(poles.imag) > EQUAL * np.abs(poles), poles.imag, 0.0)
+def _unit_circle(axes: Any, color: str) -> None:
+    angle = np.linspace(0.0, 2.0 * np.pi, 361)
+    axes.plot(np.cos(angle), np.sin(angle), color=color, lw=0.8)
+
+
+def _frame_poles(axes: Any, poles: Floats) -> None:
+    """Scales on which poles of any size can be seen, and the half plane of those that grow."""
+    # Rounding splits equal real poles into pairs that hardly swing.
+    swings = np.where(np.abs(poles.imag) > SWINGS * np.abs(poles), poles.imag, 0.0)
     least = _stretch(axes, "x", poles.real)
     _stretch(axes, "y", swings)
-    left = min(-least, 1.5 * float(poles.real.min()))
     right = max(least, 1.5 * float(poles.real.max()))
     up = 1.5 * float(swings.max()) or 1.0
     axes.axvspan(0.0, right, color=style.UNREACHABLE, lw=0)
-    _mark(axes, poles[~grows], style.BLUE, "x")
-    _mark(axes, poles[grows], style.RED, "X")
-    axes.set(xlim=(left, right), xlabel="real part (rad/s)")
-    axes.set(ylim=(-up, up), ylabel="imaginary part (rad/s)")
+    axes.set(xlim=(min(-least, 1.5 * float(poles.real.min())), right), ylim=(-up, up))
+    axes.set(xlabel="real part (rad/s)", ylabel="imaginary part (rad/s)")
     axes.axvline(0.0, color=style.INK, lw=0.8)
 
 
@@ -156,16 +161,3 @@ def _stretch(axes: Any, name: str, parts: Floats) -> float:
     getattr(axes, f"set_{name}scale")("symlog", linthresh=least, subs=range(2, 10))
     getattr(axes, f"{name}axis").set_major_formatter("{x:g}")
     return float(least)
-
-
-def _draw_multipliers(axes: Any, multipliers: Floats) -> None:
-    angle = np.linspace(0.0, 2.0 * np.pi, 361)
-    axes.plot(np.cos(angle), np.sin(angle), color=style.INK, lw=0.8)
-    grows = np.abs(multipliers) > 1.0
-    _mark(axes, multipliers[~grows], style.BLUE, "x")
-    _mark(axes, multipliers[grows], style.RED, "X")
-    axes.set(xlabel="real part", ylabel="imaginary part", aspect="equal")
-
-
-def _mark(axes: Any, values: Floats, color: str, marker: str) -> None:
-    axes.plot(values.real, values.imag, marker, color=color, ms=6.0, mew=1.4)

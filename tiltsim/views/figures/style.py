@@ -1,4 +1,4 @@
-"""The common style: sizes, fonts and colours that survive print and colour blindness."""
+"""The common style: sizes, fonts and colors that survive print and color blindness."""
 
 from __future__ import annotations
 
@@ -16,7 +16,6 @@ from tiltsim.errors import InputError
 from tiltsim.system.files import replacing
 from tiltsim.system.numbers import is_finite
 from tiltsim.system.text import short_repr, shortened
-from tiltsim.views.figures.glyphs import missing_glyphs_as_boxes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -45,7 +44,7 @@ DASHES: Final[tuple[Any, ...]] = (
     (0, (3, 1, 1, 1, 1, 1)),
 )
 MARKERS: Final = "os^DvPX"
-"""Dashes and markers that accompany the colours of `CYCLE`, for prints without colour."""
+"""Dashes and markers that accompany the colors of `CYCLE`, for prints without color."""
 SEQUENTIAL: Final = "cividis"
 
 # Lines of equal angles and speeds would cover each other: later ones are thinner and dashed.
@@ -59,7 +58,7 @@ ROTOR_LINES: Final[tuple[dict[str, Any], ...]] = (
 
 
 def rotor_lines(count: int) -> list[dict[str, Any]]:
-    """Styles of the lines of so many rotors: those of `ROTOR_LINES`, then thin ones of all hues."""
+    """Styles of the lines of some rotors: `ROTOR_LINES`, then thin ones of all hues."""
     hues = (GREEN, RED, *(line["color"] for line in ROTOR_LINES))
     more = [
         {"color": hues[i % len(hues)], "ls": _ROTOR_DASHES[i % len(_ROTOR_DASHES)], "lw": 1.2}
@@ -78,11 +77,8 @@ AXIS_LINES: Final[tuple[dict[str, Any], ...]] = (
 )
 """Styles of the lines of x, y, z, or roll, pitch, yaw, in one panel."""
 
-FORMATS: Final = (".png", ".svg", ".pdf")
-"""Suffixes of figure files."""
-
-SINGULAR: Final = RED
-"""Curves of singular attitudes and of singular tilt angles, in every figure."""
+FORMATS: Final = (".png", ".svg", ".pdf")  # suffixes of figure files
+SINGULAR: Final = RED  # curves of singular attitudes and of singular tilt angles, in every figure
 UNREACHABLE: Final = "#F3D3C3"
 """The shade of what lies beyond singular attitudes or is as good as singular, in every figure."""
 
@@ -139,8 +135,7 @@ PRINT_DPI: Final = 300.0
 _LENGTH: Final = r"(\d+(?:\.\d*)?|\.\d+)\s*(mm|cm|in)?"
 _SIZE: Final = re.compile(rf"{_LENGTH}(?:\s*x\s*{_LENGTH})?")
 _INCHES: Final = {"in": 1.0, "cm": 1.0 / 2.54, "mm": 1.0 / 25.4}
-_ALLOWED: Final = (0.5, 80.0)
-"""Smallest and largest width or height of a figure, inches."""
+_ALLOWED: Final = (0.5, 80.0)  # smallest and largest width or height of a figure, inches
 
 
 def parse_size(name: str, size: str | tuple[float, float] | None) -> Size | None:
@@ -183,6 +178,8 @@ def paper_style(file: Path | None = None, size: Size | None = None) -> Iterator[
     """
     from cycler import cycler
     from matplotlib import rc_context, rcParams
+
+    from tiltsim.views.figures.shown import missing_glyphs_as_boxes
 
     outer = _size.set(size if size is not None else _size.get())
     try:
@@ -264,12 +261,12 @@ def _complaints() -> Iterator[list[str]]:
 
 
 def line_style(number: int) -> dict[str, Any]:
-    """Colour and dashes of the line with this number, from 0."""
+    """Color and dashes of the line with this number, from 0."""
     return {"color": cycle_color(number), "ls": DASHES[number % len(DASHES)]}
 
 
 def marked_line(number: int, samples: int) -> dict[str, Any]:
-    """Colour and markers of the line with this number, from 0, with so many samples.
+    """Color and markers of the line with this number, from 0, and number of samples.
 
     Dashes would vanish in dense oscillations; the few markers of each line have their own places.
     """
@@ -279,15 +276,14 @@ def marked_line(number: int, samples: int) -> dict[str, Any]:
 
 
 def cycle_color(number: int) -> str:
-    """The colour of the line with this number, from 0: `CYCLE`, unless the user has another."""
+    """The color of the line with this number, from 0: `CYCLE`, unless the user has another."""
     from matplotlib import rcParams
 
     colors = rcParams["axes.prop_cycle"].by_key().get("color", CYCLE)
     return str(colors[number % len(colors)])
 
 
-LONGEST_TEXT: Final = 300
-"""Letters of a user's text that a figure has room for."""
+LONGEST_TEXT: Final = 300  # letters of a user's text that a figure has room for
 
 
 def verbatim(text: str) -> str:
@@ -344,21 +340,8 @@ def shade_share(axes: Axes, edges: Floats, share: Floats) -> None:
     from matplotlib.colors import LinearSegmentedColormap
 
     shades = LinearSegmentedColormap.from_list("unreachable", ["#FFFFFF", UNREACHABLE])
+    axes.grid(visible=False)
     axes.pcolormesh(edges, edges, share, cmap=shades, vmin=0.0, vmax=1.0, rasterized=True)
-
-
-def legend_below(axes: Axes) -> None:
-    """A legend below the x label, in as many columns as fit, at most four."""
-    from matplotlib import rcParams
-
-    look: dict[str, Any] = {"loc": "upper center", "handlelength": 1.4, "columnspacing": 1.2}
-    below = -4.2 * rcParams["font.size"] * axes.figure.dpi / 72.0
-    box = axes.get_window_extent()
-    for number in range(4, 0, -1):
-        anchor = (0.5, below / box.height)
-        legend = axes.legend(ncols=number, bbox_to_anchor=anchor, **look)
-        if legend.get_window_extent().width <= 1.15 * box.width:
-            return
 
 
 def zero_lines(axes: Axes, which: str = "xy") -> None:

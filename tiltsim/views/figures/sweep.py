@@ -2,55 +2,53 @@
 
 from __future__ import annotations
 
-from textwrap import fill
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from tiltsim.errors import InputError
 from tiltsim.scenario.messages import choose
+from tiltsim.scenario.metric_names import METRICS
 from tiltsim.sweeps.dataset import Column, SweepResults
 from tiltsim.sweeps.tables import GridAxis, SampledAxis
+from tiltsim.views.figures import style
 from tiltsim.views.figures.distributions import distributions_figure
-from tiltsim.views.figures.style import (
-    CYCLE,
-    GREY,
-    MARKERS,
-    PALE,
-    RED,
-    SEQUENTIAL,
-    line_style,
-    new_figure,
-    paper_style,
-    verbatim,
-    zero_lines,
-)
+from tiltsim.views.figures.layout import add_heading, add_legend
 from tiltsim.views.figures.sweep_columns import (
-    add_legend,
     completed_mask,
     groups_of,
     label_of,
     spans_decades,
+    text_of,
 )
+from tiltsim.views.signals import FLOORS, SMALLEST, scale
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 MAX_PANELS: Final = 24
-MAX_LINES: Final = len(CYCLE)
+MAX_TICKS: Final = 8  # values of an axis of a map that are written beside it
 
 
+@style.paper_style()
 def sweep_figure(results: SweepResults, metrics: tuple[str, ...] = ()) -> Figure:
     """The figure that the ``[plot]`` table of a sweep requests, or else one that suits its axes.
 
-    ``metrics`` default to those of the ``[plot]`` table, else to the first three that vary.
+    ``metrics`` default to the metrics of the ``[plot]`` table, else to the first three that vary.
 
     Raises:
         InputError: If a column or metric is unknown, or there would be too many panels.
     """
-    plot = results.points.sweep.plot
-    kind = plot.kind or _kind(results)
+    sweep, address = results.points.sweep, results.points.definition.address
+    kind = sweep.plot.kind
+    if kind is None and sweep.bisect is not None:
+        kind = "boundary"
+    elif kind is None and any(isinstance(axis, SampledAxis) for axis in sweep.axis):
+        kind = "quantiles"
+    elif kind is None:
+        kind = "map" if len(_axes_of(results, numeric=True)) >= 2 else "lines"
     draw = {
         "lines": _lines_figure,
         "map": _map_figure,
@@ -60,34 +58,19 @@ def sweep_figure(results: SweepResults, metrics: tuple[str, ...] = ()) -> Figure
     }[kind]
     chosen = _metrics(results, metrics)
     if not chosen and kind not in {"boundary", "plane"}:
-        address = results.points.definition.address
         raise InputError(f"{address}: metrics = []: the sweep has no metric to plot")
-    with paper_style():
-        figure = draw(results, chosen)
-        title = results.points.sweep.title or results.points.definition.address
-        missing = len(results.points) - len(results)
-        more = f" ({missing} of {len(results.points)} points missing)" if missing else ""
-        lines = fill(verbatim(title) + more, round(11.0 * figure.get_figwidth()))
-        figure.suptitle(lines, x=0.01, ha="left", fontsize=10.5)
-        return figure
+    figure = draw(results, chosen)
+    missing = len(results.points) - len(results)
+    more = f"{missing} of {len(results.points)} points missing" if missing else ""
+    add_heading(figure, style.verbatim(sweep.title or address), more)
+    return figure
 
 
-def _kind(results: SweepResults) -> str:
-    if results.points.sweep.bisect is not None:
-        return "boundary"
-    if any(isinstance(axis, SampledAxis) for axis in results.points.sweep.axis):
-        return "quantiles"
-    return "map" if len(_numeric_axes(results)) >= 2 else "lines"
-
-
-def _numeric_axes(results: SweepResults) -> list[str]:
-    keys = [key for axis in results.points.sweep.axis for key in axis.targets[:1]]
-    return [key for key in keys if results.columns[key].dtype == np.float64]
-
-
-def _text_axes(results: SweepResults) -> list[str]:
-    keys = [a.targets[0] for a in results.points.sweep.axis if isinstance(a, GridAxis)]
-    return [key for key in keys if results.columns[key].dtype != np.float64]
+def _axes_of(results: SweepResults, *, numeric: bool) -> list[str]:
+    """The first key of every axis with numbers, or of every grid axis with texts."""
+    axes = [axis for axis in results.points.sweep.axis if numeric or isinstance(axis, GridAxis)]
+    keys = [key for axis in axes for key in axis.targets[:1]]
+    return [key for key in keys if (results.columns[key].dtype == np.float64) is numeric]
 
 
 def _metrics(results: SweepResults, requested: tuple[str, ...]) -> tuple[str, ...]:
@@ -100,151 +83,167 @@ def _metrics(results: SweepResults, requested: tuple[str, ...]) -> tuple[str, ..
                 f"{results.points.definition.address}: plot.metrics = {name!r}: not in these "
                 f"results; {choose(name, available)}"
             )
-    varying = tuple(name for name in available if _varies(results.columns[name]))
+    ranges = {name: _least_range(name, results.columns[name]) for name in available}
+    varying = tuple(name for name in available if ranges[name][2])
     return chosen or varying[:3] or available[:1]
 
 
-def _varies(column: Column) -> bool:
-    known = column[~np.isnan(column)]
-    return known.size > 0 and float(np.ptp(known)) > 0.0
+def _least_range(metric: str, values: Column) -> tuple[float, float, bool]:
+    """Lowest and highest value, no closer than what counts, and whether they are unequal."""
+    known = values[~np.isnan(values)]
+    if not known.size:
+        return 0.0, 1.0, False
+    least = FLOORS.get(METRICS[metric].unit, SMALLEST) if metric in METRICS else 0.0
+    if np.ptp(known) < least:
+        low, high, _ = scale([known], [False], least)
+        return low, high, bool(np.ptp(known) > 1e-6 * least)
+    return float(known.min()), float(known.max()), bool(np.ptp(known) > 0.0)
 
 
 def _columns_for(results: SweepResults) -> tuple[str, str | None, str | None]:
-    """The columns for x, lines and panels: those of the file, else by the type of axis."""
-    plot = results.points.sweep.plot
-    numeric, text = _numeric_axes(results), _text_axes(results)
+    """The columns for x, lines and panels: as the file has them, else by the type of axis."""
+    plot, numeric = results.points.sweep.plot, _axes_of(results, numeric=True)
     longest = max(numeric, key=lambda key: len(np.unique(results.columns[key])), default="index")
-    x = plot.x or longest
+    x, text = plot.x or longest, _axes_of(results, numeric=False)
     rest = [key for key in [*text, *numeric] if key not in {x, plot.lines, plot.panels}]
     lines = plot.lines or (rest.pop(0) if rest else None)
-    panels = plot.panels or (rest.pop(0) if rest else None)
-    return x, lines, panels
+    return x, lines, plot.panels or (rest.pop(0) if rest else None)
 
 
-def _panel_grid(rows: int, columns: int, width: float, height: float) -> tuple[Figure, Any]:
+def _panels(
+    results: SweepResults, key: str | None, rows: int, size: tuple[float, float], across: int = 0
+) -> tuple[Figure, Any, list[tuple[str, Column]]]:
+    """A figure with a grid of axes, and the groups of flights in its columns, or in its cells."""
+    groups = [*groups_of(results, key, np.ones(len(results), dtype=bool))]
+    columns = min(across or len(groups), len(groups))
+    rows = -(-len(groups) // columns) if across else rows
     if rows * columns > MAX_PANELS:
         raise InputError(f"plot: {rows * columns} panels: at most {MAX_PANELS}; choose a metric")
-    figure = new_figure(width * columns, 0.35 + height * rows)
-    return figure, figure.subplots(rows, columns, squeeze=False)
+    figure = style.new_figure(size[0] * columns, 0.6 + size[1] * rows)
+    return figure, figure.subplots(rows, columns, squeeze=False), groups
 
 
-# --- lines ---------------------------------------------------------------------------------------
+def _lines(
+    results: SweepResults, key: str | None, mask: Column, x: Column
+) -> Iterator[tuple[str, dict[str, Any], Column, Column]]:
+    """Name, look, rows and order along x of the flights of every line."""
+    for number, (name, group) in enumerate(groups_of(results, key, mask)):
+        look = {**style.line_style(number), "marker": style.MARKERS[number % len(style.MARKERS)]}
+        yield name, {**look, "ms": 3.5, "label": name}, group, np.argsort(x[group], kind="stable")
+
+
+def _legend_below(figure: Figure, axes: Axes, results: SweepResults, key: str | None) -> None:
+    """A legend of the lines below the panels, so that it covers none of them."""
+    handles, labels = axes.get_legend_handles_labels()
+    if any(labels):
+        title = None if key is None else label_of(results, key)
+        add_legend(figure, handles, title=title)
 
 
 def _lines_figure(results: SweepResults, metrics: tuple[str, ...]) -> Figure:
-    x, lines, panels = _columns_for(results)
-    everything = np.ones(len(results), dtype=bool)
-    columns = list(groups_of(results, panels, everything))
-    width, height = (5.6, 3.0) if len(columns) == 1 else (4.2, 2.7)
-    figure, grid = _panel_grid(len(metrics), len(columns), width, height)
+    x, key, panels = _columns_for(results)
+    single = len([*groups_of(results, panels, np.ones(len(results), dtype=bool))]) == 1
+    size = (5.6, 3.0) if single else (4.2, 2.7)
+    figure, grid, columns = _panels(results, panels, len(metrics), size)
     abscissa, completed = results.values(x), completed_mask(results)
-    for row, metric in zip(grid, metrics):
-        for axes, (title, mask) in zip(row, columns):
-            groups = list(groups_of(results, lines, mask))
-            for number, (name, group) in enumerate(groups):
-                color, flown = CYCLE[number % MAX_LINES], group & completed
-                order = np.argsort(abscissa[group], kind="stable")
-                values = np.where(flown, results.columns[metric], np.nan)[group][order]
-                line, marker = abscissa[group][order], MARKERS[number % len(MARKERS)]
-                axes.plot(line, values, marker=marker, ms=3.5, label=name, **line_style(number))
-                missing = line[np.isnan(values)]
-                heights = np.full(len(missing), 0.03 + 0.04 * (len(groups) - 1 - number))
-                bottom = axes.get_xaxis_transform()
-                axes.plot(missing, heights, "x", color=color, ms=4, transform=bottom)
-            axes.set(title=title, xlabel=label_of(results, x), ylabel=label_of(results, metric))
-    for axis in results.points.sweep.plot.log:
-        for axes in grid.flat:
-            getattr(axes, f"set_{axis}scale")("log")
-    _share_limits(grid)
+    for (row, column), axes in np.ndenumerate(grid):
+        metric, (title, mask) = metrics[row], columns[column]
+        lines = [*_lines(results, key, mask, abscissa)]
+        for number, (_, look, group, order) in enumerate(lines):
+            values = np.where(completed, results.columns[metric], np.nan)[group][order]
+            along = abscissa[group][order]
+            axes.plot(along, values, **look)
+            heights = np.full(np.isnan(values).sum(), 0.03 + 0.04 * (len(lines) - 1 - number))
+            place: dict[str, Any] = {"transform": axes.get_xaxis_transform()}
+            axes.plot(along[np.isnan(values)], heights, "x", color=look["color"], ms=4, **place)
+        axes.set(title=title, xlabel=label_of(results, x), ylabel=label_of(results, metric))
+    log = results.points.sweep.plot.log
+    for axes in grid.flat if log else []:
+        axes.set(**{f"{axis}scale": "log" for axis in log})
+    _share_limits(grid, () if "y" in log else metrics)
     if not completed.all():
+        share = 0.03 + 0.04 * len(lines)  # of a panel's height, for the marks of terminated flights
         for axes in grid.flat:
-            _make_room_below(axes, 0.03 + 0.04 * len(groups))
-        grid[0][0].plot([], [], "x", color=GREY, ms=4, label="terminated early, in this order")
-    add_legend(grid[0][0], lines)
+            transform = axes.yaxis.get_transform()
+            low, high = transform.transform(np.array(axes.get_ylim()))
+            bottom = low - (high - low) * share / (1.0 - share)
+            axes.set_ylim(bottom=transform.inverted().transform(bottom))
+        mark = {"color": style.GREY, "ms": 4, "label": "terminated early, in this order"}
+        grid[0][0].plot([], [], "x", **mark)
+    _legend_below(figure, grid[0][0], results, key)
     return figure
 
 
-def _share_limits(grid: Any) -> None:
-    """Use one y scale per row."""
-    for row in grid:
-        low = min(axes.get_ylim()[0] for axes in row)
-        high = max(axes.get_ylim()[1] for axes in row)
+def _share_limits(grid: Any, metrics: tuple[str, ...] = ()) -> None:
+    """Use one y scale per row, wide enough for what counts of its metric."""
+    for number, row in enumerate(grid):
+        ends = np.array([axes.get_ylim() for axes in row])
+        low, high = ends.min(), ends.max()
+        if metrics:
+            seen = np.array([low, high])
+            low, high, _ = _least_range(metrics[number], seen)
         for axes in row:
             axes.set_ylim(low, high)
-
-
-def _make_room_below(axes: Any, share: float) -> None:
-    """Reserve a share of a panel's height at the bottom for the marks of terminated flights."""
-    scale = axes.yaxis.get_transform()
-    low, high = scale.transform(np.array(axes.get_ylim()))
-    axes.set_ylim(bottom=scale.inverted().transform(low - (high - low) * share / (1.0 - share)))
-
-
-# --- map -----------------------------------------------------------------------------------------
 
 
 def _map_figure(results: SweepResults, metrics: tuple[str, ...]) -> Figure:
     from matplotlib.colors import LogNorm, Normalize
 
-    plot, numeric = results.points.sweep.plot, _numeric_axes(results)
+    plot, numeric = results.points.sweep.plot, _axes_of(results, numeric=True)
     x = plot.x or next((key for key in numeric if key != plot.y), None)
     y = plot.y or next((key for key in numeric if key != x), None)
     if x is None or y is None:
         raise InputError("plot.kind = 'map': needs two numeric axes, or x and y")
-    panels = plot.panels or next(iter(_text_axes(results)), None)
-    columns = list(groups_of(results, panels, np.ones(len(results), dtype=bool)))
-    figure, grid = _panel_grid(len(metrics), len(columns), 4.0, 3.1)
-    abscissa, ordinate, completed = results.values(x), results.values(y), completed_mask(results)
+    panels = plot.panels or next(iter(_axes_of(results, numeric=False)), None)
+    figure, grid, columns = _panels(results, panels, len(metrics), (4.0, 2.6))
+    completed = completed_mask(results)
+    xs, across = np.unique(results.values(x), return_inverse=True)
+    ys, up = np.unique(results.values(y), return_inverse=True)
     for row, metric in zip(grid, metrics):
         values = np.where(completed, results.columns[metric], np.nan)
-        known = values[~np.isnan(values)]
-        low, high = (known.min(), known.max()) if known.size else (0.0, 1.0)
+        low, high, _ = _least_range(metric, values)
         norm = LogNorm(low, high) if spans_decades(values) else Normalize(low, high)
         for axes, (title, mask) in zip(row, columns):
-            xs, ys = np.unique(abscissa[mask]), np.unique(ordinate[mask])
             cells = np.full((len(ys), len(xs)), np.nan)
-            rows, places = np.searchsorted(ys, ordinate[mask]), np.searchsorted(xs, abscissa[mask])
-            cells[rows, places] = values[mask]
-            axes.set_facecolor(PALE)
+            cells[up[mask], across[mask]] = values[mask]
+            axes.set_facecolor(style.PALE)
             axes.grid(visible=False)
-            known_cells = np.ma.masked_invalid(cells)
-            image = axes.pcolormesh(
-                xs, ys, known_cells, cmap=SEQUENTIAL, norm=norm, shading="nearest", rasterized=True
-            )
+            look: dict[str, Any] = {"cmap": style.SEQUENTIAL, "norm": norm, "aspect": "auto"}
+            image: Any = axes.imshow(np.ma.masked_invalid(cells), origin="lower", **look)
             ended = mask & ~completed
-            axes.plot(abscissa[ended], ordinate[ended], "x", color=RED, ms=4, ls="none")
+            axes.plot(across[ended], up[ended], "x", color=style.RED, ms=4, ls="none")
             axes.set(title=title, xlabel=label_of(results, x), ylabel=label_of(results, y))
+            # The values that were flown, not a scale between them.
+            for name, known in (("x", xs), ("y", ys)):
+                shown = range(0, len(known), -(-len(known) // MAX_TICKS))
+                axes.set(**{f"{name}ticks": shown, f"{name}ticklabels": map(text_of, known[shown])})
         figure.colorbar(image, ax=list(row), label=label_of(results, metric))
     if not completed.all():
-        figure.supxlabel("× terminated early", x=0.99, ha="right", fontsize=8, color=RED)
+        look = {"ha": "right", "size": "small", "color": style.RED}
+        figure.supxlabel("× terminated early", x=0.99, **look)
     return figure
-
-
-# --- boundary and plane --------------------------------------------------------------------------
 
 
 def _boundary_figure(results: SweepResults, _metrics: tuple[str, ...]) -> Figure:
     bisect = results.points.sweep.bisect
     if bisect is None:
         raise InputError("plot.kind = 'boundary': the sweep has no [bisect]")
-    x, lines, panels = _columns_for(results)
-    columns = list(groups_of(results, panels, np.ones(len(results), dtype=bool)))
-    figure, grid = _panel_grid(1, len(columns), 4.2, 3.2)
+    x, key, panels = _columns_for(results)
+    figure, grid, columns = _panels(results, panels, 1, (4.2, 3.2))
     abscissa = results.values(x)
     holds, fails = results.columns[bisect.key], results.columns[f"{bisect.key}_beyond"]
+    label = f"last {label_of(results, bisect.key)} that holds"
     for axes, (title, mask) in zip(grid[0], columns):
-        for number, (name, group) in enumerate(groups_of(results, lines, mask)):
-            color = CYCLE[number % MAX_LINES]
-            order = np.argsort(abscissa[group], kind="stable")
-            line, last, first = (v[group][order] for v in (abscissa, holds, fails))
-            axes.plot(line, last, marker="o", ms=3.5, label=name, **line_style(number))
-            axes.fill_between(line, last, first, color=color, alpha=0.25, lw=0)
+        for _, look, group, order in _lines(results, key, mask, abscissa):
+            along, last, first = (v[group][order] for v in (abscissa, holds, fails))
+            axes.plot(along, last, **look)
+            axes.fill_between(along, last, first, color=look["color"], alpha=0.25, lw=0)
             always, never = np.isnan(first), np.isnan(last)
-            axes.plot(line[always], last[always], "^", ms=6, color=color)
-            axes.plot(line[never], first[never], "x", ms=6, color=color)
-        axes.set(title=title, xlabel=label_of(results, x), ylabel=f"last {bisect.key} that holds")
+            axes.plot(along[always], last[always], "^", ms=6, color=look["color"])
+            axes.plot(along[never], first[never], "x", ms=6, color=look["color"])
+        axes.set(title=title, xlabel=label_of(results, x), ylabel=label)
     _share_limits(grid)
-    add_legend(grid[0][0], lines)
+    _legend_below(figure, grid[0][0], results, key)
     _boundary_key(grid[0][-1], holds, fails)
     return figure
 
@@ -252,22 +251,21 @@ def _boundary_figure(results: SweepResults, _metrics: tuple[str, ...]) -> Figure
 def _boundary_key(axes: Axes, holds: Column, fails: Column) -> None:
     texts = ["▲ holds to the end"] if np.isnan(fails).any() else []
     texts += ["× fails at the start"] if np.isnan(holds).any() else []
-    text = axes.annotate("   ".join(texts), (1.0, 1.015), xycoords="axes fraction", fontsize=8)
-    text.set(ha="right", va="bottom")
+    look: dict[str, Any] = {"size": "small", "ha": "right", "va": "bottom"}
+    axes.annotate("   ".join(texts), (1.0, 1.015), xycoords="axes fraction", **look)
 
 
 def _plane_figure(results: SweepResults, _metrics: tuple[str, ...]) -> Figure:
     plot, bisect = results.points.sweep.plot, results.points.sweep.bisect
     if bisect is None or plot.x is None or plot.y is None:
         raise InputError("plot.kind = 'plane': needs a [bisect], x and y")
-    columns = list(groups_of(results, plot.panels, np.ones(len(results), dtype=bool)))
-    per_row = min(2, len(columns))
-    figure, grid = _panel_grid(-(-len(columns) // per_row), per_row, 4.4, 3.7)
+    figure, grid, columns = _panels(results, plot.panels, 1, (4.4, 3.7), across=2)
     x, y = results.values(plot.x), results.values(plot.y)
     holds, fails = results.columns[bisect.key], results.columns[f"{bisect.key}_beyond"]
+    seen = np.concatenate([x[~np.isnan(holds)], y[~np.isnan(holds)], [-1e-3, 1e-3]])
     for axes, (title, mask) in zip(grid.flat, columns):
         for number, (name, group) in enumerate(groups_of(results, plot.lines, mask)):
-            color = CYCLE[number % MAX_LINES]
+            color = style.CYCLE[number % len(style.CYCLE)]
             reached = group & ~np.isnan(holds)
             always = reached & np.isnan(fails)
             # The outline in the order of the directions, closed.
@@ -275,19 +273,21 @@ def _plane_figure(results: SweepResults, _metrics: tuple[str, ...]) -> Figure:
             outline = np.append(order, order[:1])
             width = max(0.8, 4.0 - 0.8 * number)  # so that lines below others are visible
             label = name if reached.any() else f"{name}: fails at {bisect.start:g}"
-            outline_x, outline_y = x[reached][outline], y[reached][outline]
-            axes.plot(outline_x, outline_y, "-", lw=width, color=color, label=label)
+            axes.plot(
+                x[reached][outline], y[reached][outline], "-", lw=width, color=color, label=label
+            )
             axes.plot(x[reached & ~always], y[reached & ~always], "o", ms=width + 3.5, color=color)
             axes.plot(x[always], y[always], "^", ms=width + 4.5, color=color)
-        zero_lines(axes)
+        style.zero_lines(axes)
         axes.set_aspect("equal", adjustable="datalim")
         axes.set(title=title, xlabel=label_of(results, plot.x), ylabel=label_of(results, plot.y))
-        add_legend(axes, plot.lines)
+        handles, labels = axes.get_legend_handles_labels()
+        if any(labels):
+            key = None if plot.lines is None else label_of(results, plot.lines)
+            axes.legend(handles, labels, title=key, alignment="left")
+        if np.isnan(holds[mask]).all():  # an empty panel: as wide as the others
+            axes.plot([seen.min(), seen.max()], [seen.min(), seen.max()], alpha=0.0)
     for axes in grid.flat[len(columns) :]:
         axes.set_axis_off()
-    reached = np.concatenate([x[~np.isnan(holds)], y[~np.isnan(holds)], [-1e-3, 1e-3]])
-    for axes, (_, mask) in zip(grid.flat, columns):
-        if np.isnan(holds[mask]).all():  # an empty panel: as wide as the others
-            axes.plot([reached.min(), reached.max()], [reached.min(), reached.max()], alpha=0.0)
     _boundary_key(grid.flat[0], np.zeros(1), fails)
     return figure

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -12,9 +12,6 @@ from tiltsim.scenario.metric_names import METRICS
 from tiltsim.sweeps.dataset import Column, SweepResults
 from tiltsim.sweeps.tables import NormalAxis, UniformAxis
 from tiltsim.views.figures.style import verbatim
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 
 def sampled_keys(results: SweepResults) -> list[str]:
@@ -35,7 +32,7 @@ def completed_mask(results: SweepResults) -> Column:
 
 
 def groups_of(results: SweepResults, key: str | None, mask: Column) -> Iterator[tuple[str, Column]]:
-    """The distinct values of a column as text, each with its rows among those of a mask.
+    """The distinct values of a column as text, each with its rows within a mask.
 
     Without a column (None) all rows are one group without a name.
     """
@@ -60,11 +57,9 @@ def label_of(results: SweepResults, name: str) -> str:
     own = results.points.sweep.plot.labels.get(name)
     if own is not None:
         return verbatim(own)
-    return (METRICS[name].quantity if name in METRICS else quantity_of_key(name)).text
-
-
-def add_legend(axes: Axes, title: str | None) -> None:
-    """A legend if any line has a label."""
-    handles, labels = axes.get_legend_handles_labels()
-    if any(labels):
-        axes.legend(handles, labels, title=title, title_fontsize=8, alignment="left")
+    if name in METRICS:
+        return METRICS[name].quantity.text
+    known = quantity_of_key(name)
+    # Errors of a model without a unit are factors.
+    factor = name.startswith("model_error.") and known.unit in {"", "1"}
+    return f"{known.text} factor" if factor else known.text

@@ -24,7 +24,7 @@ NEARLY: Final = 0.5
 """Absolute R, 4 for a level untilted vehicle, below which red counts as nearly singular."""
 
 _COLORS: Final = {"red": "#C4001A", "blue": style.BLUE}
-"""The colours of the map's own name: this red is not that of what is singular."""
+"""The colors of the map's own name: this red is not that of what is singular."""
 
 _SIDES: Final = (
     ((1.0, 1.0), "left", "bottom"),
@@ -37,44 +37,42 @@ _SIDES: Final = (
 _DASHES: Final[dict[str, Any]] = {"red": "-", "blue": (0, (4, 2))}
 
 
+@style.paper_style()
 def map_figure(vehicle: Vehicle, paths: list[tuple[str, Path]] | None = None) -> Figure:
     """Regions S_U and S_D of red, the curve L, the point P, and paths given with their labels."""
-    with style.paper_style():
-        figure = style.new_figure(5.4, 6.3)
-        axes: Any = figure.subplots()
-        axes.grid(False)
-        limit = pi / 2
-        side = np.linspace(-limit, limit, 401)
-        alpha_1, alpha_2 = np.meshgrid(side, side)
-        residual = np.abs(red_residual(alpha_1, alpha_2, vehicle))
-        axes.contourf(alpha_1, alpha_2, residual, [0.0, NEARLY], colors=[style.UNREACHABLE])
-        inside = np.linspace(-limit, limit, 801)[1:-1]
-        axes.plot(inside, curve_l(inside, vehicle), color=style.SINGULAR, lw=1.8)
-        square_x, square_y = [-1, 1, 1, -1, -1], [-1, -1, 1, 1, -1]
-        axes.plot(square_x, square_y, color=style.GREY, lw=0.8, ls=(0, (5, 3)))
-        # The other zeros of R, close to pi/2.
-        angle = delta(vehicle)
-        for line, value in ((axes.axvline, angle - limit), (axes.axhline, limit - angle)):
-            line(value, color=style.SINGULAR, lw=1.8)
-        first, second = point_p(vehicle)
-        axes.plot(first, second, "o", color="white", mec=style.INK, mew=1.2, ms=7, zorder=7)
-        axes.text(-0.75, 1.2, "$S_U$:  R > 0", size="large")
-        axes.text(0.55, -1.3, "$S_D$:  R < 0", size="large")
-        shown: set[str] = set()
-        for number, (label, path) in enumerate(paths or []):
-            shown |= _draw_path(axes, label, path, vehicle, number)
-        _legend(figure, f"P = (δ, −δ), δ = {first:.4f} rad", shown)
-        style.angle_axis(axes, "x", limit)
-        style.angle_axis(axes, "y", limit)
-        axes.set_aspect("equal")
-        axes.set_xlabel("α₁ (rad)")
-        axes.set_ylabel("α₂ (rad)")
-        axes.set_title("Two Color Map of red gaits")
-        return figure
+    figure = style.new_figure(5.4, 6.3)
+    axes: Any = figure.subplots()
+    axes.grid(False)
+    limit = pi / 2
+    side = np.linspace(-limit, limit, 401)
+    alpha_1, alpha_2 = np.meshgrid(side, side)
+    residual = np.abs(red_residual(alpha_1, alpha_2, vehicle))
+    axes.contourf(alpha_1, alpha_2, residual, [0.0, NEARLY], colors=[style.UNREACHABLE])
+    inside = np.linspace(-limit, limit, 801)[1:-1]
+    axes.plot(inside, curve_l(inside, vehicle), color=style.SINGULAR, lw=1.8)
+    square_x, square_y = [-1, 1, 1, -1, -1], [-1, -1, 1, 1, -1]
+    axes.plot(square_x, square_y, color=style.GREY, lw=0.8, ls=(0, (5, 3)))
+    # The other zeros of R, close to pi/2.
+    angle = delta(vehicle)
+    for line, value in ((axes.axvline, angle - limit), (axes.axhline, limit - angle)):
+        line(value, color=style.SINGULAR, lw=1.8)
+    first, second = point_p(vehicle)
+    axes.plot(first, second, "o", color="white", mec=style.INK, mew=1.2, ms=7, zorder=7)
+    axes.text(-0.75, 1.2, "$S_U$:  R > 0", size="large")
+    axes.text(0.55, -1.3, "$S_D$:  R < 0", size="large")
+    shown: set[str] = set()
+    for number, (label, path) in enumerate(paths or []):
+        shown |= _draw_path(axes, label, path, vehicle, number)
+    _legend(figure, f"P = (δ, −δ), δ = {first:.4f} rad", shown)
+    style.angle_axis(axes, "x", limit)
+    style.angle_axis(axes, "y", limit)
+    title = "Two Color Map of red gaits"
+    axes.set(xlabel="α₁ (rad)", ylabel="α₂ (rad)", aspect="equal", title=title)
+    return figure
 
 
 def _draw_path(axes: Axes, label: str, path: Path, vehicle: Vehicle, number: int) -> set[str]:
-    """Draw a path; returns its colours, and "crossing" if it crosses the curve L.
+    """Draw a path; returns its colors, and "crossing" if it crosses the curve L.
 
     The ``number`` of the path decides the side of its label.
     """
@@ -82,12 +80,9 @@ def _draw_path(axes: Axes, label: str, path: Path, vehicle: Vehicle, number: int
         axes.plot(*points.T, color=_COLORS[color], ls=_DASHES[color], lw=1.8)
         # An arrow at the first third shows the direction.
         start = max(1, len(points) // 3)
-        axes.annotate(
-            "",
-            xy=tuple(0.5 * (points[start] + points[start - 1])),
-            xytext=tuple(points[start - 1]),
-            arrowprops={"arrowstyle": "-|>", "color": _COLORS[color], "lw": 1.4},
-        )
+        head = {"arrowstyle": "-|>", "color": _COLORS[color], "lw": 1.4}
+        middle = 0.5 * (points[start] + points[start - 1])
+        axes.annotate("", xy=middle, xytext=points[start - 1], arrowprops=head)
     check = check_path(path, vehicle)
     outline = np.concatenate([points[:-1] for _, points in _outlines(path)])
     (x, y), ha, va = _SIDES[number % len(_SIDES)]

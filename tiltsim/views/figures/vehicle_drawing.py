@@ -25,12 +25,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import ArrayLike
 
-_VISUAL: Final = 2
-"""Group of the geoms that are drawn."""
-
-_ON_TOP: Final = 5.0
-"""Draw order of lines and texts that nothing covers."""
-
+_VISUAL: Final = 2  # group of the geoms that are drawn
+_ON_TOP: Final = 5.0  # draw order of lines and texts that nothing covers
 LEVEL: Final = (0.0, 0.0, 0.0)
 
 
@@ -53,8 +49,7 @@ class View(NamedTuple):
         return np.asarray(np.asarray(points, float) @ self.axes[:2].T)
 
 
-ABOVE: Final = View(-pi / 2, pi / 2)
-"""From above: x to the right, y up."""
+ABOVE: Final = View(-pi / 2, pi / 2)  # from above: x to the right, y up
 
 
 class Rotor(NamedTuple):

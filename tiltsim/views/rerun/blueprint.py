@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -10,47 +11,52 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from tiltsim.views.attitude_plane import MOVING_TRAIL_TIME, curve_is_constant
-from tiltsim.views.replay import reference_path, thrust_scale, vehicle_radius
+from tiltsim.views.replay import camera_of, positions, reference_path, thrust_scale, vehicle_radius
+from tiltsim.views.rerun.flight_recorder import plotted_lines
 from tiltsim.views.rerun.geometry import ground_height
 from tiltsim.views.rerun.plane import BOUND
 from tiltsim.views.rerun.scene import REFERENCE_POINTS
 from tiltsim.views.rerun.timeline import TIMELINE
 
 if TYPE_CHECKING:
+    from tiltsim.flight.flight import Flight
     from tiltsim.views.rerun.flight_recorder import FlightRecorder
-
+    from tiltsim_controllers.mathematics.scalar import Floats
 
 ALONE: Final = "Attitude (shaded: unreachable attitudes)"
-"""Title of the roll-pitch plane of a single flight."""
+NEARER: Final = 0.75  # than in videos, whose frames are larger
+OVERVIEW: Final = 1.35  # distance of the overview camera in lengths of what it shows completely
+LETTER: Final = 0.0155  # width of a letter of a legend, as a share of a plot
+MAX_LEGEND: Final = 0.34  # share of a plot before the flight, where legends cover no curve
+BACKGROUND: Final = (38, 48, 60)
 
-OVERVIEW_HEIGHT: Final = 1.35
-"""Height of the overview camera in lengths of the reference, which it shows completely."""
 
-
-def flight_blueprint(flights: Sequence[FlightRecorder], *, live: bool = False) -> rrb.Blueprint:
+def flight_blueprint(
+    recorders: Sequence[FlightRecorder], flights: Sequence[Flight] = (), *, live: bool = False
+) -> rrb.Blueprint:
     """Vehicle, trajectory, roll-pitch plane and events on the left, time series on the right.
 
-    ``live`` lets the viewer follow the latest time instead of playing from the start.
+    Args:
+        recorders: One a flight.
+        flights: Those whose values decide the ranges of the axes; without, the viewer does.
+        live: Whether the viewer follows the latest time instead of playing from the start.
     """
-    trajectory, events = _trajectory_view(flights), _events_view()
-    vehicles = [_vehicle_view(flight) for flight in flights]
-    planes = [_plane_view(flight) for flight in flights if flight.plane is not None]
-    if len(flights) > 1:
+    trajectory, events = _trajectory_view(recorders, flights), _events_view()
+    vehicles = [_vehicle_view(one) for one in recorders]
+    planes = [_plane_view(one) for one in recorders if one.plane is not None]
+    below = rrb.Horizontal(trajectory, events, column_shares=[4, 5])
+    if len(recorders) > 1:
         # Each flight has its own vehicle and curve; together they would cover each other.
         rows = [rrb.Horizontal(*views) for views in (vehicles, planes) if views]
-        below = rrb.Horizontal(trajectory, events, column_shares=[4, 5])
         left = rrb.Vertical(*rows, below)
     elif planes:
         views = rrb.Horizontal(*vehicles, *planes, column_shares=[5, 4])
-        below = rrb.Horizontal(trajectory, events, column_shares=[4, 5])
         left = rrb.Vertical(views, below, row_shares=[11, 8])
     else:
         views = rrb.Horizontal(*vehicles, trajectory, column_shares=[1, 1])
         left = rrb.Vertical(views, events, row_shares=[11, 4])
-    plots, heights = _plots(flights)
-    right = rrb.Vertical(*plots, row_shares=heights)
     return rrb.Blueprint(
-        rrb.Horizontal(left, right, column_shares=[13, 8]),
+        rrb.Horizontal(left, _plots(recorders, flights), column_shares=[13, 8]),
         rrb.BlueprintPanel(state="collapsed"),
         rrb.SelectionPanel(state="collapsed"),
         rrb.TimePanel(
@@ -60,60 +66,77 @@ def flight_blueprint(flights: Sequence[FlightRecorder], *, live: bool = False) -
     )
 
 
-def _vehicle_view(flight: FlightRecorder) -> rrb.View:
+def _end_of(recorders: Sequence[FlightRecorder], flights: Sequence[Flight]) -> float:
+    """The end (s) of the longest flight; planned, before they are flown."""
+    planned = recorders[0].scenario.simulation.duration
+    return max((float(flight["time"][-1]) for flight in flights), default=planned)
+
+
+def _vehicle_view(one: FlightRecorder) -> rrb.View:
     """The vehicle at close range; the camera moves with it but does not rotate."""
-    radius = vehicle_radius(flight.model)
-    arrows = f"thrust arrows: {100.0 * thrust_scale(flight.model):g} cm per newton"
+    radius = vehicle_radius(one.model)
+    arrows = f"thrust arrows: {100.0 * thrust_scale(one.model):g} cm per newton"
+    pose = camera_of(one.scenario)
+    eye = NEARER * radius * pose.distance * pose.away
     return rrb.Spatial3DView(
-        origin=flight.scene.camera,
-        contents=[f"{flight.scene.root}/**"],
-        name=flight.name or f"Vehicle ({arrows})",
-        eye_controls=rrb.EyeControls3D(
-            position=[radius * part for part in flight.display.eye],
-            look_target=(0.0, 0.0, 0.3 * radius),
-            eye_up=flight.display.up,
-        ),
+        origin=one.scene.camera,
+        contents=[f"{one.scene.root}/**"],
+        name=one.name or f"Vehicle ({arrows})",
+        eye_controls=_eye(eye, np.array([0.0, 0.0, 0.1 * radius])),
+        background=BACKGROUND,
         line_grid=False,
-        overrides=_trails([flight]),
+        overrides=_trails([one]),
     )
 
 
-def _trajectory_view(flights: Sequence[FlightRecorder]) -> rrb.View:
+def _trajectory_view(recorders: Sequence[FlightRecorder], flights: Sequence[Flight]) -> rrb.View:
     """The complete paths of all vehicles and references."""
     contents = []
-    for flight in flights:
-        contents += [f"{flight.scene.root}/trail", f"{flight.scene.root}/reference/**"]
-        contents += [f"{flight.scene.vehicle}/**", f"{flight.scene.camera}/**"]
+    for one in recorders:
+        contents += [f"{one.scene.root}/trail", f"{one.scene.root}/reference/**"]
+        contents += [f"{one.scene.vehicle}/**", f"{one.scene.camera}/**"]
+    first = recorders[0]
+    paths = [reference_path(first.assembly, _end_of(recorders, flights), REFERENCE_POINTS)]
+    known = np.concatenate([*paths, *(positions(flight.columns) for flight in flights)])
+    low, high = np.quantile(known, 0.02, axis=0), np.quantile(known, 0.98, axis=0)
+    size = max(float((high - low).max()), 6.0 * vehicle_radius(first.model))
+    middle, above = 0.5 * (low + high), np.array([0.0, 0.0, 1.0])
+    away = above if first.scenario.vehicle.is_planar else camera_of(first.scenario).away
+    plane = rr.encodings.Plane3D(normal=(0.0, 0.0, 1.0), distance=ground_height(first.model))
     return rrb.Spatial3DView(
         origin="world",
         contents=contents,
         name="Trajectory and reference",
-        eye_controls=_from_above(flights[0]),
-        line_grid=_grid(ground_height(flights[0].model)),
-        overrides=_trails(flights),
+        eye_controls=_eye(middle + OVERVIEW * size * away, middle),
+        background=BACKGROUND,
+        line_grid=rrb.LineGrid3D(visible=True, spacing=1.0, plane=plane),
+        overrides=_trails(recorders),
     )
 
 
-def _from_above(flight: FlightRecorder) -> rrb.EyeControls3D | None:
-    """A camera straight above the reference, for vehicles that move in a plane."""
-    if not flight.display.overview:
-        return None
-    path = reference_path(flight.assembly, flight.scenario.simulation.duration, REFERENCE_POINTS)
-    x, y, _ = (0.5 * (path.min(axis=0) + path.max(axis=0))).tolist()
-    height = OVERVIEW_HEIGHT * max(np.ptp(path, axis=0).max(), 1.0)
+def _eye(position: Floats, target: Floats) -> rrb.EyeControls3D:
+    steep = abs(float((target - position)[2])) > 0.99 * float(np.linalg.norm(target - position))
     return rrb.EyeControls3D(
-        position=(x, y, float(height)), look_target=(x, y, 0.0), eye_up=(0.0, 1.0, 0.0)
+        position=position.tolist(),
+        look_target=target.tolist(),
+        eye_up=(0.0, 1.0, 0.0) if steep else (0.0, 0.0, 1.0),
     )
 
 
-def _plane_view(flight: FlightRecorder) -> rrb.View:
-    assert flight.plane is not None
-    root = flight.plane.root
+def _plane_view(one: FlightRecorder) -> rrb.View:
+    assert one.plane is not None
+    root = one.plane.root
+    # Where the curve moves, only the latest attitudes, to which it applies.
+    trail = _from_the_start()
+    if not curve_is_constant(one.scenario):
+        start = rr.TimeRangeBoundary.cursor_relative(seconds=-MOVING_TRAIL_TIME)
+        end = rr.TimeRangeBoundary.cursor_relative()
+        trail = rrb.VisibleTimeRanges(timeline=TIMELINE, start=start, end=end)
     return rrb.Spatial2DView(
         origin=root,
-        name=f"Unreachable: {flight.name}" if flight.name else ALONE,
+        name=one.name or ALONE,
         visual_bounds=rrb.VisualBounds2D(x_range=(-BOUND, BOUND), y_range=(-BOUND, BOUND)),
-        overrides={f"{root}/trail": _attitude_trail(flight)},
+        overrides={f"{root}/trail": trail},
     )
 
 
@@ -123,69 +146,78 @@ def _events_view() -> rrb.View:
         name="Events",
         columns=rrb.TextLogColumns(
             timeline_columns=[TIMELINE],
-            text_log_columns=["Body"],  # the colour shows the level
+            text_log_columns=["Body"],  # the color shows the level
         ),
     )
 
 
-def _plots(flights: Sequence[FlightRecorder]) -> tuple[list[rrb.View], list[float]]:
-    """The plots of the time series and their heights; for several flights, those compared.
+def _plots(recorders: Sequence[FlightRecorder], flights: Sequence[Flight]) -> rrb.Container:
+    """The plots of the time series; for several flights, of what is compared.
 
-    Only the first plot of a comparison has a legend: colours are the same in all plots, and long
-    names would cover half of each.
+    Only the first plot of a comparison has a legend: colors are the same in all plots.
     """
-    panels = flights[0].display.panels(flights[0].assembly)
-    if len(flights) == 1:
-        whole = [
-            _plot(panel.title, [f"{panel.path}/**"], panel.limits(flights[0].assembly))
-            for panel in panels
-        ]
-        return whole, [panel.height for panel in panels]
+    signals = recorders[0].signals.values()
+    labels = [line.labels[0] for each in signals if each.plotted for line in plotted_lines(each)]
+    labels = [one.name for one in recorders] if len(recorders) > 1 else labels
+    share = min(MAX_LEGEND, 0.08 + LETTER * max(map(len, labels)))
+    end = _end_of(recorders, flights)
+    times = -share / (1.0 - share) * end, end
+    if len(recorders) > 1:
+        return rrb.Vertical(*_compared(recorders, flights, times))
+    plots: dict[bool, list[rrb.View]] = {True: [], False: []}
+    heights = []
+    for each in signals:
+        limits = each.range_of(flights) if flights else None
+        entries = {text for line in plotted_lines(each) for text in line.labels}
+        number = len(entries) + len(each.levels)
+        view = _plot(each.text, [f"{each.path}/**"], limits, times, legend=number > 1)
+        plots[each.plotted].append(view)
+        heights += [2.5 + number] if each.plotted else []  # every line of a legend has its height
+    return rrb.Tabs(
+        rrb.Vertical(*plots[True], row_shares=heights, name="Main signals"),
+        rrb.Grid(*plots[False], grid_columns=2, name="All other signals"),
+    )
 
-    parts = [rr.escape_entity_path_part(flight.name) for flight in flights]
-    plots: list[rrb.View] = []
-    for panel in panels:
-        limits = panel.limits(flights[0].assembly)
-        levels = [f"{parts[0]}/{panel.path}/{level}" for level in panel.levels]
-        for compared in panel.compared:
-            lines = [f"{part}/{panel.path}/{compared.name}" for part in parts]
-            legend = not plots
-            plots.append(_plot(compared.title, [*lines, *levels], limits, legend))
-    return plots, [1.0] * len(plots)
+
+def _compared(
+    recorders: Sequence[FlightRecorder], flights: Sequence[Flight], times: tuple[float, float]
+) -> Iterator[rrb.View]:
+    """A plot for every signal that is compared, with a line a flight."""
+    names = dict.fromkeys(name for one in recorders for name in one.signals)
+    legend = True
+    for name in names:
+        having = [number for number, one in enumerate(recorders) if name in one.signals]
+        panel = recorders[having[0]].signals[name]
+        for line in panel.compared:
+            paths = [f"{recorders[number].part}/{panel.path}/{line.name}" for number in having]
+            paths += [f"{recorders[0].part}/{panel.path}/{each.name}" for each in panel.levels]
+            alone = replace(panel, title=line.label, detail="", lines=[line], bounds=())
+            limits = alone.range_of([flights[number] for number in having]) if flights else None
+            yield _plot(alone.text, paths, limits, times, legend=legend)
+            legend = False
 
 
 def _plot(
-    title: str, contents: list[str], limits: tuple[float, float] | None, legend: bool = True
+    title: str,
+    contents: list[str],
+    limits: tuple[float, float] | None,
+    times: tuple[float, float],
+    *,
+    legend: bool = True,
 ) -> rrb.View:
-    # On the left: how a flight ends matters more than how it begins.
+    shown = (rr.TimeRangeBoundary.absolute(seconds=time) for time in times)
     return rrb.TimeSeriesView(
         origin="/",
         contents=contents,
         name=title,
-        axis_x=rrb.TimeAxis(link="LinkToGlobal"),
+        axis_x=rrb.TimeAxis(view_range=rr.encodings.TimeRange(*shown)),
         axis_y=None if limits is None else rrb.ScalarAxis(range=limits),
         plot_legend=rrb.PlotLegend("LeftTop", visible=legend),
     )
 
 
-def _grid(height: float) -> rrb.LineGrid3D:
-    plane = rr.encodings.Plane3D(normal=(0.0, 0.0, 1.0), distance=height)
-    return rrb.LineGrid3D(visible=True, spacing=1.0, plane=plane)
-
-
-def _trails(flights: Sequence[FlightRecorder]) -> dict[str, rrb.VisibleTimeRanges]:
-    return {f"{flight.scene.root}/trail": _from_the_start() for flight in flights}
-
-
-def _attitude_trail(flight: FlightRecorder) -> rrb.VisibleTimeRanges:
-    """All attitudes so far or, where the curve moves, only the latest, to which it applies."""
-    if curve_is_constant(flight.scenario):
-        return _from_the_start()
-    return rrb.VisibleTimeRanges(
-        timeline=TIMELINE,
-        start=rr.TimeRangeBoundary.cursor_relative(seconds=-MOVING_TRAIL_TIME),
-        end=rr.TimeRangeBoundary.cursor_relative(),
-    )
+def _trails(recorders: Sequence[FlightRecorder]) -> dict[str, rrb.VisibleTimeRanges]:
+    return {f"{one.scene.root}/trail": _from_the_start() for one in recorders}
 
 
 def _from_the_start() -> rrb.VisibleTimeRanges:

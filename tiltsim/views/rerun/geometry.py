@@ -24,7 +24,7 @@ _XYZW: Final = [1, 2, 3, 0]
 """Permutation from MuJoCo's quaternion order, scalar first, to Rerun's, scalar last."""
 
 _UNSET_COLOR: Final = (0.5, 0.5, 0.5, 1.0)
-"""MuJoCo's default RGBA; a geom with it has its material's colour instead."""
+"""MuJoCo's default RGBA; a geom with it has its material's color instead."""
 
 
 def xyzw(quaternion: npt.ArrayLike) -> npt.NDArray[np.float32]:
@@ -76,41 +76,35 @@ def ground_height(model: mujoco.MjModel) -> float:
 
 def geom_archetypes(model: mujoco.MjModel, geom: int) -> Sequence[Any]:
     """Rerun's archetypes for a geom in its body's frame; empty for shapes that Rerun lacks."""
-    shape, size = mujoco.mjtGeom(model.geom_type[geom]), model.geom_size[geom]
-    centers = [model.geom_pos[geom]]
-    common: dict[str, Any] = {
-        "quaternions": [xyzw(model.geom_quat[geom])],
-        "colors": [geom_color(model, geom)],
-        "fill_mode": rr.components.FillMode.Solid,
-    }
-    match shape:
-        case mujoco.mjtGeom.mjGEOM_BOX:
-            return (rr.Boxes3D(centers=centers, half_sizes=[size], **common),)
-        case mujoco.mjtGeom.mjGEOM_SPHERE:
-            half_sizes = [np.full(3, size[0])]
-            return (rr.Ellipsoids3D(centers=centers, half_sizes=half_sizes, **common),)
-        case mujoco.mjtGeom.mjGEOM_ELLIPSOID:
-            return (rr.Ellipsoids3D(centers=centers, half_sizes=[size], **common),)
-        case mujoco.mjtGeom.mjGEOM_CYLINDER:
-            lengths, radii = [2.0 * size[1]], [size[0]]
-            return (rr.Cylinders3D(lengths=lengths, radii=radii, centers=centers, **common),)
-        case mujoco.mjtGeom.mjGEOM_CAPSULE:
-            # Rerun's capsule starts at its origin, MuJoCo's is centred there.
-            lengths, radii, start = [2.0 * size[1]], [size[0]], [_on_axis(model, geom, -size[1])]
-            return (rr.Capsules3D(lengths=lengths, radii=radii, translations=start, **common),)
-        case mujoco.mjtGeom.mjGEOM_PLANE:
+    kind, size = mujoco.mjtGeom(model.geom_type[geom]).name, model.geom_size[geom]
+    place, turn = model.geom_pos[geom], xyzw(model.geom_quat[geom])
+    look = {"colors": [geom_color(model, geom)], "fill_mode": rr.components.FillMode.Solid}
+    common: dict[str, Any] = {"quaternions": [turn], **look}
+
+    def on_axis(z: float) -> Floats:
+        """A point on the z axis of the geom's frame (m) in its body's frame."""
+        return np.asarray(place + rotate(model.geom_quat[geom], np.array([0.0, 0.0, z])))
+
+    match kind.removeprefix("mjGEOM_"):
+        case "BOX":
+            return (rr.Boxes3D(centers=[place], half_sizes=[size], **common),)
+        case "SPHERE" | "ELLIPSOID" as shape:
+            half_sizes = [size if shape == "ELLIPSOID" else np.full(3, size[0])]
+            return (rr.Ellipsoids3D(centers=[place], half_sizes=half_sizes, **common),)
+        case "CYLINDER":
+            common |= {"lengths": [2.0 * size[1]], "radii": [size[0]]}
+            return (rr.Cylinders3D(centers=[place], **common),)
+        case "CAPSULE":  # Rerun's starts at its origin, MuJoCo's is centered there
+            common |= {"lengths": [2.0 * size[1]], "radii": [size[0]]}
+            return (rr.Capsules3D(translations=[on_axis(-size[1])], **common),)
+        case "PLANE":
             half = 1e-3  # m, half the thickness of a box whose upper face is the plane
-            centers, half_sizes = [_on_axis(model, geom, -half)], [np.array([*size[:2], half])]
-            return (rr.Boxes3D(centers=centers, half_sizes=half_sizes, **common),)
-        case mujoco.mjtGeom.mjGEOM_MESH:
-            pose = rr.InstancePoses3D(translations=centers, quaternions=common["quaternions"])
+            half_sizes = [np.array([*size[:2], half])]
+            return (rr.Boxes3D(centers=[on_axis(-half)], half_sizes=half_sizes, **common),)
+        case "MESH":
+            pose = rr.InstancePoses3D(translations=[place], quaternions=[turn])
             return _mesh(model, geom), pose
     return ()
-
-
-def _on_axis(model: mujoco.MjModel, geom: int, z: float) -> Floats:
-    """A point on the z axis of the geom's frame (m) in its body's frame."""
-    return np.asarray(model.geom_pos[geom] + rotate(model.geom_quat[geom], np.array([0.0, 0.0, z])))
 
 
 def _mesh(model: mujoco.MjModel, geom: int) -> rr.Mesh3D:
@@ -129,7 +123,7 @@ def _mesh(model: mujoco.MjModel, geom: int) -> rr.Mesh3D:
 
 
 def geom_color(model: mujoco.MjModel, geom: int) -> npt.NDArray[np.uint8]:
-    """RGBA (0 to 255) of a geom, or of its material if the geom has no colour of its own."""
+    """RGBA (0 to 255) of a geom, or of its material if the geom has no color of its own."""
     rgba, material = model.geom_rgba[geom], model.geom_matid[geom]
     if material >= 0 and np.allclose(rgba, _UNSET_COLOR):
         rgba = model.mat_rgba[material]

@@ -14,7 +14,7 @@ from tiltsim.flight.end import End
 from tiltsim.flight.flight import Flight
 from tiltsim.laws.assembling import assemble
 from tiltsim.system.text import printable
-from tiltsim.views.rerun.requirements import require_viewer
+from tiltsim.views.rerun import require_viewer
 from tiltsim.views.rerun.viewer import attach_viewer
 from tiltsim_controllers.mathematics.scalar import Floats
 
@@ -41,14 +41,13 @@ class LiveStream:
         require_viewer(url)
         # After the check, as Rerun takes a second to load.
         from tiltsim.views.rerun.blueprint import flight_blueprint
-        from tiltsim.views.rerun.flight_recorder import FlightRecorder
         from tiltsim.views.rerun.recording_file import new_recording
 
         self._assembly = assemble(scenario, recorded=True)
         # A unique name: a viewer would merge two flights of one scenario into one recording.
-        self._recording = new_recording([scenario], salt=uuid4().hex)
-        self._recorder = FlightRecorder(self._recording, self._assembly)
-        blueprint = flight_blueprint([self._recorder], live=True)
+        self._recording, recorders = new_recording([self._assembly], salt=uuid4().hex)
+        (self._recorder,) = recorders
+        blueprint = flight_blueprint(recorders, live=True)
         attach_viewer(self._recording, url, blueprint)
         self._samples: SimpleQueue[Floats] = SimpleQueue()
         self._end: End | None = None
@@ -78,7 +77,6 @@ class LiveStream:
 
     def _send_all(self) -> None:
         try:
-            self._recorder.begin()
             self._recorder.draw_references(self._assembly.scenario.simulation.duration)
             while not self._over.wait(SEND_INTERVAL):
                 self._send_queued()

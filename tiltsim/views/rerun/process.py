@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final, Self
 
 from tiltsim.errors import InputError
-from tiltsim.views.rerun.requirements import require_rerun
+from tiltsim.views.rerun import require_rerun
 
 if TYPE_CHECKING:
     from tiltsim.flight.flight import Flight

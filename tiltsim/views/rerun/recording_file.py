@@ -10,16 +10,15 @@ from typing import TYPE_CHECKING, Final
 import rerun as rr
 
 from tiltsim.system.files import replacing
-from tiltsim.views.rerun import palette
+from tiltsim.views.rerun import require_rerun
 from tiltsim.views.rerun.blueprint import flight_blueprint
 from tiltsim.views.rerun.flight_recorder import FlightRecorder
-from tiltsim.views.rerun.requirements import require_rerun
+from tiltsim.views.rerun.timeline import FLIGHTS
 from tiltsim.views.titles import common_title, flight_names
 
 if TYPE_CHECKING:
     from tiltsim.closed_loop.assembly import Assembly
     from tiltsim.flight.flight import Flight
-    from tiltsim.scenario.scenario import Scenario
 
 
 APPLICATION: Final = "tiltsim"
@@ -32,22 +31,15 @@ class RecordingFile:
     """A recording of complete flights.
 
     The constructor prepares everything that does not need the flights, so that it can run during
-    the simulation. ``names`` are those of several flights, by default `flight_names`.
+    the simulation. ``names`` name several flights, by default by `flight_names`.
     """
 
     def __init__(self, assemblies: Sequence[Assembly], names: Sequence[str] = ()) -> None:
-        require_rerun()
         # Flushed by row and byte counts only: timed flushes would make no two files equal.
         batching = rr.ChunkBatcherConfig(flush_tick=FLUSH_INTERVAL)
-        scenarios = [assembly.scenario for assembly in assemblies]
-        self._recording = new_recording(scenarios, names, batching=batching)
-        self._recorders = make_recorders(self._recording, assemblies, names)
-        for recorder in self._recorders:
-            recorder.begin()
-        blueprint = flight_blueprint(self._recorders)
+        self._recording, self._recorders = new_recording(assemblies, names, batching=batching)
         # In memory first: Rerun does not report a full disk.
         self._content = self._recording.memory_recording()
-        self._recording.send_blueprint(blueprint, make_active=False, make_default=True)
 
     def save(self, flights: Sequence[Flight], path: Path) -> None:
         """Write the flights, one per assembly, atomically; equal flights give equal files.
@@ -55,6 +47,8 @@ class RecordingFile:
         Raises:
             InputError: If the file cannot be written.
         """
+        blueprint = flight_blueprint(self._recorders, flights)
+        self._recording.send_blueprint(blueprint, make_active=False, make_default=True)
         write_flights(self._recorders, flights)
         content = self._content.drain_as_bytes()
         self._recording.disconnect()
@@ -68,20 +62,25 @@ def save_recording(flights: Sequence[Flight], path: Path, names: Sequence[str] =
 
 
 def new_recording(
-    scenarios: Sequence[Scenario],
+    assemblies: Sequence[Assembly],
     names: Sequence[str] = (),
     *,
     salt: str = "",
     batching: rr.ChunkBatcherConfig | None = None,
-) -> rr.RecordingStream:
-    """An empty recording whose identifier depends on its arguments only.
+) -> tuple[rr.RecordingStream, list[FlightRecorder]]:
+    """A recording without rows, whose identifier depends on the arguments only, and its recorders.
 
     Args:
-        scenarios: The scenarios of the flights.
+        assemblies: Those of the flights.
         names: Names of several flights, by default `flight_names`.
         salt: Distinguishes recordings of equal scenarios, which the viewer would merge.
         batching: When Rerun flushes rows; None for its default.
+
+    Raises:
+        InputError: If the environment disables Rerun.
     """
+    require_rerun()
+    scenarios = [assembly.scenario for assembly in assemblies]
     content = "\n".join([*(scenario.model_dump_json() for scenario in scenarios), *names, salt])
     digest = hashlib.sha256(content.encode()).hexdigest()[:16]
     recording = rr.RecordingStream(
@@ -92,35 +91,23 @@ def new_recording(
     )
     recording.set_log_time_enabled(False)
     title = common_title(scenarios)
-    if len(scenarios) > 1:
-        compared = " / ".join(names or flight_names(scenarios))
-        title = f"{title}: {compared}" if title else compared
-    title = title or scenarios[0].address or "flight"
-    recording.send_recording_name(title)
-    return recording
-
-
-def make_recorders(
-    recording: rr.RecordingStream, assemblies: Sequence[Assembly], names: Sequence[str] = ()
-) -> list[FlightRecorder]:
-    """One recorder per flight; several flights have distinct names and colours."""
-    if len(assemblies) == 1:
-        return [FlightRecorder(recording, assemblies[0])]
-    names = names or flight_names([assembly.scenario for assembly in assemblies])
-    return [
+    if len(scenarios) == 1:
+        recording.send_recording_name(title or scenarios[0].address or "flight")
+        return recording, [FlightRecorder(recording, assemblies[0])]
+    names = names or flight_names(scenarios)
+    compared = " / ".join(names)
+    recording.send_recording_name(f"{title}: {compared}" if title else compared)
+    recorders = [
         FlightRecorder(
-            recording,
-            assembly,
-            name=name,
-            color=palette.FLIGHTS[index % len(palette.FLIGHTS)],
-            first=index == 0,
+            recording, assembly, name=name, color=FLIGHTS[index % len(FLIGHTS)], first=index == 0
         )
         for index, (assembly, name) in enumerate(zip(assemblies, names, strict=True))
     ]
+    return recording, recorders
 
 
 def write_flights(recorders: Sequence[FlightRecorder], flights: Sequence[Flight]) -> None:
-    """Write complete flights with recorders whose `begin` has been called."""
+    """Write complete flights."""
     end = max(float(flight["time"][-1]) for flight in flights)
     for recorder, flight in zip(recorders, flights, strict=True):
         recorder.draw_references(end)

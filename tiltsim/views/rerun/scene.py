@@ -9,7 +9,7 @@ import numpy as np
 import rerun as rr
 
 from tiltsim.views import replay
-from tiltsim.views.rerun import palette
+from tiltsim.views.rerun import timeline
 from tiltsim.views.rerun.geometry import body_paths, ground_height, log_geometry, xyzw
 from tiltsim.views.rerun.timeline import Trail, send_rows
 from tiltsim_controllers.mathematics.scalar import Floats
@@ -17,7 +17,7 @@ from tiltsim_controllers.mathematics.scalar import Floats
 if TYPE_CHECKING:
     from tiltsim.closed_loop.assembly import Assembly
     from tiltsim.flight.flight import Flight
-    from tiltsim.views.rerun.palette import Color
+    from tiltsim.views.rerun.timeline import Color
 
 TRAIL_INTERVAL: Final = 0.1  # s between the corners of a trail
 REFERENCE_POINTS: Final = 400
@@ -36,7 +36,7 @@ class Scene:
         assembly: The assembly of the flight.
         model: The vehicle's model, visual geometry included.
         root: The entity of the scene.
-        color: The flight's colour.
+        color: The flight's color.
         name: The label of the vehicle in a comparison; empty for a single flight.
     """
 
@@ -50,7 +50,6 @@ class Scene:
         name: str = "",
     ) -> None:
         self._recording = recording
-        self._name = name
         self._assembly = assembly
         self._model = model
         self._color = color
@@ -63,32 +62,33 @@ class Scene:
         self._thrust = replay.thrust_sites(model)
         self._thrust_scale = replay.thrust_scale(model)
         self._floor_cell: Floats | None = None
+        self.not_drawn = log_geometry(recording, model, root)  # geoms that Rerun cannot draw
+        self._log_styles(name)
 
-    def begin(self) -> list[str]:
-        """Log the static data; returns the names of geoms that Rerun cannot draw."""
-        self._log(self.root.partition("/")[0], rr.ViewCoordinates.RIGHT_HAND_Z_UP)
-        not_drawn = log_geometry(self._recording, self._model, self.root)
+    def _log_styles(self, name: str) -> None:
+        """Log what does not move, and the looks of what does; ``name`` is the vehicle's label."""
         model = self._model
+        self._log(self.root.partition("/")[0], rr.ViewCoordinates.RIGHT_HAND_Z_UP)
         for body in range(1, model.nbody):
             if not model.body_dofnum[body]:
                 translation, quaternion = model.body_pos[body], xyzw(model.body_quat[body])
                 pose = rr.Transform3D(translation=translation, quaternion=quaternion)
                 self._log(self._paths[body], pose)
-        self._log(
-            f"{self.root}/trail",
-            rr.LineStrips3D.from_fields(colors=[self._color], radii=[TRAIL_WIDTH]),
-        )
-        self._begin_thrust()
-        self._begin_floor()
-        dot = rr.Points3D(
-            [(0.0, 0.0, 0.0)],
-            radii=[DOT],
-            colors=[self._color],
-            labels=[self._name] if self._name else None,
-            show_labels=True,
-        )
-        self._log(f"{self.camera}/dot", dot)
-        return not_drawn
+        trail = rr.LineStrips3D.from_fields(colors=[self._color], radii=[TRAIL_WIDTH])
+        self._log(f"{self.root}/trail", trail)
+        look: dict[str, Any] = {"colors": [timeline.YELLOW]}
+        look["radii"] = [0.02 * replay.vehicle_radius(model)]
+        for site in self._thrust:
+            arrow = rr.Arrows3D.from_fields(origins=[model.site_pos[site]], **look)
+            self._log(self._thrust_path(site), arrow)
+        # A grid around the origin, at the height of the model's ground.
+        half, height = FLOOR_CELL * FLOOR_CELLS, ground_height(model)
+        offsets = np.linspace(-half, half, 2 * FLOOR_CELLS + 1)
+        lines = [[(c, -half, height), (c, half, height)] for c in offsets]
+        lines += [[(-half, c, height), (half, c, height)] for c in offsets]
+        self._log(self._floor, rr.LineStrips3D(lines, colors=[timeline.FAINT], radii=[-0.5]))
+        look = {"radii": [DOT], "colors": [self._color], "labels": [name] if name else None}
+        self._log(f"{self.camera}/dot", rr.Points3D([(0.0, 0.0, 0.0)], **look, show_labels=True))
 
     def append(self, piece: Flight) -> None:
         """Log the next piece of the flight."""
@@ -103,7 +103,7 @@ class Scene:
                 )
                 send_rows(self._recording, self._paths[body], time, pose)
         for site, column in self._thrust.items():
-            axis = _axis_in_body(model, site)
+            axis = replay.rotate(model.site_quat[site], np.array([0.0, 0.0, 1.0]))
             vectors = np.outer(columns[column] * self._thrust_scale, axis).astype(np.float32)
             arrow = rr.Arrows3D.columns(vectors=vectors)
             send_rows(self._recording, self._thrust_path(site), time, arrow)
@@ -114,7 +114,13 @@ class Scene:
         if len(ends):
             strips = rr.LineStrips3D.columns(strips=segments.astype(np.float32))
             send_rows(self._recording, f"{self.root}/trail", ends, strips)
-        self._append_floor(time, position)
+        # The grid moves by whole cells, so that it appears fixed and infinite.
+        cells = FLOOR_CELL * np.round(position * (1.0, 1.0, 0.0) / FLOOR_CELL)
+        before = cells[:1] + 1.0 if self._floor_cell is None else self._floor_cell[np.newaxis]
+        moved = np.any(cells != np.concatenate([before, cells[:-1]]), axis=1)
+        move = rr.Transform3D.columns(translation=cells[moved].astype(np.float32))
+        send_rows(self._recording, self._floor, time[moved], move)
+        self._floor_cell = cells[-1]
         if self._assembly.follows_position:
             reference = replay.reference_positions(columns)
             point = rr.Points3D.columns(positions=reference.astype(np.float32))
@@ -129,44 +135,13 @@ class Scene:
         # Several on one body are named after their columns, such as thrust_1.
         return f"{self._paths[body]}/{'thrust' if alone else self._thrust[site]}"
 
-    def _begin_thrust(self) -> None:
-        for site in self._thrust:
-            arrow = rr.Arrows3D.from_fields(
-                origins=[self._model.site_pos[site]],
-                colors=[palette.YELLOW],
-                radii=[0.02 * replay.vehicle_radius(self._model)],
-            )
-            self._log(self._thrust_path(site), arrow)
-
     def draw_reference(self, end: float) -> None:
         """Log the path of the reference up to a time (s), if the controller follows a position."""
         if not self._assembly.follows_position:
             return
         path = replay.reference_path(self._assembly, end, REFERENCE_POINTS)
-        now = rr.Points3D.from_fields(colors=[palette.WHITE], radii=[DOT])
+        now = rr.Points3D.from_fields(colors=[timeline.WHITE], radii=[DOT])
         self._log(f"{self.root}/reference/now", now)
         if np.ptp(path, axis=0).max() > 0.0:
-            line = rr.LineStrips3D([path], colors=[palette.GREY], radii=[REFERENCE_WIDTH])
+            line = rr.LineStrips3D([path], colors=[timeline.GREY], radii=[REFERENCE_WIDTH])
             self._log(f"{self.root}/reference/path", line)
-
-    def _begin_floor(self) -> None:
-        """Log the grid around the origin, at the height of the model's ground."""
-        half = FLOOR_CELL * FLOOR_CELLS
-        height = ground_height(self._model)
-        offsets = np.linspace(-half, half, 2 * FLOOR_CELLS + 1)
-        lines = [[(c, -half, height), (c, half, height)] for c in offsets]
-        lines += [[(-half, c, height), (half, c, height)] for c in offsets]
-        self._log(self._floor, rr.LineStrips3D(lines, colors=[palette.FAINT], radii=[-0.5]))
-
-    def _append_floor(self, time: Floats, position: Floats) -> None:
-        """Move the grid by whole cells, so that it appears fixed and infinite."""
-        cells = FLOOR_CELL * np.round(position * (1.0, 1.0, 0.0) / FLOOR_CELL)
-        before = cells[:1] + 1.0 if self._floor_cell is None else self._floor_cell[np.newaxis]
-        moved = np.any(cells != np.concatenate([before, cells[:-1]]), axis=1)
-        move = rr.Transform3D.columns(translation=cells[moved].astype(np.float32))
-        send_rows(self._recording, self._floor, time[moved], move)
-        self._floor_cell = cells[-1]
-
-
-def _axis_in_body(model: mujoco.MjModel, site: int) -> Floats:
-    return replay.rotate(model.site_quat[site], np.array([0.0, 0.0, 1.0]))

@@ -1,4 +1,4 @@
-"""Rows on the timeline: sending columns of values, and thinning out samples."""
+"""Rows on the timeline, thinned out where they are too many, and the colors of all entities."""
 
 from __future__ import annotations
 
@@ -11,6 +11,28 @@ import rerun as rr
 from tiltsim_controllers.mathematics.scalar import Floats
 
 TIMELINE: Final = "sim_time"
+
+Color = tuple[int, int, int]
+
+# For dark and light themes, after Okabe and Ito's palette for the color-blind.
+AMBER: Final = (230, 159, 0)
+SKY: Final = (86, 180, 233)
+GREEN: Final = (0, 178, 132)
+YELLOW: Final = (240, 228, 66)
+BLUE: Final = (58, 136, 226)
+RED: Final = (226, 94, 20)
+PINK: Final = (215, 134, 182)
+GREY: Final = (140, 148, 158)
+FAINT: Final = (88, 94, 102)
+WHITE: Final = (235, 238, 242)
+UNREACHABLE: Final = (92, 50, 42)
+FLIGHTS: Final = (SKY, AMBER, PINK, GREEN, YELLOW, RED, BLUE, GREY)  # compared, in this order
+
+
+def dimmed(color: Color, factor: float = 0.62) -> Color:
+    """A darker shade of a color, for the reference of a quantity shown in it."""
+    red, green, blue = (round(channel * factor) for channel in color)
+    return red, green, blue
 
 
 def send_rows(recording: rr.RecordingStream, path: str, times: Floats, *columns: Any) -> None:

@@ -16,12 +16,7 @@ from tiltsim.errors import InputError
 from tiltsim.flight.flight import as_flights
 from tiltsim.system.optional import optional_package
 from tiltsim.system.text import short_repr
-from tiltsim.views.rerun.requirements import (
-    DEFAULT_URL,
-    require_rerun,
-    require_viewer,
-    viewer_listens,
-)
+from tiltsim.views.rerun import DEFAULT_URL, require_viewer, viewer_listens
 
 if TYPE_CHECKING:
     import rerun as rr
@@ -29,11 +24,8 @@ if TYPE_CHECKING:
 
     from tiltsim.flight.flight import Flight
 
-RECORDING_START: Final = b"RRF"
-"""First bytes of every recording; the version follows."""
-
-START_TIME: Final = 20.0
-"""Time (s) that the viewer may take to start."""
+RECORDING_START: Final = b"RRF"  # first bytes of every recording; the version follows
+START_TIME: Final = 20.0  # time (s) that the viewer may take to start
 
 
 def view(flights: Flight | Sequence[Flight], *, url: str | None = None) -> Any:
@@ -54,18 +46,13 @@ def view(flights: Flight | Sequence[Flight], *, url: str | None = None) -> Any:
             open one on, or the notebook support of Rerun is not installed.
     """
     shown = as_flights(flights)
-    if url is None and _in_notebook():
+    ipython = sys.modules.get("IPython")  # the kernel of a notebook displays widgets
+    if url is None and ipython is not None and hasattr(ipython.get_ipython(), "kernel"):
         return _inline_viewer(shown)
     if url is not None and not isinstance(url, str):
         raise InputError(f"url = {short_repr(url)}: must be text, such as {DEFAULT_URL}")
     view_flights(shown, url)
     return None
-
-
-def _in_notebook() -> bool:
-    """Whether this process is the kernel of a notebook, which displays widgets."""
-    ipython = sys.modules.get("IPython")
-    return ipython is not None and hasattr(ipython.get_ipython(), "kernel")
 
 
 def _inline_viewer(flights: Sequence[Flight]) -> Any:
@@ -77,14 +64,11 @@ def _inline_viewer(flights: Sequence[Flight]) -> Any:
     from rerun.notebook import Viewer
 
     from tiltsim.views.rerun.blueprint import flight_blueprint
-    from tiltsim.views.rerun.recording_file import make_recorders, new_recording, write_flights
+    from tiltsim.views.rerun.recording_file import new_recording, write_flights
 
-    require_rerun()
-    recording = new_recording([flight.scenario for flight in flights])
-    recorders = make_recorders(recording, [flight.assembly for flight in flights])
-    widget = Viewer(recording=recording, blueprint=flight_blueprint(recorders), width="auto")
-    for recorder in recorders:
-        recorder.begin()
+    recording, recorders = new_recording([flight.assembly for flight in flights])
+    blueprint = flight_blueprint(recorders, flights)
+    widget = Viewer(recording=recording, blueprint=blueprint, width="auto")
     write_flights(recorders, flights)
     recording.flush()
     return widget
@@ -95,20 +79,17 @@ def view_flights(
 ) -> None:
     """Show a flight, or several for a comparison, in the viewer at a URL; None opens a viewer.
 
-    ``names`` are those of several flights, by default `flight_names`.
+    ``names`` name several flights, by default by `flight_names`.
 
     Raises:
         InputError: If no viewer listens at the address, or there is no screen to open one on.
     """
     from tiltsim.views.rerun.blueprint import flight_blueprint
-    from tiltsim.views.rerun.recording_file import make_recorders, new_recording, write_flights
+    from tiltsim.views.rerun.recording_file import new_recording, write_flights
 
     require_viewer(url)
-    recording = new_recording([flight.scenario for flight in flights], names)
-    recorders = make_recorders(recording, [flight.assembly for flight in flights], names)
-    attach_viewer(recording, url, flight_blueprint(recorders))
-    for recorder in recorders:
-        recorder.begin()
+    recording, recorders = new_recording([flight.assembly for flight in flights], names)
+    attach_viewer(recording, url, flight_blueprint(recorders, flights))
     write_flights(recorders, flights)
     recording.disconnect()
 
@@ -120,7 +101,14 @@ def view_recordings(paths: Sequence[Path]) -> None:
         InputError: If a file cannot be read or is not a recording, or there is no screen.
     """
     for path in paths:
-        _require_recording(path)
+        # For other files the viewer would only show a short notice.
+        try:
+            with path.open("rb") as file:
+                start = file.read(len(RECORDING_START))
+        except OSError as error:
+            raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error
+        if start != RECORDING_START:
+            raise InputError(f"{path}: not a Rerun recording")
     require_viewer(None)
     _open_viewer(*(str(path.absolute()) for path in paths))
 
@@ -142,30 +130,15 @@ def _open_viewer(*arguments: str) -> None:
         raise InputError(f"the Rerun viewer did not start: {error.strerror}") from error
 
 
-def _require_recording(path: Path) -> None:
-    """Check the first bytes: for other files the viewer would only show a short notice."""
-    try:
-        with path.open("rb") as file:
-            start = file.read(len(RECORDING_START))
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error
-    if start != RECORDING_START:
-        raise InputError(f"{path}: not a Rerun recording")
-
-
 def attach_viewer(recording: rr.RecordingStream, url: str | None, blueprint: rrb.Blueprint) -> None:
     """Send a recording to the viewer at a URL, or else to the local one, opened if necessary."""
     if url is None:
         url = DEFAULT_URL
         if not viewer_listens(url):
             _open_viewer("--hide-welcome-screen", "--expect-data-soon")
-            _wait_for_viewer(url)
+            deadline = monotonic() + START_TIME
+            while not viewer_listens(url):
+                if monotonic() > deadline:
+                    raise InputError(f"the Rerun viewer did not start within {START_TIME:g} s")
+                sleep(0.05)
     recording.connect_grpc(url, default_blueprint=blueprint)
-
-
-def _wait_for_viewer(url: str) -> None:
-    deadline = monotonic() + START_TIME
-    while not viewer_listens(url):
-        if monotonic() > deadline:
-            raise InputError(f"the Rerun viewer did not start within {START_TIME:g} s")
-        sleep(0.05)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
@@ -10,21 +10,15 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from tiltsim.system.files import replacing
-from tiltsim.views.video.offscreen import Image
 from tiltsim.views.video.rendering import VideoFormat, frame_times, frames
 
 if TYPE_CHECKING:
-    from PIL.Image import Image as PaletteImage
-
     from tiltsim.flight.flight import Flight
 
 H264_QUALITY: Final = "21"  # constant rate factor: 18 is visually lossless, 28 coarse
 
-COLORS: Final = 255
-"""Of a GIF's 256; one is left for pixels that do not change."""
-
-PALETTE_FRAMES: Final = 6
-"""Evenly spaced frames from which the colors of a GIF are chosen."""
+COLORS: Final = 255  # of a GIF's 256; one is left for pixels that do not change
+PALETTE_FRAMES: Final = 6  # evenly spaced frames from which the colors of a GIF are chosen
 
 
 def write_video(
@@ -73,7 +67,11 @@ def _write_gif(
 
     times = frame_times(flight, video)
     chosen = times[np.linspace(0, len(times) - 1, PALETTE_FRAMES).astype(int)]
-    palette = _palette(image for _, image in frames(flight, video, chosen))
+    together = Pillow.fromarray(
+        np.concatenate([image for _, image in frames(flight, video, chosen)])
+    )
+    # Median cut spends colors on the ground, maximum coverage on rare ones; an octree keeps both.
+    palette = together.quantize(COLORS, Pillow.Quantize.FASTOCTREE)
     # Without dithering areas of one color stay so from frame to frame, and the file small.
     pictures = []
     for count, (_, image) in enumerate(frames(flight, video), start=1):
@@ -89,16 +87,4 @@ def _write_gif(
     )
 
 
-def _palette(images: Iterable[Image]) -> PaletteImage:
-    """An image with the best palette for some others.
-
-    Median cut spends it on the ground, maximum coverage on rare colors; an octree keeps both.
-    """
-    from PIL import Image as Pillow
-
-    together = Pillow.fromarray(np.concatenate(list(images)))
-    return together.quantize(COLORS, Pillow.Quantize.FASTOCTREE)
-
-
-WRITERS: Final = {".mp4": _write_mp4, ".gif": _write_gif}
-"""By the suffix of the file."""
+WRITERS: Final = {".mp4": _write_mp4, ".gif": _write_gif}  # by the suffix of the file

@@ -22,8 +22,7 @@ if TYPE_CHECKING:
     from tiltsim.views.video.rendering import VideoFormat
 
 FORMATS: Final = (".mp4", ".gif")
-GIF_MAX_FPS: Final = 50
-"""Browsers slow down GIFs with shorter delays."""
+GIF_MAX_FPS: Final = 50  # browsers slow down GIFs with shorter delays
 
 
 def video(
@@ -92,85 +91,54 @@ def video_format(
     """
     prepare_file(f"{prefix}out" if prefix else "video", path, FORMATS)
     prefer_offscreen_gl()  # before anything imports MuJoCo
-    return _format(_Options(options, prefix), float(flight["time"][-1]), path.suffix.lower())
-
-
-class _Options:
-    """The options of a video, checked one by one."""
-
-    def __init__(self, values: dict[str, Any], prefix: str) -> None:
-        self._values, self._prefix = values, prefix
-
-    def given(self, name: str) -> Any:
-        """The value; None if it is not given."""
-        return self._values.get(name)
-
-    def mistake(self, name: str, allowed: str) -> InputError:
-        """The error for a value that is not allowed."""
-        value = self._values[name]
-        shown = f"{value:g}" if isinstance(value, float) else short_repr(value)
-        return InputError(f"{self._prefix}{name} {shown}: {allowed}")
-
-    def number(self, name: str, least: float, most: float = inf) -> float:
-        """A number in a range."""
-        value = self._values[name]
-        allowed = f"from {least:g} to {most:g}" if most < inf else f"of at least {least:g}"
-        if not (is_finite(value) and least <= value <= most):
-            raise self.mistake(name, f"must be a number {allowed}")
-        return float(value)
-
-    def several(self, name: str, ranges: Sequence[tuple[float, float]], allowed: str) -> Any:
-        """Some numbers, each in its range."""
-        values = self._values[name]
-        fits = isinstance(values, list | tuple) and len(values) == len(ranges)
-        if not fits or not all(
-            is_finite(value) and low <= value <= high
-            for value, (low, high) in zip(values, ranges, strict=True)
-        ):
-            raise self.mistake(name, allowed)
-        return values
-
-
-def _format(options: _Options, flight_end: float, suffix: str) -> VideoFormat:
-    """The video that the options ask for. Raises `InputError` if that is impossible."""
-    from tiltsim.views.video.overlay import CameraPose
+    from tiltsim.views.replay import CameraPose
     from tiltsim.views.video.rendering import QUALITIES
 
-    quality = options.given("quality")
-    if not isinstance(quality, str) or quality not in QUALITIES:
-        raise options.mistake("quality", choose(quality, QUALITIES))
-    base = QUALITIES[quality]
-    start, end = options.number("start", 0.0), inf
-    if options.given("end") is not None:
-        end = options.number("end", 0.0)
+    def require(name: str, allowed: str, *, fits: bool) -> None:
+        if not fits:
+            value = options[name]
+            shown = f"{value:g}" if isinstance(value, float) else short_repr(value)
+            raise InputError(f"{prefix}{name} {shown}: {allowed}")
+
+    def number(name: str, default: float, least: float, most: float = inf) -> float:
+        value = default if options.get(name) is None else options[name]
+        allowed = f"from {least:g} to {most:g}" if most < inf else f"of at least {least:g}"
+        fits = is_finite(value) and least <= value <= most
+        require(name, f"must be a number {allowed}", fits=fits or options.get(name) is None)
+        return float(value)
+
+    def several(name: str, ranges: Sequence[tuple[float, float]], allowed: str) -> Any:
+        values = options[name]
+        fits = isinstance(values, list | tuple) and len(values) == len(ranges)
+        pairs = zip(values, ranges, strict=True) if fits else []
+        inside = all(is_finite(value) and low <= value <= high for value, (low, high) in pairs)
+        require(name, allowed, fits=fits and inside)
+        return values
+
+    quality = options.get("quality")
+    known = isinstance(quality, str) and quality in QUALITIES
+    require("quality", choose(quality, QUALITIES), fits=known)
+    made = QUALITIES[str(quality)]
+    start, end = number("start", 0.0, 0.0), number("end", inf, 0.0)
+    flight_end = float(flight["time"][-1])
     if flight_end == 0.0:
         raise InputError("the flight ended at 0 s, so that there is nothing to show")
-    if start >= min(flight_end, end):
-        reason = f"is not before the end {end:g}" if end < flight_end else "is not in it"
-        raise options.mistake("start", f"{reason}; the flight ends at {flight_end:g} s")
-    width, height = base.width, base.height
-    if options.given("size") is not None:
+    reason = f"is not before the end {end:g}" if end < flight_end else "is not in it"
+    reason = f"{reason}; the flight ends at {flight_end:g} s"
+    require("start", reason, fits=start < min(flight_end, end))
+    if options.get("size") is not None:
         allowed = "must be even numbers of pixels from 64 to 4096, such as 1280 and 720"
-        width, height = options.several("size", [(64, 4096)] * 2, allowed)
-        if not all(isinstance(side, int) and side % 2 == 0 for side in (width, height)):
-            raise options.mistake("size", allowed)
-    fps = base.fps
-    if options.given("fps") is not None:
-        fps = round(options.number("fps", 1, 240))
-    if suffix == ".gif" and fps > GIF_MAX_FPS:
-        raise options.mistake("fps", f"a GIF has at most {GIF_MAX_FPS} frames per second")
-    pose = None
-    if options.given("camera") is not None:
+        width, height = several("size", [(64, 4096)] * 2, allowed)
+        even = all(isinstance(side, int) and side % 2 == 0 for side in (width, height))
+        require("size", allowed, fits=even)
+        made = replace(made, width=width, height=height)
+    fps = round(number("fps", made.fps, 1, 240))
+    slow = path.suffix.lower() != ".gif" or fps <= GIF_MAX_FPS
+    require("fps", f"a GIF has at most {GIF_MAX_FPS} frames per second", fits=slow)
+    if options.get("camera") is not None:
         ranges = [(1.5, 1000.0), (-360.0, 360.0), (-90.0, 90.0)]
         allowed = "must be vehicle radii from 1.5 to 1000 and two angles in degrees"
-        pose = CameraPose(*options.several("camera", ranges, f"{allowed}, such as 7.5, 130, -24"))
-    return replace(
-        base,
-        width=width,
-        height=height,
-        fps=fps,
-        speed=options.number("speed", 0.01, 100.0),
-        start=start,
-        end=end,
-        camera=pose,
-    )
+        pose = several("camera", ranges, f"{allowed}, such as 7.5, 130, -24")
+        made = replace(made, camera=CameraPose(*pose))
+    speed = number("speed", 1.0, 0.01, 100.0)
+    return replace(made, fps=fps, speed=speed, start=start, end=end)

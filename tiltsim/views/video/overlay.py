@@ -1,113 +1,131 @@
-"""The text and inset over the frames of a video, by kind of vehicle."""
+"""The text over the frames of a video, and the roll-pitch plane in their corner."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
+from PIL import Image as Pillow
+from PIL import ImageDraw
 
 from tiltsim.views.attitude_plane import (
+    HALF_WIDTH,
+    MARGIN_THRESHOLD,
     MOVING_TRAIL_TIME,
     curve_is_constant,
+    side_of,
+    singular_curves,
     torque_free_directions,
+    unreachable_pitch,
 )
-from tiltsim.views.video.inset import PlaneInset, overlay_inset
+from tiltsim.views.figures import style
+from tiltsim.views.signals import has_attitude_plane
 from tiltsim.views.video.offscreen import Caption, Image
+from tiltsim_controllers.mathematics.scalar import Floats
 
 if TYPE_CHECKING:
     from tiltsim.flight.flight import Flight
 
 INSET_SHARE: Final = 0.32  # of the frame's height
 GAP_SHARE: Final = 0.025
+OPACITY: Final = 0.88
+GROUND: Final = (250, 250, 250)
+UNREACHABLE: Final = tuple(bytes.fromhex(style.UNREACHABLE[1:]))  # the color of the figures
+CURVE: Final = (213, 94, 0)
+GRID: Final = (212, 216, 220)
+FRAME: Final = (70, 78, 86)
+TRAIL: Final = (90, 160, 210)
+ATTITUDE: Final = (0, 90, 150)
 
 
-class CameraPose(NamedTuple):
-    """The pose of the camera relative to the vehicle, at which it looks."""
-
-    distance: float  # vehicle radii
-    azimuth: float  # degrees
-    elevation: float  # degrees, negative from above
-
-
-class Overlay(Protocol):
-    """What is drawn over the frames of one flight, and the camera that suits it."""
-
-    camera: CameraPose
-    caption: Caption
-
-    def rows(self, sample: int) -> dict[str, str]:
-        """Rows of the frame's table besides time and position error."""
-
-    def paint(self, image: Image, sample: int) -> None:
-        """Paint over the frame of a sample, in place."""
-
-
-class AttitudeOverlay(Overlay):
-    """The attitude of a rotorcraft and, if it is known, its singularity margin."""
-
-    camera = CameraPose(7.5, 130.0, -24.0)
-    caption = Caption("", 0, 0)
-
-    def __init__(self, flight: Flight) -> None:
-        self._flight = flight
-
-    def rows(self, sample: int) -> dict[str, str]:
-        flight, rows = self._flight, {}
-        if "singularity_margin" in flight:
-            margin = abs(flight["singularity_margin"][sample])
-            rows["singularity margin"] = f"{margin:.2f} rad"
-        roll, pitch = (flight[name][sample] for name in ("roll", "pitch"))
-        return {**rows, "roll, pitch": f"{roll:+.2f}, {pitch:+.2f} rad"}
-
-    def paint(self, image: Image, sample: int) -> None:
-        """Paint nothing: without a curve of singular attitudes there is no inset."""
-
-
-class PlaneOverlay(AttitudeOverlay):
-    """The same, and the roll-pitch plane in the corner."""
+class Overlay:
+    """What is drawn over the frames of one flight, by the columns that it has."""
 
     def __init__(self, flight: Flight, height: int) -> None:
-        super().__init__(flight)
-        self._n = torque_free_directions(flight.columns, flight.scenario.rotorcraft.resolve())
-        self._attitude = np.stack([flight["roll"], flight["pitch"]], axis=1)
-        side = float(np.sign(flight["singularity_margin"][0])) or 1.0
-        self._inset = PlaneInset(round(INSET_SHARE * height), side)
-        self._curve_is_constant = curve_is_constant(flight.scenario)
-        self._gap = gap = round(GAP_SHARE * height)
-        self.caption = Caption("shaded: unreachable attitudes", gap, self._inset.size + gap)
-
-    def paint(self, image: Image, sample: int) -> None:
-        trail = self._attitude[self._trail_start(sample) : sample + 1 : 2]
-        trail = np.concatenate([trail, self._attitude[sample : sample + 1]])
-        margin = float(self._flight["singularity_margin"][sample])
-        overlay_inset(image, self._inset.paint(self._n[sample], trail, margin), self._gap)
-
-    def _trail_start(self, sample: int) -> int:
-        """The first sample of the trail: an even one, so that the trail does not shimmer."""
-        if self._curve_is_constant:
-            return 0
-        time = self._flight["time"]
-        start = int(np.searchsorted(time, time[sample] - MOVING_TRAIL_TIME))
-        return start - start % 2
-
-
-class TiltCarOverlay(Overlay):
-    """Rotor speeds and the direction error of a tilt-car, seen from above and behind."""
-
-    camera = CameraPose(9.0, 90.0, -62.0)
-    caption = Caption("", 0, 0)
-
-    def __init__(self, flight: Flight) -> None:
+        """Prepare frames of a height (pixels)."""
         self._flight = flight
+        self._inset = round(INSET_SHARE * height) if has_attitude_plane(flight.assembly) else 0
+        self.caption = Caption("", 0, 0)
+        if self._inset:
+            vehicle = flight.scenario.rotorcraft.resolve()
+            self._n = torque_free_directions(flight.columns, vehicle)
+            self._attitude = np.stack([flight["roll"], flight["pitch"]], axis=1)
+            self._gap = gap = round(GAP_SHARE * height)
+            self.caption = Caption("shaded: unreachable attitudes", gap, self._inset + gap)
 
     def rows(self, sample: int) -> dict[str, str]:
-        flight = self._flight
-        squares = [flight[f"rotor_speed_{rotor}"][sample] ** 2 for rotor in (1, 2)]
-        error = flight["direction_ref"][sample] - flight["direction"][sample]
-        return {
-            "rotor speeds squared": f"{squares[0]:.0f}, {squares[1]:.0f} rad2/s2",
-            "direction error": f"{error:+.2f} rad",
-        }
+        """Rows of the frame's table but time and position error."""
+        now = {name: float(column[sample]) for name, column in self._flight.columns.items()}
+        rows = {}
+        if "singularity_margin" in now:
+            rows["singularity margin"] = f"{abs(now['singularity_margin']):.2f} rad"
+        if "roll" in now:
+            rows["roll, pitch"] = f"{now['roll']:+.2f}, {now['pitch']:+.2f} rad"
+        if "direction" in now:
+            squares = (now[f"rotor_speed_{rotor}"] ** 2 for rotor in (1, 2))
+            rows["rotor speeds squared"] = ", ".join(f"{each:.0f}" for each in squares) + " rad2/s2"
+            rows["direction error"] = f"{now['direction_ref'] - now['direction']:+.2f} rad"
+        return rows
 
     def paint(self, image: Image, sample: int) -> None:
-        """Paint nothing: a tilt-car has no inset."""
+        """Paint the roll-pitch plane, if there is one, over the frame of a sample, in place."""
+        if not self._inset:
+            return
+        start, flight = 0, self._flight
+        if not curve_is_constant(flight.scenario):
+            time = flight["time"]
+            start = int(np.searchsorted(time, time[sample] - MOVING_TRAIL_TIME))
+        # From an even sample on, so that the trail does not shimmer.
+        trail = self._attitude[start - start % 2 : sample + 1 : 2]
+        trail = np.concatenate([trail, self._attitude[sample : sample + 1]])
+        margin = flight["singularity_margin"]
+        near = abs(margin[sample]) < MARGIN_THRESHOLD
+        inset = plane(self._inset, self._n[sample], side_of(margin), trail, near=near)
+        overlay_inset(image, inset, self._gap)
+
+
+def plane(size: int, n: Floats, side: float, trail: Floats, *, near: bool) -> Image:
+    """The roll-pitch plane at an instant, shape (size, size, 3), pitch upwards.
+
+    Args:
+        size: Width and height, pixels.
+        n: The unit vector along the torque-free force, shape (3,).
+        side: The sign of the margin at reachable attitudes, see `side_of`.
+        trail: The attitudes (roll, pitch) until now, rad, shape (N, 2).
+        near: Whether the attitude is close to a singular one.
+    """
+    picture = Pillow.new("RGB", (size, size), GROUND)
+    pen = ImageDraw.Draw(picture)
+    end = size - 1
+
+    def pixels(attitude: Floats) -> Any:
+        """Columns and rows of attitudes; those outside the plane are moved to its edge."""
+        shares = 0.5 + 0.5 * np.clip(attitude / HALF_WIDTH, -1.0, 1.0) * (1.0, -1.0)
+        return [tuple(place) for place in (shares * end).round().tolist()]
+
+    roll = np.linspace(-HALF_WIDTH, HALF_WIDTH, 91)
+    low, high = unreachable_pitch(n[np.newaxis], side, roll)[0].T
+    if (high > low).any():
+        outline = np.concatenate([np.stack([roll, low], 1), np.stack([roll, high], 1)[::-1]])
+        pen.polygon(pixels(outline), fill=UNREACHABLE)
+    for line in (round(share * end) for share in (0.25, 0.5, 0.75)):
+        pen.line([(0, line), (end, line)], fill=GRID)
+        pen.line([(line, 0), (line, end)], fill=GRID)
+    curve = singular_curves(n[np.newaxis])[0]
+    if np.isfinite(curve).all():
+        pen.line(pixels(curve), fill=CURVE, width=2)
+    if len(trail) > 1:
+        pen.line(pixels(trail), fill=TRAIL, width=2)
+    ((x, y),) = pixels(trail[-1:])
+    radius = size / 36
+    box = (x - radius, y - radius, x + radius, y + radius)
+    pen.ellipse(box, fill=CURVE if near else ATTITUDE)
+    pen.rectangle((0, 0, end, end), outline=FRAME)
+    return np.asarray(picture)
+
+
+def overlay_inset(frame: Image, inset: Image, gap: int) -> None:
+    """Paint an inset over the lower right corner of a frame, in place, with a gap (pixels)."""
+    height, width = inset.shape[:2]
+    corner = frame[-gap - height : -gap, -gap - width : -gap]
+    corner[:] = (OPACITY * inset + (1.0 - OPACITY) * corner).astype(np.uint8)

@@ -16,18 +16,11 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 WIDTH: Final = 720
-HEIGHT: Final = 480
-"""Pixels."""
-
+HEIGHT: Final = 480  # pixels
 AZIMUTH: Final = 50.0
-ELEVATION: Final = -28.0
-"""Of the camera's direction, degrees."""
-
-DISTANCE: Final = 2.5
-"""Of the camera, by the radius of the rotors' places and of a rotor."""
-
-ROTOR_RADIUS: Final = 0.12
-"""About that of the rotors in the files, m."""
+ELEVATION: Final = -28.0  # of the camera's direction, degrees
+DISTANCE: Final = 2.5  # of the camera, by the radius of the rotors' places and of a rotor
+ROTOR_RADIUS: Final = 0.12  # about that of the rotors in the files, m
 
 
 def save_portrait(model_file: Path, angles: Sequence[float], file: Path) -> None:

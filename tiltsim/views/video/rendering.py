@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from math import inf
 from typing import TYPE_CHECKING, Final
 
@@ -11,9 +12,9 @@ import mujoco
 import numpy as np
 
 from tiltsim.views import replay
-from tiltsim.views.vehicle_views import overlay_of
+from tiltsim.views.replay import CameraPose
 from tiltsim.views.video.offscreen import Canvas, Image
-from tiltsim.views.video.overlay import CameraPose
+from tiltsim.views.video.overlay import Overlay
 from tiltsim_controllers.mathematics.scalar import Floats
 
 if TYPE_CHECKING:
@@ -25,8 +26,12 @@ TRAIL_COLOR: Final = (0.0, 0.45, 0.85)
 REFERENCE_COLOR: Final = (0.15, 0.16, 0.18)
 THRUST_COLOR: Final = (0.95, 0.80, 0.10)
 REFERENCE_POINTS: Final = 600
+ARROW: Final = mujoco.mjtGeom.mjGEOM_ARROW
 LINE: Final = mujoco.mjtGeom.mjGEOM_CYLINDER
 """Drawn as a box, which has a hundredth of the triangles and looks the same when it is thin."""
+
+
+Color = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True)
@@ -97,11 +102,11 @@ class FlightRenderer:
             self._reference = path if np.ptp(path, axis=0).max() > 0.0 else path[:1]
         self._targets = replay.reference_positions(flight.columns)
         self._position = replay.positions(flight.columns)
-        self._overlay = overlay_of(flight, self._video.height)
+        self._overlay = Overlay(flight, self._video.height)
         self._camera = mujoco.MjvCamera()
         self._camera.type = mujoco.mjtCamera.mjCAMERA_TRACKING
         self._camera.trackbodyid = replay.first_free_body(self._model)
-        pose = self._video.camera or self._overlay.camera
+        pose = self._video.camera or replay.camera_of(flight.scenario)
         self._camera.distance = pose.distance * self._radius
         self._camera.azimuth, self._camera.elevation = pose.azimuth, pose.elevation
 
@@ -113,8 +118,18 @@ class FlightRenderer:
         mujoco.mj_comPos(model, data)
         mujoco.mj_camlight(model, data)
         self.canvas.compose(data, self._camera)
-        self._add_thrusts(sample)
-        self._add_reference(sample)
+        for site, column in replay.thrust_sites(model).items():
+            start, axis = data.site_xpos[site], data.site_xmat[site].reshape(3, 3)[:, 2]
+            end = start + axis * self._arrow_scale * self._flight[column][sample]
+            self._connect(ARROW, 0.035 * self._radius, start, end, (*THRUST_COLOR, 1.0))
+        if self._reference is not None:
+            color = (*REFERENCE_COLOR, 0.6)
+            for start, end in pairwise(self._reference):
+                self._connect(LINE, 0.012 * self._radius, start, end, color)
+            size, color = np.full(3, 0.07 * self._radius), (*REFERENCE_COLOR, 0.9)
+            geom = self._new_geom(mujoco.mjtGeom.mjGEOM_SPHERE, color)
+            if geom is not None:
+                geom.size, geom.pos = size, self._targets[sample]
         self._add_trail(sample)
         names, values = self._table(sample)
         image = np.ascontiguousarray(self.canvas.draw(names, values, self._overlay.caption))
@@ -131,30 +146,6 @@ class FlightRenderer:
             rows["position error"] = f"{np.linalg.norm(error):.3f} m"
         return "\n".join(rows), "\n".join(rows.values())
 
-    def _add_thrusts(self, sample: int) -> None:
-        data = self._data
-        for site, column in replay.thrust_sites(self._model).items():
-            axis = data.site_xmat[site].reshape(3, 3)[:, 2]
-            start = data.site_xpos[site]
-            end = start + axis * self._arrow_scale * self._flight[column][sample]
-            arrow = mujoco.mjtGeom.mjGEOM_ARROW
-            self._connect(arrow, 0.035 * self._radius, start, end, (*THRUST_COLOR, 1.0))
-
-    def _add_reference(self, sample: int) -> None:
-        if self._reference is None:
-            return
-        color = (*REFERENCE_COLOR, 0.6)
-        for start, end in zip(self._reference[:-1], self._reference[1:], strict=True):
-            self._connect(LINE, 0.012 * self._radius, start, end, color)
-        target = self._targets[sample]
-        scene = self.canvas.scene
-        if scene.ngeom < scene.maxgeom:
-            geom, size = scene.geoms[scene.ngeom], np.full(3, 0.07 * self._radius)
-            rgba = np.array((*REFERENCE_COLOR, 0.9), dtype=np.float32)
-            sphere, axes = mujoco.mjtGeom.mjGEOM_SPHERE, np.eye(3).ravel()
-            mujoco.mjv_initGeom(geom, sphere, size, target, axes, rgba)
-            scene.ngeom += 1
-
     def _add_trail(self, sample: int) -> None:
         time = self._flight["time"]
         now = time[sample]
@@ -163,26 +154,27 @@ class FlightRenderer:
         samples = np.searchsorted(time, np.ceil(steps) * TRAIL_INTERVAL)
         points = self._position[np.append(samples[samples < sample], sample)]
         shades = np.linspace(0.15, 0.95, len(points))
-        for start, end, shade in zip(points[:-1], points[1:], shades, strict=False):
+        for (start, end), shade in zip(pairwise(points), shades, strict=False):
             self._connect(LINE, 0.02 * self._radius, start, end, (*TRAIL_COLOR, shade))
 
     def _connect(
-        self,
-        shape: mujoco.mjtGeom,
-        width: float,
-        start: Floats,
-        end: Floats,
-        rgba: tuple[float, float, float, float],
+        self, shape: mujoco.mjtGeom, width: float, start: Floats, end: Floats, rgba: Color
     ) -> None:
+        geom = self._new_geom(shape, rgba)
+        if geom is not None:
+            mujoco.mjv_connector(geom, shape, width, start, end)
+            geom.type = mujoco.mjtGeom.mjGEOM_BOX if shape == LINE else shape
+            if shape == ARROW:
+                geom.size[2] *= 2.0  # MuJoCo draws arrows at half the length that it sets
+                geom.emission = 0.4
+
+    def _new_geom(self, shape: mujoco.mjtGeom, rgba: Color) -> mujoco.MjvGeom | None:
+        """One more geom in the scene; None if it is full."""
         scene = self.canvas.scene
         if scene.ngeom >= scene.maxgeom:
-            return
-        geom = scene.geoms[scene.ngeom]
-        colors = np.array(rgba, dtype=np.float32)
-        mujoco.mjv_initGeom(geom, shape, np.zeros(3), np.zeros(3), np.zeros(9), colors)
-        mujoco.mjv_connector(geom, shape, width, start, end)
-        geom.type = mujoco.mjtGeom.mjGEOM_BOX if shape == LINE else shape
-        if shape == mujoco.mjtGeom.mjGEOM_ARROW:
-            geom.size[2] *= 2.0  # MuJoCo draws arrows at half the length that it sets
-            geom.emission = 0.4
+            return None
         scene.ngeom += 1
+        geom = scene.geoms[scene.ngeom - 1]
+        colors = np.array(rgba, dtype=np.float32)
+        mujoco.mjv_initGeom(geom, shape, np.zeros(3), np.zeros(3), np.eye(3).ravel(), colors)
+        return geom
