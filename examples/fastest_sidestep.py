@@ -126,10 +126,14 @@ def draw(plans: dict[str, Plan], flights: dict[str, tiltsim.Flight], file: str) 
     """The vehicles from the side, with thrusts, and the manoeuvres over time."""
     import matplotlib.pyplot as plt
 
+    blue, red, green, ink = "#0072B2", "#D55E00", "#009E73", "#222222"  # for the color-blind
+    plt.rcParams.update({"axes.spines.top": False, "axes.spines.right": False, "axes.grid": True})
+    plt.rcParams.update({"axes.titlelocation": "left", "grid.color": "#D9D9D9", "font.size": 9})
     figure, axes = plt.subplots(
-        2, 2, figsize=(10, 5.6), width_ratios=(1.6, 1), layout="constrained"
+        2, 4, figsize=(12, 4.6), width_ratios=(2.2, 1, 1, 1), layout="constrained", sharex="col"
     )
-    for (name, plan), (side, course), color in zip(plans.items(), axes, ("C0", "C3")):
+    for (name, plan), row, color in zip(plans.items(), axes, (blue, red)):
+        side, course, turning, tilting = row
         flight = flights[name]
         side.plot(flight["x"], flight["z"], color="0.8", zorder=0)
         for row in range(0, len(plan.times), 5):
@@ -148,22 +152,19 @@ def draw(plans: dict[str, Plan], flights: dict[str, tiltsim.Flight], file: str) 
             for place, force in pods:
                 side.quiver(place[0], place[2], force[0], force[2], color=color, angles="xy",
                             scale_units="xy", scale=8.0, width=0.004)  # fmt: skip
-        side.set(title=f"{name}: {plan.times[-1]:.2f} s", ylabel="z [m]", aspect="equal")
+        side.set(title=f"{name}: {plan.times[-1]:.2f} s", ylabel="z (m)", aspect="equal")
         side.set(xlim=(-0.4, 3.4), ylim=(-0.5, 0.9))
-        course.plot(plan.times, plan.states[:, X] / DISTANCE, color="k", label="x / 3 m, planned")
-        course.plot(flight["time"][::5], flight["x"][::5] / DISTANCE, "k.", label="flown in MuJoCo")
-        speeds = np.abs(plan.states[:, ROTORS]) / SPEEDS[1]
-        course.plot(plan.times, speeds, color="C1", linewidth=1, label="rotor speeds / 500 rad/s")
+        course.plot(plan.times, plan.states[:, X], color=ink, label="planned")
+        course.plot(flight["time"][::5], flight["x"][::5], ".", color=color, label="in MuJoCo")
+        course.set(title="Distance", ylabel="m")
+        course.legend(frameon=False, fontsize="small")
+        turning.plot(plan.times, np.abs(plan.states[:, ROTORS]), color=color, lw=1)
+        turning.set(title="Rotor speeds", ylabel="rad/s", ylim=(0.0, 1.05 * SPEEDS[1]))
         angle = plan.states[:, TILTS] if name == "level" else np.arcsin(-plan.states[:, [PITCH]])
-        label = "tilt angles [rad]" if name == "level" else "pitch [rad]"
-        course.plot(plan.times, angle, color="C2", linewidth=1, label=label)
-        handles, labels = course.get_legend_handles_labels()
-        unique = dict(zip(labels, handles))
-        course.legend(unique.values(), unique, fontsize="x-small", frameon=False, ncols=2,
-                      loc="lower center", bbox_to_anchor=(0.5, 1.0))  # fmt: skip
-        course.grid(alpha=0.3)
-    axes[1, 0].set_xlabel("x [m]")
-    axes[1, 1].set_xlabel("time [s]")
+        tilting.plot(plan.times, angle, color=green, lw=1)
+        tilting.set(title="Tilt angles" if name == "level" else "Pitch", ylabel="rad")
+    for panel, label in zip(axes[1], ("x (m)", *["time (s)"] * 3)):
+        panel.set_xlabel(label)
     figure.savefig(file, dpi=110)
 
 

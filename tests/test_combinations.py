@@ -29,7 +29,7 @@ from tiltsim.scenario.vehicle import VehicleUnion
 from tiltsim.studies.fleet import FLEET, fleet_file
 from tiltsim.views.figures.style import save
 from tiltsim.views.rerun.recording_file import save_recording
-from tiltsim.views.vehicle_views import overlay_of
+from tiltsim.views.video.overlay import Overlay
 
 SHORT = {"duration": 0.02, "timestep": 0.002, "engine": "python"}
 TABLES = key_tables(scenario_schema())
@@ -68,7 +68,7 @@ def attempt(use, *arguments):
 OWN = {
     "python": "def law(seen):\n"
     "    return tiltsim.Command(rotor_accelerations=[0.0] * len(seen.rotor_speeds))\n",
-    "scalar": "@tiltsim.scalar\ndef law(seen):\n    return ({thrusts}), (), ()\n",
+    "numpy": "@tiltsim.law\ndef law(seen):\n    return tiltsim.Command(thrusts=[{thrusts}])\n",
 }
 """Functions of the user's, by the law that they fly with."""
 
@@ -172,7 +172,7 @@ def of_file(flight, folder):
 
 def paint(flight, _folder):
     """Text and inset of a frame of a video, whose rendering takes long."""
-    overlay = overlay_of(flight, 90)
+    overlay = Overlay(flight, 90)
     assert overlay.rows(0)
     overlay.paint(np.zeros((90, 160, 3), dtype=np.uint8), 0)
 
@@ -278,7 +278,7 @@ def test_the_whole_public_interface_is_here():
     environments = {name for name in tiltsim.env.__all__ if "Env" in name}
     known = {*USES_OF_FLIGHTS, *USES_OF_SCENARIOS, *SLOW_USES_OF_SCENARIOS}
     # Loading is a part of saving; the base of environments and many of them are used by the others.
-    known |= {"scalar", "load_flight", "Environment", "VectorEnv"}
+    known |= {"law", "xp", "load_flight", "Environment", "VectorEnv"}
     assert public | methods | environments <= known
 
 

@@ -6,16 +6,12 @@ import numpy as np
 import pytest
 
 import tiltsim
+from tests.arguments import ADDRESS, Speechless, Unreadable, hover
 from tests.flights import flight
 
-ADDRESS = "ch04_tracking/setpoint#rho_065_modified"
 SWEEP = {"scenario": ADDRESS, "axis": [{"type": "list", "key": "vehicle.mass", "values": [0.4]}]}
 LONG = "x" * 300
 SHORT = {"simulation": {"duration": 0.01}}
-
-
-def hover(observation):
-    return tiltsim.Command(thrusts=[1.0] * 4)
 
 
 class Aimed:
@@ -24,16 +20,6 @@ class Aimed:
 
     def __call__(self, observation):
         return hover(observation)
-
-
-class Speechless:
-    def __repr__(self):
-        raise RuntimeError("no repr")
-
-
-class Unreadable:
-    def __array__(self, *_args, **_options):
-        raise ValueError("two\nlines")
 
 
 def scenario():

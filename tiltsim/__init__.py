@@ -23,9 +23,9 @@ if TYPE_CHECKING:
     from tiltsim.linear.linearization import linearize
     from tiltsim.linear.margins import margins
     from tiltsim.linear.stability import stability
-    from tiltsim.plants.command import Command, Observation
+    from tiltsim.plants.command import Observation
+    from tiltsim.scenario.law_controller import Airframe, Command, LawController, Observed, law, xp
     from tiltsim.scenario.loading import load_scenario, parse_scenario
-    from tiltsim.scenario.scalar_controller import Airframe, ScalarController, scalar
     from tiltsim.scenario.scenario import Scenario
     from tiltsim.simulation.batch import fly
     from tiltsim.simulation.simulate import simulate
@@ -38,25 +38,26 @@ if TYPE_CHECKING:
     from tiltsim.views.video.making import video
 
 _HOMES = {
-    "Airframe": "scenario.scalar_controller",
-    "Command": "plants.command",
+    "Airframe": "scenario.law_controller",
+    "Command": "scenario.law_controller",
     "End": "flight.end",
     "Flight": "flight.flight",
     "InputError": "errors",
+    "LawController": "scenario.law_controller",
     "Observation": "plants.command",
-    "ScalarController": "scenario.scalar_controller",
+    "Observed": "scenario.law_controller",
     "Scenario": "scenario.scenario",
     "Simulation": "simulation.stepwise",
     "TiltsimError": "errors",
     "airframe": "laws.airframe",
     "attraction": "linear.attraction",
     "fly": "simulation.batch",
+    "law": "scenario.law_controller",
     "linearize": "linear.linearization",
     "load_flight": "flight.reading",
     "load_scenario": "scenario.loading",
     "margins": "linear.margins",
     "parse_scenario": "scenario.loading",
-    "scalar": "scenario.scalar_controller",
     "simulate": "simulation.simulate",
     "plot": "views.figures.plot",
     "show_progress": "commands.progress",  # for progress=True
@@ -66,6 +67,7 @@ _HOMES = {
     "vectorized": "simulation.vectorized",
     "video": "views.video.making",
     "view": "views.rerun.viewer",
+    "xp": "scenario.law_controller",
 }
 
 __all__ = [
@@ -74,21 +76,22 @@ __all__ = [
     "End",
     "Flight",
     "InputError",
+    "LawController",
     "Observation",
-    "ScalarController",
+    "Observed",
     "Scenario",
     "Simulation",
     "TiltsimError",
     "airframe",
     "attraction",
     "fly",
+    "law",
     "linearize",
     "load_flight",
     "load_scenario",
     "margins",
     "parse_scenario",
     "plot",
-    "scalar",
     "simulate",
     "stability",
     "sweep",
@@ -96,6 +99,7 @@ __all__ = [
     "vectorized",
     "video",
     "view",
+    "xp",
 ]
 
 

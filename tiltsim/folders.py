@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Final
 
 CONTROLLERS: Final = (
-    "mathematics",
     "code",
+    "mathematics",
     "vehicle",
     "gaits",
     "references",

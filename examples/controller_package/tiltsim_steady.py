@@ -1,67 +1,22 @@
 """The law ``steady`` of tiltsim: computed torque, and an integral that removes steady errors."""
 
-from functools import cache
-from typing import Literal, NamedTuple
+from typing import ClassVar, Literal
 
 from pydantic import Field
 
 import tiltsim
 from tiltsim_controllers.analysis.stability import linear_loop
-from tiltsim_controllers.laws.full_pose import attitude_error
 from tiltsim_controllers.laws.outer_loop import (
     pointing_attitude,
     push_along,
     torque_for,
     tracking_errors,
 )
-from tiltsim_controllers.laws.rotor_allocation import planned_allocation_of
+from tiltsim_controllers.laws.rotor_allocation import allocated_thrusts, lift_without_torque
+from tiltsim_controllers.mathematics.attitude import attitude_error
 
 
-class Gains(NamedTuple):
-    """The numbers of one flight. They are data: other gains need no other compiled code."""
-
-    position: float  # 1/s^2
-    velocity: float  # 1/s
-    integral: float  # 1/s^3
-    attitude: float  # 1/s^2
-    rates: float  # 1/s
-    gyroscopic: float  # 1 where the plant has gyroscopic torque
-
-
-@cache
-def law_of(rotors):
-    """The law of vehicles with this many rotors: native code wants to know how many there are."""
-    lift_of, axis_of, thrusts_of = planned_allocation_of(rotors)
-
-    @tiltsim.scalar
-    def steady(observed, gains):
-        sums, omega = observed.states, observed.body_rates
-        error, speed = tracking_errors(observed)
-        ax, ay, az = observed.reference.acceleration
-        k, d, i = gains.position, gains.velocity, gains.integral
-        acceleration = (
-            ax + k * error[0] + d * speed[0] + i * sums[0],
-            ay + k * error[1] + d * speed[1] + i * sums[1],
-            az + k * error[2] + d * speed[2] + i * sums[2],
-        )
-        # The attitude that points the rotors' force there, and the torque that turns to it.
-        lift = lift_of(observed)
-        axis = axis_of(observed, lift)
-        desired = pointing_attitude(observed, acceleration, axis)
-        ex, ey, ez = attitude_error(observed.rotation, desired)
-        turning = (
-            gains.attitude * ex - gains.rates * omega[0],
-            gains.attitude * ey - gains.rates * omega[1],
-            gains.attitude * ez - gains.rates * omega[2],
-        )
-        torque = torque_for(observed.vehicle, omega, turning, gains.gyroscopic)
-        push = push_along(observed, acceleration, axis)
-        return thrusts_of(observed, lift, axis, push, torque), (), error
-
-    return steady
-
-
-class SteadyController(tiltsim.ScalarController):
+class SteadyController(tiltsim.LawController):
     """The table ``[controller]`` with ``law = "steady"``."""
 
     law: Literal["steady"] = Field(
@@ -74,15 +29,23 @@ class SteadyController(tiltsim.ScalarController):
         12.0, gt=0.0, description="double pole of the attitude loop, negated [rad/s]"
     )
 
-    def scalar_law(self, airframe):
-        return law_of(airframe.rotors)
+    states: ClassVar = {f"state_integral_{axis}": "m s" for axis in "xyz"}
 
-    def law_parameters(self, airframe):
-        w, a = self.position_bandwidth, self.attitude_bandwidth
-        return Gains(3.0 * w * w, 3.0 * w, w * w * w, a * a, 2.0 * a, airframe.gyroscopic)
-
-    def state_units(self, airframe):
-        return {f"state_integral_{axis}": "m s" for axis in "xyz"}
+    @staticmethod
+    def control(observed, p):
+        """The law; `p` are the keys above: other gains need no other compiled code."""
+        w, a = p.position_bandwidth, p.attitude_bandwidth
+        error, speed = tracking_errors(observed)
+        feedback = 3.0 * w**2 * error + 3.0 * w * speed + w**3 * observed.states
+        acceleration = observed.reference.acceleration + feedback
+        # The attitude that points the rotors' force there, and the torque that turns to it.
+        lift = lift_without_torque(observed)
+        axis = observed.force @ lift
+        desired = pointing_attitude(observed, acceleration, axis)
+        turning = a**2 * attitude_error(observed.rotation, desired) - 2.0 * a * observed.body_rates
+        torque = torque_for(observed, turning)
+        push = push_along(observed, acceleration, axis)
+        return tiltsim.Command(thrusts=allocated_thrusts(observed, lift, push, torque), rates=error)
 
     def error_loops(self, vehicle):
         w, a = self.position_bandwidth, self.attitude_bandwidth

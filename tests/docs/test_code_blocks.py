@@ -19,7 +19,6 @@ from tiltsim.cli import build_parser, main
 from tiltsim.errors import InputError
 from tiltsim.exit_codes import DONE, EXPECTATION_FAILED, VEHICLE_LOST
 from tiltsim.scenario.loading import find_scenario_file
-from tiltsim.scenario.override_keys import parse_override
 from tiltsim.scenario.scenario_tables import ScenarioTables
 from tiltsim.studies.checking import collect
 from tiltsim.sweeps.loading import load_sweep
@@ -154,7 +153,7 @@ def test_mistakes_in_toml_are_noticed(text, tmp_path):
 def check_tiltsim(arguments):
     """Parse a command, and look for the scenarios, sweeps and flights that it names."""
     parsed = parser().parse_args(arguments)
-    overrides = dict(map(parse_override, getattr(parsed, "overrides", [])))
+    overrides = dict(getattr(parsed, "overrides", []))
     if arguments[0] == "check":
         assert collect(parsed.paths or [str(ROOT / "scenarios")], parsed.word)
     elif arguments[0] == "sweep":

@@ -116,7 +116,7 @@ def test_an_interrupt_is_one_line_from_the_first_import_on(capsys, monkeypatch):
 def test_an_interrupt_that_became_another_error_stays_one(capsys, monkeypatch):
     """As compiled modules turn it into an ImportError."""
 
-    def imported(_arguments):
+    def imported():
         try:
             raise KeyboardInterrupt
         except KeyboardInterrupt as error:
@@ -131,7 +131,7 @@ def test_an_interrupt_that_became_another_error_stays_one(capsys, monkeypatch):
 def test_an_interrupt_that_compiled_code_turns_into_another_error_stays_one(capsys, monkeypatch):
     """As pydantic does, which names it in the text of its own error."""
 
-    def validated(_arguments):
+    def validated():
         with suppress(KeyboardInterrupt):
             signal.raise_signal(signal.SIGINT)
         raise RuntimeError("SchemaError")

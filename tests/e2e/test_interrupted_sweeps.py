@@ -11,7 +11,6 @@ from tests.e2e.interrupting import interrupt_sweeps
 
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="other signals")
-@pytest.mark.xfail(strict=False, reason="a process that is just starting may end with a traceback")
 @pytest.mark.parametrize("engine", ["native", "jax"])
 def test_signals_at_any_moment_end_a_sweep_and_lose_nothing(engine):
     if engine == "jax":

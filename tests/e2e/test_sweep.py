@@ -166,7 +166,7 @@ def test_plot_draws_a_map_of_two_axes(grid, tmp_path, capsys):
     figure = sweep_figure(load_results(out), ("max_abs_roll",))
     left, right = figure.axes[:2]
     assert (left.get_title(loc="left"), right.get_title(loc="left")) == ("conventional", "modified")
-    cells = left.collections[0].get_array()
+    cells = left.images[0].get_array()
     assert cells.shape == (2, 3)
     rows = pq.read_table(out / "sweep.parquet").to_pylist()
     expected = [r["max_abs_roll"] for r in rows if r["controller.decoupler"] == "conventional"]
@@ -321,7 +321,7 @@ def test_user_text_is_not_a_formula(tmp_path):
         cases += f'[axis.cases."{name}"]\ninitial.attitude = [{number}.1, 0, 0]\n'
     file.write_text(text + cases + '[plot]\npanels = "price"\n', encoding="utf-8")
     figure = sweep_figure(load_results(swept(file, tmp_path / "out")))
-    assert figure.get_suptitle() == r"short \$x_\$ ü"
+    assert figure.texts[0].get_text() == r"short \$x_\$ ü"
     assert [axes.get_title(loc="left") for axes in figure.axes[:2]] == [r"5 \$", r"\$y_\$"]
 
 
@@ -398,4 +398,4 @@ def test_plot_draws_an_unfinished_sweep(tmp_path):
     (out / "parts" / "000001.parquet").unlink()
     results = load_results(out)
     assert results.columns["index"].tolist() == [0, 1, 2, 6, 7, 8, 9, 10, 11]
-    assert "3 of 12 points missing" in sweep_figure(results).get_suptitle()
+    assert sweep_figure(results).texts[1].get_text() == "3 of 12 points missing"

@@ -10,53 +10,18 @@ import sys
 import pytest
 
 import tiltsim
+from tests.planted import MARKS, gains, plant, scenario
 from tiltsim.studies.arena import vehicles
 
-LAW = """
-import tiltsim
-
-with open({marker!r}, "w"):
-    pass
-
-
-@tiltsim.scalar
-def scalar(observed):
-    return (2.0, 2.0, 2.0, 2.0), (), ()
-
-
-def python(observation):
-    return tiltsim.Command(thrusts=[2.0] * 4)
-"""
-SCENARIO = """
-simulation = {{ duration = 0.02, timestep = 0.002, engine = "python" }}
-vehicle = {{ model = "quadrotor" }}
-controller = {{ law = "{law}", function = "evil.py:{law}" }}
-"""
-LONG = """
-simulation = { duration = 1000.0, timestep = 0.002 }
-vehicle = { model = "quadrotor" }
-controller = { law = "scalar", function = "evil.py:scalar" }
-"""
 FINE = """
 simulation = { duration = 0.004, timestep = 0.002, engine = "python" }
-"""
-SWEEP = """
-scenario = "scalar.toml"
-[[axis]]
-type = "list"
-key = "initial.position[0]"
-values = [0.0, 0.1]
-"""
-MODULE = """
-with open({marker!r}, "w"):
-    pass
 """
 WALK = """
 import argparse, contextlib, io, json, os, sys
 from tiltsim.__main__ import main
 from tiltsim.cli import build_parser
 
-SCENARIOS = ["scalar.toml", "python.toml", "long.toml"]
+SCENARIOS = ["numpy.toml", "python.toml", "long.toml"]
 PLANTED = [*SCENARIOS, "sweep.toml", "flight", "flight2", "gains.json", "."]
 EXECUTES = ["run"]  # the code of the scenario that it names
 NEEDED = {"compare": ["--controllers", "given"]}
@@ -124,14 +89,14 @@ if __name__ == "__main__":
 IS_CODE = "is Python code to execute; allow it with --trust"
 REFUSED = {
     f"{command} {law}.toml{options}"
-    for law in ("scalar", "python")
+    for law in ("numpy", "python")
     for command, options in (
         ("check", ""),
         ("attraction", ""),
         ("compare", " --controllers given"),
         ("report", ""),
     )
-} | {"stability scalar.toml", "sweep sweep.toml", "arena --out out --gains gains.json"}
+} | {"stability numpy.toml", "sweep sweep.toml", "arena --gains gains.json"}
 
 
 @pytest.fixture
@@ -143,23 +108,19 @@ def folders(tmp_path):
     mark = program / "walk.py.ran"
     (program / "walk.py").write_text(WALK)
     (program / "run.py").write_text(RUN)
-    (here / "evil.py").write_text(LAW.format(marker=str(mark)))
-    for law in ("scalar", "python"):
-        (here / f"{law}.toml").write_text(SCENARIO.format(law=law))
+    plant(here, mark)
     for name in ("fine.toml", "fine2.toml"):
         (here / name).write_text(FINE)
-    (here / "long.toml").write_text(LONG)  # worth compiling
-    (here / "sweep.toml").write_text(SWEEP)
-    for name, law in (("flight", "scalar"), ("flight2", "python")):
+    law = scenario("numpy", "law.py:numpy")
+    (here / "long.toml").write_text(law.replace("0.02", "1000.0"))  # worth compiling
+    for name, law in (("flight", "numpy"), ("flight2", "python")):
         tiltsim.simulate(here / f"{law}.toml").save(here / name)
-    evil = {"law": "scalar", "function": f"{here}/evil.py:scalar"}
-    gains = {name: {"pid": {"of": {"law": "pid"}, "table": evil}} for name in vehicles()}
-    made = {"made": {"date": "", "commit": ""}, "seed": 1, "flights": 1, "gains": gains}
-    (here / "gains.json").write_text(json.dumps(made))
+    evil = {"law": "numpy", "function": f"{here}/law.py:numpy"}
+    (here / "gains.json").write_text(gains(vehicles(), "pid", of={"law": "pid"}, table=evil))
     assert mark.exists()  # as those flights were flown
     mark.unlink()
     for name in {*sys.stdlib_module_names, "numpy", "mujoco", "tiltsim", "glfw"}:
-        (here / f"{name}.py").write_text(MODULE.format(marker=str(tmp_path / f"ran_{name}")))
+        (here / f"{name}.py").write_text(MARKS.format(mark=str(tmp_path / f"ran_{name}")))
     return here, program
 
 
@@ -183,7 +144,7 @@ def test_no_command_executes_what_it_reads(folders, tmp_path):
     named = [" ".join(argv) for argv, _code, output, _ran in found if IS_CODE in output]
     assert {argv for argv in named if argv in REFUSED} == REFUSED
     assert found[-1][1] == 0  # of flights in several processes
-    assert run(here, program / "run.py", "run", "scalar.toml").returncode == 0
+    assert run(here, program / "run.py", "run", "numpy.toml").returncode == 0
     assert (program / "walk.py.ran").exists()
 
 

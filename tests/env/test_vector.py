@@ -79,7 +79,7 @@ def test_the_step_is_mujocos(scenario):
         inputs = loop.equations.inputs(0.004 * index, state, parameters, setup.knots)
         for _ in range(5):
             time = 0.004 * index
-            state = step(time, state, inputs, 0.004, parameters, setup.knots, (0.0, 0.0, 0.0))
+            state = list(step(time, state, inputs, 0.004, parameters, setup.knots, (0.0,) * 3))
             index += 1
         flown = env._plant.data
         # MuJoCo's pods have inertia: 1e-7 of their servos', by which the body moves them.

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import tiltsim
+from tests.arguments import ADDRESS, hover
 from tests.flights import TILT_CAR
 from tiltsim.flight.vectors import VECTORS
 from tiltsim.vehicles.rotorcraft import COLUMNS
@@ -15,13 +16,9 @@ from tiltsim.vehicles.rotorcraft import COLUMNS
 SHORT = {"simulation.duration": 0.02, "simulation.engine": "python"}
 
 
-def hover(observation):
-    return tiltsim.Command(thrusts=[1.05] * 4)
-
-
 @pytest.fixture(scope="module")
 def flight():
-    return tiltsim.simulate(tiltsim.load_scenario("ch04_tracking/setpoint#rho_065_modified", SHORT))
+    return tiltsim.simulate(tiltsim.load_scenario(ADDRESS, SHORT))
 
 
 @pytest.fixture(scope="module")

@@ -53,7 +53,7 @@ def test_metrics_of_rows_are_those_of_each_flight_to_the_last_bit(name):
     for place, field in enumerate(fields):
         samples[:, :, place] += 300.0 if field.startswith("rotor_speed") else 0.0
     numbers = np.array([[*flatten(assembly.setup.parameters)] for assembly in assemblies])
-    together = metrics_of_rows(assemblies, numbers, samples, END, 1.0)
+    together = metrics_of_rows(assemblies, numbers, samples, END, [1.0] * len(assemblies))
     for assembly, own, found in zip(assemblies, samples, together, strict=True):
         alone = Flight(assembly, own.copy(), END, "jax", 1.0).metrics()
         assert [*found.items()] == [*alone.items()]
@@ -65,7 +65,7 @@ def test_rows_that_differ_in_more_than_numbers_have_no_metrics_together():
         assemble(load_scenario({"vehicle": limits})) for limits in ({}, {"max_rotor_speed": 400.0})
     ]
     samples = np.zeros((2, len(TIMES), len(assemblies[0].loop.sample_fields)))
-    assert metrics_of_rows(assemblies, np.empty((2, 0)), samples, END, 1.0) is None
+    assert metrics_of_rows(assemblies, np.empty((2, 0)), samples, END, [1.0] * 2) is None
 
 
 def test_squares_may_overflow_in_metrics_of_rows_as_in_those_of_one_flight():

@@ -8,38 +8,19 @@ from functools import cache
 import numpy as np
 
 import tiltsim
+from tests.arguments import ADDRESS, Speechless, Unreadable, hover
 from tests.flights import flight
 from tests.fuzz.documents import STRANGE
 
-ADDRESS = "ch04_tracking/setpoint#rho_065_modified"
 TABLES = {"simulation": {"duration": 0.004, "timestep": 0.002, "engine": "python"}}
 THESIS = {"simulation": {**TABLES["simulation"], "plant": "thesis"}}
 GAIT = {"time": [0.0, 1.0], **{f"alpha_{i}": [0.1, 0.2] for i in range(1, 5)}}
 
 RECORDS = (
-    *("Airframe", "Command", "End", "Flight", "Observation", "ScalarController"),
-    *("InputError", "TiltsimError", "scalar"),
+    *("Airframe", "Command", "End", "Flight", "Observation", "LawController", "Observed"),
+    *("InputError", "TiltsimError", "law", "xp"),
 )
 """Public names that nobody calls with what they have not checked."""
-
-
-class Speechless:
-    """Has no text."""
-
-    def __repr__(self):
-        raise RuntimeError("no repr")
-
-
-class Unreadable:
-    """Is no array, for a reason of several lines."""
-
-    def __array__(self, *_args, **_options):
-        raise ValueError("two\nlines")
-
-
-def hover(_observation):
-    """A controller."""
-    return tiltsim.Command(thrusts=[1.05] * 4)
 
 
 ODD = (

@@ -22,7 +22,7 @@ from tiltsim.resources import shipped_folder
 from tiltsim.vehicles.rotorcraft import COLUMNS
 from tiltsim.views.figures.plot import plot
 from tiltsim.views.rerun.recording_file import save_recording
-from tiltsim.views.vehicle_views import overlay_of
+from tiltsim.views.video.overlay import Overlay
 
 DOCS = Path(__file__).parents[2] / "docs"
 TETRAHEDRON = "v 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nv 0 0 0.1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
@@ -480,7 +480,7 @@ def test_numbers_of_another_layout_are_left_out(other_layout, tmp_path, capsys):
     assert "position_error" in drawn
     assert "singularity" not in drawn
     assert "/plane/" not in drawn
-    film = overlay_of(flight, 240)
+    film = Overlay(flight, 240)
     assert film.rows(0) == {"roll, pitch": "+0.00, +0.00 rad"}
     path = tmp_path / "mine.toml"
     path.write_text(

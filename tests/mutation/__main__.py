@@ -59,7 +59,6 @@ PYTEST += [
     "--no-header",
     "--tb=no",
 ]
-PYTEST += ["--ignore=tests/controllers/test_scalar_is_pure.py"]  # of how the code is written
 PYTEST += ["-W", "ignore::pytest.PytestAssertRewriteWarning"]  # hypothesis is loaded already
 SHARE_AT_IMPORT = 0.4  # of the tests, by time, for a line that nearly all of them depend on
 SURVIVED = {int(pytest.ExitCode.OK), int(pytest.ExitCode.NO_TESTS_COLLECTED)}

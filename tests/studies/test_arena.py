@@ -184,7 +184,7 @@ def flown(entries, **_):
     [
         (["--tune", "40", "--gains", "gains.json"], "--gains: not with --tune"),
         (["--seed", "2"], "--seed: only with --tune"),
-        (["--vehicles", ","], "--vehicles ',': name one at least"),
+        (["--vehicles", ","], "--vehicles ,: name one at least"),
         (["--controllers", ""], "--controllers '': name one at least"),
     ],
 )

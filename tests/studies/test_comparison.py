@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from argparse import Namespace
 from concurrent.futures import Future
 
 import numpy as np
@@ -153,20 +152,20 @@ def test_a_comparison_is_told_as_soon_as_it_is_there(monkeypatch):
     assert [one.row["controller"] for one in flown] == ["lqr"]
 
 
-def named(controllers=None, *own):
-    return chosen_controllers(Namespace(controllers=controllers, controller=own))
+def named(controllers=(), *own):
+    return chosen_controllers(controllers, own)
 
 
 def test_a_controller_has_gains_of_its_own(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "my_law.py").touch()
     fast = 'fast={law="pid", velocity_gains=[6.0, 3.6]}'
-    assert named("pid", fast, "my_law.py:hover") == {
+    assert named(["pid"], fast, "my_law.py:hover") == {
         "pid": {"law": "pid"},
         "fast": {"law": "pid", "velocity_gains": [6.0, 3.6]},
-        "hover": {"law": "scalar", "function": f"{tmp_path}/my_law.py:hover"},
+        "hover": {"law": "numpy", "function": f"{tmp_path}/my_law.py:hover"},
     }
-    entry = Entry(SETPOINT, "fast", named(None, fast)["fast"], {"simulation.duration": 1.0})
+    entry = Entry(SETPOINT, "fast", named((), fast)["fast"], {"simulation.duration": 1.0})
     assert entry.scenario().controller.velocity_gains == (6.0, 3.6)
     within = Entry(SETPOINT, "fast", entry.table, {"controller.position_gain": 2.0})
     assert within.scenario().controller.velocity_gains == (6.0, 3.6)
@@ -176,7 +175,7 @@ def test_a_controller_has_gains_of_its_own(tmp_path, monkeypatch):
 @pytest.mark.parametrize("text", ["pid", "fast=2", "fast={position_gain=2.0}", "mine.py"])
 def test_gains_that_are_no_table_are_refused(text):
     with pytest.raises(InputError, match=r"write NAME=\{law=\"pid\", KEY=VALUE, ...\}"):
-        named(None, text)
+        named((), text)
 
 
 @pytest.mark.parametrize(
@@ -185,20 +184,20 @@ def test_gains_that_are_no_table_are_refused(text):
         ('x={law="pdi"}', "law: did you mean pid? choose "),
         ('x={law="pid", position_gian=2.0}', "position_gian: did you mean position_gain? "),
         ("none.py:hover", "none.py: no such file"),
-        ('x={law="scalar", function="none.py:hover"}', "none.py: no such file"),
+        ('x={law="numpy", function="none.py:hover"}', "none.py: no such file"),
         ('={law="pid"}', "write NAME={law="),
     ],
 )
 def test_a_misspelt_controller_is_a_mistake_and_no_refusal(text, message):
     with pytest.raises(InputError) as caught:
-        named(None, text)
+        named((), text)
     assert str(caught.value).startswith(f"--controller {text}: ")
     assert message in str(caught.value)
 
 
 def test_two_controllers_of_one_name_are_refused():
     with pytest.raises(InputError, match="pid is there twice"):
-        named("pid", 'pid={law="pid"}')
+        named(["pid"], 'pid={law="pid"}')
 
 
 def test_a_refused_sample_time_is_not_a_lost_flight():

@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
-import argparse
 import json
 import re
 import subprocess
 import sys
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pytest
 
 from tests.refusals import refusal
+from tiltsim.cli import build_parser
 from tiltsim.commands import gait as gait_command
-from tiltsim.commands import gait_selection
 from tiltsim.commands import map as map_command
 from tiltsim.commands.angles import parse_vehicle
+from tiltsim.commands.declaring import call
+from tiltsim.commands.gait_options import Case
 from tiltsim.commands.text import json_text, number
 from tiltsim.errors import InputError
 from tiltsim.scenario.loading import load_scenario
@@ -45,12 +47,8 @@ ATTAINABLE = ["--figure", "attainable", "--plot", "f.png"]
 
 
 def run(*words: str) -> int:
-    parser = argparse.ArgumentParser()
-    subparsers = parser.add_subparsers(required=True)
-    gait_command.add_parser(subparsers)
-    map_command.add_parser(subparsers)
-    arguments = parser.parse_args(words)
-    return int(arguments.run(arguments))
+    given = build_parser(words[0]).parse_args(words)
+    return int(call(given.command, given))
 
 
 def run_json(capsys, *words: str) -> dict:
@@ -517,7 +515,7 @@ def test_blue_is_accepted_as_published_but_singular(capsys) -> None:
         ("--leg red 0,0 1", "needs 2 angles"),
         ("--circle red 0,0 -1", "radius -1.0: the radius must be positive"),
         ("--circle red 0,0 x", "must be a number, in rad"),
-        ("--circle red 0,0 0.2 --leg red 0,0 1,1", "either --leg or --circle"),
+        ("--circle red 0,0 0.2 --leg red 0,0 1,1", "--circle: not allowed with --leg"),
         ("--plot map.xyz", "unknown format '.xyz'"),
         ("--vehicle none", "choose ar_drone_2, ar_drone_2_unrounded, luukkonen"),
     ],
@@ -627,7 +625,7 @@ def test_a_bad_target_is_noticed_before_any_work(tmp_path, monkeypatch) -> None:
     def work(*_: object, **__: object) -> None:
         raise AssertionError("worked")
 
-    monkeypatch.setattr(gait_selection, "select_gait", work)
+    monkeypatch.setattr(gait_command, "_select", work)
     monkeypatch.setattr(map_command, "parse_vehicle", work)
     closed = tmp_path / "closed.png"
     closed.touch()
@@ -643,7 +641,7 @@ def test_a_bad_target_is_noticed_before_any_work(tmp_path, monkeypatch) -> None:
 
 
 def test_cases_on_the_command_line_are_those_of_the_thesis() -> None:
-    assert tuple(DETERMINANT_CASES) == gait_command.CASES
+    assert tuple(DETERMINANT_CASES) == get_args(Case)
 
 
 def test_plot_option_writes_a_file(tmp_path, capsys) -> None:
@@ -675,8 +673,8 @@ def test_the_region_of_interest_is_free_of_singularities(case) -> None:
 
 def test_parsers_and_reports_do_not_import_matplotlib() -> None:
     code = (
-        "import argparse, sys; from tiltsim.commands import gait, map as m;"
-        "s = argparse.ArgumentParser().add_subparsers(); gait.add_parser(s); m.add_parser(s);"
+        "import sys; from tiltsim.cli import build_parser;"
+        "build_parser('gait'); build_parser('map');"
         "assert not {'numpy', 'scipy', 'matplotlib', 'mujoco'} & set(sys.modules);"
         "import tiltsim.studies.gait_analysis, tiltsim_controllers.analysis.published_gaits;"
         "import tiltsim_controllers.analysis.attainable;"

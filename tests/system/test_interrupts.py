@@ -82,7 +82,7 @@ def test_other_threads_are_unaffected():
 
 def test_an_interrupt_while_files_are_written_loses_none(tmp_path, monkeypatch, capsys):
     flight = flight_named("fixed")
-    monkeypatch.setattr(tiltsim.commands.run, "fly", lambda *_: flight)
+    monkeypatch.setattr(tiltsim.commands.run, "fly", lambda *_, **__: flight)
     save = type(flight).save
 
     def interrupted_save(self, folder):
@@ -163,7 +163,7 @@ import signal, sys
 import tiltsim.commands.list
 from tiltsim.__main__ import main
 
-def run(_arguments):
+def run():
     exec("signal.raise_signal({int(number)})")
 
 tiltsim.commands.list.run = run

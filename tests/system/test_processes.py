@@ -8,10 +8,12 @@ import signal
 import subprocess
 import sys
 import time
+from multiprocessing import resource_tracker, util
 
 import pytest
 
 from tiltsim.errors import InputError
+from tiltsim.system.interrupts import terminations_as_interrupts
 from tiltsim.system.processes import ProcessDiedError, in_order, in_processes
 
 MEGABYTES = 1 << 24
@@ -59,6 +61,25 @@ def test_processes_receive_no_interrupt_while_they_start():
     found = dict(in_processes(interrupts_blocked, "ab", 2))
     assert [found[item].result() for item in "ab"] == [True, True]
     assert not interrupts_blocked(None)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_process_gets_its_work_although_a_signal_comes_meanwhile(number, monkeypatch, capfd):
+    """Else it reads nothing where it expects its work, and prints a traceback."""
+    resource_tracker.ensure_running()  # is a process, too
+    start = util.spawnv_passfds
+
+    def start_then_signal(*arguments):
+        started = start(*arguments)
+        os.kill(os.getpid(), number)
+        return started
+
+    monkeypatch.setattr(util, "spawnv_passfds", start_then_signal)
+    with pytest.raises(KeyboardInterrupt), terminations_as_interrupts():
+        list(in_processes(work_on, "ab", 2))
+    assert not multiprocessing.active_children()
+    assert capfd.readouterr().err == ""
 
 
 def test_leaving_the_loop_ends_processes_that_are_answering():

@@ -7,7 +7,7 @@ from xml.etree import ElementTree
 import pytest
 
 from tiltsim.cli import main
-from tiltsim.report.markdown import _cell
+from tiltsim.report.pages import markdown_cell
 from tiltsim.system.text import printable, printable_html, printable_markdown
 
 HOSTILE = "\x1b]0;owned\x07\x1b[2J\r\u202etxt.\x00\ud800\u2028\nok  <script>&\x9b1m"
@@ -25,7 +25,7 @@ def test_hostile_text_is_one_line_of_visible_characters():
     assert shown.startswith(r"\x1b]0;owned\x07\x1b[2J\r\u202etxt.\x00\ud800\u2028\nok  <script>")
     shown.encode()
     assert "<script" not in printable_html(HOSTILE) + printable_markdown(HOSTILE)
-    assert _cell("a|b\n<b>c") == "a\\|b<br>&lt;b>c"
+    assert markdown_cell("a|b\n<b>c") == "a\\|b<br>&lt;b>c"
 
 
 @pytest.fixture

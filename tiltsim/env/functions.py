@@ -17,7 +17,7 @@ from tiltsim.arrays.lifting import Lifting
 from tiltsim.closed_loop.limits import WITHIN_LIMITS
 from tiltsim.env.task import Task
 from tiltsim.equations.implicitfast import make_implicitfast_step, turned
-from tiltsim.equations.rigid_body import form_of, rigid_body_of
+from tiltsim.equations.rigid_body import rigid_body
 from tiltsim.errors import InputError
 from tiltsim.laws.assembling import loop_of
 from tiltsim.laws.commanded import commanded_parameters, with_command
@@ -45,7 +45,7 @@ LEAST_THRUST: Final = 1e-30  # N; a root has no derivative at zero
 
 def loop_on_equations(scenario: Scenario) -> ClosedLoop:
     """The loop of a rotorcraft under commands, as a rigid body."""
-    return on_equations(loop_of(scenario), rigid_body_of(form_of(scenario)))
+    return on_equations(loop_of(scenario), rigid_body(scenario))
 
 
 class Episode(NamedTuple):

@@ -63,7 +63,11 @@ def _metrics(own: dict[str, float], duration: float, end: End, wall_time: float)
 
 
 def metrics_of_rows(
-    assemblies: Sequence[Assembly], numbers: Floats, samples: Floats, end: End, wall_time: float
+    assemblies: Sequence[Assembly],
+    numbers: Floats,
+    samples: Floats,
+    end: End,
+    wall_times: Sequence[float],
 ) -> list[Metrics] | None:
     """`compute_metrics` of flights of one closed loop, computed together.
 
@@ -72,7 +76,7 @@ def metrics_of_rows(
         numbers: Those of their parameters, shape (rows, numbers), as `flatten` has them.
         samples: Of shape (rows, N, fields), at the same times.
         end: How they ended.
-        wall_time: Of the integration of one, s.
+        wall_times: Durations of their integrations, s.
 
     Returns:
         None if scenarios differ in more than numbers that metrics read.
@@ -101,7 +105,7 @@ def metrics_of_rows(
     table = np.stack([*metrics.values()], axis=-1).tolist()
     return [
         _metrics(dict(zip(metrics, row, strict=True)), float(time[-1]), end, wall_time)
-        for row in table
+        for row, wall_time in zip(table, wall_times, strict=True)
     ]
 
 

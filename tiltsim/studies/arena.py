@@ -113,7 +113,7 @@ def fitting(vehicle: Vehicle) -> list[str]:
     laws = [
         law
         for law, table in CONTROLLERS.items()
-        if law not in ("python", "scalar")
+        if law not in ("python", "numpy")
         and model in table.vehicle_models
         and "position" in table.reference_kinds
     ]

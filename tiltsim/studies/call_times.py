@@ -10,8 +10,10 @@ import mujoco
 
 from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.closed_loop.userdata import CONTROL_PERIOD as PERIOD_IN_USERDATA
+from tiltsim.closed_loop.userdata import Header
 from tiltsim.engines.callback import control_callback
 from tiltsim.engines.native_engine import compile_empty
+from tiltsim.engines.python_engine import control_step
 from tiltsim.laws.assembling import assemble
 from tiltsim.plants.mujoco_plant import MujocoPlant
 from tiltsim.scenario.scenario import Scenario
@@ -24,18 +26,21 @@ ROUNDS: Final = 40
 
 
 def time_per_call(assembly: Assembly) -> float:
-    """Seconds that one control step takes in Python, the least of a few rounds."""
+    """Seconds that one control step takes on the Python engine, the least of a few rounds."""
     loop, setup = assembly.loop, assembly.setup
     if assembly.scenario.controller.is_external:
         return nan
     qpos, qvel = loop.kind.initial_motion(assembly)
     act = tuple(map(float, loop.dynamics.initial_activations(assembly, setup)))
-    vectors = tuple(map(float, qpos)), tuple(map(float, qvel)), act
+    header = [*Header(assembly.scenario.simulation.timestep)]
+    none: list[float] = []
+    vectors = [*map(float, qpos)], [*map(float, qvel)], [*act], none
+    step = control_step(assembly, setup.userdata.tolist(), "controls")
     rounds = []
     for _ in range(3):
         start = perf_counter()
         for _ in range(CALLS):
-            loop.sampling.controls(0.0, *vectors, setup.parameters, setup.knots)
+            step(header, *vectors)
         rounds.append((perf_counter() - start) / CALLS)
     return min(rounds)
 

@@ -133,7 +133,7 @@ def controller_tables(names: Sequence[str]) -> dict[str, Mapping[str, Any]]:
     Raises:
         InputError: If one does not exist.
     """
-    known = [law for law in (GIVEN, *CONTROLLERS) if law not in ("python", "scalar")]
+    known = [law for law in (GIVEN, *CONTROLLERS) if law not in ("python", "numpy")]
     for name in names:
         if name not in known:
             raise InputError(f"--controllers {name}: {choose(name, known)}")

@@ -25,7 +25,7 @@ from scipy.stats import qmc
 
 from tiltsim.errors import InputError
 from tiltsim.scenario.controller_table import ControllerTable
-from tiltsim.scenario.scalar_controller import ScalarTable
+from tiltsim.scenario.law_controller import LawTable
 from tiltsim.studies.arena import Vehicle, entry_of, score
 from tiltsim.studies.comparison import Entry, compare_one
 from tiltsim.system.processes import in_processes
@@ -60,7 +60,7 @@ DURATION: Final = 5.0
 """s, of every flight."""
 
 NOT_TUNED: Final = ("rotor_bandwidth", "tilt_bandwidth", "max_speed", "max_acceleration")
-"""Numbers of scalar laws that describe actuators or limits."""
+"""Numbers of the baselines and of laws of packages that describe actuators or limits."""
 
 LOOPS: Final = ("gains", "side_gains")
 """Keys of the other laws: coefficients of the characteristic polynomials of linear loops."""
@@ -104,16 +104,16 @@ class Search:
 def knobs(controller: ControllerTable) -> dict[str, dict[Path, int]]:
     """What a search varies: places in the table, with the power of the factor there.
 
-    Of scalar laws every positive number but `NOT_TUNED`; of the others one factor for every linear
-    loop, by which its poles are faster: the i-th coefficient has the i-th power. Roll and pitch
-    share one.
+    For baselines and laws of packages every positive number but `NOT_TUNED`; for the others one
+    factor for every linear loop, by which its poles are faster: the i-th coefficient has the i-th
+    power. Roll and pitch share one.
     """
     found: dict[str, dict[Path, int]] = {}
-    scalar = isinstance(controller, ScalarTable)
+    whole = isinstance(controller, LawTable)
     for path, value in _leaves(controller.in_full().model_dump(mode="json")):
-        if scalar and value > 0.0 and path[0] not in NOT_TUNED:
+        if whole and value > 0.0 and path[0] not in NOT_TUNED:
             found.setdefault(_name(path), {})[path] = 1
-        elif not scalar and path[0] in LOOPS:
+        elif not whole and path[0] in LOOPS:
             found.setdefault(_loop_name(path), {})[path] = _order(path)
     return found
 

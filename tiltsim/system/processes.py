@@ -15,6 +15,9 @@ from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from typing import TypeVar
 
+from tiltsim.system.environment import variables_for_processes
+from tiltsim.system.interrupts import defer_interrupts
+
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
@@ -39,8 +42,9 @@ def in_processes(
     try:
         while waiting or busy:
             while waiting and len(busy) < jobs:
-                process, connection = _begin(work)
-                processes.append(process)
+                with defer_interrupts():  # a process that is not sent its work prints a traceback
+                    process, connection = _begin(work)
+                    processes.append(process)
                 busy[connection] = process, _give(connection, waiting.pop())
             for ready in wait([*busy]):
                 assert isinstance(ready, Connection)
@@ -74,28 +78,26 @@ def _begin(work: Callable[[Item], Result]) -> tuple[BaseProcess, Connection]:
     context = multiprocessing.get_context("spawn")
     here, there = context.Pipe()
     process = context.Process(target=_serve, args=(there, work), daemon=True)
-    with _without_working_folder(), _interrupts_blocked():
+    with _environment(), _interrupts_blocked():
         process.start()
     there.close()  # only the process holds it now, so its death closes the pipe
     return process, here
 
 
 @contextmanager
-def _without_working_folder() -> Iterator[None]:
-    """Let processes that start within the block take no modules from the working folder.
+def _environment() -> Iterator[None]:
+    """Start processes within the block with the variables of `variables_for_processes`.
 
-    Until it has the path of this process, Python's own ``python -c`` finds a signal.py there.
+    Until it has the path of this process, Python's own ``python -c`` finds a signal.py in the
+    working folder.
     """
-    name = "PYTHONSAFEPATH"
-    before = os.environ.get(name)
-    os.environ[name] = before or "1"
+    added = variables_for_processes()
+    os.environ |= added
     try:
         yield
     finally:
-        if before is None:
+        for name in added:
             del os.environ[name]
-        else:
-            os.environ[name] = before
 
 
 @contextmanager
