@@ -111,9 +111,10 @@ class ArrayPlan:
         Raises:
             LiftError: If code of the plan has no form on arrays, whatever numbers it is given.
         """
+        refusals: tuple[type[Exception], ...] = (PlainNumberError, *self._lifting.arrays.refusals)
         try:
             traced = self._jax.make_jaxpr(lambda t: self(t)[1:])(tree).jaxpr
-        except (PlainNumberError, *self._lifting.arrays.refusals):
+        except refusals:
             return False
         reached = {*map(id, traced.invars)}
         for equation in traced.eqns:
