@@ -258,3 +258,14 @@ def test_the_documented_examples_run(block):
     assert result.shape == ((4, 8) if block else (16, 12))
     assert np.isfinite(result).all()
     assert (result != 0.0).all()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("precisions", [("float32", "float64"), ("float64", "float32")])
+def test_precisions_follow_each_other_in_one_process(precisions):
+    """An array that outlives a trace keeps the precision that it had there."""
+    for precision in precisions:
+        env = make("tiltsim/Hover-v0", 2, precision=precision)
+        env.reset(seed=0)
+        _, rewards, *_ = env.step(np.zeros(env.action_space.shape, np.float32))
+        assert np.isfinite(rewards).all()

@@ -251,10 +251,11 @@ def limit_speeds_of(spins: Values, first: int) -> Callable[..., Any]:
         spins: Signs of the rotor speeds.
         first: Index of the first of these speeds.
     """
-    signs, end = np.array(spins), first + len(spins)
+    end = first + len(spins)
 
     @traceable
     def limit_speeds(state: Any, mechanics: Any) -> Any:
+        signs = xp.array(spins)
         speeds = signs * xp.clip(signs * state[first:end], mechanics.min_speed, mechanics.max_speed)
         return xp.hstack([state[:first], speeds, state[end:]])
 
@@ -273,7 +274,7 @@ def _stopped(motion: Motion, stop: Any) -> Motion:
 @cache
 def plant_of(form: PlantForm) -> ActuatorPlant:
     """The plant of a form."""
-    layout, tilt_of_rotor, spins = form.layout, form.tilt_of_rotor, np.array(form.spins)
+    layout, tilt_of_rotor = form.layout, form.tilt_of_rotor
     rotors, tilts = len(tilt_of_rotor), tilts_of(tilt_of_rotor)
     limit_speeds = limit_speeds_of(form.spins, layout.size)
 
@@ -290,7 +291,7 @@ def plant_of(form: PlantForm) -> ActuatorPlant:
     @traceable
     def rates(state: Any, ctrl: Any, loads: Any, mechanics: Any, disturbance: Any) -> Any:
         motion, craft = layout.split(state), craft_of(mechanics.vehicle, tilt_of_rotor)
-        thrusts = ctrl[tilts : tilts + rotors]
+        thrusts, spins = ctrl[tilts : tilts + rotors], xp.array(form.spins)
         # The controls are s varpi |varpi| with the spins s, the map's factors are without s.
         wrench = wrench_map(craft.rotors, motion.tilts) @ (spins * thrusts) + loads[:WRENCH_SIZE]
         rotation = form.attitude.rotation(motion.attitude)

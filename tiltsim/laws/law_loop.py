@@ -128,7 +128,7 @@ def _vector(command: Command, name: str, size: int) -> Any:
 @cache
 def _control_of(key: Key) -> Callable[..., Any]:
     """The NumPy part of `RotorLaw.inputs`."""
-    (rotors, tilts), spins = key.layout.places, xp.array(key.layout.spins)
+    rotors, tilts = key.layout.places
     own, discrete, layout = len(key.states), len(key.discrete), key.layout.tilt_of_rotor
     per_newton, coefficients = ROTOR_FLOATS * rotors, 2 * ROTOR_FLOATS * rotors
     is_cross = key.layout.model != "multirotor"
@@ -145,9 +145,11 @@ def _control_of(key: Key) -> Callable[..., Any]:
         attitude: Any,
         planned: Any,
     ) -> Any:
+        # An array that outlives a trace would keep its precision in the next one of JAX.
+        spins = xp.array(key.layout.spins)
         at, angles = int(known.rotors), state[12 : 12 + tilts]
         turning = spins * state[12 + tilts : 12 + tilts + rotors]
-        k = xp.array([*knots[at + coefficients : at + coefficients + rotors]])
+        k = xp.array(knots[at + coefficients : at + coefficients + rotors])
         pushing = rotors_in(knots, at + per_newton, layout)
         wrench = wrench_map(pushing, angles)
         observed = Observed(

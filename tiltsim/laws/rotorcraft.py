@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 def _array(vector: Any) -> Any:
     """A vector of MuJoCo as an array; a traced one is not an array yet."""
-    return vector if hasattr(vector, "shape") else xp.array([*vector])
+    return vector if hasattr(vector, "shape") else xp.array(vector)
 
 
 @cache
@@ -90,12 +90,11 @@ def observed_of(layout: Layout, shown: Layout, further: int) -> Callable[..., Va
 @cache
 def thrust_controls_of(spins: Values) -> Callable[[Vector], Values]:
     """Controls of the thrust actuators, ``s varpi |varpi|`` with the spin s, from ``act``."""
-    signs = np.array(spins)
 
     @traceable
     def thrust_controls(act: Any) -> Any:
-        speeds = _array(act)[: len(signs)]
-        return signs * speeds * abs(speeds)
+        speeds = _array(act)[: len(spins)]
+        return xp.array(spins) * speeds * abs(speeds)
 
     return thrust_controls
 

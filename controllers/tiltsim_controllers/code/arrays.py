@@ -58,11 +58,15 @@ class _Namespace:
         return self.minimum(self.maximum(values, low), high)
 
     def array(self, values: Any) -> Any:
-        """An array of numbers, vectors or matrices."""
+        """An array of numbers, vectors or matrices; one of JAX stays as it is."""
+        if is_jax(values):
+            return values
+        if not isinstance(values, tuple | list | np.ndarray):
+            values = [*values]  # a part of a program's input
         if "jax" in sys.modules and any(map(is_jax, numbers_in(values))):
             import jax.numpy
 
-            return jax.numpy.array(values)
+            return jax.numpy.array([*values])  # it takes no other sequences
         made = np.array(values)  # finds out faster whether there are symbolic numbers
         if made.dtype == object and any(isinstance(value, Expr) for value in made.flat):
             return made.view(Array)

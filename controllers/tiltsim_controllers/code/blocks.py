@@ -59,7 +59,7 @@ def take_row(values: Sequence[Number], index: Number, width: int) -> Any:
     place = make("floor", make("where", make("lt", place, last), place, last))
     first, nan = make("mul", place, float(width)), float("nan")
     if not isinstance(first, Expr):
-        row = xp.array([*values[int(first) : int(first) + width]])
+        row = xp.array(values[int(first) : int(first) + width])
         return row if index == index else nan * row
     entries = (_entry(values, first, column) for column in range(width))
     return xp.array([make("where", make("eq", index, index), entry, nan) for entry in entries])

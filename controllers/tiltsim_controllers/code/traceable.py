@@ -28,7 +28,7 @@ def traceable(function: Function) -> Function:
 
     def given(name: str, value: Any) -> Any:
         if isinstance(value, InputVector) and name != "knots":
-            return xp.array([*value])
+            return xp.array(value)
         return as_arrays(value)
 
     @wraps(function)
@@ -59,7 +59,7 @@ def as_arrays(value: Any) -> Any:
         return type(value)(*map(as_arrays, value))
     if value and all(isinstance(entry, int) for entry in value):
         return value
-    return xp.array([*value])  # of a plain list, which JAX wants
+    return xp.array(value)
 
 
 def as_tuples(value: Any) -> Any:

@@ -36,7 +36,7 @@ def planned_tilts(time: Any, gait: GaitParameters, knots: Any, tilts: int) -> An
         return xp.zeros((0, 3, *np.shape(time)))
     if gait.type == HARMONIC:
         turning = 2.0 * xp.pi / gait.period
-        mean, cosine, sine = xp.array([*knots[: 3 * tilts]]).reshape(tilts, 3).T
+        mean, cosine, sine = xp.array(knots[: 3 * tilts]).reshape(tilts, 3).T
         c, s = xp.cos(turning * time), xp.sin(turning * time)
         rows = [
             xp.array([mean[i] + cosine[i] * c + sine[i] * s, sine[i] * c - cosine[i] * s,

@@ -77,7 +77,7 @@ def _row_now(observed: Observed, p: Parameters, width: int) -> Any:
     """The row of the table at the present time, shape (width,)."""
     nodes = len(observed.table) // width - 1
     if nodes == 0:
-        return xp.array([*observed.table])
+        return xp.array(observed.table)
     turns = observed.time / p.period
     place = (turns - xp.floor(turns)) * nodes
     node = xp.minimum(xp.floor(place), nodes - 1.0)

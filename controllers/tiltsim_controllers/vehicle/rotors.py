@@ -57,7 +57,7 @@ def rotors_in(knots: Any, at: float, tilt_of_rotor: TiltOfRotor) -> Rotors:
         tilt_of_rotor: The layout.
     """
     count = len(tilt_of_rotor)
-    table = xp.array([*knots[int(at) : int(at) + ROTOR_FLOATS * count]]).reshape(count, -1)
+    table = xp.array(knots[int(at) : int(at) + ROTOR_FLOATS * count]).reshape(count, -1)
     moves = np.array([float(tilt >= 0) for tilt in tilt_of_rotor])  # a trace knows these zeros
     still, along, across = (table[:, part : part + 6].T for part in (CONSTANT, COSINE, SINE))
     return Rotors(tilt_of_rotor, table[:, SPIN_SIGN], still, moves * along, moves * across)

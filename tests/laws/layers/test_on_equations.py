@@ -15,6 +15,7 @@ from tiltsim.laws import assembling
 from tiltsim.laws.assembling import LOOPS, assemble, loop_of
 from tiltsim.plants.factory import make_plant
 from tiltsim.scenario.loading import merge
+from tiltsim_controllers.code.traceable import traceable
 from tiltsim_controllers.laws.yaw_position import gyroscopic_acceleration
 from tiltsim_controllers.mathematics.scalar import scalar
 
@@ -76,13 +77,13 @@ def fly(*changes, plant="thesis", **more):
 
 def with_gyroscopic_torque(loop):
     """A loop on the thesis's equations with the torque that chapter 3 leaves out."""
-    rates = loop.equations.rates
+    rates, turned = loop.equations.rates, traceable(gyroscopic_acceleration)
 
     @scalar
     def turning(time, state, inputs, parameters, table, disturbance):
         found = rates(time, state, inputs, parameters, table, disturbance)
         vehicle = parameters.layer.vehicle
-        torque = gyroscopic_acceleration(np.array(state[15:18]), vehicle)
+        torque = turned(tuple(state[15:18]), vehicle)
         moved = [rate + more for rate, more in zip(found[15:18], torque)]
         return (*found[:15], *moved, *found[18:])
 

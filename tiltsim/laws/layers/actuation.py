@@ -110,7 +110,7 @@ def with_actuation(loop: ClosedLoop, latency_steps: int, external: bool = False)
             moves these along the delay line, as no rate of activations makes a speed jump.
     """
     law_controls, dynamics = loop.sampling.controls, loop.dynamics
-    layout, spins = layout_of(dynamics), np.array(dynamics.spins)
+    layout = layout_of(dynamics)
     rotors, tilts = layout
     size = rotors + tilts  # commands of a controller
     under_way = (size + external) * latency_steps
@@ -124,6 +124,7 @@ def with_actuation(loop: ClosedLoop, latency_steps: int, external: bool = False)
     def controls_of(
         time: Any, qpos: Any, act: Any, ctrl: Any, commands: Any, rates: Any, actuation: Any
     ) -> Any:
+        spins = xp.array(dynamics.spins)
         head = driven(time, qpos[TILT_1:], act[:rotors], act[asked], commands, spins, actuation)
         return xp.hstack([head, ctrl[states], commands[tilts:], rates, commands])
 

@@ -37,19 +37,18 @@ def read_actuators(dynamics: Dynamics) -> tuple[Callable[..., Any], Callable[...
     layout = layout_of(dynamics)
     own = ExtraActuators(states=layout.rotors + dynamics.controller_states)
     first, wrenches, hinges = layout.acceleration_1, [], []
-    states: list[int] = []
+    states: list[slice] = []
     for this in (own, *dynamics.extra_actuators):
-        states += range(first, first + this.states)
+        states.append(slice(first, first + this.states))
         force = first + this.states + this.memories
         hinge = force + WRENCH_SIZE * this.wrench
         wrenches += [slice(force, hinge)] if this.wrench else []
         hinges += [slice(hinge, hinge + layout.tilts)] if this.hinge_torques else []
         first += this.controls
-    places = np.array(states, int)
 
     @traceable
     def rates(ctrl: Any) -> Any:
-        return ctrl[places]
+        return xp.hstack([ctrl[part] for part in states])
 
     @traceable
     def loads(ctrl: Any) -> Any:

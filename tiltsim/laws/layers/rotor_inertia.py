@@ -42,7 +42,6 @@ def with_rotor_inertia(loop: ClosedLoop) -> ClosedLoop:
     """A loop whose rotors have spin inertia."""
     dynamics, layout, equations = loop.dynamics, layout_of(loop.dynamics), loop.equations
     (rotors, tilts), tilted = layout, tilt_of_rotor(dynamics)
-    spins = xp.array(dynamics.spins)
     record = make_record_type(
         "SpinningRotors",
         inertia=float,  # kg m^2, of one rotor about its axis
@@ -63,7 +62,7 @@ def with_rotor_inertia(loop: ClosedLoop) -> ClosedLoop:
         angles, rates = qpos[TILT_1:], qvel[TILT_RATE_1 : TILT_RATE_1 + tilts]
         demanded = ctrl[layout.accelerations]
         accelerations = accelerations_within_limits(
-            spins, speeds, demanded, layer.slowest, layer.fastest
+            xp.array(dynamics.spins), speeds, demanded, layer.slowest, layer.fastest
         )
         torque = spin_torque(craft, angles, rates, speeds, accelerations, omega)
         hinges = hinge_torques(craft, angles, speeds, accelerations, omega)
