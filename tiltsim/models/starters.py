@@ -153,12 +153,11 @@ _MJCF: Final = """\
   <compiler angle="radian"/>
   <option gravity="0 0 -9.81"/>
   <default>
-    <geom rgba="0.25 0.28 0.32 1"/>
     <default class="arm">
-      <geom type="capsule" size="0.007" mass="0.04"/>
+      <geom type="capsule" size="0.007" mass="0.04" rgba="0.3 0.32 0.35 1"/>
     </default>
     <default class="motor">
-      <geom type="cylinder" size="0.016 0.014" mass="0.05"/>
+      <geom type="cylinder" size="0.016 0.014" mass="0.05" rgba="0.3 0.32 0.35 1"/>
     </default>
 {hinge}\
     <!-- Thrust and drag torque are gear times control, which is the signed square of the rotor
@@ -178,7 +177,8 @@ _MJCF: Final = """\
     <body name="vehicle">
       <freejoint name="vehicle"/>
       <!-- Masses in kg; MuJoCo computes the inertia from the geoms. -->
-      <geom name="hull" type="ellipsoid" size="0.08 0.06 0.03" mass="0.7"/>
+      <geom name="hull" type="ellipsoid" size="0.08 0.06 0.03" mass="0.7" rgba="0.6 0.63 0.67 1"/>
+      <geom name="nose" type="sphere" size="0.02" pos="0.07 0 0" mass="0" rgba="0.8 0.1 0.1 1"/>
 {body}
     </body>
   </worldbody>
