@@ -23,6 +23,7 @@ from tiltsim.system.text import printable, without_long_words
 
 COMMANDS: Final = """\
 fly:
+  new          write a vehicle and a scenario to start from
   run          fly one scenario
   check        fly all scenarios under some paths and check their expectations
   sweep        fly a scenario along axes: grids, random sets, stability boundaries

@@ -45,7 +45,7 @@ SAVED_AS = {
     "docs/gaits.md": {'title = "My own gait"': "my_gait.toml"},
     "docs/own_vehicle.md": {'title = "My own': "my_flight.toml", "<mujoco": "my_tiltrotor.xml"},
     "docs/own_controller.md": {"import numpy": "my_controller.py"},
-    "docs/multirotor.md": {'title = "A canted': "level.toml", "<mujoco": "own_hexarotor.xml"},
+    "docs/multirotor.md": {"<mujoco": "own_hexarotor.xml"},
     "docs/supervisor.md": {'title = "Six tilting arms': "arms.toml"},
 }
 """Blocks that a page tells to save, by their start."""

@@ -37,8 +37,9 @@ def test_its_first_blocks_set_up_a_clone():
     """`.ci/run` executes them to the letter."""
     fly, check = code("README.md", "sh")[:2]
     setup = "python3 -m venv .venv && .venv/bin/pip install -q -c constraints.txt "
-    assert fly.startswith(f"{setup}. && .venv/bin/tiltsim run ")
-    assert check == f"{setup}-e '.[test]' && .venv/bin/python -m pytest -q\n"
+    flight = ".venv/bin/tiltsim run 'beyond/references#figure_eight' --out flights/eight"
+    assert fly == f"{setup}. &&\n{flight} &&\n.venv/bin/tiltsim plot flights/eight\n"
+    assert check == f"{setup}-e '.[test]' &&\n.venv/bin/python -m pytest -q\n"
 
 
 def test_its_picture_moves_and_loads_quickly():

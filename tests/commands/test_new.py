@@ -1,0 +1,54 @@
+"""``tiltsim new``: the files of every kind fly as written, and nothing is overwritten."""
+
+from __future__ import annotations
+
+import pytest
+
+from tiltsim.cli import main
+from tiltsim.models.starters import STARTERS
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path, monkeypatch):
+    """An empty folder, in which the test runs."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.mark.parametrize("kind", STARTERS)
+def test_each_kind_passes_its_check(kind, capsys):
+    assert main(["new", kind]) == 0
+    assert main(["check", f"{kind}.toml"]) == 0
+    assert "3/3 hold" in capsys.readouterr().out
+
+
+def test_a_name_with_quotes_is_found(folder):
+    assert main(["new", "quadrotor", 'my "own".xml']) == 0
+    assert main(["run", 'my "own".toml', "--quiet", "--set", "simulation.duration=0.04"]) == 1
+    assert {file.name for file in folder.iterdir()} == {'my "own".xml', 'my "own".toml'}
+
+
+@pytest.mark.parametrize("existing", ["mine.xml", "mine.toml"])
+def test_files_are_overwritten_only_by_force(existing, folder, capsys):
+    (folder / existing).write_text("kept")
+    assert main(["new", "hexarotor", "mine.xml"]) == 2
+    assert capsys.readouterr().err == f"tiltsim: {existing}: exists; --force replaces it\n"
+    assert [file.read_text() for file in folder.iterdir()] == ["kept"]
+    assert main(["new", "hexarotor", "mine.xml", "--force"]) == 0
+    assert "kept" not in (folder / existing).read_text()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["pentarotor"], "KIND 'pentarotor': unknown; choose quadrotor, hexarotor, "),
+        (["quadrotor", "mine.txt"], "FILE mine.txt: unknown format '.txt'; choose .xml"),
+        (["quadrotor", "none/mine.xml"], "FILE none/mine.xml: its folder does not exist"),
+    ],
+)
+def test_mistakes_are_one_line(arguments, message, folder, capsys):
+    assert main(["new", *arguments]) == 2
+    error = capsys.readouterr().err
+    assert error.startswith(f"tiltsim: {message}")
+    assert error.count("\n") == 1
+    assert not any(folder.iterdir())
