@@ -23,7 +23,7 @@ from tiltsim.laws.assembling import loop_of
 from tiltsim.laws.commanded import commanded_parameters, with_command
 from tiltsim.laws.layers.on_equations import on_equations
 from tiltsim.plants.command import Observation, Reference
-from tiltsim.scenario.override_keys import split_key
+from tiltsim.scenario.override_keys import split_key, value_at, with_value
 from tiltsim.scenario.surroundings import SensorTable
 from tiltsim.scenario.vehicle import PodTable, VehicleTable
 from tiltsim.simulation.array_plan import ArrayPlan, PlannedFlight
@@ -197,7 +197,7 @@ class EnvFunctions:
         tree, place = self._plan.parameters, 0
         for key, width in zip(self.keys, self._widths, strict=True):
             value = numbers[place] if width is None else tuple(numbers[place : place + width])
-            tree, place = _with(tree, split_key(key), value), place + (width or 1)
+            tree, place = with_value(tree, split_key(key), value), place + (width or 1)
         return self._plan(tree)
 
     def _flown(self, episode: Episode, action: Any, planned: PlannedFlight) -> Episode:
@@ -281,29 +281,13 @@ class EnvFunctions:
 
     def _check_key(self, key: str, value: Any) -> None:
         """Refuse to draw what is no number of a flight."""
-        found: Any = self._plan.parameters
-        try:
-            for step in split_key(key):
-                found = found[step]
-        except (KeyError, TypeError):
-            found = None
+        found = value_at(self._plan.parameters, key)
         if found is None or np.shape(found) != np.shape(value):
             names = ", ".join(self._plan.parameters)
             raise InputError(
                 f"environment: domain: {key}: arrays draw numbers on which a flight depends, of "
                 f"{names}"
             )
-
-
-def _with(tree: Any, path: Sequence[str | int], value: Any) -> Any:
-    """A tree of dicts and tuples with another value at a path."""
-    if not path:
-        return value
-    step, *rest = path
-    inner = _with(tree[step], rest, value)
-    if isinstance(step, str):
-        return {**tree, step: inner}
-    return (*tree[:step], inner, *tree[step + 1 :])
 
 
 def _check_supported(scenario: Scenario) -> None:

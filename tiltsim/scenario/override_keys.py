@@ -29,6 +29,27 @@ def split_key(key: str) -> list[str | int]:
     return steps
 
 
+def value_at(document: Any, key: str) -> Any:
+    """The value of a dotted key in tables and lists; None where there is none."""
+    for step in split_key(key):
+        listed = isinstance(document, list | tuple) and isinstance(step, int)
+        known = step < len(document) if listed else isinstance(document, dict) and step in document
+        if not known:
+            return None
+        document = document[step]
+    return document
+
+
+def with_value(document: Any, path: Sequence[str | int], value: Any) -> Any:
+    """A copy of tables and lists with another value at a path; it shares everything else."""
+    if not path:
+        return value
+    step, *rest = path
+    changed = list(document) if isinstance(step, int) else dict(document)
+    changed[step] = with_value(document[step] if rest else None, rest, value)  # type: ignore[index]
+    return tuple(changed) if isinstance(document, tuple) else changed
+
+
 def refuse_replaced(given: Sequence[tuple[str, Any]], address: str) -> None:
     """Raise `InputError` if a value replaces the whole table or list of which another is a part."""
     paths = [split_key(key) for key, _ in given]

@@ -102,7 +102,7 @@ class Scenario(ScenarioTables):
     def _repr_html_(self) -> str:
         """What is not left at its default, as a table for notebooks."""
         given = self.model_dump(mode="json", exclude_unset=True, exclude={*DESCRIPTIVE})
-        rows = [(key, show(value)) for key, value in leaves(given)]
+        rows = [(key, show(value)) for key, value in leaves(given) if value is not None]
         return html_table(
             self.title or self.address or "Scenario", [self.address, self.source], rows
         )

@@ -43,7 +43,7 @@ def speed(timings: Sequence[Timing], steps: int, timestep: float) -> dict[str, A
         "ratio": None,
         "realtime_factor": steps * timestep / wall,
         "timestep": timestep,
-        # A program that lies in the cache is loaded in less time than one flight differs from another.
+        # Loading a cached program takes less time than flights differ by.
         "compile_seconds": max(first - wall, 0.0),
     }
 

@@ -17,7 +17,7 @@ from tiltsim.scenario.messages import one_line_message, show
 from tiltsim.sweeps.expressions import evaluate
 from tiltsim.sweeps.folder import DATASET, DEFINITION, read_definition
 from tiltsim.sweeps.points import SweepPoints
-from tiltsim.sweeps.stored_rows import finished_parts, read_rows
+from tiltsim.sweeps.rows import finished_parts, read_rows
 from tiltsim.sweeps.tables import Sweep
 from tiltsim.system.files import is_file
 from tiltsim.system.optional import optional_package

@@ -14,7 +14,7 @@ from typing import Any, Final
 from pydantic import ValidationError
 
 from tiltsim.errors import InputError
-from tiltsim.scenario.arguments import check_keys, plain
+from tiltsim.scenario.arguments import check_keys, leaves, plain
 from tiltsim.scenario.library import find_scenario_file, library_name, read_toml
 from tiltsim.scenario.loading import (
     FILE_KEYS,
@@ -40,7 +40,6 @@ from tiltsim.sweeps.tables import (
     SeedAxis,
     Sweep,
     UniformAxis,
-    dotted,
 )
 from tiltsim.system.files import file_digests, is_file
 from tiltsim.system.text import short_repr, valid_unicode
@@ -68,7 +67,7 @@ def load_sweep(
     document, address, folder = _document(source)
     fixed = document.setdefault("set", {})
     if isinstance(fixed, dict):
-        document["set"] = _located(dotted(fixed), folder, address) | plain(overrides or {})
+        document["set"] = _located(dict(leaves(fixed)), folder, address) | plain(overrides or {})
     if "scenario" not in document and not {"axis", "bisect"} & document.keys():
         raise InputError(f"{address}: a scenario, not a sweep: it has no [[axis]]; use tiltsim run")
     try:

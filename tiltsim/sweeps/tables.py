@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
+from tiltsim.scenario.arguments import leaves
 from tiltsim.scenario.expectation import Expectation
 from tiltsim.scenario.limits import MAX_VALUES
 from tiltsim.scenario.messages import InvalidValueError, choose
@@ -288,17 +289,6 @@ class PlotTable(Table):
     )
 
 
-def dotted(tables: dict[str, Any], head: str = "") -> dict[str, Any]:
-    """Nested tables as one table of dotted keys."""
-    flat: dict[str, Any] = {}
-    for key, value in tables.items():
-        if isinstance(value, dict):
-            flat |= dotted(value, f"{head}{key}.")
-        else:
-            flat[head + key] = value
-    return flat
-
-
 class Sweep(Table):
     """One sweep, fully specified."""
 
@@ -345,7 +335,7 @@ class Sweep(Table):
     @classmethod
     def _dotted(cls, value: Any) -> Any:
         # TOML reads simulation.duration = 1 as a table in a table.
-        return dotted(value) if isinstance(value, dict) else value
+        return dict(leaves(value)) if isinstance(value, dict) else value
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -386,7 +376,7 @@ class Sweep(Table):
 
     def _check_cases(self, axis: CasesAxis, taken: list[str]) -> None:
         for name, tables in axis.cases.items():
-            for key, value in dotted(tables).items():
+            for key, value in leaves(tables):
                 if any(key == other or key.startswith(f"{other}.") for other in taken):
                     raise InvalidValueError(
                         f"axis.cases.{name}.{key}", value, "also set by another axis or by set"
