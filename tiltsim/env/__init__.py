@@ -9,9 +9,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from tiltsim.env.environment import Environment, TiltrotorEnv
-from tiltsim.env.registration import register
 from tiltsim.env.task import Reward, Task, hover_reward
-from tiltsim.env.tasks import EPISODE_STEPS
+from tiltsim.env.tasks import EPISODE_STEPS, register
 
 if TYPE_CHECKING:
     from tiltsim.env.functions import EnvFunctions

@@ -6,7 +6,7 @@ import json
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 from pydantic import ValidationError
@@ -14,17 +14,14 @@ from pydantic import ValidationError
 from tiltsim.errors import InputError
 from tiltsim.scenario.loading import without_none
 from tiltsim.scenario.messages import one_line_message
+from tiltsim.scenario.scenario import Scenario
 from tiltsim.sweeps.checks import check_points
 from tiltsim.sweeps.definition import UNUSED, SweepDefinition
 from tiltsim.sweeps.loading import load_sweep
 from tiltsim.sweeps.points import SweepPoints
-from tiltsim.sweeps.tables import NormalAxis, SeedAxis, Sweep, UniformAxis
+from tiltsim.sweeps.tables import Axis, NormalAxis, SeedAxis, Sweep, UniformAxis
 from tiltsim.system.text import short_repr
 from tiltsim_controllers.mathematics.scalar import Floats
-
-if TYPE_CHECKING:
-    from tiltsim.scenario.scenario import Scenario
-    from tiltsim.sweeps.tables import Axis
 
 LARGEST_SEED: Final = 2**31
 

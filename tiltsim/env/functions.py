@@ -8,13 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from operator import attrgetter
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from tiltsim.arrays.jax_arrays import JaxArrays, recomputes, require_jax
 from tiltsim.arrays.lifting import Lifting
 from tiltsim.closed_loop.limits import WITHIN_LIMITS
+from tiltsim.closed_loop.loop import ClosedLoop
 from tiltsim.env.task import Task
 from tiltsim.equations.implicitfast import make_implicitfast_step, turned
 from tiltsim.equations.rigid_body import rigid_body
@@ -24,6 +25,7 @@ from tiltsim.laws.commanded import commanded_parameters, with_command
 from tiltsim.laws.layers.on_equations import on_equations
 from tiltsim.plants.command import Observation, Reference
 from tiltsim.scenario.override_keys import split_key, value_at, with_value
+from tiltsim.scenario.scenario import Scenario
 from tiltsim.scenario.surroundings import SensorTable
 from tiltsim.scenario.vehicle import PodTable, VehicleTable
 from tiltsim.simulation.array_plan import ArrayPlan, PlannedFlight
@@ -32,10 +34,6 @@ from tiltsim.vehicles.rotorcraft.layout import QW, TILT_1, TILT_RATE_1
 from tiltsim_controllers.mathematics.rotation import euler_from_quaternion, rotation_from_quaternion
 from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.references.trajectories import reference_derivatives
-
-if TYPE_CHECKING:
-    from tiltsim.closed_loop.loop import ClosedLoop
-    from tiltsim.scenario.scenario import Scenario
 
 NOT_FINITE: Final = -1
 """In place of the code of a limit."""

@@ -6,8 +6,8 @@ import re
 from math import pi
 from typing import Final
 
-from tiltsim.scenario.claim import NAME
 from tiltsim.scenario.controller import laws_for
+from tiltsim.scenario.expectation import NAME
 from tiltsim.scenario.gait import FixedGait, TableGait
 from tiltsim.scenario.messages import InvalidValueError, choose
 from tiltsim.scenario.multirotor_controllers import AttitudeForceController

@@ -7,9 +7,8 @@ from typing import Annotated, Any, Final
 from pydantic import Field, PrivateAttr
 
 from tiltsim.models.rotor_table import Multirotor
-from tiltsim.scenario.claim import ClaimName, ClaimTable, Origin
 from tiltsim.scenario.controller import Controller
-from tiltsim.scenario.expectation import Expectation
+from tiltsim.scenario.expectation import ClaimName, ClaimTable, Expectation, Origin
 from tiltsim.scenario.gait import FixedGait, Gait
 from tiltsim.scenario.reference import Reference, SetpointReference
 from tiltsim.scenario.rotorcraft import MultirotorTable, RotorcraftTable, TiltServoTable

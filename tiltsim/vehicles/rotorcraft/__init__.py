@@ -23,9 +23,10 @@ from tiltsim.closed_loop.limits import (
 )
 from tiltsim.closed_loop.vehicle_kind import VehicleKind
 from tiltsim.models.hover import hover_speeds
-from tiltsim.models.parts import RotorLimits
+from tiltsim.models.parts import ExtraActuators, Ground, Pod, RotorLimits, TiltServo
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.multirotor_controllers import AttitudeForceController
+from tiltsim.scenario.scenario import FlightPlan, Scenario
 from tiltsim.scenario.vehicle import VehicleTable
 from tiltsim.system.quantity import Quantity, subscript
 from tiltsim.vehicles.rotorcraft.layout import CROSS, Layout
@@ -37,9 +38,6 @@ from tiltsim_controllers.vehicle.states import P
 
 if TYPE_CHECKING:
     import mujoco
-
-    from tiltsim.models.parts import ExtraActuators
-    from tiltsim.scenario.scenario import FlightPlan, Scenario
 
 
 def rotorcraft_columns(layout: Layout) -> dict[str, Quantity]:
@@ -136,7 +134,6 @@ def _compile(
     userdata_size: int,
     visuals: bool,
 ) -> mujoco.MjModel:
-    from tiltsim.models.parts import Ground, Pod, TiltServo
     from tiltsim.models.rotorcraft import RotorcraftSpec, compile_model
 
     vehicle = scenario.any_rotorcraft

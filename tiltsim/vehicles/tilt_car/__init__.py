@@ -14,6 +14,8 @@ from tiltsim.closed_loop.limits import (
     horizontal_error,
 )
 from tiltsim.closed_loop.vehicle_kind import VehicleKind
+from tiltsim.models.parts import ExtraActuators, TiltServo
+from tiltsim.scenario.scenario import FlightPlan, Scenario
 from tiltsim.system.quantity import Quantity
 from tiltsim.vehicles.tilt_car.metrics import tilt_car_metrics
 from tiltsim_controllers.gaits.motion import tilt_motion_of
@@ -23,9 +25,6 @@ from tiltsim_controllers.tilt_car.vehicle import counter_yaw_per_tilt
 
 if TYPE_CHECKING:
     import mujoco
-
-    from tiltsim.models.parts import ExtraActuators
-    from tiltsim.scenario.scenario import FlightPlan, Scenario
 
 ROTORS: Final = (1, 2)
 
@@ -104,7 +103,6 @@ def _compile(
     userdata_size: int,
     visuals: bool,
 ) -> mujoco.MjModel:
-    from tiltsim.models.parts import TiltServo
     from tiltsim.models.tilt_car import TiltCarSpec, compile_tilt_car
 
     car, simulation = scenario.tilt_car, scenario.simulation
