@@ -3,23 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from math import inf, isfinite
+from math import inf
 from typing import Final, NamedTuple
-
-INTEGRATORS: Final = ("Euler", "RK4", "implicit", "implicitfast")
-
-
-def require_positive(name: str, value: float, unit: str) -> None:
-    """Raise ValueError unless a value, named by its key and unit, is finite and above 0."""
-    if not (isfinite(value) and value > 0.0):
-        raise ValueError(f"{name} = {value!r}: must be finite and above 0 {unit}")
-
-
-def require_choice(name: str, value: str, choices: tuple[str, ...]) -> None:
-    """Raise ValueError unless a value, named by its key, is one of the choices."""
-    if value not in choices:
-        raise ValueError(f"{name} = {value!r}: unknown; choose {', '.join(choices)}")
-
 
 WRENCH_SIZE: Final = 6
 
@@ -132,7 +117,7 @@ class Ground:
 
 @dataclass(frozen=True, kw_only=True)
 class ModelSpec:
-    """Common specification of the vehicles' models. Raises ValueError if a value is out of range.
+    """Common specification of the vehicles' models; a scenario's tables have checked its values.
 
     Attributes:
         timestep: Physics time step, s.
@@ -148,11 +133,3 @@ class ModelSpec:
     userdata_size: int = 0
     tilt_servo: TiltServo = field(default=TiltServo())
     law_states: int = 0
-
-    def __post_init__(self) -> None:
-        require_choice("simulation.integrator", self.integrator, INTEGRATORS)
-        require_positive("simulation.timestep", self.timestep, "s")
-        for name in ("userdata_size", "law_states"):
-            size = getattr(self, name)
-            if size < 0:
-                raise ValueError(f"{name} = {size!r}: must be at least 0")

@@ -9,14 +9,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tiltsim.models.vehicle_parts import Parts, VehiclePose
 from tiltsim_controllers.mathematics.scalar import Floats, Triple, Values
 from tiltsim_controllers.vehicle.effectiveness import Rotor
 
 if TYPE_CHECKING:
     import mujoco
-
-    from tiltsim.models.pose import VehiclePose
-    from tiltsim.models.vehicle_parts import Parts
 
 
 @dataclass(frozen=True)

@@ -25,16 +25,7 @@ from tiltsim.models.mjcf_editing import (
     remove_visuals,
     set_servos,
 )
-from tiltsim.models.parts import (
-    SERVO_ARMATURE,
-    ExtraActuators,
-    Ground,
-    ModelSpec,
-    Pod,
-    RotorLimits,
-    require_choice,
-    require_positive,
-)
+from tiltsim.models.parts import SERVO_ARMATURE, ExtraActuators, Ground, ModelSpec, Pod, RotorLimits
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.models.user_vehicle import UserVehicle
 from tiltsim.resources import shipped_folder
@@ -47,15 +38,13 @@ from tiltsim_controllers.vehicle.states import ROTORS
 if TYPE_CHECKING:
     import mujoco
 
-MODELS: Final = ("tiltrotor", "quadrotor", "multirotor")
-
 START_SPEED: Final = 300.0
 """Rotor speed (rad/s) of the keyframe ``start``."""
 
 
 @dataclass(frozen=True)
 class RotorcraftSpec(ModelSpec):
-    """Specification of a rotorcraft's model. Raises ValueError if a value is out of range.
+    """Specification of a rotorcraft's model.
 
     Attributes:
         model: ``tiltrotor``, ``quadrotor`` (without hinges; its pods are part of the body) or
@@ -77,13 +66,6 @@ class RotorcraftSpec(ModelSpec):
     extra_actuators: tuple[ExtraActuators, ...] = ()
     ground: Ground | None = None
     user_vehicle: UserVehicle | None = None
-
-    def __post_init__(self) -> None:
-        require_choice("vehicle.model", self.model, MODELS)
-        super().__post_init__()
-        if isinstance(self.vehicle, Vehicle):
-            for name, value in self.vehicle._asdict().items():
-                require_positive(f"vehicle.{name}", value, "(SI)")
 
     @property
     def spins(self) -> Values:

@@ -15,7 +15,7 @@ from tiltsim.models.mjcf_editing import (
     remove_visuals,
     set_servos,
 )
-from tiltsim.models.parts import ModelSpec, require_positive
+from tiltsim.models.parts import ModelSpec
 from tiltsim.resources import shipped_folder
 from tiltsim.system.hooks import mujoco_hooks
 from tiltsim.system.locks import one_thread_at_a_time
@@ -32,16 +32,11 @@ START_SPEED: Final = 200.0
 
 @dataclass(frozen=True)
 class TiltCarSpec(ModelSpec):
-    """Specification of a tilt-car's model. Raises ValueError if a value is out of range."""
+    """Specification of a tilt-car's model."""
 
     car: TiltCar  # both discs weigh half of the mass
     _: KW_ONLY
     rotor_floor: bool = True  # whether the rotor speeds, states of the simulation, stop at zero
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        for name, value in self.car._asdict().items():
-            require_positive(name, value, "(SI)")
 
 
 @one_thread_at_a_time

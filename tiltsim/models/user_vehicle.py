@@ -15,9 +15,15 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from tiltsim.models.mjcf_files import mjcf_version
-from tiltsim.models.pose import Moments, VehiclePose, parallel_axis
 from tiltsim.models.rotor_table import Multirotor, read_rotors, speed_range
-from tiltsim.models.vehicle_parts import CROSSES, Parts, check_parts
+from tiltsim.models.vehicle_parts import (
+    CROSSES,
+    Moments,
+    Parts,
+    VehiclePose,
+    check_parts,
+    parallel_axis,
+)
 from tiltsim.system.hooks import mujoco_hooks
 from tiltsim.system.locks import one_thread_at_a_time
 from tiltsim_controllers.mathematics.scalar import Floats

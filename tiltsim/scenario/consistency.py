@@ -11,7 +11,7 @@ from tiltsim.scenario.expectation import NAME
 from tiltsim.scenario.gait import FixedGait, TableGait
 from tiltsim.scenario.messages import InvalidValueError, choose
 from tiltsim.scenario.multirotor_controllers import AttitudeForceController
-from tiltsim.scenario.outputs import check_dimension, check_full_pose
+from tiltsim.scenario.outputs import check_decoupler, check_dimension, check_full_pose
 from tiltsim.scenario.reference import WaypointReference
 from tiltsim.scenario.rotorcraft import MultirotorTable, RotorcraftTable, TiltServoTable
 from tiltsim.scenario.scenario_tables import ScenarioTables
@@ -275,13 +275,7 @@ def _check_reference(scenario: ScenarioTables) -> None:
             f"the {controller.law} law{option} always includes all derivatives; set it to false",
         )
     if isinstance(controller, AttitudeAltitudeController):
-        needs_none = reference.kind == "attitude_altitude"
-        if needs_none != (controller.decoupler == "none"):
-            raise scenario.mistake(
-                "controller.decoupler",
-                f"reference.type = {reference.type!r} needs "
-                + ("none" if needs_none else "conventional, modified or exact"),
-            )
+        check_decoupler(scenario, controller.decoupler)
 
 
 def _check_time_tables(scenario: ScenarioTables) -> None:

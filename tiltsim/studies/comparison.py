@@ -20,7 +20,7 @@ from tiltsim.scenario.messages import choose
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.scenario.trust import require_trust
 from tiltsim.simulation.simulate import simulate_to_end
-from tiltsim.studies.call_times import compiled_time_per_call, time_per_call
+from tiltsim.studies.benchmark import compiled_time_per_call, time_per_call
 from tiltsim.sweeps.search import boundary
 from tiltsim.system.processes import in_order, in_processes
 from tiltsim.vehicles.spans import in_last_second
