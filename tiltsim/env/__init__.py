@@ -29,7 +29,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    """`VectorEnv` and `EnvFunctions` when they are asked for, as they need JAX and Gymnasium."""
+    """`VectorEnv` and `EnvFunctions` on first use, as they need JAX and Gymnasium."""
     if name not in ("EnvFunctions", "VectorEnv"):
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     from tiltsim.env import vector

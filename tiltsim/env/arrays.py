@@ -71,7 +71,7 @@ OBSERVATIONS: Final[dict[str, Reader]] = {
 def action_spec(scenario: Scenario, max_tilt_angle: float | None = None) -> specs.BoundedArray:
     """Shape and bounds of an action: a thrust (N) by rotor, then a tilt angle (rad) by servo.
 
-    ``max_tilt_angle`` (rad) narrows the tilt angles, whose bounds are else those of the servos, or
+    ``max_tilt_angle`` (rad) narrows the tilt angles, whose bounds are otherwise the servos' or
     `TILT_RANGE`. Raises `InputError` if it is not above 0 or beyond them, or there are no tilts.
     """
     tilting = scenario.vehicle.has_tilting_rotors
@@ -128,7 +128,7 @@ class Observed:
     Args:
         bounds: Names of `OBSERVATIONS` and the largest absolute value of each; default: `BOUNDS`,
             for a vehicle without tilt servos less the tilts.
-        rotors, tilts: How many rotors and tilt servos the vehicle has.
+        rotors, tilts: Numbers of rotors and tilt servos.
 
     Raises:
         InputError: If there is no such observation of this vehicle, or a bound is invalid.

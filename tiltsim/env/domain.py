@@ -79,7 +79,7 @@ class Domain:
         return self._points.scenario(self._axes(generator))
 
     def values(self, generator: np.random.Generator) -> dict[str, Any]:
-        """What `draw` changes in the base, by key, with the same draws."""
+        """The changes that `draw` makes in the base, by key, with the same draws."""
         axes = self._axes(generator)
         every = axes | self._points.derived(axes)
         return {key: value for key, value in every.items() if "." in key}
@@ -95,7 +95,7 @@ class Domain:
 
     @cached_property
     def _uniform(self) -> tuple[Any, Floats, Floats] | None:
-        """Of a domain with uniform axes only: the axis, low and high of each number."""
+        """The axis, low and high of each number, if all axes are uniform; else None."""
         columns: list[int] = []
         ends: list[tuple[float, float]] = []
         for column, axis in enumerate(self._points.sweep.axis):
@@ -126,7 +126,7 @@ def _flat(values: Mapping[str, Any]) -> Floats:
 def _row(axis: Axis, generator: np.random.Generator, positions: dict[str, int]) -> Sequence[Any]:
     """One value for each key of an axis; keys that move together get the same draw.
 
-    ``positions`` holds those drawn for groups so far.
+    ``positions`` holds the positions drawn for groups so far.
     """
     if isinstance(axis, UniformAxis):
         return [float(generator.uniform(axis.low, axis.high))] * len(axis.targets)

@@ -55,7 +55,7 @@ class Episode(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """What a step leads to; arrays."""
+    """The result of a step, in arrays."""
 
     observation: Any  # (entries,), from -1 to 1
     reward: Any
@@ -75,7 +75,7 @@ def check_precision(precision: object) -> None:
 class EnvFunctions:
     """An environment as pure functions of arrays: `reset` and `step`.
 
-    They do what `tiltsim.env.gymnasium.GymnasiumEnv` does with ``flat=True``. The vehicle is
+    They match `tiltsim.env.gymnasium.GymnasiumEnv` with ``flat=True``. The vehicle is
     integrated as MuJoCo does with ``implicitfast``, but its pods are massless.
 
     Args:
@@ -84,11 +84,11 @@ class EnvFunctions:
         precision: "float32" or, if JAX has 64-bit numbers enabled, "float64".
 
     Attributes:
-        scenario: That of the task, before any draws.
-        keys: What a domain draws for an episode, by the scenario's keys.
+        scenario: The scenario of the task, before any draws.
+        keys: Keys of the scenario that a domain draws for an episode.
 
     Raises:
-        InputError: If the task is none of these, or draws what is no number of a flight.
+        InputError: If the task is none of these, or draws anything but numbers of a flight.
     """
 
     def __init__(self, task: Task, precision: str = "float32") -> None:
@@ -111,7 +111,7 @@ class EnvFunctions:
         self._slowest, self._fastest = rotorcraft.speeds_along_spin
         self._qvel = TILT_1 + self._tilts
         self._act = self._qvel + TILT_RATE_1 + self._tilts
-        # A command is written to the speeds, or to what they lag behind.
+        # A command is written to the speeds, or to the speeds that they follow with a lag.
         lags = rotorcraft.rotor_time_constant is not None
         self._commanded = self._act + self._rotors * lags
         equations = loop.equations
@@ -166,7 +166,7 @@ class EnvFunctions:
 
         Args:
             episode: From `reset` or `step`.
-            action: From -1 to 1, as that of `tiltsim.env.gymnasium.GymnasiumEnv`.
+            action: Entries from -1 to 1, as in `tiltsim.env.gymnasium.GymnasiumEnv`.
         """
         jnp, planned = self._numpy, self._planned(episode.numbers)
         middle, half = 0.5 * (self._high + self._low), 0.5 * (self._high - self._low)
@@ -237,7 +237,7 @@ class EnvFunctions:
         reference, spins = planned.plan.reference, jnp.asarray(self._spins, self._dtype)
         none, tilts = jnp.zeros(0, self._dtype), self._tilts  # a stack of none is an error
         motion = jnp.asarray(self._reference_at(time, reference, planned.knots)[:9])
-        unseen = np.full(3, np.nan)  # what is not observed, as the gait
+        unseen = np.full(3, np.nan)  # values that are not observed, as the gait
         seen = Observation(
             time=time,
             position=jnp.stack(state[:3]),
@@ -278,7 +278,7 @@ class EnvFunctions:
         return (every / jnp.asarray(self._bounds, self._dtype)).astype("float32")
 
     def _check_key(self, key: str, value: Any) -> None:
-        """Refuse to draw what is no number of a flight."""
+        """Refuse to draw anything but numbers of a flight."""
         found = value_at(self._plan.parameters, key)
         if found is None or np.shape(found) != np.shape(value):
             names = ", ".join(self._plan.parameters)
@@ -289,7 +289,7 @@ class EnvFunctions:
 
 
 def _check_supported(scenario: Scenario) -> None:
-    """Refuse what these equations do not have."""
+    """Refuse features that these equations do not have."""
     allowed: dict[str, object] = {
         "vehicle.rotor_inertia": 0.0,
         "ground": None,

@@ -45,7 +45,7 @@ def compile_tilt_car(spec: TiltCarSpec, *, visuals: bool = True) -> mujoco.MjMod
 
     Args:
         spec: The specification of the model.
-        visuals: Whether to keep what is drawn or measured only, as in `tiltsim.models.rotorcraft`.
+        visuals: Whether to keep parts that are only drawn or measured, as for rotorcraft.
     """
     complete, bare = _compose(spec)
     with mujoco_hooks():
@@ -54,7 +54,7 @@ def compile_tilt_car(spec: TiltCarSpec, *, visuals: bool = True) -> mujoco.MjMod
 
 @lru_cache(maxsize=16)
 def _compose(spec: TiltCarSpec) -> tuple[Compile, Compile]:
-    """What compiles the complete car, and the same without visuals."""
+    """Functions that compile the complete car, and the car without visuals."""
     root, car = parse_mjcf(shipped_folder("mjcf") / "tilt_car.xml"), spec.car
     root.option.timestep = spec.timestep
     root.option.integrator = spec.integrator

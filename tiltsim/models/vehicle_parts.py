@@ -17,7 +17,7 @@ MAX_ROTORS: Final = 16
 
 
 class Parts(NamedTuple):
-    """How many rotors and tilt hinges a rotorcraft has."""
+    """Numbers of rotors and tilt hinges of a rotorcraft."""
 
     rotors: int
     tilts: int
@@ -51,8 +51,8 @@ def check_parts(compiled: mujoco.MjModel, model: str) -> Parts:
     """Count the parts of a compiled file for a ``vehicle.model``.
 
     Raises:
-        ValueError: In one line: a part that is missing, superfluous, out of order, or does not do
-            what its name says.
+        ValueError: In one line: a part that is missing, superfluous, out of order, or of another
+            kind than its name says.
     """
     parts = CROSSES.get(model) or _count(compiled)
     _check_names(compiled, model, parts)
@@ -120,7 +120,7 @@ def _check_joints(compiled: mujoco.MjModel) -> None:
 
 
 def _check_thrusts(compiled: mujoco.MjModel, parts: Parts, spins: tuple[float, ...] | None) -> None:
-    """Raise ValueError where an actuator of a rotor does not do what its name says.
+    """Raise ValueError where an actuator of a rotor does not match its name.
 
     ``spins`` prescribes the senses of rotation, and that all coefficients are equal.
     """

@@ -31,7 +31,7 @@ MAX_KNOTS: Final = 1500
 def check_consistency(scenario: ScenarioTables) -> None:
     """Refuse a scenario whose tables contradict each other.
 
-    Raises `InvalidValueError` for the first contradiction, with the key and what is allowed.
+    Raises `InvalidValueError` for the first contradiction, with the key and the allowed values.
     """
     _check_law(scenario)
     _check_actuators(scenario)
@@ -350,7 +350,7 @@ def _check_rotor_limits(scenario: ScenarioTables) -> None:
     if not isinstance(scenario.vehicle, RotorcraftTable):
         return
     if isinstance(scenario.vehicle, MultirotorTable) and scenario.initial.rotor_speed is None:
-        return  # those of hover
+        return  # the speeds of hover
     low, high = scenario.vehicle.min_rotor_speed, scenario.vehicle.max_rotor_speed
     for speed in scenario.initial.rotor_speeds(scenario.vehicle.rotor_count):
         if (low is not None and speed < low) or (high is not None and speed > high):

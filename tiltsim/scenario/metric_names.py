@@ -8,7 +8,7 @@ from tiltsim.system.quantity import Quantity
 
 
 class Metric(NamedTuple):
-    """What figures call a metric, its unit, and what it measures."""
+    """A metric: its label in figures, its unit and its meaning."""
 
     label: str
     unit: str  # empty for dimensionless ones

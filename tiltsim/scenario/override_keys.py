@@ -1,4 +1,4 @@
-"""Values by dotted key, as ``--set`` and the overrides of `load_scenario` have them."""
+"""Values by dotted key, as in ``--set`` and in the overrides of `load_scenario`."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def refuse_replaced(given: Sequence[tuple[str, Any]], address: str) -> None:
         for inner, (part, _) in zip(paths[:i], given):
             if len(inner) > len(path) and inner[: len(path)] == path:
                 raise InputError(
-                    f"{address}: {key} = {show(value)}: would replace {part}, which is given, too; "
+                    f"{address}: {key} = {show(value)}: would replace {part}, which is also given; "
                     "give one of them"
                 )
 

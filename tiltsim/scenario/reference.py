@@ -34,7 +34,7 @@ class _Reference(Table, ABC):
     @property
     @abstractmethod
     def kind(self) -> ReferenceKind:
-        """What a controller must be able to track."""
+        """The kind of motion that a controller must be able to track."""
 
     @property
     def parameters(self) -> ReferenceParameters:

@@ -58,7 +58,7 @@ class TiltServoTable(ServoTable):
 
 
 class AnyVehicleTable(Table, ABC):
-    """What every vehicle has."""
+    """The keys and properties of every vehicle."""
 
     table_name = "vehicle"
     is_planar: ClassVar[bool] = False  # moves on a plane, without gravity, air or ground
@@ -68,12 +68,12 @@ class AnyVehicleTable(Table, ABC):
     @property
     @abstractmethod
     def rotor_count(self) -> int:
-        """How many rotors it has."""
+        """Number of rotors."""
 
     @property
     @abstractmethod
     def tilt_count(self) -> int:
-        """How many servos tilt its rotors."""
+        """Number of servos that tilt rotors."""
 
     @property
     def has_tilting_rotors(self) -> bool:
@@ -86,7 +86,7 @@ class AnyVehicleTable(Table, ABC):
 
 
 class RotorcraftTable(AnyVehicleTable, ABC):
-    """What every vehicle that flies has."""
+    """The keys and properties of every vehicle that flies."""
 
     mjcf: str | None
     min_rotor_speed: NonNegative | None = Field(

@@ -26,7 +26,7 @@ INTEGRATORS: Final = {
     "mujoco": ("RK4", "implicitfast", "implicit", "Euler"),
     "rigid_body": ("RK4", "ode3"),
 }
-"""Those of a plant; the thesis plant ignores the key."""
+"""Integrators of each plant; the thesis plant ignores the key."""
 
 MAX_LATENCY_STEPS: Final = 20
 """Largest number of delayed control samples; each takes eight states of the simulation."""
@@ -89,7 +89,7 @@ class SimulationTable(Table):
 
     @property
     def solver(self) -> str:
-        """The integrator in use: that of the plant."""
+        """The integrator that the plant uses."""
         return "ode3" if self.plant == "thesis" else self.integrator
 
     @property

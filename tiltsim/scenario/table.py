@@ -55,7 +55,7 @@ class Table(BaseModel):
         return value
 
     def __dir__(self) -> list[str]:
-        """Names to complete: without what is pydantic's, except to copy and to dump."""
+        """Names to complete, without pydantic's methods except for copies and dumps."""
         inherited = {name for name in dir(BaseModel) if not name.startswith("_")}
         useful = {"model_copy", "model_dump", "model_dump_json"}
         return sorted({*super().__dir__()} - (inherited - useful))
@@ -68,7 +68,7 @@ class Table(BaseModel):
         raise self._frozen(f"{name} = {short_repr(value)}")
 
     def __delattr__(self, name: str) -> None:
-        """Refuse to delete a key, likewise."""
+        """Refuse to delete a key, in words that help."""
         if name.startswith("_"):
             super().__delattr__(name)
             return

@@ -23,7 +23,7 @@ REFERENCE_COLUMNS: Final = ("time", "x", "y", "z")
 
 
 def gait_columns(tilts: int) -> tuple[str, ...]:
-    """The columns of a gait of so many tilt angles."""
+    """The columns of a gait with a number of tilt angles."""
     return ("time", *(f"alpha_{i}" for i in range(1, tilts + 1)))
 
 
@@ -65,7 +65,7 @@ class TimeTable(Table):
 
     @classmethod
     def _columns_of_width(cls, width: int) -> tuple[str, ...]:
-        """The columns of rows with so many numbers."""
+        """The columns of rows with ``width`` numbers."""
         return cls.columns
 
     def ends_before(self, time: float) -> bool:
@@ -74,11 +74,11 @@ class TimeTable(Table):
         return not goes_on and time > self._rows[-1][0]
 
     def in_file(self, name: str) -> Self:
-        """The same, to be read from a file of that name."""
+        """The table, to be read from a file of that name."""
         return self.model_copy(update={"file": name, "rows": None})
 
     def in_scenario(self) -> Self:
-        """The same without a file."""
+        """The table with its rows in the scenario, without a file."""
         return self.model_copy(update={"file": None, "rows": self._rows})
 
     def csv(self) -> bytes:

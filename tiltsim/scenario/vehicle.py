@@ -257,7 +257,7 @@ class ModelErrorTable(Table):
     )
 
     def apply_to_rotors(self, vehicle: Multirotor) -> Multirotor:
-        """As `apply`, to a multirotor; products of inertia by the mean factor of their axes."""
+        """The simulated multirotor; products of inertia get the mean factor of their axes."""
         scale = np.sqrt(self.inertia)
         inertia = np.reshape(vehicle.inertia, (3, 3)) * np.outer(scale, scale)
         return replace(

@@ -134,9 +134,9 @@ def bench_flights(vehicles: int, duration: float, integrator: str, timestep: flo
 
     Args:
         vehicles: Number of flights.
-        duration: Of each, s.
+        duration: Duration of each flight, s.
         integrator: MuJoCo's.
-        timestep: Of the physics, s.
+        timestep: Time step of the physics, s.
 
     Returns:
         One row without a ratio; ``memory`` is the peak of the process, bytes, or None
@@ -153,7 +153,7 @@ def bench_flights(vehicles: int, duration: float, integrator: str, timestep: flo
 def _peak_memory() -> int | None:
     """Peak memory of this process, bytes; None where the system does not tell, as on Windows."""
     try:
-        # Linux: the peak that getrusage gives may be that of the program which started this one.
+        # Linux: getrusage may give the peak of the program that started this one.
         status = Path("/proc/self/status").read_text(encoding="ascii")
         return int(status.split("VmHWM:")[1].split()[0]) * 1024
     except (OSError, IndexError):

@@ -1,4 +1,4 @@
-"""The vehicles in ``mjcf`` with any number of rotors, and what each can do."""
+"""The vehicles in ``mjcf`` with any number of rotors, and their capabilities."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ FLEET: Final[dict[str, tuple[float, ...]]] = {
     "tilt_octorotor": (*BY_TURNS, 0.35, -0.35),
     "omni_octorotor": (),
 }
-"""Names of the files, with tilt angles (rad) that show what the vehicle can do."""
+"""Names of the files, with tilt angles (rad) that show the vehicle's capabilities."""
 
 KEYS: Final = (
     "rotors",

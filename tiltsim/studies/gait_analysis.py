@@ -167,8 +167,8 @@ def fault_report(tilts: Quad, vehicle: Vehicle, opposite_speed: float) -> dict[s
     Args:
         tilts: Tilt angles, rad.
         vehicle: Their vehicle.
-        opposite_speed: Of the rotor opposite the failed one in the hover with free tilt angles,
-            rad/s.
+        opposite_speed: Speed of the rotor opposite the failed one in the hover with free tilt
+            angles, rad/s.
 
     Returns:
         For each rotor: how far (rad) the tilt angles are from a hover on the other three, and a

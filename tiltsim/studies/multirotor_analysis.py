@@ -42,7 +42,7 @@ def tilted_rotors(
     Args:
         vehicle: with the ranges of its rotor speeds
         angles: one for each tilt hinge, rad
-        limits: minimum and maximum rotor speed (rad/s) in place of those of the file; a rotor that
+        limits: minimum and maximum rotor speed (rad/s) in place of the file's; a rotor that
             turns either way has the maximum both ways
     """
     ranges = np.array(vehicle.speed_ranges)

@@ -59,8 +59,8 @@ def load_sweep(
         overrides: Values by dotted key of the scenario, on top of the file's ``[set]``.
 
     Raises:
-        InputError: In one line: the file, the key, the value and what is allowed. The base scenario
-            and every value of every axis are tried.
+        InputError: In one line: the file, the key, the value and the allowed values. The base
+            scenario and every value of every axis are tried.
     """
     if overrides is not None:
         check_keys("overrides", overrides)

@@ -91,9 +91,9 @@ def read_rows(
 
     Args:
         file: A part, or the whole dataset.
-        points: The sweep's.
+        points: The points of the sweep.
         indices: The points whose rows the file must hold.
-        scenarios: Whether to read their scenarios, too.
+        scenarios: Whether to read the column of scenarios as well.
 
     Raises:
         InputError: If the file is damaged, or holds anything else.
@@ -118,7 +118,7 @@ def read_rows(
 
 @lru_cache(maxsize=8)
 def _difference(found: str, expected: str) -> str:
-    """How the definition in a file differs from that of the sweep; empty if it gives equal rows."""
+    """The difference of a file's definition from the sweep's; empty if it gives equal rows."""
     if found == expected:
         return ""
     try:
@@ -151,7 +151,7 @@ def _wrong_column(found: pyarrow.Schema, points: SweepPoints) -> str:
 def _damaged_column(table: pyarrow.Table, points: SweepPoints) -> str:
     """The first column with a NaN or an infinity, which no sweep stores, or an axis without values.
 
-    What a flight does not have is stored as null.
+    Values that a flight does not have are stored as null.
     """
     import pyarrow as pa
     import pyarrow.compute as pc

@@ -1,4 +1,4 @@
-"""Scenarios that differ in numbers: of each, only the tables that hold them are validated."""
+"""Scenarios that differ in numbers: only the tables that hold these are validated again."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class SimilarScenarios:
     """Makes scenarios from documents; one of each kind is made in full.
 
     Args:
-        address: Of the documents, in messages.
+        address: Name of the documents in messages.
     """
 
     def __init__(self, address: str) -> None:

@@ -1,6 +1,6 @@
-"""Which samples of a flight a metric covers, and what it makes of them.
+"""Spans of samples that metrics cover, and the metrics that vehicles share.
 
-Columns have shape (..., N): those of one flight, or of several in rows, with the same times (N,).
+Columns have shape (..., N): one flight, or several in rows, with equal times (N,).
 Spans are counted in physics steps instead of sums of their lengths.
 """
 

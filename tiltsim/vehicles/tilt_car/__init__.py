@@ -66,8 +66,8 @@ COLUMNS: Final = {
 }
 """Columns of every flight of a car and their units.
 
-``direction`` is that of the middle of the thrusts, ``yaw + alpha``; ``direction_lower`` and
-``direction_upper`` bound the directions of what both thrusts can make; ``direction_ref`` is the
+``direction`` is the direction between the thrusts, ``yaw + alpha``; ``direction_lower`` and
+``direction_upper`` bound the directions of the sum of both thrusts; ``direction_ref`` is the
 direction of the acceleration that the law wants or the reference has, each written as the angle
 nearest to ``direction``. ``input_split`` is ``omega_1^2 - omega_2^2``.
 """
