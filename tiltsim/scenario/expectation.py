@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Final, Literal, Self
+from typing import Annotated, Final, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from tiltsim.scenario.messages import choose
 from tiltsim.scenario.metric_names import BOOLEAN_METRICS, METRICS
@@ -117,8 +117,7 @@ class Expectation(Table):
         None, description="evaluate on this plant only; default: on all", examples=["thesis"]
     )
 
-    @model_validator(mode="after")
-    def _check(self) -> Self:
+    def _check_values(self) -> None:
         if self.metric not in METRICS:
             raise self.mistake("metric", choose(self.metric, METRICS))
         boolean = self.metric in BOOLEAN_METRICS
@@ -130,7 +129,6 @@ class Expectation(Table):
         if self.min is not None and self.max is not None and self.min > self.max:
             raise self.mistake("min", f"must not exceed max = {self.max}")
         self._check_claim(boolean)
-        return self
 
     def _check_claim(self, boolean: bool) -> None:
         published = self.published

@@ -6,9 +6,9 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from functools import lru_cache
 from math import pi
-from typing import Annotated, ClassVar, Final, Literal, Self
+from typing import Annotated, ClassVar, Final, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.models.vehicle_parts import MAX_ROTORS
@@ -223,13 +223,12 @@ class TableGait(GaitTable, TimeTable):
         "otherwise the angles of the last row hold",
     )
 
-    @model_validator(mode="after")
-    def _check(self) -> Self:
+    def _check_values(self) -> None:
+        super()._check_values()
         (_, *first), (_, *last) = self.table[0], self.table[-1]
         if self.repeat and first != last:
             reason = f"the angles of the last row, {last}, must equal the first, {first}"
             raise self.mistake("repeat", reason)
-        return self
 
     @classmethod
     def columns_among(cls, names: Sequence[str]) -> tuple[str, ...]:
@@ -298,13 +297,11 @@ class TwoColorGait(GaitTable):
         "two meet, at the point P = (delta, -delta)",
     )
 
-    @model_validator(mode="after")
-    def _check(self) -> Self:
+    def _check_values(self) -> None:
         circle = (self.centre is not None) + (self.radius is not None)
         given = (self.rectangle is not None, circle > 0, bool(self.path))
         if sum(given) != 1 or circle == 1:
             raise self.mistake("type", "give one of rectangle, centre with radius, and path")
-        return self
 
     @property
     def curve(self) -> Path:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from functools import lru_cache
 from math import pi
-from typing import Annotated, Final, Literal, Self
+from typing import Annotated, Final, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from tiltsim.scenario.controller_table import ReferenceKind
 from tiltsim.scenario.table import Angle, Angles3, Coordinate, Positive, Table, Vector3, example
@@ -135,11 +135,9 @@ class CircleReference(_PositionReference):
         description="positive is counterclockwise seen from above [rad/s]", examples=[0.1]
     )
 
-    @model_validator(mode="after")
-    def _check(self) -> Self:
+    def _check_values(self) -> None:
         if self.radius == 0.0:
             raise self.mistake("radius", "must not be 0")
-        return self
 
 
 class LissajousReference(_PositionReference):
@@ -206,13 +204,11 @@ class WaypointReference(_PositionReference):
         """Polynomials; see `tiltsim_controllers.references.waypoints.minimum_snap_knots`."""
         return _minimum_snap_knots(self.positions, self.times)
 
-    @model_validator(mode="after")
-    def _check(self) -> Self:
+    def _check_values(self) -> None:
         try:
             _ = self.knots
         except ValueError as error:
             raise self.mistake("times", str(error)) from None
-        return self
 
 
 class TableReference(_PositionReference, TimeTable):
@@ -252,13 +248,12 @@ class TableReference(_PositionReference, TimeTable):
         """Polynomials; see `tiltsim_controllers.references.waypoints.table_knots`."""
         return _reference_table_knots(self.table, self.interpolation)
 
-    @model_validator(mode="after")
-    def _check(self) -> Self:
+    def _check_values(self) -> None:
+        super()._check_values()
         try:
             _ = self.knots
         except ValueError as error:
             raise self.mistake("file" if self.rows is None else "rows", str(error)) from None
-        return self
 
 
 @lru_cache(maxsize=64)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from math import inf, pi
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from tiltsim.models.parts import TiltServo
 from tiltsim.models.rotor_table import Multirotor
@@ -242,8 +242,6 @@ class MultirotorTable(RotorcraftTable):
     def pod_inertias(self) -> Values:
         return self.file.pod_inertias
 
-    @model_validator(mode="after")
-    def _check(self) -> Self:
+    def _check_values(self) -> None:
         self._check_rotor_inertia(self.resolve().max_rotor_inertia)
         self._check_limits()
-        return self

@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Annotated, Any, Self
 
-from pydantic import ConfigDict, Field, ValidationError, model_validator
+from pydantic import ConfigDict, Field, ValidationError
 
 from tiltsim.errors import InputError
 from tiltsim.scenario.arguments import check_keys, leaves
@@ -64,10 +64,8 @@ class Scenario(ScenarioTables):
         with _in_one_line(address, obj, emptied):
             return super().model_validate(obj, **options)
 
-    @model_validator(mode="after")
-    def _check(self) -> Self:
+    def _check_values(self) -> None:
         self.require_consistency()
-        return self
 
     def require_consistency(self) -> None:
         """Raise `InvalidValueError`, worded by validation, if tables contradict each other."""

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Final, Literal, Self
+from typing import Annotated, Final, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from tiltsim.scenario.table import (
     Angles3,
@@ -113,8 +113,7 @@ class SimulationTable(Table):
         interval = 0.01 if self.record_timestep is None else self.record_timestep
         return max(1, round(interval / self.timestep))
 
-    @model_validator(mode="after")
-    def _check(self) -> Self:
+    def _check_values(self) -> None:
         for key in ("duration", "control_timestep", "record_timestep"):
             value = getattr(self, key)
             if value is None or value == 0.0:
@@ -128,7 +127,6 @@ class SimulationTable(Table):
                 raise self.mistake(key, f"must be a multiple of timestep = {self.timestep}")
         self._check_integrator()
         self._check_latency()
-        return self
 
     def _check_integrator(self) -> None:
         allowed = INTEGRATORS.get(self.plant)

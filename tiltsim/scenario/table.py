@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from math import pi
 from operator import attrgetter
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, Self
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator, model_validator
 
 from tiltsim.errors import InputError
 from tiltsim.scenario.messages import InvalidValueError
@@ -53,6 +53,14 @@ class Table(BaseModel):
             key = f"{cls.table_name}.{info.field_name}".removeprefix(".")
             raise InvalidValueError(key, value, "not valid Unicode")
         return value
+
+    @model_validator(mode="after")
+    def _check_table(self) -> Self:
+        self._check_values()
+        return self
+
+    def _check_values(self) -> None:
+        """Refuse keys that contradict each other; called when every key alone is valid."""
 
     def __dir__(self) -> list[str]:
         """Names to complete, without pydantic's methods except for copies and dumps."""

@@ -8,7 +8,7 @@ from math import isfinite
 from pathlib import Path
 from typing import Any, ClassVar, Final, Self
 
-from pydantic import Field, PrivateAttr, model_validator
+from pydantic import Field, PrivateAttr
 
 from tiltsim.errors import InputError
 from tiltsim.scenario.limits import MAX_FILE_SIZE, MAX_ROWS, read_text
@@ -89,8 +89,7 @@ class TimeTable(Table):
         ]
         return "".join(f"{','.join(line)}\n" for line in lines).encode()
 
-    @model_validator(mode="after")
-    def _check_rows(self) -> Self:
+    def _check_values(self) -> None:
         given: Rows | None = dict(self)["rows"]
         if (self.file is None) == (given is None):
             raise self.mistake("file", "give one of file and rows")
@@ -101,7 +100,6 @@ class TimeTable(Table):
         except InputError as error:
             key, reason = "rows" if self.file is None else "file", str(error)
             raise self.mistake(key, reason.removeprefix(f"{self.file}: ")) from None
-        return self
 
 
 def rows_of_columns(table: Any, columns: Sequence[str]) -> list[Values]:

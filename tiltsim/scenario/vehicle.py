@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 from math import pi, sqrt
-from typing import Annotated, Any, Final, Literal, Self
+from typing import Annotated, Any, Final, Literal
 
 import numpy as np
-from pydantic import Discriminator, Field, Tag, model_validator
+from pydantic import Discriminator, Field, Tag
 
 from tiltsim.models.parts import SERVO_ARMATURE, Pod
 from tiltsim.models.rotor_table import Multirotor
@@ -153,8 +153,7 @@ class VehicleTable(RotorcraftTable):
         """Whether the rotors are at the ends of four equal arms at right angles."""
         return self.user_vehicle is None or not self.user_vehicle.layout_mismatch
 
-    @model_validator(mode="after")
-    def _check(self) -> Self:
+    def _check_values(self) -> None:
         if self.mjcf is not None:
             self.require_defaults(("arm_length", "pod"), "defined by vehicle.mjcf; remove it")
         vehicle = self.resolve()
@@ -170,7 +169,6 @@ class VehicleTable(RotorcraftTable):
             )
         self._check_rotor_inertia(moments[2] / self.rotor_count)
         self._check_limits()
-        return self
 
 
 class TiltCarTable(AnyVehicleTable):
