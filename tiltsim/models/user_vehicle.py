@@ -88,7 +88,7 @@ class UserVehicle:
         """
         found = []
         if np.linalg.norm(self.center) > ALIGNMENT_TOLERANCE * self.radius:
-            found.append(f"its centre of mass at {_triple(self.center)} m")
+            found.append(f"its center of mass at {_triple(self.center)} m")
         if isinstance(self.vehicle, Multirotor):
             return " and ".join(found)
         if np.abs(self.products).max() > PRODUCT_TOLERANCE * min(self.vehicle.moments):

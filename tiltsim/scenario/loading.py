@@ -18,7 +18,7 @@ from tiltsim.scenario.controller import DEFAULT_LAW
 from tiltsim.scenario.library import find_scenario_file, library_name, read_toml
 from tiltsim.scenario.limits import check_limits
 from tiltsim.scenario.messages import choose, did_you_mean, one_line_message, show
-from tiltsim.scenario.override_keys import refuse_replaced, split_key
+from tiltsim.scenario.override_keys import refuse_replaced, split_key, value_at
 from tiltsim.scenario.own_parts import (
     controller_table,
     drop_what_own_controllers_ignore,
@@ -347,7 +347,7 @@ def _override(address: str, document: dict[str, Any], key: str, value: object) -
         if not isinstance(target, list) or last >= len(target):
             raise InputError(
                 f"{address}: {key} = {show(value)}: no such entry; "
-                f"{_entries_instead(document, path, key.rpartition('[')[0])}"
+                f"{_entries_instead(document, key.rpartition('[')[0])}"
             )
     elif not isinstance(target, dict):
         name = key.rpartition(".")[0]
@@ -361,17 +361,16 @@ def _override(address: str, document: dict[str, Any], key: str, value: object) -
     return empties
 
 
-def _entries_instead(document: dict[str, Any], path: list[str | int], whole: str) -> str:
+def _entries_instead(document: dict[str, Any], whole: str) -> str:
     """Advice for an entry beyond the end of a list, or of a list that does not exist."""
-    *above, name = path
-    table: Any = document
-    for step in above:
-        table = _enter(table, step)
+    above, _, name = whole.rpartition(".")
+    table = value_at(document, above)
     lists = table.items() if isinstance(table, dict) else ()
     lengths = {key: len(value) for key, value in lists if isinstance(value, list)}
     if name in lengths:
         return f"{whole} has {lengths[name]}, from {whole}[0]"
-    return did_you_mean(name, lengths) + f"give the whole list {whole}"
+    hint = "" if "[" in name else did_you_mean(name, lengths)
+    return f"{hint}give the whole list {whole}"
 
 
 def _enter(target: object, step: str | int) -> object:

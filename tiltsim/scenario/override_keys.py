@@ -30,10 +30,12 @@ def split_key(key: str) -> list[str | int]:
 
 
 def value_at(document: Any, key: str) -> Any:
-    """The value of a dotted key in tables and lists; None where there is none."""
-    for step in split_key(key):
-        listed = isinstance(document, list | tuple) and isinstance(step, int)
-        known = step < len(document) if listed else isinstance(document, dict) and step in document
+    """The value of a dotted key in tables and lists, all of them for ''; None if there is none."""
+    for step in split_key(key) if key else ():
+        if isinstance(step, int):
+            known = isinstance(document, list | tuple) and step < len(document)
+        else:
+            known = isinstance(document, dict) and step in document
         if not known:
             return None
         document = document[step]

@@ -85,7 +85,7 @@ class _PositionReference(_Reference):
     yaw: Angle = Field(0.0, description="heading to hold [rad]", examples=[0.5])
     acceleration_feedforward: bool = Field(
         False,
-        description="demand the reference's acceleration, too; ch. 4 omits it, laws of higher "
+        description="also demand the reference's acceleration; ch. 4 omits it, laws of higher "
         "order always include it",
     )
     type: str
@@ -128,7 +128,7 @@ class CircleReference(_PositionReference):
 
     type: Literal["circle"] = Field(description="a horizontal circle")
     position: Vector3 = Field(
-        (0.0, 0.0, 0.0), description="the centre [m]", examples=[[0.0, 0.0, 1.0]]
+        (0.0, 0.0, 0.0), description="the center [m]", examples=[[0.0, 0.0, 1.0]]
     )
     radius: float = Field(description="negative to start on the other side [m]", examples=[5.0])
     angular_frequency: float = Field(
@@ -145,7 +145,7 @@ class LissajousReference(_PositionReference):
 
     type: Literal["lissajous"] = Field(description="a sine along each axis")
     position: Vector3 = Field(
-        (0.0, 0.0, 0.0), description="the centre [m]", examples=[[0.0, 0.0, 1.0]]
+        (0.0, 0.0, 0.0), description="the center [m]", examples=[[0.0, 0.0, 1.0]]
     )
     amplitude: Vector3 = Field(description="along x, y and z [m]", examples=[[2.0, 1.0, 0.0]])
     angular_frequency: Vector3 = Field(

@@ -156,7 +156,7 @@ class InitialTable(Table):
 
     position: Vector3 = Field(
         (0.0, 0.0, 0.0),
-        description="of the centre of mass in the world, z up [m]",
+        description="of the center of mass in the world, z up [m]",
         examples=[[0.0, 0.0, 1.0]],
     )
     velocity: Vector3 = Field(

@@ -82,13 +82,13 @@ class VehicleTable(RotorcraftTable):
     )
     inertia: Annotated[tuple[Positive, Positive, Positive], Field(strict=False)] | None = Field(
         None,
-        description="principal moments about the centre of mass, along the body axes, pods "
+        description="principal moments about the center of mass, along the body axes, pods "
         "included; default: the preset's [kg m^2]",
         examples=[[2e-3, 3e-3, 5e-3]],
     )
     arm_length: NotTiny | None = Field(
         None,
-        description="from the centre of mass to a rotor; default: the preset's [m]",
+        description="from the center of mass to a rotor; default: the preset's [m]",
         examples=[0.2],
     )
     thrust_coefficient: NotTiny | None = Field(
