@@ -275,13 +275,12 @@ def time_per_call(assembly: Assembly) -> float:
     none: list[float] = []
     vectors = [*map(float, qpos)], [*map(float, qvel)], [*act], none
     step = control_step(assembly, setup.userdata.tolist(), "controls")
-    rounds = []
-    for _ in range(3):
-        start = perf_counter()
+
+    def calls() -> None:
         for _ in range(CALLS):
             step(header, *vectors)
-        rounds.append((perf_counter() - start) / CALLS)
-    return min(rounds)
+
+    return min(_seconds(calls) for _ in range(3)) / CALLS
 
 
 def compiled_time_per_call(scenario: Scenario) -> float:
@@ -295,14 +294,16 @@ def compiled_time_per_call(scenario: Scenario) -> float:
     plant = MujocoPlant(assemble(scenario), engine="native")
     plant.data.userdata[PERIOD_IN_USERDATA] = 0.0  # the control step at every evaluation
     callbacks = plant.callback, compile_empty()
+
+    def calls() -> None:
+        for _ in range(CALLS):
+            mujoco.mj_forward(plant.model, plant.data)
+
     rounds = []
     for _ in range(CALL_ROUNDS):  # by turns, as the speed of a machine changes
         for callback in callbacks:
             with control_callback(callback):
-                start = perf_counter()
-                for _ in range(CALLS):
-                    mujoco.mj_forward(plant.model, plant.data)
-                rounds.append((perf_counter() - start) / CALLS)
+                rounds.append(_seconds(calls) / CALLS)
     return max(0.0, min(rounds[::2]) - min(rounds[1::2]))
 
 

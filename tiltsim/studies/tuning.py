@@ -17,7 +17,7 @@ from functools import partial
 from math import log
 from pathlib import Path as FilePath
 from statistics import mean
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from scipy.optimize import minimize
@@ -88,14 +88,8 @@ class Tuned:
     flights: int
 
 
-@dataclass(frozen=True)
-class Search:
-    """A search to be done.
-
-    Attributes:
-        vehicle: Name of the vehicle.
-        controller: Name of the controller.
-    """
+class Search(NamedTuple):
+    """A search to be done, by the names of the vehicle and the controller."""
 
     vehicle: str
     controller: str
