@@ -11,7 +11,7 @@ import pytest
 import tiltsim
 from tiltsim.flight.reading import load_flight
 from tiltsim.laws import assembling
-from tiltsim.scenario.gait_table import GaitTable
+from tiltsim.scenario.gait import GaitTable
 from tiltsim.simulation.batch import fly
 
 TABLES = {

@@ -468,7 +468,7 @@ def test_gymnasiums_own_checker_passes_without_a_warning(arguments):
     gymnasium = pytest.importorskip("gymnasium")
     from gymnasium.utils.env_checker import check_env
 
-    from tiltsim.env.registration import ID
+    from tiltsim.env.tasks import ID
 
     check_env(gymnasium.make(ID, **arguments).unwrapped, skip_render_check=True)
 

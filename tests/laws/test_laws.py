@@ -535,11 +535,6 @@ def test_law_states_integrate_their_controls_and_act_on_nothing(model):
     np.testing.assert_array_equal(data.qpos, bare.qpos)
 
 
-def test_a_negative_number_of_law_states_is_refused():
-    with pytest.raises(ValueError, match="law_states = -1"):
-        RotorcraftSpec("quadrotor", PRESETS["ar_drone_2"], law_states=-1)
-
-
 def test_the_extension_starts_at_the_weight():
     plant = MujocoPlant(assemble(scenario("yaw_position")))
     vehicle = PRESETS["ar_drone_2_unrounded"]

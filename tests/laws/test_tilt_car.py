@@ -78,19 +78,6 @@ def test_thrusts_pass_through_the_axis_at_the_half_angle():
         assert abs(np.cross(line, place - data.xpos[1])[2]) < 1e-12
 
 
-@pytest.mark.parametrize(
-    ("mistake", "message"),
-    [
-        ({"timestep": 0.0}, "simulation.timestep = 0.0"),
-        ({"integrator": "rk4"}, "'rk4': unknown; choose Euler, RK4"),
-        ({"law_states": -1}, "law_states = -1"),
-    ],
-)
-def test_a_model_that_cannot_be_is_refused(mistake, message):
-    with pytest.raises(ValueError, match=message):
-        TiltCarSpec(THESIS_CAR, **mistake)
-
-
 # --- the yaw answers the tilt ------------------------------------------------------------------
 
 

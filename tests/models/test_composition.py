@@ -18,7 +18,7 @@ from tests.models.test_user_vehicle import (
 )
 from tiltsim.models import mjcf_editing, rotorcraft, tilt_car
 from tiltsim.models.parts import ExtraActuators, Ground, Pod, RotorLimits, TiltServo
-from tiltsim.models.rotorcraft import MODELS, RotorcraftSpec, compile_model
+from tiltsim.models.rotorcraft import RotorcraftSpec, compile_model
 from tiltsim.models.tilt_car import TiltCarSpec, compile_tilt_car
 from tiltsim.models.user_vehicle import read_user_vehicle
 from tiltsim.resources import shipped_folder
@@ -29,7 +29,8 @@ FILE_NAMES = {"paths", "npaths", "mesh_pathadr", "tex_pathadr", "nbuffer"}
 """What differs where a file names meshes or textures: dm_control gives these files new names."""
 
 MJCF = shipped_folder("mjcf")
-FLEET = sorted({path.stem for path in MJCF.glob("*.xml")} - {"scene", "tilt_car", *MODELS})
+SHIPPED_MODELS = {"scene", "tilt_car", "tiltrotor", "quadrotor"}
+FLEET = sorted({path.stem for path in MJCF.glob("*.xml")} - SHIPPED_MODELS)
 
 LAYERS = (
     ExtraActuators(states=5, begins_with_rotor_speeds=True, memories=3, wrench=True),

@@ -443,26 +443,19 @@ def test_models_compiled_alike_are_independent():
     assert second.opt.gravity[2] == -9.8
 
 
-@pytest.mark.parametrize(
-    ("build", "message"),
-    [
-        (lambda: compile_of("tricopter", AR_DRONE), "'tricopter'.*tiltrotor, quadrotor"),
-        (lambda: compile_of("tiltrotor", AR_DRONE, integrator="rk4"), "'rk4'.*Euler, RK4"),
-        (lambda: compile_of("tiltrotor", AR_DRONE, timestep=0.0), "timestep = 0.0"),
-        (lambda: compile_of("tiltrotor", AR_DRONE, userdata_size=-1), "userdata_size = -1"),
-        (lambda: compile_of("quadrotor", AR_DRONE._replace(mass=-1.0)), "mass = -1.0"),
-        (lambda: compile_of("quadrotor", AR_DRONE._replace(arm_length=inf)), "arm_length = inf"),
-        (lambda: compile_of("quadrotor", AR_DRONE._replace(inertia_zz=6e-3)), "0.006"),
-    ],
-)
-def test_bad_arguments_are_refused_by_name_and_value(build, message):
-    with pytest.raises(ValueError, match=message):
-        build()
+def test_moments_that_no_body_has_are_refused():
+    with pytest.raises(ValueError, match=r"0\.006"):
+        compile_of("quadrotor", AR_DRONE._replace(inertia_zz=6e-3))
 
 
 @pytest.mark.parametrize(
     ("tables", "message"),
     [
+        ({"vehicle": {"model": "tricopter"}}, "tricopter.*tiltrotor"),
+        ({"vehicle": {"mass": -1.0}}, "mass = -1.0"),
+        ({"vehicle": {"arm_length": inf}}, "arm_length = Infinity"),
+        ({"simulation": {"integrator": "rk4"}}, "rk4.*choose RK4"),
+        ({"simulation": {"timestep": 0.0}}, "timestep = 0.0"),
         ({"vehicle": {"tilt_servo": {"natural_frequency": -3.0}}}, "natural_frequency = -3.0"),
         ({"vehicle": {"tilt_servo": {"damping_ratio": 0.0}}}, "damping_ratio = 0.0"),
         ({"vehicle": {"tilt_servo": {"max_angle": 0.0}}}, "max_angle = 0.0"),

@@ -194,7 +194,7 @@ def off_centre(x):
     [
         ("", None),
         (off_centre(1e-4), None),  # 7 micrometres: less than what must be aligned may be off
-        (off_centre(0.073), "not modeled: its centre of mass at (0.005, 0, 0) m\n"),
+        (off_centre(0.073), "not modeled: its center of mass at (0.005, 0, 0) m\n"),
         (
             SKEW,
             "not modeled: its products of inertia (xy, xz, yz) = "

@@ -616,7 +616,7 @@ def test_overrides_that_would_replace_another_are_refused(write, changes):
     path = write("gait = { type = 'fixed', angles = [0.1, 0.2, 0.3, 0.4] }")
     whole, part = sorted(changes, key=len)
     assert f"{path}: {whole} = " in (line := refusal(path, changes))
-    assert line.endswith(f": would replace {part}, which is given, too; give one of them")
+    assert line.endswith(f": would replace {part}, which is also given; give one of them")
 
 
 def test_an_entry_of_a_list_that_is_set_may_be_set_after_it(write):

@@ -13,7 +13,7 @@ from tiltsim.cli import main
 from tiltsim.commands.controllers import chosen_controllers
 from tiltsim.errors import InputError
 from tiltsim.exit_codes import INTERRUPTED
-from tiltsim.studies.call_times import compiled_time_per_call
+from tiltsim.studies.benchmark import compiled_time_per_call
 from tiltsim.studies.comparison import (
     MEASURES,
     SEARCHES,

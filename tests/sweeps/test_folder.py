@@ -20,8 +20,8 @@ from tiltsim.sweeps.dataset import load_results
 from tiltsim.sweeps.folder import open_sweep_folder, read_definition
 from tiltsim.sweeps.loading import load_sweep
 from tiltsim.sweeps.points import SweepPoints
+from tiltsim.sweeps.rows import read_rows
 from tiltsim.sweeps.running import run_sweep
-from tiltsim.sweeps.stored_rows import read_rows
 
 
 @pytest.fixture(scope="module")

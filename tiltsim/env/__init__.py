@@ -9,9 +9,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from tiltsim.env.environment import Environment, TiltrotorEnv
-from tiltsim.env.registration import register
 from tiltsim.env.task import Reward, Task, hover_reward
-from tiltsim.env.tasks import EPISODE_STEPS
+from tiltsim.env.tasks import EPISODE_STEPS, register
 
 if TYPE_CHECKING:
     from tiltsim.env.functions import EnvFunctions
@@ -30,7 +29,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    """`VectorEnv` and `EnvFunctions` when they are asked for, as they need JAX and Gymnasium."""
+    """`VectorEnv` and `EnvFunctions` on first use, as they need JAX and Gymnasium."""
     if name not in ("EnvFunctions", "VectorEnv"):
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     from tiltsim.env import vector

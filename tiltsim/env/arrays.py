@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from math import pi
+from operator import attrgetter
 from typing import Any, Final
 
 import numpy as np
@@ -44,18 +45,17 @@ _TILT_OBSERVATIONS: Final = ("tilt_angles", "tilt_rates")
 
 Rotation = npt.NDArray[np.float64]  # (3, 3), body to world; ``vector @ rotation`` is in body axes
 
-OBSERVATIONS: Final[dict[str, Callable[[Observation, Rotation], Floats]]] = {
-    "position": lambda seen, _: seen.position,
-    "velocity": lambda seen, _: seen.velocity,
-    "attitude": lambda seen, _: seen.attitude,
-    "quaternion": lambda seen, _: seen.quaternion,
-    "body_rates": lambda seen, _: seen.body_rates,
-    "tilt_angles": lambda seen, _: seen.tilt_angles,
-    "tilt_rates": lambda seen, _: seen.tilt_rates,
-    "rotor_speeds": lambda seen, _: seen.rotor_speeds,
-    "reference_position": lambda seen, _: seen.reference.position,
-    "reference_velocity": lambda seen, _: seen.reference.velocity,
-    "reference_attitude": lambda seen, _: seen.reference.attitude,
+Reader = Callable[[Observation, Rotation], Floats]
+
+
+def _field(name: str) -> Reader:
+    """The reader of a field of a controller's observation."""
+    read = attrgetter(name.replace("reference_", "reference."))
+    return lambda seen, _: read(seen)
+
+
+OBSERVATIONS: Final[dict[str, Reader]] = {
+    **{name: _field(name) for name in BOUNDS},
     "position_error_body": lambda seen, rotation: (
         (seen.reference.position - seen.position) @ rotation
     ),
@@ -65,21 +65,17 @@ OBSERVATIONS: Final[dict[str, Callable[[Observation, Rotation], Floats]]] = {
     "reference_acceleration_body": lambda seen, rotation: seen.reference.acceleration @ rotation,
     "up_body": lambda _, rotation: rotation[2],
 }
-"""What can be observed. Errors are reference minus actual; ``_body`` is along the body's axes."""
-
-
-def has_tilts(scenario: Scenario) -> bool:
-    """Whether the scenario's vehicle has tilt servos."""
-    return scenario.vehicle.has_tilting_rotors
+"""All observations. Errors are reference minus actual; ``_body`` is along the body's axes."""
 
 
 def action_spec(scenario: Scenario, max_tilt_angle: float | None = None) -> specs.BoundedArray:
     """Shape and bounds of an action: a thrust (N) by rotor, then a tilt angle (rad) by servo.
 
-    ``max_tilt_angle`` (rad) narrows the tilt angles, whose bounds are else those of the servos, or
+    ``max_tilt_angle`` (rad) narrows the tilt angles, whose bounds are otherwise the servos' or
     `TILT_RANGE`. Raises `InputError` if it is not above 0 or beyond them, or there are no tilts.
     """
-    if max_tilt_angle is not None and not has_tilts(scenario):
+    tilting = scenario.vehicle.has_tilting_rotors
+    if max_tilt_angle is not None and not tilting:
         raise InputError("environment: max_tilt_angle: the vehicle has no tilt servos")
     table = scenario.any_rotorcraft
     vehicle, name = table.resolve(), "thrusts"
@@ -92,7 +88,7 @@ def action_spec(scenario: Scenario, max_tilt_angle: float | None = None) -> spec
     if isinstance(vehicle, Multirotor) and table.min_rotor_speed is None:
         reversing = [slowest < 0.0 < fastest for slowest, fastest in vehicle.speed_ranges]
         low = np.where(reversing, -high, low)
-    if has_tilts(scenario):
+    if tilting:
         tilt = table.tilt_servo.max_angle or TILT_RANGE
         if max_tilt_angle is not None:
             check_bound("max_tilt_angle", max_tilt_angle, tilt)
@@ -132,7 +128,7 @@ class Observed:
     Args:
         bounds: Names of `OBSERVATIONS` and the largest absolute value of each; default: `BOUNDS`,
             for a vehicle without tilt servos less the tilts.
-        rotors, tilts: How many rotors and tilt servos the vehicle has.
+        rotors, tilts: Numbers of rotors and tilt servos.
 
     Raises:
         InputError: If there is no such observation of this vehicle, or a bound is invalid.

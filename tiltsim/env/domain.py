@@ -6,7 +6,7 @@ import json
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 from pydantic import ValidationError
@@ -14,17 +14,14 @@ from pydantic import ValidationError
 from tiltsim.errors import InputError
 from tiltsim.scenario.loading import without_none
 from tiltsim.scenario.messages import one_line_message
+from tiltsim.scenario.scenario import Scenario
 from tiltsim.sweeps.checks import check_points
 from tiltsim.sweeps.definition import UNUSED, SweepDefinition
 from tiltsim.sweeps.loading import load_sweep
 from tiltsim.sweeps.points import SweepPoints
-from tiltsim.sweeps.tables import NormalAxis, SeedAxis, Sweep, UniformAxis
+from tiltsim.sweeps.tables import Axis, NormalAxis, SeedAxis, Sweep, UniformAxis
 from tiltsim.system.text import short_repr
 from tiltsim_controllers.mathematics.scalar import Floats
-
-if TYPE_CHECKING:
-    from tiltsim.scenario.scenario import Scenario
-    from tiltsim.sweeps.tables import Axis
 
 LARGEST_SEED: Final = 2**31
 
@@ -82,7 +79,7 @@ class Domain:
         return self._points.scenario(self._axes(generator))
 
     def values(self, generator: np.random.Generator) -> dict[str, Any]:
-        """What `draw` changes in the base, by key, with the same draws."""
+        """The changes that `draw` makes in the base, by key, with the same draws."""
         axes = self._axes(generator)
         every = axes | self._points.derived(axes)
         return {key: value for key, value in every.items() if "." in key}
@@ -98,7 +95,7 @@ class Domain:
 
     @cached_property
     def _uniform(self) -> tuple[Any, Floats, Floats] | None:
-        """Of a domain with uniform axes only: the axis, low and high of each number."""
+        """The axis, low and high of each number, if all axes are uniform; else None."""
         columns: list[int] = []
         ends: list[tuple[float, float]] = []
         for column, axis in enumerate(self._points.sweep.axis):
@@ -129,7 +126,7 @@ def _flat(values: Mapping[str, Any]) -> Floats:
 def _row(axis: Axis, generator: np.random.Generator, positions: dict[str, int]) -> Sequence[Any]:
     """One value for each key of an axis; keys that move together get the same draw.
 
-    ``positions`` holds those drawn for groups so far.
+    ``positions`` holds the positions drawn for groups so far.
     """
     if isinstance(axis, UniformAxis):
         return [float(generator.uniform(axis.low, axis.high))] * len(axis.targets)

@@ -51,7 +51,7 @@ class Environment(dm_env.Environment):  # type: ignore[misc]
 
     Args:
         task: Its scenario, observation, reward and termination make an episode.
-        seed: Of the scenarios drawn; default: the ``simulation.seed`` of the task's scenario. The
+        seed: Seed of the draws; default: the ``simulation.seed`` of the task's scenario. The
             same seed and the same actions give the same episodes, bit for bit.
     """
 
@@ -145,7 +145,7 @@ class Environment(dm_env.Environment):  # type: ignore[misc]
 
     @property
     def generator(self) -> np.random.Generator:
-        """What the scenarios of later episodes are drawn with."""
+        """The generator that draws the scenarios of later episodes."""
         return self._generator
 
     @property
@@ -183,7 +183,7 @@ class Environment(dm_env.Environment):  # type: ignore[misc]
         return self._renderer.frame(len(flight) - 1)
 
     def close(self) -> None:
-        """Free what `render` keeps."""
+        """Free the renderer."""
         if self._renderer is not None:
             self._renderer.canvas.close()
             self._renderer = None
@@ -222,8 +222,8 @@ class TiltrotorEnv(Environment):
             ``simulation.control_timestep``; where both are 0, one physics step.
         reward: See `Reward`.
         domain: Axes as in a sweep file, such as ``{"key": "vehicle.mass", "type": "uniform", "low":
-            0.9, "high": 1.1, "relative": True}``, drawn anew for every episode.
-        seed: Of the draws; default: the scenario's ``simulation.seed``.
+            0.9, "high": 1.1, "relative": True}``, drawn again for every episode.
+        seed: Seed of the draws; default: the scenario's ``simulation.seed``.
         max_position_error: Distance from the reference (m) beyond which the vehicle counts as lost.
         observations: Names of `tiltsim.env.arrays.OBSERVATIONS` and the largest absolute value of
             each, in their order; default: `tiltsim.env.arrays.BOUNDS`.
@@ -262,7 +262,7 @@ class TiltrotorEnv(Environment):
 
         Args:
             path: A TOML file or the name of a sweep in the library.
-            **arguments: As for `TiltrotorEnv`, without ``scenario`` and ``domain``.
+            **arguments: Arguments of `TiltrotorEnv`, without ``scenario`` and ``domain``.
 
         Raises:
             InputError: If there is no such sweep, or it is a search.

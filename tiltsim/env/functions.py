@@ -8,13 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from operator import attrgetter
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from tiltsim.arrays.jax_arrays import JaxArrays, recomputes, require_jax
 from tiltsim.arrays.lifting import Lifting
 from tiltsim.closed_loop.limits import WITHIN_LIMITS
+from tiltsim.closed_loop.loop import ClosedLoop
 from tiltsim.env.task import Task
 from tiltsim.equations.implicitfast import make_implicitfast_step, turned
 from tiltsim.equations.rigid_body import rigid_body
@@ -23,7 +24,8 @@ from tiltsim.laws.assembling import loop_of
 from tiltsim.laws.commanded import commanded_parameters, with_command
 from tiltsim.laws.layers.on_equations import on_equations
 from tiltsim.plants.command import Observation, Reference
-from tiltsim.scenario.override_keys import split_key
+from tiltsim.scenario.override_keys import split_key, value_at, with_value
+from tiltsim.scenario.scenario import Scenario
 from tiltsim.scenario.surroundings import SensorTable
 from tiltsim.scenario.vehicle import PodTable, VehicleTable
 from tiltsim.simulation.array_plan import ArrayPlan, PlannedFlight
@@ -32,10 +34,6 @@ from tiltsim.vehicles.rotorcraft.layout import QW, TILT_1, TILT_RATE_1
 from tiltsim_controllers.mathematics.rotation import euler_from_quaternion, rotation_from_quaternion
 from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.references.trajectories import reference_derivatives
-
-if TYPE_CHECKING:
-    from tiltsim.closed_loop.loop import ClosedLoop
-    from tiltsim.scenario.scenario import Scenario
 
 NOT_FINITE: Final = -1
 """In place of the code of a limit."""
@@ -57,7 +55,7 @@ class Episode(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """What a step leads to; arrays."""
+    """The result of a step, in arrays."""
 
     observation: Any  # (entries,), from -1 to 1
     reward: Any
@@ -77,7 +75,7 @@ def check_precision(precision: object) -> None:
 class EnvFunctions:
     """An environment as pure functions of arrays: `reset` and `step`.
 
-    They do what `tiltsim.env.gymnasium.GymnasiumEnv` does with ``flat=True``. The vehicle is
+    They match `tiltsim.env.gymnasium.GymnasiumEnv` with ``flat=True``. The vehicle is
     integrated as MuJoCo does with ``implicitfast``, but its pods are massless.
 
     Args:
@@ -86,11 +84,11 @@ class EnvFunctions:
         precision: "float32" or, if JAX has 64-bit numbers enabled, "float64".
 
     Attributes:
-        scenario: That of the task, before any draws.
-        keys: What a domain draws for an episode, by the scenario's keys.
+        scenario: The scenario of the task, before any draws.
+        keys: Keys of the scenario that a domain draws for an episode.
 
     Raises:
-        InputError: If the task is none of these, or draws what is no number of a flight.
+        InputError: If the task is none of these, or draws anything but numbers of a flight.
     """
 
     def __init__(self, task: Task, precision: str = "float32") -> None:
@@ -113,7 +111,7 @@ class EnvFunctions:
         self._slowest, self._fastest = rotorcraft.speeds_along_spin
         self._qvel = TILT_1 + self._tilts
         self._act = self._qvel + TILT_RATE_1 + self._tilts
-        # A command is written to the speeds, or to what they lag behind.
+        # A command is written to the speeds, or to the speeds that they follow with a lag.
         lags = rotorcraft.rotor_time_constant is not None
         self._commanded = self._act + self._rotors * lags
         equations = loop.equations
@@ -168,7 +166,7 @@ class EnvFunctions:
 
         Args:
             episode: From `reset` or `step`.
-            action: From -1 to 1, as that of `tiltsim.env.gymnasium.GymnasiumEnv`.
+            action: Entries from -1 to 1, as in `tiltsim.env.gymnasium.GymnasiumEnv`.
         """
         jnp, planned = self._numpy, self._planned(episode.numbers)
         middle, half = 0.5 * (self._high + self._low), 0.5 * (self._high - self._low)
@@ -197,7 +195,7 @@ class EnvFunctions:
         tree, place = self._plan.parameters, 0
         for key, width in zip(self.keys, self._widths, strict=True):
             value = numbers[place] if width is None else tuple(numbers[place : place + width])
-            tree, place = _with(tree, split_key(key), value), place + (width or 1)
+            tree, place = with_value(tree, split_key(key), value), place + (width or 1)
         return self._plan(tree)
 
     def _flown(self, episode: Episode, action: Any, planned: PlannedFlight) -> Episode:
@@ -239,7 +237,7 @@ class EnvFunctions:
         reference, spins = planned.plan.reference, jnp.asarray(self._spins, self._dtype)
         none, tilts = jnp.zeros(0, self._dtype), self._tilts  # a stack of none is an error
         motion = jnp.asarray(self._reference_at(time, reference, planned.knots)[:9])
-        unseen = np.full(3, np.nan)  # what is not observed, as the gait
+        unseen = np.full(3, np.nan)  # values that are not observed, as the gait
         seen = Observation(
             time=time,
             position=jnp.stack(state[:3]),
@@ -280,13 +278,8 @@ class EnvFunctions:
         return (every / jnp.asarray(self._bounds, self._dtype)).astype("float32")
 
     def _check_key(self, key: str, value: Any) -> None:
-        """Refuse to draw what is no number of a flight."""
-        found: Any = self._plan.parameters
-        try:
-            for step in split_key(key):
-                found = found[step]
-        except (KeyError, TypeError):
-            found = None
+        """Refuse to draw anything but numbers of a flight."""
+        found = value_at(self._plan.parameters, key)
         if found is None or np.shape(found) != np.shape(value):
             names = ", ".join(self._plan.parameters)
             raise InputError(
@@ -295,19 +288,8 @@ class EnvFunctions:
             )
 
 
-def _with(tree: Any, path: Sequence[str | int], value: Any) -> Any:
-    """A tree of dicts and tuples with another value at a path."""
-    if not path:
-        return value
-    step, *rest = path
-    inner = _with(tree[step], rest, value)
-    if isinstance(step, str):
-        return {**tree, step: inner}
-    return (*tree[:step], inner, *tree[step + 1 :])
-
-
 def _check_supported(scenario: Scenario) -> None:
-    """Refuse what these equations do not have."""
+    """Refuse features that these equations do not have."""
     allowed: dict[str, object] = {
         "vehicle.rotor_inertia": 0.0,
         "ground": None,

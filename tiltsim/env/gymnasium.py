@@ -42,8 +42,8 @@ class GymnasiumEnv(gymnasium.Env):  # type: ignore[misc]
         flat: Observe one vector: the arrays in their order, each divided by its bound, so that its
             entries are from -1 to 1.
         render_mode: ``"rgb_array"``, for `render`, or None.
-        **arguments: Those of `TiltrotorEnv`. Without ``seed``, and without one in `reset`, episodes
-            are drawn anew in every process, as Gymnasium has it; those of an ``env`` by its own.
+        **arguments: Arguments of `TiltrotorEnv`. Without ``seed``, here and in `reset`, every
+            process draws other episodes, as in Gymnasium; an ``env`` keeps its own draws.
 
     Raises:
         InputError: If there is no such render mode, and as `TiltrotorEnv`.
@@ -98,7 +98,7 @@ class GymnasiumEnv(gymnasium.Env):  # type: ignore[misc]
         return observation, {}
 
     def step(self, action: npt.ArrayLike) -> tuple[Observed, float, bool, bool, dict[str, Any]]:
-        """Hold an action for one control step; ``info["cause"]`` is that of a termination."""
+        """Hold an action for one control step; ``info["cause"]`` explains a termination."""
         if not self._flying:
             raise RuntimeError("the episode has ended: call reset()")
         array = np.asarray(action, dtype=np.float64)
@@ -126,7 +126,7 @@ class GymnasiumEnv(gymnasium.Env):  # type: ignore[misc]
         return self.env.render() if self.render_mode else None
 
     def close(self) -> None:
-        """Free what `render` keeps."""
+        """Free the renderer."""
         self.env.close()
 
     def _observed(self, arrays: dict[str, Floats]) -> Observed:

@@ -54,7 +54,7 @@ class Task:
 
     A subclass may replace any of them.
 
-    Its parameters are those of `tiltsim.env.TiltrotorEnv`; ``domain`` may be a `Domain`, too.
+    It takes the parameters of `tiltsim.env.TiltrotorEnv`; ``domain`` may also be a `Domain`.
     """
 
     def __init__(
@@ -74,7 +74,7 @@ class Task:
         self._timing = (
             {} if control_timestep is None else {"simulation.control_timestep": control_timestep}
         )
-        self.controller = scenario.controller  # in the place of which actions are taken
+        self.controller = scenario.controller  # replaced by the actions
         self.scenario = self._commanded(scenario)
         self.domain = domain if isinstance(domain, Domain) else None
         varies = not (domain is None or (isinstance(domain, Sequence) and not domain))

@@ -1,10 +1,11 @@
-"""The learning tasks: the arguments of `tiltsim.env.TiltrotorEnv` for each, by name.
+"""The learning tasks by name: arguments of `tiltsim.env.TiltrotorEnv`, registered with Gymnasium.
 
 The controller of their scenarios is the built-in one that policies are compared with.
 """
 
 from __future__ import annotations
 
+from importlib.util import find_spec
 from math import pi
 from typing import Any, Final
 
@@ -41,7 +42,7 @@ OBSERVATIONS: Final = {
     "up_body": 1.0,
     "body_rates": 10.0,  # rad/s
 }
-"""What is observed, with bounds. Along the body's axes one policy serves every heading."""
+"""Observations and their bounds. Along the body's axes one policy serves every heading."""
 
 
 def _uniform(key: str, *bounds: float) -> list[dict[str, Any]]:
@@ -103,3 +104,28 @@ TASKS: Final[dict[str, dict[str, Any]]] = {
         },
     ),
 }
+
+ID: Final = "tiltsim/Tiltrotor-v0"
+"""Name of `tiltsim.env.TiltrotorEnv` with its defaults; the tasks are ``tiltsim/NAME-v0``."""
+
+ENTRY_POINT: Final = "tiltsim.env.gymnasium:GymnasiumEnv"
+VECTOR_ENTRY_POINT: Final = "tiltsim.env.vector:task_of_registry"
+
+
+def register() -> None:
+    """Register the tasks with ``gymnasium.make``, where Gymnasium is installed."""
+    if find_spec("gymnasium") is None:
+        return
+    import gymnasium
+
+    if ID in gymnasium.registry:
+        return
+    gymnasium.register(ID, entry_point=ENTRY_POINT)
+    for name, arguments in TASKS.items():
+        gymnasium.register(
+            f"tiltsim/{name}-v0",
+            entry_point=ENTRY_POINT,
+            vector_entry_point=VECTOR_ENTRY_POINT if find_spec("jax") else None,
+            kwargs={**arguments, "flat": True},
+            max_episode_steps=EPISODE_STEPS,
+        )

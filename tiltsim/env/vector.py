@@ -38,21 +38,21 @@ class VectorEnv(gymnasium.vector.VectorEnv):  # type: ignore[misc]
 
     Environment ``i`` of ``reset(seed=s)`` draws the same episodes as the single environment does
     with seed ``s + i``, and has the same observations and rewards, but for rounding. An episode
-    that has ended begins anew at the next step, whose action is not used. Rewards are float64, as
-    those of Gymnasium's own vectors, but for ``arrays``, where they have the ``precision``.
+    that has ended restarts at the next step, whose action is not used. Rewards are float64, as in
+    Gymnasium's own vectors, but for ``arrays``, where they have the ``precision``.
 
     Args:
         task: The id of a task, such as ``"tiltsim/Hover-v0"``, or any scenario.
         num_envs: Number of environments.
         precision: "float32" or "float64".
         arrays: Return arrays of JAX, which stay on its device; default: NumPy's.
-        **arguments: Those of `tiltsim.env.TiltrotorEnv`, in place of the task's own.
+        **arguments: Arguments of `tiltsim.env.TiltrotorEnv`, in place of the task's own.
 
     Attributes:
         functions: One environment as pure functions; see `tiltsim.env.functions.EnvFunctions`.
 
     Raises:
-        InputError: As `TiltrotorEnv` and `EnvFunctions`, and if a package is missing.
+        InputError: As in `TiltrotorEnv` and `EnvFunctions`, and if a package is missing.
     """
 
     metadata = {"autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012, as in gymnasium
@@ -128,7 +128,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):  # type: ignore[misc]
         """Begin all episodes. There are no options.
 
         Args:
-            seed: One for each environment, or that of the first, which others count on from;
+            seed: One for each environment, or the first one's, from which the others count on;
                 default: go on with the draws.
             options: Not used.
         """
@@ -213,13 +213,13 @@ def task_of_registry(
     """A registered task for ``gymnasium.make_vec``, which knows its arguments.
 
     Args:
-        num_envs, **arguments: As of `VectorEnv`.
-        scenario: Of the task.
+        num_envs, **arguments: See `VectorEnv`.
+        scenario: Scenario of the task.
         flat: Whether observations are vectors, as they are here.
         max_episode_steps: Control steps after which an episode is over, if its time is not before.
 
     Raises:
-        InputError: As `VectorEnv`, and if observations are not to be flat.
+        InputError: As in `VectorEnv`, and if observations are not to be flat.
     """
     if not flat:
         raise InputError("environment: flat = False: arrays have flat observations only")

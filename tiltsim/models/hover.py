@@ -16,7 +16,7 @@ from tiltsim_controllers.mathematics.scalar import Floats, Values
 from tiltsim_controllers.vehicle.effectiveness import force_and_torque
 
 TOLERANCE = 1e-9
-"""Relative, of the singular values of force and torque and of the limits."""
+"""Relative tolerance of the singular values of force and torque and of the limits."""
 
 REST = 1e-12
 """A rotor with this part of the largest input is at rest."""
@@ -37,7 +37,7 @@ def hover_speeds(
         tilts: rad.
         limits: Lowest and highest speed (rad/s) along the spin, the first negative for rotors that
             reverse.
-        dimension: How many components of the force are controlled.
+        dimension: Number of components of the force that are controlled.
 
     Raises:
         InputError: If there are none within the limits.

@@ -39,7 +39,7 @@ def parse_mjcf(path: Path) -> Any:
 
 
 def _with_inclusions(path: Path) -> bytes:
-    """The MJCF of a file with what it includes in place, which dm_control would put at the end."""
+    """The MJCF of a file with included files in place; dm_control would put them at the end."""
     tree = ElementTree.fromstring(path.read_bytes())
     tree.attrib.setdefault("model", "MuJoCo Model")  # as MuJoCo calls it
     pending = [tree]
@@ -49,7 +49,7 @@ def _with_inclusions(path: Path) -> bytes:
             inside = ElementTree.fromstring((path.parent / include.get("file", "")).read_bytes())
             place = list(element).index(include)
             element[place : place + 1] = list(inside)
-            pending.append(element)  # for what that file includes
+            pending.append(element)  # for the files that it includes
             break
         else:
             pending += element
@@ -60,7 +60,7 @@ Compile = Callable[[], "mujoco.MjModel"]
 
 
 def compiler_of(root: Any) -> Compile:
-    """What compiles a tree as it is now, whatever is edited afterwards."""
+    """A function that compiles a tree as it is now, whatever is edited afterwards."""
     import mujoco
 
     from tiltsim.models.mjspec_tree import MjSpecTree
@@ -68,7 +68,7 @@ def compiler_of(root: Any) -> Compile:
     if isinstance(root, MjSpecTree):
         compile_copy: Compile = root.spec.copy().compile
         return compile_copy
-    unnamed = r' name="//unnamed_[^"]*"'  # dm_control's names for what has none
+    unnamed = r' name="//unnamed_[^"]*"'  # dm_control's names of unnamed elements
     text = re.sub(unnamed, "", root.to_xml_string())
     return partial(mujoco.MjModel.from_xml_string, text, root.get_assets())
 
@@ -96,11 +96,11 @@ def remove_visuals(root: Any, *, contacts: bool) -> None:
 def set_servos(
     root: Any, names: Sequence[str], servo: TiltServo, inertias: Sequence[float]
 ) -> None:
-    """Give hinges and their actuators, position servos of the same names, a servo's behaviour.
+    """Give hinges and their actuators, position servos of the same names, a servo's behavior.
 
     Args:
         root: The tree.
-        names: Of the hinges.
+        names: Names of the hinges.
         servo: Natural frequency, damping and stops.
         inertias: About each hinge, kg m^2.
     """
@@ -162,7 +162,7 @@ def add_wrench(root: Any, name: str, site: str) -> None:
 
 
 def add_hinge_torques(root: Any, name: str, hinges: int) -> None:
-    """Append a torque about each of so many tilt hinges."""
+    """Append a torque about each of the first ``hinges`` tilt hinges."""
     for i in range(1, hinges + 1):
         _add_actuator(root, f"{name}_hinge_{i}", joint=f"tilt_{i}")
     _extend_keyframes(root, ctrl=hinges)

@@ -15,12 +15,12 @@ from xml.etree import ElementTree
 from tiltsim.system.files import is_file, is_folder
 
 MAX_BYTES: Final = 4 * 2**20
-"""Of the file and of those that it includes, together."""
+"""Size of the file and all files that it includes, together."""
 
 MAX_ELEMENTS: Final = 2_000
-"""XML elements, those of included files and of each replica counted.
+"""XML elements, with included files and each replica counted.
 
-Ten times those of eight rotors on tilting arms. Editing the file takes a time that grows with their
+Ten times the elements of eight rotors on tilting arms. The time to edit a file grows with their
 square: with 2,000 some 3 s, with 5,000 above 15 s.
 """
 
@@ -31,7 +31,7 @@ MAX_SIZE: Final = 100_000
 """An attribute of ``<size>``."""
 
 MAX_VALUES: Final = 1_000
-"""Values that each element of a kind has for the user, or a sensor of the user's."""
+"""User values of each element of a kind, or of a user's sensor."""
 
 MAX_FILES: Final = 10_000
 """Places at which the files are searched that it names."""
@@ -102,7 +102,7 @@ _versions: dict[Path, Version] = {}
 
 
 def mjcf_version(path: Path) -> Version:
-    """The version of an MJCF file with what it includes and names. Raises as `check_mjcf`."""
+    """The version of an MJCF file and its named files. Raises ValueError as `check_mjcf`."""
     known = _versions.get(path)
     if known is None or known != _version_of(file for file, *_ in known):
         known = _versions[path] = _version_of(sorted(check_mjcf(path)))
@@ -137,7 +137,7 @@ def _check_attributes(element: Any) -> None:
 
 
 def _numbers(text: str) -> list[float]:
-    """The numbers in an attribute; those of text that is none are left out."""
+    """The numbers in an attribute; other words are left out."""
     found = []
     for word in text.split():
         try:

@@ -19,7 +19,7 @@ _NAMES: Final = {
     "solimplimit": "solimp_limit",
     "solreflimit": "solref_limit",
 }
-"""Attributes that MuJoCo calls otherwise than MJCF."""
+"""Attributes with other names in MuJoCo than in MJCF."""
 
 _ENUMERATIONS: Final[dict[str, tuple[Any, str]]] = {
     "biastype": (mujoco.mjtBias, "mjBIAS_"),
@@ -68,7 +68,7 @@ _SIZES: Final = {
     mujoco.mjtGeom.mjGEOM_CAPSULE: 2,
     mujoco.mjtGeom.mjGEOM_CYLINDER: 2,
 }
-"""How many numbers are the size of a shape, if not three."""
+"""Count of numbers in the size of a shape, if not three."""
 
 
 class _Shape(_Element):
@@ -122,7 +122,7 @@ class _Body(_Element):
         return [_wrapped(self.spec, kind, element) for element in own]
 
     def all_children(self) -> list[_Element]:
-        """Those that may have a position or a size."""
+        """The children that may have a position or a size."""
         kinds = ("joint", "geom", "site", "camera", "light", "body")
         inertial = [] if self.inertial is None else [self.inertial]
         groups = [self.find_all(kind, immediate_children_only=True) for kind in kinds]

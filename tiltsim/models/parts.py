@@ -3,23 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from math import inf, isfinite
+from math import inf
 from typing import Final, NamedTuple
-
-INTEGRATORS: Final = ("Euler", "RK4", "implicit", "implicitfast")
-
-
-def require_positive(name: str, value: float, unit: str) -> None:
-    """Raise ValueError unless a value, named by its key and unit, is finite and above 0."""
-    if not (isfinite(value) and value > 0.0):
-        raise ValueError(f"{name} = {value!r}: must be finite and above 0 {unit}")
-
-
-def require_choice(name: str, value: str, choices: tuple[str, ...]) -> None:
-    """Raise ValueError unless a value, named by its key, is one of the choices."""
-    if value not in choices:
-        raise ValueError(f"{name} = {value!r}: unknown; choose {', '.join(choices)}")
-
 
 WRENCH_SIZE: Final = 6
 
@@ -30,7 +15,7 @@ class ExtraActuators(NamedTuple):
     states: int = 0  # integrators that act on nothing: ctrl is the rate of an activation
     memories: int = 0  # act on nothing and have no state: a held ctrl is all there is
     wrench: bool = False  # force (N) and torque (N m) on the body, six, in body axes
-    hinge_torques: int = 0  # N m about so many tilt hinges
+    hinge_torques: int = 0  # number of tilt hinges with a torque, N m
     begins_with_rotor_speeds: bool = False  # these states keep within the rotors' limits
 
     @property
@@ -67,7 +52,7 @@ It loads the servo but, other than the pod's own inertia, turns no body in react
 
 @dataclass(frozen=True)
 class Pod:
-    """The part of a rotor that tilts; its centre of mass lies on the hinge.
+    """The part of a rotor that tilts; its center of mass lies on the hinge.
 
     The defaults are negligible, because the thesis gives its pods no inertia: a pod that turns by
     1 rad then turns chapter 3's body by less than 5e-11 rad. MuJoCo refuses moving bodies below
@@ -75,7 +60,7 @@ class Pod:
 
     Attributes:
         mass: kg.
-        inertia: About any axis through the pod's centre of mass, kg m^2; the same for all axes, so
+        inertia: About any axis through the pod's center of mass, kg m^2; equal for all axes, so
             that the vehicle's inertia does not depend on the tilt.
     """
 
@@ -88,7 +73,7 @@ class RotorLimits:
     """Limits on a rotor's speed, enforced by MuJoCo at the end of each step.
 
     Within a step the stages of RK4 may see speeds beyond a limit by what one step adds. The thrust
-    stays within the limits there, too.
+    also stays within the limits there.
 
     Attributes:
         min_speed: Smallest ``|varpi|``, rad/s: the rotor cannot reverse. None lets it stop and
@@ -132,7 +117,7 @@ class Ground:
 
 @dataclass(frozen=True, kw_only=True)
 class ModelSpec:
-    """Common specification of the vehicles' models. Raises ValueError if a value is out of range.
+    """Common specification of the vehicles' models; a scenario's tables have checked its values.
 
     Attributes:
         timestep: Physics time step, s.
@@ -148,11 +133,3 @@ class ModelSpec:
     userdata_size: int = 0
     tilt_servo: TiltServo = field(default=TiltServo())
     law_states: int = 0
-
-    def __post_init__(self) -> None:
-        require_choice("simulation.integrator", self.integrator, INTEGRATORS)
-        require_positive("simulation.timestep", self.timestep, "s")
-        for name in ("userdata_size", "law_states"):
-            size = getattr(self, name)
-            if size < 0:
-                raise ValueError(f"{name} = {size!r}: must be at least 0")

@@ -1,4 +1,4 @@
-"""The rotors of a compiled vehicle: what each does to the body, at any tilt."""
+"""The rotors of a compiled vehicle: their effect on the body at any tilt."""
 
 from __future__ import annotations
 
@@ -9,14 +9,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tiltsim.models.vehicle_parts import Parts, VehiclePose
 from tiltsim_controllers.mathematics.scalar import Floats, Triple, Values
 from tiltsim_controllers.vehicle.effectiveness import Rotor
 
 if TYPE_CHECKING:
     import mujoco
-
-    from tiltsim.models.pose import VehiclePose
-    from tiltsim.models.vehicle_parts import Parts
 
 
 @dataclass(frozen=True)
@@ -26,9 +24,9 @@ class Multirotor:
     Attributes:
         mass: kg.
         gravity: m/s^2.
-        inertia: About the centre of mass, untilted, everything on board included: nine entries,
+        inertia: About the center of mass, untilted, everything on board included: nine entries,
             rows first, kg m^2.
-        rotors: Where they are and what they do.
+        rotors: Places, axes and coefficients of the rotors.
         speed_ranges: Lowest and highest speed of each rotor, signed, rad/s; infinite where the file
             gives none.
         tilts: Number of tilt hinges.
@@ -43,7 +41,7 @@ class Multirotor:
 
     @cached_property
     def table(self) -> Values:
-        """Of the rotors; see `tiltsim_controllers.vehicle.effectiveness`."""
+        """Table of the rotors; see `tiltsim_controllers.vehicle.effectiveness`."""
         return tuple(entry for rotor in self.rotors for entry in rotor.entries)
 
     @property

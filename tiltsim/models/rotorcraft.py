@@ -25,16 +25,7 @@ from tiltsim.models.mjcf_editing import (
     remove_visuals,
     set_servos,
 )
-from tiltsim.models.parts import (
-    SERVO_ARMATURE,
-    ExtraActuators,
-    Ground,
-    ModelSpec,
-    Pod,
-    RotorLimits,
-    require_choice,
-    require_positive,
-)
+from tiltsim.models.parts import SERVO_ARMATURE, ExtraActuators, Ground, ModelSpec, Pod, RotorLimits
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.models.user_vehicle import UserVehicle
 from tiltsim.resources import shipped_folder
@@ -47,15 +38,13 @@ from tiltsim_controllers.vehicle.states import ROTORS
 if TYPE_CHECKING:
     import mujoco
 
-MODELS: Final = ("tiltrotor", "quadrotor", "multirotor")
-
 START_SPEED: Final = 300.0
 """Rotor speed (rad/s) of the keyframe ``start``."""
 
 
 @dataclass(frozen=True)
 class RotorcraftSpec(ModelSpec):
-    """Specification of a rotorcraft's model. Raises ValueError if a value is out of range.
+    """Specification of a rotorcraft's model.
 
     Attributes:
         model: ``tiltrotor``, ``quadrotor`` (without hinges; its pods are part of the body) or
@@ -63,7 +52,7 @@ class RotorcraftSpec(ModelSpec):
         vehicle: Physical parameters, the pods' included.
         pod: Mass and inertia of a pod. Ignored for a quadrotor.
         rotor_limits: Limits on the rotor speeds.
-        extra_actuators: What layers around the control law append after the law's states.
+        extra_actuators: Actuators that layers append after the law's states.
         ground: Ground to take off from and land on; None disables contacts.
         user_vehicle: A user's file in place of the shipped one, with its own arms and pods; its
             geoms may have mass and are always kept.
@@ -77,13 +66,6 @@ class RotorcraftSpec(ModelSpec):
     extra_actuators: tuple[ExtraActuators, ...] = ()
     ground: Ground | None = None
     user_vehicle: UserVehicle | None = None
-
-    def __post_init__(self) -> None:
-        require_choice("vehicle.model", self.model, MODELS)
-        super().__post_init__()
-        if isinstance(self.vehicle, Vehicle):
-            for name, value in self.vehicle._asdict().items():
-                require_positive(f"vehicle.{name}", value, "(SI)")
 
     @property
     def spins(self) -> Values:
@@ -107,12 +89,12 @@ class RotorcraftSpec(ModelSpec):
 def compile_model(spec: RotorcraftSpec, *, visuals: bool = True) -> mujoco.MjModel:
     """Compile the MuJoCo model of a rotorcraft.
 
-    Mass and inertia of the compiled model are the vehicle's at any tilt: those of the pods are
+    Mass and inertia of the compiled model are the vehicle's at any tilt: the pods' are
     subtracted from the body's. There are no contacts but those between vehicle and ground.
 
     Args:
         spec: The specification of the model.
-        visuals: Whether to keep what is drawn or measured only: geoms, cameras, lights and sensors.
+        visuals: Whether to keep parts that are only drawn or measured: geoms, cameras and others.
             They do not affect the physics, but updating them takes a third of a step.
 
     Returns:
@@ -141,7 +123,7 @@ def compile_model(spec: RotorcraftSpec, *, visuals: bool = True) -> mujoco.MjMod
 
 
 MODEL_CACHE_SIZE: Final = 32
-"""How many models are kept to derive others from."""
+"""Number of models that are kept to derive others from."""
 
 _compiled: dict[tuple[RotorcraftSpec, bool], tuple[mujoco.MjModel, mujoco.MjData]] = {}
 """Compiled models, with data to work in, by structure and visuals.
@@ -180,7 +162,7 @@ def _with_parameters(
 
 @lru_cache(maxsize=64)  # dm_control takes several times longer than MuJoCo's compiler
 def _compose(spec: RotorcraftSpec) -> tuple[Compile, Compile]:
-    """What compiles the complete vehicle, and the same without visuals.
+    """Functions that compile the complete vehicle, and the vehicle without visuals.
 
     A flight is simulated with the one and shown with the other, so both are made at once.
     """
@@ -238,7 +220,7 @@ def _compose(spec: RotorcraftSpec) -> tuple[Compile, Compile]:
 
 
 def _center_site(root: Any, spec: RotorcraftSpec) -> str:
-    """The name of a site in the centre of mass, along the body's axes, added if necessary."""
+    """The name of a site in the center of mass, along the body's axes, added if necessary."""
     if spec.user_vehicle is None or isinstance(spec.vehicle, Vehicle):
         return "imu"
     name = "layer_center"
@@ -248,7 +230,7 @@ def _center_site(root: Any, spec: RotorcraftSpec) -> str:
 
 
 def _moves_alike(complete: Compile, bare: Compile) -> bool:
-    """Whether what is drawn and measured gives a user's vehicle no mass, spring or damper."""
+    """Whether drawn and measured parts give a user's vehicle no mass, spring or damper."""
     try:
         with mujoco_hooks():
             models = complete(), bare()

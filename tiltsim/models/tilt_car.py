@@ -15,7 +15,7 @@ from tiltsim.models.mjcf_editing import (
     remove_visuals,
     set_servos,
 )
-from tiltsim.models.parts import ModelSpec, require_positive
+from tiltsim.models.parts import ModelSpec
 from tiltsim.resources import shipped_folder
 from tiltsim.system.hooks import mujoco_hooks
 from tiltsim.system.locks import one_thread_at_a_time
@@ -32,16 +32,11 @@ START_SPEED: Final = 200.0
 
 @dataclass(frozen=True)
 class TiltCarSpec(ModelSpec):
-    """Specification of a tilt-car's model. Raises ValueError if a value is out of range."""
+    """Specification of a tilt-car's model."""
 
     car: TiltCar  # both discs weigh half of the mass
     _: KW_ONLY
     rotor_floor: bool = True  # whether the rotor speeds, states of the simulation, stop at zero
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        for name, value in self.car._asdict().items():
-            require_positive(name, value, "(SI)")
 
 
 @one_thread_at_a_time
@@ -50,7 +45,7 @@ def compile_tilt_car(spec: TiltCarSpec, *, visuals: bool = True) -> mujoco.MjMod
 
     Args:
         spec: The specification of the model.
-        visuals: Whether to keep what is drawn or measured only, as in `tiltsim.models.rotorcraft`.
+        visuals: Whether to keep parts that are only drawn or measured, as for rotorcraft.
     """
     complete, bare = _compose(spec)
     with mujoco_hooks():
@@ -59,7 +54,7 @@ def compile_tilt_car(spec: TiltCarSpec, *, visuals: bool = True) -> mujoco.MjMod
 
 @lru_cache(maxsize=16)
 def _compose(spec: TiltCarSpec) -> tuple[Compile, Compile]:
-    """What compiles the complete car, and the same without visuals."""
+    """Functions that compile the complete car, and the car without visuals."""
     root, car = parse_mjcf(shipped_folder("mjcf") / "tilt_car.xml"), spec.car
     root.option.timestep = spec.timestep
     root.option.integrator = spec.integrator

@@ -1,4 +1,4 @@
-"""A user's own vehicle: an MJCF file with the names of the shipped ones.
+"""A user's vehicle: an MJCF file with the names of the shipped ones.
 
 `read_user_vehicle` compiles the file unchanged, checks the names, and measures the parameters that
 control laws and the scenario need. `tiltsim.models.rotorcraft` then sets a scenario's parameters in
@@ -15,9 +15,15 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from tiltsim.models.mjcf_files import mjcf_version
-from tiltsim.models.pose import Moments, VehiclePose, parallel_axis
 from tiltsim.models.rotor_table import Multirotor, read_rotors, speed_range
-from tiltsim.models.vehicle_parts import CROSSES, Parts, check_parts
+from tiltsim.models.vehicle_parts import (
+    CROSSES,
+    Moments,
+    Parts,
+    VehiclePose,
+    check_parts,
+    parallel_axis,
+)
 from tiltsim.system.hooks import mujoco_hooks
 from tiltsim.system.locks import one_thread_at_a_time
 from tiltsim_controllers.mathematics.scalar import Floats
@@ -43,21 +49,21 @@ PRODUCT_TOLERANCE: Final = 0.01
 
 @dataclass(frozen=True, eq=False)
 class UserVehicle:
-    """A user's MJCF file and what was measured of it, untilted, along the body's axes.
+    """A user's MJCF file and its measured properties, untilted, along the body's axes.
 
     Attributes:
         path: The file.
-        vehicle: Its parameters; inertia about the centre of mass.
-        parts: How many rotors and hinges it has.
-        layout_mismatch: How it differs from the layout that the built-in control laws assume; empty
+        vehicle: Its parameters; inertia about the center of mass.
+        parts: Numbers of rotors and hinges.
+        layout_mismatch: Difference from the layout that the built-in control laws assume; empty
             if it does not.
         hinge_inertias: About each tilt hinge, armature included, kg m^2.
-        pod_inertias: The same without armature.
+        pod_inertias: About each tilt hinge, without armature, kg m^2.
         pods_are_balanced: Whether mass and inertia stay where they are as the pods turn.
         carried: Mass properties of all bodies that the body ``vehicle`` carries, about its origin.
-        center: The whole vehicle's centre of mass, m, shape (3,).
+        center: The whole vehicle's center of mass, m, shape (3,).
         radius: Distance of the rotor that is farthest from the body's origin, m.
-        products: The entries xy, xz and yz of its inertia about the centre of mass, kg m^2.
+        products: The entries xy, xz and yz of its inertia about the center of mass, kg m^2.
         has_contact_geoms: Whether it has the geoms that contacts with a scenario's ground need.
     """
 
@@ -78,11 +84,11 @@ class UserVehicle:
     def unmodeled_properties(self) -> str:
         """The properties that the built-in control laws neglect; empty if there are none.
 
-        The laws fly it all the same, with a model error. docs/own_vehicle.md says what it costs.
+        The laws fly it all the same, with a model error. docs/own_vehicle.md gives the cost.
         """
         found = []
         if np.linalg.norm(self.center) > ALIGNMENT_TOLERANCE * self.radius:
-            found.append(f"its centre of mass at {_triple(self.center)} m")
+            found.append(f"its center of mass at {_triple(self.center)} m")
         if isinstance(self.vehicle, Multirotor):
             return " and ".join(found)
         if np.abs(self.products).max() > PRODUCT_TOLERANCE * min(self.vehicle.moments):
@@ -93,7 +99,7 @@ class UserVehicle:
     def set_inertia(self, root: Any, vehicle: Vehicle | Multirotor) -> None:
         """Set mass and moments of inertia of the whole vehicle by changing the body ``vehicle``.
 
-        Centre of mass and products of inertia stay the file's.
+        Center of mass and products of inertia stay the file's.
 
         Args:
             root: The file as a tree.

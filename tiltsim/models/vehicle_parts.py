@@ -1,4 +1,4 @@
-"""The parts by which tiltsim knows a rotorcraft in a user's MJCF: their names, order and types."""
+"""Parts of a rotorcraft in a user's MJCF: names, order, types, places and mass properties."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
+from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.vehicle.parameters import SPIN
 
 if TYPE_CHECKING:
@@ -16,7 +17,7 @@ MAX_ROTORS: Final = 16
 
 
 class Parts(NamedTuple):
-    """How many rotors and tilt hinges a rotorcraft has."""
+    """Numbers of rotors and tilt hinges of a rotorcraft."""
 
     rotors: int
     tilts: int
@@ -50,8 +51,8 @@ def check_parts(compiled: mujoco.MjModel, model: str) -> Parts:
     """Count the parts of a compiled file for a ``vehicle.model``.
 
     Raises:
-        ValueError: In one line: a part that is missing, superfluous, out of order, or does not do
-            what its name says.
+        ValueError: In one line: a part that is missing, superfluous, out of order, or of another
+            kind than its name says.
     """
     parts = CROSSES.get(model) or _count(compiled)
     _check_names(compiled, model, parts)
@@ -119,7 +120,7 @@ def _check_joints(compiled: mujoco.MjModel) -> None:
 
 
 def _check_thrusts(compiled: mujoco.MjModel, parts: Parts, spins: tuple[float, ...] | None) -> None:
-    """Raise ValueError where an actuator of a rotor does not do what its name says.
+    """Raise ValueError where an actuator of a rotor does not match its name.
 
     ``spins`` prescribes the senses of rotation, and that all coefficients are equal.
     """
@@ -166,3 +167,46 @@ def _check_servos(compiled: mujoco.MjModel, parts: Parts) -> None:
                 f"actuator 'tilt_{i}' must be a position servo of the joint 'tilt_{i}', "
                 "without gear or state"
             )
+
+
+class Moments(NamedTuple):
+    """Mass, first moment and inertia of bodies about an origin."""
+
+    mass: float  # kg
+    first_moment: Floats  # kg m, shape (3,)
+    inertia: Floats  # kg m^2, shape (3, 3)
+
+
+class VehiclePose:
+    """A compiled vehicle in its file's pose, in the frame of the body ``vehicle``."""
+
+    def __init__(self, compiled: mujoco.MjModel, data: mujoco.MjData) -> None:
+        self.compiled, self.data = compiled, data
+        self.body = int(compiled.body("vehicle").id)
+        self.frame = data.xmat[self.body].reshape(3, 3)  # from body to world
+
+    def point(self, point: Floats) -> Floats:
+        """A point of the world in body axes, from the body's origin."""
+        return np.asarray(self.frame.T @ (point - self.data.xpos[self.body]))
+
+    def direction(self, vector: Floats) -> Floats:
+        """A vector of the world in body axes."""
+        return np.asarray(self.frame.T @ vector)
+
+    def moments(self, bodies: list[int]) -> Moments:
+        """Mass properties of bodies, given by their ids, about the vehicle's origin."""
+        mass, moment, inertia = 0.0, np.zeros(3), np.zeros((3, 3))
+        for body in bodies:
+            own = float(self.compiled.body_mass[body])
+            center = self.point(self.data.xipos[body])
+            turn = self.frame.T @ self.data.ximat[body].reshape(3, 3)
+            mass += own
+            moment += own * center
+            inertia += turn @ np.diag(self.compiled.body_inertia[body]) @ turn.T
+            inertia += own * parallel_axis(center)
+        return Moments(mass, moment, inertia)
+
+
+def parallel_axis(offset: Floats) -> Floats:
+    """The inertia (m^2, shape (3, 3)) about the origin of a unit mass at an offset (m)."""
+    return np.asarray(np.dot(offset, offset) * np.eye(3) - np.outer(offset, offset))

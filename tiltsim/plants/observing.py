@@ -10,7 +10,7 @@ from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.laws.layers.sensing import measured, sensor_parameters
 from tiltsim.plants.command import Observation, Reference
 from tiltsim.plants.mujoco_plant import MujocoPlant
-from tiltsim.scenario.gait_table import tilts_of
+from tiltsim.scenario.gait import tilts_of
 from tiltsim_controllers.code.traceable import as_arrays
 from tiltsim_controllers.mathematics.rotation import euler_from_quaternion
 from tiltsim_controllers.mathematics.scalar import Values

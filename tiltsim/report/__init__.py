@@ -38,7 +38,7 @@ digits, which another row of the statement tests. What the thesis does not claim
     case = "x"                    # if a flight has several rows of the claim
     published = -0.38             # the printed value
 
-`tiltsim.scenario.expectation.Expectation` and `tiltsim.scenario.claim.ClaimTable` describe the
+`tiltsim.scenario.expectation`, with `Expectation` and `ClaimTable`, describes the
 keys. Rows are labelled with the titles of their variants. With a boolean metric, ``published`` is
 compared with the metric; with any other, true or false states whether the value is within
 ``holds``, where the sentence is true, which is not the narrow range around our own value. A number

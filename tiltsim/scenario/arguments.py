@@ -78,9 +78,9 @@ def plain(value: Any, depth: int = 0) -> Any:
 
 
 def leaves(tables: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:
-    """The values of nested tables by dotted key, without those that are None."""
+    """The values of nested tables by dotted key."""
     for name, value in tables.items():
         if isinstance(value, dict):
             yield from leaves(value, f"{before}{name}.")
-        elif value is not None:
+        else:
             yield before + name, value

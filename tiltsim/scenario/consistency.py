@@ -6,12 +6,12 @@ import re
 from math import pi
 from typing import Final
 
-from tiltsim.scenario.claim import NAME
 from tiltsim.scenario.controller import laws_for
+from tiltsim.scenario.expectation import NAME
 from tiltsim.scenario.gait import FixedGait, TableGait
 from tiltsim.scenario.messages import InvalidValueError, choose
 from tiltsim.scenario.multirotor_controllers import AttitudeForceController
-from tiltsim.scenario.outputs import check_dimension, check_full_pose
+from tiltsim.scenario.outputs import check_decoupler, check_dimension, check_full_pose
 from tiltsim.scenario.reference import WaypointReference
 from tiltsim.scenario.rotorcraft import MultirotorTable, RotorcraftTable, TiltServoTable
 from tiltsim.scenario.scenario_tables import ScenarioTables
@@ -31,7 +31,7 @@ MAX_KNOTS: Final = 1500
 def check_consistency(scenario: ScenarioTables) -> None:
     """Refuse a scenario whose tables contradict each other.
 
-    Raises `InvalidValueError` for the first contradiction, with the key and what is allowed.
+    Raises `InvalidValueError` for the first contradiction, with the key and the allowed values.
     """
     _check_law(scenario)
     _check_actuators(scenario)
@@ -275,13 +275,7 @@ def _check_reference(scenario: ScenarioTables) -> None:
             f"the {controller.law} law{option} always includes all derivatives; set it to false",
         )
     if isinstance(controller, AttitudeAltitudeController):
-        needs_none = reference.kind == "attitude_altitude"
-        if needs_none != (controller.decoupler == "none"):
-            raise scenario.mistake(
-                "controller.decoupler",
-                f"reference.type = {reference.type!r} needs "
-                + ("none" if needs_none else "conventional, modified or exact"),
-            )
+        check_decoupler(scenario, controller.decoupler)
 
 
 def _check_time_tables(scenario: ScenarioTables) -> None:
@@ -357,7 +351,7 @@ def _check_rotor_limits(scenario: ScenarioTables) -> None:
     if not isinstance(scenario.vehicle, RotorcraftTable):
         return
     if isinstance(scenario.vehicle, MultirotorTable) and scenario.initial.rotor_speed is None:
-        return  # those of hover
+        return  # the speeds of hover
     low, high = scenario.vehicle.min_rotor_speed, scenario.vehicle.max_rotor_speed
     for speed in scenario.initial.rotor_speeds(scenario.vehicle.rotor_count):
         if (low is not None and speed < low) or (high is not None and speed > high):

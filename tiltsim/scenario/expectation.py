@@ -1,14 +1,57 @@
-"""The ``[[expect]]`` tables of a scenario: bounds on metrics, and the thesis's claims."""
+"""The tables ``[[expect]]`` and ``[claim.NAME]``: bounds on metrics, statements of the thesis."""
 
 from __future__ import annotations
 
-from typing import Literal, Self
+from typing import Annotated, Final, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from tiltsim.scenario.messages import choose
 from tiltsim.scenario.metric_names import BOOLEAN_METRICS, METRICS
 from tiltsim.scenario.table import NonNegative, Range, Table, example
+
+Origin = Literal[
+    "path", "gains", "keyframes", "parameters", "flight", "start", "limits", "feedback"
+]
+"""Parts of a flight that do not come from its source."""
+
+NAME: Final = r"^[a-z0-9]+(-[a-z0-9]+)+$"
+ClaimName = Annotated[str, Field(pattern=NAME)]
+Words = Annotated[str, Field(min_length=1)]
+
+
+class ClaimTable(Table):
+    """A statement that a scenario's ``source`` makes; expectations refer to it by its name."""
+
+    table_name = "claim"
+
+    statement: Words = Field(
+        description="the statement in one sentence", examples=["The error at rest is -0.38 m."]
+    )
+    thesis: Words = Field(
+        description="the sentence that makes it, quoted or paraphrased, or what the figure shows",
+        examples=["Fig. 4 shows A at -0.38 m."],
+    )
+    criterion: Words = Field(
+        description="what counts as reproduced, and what would not, in words",
+        examples=["The same to two digits."],
+    )
+    note: str = Field(
+        "",
+        description="what a reader must know to judge it, shown with every row",
+        examples=["The thesis does not give the mass."],
+    )
+    fitted: bool = Field(False, description="parameters were chosen so that it holds")
+    missing: str = Field(
+        "",
+        description="what the text leaves open, so that the statement is not testable",
+        examples=["the figure with the path is not available"],
+    )
+    finding: str = Field(
+        "",
+        description="key of the finding that settles it, if one does",
+        examples=["exact-decoupler"],
+    )
 
 
 class Expectation(Table):
@@ -74,8 +117,7 @@ class Expectation(Table):
         None, description="evaluate on this plant only; default: on all", examples=["thesis"]
     )
 
-    @model_validator(mode="after")
-    def _check(self) -> Self:
+    def _check_values(self) -> None:
         if self.metric not in METRICS:
             raise self.mistake("metric", choose(self.metric, METRICS))
         boolean = self.metric in BOOLEAN_METRICS
@@ -87,7 +129,6 @@ class Expectation(Table):
         if self.min is not None and self.max is not None and self.min > self.max:
             raise self.mistake("min", f"must not exceed max = {self.max}")
         self._check_claim(boolean)
-        return self
 
     def _check_claim(self, boolean: bool) -> None:
         published = self.published

@@ -1,19 +1,27 @@
-"""The ``[gait]`` table of a scenario: one model a type, each of which plans its gait."""
+"""The ``[gait]`` table of a scenario: one model per type, which plans its gait."""
 
 from __future__ import annotations
 
-from abc import abstractmethod
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from functools import lru_cache
 from math import pi
-from typing import Annotated, Final, Literal, Self
+from typing import Annotated, ClassVar, Final, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.models.vehicle_parts import MAX_ROTORS
-from tiltsim.scenario.gait_table import AnyVehicle, GaitTable
-from tiltsim.scenario.table import Angle, Angles2, AnglesEach, Period, Positive, Table, example
+from tiltsim.scenario.table import (
+    Angle,
+    Angles2,
+    AnglesEach,
+    Factor,
+    Period,
+    Positive,
+    Table,
+    example,
+)
 from tiltsim.scenario.time_table import GAIT_COLUMNS, Rows, TimeTable, gait_columns
 from tiltsim_controllers.analysis.two_color_planner import (
     Circle,
@@ -39,9 +47,56 @@ COLOR: Final = (
     "alpha_3 = 2 delta - alpha_1, alpha_4 = -2 delta - alpha_2, where the thesis claims the same "
     "and the matrix is singular"
 )
-"""The two colours of ch. 6, for descriptions."""
+"""The two colors of ch. 6, for descriptions."""
 
 GaitRow = Annotated[tuple[float, ...], Field(strict=False, min_length=2, max_length=17)]
+
+
+AnyVehicle = Vehicle | Multirotor | TiltCar
+
+
+def tilts_of(vehicle: AnyVehicle) -> int:
+    """The number of tilt angles that a gait of a vehicle plans; the quadrotor's are idle."""
+    if isinstance(vehicle, Multirotor):
+        return vehicle.tilts
+    return 4 if isinstance(vehicle, Vehicle) else 1
+
+
+class GaitTable(Table, ABC):
+    """The keys of every gait: a common scale, and a bias on the two rear angles."""
+
+    table_name = "gait"
+    size_key: ClassVar[str]
+
+    scale: Annotated[float, Field(ge=1e-3, le=1e3)] = Field(
+        1.0, description="multiplies all tilt angles (ch. 5: 1/n) [-]", examples=[0.5]
+    )
+    bias: Factor = Field(
+        1.0, description="eta, multiplies alpha_3 and alpha_4 (ch. 6) [-]", examples=[0.8]
+    )
+
+    def plan(self, vehicle: AnyVehicle) -> PlannedGait:
+        """The gait for a vehicle. Raises ValueError if the numbers do not define one."""
+        needed = tilts_of(vehicle)
+        if self.tilts not in {None, needed} and not isinstance(vehicle, TiltCar):
+            raise ValueError(f"has {self.tilts} tilt angles; the vehicle has {needed}")
+        if self.bias != 1.0 and needed not in {1, 4}:
+            raise ValueError(f"gait.bias needs four tilt angles; the vehicle has {needed}")
+        return self._unscaled(vehicle).scaled(1.0 / self.scale).biased(self.bias)
+
+    @property
+    def tilts(self) -> int | None:
+        """Number of tilt angles; None for a gait of any number."""
+        return 4
+
+    @abstractmethod
+    def _unscaled(self, vehicle: AnyVehicle) -> PlannedGait:
+        """The gait before scale and bias."""
+
+    @property
+    def size(self) -> tuple[str, object]:
+        """The key that sets how far the gait tilts, and its value."""
+        return self.size_key, dict(self)[self.size_key]
 
 
 class FixedGait(GaitTable):
@@ -168,13 +223,12 @@ class TableGait(GaitTable, TimeTable):
         "otherwise the angles of the last row hold",
     )
 
-    @model_validator(mode="after")
-    def _check(self) -> Self:
+    def _check_values(self) -> None:
+        super()._check_values()
         (_, *first), (_, *last) = self.table[0], self.table[-1]
         if self.repeat and first != last:
             reason = f"the angles of the last row, {last}, must equal the first, {first}"
             raise self.mistake("repeat", reason)
-        return self
 
     @classmethod
     def columns_among(cls, names: Sequence[str]) -> tuple[str, ...]:
@@ -243,13 +297,11 @@ class TwoColorGait(GaitTable):
         "two meet, at the point P = (delta, -delta)",
     )
 
-    @model_validator(mode="after")
-    def _check(self) -> Self:
+    def _check_values(self) -> None:
         circle = (self.centre is not None) + (self.radius is not None)
         given = (self.rectangle is not None, circle > 0, bool(self.path))
         if sum(given) != 1 or circle == 1:
             raise self.mistake("type", "give one of rectangle, centre with radius, and path")
-        return self
 
     @property
     def curve(self) -> Path:

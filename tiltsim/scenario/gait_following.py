@@ -1,4 +1,4 @@
-"""What the ``[controller]`` tables of laws that follow a planned gait have in common."""
+"""Keys shared by the ``[controller]`` tables of laws that follow a planned gait."""
 
 from __future__ import annotations
 

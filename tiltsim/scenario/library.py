@@ -60,7 +60,7 @@ def read_toml(path: Path) -> dict[str, Any]:
 
 
 def _in_words(mistake: str) -> str:
-    """What tomllib found, with names as the file has them and the usual cause."""
+    """A message of tomllib, with names as in the file and the usual cause."""
     name = re.match(r"Cannot (declare|mutate immutable namespace) \((.*?),?\)(.*)", mistake)
     if name is not None:
         table = ".".join(part.strip(" '\"") for part in name[2].split(","))
@@ -122,12 +122,12 @@ def library_entries(word: str = "") -> Iterator[Entry]:
 def selected_entries(name: str, document: Mapping[str, Any], word: str) -> list[Entry]:
     """The scenarios of a file that a word selects.
 
-    A word that the file's own address, title or source contains selects all its variants; another
-    one those that contain it.
+    A word in the file's own address, title or source selects all variants; any other word selects
+    the variants that contain it.
 
     Args:
         name: Address of the file.
-        document: Its content; only that of a valid file is certain to have the right types.
+        document: Its content; only a valid file is certain to have the right types.
         word: Plain text, without wildcards; the case of its letters does not matter.
     """
     title, source = str(document.get("title", "")), str(document.get("source", ""))

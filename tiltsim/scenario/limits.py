@@ -1,4 +1,4 @@
-"""Limits of what files may hold, checked before any work is done with them."""
+"""Limits on the content of files, checked before any work is done with them."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ MAX_DEPTH: Final = 64
 """Tables and lists in one another, and steps of a dotted key."""
 
 MAX_VALUES: Final = 200_000
-"""Values of a document, those of lists one by one."""
+"""Values of a document; entries of lists count one by one."""
 
 MAX_ROWS: Final = 10_000
 """Rows of a table of a reference or a gait."""

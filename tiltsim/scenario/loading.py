@@ -18,7 +18,7 @@ from tiltsim.scenario.controller import DEFAULT_LAW
 from tiltsim.scenario.library import find_scenario_file, library_name, read_toml
 from tiltsim.scenario.limits import check_limits
 from tiltsim.scenario.messages import choose, did_you_mean, one_line_message, show
-from tiltsim.scenario.override_keys import refuse_replaced, split_key
+from tiltsim.scenario.override_keys import refuse_replaced, split_key, value_at
 from tiltsim.scenario.own_parts import (
     controller_table,
     drop_what_own_controllers_ignore,
@@ -64,26 +64,26 @@ def load_scenario(
         overrides: Values by dotted key in the units of docs/scenario.md, for example
             ``{"gait.period": 2.0, "gait.angles[0]": 0.1}``. Arrays are taken as lists, here and in
             a dict. A family without ``#variant`` needs them or a controller, and is its base then.
-        controller: A controller of your own, which replaces the scenario's before anything is
+        controller: A custom controller, which replaces the scenario's before anything is
             checked; the overrides then have no other law or function. It is a function from
             `tiltsim.Observation` to `tiltsim.Command`, an object with ``__call__`` and maybe
             ``reset(scenario)``, a class of these, or ``"FILE.py:NAME"``; or a function marked
             `tiltsim.law`, or an object or subclass of `tiltsim.LawController`.
-        reference: A motion of your own in place of the scenario's ``[reference]``, of which roll,
+        reference: A custom motion in place of the scenario's ``[reference]``, of which roll,
             pitch, yaw and acceleration_feedforward stay: a function of time (s) that returns a
             position ``(x, y, z)`` (m), sampled every 0.01 s over the duration of the flight, also
             of one with another duration that is made of this scenario; or a table with the columns
             time, x, y and z: of pandas or Arrow, a dict of arrays, or the name of a CSV or Parquet
-            file. The overrides are those of the new table, such as ``{"reference.interpolation":
+            file. The overrides are keys of the new table, such as ``{"reference.interpolation":
             "cubic"}``.
-        gait: A gait of your own in place of the scenario's ``[gait]``, as the reference: a function
+        gait: A custom gait in place of the scenario's ``[gait]``, as the reference: a function
             that returns four tilt angles (rad), or a table with the columns time and alpha_1 to
             alpha_4.
         trusted: Whether the Python file that the scenario names may be executed, by whatever takes
             the scenario. The file of ``controller`` may in any case.
 
     Raises:
-        InputError: In one line: the file, the key, the value and what is allowed.
+        InputError: In one line: the file, the key, the value and the allowed values.
     """
     overrides = {} if overrides is None else overrides
     check_keys("overrides", overrides)
@@ -110,7 +110,7 @@ def load_scenario(
 
 
 def _title_in_file(source: object, address: str) -> object:
-    """The title in the file of a scenario; empty if it is of no file, as that of a dict."""
+    """The title in the file of a scenario; empty without a file, as for a dict."""
     if not isinstance(source, Mapping):
         with suppress(InputError):
             return _document(address, with_base=True)[0].get("title", "")
@@ -118,7 +118,7 @@ def _title_in_file(source: object, address: str) -> object:
 
 
 def as_scenario(source: Scenario | str | PathLike[str] | Mapping[str, Any]) -> Scenario:
-    """A scenario itself, or what `load_scenario` reads."""
+    """A scenario itself, or the one that `load_scenario` reads."""
     return source if isinstance(source, Scenario) else load_scenario(source)
 
 
@@ -158,7 +158,7 @@ def _document(source: object, *, with_base: bool) -> tuple[dict[str, Any], str]:
 def is_changed_from_library(path: str | Path, scenario: Scenario) -> bool:
     """Whether a scenario read from a path is one of the library, but not flown as it is there.
 
-    Plant and engine may differ, and what only describes and judges the flight.
+    Plant and engine may differ, and keys that only describe and judge the flight.
     """
     file = find_scenario_file(str(path).partition("#")[0])
     if library_name(file) == str(file):
@@ -171,7 +171,7 @@ def is_changed_from_library(path: str | Path, scenario: Scenario) -> bool:
 
 
 def _flown(scenario: Scenario) -> dict[str, Any]:
-    """What decides a flight on any plant and engine."""
+    """The keys that decide a flight on any plant and engine."""
     document = scenario.model_dump(exclude={*DESCRIPTIVE})
     return document | {"simulation": document["simulation"] | {"plant": None, "engine": None}}
 
@@ -183,9 +183,9 @@ def locate_named_files(
 
     Args:
         document: Changed in place.
-        folder: What they are relative to.
+        folder: Folder to which they are relative.
         address: Name of the document in messages, if it is a file in that folder; the Python code
-            that it names must then lie there, too. None allows any place.
+            that it names must then also lie there. None allows any place.
 
     Raises:
         InputError: If the code lies elsewhere.
@@ -202,7 +202,7 @@ def locate_named_files(
 
 
 def named_files(document: Mapping[str, Any]) -> set[Path]:
-    """The files that a document names; of MJCF also what it can include and name."""
+    """The files that a document names, with all files that its MJCF can include and name."""
     files: set[Path] = set()
     for table, key, is_code in _file_keys(document):
         name = document[table][key]
@@ -238,7 +238,7 @@ def _lies_in(folder: Path, name: str) -> bool:
 def apply_overrides(
     document: dict[str, Any], overrides: Mapping[str, Any], address: str
 ) -> list[str]:
-    """Set values in a document. Returns those of `KIND_KEYS`, dotted, that emptied their table.
+    """Set values in a document. Returns the kind keys, dotted, that emptied their table.
 
     Args:
         document: Changed in place.
@@ -261,7 +261,7 @@ def parse_scenario(document: Mapping[str, Any], address: str = "scenario") -> Sc
         address: Name of the document in messages.
 
     Raises:
-        InputError: As `load_scenario` does.
+        InputError: As in `load_scenario`.
     """
     if not isinstance(document, Mapping):
         raise InputError(f"scenario = {short_repr(document)}: must be a dict")
@@ -271,7 +271,7 @@ def parse_scenario(document: Mapping[str, Any], address: str = "scenario") -> Sc
 
 
 def _parse(document: Mapping[str, Any], address: str, emptied: Collection[str] = ()) -> Scenario:
-    """As `parse_scenario`; ``emptied`` is what `apply_overrides` returned."""
+    """Validate a document; ``emptied`` is the result of `apply_overrides`."""
     check_limits(document := plain(document), address)
     scenario = Scenario.model_validate(document, address=address, emptied=emptied)
     scenario._address = valid_unicode(address)
@@ -333,7 +333,7 @@ def _has_other_keys(old: object, new: object) -> bool:
 
 
 def _kinds_first(overrides: Mapping[str, Any]) -> list[tuple[str, Any]]:
-    """Overrides with those of `KIND_KEYS` first: a new kind empties its table."""
+    """Overrides, kind keys first, since a new kind empties its table."""
     return sorted(overrides.items(), key=lambda item: item[0].rpartition(".")[2] not in KIND_KEYS)
 
 
@@ -347,7 +347,7 @@ def _override(address: str, document: dict[str, Any], key: str, value: object) -
         if not isinstance(target, list) or last >= len(target):
             raise InputError(
                 f"{address}: {key} = {show(value)}: no such entry; "
-                f"{_entries_instead(document, path, key.rpartition('[')[0])}"
+                f"{_entries_instead(document, key.rpartition('[')[0])}"
             )
     elif not isinstance(target, dict):
         name = key.rpartition(".")[0]
@@ -361,17 +361,16 @@ def _override(address: str, document: dict[str, Any], key: str, value: object) -
     return empties
 
 
-def _entries_instead(document: dict[str, Any], path: list[str | int], whole: str) -> str:
-    """What to write instead of an entry that a list has not, or of a list that does not exist."""
-    *above, name = path
-    table: Any = document
-    for step in above:
-        table = _enter(table, step)
+def _entries_instead(document: dict[str, Any], whole: str) -> str:
+    """Advice for an entry beyond the end of a list, or of a list that does not exist."""
+    above, _, name = whole.rpartition(".")
+    table = value_at(document, above)
     lists = table.items() if isinstance(table, dict) else ()
     lengths = {key: len(value) for key, value in lists if isinstance(value, list)}
     if name in lengths:
         return f"{whole} has {lengths[name]}, from {whole}[0]"
-    return did_you_mean(name, lengths) + f"give the whole list {whole}"
+    hint = "" if "[" in name else did_you_mean(name, lengths)
+    return f"{hint}give the whole list {whole}"
 
 
 def _enter(target: object, step: str | int) -> object:

@@ -8,7 +8,7 @@ from tiltsim.system.quantity import Quantity
 
 
 class Metric(NamedTuple):
-    """What figures call a metric, its unit, and what it measures."""
+    """A metric: its label in figures, its unit and its meaning."""
 
     label: str
     unit: str  # empty for dimensionless ones
@@ -44,10 +44,10 @@ METRICS: Final = {
         "smallest horizontal position error from 20 s on",
     ),
     "max_orbit_radius_after_20s": Metric(
-        "largest radius after 20 s", "m", "largest distance from the reference circle's centre"
+        "largest radius after 20 s", "m", "largest distance from the reference circle's center"
     ),
     "min_orbit_radius_after_20s": Metric(
-        "smallest radius after 20 s", "m", "smallest distance from the reference circle's centre"
+        "smallest radius after 20 s", "m", "smallest distance from the reference circle's center"
     ),
     "final_roll": Metric("final roll", "rad", "mean over the last second"),
     "final_pitch": Metric("final pitch", "rad", "mean over the last second"),

@@ -19,6 +19,15 @@ def _check_failed_rotor(scenario: ScenarioTables, failed: int | None) -> None:
         )
 
 
+def check_decoupler(scenario: ScenarioTables, decoupler: str) -> None:
+    """Refuse a decoupler of positions without a position to track, and the reverse."""
+    needs_none = scenario.reference.kind == "attitude_altitude"
+    if needs_none != (decoupler == "none"):
+        needs = "none" if needs_none else "conventional, modified or exact"
+        reason = f"reference.type = {scenario.reference.type!r} needs {needs}"
+        raise scenario.mistake("controller.decoupler", reason)
+
+
 def check_full_pose(scenario: ScenarioTables, controller: FullPoseController, gait: Gait) -> None:
     """Refuse a failed rotor that is not there, and inputs that do not move six outputs."""
     vehicle, failed = scenario.vehicle.resolve(), controller.failed_rotor
@@ -58,13 +67,8 @@ def check_dimension(
     assert isinstance(vehicle, Multirotor)
     dimension = controller.resolve_force(vehicle, gait).dimension
     _check_scaling(controller, vehicle, dimension)
+    check_decoupler(scenario, controller.decoupler)
     reference = scenario.reference
-    if (reference.kind == "attitude_altitude") != (controller.decoupler == "none"):
-        raise scenario.mistake(
-            "controller.decoupler",
-            f"reference.type = {reference.type!r} needs "
-            + ("none" if controller.decoupler != "none" else "conventional, modified or exact"),
-        )
     if reference.kind == "pose" and dimension < 3:
         key = "roll" if reference.roll else "pitch"
         reason = f"is no output with {dimension} components of force; needs a vehicle with 3"

@@ -1,4 +1,4 @@
-"""Values by dotted key, as ``--set`` and the overrides of `load_scenario` have them."""
+"""Values by dotted key, as in ``--set`` and in the overrides of `load_scenario`."""
 
 from __future__ import annotations
 
@@ -29,6 +29,29 @@ def split_key(key: str) -> list[str | int]:
     return steps
 
 
+def value_at(document: Any, key: str) -> Any:
+    """The value of a dotted key in tables and lists, all of them for ''; None if there is none."""
+    for step in split_key(key) if key else ():
+        if isinstance(step, int):
+            known = isinstance(document, list | tuple) and step < len(document)
+        else:
+            known = isinstance(document, dict) and step in document
+        if not known:
+            return None
+        document = document[step]
+    return document
+
+
+def with_value(document: Any, path: Sequence[str | int], value: Any) -> Any:
+    """A copy of tables and lists with another value at a path; it shares everything else."""
+    if not path:
+        return value
+    step, *rest = path
+    changed = list(document) if isinstance(step, int) else dict(document)
+    changed[step] = with_value(document[step] if rest else None, rest, value)  # type: ignore[index]
+    return tuple(changed) if isinstance(document, tuple) else changed
+
+
 def refuse_replaced(given: Sequence[tuple[str, Any]], address: str) -> None:
     """Raise `InputError` if a value replaces the whole table or list of which another is a part."""
     paths = [split_key(key) for key, _ in given]
@@ -36,7 +59,7 @@ def refuse_replaced(given: Sequence[tuple[str, Any]], address: str) -> None:
         for inner, (part, _) in zip(paths[:i], given):
             if len(inner) > len(path) and inner[: len(path)] == path:
                 raise InputError(
-                    f"{address}: {key} = {show(value)}: would replace {part}, which is given, too; "
+                    f"{address}: {key} = {show(value)}: would replace {part}, which is also given; "
                     "give one of them"
                 )
 

@@ -1,4 +1,4 @@
-"""Python code of the user's that scenario files name: loading it, and its errors in one line."""
+"""Loading of the user's Python code that scenario files name, and its errors in one line."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def load_function(scenario: Scenario) -> Any:
 
 
 def _run_file(start: str, file: Path) -> Any:
-    """The module of a file, executed anew for every flight."""
+    """The module of a file, executed again for every flight."""
     spec = importlib.util.spec_from_file_location(f"tiltsim_controller_{file.stem}", file)
     assert spec is not None
     module = importlib.util.module_from_spec(spec)

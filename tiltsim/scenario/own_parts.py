@@ -28,21 +28,21 @@ SAMPLING_STEP: Final = 0.01
 """Seconds between the rows of a function of time, unless the flight is too long for that."""
 
 COLUMNS: Final = {"reference": REFERENCE_COLUMNS, "gait": GAIT_COLUMNS}
-"""What can be given as a table over time, and its columns."""
+"""Parts that can be given as a table over time, and their columns."""
 
 KEPT_KEYS: Final = ("roll", "pitch", "yaw", "acceleration_feedforward")
 """Keys of a reference that stay when another motion is given."""
 
 
 def replace_tables(document: dict[str, Any], given: Mapping[str, object]) -> None:
-    """Replace a scenario's reference and gait by tables; those of functions have no rows yet.
+    """Replace a scenario's reference and gait by tables; a function's table has no rows yet.
 
     Args:
         document: Changed in place.
         given: Reference and gait by name; see `tiltsim.load_scenario`.
 
     Raises:
-        InputError: In one line: the argument, the value and what is allowed.
+        InputError: In one line: the argument, the value and the allowed values.
     """
     for name in filter(given.__contains__, COLUMNS):
         old, kept = document.get(name), KEPT_KEYS if name == "reference" else ()
@@ -77,7 +77,7 @@ def controller_table(controller: object) -> dict[str, Any]:
 def drop_what_own_controllers_ignore(
     document: Mapping[str, Any], overrides: Mapping[str, Any]
 ) -> None:
-    """Leave it to a user's controller which derivatives it uses, unless overrides say it."""
+    """Drop the feed-forward key, which user controllers ignore, unless overrides give it."""
     law, reference = document["controller"]["law"], document.get("reference")
     is_given = "reference.acceleration_feedforward" in overrides
     if law in ("python", "numpy") and isinstance(reference, dict) and not is_given:
@@ -87,7 +87,7 @@ def drop_what_own_controllers_ignore(
 def kept_functions(
     source: object, overrides: Mapping[str, Any], given: Mapping[str, object]
 ) -> dict[str, Any]:
-    """The functions and controllers of a scenario by name: its source's, unless replaced, and new.
+    """The functions and controllers of a scenario by name: new ones, and its source's if kept.
 
     Args:
         source, overrides: See `tiltsim.load_scenario`.
@@ -104,7 +104,7 @@ def sample_functions(document: Mapping[str, Any], own: Mapping[str, Any]) -> Non
 
     Args:
         document: A scenario's, changed in place.
-        own: What `kept_functions` returned.
+        own: The functions by name, from `kept_functions`.
     """
     simulation = document.get("simulation")
     duration = simulation.get("duration") if isinstance(simulation, Mapping) else None
@@ -129,7 +129,7 @@ def _is_multirotor(document: Mapping[str, Any]) -> bool:
 
 
 def _tilts_of(gait: Callable[[float], Any]) -> int:
-    """How many tilt angles a function of time gives; 4 where it gives no such vector."""
+    """Number of tilt angles that a function of time returns; 4 if it returns no such vector."""
     try:
         angles = real_array(gait(0.0))
     except Exception:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from functools import lru_cache
 from math import pi
-from typing import Annotated, Literal, Self
+from typing import Annotated, Final, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from tiltsim.scenario.controller_table import ReferenceKind
 from tiltsim.scenario.table import Angle, Angles3, Coordinate, Positive, Table, Vector3, example
@@ -22,24 +22,42 @@ Roll = Annotated[float, Field(ge=-pi, le=pi)]
 ReferenceRow = Annotated[tuple[float, Coordinate, Coordinate, Coordinate], Field(strict=False)]
 
 
+_PREFIXES: Final = {"position": "", "angular_frequency": "frequency_"}
+"""Beginnings of the fields of `ReferenceParameters` that hold a vector, unless they are its key."""
+
+
 class _Reference(Table, ABC):
-    """What every reference has."""
+    """The keys and properties of every reference."""
 
     table_name = "reference"
 
     @property
     @abstractmethod
     def kind(self) -> ReferenceKind:
-        """What a controller must be able to track."""
+        """The kind of motion that a controller must be able to track."""
 
     @property
-    @abstractmethod
     def parameters(self) -> ReferenceParameters:
-        """The record that the law reads."""
+        """The record that the law reads: keys by their names, vectors by their components."""
+        given = dict(self)
+        fields = {angle: given[angle] for angle in ("roll", "pitch", "yaw")}
+        fields["acceleration_feedforward"] = float(self.adds_acceleration)
+        for key, value in self._motion().items():
+            if isinstance(value, tuple):
+                prefix = _PREFIXES.get(key, f"{key}_")
+                fields |= {f"{prefix}{axis}": n for axis, n in zip("xyz", value, strict=True)}
+            else:
+                fields[key] = value
+        return ReferenceParameters(REFERENCE_TYPES[given["type"]], **fields)
+
+    def _motion(self) -> dict[str, float | Triple]:
+        """The parameters of the motion: by default all keys of the reference's own type."""
+        shared = _PositionReference.model_fields
+        return {key: value for key, value in self if key not in shared}
 
     @property
     def knots(self) -> Values:
-        """The numbers of references of any length, which the record does not hold."""
+        """Table data of references of any length, which the record does not hold."""
         return NO_KNOTS
 
     @property
@@ -48,7 +66,7 @@ class _Reference(Table, ABC):
         return False
 
     def after_gait(self, gait: Values) -> tuple[ReferenceParameters, Values]:
-        """The record, and the knots of a flight: those of its gait, then the reference's own."""
+        """The record, and the table data of a flight: the gait's, then the reference's."""
         if self.knots == NO_KNOTS:
             return self.parameters, gait
         return self.parameters._replace(offset=float(len(gait))), (*gait, *self.knots)
@@ -67,7 +85,7 @@ class _PositionReference(_Reference):
     yaw: Angle = Field(0.0, description="heading to hold [rad]", examples=[0.5])
     acceleration_feedforward: bool = Field(
         False,
-        description="demand the reference's acceleration, too; ch. 4 omits it, laws of higher "
+        description="also demand the reference's acceleration; ch. 4 omits it, laws of higher "
         "order always include it",
     )
     type: str
@@ -80,21 +98,6 @@ class _PositionReference(_Reference):
     def kind(self) -> ReferenceKind:
         return "position" if self.roll == self.pitch == 0.0 else "pose"
 
-    @property
-    def parameters(self) -> ReferenceParameters:
-        return ReferenceParameters(
-            REFERENCE_TYPES[self.type],
-            roll=self.roll,
-            pitch=self.pitch,
-            yaw=self.yaw,
-            acceleration_feedforward=float(self.acceleration_feedforward),
-            **self._motion(),
-        )
-
-    @abstractmethod
-    def _motion(self) -> dict[str, float]:
-        """The parameters of the motion."""
-
 
 class SetpointReference(_PositionReference):
     """A point to hold."""
@@ -105,9 +108,6 @@ class SetpointReference(_PositionReference):
     position: Vector3 = Field(
         (0.0, 0.0, 0.0), description="the point, z up [m]", examples=[[1.0, 0.0, 0.5]]
     )
-
-    def _motion(self) -> dict[str, float]:
-        return _axes("", self.position)
 
 
 class LineReference(_PositionReference):
@@ -122,32 +122,22 @@ class LineReference(_PositionReference):
         (0.0, 0.0, 0.0), description="constant [m/s^2]", examples=[[0.1, 0.0, 0.0]]
     )
 
-    def _motion(self) -> dict[str, float]:
-        moving = _axes("velocity_", self.velocity) | _axes("acceleration_", self.acceleration)
-        return _axes("", self.position) | moving
-
 
 class CircleReference(_PositionReference):
     """Uniform motion on a horizontal circle, from +x towards +y; from -x where radius < 0."""
 
     type: Literal["circle"] = Field(description="a horizontal circle")
     position: Vector3 = Field(
-        (0.0, 0.0, 0.0), description="the centre [m]", examples=[[0.0, 0.0, 1.0]]
+        (0.0, 0.0, 0.0), description="the center [m]", examples=[[0.0, 0.0, 1.0]]
     )
     radius: float = Field(description="negative to start on the other side [m]", examples=[5.0])
     angular_frequency: float = Field(
         description="positive is counterclockwise seen from above [rad/s]", examples=[0.1]
     )
 
-    def _motion(self) -> dict[str, float]:
-        turning = {"radius": self.radius, "angular_frequency": self.angular_frequency}
-        return _axes("", self.position) | turning
-
-    @model_validator(mode="after")
-    def _check(self) -> Self:
+    def _check_values(self) -> None:
         if self.radius == 0.0:
             raise self.mistake("radius", "must not be 0")
-        return self
 
 
 class LissajousReference(_PositionReference):
@@ -155,7 +145,7 @@ class LissajousReference(_PositionReference):
 
     type: Literal["lissajous"] = Field(description="a sine along each axis")
     position: Vector3 = Field(
-        (0.0, 0.0, 0.0), description="the centre [m]", examples=[[0.0, 0.0, 1.0]]
+        (0.0, 0.0, 0.0), description="the center [m]", examples=[[0.0, 0.0, 1.0]]
     )
     amplitude: Vector3 = Field(description="along x, y and z [m]", examples=[[2.0, 1.0, 0.0]])
     angular_frequency: Vector3 = Field(
@@ -164,10 +154,6 @@ class LissajousReference(_PositionReference):
     phase: Angles3 = Field(
         (0.0, 0.0, 0.0), description="at time zero [rad]", examples=[[1.5708, 0.0, 0.0]]
     )
-
-    def _motion(self) -> dict[str, float]:
-        sine = _axes("amplitude_", self.amplitude) | _axes("phase_", self.phase)
-        return _axes("", self.position) | sine | _axes("frequency_", self.angular_frequency)
 
 
 class FigureEightReference(_PositionReference):
@@ -183,10 +169,13 @@ class FigureEightReference(_PositionReference):
         description="2 pi over the time once around [rad/s]", examples=[0.5]
     )
 
-    def _motion(self) -> dict[str, float]:
+    def _motion(self) -> dict[str, float | Triple]:
         once = self.angular_frequency
-        sine = _axes("amplitude_", (0.5 * self.length, 0.5 * self.width, 0.0))
-        return _axes("", self.position) | sine | _axes("frequency_", (once, 2.0 * once, 0.0))
+        return {
+            "position": self.position,
+            "amplitude": (0.5 * self.length, 0.5 * self.width, 0.0),
+            "angular_frequency": (once, 2.0 * once, 0.0),
+        }
 
 
 class WaypointReference(_PositionReference):
@@ -207,7 +196,7 @@ class WaypointReference(_PositionReference):
         examples=[[0.0, 5.0]],
     )
 
-    def _motion(self) -> dict[str, float]:
+    def _motion(self) -> dict[str, float | Triple]:
         return {"segments": float(len(self.times))}
 
     @property
@@ -215,13 +204,11 @@ class WaypointReference(_PositionReference):
         """Polynomials; see `tiltsim_controllers.references.waypoints.minimum_snap_knots`."""
         return _minimum_snap_knots(self.positions, self.times)
 
-    @model_validator(mode="after")
-    def _check(self) -> Self:
+    def _check_values(self) -> None:
         try:
             _ = self.knots
         except ValueError as error:
             raise self.mistake("times", str(error)) from None
-        return self
 
 
 class TableReference(_PositionReference, TimeTable):
@@ -253,7 +240,7 @@ class TableReference(_PositionReference, TimeTable):
         "or noisy",
     )
 
-    def _motion(self) -> dict[str, float]:
+    def _motion(self) -> dict[str, float | Triple]:
         return {"segments": float(len(self.table))}
 
     @property
@@ -261,13 +248,12 @@ class TableReference(_PositionReference, TimeTable):
         """Polynomials; see `tiltsim_controllers.references.waypoints.table_knots`."""
         return _reference_table_knots(self.table, self.interpolation)
 
-    @model_validator(mode="after")
-    def _check(self) -> Self:
+    def _check_values(self) -> None:
+        super()._check_values()
         try:
             _ = self.knots
         except ValueError as error:
             raise self.mistake("file" if self.rows is None else "rows", str(error)) from None
-        return self
 
 
 @lru_cache(maxsize=64)
@@ -277,10 +263,6 @@ def _reference_table_knots(rows: Rows, interpolation: str) -> Values:
 
 
 _minimum_snap_knots = lru_cache(maxsize=64)(minimum_snap_knots)
-
-
-def _axes(prefix: str, values: Triple) -> dict[str, float]:
-    return {f"{prefix}{axis}": value for axis, value in zip("xyz", values, strict=True)}
 
 
 class AttitudeAltitudeReference(_Reference):
@@ -302,15 +284,8 @@ class AttitudeAltitudeReference(_Reference):
     def kind(self) -> ReferenceKind:
         return "attitude_altitude"
 
-    @property
-    def parameters(self) -> ReferenceParameters:
-        return ReferenceParameters(
-            REFERENCE_TYPES[self.type],
-            z=self.altitude,
-            roll=self.roll,
-            pitch=self.pitch,
-            yaw=self.yaw,
-        )
+    def _motion(self) -> dict[str, float | Triple]:
+        return {"z": self.altitude}
 
 
 Reference = Annotated[

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from math import inf, pi
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from tiltsim.models.parts import TiltServo
 from tiltsim.models.rotor_table import Multirotor
@@ -58,7 +58,7 @@ class TiltServoTable(ServoTable):
 
 
 class AnyVehicleTable(Table, ABC):
-    """What every vehicle has."""
+    """The keys and properties of every vehicle."""
 
     table_name = "vehicle"
     is_planar: ClassVar[bool] = False  # moves on a plane, without gravity, air or ground
@@ -68,12 +68,12 @@ class AnyVehicleTable(Table, ABC):
     @property
     @abstractmethod
     def rotor_count(self) -> int:
-        """How many rotors it has."""
+        """Number of rotors."""
 
     @property
     @abstractmethod
     def tilt_count(self) -> int:
-        """How many servos tilt its rotors."""
+        """Number of servos that tilt rotors."""
 
     @property
     def has_tilting_rotors(self) -> bool:
@@ -86,7 +86,7 @@ class AnyVehicleTable(Table, ABC):
 
 
 class RotorcraftTable(AnyVehicleTable, ABC):
-    """What every vehicle that flies has."""
+    """The keys and properties of every vehicle that flies."""
 
     mjcf: str | None
     min_rotor_speed: NonNegative | None = Field(
@@ -242,8 +242,6 @@ class MultirotorTable(RotorcraftTable):
     def pod_inertias(self) -> Values:
         return self.file.pod_inertias
 
-    @model_validator(mode="after")
-    def _check(self) -> Self:
+    def _check_values(self) -> None:
         self._check_rotor_inertia(self.resolve().max_rotor_inertia)
         self._check_limits()
-        return self

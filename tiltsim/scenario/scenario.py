@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Annotated, Any, Self
 
-from pydantic import ConfigDict, Field, ValidationError, model_validator
+from pydantic import ConfigDict, Field, ValidationError
 
 from tiltsim.errors import InputError
 from tiltsim.scenario.arguments import check_keys, leaves
@@ -51,7 +51,7 @@ class Scenario(ScenarioTables):
     def model_validate(
         cls, obj: Any, *, address: str = "scenario", emptied: Collection[str] = (), **options: Any
     ) -> Self:
-        """As pydantic's, but what is wrong is an `InputError` of one line.
+        """As in pydantic, but mistakes raise an `InputError` of one line.
 
         Args:
             obj: The tables.
@@ -64,10 +64,8 @@ class Scenario(ScenarioTables):
         with _in_one_line(address, obj, emptied):
             return super().model_validate(obj, **options)
 
-    @model_validator(mode="after")
-    def _check(self) -> Self:
+    def _check_values(self) -> None:
         self.require_consistency()
-        return self
 
     def require_consistency(self) -> None:
         """Raise `InvalidValueError`, worded by validation, if tables contradict each other."""
@@ -83,7 +81,7 @@ class Scenario(ScenarioTables):
                 kinds have the same keys, as ``trot_instant`` and ``trot_continuous``.
 
         Raises:
-            InputError: In one line: the key, the value and what is allowed.
+            InputError: In one line: the key, the value and the allowed values.
         """
         check_keys("changes", changes)
         changed: Scenario = public("load_scenario")(self, changes)
@@ -96,13 +94,13 @@ class Scenario(ScenarioTables):
         )
 
     def __str__(self) -> str:
-        """The same; `model_dump` has all keys."""
+        """Address and title; `model_dump` has all keys."""
         return repr(self)
 
     def _repr_html_(self) -> str:
-        """What is not left at its default, as a table for notebooks."""
+        """The keys that are set, as a table for notebooks."""
         given = self.model_dump(mode="json", exclude_unset=True, exclude={*DESCRIPTIVE})
-        rows = [(key, show(value)) for key, value in leaves(given)]
+        rows = [(key, show(value)) for key, value in leaves(given) if value is not None]
         return html_table(
             self.title or self.address or "Scenario", [self.address, self.source], rows
         )
@@ -125,10 +123,10 @@ class FlightPlan:
     scenario: Scenario
     gait: Gait  # planned for the scenario's vehicle
     reference: ReferenceParameters
-    knots: Values  # those of the gait, then those of the reference
+    knots: Values  # table data of the gait, then of the reference
 
 
 def plan_flight(scenario: Scenario) -> FlightPlan:
-    """Plan a scenario's gait, and place the knots of its reference after the gait's."""
+    """Plan a scenario's gait, and append the table data of its reference to the gait's."""
     gait = scenario.gait.plan(scenario.vehicle.resolve())
     return FlightPlan(scenario, gait, *scenario.reference.after_gait(gait.knots))

@@ -1,4 +1,4 @@
-"""The tables of a scenario together, and what follows from several of them."""
+"""The tables of a scenario together, and properties that follow from several of them."""
 
 from __future__ import annotations
 
@@ -7,9 +7,8 @@ from typing import Annotated, Any, Final
 from pydantic import Field, PrivateAttr
 
 from tiltsim.models.rotor_table import Multirotor
-from tiltsim.scenario.claim import ClaimName, ClaimTable, Origin
 from tiltsim.scenario.controller import Controller
-from tiltsim.scenario.expectation import Expectation
+from tiltsim.scenario.expectation import ClaimName, ClaimTable, Expectation, Origin
 from tiltsim.scenario.gait import FixedGait, Gait
 from tiltsim.scenario.reference import Reference, SetpointReference
 from tiltsim.scenario.rotorcraft import MultirotorTable, RotorcraftTable, TiltServoTable
@@ -79,7 +78,7 @@ class ScenarioTables(Table):
     claim: dict[ClaimName, ClaimTable] = Field({}, description="statements of the source")
 
     _address: str = PrivateAttr("")
-    _own: dict[str, Any] = PrivateAttr({})  # what was given in Python, by name
+    _own: dict[str, Any] = PrivateAttr({})  # parts given in Python, by name
     _trusted: bool = PrivateAttr(False)  # see `tiltsim.scenario.trust`
 
     @property
@@ -93,14 +92,14 @@ class ScenarioTables(Table):
         return self._own.get("controller")
 
     def __getstate__(self) -> dict[Any, Any]:
-        """Without functions: other processes need not be able to import those of a notebook."""
+        """Without functions: other processes need not be able to import a notebook's."""
         state = super().__getstate__()
         private = {**(state["__pydantic_private__"] or {}), "_own": {}}
         return {**state, "__pydantic_private__": private}
 
     @property
     def time_tables(self) -> dict[str, TimeTable]:
-        """Reference and gait by name, as far as they are tables over time."""
+        """Reference and gait by name, if they are tables over time."""
         named = {"reference": self.reference, "gait": self.gait}
         return {name: table for name, table in named.items() if isinstance(table, TimeTable)}
 

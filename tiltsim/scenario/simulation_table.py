@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Final, Literal, Self
+from typing import Annotated, Final, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from tiltsim.scenario.table import (
     Angles3,
@@ -26,7 +26,7 @@ INTEGRATORS: Final = {
     "mujoco": ("RK4", "implicitfast", "implicit", "Euler"),
     "rigid_body": ("RK4", "ode3"),
 }
-"""Those of a plant; the thesis plant ignores the key."""
+"""Integrators of each plant; the thesis plant ignores the key."""
 
 MAX_LATENCY_STEPS: Final = 20
 """Largest number of delayed control samples; each takes eight states of the simulation."""
@@ -89,7 +89,7 @@ class SimulationTable(Table):
 
     @property
     def solver(self) -> str:
-        """The integrator in use: that of the plant."""
+        """The integrator that the plant uses."""
         return "ode3" if self.plant == "thesis" else self.integrator
 
     @property
@@ -113,8 +113,7 @@ class SimulationTable(Table):
         interval = 0.01 if self.record_timestep is None else self.record_timestep
         return max(1, round(interval / self.timestep))
 
-    @model_validator(mode="after")
-    def _check(self) -> Self:
+    def _check_values(self) -> None:
         for key in ("duration", "control_timestep", "record_timestep"):
             value = getattr(self, key)
             if value is None or value == 0.0:
@@ -128,7 +127,6 @@ class SimulationTable(Table):
                 raise self.mistake(key, f"must be a multiple of timestep = {self.timestep}")
         self._check_integrator()
         self._check_latency()
-        return self
 
     def _check_integrator(self) -> None:
         allowed = INTEGRATORS.get(self.plant)
@@ -158,7 +156,7 @@ class InitialTable(Table):
 
     position: Vector3 = Field(
         (0.0, 0.0, 0.0),
-        description="of the centre of mass in the world, z up [m]",
+        description="of the center of mass in the world, z up [m]",
         examples=[[0.0, 0.0, 1.0]],
     )
     velocity: Vector3 = Field(

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from tiltsim.models.parts import Ground
 from tiltsim.models.vehicle_parts import MAX_ROTORS
@@ -161,11 +161,9 @@ class GustTable(Table):
         0.0, description="from start to end; 0 for a gust that lasts [s]", examples=[8.0]
     )
 
-    @model_validator(mode="after")
-    def _check(self) -> Self:
+    def _check_values(self) -> None:
         if 0.0 < self.duration < 2.0 * self.rise:
             raise self.mistake("duration", f"must be 0 or at least twice rise = {self.rise}")
-        return self
 
 
 class TurbulenceTable(Table):
@@ -206,10 +204,9 @@ class AirTable(Table):
         None, description="more thrust near the ground; default: none"
     )
 
-    @model_validator(mode="after")
-    def _check(self) -> Self:
+    def _check_values(self) -> None:
         if any(self.drag.linear) or any(self.drag.area):
-            return self
+            return
         for key, moves in (
             ("wind", any(self.wind)),
             ("gust", self.gust),
@@ -219,4 +216,3 @@ class AirTable(Table):
                 raise InvalidValueError(
                     f"air.{key}", getattr(self, key), "acts through drag only; set air.drag"
                 )
-        return self

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from math import pi
 from operator import attrgetter
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, Self
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator, model_validator
 
 from tiltsim.errors import InputError
 from tiltsim.scenario.messages import InvalidValueError
@@ -54,8 +54,16 @@ class Table(BaseModel):
             raise InvalidValueError(key, value, "not valid Unicode")
         return value
 
+    @model_validator(mode="after")
+    def _check_table(self) -> Self:
+        self._check_values()
+        return self
+
+    def _check_values(self) -> None:
+        """Refuse keys that contradict each other; called when every key alone is valid."""
+
     def __dir__(self) -> list[str]:
-        """Names to complete: without what is pydantic's, except to copy and to dump."""
+        """Names to complete, without pydantic's methods except for copies and dumps."""
         inherited = {name for name in dir(BaseModel) if not name.startswith("_")}
         useful = {"model_copy", "model_dump", "model_dump_json"}
         return sorted({*super().__dir__()} - (inherited - useful))
@@ -68,7 +76,7 @@ class Table(BaseModel):
         raise self._frozen(f"{name} = {short_repr(value)}")
 
     def __delattr__(self, name: str) -> None:
-        """Refuse to delete a key, likewise."""
+        """Refuse to delete a key, in words that help."""
         if name.startswith("_"):
             super().__delattr__(name)
             return

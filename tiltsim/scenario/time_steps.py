@@ -32,7 +32,7 @@ MAX_LOOP_STEP: Final = 2.5
 """Largest product of timestep and closed-loop pole; RK4 turns unstable at 2.78, ode3 at 2.51."""
 
 MAX_HOVER_SPEED: Final = 5000.0
-"""Rotor speed (rad/s) in hover beyond that of any rotor: tips at 7 cm would be supersonic."""
+"""Rotor speed (rad/s) in hover that no rotor reaches: tips at 7 cm would be supersonic."""
 
 MAX_HELD_STEP: Final = 2.0
 """Largest product of control timestep and pole, where a held third derivative turns unstable."""
@@ -44,7 +44,7 @@ On the real axis RK4 turns unstable at 2.78; at a damping ratio of 0.3 or more i
 """
 
 MAX_ODE3_SERVO_STEP: Final = 2.45
-"""The same for ode3, which turns unstable at 2.51; at less damping: `MAX_UNDAMPED_SERVO_STEP`."""
+"""Limit for ode3, unstable from 2.51 on; at less damping: `MAX_UNDAMPED_SERVO_STEP`."""
 
 MAX_UNDAMPED_SERVO_STEP: Final = 1.7
 """ode3 turns unstable at 1.73 on the imaginary axis."""

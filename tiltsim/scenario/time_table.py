@@ -8,7 +8,7 @@ from math import isfinite
 from pathlib import Path
 from typing import Any, ClassVar, Final, Self
 
-from pydantic import Field, PrivateAttr, model_validator
+from pydantic import Field, PrivateAttr
 
 from tiltsim.errors import InputError
 from tiltsim.scenario.limits import MAX_FILE_SIZE, MAX_ROWS, read_text
@@ -23,7 +23,7 @@ REFERENCE_COLUMNS: Final = ("time", "x", "y", "z")
 
 
 def gait_columns(tilts: int) -> tuple[str, ...]:
-    """The columns of a gait of so many tilt angles."""
+    """The columns of a gait with a number of tilt angles."""
     return ("time", *(f"alpha_{i}" for i in range(1, tilts + 1)))
 
 
@@ -65,7 +65,7 @@ class TimeTable(Table):
 
     @classmethod
     def _columns_of_width(cls, width: int) -> tuple[str, ...]:
-        """The columns of rows with so many numbers."""
+        """The columns of rows with ``width`` numbers."""
         return cls.columns
 
     def ends_before(self, time: float) -> bool:
@@ -74,11 +74,11 @@ class TimeTable(Table):
         return not goes_on and time > self._rows[-1][0]
 
     def in_file(self, name: str) -> Self:
-        """The same, to be read from a file of that name."""
+        """The table, to be read from a file of that name."""
         return self.model_copy(update={"file": name, "rows": None})
 
     def in_scenario(self) -> Self:
-        """The same without a file."""
+        """The table with its rows in the scenario, without a file."""
         return self.model_copy(update={"file": None, "rows": self._rows})
 
     def csv(self) -> bytes:
@@ -89,8 +89,7 @@ class TimeTable(Table):
         ]
         return "".join(f"{','.join(line)}\n" for line in lines).encode()
 
-    @model_validator(mode="after")
-    def _check_rows(self) -> Self:
+    def _check_values(self) -> None:
         given: Rows | None = dict(self)["rows"]
         if (self.file is None) == (given is None):
             raise self.mistake("file", "give one of file and rows")
@@ -101,7 +100,6 @@ class TimeTable(Table):
         except InputError as error:
             key, reason = "rows" if self.file is None else "file", str(error)
             raise self.mistake(key, reason.removeprefix(f"{self.file}: ")) from None
-        return self
 
 
 def rows_of_columns(table: Any, columns: Sequence[str]) -> list[Values]:

@@ -1,7 +1,7 @@
 """The one decision whether the Python code that a scenario names may be executed.
 
-The permission is a property of the scenario and goes with it, to other processes, too. What reads
-a scenario gives none; `tiltsim.scenario.own_code`, which alone executes such files, asks here.
+The permission is a property of the scenario and goes with it, also to other processes. Reading a
+scenario gives none; `tiltsim.scenario.own_code`, which alone executes such files, checks it here.
 """
 
 from __future__ import annotations

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 from math import pi, sqrt
-from typing import Annotated, Any, Final, Literal, Self
+from typing import Annotated, Any, Final, Literal
 
 import numpy as np
-from pydantic import Discriminator, Field, Tag, model_validator
+from pydantic import Discriminator, Field, Tag
 
 from tiltsim.models.parts import SERVO_ARMATURE, Pod
 from tiltsim.models.rotor_table import Multirotor
@@ -82,13 +82,13 @@ class VehicleTable(RotorcraftTable):
     )
     inertia: Annotated[tuple[Positive, Positive, Positive], Field(strict=False)] | None = Field(
         None,
-        description="principal moments about the centre of mass, along the body axes, pods "
+        description="principal moments about the center of mass, along the body axes, pods "
         "included; default: the preset's [kg m^2]",
         examples=[[2e-3, 3e-3, 5e-3]],
     )
     arm_length: NotTiny | None = Field(
         None,
-        description="from the centre of mass to a rotor; default: the preset's [m]",
+        description="from the center of mass to a rotor; default: the preset's [m]",
         examples=[0.2],
     )
     thrust_coefficient: NotTiny | None = Field(
@@ -153,8 +153,7 @@ class VehicleTable(RotorcraftTable):
         """Whether the rotors are at the ends of four equal arms at right angles."""
         return self.user_vehicle is None or not self.user_vehicle.layout_mismatch
 
-    @model_validator(mode="after")
-    def _check(self) -> Self:
+    def _check_values(self) -> None:
         if self.mjcf is not None:
             self.require_defaults(("arm_length", "pod"), "defined by vehicle.mjcf; remove it")
         vehicle = self.resolve()
@@ -170,7 +169,6 @@ class VehicleTable(RotorcraftTable):
             )
         self._check_rotor_inertia(moments[2] / self.rotor_count)
         self._check_limits()
-        return self
 
 
 class TiltCarTable(AnyVehicleTable):
@@ -257,7 +255,7 @@ class ModelErrorTable(Table):
     )
 
     def apply_to_rotors(self, vehicle: Multirotor) -> Multirotor:
-        """As `apply`, to a multirotor; products of inertia by the mean factor of their axes."""
+        """The simulated multirotor; products of inertia get the mean factor of their axes."""
         scale = np.sqrt(self.inertia)
         inertia = np.reshape(vehicle.inertia, (3, 3)) * np.outer(scale, scale)
         return replace(

@@ -1,1 +1,1 @@
-"""Studies that fly or analyse many cases: checks of the library, benchmark, gait analysis."""
+"""Studies that fly or analyze many cases: checks of the library, benchmark, gait analysis."""

@@ -18,10 +18,10 @@ from tiltsim.studies.comparison import GIVEN, Entry, fly_entries
 from tiltsim.studies.fleet import FLEET, fleet_file
 
 FOLDER: Final = "arena"
-"""Of the library: one file for each vehicle, one variant for each task."""
+"""Folder of the library with one file for each vehicle and one variant for each task."""
 
 BASELINES: Final = ("geometric", "pid", "indi", "lqr")
-"""Laws of the literature, against which the thesis's and ours stand."""
+"""Laws of the literature, with which the other laws are compared."""
 
 HALF: Final = (0.1, 0.1)
 """Root mean square errors of position (m) and yaw (rad), each of which alone halves the score."""
@@ -41,16 +41,16 @@ MULTIROTOR: Final = "multirotor"
 """The file whose tasks the fleet flies, each vehicle in place of the file's own."""
 
 OWN_KEYS: Final = {"omni_octorotor": {"controller.norm": "thrust"}}
-"""What a vehicle of the fleet needs beside its file and its tilt angles: its rotors reverse."""
+"""Keys that a vehicle of the fleet needs beside its file and tilt angles: its rotors reverse."""
 
 
 @dataclass(frozen=True)
 class Vehicle:
-    """Of the arena.
+    """A vehicle of the arena.
 
     Attributes:
-        tasks: Addresses.
-        overrides: Values by dotted key that make the tasks those of this vehicle.
+        tasks: Addresses of its tasks.
+        overrides: Values by dotted key that put this vehicle into the tasks.
     """
 
     tasks: tuple[str, ...]
@@ -64,7 +64,7 @@ class Standing:
     Attributes:
         controller: Its law, or `GIVEN`.
         scores: By task, 0 to 100; None where the controller does not fit the task.
-        tuned: The same with tuned gains; those of `scores` where there are none.
+        tuned: Scores with tuned gains; equal to `scores` where there are none.
     """
 
     controller: str
@@ -78,7 +78,7 @@ class Standing:
 
     @property
     def tuned_total(self) -> float:
-        """The same with tuned gains."""
+        """Mean over all tasks with tuned gains."""
         return mean(score or 0.0 for score in self.tuned.values())
 
 
@@ -98,7 +98,7 @@ def vehicles() -> dict[str, Vehicle]:
 
 
 def chosen_vehicles(names: Sequence[str]) -> dict[str, Vehicle]:
-    """Those named, or all. Raises InputError if one does not exist."""
+    """The named vehicles, or all. Raises InputError if one does not exist."""
     known = vehicles()
     for name in names:
         if name not in known:
@@ -134,7 +134,7 @@ def fly_tasks(
     Args:
         chosen: The vehicles.
         controllers: Their tables by vehicle and name.
-        tuned: Tables with tuned gains of some of them, flown, too.
+        tuned: Tables with tuned gains of some of them, which are also flown.
         jobs: Processes.
         trusted: Whether to execute Python code that only tuned tables name.
 
@@ -168,8 +168,8 @@ def entry_of(
 
     Args:
         vehicle: The vehicle.
-        address: Of the task.
-        name: Of the controller.
+        address: Address of the task.
+        name: Name of the controller.
         table: Its keys, empty for the tasks' own.
         changes: Further values by dotted key.
     """
@@ -182,7 +182,7 @@ def entry_of(
 
 
 def score(row: Mapping[str, Any]) -> float | None:
-    """Of a row of `compare`: ``100 / (1 + e_position / half + e_yaw / half)``.
+    """The score of a row of `compare`: ``100 / (1 + e_position / half + e_yaw / half)``.
 
     None if the task refuses the controller, 0 if the flight ends early.
     """
@@ -200,7 +200,7 @@ def task_of(row: Mapping[str, Any]) -> str:
 
 
 def standings(rows: Sequence[Mapping[str, Any]]) -> list[Standing]:
-    """Of the rows of one vehicle, the best first, with tuned gains where there are any."""
+    """Standings from the rows of one vehicle, the best first, by tuned gains if there are any."""
     scores: dict[str, dict[str, dict[str, float | None]]] = {}
     for row in rows:
         by_gains = scores.setdefault(row["controller"], {"default": {}, "tuned": {}})
@@ -234,7 +234,7 @@ def are_rivals(every: Sequence[Standing]) -> bool:
 
 
 def beaten(every: Sequence[Standing], gains: str) -> list[str]:
-    """Of each task in which a baseline stands before all other controllers, who wins.
+    """The winner of each task in which a baseline beats all other controllers.
 
     Args:
         every: The controllers of a vehicle.
@@ -253,7 +253,7 @@ def beaten(every: Sequence[Standing], gains: str) -> list[str]:
 
 
 def changed(every: Sequence[Standing]) -> list[str]:
-    """Of each task whose winner is another with tuned gains, both winners."""
+    """Both winners of each task in which tuned gains change the winner."""
     lines = []
     for task in every[0].scores if every else ():
         (before, low), (after, high) = (best(every, task, kind) for kind in ("default", "tuned"))

@@ -14,7 +14,7 @@ def arena_page(rows: Mapping[str, Sequence[Mapping[str, Any]]], made: Sequence[s
     """How often baselines win, all totals, and for each vehicle who wins and a table.
 
     Args:
-        rows: Of each vehicle.
+        rows: Rows of each vehicle.
         made: Sentences on versions, seeds and gains.
     """
     every = {vehicle: standings(chosen) for vehicle, chosen in rows.items()}
@@ -47,7 +47,7 @@ def _baselines_win(every: Mapping[str, Sequence[Standing]], kinds: Sequence[str]
 
 
 def _winners(ranked: Sequence[Standing], kinds: Sequence[str]) -> Iterator[str]:
-    """Of one vehicle, where baselines win, and where tuning changes who wins."""
+    """Tasks of one vehicle that baselines win, and whose winner changes by tuning."""
     for gains in kinds if are_rivals(ranked) else ():
         won = ", ".join(beaten(ranked, gains)) or "nowhere"
         yield f"- a baseline wins with {gains} gains: {won}"

@@ -25,10 +25,10 @@ from tiltsim.studies.peers import PEERS, Timing, running, speed, timed
 from tiltsim_controllers.mathematics.scalar import Floats
 
 TROTTING: Final = "ch04_tracking/circle#continuous_t2_modified"
-"""What is flown: the circle with the continuous trot."""
+"""The scenario flown: the circle with the continuous trot."""
 
 STEADY: Final = "ch04_tracking/circle#fixed_modified"
-"""What is flown to measure errors: the circle with constant tilts, here with the exact law."""
+"""The scenario for errors: the circle with constant tilts, here with the exact law."""
 
 EXACT: Final = {f"controller.{key}": "exact" for key in ("decoupling", "gains", "decoupler")}
 
@@ -66,16 +66,16 @@ class Kind(NamedTuple):
 class TimedBatch:
     """Vehicles, each with its own mass, which fly some steps whenever they are timed.
 
-    ``position`` (m) is that of the first at the end of its flight.
+    ``position`` (m) is the first vehicle's at the end of its flight.
 
     Args:
-        vehicles: How many; all cores share them.
+        vehicles: Number of vehicles; all cores share them.
         kind: Engine, precision and functions.
         solver: One of `tiltsim.equations.solvers.SOLVERS`.
         timestep: s
-        steps: Of a flight.
+        steps: Steps of a flight.
         address: The scenario.
-        changes: To the scenario.
+        changes: Changes of the scenario by dotted key.
     """
 
     vehicles: int
@@ -151,7 +151,7 @@ class TimedBatch:
         self.position = first[1:4]
 
     def row(self, case: str) -> dict[str, Any]:
-        """As of ``tiltsim bench --json``, with further columns; see `speed`."""
+        """A row of ``tiltsim bench --json``, with further columns; see `speed`."""
         return {
             "case": case,
             **self.kind._asdict(),
@@ -164,7 +164,7 @@ class TimedBatch:
 
 
 def _in_rounds(timings: Sequence[Callable[[], None]], rounds: int) -> None:
-    """Time all one after the other, so many times; the first round compiles."""
+    """Time all one after the other in each round; an additional first round compiles."""
     for _ in range(1 + rounds):
         for time in timings:
             time()
@@ -214,7 +214,7 @@ def bench_array_accuracy(timesteps: Iterable[float] = ACCURACY_STEPS) -> Rows:
 def bench_peer(name: str) -> Rows:
     """Time another simulator and ours in turns, with equal numbers of vehicles and time steps.
 
-    Rows as those of `bench_arrays`, with ``simulator``; ``ratio`` is to the peer's best speed.
+    Rows as in `bench_arrays`, with ``simulator``; ``ratio`` is to the peer's best speed.
     """
     case = PEERS[name]
     with ExitStack() as stack:

@@ -11,6 +11,7 @@ import os
 import sys
 from collections.abc import Callable
 from functools import partial
+from math import nan
 from pathlib import Path
 from statistics import median
 from time import perf_counter
@@ -20,10 +21,13 @@ import mujoco
 import numpy as np
 
 from tiltsim.closed_loop.assembly import Assembly
+from tiltsim.closed_loop.userdata import CONTROL_PERIOD as PERIOD_IN_USERDATA
+from tiltsim.closed_loop.userdata import Header
 from tiltsim.engines.base import EngineName
 from tiltsim.engines.callback import control_callback
 from tiltsim.engines.factory import make_engine
 from tiltsim.engines.native_engine import compile_empty
+from tiltsim.engines.python_engine import control_step
 from tiltsim.laws.assembling import assemble
 from tiltsim.plants.mujoco_plant import MujocoPlant
 from tiltsim.scenario.loading import parse_scenario
@@ -42,6 +46,12 @@ RECORD_STEPS: Final = 10
 BATCH_ROWS: Final = 64
 BATCH_STEPS: Final = 200
 BATCH_ROUNDS: Final = 9
+
+CALLS: Final = 200
+"""Control steps that are timed together."""
+
+CALL_ROUNDS: Final = 40
+"""Timings of compiled code, of which the least counts."""
 
 ACCURACY_STEPS: Final = (0.008, 0.004, 0.002, 0.001, 0.0005)
 REFERENCE_STEP: Final = 0.0001
@@ -124,9 +134,9 @@ def bench_flights(vehicles: int, duration: float, integrator: str, timestep: flo
 
     Args:
         vehicles: Number of flights.
-        duration: Of each, s.
+        duration: Duration of each flight, s.
         integrator: MuJoCo's.
-        timestep: Of the physics, s.
+        timestep: Time step of the physics, s.
 
     Returns:
         One row without a ratio; ``memory`` is the peak of the process, bytes, or None
@@ -143,7 +153,7 @@ def bench_flights(vehicles: int, duration: float, integrator: str, timestep: flo
 def _peak_memory() -> int | None:
     """Peak memory of this process, bytes; None where the system does not tell, as on Windows."""
     try:
-        # Linux: the peak that getrusage gives may be that of the program which started this one.
+        # Linux: getrusage may give the peak of the program that started this one.
         status = Path("/proc/self/status").read_text(encoding="ascii")
         return int(status.split("VmHWM:")[1].split()[0]) * 1024
     except (OSError, IndexError):
@@ -252,6 +262,49 @@ def _compare(variants: Variants, rounds: int, timestep: float, shared: dict[str,
         }
         for (case, engine), values in seconds.items()
     ]
+
+
+def time_per_call(assembly: Assembly) -> float:
+    """Seconds that one control step takes on the Python engine, the least of a few rounds."""
+    loop, setup = assembly.loop, assembly.setup
+    if assembly.scenario.controller.is_external:
+        return nan
+    qpos, qvel = loop.kind.initial_motion(assembly)
+    act = tuple(map(float, loop.dynamics.initial_activations(assembly, setup)))
+    header = [*Header(assembly.scenario.simulation.timestep)]
+    none: list[float] = []
+    vectors = [*map(float, qpos)], [*map(float, qvel)], [*act], none
+    step = control_step(assembly, setup.userdata.tolist(), "controls")
+
+    def calls() -> None:
+        for _ in range(CALLS):
+            step(header, *vectors)
+
+    return min(_seconds(calls) for _ in range(3)) / CALLS
+
+
+def compiled_time_per_call(scenario: Scenario) -> float:
+    """Seconds that one control step takes in compiled code; NaN where it does not fly in MuJoCo.
+
+    The difference, the least of a few rounds each, of MuJoCo's forward dynamics with the control
+    step and with a callback that does nothing.
+    """
+    if scenario.controller.is_external or scenario.simulation.plant != "mujoco":
+        return nan
+    plant = MujocoPlant(assemble(scenario), engine="native")
+    plant.data.userdata[PERIOD_IN_USERDATA] = 0.0  # the control step at every evaluation
+    callbacks = plant.callback, compile_empty()
+
+    def calls() -> None:
+        for _ in range(CALLS):
+            mujoco.mj_forward(plant.model, plant.data)
+
+    rounds = []
+    for _ in range(CALL_ROUNDS):  # by turns, as the speed of a machine changes
+        for callback in callbacks:
+            with control_callback(callback):
+                rounds.append(_seconds(calls) / CALLS)
+    return max(0.0, min(rounds[::2]) - min(rounds[1::2]))
 
 
 def run_benchmark(progress: Callable[[int, int], None] = lambda done, total: None) -> Rows:

@@ -23,7 +23,7 @@ EXIT_CODES: Final[Mapping[Status, int]] = {
     "failed": EXPECTATION_FAILED,
     "passed": DONE,
 }
-"""Of what was flown, the most severe first."""
+"""Exit codes of flown scenarios, the most severe first."""
 
 _ELEMENTS: Final = {"passed": None, "failed": "failure", "lost": "failure", "skipped": "skipped"}
 """Elements of JUnit by status; any other status is an error."""

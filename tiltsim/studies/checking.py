@@ -76,7 +76,7 @@ def shard(addresses: list[str], number: int, count: int) -> list[str]:
 
     Args:
         addresses: Of scenarios, as from `collect`.
-        number: Of the part, from 1.
+        number: Number of the part, from 1.
         count: Number of parts.
     """
     return addresses[number - 1 :: count]

@@ -1,4 +1,4 @@
-"""Controllers side by side: the same flights under each, what they cost, and what they survive."""
+"""Controllers side by side: errors, effort, cost and robustness in the same flights."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from tiltsim.scenario.messages import choose
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.scenario.trust import require_trust
 from tiltsim.simulation.simulate import simulate_to_end
-from tiltsim.studies.call_times import compiled_time_per_call, time_per_call
+from tiltsim.studies.benchmark import compiled_time_per_call, time_per_call
 from tiltsim.sweeps.search import boundary
 from tiltsim.system.processes import in_order, in_processes
 from tiltsim.vehicles.spans import in_last_second
@@ -41,7 +41,7 @@ class Search:
     """A value at which a controller is tried, in ever larger steps away from the true one.
 
     Attributes:
-        key: Of the scenario, except for the latency, which is in control periods.
+        key: Key of the scenario; the values of the latency are control periods.
         start, stop, step, tolerance: See `tiltsim.sweeps.search.boundary`.
     """
 
@@ -83,8 +83,8 @@ class Compared:
     """One controller on one scenario.
 
     Attributes:
-        row: As ``tiltsim compare --json`` prints it.
-        time, error: Of the flight: s, and the distance from the reference, m.
+        row: The row that ``tiltsim compare --json`` prints.
+        time, error: Times of the samples, s, and distances from the reference, m, shape (N,).
     """
 
     row: dict[str, Any]
@@ -97,8 +97,8 @@ class Entry:
     """One controller on one scenario, to be flown.
 
     Attributes:
-        address: Of the scenario.
-        name: Of the controller in the results.
+        address: Address of the scenario.
+        name: Name of the controller in the results.
         table: Its keys in place of the scenario's ``[controller]``; empty for the scenario's own.
         overrides: Further values by dotted key.
         trusted: Whether to execute Python code that the flight names.
@@ -152,13 +152,13 @@ def compare(
     """Fly every scenario under every controller; yields them in this order.
 
     Args:
-        addresses: Of scenarios.
+        addresses: Addresses of scenarios.
         controllers: Their tables by name, see `controller_tables`.
         overrides: Values by dotted key, for all flights.
         searches: Whether robustness is sought, which takes some forty flights each.
         jobs: Processes.
-        trusted: Whether Python code that scenario files name may be executed, as is that which
-            the tables name.
+        trusted: Whether to execute Python code that scenario files name; code that the tables
+            name is executed in any case.
 
     Raises:
         InputError: If no controller is given, a scenario does not exist, or code is not trusted.
@@ -181,7 +181,7 @@ def fly_entries(
     """Fly controllers on scenarios, in this order.
 
     Args:
-        entries: What to fly.
+        entries: Controllers and scenarios to fly.
         searches: Whether robustness is sought.
         timed: Whether control steps are timed.
         jobs: Processes.
@@ -214,7 +214,7 @@ def compare_one(entry: Entry, *, searches: bool, timed: bool = True) -> Compared
     """One controller on one scenario; a scenario that refuses it is part of the result.
 
     Args:
-        entry: What to fly.
+        entry: The controller and the scenario.
         searches: Whether robustness is sought.
         timed: Whether control steps are timed.
     """
@@ -255,7 +255,7 @@ def _number(value: Any) -> Any:
 
 
 def _distance(flight: Flight) -> Floats:
-    """How far the vehicle is from its reference, m; in altitude where it follows no more."""
+    """Distance of the vehicle from its reference, m; of the altitude where only that is given."""
     error = flight["reference_position"] - flight["position"]
     if flight.scenario.reference.kind == "attitude_altitude":
         return np.abs(error[:, 2])

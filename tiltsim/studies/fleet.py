@@ -1,16 +1,14 @@
-"""The vehicles in ``mjcf`` with any number of rotors, and what each can do."""
+"""The vehicles in ``mjcf`` with any number of rotors, and their capabilities."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final
+from pathlib import Path
+from typing import Any, Final
 
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.models.user_vehicle import read_user_vehicle
 from tiltsim.resources import shipped_folder
 from tiltsim.studies.multirotor_analysis import multirotor_report
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 BY_TURNS: Final = (0.35, -0.35, 0.35, -0.35, 0.35, -0.35)
 """Tilt angles (rad), about as large as a fixed cant of 20 degrees."""
@@ -26,7 +24,7 @@ FLEET: Final[dict[str, tuple[float, ...]]] = {
     "tilt_octorotor": (*BY_TURNS, 0.35, -0.35),
     "omni_octorotor": (),
 }
-"""Names of the files, with tilt angles (rad) that show what the vehicle can do."""
+"""Names of the files, with tilt angles (rad) that show the vehicle's capabilities."""
 
 KEYS: Final = (
     "rotors",

@@ -6,9 +6,10 @@ Angles are in rad, everything else in SI units; NaN becomes null.
 from __future__ import annotations
 
 from math import isfinite
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tiltsim_controllers.analysis import two_color_map
 from tiltsim_controllers.analysis.fault_tolerance import (
@@ -31,21 +32,15 @@ from tiltsim_controllers.analysis.singularity import (
 )
 from tiltsim_controllers.analysis.statics import hover_rotor_speeds
 from tiltsim_controllers.analysis.torque_free import SINGULAR_ATTITUDES, torque_free_forces
-from tiltsim_controllers.analysis.two_color_planner import check_path
+from tiltsim_controllers.analysis.two_color_planner import Path, check_path
 from tiltsim_controllers.analysis.unacceptable_attitudes import (
     acceptable_share,
     unacceptable_attitudes,
 )
-from tiltsim_controllers.vehicle.parameters import PRESETS, drag_ratio
+from tiltsim_controllers.gaits.plans import Gait
+from tiltsim_controllers.mathematics.scalar import Floats, Quad
+from tiltsim_controllers.vehicle.parameters import PRESETS, Vehicle, drag_ratio
 from tiltsim_controllers.vehicle.states import ROTORS
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from tiltsim_controllers.analysis.two_color_planner import Path
-    from tiltsim_controllers.gaits.plans import Gait
-    from tiltsim_controllers.mathematics.scalar import Floats, Quad
-    from tiltsim_controllers.vehicle.parameters import Vehicle
 
 NEARLY_SINGULAR: Final = 1e-3
 """Ratio of singular values of tau below which a gait has full rank only because of rounding.
@@ -172,8 +167,8 @@ def fault_report(tilts: Quad, vehicle: Vehicle, opposite_speed: float) -> dict[s
     Args:
         tilts: Tilt angles, rad.
         vehicle: Their vehicle.
-        opposite_speed: Of the rotor opposite the failed one in the hover with free tilt angles,
-            rad/s.
+        opposite_speed: Speed of the rotor opposite the failed one in the hover with free tilt
+            angles, rad/s.
 
     Returns:
         For each rotor: how far (rad) the tilt angles are from a hover on the other three, and a

@@ -5,17 +5,20 @@ Angles are in rad, everything else in SI units and body axes; what does not exis
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final
+from collections.abc import Sequence
+from typing import Any, Final
 
 import numpy as np
 
+from tiltsim.models.rotor_table import Multirotor
 from tiltsim_controllers.analysis.attainable import (
+    AttainableSet,
     TiltedRotors,
     attainable_forces,
     attainable_torques,
     side_force_share,
 )
-from tiltsim_controllers.analysis.hover import hover, rotor_losses
+from tiltsim_controllers.analysis.hover import Hover, hover, rotor_losses
 from tiltsim_controllers.analysis.level_hover import MAX_TILT, level_hover
 from tiltsim_controllers.analysis.singularity import world_up
 from tiltsim_controllers.analysis.torque_free import (
@@ -24,15 +27,8 @@ from tiltsim_controllers.analysis.torque_free import (
     singularity_margin,
     torque_free_forces,
 )
+from tiltsim_controllers.gaits.plans import Gait
 from tiltsim_controllers.vehicle.effectiveness import ROTOR_FLOATS, force_and_torque
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from tiltsim.models.rotor_table import Multirotor
-    from tiltsim_controllers.analysis.attainable import AttainableSet
-    from tiltsim_controllers.analysis.hover import Hover
-    from tiltsim_controllers.gaits.plans import Gait
 
 UNLIMITED: Final = 100.0
 """Share of the weight that a rotor without a speed limit can carry, in a search for a hover."""
@@ -46,7 +42,7 @@ def tilted_rotors(
     Args:
         vehicle: with the ranges of its rotor speeds
         angles: one for each tilt hinge, rad
-        limits: minimum and maximum rotor speed (rad/s) in place of those of the file; a rotor that
+        limits: minimum and maximum rotor speed (rad/s) in place of the file's; a rotor that
             turns either way has the maximum both ways
     """
     ranges = np.array(vehicle.speed_ranges)

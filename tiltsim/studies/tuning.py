@@ -17,7 +17,7 @@ from functools import partial
 from math import log
 from pathlib import Path as FilePath
 from statistics import mean
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from scipy.optimize import minimize
@@ -54,7 +54,7 @@ TASKS: Final[Mapping[str, Mapping[str, Any]]] = {
     "weak_rotor": {"fault[0].rotor": 3, "fault[0].factor": 0.85},
     "latency": {"simulation.control_latency": 0.012, "reference.position": [0.0, -0.25, 0.15]},
 }
-"""Tasks of the arena, by name, and what is different in tuning; those that a vehicle has."""
+"""Tasks of the arena by name, and the keys that differ in tuning; a vehicle may lack some."""
 
 DURATION: Final = 5.0
 """s, of every flight."""
@@ -70,14 +70,14 @@ Path = tuple[str | int, ...]
 
 @dataclass(frozen=True)
 class Tuned:
-    """What a search found for a controller of a vehicle.
+    """The result of a search for a controller of a vehicle.
 
     Attributes:
         of: The controller's table before, empty for the tasks' own controller.
         table: The keys of ``[controller]`` with the best gains.
-        factors: By knob, on the default gains.
+        factors: Factors on the default gains, by knob.
         default_score, tuned_score: Means over the tuning tasks.
-        flights: Flown, at most the budget.
+        flights: Number of flights, at most the budget.
     """
 
     of: dict[str, Any]
@@ -88,21 +88,15 @@ class Tuned:
     flights: int
 
 
-@dataclass(frozen=True)
-class Search:
-    """A search to be done.
-
-    Attributes:
-        vehicle: Name of the vehicle.
-        controller: Name of the controller.
-    """
+class Search(NamedTuple):
+    """A search to be done, by the names of the vehicle and the controller."""
 
     vehicle: str
     controller: str
 
 
 def knobs(controller: ControllerTable) -> dict[str, dict[Path, int]]:
-    """What a search varies: places in the table, with the power of the factor there.
+    """The numbers that a search varies: places in the table, with the power of the factor there.
 
     For baselines and laws of packages every positive number but `NOT_TUNED`; for the others one
     factor for every linear loop, by which its poles are faster: the i-th coefficient has the i-th
@@ -128,7 +122,7 @@ def _leaves(value: Any, path: Path = ()) -> Iterator[tuple[Path, float]]:
 
 
 def _name(path: Path) -> str:
-    """As ``--set`` writes it."""
+    """The dotted key of a place, as in ``--set``."""
     return "".join(f"[{p}]" if isinstance(p, int) else f".{p}" for p in path).removeprefix(".")
 
 
@@ -139,7 +133,7 @@ def _loop_name(path: Path) -> str:
 
 
 def _order(path: Path) -> int:
-    """Of the coefficient in its loop, from 1; poles that are given themselves scale by 1."""
+    """Number of a coefficient in its loop, from 1; poles count as 1."""
     first = next((part for part in path if isinstance(part, int)), 0)
     return first + 1
 
@@ -188,7 +182,7 @@ def tune(
         vehicles: By name.
         controllers: Their tables, by vehicle and name.
         flights: The budget.
-        seed: Of the Latin hypercube.
+        seed: Seed of the Latin hypercube.
     """
     vehicle = vehicles[search.vehicle]
     table = controllers[search.vehicle][search.controller]
@@ -219,7 +213,7 @@ def tune(
 
 
 def _controller(tasks: Sequence[Entry]) -> ControllerTable | None:
-    """Of the first task that does not refuse it."""
+    """The controller in the first task that does not refuse it."""
     for entry in tasks:
         with suppress(InputError):
             return entry.scenario().controller
@@ -229,13 +223,13 @@ def _controller(tasks: Sequence[Entry]) -> ControllerTable | None:
 def maximize(
     value: Callable[[Floats], float], size: int, evaluations: int, seed: int
 ) -> list[tuple[Floats, float]]:
-    """Points and values that a search tried, at most so many; see the head of the module.
+    """Points and values that a search tried; see the head of the module.
 
     Args:
         value: To be made large, of `size` logarithms of factors.
         size: Number of factors.
-        evaluations: At most.
-        seed: Of the Latin hypercube.
+        evaluations: Largest number of points.
+        seed: Seed of the Latin hypercube.
     """
     tried: list[tuple[Floats, float]] = []
 
@@ -274,7 +268,7 @@ def tune_all(
         vehicles: By name.
         controllers: Their tables, by vehicle and name.
         flights: The budget of each.
-        seed: Of the search.
+        seed: Seed of the search.
         jobs: Processes.
     """
     work = partial(tune, vehicles=vehicles, controllers=controllers, flights=flights, seed=seed)
@@ -286,12 +280,12 @@ def tune_all(
 def tuning_document(
     found: Mapping[Search, Tuned | None], flights: int, seed: int, made: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """What is kept of searches, as JSON.
+    """The results of searches as a JSON document.
 
     Args:
-        found: What they found.
+        found: Result of each search.
         flights: The budget of each.
-        seed: Of the searches.
+        seed: Seed of the searches.
         made: Date, commit and versions.
     """
     gains: dict[str, dict[str, Any]] = {}

@@ -19,13 +19,13 @@ VALUES_TRIED: Final = 1000
 """Maximum values of an axis that are checked before any is flown."""
 
 RESERVED: Final = ("index", "end", "end_time", "cause", "scenario", "flights")
-"""Columns of every dataset, besides metrics and versions."""
+"""Columns of every dataset, in addition to metrics and versions."""
 
 
 def check_points(points: SweepPoints) -> list[Scenario]:
     """Check the values of every axis, with the others at their first; return the scenarios.
 
-    Of an axis with more than `VALUES_TRIED` values, so many spread evenly, both ends included;
+    An axis with more values is tried at `VALUES_TRIED` of them, spread evenly, both ends included;
     mistakes in others appear in their rows. Raises `InputError` if a scenario is not valid.
     """
     _check_names(points)

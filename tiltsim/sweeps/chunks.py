@@ -1,27 +1,48 @@
-"""Flying a chunk of a sweep: from points to rows, searches for boundaries included."""
+"""Flying a chunk of a sweep: from points to rows, searches for boundaries included.
+
+Only this module of the sweeps calls the simulation.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterable, Iterator
+import json
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any
+from typing import Any, Final
 
 from tiltsim.engines.base import EngineName
 from tiltsim.errors import InputError
 from tiltsim.flight.expectations import Verdict
+from tiltsim.flight.flight import Flight
 from tiltsim.plants.engine_choice import with_engine
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.scenario.trust import require_trust, with_trust
-from tiltsim.sweeps.columns import installed_versions, make_row, rows_to_table
+from tiltsim.simulation.batch import fly
 from tiltsim.sweeps.definition import SweepDefinition
-from tiltsim.sweeps.executing import FEW, ScenarioResult, fly_scenarios
 from tiltsim.sweeps.points import SweepPoints
+from tiltsim.sweeps.rows import installed_versions, rows_to_table
 from tiltsim.sweeps.search import boundary
 from tiltsim.system.parquet import parquet_bytes
+from tiltsim.system.text import valid_unicode
 
 Row = dict[str, Any]
+
+FEW: Final = 3
+"""Crashed flights after which others of the sweep are tried before more are flown."""
+
+
+@dataclass(frozen=True)
+class ScenarioResult:
+    """The part of one flight that goes into the dataset."""
+
+    metrics: Mapping[str, float | bool]
+    end: str  # an `EndKind`, invalid or crashed
+    end_time: float | None  # s
+    cause: str
+    flight: bytes | None = None  # flight.parquet, if the sweep keeps flights
+    scenario: Scenario | None = None  # as the sweep has it; None if invalid
 
 
 @dataclass(frozen=True)
@@ -65,9 +86,9 @@ def fly_points(
     The searches of all points advance together, so that their flights come in batches.
 
     Args:
-        points: The sweep's.
-        indices: Of the points to fly.
-        engine: For scenarios whose engine is auto.
+        points: The points of the sweep.
+        indices: Numbers of the points to fly.
+        engine: Engine of scenarios whose engine is auto.
         trusted: Whether to execute Python code that scenarios name.
     """
     finished: dict[int, tuple[Row, ScenarioResult]] = {}
@@ -91,7 +112,7 @@ def _fly_values(
 ) -> list[ScenarioResult]:
     """Results for values of the axes, "invalid" where they do not make a scenario."""
     results: dict[int, ScenarioResult] = {}
-    asked: dict[int, Scenario] = {}
+    requested: dict[int, Scenario] = {}
     scenarios: dict[int, Scenario] = {}
     for position, values in enumerate(batch):
         try:
@@ -100,17 +121,17 @@ def _fly_values(
             results[position] = ScenarioResult({}, "invalid", None, str(error))
             continue
         require_trust(scenario)
-        asked[position] = scenario
+        requested[position] = scenario
         if engine is not None and scenario.simulation.engine == "auto":
             scenario = with_engine(scenario, engine)
         scenarios[position] = scenario
-    flown = fly_scenarios(
+    flown = _fly_scenarios(
         list(scenarios.values()),
-        keep_flights=points.sweep.keep_flights,
-        others=lambda: _valid(points, points.spread(FEW), trusted),
+        points.sweep.keep_flights,
+        lambda: _valid(points, points.spread(FEW), trusted),
     )
     for position, result in zip(scenarios, flown, strict=True):
-        results[position] = replace(result, scenario=asked[position])
+        results[position] = replace(result, scenario=requested[position])
     return [results[position] for position in range(len(batch))]
 
 
@@ -133,7 +154,7 @@ def _search(points: SweepPoints, index: int) -> Search:
     values, bisect = points.point(index), points.sweep.bisect
     if bisect is None:
         result = yield values
-        return make_row(points, index, values, result), result
+        return _row(points, index, values, result), result
     walk = boundary(bisect.start, points.stop(values), bisect.step, bisect.tolerance)
     at, flights = next(walk), 0
     shown: ScenarioResult | None = None  # the last at which the condition holds, or the first
@@ -149,7 +170,7 @@ def _search(points: SweepPoints, index: int) -> Search:
             found = stop.value
             break
     reached = bisect.start if found.holds is None else found.holds
-    row = make_row(points, index, values | {bisect.key: reached}, shown)
+    row = _row(points, index, values | {bisect.key: reached}, shown)
     row[bisect.key] = found.holds
     return row | {f"{bisect.key}_beyond": found.fails, "flights": flights}, shown
 
@@ -161,3 +182,95 @@ def _holds(points: SweepPoints, result: ScenarioResult) -> bool:
     if result.end != "completed" and not may_diverge:
         return False
     return all(Verdict(bound, result.metrics.get(bound.metric)).holds for bound in bounds)
+
+
+def _row(
+    points: SweepPoints, index: int, values: Mapping[str, Any], result: ScenarioResult
+) -> dict[str, Any]:
+    """The row of a point, by column, without versions.
+
+    Args:
+        points: The points of the sweep.
+        index: Number of the point.
+        values: Values that the axes set, by key.
+        result: Result of the flight with these values.
+    """
+    if result.scenario is None:
+        document = points.document(values)  # not valid, but it shows the mistake
+    else:
+        document = result.scenario.model_dump(mode="json", exclude_none=True)
+    return {
+        "index": index,
+        **values,
+        **points.derived(values),
+        "end": result.end,
+        "end_time": result.end_time,
+        "cause": valid_unicode(result.cause),
+        **{name: result.metrics.get(name) for name in points.metrics},
+        "scenario": json.dumps(document),
+    }
+
+
+def _fly_scenarios(
+    scenarios: Sequence[Scenario], keep_flights: bool, others: Callable[[], Iterable[Scenario]]
+) -> list[ScenarioResult]:
+    """Fly scenarios and return their results in the same order.
+
+    Args:
+        scenarios: The scenarios of a chunk.
+        keep_flights: Whether results hold their flights.
+        others: Makes a few scenarios from all over the sweep.
+
+    Raises:
+        InputError: If the first few crash, and the others, all with one Python error.
+        KeyboardInterrupt: If a flight was interrupted from the keyboard.
+    """
+    try:
+        return _fly(scenarios, keep_flights)
+    except Exception:
+        # One bad flight must not end the others: find it by flying one at a time.
+        first = [_fly_alone(scenario, keep_flights) for scenario in scenarios[:FEW]]
+        if _have_one_crash(first):
+            crash = first[0]
+            tried = [*first, *(_fly_alone(scenario, False) for scenario in others())]
+            if len(tried) > len(first) and _have_one_crash(tried):
+                raise InputError(
+                    f"every flight tried, from all over the sweep, crashed with {crash.cause}"
+                ) from None
+        return [*first, *(_fly_alone(scenario, keep_flights) for scenario in scenarios[FEW:])]
+
+
+def _have_one_crash(results: Sequence[ScenarioResult]) -> bool:
+    """Whether all flights crashed, for one reason."""
+    return len({(result.end, result.cause) for result in results}) == 1 and (
+        results[0].end == "crashed"
+    )
+
+
+def _fly(scenarios: Sequence[Scenario], keep_flights: bool) -> list[ScenarioResult]:
+    return [
+        ScenarioResult(
+            result.metrics,
+            result.end.kind,
+            result.end.time,
+            result.end.cause,
+            None if result.flight is None else _flight_file(result.flight),
+        )
+        for result in fly(scenarios, threads=1, keep_samples=keep_flights)
+    ]
+
+
+def _fly_alone(scenario: Scenario, keep_flight: bool) -> ScenarioResult:
+    try:
+        return _fly([scenario], keep_flight)[0]
+    except InputError as error:
+        return ScenarioResult({}, "invalid", None, str(error))
+    except Exception as error:
+        return ScenarioResult({}, "crashed", None, f"{type(error).__name__}: {error}")
+
+
+def _flight_file(flight: Flight) -> bytes:
+    table = flight.to_arrow()
+    # Two equal flights make equal files.
+    origin = {**table.schema.metadata, b"wall_time": b"0.0"}
+    return parquet_bytes(table.replace_schema_metadata(origin))

@@ -11,7 +11,7 @@ from typing import Any, Final, cast
 
 from tiltsim.errors import InputError
 from tiltsim.sweeps.chunks import ChunkWork, FinishedChunk
-from tiltsim.sweeps.columns import installed_versions
+from tiltsim.sweeps.rows import installed_versions
 
 CONNECT_TIMEOUT: Final = 10.0  # s
 

@@ -17,7 +17,7 @@ from tiltsim.scenario.messages import one_line_message, show
 from tiltsim.sweeps.expressions import evaluate
 from tiltsim.sweeps.folder import DATASET, DEFINITION, read_definition
 from tiltsim.sweeps.points import SweepPoints
-from tiltsim.sweeps.stored_rows import finished_parts, read_rows
+from tiltsim.sweeps.rows import finished_parts, read_rows
 from tiltsim.sweeps.tables import Sweep
 from tiltsim.system.files import is_file
 from tiltsim.system.optional import optional_package
@@ -69,7 +69,7 @@ class SweepResults:
         return f"{len(self)} rows of {len(self.table.column_names)} columns; {ends}"
 
     def __getitem__(self, name: str) -> Column:
-        """The same as `values`."""
+        """A column, or arithmetic on columns; see `values`."""
         return self.values(name)
 
     def to_arrow(self) -> pyarrow.Table:
@@ -77,7 +77,7 @@ class SweepResults:
         return self.table
 
     def to_pandas(self) -> Any:
-        """The same as a pandas DataFrame. Raises `InputError` if pandas is not installed."""
+        """The rows as a pandas DataFrame. Raises `InputError` if pandas is not installed."""
         optional_package("pandas", "SweepResults.to_pandas")
         return self.table.to_pandas()
 
@@ -109,7 +109,7 @@ def is_sweep_folder(path: Path) -> bool:
 def load_results(folder: Path, *, scenarios: bool = False) -> SweepResults:
     """Read the dataset in a sweep's folder, or the finished chunks of an unfinished sweep.
 
-    ``scenarios`` reads the column ``scenario``, too, a few kB a row. Raises `InputError` if there
+    ``scenarios`` also reads the column ``scenario``, a few kB per row. Raises `InputError` if there
     is nothing yet, or it cannot be read.
     """
     import pyarrow as pa

@@ -33,7 +33,7 @@ class SweepDefinition:
     sweep: dict[str, Any]  # the validated file
     base: dict[str, Any]  # the base scenario with every default written out
     versions: dict[str, str]  # installed versions of `VERSIONS`
-    files: dict[str, str] = field(default_factory=dict)  # digests of those that scenarios name
+    files: dict[str, str] = field(default_factory=dict)  # digests of the files that scenarios name
 
     def to_json(self) -> str:
         """The definition as text with a checksum, for a file."""
@@ -87,7 +87,7 @@ class SweepDefinition:
         return ""
 
     def _completed(self) -> SweepDefinition:
-        """The same with today's defaults written out; unchanged if it is no longer valid."""
+        """The definition with today's defaults; unchanged if it is no longer valid."""
         try:
             sweep = Sweep.model_validate(self.sweep).model_dump_json(exclude_none=True)
             scenario = parse_scenario(self.base)

@@ -43,8 +43,8 @@ def evaluate(expression: str, values: Mapping[str, Any]) -> float:
     """The value of an expression over named numbers.
 
     Args:
-        expression: ``+ - * / **``, parentheses, numbers, `FUNCTIONS`, pi, and names: those of
-            ``values``, dots and positions included, as in ``2 * gait.period``.
+        expression: ``+ - * / **``, parentheses, numbers, `FUNCTIONS`, pi, and the names
+            in ``values``, dots and positions included, as in ``2 * gait.period``.
         values: Numbers by name.
 
     Raises:

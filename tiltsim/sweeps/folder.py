@@ -18,10 +18,9 @@ from typing import Final
 
 from tiltsim.errors import InputError
 from tiltsim.sweeps.chunks import FinishedChunk
-from tiltsim.sweeps.columns import schema
 from tiltsim.sweeps.definition import SweepDefinition
 from tiltsim.sweeps.points import SweepPoints
-from tiltsim.sweeps.stored_rows import finished_parts, part_file, read_rows
+from tiltsim.sweeps.rows import finished_parts, part_file, read_rows, schema
 from tiltsim.system.files import is_folder, prepare_folder, remove_leftovers, replacing
 from tiltsim.system.locks import locked
 from tiltsim.system.parquet import UnreadableError, parquet_writer

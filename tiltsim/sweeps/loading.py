@@ -14,7 +14,7 @@ from typing import Any, Final
 from pydantic import ValidationError
 
 from tiltsim.errors import InputError
-from tiltsim.scenario.arguments import check_keys, plain
+from tiltsim.scenario.arguments import check_keys, leaves, plain
 from tiltsim.scenario.library import find_scenario_file, library_name, read_toml
 from tiltsim.scenario.loading import (
     FILE_KEYS,
@@ -40,7 +40,6 @@ from tiltsim.sweeps.tables import (
     SeedAxis,
     Sweep,
     UniformAxis,
-    dotted,
 )
 from tiltsim.system.files import file_digests, is_file
 from tiltsim.system.text import short_repr, valid_unicode
@@ -60,15 +59,15 @@ def load_sweep(
         overrides: Values by dotted key of the scenario, on top of the file's ``[set]``.
 
     Raises:
-        InputError: In one line: the file, the key, the value and what is allowed. The base scenario
-            and every value of every axis are tried.
+        InputError: In one line: the file, the key, the value and the allowed values. The base
+            scenario and every value of every axis are tried.
     """
     if overrides is not None:
         check_keys("overrides", overrides)
     document, address, folder = _document(source)
     fixed = document.setdefault("set", {})
     if isinstance(fixed, dict):
-        document["set"] = _located(dotted(fixed), folder, address) | plain(overrides or {})
+        document["set"] = _located(dict(leaves(fixed)), folder, address) | plain(overrides or {})
     if "scenario" not in document and not {"axis", "bisect"} & document.keys():
         raise InputError(f"{address}: a scenario, not a sweep: it has no [[axis]]; use tiltsim run")
     try:

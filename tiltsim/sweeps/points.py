@@ -10,23 +10,26 @@ from collections.abc import Mapping, Sequence
 from copy import deepcopy
 from functools import cached_property
 from math import prod
-from typing import Any, Final
+from typing import Any, Final, cast
+
+import numpy as np
 
 from tiltsim.errors import InputError
-from tiltsim.scenario.loading import apply_overrides, merge
+from tiltsim.scenario.loading import apply_overrides, merge, parse_scenario
+from tiltsim.scenario.messages import show
 from tiltsim.scenario.metric_names import METRICS, WALL_CLOCK_METRICS
-from tiltsim.scenario.override_keys import split_key
+from tiltsim.scenario.override_keys import value_at
 from tiltsim.scenario.scenario import Scenario
-from tiltsim.sweeps.base_values import BaseValues
+from tiltsim.scenario.vehicle import MOMENTS, VehicleTable
 from tiltsim.sweeps.definition import SweepDefinition
 from tiltsim.sweeps.expressions import evaluate
-from tiltsim.sweeps.sampling import draw_samples
 from tiltsim.sweeps.similar import SimilarScenarios
 from tiltsim.sweeps.tables import (
     AxisTable,
     CasesAxis,
     GridAxis,
     NormalAxis,
+    SampleTable,
     SeedAxis,
     Sweep,
     UniformAxis,
@@ -52,7 +55,6 @@ class SweepPoints:
     def __init__(self, definition: SweepDefinition) -> None:
         self.definition = definition
         self.sweep = Sweep.model_validate(definition.sweep)
-        self._base_values = BaseValues(definition)
         self._scenarios = SimilarScenarios(definition.address)
         self._check_count()
         self._groups = self._make_groups()
@@ -123,7 +125,8 @@ class SweepPoints:
     def along_each_group(self, most: int) -> list[dict[str, Any]]:
         """The first point, and those at other values of one group of axes at a time.
 
-        Of a group with more than ``most`` values, so many spread evenly, both ends included.
+        A group with more than ``most`` values gives ``most`` of them, spread evenly, both ends
+        included.
         """
         points = [self.point(0)]
         for position, length in enumerate(self._lengths[:-1]):
@@ -134,7 +137,7 @@ class SweepPoints:
         return points
 
     def spread(self, most: int) -> list[dict[str, Any]]:
-        """So many points at most, spread evenly over the sweep, both ends included."""
+        """At most ``most`` points, spread evenly over the sweep, both ends included."""
         count = min(len(self), most)
         return [self.point(n * (len(self) - 1) // max(1, count - 1)) for n in range(count)]
 
@@ -161,7 +164,7 @@ class SweepPoints:
         return document
 
     def _given(self, values: Mapping[str, Any]) -> dict[str, Any]:
-        """What a point gives of its scenario, by dotted key."""
+        """The keys of the scenario that a point sets, dotted, and their values."""
         given = {**self.sweep.set, **values, **self.derived(values)}
         return {key: value for key, value in given.items() if "." in key}
 
@@ -174,18 +177,39 @@ class SweepPoints:
     def place(self, axis: AxisTable, values: Sequence[Any]) -> dict[str, Any]:
         """The values that an axis sets, by key, from one value for each of its targets."""
         placed = dict(zip(axis.targets, values, strict=True))
-        return self._base_values.scaled(placed) if axis.relative else placed
+        if not axis.relative:
+            return placed
+        return {key: self._scaled(key, factor) for key, factor in placed.items()}
+
+    @cached_property
+    def _base(self) -> dict[str, Any]:
+        """The base scenario with the vehicle's preset written out."""
+        base = self.definition.base
+        vehicle = parse_scenario(base).vehicle
+        if not isinstance(vehicle, VehicleTable):
+            return base
+        known = vehicle.resolve()._asdict()
+        known["inertia"] = [known.pop(moment) for moment in MOMENTS]
+        return {**base, "vehicle": {**known, **base["vehicle"]}}
+
+    def _scaled(self, key: str, factor: Any) -> Any:
+        """A base value times a factor. Raises `InputError` if either is not numeric."""
+        base = value_at(self._base, key)
+        if not is_number(factor):
+            raise self.definition.mistake("axis.values", factor, "relative values are numbers")
+        if is_number(base):
+            return float(base * factor)
+        if isinstance(base, list) and all(map(is_number, base)):
+            return [float(value * factor) for value in base]
+        allowed = f"{key} = {show(base)} in the base scenario is not a number"
+        raise self.definition.mistake("axis.relative", True, allowed)
 
     def _write_out(self, document: dict[str, Any], key: str) -> None:
         """Put a list that follows from a preset into the document, to change an entry of it."""
-        table: Any = document
-        *path, last = split_key(key)
-        for step in path:
-            table = table.get(step) if isinstance(table, dict) else None
-        if isinstance(table, dict) and last not in table:
-            value = self._base_values.look_up(key)
-            if isinstance(value, list):
-                table[last] = list(value)
+        name, _, last = key.rpartition(".")
+        table, value = value_at(document, name), value_at(self._base, key)
+        if isinstance(table, dict) and last not in table and isinstance(value, list):
+            table[last] = [*value]
 
     def _evaluate(self, key: str, rule: Any, values: Mapping[str, Any]) -> Any:
         if isinstance(rule, list | tuple):
@@ -237,10 +261,40 @@ class SweepPoints:
     def _draws(self) -> Floats:
         """Values of the drawn axes, shape (samples, axes)."""
         assert self.sweep.sample is not None
-        return draw_samples(self._drawn, self.sweep.sample)
+        return _draw_samples(self._drawn, self.sweep.sample)
 
 
 def _of_one_type(values: Sequence[Any]) -> Sequence[Any]:
     """Integers mixed with floats as floats; other values unchanged."""
     mixed = all(map(is_number, values)) and any(isinstance(value, float) for value in values)
     return [float(value) for value in values] if mixed else values
+
+
+def _draw_samples(axes: Sequence[UniformAxis | NormalAxis], sample: SampleTable) -> Floats:
+    """Values of drawn axes, shape (samples, axes); equal for equal seeds."""
+    unit = _unit_points(sample, len(axes))
+    columns = []
+    for axis, column in zip(axes, unit.T, strict=True):
+        if isinstance(axis, UniformAxis):
+            columns.append(axis.low + (axis.high - axis.low) * column)
+        else:
+            from scipy.special import ndtri
+
+            inside = np.clip(column, 2.0**-54, 1.0 - 2.0**-53)
+            columns.append(axis.mean + axis.standard_deviation * ndtri(inside))
+    return cast(Floats, np.stack(columns, axis=-1))
+
+
+def _unit_points(sample: SampleTable, dimensions: int) -> Floats:
+    """Points in the unit cube, shape (samples, dimensions)."""
+    generator = np.random.default_rng(sample.seed)
+    if sample.method == "random":
+        return generator.random((sample.count, dimensions))
+    from scipy.stats import qmc
+
+    if sample.method == "latin_hypercube":
+        points = qmc.LatinHypercube(dimensions, seed=generator).random(sample.count)
+    else:
+        exponent = sample.count.bit_length() - 1
+        points = qmc.Sobol(dimensions, seed=generator).random_base2(exponent)
+    return np.asarray(points, dtype=np.float64)

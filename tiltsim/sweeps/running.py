@@ -18,7 +18,7 @@ from tiltsim.sweeps.points import SweepPoints
 from tiltsim.system.processes import ProcessDiedError, in_processes
 
 MAX_DEATHS: Final = 3
-"""How often in a row all processes may die without finishing a chunk."""
+"""Number of times in a row that all processes may die without finishing a chunk."""
 
 
 def run_sweep(
@@ -44,7 +44,7 @@ def run_sweep(
         The finished dataset, which does not depend on interruptions or on the machines.
 
     Raises:
-        InputError: As `open_sweep_folder`, or if the cluster cannot be used or processes keep
+        InputError: As in `open_sweep_folder`, or if the cluster cannot be used or processes keep
             dying.
     """
     points = SweepPoints(definition)

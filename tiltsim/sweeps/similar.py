@@ -1,9 +1,8 @@
-"""Scenarios that differ in numbers: of each, only the tables that hold them are validated."""
+"""Scenarios that differ in numbers: only the tables that hold these are validated again."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from copy import copy
+from collections.abc import Callable, Mapping
 from functools import cache
 from typing import Any, Final, NamedTuple
 
@@ -11,7 +10,7 @@ from pydantic import BaseModel, ValidationError
 
 from tiltsim.scenario.loading import parse_scenario
 from tiltsim.scenario.messages import InvalidValueError
-from tiltsim.scenario.override_keys import split_key
+from tiltsim.scenario.override_keys import split_key, with_value
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.system.numbers import is_number
 
@@ -30,7 +29,7 @@ class SimilarScenarios:
     """Makes scenarios from documents; one of each kind is made in full.
 
     Args:
-        address: Of the documents, in messages.
+        address: Name of the documents in messages.
     """
 
     def __init__(self, address: str) -> None:
@@ -82,7 +81,7 @@ def _similar(known: _Known, changes: Mapping[str, Any]) -> Scenario | None:
         if not isinstance(getattr(known.scenario, str(name), None), BaseModel):
             return None
         table = changed.get(str(name), known.document[str(name)])
-        changed[str(name)] = _with(table, path, value)
+        changed[str(name)] = with_value(table, path, value)
     try:
         tables = {
             name: type(getattr(known.scenario, name)).model_validate(table)
@@ -96,13 +95,3 @@ def _similar(known: _Known, changes: Mapping[str, Any]) -> Scenario | None:
 
 
 _split: Final = cache(split_key)
-
-
-def _with(table: Any, path: Sequence[str | int], value: Any) -> Any:
-    """A table or list with another value at a path; it shares everything else."""
-    if not path:
-        return value
-    step, *rest = path
-    copied = copy(table)
-    copied[step] = _with(table[step] if rest else None, rest, value)
-    return copied

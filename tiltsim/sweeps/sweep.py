@@ -44,7 +44,7 @@ def sweep(
         One row for each point; see `SweepResults.to_pandas` and `SweepResults.to_arrow`.
 
     Raises:
-        InputError: In one line: the sweep, the key, the value and what is allowed.
+        InputError: In one line: the sweep, the key, the value and the allowed values.
     """
     jobs, trusted = whole_number("jobs", jobs), true_or_false("trusted", trusted)
     if out is not None and not isinstance(out, str | PathLike):

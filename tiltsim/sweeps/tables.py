@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from math import isfinite
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, field_validator
 
+from tiltsim.scenario.arguments import leaves
 from tiltsim.scenario.expectation import Expectation
 from tiltsim.scenario.limits import MAX_VALUES
 from tiltsim.scenario.messages import InvalidValueError, choose
@@ -53,13 +54,11 @@ class AxisTable(Table):
         """The axis's name in messages."""
         return ", ".join(self.targets)
 
-    @model_validator(mode="after")
-    def _check_keys(self) -> Self:
+    def _check_values(self) -> None:
         if (self.key is None) == (self.keys is None):
             raise self.mistake("key", "give either key or keys")
         if self.relative and not all("." in key for key in self.targets):
             raise self.mistake("relative", "only keys of the scenario have a base value")
-        return self
 
 
 def _leaves(value: Any) -> Iterator[Any]:
@@ -80,8 +79,8 @@ class ListAxis(AxisTable):
     )
     group: Group = None
 
-    @model_validator(mode="after")
-    def _check_rows(self) -> Self:
+    def _check_values(self) -> None:
+        super()._check_values()
         for value in self.values:
             if any(isinstance(v, float) and not isfinite(v) for v in _leaves(value)):
                 raise InvalidValueError("axis.values", value, "must be finite")
@@ -90,7 +89,6 @@ class ListAxis(AxisTable):
                 raise InvalidValueError(
                     "axis.values", row, f"must be a list with one value for each of {self.name}"
                 )
-        return self
 
     @property
     def length(self) -> int:
@@ -137,11 +135,10 @@ class UniformAxis(AxisTable):
     low: float = Field(description="the lower bound [the key's]", examples=[1.0])
     high: float = Field(description="the upper bound [the key's]", examples=[3.0])
 
-    @model_validator(mode="after")
-    def _check_range(self) -> Self:
+    def _check_values(self) -> None:
+        super()._check_values()
         if self.low >= self.high:
             raise self.mistake("low", f"must be below high = {self.high}")
-        return self
 
 
 class NormalAxis(AxisTable):
@@ -179,11 +176,10 @@ class CasesAxis(AxisTable):
     )
     group: Group = None
 
-    @model_validator(mode="after")
-    def _check_name(self) -> Self:
+    def _check_values(self) -> None:
+        super()._check_values()
         if "." in self.key:
             raise self.mistake("key", "the key of cases is a name without a dot")
-        return self
 
     @property
     def length(self) -> int:
@@ -221,11 +217,9 @@ class SampleTable(Table):
     )
     seed: Annotated[int, Field(ge=0)] = Field(0, description="of the draws", examples=[1])
 
-    @model_validator(mode="after")
-    def _check(self) -> Self:
+    def _check_values(self) -> None:
         if self.method == "sobol" and self.count & (self.count - 1):
             raise self.mistake("count", "Sobol's sequence is balanced only for powers of two")
-        return self
 
 
 class BisectTable(Table):
@@ -288,17 +282,6 @@ class PlotTable(Table):
     )
 
 
-def dotted(tables: dict[str, Any], head: str = "") -> dict[str, Any]:
-    """Nested tables as one table of dotted keys."""
-    flat: dict[str, Any] = {}
-    for key, value in tables.items():
-        if isinstance(value, dict):
-            flat |= dotted(value, f"{head}{key}.")
-        else:
-            flat[head + key] = value
-    return flat
-
-
 class Sweep(Table):
     """One sweep, fully specified."""
 
@@ -345,10 +328,9 @@ class Sweep(Table):
     @classmethod
     def _dotted(cls, value: Any) -> Any:
         # TOML reads simulation.duration = 1 as a table in a table.
-        return dotted(value) if isinstance(value, dict) else value
+        return dict(leaves(value)) if isinstance(value, dict) else value
 
-    @model_validator(mode="after")
-    def _check(self) -> Self:
+    def _check_values(self) -> None:
         for metric in self.metrics or ():
             if metric in WALL_CLOCK_METRICS or metric not in METRICS:
                 allowed = [name for name in METRICS if name not in WALL_CLOCK_METRICS]
@@ -382,11 +364,10 @@ class Sweep(Table):
         for axis in self.axis:
             if isinstance(axis, CasesAxis):
                 self._check_cases(axis, [key for key in (*targets, *self.set) if "." in key])
-        return self
 
     def _check_cases(self, axis: CasesAxis, taken: list[str]) -> None:
         for name, tables in axis.cases.items():
-            for key, value in dotted(tables).items():
+            for key, value in leaves(tables):
                 if any(key == other or key.startswith(f"{other}.") for other in taken):
                     raise InvalidValueError(
                         f"axis.cases.{name}.{key}", value, "also set by another axis or by set"

@@ -1,12 +1,12 @@
-"""Which samples of a flight a metric covers, and what it makes of them.
+"""Spans of samples that metrics cover, and the metrics that vehicles share.
 
-Columns have shape (..., N): those of one flight, or of several in rows, with the same times (N,).
+Columns have shape (..., N): one flight, or several in rows, with equal times (N,).
 Spans are counted in physics steps instead of sums of their lengths.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any, Final
 
 import numpy as np
@@ -17,7 +17,7 @@ from tiltsim_controllers.mathematics.scalar import Floats
 SETTLED: Final = 20.0
 """Time (s) from which on the supremum of the position error is taken."""
 
-_ROUNDING: Final = 1e-9  # relative, of a time over a time step
+_ROUNDING: Final = 1e-9  # relative: of a time over a time step, of a speed at its limit
 
 
 def in_last_second(time: Floats, timestep: float) -> npt.NDArray[np.bool_]:
@@ -61,3 +61,40 @@ def first_and_last(where: npt.NDArray[np.bool_]) -> tuple[Any, Any]:
 def time_of(time: Floats, sample: Any) -> Any:
     """The times (s) of samples (...), NaN for -1."""
     return np.where(sample < 0, np.nan, time[sample])
+
+
+def at_upper_limit(speeds: Floats, limit: Any) -> npt.NDArray[np.bool_]:
+    """Where rotor speeds along the spin (rad/s) are at their upper limit; nowhere without one."""
+    return speeds >= (np.inf if limit is None else limit * (1.0 - _ROUNDING))
+
+
+def at_lower_limit(speeds: Floats, limit: Any) -> npt.NDArray[np.bool_]:
+    """Where rotor speeds along the spin (rad/s) are at their lower limit; nowhere without one."""
+    return speeds <= (-np.inf if limit is None else limit * (1.0 + _ROUNDING))
+
+
+def saturation_metrics(time: Floats, saturated: npt.NDArray[np.bool_]) -> dict[str, Any]:
+    """Share of the samples with a rotor at its limit, and the first and last of them, or NaN.
+
+    ``time`` in s, shape (N,); ``saturated`` of shape (rotors, ..., N).
+    """
+    limited: npt.NDArray[np.bool_] = np.any(saturated, axis=0)
+    first, last = first_and_last(limited)
+    return {
+        "saturated_fraction": limited.mean(axis=-1),
+        "first_saturation_time": time_of(time, first),
+        "last_saturation_time": time_of(time, last),
+    }
+
+
+def horizontal_error_metrics(columns: Mapping[str, Floats], timestep: float) -> dict[str, Any]:
+    """The largest and the smallest horizontal position error (m) from `SETTLED` on, if it lasts."""
+    settled = when_settled(columns["time"], timestep)
+    if not settled.any():
+        return {}
+    x, y = (columns[f"{axis}_ref"] - columns[axis] for axis in ("x", "y"))
+    error = np.hypot(x, y)[..., settled]
+    return {
+        "sup_position_error_after_20s": error.max(axis=-1),
+        "least_position_error_after_20s": error.min(axis=-1),
+    }

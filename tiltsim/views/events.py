@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tiltsim.laws.layers.supervision import SUPERVISION
-from tiltsim.vehicles.saturation import at_lower_limit, at_upper_limit
+from tiltsim.vehicles.spans import at_lower_limit, at_upper_limit
 from tiltsim.views.attitude_plane import SUPERVISION_THRESHOLD, margin_threshold
 from tiltsim.views.titles import describe_controller, describe_gait
 from tiltsim_controllers.mathematics.scalar import Floats

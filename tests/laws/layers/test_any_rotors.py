@@ -9,7 +9,7 @@ import pytest
 import tiltsim
 from tests.refusals import refusal
 from tiltsim.laws.assembling import assemble
-from tiltsim.models.pose import VehiclePose
+from tiltsim.models.vehicle_parts import VehiclePose
 from tiltsim.plants.command import Command, check_command
 from tiltsim.plants.commanded_plant import CommandedPlant
 from tiltsim.plants.factory import make_plant

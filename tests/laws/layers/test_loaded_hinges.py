@@ -154,7 +154,7 @@ def test_a_centre_of_mass_to_the_side_is_told(tmp_path, capsys):
     )
     assert main(["run", str(path)]) == 0
     error = capsys.readouterr().err
-    assert "body's origin; not modeled: its centre of mass at (0.01, " in error
+    assert "body's origin; not modeled: its center of mass at (0.01, " in error
 
 
 # --- spin inertia ------------------------------------------------------------------------------

@@ -23,9 +23,10 @@ from tiltsim.closed_loop.limits import (
 )
 from tiltsim.closed_loop.vehicle_kind import VehicleKind
 from tiltsim.models.hover import hover_speeds
-from tiltsim.models.parts import RotorLimits
+from tiltsim.models.parts import ExtraActuators, Ground, Pod, RotorLimits, TiltServo
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.multirotor_controllers import AttitudeForceController
+from tiltsim.scenario.scenario import FlightPlan, Scenario
 from tiltsim.scenario.vehicle import VehicleTable
 from tiltsim.system.quantity import Quantity, subscript
 from tiltsim.vehicles.rotorcraft.layout import CROSS, Layout
@@ -37,9 +38,6 @@ from tiltsim_controllers.vehicle.states import P
 
 if TYPE_CHECKING:
     import mujoco
-
-    from tiltsim.models.parts import ExtraActuators
-    from tiltsim.scenario.scenario import FlightPlan, Scenario
 
 
 def rotorcraft_columns(layout: Layout) -> dict[str, Quantity]:
@@ -136,7 +134,6 @@ def _compile(
     userdata_size: int,
     visuals: bool,
 ) -> mujoco.MjModel:
-    from tiltsim.models.parts import Ground, Pod, TiltServo
     from tiltsim.models.rotorcraft import RotorcraftSpec, compile_model
 
     vehicle = scenario.any_rotorcraft
@@ -171,7 +168,7 @@ def initial_tilts(plan: FlightPlan) -> tuple[Values, Values]:
 
 
 def initial_rotor_speeds(plan: FlightPlan) -> Values:
-    """Signed rotor speeds (rad/s) at time zero: as given, or of a multirotor those of hover."""
+    """Signed rotor speeds (rad/s) at time zero: as given, or a multirotor's in hover."""
     scenario = plan.scenario
     vehicle, table = scenario.vehicle.resolve(), scenario.any_rotorcraft
     if isinstance(vehicle, Multirotor) and scenario.initial.rotor_speed is None:
@@ -196,7 +193,7 @@ def initial_motion(plan: FlightPlan) -> tuple[Vector, Vector]:
 
 @cache
 def rotorcraft_kind(layout: Layout, extra_columns: tuple[str, ...] = ()) -> VehicleKind:
-    """The kind of rotorcraft with so many rotors and hinges; names of `EXTRA_COLUMNS` it has."""
+    """The kind of rotorcraft with a layout, and its columns among `EXTRA_COLUMNS`."""
     return VehicleKind(
         observed_fields=layout.observed_fields,
         columns=rotorcraft_columns(layout) | {name: EXTRA_COLUMNS[name] for name in extra_columns},
@@ -218,7 +215,7 @@ ROTORCRAFT: Final = rotorcraft_kind(CROSS, tuple(EXTRA_COLUMNS))
 """Tiltrotor and quadrotor."""
 
 COLUMNS: Final = ROTORCRAFT.columns
-"""The columns of every flight of these."""
+"""The columns of every flight of tiltrotor and quadrotor."""
 
 OTHER_LAYOUT: Final = rotorcraft_kind(CROSS)
-"""A user's rotorcraft without four equal arms at right angles, of which those columns speak."""
+"""A user's rotorcraft without the four equal arms that the extra columns assume."""

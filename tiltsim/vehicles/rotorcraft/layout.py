@@ -1,4 +1,4 @@
-"""Where the numbers of a rotorcraft lie: in a sample, and in MuJoCo's vectors."""
+"""Places of a rotorcraft's numbers in a sample and in MuJoCo's vectors."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ TILT_RATE_1: Final = 6
 
 
 class Layout(NamedTuple):
-    """The layout of a rotorcraft's numbers, by how many rotors and tilt hinges it has."""
+    """The layout of a rotorcraft's numbers, by its numbers of rotors and tilt hinges."""
 
     rotors: int
     tilts: int
@@ -88,4 +88,4 @@ def tilt_of_rotor(dynamics: Dynamics) -> tuple[int, ...]:
 
 
 CROSS: Final = Layout(4, 4)
-"""Of tiltrotor and quadrotor, whose samples are alike; see `tiltsim_controllers.vehicle.states`."""
+"""Tiltrotor and quadrotor, whose samples are alike; see `tiltsim_controllers.vehicle.states`."""

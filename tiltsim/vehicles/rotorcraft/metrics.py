@@ -9,12 +9,15 @@ import numpy as np
 
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.scenario import Scenario
-from tiltsim.vehicles.saturation import at_lower_limit, at_upper_limit, saturation_metrics
 from tiltsim.vehicles.spans import (
+    at_lower_limit,
+    at_upper_limit,
     first_and_last,
+    horizontal_error_metrics,
     in_last_second,
     largest,
     mean_of,
+    saturation_metrics,
     time_of,
     when_settled,
 )
@@ -55,18 +58,16 @@ def rotorcraft_metrics(
 def _position_metrics(
     columns: Mapping[str, Floats], scenario: Scenario, follows_position: bool
 ) -> dict[str, Any]:
-    clock, metrics = (columns["time"], scenario.simulation.timestep), {}
+    clock = columns["time"], scenario.simulation.timestep
     last_second, settled = in_last_second(*clock), when_settled(*clock)
-    errors = {axis: columns[f"{axis}_ref"] - columns[axis] for axis in ("x", "y", "z")}
-    for axis, error in errors.items():
-        if follows_position or axis == "z":
-            metrics[f"final_position_error_{axis}"] = mean_of(error, last_second)
-    if not follows_position or not settled.any():
+    metrics = {
+        f"final_position_error_{axis}": mean_of(columns[f"{axis}_ref"] - columns[axis], last_second)
+        for axis in ("xyz" if follows_position else "z")
+    }
+    if not follows_position:
         return metrics
-    horizontal = np.hypot(errors["x"], errors["y"])[..., settled]
-    metrics["sup_position_error_after_20s"] = horizontal.max(axis=-1)
-    metrics["least_position_error_after_20s"] = horizontal.min(axis=-1)
-    if scenario.reference.type == "circle":
+    metrics |= horizontal_error_metrics(columns, clock[1])
+    if scenario.reference.type == "circle" and settled.any():
         centre_x, centre_y, _ = scenario.reference.position
         orbit = np.hypot(columns["x"] - centre_x, columns["y"] - centre_y)[..., settled]
         metrics["max_orbit_radius_after_20s"] = orbit.max(axis=-1)

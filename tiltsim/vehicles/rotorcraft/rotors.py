@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from tiltsim.closed_loop.loop import Dynamics
 from tiltsim.models.rotor_table import Multirotor
+from tiltsim.scenario.scenario import Scenario
 from tiltsim.vehicles.rotorcraft.layout import layout_of
+from tiltsim_controllers.mathematics.scalar import Values
 from tiltsim_controllers.vehicle.body import Body, body_of, principal_body
 from tiltsim_controllers.vehicle.craft import craft_parameters, craft_record
 from tiltsim_controllers.vehicle.parameters import Vehicle
-
-if TYPE_CHECKING:
-    from tiltsim.closed_loop.loop import Dynamics
-    from tiltsim.scenario.scenario import Scenario
-    from tiltsim_controllers.mathematics.scalar import Values
 
 
 def rotors_record(dynamics: Dynamics) -> Any:

@@ -14,6 +14,8 @@ from tiltsim.closed_loop.limits import (
     horizontal_error,
 )
 from tiltsim.closed_loop.vehicle_kind import VehicleKind
+from tiltsim.models.parts import ExtraActuators, TiltServo
+from tiltsim.scenario.scenario import FlightPlan, Scenario
 from tiltsim.system.quantity import Quantity
 from tiltsim.vehicles.tilt_car.metrics import tilt_car_metrics
 from tiltsim_controllers.gaits.motion import tilt_motion_of
@@ -23,9 +25,6 @@ from tiltsim_controllers.tilt_car.vehicle import counter_yaw_per_tilt
 
 if TYPE_CHECKING:
     import mujoco
-
-    from tiltsim.models.parts import ExtraActuators
-    from tiltsim.scenario.scenario import FlightPlan, Scenario
 
 ROTORS: Final = (1, 2)
 
@@ -67,8 +66,8 @@ COLUMNS: Final = {
 }
 """Columns of every flight of a car and their units.
 
-``direction`` is that of the middle of the thrusts, ``yaw + alpha``; ``direction_lower`` and
-``direction_upper`` bound the directions of what both thrusts can make; ``direction_ref`` is the
+``direction`` is the direction between the thrusts, ``yaw + alpha``; ``direction_lower`` and
+``direction_upper`` bound the directions of the sum of both thrusts; ``direction_ref`` is the
 direction of the acceleration that the law wants or the reference has, each written as the angle
 nearest to ``direction``. ``input_split`` is ``omega_1^2 - omega_2^2``.
 """
@@ -104,7 +103,6 @@ def _compile(
     userdata_size: int,
     visuals: bool,
 ) -> mujoco.MjModel:
-    from tiltsim.models.parts import TiltServo
     from tiltsim.models.tilt_car import TiltCarSpec, compile_tilt_car
 
     car, simulation = scenario.tilt_car, scenario.simulation

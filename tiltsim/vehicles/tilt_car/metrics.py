@@ -8,8 +8,13 @@ from typing import Any
 import numpy as np
 
 from tiltsim.scenario.scenario import Scenario
-from tiltsim.vehicles.saturation import at_lower_limit, saturation_metrics
-from tiltsim.vehicles.spans import in_last_second, mean_of, when_settled
+from tiltsim.vehicles.spans import (
+    at_lower_limit,
+    horizontal_error_metrics,
+    in_last_second,
+    mean_of,
+    saturation_metrics,
+)
 from tiltsim_controllers.mathematics.scalar import Floats
 
 
@@ -17,18 +22,15 @@ def tilt_car_metrics(
     columns: Mapping[str, Floats], scenario: Scenario, _follows_position: bool
 ) -> dict[str, Any]:
     """See `tiltsim.closed_loop.vehicle_kind.VehicleKind.metrics`."""
-    clock, metrics = (columns["time"], scenario.simulation.timestep), {}
-    last_second, settled = in_last_second(*clock), when_settled(*clock)
+    timestep = scenario.simulation.timestep
+    last_second = in_last_second(columns["time"], timestep)
     errors = {axis: columns[f"{axis}_ref"] - columns[axis] for axis in ("x", "y")}
     speeds = np.array([columns["rotor_speed_1"], columns["rotor_speed_2"]])
-    for axis, error in errors.items():
-        metrics[f"final_position_error_{axis}"] = mean_of(error, last_second)
-    if settled.any():
-        horizontal = np.hypot(errors["x"], errors["y"])[..., settled]
-        metrics["sup_position_error_after_20s"] = horizontal.max(axis=-1)
-        metrics["least_position_error_after_20s"] = horizontal.min(axis=-1)
-    for axis, error in errors.items():
-        metrics[f"max_abs_error_{axis}"] = np.abs(error).max(axis=-1)
+    metrics = {
+        f"final_position_error_{axis}": mean_of(e, last_second) for axis, e in errors.items()
+    }
+    metrics |= horizontal_error_metrics(columns, timestep)
+    metrics |= {f"max_abs_error_{axis}": np.abs(e).max(axis=-1) for axis, e in errors.items()}
     if "lyapunov" in columns:
         metrics["max_lyapunov"] = columns["lyapunov"].max(axis=-1)
     metrics["final_input_split"] = mean_of(columns["input_split"], last_second)

@@ -1,20 +1,76 @@
-"""Reading rows of a sweep back: of this sweep, of these points, and undamaged."""
+"""The rows of a sweep's dataset: their columns, and their files.
+
+Rows depend neither on the computer nor on the other flights, so that a chunk gives equal rows
+wherever and whenever it is flown.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from tiltsim.errors import InputError
-from tiltsim.sweeps.columns import schema
-from tiltsim.sweeps.definition import SweepDefinition
+from tiltsim.scenario.metric_names import BOOLEAN_METRICS
+from tiltsim.sweeps.definition import VERSIONS, SweepDefinition
 from tiltsim.sweeps.points import SweepPoints
 from tiltsim.system.parquet import UnreadableError, open_parquet
 
 if TYPE_CHECKING:
     import pyarrow
+
+
+@lru_cache(maxsize=1)
+def installed_versions() -> dict[str, str]:
+    """Versions of the packages that rows depend on."""
+    from importlib.metadata import version
+
+    return {name: version(name) for name in VERSIONS}
+
+
+def rows_to_table(points: SweepPoints, rows: Sequence[Mapping[str, Any]]) -> pyarrow.Table:
+    """Rows as an Arrow table, in the schema of the sweep, versions added."""
+    import pyarrow as pa
+
+    versions = {f"{name}_version": number for name, number in installed_versions().items()}
+    return pa.Table.from_pylist([{**row, **versions} for row in rows], schema=schema(points))
+
+
+def schema(points: SweepPoints) -> pyarrow.Schema:
+    """The columns of a sweep's dataset; the definition is among the schema's metadata."""
+    import pyarrow as pa
+
+    first = points.point(0)
+    bisect = points.sweep.bisect
+    searched = {} if bisect is None else {bisect.key: bisect.start}
+    values = first | searched | points.derived(first | searched)
+    fields = [pa.field("index", pa.int64(), nullable=False)]
+    for key in points.columns:
+        fields.append(pa.field(key, _column_type(values.get(key, 0.0))))
+    if bisect is not None:
+        fields.append(pa.field("flights", pa.int64(), nullable=False))
+    fields += [
+        pa.field("end", pa.string(), nullable=False),
+        pa.field("end_time", pa.float64(), metadata={"unit": "s"}),
+        pa.field("cause", pa.string(), nullable=False),
+    ]
+    for name in points.metrics:
+        fields.append(pa.field(name, pa.bool_() if name in BOOLEAN_METRICS else pa.float64()))
+    names = ("scenario", *(f"{name}_version" for name in VERSIONS))
+    fields += [pa.field(name, pa.string(), nullable=False) for name in names]
+    return pa.schema(fields, metadata={"sweep": points.definition.to_json()})
+
+
+def _column_type(value: object) -> pyarrow.DataType:
+    import pyarrow as pa
+
+    if isinstance(value, list | tuple):
+        return pa.list_(_column_type(value[0] if value else 0.0))
+    for kind, column in ((bool, pa.bool_()), (int, pa.int64()), (str, pa.string())):
+        if isinstance(value, kind):
+            return column
+    return pa.float64()
 
 
 def part_file(folder: Path, number: int) -> Path:
@@ -35,9 +91,9 @@ def read_rows(
 
     Args:
         file: A part, or the whole dataset.
-        points: The sweep's.
+        points: The points of the sweep.
         indices: The points whose rows the file must hold.
-        scenarios: Whether to read their scenarios, too.
+        scenarios: Whether to read the column of scenarios as well.
 
     Raises:
         InputError: If the file is damaged, or holds anything else.
@@ -62,7 +118,7 @@ def read_rows(
 
 @lru_cache(maxsize=8)
 def _difference(found: str, expected: str) -> str:
-    """How the definition in a file differs from that of the sweep; empty if it gives equal rows."""
+    """The difference of a file's definition from the sweep's; empty if it gives equal rows."""
     if found == expected:
         return ""
     try:
@@ -95,7 +151,7 @@ def _wrong_column(found: pyarrow.Schema, points: SweepPoints) -> str:
 def _damaged_column(table: pyarrow.Table, points: SweepPoints) -> str:
     """The first column with a NaN or an infinity, which no sweep stores, or an axis without values.
 
-    What a flight does not have is stored as null.
+    Values that a flight does not have are stored as null.
     """
     import pyarrow as pa
     import pyarrow.compute as pc
