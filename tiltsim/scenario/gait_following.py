@@ -7,7 +7,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field
 
 from tiltsim.models.rotor_table import Multirotor
-from tiltsim.scenario.controller_table import ControllerTable, SupervisorTable, gain_kind
+from tiltsim.scenario.controller_table import ControllerTable, SupervisorTable
 from tiltsim.scenario.table import Gains2, NonNegative, Positive, Table, Vector3, example
 from tiltsim_controllers.laws.attitude_altitude import Gains
 from tiltsim_controllers.laws.failures import Failure
@@ -18,6 +18,7 @@ from tiltsim_controllers.laws.gains import (
     gains_from_poles,
     gains_from_rows,
 )
+from tiltsim_controllers.laws.keys import gain_kind
 from tiltsim_controllers.laws.multirotor_steps import FeedforwardTerms
 from tiltsim_controllers.laws.supervisor import Supervisor
 from tiltsim_controllers.vehicle.parameters import Vehicle

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from math import inf, pi
 from typing import Annotated, Final, Literal, Self
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
-import tiltsim_controllers.laws.full_pose as full_pose
-from tiltsim.models.rotor_table import Multirotor
-from tiltsim.scenario.controller_table import NamedGains
 from tiltsim.scenario.gait_following import (
     FailureAwareController,
     GainTable,
@@ -17,9 +13,10 @@ from tiltsim.scenario.gait_following import (
     PolePlacementTable,
     attitude_altitude_gain_kind,
 )
-from tiltsim.scenario.table import Positive, Table, Vector3, example
+from tiltsim.scenario.table import example
 from tiltsim_controllers.analysis.stability import ErrorLoop, error_loops, feedforward_loops
 from tiltsim_controllers.laws.attitude_altitude import DECOUPLINGS
+from tiltsim_controllers.laws.full_pose import FullPose
 from tiltsim_controllers.vehicle.parameters import Vehicle
 
 
@@ -112,64 +109,10 @@ _RATE_KEYS: Final = (
 """Keys of `AttitudeAltitudeController` that only gait_rate_feedforward reads."""
 
 
-class FullPoseGainTable(Table):
-    """Explicit gains of full-pose control."""
-
-    position: Vector3 = Field(
-        description="on the errors of acceleration, velocity and position [1/s, 1/s^2, 1/s^3]",
-        examples=[[750.0, 1875.0, 1562.0]],
-    )
-    attitude: Vector3 = Field(
-        description="on the errors of angular acceleration, body rates and attitude "
-        "[1/s, 1/s^2, 1/s^3]",
-        examples=[[750.0, 1500.0, 2577.0]],
-    )
-
-
-class FullPoseController(FailureAwareController):
+class FullPoseController(FullPose, FailureAwareController):
     """Position and attitude control with the tilt angles as inputs (ch. 3)."""
 
     vehicle_models = ("tiltrotor", "multirotor")
     reference_kinds = ("position", "pose", "attitude_altitude")
-    loop_gains = (("position", 3), ("attitude", 3))
+    loop_gains = ("gains",)
     commands_tilts = True
-
-    law: Literal["full_pose"] = Field(
-        description="position and attitude independently: the law commands the tilt angles as "
-        "well, of the tiltrotor or of a multirotor whose rotors and tilts move six outputs"
-    )
-    gains: NamedGains[Literal["ch03"], FullPoseGainTable] = Field(
-        "ch03", description="a set by name, or a table of gains; ch03 is the thesis's author's"
-    )
-    tilt_weight: Literal["even", "published"] = Field(
-        "even",
-        description="how tilt rates count against rotor accelerations in the least-norm solution: "
-        "even by the force that they change, published by number, which turns the rotors fast",
-    )
-    max_tilt_rate: Positive | None = Field(
-        None, description="limit enforced by the law; default: none [rad/s]", examples=[5.0]
-    )
-    max_tilt_angle: Annotated[float, Field(gt=0.0, le=pi)] | None = Field(
-        None, description="limit enforced by the law; default: none [rad]", examples=[1.0]
-    )
-
-    def in_full(self) -> Self:
-        gains = self.resolve_gains()
-        table = FullPoseGainTable(position=gains[:3], attitude=gains[3:])
-        return self.model_copy(update={"gains": table})
-
-    def resolve_gains(self) -> full_pose.Gains:
-        if isinstance(self.gains, FullPoseGainTable):
-            return full_pose.Gains(*self.gains.position, *self.gains.attitude)
-        return full_pose.GAIN_SETS[self.gains]
-
-    def resolve_tilt_weight(self, vehicle: Vehicle | Multirotor) -> float:
-        """The weight for a vehicle, (rad/s)^2/rad."""
-        if self.tilt_weight == "published":
-            return full_pose.PUBLISHED_TILT_WEIGHT
-        return full_pose.force_balanced_tilt_weight(vehicle)
-
-    def resolve_limits(self) -> full_pose.Limits:
-        """The limits that the law enforces, infinite where there are none."""
-        rate, angle = self.max_tilt_rate, self.max_tilt_angle
-        return full_pose.Limits(inf if rate is None else rate, inf if angle is None else angle)
