@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from tiltsim.laws.rotor_loop import RotorLaw
 from tiltsim.laws.tiltrotor import tiltrotor_loops
-from tiltsim.scenario.tiltrotor_controllers import AttitudeAltitudeController
-from tiltsim_controllers.laws.attitude_altitude import (
-    DECOUPLINGS,
-    Parameters,
-    attitude_altitude_inputs,
-)
-from tiltsim_controllers.laws.decouplers import DECOUPLERS
+from tiltsim.laws.tracking import tracking_parameters
+from tiltsim_controllers.laws.attitude_altitude import Parameters, attitude_altitude_inputs
 from tiltsim_controllers.mathematics.scalar import Triple, Values, Vector, scalar
 
 if TYPE_CHECKING:
@@ -25,7 +20,7 @@ def _law(
     state: Values,
     tilt_rates: Values,
     states: Values,
-    parameters: Parameters,
+    parameters: Any,
     knots: Vector,
     motion: Triple,
     measured: Triple | None = None,
@@ -34,18 +29,9 @@ def _law(
     return attitude_altitude_inputs(time, state, parameters, knots, measured)
 
 
-def _setup(plan: FlightPlan) -> tuple[Parameters, Values]:
-    controller, rotorcraft = plan.scenario.controller, plan.scenario.rotorcraft
-    assert isinstance(controller, AttitudeAltitudeController)
-    law = Parameters(
-        vehicle=rotorcraft.resolve(),
-        gains=controller.resolve_gains(),
-        gait=plan.gait.parameters,
-        reference=plan.reference,
-        decoupler=DECOUPLERS[controller.decoupler],
-        decoupling=DECOUPLINGS[controller.decoupling],
-    )
-    return law, ()
+def _setup(plan: FlightPlan) -> tuple[Any, Values]:
+    vehicle = plan.scenario.rotorcraft.resolve()
+    return tracking_parameters(plan, Parameters, vehicle=vehicle), ()
 
 
 TILTROTOR, MEASURED_TILTROTOR = tiltrotor_loops(

@@ -2,28 +2,33 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from tiltsim.laws.rotor_loop import RotorLaw
 from tiltsim.laws.tiltrotor import tiltrotor_loops
-from tiltsim.laws.tracking import INTEGRALS, integrals_at_rest, tracking_fields
+from tiltsim.laws.tracking import INTEGRALS, integrals_at_rest, tracking_parameters
 from tiltsim.scenario.tiltrotor_controllers import AttitudeAltitudeController
 from tiltsim_controllers.laws.gait_feedforward import Parameters, tracking_inputs
+from tiltsim_controllers.laws.multirotor_steps import EULER_ANGLES
 from tiltsim_controllers.mathematics.scalar import Values
 
 if TYPE_CHECKING:
     from tiltsim.scenario.scenario import FlightPlan
 
 
-def _setup(plan: FlightPlan) -> tuple[Parameters, Values]:
-    scenario, controller = plan.scenario, plan.scenario.controller
+def _setup(plan: FlightPlan) -> tuple[Any, Values]:
+    controller, rotorcraft = plan.scenario.controller, plan.scenario.rotorcraft
     assert isinstance(controller, AttitudeAltitudeController)
-    vehicle, spin_inertia = scenario.rotorcraft.resolve(), scenario.rotorcraft.rotor_inertia
-    law = Parameters(
+    vehicle, is_fed_forward = rotorcraft.resolve(), controller.rotor_inertia_feedforward
+    law = tracking_parameters(
+        plan,
+        Parameters,
         vehicle=vehicle,
-        **tracking_fields(plan),
         supervisor=controller.resolve_supervisor(vehicle),
-        rotor_inertia=spin_inertia if controller.rotor_inertia_feedforward else 0.0,
+        rotor_inertia=rotorcraft.rotor_inertia if is_fed_forward else 0.0,
+        attitude_error=EULER_ANGLES,
+        slowest_rotor=0.0,
+        turn_time=0.0,
     )
     return law, ()
 

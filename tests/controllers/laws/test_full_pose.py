@@ -288,8 +288,8 @@ def planned(gait, duration, step):
         ATTITUDE_GAINS["ch03"],
         GaitParameters(FIXED),
         ReferenceParameters(REFERENCE_TYPES["attitude_altitude"]),
-        0.0,
-        0.0,
+        decoupling=0.0,
+        decoupler=0.0,
     )
     inputs = compiled(attitude_altitude_inputs, 0.0, start(GAITS[gait]), law)
     return fly(
