@@ -10,10 +10,21 @@ import numpy as np
 from tests.natively import compiled
 from tests.tracing import seldom_traced
 from tiltsim_controllers.gaits import plans
+from tiltsim_controllers.laws.allocation import RotorRange
+from tiltsim_controllers.laws.attitude_altitude import EXACT_DECOUPLING
 from tiltsim_controllers.laws.decouplers import EXACT
+from tiltsim_controllers.laws.failures import Failure
 from tiltsim_controllers.laws.gains import GAIN_SETS, IntegralGains
 from tiltsim_controllers.laws.gait_feedforward import multirotor_law_of
-from tiltsim_controllers.laws.multirotor_steps import FeedforwardTerms, Form, Parameters, SideGains
+from tiltsim_controllers.laws.multirotor_steps import (
+    ROTATION,
+    Direction,
+    FeedforwardTerms,
+    Form,
+    Parameters,
+)
+from tiltsim_controllers.laws.multirotor_supervisor import Watched
+from tiltsim_controllers.laws.supervisor import Supervisor
 from tiltsim_controllers.mathematics.rotation import euler_from_quaternion, quaternion_from_rotation
 from tiltsim_controllers.references.trajectories import SETPOINT, ReferenceParameters
 from tiltsim_controllers.vehicle.body import body_of
@@ -94,7 +105,8 @@ def parameters_of(vehicle, gait=None, reference=None, **changes):
         vehicle=vehicle.body,
         gains=GAIN_SETS["feedforward"],
         integral=IntegralGains(),
-        side=SideGains(),
+        side_gains=(12.0, 48.0, 64.0),
+        side_integral=0.0,
         max_acceleration=inf,
         max_angular_acceleration=inf,
         anticipation=0.0,
@@ -102,7 +114,19 @@ def parameters_of(vehicle, gait=None, reference=None, **changes):
         gait=gait.parameters,
         reference=reference,
         decoupler=EXACT,
+        decoupling=EXACT_DECOUPLING,
+        attitude_error=ROTATION,
+        restoring=0.0,
+        slowest_rotor=0.0,
+        turn_time=0.0,
         rotors=float(len(gait.knots)),
+        failure=Failure(),
+        limits=RotorRange(),
+        supervisor=Supervisor(),
+        watched=Watched(),
+        watched_without=Watched(),
+        upper_side=Direction(),
+        upper_side_without=Direction(),
     )
     return law._replace(**changes), (*gait.knots, *vehicle.table)
 

@@ -67,7 +67,11 @@ def _report(vehicle: Vehicle, roll: float, pitch: float) -> dict[str, Any]:
         "exact_determinant": float(exact_determinant(roll, pitch, hover, vehicle)),
         "normalized_determinant": float(normalized_determinant(roll, pitch, hover, vehicle)),
         "singularity_margin": asin(cos(roll) * cos(pitch)),
-        "published_zone": PUBLISHED_ZONE._asdict(),
+        "published_zone": {
+            f"{angle}_{side}": bound
+            for angle, bounds in PUBLISHED_ZONE
+            for side, bound in zip(("min", "max"), bounds, strict=True)
+        },
         "exact_on_published_curve": {"min": float(on_curve.min()), "max": float(on_curve.max())},
         "published_curve": {
             "roll": (curve_roll + 0.0).tolist(),  # no negative zeros

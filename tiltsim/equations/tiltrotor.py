@@ -1,6 +1,6 @@
 """The tiltrotor as ch. 3 models it (Eqs. 1-7): massless pods, no gyroscopic torque.
 
-The state begins with `tiltsim_controllers.vehicle.multirotor.RigidState`, followed by rotor speeds.
+The state begins with `tiltsim_controllers.vehicle.motion.RigidState`, followed by rotor speeds.
 Tilt angles follow the gait exactly, or are further states where the controller moves them.
 """
 

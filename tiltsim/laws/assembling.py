@@ -7,11 +7,9 @@ from typing import TYPE_CHECKING, Final
 from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.equations.actuator_level import ActuatorPlant, actuator_plant
 from tiltsim.equations.rigid_body import rigid_body
-from tiltsim.laws.attitude_altitude import MEASURED_TILTROTOR, TILTROTOR
 from tiltsim.laws.commanded import commanded_loop
 from tiltsim.laws.flown_law import loop_of_law
 from tiltsim.laws.full_pose import FULL_POSE, full_pose_loop_of
-from tiltsim.laws.gait_feedforward import GAIT_FEEDFORWARD, MEASURED_GAIT_FEEDFORWARD
 from tiltsim.laws.layers.actuation import with_actuation
 from tiltsim.laws.layers.air import with_air
 from tiltsim.laws.layers.allocation import ALLOCATIONS, with_allocation
@@ -23,6 +21,12 @@ from tiltsim.laws.multirotor import loop_of_multirotor
 from tiltsim.laws.quadrotor import QUADROTOR_ATTITUDE_ALTITUDE, SWITCHING, YAW_POSITION
 from tiltsim.laws.tilt_car import FOURTH_DERIVATIVE, THIRD_DERIVATIVE
 from tiltsim.laws.tilt_car_planned import PLANNED_DIRECTION
+from tiltsim.laws.tiltrotor import (
+    GAIT_FEEDFORWARD,
+    MEASURED_GAIT_FEEDFORWARD,
+    MEASURED_TILTROTOR,
+    TILTROTOR,
+)
 from tiltsim.scenario.law_controller import LawTable
 from tiltsim.scenario.scenario import plan_flight
 from tiltsim.system.locks import one_thread_at_a_time

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Monitoring
+from tiltsim.laws.parameters import parameters_of
 from tiltsim.laws.rotor_loop import (
     RotorLaw,
     RotorLayout,
@@ -23,7 +24,12 @@ from tiltsim.laws.tiltrotor import TILTROTOR_LAYOUT, singularity_columns, tiltro
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.tiltrotor_controllers import FullPoseController
 from tiltsim.vehicles.rotorcraft import ROTORCRAFT, initial_tilts
-from tiltsim_controllers.laws.full_pose import Parameters, full_pose
+from tiltsim_controllers.laws.full_pose import (
+    PUBLISHED_TILT_WEIGHT,
+    Parameters,
+    force_balanced_tilt_weight,
+    full_pose,
+)
 from tiltsim_controllers.mathematics.records import changed_record
 from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector, scalar
 from tiltsim_controllers.mathematics.vectors import entries_of
@@ -63,25 +69,29 @@ def _margins(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Fl
     return {name: np.where(intact, column, 0.0) for name, column in columns.items()}
 
 
-def _setup(plan: FlightPlan) -> tuple[Parameters, Values]:
-    controller = plan.scenario.controller
-    assert isinstance(controller, FullPoseController)
-    vehicle: Any = plan.scenario.any_rotorcraft.resolve()
-    is_multirotor = isinstance(vehicle, Multirotor)
-    law = Parameters(
-        vehicle=body_of_vehicle(vehicle) if is_multirotor else vehicle,
-        gains=controller.resolve_gains(),
-        reference=plan.reference,
-        limits=controller.resolve_limits(),
-        tilt_weight=controller.resolve_tilt_weight(vehicle),
-        failure=controller.resolve_failure(),
-        rotors=float(len(plan.knots)),
-    )
-    return law, vehicle.table if is_multirotor else ()
+def _setup_of(record: Any) -> Callable[[FlightPlan], tuple[Any, Values]]:
+    """`RotorLaw.setup` with a type of record."""
+
+    def setup(plan: FlightPlan) -> tuple[Any, Values]:
+        controller = plan.scenario.controller
+        assert isinstance(controller, FullPoseController)
+        vehicle: Any = plan.scenario.any_rotorcraft.resolve()
+        is_multirotor = isinstance(vehicle, Multirotor)
+        even = controller.tilt_weight == "even"
+        law = parameters_of(
+            plan,
+            record,
+            vehicle=body_of_vehicle(vehicle) if is_multirotor else vehicle,
+            tilt_weight=force_balanced_tilt_weight(vehicle) if even else PUBLISHED_TILT_WEIGHT,
+            failure=controller.resolve_failure(),
+        )
+        return law, vehicle.table if is_multirotor else ()
+
+    return setup
 
 
-def _loop(layout: RotorLayout, **options: Any) -> ClosedLoop:
-    """Full-pose control of all vehicles of a layout."""
+def _loop(layout: RotorLayout, parameters: Any, **options: Any) -> ClosedLoop:
+    """Full-pose control of all vehicles of a layout, with a type of parameters."""
     places = layout.places
     speeds_in, stops = entries_of(places.speed_1, places.rotors), rotor_stops(places.rotors)
 
@@ -94,7 +104,8 @@ def _loop(layout: RotorLayout, **options: Any) -> ClosedLoop:
     law = RotorLaw(
         "full_pose",
         _inputs_of(layout),
-        setup=_setup,
+        parameters,
+        _setup_of(parameters),
         states=dict.fromkeys(places.names("tilt_command"), "rad"),
         initial=lambda plan: initial_tilts(plan)[0],
         commands=0,
@@ -110,7 +121,7 @@ def _loop(layout: RotorLayout, **options: Any) -> ClosedLoop:
 FULL_POSE: Final = replace(
     _loop(
         TILTROTOR_LAYOUT,
-        parameters=changed_record(Parameters, vehicle=Vehicle),
+        changed_record(Parameters, vehicle=Vehicle),
         margins=_margins,
         motion=tiltrotor_motion,
     ),
@@ -124,7 +135,7 @@ def full_pose_loop(layout: RotorLayout) -> ClosedLoop:
     """Full-pose control of all multirotors of a layout."""
     return _loop(
         layout,
-        parameters=Parameters,
+        Parameters,
         margins=lambda samples, setup: torque_free_columns(
             layout.places,
             table_of(layout.places, setup),

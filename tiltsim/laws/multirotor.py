@@ -10,25 +10,19 @@ from tiltsim.closed_loop.loop import ClosedLoop
 from tiltsim.laws.multirotor_columns import NULL_PART, REFERENCES, margins_of, monitoring_of
 from tiltsim.laws.rotor_loop import RotorLaw, RotorLayout, body_of_vehicle, layout_of_vehicle
 from tiltsim.laws.rotorcraft import CONDITION
-from tiltsim.laws.tracking import INTEGRALS, integrals_at_rest, tracking_fields, tracking_loop
+from tiltsim.laws.tracking import INTEGRALS, integrals_at_rest, tracking_loop, tracking_parameters
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.multirotor_controllers import AttitudeForceController, upper_side
 from tiltsim_controllers.laws.allocation import RotorRange
-from tiltsim_controllers.laws.attitude_altitude import DECOUPLINGS
 from tiltsim_controllers.laws.gait_feedforward import multirotor_law_of
-from tiltsim_controllers.laws.multirotor_steps import (
-    ATTITUDE_ERRORS,
-    Direction,
-    Form,
-    Parameters,
-    SideGains,
-)
+from tiltsim_controllers.laws.multirotor_steps import Direction, Form, Parameters
 from tiltsim_controllers.laws.multirotor_supervisor import (
     Watched,
     multirotor_supervision_of,
     watched,
     watched_at,
 )
+from tiltsim_controllers.laws.supervisor import Supervisor
 from tiltsim_controllers.mathematics.scalar import Values, scalar
 from tiltsim_controllers.vehicle.effectiveness import without_rotor
 
@@ -36,7 +30,7 @@ if TYPE_CHECKING:
     from tiltsim.scenario.scenario import FlightPlan, Scenario
 
 
-def _setup(plan: FlightPlan) -> tuple[Parameters, Values]:
+def _setup(plan: FlightPlan) -> tuple[Any, Values]:
     scenario, gait = plan.scenario, plan.gait
     controller, vehicle = scenario.controller, scenario.vehicle.resolve()
     assert isinstance(controller, AttitudeForceController)
@@ -44,17 +38,16 @@ def _setup(plan: FlightPlan) -> tuple[Parameters, Values]:
     dimension = controller.resolve_force(vehicle, gait).dimension
     side, lost = upper_side(vehicle, gait), controller.failed_rotor
     side_without = side if lost is None else upper_side(vehicle, gait, lost)
-    law = Parameters(
+    law = tracking_parameters(
+        plan,
+        Parameters,
         vehicle=body_of_vehicle(vehicle),
-        **tracking_fields(plan),
-        side=SideGains(*controller.side_gains),
-        rotors=float(len(plan.knots)),
-        decoupling=DECOUPLINGS[controller.decoupling],
-        attitude_error=ATTITUDE_ERRORS[controller.attitude_error],
+        side_integral=0.0,
+        watched=Watched(),
+        watched_without=Watched(),
+        supervisor=Supervisor(),
         restoring=controller.resolve_restoring(len(vehicle.spins), dimension, gait),
-        slowest=controller.slowest_rotor,
         failure=controller.resolve_failure(),
-        turn_time=controller.turn_time,
         limits=RotorRange(
             *scenario.any_rotorcraft.speeds_along_spin, controller.allocation_horizon
         ),

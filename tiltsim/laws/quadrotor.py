@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -24,13 +24,9 @@ from tiltsim.closed_loop.loop import (
 )
 from tiltsim.engines.sample_evaluation import evaluate_over_samples
 from tiltsim.equations.quadrotor import equations_of_motion, initial_state
+from tiltsim.laws.parameters import head_of, parameters_of
 from tiltsim.laws.rotorcraft import REFERENCE_COLUMNS
 from tiltsim.laws.tiltrotor import TILT_REFERENCE_COLUMNS
-from tiltsim.scenario.quadrotor_controllers import (
-    QuadrotorAttitudeAltitudeController,
-    SwitchingController,
-    YawPositionController,
-)
 from tiltsim.vehicles.rotorcraft import ROTORCRAFT
 from tiltsim_controllers.analysis.quadrotor_singularity import (
     normalized_determinant,
@@ -57,38 +53,6 @@ EXTENSION_COLUMNS: Final = {
     "extension_thrust_rate": "N/s",
     "published_determinant": "1",
 }
-
-
-class AttitudeAltitudeParameters(NamedTuple):
-    """The law without states and its reference."""
-
-    vehicle: Vehicle
-    gains: quadrotor_attitude_altitude.Gains
-    reference: ReferenceParameters
-
-
-class YawPositionLoop(NamedTuple):
-    """The head of `userdata`."""
-
-    signature: float  # see `tiltsim.closed_loop.loop.ClosedLoop.signature`
-    vehicle: Vehicle
-    law: yaw_position.Parameters
-
-
-class SwitchingLoop(NamedTuple):
-    """The head of `userdata`."""
-
-    signature: float
-    vehicle: Vehicle
-    law: switching.Parameters
-
-
-class AttitudeAltitudeLoop(NamedTuple):
-    """The head of `userdata`."""
-
-    signature: float
-    vehicle: Vehicle
-    law: AttitudeAltitudeParameters
 
 
 # --- columns -----------------------------------------------------------------------------------
@@ -167,14 +131,14 @@ def _derive_attitude_altitude(
 
 def _derive_switching(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
     law = setup.parameters.law
-    reference = law.yaw_position.reference
+    reference = law.reference
     inside = switching.in_attitude_zone(samples["roll"], samples["pitch"], law.zone)
     # Outside the zone roll and pitch are not outputs: they follow from the position.
     roll = np.where(inside, reference.roll, samples["roll"])
     pitch = np.where(inside, reference.pitch, samples["pitch"])
     return {
         **references(samples, reference, setup.knots, (roll, pitch, reference.yaw)),
-        **_extended_singularity(samples, law.yaw_position.vehicle),
+        **_extended_singularity(samples, law.vehicle),
         "attitude_zone": np.asarray(inside, float),
     }
 
@@ -241,13 +205,13 @@ def _rates(
     time: Any, state: Any, inputs: Any, parameters: Any, knots: Any, disturbance: Any
 ) -> Any:
     """Ch. 2's equations of motion, followed by the law's own states."""
-    motion = equations_of_motion(state, inputs, parameters.vehicle, disturbance)
+    motion = equations_of_motion(state, inputs, parameters.law.vehicle, disturbance)
     return xp.hstack([motion, inputs[4:]])
 
 
 @traceable
 def _observe_equations(time: Any, state: Any, inputs: Any, parameters: Any, knots: Any) -> Any:
-    thrusts = thrust_controls(inputs[:4], parameters.vehicle)
+    thrusts = thrust_controls(inputs[:4], parameters.law.vehicle)
     return xp.hstack([_sample(state[:12], thrusts), state[12:]])
 
 
@@ -258,8 +222,7 @@ def _extension(plan: FlightPlan, own: int) -> tuple[float, ...]:
 
 
 def _quadrotor_loop(
-    record: Callable[..., Any],
-    setup: Callable[[FlightPlan], Any],
+    parameters_type: Any,
     law: Law,
     columns: Mapping[str, str],
     derive: Callable[[Mapping[str, Floats], ControlSetup], dict[str, Floats]],
@@ -270,25 +233,24 @@ def _quadrotor_loop(
     """A closed loop around a law that demands thrust and torques.
 
     Args:
-        record: Type of the head of `userdata`.
-        setup: ``plan -> parameters`` of the law.
+        parameters_type: Type of the parameters of the law.
         law: See `Law`.
         columns: Further columns of a flight, with their units.
         derive, monitoring: See `Columns` and `Monitoring`.
         own: Number of the law's own states: the thrust and its rate, or none.
     """
-    fields = EXTENSION_FIELDS[:own]
+    fields, record = EXTENSION_FIELDS[:own], head_of(parameters_type)
 
-    def control_setup(plan: FlightPlan, signature: float) -> ControlSetup:
-        vehicle = plan.scenario.rotorcraft.resolve()
-        return ControlSetup(record(signature, vehicle, setup(plan)), plan.knots)
+    def setup(plan: FlightPlan, signature: float) -> ControlSetup:
+        law = parameters_of(plan, parameters_type, vehicle=plan.scenario.rotorcraft.resolve())
+        return ControlSetup(record(signature, law), plan.knots)
 
     @traceable
     def controls(time: Any, qpos: Any, qvel: Any, act: Any, parameters: Any, knots: Any) -> Any:
         """Thrusts, idle rotor states, the law's states."""
         state = xp.hstack([_body(qpos, qvel), act[4:]])
         inputs = law(time, state, parameters.law, knots)
-        thrusts = thrust_controls(inputs[:4], parameters.vehicle)
+        thrusts = thrust_controls(inputs[:4], parameters.law.vehicle)
         return xp.hstack([thrusts, xp.zeros(4), inputs[4:]])
 
     @traceable
@@ -297,8 +259,8 @@ def _quadrotor_loop(
 
     return ClosedLoop(
         kind=ROTORCRAFT,
-        parameters=record,  # type: ignore[arg-type]
-        setup=control_setup,
+        parameters=record,
+        setup=setup,
         dynamics=Dynamics(
             "quadrotor",
             Sizes(qpos=7, qvel=6, act=4 + own, ctrl=8 + own),
@@ -321,42 +283,14 @@ def _quadrotor_loop(
     )
 
 
-def _yaw_position_setup(plan: FlightPlan) -> yaw_position.Parameters:
-    controller = plan.scenario.controller
-    assert isinstance(controller, YawPositionController)
-    vehicle = plan.scenario.rotorcraft.resolve()
-    return yaw_position.Parameters(vehicle, controller.resolve_gains(), plan.reference)
-
-
-def _switching_setup(plan: FlightPlan) -> switching.Parameters:
-    controller = plan.scenario.controller
-    assert isinstance(controller, SwitchingController)
-    vehicle = plan.scenario.rotorcraft.resolve()
-    return switching.Parameters(
-        yaw_position.Parameters(vehicle, controller.resolve_gains(), plan.reference),
-        controller.resolve_attitude_gains(),
-        switching.Zone(*controller.zone.roll, *controller.zone.pitch),
-        switching.EXTENSIONS[controller.extension],
-        controller.extension_rate,
+def _attitude_altitude(time: Any, state: Any, p: Any, knots: Any) -> Any:
+    return quadrotor_attitude_altitude.attitude_altitude_inputs(
+        time, state, p.vehicle, p.gains, p.reference, knots
     )
 
 
-def _attitude_altitude_setup(plan: FlightPlan) -> AttitudeAltitudeParameters:
-    controller = plan.scenario.controller
-    assert isinstance(controller, QuadrotorAttitudeAltitudeController)
-    vehicle = plan.scenario.rotorcraft.resolve()
-    return AttitudeAltitudeParameters(vehicle, controller.resolve_gains(), plan.reference)
-
-
-def _attitude_altitude(
-    time: Any, state: Any, parameters: AttitudeAltitudeParameters, knots: Any
-) -> Any:
-    return quadrotor_attitude_altitude.attitude_altitude_inputs(time, state, *parameters, knots)
-
-
 YAW_POSITION: Final = _quadrotor_loop(
-    YawPositionLoop,
-    _yaw_position_setup,
+    yaw_position.Parameters,
     yaw_position.yaw_position_inputs,
     EXTENSION_COLUMNS,
     _derive_yaw_position,
@@ -367,8 +301,7 @@ YAW_POSITION: Final = _quadrotor_loop(
 
 QUADROTOR_ATTITUDE_ALTITUDE: Final = replace(
     _quadrotor_loop(
-        AttitudeAltitudeLoop,
-        _attitude_altitude_setup,
+        quadrotor_attitude_altitude.Parameters,
         _attitude_altitude,
         {},
         _derive_attitude_altitude,
@@ -381,8 +314,7 @@ QUADROTOR_ATTITUDE_ALTITUDE: Final = replace(
 
 SWITCHING: Final = replace(
     _quadrotor_loop(
-        SwitchingLoop,
-        _switching_setup,
+        switching.Parameters,
         switching.switching_inputs,
         {**EXTENSION_COLUMNS, "attitude_zone": "1"},
         _derive_switching,

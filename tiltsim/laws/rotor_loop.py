@@ -23,6 +23,7 @@ from tiltsim.closed_loop.loop import (
     Sampling,
 )
 from tiltsim.equations.tiltrotor import body_fields, initial_state
+from tiltsim.laws.parameters import head_of
 from tiltsim.laws.rotorcraft import (
     REFERENCE_COLUMNS,
     ahead,
@@ -39,7 +40,6 @@ from tiltsim.vehicles.rotorcraft import initial_rotor_speeds, rotorcraft_kind
 from tiltsim.vehicles.rotorcraft.layout import CROSS
 from tiltsim.vehicles.rotorcraft.layout import Layout as Places
 from tiltsim_controllers.gaits.motion import tilt_motion_of
-from tiltsim_controllers.mathematics.records import make_record_type
 from tiltsim_controllers.mathematics.scalar import Floats, Triple, Values, Vector, scalar
 from tiltsim_controllers.mathematics.vectors import entries_of
 from tiltsim_controllers.references.trajectories import position_reference
@@ -118,17 +118,6 @@ class RotorLaw(NamedTuple):
     motion: Callable[..., Values] | None = None
     """Scalar code ``(state, tilts, inputs, parameters, knots, disturbance)`` of the derivative of
     body and rotor speeds on the thesis's equations; None for the equations of a rotor table."""
-
-
-@cache
-def head_of(law: type[tuple[Any, ...]]) -> Any:
-    """The type of the head of `userdata`, around the parameters of a law."""
-    return make_record_type(
-        "LoopParameters",
-        signature=float,  # see `tiltsim.closed_loop.loop.ClosedLoop.signature`
-        servo_lead=float,  # s, rate feed-forward of the tilt servos, 2 zeta / omega_n
-        law=law,
-    )
 
 
 def body_of_vehicle(vehicle: Multirotor) -> Body:
@@ -302,7 +291,7 @@ def _equations_of(layout: RotorLayout, law: RotorLaw) -> Equations:
 
 def rotor_loop(layout: RotorLayout, law: RotorLaw) -> ClosedLoop:
     """The closed loop of a control law with all vehicles of a layout."""
-    places, record = layout.places, head_of(law.parameters)
+    places, record = layout.places, head_of(law.parameters, servo_lead=float)
     sampling, equations = _sampling_of(layout, law), None
     if not law.measured:  # the equations have no other acceleration than the law's
         equations = _equations_of(layout, law)

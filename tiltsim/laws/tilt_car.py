@@ -22,11 +22,8 @@ from tiltsim.closed_loop.loop import (
     Sizes,
 )
 from tiltsim.engines.sample_evaluation import evaluate_over_samples
+from tiltsim.laws.parameters import head_of, parameters_of
 from tiltsim.laws.rotorcraft import servo_lead
-from tiltsim.scenario.tilt_car_controllers import (
-    FourthDerivativeController,
-    ThirdDerivativeController,
-)
 from tiltsim.vehicles.tilt_car import ROTORS, SPEED_1, SPEED_2, TILT_CAR, initial_tilt
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.code.traceable import traceable
@@ -39,39 +36,34 @@ if TYPE_CHECKING:
     from tiltsim.scenario.scenario import FlightPlan, Scenario
 
 
-class ThirdParameters(NamedTuple):
-    """The head of `userdata` with the third-derivative law."""
-
-    signature: float  # see `tiltsim.closed_loop.loop.ClosedLoop.signature`
-    servo_lead: float  # s, rate feed-forward of the tilt servo, 2 zeta / omega_n
-    heading: float  # rad, yaw at zero tilt, for the thesis's equations
-    law: third_derivative.Parameters
-
-
-class FourthParameters(NamedTuple):
-    """As `ThirdParameters`, with the fourth-derivative law."""
-
-    signature: float
-    servo_lead: float
-    heading: float
-    law: fourth_derivative.Parameters
-
-
-def car_setup(
-    record: Callable[..., Any], plan: FlightPlan, signature: float, law: Any, *own: Any
-) -> ControlSetup:
-    """The parameters of a flight with a tilt-car.
+def car_record(law: Any, **own: type) -> Any:
+    """The type of the head of `userdata`, around the parameters of a law.
 
     Args:
-        record: Type of the loop's record.
-        plan: Of the flight.
-        signature: See `tiltsim.closed_loop.loop.ClosedLoop.signature`.
-        law: Parameters of the law.
-        own: Further fields of the record.
+        law: Type of these parameters.
+        own: Further fields.
     """
-    lead = servo_lead(plan.scenario.tilt_car.tilt_servo)
-    heading = float(plan.scenario.initial.attitude[2])
-    return ControlSetup(record(signature, lead, heading, law, *own), plan.knots)
+    # The lead (s) of the servo, and the yaw (rad) at zero tilt for the thesis's equations.
+    return head_of(law, servo_lead=float, heading=float, **own)
+
+
+def car_setup_of(law: Any, record: Any) -> Callable[[FlightPlan, float], ControlSetup]:
+    """`ClosedLoop.setup` of a law.
+
+    Args:
+        law: Type of its parameters.
+        record: `car_record`, whose further fields are the plan's.
+    """
+
+    def setup(plan: FlightPlan, signature: float) -> ControlSetup:
+        car, heading = plan.scenario.tilt_car, float(plan.scenario.initial.attitude[2])
+        own = parameters_of(plan, law, car=car.resolve())
+        gait = {"gait": plan.gait.parameters} if "gait" in record._fields else {}
+        lead = servo_lead(car.tilt_servo)
+        known = record(signature=signature, servo_lead=lead, heading=heading, law=own, **gait)
+        return ControlSetup(known, plan.knots)
+
+    return setup
 
 
 def initial_motion(scenario: Scenario) -> tuple[float, ...]:
@@ -247,20 +239,14 @@ class _Integrating(NamedTuple):
         own = [state[4:5], state[7:], seen[6:8]] if self.twice else [state[4:5]]
         return xp.hstack([state[:4], discs, _running(seen[6:8]), *own])
 
-    def loop(
-        self,
-        record: type[tuple[Any, ...]],
-        setup: Callable[[FlightPlan, float], ControlSetup],
-        units: Mapping[str, str],
-    ) -> ClosedLoop:
+    def loop(self, parameters: Any, units: Mapping[str, str]) -> ClosedLoop:
         """The closed loop.
 
         Args:
-            record: Type of the head of `userdata`.
-            setup: ``(plan, signature)``
+            parameters: Type of the law's parameters.
             units: Columns of the controller's states after the servo's command, with their units.
         """
-        states = 4 if self.twice else 1
+        record, states = car_record(parameters), 4 if self.twice else 1
         further = (0.0,) * (states - 1)
 
         def initial(plan: FlightPlan, *, equations: bool) -> Vector:
@@ -272,7 +258,7 @@ class _Integrating(NamedTuple):
         return ClosedLoop(
             kind=TILT_CAR,
             parameters=record,
-            setup=setup,
+            setup=car_setup_of(parameters, record),
             dynamics=Dynamics(
                 "tilt_car",
                 Sizes(qpos=4, qvel=4, act=2 + states, ctrl=5 + states),
@@ -295,41 +281,15 @@ class _Integrating(NamedTuple):
         )
 
 
-def _third_setup(plan: FlightPlan, signature: float) -> ControlSetup:
-    controller = plan.scenario.controller
-    assert isinstance(controller, ThirdDerivativeController)
-    law = third_derivative.Parameters(
-        plan.scenario.tilt_car.resolve(),
-        controller.resolve_gains(),
-        plan.reference,
-        controller.restoring_rate,
-    )
-    return car_setup(ThirdParameters, plan, signature, law)
-
-
-def _fourth_setup(plan: FlightPlan, signature: float) -> ControlSetup:
-    controller = plan.scenario.controller
-    assert isinstance(controller, FourthDerivativeController)
-    law = fourth_derivative.Parameters(
-        plan.scenario.tilt_car.resolve(),
-        controller.resolve_gains(),
-        plan.reference,
-        fourth_derivative.DECOUPLINGS[controller.decoupling],
-        float(controller.anti_windup),
-    )
-    return car_setup(FourthParameters, plan, signature, law)
-
-
 THIRD_DERIVATIVE: Final = _Integrating(third_derivative.third_derivative_inputs, twice=False).loop(
-    ThirdParameters, _third_setup, {}
+    third_derivative.Parameters, {}
 )
 """Third-derivative feedback linearization of the tilt-car (ch. 10, Sec. 3.1)."""
 
 FOURTH_DERIVATIVE: Final = _Integrating(
     fourth_derivative.fourth_derivative_inputs, twice=True
 ).loop(
-    FourthParameters,
-    _fourth_setup,
+    fourth_derivative.Parameters,
     {
         "alpha_ref_rate": "rad/s",
         **{f"rotor_acceleration_{rotor}": "rad/s^2" for rotor in ROTORS},

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 
@@ -18,14 +18,14 @@ from tiltsim.closed_loop.loop import (
 )
 from tiltsim.engines.sample_evaluation import evaluate_over_samples
 from tiltsim.laws.tilt_car import (
-    car_setup,
+    car_record,
+    car_setup_of,
     derived_columns,
     initial_motion,
     motion_rates,
     reference_columns,
     yaw,
 )
-from tiltsim.scenario.tilt_car_controllers import PlannedDirectionController
 from tiltsim.vehicles.tilt_car import ROTORS, TILT_CAR
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.code.traceable import traceable
@@ -35,28 +35,17 @@ from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.tilt_car import planned_direction
 from tiltsim_controllers.tilt_car.vehicle import counter_yaw_per_tilt
 
-if TYPE_CHECKING:
-    from tiltsim.scenario.scenario import FlightPlan
+PARAMETERS: Final = car_record(planned_direction.Parameters, gait=GaitParameters)
 
 
-class PlannedParameters(NamedTuple):
-    """As `ThirdParameters`, with the planned direction and its gait."""
-
-    signature: float
-    servo_lead: float
-    heading: float
-    law: planned_direction.Parameters
-    gait: GaitParameters
-
-
-def _tilt(time: Any, parameters: PlannedParameters, knots: Any) -> Any:
+def _tilt(time: Any, parameters: Any, knots: Any) -> Any:
     """The planned tilt angle with its rate, rad and rad/s, shape (2,)."""
     return planned_tilts(time, parameters.gait, knots, 1)[0][:2]
 
 
 @traceable
 def _planned_controls(
-    time: Any, qpos: Any, qvel: Any, act: Any, parameters: PlannedParameters, knots: Any
+    time: Any, qpos: Any, qvel: Any, act: Any, parameters: Any, knots: Any
 ) -> Any:
     """Tilt servo, thrusts, idle rotor states.
 
@@ -69,14 +58,14 @@ def _planned_controls(
     return xp.hstack([servo, squares, xp.zeros(2)])
 
 
-def _planned_state(time: Any, state: Any, parameters: PlannedParameters, knots: Any) -> Any:
+def _planned_state(time: Any, state: Any, parameters: Any, knots: Any) -> Any:
     """State of the law from that of the equations, with the planned tilt."""
     tilt = _tilt(time, parameters, knots)[0]
     return xp.hstack([state[:4], xp.array([yaw(tilt, parameters), tilt])])
 
 
 @traceable
-def _planned_inputs(time: Any, state: Any, parameters: PlannedParameters, knots: Any) -> Any:
+def _planned_inputs(time: Any, state: Any, parameters: Any, knots: Any) -> Any:
     """The squares of the rotor speeds on the thesis's equations."""
     seen = _planned_state(time, state, parameters, knots)
     return planned_direction.planned_direction_inputs(time, seen, parameters.law)
@@ -84,7 +73,7 @@ def _planned_inputs(time: Any, state: Any, parameters: PlannedParameters, knots:
 
 @traceable
 def _planned_rates(
-    time: Any, state: Any, inputs: Any, parameters: PlannedParameters, knots: Any, disturbance: Any
+    time: Any, state: Any, inputs: Any, parameters: Any, knots: Any, disturbance: Any
 ) -> Any:
     """The thesis's equations with a tilt that follows the gait exactly."""
     seen = _planned_state(time, state, parameters, knots)
@@ -105,7 +94,7 @@ def _observe_planned(qpos: Any, qvel: Any, act: Any, ctrl: Any) -> Any:
 
 @traceable
 def _observe_planned_equations(
-    time: Any, state: Any, inputs: Any, parameters: PlannedParameters, knots: Any
+    time: Any, state: Any, inputs: Any, parameters: Any, knots: Any
 ) -> Any:
     tilt, tilt_rate = _tilt(time, parameters, knots)
     yaw_rate = -counter_yaw_per_tilt(parameters.law.car) * tilt_rate
@@ -114,7 +103,7 @@ def _observe_planned_equations(
 
 
 @traceable
-def _demanded(time: Any, state: Any, parameters: PlannedParameters, knots: Any) -> Any:
+def _demanded(time: Any, state: Any, parameters: Any, knots: Any) -> Any:
     """Acceleration (m/s^2), squares of the rotor speeds (rad^2/s^2) and tilt (rad)."""
     acceleration = planned_direction.demanded_acceleration(time, state, parameters.law)
     squares = planned_direction.demanded_squared_speeds(time, state, parameters.law)
@@ -137,18 +126,10 @@ def _derive_planned(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[
     return columns | {"lyapunov": lyapunov}
 
 
-def _planned_setup(plan: FlightPlan, signature: float) -> ControlSetup:
-    controller = plan.scenario.controller
-    assert isinstance(controller, PlannedDirectionController)
-    car = plan.scenario.tilt_car.resolve()
-    law = planned_direction.Parameters(car, controller.resolve_gains(), plan.reference)
-    return car_setup(PlannedParameters, plan, signature, law, plan.gait.parameters)
-
-
 PLANNED_DIRECTION: Final = ClosedLoop(
     kind=TILT_CAR,
-    parameters=PlannedParameters,
-    setup=_planned_setup,
+    parameters=PARAMETERS,
+    setup=car_setup_of(planned_direction.Parameters, PARAMETERS),
     dynamics=Dynamics(
         "tilt_car",
         Sizes(qpos=4, qvel=4, act=2, ctrl=5),

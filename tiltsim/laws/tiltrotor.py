@@ -1,10 +1,10 @@
-"""Common parts of the closed loops of the thesis's laws with the tiltrotor."""
+"""The tiltrotor in closed loops: common parts, and attitude-altitude control (ch. 3 and 4)."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -13,12 +13,15 @@ from tiltsim.engines.sample_evaluation import flights_in
 from tiltsim.equations.tiltrotor import equations_of_motion
 from tiltsim.laws.rotor_loop import RotorLaw, RotorLayout
 from tiltsim.laws.rotorcraft import rotor_stops, singular_attitude
-from tiltsim.laws.tracking import tracking_loop
+from tiltsim.laws.tracking import INTEGRALS, integrals_at_rest, tracking_loop, tracking_parameters
+from tiltsim.scenario.tiltrotor_controllers import AttitudeAltitudeController
 from tiltsim.vehicles.rotorcraft import ROTORCRAFT
 from tiltsim_controllers.analysis.singularity import determinant, margin_over_gait
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.code.traceable import traceable
+from tiltsim_controllers.laws import attitude_altitude, gait_feedforward
 from tiltsim_controllers.laws.attitude_altitude import PUBLISHED_DECOUPLING
+from tiltsim_controllers.laws.multirotor_steps import EULER_ANGLES
 from tiltsim_controllers.laws.tiltrotor_supervisor import SUPERVISION
 from tiltsim_controllers.mathematics.attitude import rotation_matrix
 from tiltsim_controllers.mathematics.linear import kernel
@@ -27,6 +30,9 @@ from tiltsim_controllers.mathematics.vectors import entries_of
 from tiltsim_controllers.vehicle.parameters import SPIN, Vehicle, drag_ratio
 from tiltsim_controllers.vehicle.rotors import airframe, wrench_map
 from tiltsim_controllers.vehicle.states import ROTORS, TILT_FIELDS, TILTROTOR_FIELDS, state_of
+
+if TYPE_CHECKING:
+    from tiltsim.scenario.scenario import FlightPlan
 
 TILT_REFERENCE_COLUMNS: Final = tuple(f"alpha_ref_{rotor}" for rotor in ROTORS)
 
@@ -127,3 +133,61 @@ def tiltrotor_loops(law: RotorLaw) -> tuple[ClosedLoop, ClosedLoop]:
         )
 
     return loop(measured=False), loop(measured=True)
+
+
+@scalar
+def _without_gait(
+    time: float,
+    state: Values,
+    tilt_rates: Values,
+    states: Values,
+    parameters: Any,
+    knots: Vector,
+    motion: Triple,
+    measured: Triple | None = None,
+) -> Values:
+    """The law without feed-forward as `tiltsim.laws.tracking` takes it; it has no states."""
+    return attitude_altitude.attitude_altitude_inputs(time, state, parameters, knots, measured)
+
+
+def _setup(plan: FlightPlan) -> tuple[Any, Values]:
+    vehicle = plan.scenario.rotorcraft.resolve()
+    return tracking_parameters(plan, attitude_altitude.Parameters, vehicle=vehicle), ()
+
+
+TILTROTOR, MEASURED_TILTROTOR = tiltrotor_loops(
+    RotorLaw("attitude_altitude", _without_gait, attitude_altitude.Parameters, _setup)
+)
+"""The attitude-altitude controller of the tiltrotor; the second with the angular acceleration of
+the plant in place of the model's."""
+
+
+def _feedforward_setup(plan: FlightPlan) -> tuple[Any, Values]:
+    controller, rotorcraft = plan.scenario.controller, plan.scenario.rotorcraft
+    assert isinstance(controller, AttitudeAltitudeController)
+    vehicle, is_fed_forward = rotorcraft.resolve(), controller.rotor_inertia_feedforward
+    law = tracking_parameters(
+        plan,
+        gait_feedforward.Parameters,
+        vehicle=vehicle,
+        supervisor=controller.resolve_supervisor(vehicle),
+        rotor_inertia=rotorcraft.rotor_inertia if is_fed_forward else 0.0,
+        attitude_error=EULER_ANGLES,
+        slowest_rotor=0.0,
+        turn_time=0.0,
+    )
+    return law, ()
+
+
+GAIT_FEEDFORWARD, MEASURED_GAIT_FEEDFORWARD = tiltrotor_loops(
+    RotorLaw(
+        "gait_feedforward",
+        gait_feedforward.tracking_inputs,
+        gait_feedforward.Parameters,
+        _feedforward_setup,
+        states=INTEGRALS,
+        initial=integrals_at_rest,
+    )
+)
+"""The attitude-altitude controller with tilt-rate feed-forward, of the tiltrotor; the second with
+the angular acceleration of the plant in place of the model's."""

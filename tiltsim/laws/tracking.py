@@ -14,11 +14,11 @@ from functools import cache
 from typing import TYPE_CHECKING, Any, Final
 
 from tiltsim.closed_loop.loop import ClosedLoop, SupervisedLaw
+from tiltsim.laws.parameters import parameters_of
 from tiltsim.laws.rotor_loop import RotorLaw, RotorLayout, rotor_loop
 from tiltsim.laws.rotorcraft import REFERENCE_COLUMNS, seen_of
 from tiltsim.scenario.multirotor_controllers import AttitudeForceController
 from tiltsim.scenario.tiltrotor_controllers import AttitudeAltitudeController
-from tiltsim_controllers.laws.decouplers import DECOUPLERS
 from tiltsim_controllers.laws.multirotor_steps import INTEGRAL_FIELDS
 from tiltsim_controllers.laws.supervisor import SUPERVISOR_AT_REST, Supervision
 from tiltsim_controllers.mathematics.scalar import Triple, Values, Vector, scalar
@@ -37,23 +37,27 @@ def integrals_at_rest(_plan: FlightPlan) -> Values:
     return (0.0,) * len(INTEGRALS)
 
 
-def tracking_fields(plan: FlightPlan) -> dict[str, Any]:
-    """The parameters that controllers with feed-forward of the gait share, by name."""
-    controller, gait = plan.scenario.controller, plan.gait
+def tracking_parameters(plan: FlightPlan, record: Any, **own: Any) -> Any:
+    """The parameters of a law that follows a gait.
+
+    Args:
+        plan, record, own: As for `parameters_of`.
+    """
+    scenario, controller = plan.scenario, plan.scenario.controller
     assert isinstance(controller, (AttitudeAltitudeController, AttitudeForceController))
     # The thesis's equations omit the gyroscopic torque.
-    gyroscopic_torque = plan.scenario.simulation.plant != "thesis"
-    return {
-        "gains": controller.resolve_gains(),
-        "integral": controller.resolve_integral_gains(),
-        "max_acceleration": controller.max_acceleration,
-        "max_angular_acceleration": controller.max_angular_acceleration,
-        "anticipation": min(controller.anticipation, 0.5 * gait.min_segment_time),
-        "terms": controller.resolve_feedforward_terms(gyroscopic_torque=gyroscopic_torque),
-        "gait": gait.parameters,
-        "reference": plan.reference,
-        "decoupler": DECOUPLERS[controller.decoupler],
-    }
+    terms = controller.resolve_feedforward_terms(
+        gyroscopic_torque=scenario.simulation.plant != "thesis"
+    )
+    return parameters_of(
+        plan,
+        record,
+        gains=controller.resolve_gains(),
+        integral=controller.resolve_integral_gains(),
+        anticipation=min(controller.anticipation, 0.5 * plan.gait.min_segment_time),
+        terms=terms,
+        **own,
+    )
 
 
 @scalar

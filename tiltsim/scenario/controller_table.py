@@ -2,26 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from itertools import islice
 from math import atan, pi
-from typing import Annotated, Any, ClassVar, Literal, Self, TypeVar
+from typing import Annotated, Any, ClassVar, Literal, Self
 
-from pydantic import Discriminator, Field, Tag, model_validator
+from pydantic import Field, model_validator
 
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.table import Positive, Table, example
 from tiltsim_controllers.analysis.stability import ErrorLoop, linear_loop
 from tiltsim_controllers.gaits.red_gait import determinant_at_clearance
+from tiltsim_controllers.laws.keys import GainSets, number_of, table_of
 from tiltsim_controllers.laws.multirotor_supervisor import untilted_volume
 from tiltsim_controllers.laws.supervisor import STRATEGIES, UNTILTED, Supervisor
 from tiltsim_controllers.vehicle.parameters import Vehicle, drag_ratio
 
 ReferenceKind = Literal["position", "attitude_altitude", "pose"]
 """What a controller tracks: position and yaw, attitude and altitude, or position and attitude."""
-
-LoopGains = tuple[tuple[str, int], ...]
-"""Linear loops: the name of each, and how many gains it has."""
 
 
 class SupervisorTable(Table):
@@ -125,23 +121,30 @@ class ControllerTable(Table):
     vehicle_models: ClassVar[tuple[str, ...]]
     reference_kinds: ClassVar[tuple[ReferenceKind, ...]]
     gait_types: ClassVar[tuple[str, ...]] = ("fixed",)  # of the tilt-car's controllers
-    loop_gains: ClassVar[LoopGains] = ()  # of independent linear loops
+    loop_gains: ClassVar[tuple[str, ...]] = ()  # keys of the gains of independent linear loops
     is_external: ClassVar[bool] = False  # commands come from Python code, not from a built-in law
     commands_tilts: ClassVar[bool] = False  # the tilt angles are inputs, not planned by a gait
     rotors_have_speeds: ClassVar[bool] = False  # of the quadrotor, too, whose laws make thrusts
+
+    gain_sets: ClassVar[GainSets] = {}
 
     allow_unstable: bool = Field(
         False, description="accept gains that fail the Routh-Hurwitz criterion of stability"
     )
     law: str
 
-    def resolve_gains(self) -> tuple[float, ...]:
-        """The gains: of a named set, or as given."""
-        return ()
+    def resolve_gains(self) -> Any:
+        """The gains as the law reads them: of a named set, or as given."""
+        return number_of(self, "gains")
 
     def error_loops(self, vehicle: Any) -> list[ErrorLoop]:
         """The linear closed loops that the gains make around a vehicle's parameters."""
-        return linear_loops(self.resolve_gains(), self.loop_gains)
+        loops: list[ErrorLoop] = []
+        for key in self.loop_gains:
+            gains = number_of(self, key)
+            named = gains._asdict() if hasattr(gains, "_asdict") else {"position": gains}
+            loops += [linear_loop(name, values) for name, values in named.items()]
+        return loops
 
     def check_scenario(self, scenario: Any) -> None:
         """Refuse the controller in a scenario, otherwise consistent. Raises `mistake`."""
@@ -172,8 +175,14 @@ class ControllerTable(Table):
         return False
 
     def in_full(self) -> Self:
-        """The same with numbers in place of the name of a set of gains."""
-        return self
+        """The same with numbers in place of the names of sets of gains."""
+        named = [key for key in self.gain_sets if isinstance(getattr(self, key), str)]
+        return self.model_copy(
+            update={
+                key: table_of(type(self).model_fields[key].annotation, number_of(self, key))
+                for key in named
+            }
+        )
 
     @property
     def measures_angular_acceleration(self) -> bool:
@@ -184,22 +193,3 @@ class ControllerTable(Table):
     def rotors_stop_at_zero(self) -> bool:
         """Whether rotor speeds that the law integrates stop at zero."""
         return True
-
-
-def linear_loops(gains: Sequence[float], sizes: LoopGains) -> list[ErrorLoop]:
-    """Independent linear loops, given the gains of all, one after another."""
-    rest = iter(gains)
-    return [linear_loop(name, [*islice(rest, size)]) for name, size in sizes]
-
-
-def gain_kind(value: object) -> str:
-    """The tag of a controller's gains: ``named`` for a set, ``table`` for numbers."""
-    return "named" if isinstance(value, str) else "table"
-
-
-_Names = TypeVar("_Names")
-_Numbers = TypeVar("_Numbers")
-NamedGains = Annotated[
-    Annotated[_Names, Tag("named")] | Annotated[_Numbers, Tag("table")], Discriminator(gain_kind)
-]
-"""The name of a set of gains, or explicit gains."""

@@ -7,94 +7,21 @@ from typing import Annotated, Literal, Self
 from pydantic import Field
 
 from tiltsim.models.rotor_table import Multirotor
-from tiltsim.scenario.controller_table import ControllerTable, SupervisorTable, gain_kind
-from tiltsim.scenario.table import Gains2, NonNegative, Positive, Table, Vector3, example
-from tiltsim_controllers.laws.attitude_altitude import Gains
+from tiltsim.scenario.controller_table import ControllerTable, SupervisorTable
+from tiltsim.scenario.table import NonNegative, Positive
 from tiltsim_controllers.laws.failures import Failure
 from tiltsim_controllers.laws.gains import (
     GAIN_SETS,
+    Gains,
+    GainTable,
+    GivenGains,
     IntegralGains,
-    Poles,
-    gains_from_poles,
+    PolePlacementTable,
     gains_from_rows,
 )
 from tiltsim_controllers.laws.multirotor_steps import FeedforwardTerms
 from tiltsim_controllers.laws.supervisor import Supervisor
 from tiltsim_controllers.vehicle.parameters import Vehicle
-
-
-def attitude_altitude_gain_kind(value: object) -> str:
-    """The tag of gains that may also be given by poles."""
-    if isinstance(value, PolePlacementTable):
-        return "poles"
-    loops = value.values() if isinstance(value, dict) else ()
-    return "poles" if any(isinstance(loop, dict) for loop in loops) else gain_kind(value)
-
-
-class GainTable(Table):
-    """Explicit gains; see `tiltsim_controllers.laws.gains.gains_from_rows`."""
-
-    attitude: Annotated[tuple[Vector3, Vector3, Vector3], Field(strict=False)] = Field(
-        description="diagonals of K_P1, K_P2 and K_P3, each roll, pitch, yaw: on the errors of "
-        "angular acceleration, rate and angle [1/s, 1/s^2, 1/s^3]",
-        examples=[[[40, 40, 40], [600, 600, 600], [4000, 4000, 4000]]],
-    )
-    altitude: Vector3 = Field(
-        description="K_PZ1, K_PZ2, K_PZ3: on the errors of vertical acceleration, velocity and "
-        "altitude [1/s, 1/s^2, 1/s^3]",
-        examples=[[10.0, 15.0, 10.0]],
-    )
-    position: Gains2 = Field(
-        (1.0, 1.0),
-        description="K_X1, K_X2: on the errors of horizontal velocity and position [1/s, 1/s^2]",
-    )
-
-
-class PoleTable(Table):
-    """The poles of one closed loop: a pair, and for third order a real one at its bandwidth."""
-
-    bandwidth: Positive = Field(description="natural frequency [rad/s]", examples=[10.0])
-    damping: Positive = Field(1.0, description="damping ratio of the pair [-]", examples=[0.7])
-
-    @property
-    def poles(self) -> Poles:
-        """The poles as `gains_from_poles` takes them."""
-        return Poles(self.bandwidth, self.damping)
-
-
-class IntegralPoleTable(PoleTable):
-    """The poles of a loop that may have integral action."""
-
-    integral: NonNegative = Field(
-        0.0,
-        description="pole of integral action; 0 disables it; needs gait_rate_feedforward [rad/s]",
-        examples=[0.5],
-    )
-
-    @property
-    def poles(self) -> Poles:
-        return Poles(self.bandwidth, self.damping, self.integral)
-
-
-class PolePlacementTable(Table):
-    """Gains by pole placement; see `tiltsim_controllers.laws.gains.gains_from_poles`."""
-
-    model_config = example(attitude={"bandwidth": 25.0}, altitude={"bandwidth": 10.0})
-
-    attitude: PoleTable = Field(description="the loops of roll and pitch")
-    yaw: PoleTable | None = Field(None, description="the loop of yaw; default: as attitude")
-    altitude: IntegralPoleTable = Field(description="the loop of the altitude")
-    position: IntegralPoleTable = Field(
-        IntegralPoleTable(bandwidth=1.0, damping=0.5), description="the loops of x and y"
-    )
-
-    def resolve(self) -> tuple[Gains, IntegralGains]:
-        """The gains of the control law and of its integrals."""
-        yaw = self.yaw or self.attitude
-        return gains_from_poles(
-            self.attitude.poles, yaw.poles, self.altitude.poles, self.position.poles
-        )
-
 
 FeedforwardTerm = Literal[
     "gait_rates",
@@ -104,10 +31,6 @@ FeedforwardTerm = Literal[
     "gyroscopic_torque",
     "integral_action",
 ]
-
-
-GivenGains = str | GainTable | PolePlacementTable
-"""The name of a set of gains, gains, or poles."""
 
 
 class GaitFollowingController(ControllerTable):

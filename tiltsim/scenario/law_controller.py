@@ -10,7 +10,7 @@ from abc import abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
-from typing import Any, ClassVar, Literal, TypeVar, get_args, get_origin
+from typing import Any, ClassVar, Literal, TypeVar
 
 from pydantic import Field
 
@@ -20,9 +20,9 @@ from tiltsim.scenario.table import Positive
 from tiltsim_controllers.analysis.stability import ErrorLoop, linear_loop
 from tiltsim_controllers.code.arrays import xp as xp
 from tiltsim_controllers.gaits.plans import Gait
+from tiltsim_controllers.laws.keys import number_of, record_of
 from tiltsim_controllers.laws.observed import Command as Command
 from tiltsim_controllers.laws.observed import Observed as Observed
-from tiltsim_controllers.mathematics.records import make_record_type, vector_of
 from tiltsim_controllers.mathematics.scalar import Triple, Values
 
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -130,11 +130,9 @@ class LawController(LawTable):
         return self.control
 
     def law_parameters(self, airframe: Airframe) -> tuple[Any, ...]:
-        """The law's parameters, a NamedTuple of floats and tuples: by default the numeric keys."""
-        names, record = _parameters_of(type(self))
-        made: tuple[Any, ...] = record(
-            *(getattr(self, name) for name in names) if names else (0.0,)
-        )
+        """The law's parameters, a NamedTuple of floats and tuples: by default its own keys."""
+        record = record_of(type(self), _not_read())
+        made: tuple[Any, ...] = record(*(number_of(self, name) for name in record._fields))
         return made
 
     def law_table(self, airframe: Airframe) -> Values:
@@ -180,13 +178,6 @@ class TiltingTable(LawTable):
 
 
 @cache
-def _parameters_of(table: type[LawController]) -> tuple[tuple[str, ...], Any]:
-    """Names of the numeric keys of a law, and the type of their record."""
-    known = LawController.model_fields.keys() | TiltingTable.model_fields.keys()
-    fields: dict[str, type] = {}
-    for name, key in table.model_fields.items():
-        if name not in known and key.annotation in (float, int):
-            fields[name] = float
-        elif name not in known and get_origin(key.annotation) is tuple:
-            fields[name] = vector_of(len(get_args(key.annotation)))
-    return tuple(fields), make_record_type("Parameters", **(fields or {"none": float}))
+def _not_read() -> frozenset[str]:
+    """Keys of the tables of laws that a law does not read."""
+    return frozenset(LawController.model_fields.keys() | TiltingTable.model_fields.keys())

@@ -2,20 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Final, Literal, Self
+from typing import Self
 
-from pydantic import Discriminator, Field, Tag, model_validator
+from pydantic import model_validator
 
 from tiltsim.models.rotor_table import Multirotor
-from tiltsim.scenario.gait_following import (
-    FailureAwareController,
-    GainTable,
-    GaitFollowingController,
-    PolePlacementTable,
-    attitude_altitude_gain_kind,
-)
+from tiltsim.scenario.gait_following import FailureAwareController, GaitFollowingController
 from tiltsim.scenario.messages import InvalidValueError
-from tiltsim.scenario.table import NonNegative, Vector3, example
+from tiltsim.scenario.table import example
 from tiltsim_controllers.analysis.stability import (
     ErrorLoop,
     error_loops,
@@ -29,81 +23,18 @@ from tiltsim_controllers.analysis.torque_free import (
 )
 from tiltsim_controllers.gaits.plans import Gait
 from tiltsim_controllers.laws.attitude_altitude import PUBLISHED_DECOUPLING
-from tiltsim_controllers.laws.multirotor_steps import Form
+from tiltsim_controllers.laws.multirotor_steps import RESTORING, AttitudeForce, Form
 from tiltsim_controllers.mathematics.scalar import Floats, Triple
 from tiltsim_controllers.vehicle.effectiveness import force_and_torque
 
-RESTORING: Final = 0.5
-"""1/s, the default where rotor speeds would drift."""
 
-
-class AttitudeForceController(GaitFollowingController, FailureAwareController):
+class AttitudeForceController(AttitudeForce, GaitFollowingController, FailureAwareController):
     """Attitude and one, two or three components of force of a multirotor."""
 
     model_config = example(law="attitude_force", dimension=1)
 
     vehicle_models = ("multirotor",)
     reference_kinds = ("position", "pose", "attitude_altitude")
-
-    law: Literal["attitude_force"] = Field(
-        description="feedback linearization of a multirotor: its rotor speeds control the attitude "
-        "and as many components of the force as it has; the tilt angles follow the gait"
-    )
-    dimension: Annotated[int, Field(ge=1, le=3)] | None = Field(
-        None,
-        description="how many components of the force are controlled beside the attitude: 1, lift; "
-        "2, one sideways, too, of a vehicle with three that along its x axis; 3, all, so that the "
-        "vehicle need not lean; default: as many as the vehicle has at all angles of its gait [-]",
-        examples=[1],
-    )
-    decoupler: Literal["none", "conventional", "modified", "exact"] = Field(
-        "exact",
-        description="how the vehicle leans to control what its side force leaves of the horizontal "
-        "position: as for the tiltrotor; other than exact needs dimension 1 [-]",
-    )
-    decoupling: Literal["published", "exact"] = Field(
-        "exact",
-        description="form of the decoupling matrix; published lacks the factor 2 |rotor speed| in "
-        "its attitude rows, as the thesis prints it for the tiltrotor",
-    )
-    attitude_error: Literal["rotation", "euler_angles"] = Field(
-        "rotation",
-        description="what the attitude's error is: the rotation that remains, without any singular "
-        "attitude, or roll, pitch and yaw, as in the thesis",
-    )
-    gains: Annotated[
-        Annotated[Literal["ch03", "ch04", "exact", "feedforward"], Tag("named")]
-        | Annotated[GainTable, Tag("table")]
-        | Annotated[PolePlacementTable, Tag("poles")],
-        Discriminator(attitude_altitude_gain_kind),
-    ] = Field("exact", description="a named set, or a table of gains or of poles")
-    side_gains: Vector3 = Field(
-        (12.0, 48.0, 64.0),
-        description="on the errors of acceleration, velocity and position along directions that "
-        "side force moves [1/s, 1/s^2, 1/s^3]",
-    )
-    norm: Literal["speed", "thrust"] = Field(
-        "speed",
-        description="of all rotor accelerations that do the same, those of least norm: of the "
-        "accelerations themselves, for rotors that turn one way, or of the rates of thrust, for "
-        "rotors that reverse",
-    )
-    slowest_rotor: NonNegative = Field(
-        5.0,
-        description="speed below which norm = thrust accelerates a rotor as if it were that fast "
-        "[rad/s]",
-    )
-    restoring: NonNegative | None = Field(
-        None,
-        description="rate towards the rotor speeds of least power among those that do the same, "
-        "with norm = thrust to those whose thrusts have the least sum of squares; default: "
-        f"{RESTORING:g} where they would drift, which is with moving tilts and more rotors than "
-        "outputs, else 0 [1/s]",
-        examples=[0.5],
-    )
-    turn_time: NonNegative = Field(
-        0.0, description="time in which the reference of roll and pitch is reached, smoothly [s]"
-    )
 
     @model_validator(mode="after")
     def _check(self) -> Self:

@@ -18,7 +18,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tiltsim_controllers.analysis.torque_free import LEVEL, controlled_axes, torque_free_forces
-from tiltsim_controllers.laws.attitude_altitude import EXACT_DECOUPLING, Gains
+from tiltsim_controllers.laws.attitude_altitude import EXACT_DECOUPLING
+from tiltsim_controllers.laws.gains import Gains
 from tiltsim_controllers.vehicle.effectiveness import ROTOR_FLOATS, SPIN_SIGN, force_and_torque
 
 if TYPE_CHECKING:

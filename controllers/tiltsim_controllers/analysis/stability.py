@@ -9,8 +9,7 @@ from tiltsim_controllers.laws.attitude_altitude import PUBLISHED_DECOUPLING
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from tiltsim_controllers.laws.attitude_altitude import Gains
-    from tiltsim_controllers.laws.gains import IntegralGains
+    from tiltsim_controllers.laws.gains import Gains, IntegralGains
 
 
 class ErrorLoop(NamedTuple):

@@ -7,7 +7,9 @@ control law is one function of time and state; its steps follow the order of ch.
 
 from __future__ import annotations
 
-from typing import Any, Final, NamedTuple
+from typing import Any, Final, Literal
+
+from pydantic import Field
 
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.code.traceable import traceable
@@ -20,6 +22,8 @@ from tiltsim_controllers.laws.decouplers import (
     exact_decoupler,
     modified_decoupler,
 )
+from tiltsim_controllers.laws.gains import Gains, GivenGains
+from tiltsim_controllers.laws.keys import Keys, record_of
 from tiltsim_controllers.mathematics.attitude import rotation_matrix, wrapped
 from tiltsim_controllers.mathematics.linear import cross, kernel, solved
 from tiltsim_controllers.mathematics.scalar import Triple, Values, Vector, scalar
@@ -39,48 +43,58 @@ ROTORS: Final = (0, 1, 2, 3)
 """Every rotor of the tiltrotor has its own tilt."""
 
 
-class Gains(NamedTuple):
-    """Gains of the third-order error dynamics and of the position loop (ch. 4, Eqs. 26-28).
+class AttitudeAltitude(Keys):
+    """Keys of `attitude_altitude`, also with feed-forward of the gait (`gait_feedforward`)."""
 
-    ``1`` multiplies the error of the second derivative, ``2`` of the first, ``3`` of the output;
-    in the position loop ``1`` multiplies the velocity error and ``2`` the position error.
-    """
+    law: Literal["attitude_altitude"] = Field(
+        "attitude_altitude",
+        description="the four rotor speeds control roll, pitch, yaw and altitude by feedback "
+        "linearization; the tilt angles follow the gait",
+    )
+    decoupling: Literal["published", "exact"] = Field(
+        "published",
+        description="form of the decoupling matrix, which relates rotor accelerations to the third "
+        "derivatives of attitude and altitude: as the thesis prints it, without the factor "
+        "2 |rotor speed| in its attitude rows, or exact; the gains belong to one of the two",
+    )
+    decoupler: Literal["none", "conventional", "modified", "exact"] = Field(
+        "modified",
+        description="how the vehicle leans to control its horizontal position, for which no rotor "
+        "speed is left: conventional leans as a quadrotor does, as if no rotor tilted; modified "
+        "adds the lean that balances the tilted rotors' side force at hover, to first order; exact "
+        "points their whole torque-free force along the desired acceleration; none leaves the "
+        "position free, for reference.type attitude_altitude",
+        examples=["exact"],
+    )
+    gains: GivenGains = Field(
+        "ch04",
+        description="a named set, or a table of gains or of poles: ch03 and ch04 are the thesis's, "
+        "for decoupling published; exact and feedforward are for decoupling exact; with the set "
+        "exact a yaw step of 0.39 rad stops a rotor",
+    )
+    gait_rate_feedforward: bool = Field(
+        False,
+        description="use the planned tilt rates as well as the angles; needs decoupling and "
+        "decoupler exact, and allows integral action",
+    )
+    rotor_inertia_feedforward: bool = Field(
+        False,
+        description="include the gyroscopic torque of the rotors' vehicle.rotor_inertia; needs "
+        "gait_rate_feedforward",
+    )
 
-    roll_1: float  # [K_P1] 1/s
-    roll_2: float  # [K_P2] 1/s^2
-    roll_3: float  # [K_P3] 1/s^3
-    pitch_1: float
-    pitch_2: float
-    pitch_3: float
-    yaw_1: float
-    yaw_2: float
-    yaw_3: float
-    altitude_1: float  # [K_PZ1] 1/s
-    altitude_2: float  # [K_PZ2] 1/s^2
-    altitude_3: float  # [K_PZ3] 1/s^3
-    position_1: float  # [K_X1 = K_Y1] 1/s
-    position_2: float  # [K_X2 = K_Y2] 1/s^2
 
-    @property
-    def attitude(self) -> Any:
-        """Gains of roll, pitch and yaw, one row for each order, shape (3, 3)."""
-        return xp.array(self[:9]).reshape(3, 3).T
+OPTIONS: Final = frozenset({"law", "gait_rate_feedforward", "rotor_inertia_feedforward"})
+"""Keys that the law does not read."""
 
-    @property
-    def altitude(self) -> tuple[float, float, float]:
-        """Gains of the altitude, by order."""
-        return self.altitude_1, self.altitude_2, self.altitude_3
-
-
-class Parameters(NamedTuple):
-    """Parameters of the controller."""
-
-    vehicle: Vehicle
-    gains: Gains
-    gait: GaitParameters
-    reference: ReferenceParameters
-    decoupler: float
-    decoupling: float
+Parameters = record_of(
+    AttitudeAltitude,
+    OPTIONS,
+    vehicle=Vehicle,
+    gains=Gains,
+    gait=GaitParameters,
+    reference=ReferenceParameters,
+)
 
 
 def torque_free_force(force: Any, torque: Any) -> Any:
@@ -114,7 +128,7 @@ def _attitude_reference(now: RotorcraftState, target: Any, wrench: Any, paramete
 
 
 @traceable
-def attitude_altitude(state: Any, target: Any, parameters: Parameters, measured: Any = None) -> Any:
+def attitude_altitude(state: Any, target: Any, parameters: Any, measured: Any = None) -> Any:
     """The rotor accelerations (rad/s^2), 4, and the attitude that they track (rad), 3.
 
     Third-order error dynamics (ch. 4, Eqs. 26-27) give the desired third derivatives of the
@@ -125,7 +139,7 @@ def attitude_altitude(state: Any, target: Any, parameters: Parameters, measured:
     Args:
         state: `tiltsim_controllers.vehicle.states.TILTROTOR_FIELDS`, shape (20,).
         target: Position (m), velocity and acceleration to track, world axes, shape (9,).
-        parameters: Parameters of the controller.
+        parameters: Any of the controller.
         measured: Angular acceleration, rad/s^2, body axes, shape (3,); None takes the model's,
             ``I^-1 tau w``.
     """
@@ -168,7 +182,7 @@ def attitude_altitude(state: Any, target: Any, parameters: Parameters, measured:
 def attitude_altitude_inputs(
     time: float,
     state: Values,
-    parameters: Parameters,
+    parameters: Any,
     knots: Vector = NO_KNOTS,
     measured: Triple | None = None,
 ) -> Values:

@@ -17,16 +17,17 @@ is known to have failed is left out of the matrix, with the part of its tilt tha
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import inf
-from typing import Any, Final, NamedTuple
+from math import pi
+from typing import Annotated, Any, ClassVar, Final, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
+from pydantic import Field
 
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.code.traceable import traceable
-from tiltsim_controllers.laws.failures import Failure as Failure
-from tiltsim_controllers.laws.failures import working
+from tiltsim_controllers.laws.failures import Failure, working
+from tiltsim_controllers.laws.keys import GainSets, Keys, NamedGains, Positive, Vector3, record_of
 from tiltsim_controllers.mathematics.attitude import attitude_error, rotation_matrix
 from tiltsim_controllers.mathematics.linear import cross, least_norm
 from tiltsim_controllers.references.trajectories import ReferenceParameters
@@ -44,41 +45,63 @@ from tiltsim_controllers.vehicle.rotors import (
 from tiltsim_controllers.vehicle.states import state_of
 
 
-class Gains(NamedTuple):
-    """Gains of third-order error dynamics, ``1`` on the second derivative, ``3`` on the output."""
+class FullPoseGainTable(Keys):
+    """Explicit gains of full-pose control."""
 
-    position_1: float  # 1/s
-    position_2: float  # 1/s^2
-    position_3: float  # 1/s^3
-    attitude_1: float  # 1/s
-    attitude_2: float  # 1/s^2
-    attitude_3: float  # 1/s^3
-
-
-class Limits(NamedTuple):
-    """Limits of the tilt servos; infinite for none."""
-
-    max_tilt_rate: float = inf  # rad/s
-    max_tilt_angle: float = inf  # rad
+    position: Vector3 = Field(
+        description="on the errors of acceleration, velocity and position [1/s, 1/s^2, 1/s^3]",
+        examples=[[750.0, 1875.0, 1562.0]],
+    )
+    attitude: Vector3 = Field(
+        description="on the errors of angular acceleration, body rates and attitude "
+        "[1/s, 1/s^2, 1/s^3]",
+        examples=[[750.0, 1500.0, 2577.0]],
+    )
 
 
-class Parameters(NamedTuple):
-    """Parameters of the controller."""
-
-    vehicle: Body  # of the tiltrotor a `tiltsim_controllers.vehicle.parameters.Vehicle`
-    gains: Gains
-    reference: ReferenceParameters
-    limits: Limits
-    tilt_weight: float  # (rad/s)^2/rad: the norm of (w', tilt_weight alpha')
-    failure: Failure = Failure()
-    rotors: float = 0.0  # where in the knots the table of the rotors begins
-
+Gains = record_of(FullPoseGainTable)
 
 GAIN_SETS: Final = {
     # the author's public model, HansOersted/tiltrotor_simulator
-    "ch03": Gains(750.0, 1875.0, 1562.0, 750.0, 1500.0, 2577.0)
+    "ch03": Gains((750.0, 1875.0, 1562.0), (750.0, 1500.0, 2577.0))
 }
 """Gains by name."""
+
+
+class FullPose(Keys):
+    """Keys of `full_pose`."""
+
+    gain_sets: ClassVar[GainSets] = {"gains": GAIN_SETS}
+
+    law: Literal["full_pose"] = Field(
+        description="position and attitude independently: the law commands the tilt angles as "
+        "well, of the tiltrotor or of a multirotor whose rotors and tilts move six outputs"
+    )
+    gains: NamedGains[Literal["ch03"], FullPoseGainTable] = Field(
+        "ch03", description="a set by name, or a table of gains; ch03 is the thesis's author's"
+    )
+    tilt_weight: Literal["even", "published"] = Field(
+        "even",
+        description="how tilt rates count against rotor accelerations in the least-norm solution: "
+        "even by the force that they change, published by number, which turns the rotors fast",
+    )
+    max_tilt_rate: Positive | None = Field(
+        None, description="limit enforced by the law; default: none [rad/s]", examples=[5.0]
+    )
+    max_tilt_angle: Annotated[float, Field(gt=0.0, le=pi)] | None = Field(
+        None, description="limit enforced by the law; default: none [rad]", examples=[1.0]
+    )
+
+
+Parameters = record_of(
+    FullPose,
+    vehicle=Body,  # of the tiltrotor a `tiltsim_controllers.vehicle.parameters.Vehicle`
+    reference=ReferenceParameters,
+    tilt_weight=float,  # (rad/s)^2/rad: the norm of (w', tilt_weight alpha')
+    failure=Failure,
+    rotors=float,  # where in the knots the table of the rotors begins
+)
+"""Parameters of the law: its keys and these."""
 
 PUBLISHED_TILT_WEIGHT: Final = 1.0
 """Rates of ``w`` and of the tilt angles have the same weight, number for number."""
@@ -107,10 +130,10 @@ def input_matrix(rotors: Rotors, tilts: Any, w: Any, weight: Any = 1.0) -> Any:
     return xp.vstack([rows[3:], rows[:3]])
 
 
-def limited_tilt_rate(rates: Any, angles: Any, limits: Limits) -> Any:
+def limited_tilt_rate(rates: Any, angles: Any, p: Any) -> Any:
     """Tilt rates (rad/s) within their limit, zero where they take an angle (rad) past its limit."""
-    at_stop = (abs(angles) >= limits.max_tilt_angle) & (rates * angles > 0.0)
-    return xp.where(at_stop, 0.0, xp.clip(rates, -limits.max_tilt_rate, limits.max_tilt_rate))
+    at_stop = (abs(angles) >= p.max_tilt_angle) & (rates * angles > 0.0)
+    return xp.where(at_stop, 0.0, xp.clip(rates, -p.max_tilt_rate, p.max_tilt_rate))
 
 
 @traceable
@@ -118,7 +141,7 @@ def full_pose(
     time: Any,
     state: Any,
     reference: Any,
-    parameters: Parameters,
+    p: Any,
     knots: Any,
     tilt_of_rotor: TiltOfRotor,
     commands: Any = None,
@@ -133,14 +156,14 @@ def full_pose(
         state: `tiltsim_controllers.vehicle.states.RotorcraftState` in one vector.
         reference: Position with four derivatives, m and s, world axes, shape (15,); its roll, pitch
             and yaw are parameters.
-        parameters: Parameters of the controller.
+        p: `Parameters`.
         knots: Table data of the flight, with the table of the rotors.
         tilt_of_rotor: The layout.
         commands: Commanded tilt angles, rad, shape (M,), if their limit also counts: they are
             beyond the angle of a pod that its servo's stop holds.
     """
-    now, (body, rotors) = state_of(state, tilt_of_rotor), airframe(parameters, knots, tilt_of_rotor)
-    works = working(time, parameters.failure, len(tilt_of_rotor))
+    now, (body, rotors) = state_of(state, tilt_of_rotor), airframe(p, knots, tilt_of_rotor)
+    works = working(time, p.failure, len(tilt_of_rotor))
     rotors = rotors.masked(works)
     w = works * now.speeds * abs(now.speeds)
 
@@ -152,27 +175,27 @@ def full_pose(
     omega_rate = angular_acceleration(body, torque, now.omega, 0.0)
 
     # Third-order error dynamics.
-    ref, target = reference.reshape(5, 3), parameters.reference
-    k1, k2, k3 = parameters.gains[:3]
+    ref, target = reference.reshape(5, 3), p.reference
+    k1, k2, k3 = p.gains.position
     jerk = (
         ref[3]
         + k1 * (ref[2] - acceleration)
         + k2 * (ref[1] - now.velocity)
         + k3 * (ref[0] - now.position)
     )
-    k1, k2, k3 = parameters.gains[3:]
+    k1, k2, k3 = p.gains.attitude
     desired = rotation_matrix(xp.array([target.roll, target.pitch, target.yaw]))
     omega_jerk = k3 * attitude_error(rotation, desired) - k2 * now.omega - k1 * omega_rate
 
     # In body axes, without the part of the force's rate with which it turns with the body.
     force_rate = body.mass * (rotation.T @ jerk) - cross(now.omega, force)
-    rows = input_matrix(rotors, now.tilts, w, parameters.tilt_weight)
+    rows = input_matrix(rotors, now.tilts, w, p.tilt_weight)
     rates = least_norm(rows, xp.hstack([inertia_matrix(body) @ omega_jerk, force_rate]))
     count = len(tilt_of_rotor)
-    tilt_rates = rates[count:] / parameters.tilt_weight
+    tilt_rates = rates[count:] / p.tilt_weight
     for angles in (now.tilts, commands):
         if angles is not None:
-            tilt_rates = limited_tilt_rate(tilt_rates, angles, parameters.limits)
+            tilt_rates = limited_tilt_rate(tilt_rates, angles, p)
     return xp.hstack([rotor_accelerations(rates[:count], now.speeds), tilt_rates])
 
 

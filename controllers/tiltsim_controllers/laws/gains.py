@@ -1,13 +1,49 @@
-"""Gain sets by name."""
+"""Gains of attitude, altitude and position: their keys, poles, and sets by name."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, NamedTuple
 
-from tiltsim_controllers.laws.attitude_altitude import Gains
+from pydantic import ConfigDict, Discriminator, Field, Tag
+
+from tiltsim_controllers.code.arrays import xp
+from tiltsim_controllers.laws.keys import Gains2, Keys, NonNegative, Positive, Vector3, gain_kind
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+
+
+class Gains(NamedTuple):
+    """Gains of the third-order error dynamics and of the position loop (ch. 4, Eqs. 26-28).
+
+    ``1`` multiplies the error of the second derivative, ``2`` of the first, ``3`` of the output;
+    in the position loop ``1`` multiplies the velocity error and ``2`` the position error.
+    """
+
+    roll_1: float  # [K_P1] 1/s
+    roll_2: float  # [K_P2] 1/s^2
+    roll_3: float  # [K_P3] 1/s^3
+    pitch_1: float
+    pitch_2: float
+    pitch_3: float
+    yaw_1: float
+    yaw_2: float
+    yaw_3: float
+    altitude_1: float  # [K_PZ1] 1/s
+    altitude_2: float  # [K_PZ2] 1/s^2
+    altitude_3: float  # [K_PZ3] 1/s^3
+    position_1: float  # [K_X1 = K_Y1] 1/s
+    position_2: float  # [K_X2 = K_Y2] 1/s^2
+
+    @property
+    def attitude(self) -> Any:
+        """Gains of roll, pitch and yaw, one row for each order, shape (3, 3)."""
+        return xp.array(self[:9]).reshape(3, 3).T
+
+    @property
+    def altitude(self) -> tuple[float, float, float]:
+        """Gains of the altitude, by order."""
+        return self.altitude_1, self.altitude_2, self.altitude_3
 
 
 def gains_from_rows(
@@ -69,6 +105,92 @@ def gains_from_poles(
     *move, move_integral = second_order_gains(position)
     gains = Gains(*lean, *lean, *turn, *climb, *move)
     return gains, IntegralGains(move_integral, climb_integral)
+
+
+class GainTable(Keys):
+    """Explicit gains; see `tiltsim_controllers.laws.gains.gains_from_rows`."""
+
+    attitude: Annotated[tuple[Vector3, Vector3, Vector3], Field(strict=False)] = Field(
+        description="diagonals of K_P1, K_P2 and K_P3, each roll, pitch, yaw: on the errors of "
+        "angular acceleration, rate and angle [1/s, 1/s^2, 1/s^3]",
+        examples=[[[40, 40, 40], [600, 600, 600], [4000, 4000, 4000]]],
+    )
+    altitude: Vector3 = Field(
+        description="K_PZ1, K_PZ2, K_PZ3: on the errors of vertical acceleration, velocity and "
+        "altitude [1/s, 1/s^2, 1/s^3]",
+        examples=[[10.0, 15.0, 10.0]],
+    )
+    position: Gains2 = Field(
+        (1.0, 1.0),
+        description="K_X1, K_X2: on the errors of horizontal velocity and position [1/s, 1/s^2]",
+    )
+
+
+class PoleTable(Keys):
+    """The poles of one closed loop: a pair, and for third order a real one at its bandwidth."""
+
+    bandwidth: Positive = Field(description="natural frequency [rad/s]", examples=[10.0])
+    damping: Positive = Field(1.0, description="damping ratio of the pair [-]", examples=[0.7])
+
+    @property
+    def poles(self) -> Poles:
+        """The poles as `gains_from_poles` takes them."""
+        return Poles(self.bandwidth, self.damping)
+
+
+class IntegralPoleTable(PoleTable):
+    """The poles of a loop that may have integral action."""
+
+    integral: NonNegative = Field(
+        0.0,
+        description="pole of integral action; 0 disables it; needs gait_rate_feedforward [rad/s]",
+        examples=[0.5],
+    )
+
+    @property
+    def poles(self) -> Poles:
+        return Poles(self.bandwidth, self.damping, self.integral)
+
+
+class PolePlacementTable(Keys):
+    """Gains by pole placement; see `tiltsim_controllers.laws.gains.gains_from_poles`."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [{"attitude": {"bandwidth": 25.0}, "altitude": {"bandwidth": 10.0}}]
+        }
+    )
+
+    attitude: PoleTable = Field(description="the loops of roll and pitch")
+    yaw: PoleTable | None = Field(None, description="the loop of yaw; default: as attitude")
+    altitude: IntegralPoleTable = Field(description="the loop of the altitude")
+    position: IntegralPoleTable = Field(
+        IntegralPoleTable(bandwidth=1.0, damping=0.5), description="the loops of x and y"
+    )
+
+    def resolve(self) -> tuple[Gains, IntegralGains]:
+        """The gains of the control law and of its integrals."""
+        yaw = self.yaw or self.attitude
+        return gains_from_poles(
+            self.attitude.poles, yaw.poles, self.altitude.poles, self.position.poles
+        )
+
+
+def attitude_altitude_gain_kind(value: object) -> str:
+    """The tag of gains that may also be given by poles."""
+    if isinstance(value, PolePlacementTable):
+        return "poles"
+    loops = value.values() if isinstance(value, dict) else ()
+    return "poles" if any(isinstance(loop, dict) for loop in loops) else gain_kind(value)
+
+
+GivenGains = Annotated[
+    Annotated[Literal["ch03", "ch04", "exact", "feedforward"], Tag("named")]
+    | Annotated[GainTable, Tag("table")]
+    | Annotated[PolePlacementTable, Tag("poles")],
+    Discriminator(attitude_altitude_gain_kind),
+]
+"""The name of a set of gains, gains, or poles."""
 
 
 GAIN_SETS: Final = {

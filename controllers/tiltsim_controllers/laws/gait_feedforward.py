@@ -8,16 +8,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 from tiltsim_controllers.gaits.motion import Jets, tilt_motion_of
 from tiltsim_controllers.gaits.parameters import FIXED, NO_KNOTS, GaitParameters
 from tiltsim_controllers.laws.allocation import limited_of
-from tiltsim_controllers.laws.attitude_altitude import EXACT_DECOUPLING, Gains
+from tiltsim_controllers.laws.attitude_altitude import OPTIONS, AttitudeAltitude
 from tiltsim_controllers.laws.decouplers import NONE
-from tiltsim_controllers.laws.gains import IntegralGains
+from tiltsim_controllers.laws.gains import Gains, IntegralGains
+from tiltsim_controllers.laws.keys import record_of
 from tiltsim_controllers.laws.multirotor import attitude_force, present_wrench
-from tiltsim_controllers.laws.multirotor_steps import EULER_ANGLES, FeedforwardTerms, Form
+from tiltsim_controllers.laws.multirotor_steps import FeedforwardTerms, Form
 from tiltsim_controllers.laws.multirotor_supervisor import multirotor_supervision_of, watched_at
 from tiltsim_controllers.laws.supervisor import SUPERVISOR_AT_REST, Supervisor, gait_time
 from tiltsim_controllers.laws.tiltrotor_supervisor import SUPERVISION
@@ -28,27 +29,25 @@ from tiltsim_controllers.vehicle.effectiveness import TiltOfRotor, tilts_of
 from tiltsim_controllers.vehicle.parameters import Vehicle, drag_ratio
 from tiltsim_controllers.vehicle.states import PITCH, ROLL
 
-
-class Parameters(NamedTuple):
-    """Parameters of the tiltrotor's controller."""
-
-    vehicle: Vehicle
-    gains: Gains
-    integral: IntegralGains
-    max_acceleration: float  # m/s^2 of the feedback, horizontally; integrators stop there
-    max_angular_acceleration: float  # rad/s^2, desired, per axis
-    anticipation: float  # s before and after a corner of the gait in which the body turns
-    terms: FeedforwardTerms
-    gait: GaitParameters
-    reference: ReferenceParameters
-    decoupler: float  # NONE or EXACT
-    supervisor: Supervisor = Supervisor()
-    rotor_inertia: float = 0.0  # kg m^2, of a rotor about its axis, as far as it is known
-    decoupling: float = EXACT_DECOUPLING
-    attitude_error: float = EULER_ANGLES
-    slowest: float = 0.0  # rad/s: a rotor at rest has no acceleration that helps
-    turn_time: float = 0.0  # s
-
+Parameters = record_of(
+    AttitudeAltitude,
+    OPTIONS,
+    vehicle=Vehicle,
+    gains=Gains,
+    integral=IntegralGains,
+    max_acceleration=float,  # m/s^2 of the feedback, horizontally; integrators stop there
+    max_angular_acceleration=float,  # rad/s^2, desired, per axis
+    anticipation=float,  # s before and after a corner of the gait in which the body turns
+    terms=FeedforwardTerms,
+    gait=GaitParameters,
+    reference=ReferenceParameters,
+    supervisor=Supervisor,
+    rotor_inertia=float,  # kg m^2, of a rotor about its axis, as far as it is known
+    attitude_error=float,  # `EULER_ANGLES`
+    slowest_rotor=float,  # rad/s, 0: a rotor at rest has no acceleration that helps
+    turn_time=float,  # s, 0
+)
+"""Parameters of the tiltrotor's controller."""
 
 TILTROTOR: Final = (0, 1, 2, 3)
 """Every rotor of the tiltrotor has its own tilt."""
@@ -66,7 +65,7 @@ def tracking_inputs(
     state: Values,
     tilt_rates: Quad,
     integrals: Triple,
-    parameters: Parameters,
+    parameters: Any,
     knots: Vector = NO_KNOTS,
     supervisor_motion: Triple = SUPERVISOR_AT_REST,
     measured: Triple | None = None,
@@ -78,7 +77,7 @@ def tracking_inputs(
         state: `tiltsim_controllers.vehicle.states.TILTROTOR_FIELDS`.
         tilt_rates: Rates of its tilt angles, rad/s.
         integrals: `tiltsim_controllers.laws.multirotor_steps.INTEGRAL_FIELDS`.
-        parameters: Parameters of the controller.
+        parameters: Any of the controller.
         knots: Table data of gait and reference.
         supervisor_motion: The supervisor's state with its rate and acceleration.
         measured: The angular acceleration (rad/s^2, body axes); None takes the model's.

@@ -306,6 +306,6 @@ def attitude_force(
     matrix, start = xp.vstack([unknown[3:], found.rows]), _start(w, now.speeds, parameters, form)
     inputs = nearest_solution(matrix, desired, start, found.units)
     if form.norm == "thrust":
-        inputs = rotor_accelerations(inputs, now.speeds, parameters.slowest)
+        inputs = rotor_accelerations(inputs, now.speeds, parameters.slowest_rotor)
     unseen = null_part(rows, rotation[2], w, form)
     return xp.hstack([inputs, rates, lean_ref, parameters.reference.yaw, unseen])

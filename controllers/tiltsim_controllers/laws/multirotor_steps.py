@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any, Final, NamedTuple
+from typing import Annotated, Any, Final, Literal, NamedTuple
+
+from pydantic import Field
 
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.gaits.parameters import GaitParameters
 from tiltsim_controllers.laws.allocation import RotorRange
-from tiltsim_controllers.laws.attitude_altitude import EXACT_DECOUPLING, Gains
 from tiltsim_controllers.laws.decouplers import (
     CONVENTIONAL,
     EXACT,
@@ -25,7 +26,8 @@ from tiltsim_controllers.laws.feedback import (
     limited_acceleration,
     position_feedback,
 )
-from tiltsim_controllers.laws.gains import IntegralGains
+from tiltsim_controllers.laws.gains import Gains, GivenGains, IntegralGains
+from tiltsim_controllers.laws.keys import Keys, NonNegative, Vector3, record_of
 from tiltsim_controllers.laws.multirotor_supervisor import Watched
 from tiltsim_controllers.laws.supervisor import Supervisor
 from tiltsim_controllers.mathematics.attitude import attitude_error, rotation_matrix, wrapped
@@ -35,12 +37,11 @@ from tiltsim_controllers.references.trajectories import ReferenceParameters
 from tiltsim_controllers.vehicle.body import Body
 from tiltsim_controllers.vehicle.states import RotorcraftState
 
-EULER_ANGLES: Final = 0.0
-ROTATION: Final = 1.0
+ROTATION: Final = 0.0
+"""An error of attitude: the rotation that remains, which has no singular pitch."""
 
-ATTITUDE_ERRORS: Final = {"euler_angles": EULER_ANGLES, "rotation": ROTATION}
-"""Errors on which the attitude's error dynamics act, by name: of roll, pitch and yaw as in ch. 3,
-or the rotation that remains, which has no singular pitch."""
+EULER_ANGLES: Final = 1.0
+"""Another: of roll, pitch and yaw, as in ch. 3."""
 
 NORMS: Final = ("speed", "thrust")
 """Norms in which the inputs are the least: of rotor accelerations, or of the rates of ``w``."""
@@ -80,15 +81,6 @@ class Form(NamedTuple):
         return f"{self.dimension}{''.join((*options, *further))}_{self.norm}"
 
 
-class SideGains(NamedTuple):
-    """Gains of x and y as far as force moves them, without leaning."""
-
-    side_1: float = 12.0  # 1/s, on the acceleration
-    side_2: float = 48.0  # 1/s^2
-    side_3: float = 64.0  # 1/s^3, on the position
-    side_integral: float = 0.0  # 1/s^4
-
-
 class Direction(NamedTuple):
     """A vector in body axes."""
 
@@ -97,33 +89,93 @@ class Direction(NamedTuple):
     z: float = 0.0
 
 
-class Parameters(NamedTuple):
-    """Parameters of the controller."""
+RESTORING: Final = 0.5
+"""1/s, the default where rotor speeds would drift."""
 
-    vehicle: Body
-    gains: Gains
-    integral: IntegralGains
-    side: SideGains
-    max_acceleration: float  # m/s^2 of the feedback, horizontally; integrators stop there
-    max_angular_acceleration: float  # rad/s^2, desired, per axis
-    anticipation: float  # s before and after a corner of the gait in which the body turns
-    terms: FeedforwardTerms
-    gait: GaitParameters
-    reference: ReferenceParameters
-    decoupler: float  # see `tiltsim_controllers.laws.decouplers`; dimension 1 knows all
-    rotors: float  # where in the knots the table of the rotors begins
-    decoupling: float = EXACT_DECOUPLING  # published: rows of the torque as in ch. 3
-    attitude_error: float = ROTATION
-    restoring: float = 0.0  # 1/s, rate towards the least power or sum of w^2
-    slowest: float = 0.0  # rad/s, thrust norm: a slower rotor is accelerated as if it were so fast
-    failure: Failure = Failure()
-    turn_time: float = 0.0  # s in which a reference of roll and pitch is reached, smoothly
-    limits: RotorRange = RotorRange()  # of prioritized allocation
-    supervisor: Supervisor = Supervisor()
-    watched: Watched = Watched()
-    watched_without: Watched = Watched()  # the same once the failed rotor is known
-    upper_side: Direction = Direction()  # of the force with which it lifts, if it has two; else 0
-    upper_side_without: Direction = Direction()  # the same once the failed rotor is known
+
+class AttitudeForce(Keys):
+    """Keys of the law."""
+
+    law: Literal["attitude_force"] = Field(
+        description="feedback linearization of a multirotor: its rotor speeds control the attitude "
+        "and as many components of the force as it has; the tilt angles follow the gait"
+    )
+    dimension: Annotated[int, Field(ge=1, le=3)] | None = Field(
+        None,
+        description="how many components of the force are controlled beside the attitude: 1, lift; "
+        "2, one sideways, too, of a vehicle with three that along its x axis; 3, all, so that the "
+        "vehicle need not lean; default: as many as the vehicle has at all angles of its gait [-]",
+        examples=[1],
+    )
+    decoupler: Literal["none", "conventional", "modified", "exact"] = Field(
+        "exact",
+        description="how the vehicle leans to control what its side force leaves of the horizontal "
+        "position: as for the tiltrotor; other than exact needs dimension 1 [-]",
+    )
+    decoupling: Literal["published", "exact"] = Field(
+        "exact",
+        description="form of the decoupling matrix; published lacks the factor 2 |rotor speed| in "
+        "its attitude rows, as the thesis prints it for the tiltrotor",
+    )
+    attitude_error: Literal["rotation", "euler_angles"] = Field(
+        "rotation",
+        description="what the attitude's error is: the rotation that remains, without any singular "
+        "attitude, or roll, pitch and yaw, as in the thesis",
+    )
+    gains: GivenGains = Field("exact", description="a named set, or a table of gains or of poles")
+    side_gains: Vector3 = Field(
+        (12.0, 48.0, 64.0),
+        description="on the errors of acceleration, velocity and position along directions that "
+        "side force moves [1/s, 1/s^2, 1/s^3]",
+    )
+    norm: Literal["speed", "thrust"] = Field(
+        "speed",
+        description="of all rotor accelerations that do the same, those of least norm: of the "
+        "accelerations themselves, for rotors that turn one way, or of the rates of thrust, for "
+        "rotors that reverse",
+    )
+    slowest_rotor: NonNegative = Field(
+        5.0,
+        description="speed below which norm = thrust accelerates a rotor as if it were that fast "
+        "[rad/s]",
+    )
+    restoring: NonNegative | None = Field(
+        None,
+        description="rate towards the rotor speeds of least power among those that do the same, "
+        "with norm = thrust to those whose thrusts have the least sum of squares; default: "
+        f"{RESTORING:g} where they would drift, which is with moving tilts and more rotors than "
+        "outputs, else 0 [1/s]",
+        examples=[0.5],
+    )
+    turn_time: NonNegative = Field(
+        0.0, description="time in which the reference of roll and pitch is reached, smoothly [s]"
+    )
+
+
+Parameters = record_of(
+    AttitudeForce,
+    frozenset({"law", "dimension", "norm"}),  # those of a `Form`
+    vehicle=Body,
+    gains=Gains,
+    integral=IntegralGains,
+    side_integral=float,  # 1/s^4, with the side gains
+    max_acceleration=float,  # m/s^2 of the feedback, horizontally; integrators stop there
+    max_angular_acceleration=float,  # rad/s^2, desired, per axis
+    anticipation=float,  # s before and after a corner of the gait in which the body turns
+    terms=FeedforwardTerms,
+    gait=GaitParameters,
+    reference=ReferenceParameters,
+    rotors=float,  # where in the knots the table of the rotors begins
+    restoring=float,  # 1/s, rate towards the least power or sum of w^2
+    failure=Failure,
+    limits=RotorRange,  # of prioritized allocation
+    supervisor=Supervisor,
+    watched=Watched,
+    watched_without=Watched,  # once the failed rotor is known
+    upper_side=Direction,  # of the force with which it lifts, if it has two; else 0
+    upper_side_without=Direction,  # once the failed rotor is known
+)
+"""Parameters of the law: its keys and these."""
 
 
 def turned(time: Any, angle: Any, duration: Any) -> Any:
@@ -189,9 +241,8 @@ def horizontal_control(
 
 def side_control(motion: Tracking, integrals: Any, parameters: Any) -> tuple[Any, Any]:
     """Desired jerk (m/s^3) of x and y as far as force moves them, and integrator rates (m)."""
-    side = parameters.side
-    k4 = parameters.terms.integral_action * side.side_integral
-    gains = side.side_1, side.side_2, side.side_3, k4
+    k4 = parameters.terms.integral_action * parameters.side_integral
+    gains = (*parameters.side_gains, k4)
     error, limit = motion.error[:2], parameters.max_acceleration
     return force_control(error, motion.acceleration.rate[:2], integrals[:2], gains, limit)
 

@@ -7,34 +7,61 @@ roll or pitch of 90 degrees.
 
 from __future__ import annotations
 
-from typing import Any, Final, NamedTuple
+from typing import Any, ClassVar, Final, Literal
+
+from pydantic import Field
 
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.gaits.parameters import NO_KNOTS
+from tiltsim_controllers.laws.keys import Gains2, GainSets, Keys, NamedGains, record_of
 from tiltsim_controllers.laws.yaw_position import gyroscopic_acceleration, moments_of
 from tiltsim_controllers.mathematics.attitude import euler_rates, wrapped
 from tiltsim_controllers.references.trajectories import ReferenceParameters, reference_motion
 from tiltsim_controllers.vehicle.parameters import Vehicle
 
 
-class Gains(NamedTuple):
-    """Gains of the linearized system (ch. 2, Eqs. A7-A9)."""
+class QuadrotorAttitudeGainTable(Keys):
+    """Explicit gains of the quadrotor's attitude-altitude control."""
 
-    altitude_1: float  # [k_p1] 1/s, on the rate
-    altitude_2: float  # [k_p2] 1/s^2, on the output
-    attitude_1: float  # [k_p1] 1/s, roll, pitch and yaw alike
-    attitude_2: float  # [k_p2] 1/s^2
+    altitude: Gains2 = Field(
+        description="on the errors of vertical velocity and altitude [1/s, 1/s^2]",
+        examples=[[10.0, 10.0]],
+    )
+    attitude: Gains2 = Field(
+        description="on the errors of the rates and of roll, pitch and yaw [1/s, 1/s^2]",
+        examples=[[10.0, 10.0]],
+    )
 
 
-GAIN_SETS: Final = {"ch02": Gains(10.0, 10.0, 10.0, 10.0)}
+Gains = record_of(QuadrotorAttitudeGainTable)
+
+GAIN_SETS: Final = {"ch02": Gains((10.0, 10.0), (10.0, 10.0))}
 """Gains by name; ch. 2, Eqs. (A8)-(A9)."""
+
+QuadrotorAttitudeGains = NamedGains[Literal["ch02"], QuadrotorAttitudeGainTable]
+
+
+class QuadrotorAttitudeAltitude(Keys):
+    """Keys of `attitude_altitude_inputs`."""
+
+    gain_sets: ClassVar[GainSets] = {"gains": GAIN_SETS}
+
+    law: Literal["quadrotor_attitude_altitude"] = Field(
+        description="the quadrotor's thrust and three torques control attitude and altitude"
+    )
+    gains: QuadrotorAttitudeGains = Field(
+        "ch02", description="the thesis's set, or a table of gains"
+    )
+
+
+Parameters = record_of(QuadrotorAttitudeAltitude, vehicle=Vehicle, reference=ReferenceParameters)
 
 
 def attitude_altitude_inputs(
     time: Any,
     state: Any,
     vehicle: Vehicle,
-    gains: Gains,
+    gains: Any,
     reference: ReferenceParameters,
     knots: Any = NO_KNOTS,
 ) -> Any:
@@ -53,14 +80,16 @@ def attitude_altitude_inputs(
     regular = (cos_roll != 0.0) & (cos_pitch != 0.0)
     upright = xp.where(regular, cos_roll * cos_pitch, xp.nan)
     (_, _, z_ref), (_, _, vz_ref) = reference_motion(time, reference, knots)[:2]
-    lift = vehicle.gravity + gains.altitude_1 * (vz_ref - vz) + gains.altitude_2 * (z_ref - z)
+    k1, k2 = gains.altitude
+    lift = vehicle.gravity + k1 * (vz_ref - vz) + k2 * (z_ref - z)
 
     # Eq. (A7), then Euler accelerations into body accelerations: omega = E(roll, pitch) euler',
     # omega' = E euler'' + E' euler'.
     rates = euler_rates(attitude, omega)
     desired = xp.array([reference.roll, reference.pitch, reference.yaw]) - attitude
     error = xp.array([desired[0], desired[1], wrapped(desired[2])])
-    roll, pitch, yaw = gains.attitude_2 * error - gains.attitude_1 * rates
+    k1, k2 = gains.attitude
+    roll, pitch, yaw = k2 * error - k1 * rates
     roll_rate, pitch_rate, yaw_rate = rates
     forward = cos_pitch * yaw - sin_pitch * pitch_rate * yaw_rate
     angular = xp.array(

@@ -13,10 +13,13 @@ determinant is in `tiltsim_controllers.analysis.quadrotor_singularity`. The axes
 
 from __future__ import annotations
 
-from typing import Any, Final, NamedTuple
+from typing import Any, ClassVar, Final, Literal
+
+from pydantic import Field
 
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.gaits.parameters import NO_KNOTS
+from tiltsim_controllers.laws.keys import Gains2, Gains4, GainSets, Keys, NamedGains, record_of
 from tiltsim_controllers.mathematics.attitude import euler_rates, rotation_matrix, wrapped
 from tiltsim_controllers.mathematics.linear import cross
 from tiltsim_controllers.references.trajectories import ReferenceParameters, reference_motion
@@ -33,32 +36,48 @@ INPUT_FIELDS: Final = (
 """The result of the quadrotor's control laws: one float per name, in this order."""
 
 
-class Gains(NamedTuple):
-    """Gains of the linearized system (ch. 2, Eqs. A2-A6), ``1`` on the highest derivative."""
+class YawPositionGainTable(Keys):
+    """Explicit gains of yaw-position control."""
 
-    position_1: float  # [k_1] 1/s, jerk
-    position_2: float  # [k_2] 1/s^2, acceleration
-    position_3: float  # [k_3] 1/s^3, velocity
-    position_4: float  # [k_4] 1/s^4, position
-    yaw_1: float  # 1/s, yaw rate, the last entry of k_3
-    yaw_2: float  # 1/s^2, yaw, the last entry of k_4
+    position: Gains4 = Field(
+        description="k_1 to k_4, on the errors of jerk, acceleration, velocity and position "
+        "[1/s, 1/s^2, 1/s^3, 1/s^4]",
+        examples=[[10.0, 37.5, 62.5, 39.0625]],
+    )
+    yaw: Gains2 = Field(
+        (5.0, 5.0), description="on the errors of the yaw rate and of yaw [1/s, 1/s^2]"
+    )
 
 
-class Parameters(NamedTuple):
-    """Parameters of the controller."""
-
-    vehicle: Vehicle
-    gains: Gains
-    reference: ReferenceParameters
-
+Gains = record_of(YawPositionGainTable)
 
 GAIN_SETS: Final = {
     # Appendix B. The position loop s^4 + 10 s^3 + 20 s^2 + 50 s + 500 is unstable.
-    "ch02": Gains(10.0, 20.0, 50.0, 500.0, 5.0, 5.0),
+    "ch02": Gains((10.0, 20.0, 50.0, 500.0), (5.0, 5.0)),
     # Ours: the same k_1, all four poles of the position loop at -2.5.
-    "stable": Gains(10.0, 37.5, 62.5, 39.0625, 5.0, 5.0),
+    "stable": Gains((10.0, 37.5, 62.5, 39.0625), (5.0, 5.0)),
 }
-"""Gains by name."""
+"""Gains by name (ch. 2, Eqs. A2-A6)."""
+
+YawPositionGains = NamedGains[Literal["ch02", "stable"], YawPositionGainTable]
+YAW_POSITION_GAINS: Final = (
+    "stable, or ch02 as the thesis prints them, which are unstable, or a table of gains"
+)
+"""The choices of gains, for descriptions."""
+
+
+class YawPosition(Keys):
+    """Keys of `yaw_position_inputs`."""
+
+    gain_sets: ClassVar[GainSets] = {"gains": GAIN_SETS}
+
+    law: Literal["yaw_position"] = Field(
+        description="the quadrotor's thrust and three torques control position and yaw"
+    )
+    gains: YawPositionGains = Field("stable", description=YAW_POSITION_GAINS)
+
+
+Parameters = record_of(YawPosition, vehicle=Vehicle, reference=ReferenceParameters)
 
 
 def moments_of(vehicle: Vehicle) -> Any:
@@ -117,9 +136,7 @@ def decoupling_matrix(state: Any, vehicle: Vehicle) -> Any:
     return xp.vstack([position.T, yaw])
 
 
-def yaw_position_inputs(
-    time: Any, state: Any, parameters: Parameters, knots: Any = NO_KNOTS
-) -> Any:
+def yaw_position_inputs(time: Any, state: Any, p: Any, knots: Any = NO_KNOTS) -> Any:
     """`INPUT_FIELDS`: thrust, torques and rates of the controller's own states, shape (6,).
 
     The inputs of ch. 2, Eqs. (1)-(8), with ``u_2`` to ``u_4`` converted from forces at the arms to
@@ -130,10 +147,10 @@ def yaw_position_inputs(
     Args:
         time: s
         state: `tiltsim_controllers.vehicle.states.EXTENDED_QUADROTOR_FIELDS`, shape (14,).
-        parameters: Of the controller.
+        p: Its parameters, `Parameters` or those of `switching`.
         knots: Table data of the reference.
     """
-    vehicle, gains, reference = parameters.vehicle, parameters.gains, parameters.reference
+    vehicle, reference = p.vehicle, p.reference
     position, velocity, attitude, omega = state[:3], state[3:6], state[6:9], state[9:12]
     thrust, thrust_rate, mass = state[12], state[13], vehicle.mass
     sin_roll, (cos_roll, cos_pitch) = xp.sin(attitude[0]), xp.cos(attitude[:2])
@@ -145,15 +162,17 @@ def yaw_position_inputs(
 
     # The demanded fourth derivative of the position and second of yaw (Eqs. A2-A6).
     motion = reference_motion(time, reference, knots)
+    k1, k2, k3, k4 = p.gains.position
     snap = (
         motion[4]
-        + gains.position_1 * (motion[3] - jerk)
-        + gains.position_2 * (motion[2] - acceleration)
-        + gains.position_3 * (motion[1] - velocity)
-        + gains.position_4 * (motion[0] - position)
+        + k1 * (motion[3] - jerk)
+        + k2 * (motion[2] - acceleration)
+        + k3 * (motion[1] - velocity)
+        + k4 * (motion[0] - position)
     )
+    k1, k2 = p.gains.yaw
     yaw_rate = euler_rates(attitude, omega)[2]
-    turn = gains.yaw_2 * wrapped(reference.yaw - attitude[2]) - gains.yaw_1 * yaw_rate
+    turn = k2 * wrapped(reference.yaw - attitude[2]) - k1 * yaw_rate
 
     # Solved in body axes: the force's second derivative is (zeta q', -zeta p', u_1).
     free = drift(state, vehicle)

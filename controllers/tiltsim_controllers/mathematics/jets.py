@@ -10,7 +10,6 @@ from __future__ import annotations
 from tiltsim_controllers.mathematics.scalar import scalar
 
 Jet = tuple[float, float, float]
-Jets3 = tuple[Jet, Jet, Jet]
 Jets4 = tuple[Jet, Jet, Jet, Jet]
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import asin, atan2, cos, floor, pi, sin, sqrt
+from math import asin, atan2, cos, sin, sqrt
 
 from tiltsim_controllers.mathematics.scalar import Quad, Triple, scalar
 
@@ -38,14 +38,6 @@ def quaternion_from_euler(roll: float, pitch: float, yaw: float) -> Quad:
         cr * sp * cy + sr * cp * sy,
         cr * cp * sy - sr * sp * cy,
     )
-
-
-@scalar
-def wrap_angle(angle: float) -> float:
-    """The equivalent angle (rad) from -pi to pi, for differences of yaw."""
-    if abs(angle) > pi:
-        return angle - 2.0 * pi * floor(angle / (2.0 * pi) + 0.5)
-    return angle
 
 
 @scalar

@@ -2,8 +2,8 @@
 
 The inputs are the second derivatives of both rotor speeds and of the tilt angle; their first
 derivatives are states of the controller. As printed, the tilt's column of the decoupling matrix
-(Eq. 27) lacks the factor ``1 - I_T / I_B`` due to the counter-rotation: `PUBLISHED` omits it,
-`EXACT` includes it.
+(Eq. 27) lacks the factor ``1 - I_T / I_B`` due to the counter-rotation, which the ``decoupling``
+``exact`` includes.
 
 The rotor speeds that the controller integrates may drift below zero, where no thrust follows them.
 As in the chapter, the controller then continues with speeds that no rotor has (windup), and fails;
@@ -12,9 +12,12 @@ with ``anti_windup`` they stop at zero, and the other rotor and the tilt continu
 
 from __future__ import annotations
 
-from typing import Any, Final, NamedTuple
+from typing import Any, ClassVar, Final, Literal
+
+from pydantic import Field
 
 from tiltsim_controllers.code.arrays import xp
+from tiltsim_controllers.laws.keys import Gains4, GainSets, Keys, NamedGains, choice, record_of
 from tiltsim_controllers.references.trajectories import ReferenceParameters, reference_motion
 from tiltsim_controllers.tilt_car.third_derivative import minimum_norm
 from tiltsim_controllers.tilt_car.vehicle import (
@@ -30,36 +33,40 @@ DERIVATIVE_FIELDS: Final = ("alpha_rate", "rotor_acceleration_1", "rotor_acceler
 EXTENDED_STATE_FIELDS: Final = (*STATE_FIELDS, *DERIVATIVE_FIELDS)
 """The state of the car and the controller's own first derivatives, rad/s and rad/s^2."""
 
-PUBLISHED: Final = 0.0
-EXACT: Final = 1.0
-DECOUPLINGS: Final = {"published": PUBLISHED, "exact": EXACT}
-"""Forms of the tilt's column by name."""
-
-
-class Gains(NamedTuple):
-    """Gains on jerk, acceleration, velocity and position, the same for both axes."""
-
-    jerk: float  # 1/s
-    acceleration: float  # 1/s^2
-    velocity: float  # 1/s^3
-    position: float  # 1/s^4
-
-
-class Parameters(NamedTuple):
-    """Parameters of the controller."""
-
-    car: TiltCar
-    gains: Gains
-    reference: ReferenceParameters
-    decoupling: float
-    anti_windup: float  # 1 or 0: whether the controller's rotor speeds stop at zero
-
-
 GAIN_SETS: Final = {
     # Ours, all four poles at -3: the thesis prints none.
-    "ch10": Gains(12.0, 54.0, 108.0, 81.0)
+    "ch10": (12.0, 54.0, 108.0, 81.0)
 }
-"""Gains by name."""
+"""Gains by name, the same for both axes."""
+
+
+class FourthDerivative(Keys):
+    """Keys of `fourth_derivative_inputs`."""
+
+    gain_sets: ClassVar[GainSets] = {"gains": GAIN_SETS}
+
+    law: Literal["tilt_car_fourth_derivative"] = Field(
+        description="the tilt-car's rotor speeds and tilt control the fourth derivative of x and y"
+    )
+    decoupling: Literal["published", "exact"] = Field(
+        "exact",
+        description="effect of the tilt in the decoupling matrix: as published, or with the yaw's "
+        "reaction",
+    )
+    anti_windup: bool = Field(
+        False, description="stop the rotor speeds that the law integrates at zero"
+    )
+    gains: NamedGains[Literal["ch10"], Gains4] = Field(
+        "ch10",
+        description="poles at -3, or four gains on the errors of jerk, acceleration, velocity and "
+        "position [1/s, 1/s^2, 1/s^3, 1/s^4]",
+        examples=[[12.0, 54.0, 108.0, 81.0]],
+    )
+
+
+Parameters = record_of(FourthDerivative, car=TiltCar, reference=ReferenceParameters)
+
+PUBLISHED: Final = choice(FourthDerivative, "decoupling", "published")
 
 
 def body_derivatives(state: Any, car: TiltCar) -> Any:
@@ -82,31 +89,29 @@ def body_derivatives(state: Any, car: TiltCar) -> Any:
     return xp.array([pushed, push_rate + turn @ pushed, drift])
 
 
-def fourth_derivative_inputs(time: Any, state: Any, parameters: Parameters) -> Any:
+def fourth_derivative_inputs(time: Any, state: Any, p: Any) -> Any:
     """Second derivatives of the rotor speeds (rad/s^3) and of the tilt angle (rad/s^2); Eq. (29).
 
     Args:
         time: s
         state: `EXTENDED_STATE_FIELDS`, shape (11,).
-        parameters: Of the controller.
+        p: `Parameters`.
 
     Returns:
         Shape (3,).
     """
-    car, gains = parameters.car, parameters.gains
+    car, (k1, k2, k3, k4) = p.car, p.gains
     to_world = rotation(state[4] + state[5])
     pushed, moved, drift = body_derivatives(state, car)
-    position, velocity, acceleration, jerk, snap = reference_motion(time, parameters.reference)[
-        :, :2
-    ]
+    position, velocity, acceleration, jerk, snap = reference_motion(time, p.reference)[:, :2]
     demanded = (
         snap
-        + gains.jerk * (jerk - to_world @ moved)
-        + gains.acceleration * (acceleration - to_world @ pushed)
-        + gains.velocity * (velocity - state[2:4])
-        + gains.position * (position - state[0:2])
+        + k1 * (jerk - to_world @ moved)
+        + k2 * (acceleration - to_world @ pushed)
+        + k3 * (velocity - state[2:4])
+        + k4 * (position - state[0:2])
     )
     matrix = input_matrix(state[6:8], car)
-    if parameters.decoupling == PUBLISHED:
+    if p.decoupling == PUBLISHED:
         matrix = xp.hstack([matrix[:, :2], xp.array([[-pushed[1]], [pushed[0]]])])
     return minimum_norm(matrix, to_world.T @ demanded - drift)

@@ -17,11 +17,11 @@ from __future__ import annotations
 import itertools
 from dataclasses import dataclass
 from math import cos, exp, isclose, pi, sin, sqrt, tan
+from typing import Any
 
 import numpy as np
 
 from tiltsim_controllers.mathematics.scalar import Floats, Pair
-from tiltsim_controllers.tilt_car.planned_direction import Gains
 
 STEPS = 64
 """Intervals of a half period in which the switch is bracketed."""
@@ -40,7 +40,7 @@ class Swing:
 
     half_angle: float
     half_period: float
-    gains: Gains
+    gains: Any  # of `planned_direction`
     reference_acceleration: float = 1.0
 
     @property
@@ -61,12 +61,12 @@ class Swing:
     def both_push(self, state: Pair) -> bool:
         """Whether both rotors push: the desired acceleration lies between the thrusts (Prop. 4)."""
         error, rate = state
-        return self.gains.y_velocity * rate + self.gains.y_position * error > self._side
+        return self.gains.y[0] * rate + self.gains.y[1] * error > self._side
 
     def after_both_push(self, time: float, state: Pair) -> Pair:
         """The state after a time (s) of both rotors pushing (ch. 11, Eq. 42)."""
         error, rate = state
-        k1, k2 = self.gains.y_velocity, self.gains.y_position
+        k1, k2 = self.gains.y
         discriminant = 0.25 * k1 * k1 - k2
         decay = exp(-0.5 * k1 * time)
         if isclose(discriminant, 0.0, abs_tol=1e-12):
@@ -173,7 +173,7 @@ def multipliers(swing: Swing, state: Pair) -> Floats:
 def lyapunov(swing: Swing, state: Pair) -> float:
     """The Lyapunov candidate of ch. 11 at a state, m^2/s^2 (Eq. 49)."""
     error, rate = state
-    return 0.5 * rate * rate + 0.5 * swing.gains.y_position * error * error
+    return 0.5 * rate * rate + 0.5 * swing.gains.y[1] * error * error
 
 
 def lyapunov_growth(swing: Swing, state: Pair) -> float:
@@ -213,7 +213,7 @@ def lyapunov_bound(swing: Swing, points: int = 161) -> LyapunovBound:
     critical, at, largest = 0.0, (0.0, 0.0), 0.0
     for angle in angles.tolist():
         # In the ellipse's coordinates rays are lines through states of proportional errors.
-        unit = (cos(angle) * sqrt(2.0 / swing.gains.y_position), sin(angle) * sqrt(2.0))
+        unit = (cos(angle) * sqrt(2.0 / swing.gains.y[1]), sin(angle) * sqrt(2.0))
         edge = _edge(swing, unit)
         gain = lyapunov_growth(swing, (edge * unit[0], edge * unit[1]))
         largest = max(largest, gain)
@@ -235,6 +235,6 @@ def lyapunov_bound(swing: Swing, points: int = 161) -> LyapunovBound:
 
 def _edge(swing: Swing, unit: Pair) -> float:
     """The distance along a ray at which the zone of Eq. (39) begins."""
-    gains = swing.gains
-    slope = gains.y_velocity * unit[1] + gains.y_position * unit[0]
+    k1, k2 = swing.gains.y
+    slope = k1 * unit[1] + k2 * unit[0]
     return -swing.push / slope * (1.0 + 1e-12)

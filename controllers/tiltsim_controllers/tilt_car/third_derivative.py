@@ -8,9 +8,19 @@ restoring rate in the null space turns the thrusts' bisector back towards the ac
 
 from __future__ import annotations
 
-from typing import Any, Final, NamedTuple
+from typing import Any, ClassVar, Final, Literal
+
+from pydantic import Field
 
 from tiltsim_controllers.code.arrays import xp
+from tiltsim_controllers.laws.keys import (
+    GainSets,
+    Keys,
+    NamedGains,
+    NonNegative,
+    Vector3,
+    record_of,
+)
 from tiltsim_controllers.references.trajectories import ReferenceParameters, reference_motion
 from tiltsim_controllers.tilt_car.vehicle import (
     TiltCar,
@@ -20,29 +30,36 @@ from tiltsim_controllers.tilt_car.vehicle import (
     turn_per_tilt,
 )
 
-
-class Gains(NamedTuple):
-    """Gains on acceleration, velocity and position, the same for both axes."""
-
-    acceleration: float  # [k_1] 1/s
-    velocity: float  # [k_2] 1/s^2
-    position: float  # [k_3] 1/s^3
-
-
-class Parameters(NamedTuple):
-    """Parameters of the controller."""
-
-    car: TiltCar
-    gains: Gains
-    reference: ReferenceParameters
-    restoring_rate: float  # 1/s, 0 as published
-
-
 GAIN_SETS: Final = {
     # Ours, all three poles at -2: the thesis prints none.
-    "ch10": Gains(6.0, 12.0, 8.0)
+    "ch10": (6.0, 12.0, 8.0)
 }
-"""Gains by name."""
+"""Gains by name: k_1 to k_3, the same for both axes."""
+
+
+class ThirdDerivative(Keys):
+    """Keys of `third_derivative_inputs`."""
+
+    gain_sets: ClassVar[GainSets] = {"gains": GAIN_SETS}
+
+    law: Literal["tilt_car_third_derivative"] = Field(
+        description="the tilt-car's rotor speeds and tilt control the third derivative of x and y"
+    )
+    gains: NamedGains[Literal["ch10"], Vector3] = Field(
+        "ch10",
+        description="poles at -2, or three gains on the errors of acceleration, velocity and "
+        "position [1/s, 1/s^2, 1/s^3]",
+        examples=[[6.0, 12.0, 8.0]],
+    )
+    restoring_rate: NonNegative = Field(
+        0.0,
+        description="rate of turning the mean thrust direction towards the acceleration; "
+        "0 as published [1/s]",
+        examples=[1.0],
+    )
+
+
+Parameters = record_of(ThirdDerivative, car=TiltCar, reference=ReferenceParameters)
 
 
 def minimum_norm(matrix: Any, desired: Any) -> Any:
@@ -85,25 +102,25 @@ def restoring_inputs(lean: Any, rate: Any, matrix: Any, car: TiltCar) -> Any:
     return xp.where(turns, scale, 0.0) * silent
 
 
-def third_derivative_inputs(time: Any, state: Any, parameters: Parameters) -> Any:
+def third_derivative_inputs(time: Any, state: Any, p: Any) -> Any:
     """Rates of the rotor speeds (rad/s^2) and of the tilt angle (rad/s), shape (3,); Eq. (14).
 
     Args:
         time: s
         state: `tiltsim_controllers.tilt_car.vehicle.STATE_FIELDS`, shape (8,).
-        parameters: Of the controller.
+        p: `Parameters`.
     """
-    car, gains = parameters.car, parameters.gains
+    car, (k1, k2, k3) = p.car, p.gains
     yaw, alpha, speeds = state[4], state[5], state[6:8]
-    position, velocity, acceleration, jerk = reference_motion(time, parameters.reference)[:4, :2]
+    position, velocity, acceleration, jerk = reference_motion(time, p.reference)[:4, :2]
     to_world, pushed = rotation(yaw + alpha), thrust_map(car) @ (speeds * speeds)
     demanded = (
         jerk
-        + gains.acceleration * (acceleration - to_world @ pushed)
-        + gains.velocity * (velocity - state[2:4])
-        + gains.position * (position - state[0:2])
+        + k1 * (acceleration - to_world @ pushed)
+        + k2 * (velocity - state[2:4])
+        + k3 * (position - state[0:2])
     )
     matrix = input_matrix(speeds, car)
     lean = xp.arctan2(pushed[1], pushed[0])
-    restoring = restoring_inputs(lean, parameters.restoring_rate, matrix, car)
+    restoring = restoring_inputs(lean, p.restoring_rate, matrix, car)
     return minimum_norm(matrix, to_world.T @ demanded) + restoring

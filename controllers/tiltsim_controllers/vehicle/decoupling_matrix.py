@@ -34,14 +34,6 @@ def sines_and_cosines(a1: float, a2: float, a3: float, a4: float) -> Octet:
 
 
 @scalar
-def trigonometric_rates(trig: Octet, rates: Quad) -> Octet:
-    """Rates (1/s) of the `sines_and_cosines` at tilt rates (rad/s)."""
-    s1, c1, s2, c2, s3, c3, s4, c4 = trig
-    v1, v2, v3, v4 = rates
-    return c1 * v1, -s1 * v1, c2 * v2, -s2 * v2, c3 * v3, -s3 * v3, c4 * v4, -s4 * v4
-
-
-@scalar
 def torque_entries(trig: Octet, drag_ratio: float) -> Octet:
     """The eight non-zero entries of ``tau(alpha) / (L K_f)`` (ch. 3, Eq. 5).
 
@@ -72,18 +64,6 @@ def body_force(trig: Octet, w1: float, w2: float, w3: float, w4: float) -> Tripl
     """
     s1, c1, s2, c2, s3, c3, s4, c4 = trig
     return (s2 * w2 - s4 * w4, s1 * w1 - s3 * w3, -c1 * w1 + c2 * w2 - c3 * w3 + c4 * w4)
-
-
-@scalar
-def body_torque(torque: Octet, w1: float, w2: float, w3: float, w4: float) -> Triple:
-    """The torque ``tau(alpha) w / (L K_f)`` in body axes (ch. 3, Eq. 5).
-
-    Args:
-        torque: `torque_entries` of the tilt angles
-        w1, w2, w3, w4: rotor inputs, rad^2/s^2
-    """
-    x2, x4, y1, y3, z1, z2, z3, z4 = torque
-    return x2 * w2 + x4 * w4, y1 * w1 + y3 * w3, z1 * w1 + z2 * w2 + z3 * w3 + z4 * w4
 
 
 @scalar

@@ -151,16 +151,6 @@ def wrench_slope(rotors: Rotors, tilts: Any) -> Any:
     return turned(rotors, (0.0, rotors.sine, -rotors.cosine), tilts)
 
 
-def wrench_rates(rotors: Rotors, tilts: Any, tilt_rates: Any) -> Any:
-    """The time derivative of `wrench_map`, 1/s, shape (6, N).
-
-    Args:
-        rotors: Rotors of the vehicle.
-        tilts, tilt_rates: rad and rad/s, shape (M,) each.
-    """
-    return wrench_slope(rotors, tilts) * of_rotors(rotors, tilt_rates)
-
-
 def by_tilt(rotors: Rotors, columns: Any) -> Any:
     """Sums of columns of rotors over each tilt, shape (6, N) to (6, M)."""
     layout = rotors.tilt_of_rotor

@@ -16,11 +16,10 @@ from tiltsim_controllers.analysis.stability import is_hurwitz
 from tiltsim_controllers.gaits.parameters import FIXED, GaitParameters
 from tiltsim_controllers.laws import attitude_altitude
 from tiltsim_controllers.laws.attitude_altitude import attitude_altitude_inputs
+from tiltsim_controllers.laws.failures import UNHARMED, Failure
 from tiltsim_controllers.laws.full_pose import (
     GAIN_SETS,
     PUBLISHED_TILT_WEIGHT,
-    Failure,
-    Limits,
     Parameters,
     force_balanced_tilt_weight,
     full_pose,
@@ -51,6 +50,7 @@ from tiltsim_controllers.vehicle.rotors import rotors_in
 
 TILTROTOR = PRESETS["ar_drone_2_unrounded"]
 GAINS = GAIN_SETS["ch03"]
+NO_LIMITS = (inf, inf)
 HERE = ReferenceParameters(REFERENCE_TYPES["setpoint"])
 WEIGHTS = {"published": PUBLISHED_TILT_WEIGHT, "even": force_balanced_tilt_weight(TILTROTOR)}
 GAITS = {1: (-0.1, 0.1, -0.2, 0.1), 2: (-0.15, -0.1, 0.3, -0.1)}
@@ -65,8 +65,16 @@ def full_pose_inputs(time, state, parameters, knots=()):
     return full_pose(time, state, target, parameters, knots, (0, 1, 2, 3))
 
 
+def law_of(vehicle, weight, limits, failure=UNHARMED, reference=HERE):
+    """Parameters, given the limits of tilt rate and tilt angle."""
+    rate, angle = limits
+    return Parameters(
+        vehicle, reference, weight, failure, 0.0, GAINS, max_tilt_rate=rate, max_tilt_angle=angle
+    )
+
+
 def parameters(weight="even", limits=None, reference=HERE):
-    return Parameters(TILTROTOR, GAINS, reference, limits or Limits(), WEIGHTS[weight])
+    return law_of(TILTROTOR, WEIGHTS[weight], limits or NO_LIMITS, reference=reference)
 
 
 def random_state(random):
@@ -244,8 +252,7 @@ def test_the_even_weight_is_that_of_hover():
 
 
 def test_the_published_gains_are_stable():
-    assert is_hurwitz((1.0, GAINS.position_1, GAINS.position_2, GAINS.position_3))
-    assert is_hurwitz((1.0, GAINS.attitude_1, GAINS.attitude_2, GAINS.attitude_3))
+    assert all(is_hurwitz((1.0, *gains)) for gains in GAINS)
 
 
 @pytest.mark.parametrize("stopped", [0, 3])
@@ -257,13 +264,13 @@ def test_inputs_are_nan_where_a_rotor_stands_still(stopped):
 
 
 def test_limits():
-    limits = Limits(max_tilt_rate=2.0, max_tilt_angle=0.5)
+    limits = parameters(limits=(2.0, 0.5))
     assert limited_tilt_rate(1.5, 0.2, limits) == 1.5
     assert limited_tilt_rate(-7.0, 0.2, limits) == -2.0
     assert limited_tilt_rate(7.0, 0.5, limits) == 0.0
     assert limited_tilt_rate(-7.0, 0.6, limits) == -2.0
     assert limited_tilt_rate(-1.0, -0.5, limits) == 0.0
-    assert limited_tilt_rate(-9e9, -9.0, Limits()) == -9e9
+    assert limited_tilt_rate(-9e9, -9.0, parameters()) == -9e9
     assert isnan(limited_tilt_rate(float("nan"), 0.0, limits))
 
 
@@ -281,8 +288,8 @@ def planned(gait, duration, step):
         ATTITUDE_GAINS["ch03"],
         GaitParameters(FIXED),
         ReferenceParameters(REFERENCE_TYPES["attitude_altitude"]),
-        0.0,
-        0.0,
+        decoupling=0.0,
+        decoupler=0.0,
     )
     inputs = compiled(attitude_altitude_inputs, 0.0, start(GAITS[gait]), law)
     return fly(
@@ -324,7 +331,7 @@ def test_full_pose_control_is_faster_with_less_overshoot_and_fast_tilting(gait):
 
 
 def test_limits_hold_in_flight():
-    limits = Limits(max_tilt_rate=5.0, max_tilt_angle=0.25)
+    limits = (5.0, 0.25)
     times, states = full(1, 1.5, 0.001, limits=limits)
     assert times[-1] == pytest.approx(1.5)
     assert np.abs(np.diff(states[:, 12:16], axis=0)).max() <= 5.0 * 0.001 * (1 + 1e-9)
@@ -346,7 +353,7 @@ def test_under_the_published_weight_tilting_is_faster_than_any_step():
 @pytest.mark.parametrize("weight", WEIGHTS)
 def test_machine_code_gives_the_same_inputs(weight):
     random = np.random.default_rng(6)
-    law, state = parameters(weight, Limits(3.0, 0.5)), random_state(random)
+    law, state = parameters(weight, (3.0, 0.5)), random_state(random)
     found = natively(full_pose_inputs, 1.7, state, law)
     np.testing.assert_allclose(found, full_pose_inputs(1.7, state, law), rtol=1e-9)
 
@@ -360,8 +367,8 @@ ON_CIRCLE = ReferenceParameters(
 
 @pytest.mark.parametrize("failure", [Failure(), Failure(2.0, 10.0)], ids=["whole", "lost"])
 def test_the_tiltrotors_parameters_stand_for_a_table_of_its_rotors(failure):
-    vehicle, limits, weight = tiltrotor(), Limits(5.0, 1.0), force_balanced_tilt_weight(FOUR)
-    own = Parameters(FOUR, GAINS, ON_CIRCLE, limits, weight, failure)
+    vehicle, weight = tiltrotor(), force_balanced_tilt_weight(FOUR)
+    own = law_of(FOUR, weight, (5.0, 1.0), failure, ON_CIRCLE)
     general = own._replace(vehicle=vehicle.body)
     for time, state in random_states(10):
         expected = np.array(full_pose_inputs(time, state, own))
@@ -390,7 +397,7 @@ def on_shared_pods():
 def test_force_and_torque_change_as_desired_with_the_least_inputs(table, failure):
     vehicle, layout = Vehicle(table, HEXAROTOR, 3), tilt_of_rotor(table)
     rotors, tilts = len(layout), tilts_of(layout)
-    parameters = Parameters(vehicle.body, GAINS, ON_CIRCLE, Limits(), 3e5, failure)
+    parameters = law_of(vehicle.body, 3e5, NO_LIMITS, failure, ON_CIRCLE)
     target = np.array(reference_derivatives(1.0, ON_CIRCLE)).reshape(5, 3)
     works = np.array([rotor + 1.0 != failure.rotor for rotor in range(rotors)], float)
     rng = np.random.default_rng(4)
@@ -415,11 +422,11 @@ def test_force_and_torque_change_as_desired_with_the_least_inputs(table, failure
         inertia = np.diag((HEXAROTOR.inertia_xx, HEXAROTOR.inertia_yy, HEXAROTOR.inertia_zz))
         present = rotation @ force / HEXAROTOR.mass - (0.0, 0.0, HEXAROTOR.gravity)
         jerk = target[3] + np.dot(
-            GAINS[:3], (target[2] - present, target[1] - body[3:6], target[0] - body[:3])
+            GAINS.position, (target[2] - present, target[1] - body[3:6], target[0] - body[:3])
         )
         yaw = rotation_from_euler(0.0, 0.0, ON_CIRCLE.yaw)
         error = attitude_error(rotation, np.reshape(yaw, (3, 3)))
-        angular = -np.dot(GAINS[3:], (np.linalg.solve(inertia, torque), body[9:12], -error))
+        angular = -np.dot(GAINS.attitude, (np.linalg.solve(inertia, torque), body[9:12], -error))
         lift = HEXAROTOR.mass * rotation.T @ jerk - np.cross(body[9:12], force)
         np.testing.assert_allclose(rate[:3], lift, rtol=1e-6, atol=1e-6 * np.abs(lift).max())
         moment = inertia @ angular

@@ -49,12 +49,12 @@ def test_the_published_sets_are_as_printed():
 
 def test_other_sets_are_as_printed_and_ours_have_the_poles_that_they_say():
     """Ch. 2, App. B; ch. 11, Sec. 4.2; of ch. 10, which prints none, multiple poles."""
-    assert yaw_position.GAIN_SETS["ch02"] == (10.0, 20.0, 50.0, 500.0, 5.0, 5.0)
-    assert yaw_position.GAIN_SETS["stable"][4:] == yaw_position.GAIN_SETS["ch02"][4:]
-    assert planned_direction.GAIN_SETS["ch11"] == (12.0, 6.0, 9.0, 18.0)
+    assert yaw_position.GAIN_SETS["ch02"] == ((10.0, 20.0, 50.0, 500.0), (5.0, 5.0))
+    assert yaw_position.GAIN_SETS["stable"].yaw == yaw_position.GAIN_SETS["ch02"].yaw
+    assert planned_direction.GAIN_SETS["ch11"] == ((12.0, 6.0), (9.0, 18.0))
     loops = (
-        (planned_direction.GAIN_SETS["ch10"][:2], -2.0),
-        (planned_direction.GAIN_SETS["ch10"][2:], -2.0),
+        (planned_direction.GAIN_SETS["ch10"].x, -2.0),
+        (planned_direction.GAIN_SETS["ch10"].y, -2.0),
         (third_derivative.GAIN_SETS["ch10"], -2.0),
         (fourth_derivative.GAIN_SETS["ch10"], -3.0),
     )

@@ -14,7 +14,7 @@ from tests.thesis import force_matrix, torque_matrix
 from tiltsim_controllers.analysis.stability import feedforward_loops
 from tiltsim_controllers.gaits.parameters import FIXED, GaitParameters
 from tiltsim_controllers.gaits.plans import continuous_trot, fixed
-from tiltsim_controllers.laws.attitude_altitude import Gains
+from tiltsim_controllers.laws.attitude_altitude import EXACT_DECOUPLING, Gains
 from tiltsim_controllers.laws.decouplers import DECOUPLERS, exact_decoupler
 from tiltsim_controllers.laws.feedback import (
     angular_jerk,
@@ -33,7 +33,8 @@ from tiltsim_controllers.laws.gains import (
     third_order_gains,
 )
 from tiltsim_controllers.laws.gait_feedforward import Parameters, tracking_inputs
-from tiltsim_controllers.laws.multirotor_steps import FeedforwardTerms
+from tiltsim_controllers.laws.multirotor_steps import EULER_ANGLES, FeedforwardTerms
+from tiltsim_controllers.laws.supervisor import Supervisor
 from tiltsim_controllers.mathematics.moving import Moving
 from tiltsim_controllers.references.trajectories import REFERENCE_TYPES, ReferenceParameters
 from tiltsim_controllers.vehicle.decoupling_matrix import (
@@ -173,6 +174,12 @@ def parameters(**changed):
         gait=GaitParameters(FIXED),
         reference=HOVER,
         decoupler=DECOUPLERS["none"],
+        decoupling=EXACT_DECOUPLING,
+        supervisor=Supervisor(),
+        rotor_inertia=0.0,
+        attitude_error=EULER_ANGLES,
+        slowest_rotor=0.0,
+        turn_time=0.0,
     )
     return base._replace(**changed)
 

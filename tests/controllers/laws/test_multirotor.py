@@ -7,6 +7,7 @@ from math import pi
 import numpy as np
 import pytest
 
+from tests.controllers.laws.test_gait_feedforward import parameters as gait_parameters
 from tests.controllers.multirotors import (
     FOUR,
     HEXAROTOR,
@@ -36,7 +37,6 @@ from tiltsim_controllers.laws.multirotor_steps import (
     EULER_ANGLES,
     FeedforwardTerms,
     Form,
-    SideGains,
     Tracking,
     rotation_control,
     side_control,
@@ -76,7 +76,9 @@ def test_the_law_of_chapters_3_and_4_is_a_case(decoupler, decoupling):
     vehicle, gait = tiltrotor(), plans.fixed((0.0,) * 4)
     gains = GAIN_SETS["ch04" if decoupling == "published" else "exact"]
     codes = DECOUPLERS[decoupler], attitude_altitude.DECOUPLINGS[decoupling]
-    special = attitude_altitude.Parameters(FOUR, gains, gait.parameters, ON_CIRCLE, *codes)
+    special = attitude_altitude.Parameters(
+        FOUR, gains, gait.parameters, ON_CIRCLE, decoupler=codes[0], decoupling=codes[1]
+    )
     law, knots = parameters_of(
         vehicle, gait, ON_CIRCLE, gains=gains, terms=AS_PUBLISHED, decoupler=codes[0],
         decoupling=codes[1], attitude_error=EULER_ANGLES,
@@ -108,9 +110,10 @@ def test_gait_feedforward_is_a_case(gait):
         Poles(25.0), Poles(10.0), Poles(10.0, 1.0, 0.5), Poles(1.5, 1.0, 0.3)
     )
     terms, rates, integrals = FeedforwardTerms(), (0.1, -0.3, 0.2, 0.5), (0.1, 0.2, -0.1)
-    special = gait_feedforward.Parameters(
-        FOUR, gains, integral, 3.0, 200.0, 0.05, terms, gait.parameters, ON_CIRCLE,
-        DECOUPLERS["exact"],
+    special = gait_parameters(
+        vehicle=FOUR, gains=gains, integral=integral, max_angular_acceleration=200.0,
+        anticipation=0.05, terms=terms, gait=gait.parameters, reference=ON_CIRCLE,
+        decoupler=DECOUPLERS["exact"],
     )  # fmt: skip
     law, knots = parameters_of(
         vehicle, gait, ON_CIRCLE, gains=gains, integral=integral, max_acceleration=3.0,
@@ -197,7 +200,7 @@ def test_it_stays_level_in_a_side_wind_which_its_integrators_cancel():
     assert flight.position[-1, 1] == pytest.approx(12.0 / 64.0, abs=1e-3)  # wind k1 / k3
     assert np.abs(flight.up[:, :2]).max() < 1e-12
     # Four poles at -4 rad/s: k4 = 256.
-    law = law._replace(side=SideGains(16.0, 96.0, 256.0, 256.0))
+    law = law._replace(side_gains=(16.0, 96.0, 256.0), side_integral=256.0)
     flight = fly(CANTED, law, knots, 5.0, wind=(0.0, 1.0, 0.0))
     assert abs(flight.position[-1, 1]) < 1e-3
 
@@ -270,7 +273,7 @@ def test_of_all_inputs_that_do_the_same_it_takes_those_nearest_to_restoring(
 def test_an_octorotor_turns_upside_down_and_hovers_there():
     vehicle = Vehicle(octorotor(), SMALL, 3, "thrust")
     reference = ReferenceParameters(SETPOINT, roll=pi)
-    law, knots = parameters_of(vehicle, reference=reference, turn_time=2.0, slowest=20.0)
+    law, knots = parameters_of(vehicle, reference=reference, turn_time=2.0, slowest_rotor=20.0)
     flight = fly(vehicle, law, knots, 3.0)
     assert flight.up[-1, 2] < -1.0 + 1e-6
     assert np.abs(flight.position).max() < 1e-3
@@ -280,7 +283,7 @@ def test_an_octorotor_turns_upside_down_and_hovers_there():
 def test_force_control_of_x_and_y_is_third_order_with_an_integrator():
     law, _ = parameters_of(CANTED)
     law = law._replace(
-        side=SideGains(5.0, 8.0, 6.0, 2.0), terms=law.terms._replace(integral_action=0.5)
+        side_gains=(5.0, 8.0, 6.0), side_integral=2.0, terms=law.terms._replace(integral_action=0.5)
     )
     errors, accelerations, integrals = np.random.default_rng(5).uniform(-0.1, 0.1, (3, 3, 3))
     motion = Tracking(Moving(*errors.T), Moving(*accelerations.T))

@@ -10,11 +10,12 @@ import pytest
 import tiltsim_controllers.laws.quadrotor_attitude_altitude as attitude_altitude
 import tiltsim_controllers.laws.yaw_position as yaw_position
 from tests.controllers.flights import fly, quadrotor_rates, rk4_step
+from tiltsim_controllers.laws.keys import choice, number_of
 from tiltsim_controllers.laws.quadrotor_attitude_altitude import attitude_altitude_inputs
 from tiltsim_controllers.laws.switching import (
-    EXTENSIONS,
     PUBLISHED_ZONE,
     Parameters,
+    Switching,
     attitude_altitude_thrust_rate,
     in_attitude_zone,
     switching_inputs,
@@ -25,6 +26,8 @@ from tiltsim_controllers.vehicle.parameters import PRESETS
 QUADROTOR = PRESETS["ar_drone_2_unrounded"]
 WEIGHT = QUADROTOR.mass * QUADROTOR.gravity
 GAINS = attitude_altitude.GAIN_SETS["ch02"]
+EXTENSIONS = ("bumpless", "held", "running")
+ZONE = number_of(Switching(law="switching"), "zone")
 START = (*[0.0] * 6, 0.5, -0.5, 0.0, 0.0, 0.0, 0.0, WEIGHT, 0.0)
 CASES = 20
 
@@ -40,10 +43,13 @@ def parameters(extension, roll=0.01, pitch=0.0, gains="ch02"):
         pitch=-pitch,
     )
     return Parameters(
-        yaw_position.Parameters(QUADROTOR, yaw_position.GAIN_SETS[gains], reference),
+        QUADROTOR,
+        reference,
+        yaw_position.GAIN_SETS[gains],
         GAINS,
-        PUBLISHED_ZONE,
-        EXTENSIONS[extension],
+        ZONE,
+        choice(Switching, "extension", extension),
+        extension_rate=100.0,
     )
 
 
@@ -114,22 +120,19 @@ def test_the_published_zone(roll, pitch, inside):
 def test_each_law_flies_in_its_zone(extension):
     random = np.random.default_rng(2)
     law = parameters(extension)
-    position = law.yaw_position
     for _ in range(2 * CASES):
         state = random_state(random)
         inputs = switching_inputs(1.0, state, law)
         if in_attitude_zone(state[6], state[7], PUBLISHED_ZONE):
-            attitude = attitude_altitude_inputs(
-                1.0, state, QUADROTOR, GAINS, law.yaw_position.reference
-            )
+            attitude = attitude_altitude_inputs(1.0, state, QUADROTOR, GAINS, law.reference)
             np.testing.assert_array_equal(inputs[:4], attitude)
             if extension == "held":
                 np.testing.assert_array_equal(inputs[4:], 0.0)
             if extension == "running":
-                outside = yaw_position.yaw_position_inputs(1.0, state, position)
+                outside = yaw_position.yaw_position_inputs(1.0, state, law)
                 np.testing.assert_array_equal(inputs[4:], outside[4:])
         else:
-            outside = yaw_position.yaw_position_inputs(1.0, state, position)
+            outside = yaw_position.yaw_position_inputs(1.0, state, law)
             np.testing.assert_array_equal(inputs, outside)
 
 
@@ -143,14 +146,14 @@ def test_the_flown_thrust_rate_is_the_thrusts_derivative(reference):
     random = np.random.default_rng(3)
     law = parameters("bumpless")
     if reference is not None:
-        law = law._replace(yaw_position=law.yaw_position._replace(reference=reference))
+        law = law._replace(reference=reference)
     for _ in range(CASES):
         state = random_state(random)
 
         def thrust(time, state):
-            return attitude_altitude_inputs(
-                time, np.array(state), QUADROTOR, GAINS, law.yaw_position.reference
-            )[0]
+            return attitude_altitude_inputs(time, np.array(state), QUADROTOR, GAINS, law.reference)[
+                0
+            ]
 
         def rates(time, state):
             return quadrotor_rates(state, switching_inputs(time, np.array(state), law), QUADROTOR)

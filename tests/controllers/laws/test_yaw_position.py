@@ -174,7 +174,7 @@ def test_ma_is_the_plants_derivative_at_zero_input():
 @pytest.mark.parametrize("gains", GAIN_SETS)
 def test_the_outputs_move_as_appendix_b_demands(gains):
     random = np.random.default_rng(4)
-    parameters = Parameters(QUADROTOR, GAIN_SETS[gains], CIRCLE._replace(yaw=0.3))
+    parameters = Parameters(QUADROTOR, CIRCLE._replace(yaw=0.3), GAIN_SETS[gains])
     k = GAIN_SETS[gains]
     time = 2.0
     reference = reference_motion(time, parameters.reference)
@@ -189,11 +189,8 @@ def test_the_outputs_move_as_appendix_b_demands(gains):
         )
         jerk = (third_derivatives(ahead) - third_derivatives(behind))[:3] / 2e-5
         errors = reference[:4] - [state[:3], state[3:6], rates[3:6], jerk]
-        desired = (
-            reference[4]
-            + np.array([k.position_4, k.position_3, k.position_2, k.position_1]) @ errors
-        )
-        desired_yaw = k.yaw_2 * (0.3 - state[8]) - k.yaw_1 * rates[8]
+        desired = reference[4] + np.array(k.position[::-1]) @ errors
+        desired_yaw = k.yaw[1] * (0.3 - state[8]) - k.yaw[0] * rates[8]
         inputs = yaw_position_inputs(time, state, parameters)
         found = numerical_derivatives(state, inputs)
         desired = np.array([*desired, desired_yaw])
@@ -222,7 +219,7 @@ def test_the_reference_derivatives_are_derivatives():
 
 # --- flights -----------------------------------------------------------------------------------
 
-PARAMETERS = {name: Parameters(QUADROTOR, gains, CIRCLE) for name, gains in GAIN_SETS.items()}
+PARAMETERS = {name: Parameters(QUADROTOR, CIRCLE, gains) for name, gains in GAIN_SETS.items()}
 
 
 def flight(gains, duration, step):
@@ -238,7 +235,7 @@ def flight(gains, duration, step):
 
 
 def position_polynomial(gains):
-    return (1.0, gains.position_1, gains.position_2, gains.position_3, gains.position_4)
+    return (1.0, *gains.position)
 
 
 def test_the_published_gains_are_unstable_by_themselves_and_ours_are_not():

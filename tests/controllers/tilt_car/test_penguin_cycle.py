@@ -39,7 +39,7 @@ def integrated(swing, start, time):
     gains = swing.gains
 
     def demanded(_t, state):
-        return gains.y_velocity * state[1] + gains.y_position * state[0]
+        return gains.y[0] * state[1] + gains.y[1] * state[0]
 
     def room(t, state):
         return demanded(t, state) - side
@@ -72,7 +72,7 @@ def test_the_map_is_the_integrated_error(error, rate):
 
 @pytest.mark.parametrize("gains", [(9.0, 18.0), (4.0, 4.0), (2.0, 8.0)])
 def test_free_motion_is_right_for_any_damping(gains):
-    swing = Swing(pi / 6, 1.0, Gains(12.0, 6.0, *gains))
+    swing = Swing(pi / 6, 1.0, Gains((12.0, 6.0), gains))
     step = 1e-5
     state = (0.3, -0.2)
     here, ahead, behind = (swing.after_both_push(0.4 + side, state) for side in (0.0, step, -step))
@@ -149,5 +149,5 @@ def test_in_a_short_half_both_rotors_push_all_the_time():
     start = (0.3, 0.9)
     half = half_period(short, start)
     assert half.free_time == 0.05
-    matrix = np.array([[0.0, 1.0], [-short.gains.y_position, -short.gains.y_velocity]])
+    matrix = np.array([[0.0, 1.0], [-short.gains.y[1], -short.gains.y[0]]])
     np.testing.assert_allclose(half.end, expm(0.05 * matrix) @ start, rtol=1e-13)

@@ -133,7 +133,7 @@ def _quadrotor_numbers() -> dict[str, str]:
     vehicle = PRESETS["ar_drone_2_unrounded"]
     hover = vehicle.mass * vehicle.gravity
     on_curve = normalized_determinant(*published_singular_curve(), hover, vehicle)
-    roots = np.roots((1.0, *yaw_position.GAIN_SETS["ch02"][:4]))
+    roots = np.roots((1.0, *yaw_position.GAIN_SETS["ch02"].position))
     worst = roots[np.argmax(roots.real)]
     return {
         "low": f"{on_curve.min():.3f}",

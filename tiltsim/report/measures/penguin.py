@@ -103,7 +103,7 @@ def switch_line() -> float:
     for _ in range(60):
         middle = 0.5 * (low + high)
         low, high = (
-            (low, middle) if SWING.both_push((middle / _GAINS.y_position, 0.0)) else (middle, high)
+            (low, middle) if SWING.both_push((middle / _GAINS.y[1], 0.0)) else (middle, high)
         )
     return high
 
@@ -243,7 +243,7 @@ def stays_below_the_bound(flights: Flown) -> bool:
 def candidates_fall_as_printed() -> bool:
     """Eqs. (18), (20): the slopes of both candidates along Eq. (16)."""
     step = 1e-6
-    pairs = ((_GAINS.x_velocity, _GAINS.x_position), (_GAINS.y_velocity, _GAINS.y_position))
+    pairs = (_GAINS.x, _GAINS.y)
     for error, rate in np.random.default_rng(13).uniform(-1.0, 1.0, (100, 2)).tolist():
         for damping, stiffness in pairs:
             second = -damping * rate - stiffness * error

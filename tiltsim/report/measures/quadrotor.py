@@ -62,10 +62,8 @@ def singular_without_thrust() -> bool:
 
 def quadrotor_gains_are_stable(law: str) -> bool:
     """Whether Appendix B's gains, of position or altitude, and of yaw stabilize their loops."""
-    position = law == "yaw_position"
-    module = yaw_position if position else quadrotor_attitude_altitude
-    gains, first = module.GAIN_SETS["ch02"], 4 if position else 2
-    return is_hurwitz((1.0, *gains[:first])) and is_hurwitz((1.0, *gains[first:]))
+    module = yaw_position if law == "yaw_position" else quadrotor_attitude_altitude
+    return all(is_hurwitz((1.0, *gains)) for gains in module.GAIN_SETS["ch02"])
 
 
 def attitude_altitude_is_singular() -> bool:

@@ -192,7 +192,7 @@ def _derivative_by_yaw(mended: bool) -> float:
 def _ch2_gains(mended: bool) -> float:
     """Largest real part above zero of the position loop's roots with Appendix B's gains."""
     gains = QUADROTOR_GAINS["stable" if mended else "ch02"]
-    return max(0.0, float(np.roots((1.0, *gains[:4])).real.max()))
+    return max(0.0, float(np.roots((1.0, *gains.position)).real.max()))
 
 
 def _routh(mended: bool) -> float:

@@ -67,7 +67,7 @@ def singularity_figure(vehicle: Vehicle) -> Figure:
     style.roll_pitch_axes(alone)
     axes, box, limit = figure.add_subplot(grid[1, 2]), PUBLISHED_ZONE, pi / 2
     axes.axvspan(-limit, limit, color=style.PALE, label="yaw-position control")
-    left, right, low, high = box.roll_min, box.roll_max, box.pitch_min, box.pitch_max
+    (left, right), (low, high) = box.roll, box.pitch
     outline = [left, right, right, left], [low, low, high, high]
     zone: dict[str, Any] = {"color": style.AMBER, "alpha": 0.55, "lw": 0.0}
     axes.fill(*outline, **zone, label="attitude-altitude control")

@@ -1,0 +1,45 @@
+"""Parameters of a law in a flight: numbers of its keys, its vehicle, gait and reference."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+from tiltsim_controllers.laws.keys import number_of
+from tiltsim_controllers.mathematics.records import make_record_type
+
+if TYPE_CHECKING:
+    from tiltsim.scenario.scenario import FlightPlan
+
+
+@cache
+def head_of(law: Any, **own: type) -> Any:
+    """The type of the head of `userdata`, around the parameters of a law.
+
+    Args:
+        law: Type of these parameters.
+        own: Further fields, such as ``servo_lead``: rate feed-forward of the tilt servos, s,
+            ``2 zeta / omega_n``.
+    """
+    # The signature is `tiltsim.closed_loop.loop.ClosedLoop.signature`.
+    return make_record_type("LoopParameters", signature=float, **own, law=law)
+
+
+def parameters_of(plan: FlightPlan, record: Any, **own: Any) -> Any:
+    """The parameters of a flight's law.
+
+    Args:
+        plan: Plan of the flight.
+        record: Their type, see `tiltsim_controllers.laws.keys.record_of`.
+        own: Values of fields that are neither keys nor parts of the plan.
+    """
+    known = {
+        "gait": plan.gait.parameters,
+        "reference": plan.reference,
+        "rotors": float(len(plan.knots)),  # where the law's tables follow in the knots
+        **own,
+    }
+    controller = plan.scenario.controller
+    return record(
+        *(known[key] if key in known else number_of(controller, key) for key in record._fields)
+    )
