@@ -12,7 +12,7 @@ from tiltsim.laws.flown_law import loop_of_law
 from tiltsim.laws.full_pose import FULL_POSE, full_pose_loop_of
 from tiltsim.laws.layers.actuation import with_actuation
 from tiltsim.laws.layers.air import with_air
-from tiltsim.laws.layers.allocation import ALLOCATIONS, with_allocation
+from tiltsim.laws.layers.allocation import ALLOCATED, with_allocation
 from tiltsim.laws.layers.measured_acceleration import with_measured_acceleration
 from tiltsim.laws.layers.on_equations import on_equations
 from tiltsim.laws.layers.rotor_inertia import with_rotor_inertia
@@ -94,7 +94,7 @@ def loop_of(
     loop, supervisor = adapted(loop), controller.supervision
     if supervisor is not None:
         loop = with_supervisor(loop, supervisor.strategy)
-    if controller.prioritizes_attitude and loop.dynamics.model in ALLOCATIONS:
+    if controller.prioritizes_attitude and loop.dynamics.model in ALLOCATED:
         loop = with_allocation(loop)
     if scenario.needs_actuation_layer:
         loop = with_actuation(loop, scenario.simulation.latency_steps, external)

@@ -169,7 +169,8 @@ def repeat(
         return _repeat_in_jax(count, body, state, until)
     leaves, build = flatten(state)
     graph = current_graph()
-    if graph is None or not any(isinstance(value, Expr) for value in (count, *leaves)):
+    plain = until is None and not any(isinstance(value, Expr) for value in (count, *leaves))
+    if graph is None or plain:
         turn = 0.0
         while turn < count and not (until is not None and until(*state)):
             state, turn = body(turn, *state), turn + 1.0

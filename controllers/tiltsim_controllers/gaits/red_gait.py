@@ -22,39 +22,40 @@ angle by angle.
 
 from __future__ import annotations
 
-from math import atan, cos, pi, sin
+from math import atan, cos, sin
+from typing import Any
 
-from tiltsim_controllers.mathematics.jets import Jet, Jets4, jet_sum
-from tiltsim_controllers.mathematics.scalar import scalar
-
-
-@scalar
-def clipped_jet(x: Jet, low: float, high: float) -> Jet:
-    """A quantity limited to an interval, at rest on its ends."""
-    if x[0] < low:
-        return low, 0.0, 0.0
-    if x[0] > high:
-        return high, 0.0, 0.0
-    return x
+from tiltsim_controllers.code.arrays import xp
+from tiltsim_controllers.code.traceable import traceable
 
 
-@scalar
-def nearest_red_angles(tilts: Jets4, drag_ratio: float, clearance: float) -> tuple[Jet, Jet]:
-    """``(alpha_1, alpha_2)`` of the red gait nearest to moving ``tilts``, as jets (rad and s).
+@traceable
+def nearest_red_angles(tilts: Any, drag_ratio: Any, clearance: Any) -> Any:
+    """``alpha_1`` and ``alpha_2`` of the red gait nearest to moving tilts.
 
-    ``clearance`` (rad, below ``delta``) is the distance kept from the sides of the quadrant
-    ``u < 0 < v``, where rotors stop, and from a right angle beyond them, where ``R`` vanishes.
+    Args:
+        tilts: Angles with rates and accelerations (rad, s), shape (4, 3).
+        drag_ratio: ``r = K_m / (L K_f)``.
+        clearance: Distance (rad, below ``delta``) from the sides of the quadrant ``u < 0 < v``,
+            where rotors stop, and from a right angle beyond them, where ``R`` vanishes.
+
+    Returns:
+        Angles, rates and accelerations, at rest on a side, shape (2, 3).
     """
-    alpha_1, alpha_2, alpha_3, alpha_4 = tilts
-    delta = atan(drag_ratio)
-    low, high = clearance - delta, 0.5 * pi - delta - clearance
-    return (
-        clipped_jet(jet_sum(0.5, alpha_1, 0.5, alpha_3), -high, -low),
-        clipped_jet(jet_sum(0.5, alpha_2, 0.5, alpha_4), low, high),
-    )
+    delta = xp.arctan(drag_ratio)
+    near, far = clearance - delta, 0.5 * xp.pi - delta - clearance
+    means = 0.5 * tilts[:2] + 0.5 * tilts[2:]
+    ends = xp.array([[-far, -near], [near, far]])
+    return xp.array([_limited(mean, *limits) for mean, limits in zip(means, ends)])
 
 
-@scalar
+def _limited(mean: Any, low: Any, high: Any) -> Any:
+    """A quantity limited to an interval, at rest on its ends, shape (3,)."""
+    below, above = mean[0] < low, mean[0] > high
+    angle = xp.where(below, low, xp.where(above, high, mean[0]))
+    return xp.hstack([angle, xp.where(below | above, 0.0, mean[1:])])
+
+
 def red_determinant(alpha_1: float, alpha_2: float, drag_ratio: float) -> float:
     """``R`` on red (ch. 8, Eq. 7) of angles in rad, factored as above; 4 without tilt."""
     delta = atan(drag_ratio)

@@ -24,30 +24,13 @@ let go again where its multiplier says so.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import cache
-from math import inf, sqrt
+from math import inf
 from typing import Any, Final, NamedTuple
 
-from tiltsim_controllers.laws.force_directions import combination_of
-from tiltsim_controllers.mathematics.rotation import world_up_in_body
-from tiltsim_controllers.mathematics.scalar import (
-    Pair,
-    Quad,
-    Triple,
-    Values,
-    Vector,
-    clipped,
-    scalar,
-)
-from tiltsim_controllers.mathematics.vectors import componentwise, vectors_of, written_out
-from tiltsim_controllers.vehicle.decoupling_matrix import (
-    sines_and_cosines,
-    torque_entries,
-    vertical_force_entries,
-)
-from tiltsim_controllers.vehicle.effectiveness import ROTOR_FLOATS, SPIN_SIGN, Rows
-from tiltsim_controllers.vehicle.parameters import Vehicle, drag_ratio
+from tiltsim_controllers.code.arrays import xp
+from tiltsim_controllers.code.blocks import branch, repeat
+from tiltsim_controllers.code.traceable import traceable
+from tiltsim_controllers.mathematics.linear import norm
 
 NEGLIGIBLE: Final = 1e-9
 """Share of a row or gradient below which it is nothing: well above rounding.
@@ -64,281 +47,173 @@ class RotorRange(NamedTuple):
     horizon: float = 1.0  # s
 
 
-@scalar
-def acceleration_range(speed: float, spin: float, limits: Any) -> Pair:
-    """The accelerations (rad/s^2) of a rotor that keep it within limits, and zero in any case.
+@traceable
+def acceleration_range(speeds: Any, spins: Any, limits: RotorRange) -> tuple[Any, Any]:
+    """Least and greatest accelerations (rad/s^2) that keep rotors within limits, and zero.
 
     Args:
-        speed: rad/s, signed
-        spin: 1 or -1, the sign of the speed with which it pushes along its axis
-        limits: a `RotorRange`
+        speeds: rad/s, signed, shape (N,) or ().
+        spins: 1 or -1, signs of the speeds with which they push along their axes, as ``speeds``.
+        limits: Limits of the speeds.
     """
-    low = min(0.0, (limits.slowest - spin * speed) / limits.horizon)
-    high = max(0.0, (limits.fastest - spin * speed) / limits.horizon)
-    return (low, high) if spin > 0.0 else (-high, -low)
+    low = xp.minimum(0.0, (limits.slowest - spins * speeds) / limits.horizon)
+    high = xp.maximum(0.0, (limits.fastest - spins * speeds) / limits.horizon)
+    along = spins > 0.0
+    return xp.where(along, low, -high), xp.where(along, high, -low)
 
 
-@scalar
-def _room(value: float, direction: float, box: Pair) -> float:
-    """How far a value may move in a direction within its range."""
-    return box[1] - value if direction > 0.0 else value - box[0]
+def _unit(row: Any) -> Any:
+    """A row divided by its length; zeros as they are."""
+    square = row @ row
+    exists = square > 0.0
+    return xp.where(exists, 1.0 / xp.sqrt(xp.where(exists, square, 1.0)), 1.0) * row
 
 
-@scalar
-def _inverse_length(square: float) -> float:
-    """One over the length of what is left of a row of length 1, from its square; 0 for nothing."""
-    return 1.0 / sqrt(square) if square > NEGLIGIBLE * NEGLIGIBLE else 0.0
+def _remainder(rows: Any, free: Any, gradient: Any) -> Any:
+    """The part of a gradient that rows and stopped rotors leave.
 
-
-@scalar
-def _way(value: float, free: float, slope: float, least: float, box: Pair) -> float:
-    """The step along a slope that takes a free rotor to its limit; infinite for any other."""
-    return _room(value, slope, box) / abs(slope) if free > 0.0 and abs(slope) > least else inf
-
-
-@scalar
-def _loss(value: float, free: float, slope: float, least: float, box: Pair) -> float:
-    """Minus the multiplier of a rotor that stopped and gains by leaving its limit; 0 for others."""
-    stopped = free == 0.0 and abs(slope) > least
-    return -abs(slope) if stopped and _room(value, slope, box) > 0.0 else 0.0
-
-
-@scalar
-def _after(value: float, free: float, slope: float, step: float, is_met: bool, box: Pair) -> float:
-    """A rotor's acceleration after a step; at its limit where it is the one that met it."""
-    if is_met:
-        return box[1] if slope > 0.0 else box[0]
-    return value + step * slope if free > 0.0 else value
-
-
-@cache
-def _remainder_of(length: int) -> Callable[..., Values]:
-    """Scalar code of what rows and stopped rotors leave of a gradient: ``(rows, free, gradient)``.
-
-    The remainder is orthogonal to the rows over the free rotors, for which it is the direction of
-    steepest ascent. Its other entries are the multipliers of the rotors that stopped.
-    """
-    dot, scaled, add_scaled, product, _ = vectors_of(length)
-
-    @scalar
-    def without(row: Values, unit: Values, free: Values) -> Values:
-        return add_scaled(row, -dot(product(free, unit), row), unit)
-
-    @scalar
-    def remainder(
-        rows: tuple[Values, Values, Values, Values], free: Values, gradient: Values
-    ) -> Values:
-        a, b, c, d = rows
-        a = scaled(_inverse_length(dot(product(free, a), a)), a)
-        b = without(b, a, free)
-        b = scaled(_inverse_length(dot(product(free, b), b)), b)
-        c = without(without(c, a, free), b, free)
-        c = scaled(_inverse_length(dot(product(free, c), c)), c)
-        d = without(without(without(d, a, free), b, free), c, free)
-        d = scaled(_inverse_length(dot(product(free, d), d)), d)
-        rest = without(without(without(gradient, a, free), b, free), c, free)
-        return without(rest, d, free)
-
-    return remainder
-
-
-class _Rotors(NamedTuple):
-    """Scalar functions of each of a number of rotors."""
-
-    ways: Callable[..., Values]
-    losses: Callable[..., Values]
-    after: Callable[..., Values]
-    let_go: Callable[..., Values]  # (free, which, now): 1 or 0 for one of them
-    smallest: Callable[..., tuple[float, int]]  # (values): and which it is
-
-
-@cache
-def _rotors_of(length: int) -> _Rotors:
-    @scalar
-    def smallest(values: Values) -> tuple[float, int]:
-        least, which = values[0], 0
-        for i in range(1, length):
-            if values[i] < least:
-                least, which = values[i], i
-        return least, which
-
-    return _Rotors(
-        componentwise(
-            "ways",
-            "a, free, rest, least, box",
-            "way(a#, free#, rest#, least, box#)",
-            length,
-            way=_way,
-        ),
-        componentwise(
-            "losses",
-            "a, free, rest, least, box",
-            "loss(a#, free#, rest#, least, box#)",
-            length,
-            loss=_loss,
-        ),
-        componentwise(
-            "after",
-            "a, free, rest, step, met, box",
-            "after(a#, free#, rest#, step, met == @, box#)",
-            length,
-            after=_after,
-        ),
-        componentwise("let_go", "free, which, now", "now if which == @ else free#", length),
-        smallest,
-    )
-
-
-@cache
-def allocated_of(length: int) -> Callable[..., Values]:
-    """Scalar code of the accelerations in a box: ``(requested, torque, lift, box)``.
-
-    ``torque`` are three rows, ``lift`` is one: torque and force rates per acceleration, of any
-    unit. The box has a lower and an upper limit for each rotor, and includes zero. Requested
-    accelerations that are in it come back as they are, and so do those that are not numbers.
-    """
-    dot, scaled, add_scaled, product, _ = vectors_of(length)
-    nothing, each = (0.0,) * length, (1.0,) * length
-    remainder, steps = _remainder_of(length), 3 * length + 8
-    ways, losses, after, let_go, smallest = _rotors_of(length)
-    # Rounding may take the sum past the active limit.
-    within: Callable[..., Values] = componentwise(
-        "within", "a, box", "clipped(a#, box#[0], box#[1])", length, clipped=clipped
-    )
-    is_within: Callable[..., bool] = written_out(
-        f"is_within_{length}",
-        "a, box",
-        " and ".join(f"box[{i}][0] <= a[{i}] <= box[{i}][1]" for i in range(length)),
-    )
-
-    @scalar
-    def unit(row: Values) -> Values:
-        square = dot(row, row)
-        return scaled(1.0 / sqrt(square), row) if square > 0.0 else row
-
-    @scalar
-    def allocated(
-        requested: Values, torque: tuple[Values, Values, Values], lift: Values, box: Any
-    ) -> Values:
-        size = sqrt(dot(requested, requested))
-        if is_within(requested, box) or not size < inf:
-            return requested
-        roll, pitch = dot(torque[0], requested), dot(torque[1], requested)
-        if roll == 0.0 and pitch == 0.0:
-            roll = 1.0
-        across = unit(add_scaled(scaled(pitch, torque[0]), -roll, torque[1]))
-        leaning = unit(add_scaled(scaled(roll, torque[0]), pitch, torque[1]))
-        turning, rising = unit(torque[2]), unit(lift)
-        a, free, level = nothing, each, 0
-        for _ in range(steps):
-            objective, kept, kept_yaw, kept_lift = leaning, nothing, nothing, nothing
-            if level > 0:
-                objective, kept = turning, leaning
-            if level > 1:
-                objective, kept_yaw = rising, turning
-            gap = dot(objective, requested) - dot(objective, a)
-            gradient = scaled(1.0 if gap > 0.0 else -1.0, objective)
-            if level > 2:
-                gradient, kept_lift = add_scaled(requested, -1.0, a), rising
-            rest = remainder((across, kept, kept_yaw, kept_lift), free, gradient)
-            along = dot(product(free, rest), rest)
-            least = NEGLIGIBLE * sqrt(dot(gradient, gradient))
-            if along > least * least:
-                enough = abs(gap) / along if level < 3 else 1.0
-                step, which = smallest(ways(a, free, rest, least, box))
-                if step < enough:
-                    a = after(a, free, rest, step, which, box)
-                    free = let_go(free, which, 0.0)
-                else:
-                    a = after(a, free, rest, enough, -1, box)
-                    level = min(3, level + 1)
-            else:
-                loss, which = smallest(losses(a, free, rest, least, box))
-                if loss < 0.0:
-                    free = let_go(free, which, 1.0)
-                elif level == 3:
-                    break
-                else:
-                    level += 1
-        return within(a, box)
-
-    return allocated
-
-
-@cache
-def limited_of(length: int) -> Callable[..., Values]:
-    """Scalar code that keeps rotor accelerations (rad/s^2) within limits.
-
-    ``(requested, rows, up, speeds, limits, table, at)``: ``rows`` of F and tau per unit of ``w``,
-    ``up`` is world up in body axes, ``limits`` a `RotorRange`; ``table`` and ``at`` as in
-    `tiltsim_controllers.vehicle.effectiveness`.
-    """
-    _, scaled, _, product, sizes = vectors_of(length)
-    allocated, combination = allocated_of(length), combination_of(length)
-    ranges: Callable[..., tuple[Pair, ...]] = componentwise(
-        "acceleration_ranges",
-        "speeds, limits, table, at",
-        f"range_of(speeds#, table[at + {SPIN_SIGN} + {ROTOR_FLOATS} * @], limits)",
-        length,
-        range_of=acceleration_range,
-    )
-
-    @scalar
-    def limited(
-        requested: Values,
-        rows: Rows,
-        up: Triple,
-        speeds: Values,
-        limits: Any,
-        table: Vector,
-        at: int,
-    ) -> Values:
-        fx, fy, fz, tx, ty, tz = rows
-        gain = scaled(2.0, sizes(speeds))  # of w, per acceleration
-        torque = product(gain, tx), product(gain, ty), product(gain, tz)
-        lift = product(gain, combination(up, fx, fy, fz))
-        return allocated(requested, torque, lift, ranges(speeds, limits, table, at))
-
-    return limited
-
-
-_allocated, _product = allocated_of(4), vectors_of(4).product
-
-
-@scalar
-def limited_tiltrotor(
-    requested: Quad,
-    tilts: Quad,
-    speeds: Quad,
-    roll: float,
-    pitch: float,
-    vehicle: Vehicle,
-    limits: Any,
-) -> Values:
-    """Rotor accelerations (rad/s^2) of the tiltrotor within limits.
+    It is orthogonal to the rows over the free rotors, for which it is the direction of steepest
+    ascent. Its other entries are the multipliers of the rotors that stopped.
 
     Args:
-        requested: solution of the decoupling matrix, rad/s^2
-        tilts, speeds: tilt angles, rad; signed rotor speeds, rad/s
-        roll, pitch: rad
-        vehicle: the tiltrotor
-        limits: a `RotorRange`
+        rows: Of length 1 or 0, shape (N,) each.
+        free: 1 for rotors that move, 0 for rotors at a limit, shape (N,).
+        gradient: Shape (N,).
     """
-    s1, s2, s3, s4 = speeds
-    trig = sines_and_cosines(tilts[0], tilts[1], tilts[2], tilts[3])
-    x2, x4, y1, y3, z1, z2, z3, z4 = torque_entries(trig, drag_ratio(vehicle))
-    ux, uy, uz = world_up_in_body(roll, pitch)
-    gain = 2.0 * abs(s1), 2.0 * abs(s2), 2.0 * abs(s3), 2.0 * abs(s4)
-    torque = (
-        _product(gain, (0.0, x2, 0.0, x4)),
-        _product(gain, (y1, 0.0, y3, 0.0)),
-        _product(gain, (z1, z2, z3, z4)),
-    )
-    lift = _product(gain, vertical_force_entries(trig, ux, uy, uz))
-    box = (
-        acceleration_range(s1, -1.0, limits),
-        acceleration_range(s2, 1.0, limits),
-        acceleration_range(s3, -1.0, limits),
-        acceleration_range(s4, 1.0, limits),
-    )
-    return _allocated(requested, torque, lift, box)
+    units: list[Any] = []
+    for row in (*rows, gradient):
+        rest = row
+        for unit in units:
+            rest = rest - ((free * unit) @ rest) * unit
+        square = (free * rest) @ rest
+        exists = square > NEGLIGIBLE * NEGLIGIBLE
+        inverse = xp.where(exists, 1.0 / xp.sqrt(xp.where(exists, square, 1.0)), 0.0)
+        units.append(inverse * rest)
+    return rest
+
+
+def _least(values: Any) -> tuple[Any, Any]:
+    """The first of the least of some numbers, and its place."""
+    least, place = values[0], 0.0
+    for index, value in enumerate(values):
+        place = xp.where(value < least, float(index), place)
+        least = xp.where(value < least, value, least)
+    return least, place
+
+
+def _is_at(place: Any, count: int) -> Any:
+    """Whether each of a number of rotors is the one at a place."""
+    return xp.array([float(index) for index in range(count)]) == place
+
+
+class _Objective(NamedTuple):
+    """The four levels of the allocation, of which each keeps the results of those before it.
+
+    Attributes:
+        requested: Requested accelerations, rad/s^2, shape (N,).
+        across: Row that keeps the direction of the roll and pitch torque, shape (N,).
+        rows: Rows of roll and pitch, yaw, and lift, shape (3, N).
+        low, high: Limits of the accelerations, rad/s^2, shape (N,).
+    """
+
+    requested: Any
+    across: Any
+    rows: Any
+    low: Any
+    high: Any
+
+    def gradient(self, level: Any, now: Any) -> tuple[Any, Any, Any]:
+        """The gradient of a level, the gap that it closes, and the rows that it keeps."""
+        leaning, turning, rising = self.rows
+        objective = xp.where(level > 1.0, rising, xp.where(level > 0.0, turning, leaning))
+        gap = objective @ self.requested - objective @ now
+        toward = xp.where(gap > 0.0, 1.0, -1.0) * objective
+        gradient = xp.where(level > 2.0, self.requested - now, toward)
+        kept = [xp.where(level > k, row, 0.0 * row) for k, row in enumerate(self.rows)]
+        return gradient, gap, (self.across, *kept)
+
+    def turn(self, now: Any, free: Any, level: Any) -> tuple[Any, Any, Any, Any]:
+        """Accelerations, free rotors, level and whether it is done, one step further."""
+        gradient, gap, rows = self.gradient(level, now)
+        rest = _remainder(rows, free, gradient)
+        along = (free * rest) @ rest
+        least = NEGLIGIBLE * norm(gradient)
+        counts = abs(rest) > least
+        room = xp.where(rest > 0.0, self.high - now, now - self.low)
+
+        def step() -> tuple[Any, ...]:
+            moves = (free > 0.0) & counts
+            way, met = _least(xp.where(moves, room / xp.where(moves, abs(rest), 1.0), inf))
+            enough = xp.where(level < 3.0, abs(gap) / along, 1.0)
+            stops = way < enough
+            stopped = stops & _is_at(met, len(now))
+            moved = now + xp.where(stops, way, enough) * rest
+            limit = xp.where(rest > 0.0, self.high, self.low)
+            reached = xp.where(stopped, limit, xp.where(free > 0.0, moved, now))
+            next_level = xp.where(stops, level, xp.minimum(3.0, level + 1.0))
+            return reached, xp.where(stopped, 0.0, free), next_level, 0.0
+
+        def release() -> tuple[Any, ...]:
+            stopped = (free == 0.0) & counts & (room > 0.0)
+            loss, place = _least(xp.where(stopped, -abs(rest), 0.0))
+            gains, is_last = loss < 0.0, level == 3.0
+            freed = xp.where(gains & _is_at(place, len(now)), 1.0, free)
+            next_level = xp.where(gains | is_last, level, level + 1.0)
+            return now, freed, next_level, xp.where(gains, 0.0, xp.where(is_last, 1.0, 0.0))
+
+        return branch(along > least * least, step, release)  # type: ignore[no-any-return]
+
+
+@traceable
+def allocated(requested: Any, torque: Any, lift: Any, low: Any, high: Any) -> Any:
+    """Rotor accelerations (rad/s^2) within limits, shape (N,).
+
+    Requested accelerations within the limits come back as they are, and so do those that are not
+    numbers.
+
+    Args:
+        requested: rad/s^2, shape (N,).
+        torque: Torque rates per acceleration, of any unit, shape (3, N).
+        lift: Force rates, likewise, shape (N,).
+        low, high: Limits, which include zero, rad/s^2, shape (N,) each.
+    """
+    count = len(requested)
+    exceeds = False
+    for value, least, most in zip(requested, low, high):
+        exceeds = exceeds | (value < least) | (value > most)
+
+    def limited() -> Any:
+        roll, pitch = torque[0] @ requested, torque[1] @ requested
+        roll = xp.where((roll == 0.0) & (pitch == 0.0), 1.0, roll)
+        across = _unit(pitch * torque[0] - roll * torque[1])
+        leaning = _unit(roll * torque[0] + pitch * torque[1])
+        rows = xp.array([leaning, _unit(torque[2]), _unit(lift)])
+        objective = _Objective(requested, across, rows, low, high)
+        found = repeat(
+            3 * count + 8,
+            lambda _turn, now, free, level, _done: objective.turn(now, free, level),
+            *(xp.zeros(count), xp.ones(count), 0.0, 0.0),
+            until=lambda _now, _free, _level, done: done > 0.0,
+        )[0]
+        return xp.clip(found, low, high)  # rounding may take the sum past the active limit
+
+    return branch((norm(requested) < inf) & exceeds, limited, lambda: requested)
+
+
+@traceable
+def limited_accelerations(
+    requested: Any, wrench: Any, up: Any, speeds: Any, spins: Any, limits: RotorRange
+) -> Any:
+    """Rotor accelerations (rad/s^2) that keep the speeds within limits, shape (N,).
+
+    Args:
+        requested: rad/s^2, shape (N,).
+        wrench: Force and torque per unit of ``w``, body axes, any units, shape (6, N).
+        up: World up in body axes, shape (3,).
+        speeds: rad/s, signed, shape (N,).
+        spins: Signs of the speeds with which they push along their axes, shape (N,).
+        limits: Limits of the speeds.
+    """
+    gain = 2.0 * abs(speeds)  # of w, per acceleration
+    low, high = acceleration_range(speeds, spins, limits)
+    return allocated(requested, gain * wrench[3:], gain * (up @ wrench[:3]), low, high)

@@ -12,7 +12,7 @@ from typing import Any, Final
 
 from tiltsim_controllers.gaits.motion import Jets, tilt_motion_of
 from tiltsim_controllers.gaits.parameters import FIXED, NO_KNOTS, GaitParameters
-from tiltsim_controllers.laws.allocation import limited_of
+from tiltsim_controllers.laws.allocation import limited_accelerations
 from tiltsim_controllers.laws.attitude_altitude import OPTIONS, AttitudeAltitude
 from tiltsim_controllers.laws.decouplers import NONE
 from tiltsim_controllers.laws.gains import Gains, IntegralGains
@@ -23,10 +23,10 @@ from tiltsim_controllers.laws.multirotor_supervisor import multirotor_supervisio
 from tiltsim_controllers.laws.supervisor import SUPERVISOR_AT_REST, Supervisor, gait_time
 from tiltsim_controllers.laws.tiltrotor_supervisor import SUPERVISION
 from tiltsim_controllers.mathematics.scalar import Quad, Triple, Values, Vector, scalar
-from tiltsim_controllers.mathematics.vectors import componentwise, entries_of
 from tiltsim_controllers.references.trajectories import ReferenceParameters, reference_derivatives
 from tiltsim_controllers.vehicle.effectiveness import TiltOfRotor, tilts_of
 from tiltsim_controllers.vehicle.parameters import Vehicle, drag_ratio
+from tiltsim_controllers.vehicle.rotors import spins_in
 from tiltsim_controllers.vehicle.states import PITCH, ROLL
 
 Parameters = record_of(
@@ -106,8 +106,7 @@ def _plan_of(layout: TiltOfRotor, form: Form) -> Callable[..., Jets]:
     under a supervisor whose state is ``motion``, what it makes of them.
     """
     motion_of = tilt_motion_of(tilts_of(layout))
-    planned_of, anticipated = motion_of.planned, motion_of.anticipated
-    angles = componentwise("angles_of_jets", "jets", "jets#[0]", tilts_of(layout))
+    moving, anticipated = motion_of.moving, motion_of.anticipated
 
     @scalar
     def planned(time: float, state: Values, motion: Triple, parameters: Any, knots: Vector) -> Jets:
@@ -124,7 +123,7 @@ def _plan_of(layout: TiltOfRotor, form: Form) -> Callable[..., Jets]:
     ) -> Jets:
         supervisor, vehicle = parameters.supervisor, watched_at(time, parameters)
         clock = gait_time(time, motion, supervisor)
-        now = angles(planned_of(clock, parameters.gait, knots))
+        now, _ = moving(clock, parameters.gait, knots)
         scale = gait_scale(now, state[ROLL], state[PITCH], supervisor, vehicle, knots)
         ahead = planned(clock, state, motion, parameters, knots)
         return supervised_tilts(ahead, scale, motion, supervisor, vehicle)
@@ -140,8 +139,7 @@ def multirotor_law_of(layout: TiltOfRotor, form: Form) -> Callable[..., Values]:
     rotors is in the knots, and it also returns the null part.
     """
     count, plan_of, prioritized = len(layout), _plan_of(layout, form), form.prioritized
-    speeds_in, rest_in = entries_of(12 + tilts_of(layout), count), entries_of(count, 7)
-    accelerations_in, limited = entries_of(0, count), limited_of(count)
+    speeds = slice(12 + tilts_of(layout), 12 + tilts_of(layout) + count)
     leans_with_gait = form.dimension < 3 and not form.forward and tilts_of(layout) > 0
     supervised = form.supervised
 
@@ -167,9 +165,11 @@ def multirotor_law_of(layout: TiltOfRotor, form: Form) -> Callable[..., Values]:
         )  # fmt: skip
         if not prioritized:
             return found
-        rows, up = present_wrench(time, state, parameters, knots, layout)
-        limits, at, speeds = parameters.limits, int(parameters.rotors), speeds_in(state)
-        accelerations = limited(accelerations_in(found), rows, up, speeds, limits, knots, at)
-        return (*accelerations, *rest_in(found))
+        wrench, up = present_wrench(time, state, parameters, knots, layout)
+        spins = spins_in(knots, parameters.rotors, layout)
+        accelerations = limited_accelerations(
+            found[:count], wrench, up, state[speeds], spins, parameters.limits
+        )
+        return (*accelerations, *found[count:])
 
     return inputs

@@ -11,26 +11,29 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cache
-from math import asin, pi, sqrt
+from math import pi
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from tiltsim_controllers.laws.force_directions import combination_of, factors_of, share_of
-from tiltsim_controllers.laws.supervisor import UNTILTED, Assessment, Supervision, supervision_of
-from tiltsim_controllers.mathematics.scalar import Triple, Values, Vector, scalar
-from tiltsim_controllers.mathematics.vectors import vectors_of
+from tiltsim_controllers.code.arrays import xp
+from tiltsim_controllers.code.traceable import traceable
+from tiltsim_controllers.gaits.parameters import NO_KNOTS
+from tiltsim_controllers.laws.force_directions import factors, share
+from tiltsim_controllers.laws.supervisor import UNTILTED, Supervision, supervision_of
+from tiltsim_controllers.mathematics.linear import norm
+from tiltsim_controllers.mathematics.scalar import Triple
 from tiltsim_controllers.vehicle.effectiveness import (
     TiltOfRotor,
-    effectiveness_of,
     force_and_torque,
     tilt_of_rotor,
     tilts_of,
 )
+from tiltsim_controllers.vehicle.rotors import rotors_in, wrench_map
 
 
 class Watched(NamedTuple):
-    """What the supervisor reads of a vehicle."""
+    """Vehicle parameters used by the supervisor."""
 
     rotors: float = 0.0  # where in the knots the table of the rotors begins
     per_volume: float = 0.0  # of the determinant, 1 / (N^3 m^3) and units of the speeds
@@ -53,13 +56,29 @@ def watched(table: Sequence[float], rotors: int, side: Triple) -> Watched:
     return Watched(float(rotors), UNTILTED / untilted_volume(table), *side)
 
 
-@scalar
-def watched_at(time: float, parameters: Any) -> Watched:
-    """What is watched at a time (s): of the other rotors, once it is known that one failed."""
-    seen: Watched = parameters.watched
-    if time >= parameters.failure.known_from:
-        seen = parameters.watched_without
-    return seen
+@traceable
+def watched_at(time: Any, parameters: Any) -> Watched:
+    """Parameters of the rotors that work: without a failed one once the failure is known.
+
+    Args:
+        time: s.
+        parameters: ``watched``, ``watched_without`` and ``failure`` of a law.
+    """
+    whole, rest = parameters.watched, parameters.watched_without
+    if rest.rotors == 0.0:  # no table without a rotor: no failure will be known
+        return whole  # type: ignore[no-any-return]
+    known = time >= parameters.failure.known_from
+    return Watched(*(xp.where(known, b, a) for a, b in zip(whole, rest, strict=True)))
+
+
+def _margin(up: Any, direction: Any, dimension: int) -> Any:
+    """The margin (rad) by the ``direction`` of the factors, whatever its length."""
+    if dimension == 3:
+        return 0.5 * pi
+    along = direction @ up / norm(direction)
+    if dimension == 2:
+        along = xp.sqrt(xp.maximum(0.0, 1.0 - along * along))
+    return xp.arcsin(xp.minimum(1.0, along))
 
 
 @cache
@@ -69,46 +88,31 @@ def multirotor_supervision_of(
     """The supervisor of vehicles of a layout, whose ``vehicle`` is a `Watched`.
 
     Args:
-        layout: of the table of rotors
-        dimension, forward: as for `tiltsim_controllers.laws.multirotor.multirotor_law_of`
+        layout: Layout of the table of rotors.
+        dimension, forward: As for `tiltsim_controllers.laws.force_directions.factors`.
     """
-    cosines, sines, effect, _, _ = effectiveness_of(layout)
-    length = len(layout)
-    factors_of_rows = factors_of(length, dimension, forward)
-    dot, combination, share_of_row = (
-        vectors_of(length).dot,
-        combination_of(length),
-        share_of(length),
-    )
 
-    @scalar
-    def margin_of(up: Triple, direction: Triple) -> float:
-        """The margin by the ``direction`` of the factors, whatever its length."""
-        if dimension == 3:
-            return 0.5 * pi
-        x, y, z = direction
-        along = (x * up[0] + y * up[1] + z * up[2]) / sqrt(x * x + y * y + z * z)
-        if dimension == 2:
-            along = sqrt(max(0.0, 1.0 - along * along))
-        return asin(min(1.0, along))
-
-    @scalar
-    def assess(tilts: Values, up: Triple, vehicle: Watched, knots: Vector) -> Assessment:
-        rows = effect(1.0, cosines(tilts), sines(tilts), knots, int(vehicle.rotors))
-        forces = rows[0], rows[1], rows[2]
-        _, lifts, units, direction = factors_of_rows(rows, forces, up)
-        lift = combination(up, *forces)
-        size = dot(rows[3], units[0]) * dot(rows[4], units[1]) * dot(rows[5], units[2])
-        size *= vehicle.per_volume * sqrt(dot(lift, lift))
-        for k in range(dimension):
-            size *= share_of_row(lifts[k], units[3 + k])
-        if not size > 0.0:
-            return 0.0, 0.0, up
-        margin = margin_of(up, direction)
+    @traceable
+    def assess(
+        tilts: Any, up: Any, vehicle: Watched, knots: Any = NO_KNOTS
+    ) -> tuple[Any, Any, Any]:
+        wrench = wrench_map(rotors_in(knots, vehicle.rotors, layout), tilts)
+        force, torque = wrench[:3], wrench[3:]
+        _, lifts, units, direction = factors(wrench, force, up, dimension, forward)
+        size = (torque[0] @ units[0]) * (torque[1] @ units[1]) * (torque[2] @ units[2])
+        size = size * (vehicle.per_volume * norm(up @ force))
+        for lift, unit in zip(lifts, units[3:]):
+            size = size * share(lift, unit)
+        regular = size > 0.0
+        margin = _margin(up, direction, dimension)
         if dimension == 1:
-            side = (vehicle.side_x, vehicle.side_y, vehicle.side_z)
-            if dot(units[3], combination(side, *forces)) < 0.0:
-                return -margin, -size, direction
-        return margin, size, direction
+            side = xp.array([vehicle.side_x, vehicle.side_y, vehicle.side_z])
+            sign = xp.where(units[3] @ (side @ force) < 0.0, -1.0, 1.0)
+            margin, size = sign * margin, sign * size
+        return (
+            xp.where(regular, margin, 0.0),
+            xp.where(regular, size, 0.0),
+            xp.where(regular, direction, up),
+        )
 
     return supervision_of(tilts_of(layout), assess)

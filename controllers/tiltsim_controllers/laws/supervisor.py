@@ -28,16 +28,16 @@ tilts have accelerations for the controllers that use them.
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import inf, pi, sqrt
+from math import inf, pi
 from typing import Any, Final, NamedTuple
 
-from tiltsim_controllers.gaits.motion import Jets, tilt_motion_of
+from tiltsim_controllers.code.arrays import xp
+from tiltsim_controllers.code.blocks import branch, repeat
+from tiltsim_controllers.code.traceable import traceable
+from tiltsim_controllers.gaits.motion import planned_tilts
 from tiltsim_controllers.gaits.parameters import NO_KNOTS, GaitParameters
-from tiltsim_controllers.mathematics.jets import Jet, jet_scaled
-from tiltsim_controllers.mathematics.rotation import world_up_in_body
-from tiltsim_controllers.mathematics.scalar import Triple, Values, Vector, scalar
-from tiltsim_controllers.mathematics.vectors import componentwise, vectors_of
-from tiltsim_controllers.vehicle.rigid_body import cross
+from tiltsim_controllers.mathematics.attitude import rotation_matrix
+from tiltsim_controllers.mathematics.linear import cross
 
 SCALE: Final = 0.0
 HOLD: Final = 1.0
@@ -86,286 +86,241 @@ class Supervisor(NamedTuple):
     clearance: float = 0.0  # rad, of red gaits from the curve L
 
 
-Assessment = tuple[float, float, Triple]
-"""Margin (rad), determinant (`UNTILTED` at best), and the direction (body axes, of any length and
-sense) that keeps its attitude in hover."""
-
-
 class WayBack(NamedTuple):
-    """Scalar code of the gait to which a vehicle's tilts can return."""
+    """The gait to which a vehicle's tilts can return; planned tilts have shape (M, 3)."""
 
-    tilts: Callable[..., Jets]
+    tilts: Callable[..., Any]
     """``(planned, motion, supervisor, vehicle)``: the planned tilts, moved by a fraction."""
-    speed: Callable[..., float]
+    speed: Callable[..., Any]
     """``(planned, supervisor, vehicle)``: rate (1/s) along the way at the maximum tilt rate."""
 
 
-@scalar
-def _as_planned(planned: Jets, motion: Triple, supervisor: Supervisor, vehicle: Any) -> Jets:
-    return planned
-
-
-@scalar
-def _standing(planned: Jets, supervisor: Supervisor, vehicle: Any) -> float:
-    return 0.0
-
-
-NO_WAY_BACK: Final = WayBack(_as_planned, _standing)
+NO_WAY_BACK: Final = WayBack(lambda planned, *_: planned, lambda *_: 0.0)
 """For vehicles without `RETURN_TO_RED`, which is refused for them."""
 
 
 class Supervision(NamedTuple):
-    """Scalar code of a supervisor of vehicles with the same tilts.
+    """Functions of a supervisor of vehicles with M tilts.
 
-    ``vehicle`` is what ``assess`` reads of a vehicle besides the ``knots``; tilt angles, roll and
-    pitch are in rad.
+    ``vehicle`` holds the parameters that ``assess`` needs beside the ``knots``. Tilt angles, shape
+    (M,), roll and pitch are in rad.
     """
 
-    assess: Callable[..., Assessment]
-    """``(tilts, up, vehicle, knots)``; ``up`` as `world_up_in_body` returns it."""
-    clearance: Callable[..., float]
+    assess: Callable[..., tuple[Any, Any, Any]]
+    """``(tilts, up, vehicle, knots)``: margin (rad), determinant (`UNTILTED` at best), and the
+    direction (body axes, of any length and sense) that keeps its attitude in hover; ``up`` is world
+    up in body axes."""
+    clearance: Callable[..., Any]
     """``(tilts, up, supervisor, vehicle, knots)``: distance above the thresholds relative to the
     largest possible; negative below them."""
-    allowed_scale: Callable[..., float]
+    allowed_scale: Callable[..., Any]
     """``(tilts, roll, pitch, supervisor, vehicle, knots)``: the largest scale in [0, 1] that
     satisfies the thresholds, or that of the grid which comes nearest where none does. A range of
     scales between two of the grid may pass unseen."""
-    gait_scale: Callable[..., float]
+    gait_scale: Callable[..., Any]
     """As ``allowed_scale``, and 1 unless the strategy is `SCALE`."""
-    tilts: Callable[..., Jets]
+    tilts: Callable[..., Any]
     """``(planned, scale, motion, supervisor, vehicle)``: the supervised tilts with rates and
-    accelerations (rad, s): of the gait at its `gait_time`, the ``gait_scale``, and the supervisor's
-    state with its rate and acceleration."""
-    derivative: Callable[..., Triple]
+    accelerations (rad, s), shape (M, 3): of the gait at its `gait_time`, the ``gait_scale``, and
+    the supervisor's state with its rate and acceleration."""
+    derivative: Callable[..., Any]
     """``(time, roll, pitch, state, rate, gait, knots, supervisor, vehicle)``: the supervisor's
-    state (s or a fraction), its rate and the resulting acceleration."""
+    state (s or a fraction), its rate and the resulting acceleration, shape (3,)."""
 
 
-@scalar
-def gait_time(time: float, motion: Triple, supervisor: Supervisor) -> float:
+@traceable
+def gait_time(time: Any, motion: Any, supervisor: Supervisor) -> Any:
     """The time (s) of the gait's clock, which the strategy ``HOLD`` delays."""
     return time - motion[0] if supervisor.strategy == HOLD else time
 
 
-@scalar
-def _on_clock(tilt: Jet, motion: Triple) -> Jet:
-    """A tilt on the gait's clock as a function of time: the clock runs at one minus the rate."""
+def _up(roll: Any, pitch: Any) -> Any:
+    """World up in body axes, shape (3,)."""
+    return rotation_matrix(xp.array([roll, pitch, 0.0]))[2]
+
+
+def _on_clock(planned: Any, motion: Any) -> Any:
+    """Tilts on the gait's clock as functions of time: the clock runs at one minus the rate."""
+    angles, rates, accelerations = planned.T
     speed = 1.0 - motion[1]
-    return tilt[0], tilt[1] * speed, tilt[2] * speed * speed - tilt[1] * motion[2]
+    slowed = accelerations * speed * speed - rates * motion[2]
+    return xp.stack([angles, rates * speed, slowed], 1)
 
 
-@scalar
-def _relative_clearance(margin: float, determinant: float, supervisor: Supervisor) -> float:
+def _relative_clearance(margin: Any, determinant: Any, supervisor: Supervisor) -> Any:
     """The distance above the thresholds, as `Supervision.clearance`."""
-    return min(
+    return xp.minimum(
         (margin - supervisor.min_margin) / (0.5 * pi - supervisor.min_margin),
         (determinant - supervisor.min_determinant) / (UNTILTED - supervisor.min_determinant),
     )
 
 
-@scalar
-def turned_along(up: Triple, start: Triple, end: Triple) -> Triple:
-    """A direction turned by the least rotation between two lines, if both have a length."""
-    size = sqrt(
-        (start[0] * start[0] + start[1] * start[1] + start[2] * start[2])
-        * (end[0] * end[0] + end[1] * end[1] + end[2] * end[2])
-    )
-    if not size > 0.0:
-        return up
-    along = (start[0] * end[0] + start[1] * end[1] + start[2] * end[2]) / size
-    if along < 0.0:
-        along, size = -along, -size
-    x, y, z = cross(start, end)
-    axis = x / size, y / size, z / size  # times the sine of the angle
-    turned = cross(axis, up)
-    share = (axis[0] * up[0] + axis[1] * up[1] + axis[2] * up[2]) / (1.0 + along)
-    return (
-        along * up[0] + turned[0] + share * axis[0],
-        along * up[1] + turned[1] + share * axis[1],
-        along * up[2] + turned[2] + share * axis[2],
-    )
+@traceable
+def turned_along(up: Any, start: Any, end: Any) -> Any:
+    """A direction turned by the least rotation between two lines, if both have a length.
+
+    Args:
+        up, start, end: Shape (3,) each.
+    """
+    size = xp.sqrt((start @ start) * (end @ end))
+    turns = size > 0.0
+    along = start @ end / xp.where(turns, size, 1.0)
+    length = xp.where(turns, xp.where(along < 0.0, -size, size), 1.0)
+    along = abs(along)
+    axis = cross(start, end) / length  # times the sine of the angle
+    share = axis @ up / (1.0 + along)
+    return xp.where(turns, along * up + cross(axis, up) + share * axis, up)
 
 
-def _clearance_of(assess: Callable[..., Assessment]) -> Any:
-    @scalar
-    def clearance(
-        tilts: Values, up: Triple, supervisor: Supervisor, vehicle: Any, knots: Vector = NO_KNOTS
-    ) -> float:
-        margin, determinant, _ = assess(tilts, up, vehicle, knots)
-        return _relative_clearance(margin, determinant, supervisor)
+class _Supervised(NamedTuple):
+    """A supervisor in a flight: how far a vehicle is from its thresholds.
 
-    return clearance
+    Attributes:
+        assess: See `Supervision`.
+        supervisor: Thresholds.
+        vehicle: Parameters of the vehicle.
+        knots: Table data of the flight.
+    """
+
+    assess: Callable[..., tuple[Any, Any, Any]]
+    supervisor: Supervisor
+    vehicle: Any
+    knots: Any
+
+    def look(self, tilts: Any, up: Any) -> tuple[Any, Any]:
+        """Clearance, and the direction in which the vehicle hovers."""
+        margin, determinant, direction = self.assess(tilts, up, self.vehicle, self.knots)
+        return _relative_clearance(margin, determinant, self.supervisor), direction
 
 
-def _scales_of(
-    tilts: int, clearance: Callable[..., float]
-) -> tuple[Callable[..., float], Callable[..., float]]:
-    """``allowed_scale`` and ``gait_scale``."""
-    scaled = vectors_of(tilts).scaled
+def _largest_scale(tilts: Any, up: Any, supervised: _Supervised) -> Any:
+    """`Supervision.allowed_scale` at an attitude."""
 
-    @scalar
-    def allowed_scale(
-        tilts: Values,
-        roll: float,
-        pitch: float,
-        supervisor: Supervisor,
-        vehicle: Any,
-        knots: Vector = NO_KNOTS,
-    ) -> float:
-        up = world_up_in_body(roll, pitch)
-        low = high = nearest = 1.0
-        left, most = 0.0, -inf
-        for step in range(SCALE_GRID + 1):
-            low = 1.0 - step / SCALE_GRID
-            left = clearance(scaled(low, tilts), up, supervisor, vehicle, knots)
-            if left >= 0.0:
-                break
-            if left > most:
-                most, nearest = left, low
-            high = low
-        if left < 0.0:
-            return nearest
-        if low == 1.0:
-            return low
-        for _ in range(BISECTIONS):
+    def clearance_at(scale: Any) -> Any:
+        return supervised.look(scale * tilts, up)[0]
+
+    def lower(step: Any, scale: Any, left: Any, nearest: Any, most: Any) -> tuple[Any, ...]:
+        better = left > most
+        nearest, most = xp.where(better, scale, nearest), xp.where(better, left, most)
+        scale = 1.0 - (step + 1.0) / SCALE_GRID
+        return scale, clearance_at(scale), nearest, most
+
+    def bisected(low: Any) -> Any:
+        def halve(_turn: Any, low: Any, high: Any) -> tuple[Any, Any]:
             middle = 0.5 * (low + high)
-            if clearance(scaled(middle, tilts), up, supervisor, vehicle, knots) >= 0.0:
-                low = middle
-            else:
-                high = middle
-        return low
+            allowed = clearance_at(middle) >= 0.0
+            return xp.where(allowed, middle, low), xp.where(allowed, high, middle)
 
-    @scalar
-    def gait_scale(
-        tilts: Values,
-        roll: float,
-        pitch: float,
-        supervisor: Supervisor,
-        vehicle: Any,
-        knots: Vector = NO_KNOTS,
-    ) -> float:
-        if supervisor.strategy != SCALE:
-            return 1.0
-        if supervisor.min_margin <= 0.0 and supervisor.min_determinant <= 0.0:
-            return 1.0
-        return allowed_scale(tilts, roll, pitch, supervisor, vehicle, knots)
+        return repeat(BISECTIONS, halve, low, low + 1.0 / SCALE_GRID)[0]
 
-    return allowed_scale, gait_scale
+    whole = clearance_at(1.0)
+
+    def searched() -> Any:
+        low, left, nearest, most = repeat(
+            SCALE_GRID, lower, 1.0, whole, 1.0, -inf, until=lambda _, left, *__: left >= 0.0
+        )
+        nearest = xp.where(left > most, low, nearest)
+        return branch(left < 0.0, lambda: nearest, lambda: bisected(low))
+
+    return branch(whole >= 0.0, lambda: 1.0, searched)
 
 
-def _tilts_of(tilts: int, way_back: WayBack) -> Callable[..., Jets]:
-    moved_back = way_back.tilts
-    on_clock: Callable[..., Jets] = componentwise(
-        "on_clock", "planned, motion", "clock(planned#, motion)", tilts, clock=_on_clock
-    )
-    scaled: Callable[..., Jets] = componentwise(
-        "scaled_jets", "scale, planned", "scaled(scale, planned#)", tilts, scaled=jet_scaled
-    )
+def _smallest_ahead(clock: Any, up: Any, tilts_at: Callable[..., Any], now: _Supervised) -> Any:
+    """The smallest clearance up to the horizon at the supervisor's present state.
 
-    @scalar
-    def supervised_tilts(
-        planned: Jets, scale: float, motion: Triple, supervisor: Supervisor, vehicle: Any
-    ) -> Jets:
-        if supervisor.strategy == HOLD:
-            return on_clock(planned, motion)
-        if supervisor.strategy == RETURN_TO_RED:
-            return moved_back(planned, motion, supervisor, vehicle)
-        return scaled(scale, planned)
+    The vehicle meets each sample's tilts with the lean of a moment before. In hover it leans with
+    their direction; it stays as far away from that as it is now.
 
-    return supervised_tilts
+    Args:
+        clock: Time of the gait's clock, s.
+        up: World up in body axes, shape (3,).
+        tilts_at: The tilts (rad, shape (M,)) at a time of the clock.
+        now: The supervisor.
+    """
+    spacing = now.supervisor.horizon / LOOKAHEAD_SAMPLES
+    smallest, start = now.look(tilts_at(clock), up)
 
+    def glance(sample: Any, smallest: Any, before: Any) -> tuple[Any, Any]:
+        ahead = clock + spacing * (sample + 1.0)
+        before = branch(
+            spacing > FOLLOWED, lambda: now.look(tilts_at(ahead - FOLLOWED), up)[1], lambda: before
+        )
+        clearance, direction = now.look(tilts_at(ahead), turned_along(up, start, before))
+        return xp.minimum(smallest, clearance), direction
 
-def _lookahead_of(
-    tilts: int, assess: Callable[..., Assessment], supervised_tilts: Callable[..., Jets]
-) -> Callable[..., float]:
-    """``min_clearance_ahead``."""
-    planned_of = tilt_motion_of(tilts).planned
-    angles: Callable[..., Values] = componentwise("angles_of_jets", "jets", "jets#[0]", tilts)
-
-    @scalar
-    def tilts_at(
-        clock: float,
-        state: float,
-        gait: GaitParameters,
-        knots: Vector,
-        supervisor: Supervisor,
-        vehicle: Any,
-    ) -> Values:
-        """The tilts at a time of the gait's clock in the supervisor's present state."""
-        planned, motion = planned_of(clock, gait, knots), (state, 0.0, 0.0)
-        return angles(supervised_tilts(planned, 1.0, motion, supervisor, vehicle))
-
-    @scalar
-    def min_clearance_ahead(
-        time: float,
-        up: Triple,
-        state: float,
-        gait: GaitParameters,
-        knots: Vector,
-        supervisor: Supervisor,
-        vehicle: Any,
-    ) -> float:
-        """The smallest clearance up to the horizon at the supervisor's present state.
-
-        The vehicle meets each sample's tilts with the lean of a moment before. In hover it leans
-        with their direction; it stays as far away from that as it is now.
-        """
-        smallest, start, before = 1.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-        clock = gait_time(time, (state, 0.0, 0.0), supervisor)
-        spacing = supervisor.horizon / LOOKAHEAD_SAMPLES
-        for sample in range(LOOKAHEAD_SAMPLES + 1):
-            ahead = clock + spacing * sample
-            if sample > 0 and spacing > FOLLOWED:
-                tilts = tilts_at(ahead - FOLLOWED, state, gait, knots, supervisor, vehicle)
-                before = assess(tilts, up, vehicle, knots)[2]
-            lean = turned_along(up, start, before)
-            tilts = tilts_at(ahead, state, gait, knots, supervisor, vehicle)
-            margin, determinant, before = assess(tilts, lean, vehicle, knots)
-            smallest = min(smallest, _relative_clearance(margin, determinant, supervisor))
-            if sample == 0:
-                start = before
-        return smallest
-
-    return min_clearance_ahead
+    return repeat(LOOKAHEAD_SAMPLES, glance, xp.minimum(1.0, smallest), start)[0]
 
 
 def supervision_of(
-    tilts: int, assess: Callable[..., Assessment], way_back: WayBack = NO_WAY_BACK
+    tilts: int, assess: Callable[..., tuple[Any, Any, Any]], way_back: WayBack = NO_WAY_BACK
 ) -> Supervision:
-    """The supervisor of vehicles with so many tilts; see `Supervision`."""
-    planned_of, return_speed = tilt_motion_of(tilts).planned, way_back.speed
-    clearance = _clearance_of(assess)
-    supervised_tilts = _tilts_of(tilts, way_back)
-    min_clearance_ahead = _lookahead_of(tilts, assess, supervised_tilts)
+    """The supervisor of vehicles with a number of tilts; see `Supervision`."""
 
-    @scalar
+    @traceable
+    def clearance(
+        angles: Any, up: Any, supervisor: Supervisor, vehicle: Any, knots: Any = NO_KNOTS
+    ) -> Any:
+        return _Supervised(assess, supervisor, vehicle, knots).look(angles, up)[0]
+
+    @traceable
+    def allowed_scale(
+        angles: Any, roll: Any, pitch: Any, supervisor: Supervisor, vehicle: Any,
+        knots: Any = NO_KNOTS,
+    ) -> Any:  # fmt: skip
+        supervised = _Supervised(assess, supervisor, vehicle, knots)
+        return _largest_scale(angles, _up(roll, pitch), supervised)
+
+    @traceable
+    def gait_scale(
+        angles: Any, roll: Any, pitch: Any, supervisor: Supervisor, vehicle: Any,
+        knots: Any = NO_KNOTS,
+    ) -> Any:  # fmt: skip
+        if supervisor.strategy != SCALE:
+            return 1.0
+        return branch(
+            (supervisor.min_margin > 0.0) | (supervisor.min_determinant > 0.0),
+            lambda: allowed_scale(angles, roll, pitch, supervisor, vehicle, knots),
+            lambda: 1.0,
+        )
+
+    @traceable
+    def supervised_tilts(
+        planned: Any, scale: Any, motion: Any, supervisor: Supervisor, vehicle: Any
+    ) -> Any:
+        if supervisor.strategy == HOLD:
+            return _on_clock(planned, motion)
+        if supervisor.strategy == RETURN_TO_RED:
+            return way_back.tilts(planned, motion, supervisor, vehicle)
+        return scale * planned
+
+    @traceable
     def derivative(
-        time: float,
-        roll: float,
-        pitch: float,
-        state: float,
-        rate: float,
-        gait: GaitParameters,
-        knots: Vector,
-        supervisor: Supervisor,
-        vehicle: Any,
-    ) -> Triple:
+        time: Any, roll: Any, pitch: Any, state: Any, rate: Any, gait: GaitParameters, knots: Any,
+        supervisor: Supervisor, vehicle: Any,
+    ) -> Any:  # fmt: skip
         """``HOLD``: the clock runs (rate 0) with sufficient clearance and stops (rate 1) without.
 
         ``RETURN_TO_RED``: towards red where the thresholds would be violated, back where they
         allow it, slowing down towards both ends.
         """
-        up = world_up_in_body(roll, pitch)
-        smallest = min_clearance_ahead(time, up, state, gait, knots, supervisor, vehicle)
-        if supervisor.strategy == HOLD:
-            desired = 1.0 - min(1.0, max(0.0, smallest / BAND))
-        else:
-            speed = return_speed(planned_of(time, gait, knots), supervisor, vehicle)
-            desired = -speed * min(1.0, max(-1.0, smallest / BAND))
-            # Four lags: the motion to either end is critically damped.
-            desired = min((1.0 - state) / (4.0 * LAG), max(-state / (4.0 * LAG), desired))
-        return state, rate, (desired - rate) / LAG
+        still = xp.array([state, 0.0, 0.0])
 
-    return Supervision(
-        assess, clearance, *_scales_of(tilts, clearance), supervised_tilts, derivative
-    )
+        def tilts_at(clock: Any) -> Any:
+            planned = planned_tilts(clock, gait, knots, tilts)
+            return supervised_tilts(planned, 1.0, still, supervisor, vehicle)[:, 0]
+
+        clock = gait_time(time, still, supervisor)
+        now = _Supervised(assess, supervisor, vehicle, knots)
+        share = _smallest_ahead(clock, _up(roll, pitch), tilts_at, now) / BAND
+        if supervisor.strategy == HOLD:
+            desired = 1.0 - xp.minimum(1.0, xp.maximum(0.0, share))
+        else:
+            planned = planned_tilts(time, gait, knots, tilts)
+            speed = way_back.speed(planned, supervisor, vehicle)
+            desired = -speed * xp.minimum(1.0, xp.maximum(-1.0, share))
+            # Four lags: the motion to either end is critically damped.
+            desired = xp.maximum(-state / (4.0 * LAG), desired)
+            desired = xp.minimum((1.0 - state) / (4.0 * LAG), desired)
+        return xp.array([state, rate, (desired - rate) / LAG])
+
+    return Supervision(assess, clearance, allowed_scale, gait_scale, supervised_tilts, derivative)

@@ -8,68 +8,55 @@ tilts and on red ``n`` is vertical.
 
 from __future__ import annotations
 
-from math import asin, sqrt
-from typing import Final
+from typing import Any, Final
 
+from tiltsim_controllers.code.arrays import xp
+from tiltsim_controllers.code.traceable import traceable
 from tiltsim_controllers.gaits.parameters import NO_KNOTS
 from tiltsim_controllers.gaits.red_gait import nearest_red_angles
-from tiltsim_controllers.laws.supervisor import Assessment, Supervisor, WayBack, supervision_of
-from tiltsim_controllers.mathematics.jets import Jet, Jets4, jet_product, jet_sum
-from tiltsim_controllers.mathematics.scalar import Quad, Triple, Vector, scalar
-from tiltsim_controllers.vehicle.decoupling_matrix import (
-    sines_and_cosines,
-    torque_entries,
-    torque_free_force,
-)
+from tiltsim_controllers.laws.supervisor import Supervisor, WayBack, supervision_of
+from tiltsim_controllers.mathematics.linear import norm
+from tiltsim_controllers.mathematics.moving import Moving
+from tiltsim_controllers.vehicle.decoupling_matrix import torque_entries, torque_free_force
 
 NEAR: Final = 0.05
 """rad: the distance from red, for the speed of the return, is at least this."""
 
 
-@scalar
-def assess(tilts: Quad, up: Triple, drag_ratio: float, knots: Vector = NO_KNOTS) -> Assessment:
+@traceable
+def assess(tilts: Any, up: Any, drag_ratio: Any, knots: Any = NO_KNOTS) -> tuple[Any, Any, Any]:
     """Singularity margin (rad), determinant and ``n``, along which the vehicle hovers.
 
     Args:
-        tilts: rad
-        up: `world_up_in_body`
-        drag_ratio: ``r = K_m / (L K_f)``
-        knots: without use here
+        tilts: rad, shape (4,).
+        up: World up in body axes, shape (3,).
+        drag_ratio: ``r = K_m / (L K_f)``.
+        knots: Not used here.
     """
-    trig = sines_and_cosines(tilts[0], tilts[1], tilts[2], tilts[3])
-    nx, ny, nz = torque_free_force(trig, torque_entries(trig, drag_ratio), drag_ratio)
-    along = nx * up[0] + ny * up[1] + nz * up[2]
-    length = sqrt(nx * nx + ny * ny + nz * nz)
-    if length == 0.0:
-        return 0.0, 0.0, up
-    return asin(min(1.0, max(-1.0, along / length))), along, (nx, ny, nz)
+    trig = tuple(xp.array([xp.sin(tilts), xp.cos(tilts)]).T.ravel())
+    n = xp.array([*torque_free_force(trig, torque_entries(trig, drag_ratio), drag_ratio)])
+    along, length = n @ up, norm(n)
+    exists = length != 0.0
+    sine = xp.where(exists, along / xp.where(exists, length, 1.0), 0.0)
+    margin = xp.arcsin(xp.minimum(1.0, xp.maximum(-1.0, sine)))
+    return margin, xp.where(exists, along, 0.0), xp.where(exists, n, up)
 
 
-@scalar
-def _blend(tilt: Jet, red: Jet, share: Jet) -> Jet:
-    """A tilt moved by a fraction of the path to red."""
-    return jet_sum(1.0, tilt, 1.0, jet_product(share, jet_sum(1.0, red, -1.0, tilt)))
+def _towards_red(planned: Any, motion: Any, supervisor: Supervisor, drag_ratio: Any) -> Any:
+    """Tilts moved by a fraction of the path to red, shape (4, 3)."""
+    red = nearest_red_angles(planned, drag_ratio, supervisor.clearance)
+    way = Moving(*motion) * Moving(*(xp.vstack([red, red]) - planned).T)
+    return planned + xp.stack([way.value, way.rate, way.acceleration], 1)
 
 
-@scalar
-def _towards_red(
-    planned: Jets4, motion: Triple, supervisor: Supervisor, drag_ratio: float
-) -> Jets4:
-    a1, a2, a3, a4 = planned
-    r1, r2 = nearest_red_angles(planned, drag_ratio, supervisor.clearance)
-    m = motion
-    return _blend(a1, r1, m), _blend(a2, r2, m), _blend(a3, r1, m), _blend(a4, r2, m)
-
-
-@scalar
-def _return_speed(planned: Jets4, supervisor: Supervisor, drag_ratio: float) -> float:
+def _return_speed(planned: Any, supervisor: Supervisor, drag_ratio: Any) -> Any:
     """Rate (1/s) along the path to red at which the fastest tilt has its maximum rate."""
-    a1, a2, a3, a4 = planned
-    red_1, red_2 = nearest_red_angles(planned, drag_ratio, supervisor.clearance)
-    front = max(abs(red_1[0] - a1[0]), abs(red_2[0] - a2[0]))
-    rear = max(abs(red_1[0] - a3[0]), abs(red_2[0] - a4[0]))
-    return supervisor.max_rate / max(front, rear, NEAR)
+    red = nearest_red_angles(planned, drag_ratio, supervisor.clearance)[:, 0]
+    longest = NEAR
+    for way in abs(xp.hstack([red, red]) - planned[:, 0]):
+        longest = xp.maximum(longest, way)
+    return supervisor.max_rate / longest
 
 
 SUPERVISION: Final = supervision_of(4, assess, WayBack(_towards_red, _return_speed))
-"""Its scalar code; the ``vehicle`` is the drag ratio ``r = K_m / (L K_f)``."""
+"""Its functions; the ``vehicle`` is the drag ratio ``r = K_m / (L K_f)``."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import cache
 from math import inf
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
@@ -10,18 +9,20 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 from tiltsim.closed_loop.loop import ClosedLoop
 from tiltsim.laws.layers.layer import Layer, wrap_loop
 from tiltsim.scenario.gait_following import GaitFollowingController
-from tiltsim.vehicles.rotorcraft.layout import QW, QX, QY, QZ, TILT_1, layout_of
-from tiltsim_controllers.laws.allocation import RotorRange, limited_tiltrotor
-from tiltsim_controllers.mathematics.rotation import euler_from_quaternion
+from tiltsim.vehicles.rotorcraft.layout import QW, TILT_1, layout_of, tilt_of_rotor
+from tiltsim_controllers.code.arrays import xp
+from tiltsim_controllers.code.traceable import traceable
+from tiltsim_controllers.laws.allocation import RotorRange, limited_accelerations
+from tiltsim_controllers.mathematics.attitude import euler_angles, rotation_matrix
 from tiltsim_controllers.mathematics.scalar import Values, Vector, scalar
-from tiltsim_controllers.mathematics.vectors import entries_of
 from tiltsim_controllers.vehicle.parameters import Vehicle
+from tiltsim_controllers.vehicle.rotors import airframe, wrench_map
 
 if TYPE_CHECKING:
     from tiltsim.scenario.scenario import FlightPlan
 
-ALLOCATIONS: Final[dict[str, Callable[..., Values]]] = {"tiltrotor": limited_tiltrotor}
-"""By model: ``(accelerations, tilts, speeds, roll, pitch, vehicle, limits)``."""
+ALLOCATED: Final = frozenset({"tiltrotor"})
+"""Models whose controllers this layer limits; the law of multirotors limits itself."""
 
 
 class Allocation(NamedTuple):
@@ -42,23 +43,26 @@ def _read(plan: FlightPlan) -> Allocation:
 @cache
 def with_allocation(loop: ClosedLoop) -> ClosedLoop:
     """A controller with prioritized allocation; it sees what its sensors read, as the law does."""
-    inner_controls, allocated = loop.sampling.controls, ALLOCATIONS[loop.dynamics.model]
-    layout = layout_of(loop.dynamics)
-    rotors, tilts = layout
-    first, further = layout.acceleration_1, layout.further_rates
-    demanded_in, tilts_in = entries_of(first, rotors), entries_of(TILT_1, tilts)
-    speeds_in = entries_of(0, rotors)
+    inner_controls, layout = loop.sampling.controls, layout_of(loop.dynamics)
+    places, rotors_tilt = layout.accelerations, tilt_of_rotor(loop.dynamics)
+
+    @traceable
+    def limited(qpos: Any, act: Any, ctrl: Any, own: Allocation) -> Any:
+        _, rotors = airframe(own, (), rotors_tilt)
+        wrench = wrench_map(rotors, qpos[TILT_1 : TILT_1 + layout.tilts])
+        up = rotation_matrix(euler_angles(qpos[QW:TILT_1]))[2]
+        speeds = act[: layout.rotors]
+        accelerations = limited_accelerations(
+            ctrl[places], wrench, up, speeds, rotors.spins, own.limits
+        )
+        return xp.hstack([ctrl[: places.start], accelerations, ctrl[places.stop :]])
 
     @scalar
     def controls(
         time: float, qpos: Vector, qvel: Vector, act: Vector, parameters: Any, knots: Vector
     ) -> Values:
-        ctrl, own = inner_controls(time, qpos, qvel, act, parameters.inner, knots), parameters.layer
-        roll, pitch, _yaw = euler_from_quaternion(qpos[QW], qpos[QX], qpos[QY], qpos[QZ])
-        accelerations = allocated(
-            demanded_in(ctrl), tilts_in(qpos), speeds_in(act), roll, pitch, own.vehicle, own.limits
-        )
-        return (*ctrl[:first], *accelerations, *ctrl[further:])
+        ctrl = inner_controls(time, qpos, qvel, act, parameters.inner, knots)
+        return limited((*qpos,), (*act,), ctrl, parameters.layer)
 
     layer = Layer("with_allocation", Allocation, _read, controls=controls, of_controller=True)
     return wrap_loop(loop, layer)

@@ -14,13 +14,14 @@ from tiltsim.laws.layers.layer import Layer, Samples, wrap_loop
 from tiltsim.laws.rotorcraft import reference_columns, thrust_controls_of
 from tiltsim.models.parts import ExtraActuators
 from tiltsim.scenario.gait_following import GaitFollowingController
-from tiltsim.vehicles.rotorcraft.layout import QW, QX, QY, QZ, layout_of
-from tiltsim_controllers.gaits.motion import tilt_motion_of
+from tiltsim.vehicles.rotorcraft.layout import QW, TILT_1, layout_of
+from tiltsim_controllers.code.arrays import xp
+from tiltsim_controllers.code.traceable import traceable
+from tiltsim_controllers.gaits.motion import planned_tilts
 from tiltsim_controllers.gaits.parameters import GaitParameters
 from tiltsim_controllers.laws.supervisor import HOLD, Supervisor, gait_time
-from tiltsim_controllers.mathematics.rotation import euler_from_quaternion
-from tiltsim_controllers.mathematics.scalar import Floats, Triple, Values, Vector, scalar
-from tiltsim_controllers.mathematics.vectors import componentwise, entries_of, vectors_of
+from tiltsim_controllers.mathematics.attitude import euler_angles
+from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector, scalar
 from tiltsim_controllers.vehicle.states import PITCH, ROLL
 
 if TYPE_CHECKING:
@@ -49,42 +50,46 @@ def _supervised(loop: ClosedLoop) -> SupervisedLaw:
     return loop.supervised
 
 
+@traceable
+def attitude_in(qpos: Any) -> Any:
+    """Roll, pitch and yaw (rad), shape (3,), of a vehicle."""
+    return euler_angles(qpos[QW:TILT_1])
+
+
 def _scaling(loop: ClosedLoop) -> Layer:
     """A supervisor that scales the gait, without states."""
     inner_controls, law = loop.sampling.controls, _supervised(loop)
     layout = layout_of(loop.dynamics)
     names, tilts = layout.names("alpha_ref"), layout.tilts
-    planned_of, gait_scale, vehicle_of = (
-        tilt_motion_of(tilts).planned,
-        law.code.gait_scale,
-        law.vehicle,
-    )
-    angles = componentwise("angles_of_jets", "jets", "jets#[0]", tilts)
-    commands_in, scaled = entries_of(0, tilts), vectors_of(tilts).scaled
+    gait_scale, vehicle_of = law.code.gait_scale, law.vehicle
+
+    @traceable
+    def scale_at(
+        time: Any, attitude: Any, gait: GaitParameters, layer: Supervisor, vehicle: Any, knots: Any
+    ) -> Any:
+        """The factor of the planned gait at an attitude (rad), shape (1,)."""
+        planned = planned_tilts(time, gait, knots, tilts)[:, 0]
+        return xp.array([gait_scale(planned, attitude[0], attitude[1], layer, vehicle, knots)])
+
+    @traceable
+    def scaled(scale: Any, ctrl: Any) -> Any:
+        """Controls with scaled tilt angles."""
+        return xp.hstack([scale * ctrl[:tilts], ctrl[tilts:]])
 
     @scalar
-    def scale_at(time: float, roll: float, pitch: float, parameters: Any, knots: Vector) -> float:
-        """The factor of the planned gait at an attitude (rad)."""
-        inner = parameters.inner
-        planned = angles(planned_of(time, inner.law.gait, knots))
-        scale: float = gait_scale(
-            planned, roll, pitch, parameters.layer, vehicle_of(time, inner), knots
-        )
-        return scale
-
-    @scalar
-    def scale_of(time: float, attitude: Vector, parameters: Any, knots: Vector) -> tuple[float]:
-        """The same of a sample."""
-        return (scale_at(time, attitude[0], attitude[1], parameters, knots),)
+    def scale_of(time: float, attitude: Vector, parameters: Any, knots: Vector) -> Values:
+        """The factor at a sample."""
+        inner, layer = parameters.inner, parameters.layer
+        vehicle = vehicle_of(time, inner)
+        return scale_at(time, (*attitude,), inner.law.gait, layer, vehicle, knots)
 
     @scalar
     def controls(
         time: float, qpos: Vector, qvel: Vector, act: Vector, parameters: Any, knots: Vector
     ) -> Values:
         planned = inner_controls(time, qpos, qvel, act, parameters.inner, knots)
-        roll, pitch, _yaw = euler_from_quaternion(qpos[QW], qpos[QX], qpos[QY], qpos[QZ])
-        scale = scale_at(time, roll, pitch, parameters, knots)
-        return (*scaled(scale, commands_in(planned)), *planned[tilts:])
+        attitude = attitude_in((*qpos,))
+        return scaled(scale_of(time, attitude, parameters, knots), planned)
 
     def derive(
         inner: Callable[[], dict[str, Floats]], samples: Samples, setup: ControlSetup
@@ -105,29 +110,27 @@ def _scaling(loop: ClosedLoop) -> Layer:
     )
 
 
-def _servo_commands_of(law: SupervisedLaw, tilts: int) -> Callable[..., Values]:
-    """Scalar code of the commands (rad) of the tilt servos under a supervisor with states.
+def _servo_commands_of(law: SupervisedLaw, tilts: int) -> Callable[..., Any]:
+    """Commands (rad) of the tilt servos under a supervisor with states, shape (tilts,).
 
     It is ``(time, motion, gait, knots, supervisor, vehicle, lead)``: s, and the supervisor's state
     with its rate and acceleration; ``lead`` in s, of the servos.
     """
-    planned_of, supervised_tilts = tilt_motion_of(tilts).planned, law.code.tilts
-    ahead = componentwise("servo_commands", "jets, lead", "jets#[0] + lead * jets#[1]", tilts)
+    supervised_tilts = law.code.tilts
 
-    @scalar
+    @traceable
     def servo_commands(
-        time: float,
-        motion: Triple,
+        time: Any,
+        motion: Any,
         gait: GaitParameters,
-        knots: Vector,
+        knots: Any,
         supervisor: Supervisor,
         vehicle: Any,
-        lead: float,
-    ) -> Values:
-        clock = gait_time(time, motion, supervisor)
-        planned = planned_of(clock, gait, knots)
-        commands: Values = ahead(supervised_tilts(planned, 1.0, motion, supervisor, vehicle), lead)
-        return commands
+        lead: Any,
+    ) -> Any:
+        planned = planned_tilts(gait_time(time, motion, supervisor), gait, knots, tilts)
+        moving = supervised_tilts(planned, 1.0, motion, supervisor, vehicle)
+        return moving[:, 0] + lead * moving[:, 1]
 
     return servo_commands
 
