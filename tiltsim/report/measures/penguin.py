@@ -150,7 +150,7 @@ def switch_matrix_is_the_limit() -> bool:
     rng = np.random.default_rng(12)
     state = (0.0, 0.0, 0.0, 0.0, 0.0)
     for alpha, x, y in rng.uniform(-2.0, 2.0, (200, 3)).tolist():
-        law = Parameters(THESIS_CAR, _GAINS, ReferenceParameters(LINE, x, y))
+        law = Parameters(THESIS_CAR, ReferenceParameters(LINE, x, y), _GAINS)
         at = (*state, alpha, 0.0, 0.0)
         squares = np.array(demanded_squared_speeds(0.0, at, law))
         switch = np.diag((squares > 0.0).astype(float))
