@@ -74,6 +74,7 @@ class PythonController(OwnFunctionController):
     reference_kinds = ("position", "pose", "attitude_altitude")
     is_external = True
     rotors_have_speeds = True
+    leans_unrecorded = True
 
     law: Literal["python"] = Field(description="your own controller")
 

@@ -15,6 +15,7 @@ from tiltsim.vehicles.spans import (
     in_last_second,
     largest,
     mean_of,
+    position_error,
     time_of,
     when_settled,
 )
@@ -40,7 +41,7 @@ def rotorcraft_metrics(
     rates = [np.abs(columns[name]).max(axis=-1) for name in names]
     return {
         **_position_metrics(columns, scenario, follows_position),
-        **_attitude_metrics(columns, scenario.simulation.timestep),
+        **_attitude_metrics(columns, scenario),
         "min_rotor_speed": spins.min(axis=(0, -1)),
         "max_rotor_speed": spins.max(axis=(0, -1)),
         **_altitude_metrics(time, columns["z_ref"] - columns["z"]),
@@ -61,7 +62,10 @@ def _position_metrics(
     for axis, error in errors.items():
         if follows_position or axis == "z":
             metrics[f"final_position_error_{axis}"] = mean_of(error, last_second)
-    if not follows_position or not settled.any():
+    if not follows_position:
+        return metrics | position_error(errors["z"])
+    metrics |= position_error(*errors.values())
+    if not settled.any():
         return metrics
     horizontal = np.hypot(errors["x"], errors["y"])[..., settled]
     metrics["sup_position_error_after_20s"] = horizontal.max(axis=-1)
@@ -74,18 +78,21 @@ def _position_metrics(
     return metrics
 
 
-def _attitude_metrics(columns: Mapping[str, Floats], timestep: float) -> dict[str, Any]:
+def _attitude_metrics(columns: Mapping[str, Floats], scenario: Scenario) -> dict[str, Any]:
     angles, metrics = ("roll", "pitch", "yaw"), {}
-    last_second = in_last_second(columns["time"], timestep)
+    last_second = in_last_second(columns["time"], scenario.simulation.timestep)
     for angle in angles:
         # Near half a revolution samples of one direction have both signs.
         metrics[f"final_{angle}"] = np.mean(
             np.unwrap(np.compress(last_second, columns[angle], axis=-1)), axis=-1
         )
-    metrics["final_attitude_error"] = largest(
-        np.abs(_wrapped(columns[f"{angle}_ref"] - columns[angle])[..., last_second]).max(axis=-1)
-        for angle in angles
-    )
+    if scenario.controller.records_attitude(scenario.reference.kind):
+        metrics["final_attitude_error"] = largest(
+            np.abs(_wrapped(columns[f"{angle}_ref"] - columns[angle])[..., last_second]).max(
+                axis=-1
+            )
+            for angle in angles
+        )
     for angle in ("roll", "pitch"):
         metrics[f"max_abs_{angle}"] = np.abs(columns[angle]).max(axis=-1)
     return metrics

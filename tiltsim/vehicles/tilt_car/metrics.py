@@ -9,7 +9,7 @@ import numpy as np
 
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.vehicles.saturation import at_lower_limit, saturation_metrics
-from tiltsim.vehicles.spans import in_last_second, mean_of, when_settled
+from tiltsim.vehicles.spans import in_last_second, mean_of, position_error, when_settled
 from tiltsim_controllers.mathematics.scalar import Floats
 
 
@@ -23,6 +23,7 @@ def tilt_car_metrics(
     speeds = np.array([columns["rotor_speed_1"], columns["rotor_speed_2"]])
     for axis, error in errors.items():
         metrics[f"final_position_error_{axis}"] = mean_of(error, last_second)
+    metrics |= position_error(*errors.values())
     if settled.any():
         horizontal = np.hypot(errors["x"], errors["y"])[..., settled]
         metrics["sup_position_error_after_20s"] = horizontal.max(axis=-1)
