@@ -398,7 +398,7 @@ def test_every_flight_has_position_errors(vehicle):
 
 @pytest.mark.parametrize("law", ["geometric", "pid", "indi", "lqr"])
 def test_a_law_that_leans_as_it_needs_has_no_attitude_error(law):
-    """Its lean on a circle was counted as an error, since no column has the attitude it asks for."""
+    """Its lean on a circle was an error, since no column has the attitude it asks for."""
     circle = {"type": "circle", "radius": 2.0, "angular_frequency": 1.0}
     scenario = {"controller": {"law": law}, "reference": circle}
     scenario["simulation"] = {"duration": 0.1, "engine": "python"}

@@ -74,7 +74,11 @@ def test_every_way_to_give_a_table_gives_the_same_rows(files, monkeypatch):
         ("time,x,y,z\n1,0,0,0\n", "1 row; at least 2"),
         ("time,x,y,z\n1,0,0,0\n2,0,0,0\n", "row 1, column time = 1.0: must be 0"),
         (HEAD + "1,0,0\n", "row 2: 3 values in 4 columns"),
-        ("", "no column time; needs one each of time, x, y, z; found []"),
+        ("", "is empty"),
+        (
+            "time x;y z\n",
+            "no column time; needs one each of time, x, y, z; found ['time x', 'y z']",
+        ),
         (
             "t,x,y,z\n",
             "no column time; needs one each of time, x, y, z; found ['t', 'x', 'y', 'z']",
@@ -91,6 +95,14 @@ def test_a_mistake_in_a_file_is_named_by_row_column_and_value(tmp_path, content,
     message = refusal(load_scenario, SHORT, reference=file)
     assert message.startswith(f'scenario: reference.file = "{file}": {words}')
     assert "\n" not in message
+
+
+@pytest.mark.parametrize("separator", [";", "\t", " ", "   ", " ; "])
+def test_the_first_line_shows_what_separates_the_columns(tmp_path, separator):
+    file = tmp_path / "own.csv"
+    file.write_text(csv_text(COLUMNS).replace(",", separator))
+    rows = tuple(zip(*(column.tolist() for column in COLUMNS.values())))
+    assert load_scenario(SHORT, reference=file).reference.table == rows
 
 
 @pytest.mark.parametrize(

@@ -32,6 +32,9 @@ GAIT_COLUMNS: Final = gait_columns(4)
 SHORTEST_STEP: Final = 1e-4
 """Seconds between the rows of any table."""
 
+SEPARATORS: Final = ",;\t "
+"""What may separate the columns of a CSV file."""
+
 _NUMBERS: Final = ("double", "float", "int64", "int32")
 """Types of columns of a Parquet file."""
 
@@ -140,8 +143,7 @@ def _read_rows(file: Path, columns_among: ColumnsAmong) -> list[Values]:
         return _read_parquet(file, columns_among)
     if file.suffix.lower() != ".csv":
         raise InputError("must end with .csv or .parquet")
-    head, *lines = [row for row in csv.reader(read_text(file).splitlines()) if row] or [[]]
-    head = [name.strip() for name in head]
+    head, *lines = _fields(read_text(file))
     columns = columns_among(head)
     _check_names(head, columns)
     _check_count(len(lines))
@@ -152,6 +154,16 @@ def _read_rows(file: Path, columns_among: ColumnsAmong) -> list[Values]:
             raise InputError(f"row {number}: {len(line)} values in {len(head)} columns")
         rows.append(tuple(_number(line[place], number, head[place]) for place in places))
     return rows
+
+
+def _fields(text: str) -> list[list[str]]:
+    """Fields of the lines of a CSV file; the first line shows what separates them."""
+    lines = [line.strip() for line in text.splitlines() if line.strip()]
+    if not lines:
+        raise InputError("is empty")
+    separator = next((mark for mark in SEPARATORS if mark in lines[0]), ",")
+    rows = csv.reader(lines, delimiter=separator, skipinitialspace=True)
+    return [[field.strip() for field in row] for row in rows]
 
 
 def _read_parquet(file: Path, columns_among: ColumnsAmong) -> list[Values]:
