@@ -109,6 +109,14 @@ def _check_multirotor(scenario: ScenarioTables, vehicle: MultirotorTable) -> Non
         scenario.require(
             "vehicle.tilt_servo", TiltServoTable(), "vehicle.mjcf has no tilts; remove it"
         )
+    controller, rotors = scenario.controller, vehicle.rotor_count
+    if rotors < 4 and controller.needs_four_rotors and not controller.commands_tilts:
+        reason = f"{rotors} rotors control attitude and lift only together with their tilts"
+        if not vehicle.has_tilting_rotors:
+            raise scenario.mistake("vehicle.mjcf", f"{reason}, and none of them tilts")
+        raise scenario.mistake(
+            "controller.law", f"{reason}; choose full_pose, or geometric with tilts = free"
+        )
 
 
 def _check_fixed_rotors(scenario: ScenarioTables) -> None:

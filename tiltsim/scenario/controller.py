@@ -38,6 +38,8 @@ StateUnits = dict[Annotated[str, Field(pattern="^state_[a-z0-9_]+$")], str]
 class OwnFunctionController(ControllerTable):
     """A function of the user's."""
 
+    needs_four_rotors = False
+
     function: str = Field(
         description="FILE.py:NAME of a function or class; FILE in the scenario's folder",
         examples=["my_controller.py:hover"],

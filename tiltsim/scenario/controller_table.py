@@ -129,6 +129,7 @@ class ControllerTable(Table):
     is_external: ClassVar[bool] = False  # commands come from Python code, not from a built-in law
     commands_tilts: ClassVar[bool] = False  # the tilt angles are inputs, not planned by a gait
     rotors_have_speeds: ClassVar[bool] = False  # of the quadrotor, too, whose laws make thrusts
+    needs_four_rotors: ClassVar[bool] = True  # or tilts that the law commands
     leans_unrecorded: ClassVar[bool] = False  # towards a position; no column has this attitude
 
     allow_unstable: bool = Field(
@@ -147,13 +148,10 @@ class ControllerTable(Table):
     def check_scenario(self, scenario: Any) -> None:
         """Refuse the controller in a scenario, otherwise consistent. Raises `mistake`."""
 
-    def records_attitude(self, kind: ReferenceKind) -> bool:
-        """Whether ``roll_ref`` and ``pitch_ref`` are the attitude that the law asks for.
-
-        Args:
-            kind: Of the reference.
-        """
-        return kind != "position" or self.commands_tilts or not self.leans_unrecorded
+    def records_attitude(self, scenario: Any) -> bool:
+        """Whether ``roll_ref`` and ``pitch_ref`` are the attitude that the law asks for."""
+        leans = self.leans_unrecorded and not self.commands_tilts
+        return not leans or scenario.reference.kind != "position"
 
     @property
     def linearization(self) -> str:

@@ -185,7 +185,7 @@ def reference_of(assembly: Assembly, column: str) -> str:
     """The column with the reference of another; empty for none, as for an unrecorded lean."""
     scenario, name = assembly.scenario, f"{column}_ref"
     if column in ("roll", "pitch") and "roll_ref" in assembly.loop.units:
-        return name if scenario.controller.records_attitude(scenario.reference.kind) else ""
+        return name if scenario.controller.records_attitude(scenario) else ""
     return name if name in assembly.loop.units else ""
 
 

@@ -86,7 +86,7 @@ def _attitude_metrics(columns: Mapping[str, Floats], scenario: Scenario) -> dict
         metrics[f"final_{angle}"] = np.mean(
             np.unwrap(np.compress(last_second, columns[angle], axis=-1)), axis=-1
         )
-    if scenario.controller.records_attitude(scenario.reference.kind):
+    if scenario.controller.records_attitude(scenario):
         metrics["final_attitude_error"] = largest(
             np.abs(_wrapped(columns[f"{angle}_ref"] - columns[angle])[..., last_second]).max(
                 axis=-1
