@@ -41,7 +41,11 @@ from tiltsim_controllers.code.traceable import traceable
 from tiltsim_controllers.laws import quadrotor_attitude_altitude, switching, yaw_position
 from tiltsim_controllers.mathematics.attitude import euler_angles
 from tiltsim_controllers.mathematics.scalar import Floats, Vector
-from tiltsim_controllers.references.trajectories import ReferenceParameters, reference_motion
+from tiltsim_controllers.references.trajectories import (
+    ReferenceParameters,
+    reference_attitude,
+    reference_motion,
+)
 from tiltsim_controllers.vehicle.parameters import SPIN, Vehicle
 from tiltsim_controllers.vehicle.quadrotor_mixer import speed_along_spin, thrust_controls
 from tiltsim_controllers.vehicle.states import PITCH, ROLL
@@ -100,6 +104,12 @@ def _reference_position(time: Any, state: Any, reference: ReferenceParameters, k
     return reference_motion(time, reference, knots)[0]
 
 
+@traceable
+def _reference_attitude(time: Any, state: Any, reference: ReferenceParameters, knots: Any) -> Any:
+    """Roll, pitch and yaw (rad) to track."""
+    return reference_attitude(time, reference, knots)[0]
+
+
 def references(
     samples: Mapping[str, Floats],
     reference: ReferenceParameters,
@@ -119,7 +129,7 @@ def references(
     time = samples["time"]
     states, setup = np.empty((len(time), 0)), ControlSetup(reference, tuple(knots))
     columns = [*evaluate_over_samples(_reference_position, 3, time, states, setup).T]
-    angles = attitude or (reference.roll, reference.pitch, reference.yaw)
+    angles = attitude or evaluate_over_samples(_reference_attitude, 3, time, states, setup).T
     columns += [np.broadcast_to(np.asarray(angle, dtype=float), time.shape) for angle in angles]
     idle = dict.fromkeys(tilts, np.zeros_like(time))
     return dict(zip(REFERENCE_COLUMNS, columns, strict=True)) | idle

@@ -7,7 +7,7 @@ from math import pi
 from typing import Final
 
 from tiltsim.scenario.claim import NAME
-from tiltsim.scenario.controller import laws_for
+from tiltsim.scenario.controller import CONTROLLERS, laws_for
 from tiltsim.scenario.gait import FixedGait, TableGait
 from tiltsim.scenario.messages import InvalidValueError, choose
 from tiltsim.scenario.multirotor_controllers import AttitudeForceController
@@ -264,6 +264,11 @@ def _check_reference(scenario: ScenarioTables) -> None:
     kinds = {*controller.reference_kinds}
     if "pose" in kinds:
         kinds.add("position")  # a pose of zero roll and pitch is written like a position
+    if reference.turns and not controller.follows_turns:
+        able = [law for law in laws_for(scenario.vehicle.model) if CONTROLLERS[law].follows_turns]
+        reason = f"the {controller.law} law cannot follow roll, pitch and yaw that vary"
+        choice = f"; choose {', '.join(able)}" if able else ""
+        raise scenario.mistake("reference.type", f"{reason}{choice}")
     if reference.kind not in kinds:
         if reference.kind == "pose":
             key = "roll" if reference.roll else "pitch"

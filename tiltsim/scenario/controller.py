@@ -38,6 +38,7 @@ StateUnits = dict[Annotated[str, Field(pattern="^state_[a-z0-9_]+$")], str]
 class OwnFunctionController(ControllerTable):
     """A function of the user's."""
 
+    follows_turns = True
     needs_four_rotors = False
 
     function: str = Field(

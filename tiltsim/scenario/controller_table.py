@@ -129,6 +129,7 @@ class ControllerTable(Table):
     is_external: ClassVar[bool] = False  # commands come from Python code, not from a built-in law
     commands_tilts: ClassVar[bool] = False  # the tilt angles are inputs, not planned by a gait
     rotors_have_speeds: ClassVar[bool] = False  # of the quadrotor, too, whose laws make thrusts
+    follows_turns: ClassVar[bool] = False  # roll, pitch and yaw that vary with time
     needs_four_rotors: ClassVar[bool] = True  # or tilts that the law commands
     leans_unrecorded: ClassVar[bool] = False  # towards a position; no column has this attitude
 

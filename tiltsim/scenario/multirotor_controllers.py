@@ -44,6 +44,7 @@ class AttitudeForceController(GaitFollowingController, FailureAwareController):
 
     vehicle_models = ("multirotor",)
     reference_kinds = ("position", "pose", "attitude_altitude")
+    follows_turns = True
 
     law: Literal["attitude_force"] = Field(
         description="feedback linearization of a multirotor: its rotor speeds control the attitude "

@@ -133,6 +133,7 @@ class FullPoseController(FailureAwareController):
     reference_kinds = ("position", "pose", "attitude_altitude")
     loop_gains = (("position", 3), ("attitude", 3))
     commands_tilts = True
+    follows_turns = True
 
     law: Literal["full_pose"] = Field(
         description="position and attitude independently: the law commands the tilt angles as "

@@ -20,6 +20,12 @@ from tiltsim.system.text import short_repr
 from tiltsim_controllers.mathematics.scalar import Values
 
 REFERENCE_COLUMNS: Final = ("time", "x", "y", "z")
+POSE_COLUMNS: Final = (*REFERENCE_COLUMNS, "roll", "pitch", "yaw")
+
+
+def reference_columns_among(names: Sequence[str]) -> tuple[str, ...]:
+    """The columns that a reference with columns of these names has to have."""
+    return POSE_COLUMNS if {"roll", "pitch", "yaw"} & {*names} else REFERENCE_COLUMNS
 
 
 def gait_columns(tilts: int) -> tuple[str, ...]:
@@ -180,15 +186,16 @@ def _read_parquet(file: Path, columns_among: ColumnsAmong) -> list[Values]:
 
 
 def _check_names(names: Sequence[str], columns: Sequence[str]) -> None:
-    if "yaw" in names and "x" in columns:
-        raise InputError(
-            "column yaw: the heading cannot vary; remove the column and set reference.yaw"
-        )
     for name in columns:
         if (count := names.count(name)) != 1:
             problem = f"{count} columns" if count else "no column"
             needed, found = ", ".join(columns), short_repr([*names])
             raise InputError(f"{problem} {name}; needs one each of {needed}; found {found}")
+    for name in names:
+        if name not in columns:
+            may = "" if columns != REFERENCE_COLUMNS else ", and may have roll, pitch and yaw"
+            needed = ", ".join(columns)
+            raise InputError(f"column {short_repr(name)} is unknown; needs {needed}{may}")
 
 
 def _number(text: str, row: int, column: str) -> float:
