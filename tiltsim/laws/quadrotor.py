@@ -99,15 +99,10 @@ class AttitudeAltitudeLoop(NamedTuple):
 
 
 @traceable
-def _reference_position(time: Any, state: Any, reference: ReferenceParameters, knots: Any) -> Any:
-    """The position (m) to track."""
-    return reference_motion(time, reference, knots)[0]
-
-
-@traceable
-def _reference_attitude(time: Any, state: Any, reference: ReferenceParameters, knots: Any) -> Any:
-    """Roll, pitch and yaw (rad) to track."""
-    return reference_attitude(time, reference, knots)[0]
+def _reference_pose(time: Any, state: Any, reference: ReferenceParameters, knots: Any) -> Any:
+    """Position (m), roll, pitch and yaw (rad) to track, shape (6,)."""
+    position = reference_motion(time, reference, knots)[0]
+    return xp.hstack([position, reference_attitude(time, reference, knots)[0]])
 
 
 def references(
@@ -128,8 +123,8 @@ def references(
     """
     time = samples["time"]
     states, setup = np.empty((len(time), 0)), ControlSetup(reference, tuple(knots))
-    columns = [*evaluate_over_samples(_reference_position, 3, time, states, setup).T]
-    angles = attitude or evaluate_over_samples(_reference_attitude, 3, time, states, setup).T
+    columns = [*evaluate_over_samples(_reference_pose, 6, time, states, setup).T]
+    angles, columns = attitude or columns[3:], columns[:3]
     columns += [np.broadcast_to(np.asarray(angle, dtype=float), time.shape) for angle in angles]
     idle = dict.fromkeys(tilts, np.zeros_like(time))
     return dict(zip(REFERENCE_COLUMNS, columns, strict=True)) | idle
