@@ -122,6 +122,7 @@ def test_the_summary_is_readable(capsys):
     words = "--balance", "0,1,0", "--faults"
     assert main(["gait", "--mjcf", file_of("tilt_hexarotor"), *words]) == 0
     text = capsys.readouterr().out
+    assert "moves 4 of attitude and lift, 6 of pose\n" in text
     assert "balanced rotor speeds" in text
     assert "level, controllable, at 0, " in text
 
@@ -150,7 +151,9 @@ def test_mistakes_are_one_line(capsys, words, message):
 
 def test_a_file_that_is_none_and_angles_that_turn_nothing(capsys):
     assert main(["gait", "--mjcf", file_of("tilt_car")]) == 2
-    assert "a multirotor has 4 to 16" in capsys.readouterr().err
+    assert "no joint 'vehicle'; a multirotor has" in capsys.readouterr().err
+    assert main(["gait", "--mjcf", file_of("scene")]) == 2
+    assert "rotor_2, ... without a gap; a multirotor has 2 to 16" in capsys.readouterr().err
     assert main(["gait", "--mjcf", file_of("hexarotor"), "--angles", "0.1"]) == 2
     assert "no rotor of" in capsys.readouterr().err
 

@@ -10,11 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import tiltsim
 from tests.flights import SAMPLE_FIELDS, flight
 from tiltsim.commands.schema import scenario_schema
 from tiltsim.flight.end import End
 from tiltsim.flight.flight import Flight
-from tiltsim.scenario.loading import parse_scenario
+from tiltsim.scenario.loading import load_scenario, parse_scenario
 from tiltsim.scenario.metric_names import BOOLEAN_METRICS, METRICS
 from tiltsim.vehicles.rotorcraft import COLUMNS
 from tiltsim.vehicles.spans import in_last_second, when_settled
@@ -41,6 +42,8 @@ def test_a_flight_at_rest_on_its_setpoint_has_these_metrics():
     metrics = fly().metrics()
     assert metrics == {
         **{f"final_position_error_{axis}": 0.0 for axis in "xyz"},
+        "rms_position_error": 0.0,
+        "max_position_error": 0.0,
         "sup_position_error_after_20s": 0.0,
         "least_position_error_after_20s": 0.0,
         **{"final_roll": 0.0, "final_pitch": 0.0, "final_yaw": 0.0},
@@ -367,3 +370,46 @@ def test_spans_count_steps_and_not_their_sums(timestep):
         assert list(np.flatnonzero(when_settled(times, timestep))) == [steps - 1]
     metrics = fly({"simulation": {"timestep": 0.0005}}, times=[0.0, 10.0, summed[-1]], x=2.0)
     assert metrics.metrics()["sup_position_error_after_20s"] == 2.0
+
+
+def test_position_errors_are_distances_in_space_over_the_whole_flight():
+    scenario = {"reference": {"type": "setpoint", "position": [1.0, 2.0, 3.0]}}
+    x = np.where(TIMES < 15.0, 3.0, 1.0)
+    y, z = np.where(TIMES < 15.0, -1.0, 2.0), np.where(TIMES < 15.0, 9.0, 3.0)
+    metrics = fly(scenario, x=x, y=y, z=z).metrics()
+    assert metrics["max_position_error"] == 7.0  # of 2, 3 and 6
+    assert metrics["rms_position_error"] == pytest.approx(np.sqrt(60 * 49.0 / 121), rel=1e-15)
+
+
+def test_without_a_position_loop_the_position_error_is_of_altitude():
+    scenario = {
+        "reference": {"type": "attitude_altitude", "altitude": 2.0},
+        "controller": {"decoupler": "none"},
+    }
+    metrics = fly(scenario, x=5.0, z=0.5).metrics()
+    assert metrics["max_position_error"] == metrics["rms_position_error"] == 1.5
+
+
+@pytest.mark.parametrize("vehicle", ["tilt_car", "trot", "free"])
+def test_every_flight_has_position_errors(vehicle):
+    metrics = flight(vehicle).metrics()
+    assert 0.0 <= metrics["rms_position_error"] <= metrics["max_position_error"]
+
+
+@pytest.mark.parametrize("law", ["geometric", "pid", "indi", "lqr"])
+def test_a_law_that_leans_as_it_needs_has_no_attitude_error(law):
+    """Its lean on a circle was an error, since no column has the attitude it asks for."""
+    circle = {"type": "circle", "radius": 2.0, "angular_frequency": 1.0}
+    scenario = {"controller": {"law": law}, "reference": circle}
+    scenario["simulation"] = {"duration": 0.1, "engine": "python"}
+    metrics = tiltsim.simulate(scenario).metrics()
+    assert "final_attitude_error" not in metrics
+    assert "final_roll" in metrics
+
+
+def test_a_law_that_asks_for_an_attitude_is_compared_with_that():
+    """Parallel rotors lean on a circle, as the law asks."""
+    changes = {"simulation.duration": 3.0, "simulation.engine": "native"}
+    metrics = tiltsim.simulate(load_scenario("fleet/hexarotor#circle", changes)).metrics()
+    assert metrics["max_abs_roll"] > 0.05
+    assert metrics["final_attitude_error"] < 0.01

@@ -9,6 +9,8 @@ import pytest
 from tiltsim.resources import shipped_folder
 
 FLEET = {
+    "bicopter": (2, 2),
+    "tricopter": (3, 3),
     "hexarotor": (6, 0),
     "cant_hexarotor": (6, 0),
     "tilt_hexarotor": (6, 6),

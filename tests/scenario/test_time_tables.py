@@ -23,6 +23,7 @@ SHORT = {"simulation": {"duration": 0.4}, "controller": {"decoupling": "exact", 
 TIMES = np.linspace(0.0, 0.4, 9)
 COLUMNS = {"time": TIMES, "x": np.sin(TIMES), "y": np.cos(TIMES), "z": TIMES**2}
 HEAD = "time,x,y,z\n0,0,0,0\n"
+POSES = "time,x,y,z,roll,pitch,yaw\n0,0,0,0,0,0,0\n"
 
 
 def csv_text(columns):
@@ -32,11 +33,11 @@ def csv_text(columns):
 
 @pytest.fixture
 def files(tmp_path):
-    """The same table in three files; columns that have no meaning here do not matter."""
-    more = {"speed": TIMES, **COLUMNS}
+    """The same table in three files, in one of them with its columns in another order."""
+    other = {name: COLUMNS[name] for name in ("z", "x", "time", "y")}
     (tmp_path / "own.csv").write_text(csv_text(COLUMNS))
-    (tmp_path / "more.csv").write_text(csv_text(more).replace(",", " , ").replace("\n", "\n\n"))
-    pq.write_table(pa.table(more), tmp_path / "own.parquet")
+    (tmp_path / "other.csv").write_text(csv_text(other).replace(",", " , ").replace("\n", "\n\n"))
+    pq.write_table(pa.table(COLUMNS), tmp_path / "own.parquet")
     return tmp_path
 
 
@@ -52,7 +53,7 @@ def test_every_way_to_give_a_table_gives_the_same_rows(files, monkeypatch):
         load_scenario(base, {"reference.type": "table", "reference.rows": rows}),
         *(
             load_scenario(base, reference=given)
-            for given in (COLUMNS, pa.table(COLUMNS), "own.csv", files / "more.csv", "own.parquet")
+            for given in (COLUMNS, pa.table(COLUMNS), "own.csv", files / "other.csv", "own.parquet")
         ),
     ]
     knots = scenarios[0].reference.knots
@@ -74,13 +75,20 @@ def test_every_way_to_give_a_table_gives_the_same_rows(files, monkeypatch):
         ("time,x,y,z\n1,0,0,0\n", "1 row; at least 2"),
         ("time,x,y,z\n1,0,0,0\n2,0,0,0\n", "row 1, column time = 1.0: must be 0"),
         (HEAD + "1,0,0\n", "row 2: 3 values in 4 columns"),
-        ("", "no column time; needs one each of time, x, y, z; found []"),
+        ("", "is empty"),
+        (
+            "time x;y z\n",
+            "no column time; needs one each of time, x, y, z; found ['time x', 'y z']",
+        ),
         (
             "t,x,y,z\n",
             "no column time; needs one each of time, x, y, z; found ['t', 'x', 'y', 'z']",
         ),
         ("time,x,x,y,z\n", "2 columns x; needs one each"),
-        ("time,x,y,z,yaw\n", "column yaw: the heading cannot vary"),
+        ("time,x,y,z,yaw\n", "no column roll; needs one each of time, x, y, z, roll, pitch, yaw;"),
+        ("time,x,y,z,vx\n", "column 'vx' is unknown; needs time, x, y, z, and may have roll, pit"),
+        (POSES + "1,0,0,0,0,1.6,0\n", "row 2, column pitch = 1.6: must be between -pi/2 and pi/2"),
+        (POSES + "1,0,0,0,3.2,0,0\n", "row 2, column roll = 3.2: jumps by 3.2 rad; unwrap the a"),
         (HEAD + "1,0,0,0\n" * (MAX_ROWS + 1), "10002 rows; at most 10000: keep every second"),
         (b"\xff\xfe", "not UTF-8 text"),
     ],
@@ -91,6 +99,14 @@ def test_a_mistake_in_a_file_is_named_by_row_column_and_value(tmp_path, content,
     message = refusal(load_scenario, SHORT, reference=file)
     assert message.startswith(f'scenario: reference.file = "{file}": {words}')
     assert "\n" not in message
+
+
+@pytest.mark.parametrize("separator", [";", "\t", " ", "   ", " ; "])
+def test_the_first_line_shows_what_separates_the_columns(tmp_path, separator):
+    file = tmp_path / "own.csv"
+    file.write_text(csv_text(COLUMNS).replace(",", separator))
+    rows = tuple(zip(*(column.tolist() for column in COLUMNS.values())))
+    assert load_scenario(SHORT, reference=file).reference.table == rows
 
 
 @pytest.mark.parametrize(
@@ -158,7 +174,7 @@ def test_a_file_that_cannot_be_read_is_named(tmp_path, name, words):
         ({"gait": lambda t: [4.0] * 4}, "row 1, column alpha_1 = 4.0: must be from -3.14159 to"),
         ({"reference": lambda t: "abc"}, "reference.0. = 'abc': must be 3 finite numbers"),
         ({"reference": lambda t: (t, t, 1j)}, "must be 3 finite numbers"),
-        ({"reference": lambda t: (t, t, t, 0.1)}, "a yaw cannot vary, set reference.yaw"),
+        ({"reference": lambda t: (t, t, t, 0.1)}, "numbers, or 6 with roll, pitch and yaw"),
         (
             {"gait": "walk"},
             """gait = 'walk': must be your own gait; override {"gait.type": "walk"}""",
@@ -361,3 +377,42 @@ def test_a_gait_that_repeats_goes_on():
     with pytest.raises(InputError, match=r"gait ends at 0\.2 s; .*gait\.hold = true"):
         load_scenario({**SHORT, "gait": table})
     assert load_scenario({**SHORT, "gait": {**table, "repeat": True}}).gait.repeat
+
+
+def test_a_gaits_unknown_column_is_refused(tmp_path):
+    file = tmp_path / "gait.csv"
+    file.write_text("time,alpha_1,alpha_2,alpha_3,alpha_4,beta\n0,0,0,0,0,0\n1,0,0,0,0,0\n")
+    assert "column 'beta' is unknown" in refusal(load_scenario, SHORT, gait=file)
+
+
+TURNING = {**COLUMNS, "roll": 4.0 * TIMES, "pitch": 0.1 * TIMES, "yaw": -TIMES}
+OMNI = {"simulation.duration": 0.4, "expect": []}
+
+
+def test_every_way_to_give_attitudes_gives_the_same_rows(tmp_path):
+    rows = tuple(zip(*(column.tolist() for column in TURNING.values())))
+    (tmp_path / "own.csv").write_text(csv_text(TURNING))
+    pq.write_table(pa.table(TURNING), tmp_path / "own.parquet")
+    given = TURNING, pa.table(TURNING), tmp_path / "own.csv", tmp_path / "own.parquet"
+    scenarios = [load_scenario("fleet/omni_octorotor#hover", OMNI, reference=one) for one in given]
+    rows_given = {"reference.type": "table", "reference.rows": rows}
+    scenarios.append(load_scenario("fleet/omni_octorotor#hover", {**OMNI, **rows_given}))
+    assert {scenario.reference.table for scenario in scenarios} == {rows}
+    assert {scenario.reference.kind for scenario in scenarios} == {"pose"}
+    level = {**TURNING, "roll": 0.0 * TIMES, "pitch": 0.0 * TIMES}
+    assert load_scenario("fleet/hexarotor#hover", OMNI, reference=level).reference.turns
+
+
+@pytest.mark.parametrize(
+    ("scenario", "changes", "words"),
+    [
+        ("fleet/hexarotor#hover", {}, "is no output with 1 components of force"),
+        ("fleet/bicopter#hover", {}, "the geometric law cannot follow roll, pitch and yaw that"),
+        ("fleet/omni_octorotor#hover", {"controller.turn_time": 1.0}, "controller.turn_time = 1.0"),
+        ("fleet/omni_octorotor#hover", {"reference.yaw": 0.1}, "reference.yaw = 0.1: is a column"),
+        ("ch04_tracking/setpoint#rho_0_modified", {}, "the attitude_altitude law cannot follow"),
+    ],
+)
+def test_attitudes_that_cannot_be_followed_are_refused_in_one_line(scenario, changes, words):
+    changes = OMNI | changes
+    assert words in refusal(load_scenario, scenario, changes, reference=TURNING)

@@ -291,6 +291,17 @@ def test_blue_gait_is_singular_from_the_start():
     assert flight.end.time == 0.0
 
 
+def test_the_end_of_a_step_that_would_reverse_a_rotor_says_what_helps():
+    step = {"reference.position": [2.0, 0.0, 0.0], "simulation.duration": 0.1, "expect": []}
+    lost = tiltsim.load_scenario("fleet/cant_hexarotor#hover", step)
+    assert tiltsim.simulate(lost).end.cause.endswith(
+        'rotor 2 came to a stop; controller.norm = "thrust", with which rotors reverse, a smaller '
+        "step of the reference or wider limits of the rotor speeds may help"
+    )
+    for remedy in ({"controller.norm": "thrust"}, {"reference.position": [0.3, 0.0, 0.0]}):
+        assert tiltsim.simulate(lost.replace(remedy)).end.kind == "completed"
+
+
 def test_exact_decoupling_ends_when_a_rotor_stops():
     flight = tiltsim.simulate(
         scenario(

@@ -26,6 +26,14 @@ def _side_force(vehicle: dict[str, Any]) -> float | None:
     return None if share is None else 100.0 * share
 
 
+def _with_tilts(vehicle: dict[str, Any]) -> str:
+    """What rotors and tilts together move about a level hover."""
+    tilting = vehicle["with_tilts"]
+    if tilting is None or tilting["attitude_and_lift"] < 4:
+        return "-"
+    return "position and attitude" if tilting["pose"] == 6 else "attitude and lift"
+
+
 COLUMNS: Final[Columns] = {
     "vehicle": ("name", ""),
     "rotors": ("rotors", "d"),
@@ -34,6 +42,7 @@ COLUMNS: Final[Columns] = {
     "dimension": ("torque_free_dimension", "d"),
     "singular attitudes": ("singular_attitudes", ""),
     "margin (rad)": (_margin, ".4f"),
+    "tilts as inputs": (_with_tilts, ""),
     "side force (% of weight)": (_side_force, ".1f"),
     "survives the loss of": (lambda row: ", ".join(map(str, row["survives"])) or "none", ""),
 }
@@ -43,8 +52,8 @@ def run(*, json: Json = False, markdown: bool = False, pictures: Path | None = N
     """List the vehicles that ship as MJCF files.
 
     Each row has the rotors, dimension of the torque-free forces, singular attitudes, margin at
-    level attitude, side force that level hover leaves in every direction, and the rotors whose loss
-    leaves a hover that can be controlled.
+    level attitude, the outputs that rotors and tilts together move, side force that level hover
+    leaves in every direction, and the rotors whose loss leaves a hover that can be controlled.
 
     Args:
         markdown: print the table of docs/fleet.md

@@ -27,7 +27,7 @@ class GaitOptions:
 
     Args:
         angles (A1,A2,A3,A4): tilt angles in rad, instead of a scenario
-        mjcf (FILE): the MJCF file of a vehicle of 4 to 16 rotors; --angles has one for each
+        mjcf (FILE): the MJCF file of a vehicle of 2 to 16 rotors; --angles has one for each
             tilt hinge
         published (NAME): a gait of the thesis, such as ch06_gait_3
         balance (AX,AY,AZ): the gait of least tilt that hovers level under an acceleration, m/s^2,

@@ -134,6 +134,10 @@ def multirotor_text(report: dict[str, Any]) -> str:
     ]
     if hover is not None:
         rows.append(("hover rotor speeds", numbers(hover["rotor_speeds"]) + " rad/s along spins"))
+    if (tilting := report.get("with_tilts")) is not None:
+        moved = f"{tilting['attitude_and_lift']} of attitude and lift, {tilting['pose']} of pose"
+        rows.append(("with tilts as inputs", f"level hover at {numbers(tilting['angles'])} rad"))
+        rows.append(("", f"moves {moved}"))
     if report["side_force_share"] is not None:
         share = f"{100.0 * report['side_force_share']:.4g} % of the weight in every direction"
         rows.append(("level side force", share))

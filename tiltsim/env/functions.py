@@ -33,7 +33,7 @@ from tiltsim.system.text import short_repr
 from tiltsim.vehicles.rotorcraft.layout import QW, TILT_1, TILT_RATE_1
 from tiltsim_controllers.mathematics.rotation import euler_from_quaternion, rotation_from_quaternion
 from tiltsim_controllers.mathematics.scalar import Floats
-from tiltsim_controllers.references.trajectories import reference_derivatives
+from tiltsim_controllers.references.trajectories import attitude_reference, reference_derivatives
 
 NOT_FINITE: Final = -1
 """In place of the code of a limit."""
@@ -122,6 +122,7 @@ class EnvFunctions:
         self._inputs, self._sample = lifting(equations.inputs), lifting(equations.observe)
         self._limit = lifting(loop.kind.limit_exceeded)
         self._reference_at = lifting(reference_derivatives)
+        self._attitude_at = lifting(attitude_reference)
         self._euler, self._rotation = map(
             lifting, (euler_from_quaternion, rotation_from_quaternion)
         )
@@ -252,7 +253,7 @@ class EnvFunctions:
                 position=motion[:3],
                 velocity=motion[3:6],
                 acceleration=motion[6:],
-                attitude=jnp.stack([reference.roll, reference.pitch, reference.yaw]),
+                attitude=jnp.asarray(self._attitude_at(time, reference, planned.knots)),
                 tilt_angles=unseen,
                 tilt_rates=unseen,
             ),

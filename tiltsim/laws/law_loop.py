@@ -28,7 +28,11 @@ from tiltsim_controllers.laws.observed import ROTOR_COMMANDS, Command, Desired, 
 from tiltsim_controllers.mathematics.attitude import rotation_matrix
 from tiltsim_controllers.mathematics.records import make_record_type
 from tiltsim_controllers.mathematics.scalar import Values, Vector, scalar
-from tiltsim_controllers.references.trajectories import ReferenceParameters, reference_derivatives
+from tiltsim_controllers.references.trajectories import (
+    ReferenceParameters,
+    attitude_reference,
+    reference_derivatives,
+)
 from tiltsim_controllers.vehicle.actuators import held_gain
 from tiltsim_controllers.vehicle.body import Body, inertia_matrix
 from tiltsim_controllers.vehicle.effectiveness import ROTOR_FLOATS, table_per_newton
@@ -255,7 +259,7 @@ def _inputs_of(key: Key) -> Callable[..., Values]:
         reference = known.reference
         motion: Any = reference_derivatives(time, reference, knots)
         angles, rates = moving(time, known.gait, knots)
-        attitude = reference.roll, reference.pitch, reference.yaw
+        attitude = attitude_reference(time, reference, knots)
         planned = (*angles, *rates)
         return control(
             time, state, tilt_rates, states, known, knots, motion[:12], attitude, planned

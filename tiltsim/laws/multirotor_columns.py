@@ -23,6 +23,9 @@ from tiltsim_controllers.mathematics.vectors import entries_of
 NULL_PART: Final = "null_part"
 """A column: the share of the rotors' ``varpi |varpi|`` that neither force nor torque show."""
 
+REVERSING: Final = 'controller.norm = "thrust", with which rotors reverse'
+"""The remedy where a rotor would have to reverse."""
+
 REFERENCES: Final = (*REFERENCE_COLUMNS, NULL_PART)
 """Columns of what the law asks for."""
 
@@ -42,7 +45,7 @@ def monitoring_of(layout: RotorLayout, form: Form) -> Monitoring:
     places = layout.places
     turning = places.rotors if form.norm == "speed" else 0
     speeds_in = entries_of(places.speed_1, turning)
-    names, stops = places.names("alpha"), rotor_stops(turning)
+    names, stops = places.names("alpha"), rotor_stops(turning, REVERSING)
     rotors, state_in = layout.tilt_of_rotor, entries_of(0, places.speed_1 + places.rotors)
     harmless = (1.0,) * len(stops)  # as published, the factor 2 |varpi| is in rows of force only
 

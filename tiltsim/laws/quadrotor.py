@@ -37,7 +37,11 @@ from tiltsim_controllers.code.traceable import traceable
 from tiltsim_controllers.laws import quadrotor_attitude_altitude, switching, yaw_position
 from tiltsim_controllers.mathematics.attitude import euler_angles
 from tiltsim_controllers.mathematics.scalar import Floats, Vector
-from tiltsim_controllers.references.trajectories import ReferenceParameters, reference_motion
+from tiltsim_controllers.references.trajectories import (
+    ReferenceParameters,
+    reference_attitude,
+    reference_motion,
+)
 from tiltsim_controllers.vehicle.parameters import SPIN, Vehicle
 from tiltsim_controllers.vehicle.quadrotor_mixer import speed_along_spin, thrust_controls
 from tiltsim_controllers.vehicle.states import PITCH, ROLL
@@ -59,9 +63,10 @@ EXTENSION_COLUMNS: Final = {
 
 
 @traceable
-def _reference_position(time: Any, state: Any, reference: ReferenceParameters, knots: Any) -> Any:
-    """The position (m) to track."""
-    return reference_motion(time, reference, knots)[0]
+def _reference_pose(time: Any, state: Any, reference: ReferenceParameters, knots: Any) -> Any:
+    """Position (m), roll, pitch and yaw (rad) to track, shape (6,)."""
+    position = reference_motion(time, reference, knots)[0]
+    return xp.hstack([position, reference_attitude(time, reference, knots)[0]])
 
 
 def references(
@@ -82,8 +87,8 @@ def references(
     """
     time = samples["time"]
     states, setup = np.empty((len(time), 0)), ControlSetup(reference, tuple(knots))
-    columns = [*evaluate_over_samples(_reference_position, 3, time, states, setup).T]
-    angles = attitude or (reference.roll, reference.pitch, reference.yaw)
+    columns = [*evaluate_over_samples(_reference_pose, 6, time, states, setup).T]
+    angles, columns = attitude or columns[3:], columns[:3]
     columns += [np.broadcast_to(np.asarray(angle, dtype=float), time.shape) for angle in angles]
     idle = dict.fromkeys(tilts, np.zeros_like(time))
     return dict(zip(REFERENCE_COLUMNS, columns, strict=True)) | idle

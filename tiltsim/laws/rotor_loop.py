@@ -42,7 +42,7 @@ from tiltsim.vehicles.rotorcraft.layout import Layout as Places
 from tiltsim_controllers.gaits.motion import tilt_motion_of
 from tiltsim_controllers.mathematics.scalar import Floats, Triple, Values, Vector, scalar
 from tiltsim_controllers.mathematics.vectors import entries_of
-from tiltsim_controllers.references.trajectories import position_reference
+from tiltsim_controllers.references.trajectories import attitude_reference, position_reference
 from tiltsim_controllers.vehicle.body import Body, body_of
 from tiltsim_controllers.vehicle.effectiveness import ROTOR_FLOATS
 from tiltsim_controllers.vehicle.motion import BODY_STATES, equations_of_motion_of
@@ -177,16 +177,17 @@ def _sampling_of(layout: RotorLayout, law: RotorLaw) -> Sampling:
 
 
 @scalar
-def _constant_attitude(time: float, values: Vector, parameters: Any, knots: Vector) -> Values:
+def _pose(time: float, values: Vector, parameters: Any, knots: Vector) -> Values:
     """Position and attitude of the reference, `REFERENCE_COLUMNS`."""
     reference = parameters.law.reference
     x, y, z, _, _, _, _, _, _ = position_reference(time, reference, knots)
-    return x, y, z, reference.roll, reference.pitch, reference.yaw
+    roll, pitch, yaw = attitude_reference(time, reference, knots)
+    return x, y, z, roll, pitch, yaw
 
 
 def _columns_of(layout: RotorLayout, law: RotorLaw) -> Columns:
     """Samples of flights, and the columns of references and margin."""
-    places, shown, references = layout.places, layout.shown, law.references or _constant_attitude
+    places, shown, references = layout.places, layout.shown, law.references or _pose
     fields, names = (*shown.observed_fields, *law.states), (*law.names, *shown.names("alpha_ref"))
     observed, idle = observed_of(places, shown, len(law.states)), (0.0,) * (shown[1] - places[1])
     first = len(shown.observed_fields)

@@ -207,10 +207,17 @@ def reference_columns(
     return dict(zip(names, rows.T, strict=True))
 
 
-def rotor_stops(rotors: int) -> tuple[str, ...]:
-    """Causes of an end where the speed of a rotor reaches zero, one a rotor."""
+def rotor_stops(rotors: int, remedy: str = "") -> tuple[str, ...]:
+    """Causes of an end where the speed of a rotor reaches zero, one a rotor.
+
+    Args:
+        rotors: Their number.
+        remedy: A key that also helps.
+    """
+    remedies = [remedy] * bool(remedy) + ["a smaller step of the reference"]
+    advice = ", ".join(remedies) + " or wider limits of the rotor speeds may help"
     return tuple(
-        f"the decoupling matrix became singular: rotor {rotor} came to a stop"
+        f"the decoupling matrix became singular: rotor {rotor} came to a stop; {advice}"
         for rotor in range(1, rotors + 1)
     )
 

@@ -8,7 +8,6 @@ from itertools import permutations
 from math import inf, pi
 from os import PathLike
 from typing import Any, Final
-from warnings import warn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -126,8 +125,7 @@ def attraction(
 
     Flights start on a grid; cells whose corners differ are divided into four, and so on. A flight
     comes back if it completes its duration and in its last second has attitude and position of the
-    undisturbed flight, to 0.05 rad and m: the height, and x and y if its law follows them. A
-    duration in which the slowest mode leaves more of a disturbance is a RuntimeWarning.
+    undisturbed flight, to 0.05 rad and m: the height, and x and y if its law follows them.
 
     Args:
         scenario: Anything that `tiltsim.load_scenario` takes, of a rotorcraft.
@@ -139,7 +137,8 @@ def attraction(
             estimate until the last division.
 
     Raises:
-        InputError: If an argument is invalid, or the undisturbed flight is lost.
+        InputError: If an argument is invalid, the undisturbed flight is lost, or the slowest mode
+            leaves more of a disturbance at the end than counts as back.
     """
     scenario = load_scenario(scenario)
     _check(scenario, axes, coarse, refinements)
@@ -153,7 +152,7 @@ def attraction(
     if slowest is not None:
         advice = advice_on_duration(slowest, scenario.simulation.duration, NEAR, MEAN)
         if advice:
-            warn(f"{scenario.address or 'scenario'}: {advice}", RuntimeWarning, stacklevel=2)
+            raise InputError(f"{scenario.address or 'scenario'}: {advice}")
     grid = _Grid(scenario, axes, (edges[0], edges[1]), progress)
     leaves = [(i, j, size) for i in range(0, cells, size) for j in range(0, cells, size)]
     returned = np.zeros((cells + 1, cells + 1), dtype=bool)

@@ -18,6 +18,9 @@ from tiltsim_controllers.vehicle.effectiveness import force_and_torque
 TOLERANCE = 1e-9
 """Relative tolerance of the singular values of force and torque and of the limits."""
 
+NEARLY = 1e-3
+"""Share of the weight by which the force of fewer than four rotors may miss it."""
+
 REST = 1e-12
 """A rotor with this part of the largest input is at rest."""
 
@@ -49,12 +52,15 @@ def hover_speeds(
         axes = controlled_axes(forces, LEVEL, dimension)
         desired = force @ _least_inputs(axes @ force, torque, weight * axes[:, 2])
         direction = desired / np.linalg.norm(desired)
-    else:
+    elif forces.dimension:
         direction = hover_direction(forces)
+    else:  # too few rotors for all torques; some make none, nearly so at tilts in decimals
+        direction = np.array(LEVEL)
     ends = np.outer(vehicle.spins, [speed * abs(speed) for speed in limits])
     lower, upper = ends.min(axis=1), ends.max(axis=1)
     inputs = _least_inputs(force, torque, weight * direction)
-    if not _within(inputs, lower, upper):
+    nearly = np.linalg.norm(force @ inputs / weight - direction) <= NEARLY
+    if not (_within(inputs, lower, upper) and (forces.dimension or nearly)):
         from tiltsim_controllers.analysis.attainable import TiltedRotors
         from tiltsim_controllers.analysis.hover import evenest_inputs
 
@@ -67,6 +73,11 @@ def hover_speeds(
                 "vehicle.max_rotor_speed or the gait"
             )
         inputs = found
+    return _speeds(inputs)
+
+
+def _speeds(inputs: Floats) -> Values:
+    """Signed speeds (rad/s) of inputs ``varpi |varpi|``, shape (N,)."""
     # Otherwise rounding, which depends on the processor, decides whether a rotor is at rest.
     inputs = np.where(np.abs(inputs) > REST * np.abs(inputs).max(), inputs, 0.0)
     return tuple((np.sign(inputs) * np.sqrt(np.abs(inputs))).tolist())

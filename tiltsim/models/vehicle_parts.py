@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
@@ -12,7 +13,7 @@ from tiltsim_controllers.vehicle.parameters import SPIN
 if TYPE_CHECKING:
     import mujoco
 
-MIN_ROTORS: Final = 4
+MIN_ROTORS: Final = 2
 MAX_ROTORS: Final = 16
 
 
@@ -70,7 +71,8 @@ def _count(compiled: mujoco.MjModel) -> Parts:
         rotors += 1
     while f"tilt_{tilts + 1}" in joints:
         tilts += 1
-    if not MIN_ROTORS <= rotors <= MAX_ROTORS:
+    numbered = sum(re.fullmatch(r"rotor_\d+", name) is not None for name in sites)
+    if numbered > rotors or not MIN_ROTORS <= rotors <= MAX_ROTORS:
         raise ValueError(
             f"{rotors} sites named rotor_1, rotor_2, ... without a gap; a multirotor has "
             f"{MIN_ROTORS} to {MAX_ROTORS}"

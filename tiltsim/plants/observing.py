@@ -14,7 +14,7 @@ from tiltsim.scenario.gait import tilts_of
 from tiltsim_controllers.code.traceable import as_arrays
 from tiltsim_controllers.mathematics.rotation import euler_from_quaternion
 from tiltsim_controllers.mathematics.scalar import Values
-from tiltsim_controllers.references.trajectories import reference_derivatives
+from tiltsim_controllers.references.trajectories import attitude_reference, reference_derivatives
 
 
 class Observer:
@@ -62,7 +62,7 @@ class Observer:
             position=motion[:3],
             velocity=motion[3:6],
             acceleration=motion[6:],
-            attitude=np.array((reference.roll, reference.pitch, reference.yaw)),
+            attitude=np.array(attitude_reference(time, reference, knots)),
             tilt_angles=angles.copy(),
             tilt_rates=rates.copy(),
         )

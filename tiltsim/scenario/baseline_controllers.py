@@ -7,14 +7,21 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.law_controller import Airframe, LawController, TiltingTable
 from tiltsim.scenario.messages import InvalidValueError
 from tiltsim_controllers.analysis.stability import ErrorLoop, linear_loop
-from tiltsim_controllers.laws.geometric import Geometric, geometric, geometric_with_tilts
+from tiltsim_controllers.analysis.torque_free import RANK_TOLERANCE
+from tiltsim_controllers.laws.geometric import (
+    Geometric,
+    geometric,
+    geometric_leaning_with_tilts,
+    geometric_with_tilts,
+)
 from tiltsim_controllers.laws.indi import Indi, indi, state_units
 from tiltsim_controllers.laws.pid import STATES, Pid, pid
 from tiltsim_controllers.mathematics.scalar import Values
-from tiltsim_controllers.vehicle.effectiveness import CONSTANT, COSINE, ROTOR_FLOATS, tilt_of_rotor
+from tiltsim_controllers.vehicle.effectiveness import CONSTANT, COSINE, ROTOR_FLOATS, SINE
 
 
 def require_no_pose(scenario: Any) -> None:
@@ -34,26 +41,47 @@ class GeometricController(Geometric, TiltingTable, LawController):
 
     def check_scenario(self, scenario: Any) -> None:
         super().check_scenario(scenario)
-        if not self.commands_tilts:
+        if self._leans(scenario.vehicle):
             require_no_pose(scenario)
+
+    def records_attitude(self, scenario: Any) -> bool:
+        return super().records_attitude(scenario) and not self._leans(scenario.vehicle)
 
     def law_function(self, airframe: Airframe) -> Callable[..., Any]:
         if not self.commands_tilts:
             return self.control
-        self._check_free(airframe)
-        return geometric_with_tilts
+        outputs = self._outputs(airframe.vehicle)
+        return geometric_with_tilts if outputs == 6 else geometric_leaning_with_tilts
 
-    def _check_free(self, airframe: Airframe) -> None:
-        """Refuse tilts that static allocation does not reach."""
-        table = np.reshape(airframe.vehicle.table, (airframe.rotors, ROTOR_FLOATS))
-        layout = tilt_of_rotor(airframe.vehicle.table)
-        fixed = np.abs(table[:, CONSTANT:COSINE]).max() > 1e-9 * np.abs(table[:, CONSTANT:]).max()
-        if len(set(layout)) < len(layout) or -1 in layout or fixed:
-            reason = "every rotor needs a tilt of its own, about an axis across its thrust"
+    def _leans(self, vehicle: Any) -> bool:
+        """Whether roll and pitch are inputs of the position, not outputs."""
+        if not self.commands_tilts:
+            return True
+        resolved = vehicle.resolve()
+        return isinstance(resolved, Multirotor) and self._outputs(resolved) < 6
+
+    def _outputs(self, vehicle: Multirotor) -> int:
+        """How many outputs rotors and tilts move: 6, or 4, torque and lift.
+
+        Raises `mistake` for fewer, and for tilts that static allocation does not reach.
+        """
+        layout = np.array(vehicle.tilt_of_rotor)
+        table = np.reshape(vehicle.table, (len(layout), ROTOR_FLOATS)).T
+        still, along, across = (table[part : part + 6] for part in (CONSTANT, COSINE, SINE))
+        tilting = layout >= 0
+        skew = np.abs(still[:, tilting]).max(initial=0.0) > 1e-9 * np.abs(along).max()
+        if len({*layout[tilting]}) < tilting.sum() or skew:
+            reason = "every pod needs one rotor, and an axis across its thrust"
             raise self.mistake("tilts", reason)
-        rows = np.hstack([table[:, COSINE : COSINE + 6].T, table[:, COSINE + 6 :].T])
-        if np.linalg.matrix_rank(rows) < len(rows):
-            raise self.mistake("tilts", "the vehicle has not force and torque in all directions")
+        rows = np.hstack([np.where(tilting, along, still), across[:, tilting]])
+        rows /= np.repeat([np.abs(rows[:3]).max(), np.abs(rows[3:]).max()], 3)[:, np.newaxis]
+        if np.linalg.matrix_rank(rows, RANK_TOLERANCE) == 6:
+            return 6
+        moved = int(np.linalg.matrix_rank(rows[2:], RANK_TOLERANCE))
+        if moved < 4:
+            reason = f"rotors and tilts move {moved} of the four outputs attitude and lift"
+            raise self.mistake("tilts", reason)
+        return 4
 
 
 class PidController(Pid, LawController):

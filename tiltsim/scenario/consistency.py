@@ -6,7 +6,7 @@ import re
 from math import pi
 from typing import Final
 
-from tiltsim.scenario.controller import laws_for
+from tiltsim.scenario.controller import CONTROLLERS, laws_for
 from tiltsim.scenario.expectation import NAME
 from tiltsim.scenario.gait import FixedGait, TableGait
 from tiltsim.scenario.messages import InvalidValueError, choose
@@ -108,6 +108,14 @@ def _check_multirotor(scenario: ScenarioTables, vehicle: MultirotorTable) -> Non
     if not vehicle.has_tilting_rotors:
         scenario.require(
             "vehicle.tilt_servo", TiltServoTable(), "vehicle.mjcf has no tilts; remove it"
+        )
+    controller, rotors = scenario.controller, vehicle.rotor_count
+    if rotors < 4 and controller.needs_four_rotors and not controller.commands_tilts:
+        reason = f"{rotors} rotors control attitude and lift only together with their tilts"
+        if not vehicle.has_tilting_rotors:
+            raise scenario.mistake("vehicle.mjcf", f"{reason}, and none of them tilts")
+        raise scenario.mistake(
+            "controller.law", f"{reason}; choose full_pose, or geometric with tilts = free"
         )
 
 
@@ -256,6 +264,11 @@ def _check_reference(scenario: ScenarioTables) -> None:
     kinds = {*controller.reference_kinds}
     if "pose" in kinds:
         kinds.add("position")  # a pose of zero roll and pitch is written like a position
+    if reference.turns and not controller.follows_turns:
+        able = [law for law in laws_for(scenario.vehicle.model) if CONTROLLERS[law].follows_turns]
+        reason = f"the {controller.law} law cannot follow roll, pitch and yaw that vary"
+        choice = f"; choose {', '.join(able)}" if able else ""
+        raise scenario.mistake("reference.type", f"{reason}{choice}")
     if reference.kind not in kinds:
         if reference.kind == "pose":
             key = "roll" if reference.roll else "pitch"

@@ -38,6 +38,9 @@ StateUnits = dict[Annotated[str, Field(pattern="^state_[a-z0-9_]+$")], str]
 class OwnFunctionController(ControllerTable):
     """A function of the user's."""
 
+    follows_turns = True
+    needs_four_rotors = False
+
     function: str = Field(
         description="FILE.py:NAME of a function or class; FILE in the scenario's folder",
         examples=["my_controller.py:hover"],
@@ -74,6 +77,7 @@ class PythonController(OwnFunctionController):
     reference_kinds = ("position", "pose", "attitude_altitude")
     is_external = True
     rotors_have_speeds = True
+    leans_unrecorded = True
 
     law: Literal["python"] = Field(description="your own controller")
 

@@ -125,6 +125,9 @@ class ControllerTable(Table):
     is_external: ClassVar[bool] = False  # commands come from Python code, not from a built-in law
     commands_tilts: ClassVar[bool] = False  # the tilt angles are inputs, not planned by a gait
     rotors_have_speeds: ClassVar[bool] = False  # of the quadrotor, too, whose laws make thrusts
+    follows_turns: ClassVar[bool] = False  # roll, pitch and yaw that vary with time
+    needs_four_rotors: ClassVar[bool] = True  # or tilts that the law commands
+    leans_unrecorded: ClassVar[bool] = False  # towards a position; no column has this attitude
 
     gain_sets: ClassVar[GainSets] = {}
 
@@ -148,6 +151,11 @@ class ControllerTable(Table):
 
     def check_scenario(self, scenario: Any) -> None:
         """Refuse the controller in a scenario, otherwise consistent. Raises `mistake`."""
+
+    def records_attitude(self, scenario: Any) -> bool:
+        """Whether ``roll_ref`` and ``pitch_ref`` are the attitude that the law asks for."""
+        leans = self.leans_unrecorded and not self.commands_tilts
+        return not leans or scenario.reference.kind != "position"
 
     @property
     def linearization(self) -> str:

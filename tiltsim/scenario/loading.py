@@ -71,11 +71,11 @@ def load_scenario(
             `tiltsim.law`, or an object or subclass of `tiltsim.LawController`.
         reference: A custom motion in place of the scenario's ``[reference]``, of which roll,
             pitch, yaw and acceleration_feedforward stay: a function of time (s) that returns a
-            position ``(x, y, z)`` (m), sampled every 0.01 s over the duration of the flight, also
-            of one with another duration that is made of this scenario; or a table with the columns
-            time, x, y and z: of pandas or Arrow, a dict of arrays, or the name of a CSV or Parquet
-            file. The overrides are keys of the new table, such as ``{"reference.interpolation":
-            "cubic"}``.
+            position ``(x, y, z)`` (m), or these with roll, pitch and yaw (rad), sampled every 0.01
+            s over the duration of the flight, also of one with another duration that is made of
+            this scenario; or a table with the columns time, x, y and z, maybe roll, pitch and yaw:
+            of pandas or Arrow, a dict of arrays, or the name of a CSV or Parquet file. The
+            overrides are keys of the new table, such as ``{"reference.interpolation": "cubic"}``.
         gait: A custom gait in place of the scenario's ``[gait]``, as the reference: a function
             that returns four tilt angles (rad), or a table with the columns time and alpha_1 to
             alpha_4.

@@ -35,6 +35,16 @@ METRICS: Final = {
     "final_position_error_z": Metric(
         "final error along z", "m", "reference minus actual, mean over the last second"
     ),
+    "rms_position_error": Metric(
+        "rms position error",
+        "m",
+        "root mean square distance from the reference; of altitude alone where no law follows x, y",
+    ),
+    "max_position_error": Metric(
+        "largest position error",
+        "m",
+        "largest distance from the reference; of altitude alone where no law follows x, y",
+    ),
     "sup_position_error_after_20s": Metric(
         "largest horizontal error after 20 s", "m", "largest horizontal position error from 20 s on"
     ),

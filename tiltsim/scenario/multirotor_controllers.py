@@ -35,6 +35,7 @@ class AttitudeForceController(AttitudeForce, GaitFollowingController, FailureAwa
 
     vehicle_models = ("multirotor",)
     reference_kinds = ("position", "pose", "attitude_altitude")
+    follows_turns = True
 
     @model_validator(mode="after")
     def _check(self) -> Self:

@@ -69,8 +69,12 @@ def check_dimension(
     _check_scaling(controller, vehicle, dimension)
     check_decoupler(scenario, controller.decoupler)
     reference = scenario.reference
+    if reference.turns:
+        controller.require_defaults(
+            ("attitude_error", "turn_time"), "not supported where roll, pitch and yaw vary"
+        )
     if reference.kind == "pose" and dimension < 3:
-        key = "roll" if reference.roll else "pitch"
+        key = "type" if reference.turns else "roll" if reference.roll else "pitch"
         reason = f"is no output with {dimension} components of force; needs a vehicle with 3"
         raise scenario.mistake(f"reference.{key}", reason)
     for key in ("decoupling", "decoupler"):

@@ -19,7 +19,13 @@ from tiltsim.scenario.limits import MAX_ROWS
 from tiltsim.scenario.messages import tags_of
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.scenario.simulation_table import SimulationTable
-from tiltsim.scenario.time_table import GAIT_COLUMNS, REFERENCE_COLUMNS, rows_of_columns
+from tiltsim.scenario.time_table import (
+    GAIT_COLUMNS,
+    POSE_COLUMNS,
+    REFERENCE_COLUMNS,
+    reference_columns_among,
+    rows_of_columns,
+)
 from tiltsim.system.numbers import is_finite, real_array
 from tiltsim.system.text import short_repr
 from tiltsim_controllers.mathematics.scalar import Values
@@ -119,6 +125,8 @@ def sample_functions(document: Mapping[str, Any], own: Mapping[str, Any]) -> Non
             size = len(COLUMNS[name]) - 1
             if name == "gait" and _is_multirotor(document):
                 size = _tilts_of(own[name])
+            if name == "reference" and _size_of(own[name]) == len(POSE_COLUMNS) - 1:
+                size = len(POSE_COLUMNS) - 1
             rows[:] = _samples(name, own[name], size, span)
 
 
@@ -128,20 +136,30 @@ def _is_multirotor(document: Mapping[str, Any]) -> bool:
     return isinstance(vehicle, Mapping) and vehicle.get("model") == "multirotor"
 
 
+def _size_of(function: Callable[[float], Any]) -> int:
+    """Number of values that a function of time returns; 0 if it returns no vector."""
+    try:
+        values = real_array(function(0.0))
+    except Exception:
+        return 0
+    return values.size if values.ndim == 1 else 0
+
+
 def _tilts_of(gait: Callable[[float], Any]) -> int:
     """Number of tilt angles that a function of time returns; 4 if it returns no such vector."""
-    try:
-        angles = real_array(gait(0.0))
-    except Exception:
-        return 4
-    return angles.size if angles.ndim == 1 and 1 <= angles.size <= MAX_ROTORS else 4
+    size = _size_of(gait)
+    return size if 1 <= size <= MAX_ROTORS else 4
 
 
 def _table(name: str, value: Any, multirotor: bool) -> dict[str, Any]:
     """The table of a scenario for an argument."""
     columns: Sequence[str] = COLUMNS[name]
-    if name == "gait" and multirotor and (isinstance(value, Mapping) or hasattr(value, "columns")):
-        columns = TableGait.columns_among([*map(str, getattr(value, "columns", value))])
+    if isinstance(value, Mapping) or hasattr(value, "columns"):
+        names = [*map(str, getattr(value, "column_names", getattr(value, "columns", value)))]
+        if name == "reference":
+            columns = reference_columns_among(names)
+        elif multirotor:
+            columns = TableGait.columns_among(names)
     kind = value.get("type") if isinstance(value, Mapping) else value
     if isinstance(kind, str) and kind in tags_of(Scenario, (name,))[1]:
         hint = f'override {{"{name}.type": "{kind}"}} for one of the built-in types'
@@ -178,6 +196,6 @@ def _samples(
             values = np.array(np.nan)
         if values.shape != (size,) or not np.isfinite(values).all():
             shown = short_repr(returned)
-            yaw = "; a yaw cannot vary, set reference.yaw" if values.size > size == 3 else ""
-            raise InputError(f"{name}({time:g}) = {shown}: must be {size} finite numbers{yaw}")
+            pose = ", or 6 with roll, pitch and yaw" if name == "reference" and size == 3 else ""
+            raise InputError(f"{name}({time:g}) = {shown}: must be {size} finite numbers{pose}")
         yield (time, *values.tolist())

@@ -3,23 +3,31 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from functools import lru_cache
+from itertools import pairwise
 from math import pi
 from typing import Annotated, Final, Literal
 
 from pydantic import Field
 
 from tiltsim.scenario.controller_table import ReferenceKind
-from tiltsim.scenario.table import Angle, Angles3, Coordinate, Positive, Table, Vector3, example
-from tiltsim.scenario.time_table import REFERENCE_COLUMNS, Rows, TimeTable
+from tiltsim.scenario.table import Angle, Angles3, Positive, Table, Vector3, example
+from tiltsim.scenario.time_table import (
+    POSE_COLUMNS,
+    REFERENCE_COLUMNS,
+    Rows,
+    TimeTable,
+    reference_columns_among,
+)
 from tiltsim_controllers.gaits.parameters import NO_KNOTS
 from tiltsim_controllers.mathematics.scalar import Triple, Values
-from tiltsim_controllers.references.trajectories import REFERENCE_TYPES, ReferenceParameters
+from tiltsim_controllers.references.trajectories import POSES, REFERENCE_TYPES, ReferenceParameters
 from tiltsim_controllers.references.waypoints import minimum_snap_knots, table_knots
 
 Tilt = Annotated[float, Field(gt=-pi / 2, lt=pi / 2)]
 Roll = Annotated[float, Field(ge=-pi, le=pi)]
-ReferenceRow = Annotated[tuple[float, Coordinate, Coordinate, Coordinate], Field(strict=False)]
+ReferenceRow = Annotated[tuple[float, ...], Field(strict=False, min_length=4, max_length=7)]
 
 
 _PREFIXES: Final = {"position": "", "angular_frequency": "frequency_"}
@@ -63,6 +71,11 @@ class _Reference(Table, ABC):
     @property
     def adds_acceleration(self) -> bool:
         """Whether ``acceleration_feedforward`` is set."""
+        return False
+
+    @property
+    def turns(self) -> bool:
+        """Whether roll, pitch and yaw vary with time."""
         return False
 
     def after_gait(self, gait: Values) -> tuple[ReferenceParameters, Values]:
@@ -223,14 +236,15 @@ class TableReference(_PositionReference, TimeTable):
     type: Literal["table"] = Field(description="your own motion, as a table over time")
     file: str | None = Field(
         None,
-        description="CSV or Parquet file with the columns time, x, y and z, in s and m, relative "
-        "to the scenario's folder; times from 0, at least 1e-4 s apart; 2 to 10,000 rows",
+        description="CSV or Parquet file with the columns time, x, y and z, in s and m, and for an "
+        "attitude that varies roll, pitch and yaw, in rad without jumps, relative to the "
+        "scenario's folder; times from 0, at least 1e-4 s apart; 2 to 10,000 rows",
         examples=["my_reference.csv"],
     )
     rows: Annotated[tuple[ReferenceRow, ...], Field(strict=False)] | None = Field(
         None,
-        description="the table itself in place of a file: time, x, y and z of each row "
-        "[s, m, m, m]",
+        description="the table itself in place of a file: time, x, y and z of each row, and roll, "
+        "pitch and yaw where they vary [s, m, m, m, rad, rad, rad]",
         examples=[[[0.0, 0.0, 0.0, 0.0], [2.0, 0.5, 0.0, 0.2]]],
     )
     interpolation: Literal["minimum_snap", "cubic"] = Field(
@@ -240,6 +254,27 @@ class TableReference(_PositionReference, TimeTable):
         "or noisy",
     )
 
+    @classmethod
+    def columns_among(cls, names: Sequence[str]) -> tuple[str, ...]:
+        return reference_columns_among(names)
+
+    @classmethod
+    def _columns_of_width(cls, width: int) -> tuple[str, ...]:
+        return POSE_COLUMNS if width == len(POSE_COLUMNS) else cls.columns
+
+    @property
+    def turns(self) -> bool:
+        return len(self.table[0]) == len(POSE_COLUMNS)
+
+    @property
+    def kind(self) -> ReferenceKind:
+        leans = self.turns and any(row[4] or row[5] for row in self.table)
+        return "pose" if leans else super().kind
+
+    @property
+    def parameters(self) -> ReferenceParameters:
+        return super().parameters._replace(**{"type": POSES} if self.turns else {})
+
     def _motion(self) -> dict[str, float | Triple]:
         return {"segments": float(len(self.table))}
 
@@ -248,8 +283,24 @@ class TableReference(_PositionReference, TimeTable):
         """Polynomials; see `tiltsim_controllers.references.waypoints.table_knots`."""
         return _reference_table_knots(self.table, self.interpolation)
 
+    def _check_attitude(self) -> None:
+        """Refuse angles beside the table's, jumps of angles, and a pitch of pi/2."""
+        self.require_defaults(("roll", "pitch", "yaw"), "is a column of the table; remove it")
+        for number, (before, row) in enumerate(pairwise((self.table[0], *self.table)), start=1):
+            for name, last, angle in zip(POSE_COLUMNS[4:], before[4:], row[4:], strict=True):
+                if abs(angle - last) > pi:
+                    problem = f"jumps by {abs(angle - last):.3g} rad; unwrap the angles"
+                elif name == "pitch" and abs(angle) >= pi / 2:
+                    problem = "must be between -pi/2 and pi/2"
+                else:
+                    continue
+                key = "file" if self.rows is None else "rows"
+                raise self.mistake(key, f"row {number}, column {name} = {angle!r}: {problem}")
+
     def _check_values(self) -> None:
         super()._check_values()
+        if self.turns:
+            self._check_attitude()
         try:
             _ = self.knots
         except ValueError as error:

@@ -195,7 +195,7 @@ class MultirotorTable(RotorcraftTable):
     model_config = example(model="multirotor", mjcf="mjcf/hexarotor.xml")
 
     model: Literal["multirotor"] = Field(
-        description="4 to 16 rotors at any places, with any thrust axes, fixed or tilted about "
+        description="2 to 16 rotors at any places, with any thrust axes, fixed or tilted about "
         "hinges of any axes, of which two may share one"
     )
     mjcf: str = Field(

@@ -68,3 +68,4 @@ class FullPoseController(FullPose, FailureAwareController):
     reference_kinds = ("position", "pose", "attitude_altitude")
     loop_gains = ("gains",)
     commands_tilts = True
+    follows_turns = True

@@ -20,6 +20,12 @@ from tiltsim.system.text import short_repr
 from tiltsim_controllers.mathematics.scalar import Values
 
 REFERENCE_COLUMNS: Final = ("time", "x", "y", "z")
+POSE_COLUMNS: Final = (*REFERENCE_COLUMNS, "roll", "pitch", "yaw")
+
+
+def reference_columns_among(names: Sequence[str]) -> tuple[str, ...]:
+    """The columns that a reference with columns of these names has to have."""
+    return POSE_COLUMNS if {"roll", "pitch", "yaw"} & {*names} else REFERENCE_COLUMNS
 
 
 def gait_columns(tilts: int) -> tuple[str, ...]:
@@ -31,6 +37,9 @@ GAIT_COLUMNS: Final = gait_columns(4)
 
 SHORTEST_STEP: Final = 1e-4
 """Seconds between the rows of any table."""
+
+SEPARATORS: Final = ",;\t "
+"""What may separate the columns of a CSV file."""
 
 _NUMBERS: Final = ("double", "float", "int64", "int32")
 """Types of columns of a Parquet file."""
@@ -138,8 +147,7 @@ def _read_rows(file: Path, columns_among: ColumnsAmong) -> list[Values]:
         return _read_parquet(file, columns_among)
     if file.suffix.lower() != ".csv":
         raise InputError("must end with .csv or .parquet")
-    head, *lines = [row for row in csv.reader(read_text(file).splitlines()) if row] or [[]]
-    head = [name.strip() for name in head]
+    head, *lines = _fields(read_text(file))
     columns = columns_among(head)
     _check_names(head, columns)
     _check_count(len(lines))
@@ -150,6 +158,16 @@ def _read_rows(file: Path, columns_among: ColumnsAmong) -> list[Values]:
             raise InputError(f"row {number}: {len(line)} values in {len(head)} columns")
         rows.append(tuple(_number(line[place], number, head[place]) for place in places))
     return rows
+
+
+def _fields(text: str) -> list[list[str]]:
+    """Fields of the lines of a CSV file; the first line shows what separates them."""
+    lines = [line.strip() for line in text.splitlines() if line.strip()]
+    if not lines:
+        raise InputError("is empty")
+    separator = next((mark for mark in SEPARATORS if mark in lines[0]), ",")
+    rows = csv.reader(lines, delimiter=separator, skipinitialspace=True)
+    return [[field.strip() for field in row] for row in rows]
 
 
 def _read_parquet(file: Path, columns_among: ColumnsAmong) -> list[Values]:
@@ -166,15 +184,16 @@ def _read_parquet(file: Path, columns_among: ColumnsAmong) -> list[Values]:
 
 
 def _check_names(names: Sequence[str], columns: Sequence[str]) -> None:
-    if "yaw" in names and "x" in columns:
-        raise InputError(
-            "column yaw: the heading cannot vary; remove the column and set reference.yaw"
-        )
     for name in columns:
         if (count := names.count(name)) != 1:
             problem = f"{count} columns" if count else "no column"
             needed, found = ", ".join(columns), short_repr([*names])
             raise InputError(f"{problem} {name}; needs one each of {needed}; found {found}")
+    for name in names:
+        if name not in columns:
+            may = "" if columns != REFERENCE_COLUMNS else ", and may have roll, pitch and yaw"
+            needed = ", ".join(columns)
+            raise InputError(f"column {short_repr(name)} is unknown; needs {needed}{may}")
 
 
 def _number(text: str, row: int, column: str) -> float:

@@ -15,7 +15,7 @@ from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.messages import choose
 from tiltsim.studies.checking import collect
 from tiltsim.studies.comparison import GIVEN, Entry, fly_entries
-from tiltsim.studies.fleet import FLEET, fleet_file
+from tiltsim.studies.fleet import FEW_ROTORS, FLEET, fleet_file
 
 FOLDER: Final = "arena"
 """Folder of the library with one file for each vehicle and one variant for each task."""
@@ -83,14 +83,14 @@ class Standing:
 
 
 def vehicles() -> dict[str, Vehicle]:
-    """The vehicles by name: those with a file of their own, then the others of the fleet."""
+    """The vehicles by name: those with a file of their own, then the fleet's others on a gait."""
     found: dict[str, list[str]] = {}
     for address in collect([str(shipped_folder("scenarios") / FOLDER)]):
         found.setdefault(address.partition("#")[0].rpartition("/")[2], []).append(address)
     shared = tuple(found.pop(MULTIROTOR))
     every = {name: Vehicle(tuple(tasks), {}) for name, tasks in found.items()}
     for name, angles in FLEET.items():
-        if name not in every:
+        if name not in (*every, *FEW_ROTORS):
             gait = {"gait": {"type": "fixed", "angles": [*angles]}} if angles else {}
             own = {"vehicle.mjcf": str(fleet_file(name)), **gait, **OWN_KEYS.get(name, {})}
             every[name] = Vehicle(shared, own)

@@ -228,8 +228,8 @@ def compare_one(entry: Entry, *, searches: bool, timed: bool = True) -> Compared
         return Compared(row | refused | {"latency_refused": None}, np.zeros(0), np.zeros(0))
     row |= {"end": flight.end.kind, "refused": None, **_tracking(flight), **_effort(flight)}
     metrics = flight.metrics()
-    for measure in ("min_singularity_margin", "min_rotor_speed", "saturated_fraction"):
-        row[measure] = metrics.get(measure)
+    for measure in MEASURES:
+        row[measure] = row.get(measure, metrics.get(measure))
     for measure, search in SEARCHES.items():
         row[measure] = _survived(scenario, search) if searches else None
     row["control_period"] = _control_period(scenario)
@@ -257,7 +257,7 @@ def _number(value: Any) -> Any:
 def _distance(flight: Flight) -> Floats:
     """Distance of the vehicle from its reference, m; of the altitude where only that is given."""
     error = flight["reference_position"] - flight["position"]
-    if flight.scenario.reference.kind == "attitude_altitude":
+    if not flight.assembly.follows_position:
         return np.abs(error[:, 2])
     return np.asarray(np.linalg.norm(error, axis=1))
 
@@ -265,12 +265,7 @@ def _distance(flight: Flight) -> Floats:
 def _tracking(flight: Flight) -> dict[str, float]:
     error = _distance(flight)
     last = in_last_second(flight["time"], flight.scenario.simulation.timestep)
-    return {
-        "rms_position_error": float(np.sqrt(np.mean(error**2))),
-        "max_position_error": float(error.max()),
-        "final_position_error": float(error[last].mean()),
-        "rms_yaw_error": _yaw_error(flight),
-    }
+    return {"final_position_error": float(error[last].mean()), "rms_yaw_error": _yaw_error(flight)}
 
 
 def _yaw_error(flight: Flight) -> float:

@@ -14,6 +14,8 @@ BY_TURNS: Final = (0.35, -0.35, 0.35, -0.35, 0.35, -0.35)
 """Tilt angles (rad), about as large as a fixed cant of 20 degrees."""
 
 FLEET: Final[dict[str, tuple[float, ...]]] = {
+    "bicopter": (0.0, 0.0),
+    "tricopter": (-0.02127199, -0.02127199, -0.02121423),
     "quadrotor": (),
     "cant_quadrotor": (),
     "tiltrotor": (-0.65, -0.65, 0.65, 0.65),
@@ -25,6 +27,9 @@ FLEET: Final[dict[str, tuple[float, ...]]] = {
     "omni_octorotor": (),
 }
 """Names of the files, with tilt angles (rad) that show the vehicle's capabilities."""
+
+FEW_ROTORS: Final = ("bicopter", "tricopter")
+"""Vehicles whose tilts a law has to command, since a gait leaves too few inputs."""
 
 KEYS: Final = (
     "rotors",
@@ -57,6 +62,7 @@ def fleet_report() -> list[dict[str, Any]]:
             {
                 "name": name,
                 **{key: report[key] for key in KEYS},
+                "with_tilts": report.get("with_tilts"),
                 "max_rotor_speed": report["hover"]["max_rotor_speed"],
                 "survives": [loss["rotor"] for loss in report["faults"] if _survives(loss)],
             }

@@ -19,7 +19,7 @@ from tiltsim_controllers.analysis.attainable import (
     side_force_share,
 )
 from tiltsim_controllers.analysis.hover import Hover, hover, rotor_losses
-from tiltsim_controllers.analysis.level_hover import MAX_TILT, level_hover
+from tiltsim_controllers.analysis.level_hover import MAX_TILT, level_hover, moved_outputs
 from tiltsim_controllers.analysis.singularity import world_up
 from tiltsim_controllers.analysis.torque_free import (
     SINGULAR_ATTITUDES,
@@ -28,6 +28,7 @@ from tiltsim_controllers.analysis.torque_free import (
     torque_free_forces,
 )
 from tiltsim_controllers.gaits.plans import Gait
+from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.vehicle.effectiveness import ROTOR_FLOATS, force_and_torque
 
 UNLIMITED: Final = 100.0
@@ -105,6 +106,8 @@ def multirotor_report(
         "side_force_share": side_force_share(rotors) if is_limited or dimension < 3 else None,
         "attainable": _attainable(rotors, found) if is_limited else None,
     }
+    if vehicle.tilts:
+        report["with_tilts"] = _with_tilts(vehicle, rotors)
     if faults:
         report["faults"] = [
             {
@@ -144,6 +147,25 @@ def period_report(vehicle: Multirotor, gait: Gait, roll: float, pitch: float) ->
             "singularity_margin": margin.tolist(),
         },
     }
+
+
+def _with_tilts(vehicle: Multirotor, rotors: TiltedRotors) -> dict[str, Any] | None:
+    """The level hover of least tilt angles, and how many outputs rotors and tilts move there."""
+    weight = np.array([0.0, 0.0, rotors.weight])
+    found = level_hover(vehicle.table, weight, (rotors.lower, rotors.upper))
+    if found is None:
+        return None
+    tilts, w = found
+    return {
+        "angles": np.round(tilts, 9).tolist(),
+        "rotor_speeds": _speeds_along(w, vehicle),
+        **moved_outputs(vehicle.table, tilts, w)._asdict(),
+    }
+
+
+def _speeds_along(w: Floats, vehicle: Multirotor) -> list[float]:
+    """Rotor speeds (rad/s) along the spins, of inputs w."""
+    return (np.array(vehicle.spins) * np.copysign(np.sqrt(np.abs(w)), w)).tolist()
 
 
 def _free_tilts(vehicle: Multirotor, rotors: TiltedRotors, lost: int) -> dict[str, Any] | None:
@@ -194,11 +216,10 @@ def balance_report(
             " vehicle level"
         )
     tilts, w = found
-    speeds = np.array(vehicle.spins) * np.copysign(np.sqrt(np.abs(w)), w)
     return {
         "acceleration": list(acceleration),
         "angles": tilts.tolist(),
-        "rotor_speeds": speeds.tolist(),
+        "rotor_speeds": _speeds_along(w, vehicle),
     }
 
 
@@ -247,6 +268,9 @@ def _warnings(report: dict[str, Any], *, is_limited: bool) -> list[str]:
             "the rotors make no force without torque: the decoupling matrix is singular at every"
             " attitude"
         )
+    tilting = report.get("with_tilts")
+    if report["torque_free_dimension"] == 0 and tilting and tilting["attitude_and_lift"] == 4:
+        warnings[-1] += "; with its tilts as inputs the vehicle hovers and can be controlled"
     if report["hover"] is None:
         warnings.append("no hover within the rotors' limits")
     elif not report["hover"]["controllable"]:

@@ -40,6 +40,15 @@ def mean_of(column: Floats, span: npt.NDArray[np.bool_]) -> Any:
     return np.mean(np.compress(span, column, axis=-1), axis=-1)
 
 
+def position_error(*errors: Floats) -> dict[str, Any]:
+    """Metrics of the distance from the reference, from its components (m), shape (..., N) each."""
+    square = sum(error * error for error in errors)
+    return {
+        "rms_position_error": np.sqrt(np.mean(square, axis=-1)),
+        "max_position_error": np.sqrt(square).max(axis=-1),
+    }
+
+
 def largest(values: Iterable[Any]) -> Any:
     """The largest of arrays (...), one by one; a NaN that comes first stays, as in ``max``."""
     first, *others = values

@@ -181,12 +181,19 @@ def stems(columns: Collection[str]) -> dict[str, list[str]]:
     return {name if len(parts) > 1 else parts[0]: parts for name, parts in found.items()}
 
 
+def reference_of(assembly: Assembly, column: str) -> str:
+    """The column with the reference of another; empty for none, as for an unrecorded lean."""
+    scenario, name = assembly.scenario, f"{column}_ref"
+    if column in ("roll", "pitch") and "roll_ref" in assembly.loop.units:
+        return name if scenario.controller.records_attitude(scenario) else ""
+    return name if name in assembly.loop.units else ""
+
+
 def vector_signals(assembly: Assembly, name: str, columns: Sequence[str]) -> Signals:
     """The panel of some columns, shown on request."""
     known = [assembly.loop.label(column) for column in columns]
-    units = assembly.loop.units
     lines = [
-        Signal(column, label, column, f"{column}_ref" if f"{column}_ref" in units else "")
+        Signal(column, label, column, reference_of(assembly, column))
         for column, (label, _) in zip(columns, known, strict=True)
     ]
     title = in_words(name) if len(columns) > 1 else known[0].label
@@ -200,7 +207,7 @@ def _chosen(assembly: Assembly) -> Iterator[Signals]:
     units, vehicle = assembly.loop.units, assembly.scenario.vehicle
     rotors = assembly.loop.kind.rotors
     if "roll" in units:
-        angles = [Signal(name, name, name, f"{name}_ref") for name in ANGLES]
+        angles = [Signal(name, name, name, reference_of(assembly, name)) for name in ANGLES]
         compared = [angle._replace(label=angle.name.capitalize()) for angle in angles[:2]]
         yield Signals("attitude", "Attitude", "rad", angles, compared=compared, moves=True)
     if "alpha_1" in units and vehicle.has_tilting_rotors:

@@ -9,17 +9,20 @@ Without a reserve the least tilts would load some rotors fully and stop others.
 from __future__ import annotations
 
 from math import radians
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 from scipy.optimize import minimize
 
+from tiltsim_controllers.analysis.torque_free import RANK_TOLERANCE
+from tiltsim_controllers.laws.full_pose import input_matrix
 from tiltsim_controllers.vehicle.effectiveness import (
     ROTOR_FLOATS,
     SPIN_SIGN,
     effectiveness_of,
     tilt_of_rotor,
 )
+from tiltsim_controllers.vehicle.rotors import rotors_in
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -79,6 +82,28 @@ def level_hover(
         return None
     best = min(candidates, key=lambda x: float(x[:tilts] @ x[:tilts]))
     return best[:tilts], best[tilts:] * problem.unit
+
+
+class MovedOutputs(NamedTuple):
+    """How many outputs rotors and tilts move independently of each other about a hover."""
+
+    attitude_and_lift: int  # of four
+    pose: int  # of six
+
+
+def moved_outputs(table: Sequence[float], tilts: Floats, w: Floats) -> MovedOutputs:
+    """The outputs of a level hover with rotor speeds and tilt angles as inputs.
+
+    Args:
+        table: of the rotors, as for `level_hover`
+        tilts: tilt angles, rad, shape (M,)
+        w: rotor inputs ``varpi |varpi|``, rad^2/s^2, shape (N,)
+    """
+    rotors = rotors_in(table, 0, tilt_of_rotor(table))
+    rows = input_matrix(rotors, tilts, w / np.abs(w).max())
+    rows /= np.repeat([np.abs(part).max() for part in (rows[:3], rows[3:])], 3)[:, np.newaxis]
+    ranks = (np.linalg.matrix_rank(part, RANK_TOLERANCE) for part in (rows[[0, 1, 2, 5]], rows))
+    return MovedOutputs(*map(int, ranks))
 
 
 class _Problem:

@@ -49,8 +49,8 @@ def torque_free_forces(force: ArrayLike, torque: ArrayLike) -> TorqueFreeForces:
     """Rank of ``tau`` and the space of torque-free forces.
 
     Args:
-        force, torque: Effectiveness F and tau, each of shape (..., 3, N), N of at least 3, in any
-            unit; a rotor that is lost has columns of zeros.
+        force, torque: Effectiveness F and tau, each of shape (..., 3, N), in any unit; a rotor
+            that is lost has columns of zeros.
     """
     force, torque = np.asarray(force, float), np.asarray(torque, float)
     _, sizes, rows = np.linalg.svd(torque)
@@ -60,7 +60,7 @@ def torque_free_forces(force: ArrayLike, torque: ArrayLike) -> TorqueFreeForces:
     strongest = np.linalg.norm(force, axis=-2).max(axis=-1)
     axes, sizes, _ = np.linalg.svd(force @ kernel)
     used = (sizes > RANK_TOLERANCE * strongest[..., np.newaxis]) & (rank == 3)[..., np.newaxis]
-    basis = axes * used[..., np.newaxis, :]
+    basis = axes[..., : used.shape[-1]] * used[..., np.newaxis, :]
     return TorqueFreeForces(rank, used.sum(axis=-1), basis @ np.swapaxes(basis, -1, -2))
 
 

@@ -27,10 +27,16 @@ from pydantic import Field
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.code.traceable import traceable
 from tiltsim_controllers.laws.failures import Failure, working
+from tiltsim_controllers.laws.feedback import body_rate_matrix
 from tiltsim_controllers.laws.keys import GainSets, Keys, NamedGains, Positive, Vector3, record_of
 from tiltsim_controllers.mathematics.attitude import attitude_error, rotation_matrix
 from tiltsim_controllers.mathematics.linear import cross, least_norm
-from tiltsim_controllers.references.trajectories import ReferenceParameters
+from tiltsim_controllers.mathematics.moving import Moving
+from tiltsim_controllers.references.trajectories import (
+    POSES,
+    ReferenceParameters,
+    reference_attitude,
+)
 from tiltsim_controllers.vehicle.body import Body, angular_acceleration, inertia_matrix
 from tiltsim_controllers.vehicle.effectiveness import TiltOfRotor, tilt_of_rotor
 from tiltsim_controllers.vehicle.rotors import (
@@ -136,6 +142,22 @@ def limited_tilt_rate(rates: Any, angles: Any, p: Any) -> Any:
     return xp.where(at_stop, 0.0, xp.clip(rates, -p.max_tilt_rate, p.max_tilt_rate))
 
 
+def turning_rates(target: Any, turn: Any, omega: Any, omega_rate: Any) -> Moving:
+    """Rates of a desired attitude in the axes of the body, which turn too: rad and s, shape (3,).
+
+    Args:
+        target: Roll, pitch and yaw with three derivatives, rad and s, shape (4, 3).
+        turn: From the desired axes to those of the body, shape (3, 3).
+        omega, omega_rate: Body rates (rad/s) and their rates (rad/s^2), shape (3,) each.
+    """
+    roll, pitch = (Moving(*target[:3, axis]) for axis in (0, 1))
+    rates = body_rate_matrix(roll, pitch) @ Moving(*target[1:])
+    value, first, second = turn @ rates.value, turn @ rates.rate, turn @ rates.acceleration
+    rate = first - cross(omega, value)
+    change = turn @ cross(rates.value, rates.rate) - cross(omega, first)  # of the turn
+    return Moving(value, rate, second + change - cross(omega_rate, value) - cross(omega, rate))
+
+
 @traceable
 def full_pose(
     time: Any,
@@ -154,8 +176,8 @@ def full_pose(
     Args:
         time: s, by which a failure is known.
         state: `tiltsim_controllers.vehicle.states.RotorcraftState` in one vector.
-        reference: Position with four derivatives, m and s, world axes, shape (15,); its roll, pitch
-            and yaw are parameters.
+        reference: Position with four derivatives, m and s, world axes, shape (15,); its attitude
+            is read from the parameters and knots.
         p: `Parameters`.
         knots: Table data of the flight, with the table of the rotors.
         tilt_of_rotor: The layout.
@@ -175,7 +197,7 @@ def full_pose(
     omega_rate = angular_acceleration(body, torque, now.omega, 0.0)
 
     # Third-order error dynamics.
-    ref, target = reference.reshape(5, 3), p.reference
+    ref, target = reference.reshape(5, 3), reference_attitude(time, p.reference, knots)
     k1, k2, k3 = p.gains.position
     jerk = (
         ref[3]
@@ -184,8 +206,11 @@ def full_pose(
         + k3 * (ref[0] - now.position)
     )
     k1, k2, k3 = p.gains.attitude
-    desired = rotation_matrix(xp.array([target.roll, target.pitch, target.yaw]))
+    desired = rotation_matrix(target[0])
     omega_jerk = k3 * attitude_error(rotation, desired) - k2 * now.omega - k1 * omega_rate
+    if p.reference.type == POSES:
+        ahead = turning_rates(target, rotation.T @ desired, now.omega, omega_rate)
+        omega_jerk = omega_jerk + ahead.acceleration + k1 * ahead.rate + k2 * ahead.value
 
     # In body axes, without the part of the force's rate with which it turns with the body.
     force_rate = body.mass * (rotation.T @ jerk) - cross(now.omega, force)

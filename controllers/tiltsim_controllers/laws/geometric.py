@@ -2,8 +2,8 @@
 
 Lee, Leok and McClamroch (2010), "Geometric tracking control of a quadrotor UAV on SE(3)", Eqs. 10
 to 16. The force is that of Eq. 12 along the axis in which the rotors push without torque, or, where
-the law commands the tilts, in any direction. The torque is Eq. 16 with the desired angular
-acceleration zero.
+the law commands the tilts of enough rotors, in any direction. The torque is Eq. 16 with the desired
+angular acceleration zero.
 """
 
 from __future__ import annotations
@@ -25,7 +25,9 @@ from tiltsim_controllers.laws.outer_loop import (
 from tiltsim_controllers.laws.rotor_allocation import (
     allocated_thrusts,
     allocated_with_tilts,
+    in_components,
     lift_without_torque,
+    of_components,
 )
 from tiltsim_controllers.mathematics.attitude import attitude_error, rotation_matrix
 from tiltsim_controllers.mathematics.linear import cross
@@ -73,6 +75,13 @@ def geometric_with_tilts(observed: Observed, p: Geometric) -> Command:
     force = m * observed.rotation.T @ (acceleration + g * xp.array(UP))
     M = moment(observed, p, rotation_matrix(observed.reference.attitude), xp.zeros(3))
     thrusts, tilts = allocated_with_tilts(observed, force, M)
+    return Command(thrusts=thrusts, tilt_angles=tilts)
+
+
+def geometric_leaning_with_tilts(observed: Observed, p: Geometric) -> Command:
+    """The law where it commands the tilts of too few rotors for a force in any direction."""
+    components = geometric(in_components(observed), p).thrusts
+    thrusts, tilts = of_components(observed.rotors, components)
     return Command(thrusts=thrusts, tilt_angles=tilts)
 
 

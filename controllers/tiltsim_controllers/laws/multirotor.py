@@ -71,6 +71,7 @@ from tiltsim_controllers.laws.multirotor_steps import (
 from tiltsim_controllers.mathematics.attitude import rotation_matrix
 from tiltsim_controllers.mathematics.linear import cross, nearest_solution
 from tiltsim_controllers.mathematics.moving import Moving, at_rest, stacked
+from tiltsim_controllers.references.trajectories import POSES, reference_attitude
 from tiltsim_controllers.vehicle.body import angular_acceleration, torque_rate
 from tiltsim_controllers.vehicle.effectiveness import TiltOfRotor
 from tiltsim_controllers.vehicle.rotors import airframe, moving_wrench_map, rotor_accelerations
@@ -95,8 +96,24 @@ class Present(NamedTuple):
     direction: Any
 
 
+def _target(time: Any, parameters: Any, knots: Any) -> tuple[Moving, Moving, Moving]:
+    """References of roll, pitch and yaw, rad."""
+    target, duration = parameters.reference, parameters.turn_time
+    if target.type == POSES:
+        roll, pitch, yaw = reference_attitude(time, target, knots)[:3].T
+        return Moving(*roll), Moving(*pitch), Moving(*yaw)
+    roll, pitch = (turned(time, angle, duration) for angle in (target.roll, target.pitch))
+    return roll, pitch, at_rest(target.yaw)
+
+
 def _horizontal(
-    time: Any, present: Present, motion: Any, yaw: Any, integrals: Any, parameters: Any, form: Form
+    present: Present,
+    motion: Any,
+    target: tuple[Moving, Moving, Moving],
+    yaw: Any,
+    integrals: Any,
+    parameters: Any,
+    form: Form,
 ) -> tuple[Moving, Moving, Any, Any]:
     """References of roll and pitch (rad), then of x and y jerk by force and integrator rates."""
     terms, omega, dimension = parameters.terms, present.state.omega, form.dimension
@@ -104,9 +121,7 @@ def _horizontal(
     if dimension > 1:
         jerk, rates = side_control(motion, integrals, parameters)
     if dimension == 3 or parameters.decoupler == NONE:
-        target, duration = parameters.reference, parameters.turn_time
-        angles = (turned(time, angle, duration) for angle in (target.roll, target.pitch))
-        return *angles, jerk, rates
+        return *target[:2], jerk, rates
     force, specific = present.direction, present.specific
     body_jerk = xp.zeros(3)  # counts only for the attitude's rates
     if dimension == 2:
@@ -121,7 +136,12 @@ def _horizontal(
 
 
 def _control(
-    time: Any, present: Present, reference: Any, integrals: Any, parameters: Any, form: Form
+    present: Present,
+    reference: Any,
+    target: tuple[Moving, Moving, Moving],
+    integrals: Any,
+    parameters: Any,
+    form: Form,
 ) -> tuple[Any, ...]:
     """Position and attitude control.
 
@@ -134,12 +154,15 @@ def _control(
     )
     yaw = attitude[2]
     if parameters.attitude_error == ROTATION or not (terms.attitude_rates or form.own_yaw):
-        yaw = parameters.reference.yaw
+        yaw = target[2] if parameters.reference.type == POSES else parameters.reference.yaw
     motion = tracking(now, reference, rotation @ present.specific.value, parameters)
-    roll, pitch, jerk, rates = _horizontal(time, present, motion, yaw, integrals, parameters, form)
+    roll, pitch, jerk, rates = _horizontal(
+        present, motion, target, yaw, integrals, parameters, form
+    )
     climb, climb_rate = altitude_control(motion, integrals, parameters)
     if parameters.attitude_error == ROTATION:
-        angular = rotation_control(roll, pitch, rotation, now.omega, present.omega_rate, parameters)
+        leaning = roll, pitch, target[2]
+        angular = rotation_control(leaning, rotation, now.omega, present.omega_rate, parameters)
     else:
         angular = euler_control(roll, pitch, attitude, parameters)
     jerk, rates = xp.hstack([jerk, climb]), xp.hstack([rates, climb_rate])
@@ -295,8 +318,9 @@ def attitude_force(
         direction = moving_direction(planned, rotation[2], form.dimension)
     specific = Moving(force / body.mass, change[:3] / body.mass, 0.0)
     present = Present(now, rotation, omega_rate, specific, direction)
+    target = _target(time, parameters, knots)
     jerk, omega_jerk, rates, lean_ref = _control(
-        time, present, reference.reshape(5, 3), integrals, parameters, form
+        present, reference.reshape(5, 3), target, integrals, parameters, form
     )
 
     # Rates of torque and force that remain for the rotors.
@@ -308,4 +332,4 @@ def attitude_force(
     if form.norm == "thrust":
         inputs = rotor_accelerations(inputs, now.speeds, parameters.slowest_rotor)
     unseen = null_part(rows, rotation[2], w, form)
-    return xp.hstack([inputs, rates, lean_ref, parameters.reference.yaw, unseen])
+    return xp.hstack([inputs, rates, lean_ref, target[2].value, unseen])

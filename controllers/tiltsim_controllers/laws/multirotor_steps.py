@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Annotated, Any, Final, Literal, NamedTuple
 
 from pydantic import Field
@@ -270,20 +271,20 @@ def euler_control(roll: Moving, pitch: Moving, attitude: Moving, parameters: Any
 
 
 def rotation_control(
-    roll: Moving, pitch: Moving, rotation: Any, omega: Any, omega_rate: Any, parameters: Any
+    attitude: Sequence[Moving], rotation: Any, omega: Any, omega_rate: Any, parameters: Any
 ) -> Any:
     """Desired second derivatives (rad/s^3) of the body rates, by the rotation that remains.
 
     Args:
-        roll, pitch: References, rad; the reference of yaw is at rest.
+        attitude: References of roll, pitch and yaw, rad.
         rotation: Body to world, shape (3, 3).
         omega, omega_rate: Body rates (rad/s) and their rates (rad/s^2), shape (3,) each.
         parameters: Parameters of the controller.
     """
-    desired = rotation_matrix(xp.array([roll.value, pitch.value, parameters.reference.yaw]))
+    desired = rotation_matrix(xp.array([angle.value for angle in attitude]))
     # Rates of the desired attitude in its own axes, then in body axes.
-    rates = stacked(*(Moving(e.rate, e.acceleration, 0.0) for e in (roll, pitch, at_rest(0.0))))
-    turning = rotation.T @ (desired @ (body_rate_matrix(roll, pitch) @ rates))
+    rates = stacked(*(Moving(angle.rate, angle.acceleration, 0.0) for angle in attitude))
+    turning = rotation.T @ (desired @ (body_rate_matrix(*attitude[:2]) @ rates))
     second = turning.rate - cross(omega, turning.value)
     return attitude_jerk(
         Moving(attitude_error(rotation, desired), turning.value, second),

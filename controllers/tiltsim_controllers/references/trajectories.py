@@ -7,6 +7,7 @@ from typing import Any, Final, NamedTuple
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.code.traceable import traceable
 from tiltsim_controllers.gaits.parameters import NO_KNOTS
+from tiltsim_controllers.mathematics.attitude import wrapped
 from tiltsim_controllers.references.waypoints import waypoint_motion
 
 SETPOINT: Final = 0.0
@@ -15,6 +16,7 @@ CIRCLE: Final = 2.0
 ATTITUDE_ALTITUDE: Final = 3.0
 LISSAJOUS: Final = 4.0
 WAYPOINTS: Final = 5.0
+POSES: Final = 6.0
 
 REFERENCE_TYPES: Final = {
     "setpoint": SETPOINT,
@@ -24,7 +26,7 @@ REFERENCE_TYPES: Final = {
     "lissajous": LISSAJOUS,
     "figure_eight": LISSAJOUS,
     "waypoints": WAYPOINTS,
-    "table": WAYPOINTS,
+    "table": WAYPOINTS,  # POSES if its roll, pitch and yaw vary
 }
 """Reference types by their name in a scenario."""
 
@@ -41,9 +43,9 @@ class ReferenceParameters(NamedTuple):
     velocity_z: float = 0.0
     radius: float = 0.0  # m, circle
     angular_frequency: float = 0.0  # rad/s, circle
-    roll: float = 0.0  # rad, attitude_altitude
+    roll: float = 0.0  # rad, all types but poses
     pitch: float = 0.0
-    yaw: float = 0.0  # rad, all types
+    yaw: float = 0.0
     acceleration_feedforward: float = 0.0  # 1 or 0: whether the controller gets the acceleration
     amplitude_x: float = 0.0  # m, lissajous
     amplitude_y: float = 0.0
@@ -76,6 +78,8 @@ def reference_motion(time: Any, reference: ReferenceParameters, knots: Any = NO_
     r = reference
     if r.type == WAYPOINTS:
         return waypoint_motion(time, r.segments, r.offset, knots)
+    if r.type == POSES:
+        return waypoint_motion(time, r.segments, r.offset, knots, 6)[:, :3]
     start, rest = xp.array([r.x, r.y, r.z]), xp.zeros(3)
     if r.type == SETPOINT:
         return xp.array([start, rest, rest, rest, rest])
@@ -118,3 +122,22 @@ def position_reference(time: Any, reference: ReferenceParameters, knots: Any = N
     position, velocity, acceleration = reference_motion(time, reference, knots)[:3]
     feedforward = reference.acceleration_feedforward * acceleration
     return xp.hstack([position, velocity, feedforward])
+
+
+def reference_attitude(time: Any, reference: ReferenceParameters, knots: Any = NO_KNOTS) -> Any:
+    """Roll, pitch and yaw to track with three derivatives, rad and s, shape (4, 3).
+
+    The angles are between -pi and pi. Arguments as for `reference_motion`.
+    """
+    r = reference
+    if r.type == POSES:
+        motion = waypoint_motion(time, r.segments, r.offset, knots, 6)[:4, 3:]
+        return xp.vstack([wrapped(motion[0]).reshape(1, 3), motion[1:]])
+    rest = xp.zeros(3)
+    return xp.array([xp.array([r.roll, r.pitch, r.yaw]), rest, rest, rest])
+
+
+@traceable
+def attitude_reference(time: Any, reference: ReferenceParameters, knots: Any = NO_KNOTS) -> Any:
+    """Roll, pitch and yaw (rad) to track, shape (3,); arguments as for `reference_motion`."""
+    return reference_attitude(time, reference, knots)[0]

@@ -22,21 +22,19 @@ from tiltsim_controllers.mathematics.splines import spline_knots
 COEFFICIENTS: Final = 8
 """Coefficients of a polynomial of degree seven, highest power first."""
 
-ROW: Final = 25
-"""Floats per segment: the time at which it begins, and one polynomial per axis."""
 
-
-def waypoint_motion(time: Any, rows: float, offset: float, knots: Any) -> Any:
-    """Position, velocity, acceleration, jerk and snap, shape (5, 3), m and s.
+def waypoint_motion(time: Any, rows: float, offset: float, knots: Any, axes: int = 3) -> Any:
+    """Position, velocity, acceleration, jerk and snap, shape (5, axes), m and s.
 
     Args:
         time: s
-        rows: Number of segments.
+        rows: Number of segments: the time at which each begins, and a polynomial per axis.
         offset: Index of the first knot.
         knots: Contains the segments of `minimum_snap_knots` or `table_knots`.
+        axes: Number of coordinates.
     """
-    row = piece_at(time, int(rows), int(offset), ROW, knots)
-    coefficients = row[1:].reshape(3, COEFFICIENTS).T
+    row = piece_at(time, int(rows), int(offset), 1 + axes * COEFFICIENTS, knots)
+    coefficients = row[1:].reshape(axes, COEFFICIENTS).T
     return polynomial_derivatives(xp.maximum(time - row[0], 0.0), coefficients, 4)
 
 
@@ -72,12 +70,12 @@ def table_knots(
 
     Args:
         times: s, increasing
-        points: m, of three coordinates each
+        points: m or rad, of any number of coordinates each
         interpolation: ``minimum_snap``: of all motions through the points, the one that minimizes
             the integral of squared snap; up to four points are joined by one polynomial, without
             snap. ``cubic``: a spline of degree three, whose acceleration is continuous.
     """
     if interpolation == "cubic" or len(points) <= 4:
         return spline_knots(times, points, COEFFICIENTS, degree=min(3, len(points) - 1))
-    free = [(order, [0.0, 0.0, 0.0]) for order in (4, 5, 6)]
+    free = [(order, [0.0] * len(points[0])) for order in (4, 5, 6)]
     return spline_knots(times, points, COEFFICIENTS, degree=COEFFICIENTS - 1, ends=(free, free))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import inf, isnan
+from math import inf, isnan, prod
 
 import numpy as np
 import pytest
@@ -26,6 +26,7 @@ from tiltsim_controllers.laws.full_pose import (
     input_matrix,
     limited_tilt_rate,
     pose_rank,
+    turning_rates,
 )
 from tiltsim_controllers.laws.gains import GAIN_SETS as ATTITUDE_GAINS
 from tiltsim_controllers.mathematics.attitude import attitude_error, rotation_matrix
@@ -456,3 +457,38 @@ def test_the_rank_counts_rotors_tilts_and_losses():
     assert pose_rank(ring(6, 0.44), (), w * (np.arange(6) > 0)) == 5
     assert pose_rank(arms, (0.0,) * 6, w) == 6
     assert pose_rank(arms, (0.0,) * 6, w * (np.arange(6) > 0)) == 6
+
+
+def test_rates_of_a_desired_attitude_are_seen_from_the_turning_body():
+    """The reference ahead by differences of rotations, with all the terms of the body's turning."""
+    random = np.random.default_rng(6)
+    powers = random.uniform(-0.4, 0.4, (5, 3))  # of time, for roll, pitch and yaw
+
+    def angles(time, order=0):
+        terms = [prod(range(k - order + 1, k + 1)) * time ** (k - order) for k in range(order, 5)]
+        return np.array(terms) @ powers[order:]
+
+    def desired(time):
+        return rotation_matrix(angles(time))
+
+    def body(time):
+        return rotation_matrix(np.array([0.3, -0.2, 0.4]) * (1.0 + time + 0.5 * time**2))
+
+    def rates_of(rotation, time, step=1e-5):
+        change = rotation(time).T @ (rotation(time + step) - rotation(time - step)) / (2.0 * step)
+        return np.array([change[2, 1], change[0, 2], change[1, 0]])
+
+    def seen(time):
+        return body(time).T @ desired(time) @ rates_of(desired, time)
+
+    def slope(vector, time, step=1e-3):
+        return (vector(time + step) - vector(time - step)) / (2.0 * step)
+
+    now, step = 0.4, 1e-3
+    omega, omega_rate = rates_of(body, now), slope(lambda time: rates_of(body, time), now)
+    target = np.array([angles(now, order) for order in range(4)])
+    found = turning_rates(target, body(now).T @ desired(now), omega, omega_rate)
+    second = (seen(now + step) - 2.0 * seen(now) + seen(now - step)) / step**2
+    np.testing.assert_allclose(found.value, seen(now), atol=1e-8)
+    np.testing.assert_allclose(found.rate, slope(seen, now), atol=1e-5)
+    np.testing.assert_allclose(found.acceleration, second, atol=1e-4)

@@ -293,13 +293,13 @@ def test_force_control_of_x_and_y_is_third_order_with_an_integrator():
 
 
 def test_attitude_control_feeds_the_motion_of_its_reference_forward():
-    """Rates by differences of rotations, seen from a body behind its reference; yaw is at rest."""
+    """Rates by differences of rotations, seen from a body behind its reference."""
     law, _ = parameters_of(CANTED, reference=ReferenceParameters(SETPOINT, yaw=0.5))
     now, step = 0.5, 1e-4
 
     def desired(time):
-        roll, pitch = turned(time, 0.8, 1.0), turned(time, -0.6, 1.3)
-        return np.reshape(rotation_from_euler(roll.value, pitch.value, 0.5), (3, 3))
+        angles = turned(time, 0.8, 1.0), turned(time, -0.6, 1.3), turned(time, 0.9, 1.1)
+        return np.reshape(rotation_from_euler(*(angle.value for angle in angles)), (3, 3))
 
     def body(time):
         return desired(time - 0.2)
@@ -326,7 +326,7 @@ def test_attitude_control_feeds_the_motion_of_its_reference_forward():
         + np.array((gains.roll_3, gains.pitch_3, gains.yaw_3)) * error
     )
     motion = body(now), present(now), rate(present, now)
-    references = turned(now, 0.8, 1.0), turned(now, -0.6, 1.3)
-    found = rotation_control(*references, *motion, law)
+    references = turned(now, 0.8, 1.0), turned(now, -0.6, 1.3), turned(now, 0.9, 1.1)
+    found = rotation_control(references, *motion, law)
     # The differences are wrong by 1e-6 at most, which gains multiply by up to 2e3.
     np.testing.assert_allclose(found, expected, atol=2e-3)

@@ -11,10 +11,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tiltsim_controllers.references.trajectories import (
+    POSES,
     REFERENCE_TYPES,
     ReferenceParameters,
+    attitude_reference,
     position_reference,
+    reference_attitude,
     reference_derivatives,
+    reference_motion,
 )
 from tiltsim_controllers.references.waypoints import (
     minimum_snap_knots,
@@ -240,3 +244,22 @@ def test_a_square_of_waypoints_is_left_as_documented():
         knots = np.array(minimum_snap_knots(points, times))
         x = [waypoint_motion(t, len(times), 0.0, knots)[0, 0] for t in np.linspace(0.0, 20.0, 401)]
         assert round(max(x) - 2.0, 2) == outside
+
+
+def test_attitudes_of_a_table_have_the_derivatives_of_their_polynomials():
+    times = np.linspace(0.0, 2.0, 9)
+    points = np.column_stack([np.sin(times + k) * (1.0 + 2.0 * (k == 3)) for k in range(6)])
+    knots = (9.0, *table_knots(times.tolist(), points.tolist(), "minimum_snap"))
+    poses = ReferenceParameters(POSES, segments=9.0, offset=1.0)
+    for time, row in zip(times, points):
+        np.testing.assert_allclose(reference_motion(time, poses, knots)[0], row[:3], atol=1e-9)
+        np.testing.assert_allclose(attitude_reference(time, poses, knots), row[3:], atol=1e-9)
+    step, now = 1e-4, 0.8
+    before, here, after = (
+        reference_attitude(time, poses, knots) for time in (now - step, now, now + step)
+    )
+    np.testing.assert_allclose((after[:3] - before[:3]) / (2.0 * step), here[1:], rtol=1e-6)
+    moving = poses._replace(segments=2.0)
+    turns = table_knots([0.0, 1.0], [[0.0] * 6, [0.0] * 3 + [4.0, 0.0, -7.0]], "cubic")
+    found = attitude_reference(5.0, moving, (0.0, *turns))
+    np.testing.assert_allclose(found, [4.0 - 2.0 * np.pi, 0.0, 2.0 * np.pi - 7.0], atol=1e-14)

@@ -17,6 +17,7 @@ from tiltsim.vehicles.spans import (
     in_last_second,
     largest,
     mean_of,
+    position_error,
     saturation_metrics,
     time_of,
     when_settled,
@@ -43,7 +44,7 @@ def rotorcraft_metrics(
     rates = [np.abs(columns[name]).max(axis=-1) for name in names]
     return {
         **_position_metrics(columns, scenario, follows_position),
-        **_attitude_metrics(columns, scenario.simulation.timestep),
+        **_attitude_metrics(columns, scenario),
         "min_rotor_speed": spins.min(axis=(0, -1)),
         "max_rotor_speed": spins.max(axis=(0, -1)),
         **_altitude_metrics(time, columns["z_ref"] - columns["z"]),
@@ -60,12 +61,15 @@ def _position_metrics(
 ) -> dict[str, Any]:
     clock = columns["time"], scenario.simulation.timestep
     last_second, settled = in_last_second(*clock), when_settled(*clock)
+    errors = {axis: columns[f"{axis}_ref"] - columns[axis] for axis in ("x", "y", "z")}
     metrics = {
-        f"final_position_error_{axis}": mean_of(columns[f"{axis}_ref"] - columns[axis], last_second)
-        for axis in ("xyz" if follows_position else "z")
+        f"final_position_error_{axis}": mean_of(error, last_second)
+        for axis, error in errors.items()
+        if follows_position or axis == "z"
     }
     if not follows_position:
-        return metrics
+        return metrics | position_error(errors["z"])
+    metrics |= position_error(*errors.values())
     metrics |= horizontal_error_metrics(columns, clock[1])
     if scenario.reference.type == "circle" and settled.any():
         centre_x, centre_y, _ = scenario.reference.position
@@ -75,18 +79,21 @@ def _position_metrics(
     return metrics
 
 
-def _attitude_metrics(columns: Mapping[str, Floats], timestep: float) -> dict[str, Any]:
+def _attitude_metrics(columns: Mapping[str, Floats], scenario: Scenario) -> dict[str, Any]:
     angles, metrics = ("roll", "pitch", "yaw"), {}
-    last_second = in_last_second(columns["time"], timestep)
+    last_second = in_last_second(columns["time"], scenario.simulation.timestep)
     for angle in angles:
         # Near half a revolution samples of one direction have both signs.
         metrics[f"final_{angle}"] = np.mean(
             np.unwrap(np.compress(last_second, columns[angle], axis=-1)), axis=-1
         )
-    metrics["final_attitude_error"] = largest(
-        np.abs(_wrapped(columns[f"{angle}_ref"] - columns[angle])[..., last_second]).max(axis=-1)
-        for angle in angles
-    )
+    if scenario.controller.records_attitude(scenario):
+        metrics["final_attitude_error"] = largest(
+            np.abs(_wrapped(columns[f"{angle}_ref"] - columns[angle])[..., last_second]).max(
+                axis=-1
+            )
+            for angle in angles
+        )
     for angle in ("roll", "pitch"):
         metrics[f"max_abs_{angle}"] = np.abs(columns[angle]).max(axis=-1)
     return metrics

@@ -13,6 +13,7 @@ from tiltsim.vehicles.spans import (
     horizontal_error_metrics,
     in_last_second,
     mean_of,
+    position_error,
     saturation_metrics,
 )
 from tiltsim_controllers.mathematics.scalar import Floats
@@ -29,6 +30,7 @@ def tilt_car_metrics(
     metrics = {
         f"final_position_error_{axis}": mean_of(e, last_second) for axis, e in errors.items()
     }
+    metrics |= position_error(*errors.values())
     metrics |= horizontal_error_metrics(columns, timestep)
     metrics |= {f"max_abs_error_{axis}": np.abs(e).max(axis=-1) for axis, e in errors.items()}
     if "lyapunov" in columns:

@@ -30,6 +30,7 @@ from tiltsim.views.signals import (
     Signals,
     distance,
     has_attitude_plane,
+    reference_of,
     scale,
     signals_of,
     vector_signals,
@@ -120,9 +121,9 @@ def column_panel(flights: Sequence[Flight], name: str) -> Panel:
         for one in shown:
             time, values = one.flight["time"], one.flight[name]
             axes.plot(time, values, **one.look, lw=1.2)
-            if f"{name}_ref" in one.flight.columns:
+            if reference := reference_of(one.flight.assembly, name):
                 color = one.look["color"] if "marker" in one.look else style.INK
-                axes.plot(time, one.flight[f"{name}_ref"], color=color, ls=":", lw=0.8)
+                axes.plot(time, one.flight[reference], color=color, ls=":", lw=0.8)
             _mark_end(axes, one, values)
         axes.set_ylabel(shown[0].flight.assembly.loop.label(name).text)
 
