@@ -67,7 +67,7 @@ _SHOWN_GAITS: Final = (
 """Gaits of the drawing, with a period of 1 s."""
 
 _RED_GAITS: Final = "#B0122B"
-"""Redder than the color of what is singular."""
+"""Redder than the color of singular attitudes."""
 
 _LEANS: Final = "BrBG"  # color map of forward and backward leans
 
@@ -192,7 +192,7 @@ def gait_figure() -> Figure:
 
 @_drawing_style()
 def decoupler_figure(flights: Mapping[str, Flight]) -> Figure:
-    """What each decoupler, given by its name, does at the set point (0, 0)."""
+    """The response of each decoupler, given by its name, at the set point (0, 0)."""
     first = next(iter(flights.values()))
     vehicle, tilts = first.scenario.true_rotorcraft, first.assembly.gait.angles(0.0)
     n = torque_free_direction(tilts, vehicle)
