@@ -18,7 +18,7 @@ ON_AXIS: Final = 1e-6
 
 @dataclass(frozen=True)
 class Point:
-    """A value of the key and what is found there."""
+    """A value of the key and its result."""
 
     value: float
     found: Stability | None  # None where there is no orbit
