@@ -53,7 +53,7 @@ def compute_metrics(
 
 
 def _metrics(own: dict[str, float], duration: float, end: End, wall_time: float) -> Metrics:
-    """Metrics of a kind of vehicle with those of all kinds, without those that have no value."""
+    """Metrics of a kind of vehicle and of all kinds, without metrics that have no value."""
     metrics: dict[str, float | bool] = own | {
         "diverged": end.kind in {"diverged", "singular", "failed"},
         "duration": duration,
@@ -72,9 +72,9 @@ def metrics_of_rows(
     """`compute_metrics` of flights of one closed loop, computed together.
 
     Args:
-        assemblies: Those of the flights, with the same knots.
-        numbers: Those of their parameters, shape (rows, numbers), as `flatten` has them.
-        samples: Of shape (rows, N, fields), at the same times.
+        assemblies: One per flight, with equal knots.
+        numbers: Numbers of their parameters, shape (rows, numbers), in the order of `flatten`.
+        samples: Shape (rows, N, fields), at equal times.
         end: How they ended.
         wall_times: Durations of their integrations, s.
 

@@ -42,8 +42,8 @@ def prepare_flight_folder(folder: Path, scenario: Scenario) -> None:
     """Create a folder for a flight of a scenario.
 
     Raises:
-        InputError: If that is impossible, or the flight would replace what is not a file, or what
-            tiltsim did not write.
+        InputError: If that is impossible, or the flight would replace a path that is no file or a
+            file that tiltsim did not write.
     """
     prepare_folder(folder)
     named = _named_files(scenario)
@@ -75,7 +75,7 @@ def write_flight(
             gait.csv.
 
     Raises:
-        InputError: As `prepare_flight_folder`, or if a file cannot be written.
+        InputError: See `prepare_flight_folder`; or if a file cannot be written.
     """
     prepare_flight_folder(folder, scenario)
     files = {FLIGHT: parquet_bytes(table), METRICS: metrics_json(metrics).encode()}

@@ -45,7 +45,7 @@ class _Sound:
 
 
 def numbers_of(assembly: Assembly) -> tuple[float, ...]:
-    """What `tiltsim.arrays.flying.Batch` takes of a flight, knots aside."""
+    """Inputs of `tiltsim.arrays.flying.Batch` from a flight, without knots."""
     return (
         *flatten(assembly.setup.parameters),
         *map(float, assembly.reference),
@@ -166,10 +166,10 @@ class ArrayBatch(Generic[Result]):
         """The flight of a row that ended before the end of the duration.
 
         Args:
-            index: Of its assembly.
+            index: Index of its assembly.
             row: In the recording.
             samples: As if nothing ended it.
-            recording: Of the part.
+            recording: Recording of the part.
             closer: Its samples from step to step in the interval in which it ended.
             seconds: That it took.
         """
