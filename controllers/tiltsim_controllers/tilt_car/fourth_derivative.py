@@ -37,7 +37,7 @@ DECOUPLINGS: Final = {"published": PUBLISHED, "exact": EXACT}
 
 
 class Gains(NamedTuple):
-    """Gains on jerk, acceleration, velocity and position, the same for both axes."""
+    """Gains on jerk, acceleration, velocity and position, equal for both axes."""
 
     jerk: float  # 1/s
     acceleration: float  # 1/s^2
@@ -88,7 +88,7 @@ def fourth_derivative_inputs(time: Any, state: Any, parameters: Parameters) -> A
     Args:
         time: s
         state: `EXTENDED_STATE_FIELDS`, shape (11,).
-        parameters: Of the controller.
+        parameters: Parameters of the controller.
 
     Returns:
         Shape (3,).

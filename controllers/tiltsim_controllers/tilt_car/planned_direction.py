@@ -1,8 +1,8 @@
 """Control of the tilt-car with the direction of its thrusts planned (ch. 10, Sec. 5; ch. 11).
 
-The gait moves the tilt, the controller sets the squares of both rotor speeds: as many inputs as
-outputs, so that no state drifts. A thrust cannot pull, so negative squares become zero (ch. 11,
-Eq. 13), which ch. 11 writes with the switch matrix ``S_pq``.
+The gait moves the tilt, the controller sets the squares of both rotor speeds: inputs and outputs
+are equal in number, so that no state drifts. A thrust cannot pull, so negative squares become zero
+(ch. 11, Eq. 13), which ch. 11 writes with the switch matrix ``S_pq``.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def demanded_acceleration(time: Any, state: Any, parameters: Parameters) -> Any:
     Args:
         time: s
         state: Begins with `tiltsim_controllers.tilt_car.vehicle.STATE_FIELDS`.
-        parameters: Of the controller.
+        parameters: Parameters of the controller.
 
     Returns:
         Shape (2,).

@@ -1,9 +1,9 @@
 """Third-derivative feedback linearization of the tilt-car (ch. 10, Sec. 3.1).
 
 Three inputs, the rates of both rotor speeds and of the tilt angle, determine two outputs, the third
-derivatives of the position. The controller takes the shortest of all solutions (`minimum_norm`,
-Eq. 12), which makes its states drift (`tiltsim_controllers.tilt_car.state_drift`). Optionally a
-restoring rate in the null space turns the thrusts' bisector back towards the acceleration.
+derivatives of the position. The controller takes the shortest of all solutions (`minimum_norm`, Eq.
+12), which makes its states drift (`tiltsim_controllers.tilt_car.state_drift`). Optionally a
+restoring rate in the null space turns the thrusts' bisector back toward the acceleration.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from tiltsim_controllers.tilt_car.vehicle import (
 
 
 class Gains(NamedTuple):
-    """Gains on acceleration, velocity and position, the same for both axes."""
+    """Gains on acceleration, velocity and position, equal for both axes."""
 
     acceleration: float  # [k_1] 1/s
     velocity: float  # [k_2] 1/s^2
@@ -91,7 +91,7 @@ def third_derivative_inputs(time: Any, state: Any, parameters: Parameters) -> An
     Args:
         time: s
         state: `tiltsim_controllers.tilt_car.vehicle.STATE_FIELDS`, shape (8,).
-        parameters: Of the controller.
+        parameters: Parameters of the controller.
     """
     car, gains = parameters.car, parameters.gains
     yaw, alpha, speeds = state[4], state[5], state[6:8]
