@@ -159,7 +159,7 @@ def multirotor_text(report: dict[str, Any]) -> str:
 
 
 def _period_rows(report: dict[str, Any]) -> list[tuple[str, str]]:
-    """The worst of a moving gait, whose other values are those at time zero."""
+    """The worst instant of a moving gait; its other values are taken at time zero."""
     if "time" not in report:
         return []
     margin = number(report["min_singularity_margin"])
