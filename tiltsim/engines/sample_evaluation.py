@@ -64,7 +64,7 @@ def evaluate_over_samples(
 
 
 class Row(NamedTuple):
-    """A scalar function ``(time, state, parameters, knots) -> values``, and what it is traced with.
+    """A scalar function ``(time, state, parameters, knots) -> values`` and its tracing arguments.
 
     Attributes:
         function: The function.

@@ -105,7 +105,7 @@ def simulate_assembly(
     engine: EngineName | None = None,
     report: Report = lambda time: None,
 ) -> Flight:
-    """As `simulate`, for a flight that is assembled already.
+    """`simulate` for a flight that is assembled already.
 
     Args:
         assembly: The flight.

@@ -117,7 +117,7 @@ class Simulation:
             self._wall_time += perf_counter() - start
 
     def _check_tables(self, steps: int) -> None:
-        """Raise `InputError` if a table ends before so many steps have been taken."""
+        """Raise `InputError` if a table ends before this number of steps."""
         simulation = self.scenario.simulation
         for name, table in self.scenario.time_tables.items():
             if steps > simulation.steps and table.ends_before(steps * simulation.timestep):
