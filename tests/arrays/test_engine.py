@@ -142,7 +142,7 @@ def test_compiled_flights_are_those_in_python(name, timing):
 
 @needs_jax
 @pytest.mark.slow
-def test_a_flight_of_20_s_differs_by_less_than_a_nanometre_from_the_native_one():
+def test_a_flight_of_20_s_differs_by_less_than_a_nanometer_from_the_native_one():
     changes = {"expect": [], "simulation.plant": "thesis", "simulation.duration": 20.0}
     scenario = tiltsim.load_scenario("ch04_tracking/circle#continuous_t2_modified", changes)
     flown, native = (

@@ -53,7 +53,7 @@ def test_a_full_disk_names_the_file(tmp_path, capsys):
 
 
 @pytest.mark.parametrize("name", ["metrics.json", "scenario.toml"])
-def test_what_cannot_be_written_is_told_before_the_flight(tmp_path, capsys, monkeypatch, name):
+def test_unwritable_outputs_are_reported_before_the_flight(tmp_path, capsys, monkeypatch, name):
     monkeypatch.setattr("tiltsim.commands.run.fly", None)
     (tmp_path / name).mkdir()
     assert f"{tmp_path}/{name}: not a file" in refused(

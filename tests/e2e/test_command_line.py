@@ -107,7 +107,7 @@ def test_run_writes_the_three_files_and_prints_a_summary(tmp_path, capsys):
     ("value", "shown"),
     [(0.38123456, "0.381235"), (-8.123e-8, "-8e-08"), (-8.7e-16, "0"), (361.3829, "361.383")],
 )
-def test_run_shows_few_digits_of_what_is_zero_but_for_the_solver(value, shown):
+def test_run_shows_few_digits_of_values_that_are_zero_but_for_the_solver(value, shown):
     assert run_command._shown(value) == shown
 
 
@@ -170,7 +170,7 @@ def test_a_flight_of_the_library_is_as_shipped_on_any_plant(path, overrides, cha
     assert is_changed_from_library(path, load_scenario(path, overrides)) is changed
 
 
-def test_a_flight_of_ones_own_is_always_judged(expecting):
+def test_a_custom_flight_is_always_judged(expecting):
     path = expecting(1.0)
     changed = load_scenario(path, {"simulation.duration": 0.1})
     assert not is_changed_from_library(path, changed)
@@ -493,7 +493,7 @@ def test_long_lines_are_wrapped_only_on_a_terminal(capsys, monkeypatch):
     assert shown.split() == piped.split()
 
 
-def test_list_of_what_contains_a_word(capsys):
+def test_list_of_scenarios_that_contain_a_word(capsys):
     assert main(["list", "ch02_singular_zone"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert all(line.startswith(("ch02_singular_zone", "  #")) for line in lines)

@@ -108,6 +108,6 @@ def test_the_command_line_knows_the_law(folder):
 
 
 @pytest.mark.slow
-def test_it_flies_in_batches_natively_as_in_python(folder):
+def test_a_package_flies_in_batches_natively_as_in_python(folder):
     done = run(folder, "-c", PYTHON)
     assert done.returncode == 0, done.stderr

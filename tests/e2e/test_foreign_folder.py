@@ -60,7 +60,7 @@ def project(tmp_path):
 
 
 @pytest.mark.parametrize("kind", ["editable", "wheel"])
-def test_a_users_own_packages_do_not_shadow_those_of_tiltsim(kind, python, project, tmp_path):
+def test_a_users_packages_do_not_shadow_the_packages_of_tiltsim(kind, python, project, tmp_path):
     pytest.importorskip("hatchling", reason="builds without network need the build backend")
     if kind == "wheel":
         pip("wheel", "--wheel-dir", str(tmp_path / "dist"), str(ROOT), cwd=tmp_path)

@@ -78,7 +78,7 @@ def test_a_write_that_fails_leaves_the_old_file_whole(tmp_path, monkeypatch, wri
     assert set(after) == NAMES, "no temporary file is left behind"
 
 
-def test_files_get_the_permissions_that_the_user_asked_for(tmp_path):
+def test_files_get_the_permissions_of_the_users_umask(tmp_path):
     previous = os.umask(0o027)
     try:
         flight().save(tmp_path)

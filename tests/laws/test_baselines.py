@@ -314,7 +314,7 @@ def test_the_cost_about_an_orbit_decreases(orbit):
     assert value[-1] < 0.05 * value[0]
 
 
-def test_about_an_orbit_that_rests_the_gains_are_those_of_hover():
+def test_about_an_orbit_that_rests_the_gains_equal_the_hover_gains():
     angles = [0.1, -0.2, 0.1, 0.2]
     tables = {"controller": {"law": "lqr"}, "disturbance": GUST}
     flights = [
@@ -328,7 +328,7 @@ def test_about_an_orbit_that_rests_the_gains_are_those_of_hover():
 
 
 @pytest.mark.slow
-def test_the_multipliers_about_an_orbit_are_those_of_the_riccati_solution():
+def test_the_multipliers_about_an_orbit_agree_with_the_riccati_solution():
     scenario = tiltsim.load_scenario({**ORBITING, "simulation": {"duration": 4.0}})
     flown = tiltsim.stability(scenario).multipliers
     airframe = tiltsim.airframe(scenario)
@@ -384,6 +384,6 @@ def test_free_tilts_hold_a_pose_that_a_gait_cannot():
         ),
     ],
 )
-def test_what_does_not_fit_is_refused_in_one_line(tables, message):
+def test_unsuitable_baselines_are_refused_in_one_line(tables, message):
     with pytest.raises(tiltsim.InputError, match=message):
         tiltsim.load_scenario(tables)

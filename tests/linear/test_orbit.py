@@ -42,7 +42,7 @@ def continuous():
     return equilibrium_of(gait("trot_continuous"))
 
 
-def test_the_multipliers_are_those_of_the_product_of_exact_steps(continuous):
+def test_the_multipliers_agree_with_the_product_of_exact_steps(continuous):
     """Symbolic Jacobians of ode3's steps along the orbit, one after the other."""
     casadi = pytest.importorskip("casadi")
     motion, state = continuous.motion, continuous.root.state
@@ -84,7 +84,7 @@ def test_modes_lost_in_the_rounding_of_a_period_are_not_listed():
 @pytest.mark.slow
 @pytest.mark.parametrize("plant", ["thesis", "mujoco"])
 @pytest.mark.parametrize("kind", ["trot_continuous", "trot_instant", "walk", "two_color"])
-def test_the_multipliers_are_those_of_native_flights_over_a_period(kind, plant):
+def test_the_multipliers_agree_with_native_flights_over_a_period(kind, plant):
     """Simple differences of second order, with the step at which they are best, near 1e-5."""
     scale = 0.5 if kind == "walk" else 1.0  # scaled up, MuJoCo's servos do not follow it
     keys = {"gait.period": 0.05, "gait.scale": scale}
@@ -207,7 +207,7 @@ def test_a_sweep_keeps_what_is_found_and_why_nothing_is():
     assert "noise" in refused.reason
 
 
-def test_an_orbit_is_sought_near_that_of_a_neighbour_first(continuous):
+def test_an_orbit_is_sought_near_the_neighboring_orbit_first(continuous):
     """From the orbit itself there is nothing left to do but the derivative, of six evaluations."""
     flights = []
     near = equilibrium_of(
@@ -253,7 +253,7 @@ def test_a_long_orbit_takes_one_derivative():
     assert abs(found.multipliers[0]) == pytest.approx(np.exp(altitude * found.period), rel=1e-4)
 
 
-def test_what_does_not_return_is_refused():
+def test_scenarios_that_do_not_return_are_refused():
     """A gait that reaches singular attitudes."""
     lost = gait("trot_continuous").replace({"gait.amplitude": 1.5})
     with pytest.raises(tiltsim.InputError, match="found no periodic orbit near its flight"):

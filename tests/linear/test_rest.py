@@ -97,7 +97,7 @@ RANDOM = [
 
 
 @pytest.mark.parametrize(("seed", "engine"), RANDOM)
-def test_matrix_and_poles_are_those_of_a_flown_step(seed, engine):
+def test_matrix_and_poles_agree_with_a_flown_step(seed, engine):
     """A step's matrix is the solver's polynomial of the linear system's, its poles those of it.
 
     The servos' poles are double and defective. An error of differences splits such an eigenvalue by
@@ -237,7 +237,7 @@ def test_an_undamped_swing_is_not_stable_beside_neutral_states_either():
     assert is_stable(damped, np.linalg.eigvals(damped), None)
 
 
-def test_what_decays_slowest_comes_first():
+def test_the_slowest_mode_comes_first():
     """A fast swing that lasts before a slow pole, and neutral states before both."""
     matrix = np.zeros((4, 4))
     matrix[0, 0] = -1.0
@@ -273,7 +273,7 @@ def test_a_negative_multiplier_is_one_pole():
     assert [(mode.name, mode.count) for mode in modes] == [("x", 1), ("y", 1)]
 
 
-def test_rest_is_where_the_vehicle_is_told_to_turn():
+def test_the_rest_point_has_the_commanded_attitude():
     """Upside down, and not level, which is at rest, too, as far as can be from there."""
     changes = {"simulation.plant": "rigid_body", "simulation.engine": "python"}
     changes |= {"controller.turn_time": 1.0, "simulation.duration": 1.0}

@@ -175,7 +175,7 @@ def test_the_fleet_is_equal(both_ways, path):
     assert not differences(both_ways(spec))
 
 
-def test_what_dm_control_cannot_read_is_composed_all_the_same(both_ways, write):
+def test_files_that_dm_control_cannot_read_are_composed(both_ways, write):
     mjcf = pytest.importorskip("dm_control.mjcf")
     path = write(edited((IMU, f'<frame pos="0 0 0.01">{IMU}</frame>')))
     with pytest.raises(KeyError):

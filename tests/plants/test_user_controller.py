@@ -463,7 +463,7 @@ def test_rotors_whose_least_speed_is_0_stop_and_do_not_reverse(model):
 
 
 @pytest.mark.parametrize(("control_timestep", "calls"), [(0.0, 30), (0.001, 30), (0.005, 6)])
-def test_asked_at_every_control_sample(control_timestep, calls):
+def test_a_controller_is_called_at_every_control_sample(control_timestep, calls):
     times = []
 
     def law(observation):
@@ -480,7 +480,7 @@ def test_asked_at_every_control_sample(control_timestep, calls):
 # --- memory and repetition -----------------------------------------------------------------------
 
 
-def test_a_class_is_made_anew_and_an_object_is_reset(hover_file):
+def test_a_class_is_created_again_and_an_object_is_reset(hover_file):
     class Integral:
         made = 0
 
@@ -651,7 +651,7 @@ def test_a_failing_reset_is_reported_like_a_failing_controller():
         tiltsim.simulate(scenario(), controller=Law())
 
 
-def test_of_many_flights_the_first_that_fails_is_told():
+def test_the_first_failing_flight_of_many_is_reported():
     fails = scenario().replace({"simulation.duration": 0.05})
     fails = tiltsim.load_scenario(fails, controller=returning(None))
     flies = tiltsim.load_scenario(fails, controller=lambda _: STILL)

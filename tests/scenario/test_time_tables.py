@@ -313,7 +313,7 @@ def test_a_table_takes_the_place_of_a_function():
 
 
 @pytest.mark.parametrize("given", [COLUMNS, moving])
-def test_overrides_are_those_of_the_table_that_is_given(given):
+def test_overrides_belong_to_the_given_table(given):
     keys = {"reference.interpolation": "cubic", "reference.yaw": 0.2}
     scenario = load_scenario(SHORT, keys, reference=given)
     assert (scenario.reference.interpolation, scenario.reference.yaw) == ("cubic", 0.2)
@@ -341,7 +341,7 @@ def test_overrides_that_do_not_fit_the_table_are_refused(overrides, given, words
         load_scenario(SHORT, overrides, **given)
 
 
-def test_a_flight_is_not_titled_by_what_was_replaced_in_it():
+def test_the_title_of_a_flight_omits_replaced_parts():
     address = "ch04_tracking/setpoint#rho_0_modified"
     scenario = load_scenario(address)
     own = load_scenario(scenario, reference=moving)

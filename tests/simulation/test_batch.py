@@ -180,7 +180,7 @@ def test_flights_that_differ_in_one_thing_do_not_share_what_depends_on_it(what):
     )
 
 
-def test_user_files_with_other_bodies_fly_in_batches_of_their_own(tmp_path):
+def test_user_files_with_other_bodies_fly_in_separate_batches(tmp_path):
     shipped = (shipped_folder("mjcf") / "tiltrotor.xml").read_text(encoding="utf-8")
     scene = (shipped_folder("mjcf") / "scene.xml").read_text(encoding="utf-8")
     (tmp_path / "scene.xml").write_text(scene, encoding="utf-8")
@@ -340,7 +340,7 @@ def test_air_around_quadrotors_flies_the_same_three_ways():
     )
 
 
-def test_every_row_flies_a_model_of_its_own():
+def test_every_row_flies_a_separate_model():
     """What the law knows nothing of: the true vehicle, and ground to touch."""
     down = {"initial": {"velocity": [0.0, 0.0, -1.0]}}
     rows = three_ways(
@@ -375,7 +375,7 @@ def test_every_row_flies_a_model_of_its_own():
     ],
     ids=str,
 )
-def test_the_model_cache_key_tells_models_apart(change):
+def test_the_model_cache_key_distinguishes_models(change):
     """Rows share a model exactly where MuJoCo would compile the same one."""
     change = {"disturbance": change} if change is GUST else change
     tables = {**LAYERED, "simulation": {"timestep": 0.002, "duration": 0.3}}
@@ -480,7 +480,7 @@ def test_a_batch_takes_whatever_describes_a_scenario_and_flies_own_controllers()
     np.testing.assert_array_equal(results[1].flight.samples, tiltsim.simulate(short).samples)
 
 
-def test_a_batch_tells_of_flights_whose_results_wait_for_others(monkeypatch):
+def test_a_batch_reports_flights_whose_results_wait_for_others(monkeypatch):
     class Flown:
         def __init__(self, assemblies, *_):
             self.flights = len(assemblies)
@@ -499,7 +499,7 @@ def test_a_batch_tells_of_flights_whose_results_wait_for_others(monkeypatch):
     assert counts == [1, 2, 3]  # the second A waits for the first B
 
 
-def test_a_batch_tells_of_its_flights_and_takes_numbers_of_numpy():
+def test_a_batch_reports_its_flights_and_takes_numpy_numbers():
     counts = []
     short = {"simulation": {"duration": 0.01}}
     results = tiltsim.fly([short] * 3, threads=np.int64(2), progress=counts.append)

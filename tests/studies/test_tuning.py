@@ -56,7 +56,7 @@ def test_a_factor_on_a_loop_makes_its_poles_faster(vehicle, name, loops):
     assert after.model_dump(exclude={"gains", "allow_unstable"}) == kept
 
 
-def test_yaw_is_a_loop_of_its_own():
+def test_yaw_is_a_separate_loop():
     before = controller("tiltrotor", "given")
     factors = dict.fromkeys(tuning.knobs(before), 1.0) | {"gains.attitude, yaw": 2.0}
     attitude = np.array(tuning.scaled(before, factors)["gains"]["attitude"])
@@ -135,7 +135,7 @@ def test_a_budget_below_one_flight_on_each_task_is_refused(flights):
     assert not flights
 
 
-def test_what_fits_no_task_has_no_tuned_gains(monkeypatch):
+def test_scenarios_without_a_task_have_no_tuned_gains(monkeypatch):
     def refused(entry, **_):
         return Compared({"scenario": entry.address, "end": "refused"}, np.zeros(0), np.zeros(0))
 

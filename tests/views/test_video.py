@@ -249,7 +249,7 @@ def test_a_missing_opengl_is_one_line_with_the_remedy(monkeypatch):
     assert "MUJOCO_GL=egl" in line
 
 
-def test_an_implementation_that_only_warns_is_one_line_too(monkeypatch):
+def test_an_implementation_that_only_warns_is_also_one_line(monkeypatch):
     if sys.platform != "linux" or has_display():
         pytest.skip("for Linux without a screen")
     monkeypatch.setenv("MUJOCO_GL", "glfw")

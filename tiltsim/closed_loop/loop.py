@@ -200,8 +200,8 @@ class ClosedLoop:
             gait and reference follow it.
         setup: ``(plan, signature) -> ControlSetup``.
         dynamics, sampling, columns, monitoring: See there.
-        equations: The same controller on the thesis's equations; None where it is supported in
-            MuJoCo only or, inside a layer, by `tiltsim.laws.layers.on_equations`.
+        equations: This controller on the thesis's equations; None where it is supported in MuJoCo
+            only or, inside a layer, by `tiltsim.laws.layers.on_equations`.
         supervised: The controller for a supervisor; None where it cannot be supervised.
         follows_position: Whether a scenario has the controller follow the reference's horizontal
             position.

@@ -149,7 +149,7 @@ class Block:
 
     Attributes:
         operations: In the order of evaluation.
-        known: The same by their operation and arguments, so that an equal one is found.
+        known: Operations by operator and arguments, so that an equal one is found.
         parameters: Numbers that change with every turn of a loop.
         results: Numbers that leave the block.
     """

@@ -71,7 +71,7 @@ def by_determinants(force, torque):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_what_is_singular_follows_from_the_torque_free_forces(kind):
+def test_singularity_follows_from_the_torque_free_forces(kind):
     rng = np.random.default_rng(KINDS.index(kind))
     dimensions = set()
     for _ in range(40):
@@ -162,7 +162,7 @@ def by_brute_force(zeros, starts, up):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
-def test_classes_and_margins_are_those_of_a_search_over_attitudes(kind):
+def test_classes_and_margins_agree_with_a_search_over_attitudes(kind):
     rng, starts = np.random.default_rng(100 + KINDS.index(kind)), 16
     for _ in range(15):
         force, torque = random_vehicle(rng, kind)

@@ -187,7 +187,7 @@ def test_loads_at_the_point_where_the_torque_matrix_loses_rank():
         ((float("nan"), 0.0, 0.0), r"nan.*must be finite"),
     ],
 )
-def test_what_is_out_of_reach_is_named(acceleration, message):
+def test_unreachable_accelerations_are_named(acceleration, message):
     with pytest.raises(ValueError, match=message):
         balanced_gait(acceleration, AR_DRONE)
 

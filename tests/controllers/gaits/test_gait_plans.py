@@ -180,7 +180,7 @@ def test_scaling_reconstructed_gaits_leads_away_from_singular_matrices(name) -> 
     assert max(0.0, whole) < half < third
 
 
-def test_footfall_orders_are_those_of_the_sources() -> None:
+def test_footfall_orders_agree_with_the_sources() -> None:
     """Pods 1 to 4, around the body, are right fore, left fore, left hind, right hind."""
     feet = ("RF", "LF", "LH", "RH")
 

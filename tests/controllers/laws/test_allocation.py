@@ -62,7 +62,7 @@ def test_roll_and_pitch_keep_their_direction_and_come_before_yaw(angles, magnitu
             assert -1e-6 < allocated[axis] / requested[axis] < 1.0 + 1e-6
 
 
-def test_what_the_limits_allow_comes_back_untouched():
+def test_commands_within_the_limits_come_back_untouched():
     desired = (10.0, -20.0, 5.0, 1.0)
     speeds_now = (-300.0, 300.0, -300.0, 300.0)
     tilts_now = (0.1, -0.1, 0.2, 0.0)
@@ -198,7 +198,7 @@ def test_a_rotor_that_stands_still_does_not_stop_the_others(stopped):
     np.testing.assert_allclose(matrix[:2] @ found, asked, rtol=1e-9, atol=1e-3)
 
 
-def test_what_is_no_number_comes_back():
+def test_non_finite_requests_come_back():
     for value in (nan, inf):
         requested = (value, 0.0, 0.0, 0.0)
         found = limited_tiltrotor(
@@ -272,7 +272,7 @@ def test_the_rest_is_nearest_to_the_request(rotors):
     assert apart > 0 or rotors == 5
 
 
-def test_what_the_box_contains_comes_back_and_its_edge_is_no_jump():
+def test_points_in_the_box_come_back_and_its_edge_is_no_jump():
     for rows, requested, box in random_vehicles(6, 40):
         edge = np.clip(requested, *box.T)
         np.testing.assert_array_equal(allocated(rows, edge, box), edge)

@@ -237,7 +237,7 @@ def test_no_failure_is_the_default():
     assert full_pose_inputs(1.0, state, named) == full_pose_inputs(1.0, state, parameters())
 
 
-def test_the_even_weight_is_that_of_hover():
+def test_the_even_weight_follows_from_hover():
     """A tilt rate moves the force by ``w alpha'``, a rotor's acceleration by ``w'``."""
     weight = TILTROTOR.mass * TILTROTOR.gravity / (4.0 * TILTROTOR.thrust_coefficient)
     assert WEIGHTS["even"] == pytest.approx(weight, rel=1e-12)

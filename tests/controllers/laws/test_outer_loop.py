@@ -48,7 +48,7 @@ def observed(seed, states=(), gyroscopic=1.0):
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_rates_are_those_of_the_attitude_that_points_the_force(seed):
+def test_rates_are_derivatives_of_the_attitude_that_points_the_force(seed):
     """By central differences of the attitude as the acceleration follows its jerk."""
     seen, h = observed(seed), 1e-5
     acceleration = seen.reference.velocity  # any

@@ -31,7 +31,7 @@ def precise(rates, start, duration):
     return found.y[:, -1]
 
 
-def test_gains_are_those_of_the_periodic_riccati_equation():
+def test_gains_solve_the_periodic_riccati_equation():
     """``-P' = A^T P + P A - P B R^-1 B^T P + Q``, backward over a period, ends where it began."""
     nodes, step, phase = 64, 0.05, 2.0 * np.pi * np.arange(64) / 64
     a = np.zeros((nodes, 2, 2))

@@ -63,7 +63,7 @@ def test_circle_is_eqs_43_and_44(time):
 
 @quick
 @given(times)
-def test_circle_passes_its_acceleration_on_when_asked(time):
+def test_circle_passes_its_acceleration_on_when_requested(time):
     *_, ax, ay, az = position_reference(time, CIRCLE._replace(acceleration_feedforward=1.0))
     expected = (-0.05 * np.cos(0.1 * time), -0.05 * np.sin(0.1 * time), 0.0)
     assert (ax, ay, az) == pytest.approx(expected, abs=1e-16)
@@ -226,7 +226,7 @@ def test_waypoints_that_make_no_motion_are_refused(points, times, message):
         minimum_snap_knots(points, times)
 
 
-def test_what_a_reference_leaves_out_is_zero():
+def test_missing_parts_of_a_reference_are_zero():
     assert not any(ReferenceParameters(REFERENCE_TYPES["line"])[1:])
 
 

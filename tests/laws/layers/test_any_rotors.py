@@ -278,14 +278,14 @@ def test_once_a_rotor_is_known_to_be_lost_the_others_are_watched(strategy):
         ("hexarotor", "hold", "vehicle.mjcf has no tilts"),
     ],
 )
-def test_what_there_is_nothing_to_supervise_for_is_refused(name, strategy, message):
+def test_supervision_without_purpose_is_refused(name, strategy, message):
     controller = {"law": "attitude_force", "supervisor": {"strategy": strategy}}
     gait = {"gait": TILTS} if strategy == "scale" else {}
     line = refusal(scenario, name, controller=controller, **gait)
     assert f'controller.supervisor.strategy = "{strategy}": {message}' in line
 
 
-def test_scaling_is_refused_towards_angles_of_too_little_force_without_the_lost_rotor(tmp_path):
+def test_scaling_to_angles_with_too_little_force_without_the_lost_rotor_is_refused(tmp_path):
     """Untilted all but one of six rotors are parallel, and that one is lost."""
     text = fleet_file("tilt_hexarotor").read_text()
     text = text.replace("scene.xml", str(fleet_file("scene")))

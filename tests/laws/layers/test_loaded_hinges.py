@@ -129,7 +129,7 @@ def test_a_servo_gives_way_until_it_carries_its_rotor(plant, tmp_path):
         ("thesis", 0.004, "hover, which the ideal pods of the thesis plant neglect; more armature"),
     ],
 )
-def test_a_soft_servo_is_told(plant, beside, words, tmp_path, capsys):
+def test_a_soft_servo_is_reported(plant, beside, words, tmp_path, capsys):
     path = tmp_path / "flight.toml"
     vehicle_file(tmp_path, beside=beside)
     path.write_text(
@@ -143,7 +143,7 @@ def test_a_soft_servo_is_told(plant, beside, words, tmp_path, capsys):
     assert error.count("\n") <= 1
 
 
-def test_a_centre_of_mass_to_the_side_is_told(tmp_path, capsys):
+def test_a_center_of_mass_to_the_side_is_reported(tmp_path, capsys):
     path, vehicle = tmp_path / "flight.toml", vehicle_file(tmp_path)
     file = Path(vehicle["mjcf"])
     file.write_text(file.read_text().replace('pos="0 0 0" mass="1.5"', 'pos="0.01 0 0" mass="1.5"'))

@@ -199,12 +199,12 @@ def test_a_state_that_has_overflowed_is_seen_as_no_number(base):
         assert not np.isfinite(plant.observe()).all()
 
 
-def test_a_vehicle_that_does_as_told_flies_the_printed_equations():
+def test_an_ideal_vehicle_flies_the_printed_equations():
     desired = scenario(TILTROTOR, {"simulation": {"plant": "thesis"}})
     assert loop_of(desired) is LOOPS["attitude_altitude"]
 
 
-def test_they_are_the_printed_equations():
+def test_layered_equations_equal_the_printed_ones():
     """A layer that does nothing leaves how far the solver lets a rotation lose its length."""
     never = {"fault": [{"type": "rotor_loss", "rotor": 1, "time": 1e6}]}
     printed, driven = fly(TILTROTOR), fly(TILTROTOR, never)

@@ -97,7 +97,7 @@ def spinning_model(own, inertia):
     return model
 
 
-def test_accelerations_are_those_of_bodies_that_spin():
+def test_accelerations_include_the_spin_of_bodies():
     """MuJoCo's own dynamics of spinning bodies knows nothing of the layer's formulas."""
     rng = np.random.default_rng(4)
     assembly = assemble(scenario(vehicle={"pod": {"mass": 0.01, "inertia": 1e-4}}))
@@ -279,7 +279,7 @@ def test_commanded_speeds_take_their_momentum_from_the_body(model):
         ({"vehicle": {"rotor_inertia": 1.3e-3}}, "all rotors"),
     ],
 )
-def test_what_has_no_such_rotors_is_refused(tables, message):
+def test_vehicles_without_such_rotors_are_refused(tables, message):
     tables = merge({"vehicle": {"rotor_inertia": INERTIA}}, tables)
     with pytest.raises(InputError, match=message):
         tiltsim.parse_scenario(tables)
@@ -295,7 +295,7 @@ def test_a_users_file_gets_the_same_rotors():
     assert furthest(own, still) > 1e-3
 
 
-def test_the_feedforward_law_knows_the_inertia_where_asked():
+def test_the_feedforward_law_knows_the_inertia_on_request():
     fed_forward = {"controller": {"gait_rate_feedforward": True, "gains": "feedforward"}}
     known = {"controller": {"rotor_inertia_feedforward": True}}
     plain, knowing = (fly(THESIS, fed_forward, change) for change in ({}, known))
