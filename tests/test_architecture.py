@@ -1,4 +1,4 @@
-"""Which part may know which, and what importing costs."""
+"""Order of imports between rooms, and the cost of importing."""
 
 from __future__ import annotations
 

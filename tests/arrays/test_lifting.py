@@ -31,7 +31,7 @@ from tiltsim_controllers.mathematics.scalar import scalar, scalar_functions
 jax = pytest.importorskip("jax")
 
 CHANGE = 1e-3
-"""Of the recorded arguments, relative: their values must not be in the lifted function."""
+"""Relative change of the recorded arguments: their values must not be in the lifted function."""
 
 ROUNDING = 1e-12
 """Relative to the largest of the values: a few hundred roundings."""
@@ -100,7 +100,7 @@ def with_tables(value):
 
 
 class Compared(Lifting):
-    """Lifts functions, and compares each of them, at its first call, with what it is in Python."""
+    """Lifts functions, and compares each, at its first call, with its result in Python."""
 
     def __init__(self):
         super().__init__(JaxArrays("float64"))
@@ -132,7 +132,7 @@ def name_of(function):
 
 
 def differences(lifting, function, arguments, rng):
-    """What keeps a function from being lifted near its arguments; the rest notes the lifting."""
+    """Stops a function from being lifted near its arguments; the rest notes the lifting."""
     found = np.array([value for value, name in fields(function, arguments) if varies(value, name)])
     row = found * (1.0 + CHANGE * rng.standard_normal(len(found)))
     following = iter(map(jax.numpy.asarray, row))
@@ -150,7 +150,7 @@ def all_differences(flights):
         patch.setattr(sample_evaluation, "_in_python", called_rows)
         for tables, simulation in flights:
             record(lambda: flown(tables, **simulation).metrics(), calls)  # noqa: B023
-    for function in calls:  # callers first: most of what they call is compared with them
+    for function in calls:  # callers first: most of their callees are compared with them
         if described(function) not in lifting.compared:
             differences(lifting, function, calls[function], rng)
     return lifting.wrong, calls
@@ -221,7 +221,7 @@ def test_every_scalar_function_has_the_same_values_on_arrays():
         if f.__module__.startswith("tiltsim")  # not of another test
         and f.__code__ not in codes
         and getattr(sys.modules[f.__module__], f.__name__, None) is f  # not made by a factory
-        # Of users' controllers, in Python only; and of `VectorEnv`, which tests/env compares.
+        # For users' controllers, in Python only; and for `VectorEnv`, which tests/env compares.
         and not f.__module__.endswith(("laws.commanded", "equations.implicitfast"))
     }
     assert missing == NEVER_CALLED

@@ -64,7 +64,7 @@ def test_every_machine_flies_its_own_shard():
 
 @pytest.fixture(scope="module")
 def checkout(tmp_path_factory):
-    """A clone with three scenarios of its own, and the environment that its steps run in."""
+    """A clone with three scenarios, and the environment that its steps run in."""
     folder = tmp_path_factory.mktemp("checkout")
     for file in ROOT.iterdir():
         if not file.name.startswith("."):

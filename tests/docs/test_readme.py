@@ -70,7 +70,7 @@ def test_the_readme_counts_rows_and_scenarios_correctly():
 
 
 def test_the_report_agrees_with_the_claims(scenarios):
-    """So that its numbers, and the README's, are not those of an earlier library."""
+    """So that its numbers, and the README's, do not come from an earlier library."""
     statements = {claim.statement.id for claim in registered_claims()}
     rows = {claim.id for claim in registered_claims()}
     for scenario in scenarios:

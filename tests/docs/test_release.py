@@ -1,4 +1,4 @@
-"""What a release repeats in several files is the same in all."""
+"""Facts that a release repeats in several files agree in all."""
 
 from __future__ import annotations
 

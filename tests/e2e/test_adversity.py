@@ -36,7 +36,7 @@ def refused(capsys, *arguments):
 
 @contextmanager
 def nearly_full_disk(size):
-    """As if files could only have so many bytes."""
+    """As if files could only have a few bytes."""
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
     try:
@@ -129,7 +129,7 @@ def test_an_interrupt_that_became_another_error_stays_one(capsys, monkeypatch):
 
 
 def test_an_interrupt_that_compiled_code_turns_into_another_error_stays_one(capsys, monkeypatch):
-    """As pydantic does, which names it in the text of its own error."""
+    """Like pydantic, which names it in the text of its error."""
 
     def validated():
         with suppress(KeyboardInterrupt):

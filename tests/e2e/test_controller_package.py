@@ -61,7 +61,7 @@ for command in {COMMANDS}:
     found.append([code, out.getvalue(), error.getvalue()])
 print(json.dumps(found))
 """
-"""Commands one after the other in one process: each of its own would import all of tiltsim."""
+"""Commands one after the other in one process: separate ones would each import all of tiltsim."""
 
 
 @pytest.fixture(scope="module")

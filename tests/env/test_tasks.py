@@ -82,7 +82,7 @@ def test_zero_actions_lose_the_vehicle_with_the_stated_score(task):
 
 @pytest.mark.slow(longest=True)
 def test_the_page_states_the_scores_that_its_command_prints():
-    """Of one task: the tests above fly the others."""
+    """For one task: the tests above fly the others."""
     assert table(["Hover"]) in PAGE
 
 

@@ -223,7 +223,7 @@ def test_a_termination_says_why(two):
     assert infos["cause"][0].endswith("m away from the reference")
     assert infos["cause"][1] is None
     actions = np.array([np.full(8, np.nan), hover])
-    two.step(actions)  # that of the first is not used: its episode begins
+    two.step(actions)  # the first one's is not used: its episode begins
     with pytest.raises(ValueError, match=r"actions\[0, 0\] = nan: must be finite"):
         two.step(actions)
 

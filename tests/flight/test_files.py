@@ -340,7 +340,7 @@ def test_another_controller_is_not_replaced(tmp_path, law, flown_before):
 
 
 def test_the_digest_of_a_copied_controller_is_carried_forward(tmp_path, law):
-    """By flights of the resolved scenario, and by those without a controller of their own."""
+    """By flights of the resolved scenario, and by flights without a custom controller."""
     out = tmp_path / "out"
     flown_with(law, out)
     flown_with(out / "my_law.py", out)

@@ -1,4 +1,4 @@
-"""What a notebook uses of a flight: vectors, tables, resolved files of own controllers."""
+"""A flight in a notebook: vectors, tables, resolved files of custom controllers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Metrics of flights computed together: those of each alone, to the last bit."""
+"""Metrics of flights computed together equal each flight's metrics, to the last bit."""
 
 from __future__ import annotations
 

@@ -204,7 +204,7 @@ def test_lqr_closes_the_loop_with_the_poles_of_the_riccati_solution(regulated):
     inertia = np.reshape(vehicle.inertia, (3, 3))
     known = PeriodicVehicle(1.0, vehicle.mass, vehicle.gravity, inertia, 0.0, 100.0, *rotors)
     a, b = (m[0] for m in linear_orbit(known, solution.states, solution.thrusts))
-    # Half of the Hamiltonian's poles, those on the left, with Bryson's weights.
+    # Half of the Hamiltonian's poles, in the left half plane, with Bryson's weights.
     errors = np.r_[np.repeat([0.5, 1.0, 0.3, 3.0], 3), np.full(4, np.inf)]
     weight = np.diag((0.3 * thrusts) ** 2)
     hamiltonian = np.block([[a, -b @ weight @ b.T], [-np.diag(errors**-2.0), -a.T]])

@@ -343,7 +343,7 @@ def test_a_held_rate_ends_where_the_lag_would_be():
 
 
 class Lawless(tiltsim.LawController):
-    """Of a package whose author forgot the method."""
+    """For a package whose author forgot the method."""
 
     law: Literal["lawless"]
 

@@ -1,4 +1,4 @@
-"""Gait-rate feed-forward through scenarios: keys, limits, mistakes, what it buys."""
+"""Gait-rate feed-forward through scenarios: keys, limits, mistakes, benefit."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ NAMES = ("x", *ROTATION_NAMES, "speed")
 
 
 def random_states(entries, count):
-    """Coordinates, and states with a rotation of so many entries, and vectors of coordinates."""
+    """Coordinates, states with a rotation of ``entries`` numbers, and vectors of coordinates."""
     generator = np.random.default_rng(7)
     coordinates = Coordinates(NAMES, ("",) * len(NAMES), entries, 1)
     for _ in range(count):

@@ -106,7 +106,7 @@ def test_a_broken_measurement_reaches_no_integrator_either():
 
 
 def test_the_position_of_an_integral_law_bears_any_smaller_gain():
-    """The loop is stable at all factors below the upper limit, which python-control finds, too."""
+    """The loop is stable at all factors below the upper limit, which python-control also finds."""
     system = linearize(tiltsim.load_scenario("beyond/constant_disturbance#with_integral", INTEGRAL))
     margin = next(margin for margin in margins_of(system) if margin.place == "x")
     loop = next(loop for loop in broken_loops(system) if loop.place == "x")
@@ -266,7 +266,7 @@ def test_the_delay_margin_of_a_baseline_is_also_a_latency(law, step, vehicle):
 
 
 def test_a_baseline_with_a_latency_has_that_much_less_delay_margin():
-    """Without flights: the loop is the same as the one with commands under way."""
+    """Without flights: the loop equals the one with commands under way."""
     rest = {"reference.position": [0, 0, 0], "simulation.plant": "rigid_body"}
     scenario = offset_flight("beyond/baselines#geometric_tiltrotor", 0.004, rest)
     late = scenario.replace({"simulation.control_latency": 0.004})

@@ -132,7 +132,7 @@ def test_a_disturbance_grows_or_decays_by_the_largest_multiplier(kind, plant, ke
 def growth_in_flight(found, periods):
     """Size of the largest multiplier, and growth of a disturbance per period as flown.
 
-    A left eigenvector tells how far a state is along the mode.
+    A left eigenvector gives the distance of a state along the mode.
     """
     motion, start = found.motion, found.root.state
     values, left = np.linalg.eig(found.matrix.T)
@@ -164,7 +164,7 @@ def test_the_penguin_gait_agrees_with_the_map_of_half_a_period():
     assert distance(np.sqrt(found.multipliers), half) < 2e-3
     assert found.report()["kind"] == "orbit"
     assert flights == list(range(1, len(flights) + 1))
-    assert len(flights) > 6 * len(found.states)  # the derivative alone takes so many
+    assert len(flights) > 6 * len(found.states)  # for the derivative alone
 
 
 def test_a_flight_repeats_when_gait_and_circle_share_a_period():
@@ -231,7 +231,7 @@ def test_flights_on_all_cores_end_as_single_ones(plant, monkeypatch):
     motion = make_motion(gait("trot_continuous", plant), "native")
     offsets = np.linspace(-0.1, 0.1, 4 * os.cpu_count() + 3)
     states = [motion.initial + offset * np.eye(len(motion.initial))[0] for offset in offsets]
-    states[1][-1] = 1e11  # a rotor's speed: MuJoCo begins anew
+    states[1][-1] = 1e11  # a rotor's speed: MuJoCo resets the state
     together = list(motion.flown_each(4, states, 20))
     alone = [motion.flown(4, state, 20) for state in states]
     np.testing.assert_array_equal(together, alone)

@@ -26,7 +26,7 @@ from tiltsim_controllers.tilt_car.vehicle import THESIS_CAR
 from tiltsim_controllers.vehicle.parameters import PRESETS
 
 FILE_NAMES = {"paths", "npaths", "mesh_pathadr", "tex_pathadr", "nbuffer"}
-"""What differs where a file names meshes or textures: dm_control gives these files new names."""
+"""Differences where a file names meshes or textures: dm_control gives these files new names."""
 
 MJCF = shipped_folder("mjcf")
 FLEET = sorted({path.stem for path in MJCF.glob("*.xml")} - {"scene", "tilt_car", *MODELS})

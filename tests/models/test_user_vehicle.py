@@ -1,4 +1,4 @@
-"""A user's own vehicle by its MJCF file: what is measured, overridden, refused and flown."""
+"""A user's vehicle by its MJCF file: measured, overridden and refused properties, and flights."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ def scenario(path, model="tiltrotor", vehicle=None, **tables):
 
 
 def total_inertia(model):
-    """Mass and inertia of all that moves, about its centre of mass, world axes, from mj_crb."""
+    """Mass and inertia of all that moves, about its center of mass, world axes, from mj_crb."""
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     full = np.zeros((model.nv, model.nv))
@@ -193,7 +193,7 @@ def off_centre(x):
     ("more", "words"),
     [
         ("", None),
-        (off_centre(1e-4), None),  # 7 micrometres: less than what must be aligned may be off
+        (off_centre(1e-4), None),  # 7 micrometers: within the tolerance of alignment
         (off_centre(0.073), "not modeled: its centre of mass at (0.005, 0, 0) m\n"),
         (
             SKEW,

@@ -1,4 +1,4 @@
-"""A user's own controller: what it sees and commands, and what is said when it fails."""
+"""A custom controller: its observations, its commands, and messages when it fails."""
 
 from __future__ import annotations
 
@@ -161,7 +161,7 @@ LAYERS = {
 
 
 def merged(base, *layers):
-    """Tables of a scenario with those of layers; the keys of each table side by side."""
+    """Tables of a scenario with tables of layers; the keys of each table side by side."""
     tables = dict(base)
     for layer in layers:
         for name, table in layer.items():

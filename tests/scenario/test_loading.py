@@ -74,7 +74,7 @@ def fixed(angles):
 
 
 MISTAKES = {
-    # name: (file, key and value as shown, what is allowed)
+    # name: (file, key and value as shown, allowed values)
     "unknown key at the top": ('titel = "x"', 'titel = "x"', "did you mean title?"),
     "unknown key in a table": (
         '[controller]\ndecopler = "exact"',

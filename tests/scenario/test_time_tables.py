@@ -32,7 +32,7 @@ def csv_text(columns):
 
 @pytest.fixture
 def files(tmp_path):
-    """The same table in three files; columns that have no meaning here do not matter."""
+    """One table in three files; columns that have no meaning here do not matter."""
     more = {"speed": TIMES, **COLUMNS}
     (tmp_path / "own.csv").write_text(csv_text(COLUMNS))
     (tmp_path / "more.csv").write_text(csv_text(more).replace(",", " , ").replace("\n", "\n\n"))

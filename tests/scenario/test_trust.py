@@ -1,4 +1,4 @@
-"""Python code that scenario files name is executed only where the user asks for it."""
+"""Python code that scenario files name is executed only where the user trusts it."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ values = [["python", "../law.py:python"]]
 
 @pytest.fixture
 def folder(tmp_path):
-    """Of scenarios whose code is known to no other test."""
+    """A folder with scenarios whose code is known to no other test."""
     plant(tmp_path, tmp_path / "ran")
     return tmp_path
 

@@ -69,7 +69,7 @@ def without_speed(metrics):
 
 
 def three_ways(scenarios):
-    """Assert that every scenario flies the same in Python, natively and in a batch of all."""
+    """Assert that every scenario flies equally in Python, natively and in a batch of all."""
     rows = list(fly(scenarios, keep_samples=True, threads=2))
     assert [row.scenario for row in rows] == scenarios
     for flown, row in zip(scenarios, rows, strict=True):
@@ -101,7 +101,7 @@ def test_every_law_flies_the_same_three_ways_with_continuous_and_held_control(la
     rows = three_ways(
         [
             scenario(tables, **simulation, duration=0.21),
-            # 0.426 s are no whole number of recording intervals, nor those of held commands
+            # 0.426 s is no multiple of the recording interval or of the interval of held commands
             scenario(tables, **simulation, control_timestep=0.006, duration=0.426),
         ]
     )
@@ -341,7 +341,7 @@ def test_air_around_quadrotors_flies_the_same_three_ways():
 
 
 def test_every_row_flies_a_separate_model():
-    """What the law knows nothing of: the true vehicle, and ground to touch."""
+    """Properties that the law does not model: the true vehicle, and ground to touch."""
     down = {"initial": {"velocity": [0.0, 0.0, -1.0]}}
     rows = three_ways(
         [
@@ -411,7 +411,7 @@ def test_own_controllers_are_flown_one_by_one_among_others(tmp_path):
         )
         for mass in (0.9, 1.0, 1.1)
     ]
-    # A sweep requests the native engine for all scenarios, even for those that cannot use it.
+    # A sweep requests the native engine for all scenarios, even where it cannot be used.
     simulation = scenarios[2].simulation.model_copy(update={"engine": "native"})
     scenarios[2] = scenarios[2].model_copy(update={"simulation": simulation})
     scenarios.insert(1, scenario({}, duration=0.1))

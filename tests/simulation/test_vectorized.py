@@ -232,7 +232,7 @@ def test_gradients_agree_with_central_differences(law):
     ones, h = np.ones(len(keys)), 3e-4
     for key, along in zip(keys, np.eye(len(keys)), strict=True):
         _, exact = slope(ones, along)
-        # Of five points: errors of h**4 and of rounding / h, both about 1e-12 of the cost.
+        # With five points: errors of h**4 and of rounding / h, both about 1e-12 of the cost.
         points = [ones + k * h * along for k in (-2, -1, 1, 2)]
         far_below, below, above, far_above = (float(slope(p, along)[0]) for p in points)
         difference = (8.0 * (above - below) - (far_above - far_below)) / (12.0 * h)

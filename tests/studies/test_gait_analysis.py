@@ -1,4 +1,4 @@
-"""The analysis commands: what they report, draw and refuse."""
+"""The analysis commands: reports, figures and refusals."""
 
 from __future__ import annotations
 
@@ -279,7 +279,7 @@ def test_without_a_hover_there_are_no_hover_speeds(capsys) -> None:
 
 
 def test_a_rotor_at_rest_does_not_count_as_turning_backwards() -> None:
-    # Rotors 2 and 4 hover alone at minus delta: what rounding leaves of the others has a sign.
+    # Rotors 2 and 4 hover alone at minus delta: the rounding of the others has a sign.
     delta = np.arctan(gait_report(plans.fixed([0] * 4), AR_DRONE)["drag_ratio"])
     for nudge in (-1e-15, 0.0, 1e-15):
         report = gait_report(plans.fixed([0.1, -delta + nudge, 0.1, -delta]), AR_DRONE)

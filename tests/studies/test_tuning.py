@@ -1,4 +1,4 @@
-"""Fair tuning: what a search varies, how it searches, and on which tasks."""
+"""Fair tuning: the varied keys, the search, and its tasks."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ def test_a_search_of_many_factors_flies_its_whole_budget(budget):
 
 @pytest.fixture
 def flights(monkeypatch):
-    """Flights whose error is that of the position gain from 2.0, refused where it is above 3."""
+    """Flights whose error is the distance of the position gain from 2.0, refused above 3."""
     flown = []
 
     def compare_one(entry, **_):

@@ -1,4 +1,4 @@
-"""Scenarios of a sweep that differ in numbers: equal to those that are made in full."""
+"""Scenarios of a sweep that differ in numbers: equal to scenarios that are made in full."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The drawings of docs/concepts.md: signs are the model's, numbers those of the control laws."""
+"""The drawings of docs/concepts.md: signs are the model's, numbers the control laws'."""
 
 from __future__ import annotations
 

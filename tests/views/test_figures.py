@@ -1,4 +1,4 @@
-"""The figure of a flight: what it shows, its formats, its command."""
+"""The figure of a flight: its content, its formats, its command."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ def in_a_notebook(monkeypatch):
 
 @pytest.fixture
 def widgets(monkeypatch):
-    """What Rerun's widget for notebooks is made of, and the bytes that it gets."""
+    """Arguments of Rerun's widget for notebooks, and the bytes that it gets."""
     made = []
 
     class Widget:

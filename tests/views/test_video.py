@@ -133,7 +133,7 @@ def test_every_flight_can_be_rendered():
             assert stage.frame(len(flight(name)) - 1).std() > 10.0
             geoms = canvas.scene.geoms[: canvas.scene.ngeom]
         own = {geom.type for geom in geoms if geom.objtype != mujoco.mjtObj.mjOBJ_GEOM}
-        # Cylinders have a hundred times as many triangles: without a GPU, most of a frame's time.
+        # Cylinders have a hundred times the triangles: without a GPU, most of a frame's time.
         assert mujoco.mjtGeom.mjGEOM_BOX in own
         assert not own & {mujoco.mjtGeom.mjGEOM_CAPSULE, mujoco.mjtGeom.mjGEOM_CYLINDER}
 

@@ -1,4 +1,4 @@
-"""What is singular for any number of rotors, from the forces that they make without torque.
+"""Singular attitudes for any number of rotors, from the forces that they make without torque.
 
 Checked without them: as the last row of ``B = [tau; up^T F]`` is linear in ``up``, the determinant
 of ``B B^T`` is a quadratic form in ``up``, found from six values of it. Its null space is the set
@@ -122,7 +122,7 @@ def random_unit(rng, *shape):
 
 
 def smallest_singular_value(matrices, up):
-    """Of ``[tau; up^T F]``, for many directions of world up, shape (..., 3)."""
+    """Smallest singular values of ``[tau; up^T F]`` for directions of world up, shape (..., 3)."""
     force, torque = matrices
     last = up[..., np.newaxis, :] @ force
     rows = np.concatenate([np.broadcast_to(torque, (*up.shape[:-1], *torque.shape)), last], axis=-2)

@@ -158,7 +158,7 @@ def test_mirrored_accelerations_have_mirrored_gaits(vehicle):
 
 
 def test_the_gust_of_chapter_1():
-    """1 m/s^2 along +x: figures of our own, the thesis prints none."""
+    """1 m/s^2 along +x: our own figures, the thesis prints none."""
     gust = (1.0, 0.0, 0.0)
     np.testing.assert_allclose(
         balanced_gait(gust, AR_DRONE), (-0.0346, -0.2258, -0.0346, 0.0725), atol=1e-4

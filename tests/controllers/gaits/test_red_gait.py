@@ -104,7 +104,7 @@ def test_on_the_way_the_margin_of_a_level_vehicle_grows(angles, share):
 
 
 def test_pods_more_than_a_right_angle_apart_may_lean_further_before_they_lean_less():
-    """What the module says of the way from there: the margin of a level vehicle, in between."""
+    """The module's claim on the way from there: the margin of a level vehicle, in between."""
     start = np.array([-1.03, -1.21, -1.03, 1.91])
     way = red(start) - start
     leaning = [start + share * way for share in (0.0, 0.15, 1.0)]

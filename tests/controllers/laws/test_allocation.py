@@ -47,7 +47,7 @@ def test_roll_and_pitch_keep_their_direction_and_come_before_yaw(angles, magnitu
     assume(np.linalg.cond(matrix) < 1e4)
     found = limited_tiltrotor(desired, angles, signed, r, p, VEHICLE, RANGE)
     requested, allocated = matrix @ desired, matrix @ found
-    # What an allocation leaves of one rotor it takes from another: all are good to the largest.
+    # An allocation trades one rotor against another: errors are relative to the largest.
     scale = np.abs(matrix).sum(axis=1) * np.abs([*desired, *found]).max() + 1e-9
 
     # Within the limits, in the spin's sense, over the horizon.
@@ -106,7 +106,7 @@ def sequential_program(matrices, requested, low, high):
     tilting = block_diag(requested[:, :2, None])
     _, share = solve(-1.0, (0.0, 1.0), hstack([rows, -tilting]), np.zeros(2 * cases))
     known = tilting @ share
-    for axis in (2, 3):  # least distance from what is requested, a bound on both differences
+    for axis in (2, 3):  # least distance from the request, a bound on both differences
         row, requirement, one = (
             block_diag(matrices[:, None, axis]),
             requested[:, axis],

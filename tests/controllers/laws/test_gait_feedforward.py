@@ -226,7 +226,7 @@ def third_derivatives(state, tilt_rates, inputs):
 
 
 def demanded(state, law, integral_z):
-    """What the linear laws ask for, from the state alone."""
+    """The demands of the linear laws, from the state alone."""
     gains = law.gains
     now = outputs_second_derivatives(0.0, state, [0.0] * 4, [0.0] * 4)
     roll, pitch = state[6:8]
@@ -405,7 +405,7 @@ def test_the_jerk_includes_the_turn_of_the_body_and_of_the_force_in_it(counted):
             return Rotation.from_rotvec(t * omega).apply(size * n / np.linalg.norm(n))
 
         now, rate, _ = differences(force)
-        for side in (1.0, -1.0):  # a direction that points down is that of a force against it
+        for side in (1.0, -1.0):  # a direction that points down stands for a force against it
             found = jerk_along(moving(jets) * side, now, omega, counted)
             np.testing.assert_allclose(found, rate, rtol=0, atol=1e-8)
 

@@ -180,7 +180,7 @@ def test_indi_changes_the_torque_of_the_filtered_thrusts():
 
 
 def test_nothing_to_shorten_has_gradients():
-    """Of arrays: the side that is not selected must not make them NaN."""
+    """On arrays, the side that is not selected must not make them NaN."""
     jax = pytest.importorskip("jax")
     zero = jax.numpy.zeros(3)
     assert np.isfinite(jax.jacobian(lambda vector: shortened(vector, 1.0))(zero)).all()

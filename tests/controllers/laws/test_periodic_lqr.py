@@ -140,7 +140,7 @@ def test_an_orbit_is_flown_by_its_own_thrusts(regulated):
 
 
 def test_the_orbit_follows_the_lean_of_hover(regulated):
-    """With less than half of its swing missing, as the lean's rate is part of what is desired."""
+    """With less than half of its swing missing, as the lean's rate is part of the desired state."""
     _, lean, _, regulator = regulated
     swing = np.ptp(lean, axis=0).max()
     assert np.abs(regulator.states[:, 6:8] - lean).max() < 0.5 * swing

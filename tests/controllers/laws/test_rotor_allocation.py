@@ -1,4 +1,4 @@
-"""Allocated thrusts and tilts make the force and torque that were asked for."""
+"""Allocated thrusts and tilts make the requested force and torque."""
 
 from __future__ import annotations
 

@@ -79,7 +79,7 @@ def random_cases(random):
 
 
 def test_the_scale_is_the_largest_that_is_allowed():
-    """Of a dense grid, but for a range of scales that lies between two sixteenths."""
+    """The largest scale of a dense grid, except for a range of scales between two sixteenths."""
     dense, unseen, nearest, partial, beyond = 128, 0, 0, 0, 0
     for number, (code, seen, tilts, lean) in enumerate(random_cases(np.random.default_rng(5))):
         limits = WATCH._replace(min_margin=0.3 if number % 2 else 1.1)
@@ -194,7 +194,7 @@ def test_the_supervisor_acts_as_soon_as_the_jump_comes_into_sight(strategy):
 
 
 def test_the_clock_slows_down_within_the_band():
-    """A gait towards L, at the instant whose last glance has half the band left."""
+    """A gait toward L, at the instant whose last glance has half the band left."""
     gait = waypoints([(-0.3, 0.3, -0.3, 0.3), (0.4, -0.2, 0.4, -0.2)], 4.0)
     supervisor = watch("hold", min_determinant=2.0)
     state = asked_rates = None
@@ -302,7 +302,7 @@ def test_on_the_way_to_red_the_tilt_with_the_longest_way_has_the_maximum_rate(ro
 
 
 def test_the_way_to_red_undershoots_a_threshold_by_less_than_the_band():
-    """From red (at 0 s) towards blue (at 2 s) and back, level, as in beyond/supervisor_blue."""
+    """From red (at 0 s) toward blue (at 2 s) and back, level, as in beyond/supervisor_blue."""
     angles = ((-0.3, 0.3, -0.3, 0.3), (-0.3, 0.3, 0.634, -0.634))
     plan = waypoints(angles, 4.0)
     supervisor = watch("return_to_red", min_determinant=1.5, max_rate=1.0)
@@ -338,7 +338,7 @@ def test_four_rotors_of_a_table_have_the_tiltrotor_s_margin_and_determinant(tilt
     table, up = cross_table(VEHICLE, tilting=True), tuple(world_up(roll, pitch))
     known = assess(tilts, up, RATIO)[:2]
     n = np.array(torque_free_direction(tilts, VEHICLE))
-    side = tuple(np.sign(known[1]) * np.sign(n @ up) * n)  # that of the determinant
+    side = tuple(np.sign(known[1]) * np.sign(n @ up) * n)  # the sign of the determinant
     general = multirotor_supervision_of(tilt_of_rotor(table), 1).assess
     found = general(tilts, up, watched(table, 0, side), table)[:2]
     np.testing.assert_allclose(found, known, rtol=0.0, atol=1e-7)

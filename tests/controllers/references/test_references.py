@@ -193,7 +193,7 @@ def test_the_snap_of_a_table_begins_and_ends_at_zero():
 
 
 def snap_cost(shift):
-    """Integral of squared snap of the motion with a middle stretch bent by a bump of its own."""
+    """Integral of squared snap of the motion with a middle stretch bent by a bump."""
     times, snap = snap_along_the_way()
     # A bump that is zero with three derivatives at the knots 2 and 5: (s (1 - s))^4.
     s = np.clip((times - 2.0) / 3.0, 0.0, 1.0)

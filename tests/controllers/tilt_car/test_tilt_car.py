@@ -228,7 +228,7 @@ def test_the_printed_tilt_column_lacks_the_yaws_answer():
     for name, values in inputs.items():
         factor = 1.0 / turn_per_tilt(CAR) if name == "published" else 1.0
         made[name] = matrix_at(90.0, 70.0) @ (values * [1.0, 1.0, factor])
-    # Each makes the same with its own columns: only the exact one's are the car's.
+    # Each is consistent with its own columns: only the exact one's are the car's.
     np.testing.assert_allclose(made["published"], made["exact"], rtol=1e-9)
     assert abs(inputs["published"][2] - inputs["exact"][2]) > 1e-3
 

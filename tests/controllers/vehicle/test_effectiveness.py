@@ -1,4 +1,4 @@
-"""The table of rotors against MuJoCo, and its equations of motion against those of four rotors."""
+"""The table of rotors against MuJoCo, and its equations of motion against four rotors."""
 
 from __future__ import annotations
 

@@ -31,13 +31,13 @@ def vehicle_file(folder, *, beside=0.0, inclined=0.0, armature=1e-5, pod=(1e-9, 
     """Rotors on tilting arms of 0.2 m, as MJCF: one on each of six, or six on five.
 
     Args:
-        folder: Of the file.
+        folder: Folder of the file.
         beside: Distance of each rotor from its hinge, m.
         inclined: Angle of its thrust to the right angle with the hinge, rad.
-        armature: Of each hinge, kg m^2.
+        armature: Armature of each hinge, kg m^2.
         pod: Mass (kg) and moment of inertia (kg m^2) of each pod, about its hinge.
-        seed: Of random places, directions, coefficients and products of inertia on five arms; None
-            for six regular arms.
+        seed: Seed of random places, directions, coefficients and products of inertia on five arms;
+            None for six regular arms.
     """
     rng, random = np.random.default_rng(seed), float(seed is not None)
     arms = [0, 1, 2, 3, 4, 5] if seed is None else [0, 1, 2, 3, 4, 4]

@@ -1,4 +1,4 @@
-"""Feeding back the angular acceleration of the plant instead of that of the law's model."""
+"""Feeding back the angular acceleration of the plant instead of the law's model."""
 
 from __future__ import annotations
 
@@ -124,7 +124,7 @@ def test_on_the_ideal_thesis_plant_it_is_the_model_s():
 
 @pytest.mark.parametrize("changes", [(), (FEEDFORWARD,)], ids=["published", "feedforward"])
 def test_a_right_model_without_gyroscopic_torque_is_as_good_as_a_measurement(changes):
-    """A layer that does nothing makes the thesis plant measure, too."""
+    """A layer that does nothing makes even the thesis plant measure."""
     never = {"fault": [{"type": "rotor_loss", "rotor": 1, "time": 1e6}]}
     desired = (TILTROTOR, TROT, SPINNING, THESIS, *changes, never)
     known, measured = (tiltsim.simulate(scenario(*desired, setting)) for setting in ({}, MEASURED))
@@ -285,7 +285,7 @@ def test_rotors_too_heavy_for_the_step_are_refused(changes, cause):
     "changes", [(), (HELD,), pytest.param((EXACT, LATER), marks=pytest.mark.slow)]
 )
 def test_the_largest_inertia_is_the_one_that_flies(changes):
-    """RK4 is stable up to 2.78, the check allows 2.6; what is held is exact."""
+    """RK4 is stable up to 2.78, the check allows 2.6; held values are exact."""
     with pytest.raises(InputError) as caught:
         scenario(LAGGING, *changes)
     largest = float(re.search("at most (.*) kg", str(caught.value))[1])

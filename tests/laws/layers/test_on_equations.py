@@ -1,4 +1,4 @@
-"""Layered loops on the thesis's equations, an integration of its own to check MuJoCo's by."""
+"""Layered loops on the thesis's equations, an independent integration to check MuJoCo's by."""
 
 from __future__ import annotations
 
@@ -114,8 +114,8 @@ def on_both(*changes):
 
 # --- both plants -------------------------------------------------------------------------------
 
-# What comes at an instant, within a step, costs an integrator one step: first order. A kink costs
-# it one order, and where all is smooth ode3's third order is left.
+# An event within a step costs an integrator one step: first order. A kink costs it one order, and
+# where all is smooth ode3's third order is left.
 FLIGHTS = {
     "rotor lag": (3, (TILTROTOR, {"vehicle": {"rotor_time_constant": 0.02}})),
     "late": (3, (TILTROTOR, LATE)),
@@ -241,7 +241,7 @@ def test_a_pod_stops_where_its_servo_does():
 
 @pytest.mark.parametrize("plant", ["mujoco", "thesis"])
 def test_rotors_hold_their_limits_within_a_step(plant):
-    """Else thrust outruns them by what a step adds, and a longer step flies another flight."""
+    """Else thrust outruns them by one step's change, and a longer step flies another flight."""
     changes = {"simulation.plant": plant, "simulation.engine": "python"}
     coarse, fine = (
         tiltsim.simulate(

@@ -54,8 +54,8 @@ def largest_difference(one, other, names=MOTION):
 
 
 # --- MuJoCo ------------------------------------------------------------------------------------
-# With one solver the plants differ by what MuJoCo's pods weigh: 1e-13 kg m^2 on a hinge of 1e-6,
-# so a pod answers to one ten-millionth of the body's angular acceleration.
+# With one solver the plants differ by the inertia of MuJoCo's pods: 1e-13 kg m^2 on a hinge of
+# 1e-6, so a pod answers to one ten-millionth of the body's angular acceleration.
 
 
 @pytest.mark.parametrize(

@@ -52,7 +52,7 @@ def thrust_axes(tilts):
 
 
 def angular_momentum(plant):
-    """Of body, pods and rotors about the centre of mass, world axes, shape (3,)."""
+    """Angular momentum of body, pods and rotors about the center of mass, world axes, (3,)."""
     model, data = plant.model, plant.data
     mujoco.mj_forward(model, data)
     mujoco.mj_subtreeVel(model, data)
@@ -221,7 +221,7 @@ def test_a_trot_turns_the_body_and_a_fixed_gait_does_not(plant):
 def test_stiff_servos_approach_pods_that_follow_exactly():
     """The torques by tilt rates and rotor accelerations against the momentum formulation.
 
-    What remains is the load on the servo: 1.7e-6 at 1e4 rad/s, a fourth at twice the frequency.
+    The remainder is the load on the servo: 1.7e-6 at 1e4 rad/s, a fourth at twice the frequency.
     """
     short = {"duration": 0.04, "timestep": 4e-5, "record_timestep": 0.01}
     exact = fly(THESIS, simulation=short)
