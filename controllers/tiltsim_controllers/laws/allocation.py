@@ -1,9 +1,9 @@
 """Rotor accelerations within limits: roll and pitch first, then yaw, lift, and the rest.
 
-A rotor's speed must stay within its limits, so its acceleration is limited to what keeps it there
-for a horizon: ``(min - |varpi|) / horizon <= |varpi|' <= (max - |varpi|) / horizon``. The requested
-accelerations may lie outside this box, and limiting each rotor separately would produce an
-arbitrary torque. Instead, among all accelerations in the box, the allocation takes
+A rotor's speed must stay within its limits, so its acceleration is limited to values that keep it
+there for a horizon: ``(min - |varpi|) / horizon <= |varpi|' <= (max - |varpi|) / horizon``. The
+requested accelerations may lie outside this box, and limiting each rotor separately would produce
+an arbitrary torque. Instead, among all accelerations in the box, the allocation takes
 
 1. the largest fraction, up to 1, of the requested roll and pitch torque rates together, so that
    their direction is preserved, whatever that costs in all that follows;
@@ -17,9 +17,9 @@ not cost any of them. It comes before lift, of which a climb may ask for too muc
 lasts; side forces come last, as leaning replaces them.
 
 The first three are linear programs, the last is a quadratic one. All are solved by the same active
-set method, for any number of rotors: along the objective's gradient, as far as what comes before it
-and the rotors at their limits leave it; a rotor that the way meets at its limit stops there, and is
-let go again where its multiplier says so.
+set method, for any number of rotors: along the objective's gradient, projected on the directions
+that earlier objectives and rotors at their limits leave free; a rotor that reaches its limit on the
+way stops there, and is released when leaving it pays off.
 """
 
 from __future__ import annotations
@@ -86,7 +86,7 @@ def _room(value: float, direction: float, box: Pair) -> float:
 
 @scalar
 def _inverse_length(square: float) -> float:
-    """One over the length of what is left of a row of length 1, from its square; 0 for nothing."""
+    """One over the length of the rest of a row of length 1, from its square; 0 if it vanishes."""
     return 1.0 / sqrt(square) if square > NEGLIGIBLE * NEGLIGIBLE else 0.0
 
 
@@ -113,7 +113,7 @@ def _after(value: float, free: float, slope: float, step: float, is_met: bool, b
 
 @cache
 def _remainder_of(length: int) -> Callable[..., Values]:
-    """Scalar code of what rows and stopped rotors leave of a gradient: ``(rows, free, gradient)``.
+    """Scalar code that projects a gradient off rows and stopped rotors: ``(rows, free, gradient)``.
 
     The remainder is orthogonal to the rows over the free rotors, for which it is the direction of
     steepest ascent. Its other entries are the multipliers of the rotors that stopped.
@@ -195,7 +195,7 @@ def allocated_of(length: int) -> Callable[..., Values]:
 
     ``torque`` are three rows, ``lift`` is one: torque and force rates per acceleration, of any
     unit. The box has a lower and an upper limit for each rotor, and includes zero. Requested
-    accelerations that are in it come back as they are, and so do those that are not numbers.
+    accelerations that are in it come back as they are, and so do non-finite ones.
     """
     dot, scaled, add_scaled, product, _ = vectors_of(length)
     nothing, each = (0.0,) * length, (1.0,) * length

@@ -1,10 +1,10 @@
 """The supervisor of any multirotor: its margin and determinant, as the tiltrotor's at four rotors.
 
 The margin is the angle between world up and the nearest direction in which the controller has no
-lift: with one component of force that of the torque-free force with which it lifts; with two the
-normal of their plane; with three there is none. The determinant is the volume of the decoupling
-matrix's rows of torque and lift by that of the level untilted vehicle, times the share of every
-further row of force that the rows before it leave: zero where the matrix is singular.
+lift: with one component of force, the direction of the torque-free force with which it lifts; with
+two the normal of their plane; with three there is none. The determinant is the volume of the
+decoupling matrix's rows of torque and lift relative to the level untilted vehicle, times the share
+of every further row of force that the rows before it leave: zero where the matrix is singular.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from tiltsim_controllers.vehicle.effectiveness import (
 
 
 class Watched(NamedTuple):
-    """What the supervisor reads of a vehicle."""
+    """Vehicle parameters used by the supervisor."""
 
     rotors: float = 0.0  # where in the knots the table of the rotors begins
     per_volume: float = 0.0  # of the determinant, 1 / (N^3 m^3) and units of the speeds
@@ -49,13 +49,13 @@ def untilted_volume(table: Sequence[float]) -> float:
 
 
 def watched(table: Sequence[float], rotors: int, side: Triple) -> Watched:
-    """Of a vehicle whose table begins at an index of the knots."""
+    """Parameters of a vehicle whose table begins at an index of the knots."""
     return Watched(float(rotors), UNTILTED / untilted_volume(table), *side)
 
 
 @scalar
 def watched_at(time: float, parameters: Any) -> Watched:
-    """What is watched at a time (s): of the other rotors, once it is known that one failed."""
+    """The watched vehicle at a time (s): without a rotor that is known to have failed."""
     seen: Watched = parameters.watched
     if time >= parameters.failure.known_from:
         seen = parameters.watched_without
