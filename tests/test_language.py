@@ -52,7 +52,7 @@ NAMES = {
     "name the thing instead of a pronoun": r"^test_(?:its?|their|they)_",
     "repeat the noun": r"_(?:that|those)_of_",
     "custom, separate": r"_of_(?:its|ones|our|their|your)_own",
-    "requested, sent, refused": r"_(?:asked|said|tells|told)(?=_|$)",
+    "requested, sent, refused": r"_(?:asked|said|t(?:ells|old))(?=_|$)",
     "also, again": r"_too$|_anew(?=_|$)",
     "name the number": r"_(?:as|so)_(?:many|much)_",
     "American spelling": BRITISH.replace(r"\b", ""),
