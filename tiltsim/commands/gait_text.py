@@ -20,8 +20,8 @@ CURVES: Final = {
 
 SETS: Final = {
     "all": "every attitude",
-    "great circle": "those with world up in a plane of the body (a great circle)",
-    "two directions": "those with world up along one line of the body (two directions)",
+    "great circle": "attitudes with world up in a plane of the body (a great circle)",
+    "two directions": "attitudes with world up along one line of the body (two directions)",
     "none": "none",
 }
 
@@ -89,7 +89,7 @@ def gait_text(report: dict[str, Any]) -> str:
     if "time" in report:
         rate = "jumps" if report["max_rate"] is None else f"{report['max_rate']:.6g} rad/s"
         rows += [
-            ("period", f"{report['period']:g} s; the values above are those at t = 0"),
+            ("period", f"{report['period']:g} s; the values above hold at t = 0"),
             ("maximum tilt angle", f"{report['amplitude']:.6g} rad"),
             ("maximum tilt rate", rate),
             ("minimum rank", str(report["min_rank"])),
