@@ -25,7 +25,7 @@ class Header(NamedTuple):
 
 HEADER_SIZE: Final = len(Header._fields)
 TIMESTEP, EVALUATIONS_PER_STEP, CONTROL_PERIOD, EVALUATIONS, RECORDER = range(HEADER_SIZE)
-"""Where in `userdata` the fields of the `Header` lie."""
+"""Places of the fields of the `Header` in `userdata`."""
 
 _AFTER: Final = 1.0 + 2.0**-48
 _BEFORE: Final = 1.0 - 2.0**-48

@@ -72,7 +72,7 @@ def _target() -> tuple[Any, Mapping[str, Any], str]:
 
 @cache
 def widest() -> int:
-    """How many numbers a vector register of this processor holds."""
+    """Number of floats in a vector register of this processor."""
     import llvmlite.binding as llvm
 
     has = llvm.get_host_cpu_features()

@@ -88,7 +88,7 @@ class Stepper(Protocol):
         Args:
             step_index: Number of steps so far.
             now: State and inputs in force.
-            steps: How many steps to take.
+            steps: Number of steps to take.
         """
 
 
@@ -233,7 +233,7 @@ class LaneStepper:
         """Put a flight at its first step into a lane.
 
         Args:
-            lane: Which one.
+            lane: Number of the lane, from 0.
             flight: The flight.
             now: State and inputs in force.
             head: Head of its recorder; see `tiltsim.engines.recorder.recorder_head`.

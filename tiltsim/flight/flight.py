@@ -163,7 +163,7 @@ class Flight:
         return public("video")(self, path, **options)
 
     def _repr_html_(self) -> str:
-        """How the flight ended and its metrics, as a table for notebooks."""
+        """The end of the flight and its metrics, as a table for notebooks."""
         scenario, end = self.scenario, self.end
         how = f"{end.kind} at {end.time:g} s" + (f": {end.cause}" if end.cause else "")
         size = f"{len(self)} samples of {len(self.units)} columns"

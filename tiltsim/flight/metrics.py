@@ -44,7 +44,7 @@ def compute_metrics(
     Args:
         columns: Columns of the flight by name, each of shape (N,).
         assembly: The assembly of the flight.
-        end: How it ended.
+        end: Its end.
         wall_time: Duration of the integration, s.
     """
     values = assembly.loop.kind.metrics(columns, assembly.scenario, assembly.follows_position)
@@ -75,7 +75,7 @@ def metrics_of_rows(
         assemblies: One per flight, with equal knots.
         numbers: Numbers of their parameters, shape (rows, numbers), in the order of `flatten`.
         samples: Shape (rows, N, fields), at equal times.
-        end: How they ended.
+        end: Their common end.
         wall_times: Durations of their integrations, s.
 
     Returns:

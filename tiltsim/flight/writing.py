@@ -67,9 +67,9 @@ def write_flight(
     """Write a flight into a folder; each file appears whole or not at all.
 
     Args:
-        folder: Where to; created if missing.
+        folder: Folder to write to; created if missing.
         table: The columns, for flight.parquet.
-        metrics: For metrics.json.
+        metrics: Content of metrics.json.
         scenario: For scenario.toml, with all defaults filled in; the file of a user's controller is
             copied, and the tables of its reference and gait are written as reference.csv and
             gait.csv.

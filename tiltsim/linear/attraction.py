@@ -1,4 +1,4 @@
-"""From how far a flight comes back: a map over two numbers of its initial state."""
+"""The region of attraction of a flight: a map over two numbers of its initial state."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ INSTANTS: Final = 24  # of a moving gait
 
 @dataclass(frozen=True, eq=False)
 class Attraction:
-    """Which initial states come back.
+    """A map of the initial states that come back.
 
     Attributes:
         scenario: The scenario.
@@ -88,7 +88,7 @@ class Attraction:
         return areas
 
     def report(self) -> dict[str, Any]:
-        """As JSON: shares of the map's area."""
+        """Entries of the JSON report: shares of the map's area."""
         report: dict[str, Any] = {
             "scenario": self.scenario.address,
             "axes": list(self.axes),
@@ -122,7 +122,7 @@ def attraction(
     refinements: int = REFINEMENTS,
     progress: Callable[[int, int], None] = lambda _flights, _expected: None,
 ) -> Attraction:
-    """Which initial states come back to a flight.
+    """Map the initial states that come back to a flight.
 
     Flights start on a grid; cells whose corners differ are divided into four, and so on. A flight
     comes back if it completes its duration and in its last second has attitude and position of the
@@ -135,7 +135,7 @@ def attraction(
         ranges: Lowest and highest value on each axis, SI units; default: 1.5 rad, 5 m, 5 m/s and 10
             rad/s either way.
         coarse: Cells across, before they are divided.
-        refinements: How often cells at the boundary are divided.
+        refinements: Number of times that cells at the boundary are divided.
         progress: Called with the number of flights so far, and with how many there will be, an
             estimate until the last division.
 
@@ -218,7 +218,7 @@ def _corners(i: int, j: int, width: int) -> tuple[tuple[int, int], ...]:
 
 
 def _expected(following: int, width: int) -> int:
-    """How many flights come after a level whose cells have a width, a boundary being a line."""
+    """Expected number of flights after a level of cells of a width, as a boundary is a line."""
     return following * (width - 1)  # each level doubles the number of cells at the boundary
 
 

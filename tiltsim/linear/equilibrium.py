@@ -131,8 +131,9 @@ def equilibrium_of(
 
     Args:
         scenario: The scenario.
-        at_rest: Demands a rest point.
-        late: Has the controller as it flies with a latency; see `tiltsim.linear.motion.Motion`.
+        at_rest: Whether it must be a rest point.
+        late: Whether the controller is taken as it flies with a latency; see
+            `tiltsim.linear.motion.Motion`.
         near: A state near the orbit, such as the result of a neighboring scenario; tried first.
         progress: Called with the number of periods or samples flown so far.
 
@@ -199,7 +200,7 @@ class _Search:
 
     Args:
         motion, forcing, step, steps: See `Equilibrium`.
-        returns: How often the flight may return until it has settled.
+        returns: Largest number of returns until the flight has settled.
         progress: See `equilibrium_of`.
     """
 
@@ -301,7 +302,7 @@ class _Search:
         return after
 
     def _frame(self, start: float, end: float) -> Floats:
-        """How the moving frame moves from one time (s) to another."""
+        """Motion of the moving frame from one time (s) to another."""
         return self._forcing.motion(self._motion.coordinates.names, start, end)
 
     def _back(self, state: Floats, time: float) -> Floats:

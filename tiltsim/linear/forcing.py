@@ -49,7 +49,7 @@ class Forcing(NamedTuple):
     start: float
 
     def motion(self, names: Sequence[str], start: float, end: float) -> Floats:
-        """How the frame moves from one time (s) to another, in coordinates of these names."""
+        """Motion of the frame from one time (s) to another, in coordinates of these names."""
         after, moved = end - start, dict.fromkeys(names, 0.0)
         for axis, velocity, acceleration in zip("xyz", self.velocity, self.acceleration):
             if axis in moved:

@@ -63,7 +63,7 @@ class Margin:
             limit.
         phase: Smallest lag or lead at which it becomes unstable, rad; infinite if none does.
         delay: Smallest further delay at which it becomes unstable, s.
-        frequency: Where the smallest phase margin is, rad/s; nan if there is none.
+        frequency: Frequency of the smallest phase margin, rad/s; nan if there is none.
         disk: Largest alpha of the disk of factors ``(1 + alpha d / 2) / (1 - alpha d / 2)``, any
             complex ``|d| < 1``; 2 and more: any phase. At all inputs together d is any matrix
             smaller than 1, so the disk holds for independent factors, which may bear more.
@@ -88,7 +88,7 @@ class Margin:
         return 2.0 * atan(min(1.0, 0.5 * self.disk))
 
     def report(self) -> dict[str, Any]:
-        """As JSON; null stands for no limit."""
+        """Entries of the JSON report; null stands for no limit."""
         low, high = self.gain
         numbers = {
             "gain_low": low or None,

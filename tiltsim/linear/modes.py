@@ -50,7 +50,7 @@ class Mode:
         frequency: Magnitude of the pole, rad/s.
         damping: Ratio, 1 for a stable real pole, negative where it grows.
         states: Names, the largest part first.
-        count: How many poles, a pair counted as two.
+        count: Number of poles, a pair counted as two.
     """
 
     name: str
@@ -65,7 +65,7 @@ class Mode:
         return -self.damping * self.frequency
 
     def report(self) -> dict[str, Any]:
-        """As JSON."""
+        """Entries of the JSON report."""
         return {**vars(self), "states": list(self.states)}
 
 

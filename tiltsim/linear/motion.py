@@ -51,12 +51,12 @@ class Motion(ABC):
         assembly: The flight; its controller adds the offsets to its commands to the vehicle.
         coordinates: Coordinates of its state.
         inputs: Names of the vehicle's inputs.
-        offsets: Added to the inputs; zero unless they are varied.
+        offsets: Offsets of the inputs, shape (inputs,); zero unless they are varied.
 
     Args:
         scenario: The scenario to fly.
         engine: The engine that flies it.
-        late: Has the controller as it flies with a latency, though there may be none.
+        late: Whether the controller is taken as it flies with a latency, though there may be none.
     """
 
     def __init__(self, scenario: Scenario, engine: EngineName | None, late: bool = False) -> None:

@@ -1,4 +1,4 @@
-"""How long a flight has to be, so that its slowest mode decays."""
+"""The duration of a flight in which its slowest mode decays."""
 
 from __future__ import annotations
 

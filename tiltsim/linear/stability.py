@@ -71,7 +71,7 @@ class Stability:
         return float(np.exp(self.poles.real.max()))
 
     def report(self) -> dict[str, Any]:
-        """As JSON."""
+        """Entries of the JSON report."""
         name = "poles" if self.multipliers is None else "multipliers"
         values = self.poles if self.multipliers is None else self.multipliers
         assert values is not None

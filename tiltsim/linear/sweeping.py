@@ -1,4 +1,4 @@
-"""How the multipliers of a gait move with its period, or with any other number."""
+"""The multipliers of a gait over its period, or over any other number."""
 
 from __future__ import annotations
 

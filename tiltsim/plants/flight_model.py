@@ -44,7 +44,7 @@ def model_cache_key(scenario: Scenario) -> str:
 
 
 def evaluations_per_step(model: mujoco.MjModel) -> int:
-    """How often MuJoCo's integrator evaluates the controls in a step."""
+    """Number of evaluations of the controls per step of MuJoCo's integrator."""
     return 4 if model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4 else 1
 
 

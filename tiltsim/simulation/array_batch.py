@@ -60,7 +60,7 @@ def batch_key(assembly: Assembly) -> object:
 
 
 def _padded(rows: int) -> int:
-    """As many rows or more: a number of which there are few, as each is compiled."""
+    """A number of rows, at least the given one, from a small set: each is compiled."""
     return min(1 << (rows - 1).bit_length(), -(-rows // ROUND_ROWS) * ROUND_ROWS)
 
 
@@ -69,7 +69,7 @@ class ArrayBatch(Generic[Result]):
 
     Args:
         assemblies: The flights.
-        threads: How many parts of them fly at once.
+        threads: Number of parts that fly at once.
         pool: Runs the threads.
         finish: Turns a flight into a result; samples are freed unless it keeps them.
     """
@@ -167,7 +167,7 @@ class ArrayBatch(Generic[Result]):
 
         Args:
             index: Index of its assembly.
-            row: In the recording.
+            row: Row in the recording.
             samples: As if nothing ended it.
             recording: Recording of the part.
             closer: Its samples from step to step in the interval in which it ended.

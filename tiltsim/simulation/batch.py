@@ -43,7 +43,7 @@ class FlightResult:
 
     Attributes:
         scenario: The scenario.
-        end: How it ended.
+        end: Its end.
         metrics: Its metrics; see `tiltsim.scenario.metric_names.METRICS`.
         flight: The flight itself, if its samples are kept.
     """

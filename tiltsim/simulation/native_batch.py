@@ -88,8 +88,8 @@ class NativeBatch(Generic[Result]):
 
     Args:
         assemblies: The flights, in the order of their places.
-        threads: How many step rows.
-        pool: Where the results are computed.
+        threads: Number of threads that step rows.
+        pool: Pool that computes the results.
         result: Makes the result of a flight.
     """
 

@@ -110,7 +110,7 @@ def simulate_assembly(
     Args:
         assembly: The flight.
         observer: See `simulate`.
-        engine: In place of the scenario's.
+        engine: Engine in place of the scenario's.
         report: Called with the simulated time (s) after every chunk of samples.
     """
     simulation = assembly.scenario.simulation

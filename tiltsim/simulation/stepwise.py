@@ -94,7 +94,7 @@ class Simulation:
         """Take physics steps of ``simulation.timestep``, under the scenario's controller.
 
         Args:
-            steps: How many; at least 1.
+            steps: Number of physics steps; at least 1.
 
         Raises:
             InputError: If that is no such number, the flight has ended (see `end`), or it would go
@@ -133,7 +133,7 @@ class Simulation:
 
     @property
     def end(self) -> End | None:
-        """How, when and why the flight has ended early; None as long as it goes on."""
+        """Kind, time and cause of an early end of the flight; None as long as it goes on."""
         return self._end
 
     @property

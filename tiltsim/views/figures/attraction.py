@@ -27,7 +27,7 @@ CURVES: Final = 8  # curves of singular attitudes of a moving gait
 
 @style.paper_style()
 def attraction_figure(found: Attraction) -> Figure:
-    """Where a flight comes back from, with the gait's singular attitudes."""
+    """Initial states that come back, with the gait's singular attitudes."""
     figure = style.new_figure(5.0, 5.0)
     axes: Any = figure.subplots()
     handles = _draw_map(axes, found)

@@ -310,7 +310,7 @@ def _roll_pitch_plane(axes: Axes, n: Floats, vehicle: Vehicle) -> None:
 
 @_drawing_style()
 def color_figure() -> Figure:
-    """Where red and blue gaits lie, and where red ones are singular (ch. 6 to 8)."""
+    """Angles of red and blue gaits, and the curve of singular red ones (ch. 6 to 8)."""
     vehicle = PRESETS["ar_drone_2"]
     angle = delta(vehicle)
     side = np.linspace(-pi / 2, pi / 2, 401)

@@ -227,7 +227,7 @@ def _determinant(axes: Axes, shown: Sequence[Shown]) -> None:
 
 
 def _supervisor(axes: Axes, shown: Sequence[Shown]) -> None:
-    """How far each supervisor intervenes."""
+    """The intervention of each supervisor."""
     for one in shown:
         _plot(axes, one, one.flight[SUPERVISION])
     axes.set(ylim=(-0.03, 1.03), ylabel="supervisor (0 to 1)")
