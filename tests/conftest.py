@@ -40,9 +40,9 @@ def pytest_collection_finish():
 
 
 def pytest_collection_modifyitems(items):
-    """Order the tests, and choose those that coverage traces.
+    """Order the tests, and choose the tests that coverage traces.
 
-    The longest of the slow tests begin first, and those that wait for the viewer: at the end, one
+    The longest of the slow tests begin first, and tests that wait for the viewer: at the end, one
     process would run them alone.
     """
     if sys.gettrace() is not None:

@@ -1,4 +1,4 @@
-"""Damage to files, the same in every run."""
+"""Damage to files, reproducible in every run."""
 
 from __future__ import annotations
 

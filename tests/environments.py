@@ -1,4 +1,4 @@
-"""Python environments of their own, made without network."""
+"""Separate Python environments, made without network."""
 
 from __future__ import annotations
 

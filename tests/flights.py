@@ -1,4 +1,4 @@
-"""Short flights for the tests of what shows flights, flown once."""
+"""Short flights for the tests of views, flown once."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from tiltsim.vehicles.rotorcraft import ROTORCRAFT
 
 BASE = {"simulation": {"duration": 1.2, "timestep": 0.002, "engine": "python"}}
 SAMPLE_FIELDS = ("time", *ROTORCRAFT.observed_fields)
-"""What a sample of any rotorcraft begins with; a law's own states follow."""
+"""The first fields of a sample of any rotorcraft; a law's own states follow."""
 
 FIXED = {"gait": {"type": "fixed", "angles": [-0.65, -0.65, 0.65, 0.65]}}
 TROT = {
@@ -32,7 +32,7 @@ TILT_CAR = {
 JUMPS = {"gait": {"type": "trot_instant", "amplitude": 0.65, "period": 0.8}}
 SUPERVISED = {"controller": {"supervisor": {"strategy": "return_to_red", "min_margin": 0.9}}}
 OTHER_KINDS = {"tilt_car": TILT_CAR}
-"""Flights of what is no rotorcraft."""
+"""Flights of vehicles that are no rotorcraft."""
 
 RECIPES = {
     "fixed": FIXED,

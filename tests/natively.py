@@ -1,4 +1,4 @@
-"""Traced functions as machine code, beside the same in Python."""
+"""Traced functions as machine code, compared with Python."""
 
 from __future__ import annotations
 

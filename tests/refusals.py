@@ -1,4 +1,4 @@
-"""What is refused, in one line."""
+"""Refusals, in one line."""
 
 from __future__ import annotations
 

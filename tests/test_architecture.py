@@ -1,4 +1,4 @@
-"""Which part may know which, and what importing costs."""
+"""Order of imports between rooms, and the cost of importing."""
 
 from __future__ import annotations
 
@@ -324,7 +324,7 @@ GUARDED = {
 """Where they are used, with an alternative in the same function."""
 
 
-def test_what_only_posix_has_is_guarded():
+def test_posix_features_are_guarded():
     found = {}
     for module, (tree, *inside) in nodes().items():
         used = imported()[module] & POSIX_ONLY

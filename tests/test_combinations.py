@@ -1,7 +1,7 @@
 """Every law with every vehicle, table of the scenario, plant and use: it works, or in one line not.
 
 Nobody lists combinations here: laws, vehicles, tables with their examples, plants, engines and the
-public interface are the product's own registries. What is added to them is tested with the rest.
+public interface are the product's own registries. An addition to them is tested with the rest.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ def strict(monkeypatch):
 
 
 def attempt(use, *arguments):
-    """What a use returns and no line, or nothing and the line of its refusal; else it raises."""
+    """The result of a use and no line, or nothing and the line of its refusal; else it raises."""
     try:
         return use(*arguments), ""
     except TiltsimError as error:
@@ -212,7 +212,7 @@ def learn(scenario):
 
 
 def learn_on_arrays(scenario):
-    """The same on arrays, without compiling it."""
+    """The flight on arrays, without compiling it."""
     jax = pytest.importorskip("jax")
     changed = scenario.replace({"simulation.integrator": "implicitfast"})
     env = tiltsim.env.TiltrotorEnv(changed)
@@ -375,7 +375,7 @@ FITTING = claimed(FEW)
 
 @pytest.mark.parametrize("layer", LAYERS)
 def test_every_table_is_flown_by_some_law(layer):
-    """With one pair of those that take it, another one for each table."""
+    """With one of the pairs that take it, another one for each table."""
     first = 5 * [*LAYERS].index(layer) % len(FITTING)
     for pair in FITTING[first:] + FITTING[:first]:
         flight, _ = attempt(fly, *pair, LAYERS[layer])

@@ -1,4 +1,4 @@
-"""Wrong use of the Python API: a TiltsimError with the argument, the value and what is allowed."""
+"""Wrong use of the Python API: a TiltsimError with the argument, its value and allowed values."""
 
 from __future__ import annotations
 

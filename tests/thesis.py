@@ -1,4 +1,4 @@
-"""The thesis's matrices, written out as printed: what the code is checked against."""
+"""The thesis's matrices, written out as printed, against which the code is checked."""
 
 from __future__ import annotations
 

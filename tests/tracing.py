@@ -23,11 +23,11 @@ ROWS = 3  # of every test
 
 
 def untraced(function):
-    """The same function, which no tracer sees."""
+    """The function, hidden from tracers."""
 
     @wraps(function)
     def paused(*arguments, **keywords):
-        # In one and the same frame: a tracer keeps a stack of those that it has seen entered.
+        # In one frame: a tracer keeps a stack of the frames that it has seen entered.
         tracer = sys.gettrace()
         sys.settrace(None)
         try:
@@ -39,7 +39,7 @@ def untraced(function):
 
 
 def seldom_traced(function, begins=lambda *_: False):
-    """The same function, of whose calls a tracer sees a sample, and those where ``begins`` says so.
+    """The function with a sample of its calls traced, and the calls for which ``begins`` is true.
 
     Args:
         function: Called over and over, as a step of a flight.
@@ -58,7 +58,7 @@ def seldom_traced(function, begins=lambda *_: False):
 
 
 def trace_seldom():
-    """Have a tracer see samples of flights, and nothing of what other packages do at length."""
+    """Have a tracer see samples of flights, and no long work of other packages."""
     _import_others_untraced()
     import sympy
     import tomli_w

@@ -103,8 +103,8 @@ def called_rows(row, _width, time, states, user):
 def short_flights():
     """Flights of every controller, gait, reference and layer.
 
-    Few of them in MuJoCo's plant, only those that call functions of its own: to compile its model
-    takes longer than the rest of a flight.
+    Few of them in MuJoCo's plant, only flights that call functions of that plant: to compile its
+    model takes longer than the rest of a flight.
     """
     for law in LAWS.values():
         yield {**law, "disturbance": GUST}, {"plant": "thesis"}
@@ -139,7 +139,7 @@ def record(action, calls):
     known, by_code, read = {}, defaultdict(list), 0
 
     def functions_of(code):
-        """Those with this very code; generated ones may have equal code of their own."""
+        """Functions with this code object; generated ones may have equal but separate code."""
         nonlocal read
         functions = scalar_functions()
         for function in functions[read:]:  # the flight makes others
@@ -201,7 +201,7 @@ def mapped(change, value, name=""):
 
 
 def described(function):
-    """What distinguishes a scalar function from closures of the same source.
+    """Key that distinguishes a scalar function from closures of one source.
 
     Not the functions that it calls: each of them is described on its own.
     """

@@ -1,4 +1,4 @@
-"""Flights in JAX are those of the other engines."""
+"""Flights in JAX agree with the other engines."""
 
 from __future__ import annotations
 
@@ -108,7 +108,7 @@ def compare_steps(tables):
 
 
 def results(program, values):
-    """What JAX's operations, one after the other, make of the arguments of a program."""
+    """Results of a program's operations in JAX, one after the other."""
     from jax.extend.core import Literal
 
     known = dict(zip(program.jaxpr.constvars, program.consts))
@@ -136,13 +136,13 @@ def results(program, values):
     ids=["continuous", "held"],
 )
 def test_compiled_flights_are_those_in_python(name, timing):
-    """Of few: XLA takes seconds to compile a flight."""
+    """Only few: XLA takes seconds to compile a flight."""
     assert largest_difference(EVERY[name], **timing) < 1e-9
 
 
 @needs_jax
 @pytest.mark.slow
-def test_a_flight_of_20_s_differs_by_less_than_a_nanometre_from_the_native_one():
+def test_a_flight_of_20_s_differs_by_less_than_a_nanometer_from_the_native_one():
     changes = {"expect": [], "simulation.plant": "thesis", "simulation.duration": 20.0}
     scenario = tiltsim.load_scenario("ch04_tracking/circle#continuous_t2_modified", changes)
     flown, native = (

@@ -88,7 +88,7 @@ def given():
     return parse
 
 
-def test_defaults_are_those_of_the_signature(given):
+def test_defaults_come_from_the_signature(given):
     assert given("a") == ("a", (), (), None, (), None, False, DashedStyle())
 
 
@@ -133,7 +133,7 @@ def test_a_reader_names_the_option_and_the_value(given):
         given("a", "--pair", "")
 
 
-def test_the_help_is_that_of_the_docstrings(given):
+def test_the_help_comes_from_the_docstrings(given):
     text = " ".join(given.help.split())
     for part in (
         "Do something. At length.",

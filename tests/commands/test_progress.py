@@ -1,4 +1,4 @@
-"""Progress on a terminal, also on one that reports no size, as those of CI services do."""
+"""Progress on a terminal, also on one that reports no size, as on CI services."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ pty = pytest.importorskip("pty")
 
 
 class Shown:
-    """What a terminal of no size shows."""
+    """Output of a terminal without a size."""
 
     def __init__(self):
         self.text = ""

@@ -1,4 +1,4 @@
-"""What ``tiltsim schema`` says about each key, and the page made of it."""
+"""The descriptions of keys by ``tiltsim schema``, and the page made of them."""
 
 import re
 import tomllib

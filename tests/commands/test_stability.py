@@ -39,7 +39,7 @@ def test_text_and_figure_of_poles(tmp_path, capsys):
     assert "Poles of the rest point: stable" in figure.read_text(encoding="utf-8")
 
 
-def test_axes_of_poles_are_labelled_where_the_poles_are():
+def test_axes_of_poles_are_labeled_where_the_poles_are():
     """Slow poles lie between labels; double poles that rounding splits stretch no axis."""
     poles = np.array(
         [-0.2 + 1.0j, -0.5 + 1.6j, -0.5 - 1.6j, -0.2 - 1.0j, -300 + 1e-3j, -300 - 1e-3j]
@@ -115,7 +115,7 @@ def test_contradicting_options_are_refused(arguments, message, capsys):
         ("--ranges=0:1,-2:0", "range of pitch = -2:0: must be within pi/2 either way"),
     ],
 )
-def test_a_wrong_map_is_refused_by_what_was_typed(option, message, capsys):
+def test_a_wrong_map_is_refused_in_the_words_of_the_user(option, message, capsys):
     assert main(["attraction", SETPOINT, option, "--quiet"]) == 2
     assert capsys.readouterr().err.startswith(f"tiltsim: {message}")
 

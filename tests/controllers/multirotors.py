@@ -98,7 +98,7 @@ def random_states(count):
 
 
 def parameters_of(vehicle, gait=None, reference=None, **changes):
-    """Parameters without limits, and the knots: those of the gait and the table."""
+    """Parameters without limits, and the knots of the gait and of the table."""
     gait = gait or plans.fixed(())
     reference = reference or ReferenceParameters(SETPOINT)
     law = Parameters(

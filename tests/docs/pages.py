@@ -25,7 +25,7 @@ class Block(NamedTuple):
 
 
 def markdown(page: Path) -> str:
-    """The text of a page; that of a notebook is in its Markdown cells."""
+    """The text of a page; the text of a notebook is in its Markdown cells."""
     text = page.read_text(encoding="utf-8")
     if page.suffix != ".ipynb":
         return text
@@ -54,7 +54,7 @@ def links(page: Path) -> list[str]:
 
 
 def anchors(page: Path) -> set[str]:
-    """What links can name after ``#``: headings as GitHub spells them, and explicit ids."""
+    """Targets that links can name after ``#``: headings as GitHub spells them, and explicit ids."""
     text = FENCED.sub("", markdown(page))
     found: set[str] = set()
     for heading in re.findall(r"^#{1,6} +(.*?) *#*$", text, re.MULTILINE):

@@ -44,7 +44,7 @@ OFFLINE = {
 }
 
 
-def test_its_files_and_folders_are_those_of_a_clone(monkeypatch):
+def test_ci_names_files_and_folders_of_a_clone(monkeypatch):
     setup = next(step["with"] for name, step in STEPS.items() if "setup-python" in name)
     assert (ROOT / setup["cache-dependency-path"]).is_file()
     assert (ROOT / WORKFLOW["env"]["SCENARIOS"]).is_dir()
@@ -64,7 +64,7 @@ def test_every_machine_flies_its_own_shard():
 
 @pytest.fixture(scope="module")
 def checkout(tmp_path_factory):
-    """A clone with three scenarios of its own, and the environment that its steps run in."""
+    """A clone with three scenarios, and the environment that its steps run in."""
     folder = tmp_path_factory.mktemp("checkout")
     for file in ROOT.iterdir():
         if not file.name.startswith("."):
@@ -92,7 +92,7 @@ def run_step(name, checkout, shard):
 
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="the steps are for a Linux machine")
-def test_its_shell_steps_fly_every_scenario_once(checkout):
+def test_shell_steps_of_ci_fly_every_scenario_once(checkout):
     pytest.importorskip("hatchling", reason="builds without network need the build backend")
     folder, _ = checkout
     run_step("Install", checkout, 1)

@@ -48,7 +48,7 @@ SAVED_AS = {
     "docs/multirotor.md": {"<mujoco": "own_hexarotor.xml"},
     "docs/supervisor.md": {'title = "Six tilting arms': "arms.toml"},
 }
-"""Blocks that a page tells to save, by their start."""
+"""Blocks that a page says to save, by their start."""
 
 NOT_RUN = {
     "view": "opens a window; tests/views runs the viewer headless",
@@ -93,7 +93,7 @@ def test_every_block_names_its_language(name):
 
 
 def save_blocks(name, folder):
-    """Save what a page tells to."""
+    """Save the blocks that a page says to save."""
     for start, file in SAVED_AS.get(name, {}).items():
         (text,) = (block.code for block in blocks(name) if block.code.startswith(start))
         (folder / file).write_text(text)

@@ -29,11 +29,11 @@ def page(name):
     return re.sub(r"\s+", " ", text.replace("**", ""))
 
 
-def test_it_is_read_in_five_minutes():
+def test_the_readme_is_read_in_five_minutes():
     assert len(README.split()) < 800
 
 
-def test_its_first_blocks_set_up_a_clone():
+def test_the_first_blocks_of_the_readme_set_up_a_clone():
     """`.ci/run` executes them to the letter."""
     fly, check = code("README.md", "sh")[:2]
     setup = "python3 -m venv .venv && .venv/bin/pip install -q -c constraints.txt "
@@ -42,7 +42,7 @@ def test_its_first_blocks_set_up_a_clone():
     assert check == f"{setup}-e '.[test]' &&\n.venv/bin/python -m pytest -q\n"
 
 
-def test_its_picture_moves_and_loads_quickly():
+def test_the_picture_of_the_readme_moves_and_loads_quickly():
     (name,) = re.findall(r"!\[[^\]]+\]\(([^)]+)\)", README)
     file = ROOT / name
     assert file.stat().st_size < 3_000_000
@@ -50,7 +50,7 @@ def test_its_picture_moves_and_loads_quickly():
         assert (picture.n_frames > 50, picture.info["loop"]) == (True, 0)
 
 
-def test_it_counts_rows_and_scenarios_as_they_are():
+def test_the_readme_counts_rows_and_scenarios_correctly():
     """The first sentences of the report, which its command writes, have all its numbers."""
     report = page("reproduction.md")
     statements, rows, flown = re.search(
@@ -70,8 +70,8 @@ def test_it_counts_rows_and_scenarios_as_they_are():
     assert f"# {len(list(library_entries()))} scenarios" in words
 
 
-def test_the_report_is_that_of_the_claims(scenarios):
-    """So that its numbers, and the README's, are not those of an earlier library."""
+def test_the_report_agrees_with_the_claims(scenarios):
+    """So that its numbers, and the README's, do not come from an earlier library."""
     statements = {claim.statement.id for claim in registered_claims()}
     rows = {claim.id for claim in registered_claims()}
     for scenario in scenarios:
@@ -87,7 +87,7 @@ def cells(name, row, end):
     return [float(cell) for cell in re.findall(r"0\.\d+", found)]
 
 
-def test_its_feed_forward_is_compared_with_its_ablations():
+def test_the_feed_forward_of_the_readme_is_compared_with_ablations():
     words = re.sub(r"\s+", " ", README)
     published = cells("beyond.md", "ch. 4, modified decoupler", "exact")
     ours = [1e3 * cell for cell in cells("beyond.md", "tilt-rate feed-forward", "without")]
@@ -97,7 +97,7 @@ def test_its_feed_forward_is_compared_with_its_ablations():
     assert f"leaves an error of {min(published):.2f} to {max(published):.2f} m" in words
 
 
-def test_its_speed_names_integrator_and_timers():
+def test_the_speed_in_the_readme_names_integrator_and_timers():
     words, speed = re.sub(r"\s+", " ", README), page("performance.md")
     rk4, implicitfast = re.search(r"([\d,]+) \(RK4,.*?([\d,]+) \(implicitfast\)", speed).groups()
     assert f"{implicitfast} closed-loop steps per second on one core with implicitfast" in words

@@ -1,4 +1,4 @@
-"""What a release repeats in several files is the same in all."""
+"""Facts that a release repeats in several files agree in all."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ INSTALLATION = (ROOT / "docs" / "installation.md").read_text()
 CITATION = (ROOT / "CITATION.cff").read_text()
 
 
-def test_the_version_is_that_of_the_project_everywhere():
+def test_the_version_equals_the_projects_everywhere():
     heading = re.search(r"^## ([\d.]+)", (ROOT / "CHANGELOG.md").read_text(), re.MULTILINE)
     assert heading[1] == PROJECT["version"]
     assert f"\nversion: {PROJECT['version']}\n" in CITATION

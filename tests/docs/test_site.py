@@ -19,7 +19,7 @@ LOADED = {"script", "img", "source", "video", "audio", "iframe", "embed", "objec
 
 
 class Page(HTMLParser):
-    """The ids of a page, its links, and what it loads."""
+    """The ids of a page, its links, and the files that it loads."""
 
     def __init__(self, path):
         super().__init__()

@@ -21,10 +21,10 @@ from time import monotonic
 MEANT = {signal.SIGINT: 130, signal.SIGTERM: 143}
 
 PATIENCE = 60.0
-"""Time (s) within which an interrupted sweep ends: beyond that of XLA's compiler."""
+"""Time (s) within which an interrupted sweep ends: longer than XLA's compiler takes."""
 
 SWEEPS = {"native": ("mujoco", 20.0, 40, 8), "jax": ("thesis", 0.1, 6, 3)}
-"""Of an engine: plant, duration (s) of a flight, flights and those of a chunk."""
+"""For an engine: plant, duration (s) of a flight, number of flights, flights per chunk."""
 
 SWEEP = """
 scenario = "ch04_tracking/setpoint#rho_065_modified"
@@ -103,8 +103,8 @@ class Interrupting:
 
     Args:
         folder: For files and results.
-        engine: Of the flights, a key of `SWEEPS`.
-        seed: Of signals and moments.
+        engine: Engine of the flights, a key of `SWEEPS`.
+        seed: Seed of signals and moments.
     """
 
     def __init__(self, folder, engine, seed):
@@ -138,7 +138,7 @@ class Interrupting:
         return monotonic() - began
 
     def interrupt(self):
-        """Send one signal to the sweep; return what is wrong, or an empty text."""
+        """Send one signal to the sweep; return the mistake, or an empty text."""
         random = self._random
         number, fresh = random.choice(list(MEANT)), random.random() < 0.2
         continued = (self._out / "sweep.toml").exists() or (self._out / "parts").exists()
@@ -174,7 +174,7 @@ class Interrupting:
 
 
 def interrupt_sweeps(engine, count, seed, report=lambda mistake, sweeps: None):
-    """Send ``count`` signals; return the mistakes and what happened how often."""
+    """Send ``count`` signals; return the mistakes and the number of each outcome."""
     folder = Path(mkdtemp(prefix="interrupting"))
     mistakes = []
     try:
@@ -197,7 +197,7 @@ if __name__ == "__main__":
     options = parser.parse_args()
 
     def show(mistake, sweeps):
-        """Print a mistake, and what has happened so far."""
+        """Print a mistake, and the outcomes so far."""
         counted = f"{dict(sweeps.counts)}; slowest end {sweeps.slowest:.1f} s"
         sys.stdout.write(f"{mistake}\n{counted}\n" if mistake else f"{counted}\n")
         sys.stdout.flush()

@@ -36,7 +36,7 @@ def refused(capsys, *arguments):
 
 @contextmanager
 def nearly_full_disk(size):
-    """As if files could only have so many bytes."""
+    """As if files could only have a few bytes."""
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
     try:
@@ -53,7 +53,7 @@ def test_a_full_disk_names_the_file(tmp_path, capsys):
 
 
 @pytest.mark.parametrize("name", ["metrics.json", "scenario.toml"])
-def test_what_cannot_be_written_is_told_before_the_flight(tmp_path, capsys, monkeypatch, name):
+def test_unwritable_outputs_are_reported_before_the_flight(tmp_path, capsys, monkeypatch, name):
     monkeypatch.setattr("tiltsim.commands.run.fly", None)
     (tmp_path / name).mkdir()
     assert f"{tmp_path}/{name}: not a file" in refused(
@@ -129,7 +129,7 @@ def test_an_interrupt_that_became_another_error_stays_one(capsys, monkeypatch):
 
 
 def test_an_interrupt_that_compiled_code_turns_into_another_error_stays_one(capsys, monkeypatch):
-    """As pydantic does, which names it in the text of its own error."""
+    """Like pydantic, which names it in the text of its error."""
 
     def validated():
         with suppress(KeyboardInterrupt):

@@ -45,7 +45,7 @@ max = {bound}
 
 
 def tiltsim(*arguments):
-    """Run the command in a process of its own, as from a shell."""
+    """Run the command in a separate process, as from a shell."""
     return subprocess.run(
         [*COMMAND, *map(str, arguments)], capture_output=True, text=True, check=False
     )
@@ -107,7 +107,7 @@ def test_run_writes_the_three_files_and_prints_a_summary(tmp_path, capsys):
     ("value", "shown"),
     [(0.38123456, "0.381235"), (-8.123e-8, "-8e-08"), (-8.7e-16, "0"), (361.3829, "361.383")],
 )
-def test_run_shows_few_digits_of_what_is_zero_but_for_the_solver(value, shown):
+def test_run_shows_few_digits_of_values_that_are_zero_but_for_the_solver(value, shown):
     assert run_command._shown(value) == shown
 
 
@@ -170,7 +170,7 @@ def test_a_flight_of_the_library_is_as_shipped_on_any_plant(path, overrides, cha
     assert is_changed_from_library(path, load_scenario(path, overrides)) is changed
 
 
-def test_a_flight_of_ones_own_is_always_judged(expecting):
+def test_a_custom_flight_is_always_judged(expecting):
     path = expecting(1.0)
     changed = load_scenario(path, {"simulation.duration": 0.1})
     assert not is_changed_from_library(path, changed)
@@ -395,7 +395,7 @@ def test_interrupt_ends_a_whole_check_at_once_and_keeps_what_is_finished(
     for name in ("b", "c"):
         endless = "[simulation]\nduration = 20000.0\nrecord_timestep = 10.0\n"
         (tmp_path / f"{name}.toml").write_text(endless)
-    # Of two processes one has the longest flight, the other what comes before it.
+    # One of two processes has the longest flight, the other all flights before it.
     paths = [tmp_path / f"{name}.toml" for name in ("abc" if jobs == "1" else "ab")]
     process = subprocess.Popen(
         [*COMMAND, "check", *map(str, paths), "--jobs", jobs, "--junit", tmp_path / "j.xml"],
@@ -437,7 +437,7 @@ def test_interrupted_run_keeps_its_files_and_says_so(tmp_path, capsys, monkeypat
         yield Interrupting()
 
     monkeypatch.setattr(run_command, "show_progress", no_bar)
-    # So few samples that none of what follows from them is worth compiling either.
+    # So few samples that nothing computed from them is worth compiling either.
     long = ["--set", "simulation.duration=2000.0", "--set", "simulation.record_timestep=1.0"]
     assert main(["run", SETPOINT, "--out", str(tmp_path), *long]) == 130
     output, error = capsys.readouterr()
@@ -473,7 +473,7 @@ def test_list_shows_every_scenario_with_title_and_source(capsys):
     assert main(["list", "--json"]) == 0
     entries = json.loads(capsys.readouterr().out)
     assert all(entry["title"] and entry["source"] for entry in entries)
-    # A member without a title shows what it changes; a title is not repeated.
+    # A member without a title shows its changes; a title is not repeated.
     trots = [line for line in lines if line.lstrip().startswith("#continuous_t3_modified ")]
     assert all("type = trot_continuous" in line and "period = 3.0" in line for line in trots)
     assert len(trots) == 2
@@ -493,7 +493,7 @@ def test_long_lines_are_wrapped_only_on_a_terminal(capsys, monkeypatch):
     assert shown.split() == piped.split()
 
 
-def test_list_of_what_contains_a_word(capsys):
+def test_list_of_scenarios_that_contain_a_word(capsys):
     assert main(["list", "ch02_singular_zone"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert all(line.startswith(("ch02_singular_zone", "  #")) for line in lines)

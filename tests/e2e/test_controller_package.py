@@ -61,7 +61,7 @@ for command in {COMMANDS}:
     found.append([code, out.getvalue(), error.getvalue()])
 print(json.dumps(found))
 """
-"""Commands one after the other in one process: each of its own would import all of tiltsim."""
+"""Commands one after the other in one process: separate ones would each import all of tiltsim."""
 
 
 @pytest.fixture(scope="module")
@@ -108,6 +108,6 @@ def test_the_command_line_knows_the_law(folder):
 
 
 @pytest.mark.slow
-def test_it_flies_in_batches_natively_as_in_python(folder):
+def test_a_package_flies_in_batches_natively_as_in_python(folder):
     done = run(folder, "-c", PYTHON)
     assert done.returncode == 0, done.stderr

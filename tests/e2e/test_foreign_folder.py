@@ -38,7 +38,7 @@ def run(*command, cwd):
 
 
 def pip(*words, cwd):
-    """Run pip without network: the build backend is that of this environment."""
+    """Run pip without network: the build backend comes from this environment."""
     offline = ("--no-index", "--no-deps", "--no-build-isolation", "--disable-pip-version-check")
     run(sys.executable, "-m", "pip", *words, *offline, cwd=cwd)
 
@@ -50,7 +50,7 @@ def python(tmp_path):
 
 @pytest.fixture
 def project(tmp_path):
-    """A user's project with packages of its own and a script that flies."""
+    """A user's project with its own packages and a script that flies."""
     folder = tmp_path / "project"
     for name in ("controllers", "scenarios", "tests"):
         (folder / name).mkdir(parents=True)
@@ -60,7 +60,7 @@ def project(tmp_path):
 
 
 @pytest.mark.parametrize("kind", ["editable", "wheel"])
-def test_a_users_own_packages_do_not_shadow_those_of_tiltsim(kind, python, project, tmp_path):
+def test_a_users_packages_do_not_shadow_the_packages_of_tiltsim(kind, python, project, tmp_path):
     pytest.importorskip("hatchling", reason="builds without network need the build backend")
     if kind == "wheel":
         pip("wheel", "--wheel-dir", str(tmp_path / "dist"), str(ROOT), cwd=tmp_path)
@@ -75,7 +75,7 @@ def test_a_users_own_packages_do_not_shadow_those_of_tiltsim(kind, python, proje
     assert int(samples) > 1
     installed = Path(file).is_relative_to(python.parents[1])
     assert installed == (kind == "wheel")
-    # `python -m` puts the current folder first on the path, too.
+    # `python -m` also puts the current folder first on the path.
     options = ["--set", "simulation.duration=0.2", "--set", "expect=[]", "--out", "flight"]
     run(python, "-m", "tiltsim", "run", SETPOINT, "--quiet", *options, cwd=project)
     assert (project / "flight" / "flight.parquet").is_file()

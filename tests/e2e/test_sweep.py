@@ -279,7 +279,7 @@ count = 2
 """
 
 
-def test_groups_of_a_distribution_differ_without_colour(tmp_path):
+def test_groups_of_a_distribution_differ_without_color(tmp_path):
     out = swept(short_sweep(tmp_path / "sweep.toml", count=8), tmp_path / "out")
     figure = sweep_figure(load_results(out), ("max_abs_roll",))
     shares, curves = figure.subfigs[0].axes

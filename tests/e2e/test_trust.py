@@ -1,4 +1,4 @@
-"""Nothing that only reads or checks executes what it reads, or what lies in the working folder."""
+"""Nothing that only reads or checks executes its input, or code in the working folder."""
 
 from __future__ import annotations
 
@@ -101,7 +101,7 @@ REFUSED = {
 
 @pytest.fixture
 def folders(tmp_path):
-    """The working folder with everything planted, and that of the program, both clean of marks."""
+    """The working folder with everything planted, and the program's folder, both clean of marks."""
     here, program = tmp_path / "here", tmp_path / "program"
     here.mkdir()
     program.mkdir()

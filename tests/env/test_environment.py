@@ -141,7 +141,7 @@ def test_hovering_holds_the_place_and_earns_the_whole_reward():
 
 @ideal_and_real
 def test_a_step_is_the_flight_of_a_held_command(layers):
-    """Physics, step by step from outside, is that of `tiltsim.simulate`."""
+    """Physics, step by step from outside, equals `tiltsim.simulate`."""
     this = scenario(initial={"attitude": [0.1, 0.2, 0.3]}, **layers)
     action = np.array([1.0, 1.1, 0.9, 1.2, 0.1, -0.2, 0.3, 0.0])
     env = TiltrotorEnv(this)
@@ -194,7 +194,7 @@ def test_a_lost_vehicle_terminates_with_zero_discount_and_reward():
     assert (step.reward, step.discount) == (0.0, 0.0)
     assert env.end.kind == "diverged"
     assert "m away from the reference" in env.end.cause
-    # Falling half a metre takes sqrt(2 s / g) = 0.32 s.
+    # Falling half a meter takes sqrt(2 s / g) = 0.32 s.
     assert env.end.time == pytest.approx(0.32, abs=0.021)
     assert env.step(HOVER).first()
     assert env.end is None

@@ -82,7 +82,7 @@ def test_zero_actions_lose_the_vehicle_with_the_stated_score(task):
 
 @pytest.mark.slow(longest=True)
 def test_the_page_states_the_scores_that_its_command_prints():
-    """Of one task: the tests above fly the others."""
+    """For one task: the tests above fly the others."""
     assert table(["Hover"]) in PAGE
 
 
@@ -205,7 +205,7 @@ def test_actions_span_their_bounds():
     np.testing.assert_allclose(env.action(command), [1.0] * 4 + [-1.0] * 4)
 
 
-def test_starts_on_one_model_are_those_of_a_new_environment():
+def test_starts_on_one_model_equal_the_starts_of_a_new_environment():
     used, fresh = (TiltrotorEnv(**TASKS["Hover"], seed=1) for _ in range(2))
     used.reset()
     model = used._plant.model
@@ -249,7 +249,7 @@ def test_controllers_that_need_more_than_observations_are_refused(controller):
 # --- pictures ------------------------------------------------------------------------------------
 
 
-def test_pictures_show_the_present_state_of_their_own_environment():
+def test_every_picture_shows_the_present_state_of_its_environment():
     first, second = make("Hover", render_mode="rgb_array"), make("Hover", render_mode="rgb_array")
     with pytest.raises(InputError, match="call reset"):
         first.unwrapped.render()

@@ -143,7 +143,7 @@ def make(*args, **arguments):
         ),
     ],
 )
-def test_what_does_not_fly_on_arrays_is_refused_by_name(task, arguments, words):
+def test_features_that_do_not_fly_on_arrays_are_refused_by_name(task, arguments, words):
     with pytest.raises(InputError, match=words) as caught:
         make(task, **arguments)
     assert "\n" not in str(caught.value)
@@ -157,7 +157,7 @@ FLOWN = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("task", FLOWN)
-def test_episodes_are_those_of_single_environments_step_for_step(task):
+def test_episodes_equal_single_environments_step_for_step(task):
     """Observations, rewards, ends and the starts after them, with Gymnasium's own autoreset."""
     arguments = {**FLOWN[task], "max_position_error": 2.0}
     scenario = arguments.pop("scenario")
@@ -223,7 +223,7 @@ def test_a_termination_says_why(two):
     assert infos["cause"][0].endswith("m away from the reference")
     assert infos["cause"][1] is None
     actions = np.array([np.full(8, np.nan), hover])
-    two.step(actions)  # that of the first is not used: its episode begins
+    two.step(actions)  # the first one's is not used: its episode begins
     with pytest.raises(ValueError, match=r"actions\[0, 0\] = nan: must be finite"):
         two.step(actions)
 

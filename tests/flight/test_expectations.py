@@ -1,4 +1,4 @@
-"""Expectations: what holds, what fails, and how bounds read."""
+"""Expectations that hold, expectations that fail, and the texts of bounds."""
 
 from __future__ import annotations
 

@@ -78,7 +78,7 @@ def test_a_write_that_fails_leaves_the_old_file_whole(tmp_path, monkeypatch, wri
     assert set(after) == NAMES, "no temporary file is left behind"
 
 
-def test_files_get_the_permissions_that_the_user_asked_for(tmp_path):
+def test_files_get_the_permissions_of_the_users_umask(tmp_path):
     previous = os.umask(0o027)
     try:
         flight().save(tmp_path)
@@ -340,7 +340,7 @@ def test_another_controller_is_not_replaced(tmp_path, law, flown_before):
 
 
 def test_the_digest_of_a_copied_controller_is_carried_forward(tmp_path, law):
-    """By flights of the resolved scenario, and by those without a controller of their own."""
+    """By flights of the resolved scenario, and by flights without a custom controller."""
     out = tmp_path / "out"
     flown_with(law, out)
     flown_with(out / "my_law.py", out)

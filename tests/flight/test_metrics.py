@@ -80,10 +80,10 @@ def test_all_metrics_are_declared_and_in_this_order():
     assert list(metrics) == [name for name in METRICS if name in metrics]
 
 
-def test_orbits_are_measured_from_the_centre_of_the_circle():
+def test_orbits_are_measured_from_the_center_of_the_circle():
     circle = {"type": "circle", "position": [1.0, -2.0, 0.0], "radius": 5.0}
     scenario = {"reference": circle | {"angular_frequency": 0.1}}
-    # An ellipse about the centre after 20 s; what was before does not count.
+    # An ellipse about the center after 20 s; earlier samples do not count.
     radius_x, radius_y = np.where(TIMES < 20.0, 99.0, 6.0), np.where(TIMES < 20.0, 0.1, 4.0)
     turn = 0.5 * pi * TIMES
     x, y = 1.0 + radius_x * np.cos(turn), -2.0 + radius_y * np.sin(turn)
@@ -347,7 +347,7 @@ def test_editors_complete_the_metrics_of_expectations():
     assert metric["enum"] == list(METRICS)
 
 
-def test_units_are_those_of_the_metrics():
+def test_units_belong_to_the_metrics():
     names = "final_position_error_x", "max_rotor_speed", "duration", "switches", "diverged"
     assert [METRICS[name].unit for name in names] == ["m", "rad/s", "s", "", ""]
 

@@ -1,4 +1,4 @@
-"""What a notebook uses of a flight: vectors, tables, resolved files of own controllers."""
+"""A flight in a notebook: vectors, tables, resolved files of custom controllers."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def test_a_tilt_car_has_the_vectors_of_its_plane():
 
 
 @pytest.mark.parametrize("name", ["positon", 0, ["x", "y"], None])
-def test_an_unknown_column_is_answered_with_what_there_is(flight, name):
+def test_an_unknown_column_is_answered_with_the_columns(flight, name):
     with pytest.raises(KeyError) as caught:
         _ = flight[name]
     assert isinstance(caught.value, tiltsim.TiltsimError)
@@ -90,7 +90,7 @@ def test_the_files_of_a_controller_from_python_say_how_to_fly_it_again(own_fligh
     np.testing.assert_array_equal(loaded.samples, own_flight.samples)
 
 
-def test_a_controller_of_a_cell_that_fails_is_told_by_its_function_and_line():
+def test_a_failing_controller_of_a_cell_is_named_by_function_and_line():
     names = {}
     exec(compile("def law(observation):\n    return observation.positon", "cell", "exec"), names)
     with pytest.warns(RuntimeWarning, match="line 2 of law"):

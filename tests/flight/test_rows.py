@@ -1,4 +1,4 @@
-"""Metrics of flights computed together: those of each alone, to the last bit."""
+"""Metrics of flights computed together equal each flight's metrics, to the last bit."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ END = End("completed", TIMES[-1])
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_metrics_of_rows_are_those_of_each_flight_to_the_last_bit(name):
+def test_metrics_of_rows_equal_each_flights_to_the_last_bit(name):
     base, key, values = CASES[name]
     base = load_scenario(base)
     assemblies = [assemble(base.replace({key: value})) for value in values]
@@ -68,7 +68,7 @@ def test_rows_that_differ_in_more_than_numbers_have_no_metrics_together():
     assert metrics_of_rows(assemblies, np.empty((2, 0)), samples, END, [1.0] * 2) is None
 
 
-def test_squares_may_overflow_in_metrics_of_rows_as_in_those_of_one_flight():
+def test_squares_may_overflow_in_metrics_of_rows_as_in_one_flight():
     def shared():
         return Metrics({"max_abs_roll": np.square(np.array([1e200]))[0]})
 

@@ -20,7 +20,7 @@ RECORDS = (
     *("Airframe", "Command", "End", "Flight", "Observation", "LawController", "Observed"),
     *("InputError", "TiltsimError", "law", "xp"),
 )
-"""Public names that nobody calls with what they have not checked."""
+"""Public names that nobody calls with unchecked arguments."""
 
 
 ODD = (
@@ -86,7 +86,7 @@ def _arguments(random, function):
 
 
 def _functions():
-    """Public functions by name, methods of what they return among them."""
+    """Public functions by name, and methods of their results."""
     import tiltsim.env
 
     found = {name: getattr(tiltsim, name) for name in tiltsim.__all__ if name not in RECORDS}

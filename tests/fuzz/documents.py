@@ -9,7 +9,7 @@ STRANGE = (
     *("", "a", "\x1b]0;x\x07", "\u202eb\n\x00", "飛行 🚁", "../../etc/passwd", "a.py:b"),
     *("x" * 5000, [], {}, [[]], [1.0] * 40, {"a": {"b": [{"c": 1}]}}, ["1", 2, True]),
 )
-"""Values that a schema rarely allows; those that TOML cannot hold are written all the same."""
+"""Values that a schema rarely allows; values that TOML cannot hold are written all the same."""
 
 
 class Documents:
@@ -110,7 +110,7 @@ def toml_text(value):
         return f"{{ {inner} }}"
     if isinstance(value, list | tuple):
         return f"[{', '.join(map(toml_text, value))}]"
-    return repr(value) if isinstance(value, float) else json.dumps(value)  # nan and inf, too
+    return repr(value) if isinstance(value, float) else json.dumps(value)  # also nan and inf
 
 
 def toml_document(document):

@@ -1,4 +1,4 @@
-"""Kinds of inputs: each writes what it needs into a folder and returns what to run."""
+"""Kinds of inputs: each writes its files into a folder and returns the command to run."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def parsers():
 
 @cache
 def options_of(command):
-    """A command's own options, but those that name files to write."""
+    """A command's own options, without options that name files to write."""
     actions = parsers()[command]._actions
     return [a for a in actions if a.metavar != "FILE" and not REACHES_OUT & {*a.option_strings}]
 
@@ -123,7 +123,7 @@ def override(random, _folder):
 
 
 def arguments(random, folder):
-    """Arguments of the commands that analyse gaits."""
+    """Arguments of the commands that analyze gaits."""
     command = random.choice(("gait", "gait", "map", "singularity"))
     given = ["quadrotor"] if command == "singularity" else []
     if command == "gait":
@@ -144,7 +144,7 @@ def arguments(random, folder):
 
 
 def any_command(random, folder):
-    """A command with words for what it takes, and any of its options; long ones are interrupted."""
+    """A command with words for its arguments, and any of its options; long ones are interrupted."""
     command, parser = random.choice(sorted(parsers().items()))
     given = []
     for action in parser._actions:
@@ -168,7 +168,7 @@ def any_command(random, folder):
 
 
 def _given(random, folder, action):
-    """A value of an option or argument, by the name of what it takes."""
+    """A value of an option or argument, by its name in the help."""
     names = action.metavar if isinstance(action.metavar, str) else ""
     likely = {
         "SCENARIO": (SETPOINT, "beyond/baselines#pid_quadrotor", "ch04_tracking/setpoint", "a"),
@@ -288,4 +288,4 @@ KINDS = (
     *(arguments, mjcf_file, damaged_flight, damaged_sweep, damaged_cache),
     *(any_command, any_command, python_call, python_call, python_call),
 )
-"""Kinds of inputs, by turns; those that matter most more often."""
+"""Kinds of inputs, by turns; the most important ones more often."""

@@ -77,7 +77,7 @@ def fuzz(count, seed, report=lambda done, mistake: None):
 
 
 def _remove_what_is_in(working):
-    """What was written where no option points, such as MuJoCo's MUJOCO_LOG.TXT; or nothing."""
+    """Files written where no option points, such as MuJoCo's MUJOCO_LOG.TXT; or nothing."""
     written = sorted(working.iterdir())
     for path in written:
         shutil.rmtree(path) if path.is_dir() else path.unlink()
@@ -99,7 +99,7 @@ def _interrupt(number, _frame):
 
 
 def run_one(number, seed, folder):
-    """Run one input; what is wrong, or an empty text."""
+    """Run one input; the mistake, or an empty text."""
     random = Random(f"{seed}:{number}")
     place = folder / str(number)
     place.mkdir()

@@ -9,10 +9,10 @@ from tiltsim.plants.factory import make_plant
 
 
 def assert_restarts(scenario, saved_at, steps):
-    """Another plant, restored from what one saved, goes on bit for bit as that does.
+    """Another plant, restored from a saved state, continues like the first bit for bit.
 
     Args:
-        scenario: What is flown.
+        scenario: Scenario to fly.
         saved_at: Steps before the state is saved.
         steps: Steps after that.
     """

@@ -204,7 +204,7 @@ def test_lqr_closes_the_loop_with_the_poles_of_the_riccati_solution(regulated):
     inertia = np.reshape(vehicle.inertia, (3, 3))
     known = PeriodicVehicle(1.0, vehicle.mass, vehicle.gravity, inertia, 0.0, 100.0, *rotors)
     a, b = (m[0] for m in linear_orbit(known, solution.states, solution.thrusts))
-    # Half of the Hamiltonian's poles, those on the left, with Bryson's weights.
+    # Half of the Hamiltonian's poles, in the left half plane, with Bryson's weights.
     errors = np.r_[np.repeat([0.5, 1.0, 0.3, 3.0], 3), np.full(4, np.inf)]
     weight = np.diag((0.3 * thrusts) ** 2)
     hamiltonian = np.block([[a, -b @ weight @ b.T], [-np.diag(errors**-2.0), -a.T]])
@@ -314,7 +314,7 @@ def test_the_cost_about_an_orbit_decreases(orbit):
     assert value[-1] < 0.05 * value[0]
 
 
-def test_about_an_orbit_that_rests_the_gains_are_those_of_hover():
+def test_about_an_orbit_that_rests_the_gains_equal_the_hover_gains():
     angles = [0.1, -0.2, 0.1, 0.2]
     tables = {"controller": {"law": "lqr"}, "disturbance": GUST}
     flights = [
@@ -328,7 +328,7 @@ def test_about_an_orbit_that_rests_the_gains_are_those_of_hover():
 
 
 @pytest.mark.slow
-def test_the_multipliers_about_an_orbit_are_those_of_the_riccati_solution():
+def test_the_multipliers_about_an_orbit_agree_with_the_riccati_solution():
     scenario = tiltsim.load_scenario({**ORBITING, "simulation": {"duration": 4.0}})
     flown = tiltsim.stability(scenario).multipliers
     airframe = tiltsim.airframe(scenario)
@@ -384,6 +384,6 @@ def test_free_tilts_hold_a_pose_that_a_gait_cannot():
         ),
     ],
 )
-def test_what_does_not_fit_is_refused_in_one_line(tables, message):
+def test_unsuitable_baselines_are_refused_in_one_line(tables, message):
     with pytest.raises(tiltsim.InputError, match=message):
         tiltsim.load_scenario(tables)

@@ -65,7 +65,7 @@ def test_a_users_law_flies_natively_with_its_own_states_and_tilts():
     assert not python["tilt_angles"].any()
 
 
-def test_it_flies_alike_on_both_plants_and_models(hover):
+def test_a_flown_law_flies_alike_on_both_plants_and_models(hover):
     first = tiltsim.simulate(document(hover, engine="python"))
     for other in ({"plant": "thesis"}, {"model": "quadrotor"}):
         flight = tiltsim.simulate(document(hover, engine="python", **other))
@@ -343,7 +343,7 @@ def test_a_held_rate_ends_where_the_lag_would_be():
 
 
 class Lawless(tiltsim.LawController):
-    """Of a package whose author forgot the method."""
+    """For a package whose author forgot the method."""
 
     law: Literal["lawless"]
 

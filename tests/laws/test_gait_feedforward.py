@@ -1,4 +1,4 @@
-"""Gait-rate feed-forward through scenarios: keys, limits, mistakes, what it buys."""
+"""Gait-rate feed-forward through scenarios: keys, limits, mistakes, benefit."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tiltsim_controllers.laws.multirotor_steps import FeedforwardTerms
 SCENARIO = "beyond/gait_feedforward#t2"
 
 
-def test_what_can_be_left_out_is_what_the_law_counts_in():
+def test_the_law_includes_exactly_the_terms_that_can_be_left_out():
     assert set(FeedforwardTerm.__args__) == set(FeedforwardTerms._fields)
 
 
@@ -33,7 +33,7 @@ def test_mistakes_are_one_line(changes, message):
     assert message in refusal(tiltsim.load_scenario, SCENARIO, changes)
 
 
-def test_poles_are_gains_of_the_plain_law_too():
+def test_poles_are_also_gains_of_the_plain_law():
     poles = {"attitude": {"bandwidth": 12.0}, "altitude": {"bandwidth": 6.0}}
     scenario = tiltsim.load_scenario(
         SCENARIO, {"controller": {"decoupling": "exact", "decoupler": "exact", "gains": poles}}

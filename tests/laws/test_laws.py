@@ -189,7 +189,7 @@ def test_determinants_of_the_quadrotor():
     np.testing.assert_allclose(np.sin(flight["singularity_margin"]), upright, rtol=1e-12)
 
 
-def test_switching_tells_which_law_flies_and_what_it_aims_at():
+def test_switching_records_which_law_flies_and_its_target():
     flight = fly("switching", {"duration": 1.0})
     inside = flight["attitude_zone"] == 1.0
     assert inside.any()
@@ -209,7 +209,7 @@ def test_full_pose_holds_a_position_at_a_tilted_attitude():
     assert metrics["max_tilt_rate"] < 25.0
 
 
-def test_the_margin_under_full_pose_is_that_of_the_rotors_that_are_known_to_work():
+def test_the_margin_under_full_pose_counts_rotors_that_are_known_to_work():
     """By singular values, as of any multirotor."""
     changes = {"controller": {"failed_rotor": 2, "failure_known_from": 0.05}}
     flight = tiltsim.simulate(
@@ -301,7 +301,7 @@ def test_a_step_in_yaw_stops_a_rotor_where_its_torque_ends():
     [(LIMITED, {"allocation": "prioritized"}), ({}, {"gains": SLOW_YAW})],
     ids=["prioritized", "slow yaw"],
 )
-def test_what_the_documentation_names_flies_a_large_step_in_yaw(vehicle, controller):
+def test_documented_laws_fly_a_large_step_in_yaw(vehicle, controller):
     flight = turned(3.0, 5.0, 300.0, vehicle, **controller)
     assert flight.end.kind == "completed"
     assert flight["yaw"][-1] == pytest.approx(3.0, abs=1e-3)

@@ -81,7 +81,7 @@ def test_the_tiltrotor_is_a_multirotor(plant):
 
 
 @pytest.mark.parametrize("plant", ["mujoco", "thesis"])
-def test_full_pose_of_the_tiltrotor_is_that_of_a_multirotor(plant):
+def test_full_pose_of_the_tiltrotor_equals_a_multirotors(plant):
     shared = {
         "controller": {"law": "full_pose", "max_tilt_rate": 3.0, "max_tilt_angle": 0.01},
         "initial": {"position": [0.1, 0.0, 0.0], "velocity": [0.0] * 3, "rotor_speed": 300.0},
@@ -179,7 +179,7 @@ def test_without_a_rotor_a_flight_ends_where_the_others_are_singular(plant):
     assert condition[-1] < 0.1 * condition[~known].min()
 
 
-def test_margins_of_flights_that_lose_rotors_at_other_times_are_those_of_each():
+def test_margins_of_flights_that_lose_rotors_at_other_times_equal_single_flights():
     vehicle = tiltsim.load_scenario(document("pentarotor", PENTAROTOR)).vehicle.resolve()
     time, roll = np.linspace(0.0, 1.0, 9), np.linspace(1.2, 1.5, 9)
     failures = [Failure(5.0, 0.5), Failure(), Failure(4.0, 0.25), Failure(5.0, 0.75)]
@@ -203,7 +203,7 @@ def test_margins_of_flights_that_lose_rotors_at_other_times_are_those_of_each():
         assert (values[~known] > 0.5).all()  # of all rotors, which have two directions
 
 
-def test_the_margin_under_full_pose_is_that_of_the_rotors_that_are_known_to_work():
+def test_the_margin_under_full_pose_counts_rotors_that_are_known_to_work():
     flight = fly(
         "tilt_hexarotor",
         controller={"law": "full_pose", "failed_rotor": 2, "failure_known_from": 0.1},
@@ -481,7 +481,7 @@ def test_stepwise_simulation_observes_and_commands_each_rotor(name):
     assert np.abs(noisy - clean).max() > 1.0
 
 
-def test_a_gait_of_ones_own_has_an_angle_for_each_tilt():
+def test_a_custom_gait_has_an_angle_for_each_tilt():
     own = document("tilt_hexarotor")
     flight = tiltsim.simulate(own, gait=lambda time: [0.1 + 0.1 * time, -0.1] * 3)
     assert flight["alpha_ref_5"][-1] == pytest.approx(0.11)

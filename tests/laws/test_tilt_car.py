@@ -257,7 +257,7 @@ def test_the_fourth_derivative_fails_for_want_of_anti_windup(plant):
 
 
 def test_with_the_exact_tilt_column_no_rotor_stops():
-    """Eq. (27) lacks 1 - I_T / I_B; with it the inputs drift, too, at less than half the pace."""
+    """Eq. (27) lacks 1 - I_T / I_B; with it the inputs also drift, at less than half the pace."""
     failure, exact = (
         fly(f"ch10_state_drift/fourth_derivative#{name}", "thesis") for name in ("failure", "exact")
     )

@@ -94,7 +94,7 @@ def test_a_corner_counts_as_what_it_is_itself():
     assert report["acceptable"] == report["returned"] == pytest.approx(0.5)
 
 
-def test_other_axes_have_ranges_of_their_own(flown):
+def test_other_axes_have_separate_ranges(flown):
     found = attraction(SETPOINT, ("vx", "r"), ranges=((-1.0, 2.0), None), refinements=0)
     assert [edges[[0, -1]].tolist() for edges in found.edges] == [[-1.0, 2.0], [-10.0, 10.0]]
     assert found.acceptable is None
@@ -134,7 +134,7 @@ def test_maps_of_both_engines_are_the_same(monkeypatch):
     np.testing.assert_array_equal(maps[0].share, maps[1].share)
 
 
-def test_the_slowest_mode_is_that_of_the_linear_analysis():
+def test_the_slowest_mode_agrees_with_the_linear_analysis():
     """Ch. 4's altitude loop decays most slowly; its law follows x and y as well."""
     scenario = tiltsim.load_scenario(SETPOINT, SHORT)
     slowest = slowest_mode(scenario)

@@ -18,7 +18,7 @@ NAMES = ("x", *ROTATION_NAMES, "speed")
 
 
 def random_states(entries, count):
-    """Coordinates, and states with a rotation of so many entries, and vectors of coordinates."""
+    """Coordinates, states with a rotation of ``entries`` numbers, and vectors of coordinates."""
     generator = np.random.default_rng(7)
     coordinates = Coordinates(NAMES, ("",) * len(NAMES), entries, 1)
     for _ in range(count):
@@ -49,7 +49,7 @@ def test_both_forms_of_a_rotation_turn_alike():
 
 
 @pytest.mark.parametrize("entries", [MATRIX, QUATERNION])
-def test_rates_are_those_of_the_coordinates(entries):
+def test_rates_are_derivatives_of_the_coordinates(entries):
     """A turn in body axes for a short time has its rates."""
     step = 1e-6
     for coordinates, state, by in random_states(entries, 5):
@@ -58,7 +58,7 @@ def test_rates_are_those_of_the_coordinates(entries):
         assert coordinates.rates(state, derivative) == pytest.approx(by, abs=1e-9)
 
 
-def test_a_vehicle_with_fewer_tilts_than_rotors_has_as_many_tilt_rates_as_tilts(tmp_path):
+def test_a_vehicle_with_fewer_tilts_than_rotors_has_one_rate_per_tilt(tmp_path):
     """Six rotors, of which the sixth does not tilt."""
     folder, file = shipped_folder("mjcf"), tmp_path / "five_tilts.xml"
     text = (folder / "tilt_hexarotor.xml").read_text().replace("scene.xml", f"{folder}/scene.xml")

@@ -46,7 +46,7 @@ def test_a_corner_at_the_point_is_reported_where_it_is(stencil):
 
 
 def test_drag_at_rest_has_no_slope():
-    """Of ``v |v|``, whose second derivative jumps."""
+    """Derivative of ``v |v|``, whose second derivative jumps."""
     found = derivative(lambda at: np.array([at[0] * abs(at[0]) + at[1], at[1]]))
     assert abs(found.matrix[0, 0]) < 1e-5
     assert not found.corners.any()

@@ -42,7 +42,7 @@ def margins(scenario):
     return {margin.place: margin for margin in tiltsim.margins(scenario)}
 
 
-def test_margins_of_all_inputs_are_those_of_the_error_loops(scenario, margins):
+def test_margins_of_all_inputs_equal_the_margins_of_the_error_loops(scenario, margins):
     """Under the exact matrix the loci are the loops of roll, pitch, yaw and altitude."""
     gains = scenario.controller.resolve_gains()
     loops = [
@@ -56,7 +56,7 @@ def test_margins_of_all_inputs_are_those_of_the_error_loops(scenario, margins):
     assert found.gain[1] == np.inf
 
 
-def test_gain_margins_of_measured_states_are_those_of_routh(scenario, margins):
+def test_gain_margins_of_measured_states_agree_with_routh(scenario, margins):
     """The altitude's gain may grow until K1 K2 = K3, its rate's may shrink to that."""
     gains = scenario.controller.resolve_gains()
     ratio = gains.altitude_1 * gains.altitude_2 / gains.altitude_3
@@ -106,7 +106,7 @@ def test_a_broken_measurement_reaches_no_integrator_either():
 
 
 def test_the_position_of_an_integral_law_bears_any_smaller_gain():
-    """The loop is stable at all factors below the upper limit, which python-control finds, too."""
+    """The loop is stable at all factors below the upper limit, which python-control also finds."""
     system = linearize(tiltsim.load_scenario("beyond/constant_disturbance#with_integral", INTEGRAL))
     margin = next(margin for margin in margins_of(system) if margin.place == "x")
     loop = next(loop for loop in broken_loops(system) if loop.place == "x")
@@ -256,7 +256,7 @@ def offset_flight(name, step, changes):
     ("law", "step"), [("pid", 0.002), ("indi", 0.002), ("geometric", 0.002), ("lqr", 0.004)]
 )
 @pytest.mark.parametrize("vehicle", ["tiltrotor", "hexarotor"])
-def test_the_delay_margin_of_a_baseline_is_a_latency_too(law, step, vehicle):
+def test_the_delay_margin_of_a_baseline_is_also_a_latency(law, step, vehicle):
     """Latency delays what the rotors are sent; the loop of their speeds follows a model."""
     rest = {"reference.position": [0, 0, 0], "simulation.duration": 8.0}
     scenario = offset_flight(f"beyond/baselines#{law}_{vehicle}", step, rest)
@@ -266,7 +266,7 @@ def test_the_delay_margin_of_a_baseline_is_a_latency_too(law, step, vehicle):
 
 
 def test_a_baseline_with_a_latency_has_that_much_less_delay_margin():
-    """Without flights: the loop is the same as the one with commands under way."""
+    """Without flights: the loop equals the one with commands under way."""
     rest = {"reference.position": [0, 0, 0], "simulation.plant": "rigid_body"}
     scenario = offset_flight("beyond/baselines#geometric_tiltrotor", 0.004, rest)
     late = scenario.replace({"simulation.control_latency": 0.004})

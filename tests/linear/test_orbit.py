@@ -42,7 +42,7 @@ def continuous():
     return equilibrium_of(gait("trot_continuous"))
 
 
-def test_the_multipliers_are_those_of_the_product_of_exact_steps(continuous):
+def test_the_multipliers_agree_with_the_product_of_exact_steps(continuous):
     """Symbolic Jacobians of ode3's steps along the orbit, one after the other."""
     casadi = pytest.importorskip("casadi")
     motion, state = continuous.motion, continuous.root.state
@@ -84,7 +84,7 @@ def test_modes_lost_in_the_rounding_of_a_period_are_not_listed():
 @pytest.mark.slow
 @pytest.mark.parametrize("plant", ["thesis", "mujoco"])
 @pytest.mark.parametrize("kind", ["trot_continuous", "trot_instant", "walk", "two_color"])
-def test_the_multipliers_are_those_of_native_flights_over_a_period(kind, plant):
+def test_the_multipliers_agree_with_native_flights_over_a_period(kind, plant):
     """Simple differences of second order, with the step at which they are best, near 1e-5."""
     scale = 0.5 if kind == "walk" else 1.0  # scaled up, MuJoCo's servos do not follow it
     keys = {"gait.period": 0.05, "gait.scale": scale}
@@ -132,7 +132,7 @@ def test_a_disturbance_grows_or_decays_by_the_largest_multiplier(kind, plant, ke
 def growth_in_flight(found, periods):
     """Size of the largest multiplier, and growth of a disturbance per period as flown.
 
-    A left eigenvector tells how far a state is along the mode.
+    A left eigenvector gives the distance of a state along the mode.
     """
     motion, start = found.motion, found.root.state
     values, left = np.linalg.eig(found.matrix.T)
@@ -164,7 +164,7 @@ def test_the_penguin_gait_agrees_with_the_map_of_half_a_period():
     assert distance(np.sqrt(found.multipliers), half) < 2e-3
     assert found.report()["kind"] == "orbit"
     assert flights == list(range(1, len(flights) + 1))
-    assert len(flights) > 6 * len(found.states)  # the derivative alone takes so many
+    assert len(flights) > 6 * len(found.states)  # for the derivative alone
 
 
 def test_a_flight_repeats_when_gait_and_circle_share_a_period():
@@ -207,7 +207,7 @@ def test_a_sweep_keeps_what_is_found_and_why_nothing_is():
     assert "noise" in refused.reason
 
 
-def test_an_orbit_is_sought_near_that_of_a_neighbour_first(continuous):
+def test_an_orbit_is_sought_near_the_neighboring_orbit_first(continuous):
     """From the orbit itself there is nothing left to do but the derivative, of six evaluations."""
     flights = []
     near = equilibrium_of(
@@ -231,7 +231,7 @@ def test_flights_on_all_cores_end_as_single_ones(plant, monkeypatch):
     motion = make_motion(gait("trot_continuous", plant), "native")
     offsets = np.linspace(-0.1, 0.1, 4 * os.cpu_count() + 3)
     states = [motion.initial + offset * np.eye(len(motion.initial))[0] for offset in offsets]
-    states[1][-1] = 1e11  # a rotor's speed: MuJoCo begins anew
+    states[1][-1] = 1e11  # a rotor's speed: MuJoCo resets the state
     together = list(motion.flown_each(4, states, 20))
     alone = [motion.flown(4, state, 20) for state in states]
     np.testing.assert_array_equal(together, alone)
@@ -253,7 +253,7 @@ def test_a_long_orbit_takes_one_derivative():
     assert abs(found.multipliers[0]) == pytest.approx(np.exp(altitude * found.period), rel=1e-4)
 
 
-def test_what_does_not_return_is_refused():
+def test_scenarios_that_do_not_return_are_refused():
     """A gait that reaches singular attitudes."""
     lost = gait("trot_continuous").replace({"gait.amplitude": 1.5})
     with pytest.raises(tiltsim.InputError, match="found no periodic orbit near its flight"):

@@ -97,12 +97,12 @@ RANDOM = [
 
 
 @pytest.mark.parametrize(("seed", "engine"), RANDOM)
-def test_matrix_and_poles_are_those_of_a_flown_step(seed, engine):
-    """A step's matrix is the solver's polynomial of the linear system's, its poles those of it.
+def test_matrix_and_poles_agree_with_a_flown_step(seed, engine):
+    """A step's matrix is the solver's polynomial of the linear system's matrix; its poles likewise.
 
     The servos' poles are double and defective. An error of differences splits such an eigenvalue by
-    the error's root, so neither side has single ones to compare: what is well posed is the mean of
-    those that the error splits, which both sides take.
+    the error's root, so neither side has single ones to compare: the mean of the split eigenvalues
+    is well posed, and both sides take it.
     """
     scenario = random_line(seed)
     found = tiltsim.stability(scenario)
@@ -237,7 +237,7 @@ def test_an_undamped_swing_is_not_stable_beside_neutral_states_either():
     assert is_stable(damped, np.linalg.eigvals(damped), None)
 
 
-def test_what_decays_slowest_comes_first():
+def test_the_slowest_mode_comes_first():
     """A fast swing that lasts before a slow pole, and neutral states before both."""
     matrix = np.zeros((4, 4))
     matrix[0, 0] = -1.0
@@ -273,8 +273,8 @@ def test_a_negative_multiplier_is_one_pole():
     assert [(mode.name, mode.count) for mode in modes] == [("x", 1), ("y", 1)]
 
 
-def test_rest_is_where_the_vehicle_is_told_to_turn():
-    """Upside down, and not level, which is at rest, too, as far as can be from there."""
+def test_the_rest_point_has_the_commanded_attitude():
+    """Upside down; level attitude, the farthest from there, is also a rest point."""
     changes = {"simulation.plant": "rigid_body", "simulation.engine": "python"}
     changes |= {"controller.turn_time": 1.0, "simulation.duration": 1.0}
     found = tiltsim.stability(tiltsim.load_scenario("fleet/omni_octorotor#upside_down", changes))
@@ -425,7 +425,7 @@ def test_the_attitude_of_a_vehicle_that_drifts_sideways_rests():
 
 @pytest.mark.slow
 def test_drag_gives_a_drifting_vehicle_its_airspeed():
-    """Then its velocity rests, too: where drag is what drives it sideways."""
+    """Then its velocity also rests: where drag alone drives it sideways."""
     drag = {"simulation.plant": "rigid_body", "air": {"drag": {"linear": [0.1, 0.1, 0.1]}}}
     scenario = tiltsim.load_scenario(GAIT_1, drag)
     found = tiltsim.stability(scenario)

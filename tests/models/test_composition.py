@@ -26,7 +26,7 @@ from tiltsim_controllers.tilt_car.vehicle import THESIS_CAR
 from tiltsim_controllers.vehicle.parameters import PRESETS
 
 FILE_NAMES = {"paths", "npaths", "mesh_pathadr", "tex_pathadr", "nbuffer"}
-"""What differs where a file names meshes or textures: dm_control gives these files new names."""
+"""Differences where a file names meshes or textures: dm_control gives these files new names."""
 
 MJCF = shipped_folder("mjcf")
 SHIPPED_MODELS = {"scene", "tilt_car", "tiltrotor", "quadrotor"}
@@ -176,7 +176,7 @@ def test_the_fleet_is_equal(both_ways, path):
     assert not differences(both_ways(spec))
 
 
-def test_what_dm_control_cannot_read_is_composed_all_the_same(both_ways, write):
+def test_files_that_dm_control_cannot_read_are_composed(both_ways, write):
     mjcf = pytest.importorskip("dm_control.mjcf")
     path = write(edited((IMU, f'<frame pos="0 0 0.01">{IMU}</frame>')))
     with pytest.raises(KeyError):

@@ -1,4 +1,4 @@
-"""Ground to stand on: what rests there, what it costs the flights without it."""
+"""Ground to stand on: vehicles at rest there, and its cost to flights without it."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tiltsim_controllers.vehicle.parameters import PRESETS
 
 VEHICLE = PRESETS["ar_drone_2"]
 WEIGHT = VEHICLE.mass * VEHICLE.gravity
-ON_SKIDS = 0.0785  # m, from the skids to the centre of mass
+ON_SKIDS = 0.0785  # m, from the skids to the center of mass
 LANDING = "beyond/take_off_and_landing#landing"
 DIRECTIONS = np.array([[1.0, 0.0], [0.6, 0.8], [0.5**0.5, 0.5**0.5]])
 
@@ -82,7 +82,7 @@ def test_friction_holds_up_to_its_share_of_the_weight(friction):
 
 @pytest.mark.parametrize("along", DIRECTIONS)
 def test_a_slide_ends_where_coulomb_says_in_all_directions(along):
-    """``v^2 / (2 mu g)``; while the skids share the load anew, a few percent more."""
+    """``v^2 / (2 mu g)``; while the skids redistribute the load, a few percent more."""
     friction = 0.5
     model = compile_model(RotorcraftSpec("quadrotor", VEHICLE, ground=Ground(0.0, friction)))
     data = standing(model)

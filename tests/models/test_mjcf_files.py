@@ -38,7 +38,7 @@ def test_shipped_vehicles_are_within_the_limits(path):
         ("<body>", "not XML"),
     ],
 )
-def test_what_exceeds_a_limit_is_refused(inside, words, tmp_path):
+def test_files_beyond_a_limit_are_refused(inside, words, tmp_path):
     file = tmp_path / "own.xml"
     file.write_text(f"<mujoco>{inside}</mujoco>")
     with pytest.raises(ValueError, match=words) as caught:
@@ -49,7 +49,7 @@ def test_what_exceeds_a_limit_is_refused(inside, words, tmp_path):
 
 
 @pytest.mark.parametrize("name", ["none.xml", "9" * 400, "../none.xml", "/none.xml"])
-def test_what_is_included_and_missing_is_refused_in_a_line(tmp_path, name):
+def test_missing_includes_are_refused_in_a_line(tmp_path, name):
     file = tmp_path / "own.xml"
     file.write_text(f"<mujoco><include file='{name}'/></mujoco>")
     assert file in check_mjcf(file)
@@ -58,7 +58,7 @@ def test_what_is_included_and_missing_is_refused_in_a_line(tmp_path, name):
     assert "\n" not in str(caught.value)
 
 
-def test_what_an_included_file_includes_counts(tmp_path):
+def test_nested_includes_count(tmp_path):
     (tmp_path / "parts").mkdir()
     (tmp_path / "parts" / "many.xml").write_text(f"<mujoco>{MANY}</mujoco>")
     (tmp_path / "parts" / "one.xml").write_text("<mujoco><include file='many.xml'/></mujoco>")

@@ -15,7 +15,7 @@ from tiltsim.plants.flight_model import build_model
 from tiltsim.resources import shipped_folder
 from tiltsim_controllers.vehicle.effectiveness import force_and_torque
 
-# A hinge that two rotors share, off both; a rotor that pushes down; centre of mass off the origin.
+# A hinge that two rotors share, off both; a rotor that pushes down; center of mass off the origin.
 ODD = """
 <mujoco><compiler angle="radian" autolimits="true"/><worldbody><body name="vehicle">
   <freejoint name="vehicle"/><inertial pos="0.01 -0.02 0.03" mass="2" diaginertia="0.02 0.03 0.04"/>
@@ -47,7 +47,7 @@ def odd_vehicle(text=ODD):
 
 
 def by_unit_thrusts(path, tilts, spins, center):
-    """Force and torque (body axes, about the centre of mass untilted) of one (rad/s)^2 each."""
+    """Force and torque (body axes, about the center of mass untilted) of one (rad/s)^2 each."""
     model = mujoco.MjModel.from_xml_path(str(path))
     data, columns = mujoco.MjData(model), []
     data.qpos[7:] = tilts

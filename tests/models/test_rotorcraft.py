@@ -415,7 +415,7 @@ def test_options_reach_the_model():
     assert model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_CONTACT
 
 
-def test_what_is_drawn_grows_with_the_arms():
+def test_visuals_grow_with_the_arms():
     small, large = compiled("tiltrotor", AR_DRONE), compiled("tiltrotor", BIG)
     ratio = BIG.arm_length / AR_DRONE.arm_length
     drawn = small.geom_bodyid > 0

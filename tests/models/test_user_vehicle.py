@@ -1,4 +1,4 @@
-"""A user's own vehicle by its MJCF file: what is measured, overridden, refused and flown."""
+"""A user's vehicle by its MJCF file: measured, overridden and refused properties, and flights."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ def scenario(path, model="tiltrotor", vehicle=None, **tables):
 
 
 def total_inertia(model):
-    """Mass and inertia of all that moves, about its centre of mass, world axes, from mj_crb."""
+    """Mass and inertia of all that moves, about its center of mass, world axes, from mj_crb."""
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     full = np.zeros((model.nv, model.nv))
@@ -110,7 +110,7 @@ def test_the_documented_example_flies_and_meets_its_expectation(write, tmp_path,
     assert main(["run", str(out / "scenario.toml"), *short]) == 0
 
 
-def test_parameters_are_those_of_the_file(write):
+def test_parameters_come_from_the_file(write):
     own = read_user_vehicle(str(write()), "tiltrotor")
     mass, inertia = total_inertia(mujoco.MjModel.from_xml_string(XML))
     assert own.vehicle.mass == pytest.approx(mass, rel=1e-12)
@@ -139,7 +139,7 @@ def test_a_file_placed_askew_is_measured_in_the_bodys_own_axes(write):
         {"mass": 0.7, "inertia": [3e-3, 3.2e-3, 6e-3], "thrust_coefficient": 1e-5, "gravity": 1.6},
     ],
 )
-def test_the_compiled_model_has_the_mass_and_inertia_asked_for(write, own):
+def test_the_compiled_model_has_the_requested_mass_and_inertia(write, own):
     this = scenario(write(), vehicle=own)
     expected = this.rotorcraft.resolve()
     model = build_model(assemble(this))
@@ -152,7 +152,7 @@ def test_the_compiled_model_has_the_mass_and_inertia_asked_for(write, own):
     assert pods == pytest.approx([0.03] * 4)  # never touched
 
 
-def test_a_centre_of_mass_off_the_origin_stays_where_it_is(write):
+def test_a_center_of_mass_off_the_origin_stays_where_it_is(write):
     heavy = '<geom name="camera" type="sphere" size="0.02" pos="0.05 0.02 -0.03" mass="0.1"/>'
     text = changed('<site name="imu"/>', heavy + '<site name="imu"/>')
     path = write(text)
@@ -193,7 +193,7 @@ def off_centre(x):
     ("more", "words"),
     [
         ("", None),
-        (off_centre(1e-4), None),  # 7 micrometres: less than what must be aligned may be off
+        (off_centre(1e-4), None),  # 7 micrometers: within the tolerance of alignment
         (off_centre(0.073), "not modeled: its center of mass at (0.005, 0, 0) m\n"),
         (
             SKEW,
@@ -203,7 +203,7 @@ def off_centre(x):
         (SKEW + off_centre(0.083), "(0.005, 0, 0) m and its products of inertia"),
     ],
 )
-def test_what_the_law_does_not_know_is_told(write, tmp_path, capsys, more, words):
+def test_properties_that_the_law_does_not_model_are_reported(write, tmp_path, capsys, more, words):
     write(changed('<site name="imu"/>', more + '<site name="imu"/>'))
     (tmp_path / "my_flight.toml").write_text(block("toml"), encoding="utf-8")
     command = ["run", str(tmp_path / "my_flight.toml"), "--set", "simulation.duration=0.01"]
@@ -226,7 +226,7 @@ def test_an_own_controller_may_know_more(write, tmp_path, capsys):
     assert capsys.readouterr().err == ""
 
 
-def test_a_centre_of_mass_to_the_side_costs_what_the_documentation_says(write):
+def test_a_center_of_mass_to_the_side_costs_the_documented_error(write):
     path = write(changed('<site name="imu"/>', off_centre(0.0073) + '<site name="imu"/>'))
     flight = tiltsim.simulate(
         scenario(
@@ -254,7 +254,7 @@ def test_the_servo_is_the_scenarios(write):
     np.testing.assert_array_equal(model.joint("tilt_3").range, [-0.5, 0.5])
 
 
-def test_a_stop_is_an_angle_in_rad_in_a_file_of_degrees_too(write):
+def test_a_stop_is_an_angle_in_rad_even_in_a_file_of_degrees(write):
     servo = {"tilt_servo": {"max_angle": 0.5}}
     text = edited(('angle="radian" ', ""), ('autolimits="true"', 'autolimits="false"'))
     model = build_model(assemble(scenario(write(text), vehicle={**servo, "max_rotor_speed": 900})))
@@ -403,7 +403,7 @@ def rename(name):
         ),
     ],
 )
-def test_what_is_wrong_is_told_by_name(write, text, words):
+def test_mistakes_are_named(write, text, words):
     path = write(text())
     message = refusal(scenario, path)
     assert "vehicle.mjcf" in message

@@ -106,7 +106,7 @@ class TestMap:
         return 0
 
     def confirm(self, file: Path) -> int:
-        """Run those that passed once more, as against a mutant: untraced, quickest first."""
+        """Run the passed tests once more, as against a mutant: untraced, quickest first."""
         self.read(file)
         ranked = sorted(self.seconds, key=self.seconds.__getitem__)
         self.seconds.clear()
@@ -127,7 +127,7 @@ class TestMap:
     def tests_of(self, path: str, mutant: Mutant) -> list[str]:
         """Tests that execute the mutant's lines, quickest first.
 
-        For lines that run at import: those that execute the module otherwise, then the quick ones.
+        For lines that run at import: tests that execute the module otherwise, then the quick ones.
         """
         lines = self.by_line.get(path, {})
         found = {test for line in mutant.lines for test in lines.get(str(line), [])}

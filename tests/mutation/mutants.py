@@ -56,7 +56,7 @@ class Mutant:
     replacement: ast.AST
 
     def apply(self) -> ast.AST:
-        """Edit the tree that the mutant was found in; return what was there."""
+        """Edit the tree that the mutant was found in; return the original."""
         fields = self.parent.__dict__
         if self.index is None:
             fields[self.field], original = self.replacement, fields[self.field]
@@ -174,7 +174,7 @@ def _renamed(function: ast.expr) -> ast.expr:
 
 
 def _swaps(items: list[ast.expr]) -> Iterator[list[ast.expr]]:
-    """The list with two neighbours exchanged, for every two that differ."""
+    """The list with two neighbors exchanged, for every two that differ."""
     for index in range(len(items) - 1):
         first, second = items[index : index + 2]
         starred = isinstance(first, ast.Starred) or isinstance(second, ast.Starred)

@@ -1,4 +1,4 @@
-"""A user's own controller: what it sees and commands, and what is said when it fails."""
+"""A custom controller: its observations, its commands, and messages when it fails."""
 
 from __future__ import annotations
 
@@ -161,7 +161,7 @@ LAYERS = {
 
 
 def merged(base, *layers):
-    """Tables of a scenario with those of layers; the keys of each table side by side."""
+    """Tables of a scenario with tables of layers; the keys of each table side by side."""
     tables = dict(base)
     for layer in layers:
         for name, table in layer.items():
@@ -464,7 +464,7 @@ def test_rotors_whose_least_speed_is_0_stop_and_do_not_reverse(model):
 
 
 @pytest.mark.parametrize(("control_timestep", "calls"), [(0.0, 30), (0.001, 30), (0.005, 6)])
-def test_asked_at_every_control_sample(control_timestep, calls):
+def test_a_controller_is_called_at_every_control_sample(control_timestep, calls):
     times = []
 
     def law(observation):
@@ -481,7 +481,7 @@ def test_asked_at_every_control_sample(control_timestep, calls):
 # --- memory and repetition -----------------------------------------------------------------------
 
 
-def test_a_class_is_made_anew_and_an_object_is_reset(hover_file):
+def test_a_class_is_created_again_and_an_object_is_reset(hover_file):
     class Integral:
         made = 0
 
@@ -652,7 +652,7 @@ def test_a_failing_reset_is_reported_like_a_failing_controller():
         tiltsim.simulate(scenario(), controller=Law())
 
 
-def test_of_many_flights_the_first_that_fails_is_told():
+def test_the_first_failing_flight_of_many_is_reported():
     fails = scenario().replace({"simulation.duration": 0.05})
     fails = tiltsim.load_scenario(fails, controller=returning(None))
     flies = tiltsim.load_scenario(fails, controller=lambda _: STILL)

@@ -43,12 +43,12 @@ def test_digits_set_the_tolerance(printed, number, tolerance):
 
 
 @given(st.decimals(min_value=-1000, max_value=1000, places=3), st.floats(-0.49, 0.49))
-def test_what_rounds_to_the_printed_digits_is_reproduced(printed, part):
+def test_a_value_that_rounds_to_the_printed_digits_is_reproduced(printed, part):
     assert verdict_on(claim(str(printed)), float(printed) + part * 1e-3) is ClaimVerdict.REPRODUCED
 
 
 @given(st.decimals(min_value=-1000, max_value=1000, places=3), st.floats(0.51, 1e6))
-def test_what_rounds_to_other_digits_is_not(printed, part):
+def test_a_value_that_rounds_to_other_digits_is_not_reproduced(printed, part):
     for value in (float(printed) + part * 1e-3, float(printed) - part * 1e-3):
         assert verdict_on(claim(str(printed)), value) is ClaimVerdict.NOT_REPRODUCED
 
@@ -141,7 +141,7 @@ def test_a_statement_needs_all_its_words(record, words):
         statement(**record)
 
 
-def test_what_was_fitted_is_no_evidence():
+def test_a_fitted_value_is_no_evidence():
     fitted = claim(3.35, fitted=True, in_kind=(1.0, inf))
     assert verdict_on(fitted, 3.35) is ClaimVerdict.FITTED
     assert verdict_on(fitted, 2.0) is ClaimVerdict.FITTED
@@ -149,7 +149,7 @@ def test_what_was_fitted_is_no_evidence():
     assert verdict_on(Claim(statement(fitted=True)), True) is ClaimVerdict.FITTED
 
 
-def test_what_the_text_leaves_open_is_not_testable():
+def test_omissions_of_the_text_are_not_testable():
     unclear = statement(missing="The path is not given.")
     for measured in (True, False, None):
         assert verdict_on(Claim(unclear), measured) is ClaimVerdict.NOT_TESTABLE
@@ -161,7 +161,7 @@ def test_a_wider_tolerance_is_another_verdict():
     assert verdict_on(claim(3.35), 3.353, 0.5) is ClaimVerdict.NOT_REPRODUCED
 
 
-def test_an_id_is_that_of_the_statement_and_the_case():
+def test_an_id_consists_of_the_statement_and_the_case():
     assert claim(1.0).id == "ch3-so"
     assert claim(1.0, case="ρ = -0.65, T = 2 s").id == "ch3-so-rho-minus-0-65-t-2-s"
     assert claim(1.0, case="anything", key="247").id == "ch3-so-247"

@@ -1,4 +1,4 @@
-"""What the claims of the registry measure, checked from another side."""
+"""The measures of the registry's claims, checked independently."""
 
 from __future__ import annotations
 

@@ -66,7 +66,7 @@ def pushed(tmp_path_factory):
     return make_report([str(folder)], folder / "kept", 1)
 
 
-def test_values_are_compared_with_those_of_the_other_flight(pushed):
+def test_values_are_compared_with_the_other_flight(pushed):
     calm, push = (
         pushed.flights[f"{pushed.comparisons[0].file}#{name}", "mujoco"].metrics
         for name in ("calm", "pushed")

@@ -54,7 +54,7 @@ def test_gallops_beat_the_walk_with_the_modified_decoupler(decoupler):
         assert min(gallops) > 1.2 * walk
 
 
-def test_the_measured_acceleration_saves_the_flight_that_the_modelled_loses():
+def test_the_measured_acceleration_saves_the_flight_that_the_modeled_one_loses():
     completed = {
         address: fly(f"ch04_tracking/{address}_t3_conventional", "mujoco").end.kind == "completed"
         for address in ("line#instant", "measured_acceleration#line")
@@ -87,7 +87,7 @@ def coarse_map(name):
     return attraction_map(name, coarse=6, refinements=0)
 
 
-def test_what_comes_back_was_acceptable_when_the_flight_began():
+def test_attitudes_that_come_back_were_acceptable_at_the_start():
     fixed, trot = coarse_map("ch. 4, fixed at 0.65"), coarse_map("ch. 4, trot to 0.65, T = 2 s")
     for found in (fixed, trot):
         across, up = np.meshgrid(*found.edges)

@@ -152,7 +152,7 @@ def test_a_damaged_record_is_flown_again(library, report, tmp_path):
     assert all(isinstance(record, FlightRecord) for record in records.values())
 
 
-def test_a_flights_key_tells_apart_what_its_numbers_depend_on(library):
+def test_a_flights_key_covers_all_that_its_numbers_depend_on(library):
     [entry] = report_entries([f"{library}/lost.toml"])
     scenario = entry.scenario
     simulation = scenario.simulation.model_copy(update={"duration": 0.5})
@@ -253,7 +253,7 @@ def test_the_page_contains_the_findings(full):
     assert "{" not in re.sub(code, "", text, flags=re.DOTALL)
 
 
-def test_the_page_tells_what_made_it_and_how_to_cite_it(full):
+def test_the_page_says_how_it_was_made_and_how_to_cite_it(full):
     text = page(full, MADE)
     assert (
         "Made on 2026-01-31 with tiltsim 1.2 at commit 0123456789ab on a &lt;machine&gt;." in text
@@ -354,7 +354,7 @@ def test_the_summary_is_stable_and_well_formed(full, library, kept):
         assert f"### {finding.title}" in text
 
 
-def test_the_command_writes_both_and_tells_of_bounds(library, tmp_path, capsys):
+def test_the_command_writes_both_and_reports_bounds(library, tmp_path, capsys):
     out, summary = tmp_path / "out", tmp_path / "summary.md"
     arguments = ["report", f"{library}/bounded.toml", f"{library}/lost.toml", "--jobs", "2"]
     code = main([*arguments, "--out", str(out), "--markdown", str(summary)])
@@ -385,7 +385,7 @@ def test_mistakes_are_one_clear_line(tmp_path, capsys):
         assert captured.err.count("\n") == 1
 
 
-def test_digest_of_sources_is_that_of_their_contents_wherever_they_lie(tmp_path):
+def test_digest_of_sources_depends_on_their_contents_alone(tmp_path):
     for first, second in (("a", "b"), ("z", "c")):  # the order of the folders is another
         for folder, text in ((first, "one"), (second, "two")):
             (tmp_path / folder).mkdir()

@@ -1,4 +1,4 @@
-"""Every row of the library: what it says, by what criterion, and under which id."""
+"""Every row of the library: its text, its criterion and its id."""
 
 from __future__ import annotations
 

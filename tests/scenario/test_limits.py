@@ -1,4 +1,4 @@
-"""What is too deep, too long or too large is refused in one line, before work is done with it."""
+"""Input that is nested too deep, too long or too large is refused in one line, before any work."""
 
 from __future__ import annotations
 

@@ -74,7 +74,7 @@ def fixed(angles):
 
 
 MISTAKES = {
-    # name: (file, key and value as shown, what is allowed)
+    # name: (file, key and value as shown, allowed values)
     "unknown key at the top": ('titel = "x"', 'titel = "x"', "did you mean title?"),
     "unknown key in a table": (
         '[controller]\ndecopler = "exact"',
@@ -441,7 +441,7 @@ def test_a_variant_changes_what_it_names_and_keeps_the_rest(write):
     assert scenario.gait.angles == (0.1, 0.2, 0.3, 0.4)
 
 
-def test_a_variant_adds_its_expectations_to_those_of_the_base(write):
+def test_a_variant_adds_its_expectations_to_the_base(write):
     path = write(FAMILY)
     metrics = [expectation.metric for expectation in load_scenario(f"{path}#long").expect]
     assert metrics == ["final_roll", "final_pitch"]
@@ -740,12 +740,12 @@ def test_control_too_coarse_for_the_loop_is_refused(write):
     assert "simulation.control_timestep = 0.004" in line
 
 
-def test_an_unknown_key_is_told_before_the_one_it_leaves_missing(write):
+def test_an_unknown_key_is_reported_before_a_missing_one(write):
     text = '[gait]\ntype = "trot_instant"\namplitude = 0.3\nperod = 2.0\n'
     assert "gait.perod = 2.0: unknown key; did you mean period?" in refusal(write(text))
 
 
-def test_a_single_table_of_a_list_is_told_how_to_write_it(write):
+def test_a_single_table_of_a_list_is_refused_with_its_correct_form(write):
     line = refusal(write('[expect]\nmetric = "duration"\nmin = 1.0\n'))
     assert "expect: must be a list of tables; write [[expect]]" in line
 
@@ -825,7 +825,7 @@ def test_messages_name_the_keys_of_the_file_and_their_units(document, line):
     assert "waypoints.waypoints" not in refusal(document)
 
 
-def test_a_controller_of_ones_own_decides_on_the_acceleration_of_the_reference():
+def test_a_custom_controller_decides_on_the_acceleration_of_the_reference():
     case = {"reference": {"type": "setpoint", "acceleration_feedforward": True}}
     own = {"controller.law": "python", "controller.function": "mine.py:fly"}
     for changed in (load_scenario(case, own), load_scenario(case, controller="mine.py:fly")):
@@ -843,5 +843,5 @@ def test_a_controller_of_ones_own_decides_on_the_acceleration_of_the_reference()
         ('[[expect]]\nmetric = "final_eror_x"\nmax = 1.0', "did you mean final_position_error_x?"),
     ],
 )
-def test_mistakes_in_files_are_said_as_the_file_has_them(write, text, reason):
+def test_mistakes_in_files_are_quoted_as_written(write, text, reason):
     assert reason in refusal(write(text))

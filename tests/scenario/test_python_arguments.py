@@ -24,7 +24,7 @@ def test_an_address_a_path_a_dict_and_a_scenario_give_the_same():
     assert tiltsim.load_scenario(tables).model_dump() == scenario.model_dump()
 
 
-def test_a_replaced_value_is_that_of_an_override():
+def test_a_replaced_value_equals_an_override():
     changes = {"gait.type": "trot_continuous", "gait.amplitude": 0.3, "gait.period": 2.0}
     replaced = tiltsim.load_scenario(ADDRESS).replace(changes)
     assert replaced == tiltsim.load_scenario(ADDRESS, changes)

@@ -33,7 +33,7 @@ def csv_text(columns):
 
 @pytest.fixture
 def files(tmp_path):
-    """The same table in three files, in one of them with its columns in another order."""
+    """One table in three files; in one of them its columns are in another order."""
     other = {name: COLUMNS[name] for name in ("z", "x", "time", "y")}
     (tmp_path / "own.csv").write_text(csv_text(COLUMNS))
     (tmp_path / "other.csv").write_text(csv_text(other).replace(",", " , ").replace("\n", "\n\n"))
@@ -329,7 +329,7 @@ def test_a_table_takes_the_place_of_a_function():
 
 
 @pytest.mark.parametrize("given", [COLUMNS, moving])
-def test_overrides_are_those_of_the_table_that_is_given(given):
+def test_overrides_belong_to_the_given_table(given):
     keys = {"reference.interpolation": "cubic", "reference.yaw": 0.2}
     scenario = load_scenario(SHORT, keys, reference=given)
     assert (scenario.reference.interpolation, scenario.reference.yaw) == ("cubic", 0.2)
@@ -357,7 +357,7 @@ def test_overrides_that_do_not_fit_the_table_are_refused(overrides, given, words
         load_scenario(SHORT, overrides, **given)
 
 
-def test_a_flight_is_not_titled_by_what_was_replaced_in_it():
+def test_the_title_of_a_flight_omits_replaced_parts():
     address = "ch04_tracking/setpoint#rho_0_modified"
     scenario = load_scenario(address)
     own = load_scenario(scenario, reference=moving)

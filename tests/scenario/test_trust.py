@@ -1,4 +1,4 @@
-"""Python code that scenario files name is executed only where the user asks for it."""
+"""Python code that scenario files name is executed only where the user trusts it."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ values = [["python", "../law.py:python"]]
 
 @pytest.fixture
 def folder(tmp_path):
-    """Of scenarios whose code is known to no other test."""
+    """A folder with scenarios whose code is known to no other test."""
     plant(tmp_path, tmp_path / "ran")
     return tmp_path
 
@@ -179,7 +179,7 @@ def test_permission_is_given_in_python_and_goes_with_the_scenario(folder, monkey
     assert ran(folder)
 
 
-def test_code_that_was_executed_once_is_still_asked_for(folder):
+def test_code_that_was_executed_once_still_needs_trust(folder):
     file = folder / "numpy.toml"
     tiltsim.simulate(file)
     with pytest.raises(tiltsim.InputError, match=ASKED):
@@ -187,7 +187,7 @@ def test_code_that_was_executed_once_is_still_asked_for(folder):
 
 
 @pytest.mark.parametrize("own", [False, True])
-def test_gains_name_no_code_but_that_of_the_command_line(folder, own, capsys):
+def test_gains_name_no_code_but_the_command_lines(folder, own, capsys):
     evil = {"law": "numpy", "function": f"{folder}/law.py:numpy"}
     table = {"law": "numpy", "function": f"{folder}/other.py:numpy"} if own else {"law": "pid"}
     (folder / "other.py").write_text((folder / "law.py").read_text())

@@ -1,7 +1,7 @@
 """One vehicle, two flights, three simulators: ours, RotorPy and crazyflow.
 
 With pods at zero the tiltrotor is a plain quadrotor. Mass, inertia, coefficients and rotor lag are
-the same in all three; nothing has drag. Commands are held for `SAMPLE`.
+equal in all three; nothing has drag. Commands are held for `SAMPLE`.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ def fly_tiltsim(name):
 
 
 def fly_rotorpy(name):
-    """The same in RotorPy, integrated to 1e-11."""
+    """The flight in RotorPy, integrated to 1e-11."""
     from rotorpy.vehicles.multirotor import Multirotor
 
     speeds, duration = FLIGHTS[name]
@@ -105,9 +105,9 @@ def fly_rotorpy(name):
 
 
 def fly_crazyflow(name, steps_per_second, folder):
-    """The same in crazyflow, with its RK4, in a process of its own.
+    """The flight in crazyflow, with its RK4, in a separate process.
 
-    It asks for a variable of the environment before SciPy is imported.
+    It needs an environment variable before SciPy is imported.
     """
     file = Path(folder) / f"{name}_{steps_per_second}.npy"
     arguments = ["-W", "ignore", "-m", __name__, name, str(steps_per_second), str(file)]

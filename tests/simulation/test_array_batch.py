@@ -98,7 +98,7 @@ def test_batches_have_few_sizes_since_each_is_compiled():
     assert all(size >= rows for rows, size in enumerate(sizes, start=1))
 
 
-def test_the_command_line_adds_its_option_to_those_of_the_user(monkeypatch):
+def test_the_command_line_adds_its_option_to_the_users_options(monkeypatch):
     monkeypatch.setenv("XLA_FLAGS", "--xla_dump_to=here")
     let_xla_merge_loops()
     assert os.environ["XLA_FLAGS"].split() == [

@@ -69,7 +69,7 @@ def without_speed(metrics):
 
 
 def three_ways(scenarios):
-    """Assert that every scenario flies the same in Python, natively and in a batch of all."""
+    """Assert that every scenario flies equally in Python, natively and in a batch of all."""
     rows = list(fly(scenarios, keep_samples=True, threads=2))
     assert [row.scenario for row in rows] == scenarios
     for flown, row in zip(scenarios, rows, strict=True):
@@ -101,7 +101,7 @@ def test_every_law_flies_the_same_three_ways_with_continuous_and_held_control(la
     rows = three_ways(
         [
             scenario(tables, **simulation, duration=0.21),
-            # 0.426 s are no whole number of recording intervals, nor those of held commands
+            # 0.426 s is no multiple of the recording interval or of the interval of held commands
             scenario(tables, **simulation, control_timestep=0.006, duration=0.426),
         ]
     )
@@ -180,7 +180,7 @@ def test_flights_that_differ_in_one_thing_do_not_share_what_depends_on_it(what):
     )
 
 
-def test_user_files_with_other_bodies_fly_in_batches_of_their_own(tmp_path):
+def test_user_files_with_other_bodies_fly_in_separate_batches(tmp_path):
     shipped = (shipped_folder("mjcf") / "tiltrotor.xml").read_text(encoding="utf-8")
     scene = (shipped_folder("mjcf") / "scene.xml").read_text(encoding="utf-8")
     (tmp_path / "scene.xml").write_text(scene, encoding="utf-8")
@@ -340,8 +340,8 @@ def test_air_around_quadrotors_flies_the_same_three_ways():
     )
 
 
-def test_every_row_flies_a_model_of_its_own():
-    """What the law knows nothing of: the true vehicle, and ground to touch."""
+def test_every_row_flies_a_separate_model():
+    """Properties that the law does not model: the true vehicle, and ground to touch."""
     down = {"initial": {"velocity": [0.0, 0.0, -1.0]}}
     rows = three_ways(
         [
@@ -375,7 +375,7 @@ def test_every_row_flies_a_model_of_its_own():
     ],
     ids=str,
 )
-def test_the_model_cache_key_tells_models_apart(change):
+def test_the_model_cache_key_distinguishes_models(change):
     """Rows share a model exactly where MuJoCo would compile the same one."""
     change = {"disturbance": change} if change is GUST else change
     tables = {**LAYERED, "simulation": {"timestep": 0.002, "duration": 0.3}}
@@ -411,7 +411,7 @@ def test_own_controllers_are_flown_one_by_one_among_others(tmp_path):
         )
         for mass in (0.9, 1.0, 1.1)
     ]
-    # A sweep requests the native engine for all scenarios, even for those that cannot use it.
+    # A sweep requests the native engine for all scenarios, even where it cannot be used.
     simulation = scenarios[2].simulation.model_copy(update={"engine": "native"})
     scenarios[2] = scenarios[2].model_copy(update={"simulation": simulation})
     scenarios.insert(1, scenario({}, duration=0.1))
@@ -480,7 +480,7 @@ def test_a_batch_takes_whatever_describes_a_scenario_and_flies_own_controllers()
     np.testing.assert_array_equal(results[1].flight.samples, tiltsim.simulate(short).samples)
 
 
-def test_a_batch_tells_of_flights_whose_results_wait_for_others(monkeypatch):
+def test_a_batch_reports_flights_whose_results_wait_for_others(monkeypatch):
     class Flown:
         def __init__(self, assemblies, *_):
             self.flights = len(assemblies)
@@ -499,7 +499,7 @@ def test_a_batch_tells_of_flights_whose_results_wait_for_others(monkeypatch):
     assert counts == [1, 2, 3]  # the second A waits for the first B
 
 
-def test_a_batch_tells_of_its_flights_and_takes_numbers_of_numpy():
+def test_a_batch_reports_its_flights_and_takes_numpy_numbers():
     counts = []
     short = {"simulation": {"duration": 0.01}}
     results = tiltsim.fly([short] * 3, threads=np.int64(2), progress=counts.append)

@@ -30,7 +30,7 @@ def tiltrotor(plant, vehicle):
 
 
 def budgets(flight, inertia):
-    """Changes of momentum, angular momentum and energy, and what the rotors make of them.
+    """Changes of momentum, angular momentum and energy, and the rotors' contributions.
 
     Rotors are turned about their hinges one by one; the angular momentum includes their spin.
     """

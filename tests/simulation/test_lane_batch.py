@@ -50,7 +50,7 @@ def test_more_flights_than_lanes_of_different_lengths_and_steps(threads):
     assert_flown_as_alone(results, scenarios)
 
 
-def test_held_controllers_are_sampled_at_times_of_their_own():
+def test_held_controllers_are_sampled_at_independent_times():
     """Lanes at different phases take both programs at once."""
     scenarios = [
         shifted(i, duration=0.05 + 0.008 * i, control_timestep=(0.004, 0.006, 0.014)[i % 3])
@@ -145,7 +145,7 @@ def stopping(kind):
     return next_part
 
 
-def test_as_many_lanes_as_flights_up_to_the_width_of_a_register():
+def test_one_lane_per_flight_up_to_the_width_of_a_register():
     assert [lane_batch.lanes_for(n) for n in (1, 2, 3)] == [1, 2, min(4, widest())]
     assert lane_batch.lanes_for(100) == widest()
 

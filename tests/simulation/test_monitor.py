@@ -1,4 +1,4 @@
-"""What ends a flight, sample by sample: limits, numbers that are not finite, singular matrices."""
+"""Causes that end a flight, sample by sample: limits, non-finite numbers, singular matrices."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The same flights in simulators by others (``pip install -e '.[crosscheck]'``)."""
+"""Our flights in simulators by others (``pip install -e '.[crosscheck]'``)."""
 
 from __future__ import annotations
 
@@ -41,5 +41,5 @@ def test_crazyflow_flies_the_same_up_to_the_second_order_of_its_step(name, tmp_p
         for frequency in (500, 1000)
     )
     assert fine < 1e-6
-    # Besides the second order, terms of higher orders and our own 1e-11 m.
+    # In addition to the second order: terms of higher orders and our own 1e-11 m.
     assert coarse / fine == pytest.approx(4.0, rel=0.1)

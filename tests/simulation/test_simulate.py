@@ -430,7 +430,7 @@ def test_a_flight_has_a_one_line_repr_and_lists_its_columns():
         flown["rol"]
 
 
-def test_progress_is_told_now_and_then_and_at_the_end(monkeypatch):
+def test_progress_is_reported_now_and_then_and_at_the_end(monkeypatch):
     monkeypatch.setattr(progress, "INTERVAL", 1e9)
     times = []
     flight = tiltsim.simulate({"simulation": {"duration": 0.2}}, progress=times.append)

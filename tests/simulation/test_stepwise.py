@@ -36,7 +36,7 @@ LAYERS = {
 }
 
 
-def test_steps_are_those_of_a_flight():
+def test_steps_equal_a_flight():
     flight, simulation = tiltsim.simulate(TROT), tiltsim.Simulation(TROT)
     for _ in range(2):
         for _ in range(2):
@@ -46,7 +46,7 @@ def test_steps_are_those_of_a_flight():
         assert simulation.time == 0.0
 
 
-def test_steps_follow_a_motion_and_a_gait_of_ones_own():
+def test_steps_follow_a_custom_motion_and_gait():
     own = {
         "reference": lambda time: (0.1 * np.sin(time), 0.0, 0.0),
         "gait": lambda time: (0.1 * time, 0.0, -0.1 * time, 0.0),
@@ -83,7 +83,7 @@ def assert_same(ours, others):
 
 
 @pytest.mark.parametrize("layers", LAYERS)
-def test_the_built_in_command_as_a_controller_of_ones_own_flies_the_same_flight(layers):
+def test_the_built_in_command_as_a_custom_controller_flies_the_same_flight(layers):
     shipped = tiltsim.load_scenario(LAYERS[layers])
     steps = shipped.simulation.control_steps
 
@@ -129,7 +129,7 @@ def test_mujoco_s_own_model_and_data_are_those_that_fly():
     assert data.qpos[2] == 0.0
 
 
-def test_an_own_controller_starts_anew_after_a_reset():
+def test_a_custom_controller_starts_again_after_a_reset():
     made = []
 
     class Counting:

@@ -30,7 +30,7 @@ LOOPS["rigid body"] = {**LAWS["attitude_altitude"], "simulation": {"plant": "rig
 
 
 @pytest.mark.parametrize("name", LOOPS)
-def test_closed_loops_are_those_of_python(name):
+def test_symbolic_closed_loops_agree_with_python(name):
     scenario = tiltsim.parse_scenario(merge(THESIS, LOOPS[name]))
     model, assembly = tiltsim.symbolic(scenario), assemble(scenario)
     equations, (parameters, knots) = assembly.loop.equations, assembly.setup
@@ -53,7 +53,7 @@ def test_closed_loops_are_those_of_python(name):
     assert len(model.fields) == len(sample)
 
 
-def test_its_jacobian_has_the_poles_of_the_gains():
+def test_the_symbolic_jacobian_has_the_poles_of_the_gains():
     """A hover with exact decoupling is linear, with the poles of its gains."""
     model = tiltsim.symbolic({**THESIS, "controller": {**EXACT, "decoupler": "none"},
         "reference": {"type": "attitude_altitude"},
@@ -67,7 +67,7 @@ def test_its_jacobian_has_the_poles_of_the_gains():
         assert np.abs(poles - pole).min() < 1e-3
 
 
-def test_it_refuses_what_has_no_symbolic_form():
+def test_scenarios_without_a_symbolic_form_are_refused():
     with pytest.raises(InputError, match='plant = "mujoco": symbolic supports "thesis" and'):
         tiltsim.symbolic({})
     noisy = {**THESIS, "sensors": {"position_noise": 0.1}}

@@ -1,10 +1,10 @@
 """Flights of a turned, renumbered, mirrored or scaled world are the same flights.
 
-The vehicle has two symmetries of its own: half a turn about its vertical axis exchanges rotors 1
-and 3, and 2 and 4; the mirror through the plane between the arms of rotors 1 and 2 exchanges 1 and
-2, and 3 and 4, whose spins are opposite. (A quarter turn alone does not permute the rotors: their
-spins would not fit.) Half a turn commutes with roll, pitch and yaw, so the control law shares it.
-The mirror swaps roll and pitch, which their order does not allow: it holds for given rotor speeds.
+The vehicle has two symmetries: half a turn about its vertical axis exchanges rotors 1 and 3, and 2
+and 4; the mirror through the plane between the arms of rotors 1 and 2 exchanges 1 and 2, and 3 and
+4, whose spins are opposite. (A quarter turn alone does not permute the rotors: their spins would
+not fit.) Half a turn commutes with roll, pitch and yaw, so the control law shares it. The mirror
+swaps roll and pitch, which their order does not allow: it holds for given rotor speeds.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ each_plant = pytest.mark.parametrize("plant", ["mujoco", "thesis"])
 
 @dataclass(frozen=True)
 class Symmetry:
-    """Signed permutations of the world's and the body's axes, and what they make of the rotors."""
+    """Signed permutations of the world's and the body's axes, and of the rotors."""
 
     world: np.ndarray
     body: np.ndarray

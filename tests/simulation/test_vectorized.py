@@ -31,7 +31,7 @@ def _double_precision():
         yield
 
 
-def test_the_flight_is_that_of_the_engine_and_steps_make_it():
+def test_the_flight_agrees_with_the_engine_and_consists_of_steps():
     scenario = tiltsim.parse_scenario({**LAWS["tilt_car_planned_direction"], **THESIS})
     flown = tiltsim.vectorized(scenario)
     changes = {"vehicle": {"mass": 1.1}, "gait": {"period": 0.45}}
@@ -68,7 +68,7 @@ def test_a_parameter_may_vary_unless_its_plan_needs_it_as_a_number():
     assert set(parameters["reference"]) == {"roll", "pitch", "yaw", "positions"}  # but not times
 
 
-def test_knots_of_other_points_are_those_of_their_own_plan():
+def test_knots_of_other_points_come_from_the_plan_of_each():
     changes = {
         "gait": {"rectangle": [[-0.3, -0.1], [0.1, 0.25]], "period": 3.0},
         "reference": {"positions": [[0.1, 0.0, 0.0], [1.2, 0.3, -0.1], [2.0, 0.0, 1.0]]},
@@ -131,14 +131,14 @@ def test_numbers_of_a_rigid_body_are_parameters():
         ({"gait": {"period": float("nan")}}, "parameters: period = nan: must be positive"),
     ],
 )
-def test_what_is_no_tree_of_numbers_is_refused(tree, words):
+def test_invalid_trees_of_numbers_are_refused(tree, words):
     with double_precision():
         flown = tiltsim.vectorized(tiltsim.parse_scenario({**LAWS["attitude_altitude"], **THESIS}))
         with pytest.raises(InputError, match=words):
             flown.fly(tree)
 
 
-def test_it_needs_equations():
+def test_a_vectorized_flight_needs_equations():
     with pytest.raises(InputError, match=r'plant = "mujoco".*vectorized supports "thesis" and'):
         tiltsim.vectorized({})
 
@@ -212,7 +212,7 @@ GRADIENTS = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("law", GRADIENTS)
-def test_gradients_are_those_of_central_differences(law):
+def test_gradients_agree_with_central_differences(law):
     keys = GRADIENTS[law]
     tables = {**LAWS[law], "simulation": {"plant": "thesis", "control_timestep": 0.002}}
     if "car" not in law:
@@ -232,7 +232,7 @@ def test_gradients_are_those_of_central_differences(law):
     ones, h = np.ones(len(keys)), 3e-4
     for key, along in zip(keys, np.eye(len(keys)), strict=True):
         _, exact = slope(ones, along)
-        # Of five points: errors of h**4 and of rounding / h, both about 1e-12 of the cost.
+        # With five points: errors of h**4 and of rounding / h, both about 1e-12 of the cost.
         points = [ones + k * h * along for k in (-2, -1, 1, 2)]
         far_below, below, above, far_above = (float(slope(p, along)[0]) for p in points)
         difference = (8.0 * (above - below) - (far_above - far_below)) / (12.0 * h)

@@ -48,7 +48,7 @@ def test_an_error_halves_the_score_where_it_says(rows):
     assert arena.score(row("pid", "yaw_step", 0.0, 1.571 / 4)) == pytest.approx(50.0)
 
 
-def test_the_scale_of_a_step_is_that_of_a_first_order_response():
+def test_the_scale_of_a_step_belongs_to_a_first_order_response():
     time = np.linspace(0.0, 8.0, 8001)
     assert pytest.approx(np.sqrt(np.mean(np.exp(-2.0 * time))), rel=1e-3) == arena.STEP
 

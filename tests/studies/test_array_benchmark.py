@@ -8,7 +8,7 @@ from tiltsim.studies import array_benchmark
 
 
 @pytest.mark.parametrize("engine", ["native", pytest.param("jax", marks=pytest.mark.slow)])
-def test_rows_are_those_of_bench_with_precision_and_time_to_compile(engine, monkeypatch):
+def test_rows_extend_bench_by_precision_and_time_to_compile(engine, monkeypatch):
     if engine == "jax":
         pytest.importorskip("jax")
     monkeypatch.setattr(array_benchmark, "TOTAL_STEPS", 200)
@@ -22,7 +22,7 @@ def test_rows_are_those_of_bench_with_precision_and_time_to_compile(engine, monk
         assert row["compile_seconds"] > 0.0
 
 
-def test_rk4_at_8_ms_is_within_a_micrometre(monkeypatch):
+def test_rk4_at_8_ms_is_within_a_micrometer(monkeypatch):
     monkeypatch.setattr(array_benchmark, "ACCURACY_DURATION", 8.0)
     monkeypatch.setattr(array_benchmark, "ACCURACY_VEHICLES", 2)
     monkeypatch.setattr(array_benchmark, "REFERENCE_STEP", 0.002)

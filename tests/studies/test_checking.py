@@ -60,7 +60,7 @@ def test_a_word_selects_for_check_what_list_shows(word):
     ("word", "selected"),
     [("ROUND AND", ["slow", "fast"]), ("own.toml#s", ["slow"]), ("gallop", ["fast"])],
 )
-def test_a_word_selects_in_files_of_ones_own(tmp_path, monkeypatch, word, selected):
+def test_a_word_selects_in_custom_files(tmp_path, monkeypatch, word, selected):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "own.toml").write_text(OWN)
     (tmp_path / "wrong.toml").write_text("title = 3\nvariant = 4\n")

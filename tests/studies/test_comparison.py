@@ -135,7 +135,7 @@ def test_the_command_prints_rows_and_writes_a_folder(tmp_path, capsys):
     assert "yaw_position: " in table[4]
 
 
-def test_a_comparison_is_told_as_soon_as_it_is_there(monkeypatch):
+def test_a_comparison_is_reported_as_soon_as_it_is_finished(monkeypatch):
     def in_turn(work, entries, _jobs):
         for entry in entries:
             answered.append(entry.name)
@@ -156,7 +156,7 @@ def named(controllers=(), *own):
     return chosen_controllers(controllers, own)
 
 
-def test_a_controller_has_gains_of_its_own(tmp_path, monkeypatch):
+def test_every_controller_has_separate_gains(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "my_law.py").touch()
     fast = 'fast={law="pid", velocity_gains=[6.0, 3.6]}'
@@ -212,7 +212,7 @@ def test_a_refused_sample_time_is_not_a_lost_flight():
     assert why_none(row, "min_rotor_speed") == "-"
 
 
-def test_the_time_of_compiled_code_is_that_of_the_mujoco_plant():
+def test_the_time_of_compiled_code_belongs_to_the_mujoco_plant():
     scenario = tiltsim.load_scenario(SETPOINT)
     assert compiled_time_per_call(scenario) >= 0.0
     assert np.isnan(compiled_time_per_call(scenario.replace({"simulation.plant": "thesis"})))
@@ -228,7 +228,7 @@ def test_no_controller_at_all_is_refused():
         next(compare([SETPOINT], {}, {}))
 
 
-def test_what_is_flown_is_kept_when_the_rest_is_interrupted(rows, tmp_path, capsys, monkeypatch):
+def test_finished_flights_are_kept_after_an_interrupt(rows, tmp_path, capsys, monkeypatch):
     def interrupted(*_, **__):
         yield rows[0]
         raise KeyboardInterrupt

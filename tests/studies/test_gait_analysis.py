@@ -1,4 +1,4 @@
-"""The analysis commands: what they report, draw and refuse."""
+"""The analysis commands: reports, figures and refusals."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def test_report_of_a_red_gait(capsys) -> None:
     assert "determinant" not in report
 
 
-def test_report_of_an_untilted_vehicle_has_the_published_normalisation(capsys) -> None:
+def test_report_of_an_untilted_vehicle_has_the_published_normalization(capsys) -> None:
     report = run_json(capsys, "gait", "--angles", "0,0,0,0")
     assert report["R"] == pytest.approx(4.0)
 
@@ -261,7 +261,7 @@ def test_rotors_that_would_spin_backwards_to_hover_are_named(capsys, angles, bac
     assert ("warning: " in text) is bool(backward)
 
 
-def test_a_leaning_hover_agrees_with_that_of_the_fault_analysis() -> None:
+def test_a_leaning_hover_agrees_with_the_fault_analysis() -> None:
     tilts = (-0.65, -0.65, 0.65, 0.65)
     hover = fixed_tilt_hover(tilts, AR_DRONE)
     assert hover is not None
@@ -279,7 +279,7 @@ def test_without_a_hover_there_are_no_hover_speeds(capsys) -> None:
 
 
 def test_a_rotor_at_rest_does_not_count_as_turning_backwards() -> None:
-    # Rotors 2 and 4 hover alone at minus delta: what rounding leaves of the others has a sign.
+    # Rotors 2 and 4 hover alone at minus delta: the rounding of the others has a sign.
     delta = np.arctan(gait_report(plans.fixed([0] * 4), AR_DRONE)["drag_ratio"])
     for nudge in (-1e-15, 0.0, 1e-15):
         report = gait_report(plans.fixed([0.1, -delta + nudge, 0.1, -delta]), AR_DRONE)
@@ -316,7 +316,7 @@ def test_numbers_as_text() -> None:
     assert "-0.0" not in json_text([-0.0])
 
 
-def test_a_blue_gait_as_printed_is_said_to_be_nearly_singular(capsys) -> None:
+def test_a_blue_gait_as_printed_is_reported_as_nearly_singular(capsys) -> None:
     report = run_json(capsys, "gait", "--published", "ch09_gait_5")
     assert report["rank"] == 3
     assert "tau is nearly singular: its smallest singular value is 0.00011" in report["warnings"][0]
@@ -640,7 +640,7 @@ def test_a_bad_target_is_noticed_before_any_work(tmp_path, monkeypatch) -> None:
                 run(*words, "--plot", str(target))
 
 
-def test_cases_on_the_command_line_are_those_of_the_thesis() -> None:
+def test_cases_on_the_command_line_agree_with_the_thesis() -> None:
     assert tuple(DETERMINANT_CASES) == get_args(Case)
 
 

@@ -15,7 +15,7 @@ def test_an_absent_peer_is_one_line(monkeypatch):
         pass
 
 
-def test_a_peer_that_fails_is_told(monkeypatch):
+def test_a_failing_peer_is_reported(monkeypatch):
     monkeypatch.setattr(peers, "find_spec", lambda name: name)
     monkeypatch.setitem(peers.PEERS, "json", peers.PeerCase(None, 1, 1))  # not known in its process
     with pytest.raises(InputError, match="--peer json: it failed"), peers.running("json"):

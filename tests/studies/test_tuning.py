@@ -1,4 +1,4 @@
-"""Fair tuning: what a search varies, how it searches, and on which tasks."""
+"""Fair tuning: the varied keys, the search, and its tasks."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def test_a_factor_on_a_loop_makes_its_poles_faster(vehicle, name, loops):
     assert after.model_dump(exclude={"gains", "allow_unstable"}) == kept
 
 
-def test_yaw_is_a_loop_of_its_own():
+def test_yaw_is_a_separate_loop():
     before = controller("tiltrotor", "given")
     factors = dict.fromkeys(tuning.knobs(before), 1.0) | {"gains.attitude, yaw": 2.0}
     attitude = np.array(tuning.scaled(before, factors)["gains"]["attitude"])
@@ -100,7 +100,7 @@ def test_a_search_of_many_factors_flies_its_whole_budget(budget):
 
 @pytest.fixture
 def flights(monkeypatch):
-    """Flights whose error is that of the position gain from 2.0, refused where it is above 3."""
+    """Flights whose error is the distance of the position gain from 2.0, refused above 3."""
     flown = []
 
     def compare_one(entry, **_):
@@ -135,7 +135,7 @@ def test_a_budget_below_one_flight_on_each_task_is_refused(flights):
     assert not flights
 
 
-def test_what_fits_no_task_has_no_tuned_gains(monkeypatch):
+def test_scenarios_without_a_task_have_no_tuned_gains(monkeypatch):
     def refused(entry, **_):
         return Compared({"scenario": entry.address, "end": "refused"}, np.zeros(0), np.zeros(0))
 

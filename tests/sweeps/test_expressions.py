@@ -15,7 +15,7 @@ numbers = st.floats(-1e3, 1e3)
 
 
 @given(numbers, numbers, numbers)
-def test_arithmetic_is_that_of_python(a, b, c):
+def test_arithmetic_agrees_with_python(a, b, c):
     values = {"a": a, "gait.period": b, "gait.angles[1]": c}
     assert evaluate("2 * a - gait.period / 4 + -gait.angles[1]", values) == 2 * a - b / 4 + -c
     assert evaluate("max(a, 0) ** 2 + sin(pi * a)", values) == max(a, 0) ** 2 + math.sin(

@@ -306,7 +306,7 @@ def test_a_sweep_whose_file_name_is_not_utf_8_is_flown_and_read(tmp_path):
 @pytest.mark.parametrize(
     "name", ["parts/5 copy.parquet", "parts/000099.parquet", "flights/a.parquet"]
 )
-def test_other_tables_among_those_of_a_sweep_are_refused(copy, name):
+def test_foreign_tables_in_a_sweep_are_refused(copy, name):
     definition, folder = copy
     foreign = folder / name
     foreign.parent.mkdir(exist_ok=True)

@@ -282,7 +282,7 @@ def test_killed_at_every_file_it_continues_to_the_same_dataset(tmp_path):
 
 
 @pytest.mark.slow
-def test_its_processes_end_when_it_is_killed_and_others_continue_to_the_same_dataset(tmp_path):
+def test_processes_of_a_killed_sweep_end_and_others_continue_to_the_same_dataset(tmp_path):
     file = short_sweep(tmp_path / "sweep.toml", count=80, chunk_size=8)
     whole = run_sweep(load_sweep(file), tmp_path / "whole")
     folder = tmp_path / "out"

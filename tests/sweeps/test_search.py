@@ -26,7 +26,7 @@ def search(holds, start, stop, step, tolerance):
     tolerance=st.floats(1e-4, 1.0),
     sign=st.sampled_from([1.0, -1.0]),
 )
-def test_it_brackets_the_edge(edge, step, tolerance, sign):
+def test_a_search_brackets_the_edge(edge, step, tolerance, sign):
     found, tried = search(lambda x: sign * x <= edge, 0.0, sign * 2.0, step, tolerance)
     last, first = sign * found.holds, sign * found.fails
     assert last <= edge < first

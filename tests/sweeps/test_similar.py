@@ -1,4 +1,4 @@
-"""Scenarios of a sweep that differ in numbers: equal to those that are made in full."""
+"""Scenarios of a sweep that differ in numbers: equal to scenarios that are made in full."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def sweep(*axes):
     return SweepPoints(load_sweep(base))
 
 
-def test_each_scenario_is_that_of_its_document_and_one_of_a_kind_is_made_in_full(monkeypatch):
+def test_each_scenario_matches_its_document_and_one_of_a_kind_is_made_in_full(monkeypatch):
     cases = {"theirs": {}, "ours": {"controller": {"decoupler": "exact"}}}
     points = sweep(
         {"type": "cases", "key": "stack", "cases": cases},

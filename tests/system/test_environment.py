@@ -1,4 +1,4 @@
-"""What libraries start while the command line loads them."""
+"""Processes that libraries start while the command line loads them."""
 
 from __future__ import annotations
 

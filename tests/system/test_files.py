@@ -14,7 +14,7 @@ from tiltsim.system.files import prepare_file, prepare_folder, remove_leftovers,
 from tiltsim.system.locks import locked
 
 HEX = "0123456789abcdef"
-"""As in the names of files that are being written."""
+"""Digits of the random part of the names of files that are being written."""
 
 
 @pytest.mark.parametrize("durable", [False, True])

@@ -37,7 +37,7 @@ def interrupt():
 
 
 def call_from_c(function):
-    """Call a function as compiled code does: what it raises is reported and dropped."""
+    """Call a function as compiled code does: exceptions are reported and dropped."""
     CALLED_BACK(function)()
 
 
@@ -141,7 +141,7 @@ def test_a_swallowed_interrupt_of_a_command_is_sent_again(keyboard, number, caps
     def work():
         call_from_c(interrupted)
         if len(swallowed) == 1:
-            call_from_c(lambda: time.sleep(1.0))  # the second is swallowed, too
+            call_from_c(lambda: time.sleep(1.0))  # the second is also swallowed
         time.sleep(20.0)
 
     before = signal.signal(signal.SIGINT, keyboard)

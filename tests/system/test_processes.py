@@ -67,7 +67,7 @@ def test_processes_receive_no_interrupt_while_they_start():
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_process_gets_its_work_although_a_signal_comes_meanwhile(number, monkeypatch, capfd):
     """Else it reads nothing where it expects its work, and prints a traceback."""
-    resource_tracker.ensure_running()  # is a process, too
+    resource_tracker.ensure_running()  # is also a process
     start = util.spawnv_passfds
 
     def start_then_signal(*arguments):

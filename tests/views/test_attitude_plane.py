@@ -56,7 +56,7 @@ def test_the_determinant_vanishes_on_the_curve(angles):
             assert abs(float(normals(angles)[0] @ up)) < 1e-9
 
 
-def test_curves_of_many_instants_equal_those_of_single_instants():
+def test_curves_of_many_instants_equal_single_instants():
     angles = [TROT, (0.3, -0.2, 0.1, 0.4)]
     for curve, alone in zip(singular_curves(normals(*angles), 183), angles, strict=True):
         expected = unacceptable_attitudes(alone, VEHICLE, 181)

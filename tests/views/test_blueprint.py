@@ -74,7 +74,7 @@ def test_rounding_does_not_fill_a_plot():
 
 
 def test_every_column_is_plotted():
-    """Those of a control law, too: in the main plots or in the second tab."""
+    """Also panels of a control law: in the main plots or in the second tab."""
     for name in ("supervised", "tilt_car"):
         scenario = flight(name).scenario
         signals = signals_of(assemble(scenario)).values()

@@ -1,4 +1,4 @@
-"""The drawings of docs/concepts.md: signs are the model's, numbers those of the control laws."""
+"""The drawings of docs/concepts.md: signs are the model's, numbers the control laws'."""
 
 from __future__ import annotations
 
@@ -113,7 +113,7 @@ def test_a_view_from_the_side_shows_right_and_up():
     np.testing.assert_allclose(ABOVE.project(np.eye(3)), [[1, 0], [0, 1], [0, 0]], atol=1e-15)
 
 
-def test_leans_of_the_decouplers_are_those_of_the_control_laws():
+def test_leans_of_the_decouplers_agree_with_the_control_laws():
     figure = concepts.decoupler_figure(dict.fromkeys(DECOUPLER_FLIGHTS, flight("fixed")))
     words = [text.get_text() for axes in figure.axes for text in axes.texts]
     n = torque_free_direction(concepts.TROT_ANGLES, VEHICLE)

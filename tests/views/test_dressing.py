@@ -1,4 +1,4 @@
-"""What pictures add to a user's file, and what they leave alone."""
+"""Visuals added to a user's file, and properties left alone."""
 
 from __future__ import annotations
 

@@ -69,7 +69,7 @@ def test_a_supervisor_is_reported_when_it_becomes_active():
     active = this["time"][this["supervision"] > 0.01]
     found = [event for event in flight_events(this) if "supervisor moves" in event.text]
     assert found[0].time == active[0]
-    assert {event.text for event in found} == {"supervisor moves the gait towards red"}
+    assert {event.text for event in found} == {"supervisor moves the gait toward red"}
     assert any("margin below 0.9 rad" in text for text in texts(flight_events(this)))
 
 

@@ -63,7 +63,7 @@ def test_mistakes_in_sizes(text, words):
         style.parse_size("--size", text)
 
 
-def test_panels_are_drawn_in_the_order_and_size_asked_for():
+def test_panels_are_drawn_in_the_requested_order_and_size():
     figure = plot(flight("trot"), panels=["vx", "margin", "path"], size="85mm x 150mm")
     assert labels_of(figure) == ["velocity along x (m/s)", "rad", "y (m)"]
     assert tuple(figure.get_size_inches()) == pytest.approx((85 / 25.4, 150 / 25.4))
@@ -106,7 +106,7 @@ def test_the_height_that_panels_need_is_named_and_suffices():
     assert legend.get_window_extent().x1 <= figure.bbox.x1
 
 
-def test_the_last_periods_shown_are_those_of_the_shortest_flight():
+def test_the_last_periods_shown_belong_to_the_shortest_flight():
     scenario = flight("trot").scenario
     gait = scenario.gait.model_copy(update={"period": 0.05})
     assembly = assemble(scenario.model_copy(update={"gait": gait}))
@@ -277,7 +277,7 @@ def test_title_and_labels_are_the_users(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("names", [["trot"], ["trot", "fixed"]])
-def test_panels_are_relabelled_by_their_names(names):
+def test_panels_are_relabeled_by_their_names(names):
     labels = {"position_error": "Distance", "trot": "T"} if len(names) > 1 else {}
     labels = labels or {"position_error": "Distance"}
     figure = plot([flight(name) for name in names], panels="position_error", labels=labels)
@@ -299,7 +299,7 @@ def test_a_label_of_nothing_is_one_line(tmp_path, capsys):
     assert "Altitude" in line
 
 
-def test_metrics_are_relabelled_by_their_names_and_keep_their_units():
+def test_metrics_are_relabeled_by_their_names_and_keep_their_units():
     figure = Figure()
     axes = figure.subplots()
     axes.set_xlabel(METRICS["sup_position_error_after_20s"].quantity.text)
@@ -309,7 +309,7 @@ def test_metrics_are_relabelled_by_their_names_and_keep_their_units():
     assert figure.get_suptitle() == r"A \$ sign"
 
 
-def test_every_metric_and_column_has_a_label_of_its_own():
+def test_every_metric_and_column_has_a_distinct_label():
     assert len({metric.label for metric in METRICS.values()}) == len(METRICS)
     for name in (*RECIPES, *OTHER_KINDS):
         this = flight(name)
@@ -356,5 +356,5 @@ def test_a_map_of_rounding_errors_has_one_shade():
         ([-1.5, -1.5], ["−1.5", "−1.5"]),
     ],
 )
-def test_unequal_quantiles_are_told_apart(values, texts):
+def test_unequal_quantiles_have_distinct_texts(values, texts):
     assert distinct_texts(values) == texts

@@ -1,4 +1,4 @@
-"""The figure of a flight: what it shows, its formats, its command."""
+"""The figure of a flight: its content, its formats, its command."""
 
 from __future__ import annotations
 
@@ -251,7 +251,7 @@ def test_the_page_of_a_variant_names_it():
     assert subtitle("ch04/circle#modified_t2") == f"modified_t2  ·  {plain}"
 
 
-def test_vehicles_of_several_kinds_are_compared_by_what_they_have():
+def test_vehicles_of_several_kinds_are_compared_by_available_panels():
     figure = plot([flight("tilt_car"), flight("jumps")])
     panels = {axes.get_ylabel().replace("\n", " "): axes for axes in figure.axes}
     lines = {

@@ -74,7 +74,7 @@ def test_a_capsule_begins_where_mujocos_does():
     np.testing.assert_allclose(start, (0.0, 2.0, 5.0), atol=1e-6)
 
 
-def test_a_geom_without_a_colour_has_its_materials():
+def test_a_geom_without_a_color_has_its_materials():
     model = mujoco.MjModel.from_xml_string(SHAPES)
     (archetype,) = geom_archetypes(model, model.geom("box").id)
     assert archetype.colors.as_arrow_array().to_pylist() == [0xFF0000FF]

@@ -22,7 +22,7 @@ def in_a_notebook(monkeypatch):
 
 @pytest.fixture
 def widgets(monkeypatch):
-    """What Rerun's widget for notebooks is made of, and the bytes that it gets."""
+    """Arguments of Rerun's widget for notebooks, and the bytes that it gets."""
     made = []
 
     class Widget:
@@ -47,7 +47,7 @@ def test_a_notebook_shows_the_viewer_in_the_cell(in_a_notebook, widgets, monkeyp
     assert 10_000 < one < two
 
 
-def test_an_address_is_that_of_an_open_viewer_in_a_notebook_too(in_a_notebook, monkeypatch):
+def test_an_address_names_an_open_viewer_even_in_a_notebook(in_a_notebook, monkeypatch):
     shown = []
     monkeypatch.setattr(viewer, "view_flights", lambda flights, url: shown.append((flights, url)))
     assert flight("fixed").view(url="rerun+http://here:9876/proxy") is None

@@ -64,7 +64,7 @@ def test_a_recording_has_all_entities_and_one_timeline(recorded):
     assert expected <= entities(path)
 
 
-def test_time_series_are_those_of_the_parquet_file(recorded):
+def test_time_series_agree_with_the_parquet_file(recorded):
     path, this = recorded
     for entity, column in SERIES.items():
         times, values = scalars(path, entity)
@@ -84,7 +84,7 @@ def test_a_supervisor_is_drawn_with_its_threshold(tmp_path):
     assert set(levels) == {0.9}
 
 
-def test_poses_are_those_of_the_parquet_file(recorded):
+def test_poses_agree_with_the_parquet_file(recorded):
     path, this = recorded
     times, positions = rows(path, "/world/vehicle", "Transform3D:translation")
     assert len(times) == len(this)

@@ -45,7 +45,7 @@ def test_a_flight_puts_the_vehicle_where_it_was():
         np.testing.assert_array_equal(qpos[:, address], this[f"alpha_{rotor}"])
 
 
-def test_up_of_the_last_pose_is_that_of_the_attitude():
+def test_up_of_the_last_pose_agrees_with_the_attitude():
     this = flight("trot")
     model = visible_model(this.assembly)
     poses = world_poses(model, joint_positions(model, this.columns))

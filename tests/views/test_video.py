@@ -133,7 +133,7 @@ def test_every_flight_can_be_rendered():
             assert stage.frame(len(flight(name)) - 1).std() > 10.0
             geoms = canvas.scene.geoms[: canvas.scene.ngeom]
         own = {geom.type for geom in geoms if geom.objtype != mujoco.mjtObj.mjOBJ_GEOM}
-        # Cylinders have a hundred times as many triangles: without a GPU, most of a frame's time.
+        # Cylinders have a hundred times the triangles: without a GPU, most of a frame's time.
         assert mujoco.mjtGeom.mjGEOM_BOX in own
         assert not own & {mujoco.mjtGeom.mjGEOM_CAPSULE, mujoco.mjtGeom.mjGEOM_CYLINDER}
 
@@ -249,7 +249,7 @@ def test_a_missing_opengl_is_one_line_with_the_remedy(monkeypatch):
     assert "MUJOCO_GL=egl" in line
 
 
-def test_an_implementation_that_only_warns_is_one_line_too(monkeypatch):
+def test_an_implementation_that_only_warns_is_also_one_line(monkeypatch):
     if sys.platform != "linux" or has_display():
         pytest.skip("for Linux without a screen")
     monkeypatch.setenv("MUJOCO_GL", "glfw")

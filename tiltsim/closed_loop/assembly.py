@@ -18,7 +18,7 @@ class Assembly(FlightPlan):
 
     Attributes:
         loop: The controller around the vehicle, with all layers.
-        setup: What the control step reads besides the state.
+        setup: Inputs of the control step other than the state.
         follows_position: Whether the controller follows the reference's horizontal position.
         traced: Whether the loop can be traced; else it runs as plain Python.
     """

@@ -39,7 +39,7 @@ CHOICES: Final = frozenset(
 
 @cache
 def _places(record: type[tuple[Any, ...]]) -> tuple[int, ...]:
-    """Where the choices lie in a flattened record."""
+    """Places of the choices in a flattened record."""
     names = (path.rpartition(".")[2] for path in paths_of(record))
     return tuple(place for place, name in enumerate(names) if name in CHOICES)
 

@@ -19,9 +19,9 @@ WITHIN_LIMITS: Final = 0
 HORIZONTAL_ERROR: Final = 1
 ALTITUDE_ERROR: Final = 2
 BODY_RATE: Final = 3
-"""The code of p; those of q and r follow."""
+"""The code of p; q and r have the next ones."""
 ROTOR_SPEED: Final = 6
-"""The code of the first rotor; those of the others follow."""
+"""The code of the first rotor; the other rotors have the next ones."""
 
 
 @scalar

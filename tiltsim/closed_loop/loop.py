@@ -38,7 +38,7 @@ class ControlSetup(NamedTuple):
     """Parameters of the control step of one flight."""
 
     parameters: Any  # the loop's record
-    knots: tuple[float, ...] = ()  # those of the gait, then those of the reference
+    knots: tuple[float, ...] = ()  # knots of the gait, then knots of the reference
 
     @property
     def userdata(self) -> Floats:
@@ -54,7 +54,7 @@ class Dynamics:
         model: Name of the MJCF model.
         sizes: Lengths of its vectors, the controller's own states among the activations.
         initial_activations: ``(plan, setup) -> act`` at time zero.
-        spins: Signs of the rotor speeds, one a rotor of a rotorcraft.
+        spins: Signs of the rotor speeds, one per rotor of a rotorcraft.
         tilt_of_rotor: The number, from 0, of each rotor's tilt, -1 for a fixed one; empty for
             vehicles whose rotors lie on a cross.
         controller_states: Number of activations that are states of the controller.
@@ -89,8 +89,8 @@ class Sampling:
     Attributes:
         controls: Scalar function ``(time, qpos, qvel, act, parameters, knots) -> ctrl``: the whole
             step.
-        hold: Scalar function ``(time, qpos, qvel, act, ctrl, parameters) -> ctrl``: what still
-            changes between the samples of a held controller.
+        hold: Scalar function ``(time, qpos, qvel, act, ctrl, parameters) -> ctrl``: the controls
+            between the samples of a held controller.
     """
 
     controls: Callable[..., Values]
@@ -104,10 +104,11 @@ class Columns:
     Attributes:
         observe: Scalar function ``(qpos, qvel, act, ctrl) -> values`` of the kind's fields and
             ``fields``.
-        derive: ``(samples by field, setup) -> columns``: references, determinant, margin and those
-            of ``units``.
-        fields: Fields of a sample beyond those of the vehicle's kind.
-        units: Columns of a flight beyond those of the vehicle's kind, with their units.
+        derive: ``(samples by field, setup) -> columns``: references, determinant, margin and the
+            columns in ``units``.
+        fields: Fields of a sample in addition to the fields of the vehicle's kind.
+        units: Columns of a flight in addition to the columns of the vehicle's kind, with their
+            units.
         observe_reads_controls: Whether ``observe`` needs the controls in force.
     """
 
@@ -143,7 +144,7 @@ class Monitoring:
 
 @dataclass(frozen=True, eq=False)
 class Equations:
-    """A controller on equations of motion: those that the thesis prints, or those of a rigid body.
+    """A controller on equations of motion: as the thesis prints them, or of a rigid body.
 
     Attributes:
         inputs: Scalar function ``(time, state, parameters, knots) -> inputs``: the controller.
@@ -152,7 +153,7 @@ class Equations:
             derivative`` of the state; the disturbance is an acceleration (m/s^2, world).
         initial: ``(plan, setup) -> state`` at time zero.
         observe: Scalar function ``(time, state, inputs, parameters, knots) -> values`` of the
-            loop's `sample_fields` after the time; ``inputs`` are those in force.
+            loop's `sample_fields` after the time; ``inputs`` are in force at that time.
         project_onto_limits: Scalar function ``(state, parameters) -> state`` for the end of each
             step: puts back what has passed a limit. None where there are no limits.
         tilts: Scalar function ``(time, state, parameters, knots) -> tilt angles`` (rad), where
@@ -176,17 +177,15 @@ class SupervisedLaw(NamedTuple):
     """
 
     code: Supervision
-    vehicle: Callable[..., Any]  # (time, parameters): what this code reads of the vehicle
+    vehicle: Callable[..., Any]  # (time, parameters): vehicle parameters that this code reads
     seen: Callable[..., tuple[Values, ...]]
-    """``(qpos, qvel, act)``: state, that of the body first, tilt rates and the controller's own
-    states."""
+    """``(qpos, qvel, act)``: state, the body first, tilt rates and the states of the controller."""
     inputs: Callable[..., Values]
     """``(time, *seen, parameters, knots, motion)``: the controls from rotor accelerations on."""
     references: Callable[..., Values]
-    """``(time, sample, parameters, knots, motion)``: columns of references, those of the tilts
-    left out."""
+    """``(time, sample, parameters, knots, motion)``: columns of references, without the tilts."""
     names: tuple[str, ...]  # of these columns
-    fields: tuple[str, ...]  # of a sample, those that the references need
+    fields: tuple[str, ...]  # fields of a sample that the references need
     margins: Callable[[Mapping[str, Floats], ControlSetup], dict[str, Floats]]
     """``(samples by field, setup) -> columns`` that depend on the samples alone."""
 
@@ -201,8 +200,8 @@ class ClosedLoop:
             gait and reference follow it.
         setup: ``(plan, signature) -> ControlSetup``.
         dynamics, sampling, columns, monitoring: See there.
-        equations: The same controller on the thesis's equations; None where it is supported in
-            MuJoCo only or, inside a layer, by `tiltsim.laws.layers.on_equations`.
+        equations: This controller on the thesis's equations; None where it is supported in MuJoCo
+            only or, inside a layer, by `tiltsim.laws.layers.on_equations`.
         supervised: The controller for a supervisor; None where it cannot be supervised.
         follows_position: Whether a scenario has the controller follow the reference's horizontal
             position.

@@ -13,7 +13,7 @@ class Header(NamedTuple):
 
     MuJoCo's own time is a sum of time steps, whose rounding would decide on which side of an event
     an evaluation lies, so time follows from a count of evaluations. As part of MuJoCo's state it
-    also decides when a held controller samples: a saved state restarts between two samples, too.
+    also decides when a held controller samples: a saved state restarts even between two samples.
     """
 
     timestep: float = 0.0  # s, physics
@@ -25,7 +25,7 @@ class Header(NamedTuple):
 
 HEADER_SIZE: Final = len(Header._fields)
 TIMESTEP, EVALUATIONS_PER_STEP, CONTROL_PERIOD, EVALUATIONS, RECORDER = range(HEADER_SIZE)
-"""Where in `userdata` the fields of the `Header` lie."""
+"""Places of the fields of the `Header` in `userdata`."""
 
 _AFTER: Final = 1.0 + 2.0**-48
 _BEFORE: Final = 1.0 - 2.0**-48

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class VehicleKind:
-    """What all vehicles of a kind have in common, and how MuJoCo builds them.
+    """Common properties of all vehicles of a kind, and their construction in MuJoCo.
 
     Attributes:
         observed_fields: Fields of a sample after the time.
@@ -31,9 +31,9 @@ class VehicleKind:
         limit_exceeded: Scalar function ``(time, values, reference, knots, follows_position) ->
             code`` of the first limit of `tiltsim.closed_loop.limits` that a sample exceeds;
             ``values`` begin with the observed fields.
-        metrics: ``(columns, scenario, follows_position) -> metrics``, without those of all kinds.
-            Columns have shape (..., N), the time (N,); numbers of the scenario may be arrays (...,
-            1); metrics have shape (...) and are NaN where a flight has none.
+        metrics: ``(columns, scenario, follows_position) -> metrics``, without the metrics that all
+            kinds share. Columns have shape (..., N), the time (N,); numbers of the scenario may be
+            arrays (..., 1); metrics have shape (...) and are NaN where a flight has none.
     """
 
     observed_fields: tuple[str, ...]

@@ -1,4 +1,4 @@
-"""Controllers that the command line names, with gains of their own."""
+"""Controllers that the command line names, with their gains."""
 
 from __future__ import annotations
 

@@ -20,8 +20,8 @@ CURVES: Final = {
 
 SETS: Final = {
     "all": "every attitude",
-    "great circle": "those with world up in a plane of the body (a great circle)",
-    "two directions": "those with world up along one line of the body (two directions)",
+    "great circle": "attitudes with world up in a plane of the body (a great circle)",
+    "two directions": "attitudes with world up along one line of the body (two directions)",
     "none": "none",
 }
 
@@ -89,7 +89,7 @@ def gait_text(report: dict[str, Any]) -> str:
     if "time" in report:
         rate = "jumps" if report["max_rate"] is None else f"{report['max_rate']:.6g} rad/s"
         rows += [
-            ("period", f"{report['period']:g} s; the values above are those at t = 0"),
+            ("period", f"{report['period']:g} s; the values above hold at t = 0"),
             ("maximum tilt angle", f"{report['amplitude']:.6g} rad"),
             ("maximum tilt rate", rate),
             ("minimum rank", str(report["min_rank"])),
@@ -163,7 +163,7 @@ def multirotor_text(report: dict[str, Any]) -> str:
 
 
 def _period_rows(report: dict[str, Any]) -> list[tuple[str, str]]:
-    """The worst of a moving gait, whose other values are those at time zero."""
+    """The worst instant of a moving gait; its other values are taken at time zero."""
     if "time" not in report:
         return []
     margin = number(report["min_singularity_margin"])

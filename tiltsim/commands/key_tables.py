@@ -27,7 +27,7 @@ class Step(NamedTuple):
 
     @property
     def written(self) -> str:
-        """As in the head of the table."""
+        """As written in the head of the table."""
         return f"{self.name}.your-name" if self.is_named else self.name
 
 
@@ -123,7 +123,7 @@ def _key(name: str, node: Node, required: bool) -> Key:
 def _example(node: Node) -> Any:
     """A value to show: as declared, or another than the default, or the default.
 
-    None for tables, whose keys have examples of their own.
+    None for tables, whose keys have examples.
     """
     default, choices = node.value.get("default"), node.choices
     if "examples" in node.value:

@@ -31,7 +31,7 @@ def run_multirotor(
 
     Args:
         address: The scenario that was given, if any.
-        scenario: The same, loaded; None with ``--mjcf``.
+        scenario: The loaded scenario; None with ``--mjcf``.
         options, figure, json: The options of `tiltsim gait`.
     """
     from tiltsim.models.rotor_table import Multirotor

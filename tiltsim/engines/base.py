@@ -1,8 +1,8 @@
 """Engines, which run the control step inside MuJoCo.
 
-The same scalar source runs either on Python floats (nothing to compile, best for one short flight)
-or as a native callback (`tiltsim.engines.native_engine`). MuJoCo's control callback is global to
-the process, so an engine checks that a model is ours before it writes to it.
+One scalar source runs on Python floats (nothing to compile, best for one short flight) or as a
+native callback (`tiltsim.engines.native_engine`). MuJoCo's control callback is global to the
+process, so an engine checks that a model is ours before it writes to it.
 """
 
 from __future__ import annotations

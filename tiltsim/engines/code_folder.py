@@ -8,7 +8,7 @@ from pathlib import Path
 
 
 def code_folder() -> Path:
-    """Where compiled code is kept: in the user's folder for caches."""
+    """The folder of compiled code, in the user's folder for caches."""
     base = Path(os.environ.get("XDG_CACHE_HOME", ""))
     if not base.is_absolute():  # to be ignored, as the specification of XDG_CACHE_HOME says
         base = Path.home() / ".cache"

@@ -15,7 +15,7 @@ from tiltsim.engines.code_folder import code_folder, is_usable
 from tiltsim_controllers.code.lanes import LaneMath
 
 OPTIMIZATION: Final = 1
-"""Of LLVM's levels 0 to 3; higher ones take longer to compile and run no faster."""
+"""LLVM's optimization level, 0 to 3; higher ones take longer to compile and run no faster."""
 
 _DIGEST: Final = sha256().digest_size
 
@@ -58,7 +58,7 @@ class MachineCode:
 
 @cache
 def _target() -> tuple[Any, Mapping[str, Any], str]:
-    """LLVM's target, the options of its code generator, and the name of what that generates."""
+    """LLVM's target, the options of its code generator, and a text that identifies both."""
     import llvmlite
     import llvmlite.binding as llvm
 
@@ -72,7 +72,7 @@ def _target() -> tuple[Any, Mapping[str, Any], str]:
 
 @cache
 def widest() -> int:
-    """How many numbers a vector register of this processor holds."""
+    """Number of floats in a vector register of this processor."""
     import llvmlite.binding as llvm
 
     has = llvm.get_host_cpu_features()

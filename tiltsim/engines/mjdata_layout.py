@@ -4,7 +4,7 @@ A C program reads ``d->qpos``; native code of ours has only the address ``d``. M
 for reading and writing the state (``mj_getState``) would copy all of it twice per call of the
 callback, which takes as long as a controller. So native code reads the fields in place. Their
 offsets depend on MuJoCo's version and are documented only in its C headers; here they are measured
-in the running library, as those at which a small model has the addresses and values that the
+in the running library: a small model has, at these offsets, the addresses and values that the
 Python bindings report.
 """
 

@@ -29,7 +29,7 @@ KEPT: Final = 64
 """Programs of each kind that are kept; each closed loop, gait type and decoupler has its own."""
 
 SIDES: Final = 17
-"""How many sign checks a loop may have."""
+"""Largest number of sign checks of a loop."""
 
 
 class RecorderHead(NamedTuple):

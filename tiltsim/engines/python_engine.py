@@ -43,7 +43,7 @@ def control_step(assembly: Assembly, user: list[float], name: str) -> Callable[.
     Args:
         assembly: The flight.
         user: Parameters and knots.
-        name: As for `LoopPrograms.in_mujoco`.
+        name: See `LoopPrograms.in_mujoco`.
     """
     loop = assembly.loop
     if assembly.traced:

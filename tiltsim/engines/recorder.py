@@ -48,9 +48,9 @@ def recorder_head(
 class Recorder:
     """Memory for the samples of one flight, to which native code writes.
 
-    The callback takes a sample before every so many steps, the first after a full interval. Once
-    there is no room for more, or a sample ends the flight, it returns NaN controls: MuJoCo warns of
-    them and a batch stops there.
+    The callback takes a sample before the step that ends an interval, the first after a full one.
+    Once there is no room for more, or a sample ends the flight, it returns NaN controls: MuJoCo
+    warns of them and a batch stops there.
 
     Args:
         assembly: The flight.
@@ -74,7 +74,7 @@ class Recorder:
     ) -> None:
         loop = assembly.loop
         width = len(loop.sample_fields)
-        # After the last row there is room for the number that tells whether it ends the flight.
+        # After the last row there is room for the number that shows whether it ends the flight.
         self._memory = np.zeros(HEAD_SIZE + SIDES + samples * width + 1)
         self.head = self._memory[: HEAD_SIZE + SIDES]
         self.rows = self._memory[HEAD_SIZE + SIDES : -1].reshape(samples, width)

@@ -33,7 +33,7 @@ _evaluated: Final[WeakKeyDictionary[Callable[..., Values], int]] = WeakKeyDictio
 
 
 def flights_in(time: Floats) -> int:
-    """How many flights, with the same times (s), follow one another in samples."""
+    """Number of flights, with equal times (s), that follow one another in samples."""
     return max(1, int(np.count_nonzero(time == time[:1])))
 
 
@@ -44,7 +44,7 @@ def evaluate_over_samples(
 
     Args:
         function: Scalar function ``(time, state, parameters, knots) -> values``.
-        width: How many values it returns.
+        width: Number of values that it returns.
         time: Times of the samples (N,), s.
         states: The fields of the samples that the function reads, shape (N, fields).
         setup: Parameters and knots; parameters may be arrays (N,), for samples of several flights.
@@ -64,7 +64,7 @@ def evaluate_over_samples(
 
 
 class Row(NamedTuple):
-    """A scalar function ``(time, state, parameters, knots) -> values``, and what it is traced with.
+    """A scalar function ``(time, state, parameters, knots) -> values`` and its tracing arguments.
 
     Attributes:
         function: The function.

@@ -28,7 +28,7 @@ class Layout(NamedTuple):
     """Flights with equal layouts can fly side by side.
 
     Attributes:
-        key: Of their programs.
+        key: Key of their programs.
         states: Number of states.
         solver: See `tiltsim.equations.solvers.SOLVERS`.
         held: Whether the controller is sampled and held.
@@ -58,7 +58,7 @@ class Integrated(NamedTuple):
     """A flight whose equations are integrated.
 
     Attributes:
-        layout: Of its programs.
+        layout: Layout of its programs.
         timestep: s.
         control_steps: Steps for which the inputs are held; 0: evaluated at every stage.
         user: Parameters and knots, see `tiltsim.closed_loop.loop.ControlSetup.userdata`.
@@ -88,7 +88,7 @@ class Stepper(Protocol):
         Args:
             step_index: Number of steps so far.
             now: State and inputs in force.
-            steps: How many steps to take.
+            steps: Number of steps to take.
         """
 
 
@@ -233,7 +233,7 @@ class LaneStepper:
         """Put a flight at its first step into a lane.
 
         Args:
-            lane: Which one.
+            lane: Number of the lane, from 0.
             flight: The flight.
             now: State and inputs in force.
             head: Head of its recorder; see `tiltsim.engines.recorder.recorder_head`.

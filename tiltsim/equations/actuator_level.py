@@ -91,10 +91,10 @@ class Motion(NamedTuple):
 
 
 class Attitude(NamedTuple):
-    """How a state represents the attitude, as functions of arrays.
+    """Representation of the attitude in a state, as functions of arrays.
 
     Attributes:
-        size: How many numbers it has.
+        size: Number of entries.
         rotation: ``(attitude)``: body to world, shape (3, 3).
         quaternion: ``(attitude)``: scalar first, shape (4,).
         rates: ``(attitude, omega)``: its time derivative at body rates (rad/s).
@@ -132,13 +132,13 @@ EULER: Final = Attitude(
 
 
 class StateLayout(NamedTuple):
-    """Where the parts of a motion lie at the head of a state."""
+    """Places of the parts of a motion at the head of a state."""
 
     sizes: tuple[tuple[str, int], ...]  # of the fields of `Motion`, in the order of the state
 
     @property
     def size(self) -> int:
-        """How many numbers the motion has."""
+        """Number of entries of the motion."""
         return sum(size for _, size in self.sizes)
 
     def split(self, state: Any) -> Motion:
@@ -173,7 +173,7 @@ class ActuatorPlant(NamedTuple):
     Its functions are traceable; ``mechanics`` is a `mechanics_record`.
 
     Attributes:
-        motion: How many numbers of the state come before the activations.
+        motion: Number of entries of the state before the activations.
         qpos, qvel: ``(state)``: MuJoCo's vectors.
         rates: ``(state, ctrl, loads, mechanics, disturbance)``: time derivative of the motion.
             ``loads`` are force (N) and torque (N m) on the body, body axes, and torques (N m) about
@@ -201,8 +201,8 @@ class PlantForm(NamedTuple):
     """The equations of a plant; all numbers of the vehicle are data.
 
     Attributes:
-        attitude: How the state represents the attitude.
-        layout: Where the parts of the motion lie.
+        attitude: Representation of the attitude in the state.
+        layout: Places of the parts of the motion.
         tilt_of_rotor, spins: See `tiltsim.closed_loop.loop.Dynamics`.
         vehicle: The type of the vehicle's parameters.
         gyroscopic: Factor of the gyroscopic torque: 0 or 1.

@@ -1,6 +1,6 @@
 """Fixed-step solvers for the equations of any closed loop: the thesis's ode3, RK4 and Euler.
 
-The same controller runs here and in MuJoCo: the difference between the plants is a result.
+One controller runs here and in MuJoCo: the difference between the plants is a result.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""How a flight ends."""
+"""Ends of flights."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ EndKind = Literal["completed", "diverged", "singular", "interrupted", "failed"]
 
 @dataclass(frozen=True)
 class End:
-    """How, when and why a flight ended."""
+    """Kind, time and cause of a flight's end."""
 
     kind: EndKind
     time: float  # s

@@ -52,7 +52,7 @@ def _overflow_ignored() -> np.errstate:
 
 @dataclass(frozen=True, repr=False)
 class Flight:
-    """The record of one flight; it pickles without its assembly, which is then built anew."""
+    """The record of one flight; it pickles without its assembly, which is then built again."""
 
     assembly: Assembly
     samples: Floats  # (N, len(assembly.loop.sample_fields))
@@ -71,7 +71,7 @@ class Flight:
         """A recorded flight of a scenario that is assembled here, without executing its code.
 
         Args:
-            scenario: what was flown
+            scenario: the scenario flown
             samples, end, engine, wall_time: fields of the flight
         """
         return cls(assemble(scenario, recorded=True), samples, end, engine, wall_time)
@@ -116,7 +116,7 @@ class Flight:
         return np.stack([self.columns[column] for column in columns], axis=-1)
 
     def __iter__(self) -> Iterator[str]:
-        """The names of the columns, as those of a dict of them."""
+        """The names of the columns, as in a dict."""
         return iter(self.units)
 
     def __contains__(self, name: object) -> bool:
@@ -163,7 +163,7 @@ class Flight:
         return public("video")(self, path, **options)
 
     def _repr_html_(self) -> str:
-        """How the flight ended and its metrics, as a table for notebooks."""
+        """The end of the flight and its metrics, as a table for notebooks."""
         scenario, end = self.scenario, self.end
         how = f"{end.kind} at {end.time:g} s" + (f": {end.cause}" if end.cause else "")
         size = f"{len(self)} samples of {len(self.units)} columns"
@@ -190,7 +190,7 @@ class Flight:
             for name, unit in self.units.items()
         ]
         schema = pa.schema(fields, metadata=self.origin())
-        # Of their bytes, as converting an array would import pandas where it is installed.
+        # From their bytes, as converting an array would import pandas where it is installed.
         memory = [pa.py_buffer(np.ascontiguousarray(column)) for column in self.columns.values()]
         columns = [pa.Array.from_buffers(pa.float64(), len(self), [None, one]) for one in memory]
         return pa.table(columns, schema=schema)

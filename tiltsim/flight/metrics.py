@@ -44,7 +44,7 @@ def compute_metrics(
     Args:
         columns: Columns of the flight by name, each of shape (N,).
         assembly: The assembly of the flight.
-        end: How it ended.
+        end: Its end.
         wall_time: Duration of the integration, s.
     """
     values = assembly.loop.kind.metrics(columns, assembly.scenario, assembly.follows_position)
@@ -53,7 +53,7 @@ def compute_metrics(
 
 
 def _metrics(own: dict[str, float], duration: float, end: End, wall_time: float) -> Metrics:
-    """Metrics of a kind of vehicle with those of all kinds, without those that have no value."""
+    """Metrics of a kind of vehicle and of all kinds, without metrics that have no value."""
     metrics: dict[str, float | bool] = own | {
         "diverged": end.kind in {"diverged", "singular", "failed"},
         "duration": duration,
@@ -72,10 +72,10 @@ def metrics_of_rows(
     """`compute_metrics` of flights of one closed loop, computed together.
 
     Args:
-        assemblies: Those of the flights, with the same knots.
-        numbers: Those of their parameters, shape (rows, numbers), as `flatten` has them.
-        samples: Of shape (rows, N, fields), at the same times.
-        end: How they ended.
+        assemblies: One per flight, with equal knots.
+        numbers: Numbers of their parameters, shape (rows, numbers), in the order of `flatten`.
+        samples: Shape (rows, N, fields), at equal times.
+        end: Their common end.
         wall_times: Durations of their integrations, s.
 
     Returns:

@@ -91,7 +91,7 @@ def _flight_file(given: str | PathLike[str]) -> Path:
     missing = "no flight.parquet in this folder" if is_folder(path) else "no such file"
     raise InputError(
         f"{path}: {missing}; give a folder that tiltsim run --out wrote, a flight.parquet or, to "
-        "tiltsim plot, what tiltsim sweep wrote"
+        "tiltsim plot, the output of tiltsim sweep"
     )
 
 

@@ -29,6 +29,6 @@ VECTORS: Final = {
 
 
 def components(name: str, columns: Iterable[str]) -> list[str]:
-    """Those of a flight's columns that make a vector, in its order; empty if there is none."""
+    """The columns of a flight that make a vector, in its order; empty if there are none."""
     present = {*columns}
     return [column for column in VECTORS.get(name, ()) if column in present]

@@ -42,8 +42,8 @@ def prepare_flight_folder(folder: Path, scenario: Scenario) -> None:
     """Create a folder for a flight of a scenario.
 
     Raises:
-        InputError: If that is impossible, or the flight would replace what is not a file, or what
-            tiltsim did not write.
+        InputError: If that is impossible, or the flight would replace a path that is no file or a
+            file that tiltsim did not write.
     """
     prepare_folder(folder)
     named = _named_files(scenario)
@@ -67,15 +67,15 @@ def write_flight(
     """Write a flight into a folder; each file appears whole or not at all.
 
     Args:
-        folder: Where to; created if missing.
+        folder: Folder to write to; created if missing.
         table: The columns, for flight.parquet.
-        metrics: For metrics.json.
+        metrics: Content of metrics.json.
         scenario: For scenario.toml, with all defaults filled in; the file of a user's controller is
             copied, and the tables of its reference and gait are written as reference.csv and
             gait.csv.
 
     Raises:
-        InputError: As `prepare_flight_folder`, or if a file cannot be written.
+        InputError: See `prepare_flight_folder`; or if a file cannot be written.
     """
     prepare_flight_folder(folder, scenario)
     files = {FLIGHT: parquet_bytes(table), METRICS: metrics_json(metrics).encode()}

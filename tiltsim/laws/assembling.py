@@ -51,13 +51,13 @@ LOOPS: Final[dict[str, ClosedLoop]] = {
 """Loops by their names; see `tiltsim.scenario.controller_table.ControllerTable.loop_name`."""
 
 MULTIROTOR_LOOPS: Final = {"attitude_force": loop_of_multirotor, "full_pose": full_pose_loop_of}
-"""Makers of those of multirotors, which depend on the vehicle's layout."""
+"""Makers of the loops of multirotors, which depend on the vehicle's layout."""
 
 MEASURED_LOOPS: Final = {
     "attitude_altitude": MEASURED_TILTROTOR,
     "gait_feedforward": MEASURED_GAIT_FEEDFORWARD,
 }
-"""Those that feed back the angular acceleration of the plant."""
+"""Loops that feed back the angular acceleration of the plant."""
 
 
 def _unchanged(loop: ClosedLoop) -> ClosedLoop:

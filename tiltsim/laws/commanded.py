@@ -68,7 +68,7 @@ def _parameters_of(layout: Layout, vehicle: type) -> Any:
 
 
 def commanded_parameters(parameters: Any) -> Any:
-    """The parameters of the vehicle under commands within those of its layers."""
+    """The parameters of the vehicle under commands, within the parameters of its layers."""
     inner = getattr(parameters, "inner", None)
     return parameters if inner is None else commanded_parameters(inner)
 
@@ -98,7 +98,7 @@ def _commanded_loop(
 
     Args:
         model, spins, tilt_of_rotor: See `Dynamics`.
-        layout: Of its numbers.
+        layout: Layout of its numbers.
         kind: Its kind, whose samples may have tilts that are idle.
         vehicle: The type of its parameters.
         singularity: Columns of the margin.
@@ -164,7 +164,7 @@ def _upright(samples: Mapping[str, Floats], _vehicle: Vehicle) -> dict[str, Floa
 
 
 TILTROTOR: Final = _commanded_loop("tiltrotor", CROSS, ROTORCRAFT, Vehicle, singularity_columns)
-"""The tiltrotor under commands; those of its servos are part of a sample."""
+"""The tiltrotor under commands; commands of its servos are part of a sample."""
 
 QUADROTOR: Final = _commanded_loop(
     "quadrotor", CROSS._replace(tilts=0), ROTORCRAFT, Vehicle, _upright
@@ -177,7 +177,7 @@ COMMANDED_LOOPS: Final[dict[str, ClosedLoop]] = {"tiltrotor": TILTROTOR, "quadro
 OTHER_LAYOUT_LOOPS: Final = {
     model: replace(loop, kind=OTHER_LAYOUT) for model, loop in COMMANDED_LOOPS.items()
 }
-"""Those of a user's vehicle with another layout."""
+"""Loops of a user's vehicle with another layout."""
 
 
 @cache

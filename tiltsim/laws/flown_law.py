@@ -1,4 +1,4 @@
-"""Laws of scenarios: built-in ones, and those of packages and users, checked before flights."""
+"""Laws of scenarios, built-in, from packages or from users, checked before flights."""
 
 from __future__ import annotations
 
@@ -98,7 +98,7 @@ def _own_table(
 
 
 def recorded_law_of(plan: FlightPlan) -> FlownLaw:
-    """As `law_of`, for a recorded flight: no code that its scenario names is executed."""
+    """`law_of` for a recorded flight: no code that its scenario names is executed."""
     table = plan.scenario.controller
     if not isinstance(table, NumpyController):
         return law_of(plan)
@@ -113,7 +113,7 @@ def loop_of_law(scenario: Scenario, *, recorded: bool = False) -> ClosedLoop:
     Warns of a law of a package or user that cannot be traced: it flies as plain Python.
 
     Raises:
-        InputError: For such a law that does not return what it should.
+        InputError: If such a law returns an invalid value.
     """
     plan, name = plan_flight(scenario), scenario.address or "scenario"
     find, controller = (recorded_law_of if recorded else law_of), scenario.controller

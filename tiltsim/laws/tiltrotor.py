@@ -59,7 +59,7 @@ def tiltrotor_motion(
     """The thesis's equations.
 
     Args:
-        state, tilts, inputs, parameters, knots, disturbance: As of `RotorLaw.motion`.
+        state, tilts, inputs, parameters, knots, disturbance: See `RotorLaw.motion`.
     """
     return equations_of_motion(state, tilts, four(inputs, 0), parameters.law.vehicle, disturbance)
 
@@ -120,7 +120,7 @@ def tiltrotor_loops(law: RotorLaw) -> tuple[ClosedLoop, ClosedLoop]:
     The second feeds back the angular acceleration of the plant in place of the model's.
 
     Args:
-        law: As `tiltsim.laws.tracking` takes it, without margins and motion.
+        law: The law for `tiltsim.laws.tracking`, without margins and motion.
     """
     own = law._replace(margins=singularity_margins, motion=tiltrotor_motion)
 

@@ -103,7 +103,7 @@ def _references_of(
     first = layout.places.speed_1 + rotors
     state_in, rates_of_sample = entries_of(0, first), entries_of(first, tilts)
     states_of_sample = entries_of(first + tilts, states)
-    tracked_in = entries_of(rotors + states, 3 + further)  # roll, pitch, yaw and what follows
+    tracked_in = entries_of(rotors + states, 3 + further)  # roll, pitch, yaw and all that follows
 
     @scalar
     def references(

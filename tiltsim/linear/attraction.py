@@ -1,4 +1,4 @@
-"""From how far a flight comes back: a map over two numbers of its initial state."""
+"""The region of attraction of a flight: a map over two numbers of its initial state."""
 
 from __future__ import annotations
 
@@ -45,17 +45,17 @@ INSTANTS: Final = 24  # of a moving gait
 
 @dataclass(frozen=True, eq=False)
 class Attraction:
-    """Which initial states come back.
+    """A map of the initial states that come back.
 
     Attributes:
         scenario: The scenario.
         axes: Names of the two initial quantities.
-        edges: Of the cells along each axis, shape (cells + 1,) each.
-        returned: Whether flights from the corners of the cells come back, shape (cells + 1,
-            cells + 1): by the second, then by the first axis. Those that were not flown lie in
-            cells whose corners agree.
-        flights: How many were flown, but for the undisturbed one.
-        engine: Which flew them.
+        edges: Cell edges along each axis, SI units, shape (cells + 1,) each.
+        returned: Whether flights from the corners of the cells come back, shape (cells + 1, cells +
+            1): by the second, then by the first axis. Corners that were not flown lie in cells
+            whose corners agree.
+        flights: Number of flights, without the undisturbed one.
+        engine: Engine that flew them.
         slowest: The slowest mode of the linear analysis, if there is one.
         acceptable: Whether the attitudes at the corners are on the side of level attitude of the
             gait's singular attitudes, at all times; None unless the axes are roll and pitch of a
@@ -73,21 +73,21 @@ class Attraction:
 
     @property
     def share(self) -> Floats:
-        """Of the corners of each cell that come back, shape (cells, cells)."""
+        """Share of the corners of each cell that come back, shape (cells, cells)."""
         back = self.returned.astype(float)
         share: Floats = 0.25 * (back[1:, 1:] + back[:-1, 1:] + back[1:, :-1] + back[:-1, :-1])
         return share
 
     @property
     def _areas(self) -> Floats:
-        """What the corners stand for of the map's area."""
+        """Share of the map's area that each corner represents, shape (cells + 1, cells + 1)."""
         sides = np.ones(len(self.returned))
         sides[[0, -1]] = 0.5
         areas: Floats = np.outer(sides, sides) / (len(sides) - 1) ** 2
         return areas
 
     def report(self) -> dict[str, Any]:
-        """As JSON: shares of the map's area."""
+        """Entries of the JSON report: shares of the map's area."""
         report: dict[str, Any] = {
             "scenario": self.scenario.address,
             "axes": list(self.axes),
@@ -121,7 +121,7 @@ def attraction(
     refinements: int = REFINEMENTS,
     progress: Callable[[int, int], None] = lambda _flights, _expected: None,
 ) -> Attraction:
-    """Which initial states come back to a flight.
+    """Map the initial states that come back to a flight.
 
     Flights start on a grid; cells whose corners differ are divided into four, and so on. A flight
     comes back if it completes its duration and in its last second has attitude and position of the
@@ -130,9 +130,10 @@ def attraction(
     Args:
         scenario: Anything that `tiltsim.load_scenario` takes, of a rotorcraft.
         axes: Two of x, y, z, vx, vy, vz, roll, pitch, yaw, p, q, r.
-        ranges: Of each axis, SI units; default: 1.5 rad, 5 m, 5 m/s and 10 rad/s either way.
+        ranges: Lowest and highest value on each axis, SI units; default: 1.5 rad, 5 m, 5 m/s and 10
+            rad/s either way.
         coarse: Cells across, before they are divided.
-        refinements: How often cells at the boundary are divided.
+        refinements: Number of times that cells at the boundary are divided.
         progress: Called with the number of flights so far, and with how many there will be, an
             estimate until the last division.
 
@@ -216,8 +217,8 @@ def _corners(i: int, j: int, width: int) -> tuple[tuple[int, int], ...]:
 
 
 def _expected(following: int, width: int) -> int:
-    """How many flights come after a level whose cells have a width, a boundary being a line."""
-    return following * (width - 1)  # each level has twice as many as the one before
+    """Expected number of flights after a level of cells of a width, as a boundary is a line."""
+    return following * (width - 1)  # each level doubles the number of cells at the boundary
 
 
 class _Grid:
@@ -248,7 +249,8 @@ class _Grid:
 
         Args:
             points: Indices of edges.
-            width: Of the cells whose corners they are; all but the first are at the boundary.
+            width: Width of the cells whose corners they are; all cells but the first are at the
+                boundary.
         """
         new = sorted(points - self.returned.keys())
         undisturbed = [self._scenario] if self._goal is None else []

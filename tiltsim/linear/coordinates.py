@@ -20,7 +20,7 @@ QUATERNION: Final = 4
 
 
 class Coordinates(NamedTuple):
-    """How minimal coordinates describe the states near a given one.
+    """Minimal coordinates of the states near a given one.
 
     A state is a vector of numbers in which a rotation from body to world, if there is one, takes
     nine entries (rows first) or four (a quaternion). Its coordinates relative to another state are

@@ -28,7 +28,7 @@ class Stencil(NamedTuple):
     weights: tuple[float, ...]  # of differences: the derivative
     odd: tuple[float, ...]  # of differences, and of sums: these vanish for smooth functions
     even: tuple[float, ...]
-    smooth: float  # share of what a step changes at most up to which they count as vanished
+    smooth: float  # they vanish up to this share of the largest change by a step
 
 
 HALF_STENCIL: Final = Stencil(
@@ -37,14 +37,16 @@ HALF_STENCIL: Final = Stencil(
 """Sixth order; its fifth and sixth differences vanish."""
 
 ERROR: Final = 2e-11
-"""Of derivatives by it, as a share of the largest of their row; measured against symbolic ones."""
+"""Error of `HALF_STENCIL` as a share of the largest entry of a row, against symbolic
+derivatives."""
 
 AVERAGED: Final = HALF_STENCIL._replace(smooth=0.1)
 """For flights over a period: an event within it that passes from one time step to the next is a
 small corner, which the stencil averages out."""
 
 CENTRAL: Final = Stencil((0.02,), (25.0,), (0.0,), (1.0,), AVERAGED.smooth)
-"""The same with a third of the evaluations, for long flights: second order at a step of 1e-4."""
+"""Central differences, a third of the evaluations, for long flights: second order at a step of
+1e-4."""
 
 SHORTER: Final = (1.0, 0.1, 0.01, 1e-3, 1e-4)
 """Shares of a step that are tried until the function is smooth within it."""
@@ -84,8 +86,8 @@ def jacobian(
     """Derivative at zero of a function of a vector.
 
     Args:
-        function: Of several vectors as long as ``steps``, each on its own: their values in turn.
-        steps: By which each entry is moved.
+        function: Maps several vectors, each as long as ``steps``, to their values, one by one.
+        steps: Step of each entry, shape (entries,).
         stencil: `HALF_STENCIL`, `AVERAGED` or `CENTRAL`.
     """
     offsets = [sign * offset for offset in stencil.offsets for sign in (1.0, -1.0)]

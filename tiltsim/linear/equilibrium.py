@@ -37,7 +37,7 @@ SETTLED: Final = 1e-9
 """Change over a period below which more of them gain nothing: the derivative is the orbit's."""
 
 MOST_STEPS: Final = 200_000
-"""Of an orbit: some 250 flights over it take a quarter of an hour with compiled steps."""
+"""Longest orbit: some 250 flights over it take a quarter of an hour with compiled steps."""
 
 FLIGHTS: Final = 150  # over a period, that an orbit takes to find
 
@@ -48,11 +48,11 @@ class Equilibrium:
 
     Attributes:
         motion: The closed loop on its plant.
-        forcing: What drives it.
-        root: The state at ``step``, what is left of its rates or of its change over ``steps``, and
-            their derivative.
+        forcing: Its dependence on time.
+        root: The state at ``step``, the residual of its rates or of its change over ``steps``, and
+            the derivative of the residual.
         step: The physics step at which it is considered.
-        steps: After which it returns; 0 where it rests in continuous time.
+        steps: Physics steps after which it returns; 0 where it rests in continuous time.
         left_out: Names of coordinates that nothing holds and that no other depends on: they move
             on while the others rest.
     """
@@ -82,9 +82,9 @@ class Equilibrium:
 
     @cached_property
     def kept(self) -> Any:
-        """Indices of the coordinates but those left out and those that nothing depends on.
+        """Indices of the coordinates that are not left out and that something depends on.
 
-        Such are integrals without a gain; a position counts, though, even if no law follows it.
+        An integral without a gain is dropped; a position is kept even if no law follows it.
         """
         names, derivative = self.motion.coordinates.names, self.root.derivative
         used = [name in "xyz" or column.any() for name, column in zip(names, derivative.T)]
@@ -109,7 +109,7 @@ class Equilibrium:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of the coordinates kept."""
+        """Names of the coordinates kept."""
         return tuple(self.motion.coordinates.names[index] for index in self.kept)
 
     @property
@@ -131,9 +131,10 @@ def equilibrium_of(
 
     Args:
         scenario: The scenario.
-        at_rest: Demands a rest point.
-        late: Has the controller as it flies with a latency; see `tiltsim.linear.motion.Motion`.
-        near: A state near the orbit, such as one of a neighbouring scenario's; tried first.
+        at_rest: Whether it must be a rest point.
+        late: Whether the controller is taken as it flies with a latency; see
+            `tiltsim.linear.motion.Motion`.
+        near: A state near the orbit, such as the result of a neighboring scenario; tried first.
         progress: Called with the number of periods or samples flown so far.
 
     Raises:
@@ -145,7 +146,7 @@ def equilibrium_of(
             raise InputError(
                 f"{scenario.address or 'scenario'}: moves with a period of {forcing.period:g} s; "
                 "a linear system needs a fixed gait and a set point or a line (tiltsim.stability "
-                "takes periodic flights, too)"
+                "also takes periodic flights)"
             )
         scenario = _in_whole_steps(scenario, forcing.period)
     simulation = scenario.simulation
@@ -173,7 +174,7 @@ def equilibrium_of(
 
 
 def _engine(scenario: Scenario, steps: int) -> EngineName:
-    """The engine for so many steps."""
+    """The engine for this number of steps."""
     engine = scenario.simulation.engine
     if engine == "python" or engine == "native":
         return engine
@@ -198,9 +199,9 @@ class _Search:
     """The search for a state that returns.
 
     Args:
-        motion, forcing, step, steps: As in `Equilibrium`.
-        returns: How often the flight may return until it has settled.
-        progress: As in `equilibrium_of`.
+        motion, forcing, step, steps: See `Equilibrium`.
+        returns: Largest number of returns until the flight has settled.
+        progress: See `equilibrium_of`.
     """
 
     def __init__(
@@ -301,7 +302,7 @@ class _Search:
         return after
 
     def _frame(self, start: float, end: float) -> Floats:
-        """How the moving frame moves from one time (s) to another."""
+        """Motion of the moving frame from one time (s) to another."""
         return self._forcing.motion(self._motion.coordinates.names, start, end)
 
     def _back(self, state: Floats, time: float) -> Floats:

@@ -1,4 +1,4 @@
-"""Where flights from many initial states end."""
+"""Final states of flights from many initial states."""
 
 from __future__ import annotations
 

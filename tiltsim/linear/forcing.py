@@ -1,4 +1,4 @@
-"""What drives a closed loop from outside: whether it is steady, periodic or neither."""
+"""The inputs from outside a closed loop: whether they are steady, periodic or neither."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from tiltsim_controllers.references.trajectories import (
 )
 
 MOST_PERIODS: Final = 1000
-"""Of a gait or reference in their common period."""
+"""Most periods of a gait or reference in their common period."""
 
 CONTROLLER_EVENTS: Final = ("turn_time", "failure_known_from")
 """Keys of controllers: times (s) until which they change."""
@@ -36,11 +36,11 @@ class Forcing(NamedTuple):
     """The dependence of a closed loop on time.
 
     Attributes:
-        period: s; None where nothing but the motion of the frame depends on time.
-        velocity, acceleration: Of a frame in which the reference repeats, at time zero, m/s and
-            m/s^2, world axes.
-        start: Time (s) after which it is so: faults have happened and are known, gusts have passed,
-            the attitude that a controller is given is reached.
+        period: s; None if only the motion of the frame depends on time.
+        velocity, acceleration: Motion of a frame in which the reference repeats, at time zero, m/s
+        and m/s^2, world axes.
+        start: Time (s) from which this holds: faults have happened and are known, gusts have
+            passed, the commanded attitude is reached.
     """
 
     period: float | None
@@ -49,7 +49,7 @@ class Forcing(NamedTuple):
     start: float
 
     def motion(self, names: Sequence[str], start: float, end: float) -> Floats:
-        """How the frame moves from one time (s) to another, in coordinates of these names."""
+        """Motion of the frame from one time (s) to another, in coordinates of these names."""
         after, moved = end - start, dict.fromkeys(names, 0.0)
         for axis, velocity, acceleration in zip("xyz", self.velocity, self.acceleration):
             if axis in moved:

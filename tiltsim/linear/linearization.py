@@ -42,18 +42,18 @@ class Linearization:
     """A scenario at its rest point as a linear system ``x' = A x + B u``, ``y = C x + D u``.
 
     States, inputs and outputs are deviations from the rest point. A rotation has three states, the
-    vector of a small turn in body axes. The inputs are added to what the controller asks of the
-    vehicle, so ``u = feedback x + disturbance`` closes the loop. Of a sampled controller it is the
+    vector of a small turn in body axes. The inputs are added to the controller's commands to the
+    vehicle, so ``u = feedback x + disturbance`` closes the loop. For a sampled controller it is the
     system from one sample to the next, ``x[k+1] = A x[k] + B u[k]``.
 
     Attributes:
-        A: Of the closed loop, shape (states, states), or of the vehicle alone.
+        A: Dynamics of the closed loop, or of the vehicle alone, shape (states, states).
         B: Shape (states, inputs).
         C: Shape (outputs, states).
         D: Shape (outputs, inputs).
         feedback: The controller, shape (inputs, states): commands of the vehicle's inputs.
         states, inputs, outputs: Their names and units.
-        timestep: Of the sampled system, s; None in continuous time.
+        timestep: Sample time, s; None in continuous time.
         state: The states at rest by name: the turn of a rotation is from level attitude.
         command: The inputs at rest by name.
         loop: ``"closed"`` or ``"open"``.

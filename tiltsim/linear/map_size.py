@@ -8,4 +8,4 @@ COARSE: Final = 12
 """Cells across, before they are divided."""
 
 REFINEMENTS: Final = 3
-"""How often cells at the boundary are divided."""
+"""Number of times that cells at the boundary are divided."""

@@ -44,10 +44,10 @@ MEASURED: Final = (
 TOGETHER: Final = "all inputs"
 PER_DECADE: Final = 100  # frequencies
 DECADES_BEYOND: Final = 1.0  # of the slowest and of the fastest pole
-GROWTH: Final = 1e-4  # rad/s; slower growth is that of a multiple pole at zero, by rounding
+GROWTH: Final = 1e-4  # rad/s; slower growth is the rounding of a multiple pole at zero
 NEGLIGIBLE: Final = 1e-6  # a loop's transfer below this is rounding, one above its inverse a pole
 BISECTIONS: Final = 48
-REFINED: Final = np.linspace(-1.0, 1.0, 21)  # frequencies about a peak between those of the grid
+REFINED: Final = np.linspace(-1.0, 1.0, 21)  # frequencies about a peak, between two of the grid
 REFINEMENTS: Final = 5  # each ten times finer
 NEAR_WORST: Final = 0.9  # of the largest value, smaller peaks are not refined
 REGULAR: Final = 1e12  # condition of a matrix whose inverse is more than rounding
@@ -55,7 +55,7 @@ REGULAR: Final = 1e12  # condition of a matrix whose inverse is more than roundi
 
 @dataclass(frozen=True)
 class Margin:
-    """What a loop bears, broken at one place.
+    """Stability margins of a loop broken at one place.
 
     Attributes:
         place: An input, a measured state, or all inputs together.
@@ -63,7 +63,7 @@ class Margin:
             limit.
         phase: Smallest lag or lead at which it becomes unstable, rad; infinite if none does.
         delay: Smallest further delay at which it becomes unstable, s.
-        frequency: Where the smallest phase margin is, rad/s; nan if there is none.
+        frequency: Frequency of the smallest phase margin, rad/s; nan if there is none.
         disk: Largest alpha of the disk of factors ``(1 + alpha d / 2) / (1 - alpha d / 2)``, any
             complex ``|d| < 1``; 2 and more: any phase. At all inputs together d is any matrix
             smaller than 1, so the disk holds for independent factors, which may bear more.
@@ -88,7 +88,7 @@ class Margin:
         return 2.0 * atan(min(1.0, 0.5 * self.disk))
 
     def report(self) -> dict[str, Any]:
-        """As JSON; null stands for no limit."""
+        """Entries of the JSON report; null stands for no limit."""
         low, high = self.gain
         numbers = {
             "gain_low": low or None,
@@ -178,7 +178,7 @@ def margins(scenario: Scenario | str | PathLike[str] | Mapping[str, Any]) -> lis
 def loop_for_margins(scenario: Scenario) -> Linearization:
     """The closed loop at rest, broken where a latency acts, at the commands to the vehicle.
 
-    What the controller does against a latency, such as a model of its rotors, is part of it.
+    Measures of the controller against a latency, such as a model of its rotors, are part of it.
     """
     return linearization_at(equilibrium_of(scenario, at_rest=True, late=True))
 
@@ -235,7 +235,7 @@ def _largest(function: Callable[[Floats], Floats], grid: Floats) -> float:
 def _between_gains(
     between: tuple[float, float], crossings: Iterable[complex]
 ) -> tuple[float, float]:
-    """Factors of the gain nearest to one, of those given and those that take a crossing to -1."""
+    """Gain factors nearest to one, from ``between`` and from the crossings taken to -1."""
     low, high = between
     for value in crossings:
         if -1.0 / NEGLIGIBLE < value.real < -NEGLIGIBLE:

@@ -50,7 +50,7 @@ class Mode:
         frequency: Magnitude of the pole, rad/s.
         damping: Ratio, 1 for a stable real pole, negative where it grows.
         states: Names, the largest part first.
-        count: How many poles, a pair counted as two.
+        count: Number of poles, a pair counted as two.
     """
 
     name: str
@@ -65,7 +65,7 @@ class Mode:
         return -self.damping * self.frequency
 
     def report(self) -> dict[str, Any]:
-        """As JSON."""
+        """Entries of the JSON report."""
         return {**vars(self), "states": list(self.states)}
 
 
@@ -78,7 +78,8 @@ def spectrum(matrix: Floats, error: float) -> tuple[Any, Any, Any]:
 
     Args:
         matrix: Shape (n, n).
-        error: Of its entries, as a share of the largest of their row; 0 to keep all eigenvalues.
+        error: Error of its entries, as a share of the largest of their row; 0 to keep all
+            eigenvalues.
     """
     values, vectors = np.linalg.eig(matrix)
     values, left = values.astype(complex), np.linalg.pinv(vectors)
@@ -88,7 +89,7 @@ def spectrum(matrix: Floats, error: float) -> tuple[Any, Any, Any]:
     apart, sizes = np.abs(values[:, None] - values), np.abs(values)
     near = EQUAL * np.minimum(sizes[:, None], sizes)
     together = apart <= np.minimum(unsure[:, None] + unsure, near)
-    for _ in range(len(values)):  # of chains, too
+    for _ in range(len(values)):  # chains as well
         together = together @ together
     return (together @ values) / together.sum(axis=1), vectors, left
 
@@ -108,8 +109,8 @@ def exponents(eigenvalues: Floats, timestep: float | None) -> Floats:
 def is_stable(matrix: Floats, poles: Floats, timestep: float | None) -> bool:
     """Whether small disturbances die out, but for states that stay where they are put.
 
-    All poles have a negative real part but those at zero, which have an eigenvector each, so that
-    the states along them do not grow. An undamped swing is not stable: it never dies out.
+    All poles have a negative real part or are zero; each pole at zero has an eigenvector, so that
+    the states along it do not grow. An undamped swing is not stable: it never dies out.
     """
     neutral = np.abs(poles) <= NEUTRAL
     if (poles.real[~neutral] >= -NEUTRAL).any():
@@ -125,13 +126,13 @@ def is_stable(matrix: Floats, poles: Floats, timestep: float | None) -> bool:
 def modes_of(
     matrix: Floats, names: Sequence[str], timestep: float | None, error: float = 0.0
 ) -> tuple[Mode, ...]:
-    """The modes of a system: those that grow fastest or decay slowest first.
+    """The modes of a system, sorted from fastest growth to fastest decay.
 
     Args:
-        matrix: Of the system.
-        names: Of its states.
+        matrix: The system matrix, shape (n, n).
+        names: Names of its states.
         timestep: s; None in continuous time.
-        error: As in `spectrum`.
+        error: See `spectrum`.
     """
     eigenvalues, vectors, left = spectrum(matrix, error)
     poles = exponents(eigenvalues, timestep)

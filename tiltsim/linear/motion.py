@@ -48,19 +48,20 @@ class Motion(ABC):
     """A closed loop on its plant.
 
     Attributes:
-        assembly: The flight; its controller adds the offsets to what it asks of the vehicle.
-        coordinates: Of its state.
+        assembly: The flight; its controller adds the offsets to its commands to the vehicle.
+        coordinates: Coordinates of its state.
         inputs: Names of the vehicle's inputs.
-        offsets: Added to the inputs; zero unless they are varied.
+        offsets: Offsets of the inputs, shape (inputs,); zero unless they are varied.
 
     Args:
-        scenario, engine: To fly, and how.
-        late: Has the controller as it flies with a latency, though there may be none.
+        scenario: The scenario to fly.
+        engine: The engine that flies it.
+        late: Whether the controller is taken as it flies with a latency, though there may be none.
     """
 
     def __init__(self, scenario: Scenario, engine: EngineName | None, late: bool = False) -> None:
         self.scenario, self.engine, self._late = scenario, engine, late
-        self._asked: Values = ()
+        self._commanded: Values = ()
         self._inputs: tuple[Input, ...] = ()
         self.offsets = np.zeros(0)
         self.assembly = assemble(scenario, self._adapted)
@@ -69,7 +70,7 @@ class Motion(ABC):
         self.offsets = np.zeros(len(self._inputs))
 
     def _as_flown(self, loop: ClosedLoop) -> ClosedLoop:
-        """A controller without layers, or what replaces it with a latency."""
+        """A controller without layers, or its replacement for a flight with a latency."""
         return loop.with_latency() if self._late and loop.with_latency else loop
 
     def _adapted(self, loop: ClosedLoop) -> ClosedLoop:
@@ -86,11 +87,11 @@ class Motion(ABC):
         return replace(loop, sampling=sampling, equations=equations, traced=False)
 
     def _with_offsets(self, function: Callable[..., Values]) -> Callable[..., Values]:
-        """A control step that adds the offsets and remembers what was asked for without them."""
+        """A control step that adds the offsets and remembers the commands without them."""
 
         def step(*args: Any) -> Values:
-            self._asked = function(*args)
-            values = list(self._asked)
+            self._commanded = function(*args)
+            values = list(self._commanded)
             for each, offset in zip(self._inputs, self.offsets.tolist(), strict=True):
                 values[each.place] += offset * each.per_unit
             return tuple(values)
@@ -98,9 +99,9 @@ class Motion(ABC):
         return step
 
     def commanded(self, time: float, state: Floats) -> Floats:
-        """The inputs that the controller asks for, shape (inputs,)."""
+        """The inputs that the controller commands, shape (inputs,)."""
         self.observed(time, state)
-        return np.array([self._asked[each.place] / each.per_unit for each in self._inputs])
+        return np.array([self._commanded[each.place] / each.per_unit for each in self._inputs])
 
     @abstractmethod
     def _names(self) -> tuple[Coordinates, tuple[Input, ...]]:
@@ -124,7 +125,7 @@ class Motion(ABC):
         """The state some physics steps after a step."""
 
     def flown_each(self, step: int, states: Sequence[Floats], steps: int) -> Iterator[Floats]:
-        """Of several states each some physics steps after a step; NaN where the flight is lost.
+        """The states ``steps`` physics steps after ``step``; NaN where a flight is lost.
 
         Long native flights are flown on all cores.
         """
@@ -141,7 +142,7 @@ class Motion(ABC):
 
     @abstractmethod
     def _together(self, step: int, states: Sequence[Floats], steps: int) -> list[Floats]:
-        """As `flown_each`, natively and on all cores."""
+        """`flown_each`, natively and on all cores."""
 
     @abstractmethod
     def observed(self, time: float, state: Floats) -> Floats:
@@ -275,12 +276,12 @@ class MujocoMotion(Motion):
         plant = self._varied if self.offsets.any() else self._plant
         plant.state = self._whole_at(step, state)
         plant.advance(steps)
-        if plant.fault():  # MuJoCo has begun anew
+        if plant.fault():  # MuJoCo has reset the state
             return np.full(len(state), np.nan)
         return plant.state[self._part]
 
     def _whole_at(self, step: int, state: Floats) -> Floats:
-        """An integration state after so many steps."""
+        """An integration state after ``step`` physics steps."""
         whole = self._whole.copy()
         whole[self._part] = state
         header = whole[self._varied.header_offset :][:HEADER_SIZE]

@@ -54,10 +54,10 @@ def is_of_vehicle(state: str) -> bool:
 
 
 def activation_names(loop: ClosedLoop) -> tuple[str, ...]:
-    """Rotor speeds, the controller's own states, and those of the layers, as in `act`.
+    """Rotor speeds, states of the controller, and states of the layers, as in `act`.
 
-    A layer of actuators has the speeds that it asks of the rotors, and the commands under way, the
-    newest first: ``_late_1`` arrives last.
+    A layer of actuators has the speeds that it commands, and the commands under way, the newest
+    first: ``_late_1`` arrives last.
     """
     inner = loop
     while inner.within is not None:
@@ -81,7 +81,7 @@ def activation_names(loop: ClosedLoop) -> tuple[str, ...]:
 
 
 def mujoco_coordinates(loop: ClosedLoop) -> Coordinates:
-    """Those of `qpos`, `qvel` and `act`."""
+    """Coordinates of `qpos`, `qvel` and `act`."""
     sizes = loop.dynamics.sizes
     if loop.dynamics.model == "tilt_car":
         names = ("x", "y", "yaw", "alpha", "vx", "vy", "r", "alpha_rate")
@@ -93,7 +93,7 @@ def mujoco_coordinates(loop: ClosedLoop) -> Coordinates:
 
 
 def equation_coordinates(assembly: Assembly, size: int) -> Coordinates:
-    """Those of a state of the equations with so many numbers; a rigid body has MuJoCo's."""
+    """Coordinates of a state of the equations of this size; a rigid body has MuJoCo's."""
     loop, model = assembly.loop, assembly.scenario.vehicle.model
     if assembly.scenario.simulation.plant == "rigid_body":
         return mujoco_coordinates(loop)
@@ -150,7 +150,7 @@ def control_inputs(assembly: Assembly) -> tuple[Input, ...]:
 
 
 def equation_inputs(assembly: Assembly, size: int) -> tuple[Input, ...]:
-    """Inputs of the vehicle among those of the equations, of which there are so many."""
+    """Inputs of the vehicle among the ``size`` inputs of the equations."""
     loop, model = assembly.loop, assembly.scenario.vehicle.model
     if model != "tilt_car" and loop.within is not None:
         return control_inputs(assembly)
@@ -161,7 +161,7 @@ def equation_inputs(assembly: Assembly, size: int) -> tuple[Input, ...]:
         if size > len(names):
             names = (*numbered(ROTOR_INPUT, 2), "alpha_rate")
     else:
-        # Of the further inputs, those that integrate to commands of tilts turn the arms.
+        # Further inputs turn the arms if they integrate to commands of tilts.
         commands = (f for f in loop.columns.fields if f.startswith("tilt_command"))
         rates = (command.replace("tilt_command", "alpha_rate") for command in commands)
         names = (*numbered(ROTOR_INPUT, len(loop.dynamics.spins)), *rates)

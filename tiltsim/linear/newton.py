@@ -47,10 +47,10 @@ def derivative_at(
     """Derivative of a function of the state by its coordinates.
 
     Args:
-        function: Of a state.
-        coordinates: Of the state.
-        state: Where.
-        stencil: Of the differences.
+        function: Function of a state.
+        coordinates: Coordinates of the state.
+        state: State at which the derivative is taken.
+        stencil: Stencil of the differences.
     """
     return _derivative_of_each(
         lambda states: [function(each) for each in states], coordinates, state, stencil
@@ -60,7 +60,7 @@ def derivative_at(
 def _derivative_of_each(
     function: OfEach, coordinates: Coordinates, state: Floats, stencil: Stencil
 ) -> Derivative:
-    """As `derivative_at`, of a function of several states."""
+    """`derivative_at` for a function of several states."""
     steps = coordinate_steps(coordinates, state)
     return jacobian(
         lambda moved: function([coordinates.moved(state, by) for by in moved]), steps, stencil
@@ -91,17 +91,17 @@ def solve(
 ) -> Root:
     """A state near another at which a function of it vanishes, or nearly so.
 
-    Steps are those of least norm, so that states along which nothing changes stay as they are, and
-    are halved until the value shrinks. Ends where it is below the tolerance or shrinks no more. The
-    derivative is computed anew only where that pays off.
+    Steps have the least norm, so that states along which nothing changes stay as they are, and are
+    halved until the value shrinks. Ends where it is below the tolerance or shrinks no more. The
+    derivative is only updated where that pays off.
 
     Args:
-        function: Of several states, each on its own: of each as many values as coordinates, NaN
+        function: Maps several states to their values, one by one: one value per coordinate, NaN
             where it is not defined.
-        coordinates: Of the state.
+        coordinates: Coordinates of the state.
         state: Where to begin.
-        tolerance: Of the largest entry of the value.
-        stencil: Of the differences.
+        tolerance: Bound of the largest entry of the value.
+        stencil: Stencil of the differences.
     """
 
     def derivative_here() -> Derivative:

@@ -1,4 +1,4 @@
-"""How long a flight has to be, so that its slowest mode decays."""
+"""The duration of a flight in which its slowest mode decays."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tiltsim.linear.stability import stability
 from tiltsim.scenario.scenario import Scenario
 
 MOST_STEPS: Final = 5_000
-"""Of an orbit that is sought for its modes alone: some seconds of compiled steps."""
+"""Longest orbit that is sought for its modes alone: some seconds of compiled steps."""
 
 
 class SlowestMode(NamedTuple):
@@ -59,8 +59,8 @@ def advice_on_duration(slowest: SlowestMode, duration: float, near: float, mean:
 
     Args:
         slowest: Its slowest mode.
-        duration: Of the flight, s.
-        near: What may be left of a disturbance of 1 m or rad.
+        duration: Duration of the flight, s.
+        near: Admissible remainder of a disturbance of 1 m or rad.
         mean: Seconds at the end over which the mean is taken.
     """
     left = slowest.left_after(max(0.0, duration - mean))

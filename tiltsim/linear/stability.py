@@ -21,7 +21,7 @@ from tiltsim.system.text import short_repr
 from tiltsim_controllers.mathematics.scalar import Floats
 
 RESOLVED: Final = 1e-8
-"""Of an orbit, modes whose multiplier is smaller are lost in the rounding of a period."""
+"""Modes of an orbit with a smaller multiplier are lost in the rounding of a period."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,18 +30,17 @@ class Stability:
 
     Attributes:
         kind: ``"rest"`` or ``"orbit"``.
-        period: Of the orbit, s; None at rest.
-        residual: What is left of the rates (rest) or of the change over a period, largest entry in
-            SI units.
+        period: Period of the orbit, s; None at rest.
+        residual: Largest entry of the rates (rest) or of the change over a period, SI units.
         stable: Whether small disturbances stay small.
         neutral: Number of poles at zero or multipliers of one: states that stay where they are put.
-        poles: At rest, rad/s, complex, those that grow fastest or decay slowest first; of a sampled
-            controller ``log(mu) / control_timestep``. None of an orbit.
-        multipliers: Of an orbit, complex, the largest first; None at rest.
+        poles: Poles at rest, rad/s, complex, from fastest growth to fastest decay; ``log(mu) /
+            control_timestep`` for a sampled controller. None for an orbit.
+        multipliers: Floquet multipliers of an orbit, complex, the largest first; None at rest.
         modes: In the same order, but for states that are forgotten within a period or sample.
         states: Names of the coordinates.
-        matrix: Of the linear system, shape (states, states): rates by coordinates, or the
-            coordinates after a control sample or period by those before.
+        matrix: The linear system, shape (states, states): rates by coordinates, or the coordinates
+            after a control sample or period by the coordinates before it.
         equilibrium: The state itself.
         left_out: Names of states that nothing holds and that no other depends on, x and y of a
             vehicle that drifts: they are not analyzed.
@@ -65,14 +64,14 @@ class Stability:
 
     @property
     def growth(self) -> float:
-        """What is left of the slowest disturbance after a period, at rest after one second."""
+        """Factor by which the slowest disturbance grows in a period, at rest in one second."""
         if self.multipliers is not None:
             return float(np.abs(self.multipliers).max())
         assert self.poles is not None  # it is a rest point
         return float(np.exp(self.poles.real.max()))
 
     def report(self) -> dict[str, Any]:
-        """As JSON."""
+        """Entries of the JSON report."""
         name = "poles" if self.multipliers is None else "multipliers"
         values = self.poles if self.multipliers is None else self.multipliers
         assert values is not None
@@ -100,7 +99,7 @@ def stability(
 
     Args:
         scenario: Anything that `tiltsim.load_scenario` takes.
-        near: Of a neighbouring scenario, whose orbit is followed to this one's.
+        near: Result of a neighboring scenario, whose orbit is followed to this one's.
         progress: Called with the number of periods or samples flown so far.
 
     Raises:

@@ -1,4 +1,4 @@
-"""How the multipliers of a gait move with its period, or with any other number."""
+"""The multipliers of a gait over its period, or over any other number."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ ON_AXIS: Final = 1e-6
 
 @dataclass(frozen=True)
 class Point:
-    """A value of the key and what is found there."""
+    """A value of the key and its result."""
 
     value: float
     found: Stability | None  # None where there is no orbit

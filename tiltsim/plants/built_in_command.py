@@ -1,4 +1,4 @@
-"""What a built-in controller commands: in its plant's present state, or on an observation."""
+"""Commands of a built-in controller: in its plant's present state, or for an observation."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from tiltsim_controllers.mathematics.scalar import Values
 def built_in_command(assembly: Assembly, plant: MujocoPlant) -> Command:
     """The command of a rotorcraft's built-in controller now, before latency, servos and motors.
 
-    It goes inwards through the layers of the loop, to what the controller itself reads.
+    It goes inward through the layers of the loop, to the inputs of the controller itself.
     """
     loop, parameters, knots = assembly.loop, assembly.setup.parameters, assembly.setup.knots
     time, data = plant.evaluation_time, plant.data
@@ -47,7 +47,7 @@ def built_in_command(assembly: Assembly, plant: MujocoPlant) -> Command:
 
 
 class BuiltInController:
-    """The built-in controller of a rotorcraft's scenario, as a function of what is observed.
+    """The built-in controller of a rotorcraft's scenario, as a function of an observation.
 
     It integrates its own states, and its supervisor's, over ``simulation.control_timestep``.
 
@@ -55,8 +55,8 @@ class BuiltInController:
         scenario: With a built-in controller.
 
     Raises:
-        InputError: If the controller is your own or feeds back what is not observed, or its vehicle
-            is no rotorcraft.
+        InputError: If the controller is a custom one or feeds back a state that is not observed, or
+            its vehicle is no rotorcraft.
     """
 
     def __init__(self, scenario: Scenario) -> None:

@@ -36,7 +36,8 @@ class Observation:
     """The input of a controller: the vehicle's state, its reference and its parameters.
 
     The state is as measured by the scenario's sensors. The arrays are copies: a controller may keep
-    or change them. Those of tilts (M) and rotors (N) have one entry for each that the vehicle has.
+    or change them. Arrays of tilts (M) and rotors (N) have one entry for each tilt or rotor of the
+    vehicle.
     """
 
     time: float  # s
@@ -49,7 +50,7 @@ class Observation:
     tilt_rates: Floats  # (M,), rad/s
     rotor_speeds: Floats  # (N,), rad/s, positive along each rotor's spin
     reference: Reference
-    vehicle: Vehicle | Multirotor  # mass, inertia, gravity, and what its rotors do
+    vehicle: Vehicle | Multirotor  # mass, inertia, gravity, and the rotors' coefficients
 
 
 Controller = Callable[[Observation], Command]
@@ -70,7 +71,7 @@ class CheckedCommand:
 
 
 def check_command(command: object, layout: Layout) -> CheckedCommand:
-    """Check what a controller returned, for a vehicle with so many rotors and tilt servos.
+    """Check a controller's return value for a vehicle's numbers of rotors and tilt servos.
 
     Raises:
         ControllerError: If it is not a `Command`, does not give exactly one of `ROTOR_COMMANDS`,

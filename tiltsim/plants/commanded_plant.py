@@ -1,8 +1,8 @@
 """The MuJoCo plant under commands: from a user's own controller, or step by step from outside.
 
-Commands and observations pass the same layers as those of the shipped controllers. Only the delay
-line of `tiltsim.laws.layers.actuation` is moved by this plant, as rotors may be commanded speeds
-that they take at once.
+Commands and observations pass the layers of the shipped controllers. Only the delay line of
+`tiltsim.laws.layers.actuation` is moved by this plant, as rotors may be commanded speeds that they
+take at once.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ class CommandedPlant(MujocoPlant):
         self.layout = layout = layout_of(self._loop.dynamics)
         rotors = layout.rotors
         self._spins, self._coefficients = vehicle.spins, vehicle.thrust_coefficients
-        # Along the spin, from the model: the scenario's limits, or those of a user's file.
+        # Along the spin, from the model: limits of the scenario or of a user's file.
         self._limits = [self._limits_along_spin(i, spin) for i, spin in enumerate(vehicle.spins, 1)]
         self._commanded = commanded_parameters(self._setup.parameters)
         self._servo_commands = servo_commands_of(layout.tilts)
@@ -79,7 +79,7 @@ class CommandedPlant(MujocoPlant):
         return float(low), float(high)
 
     def _prepare_engine(self) -> None:
-        """Build none: `advance` holds the commands by a callback of its own."""
+        """Build none: `advance` holds the commands by its own callback."""
 
     def apply(self, command: CheckedCommand) -> None:
         """Send a command, once per control sample, and hold the one that arrives until the next.

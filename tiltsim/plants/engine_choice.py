@@ -1,4 +1,4 @@
-"""Which engine flies a scenario."""
+"""Choice of the engine that flies a scenario."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def choose_engine(assembly: Assembly, engine: EngineName | None = None) -> Engin
 
     Args:
         assembly: The flight.
-        engine: In place of the scenario's.
+        engine: Engine in place of the scenario's.
     """
     scenario = assembly.scenario
     if scenario.controller.is_external or not assembly.loop.is_traceable:

@@ -1,4 +1,4 @@
-"""Equations of motion as the plant: the thesis's own, or those of a rigid body."""
+"""Equations of motion as the plant, either the thesis's equations or a rigid body's."""
 
 from __future__ import annotations
 

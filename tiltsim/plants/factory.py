@@ -19,8 +19,8 @@ def make_plant(
 
     Args:
         assembly: The flight.
-        engine: In place of the scenario's.
-        model: For MuJoCo; default: the one that `flight_model` compiles.
+        engine: Engine in place of the scenario's.
+        model: Model for MuJoCo; default: the one that `flight_model` compiles.
 
     Raises:
         InputError: If MuJoCo cannot compile the vehicle, or the user's controller cannot be loaded.

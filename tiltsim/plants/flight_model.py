@@ -24,8 +24,8 @@ def flight_model(
 ) -> mujoco.MjModel:
     """The model that a flight integrates; see `build_model`.
 
-    With ``visuals`` it flies the same, bit for bit, and has what is drawn or measured, too, unless
-    there is a ground to touch.
+    With ``visuals`` the flight is equal bit for bit and the model also has drawn and measured
+    parts, unless there is a ground to touch.
     """
     visuals = visuals and assembly.scenario.ground is None
     model = build_model(assembly, knots=knots, visuals=visuals)
@@ -44,7 +44,7 @@ def model_cache_key(scenario: Scenario) -> str:
 
 
 def evaluations_per_step(model: mujoco.MjModel) -> int:
-    """How often MuJoCo's integrator evaluates the controls in a step."""
+    """Number of evaluations of the controls per step of MuJoCo's integrator."""
     return 4 if model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4 else 1
 
 

@@ -130,7 +130,7 @@ class MujocoPlant(Plant):
 
     @property
     def header_offset(self) -> int:
-        """Where in `state` the `tiltsim.closed_loop.userdata.Header` begins."""
+        """Index in `state` at which the `tiltsim.closed_loop.userdata.Header` begins."""
         before = int(mujoco.mjtState.mjSTATE_USERDATA) - 1
         return int(mujoco.mj_stateSize(self.model, _INTEGRATION & before))
 

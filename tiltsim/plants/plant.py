@@ -30,7 +30,7 @@ class Plant(Protocol):
         """Take physics steps."""
 
     def record(self, samples: int, steps: int) -> Floats | None:
-        """Take ``samples`` samples, each after so many physics steps: shape (samples, fields).
+        """Take ``samples`` samples, one every ``steps`` physics steps: shape (samples, fields).
 
         None where a sample or the physics engine shows that the flight ended on the way; the state
         of the plant is then undefined.

@@ -5,23 +5,23 @@ A **statement** (`tiltsim.report.statement.Statement`) is one thing that the the
 * ``id``: the anchor on the page, "ch4-period"; never changed once published;
 * ``source``: chapter, section, equation or figure;
 * ``text``: the statement in one sentence of ours;
-* ``thesis``: the words that make it, quoted in “ ” or paraphrased, or what the figure shows;
-* ``criterion``: what counts as reproduced and what would not, in words; tolerances and ranges of
+* ``thesis``: the words that make it, quoted in “ ” or paraphrased, or a description of the figure;
+* ``criterion``: conditions of reproduction and of failure, in words; tolerances and ranges of
   the row are added by themselves;
-* ``note``: what a reader must know to judge it, whatever the verdict;
-* ``missing``: what the text leaves open, if it is therefore not testable.
+* ``note``: information that a reader needs to judge it, whatever the verdict;
+* ``missing``: information that the text omits, if it is therefore not testable.
 
-A **row** (`tiltsim.report.claim.Claim`) is one case of a statement. Its id is that of the statement
-and its label; ids that are gone are in ``withdrawn.toml``. `Origin` says what of it does not come
-from the thesis: scenario files say it of their flights (``ours = ["path", "gains", "start"]``),
-statements and rows of what they compute. Where the flight is ours the published value is shown as
-implied. A row that holds because parameters were chosen so (``fitted``) is no evidence, and none
+A **row** (`tiltsim.report.claim.Claim`) is one case of a statement. Its id is the statement's id
+and its label; ids that are gone are in ``withdrawn.toml``. `Origin` names the parts that do not
+come from the thesis: in scenario files for their flights (``ours = ["path", "gains", "start"]``),
+in statements and rows for their computations. Where the flight is ours the published value is shown
+as implied. A row that holds because parameters were chosen so (``fitted``) is no evidence, and none
 against the thesis if it fails.
 
 A row that does not hold names its ``fault`` if a proof says why: ``refuted`` (the statement is
 false), ``misprint`` (of a formula or number), both with the ``error`` that it belongs to in the
 list of errors (`tiltsim.report.errors`, ``errors.toml``); or ``rounding``: true of the printed
-digits, which another row of the statement tests. What the thesis does not claim is no row.
+digits, which another row of the statement tests. A value that the thesis does not claim is no row.
 
 **One flight is enough.** The row is in the scenario file::
 
@@ -39,13 +39,13 @@ digits, which another row of the statement tests. What the thesis does not claim
     published = -0.38             # the printed value
 
 `tiltsim.scenario.expectation`, with `Expectation` and `ClaimTable`, describes the
-keys. Rows are labelled with the titles of their variants. With a boolean metric, ``published`` is
+keys. Rows are labeled with the titles of their variants. With a boolean metric, ``published`` is
 compared with the metric; with any other, true or false states whether the value is within
 ``holds``, where the sentence is true, which is not the narrow range around our own value. A number
 is reproduced to half a unit of its last digit (3.35 means 3.345 to 3.355), or to 0.05 for an
-integer. ``source`` of the scenario is that of the row. Each plant gets its own verdict.
-Expectations with the same claim and case but different ``plant`` are one row. ``claim`` may also be
-a sentence, which then is the whole statement; files of the library use tables.
+integer. ``source`` of the row is the scenario's. Each plant gets its own verdict. Expectations with
+the same claim and case but different ``plant`` are one row. ``claim`` may also be a sentence, which
+then is the whole statement; files of the library use tables.
 
 **Analysis or several flights are needed.** The row is in a file of `tiltsim.report.claims`, one
 per chapter, measured by a function of `tiltsim.report.measures`::

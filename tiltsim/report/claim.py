@@ -88,7 +88,7 @@ class Claim:
     key: str = ""
     """End of the row's id; default: from its label."""
     where: str = ""
-    """Place in the thesis, if it is not that of the statement."""
+    """Place in the thesis, if it differs from the statement's."""
     unit: str = ""
     tolerance: float | None = None
     """Difference up to which numbers count as equal; default: half of the last printed digit."""
@@ -101,17 +101,17 @@ class Claim:
     thresholds: tuple[str, ...] = ()
     """Names of the numbers of ours in its criterion."""
     missing: str = ""
-    """What the text leaves open, so that this row is not testable."""
+    """Information that the text omits, so that this row is not testable."""
     error: str = ""
     """Key of the entry in the list of errors that a refuted or misprinted row belongs to."""
     note: str = ""
-    """What a reader must know to judge the row, whatever its verdict."""
+    """Note that a reader needs to judge the row, whatever its verdict."""
     origins: tuple[Origin, ...] = ()
-    """What is not the thesis's in this row, beside what its statement and its flights say."""
+    """Our own choices in this row, in addition to ``ours`` of its statement and flights."""
     fitted: bool = False
     """Whether parameters were chosen so that this row holds."""
     finding: str = ""
-    """Key of the finding that settles it; default: that of the statement."""
+    """Key of the finding that settles it; default: the statement's."""
 
     def __post_init__(self) -> None:
         yes_or_no = isinstance(self.published, bool)
@@ -221,7 +221,7 @@ def verdict_on(claim: Claim, measured: Value | None, widened: float = 1.0) -> Cl
     """The verdict on a claim.
 
     Args:
-        claim: What the thesis says.
+        claim: The statement of the thesis.
         measured: The measured value; None if there is none.
         widened: Factor on the tolerances of numbers.
     """
@@ -236,7 +236,7 @@ def verdict_on(claim: Claim, measured: Value | None, widened: float = 1.0) -> Cl
         values = measured if isinstance(measured, tuple) else (measured,)
         if all(low <= value <= high for value in values):
             return ClaimVerdict.FITTED if claim.is_fit else ClaimVerdict.QUALITATIVE
-    # What does not hold with settings fitted by us is no evidence against the thesis, either.
+    # A failure with settings fitted by us is no evidence against the thesis, either.
     return ClaimVerdict.NOT_TESTABLE if claim.is_fit else ClaimVerdict.NOT_REPRODUCED
 
 

@@ -49,11 +49,11 @@ class Row:
     analysis: Cell | None = None
     plants: tuple[tuple[Plant, Cell], ...] = ()
     origins: tuple[Origin, ...] = ()
-    """What of it is not the thesis's, by its statement, itself and its flights."""
+    """Choices in it that are ours, by its statement, itself and its flights."""
 
     @property
     def statement(self) -> Statement:
-        """What it is a case of."""
+        """The statement that it is a case of."""
         return self.claim.statement
 
     @property
@@ -97,7 +97,7 @@ def analyze(
     """The measured values of all computed claims, by `Claim.id`.
 
     They are stored in the folder until the core or the report changes. ``progress`` is called with
-    the number of computed claims and of those to compute: seconds in all, not worth processes.
+    the number of computed claims and their total: this takes seconds, not worth processes.
     """
     digest = sources_digest(
         [*Path(__file__).parent.rglob("measures/*.py"), *Path(__file__).parent.rglob("*.toml")],

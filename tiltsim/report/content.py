@@ -109,7 +109,7 @@ class Report:
         return [Group(list(group)) for _, group in groupby(rows, lambda row: row.statement.id)]
 
     def failing_groups(self, chapter: int) -> list[Group]:
-        """The same without the rows that are reproduced."""
+        """The groups of a chapter without the rows that are reproduced."""
         groups = [group.without(ClaimVerdict.REPRODUCED) for group in self.chapter_groups(chapter)]
         return [group for group in groups if group.rows]
 
@@ -131,7 +131,7 @@ class Group:
 
     @property
     def statement(self) -> Statement:
-        """What all rows are cases of."""
+        """The statement that all rows are cases of."""
         return self.rows[0].statement
 
     @property
@@ -170,7 +170,7 @@ class Group:
         return Group([row for row in self.rows if row.verdict is not verdict])
 
     def shown(self, drawings: list[Drawing]) -> list[Drawing]:
-        """The pictures that the statement names, and those of a flight of its rows."""
+        """The pictures that the statement names, and the pictures of a flight of its rows."""
         flown = {flight for row in self.rows for flight in flights_of(row.claim)}
 
         def shows(picture: Picture) -> bool:
@@ -225,7 +225,7 @@ def test_of(claim: Claim) -> str:
 
 
 def criterion_text(claim: Claim) -> str:
-    """What would have made the row fail, in words, with its tolerance or range."""
+    """The condition under which the row would fail, in words, with its tolerance or range."""
     if not claim.statement.criterion:
         return ""
     parts = [claim.statement.criterion.rstrip(".")]
@@ -255,7 +255,7 @@ def _range_text(name: str, low: float | None, high: float | None, unit: str) -> 
 def published_text(row: Row) -> str:
     """The published value: yes, no, or the number with its printed digits.
 
-    Where the thesis flew nothing, what its statement implies.
+    The value that its statement implies where the thesis flew nothing.
     """
     claim = row.claim
     value = claim.published

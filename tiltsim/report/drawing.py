@@ -60,7 +60,7 @@ def draw_all(
         entries, flights: The scenarios and their records.
         folder: Where drawings are stored.
         jobs: Processes.
-        progress: Called with the number of drawn figures and of those to draw.
+        progress: Called with the number of drawn figures and their total.
         whole: Whether to include pictures that need no flight.
 
     Raises:
@@ -90,7 +90,7 @@ def draw_all(
         for picture in PICTURES
         if picture.name in files
     }
-    # First those that fly long, so that no process ends up alone with one of them.
+    # Long flights first, so that no process ends up alone with one of them.
     by_length = sorted(files.items(), key=lambda item: -steps[item[0]])
     missing = [(name, file) for name, file in by_length if not file.is_file()]
     progress(0, len(missing))

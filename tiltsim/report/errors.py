@@ -29,7 +29,7 @@ class PublishedError:
     mended: str
     proof: str
     changes: str
-    """What it changes downstream."""
+    """Its consequences downstream."""
 
     @property
     def off(self) -> str:

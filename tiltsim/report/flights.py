@@ -152,7 +152,7 @@ def _fly_one(task: _Task, folder: Path) -> FlightRecord:
 def make_record(address: str, plant: Plant, flight: Flight) -> FlightRecord:
     """The record of a flight.
 
-    A flight that terminates early has no final values and no suprema: those at its end would be
+    A flight that terminates early has no final values and no suprema: values at its end would be
     mistaken for the steady state.
     """
     ended_early = flight.end.kind != "completed"

@@ -1,4 +1,4 @@
-"""What made a report, and how to cite it."""
+"""The versions that made a report, and how to cite it."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class Made:
 
     @classmethod
     def now(cls) -> Self:
-        """Those of this process."""
+        """The versions in this process."""
         versions = {name: version(name) for name in PACKAGES}
         return cls(
             date=datetime.now(UTC).date().isoformat(),

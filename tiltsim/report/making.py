@@ -30,7 +30,7 @@ def make_report(
             the report is complete: all scenarios, all claims, and the findings.
         folder: Where flights, computed values and drawings are stored.
         jobs: Processes.
-        progress: Called with what is counted, how many of it are done, and the total.
+        progress: Called with the unit of the count, the number done, and the total.
 
     Raises:
         InputError: If a scenario is invalid, or a process dies.

@@ -180,7 +180,7 @@ def _measured(row: Row) -> list[str]:
 
 
 def _described(row: Row, group: Group) -> str:
-    """The verdict of a row, what is ours, and the reason."""
+    """The verdict of a row, our choices in it, and the reason."""
     tags = f" (*{', '.join(origin.value for origin in row.origins)}*)" if row.origins else ""
     why = content.why_of(row) if not group.shared_why else ""
     return f"{row.verdict.value}{tags}{f': {why}' if why else ''}"

@@ -126,7 +126,7 @@ def determinants(metrics: FlightMetrics) -> Figure:
 
 
 def two_color_map(metrics: FlightMetrics, vehicle: str) -> Figure:
-    """The map of a vehicle; that of ch. 3 with the examples of ch. 8."""
+    """The map of a vehicle; for the vehicle of ch. 3, with the examples of ch. 8."""
     paths = list(PATHS.items()) if vehicle == "ar_drone_2" else None
     return map_figure(PRESETS[vehicle], paths)
 
@@ -153,7 +153,7 @@ GAITS: Final[dict[str, tuple[str, dict[str, Any]]]] = {
     "ch. 7, gait 2, red": ("ch07_robust_gaits/circle#gait_2", {}),
     "ch. 8, E1": ("ch08_generalized_map/stabilization#E1", {}),
 }
-"""Scenarios with overrides, by what a reader calls them."""
+"""Scenarios with overrides, by their names for readers."""
 
 SETTLED: Final[dict[str, Any]] = {
     "simulation.plant": "thesis",

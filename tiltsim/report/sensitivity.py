@@ -27,7 +27,7 @@ _OWN: Final = ("ch9-cannot-hover", "ch9-can-hover", "ch9-larger-orbit")
 
 @dataclass(frozen=True)
 class Criterion:
-    """A number of ours, why it is that number, and what depends on it."""
+    """A number of ours, the reason for it, and the rows that depend on it."""
 
     name: str
     value: str

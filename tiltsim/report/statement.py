@@ -1,4 +1,4 @@
-"""Statements of the thesis, as the report judges them, and what of a test is not the thesis's."""
+"""Statements of the thesis, as the report judges them, and our own choices in their tests."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _SPELLED: Final = {
 
 
 class Origin(Enum):
-    """What of a test does not come from the thesis; a row may have several."""
+    """A part of a test that does not come from the thesis; a row may have several."""
 
     PATH = "path ours"
     GAINS = "gains ours"
@@ -44,7 +44,7 @@ _MEANINGS: Final = {
     Origin.FLIGHT: "the thesis flies nothing here: the flight tests what its statement implies",
     Origin.START: "the thesis does not print the initial state: we chose it",
     Origin.LIMITS: "the flight ignores the rotor limits that its chapter states",
-    Origin.FEEDBACK: "the thesis does not say whether a derivative is measured or modelled",
+    Origin.FEEDBACK: "the thesis does not say whether a derivative is measured or modeled",
 }
 
 
@@ -62,21 +62,21 @@ class Statement:
     text: str
     """The statement in one sentence of ours."""
     thesis: str
-    """The sentence that makes it, quoted or paraphrased, or what the figure shows."""
+    """The sentence that makes it, quoted or paraphrased, or a description of the figure."""
     criterion: str = ""
-    """What counts as reproduced, and what would not, in words; none if it is not testable."""
+    """Criterion of reproduction, and of failure, in words; none if it is not testable."""
     note: str = ""
-    """What a reader must know to judge it, shown with every row."""
+    """Note that a reader needs to judge it, shown with every row."""
     origins: tuple[Origin, ...] = ()
-    """What is not the thesis's in every row, beside what its flights say (``ours``)."""
+    """Our own choices in every row, in addition to ``ours`` of its flights."""
     fitted: bool = False
     """Whether parameters were chosen so that it holds."""
     finding: str = ""
     """Key of the finding that settles it; rows refuted by one finding are one error."""
     missing: str = ""
-    """What the text leaves open, so that the statement is not testable."""
+    """Information that the text omits, so that the statement is not testable."""
     pictures: tuple[str, ...] = ()
-    """Names of pictures that show it, beside those of its flights."""
+    """Names of pictures that show it, in addition to the pictures of its flights."""
     tests: tuple[str, ...] = ()
     """Tests beside the row's own: "controllers/analysis/test_x.py::test_y"."""
 

@@ -45,7 +45,7 @@ class _Sound:
 
 
 def numbers_of(assembly: Assembly) -> tuple[float, ...]:
-    """What `tiltsim.arrays.flying.Batch` takes of a flight, knots aside."""
+    """Inputs of `tiltsim.arrays.flying.Batch` from a flight, without knots."""
     return (
         *flatten(assembly.setup.parameters),
         *map(float, assembly.reference),
@@ -60,7 +60,7 @@ def batch_key(assembly: Assembly) -> object:
 
 
 def _padded(rows: int) -> int:
-    """As many rows or more: a number of which there are few, as each is compiled."""
+    """A number of rows, at least the given one, from a small set: each is compiled."""
     return min(1 << (rows - 1).bit_length(), -(-rows // ROUND_ROWS) * ROUND_ROWS)
 
 
@@ -69,7 +69,7 @@ class ArrayBatch(Generic[Result]):
 
     Args:
         assemblies: The flights.
-        threads: How many parts of them fly at once.
+        threads: Number of parts that fly at once.
         pool: Runs the threads.
         finish: Turns a flight into a result; samples are freed unless it keeps them.
     """
@@ -166,10 +166,10 @@ class ArrayBatch(Generic[Result]):
         """The flight of a row that ended before the end of the duration.
 
         Args:
-            index: Of its assembly.
-            row: In the recording.
+            index: Index of its assembly.
+            row: Row in the recording.
             samples: As if nothing ended it.
-            recording: Of the part.
+            recording: Recording of the part.
             closer: Its samples from step to step in the interval in which it ended.
             seconds: That it took.
         """

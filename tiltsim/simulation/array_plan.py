@@ -54,7 +54,7 @@ def _is_number(value: Any) -> bool:
 
 
 def _numbers(table: BaseModel) -> Tree:
-    """The numbers of a table by key; tables within are trees of their own."""
+    """The numbers of a table by key; each table within is a tree."""
     found: Tree = {}
     for key, value in table:
         inner = _numbers(value) if isinstance(value, BaseModel) else value
@@ -86,7 +86,7 @@ class ArrayPlan:
     """Plans flights of a scenario with other numbers, which may be arrays of JAX.
 
     Args:
-        scenario: The scenario; its own numbers are those of `parameters`.
+        scenario: The scenario; its numbers are in `parameters`.
         loop: Its loop, which has equations.
         dtype: "float64" or "float32".
 
@@ -123,7 +123,7 @@ class ArrayPlan:
         return any(id(v) in reached for v in traced.outvars)
 
     def __call__(self, tree: Mapping[str, Any]) -> PlannedFlight:
-        """The plan with the numbers of a tree, which are not checked, in place of its own."""
+        """The plan with its numbers replaced by the numbers of a tree, which are not checked."""
         loop, lifting = self._loop, self._lifting
         equations = loop.equations
         assert equations is not None  # or flights on arrays are none of it

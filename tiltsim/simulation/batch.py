@@ -32,7 +32,7 @@ from tiltsim.system.progress import Report, check_progress, reported
 from tiltsim.system.text import short_repr
 
 WINDOW: Final = 2048
-"""How many scenarios are grouped together into those that share a batch."""
+"""Number of scenarios that are grouped into batches at a time."""
 
 Result = TypeVar("Result")
 
@@ -43,7 +43,7 @@ class FlightResult:
 
     Attributes:
         scenario: The scenario.
-        end: How it ended.
+        end: Its end.
         metrics: Its metrics; see `tiltsim.scenario.metric_names.METRICS`.
         flight: The flight itself, if its samples are kept.
     """
@@ -74,9 +74,10 @@ def fly(
     """Fly scenarios and yield their results, in their order, as they become available.
 
     Args:
-        scenarios: What to fly, each anything that `tiltsim.load_scenario` takes; they may differ in
-            anything. Those with one closed loop that do not request the Python engine are flown in
-            batches if they are long enough together, flights of the jax engine always.
+        scenarios: Scenarios to fly, each anything that `tiltsim.load_scenario` takes; they may
+            differ in anything. Scenarios that share a closed loop and do not request the Python
+            engine are flown in batches if they are long enough together, flights of the jax engine
+            always.
         threads: Maximum number of threads; None takes all cores.
         keep_samples: Whether results hold their flights. Without them memory does not grow with the
             number of scenarios.
@@ -84,14 +85,14 @@ def fly(
 
     Yields:
         Bit-identical to `tiltsim.simulate` of the scenario, but for rounding with the jax engine
-        and with ``simulation.batch_functions = "quick"``;
-        ``realtime_factor`` is computed from the time that the flight took of all threads together.
-        Of the first whose own controller fails Python warns as there.
+        and with ``simulation.batch_functions = "quick"``; ``realtime_factor`` is computed from the
+        flight's share of the time of all threads. If custom controllers fail, Python warns of the
+        first, as in `tiltsim.simulate`.
 
     Raises:
         InputError: At once, if an argument or a scenario is invalid, or a scenario names Python
             code and was not loaded with ``trusted=True``; later, if a vehicle cannot be built or a
-            controller of your own cannot be used.
+            custom controller cannot be used.
         KeyboardInterrupt: If interrupted; results yielded before are complete.
     """
     is_one = isinstance(scenarios, str | Mapping | Scenario) or getattr(scenarios, "shape", 1) == ()
@@ -137,7 +138,7 @@ def fly_each(
     Samples are freed unless it keeps them. Raises `KeyboardInterrupt` if interrupted.
 
     Args:
-        scenarios: What to fly.
+        scenarios: Scenarios to fly.
         finish: Makes a result of a flight.
         threads: Maximum number of threads.
         finished: Called after every flight, also one that waits for others before it.
@@ -192,7 +193,7 @@ def _fly_window(
 
 
 def _way_to_fly(assembly: Assembly, native: bool) -> object:
-    """``alone``, or what the flights of a batch have in common."""
+    """``alone``, or the properties that the flights of a batch share."""
     scenario = assembly.scenario
     simulation = scenario.simulation
     if simulation.engine == "jax":
@@ -210,7 +211,7 @@ def _way_to_fly(assembly: Assembly, native: bool) -> object:
         held = simulation.control_steps > 0
         return key, simulation.solver, held, simulation.batch_functions
     # Stops of the tilt servos are constraints, which lengthen a state; ground adds geoms; a layer
-    # has states and controls of its own; a user's file may have other bodies.
+    # has its own states and controls; a user's file may have other bodies.
     vehicle = scenario.vehicle
     file = vehicle.mjcf if isinstance(vehicle, VehicleTable) else None
     return key, vehicle.tilt_servo.angle_limit is not None, scenario.ground is not None, file

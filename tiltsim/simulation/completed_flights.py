@@ -27,7 +27,7 @@ def completed_flights(
     """Flights of one closed loop that were flown to the end of their duration.
 
     Args:
-        assemblies: Of the flights.
+        assemblies: One per flight.
         numbers: Parameters of their loops, shape (flights, numbers), as `flatten` returns them.
         samples: Shape (flights, N, fields), at the same times.
         engine: That flew them.

@@ -1,7 +1,7 @@
 """Flights on equations of motion, side by side in the lanes of machine code, on all cores.
 
-A lane holds a flight with parameters of its own. It records its own samples and rests once it has
-all of them or ends early; then the next flight takes its place.
+A lane holds a flight with its own parameters. It records its own samples and rests once it has all
+of them or ends early; then the next flight takes its place.
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ class LaneBatch(Generic[Result]):
     Args:
         assemblies: The flights.
         lanes: Number of lanes.
-        threads: How many fly at once, each in lanes of its own.
+        threads: Number of threads; each flies its own lanes.
         pool: Runs the threads.
         finish: Turns a flight into a result; samples are freed unless it keeps them.
     """

@@ -1,8 +1,8 @@
 """Flights with one closed loop, stepped together by all cores.
 
-A row of the batch is a flight with a model and parameters of its own. It records its own samples
-and stops when it has all of them or ends early; its place goes to the next flight at once. So
-memory holds as many flights as there are rows, however many are flown.
+A row of the batch is a flight with its own model and parameters. It records its own samples and
+stops when it has all of them or ends early; its place goes to the next flight at once. So memory
+holds one flight per row, for any number of flights.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from tiltsim.simulation.simulate import fly_intervals, intervals_of
 from tiltsim_controllers.mathematics.scalar import Floats
 
 ROWS_PER_THREAD: Final = 24
-"""Rows of a batch: so many that no thread waits long for the last one of a call."""
+"""Rows of a batch: enough that no thread waits long for the last one of a call."""
 
 MEMORY: Final = 256 * 2**20
 """Bytes of the samples of all rows together."""
@@ -88,8 +88,8 @@ class NativeBatch(Generic[Result]):
 
     Args:
         assemblies: The flights, in the order of their places.
-        threads: How many step rows.
-        pool: Where the results are computed.
+        threads: Number of threads that step rows.
+        pool: Pool that computes the results.
         result: Makes the result of a flight.
     """
 

@@ -51,24 +51,23 @@ def simulate(
     other flights in MuJoCo take turns, after each recorded sample or up to 0.1 s of native code.
 
     Args:
-        scenario: What to fly: anything that `tiltsim.load_scenario` takes. The Python code that a
-            file or dict names is executed; that of a scenario, if it was loaded with
+        scenario: Scenario to fly: anything that `tiltsim.load_scenario` takes. Python code that a
+            file or dict names is executed; code that a `Scenario` names, if it was loaded with
             ``trusted=True``.
         observer: Called with every sample (floats in the order of `ClosedLoop.sample_fields`) as it
             is recorded.
-        controller: A controller of your own in place of the scenario's; see
-            `tiltsim.load_scenario`. Threads do not share one that is a class.
-        reference: A motion of your own, as a function of time or a table; see
-            `tiltsim.load_scenario`.
-        gait: A gait of your own, likewise.
+        controller: A custom controller in place of the scenario's; see `tiltsim.load_scenario`.
+            Threads do not share one that is a class.
+        reference: A custom motion, as a function of time or a table; see `tiltsim.load_scenario`.
+        gait: A custom gait, likewise.
         progress: True for a bar; or a function, called with the simulated time (s) now and then.
 
     Returns:
         All samples up to the end. A flight that diverges or reaches a singular decoupling matrix is
         a result, not an error: its log is complete up to there, and ``flight.end`` gives the cause
-        and, to one physics step, the time. The same holds for a flight that is interrupted, or
-        whose controller of your own raises an exception or returns an invalid command: Python also
-        warns of that, with a RuntimeWarning, if the controller is not in a file.
+        and, to one physics step, the time. So is a flight that is interrupted, or whose custom
+        controller raises an exception or returns an invalid command: Python also warns of that,
+        with a RuntimeWarning, if the controller is not in a file.
 
     Raises:
         InputError: If the scenario or an argument is invalid, the vehicle cannot be built, or your
@@ -92,7 +91,7 @@ def simulate(
 
 
 def simulate_to_end(scenario: Scenario) -> Flight:
-    """As `simulate`, but raises `KeyboardInterrupt` when interrupted: for one flight of many."""
+    """`simulate` for one flight of many: raises `KeyboardInterrupt` when interrupted."""
     flight = simulate(scenario)
     if flight.end.kind == "interrupted":
         raise KeyboardInterrupt
@@ -106,12 +105,12 @@ def simulate_assembly(
     engine: EngineName | None = None,
     report: Report = lambda time: None,
 ) -> Flight:
-    """As `simulate`, for a flight that is assembled already.
+    """`simulate` for a flight that is assembled already.
 
     Args:
         assembly: The flight.
         observer: See `simulate`.
-        engine: In place of the scenario's.
+        engine: Engine in place of the scenario's.
         report: Called with the simulated time (s) after every chunk of samples.
     """
     simulation = assembly.scenario.simulation
@@ -163,7 +162,7 @@ def failure(
     Args:
         plant, monitor: The plant, where it failed, and the monitor of its flight.
         recorded: Time (s) of the last sample that is recorded already.
-        error: Of the controller.
+        error: Error of the controller.
 
     Returns:
         A sample if there is a later one and it is finite, and the end.

@@ -33,16 +33,14 @@ from tiltsim_controllers.mathematics.scalar import Floats
 class Simulation:
     """A flight in MuJoCo, stepped by its caller.
 
-    Steps are bit for bit those of `tiltsim.simulate`, as long as you do not change `data`. It may
-    go on beyond ``simulation.duration``, unless a function of time was sampled up to there.
+    Steps equal `tiltsim.simulate` bit for bit, as long as you do not change `data`. It may go on
+    beyond ``simulation.duration``, unless a function of time was sampled up to there.
 
     Args:
-        scenario: As in `tiltsim.simulate`.
-        controller: A controller of your own in place of the scenario's; see
-            `tiltsim.load_scenario`.
-        reference: A motion of your own, as a function of time or a table; see
-            `tiltsim.load_scenario`.
-        gait: A gait of your own, likewise.
+        scenario: See `tiltsim.simulate`.
+        controller: A custom controller in place of the scenario's; see `tiltsim.load_scenario`.
+        reference: A custom motion, as a function of time or a table; see `tiltsim.load_scenario`.
+        gait: A custom gait, likewise.
 
     Raises:
         InputError: If the scenario is invalid or not simulated by MuJoCo, the vehicle cannot be
@@ -96,12 +94,12 @@ class Simulation:
         """Take physics steps of ``simulation.timestep``, under the scenario's controller.
 
         Args:
-            steps: How many; at least 1.
+            steps: Number of physics steps; at least 1.
 
         Raises:
             InputError: If that is no such number, the flight has ended (see `end`), or it would go
                 on beyond a table that does not hold.
-            ControllerError: If a controller of your own fails, which is then the `end`.
+            ControllerError: If a custom controller fails, which is then the `end`.
         """
         steps = whole_number("steps", steps)
         if self._end is not None:
@@ -119,7 +117,7 @@ class Simulation:
             self._wall_time += perf_counter() - start
 
     def _check_tables(self, steps: int) -> None:
-        """Raise `InputError` if a table ends before so many steps have been taken."""
+        """Raise `InputError` if a table ends before this number of steps."""
         simulation = self.scenario.simulation
         for name, table in self.scenario.time_tables.items():
             if steps > simulation.steps and table.ends_before(steps * simulation.timestep):
@@ -135,17 +133,17 @@ class Simulation:
 
     @property
     def end(self) -> End | None:
-        """How, when and why the flight has ended early; None as long as it goes on."""
+        """Kind, time and cause of an early end of the flight; None as long as it goes on."""
         return self._end
 
     @property
     def model(self) -> mujoco.MjModel:
-        """MuJoCo's model, with what is drawn and measured, for renderers and sensors of yours."""
+        """MuJoCo's model, with visuals and sensors, for your renderers and sensors."""
         return self._plant.model
 
     @property
     def data(self) -> mujoco.MjData:
-        """MuJoCo's data; what you write there, such as ``qpos``, is where the next step begins."""
+        """MuJoCo's data; the next step starts from the values that you write, such as ``qpos``."""
         return self._plant.data
 
     def observation(self) -> Observation:
@@ -159,10 +157,10 @@ class Simulation:
         return Observer(self._assembly).observe(self._plant, speeds)
 
     def command(self) -> Command:
-        """What the built-in controller would command now, before latency, servos and motors.
+        """The command of the built-in controller now, before latency, servos and motors.
 
-        Rotor accelerations and tilt angles, of the quadrotor thrusts. Raises
-        `InputError` for the tilt-car, and if the scenario's controller is your own.
+        Rotor accelerations and tilt angles; thrusts for the quadrotor. Raises `InputError` for the
+        tilt-car, and if the scenario has a custom controller.
         """
         self._require_rotorcraft("command")
         if self.scenario.controller.is_external:

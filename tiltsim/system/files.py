@@ -13,7 +13,7 @@ from typing import Final
 from tiltsim.errors import InputError
 
 TEMPORARY_SUFFIX: Final = ".new"
-"""Of files that are being written, whose names begin with a dot; a killed process leaves them."""
+"""Suffix of unfinished files, whose names begin with a dot; a killed process leaves them."""
 
 _RANDOM_BYTES: Final = 8
 """In the name of such a file, in hexadecimal digits."""
@@ -68,7 +68,7 @@ def prepare_file(option: str, file: Path, suffixes: Sequence[str] = ()) -> None:
     """Check that a file can be written, before the work for it begins.
 
     Args:
-        option: Of the command line, for the message.
+        option: Command-line option, for the message.
         file: The file.
         suffixes: Allowed suffixes, lower case with their dots; empty allows any.
 

@@ -32,9 +32,9 @@ class _Block:
 def mujoco_hooks(control: Any = None, clock: Any = None) -> Iterator[None]:
     """Install a control callback, or none, and a clock for the length of a ``with`` block.
 
-    Threads whose callbacks differ take turns, in the order in which they arrive; those with the
-    same one run at the same time. A block must therefore be short. MuJoCo's compiler calls the
-    callback, too.
+    Threads whose callbacks differ take turns, in the order in which they arrive; threads that share
+    a callback run at the same time. A block must therefore be short. MuJoCo's compiler also calls
+    the callback.
 
     In the block MuJoCo's warnings are neither printed nor logged to a file.
 

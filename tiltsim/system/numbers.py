@@ -1,4 +1,4 @@
-"""What counts as a number."""
+"""Checks of numbers."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ def is_finite(value: object) -> TypeGuard[int | float]:
 def real_array(values: Any) -> Floats:
     """Numbers as an array of floats.
 
-    Raises TypeError or ValueError for what only converts to numbers: dates and times, whose unit
-    would be lost, true and false, complex numbers, text.
+    Raises TypeError or ValueError for values that only convert to numbers: dates and times, whose
+    unit would be lost, true and false, complex numbers, text.
     """
     array = np.asarray(values)
     if array.dtype == object and all(_is_real(value) for value in array.flat):
@@ -50,7 +50,7 @@ def _is_real(value: object) -> bool:
 
 
 def whole_number(name: str, value: Any) -> int:
-    """An argument that is a whole number from 1, of numpy too. Raises `InputError` otherwise."""
+    """An argument that is an integer from 1, also a NumPy one. Raises `InputError` otherwise."""
     try:
         number = 0 if isinstance(value, bool) else index(value)
     except TypeError:
@@ -61,7 +61,7 @@ def whole_number(name: str, value: Any) -> int:
 
 
 def true_or_false(name: str, value: object) -> bool:
-    """An argument that is true or false, of numpy too. Raises `InputError` otherwise."""
+    """An argument that is true or false, also a NumPy one. Raises `InputError` otherwise."""
     if not isinstance(value, bool | np.bool_):
         raise InputError(f"{name} = {short_repr(value)}: must be True or False")
     return bool(value)

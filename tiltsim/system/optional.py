@@ -11,8 +11,7 @@ from tiltsim.errors import InputError
 def optional_package(name: str, purpose: str, distribution: str = "") -> Any:
     """A package by name. Raises `InputError` if it is not installed.
 
-    ``purpose`` begins the message; ``distribution`` is what pip installs, if it is called
-    otherwise.
+    ``purpose`` begins the message; ``distribution`` is the name for pip, if it differs.
     """
     try:
         return import_module(name)

@@ -101,7 +101,7 @@ def _is_intact(file: BinaryIO) -> bool:
 
 
 def _checksum(content: bytes | mmap.mmap) -> tuple[int, bytes]:
-    """The place of the digest in a file, -1 if it has none, and what the digest must be."""
+    """The place of the digest in a file, -1 if it has none, and the expected digest."""
     place = content.rfind(_MARK) + len(_MARK)
     if place < len(_MARK):
         return -1, b""

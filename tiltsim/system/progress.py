@@ -19,16 +19,16 @@ Report = Callable[[float], None]
 
 @contextmanager
 def reported(progress: Report | bool | None, stage: str, total: float) -> Iterator[Report]:
-    """Yield a function to call with what is done, from 0 to ``total``.
+    """Yield a function to call with the amount done, from 0 to ``total``.
 
     Args:
         progress: A function that is called with it now and then; True for a bar on a terminal and a
             line now and then elsewhere; None or False for silence.
         stage: Name of the work.
-        total: When it is all done: a float is in seconds, an integer a count.
+        total: The amount when all is done: seconds if a float, a count if an integer.
 
     Raises:
-        InputError: As `check_progress` does.
+        InputError: See `check_progress`.
     """
     check_progress(progress)
     if progress is None or progress is False:
@@ -55,7 +55,7 @@ def check_function(name: str, value: object) -> None:
 
 
 def _seldom(report: Report, total: float) -> Report:
-    """A report that passes on what comes after an interval, and the end."""
+    """A report that passes on a value when an interval has passed, and at the end."""
     last = -INTERVAL
 
     def move(done: float) -> None:

@@ -9,7 +9,7 @@ SUBSCRIPTS: Final = "₀₁₂₃₄₅₆₇₈₉"
 
 
 class Quantity(NamedTuple):
-    """What a table or figure calls a quantity, and its unit; empty or 1 for dimensionless ones."""
+    """The label of a quantity in tables and figures, and its unit; empty or 1 if dimensionless."""
 
     label: str
     unit: str = ""

@@ -25,12 +25,12 @@ def printable(text: object) -> str:
 
 
 def valid_unicode(text: str) -> str:
-    """Text with what is no Unicode escaped, such as a byte of a file name that is not UTF-8."""
+    """Text with bytes that are no Unicode escaped, as in a file name that is not UTF-8."""
     return text.encode(errors="backslashreplace").decode()
 
 
 def shortened(text: str, length: int = 80) -> str:
-    """Text of at most so many characters; what is cut off is shown as dots."""
+    """Text of at most ``length`` characters; dots stand for the cut part."""
     return text if len(text) <= length else text[: length - 3] + "..."
 
 

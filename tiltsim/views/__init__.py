@@ -1,1 +1,1 @@
-"""What people look at: figures, Rerun recordings, videos."""
+"""Views of flights: figures, Rerun recordings, videos."""

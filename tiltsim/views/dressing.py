@@ -1,4 +1,4 @@
-"""What a user's MJCF file leaves out of the picture: sky, floor, light, arms, rotor discs.
+"""Visuals that a user's MJCF file lacks: sky, floor, light, arms, rotor discs.
 
 Only pictures have it; the file flies as it is.
 """
@@ -30,7 +30,7 @@ SKYBOX: Final = mujoco.mjtTexture.mjTEXTURE_SKYBOX
 
 
 def dressed(model: mujoco.MjModel, path: Path) -> mujoco.MjModel:
-    """The model of a user's file with what a picture needs and the file lacks.
+    """The model of a user's file with the visuals that the file lacks.
 
     Args:
         model: The file as it flies, compiled.

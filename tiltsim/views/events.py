@@ -31,7 +31,7 @@ Condition = tuple[str, Floats, npt.NDArray[np.bool_]]
 _SUPERVISOR_MESSAGES: Final = {
     "scale": "supervisor scales the gait",
     "hold": "supervisor holds the gait",
-    "return_to_red": "supervisor moves the gait towards red",
+    "return_to_red": "supervisor moves the gait toward red",
 }
 
 

@@ -1,8 +1,8 @@
 """Replaying a flight on a MuJoCo model: the pose of every body at every sample.
 
 Independent of the vehicle. Free joints take the recorded position and attitude, every other joint
-the column of its own name (`COLUMN_OF_JOINT` lists the exceptions); a joint without a column keeps
-the model's default.
+the column of its name (`COLUMN_OF_JOINT` lists the exceptions); a joint without a column keeps the
+model's default.
 """
 
 from __future__ import annotations
@@ -114,7 +114,7 @@ def thrust_sites(model: mujoco.MjModel) -> dict[int, str]:
 
 
 def vehicle_radius(model: mujoco.MjModel) -> float:
-    """Largest distance of a rotor, or else of a body, from the vehicle's centre (m), min 1 cm."""
+    """Largest distance of a rotor, or else of a body, from the vehicle's center (m), min 1 cm."""
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     free = first_free_body(model)

@@ -2,8 +2,8 @@
 
 Panels follow from the columns: components of a vector and numbered columns of one name share a
 panel, ``NAME_ref`` is the reference of ``NAME``, ``NAME_lower`` and ``NAME_upper`` bound it. So a
-column of a new law, vehicle or sensor has its panel at once. What columns cannot say, such as
-titles, limits and signals computed from several columns, `_chosen` adds.
+column of a new law, vehicle or sensor has its panel at once. `_chosen` adds titles, limits and
+signals computed from several columns.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 FLOORS: Final = {"m": 0.02, "rad": 0.02, "m/s": 0.02, "rad/s": 0.02, "N": 0.02}
 """Smallest range of an axis by its unit: smaller differences are as good as none."""
 
-SMALLEST: Final = 1e-3  # the same for other units
+SMALLEST: Final = 1e-3  # smallest range in any other unit
 END_FRACTION: Final = 0.02  # of a diverged flight's samples: its end, of any magnitude
 MAX_WIDENING: Final = 4.0  # factor by which this end may widen the range of a panel
 AXES: Final = "xyz"
@@ -63,17 +63,17 @@ class Signals:
     """Signals of one unit, which share a panel.
 
     Attributes:
-        name: Of the panel, and of its entity in Rerun, see `path`.
-        title, unit: Of the panel.
-        lines, levels: See there.
+        name: Name of the panel, and of its entity in Rerun, see `path`.
+        title, unit: Title of the panel and its unit.
+        lines, levels: Lines over time and horizontal lines.
         bounds: Columns of the lowest and highest admissible value.
-        compared: What Rerun shows of several flights, each in a plot of its own.
-        detail: What the lines are, between title and unit.
-        floor: Smallest range of the axis; 0 for that of `FLOORS`.
+        compared: Signals that Rerun compares between flights, one plot each.
+        detail: Description of the lines, between title and unit.
+        floor: Smallest range of the axis; 0 for the default in `FLOORS`.
         settling: Time (s) at the start that the range ignores.
         latest: Part (s) of flights more than twice as long that pages show; 0 for all.
         moves: Whether it moves with the gait.
-        on_request: Whether pages show it only if asked to.
+        on_request: Whether pages show it only on request.
         plotted: Whether the first tab of Rerun's plots has it.
     """
 
@@ -151,7 +151,7 @@ def scale(
 
 
 def signals_of(assembly: Assembly) -> dict[str, Signals]:
-    """All panels over time of a flight by their names, those on request last."""
+    """All panels over time of a flight by their names; panels on request come last."""
     chosen = {panel.name: panel for panel in _chosen(assembly)}
     drawn = {line.values for panel in chosen.values() for line in panel.lines}
     drawn |= {line.reference for panel in chosen.values() for line in panel.lines}

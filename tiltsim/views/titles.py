@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from tiltsim.closed_loop.assembly import Assembly
     from tiltsim.scenario.scenario import Scenario
 
-MIN_WORDS: Final = 4  # words that titles must share to make a title of their own
+MIN_WORDS: Final = 4  # words that titles must share to make a common title
 _MARKS: Final = ",:;."
 
 
@@ -27,7 +27,7 @@ def flight_names(scenarios: Sequence[Scenario], paths: Sequence[Path] = ()) -> l
 
     The first of these that is distinct: the variant or file of the address, longer parts of the
     address, the folder from which the flight was loaded, longer parts of its path, the value of a
-    key in which the scenarios differ (a controller of one's own is the value of any), a number.
+    key in which the scenarios differ (a custom controller counts as its value), a number.
     ``paths`` are the folders or files of the flights; empty for flights in memory.
     """
     addresses = [scenario.address for scenario in scenarios]
@@ -55,7 +55,7 @@ def _differences(scenarios: Sequence[Scenario]) -> Iterator[list[str]]:
 
 
 def common_title(scenarios: Sequence[Scenario]) -> str:
-    """What the titles of all scenarios begin with, or else the name of their scenario file."""
+    """The common start of the titles of all scenarios, or else the name of their scenario file."""
     titles = [scenario.title.split() for scenario in scenarios]
     columns = ({word.rstrip(_MARKS) for word in words} for words in zip(*titles, strict=False))
     start = [words.pop() for words in takewhile(lambda words: len(words) == 1, columns)]

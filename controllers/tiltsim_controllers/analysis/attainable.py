@@ -5,7 +5,7 @@ limits confine ``w`` to a box. A condition such as ``tau_N = 0`` intersects the 
 hyperplane, which leaves a polytope whose vertices lie on faces of the box. They are found exactly,
 by solving one small system per face, without sampling or optimization. A linear image of them
 (torques, thrust, acceleration) spans the attainable set. All this holds for any number of rotors
-(`TiltedRotors`); the sets of ch. 9 are those of four.
+(`TiltedRotors`); the sets of ch. 9 are for four.
 
 Two published findings are not reproduced: the body accelerations of +-2 m/s^2 (Figs. 8, 9; see
 `attainable_accelerations`), and blue gaits (5 to 8) as a usable design: that their torques are
@@ -93,9 +93,9 @@ class AttainableSet:
 
 
 class TiltedRotors(NamedTuple):
-    """Any number N of rotors at given tilt angles: what they do to the body, within which limits.
+    """Forces, torques and limits of any number N of rotors at given tilt angles.
 
-    Body axes; torques about the centre of mass; per unit of ``w_i = varpi_i |varpi_i|``.
+    Body axes; torques about the center of mass; per unit of ``w_i = varpi_i |varpi_i|``.
     """
 
     force: Floats  # F, N s^2/rad^2, shape (3, N)
@@ -127,8 +127,8 @@ def input_box(speed_limits: tuple[float, float]) -> tuple[Floats, Floats]:
 def box_slice_vertices(lower: Floats, upper: Floats, conditions: Floats, values: Floats) -> Floats:
     """Vertices of ``{w : lower <= w <= upper, conditions w = values}``, shape (vertices, N).
 
-    A vertex of the slice lies on a face of the box with as many free coordinates as there are
-    conditions, the others at a bound.
+    A vertex of the slice lies on a face of the box with one free coordinate per condition, the
+    others at a bound.
 
     Args:
         lower, upper: shape (N,)
@@ -144,7 +144,7 @@ def box_slice_vertices(lower: Floats, upper: Floats, conditions: Floats, values:
         bounded = [index for index in range(size) if index not in free]
         matrix = conditions[:, free]
         if count and abs(np.linalg.det(matrix)) < 1e-12 * norms.prod():
-            continue  # parallel to the face, whose vertices are those of its faces
+            continue  # parallel to the face: lower faces have its vertices
         w = np.empty((len(ends), size))
         w[:, bounded] = np.where(ends, upper[bounded], lower[bounded])
         if count:
@@ -186,7 +186,7 @@ def attainable_accelerations(
     """Attainable ``(F_X, F_Y) / m`` (m/s^2, body axes) in hover without yaw torque.
 
     With the stated limits gaits 2 and 3 reach about 0.12 m/s^2, not the 2 m/s^2 of ch. 9, Figs. 8
-    and 9. The arguments are those of `attainable_torque_thrust`.
+    and 9. See `attainable_torque_thrust` for the arguments.
     """
     torque, force = _wrench(angles, vehicle)
     labels = ("a_X (m/s^2)", "a_Y (m/s^2)")

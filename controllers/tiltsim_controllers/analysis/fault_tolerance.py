@@ -94,7 +94,7 @@ def _hover(tilts: Quad, rotor_speeds: Quad, vehicle: Vehicle, lost: int | None) 
 
 
 def three_rotor_hover(lost: int, vehicle: Vehicle, *, opposite_speed: float) -> Hover:
-    """The hover without a rotor in which its two neighbours share the weight evenly.
+    """The hover without a rotor in which its two neighbors share the weight evenly.
 
     Args:
         lost: the lost rotor, 1 to 4
@@ -135,7 +135,7 @@ def three_rotor_hover(lost: int, vehicle: Vehicle, *, opposite_speed: float) -> 
 def fixed_tilt_imbalance(tilts: Quad, lost: int, vehicle: Vehicle) -> float:
     """Deviation (rad) of fixed tilts from hover without a rotor: ``a_i + a_k -+ 2 delta``.
 
-    ``i`` and ``k`` are the neighbours of the rotor ``lost``. Zero where they hover alone, with the
+    ``i`` and ``k`` are the neighbors of the rotor ``lost``. Zero where they hover alone, with the
     opposite rotor at rest.
     """
     delta = atan(drag_ratio(vehicle))

@@ -3,8 +3,8 @@
 Static hover means zero torque and a force as large as the weight. Its direction in the body is up
 in the world: the vehicle leans by the angle between it and the body's z axis. The torque-free
 forces within the rotors' limits are a polytope (`tiltsim_controllers.analysis.attainable`); the
-hovers are those of its points that are as far from the origin as the weight. The one of least lean
-is level, or on a face or an edge of the polytope, so it is found without search.
+hovers are its points at the distance of the weight from the origin. The one of least lean is level,
+or on a face or an edge of the polytope, so it is found without search.
 """
 
 from __future__ import annotations
@@ -51,8 +51,8 @@ def hover(rotors: TiltedRotors) -> Hover | None:
     """The hover of least lean within the rotors' limits; None if there is none.
 
     If one of them is controllable, it is the controllable one of least lean: ``tau`` has rank 3 and
-    every rotor has a `RESERVE`, so that torque and lift can grow and fall. Of the rotor speeds that
-    make its force, those whose largest is smallest.
+    every rotor has a `RESERVE`, so that torque and lift can grow and fall. Among the rotor speeds
+    that make its force, the set with the smallest maximum is chosen.
     """
     mean = rotors.weight / np.linalg.norm(rotors.force, axis=0).sum()
     lower, upper = rotors.lower + RESERVE * mean, rotors.upper - RESERVE * mean

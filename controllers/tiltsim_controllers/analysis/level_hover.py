@@ -1,9 +1,9 @@
 """Tilt angles of any multirotor that hold it level against a constant acceleration.
 
-The rotors then make no torque and a force that balances weight and acceleration. Of all tilt angles
-for which some rotor speeds within the limits do so, those with the least sum of squares are found
-by sequential quadratic programming over tilts and rotor inputs together, from several starts.
-Without a reserve the least tilts would load some rotors fully and stop others.
+The rotors then make no torque and a force that balances weight and acceleration. Tilt angles for
+which rotor speeds within the limits do so, with the least sum of squares, are found by sequential
+quadratic programming over tilts and rotor inputs together, from several starts. Without a reserve
+the least tilts would load some rotors fully and stop others.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ RESERVE: Final = 0.25
 MAX_TILT: Final = radians(60.0)
 
 STARTS: Final = (0.0, 0.15, 0.4)
-"""Size of the tilt angles (rad) at the starts of the search, with alternating signs too."""
+"""Size of the tilt angles (rad) at the starts of the search, equal and with alternating signs."""
 
 
 def level_hover(

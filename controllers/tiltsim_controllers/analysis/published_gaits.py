@@ -1,7 +1,7 @@
 """The gaits of the thesis by chapter, and where its robustness claims hold.
 
 Ch. 3, 6 and 9 print the tilt angles of their gaits; these are used digit for digit. The paths of
-ch. 7 and 8 are in figures that are missing: the paths here have the described shape and colour, but
+ch. 7 and 8 are in figures that are missing: the paths here have the described shape and color, but
 sizes of our choice, and `PublishedGait.printed` is False.
 """
 
@@ -73,7 +73,7 @@ class PublishedGait:
     color: str | None  # red, blue, "red and blue", or None off the map
     printed: bool  # whether the thesis prints the angles
     bias: float | None = None  # [eta] of the biased gait it is compared with
-    exact: Gait | None = None  # the same on the exact lines, where the printed angles are rounded
+    exact: Gait | None = None  # the gait on the exact lines, where the printed angles are rounded
 
     @property
     def biased(self) -> Gait | None:
@@ -184,7 +184,7 @@ PUBLISHED_GAITS: Final = {
         _path("ch07_gait_1", "blue", rectangle((0.2, 0.8), (-0.8, -0.2), "blue")),
         _path("ch07_gait_2", "red", rectangle((-0.8, -0.2), (0.2, 0.8), "red")),
         _path("ch07_gait_3", "red", rectangle((0.2, 0.8), (-0.8, -0.2), "red")),
-        # ch. 8, Fig. 8 (missing): a triangle through P that changes its colour there; two circles
+        # ch. 8, Fig. 8 (missing): a triangle through P that changes its color there; two circles
         _path(
             "ch08_gait_1", "red and blue", Polyline((Leg("red", _TRIANGLE), Leg("blue", _TRIANGLE)))
         ),

@@ -8,12 +8,12 @@ product has the determinant -1 at every attitude. The determinant of ``Delta`` i
     ``det Delta = -d^3 zeta^2 cos(phi) / (I_x I_y I_z m^3 cos(theta))``,
 
 which is never zero for ``zeta != 0`` and roll and pitch inside of 90 degrees. Eqs. (31) and (36)
-have an error, too (``s_theta s_phi`` for ``s_theta c_phi``), which adds multiples of the matrix's
+also have an error (``s_theta s_phi`` for ``s_theta c_phi``), which adds multiples of the matrix's
 last row to its first two and so does not change the determinant. Both the published and the exact
 form are available.
 
-Attitudes are roll ``phi`` and pitch ``theta`` in rad. Each expression is even in pitch, so it is
-the same in the axes of ch. 2 (z down) and in ours.
+Attitudes are roll ``phi`` and pitch ``theta`` in rad. Each expression is even in pitch, so it holds
+in the axes of ch. 2 (z down) and in ours.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ def published_singular_curve() -> tuple[Floats, Floats]:
     ``-pi/4 <= phi <= 0``. The curve passes through level attitude and ``(-pi/4, 0)``.
     Pitch is positive on the first half of the points, negative on the second.
     """
-    # Evenly spaced in the angle about the curve's centre: pitch grows like the square root of the
+    # Evenly spaced in the angle about the curve's center: pitch grows like the square root of the
     # distance from either end.
     roll = -np.pi / 8.0 * (1.0 - np.cos(np.linspace(0.0, np.pi, 181)))
     cosine = 1.0 / np.sqrt(np.cos(roll) * (np.cos(roll) - np.sin(roll)))

@@ -49,11 +49,11 @@ def reaction_gains(
     """The three ``mu`` of level hovers with fixed tilts, ascending, real, shape (M, 3).
 
     Args:
-        table: Of the rotors, as the controller assumes them.
-        hovers: Tilt angles (rad) and rotor speeds (rad/s) of each; those in which a rotor stands
+        table: Table of the rotors, as the controller assumes them.
+        hovers: Tilt angles (rad) and rotor speeds (rad/s) of each; hovers in which a rotor stands
             still are left out.
         fed_back: `attitude_feedback`.
-        rotor_inertia: Of one rotor about its axis, kg m^2.
+        rotor_inertia: Inertia of one rotor about its axis, kg m^2.
         decoupling: The form of the decoupling matrix.
         dimension: How many components of force are controlled.
         norm: In which the controller's inputs are the least, of `multirotor_steps.NORMS`.
@@ -86,7 +86,7 @@ def largest_held_gain(step: float, time_constant: float, latency_steps: int) -> 
     does so where the left side is real and negative.
 
     Args:
-        step: Of control, s.
+        step: Control time step, s.
         time_constant: ``T``, s.
         latency_steps: ``k``.
     """

@@ -7,9 +7,9 @@ in rad.
 Ch. 3 and 6 write the condition for an invertible matrix as ``R cos(roll) cos(pitch) + R_phi
 sin(roll) cos(pitch) + R_theta sin(pitch) != 0``, which is ``n . r3 != 0`` with the torque-free
 force ``n = (-R_theta, R_phi, R)`` and world up seen from the body ``r3``. The coefficients printed
-in ch. 3, Eqs. (17) and (19), and ch. 12, Eqs. (4)-(8), are those of `residuals` at the respective
-drag ratio, with these misprints: the term ``-2.880 s1 s2 c3 s4 sin(roll) cos(pitch)`` of ch. 3,
-Eq. (17), should read ``s1 s2 c3 c4``, and the last term of ch. 5, Eq. (15), ``s1 s2 c3 s4``. Ch. 12
+in ch. 3, Eqs. (17) and (19), and ch. 12, Eqs. (4)-(8), equal `residuals` at the respective drag
+ratio, with these misprints: the term ``-2.880 s1 s2 c3 s4 sin(roll) cos(pitch)`` of ch. 3, Eq.
+(17), should read ``s1 s2 c3 c4``, and the last term of ch. 5, Eq. (15), ``s1 s2 c3 s4``. Ch. 12
 scales everything by the constant 1.025.
 """
 
@@ -164,10 +164,10 @@ def singularity_margin(
 ) -> Floats:
     """Smallest rotation (rad) from the attitude to a singular one, shape (...).
 
-    The singular attitudes are those with world up perpendicular to ``n``, so the margin is
-    ``asin(n . r3 / |n|)``: pi/2 at most, zero where the matrix is singular at every attitude. It is
-    positive on the side of the level attitude and negative beyond the unacceptable-attitude curve.
-    At level attitude it is the gait's robustness in the sense of ch. 5 and 6.
+    At singular attitudes world up is perpendicular to ``n``, so the margin is ``asin(n . r3 /
+    |n|)``: pi/2 at most, zero where the matrix is singular at every attitude. It is positive on the
+    side of the level attitude and negative beyond the unacceptable-attitude curve. At level
+    attitude it is the gait's robustness in the sense of ch. 5 and 6.
 
     Args:
         angles, vehicle, roll, pitch: as for `decoupling_matrix`
@@ -187,8 +187,8 @@ def margin_over_gait(
 ) -> Floats:
     """Margin (rad) along a gait that must not cross a singularity, shape (N,).
 
-    As `singularity_margin`, but with the sign of ``R`` relative to the start of the gait: a gait
-    whose determinant changes sign passes a singularity even if no sample is zero, and its margin is
+    `singularity_margin` with the sign of ``R`` relative to the start of the gait: a gait whose
+    determinant changes sign passes a singularity even if no sample is zero, and its margin is
     negative from there on.
 
     Args:

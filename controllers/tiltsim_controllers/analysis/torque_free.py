@@ -5,7 +5,8 @@ With the tilt angles fixed, N rotors make the force ``F w`` and the torque ``tau
 body ``r3``, has rank 4 exactly where ``tau`` has rank 3 and ``r3`` is not perpendicular to the
 torque-free forces ``V = F ker tau``. So the dimension of V decides which attitudes are singular:
 
-- 1: those with world up in the plane perpendicular to V, a great circle of directions. Rotors with
+- 1: attitudes with world up in the plane perpendicular to V, a great circle of directions. Rotors
+with
   parallel thrust axes are of this kind, and all vehicles of four rotors (ch. 3);
 - 2: two opposite directions of world up;
 - 3: none; force and torque are independent of each other;
@@ -83,8 +84,8 @@ def margin_over_flight(
     """Margin (rad) along flights, shape (N,), negative beyond a singularity.
 
     A great circle of singular directions has two sides, and world up begins on the positive one:
-    that of level attitude then. Elsewhere a flight goes past what is singular, and this is
-    `singularity_margin`. A rotor that is lost may leave a great circle where there was none.
+    the side of level attitude then. Elsewhere a flight goes past the singular directions, and this
+    is `singularity_margin`. A rotor that is lost may leave a great circle where there was none.
 
     Args:
         forces: in order of time
@@ -109,7 +110,7 @@ def margin_over_flight(
 
 
 def controlled_axes(forces: TorqueFreeForces, up: ArrayLike, dimension: int) -> Floats:
-    """Directions of force that a controller of so many components controls, shape (..., k, 3).
+    """Directions of force that a controller of k components controls, shape (..., k, 3).
 
     Args:
         forces: of the vehicle
@@ -132,8 +133,8 @@ def controlled_axes(forces: TorqueFreeForces, up: ArrayLike, dimension: int) -> 
 def decoupling_condition(force: ArrayLike, torque: ArrayLike, axes: ArrayLike) -> Floats:
     """Smallest over largest singular value of ``[tau; axes F]``, of shape (...).
 
-    Forces count in units of the strongest rotor's, torques in units of what the longest lever makes
-    of a rotor's force.
+    Forces count in units of the strongest rotor's, torques in units of a rotor's force at the
+    longest lever.
 
     Args:
         force, torque: F and tau, shape (..., 3, N); zeros for a rotor that is lost

@@ -15,7 +15,7 @@ so the only roots are two families of lines (where they intersect, one angle is 
 
 each angle up to a multiple of pi. They meet at ``P = (delta, -delta)``.
 
-**Red.** ``n`` is vertical and the margin pi/2, except where ``R`` vanishes too:
+**Red.** ``n`` is vertical and the margin pi/2, except where ``R`` also vanishes:
 
     ``R = (2/r) (2 r - tan alpha_1 + tan alpha_2) (1 + r tan alpha_1) (1 - r tan alpha_2)
     cos^2 alpha_1 cos^2 alpha_2``.
@@ -69,7 +69,7 @@ def delta(vehicle: Vehicle) -> float:
 
 
 def point_p(vehicle: Vehicle) -> tuple[float, float]:
-    """P, the only point (rad) of the alpha_1-alpha_2 plane on both colours (ch. 8, Sec. 3.4)."""
+    """P, the only point (rad) of the alpha_1-alpha_2 plane on both colors (ch. 8, Sec. 3.4)."""
     angle = delta(vehicle)
     return angle, -angle
 

@@ -1,12 +1,12 @@
 """Gaits planned on the Two Color Map: check a path, then give its four angles (ch. 6 and 8).
 
-A path is a closed curve in the alpha_1-alpha_2 plane with a colour on every part. Two published
+A path is a closed curve in the alpha_1-alpha_2 plane with a color on every part. Two published
 theorems give conditions:
 
 * the Two Color Map Theorem (ch. 6, Theorem 1): ``alpha_1`` and ``alpha_2`` move one at a time and
-  the colour stays;
+the color stays;
 * the generalized theorem (ch. 8, Sec. 3): any continuous path within ``|alpha| <= 1``; red stays on
-  its side of the curve L; the colour changes only at P.
+  its side of the curve L; the color changes only at P.
 
 Both accept blue anywhere. An accepted path can still be singular, a warning of `PathReport`: blue
 has rank 2 at every attitude (`tiltsim_controllers.analysis.two_color_map`), and P lies on L.
@@ -48,7 +48,7 @@ _SAME_POINT: Final = 1e-9
 
 
 class Leg(NamedTuple):
-    """A part of a path in one colour: straight lines through vertices (rad)."""
+    """A part of a path in one color: straight lines through vertices (rad)."""
 
     color: str
     vertices: tuple[Point, ...]
@@ -63,7 +63,7 @@ class Polyline:
 
 @dataclass(frozen=True)
 class Circle:
-    """A circular path in one colour (ch. 8, Sec. 4), counter-clockwise; rad."""
+    """A circular path in one color (ch. 8, Sec. 4), counterclockwise; rad."""
 
     color: str
     centre: Point
@@ -105,7 +105,7 @@ def rectangle(alpha_1: Point, alpha_2: Point, color: str) -> Polyline:
 
 
 def polygon(vertices: tuple[Point, ...], color: str) -> Polyline:
-    """A closed path through the vertices (rad) in one colour."""
+    """A closed path through the vertices (rad) in one color."""
     return Polyline((Leg(color, (*vertices, vertices[0])),))
 
 
@@ -113,7 +113,7 @@ def check_path(path: Path, vehicle: Vehicle) -> PathReport:
     """Check a path by both published theorems, and for singularities they do not consider.
 
     Raises:
-        ValueError: If the path has no extent, a number is not finite, or a colour is unknown.
+        ValueError: If the path has no extent, a number is not finite, or a color is unknown.
     """
     pieces = _pieces(path)
     joints = _joints(path)
@@ -175,7 +175,7 @@ def plan(
 
     Raises:
         PathRefusedError: If neither theorem accepts the path.
-        ValueError: As `check_path`, or if the period is not positive.
+        ValueError: See `check_path`; or if the period is not positive.
     """
     report = check_path(path, vehicle)
     if not report.accepted:
@@ -260,7 +260,7 @@ def _pieces(path: Path) -> list[_Piece]:
 
 
 def _joints(path: Path) -> list[tuple[Point, Point, str, str]]:
-    """``(end, next start, colour, next colour)`` of successive legs, the last one to the first."""
+    """``(end, next start, color, next color)`` of successive legs, the last one to the first."""
     if isinstance(path, Circle):
         return []
     following = (*path.legs[1:], path.legs[0])

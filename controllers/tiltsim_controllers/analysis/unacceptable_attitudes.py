@@ -1,8 +1,8 @@
 """Unacceptable attitudes of a gait: the singular curve in the roll-pitch diagram (ch. 5 to 8).
 
-The thesis traces the curve by root finding. The singular attitudes are those at which world up,
-in body axes, is perpendicular to the torque-free force ``n``: a great circle, known in closed
-form. Angles are in rad; ``angles`` are the four tilt angles of one gait at one instant.
+The thesis traces the curve by root finding. At singular attitudes world up, in body axes, is
+perpendicular to the torque-free force ``n``: a great circle, known in closed form. Angles are in
+rad; ``angles`` are the four tilt angles of one gait at one instant.
 """
 
 from __future__ import annotations
@@ -45,8 +45,8 @@ def unacceptable_attitudes(
 ) -> AttitudeCurve:
     """The unacceptable-attitude curve of a gait, in ``samples`` points.
 
-    Sampled evenly along the great circle, not in roll, so that steep and vertical curves are
-    resolved, too.
+    Sampled evenly along the great circle, not in roll, so that steep and vertical curves are also
+    resolved.
     """
     empty = np.empty(0)
     direction = torque_free_direction(angles, vehicle)

@@ -34,7 +34,7 @@ def casadi_function(program: Program, name: str, result: str) -> Any:
 
     Args:
         program: The program.
-        name: Of the function.
+        name: Name of the function.
         result: Name of its result.
 
     Raises:

@@ -192,7 +192,7 @@ DENOMINATOR: Final = (
 
 
 def _quick_angle(y: Number, x: Number) -> tuple[Number, Number]:
-    """As `_angle`."""
+    """See `_angle`."""
     size, across = abs(y), abs(x)
     steep = size > across
     a, b = make("where", steep, across, size), make("where", steep, size, across)
@@ -226,7 +226,7 @@ class LaneFunctions(NamedTuple):
     """Functions that are computed together.
 
     Attributes:
-        names: Of the C library's functions.
+        names: Names of the C library's functions.
         largest_error: Bound of the C library's error, in units in the last place.
     """
 
@@ -363,8 +363,8 @@ def functions_text(names: Sequence[str], lanes: Lanes, written: Callable[..., An
     """Text of `lane_text` and the programs, for some names of `PROGRAMS`.
 
     Args:
-        names: Of programs.
-        lanes: Of the vectors.
+        names: Names of programs.
+        lanes: Number of lanes of a vector.
         written: ``(name, program) -> text``.
     """
     exact = lanes.functions == "exact"

@@ -11,7 +11,7 @@ from typing import Final, NoReturn
 class TraceError(Exception):
     """Code that cannot run on symbolic numbers; the message names file, line and remedy.
 
-    It is no TypeError, which NumPy would replace by one of its own.
+    It is no TypeError, which NumPy would replace with its own.
     """
 
 

@@ -18,9 +18,9 @@ class Operation(NamedTuple):
     Attributes:
         ufunc: NumPy's function, by which arrays of traced numbers find it; None without one.
         python: Expression in Python; ``{}`` stands for an argument.
-        llvm: Instruction, in which ``{T}`` is the type of numbers and ``{B}`` that of conditions;
-            the name of an intrinsic; or else the name of a function of the C library.
-        value: The operation on floats. It returns what IEEE 754 defines where Python raises.
+        llvm: Instruction, in which ``{T}`` is the type of numbers and ``{B}`` the type of
+            conditions; the name of an intrinsic; or else the name of a function of the C library.
+        value: The operation on floats. It returns the result of IEEE 754 where Python raises.
     """
 
     ufunc: np.ufunc | None

@@ -22,7 +22,7 @@ class Program(NamedTuple):
 
     Attributes:
         inputs: Its arguments.
-        block: Its operations; their results are those of the program, in order.
+        block: Its operations; their results are the program's, in order.
     """
 
     inputs: tuple[Input, ...]
@@ -75,7 +75,7 @@ class InputVector(Sequence[Number]):
         found = outermost.known.get(key)
         if found is None:
             found = self._graph.add("in", key[1:])
-            if self._graph.scopes[-1] is not outermost:  # an input is the same in every block
+            if self._graph.scopes[-1] is not outermost:  # an input is equal in every block
                 self._graph.scopes[-1].operations.pop()
                 outermost.operations.insert(0, found)
             outermost.known[key] = found

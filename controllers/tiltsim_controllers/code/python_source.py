@@ -34,11 +34,11 @@ def python_source(
 
     Args:
         program: The program.
-        name: Of the function.
-        fixed: Inputs that do not change: the source is that of a function of them, ``bind``,
-            which evaluates once everything that depends on nothing else and returns the function
-            of the other inputs.
-        careful: Whether a division by zero returns what IEEE 754 defines; else it raises.
+        name: Name of the function.
+        fixed: Inputs that do not change: the source defines a function of them, ``bind``, which
+            evaluates once all that depends on nothing else and returns the function of the other
+            inputs.
+        careful: Whether a division by zero returns the result of IEEE 754; else it raises.
     """
     names = [item.name for item in program.inputs]
     lines: list[str] = []
@@ -79,7 +79,7 @@ _REPEATS: Final = {"abs", "floor", "branch", "loop"}
 """Operations whose text has an argument more than once, or that are statements."""
 
 _LONG: Final = 200
-"""Characters of an expression that gets a line of its own: Python's parser limits their depth."""
+"""Characters of an expression that gets a separate line: Python's parser limits their depth."""
 
 
 class _Writer:
@@ -178,7 +178,7 @@ class _Writer:
 
 
 def _arguments(block: Block) -> Iterator[Sequence[Any]]:
-    """What the operations of a block and of those within it use."""
+    """Values that the operations of a block and of its inner blocks use."""
     yield block.results
     for operation in block.operations:
         yield operation.args
@@ -195,7 +195,7 @@ def python_function(
 
     Args:
         program: The program.
-        name: Of the function, for debuggers.
+        name: Name of the function, for debuggers.
         fixed: Inputs that do not change, with their numbers; the function has the other inputs.
     """
     try:

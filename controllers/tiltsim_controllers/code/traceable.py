@@ -52,7 +52,7 @@ def _is_plain(value: Any) -> bool:
 
 
 def as_arrays(value: Any) -> Any:
-    """Tuples and lists of numbers as arrays, also those in records; tuples of ints are indices."""
+    """Tuples and lists of numbers as arrays, also in records; tuples of ints are indices."""
     if not isinstance(value, tuple | list):
         return value
     if hasattr(value, "_fields"):
@@ -63,7 +63,7 @@ def as_arrays(value: Any) -> Any:
 
 
 def as_tuples(value: Any) -> Any:
-    """Arrays as tuples of numbers, also those in tuples and records."""
+    """Arrays as tuples of numbers, also in tuples and records."""
     if isinstance(value, np.ndarray | np.generic) and value.dtype != object:
         value = value.tolist()  # Python's floats
     elif isinstance(value, np.ndarray) or is_jax(value):

@@ -149,7 +149,7 @@ class Block:
 
     Attributes:
         operations: In the order of evaluation.
-        known: The same by their operation and arguments, so that an equal one is found.
+        known: Operations by operator and arguments, so that an equal one is found.
         parameters: Numbers that change with every turn of a loop.
         results: Numbers that leave the block.
     """
@@ -213,7 +213,7 @@ class Graph:
 
     @contextmanager
     def block(self) -> Iterator[Block]:
-        """Collect operations in a block of their own."""
+        """Collect operations in a separate block."""
         self.scopes.append(Block())
         try:
             yield self.scopes[-1]
@@ -361,7 +361,7 @@ def _folded(op: str, x: Number, y: Number = None) -> Number | None:
 
 
 def remainder(a: Number, b: Number) -> Number:
-    """Python's ``a % b``, whose sign is that of b."""
+    """Python's ``a % b``, which has the sign of b."""
     rest = make("fmod", a, b)
     other_side = make("ne", make("lt", rest, 0.0), make("lt", b, 0.0))
     moved = make("where", other_side, make("add", rest, b), rest)

@@ -5,7 +5,7 @@ the feet from published footfalls, and a timing and a swing chosen so that the r
 of ch. 5 hold (`SWINGS`). Many others would satisfy them as well, so numbers flown with these gaits
 are ours, not the thesis's.
 
-A pod corresponds to a leg. The references of ch. 4 and 5 move towards +X and +Y alike, so the pods
+A pod corresponds to a leg. The references of ch. 4 and 5 move toward +X and +Y alike, so the pods
 of the +X, +Y, -X and -Y arms (1 to 4) are the right fore, left fore, left hind and right hind leg.
 A leg at the angle ``f`` forward of the vertical tilts its pod so that the thrust points forward,
 which is ``alpha = (-f, f, f, -f)`` with the signs of ``F(alpha)`` in ch. 3. During stance a leg
@@ -36,7 +36,7 @@ from __future__ import annotations
 from typing import Final, NamedTuple
 
 FORWARD: Final = (-1.0, 1.0, 1.0, -1.0)
-"""Sign with which the tilt angle of each pod tips its thrust forward, towards +X and +Y."""
+"""Sign with which the tilt angle of each pod tips its thrust forward, toward +X and +Y."""
 
 
 class Footfall(NamedTuple):
@@ -75,11 +75,11 @@ SWINGS: Final = {
   swing evenly about the vertical have almost none. It determines the walk's lean, and the error of
   0.19 m under the modified decoupler its amplitude.
 * Unscaled, walk and gallops reach a singular matrix; scaled by 1/2 and 1/3 their distance from it
-  grows. The determinant decreases with the lean of the hind legs relative to the fore legs,
-  ``R = 4 + (1/r - 2 r) (f_1 + f_2 - f_3 - f_4)`` to first order: this bounds all amplitudes,
-  especially those of the gallops, whose fore and hind pairs are half a stride apart.
-* The run flies unscaled; its errors are the largest, the walk's the smallest, those of the two
-  gallops similar.
+  grows. The determinant decreases with the lean of the hind legs relative to the fore legs, ``R = 4
+  + (1/r - 2 r) (f_1 + f_2 - f_3 - f_4)`` to first order: this bounds all amplitudes, especially in
+  the gallops, whose fore and hind pairs are half a stride apart.
+* The run flies unscaled; its errors are the largest, the walk's the smallest, and the two gallops'
+similar.
 """
 
 

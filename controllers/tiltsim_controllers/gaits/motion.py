@@ -66,11 +66,11 @@ def anticipated_tilts(time: Any, gait: GaitParameters, knots: Any, tilts: int, h
     rates, are unchanged.
 
     Args:
-        time, gait, knots, tilts: As for `planned_tilts`.
+        time, gait, knots, tilts: See `planned_tilts`.
         half: Time before and after a corner, s.
 
     Returns:
-        As `planned_tilts`.
+        See `planned_tilts`.
     """
     if gait.type != LINEAR:
         return planned_tilts(time, gait, knots, tilts)

@@ -24,7 +24,7 @@ class GaitParameters(NamedTuple):
     """Parameters of a gait.
 
     The knots of a piecewise polynomial are rows: the time (s) at which a piece begins, from 0 on,
-    then the coefficients of each tilt angle (rad, s). Those of a harmonic gait are ``mean``,
+    then the coefficients of each tilt angle (rad, s). The knots of a harmonic gait are ``mean``,
     ``cosine`` and ``sine`` (rad) of each tilt angle.
     """
 

@@ -50,8 +50,8 @@ class Gait:
     """A gait ready to be flown.
 
     Attributes:
-        name: Of the gait.
-        parameters, knots: As `planned_tilts` takes them.
+        name: Name of the gait.
+        parameters, knots: Arguments of `planned_tilts`.
         source: Where it comes from.
         tilts: Number of tilt angles.
     """
@@ -197,9 +197,9 @@ def _swinging(
     """A gait whose tilt angles move together, up to their signs.
 
     Args:
-        name, source: Of the gait.
+        name, source: Name of the gait, and its place in the thesis.
         period: s
-        signs: Of the tilt angles.
+        signs: Signs of the tilt angles.
         pieces: Start (s), rate (rad/s) and value (rad) of each.
     """
     knots = [
@@ -302,8 +302,9 @@ def keyframes(
         tilts: number of tilts
 
     Raises:
-        ValueError: If a row is not as many finite numbers, the phases do not run from 0 to 1 or
-            decrease, three rows share a phase (two make a jump), or the period is not positive.
+        ValueError: If a row has another number of entries or non-finite ones, the phases do not run
+            from 0 to 1 or decrease, three rows share a phase (two make a jump), or the period is
+            not positive.
     """
     frames = [tuple(map(float, row)) for row in rows]
     for frame in frames:
@@ -374,7 +375,7 @@ def two_color_circle(
     """A circle in the alpha_1-alpha_2 plane on one color (ch. 8, Sec. 4).
 
     Args:
-        centre, radius: ``(alpha_1, alpha_2)`` of the centre and the radius, rad
+        centre, radius: ``(alpha_1, alpha_2)`` of the center and the radius, rad
         color: ``red`` or ``blue``
         period: s
         vehicle: its drag ratio sets the offset of the blue lines

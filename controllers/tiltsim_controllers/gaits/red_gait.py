@@ -7,7 +7,7 @@ opposite angles. The straight path to it keeps their sums and reduces their diff
 are below a right angle, ``n_x`` and ``n_y`` only decrease and ``n_z`` only increases: the margin of
 a level vehicle grows along the whole path. With larger differences the path passes a difference of
 a right angle, where ``n`` leans most, so the margin may decrease first; beyond half a revolution
-``n_z`` decreases, too, and the path may be singular.
+``n_z`` also decreases, and the path may be singular.
 
 With ``delta = atan(r)``, ``u = alpha_1 - delta`` and ``v = alpha_2 + delta`` the residual on red is
 

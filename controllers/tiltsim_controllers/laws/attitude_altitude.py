@@ -192,7 +192,7 @@ def attitude_altitude_inputs(
 
     Args:
         time: s.
-        state, parameters, measured: As for `attitude_altitude`.
+        state, parameters, measured: See `attitude_altitude`.
         knots: Table data of the reference.
     """
     target = position_reference(time, parameters.reference, knots)

@@ -50,7 +50,7 @@ def modified_decoupler(ax: Any, ay: Any, yaw: Any, gravity: Any, n: Any) -> tupl
     n_z``: the printed 4 x 4 inverse in closed form. NaN where no such inputs exist.
 
     Args:
-        ax, ay, yaw, gravity: As for `conventional_decoupler`.
+        ax, ay, yaw, gravity: See `conventional_decoupler`.
         n: The torque-free force, of any unit, body axes, shape (3,).
     """
     roll, pitch = conventional_decoupler(ax, ay, yaw, gravity)
@@ -71,7 +71,7 @@ def exact_decoupler(ax: Any, ay: Any, az: Any, yaw: Any, gravity: Any, n: Any) -
 
     Args:
         ax, ay, az: Desired acceleration, m/s^2, world axes.
-        yaw, gravity, n: As for `modified_decoupler`.
+        yaw, gravity, n: See `modified_decoupler`.
     """
     s, c = sine(yaw), cosine(yaw)
     dx, dy, dz = ax * c + ay * s, ay * c - ax * s, gravity + az

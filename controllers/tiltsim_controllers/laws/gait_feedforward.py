@@ -103,7 +103,7 @@ def _plan_of(layout: TiltOfRotor, form: Form) -> Callable[..., Jets]:
     """Scalar code of the gait's tilts with derivatives.
 
     ``(time, state, motion, parameters, knots)``: they are the anticipated ones of the plan or,
-    under a supervisor whose state is ``motion``, what it makes of them.
+    under a supervisor whose state is ``motion``, the supervised ones.
     """
     motion_of = tilt_motion_of(tilts_of(layout))
     moving, anticipated = motion_of.moving, motion_of.anticipated

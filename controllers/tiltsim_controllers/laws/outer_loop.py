@@ -37,7 +37,7 @@ def demanded_acceleration(
     Args:
         observed: By the law.
         position_gain, velocity_gain: 1/s^2 and 1/s.
-        limit: Of the length of the feedback, m/s^2.
+        limit: Largest length of the feedback, m/s^2.
     """
     error, speed = tracking_errors(observed)
     feedback = shortened(position_gain * error + velocity_gain * speed, limit)
@@ -48,9 +48,9 @@ def pointing_attitude(observed: Observed, acceleration: Any, axis: Any) -> Any:
     """The rotation, shape (3, 3), that points a body axis along the force for an acceleration.
 
     Args:
-        observed: By the law; the yaw is that of its reference.
+        observed: Observation by the law; the yaw comes from its reference.
         acceleration: m/s^2, world axes, shape (3,).
-        axis: Of the force, body axes, shape (3,).
+        axis: Axis of the force, body axes, shape (3,).
     """
     (ax, ay, az), yaw = acceleration, observed.reference.attitude[2]
     roll, pitch = exact_decoupler(ax, ay, az, yaw, observed.vehicle.gravity, axis)
@@ -66,7 +66,7 @@ def pointing_rates(observed: Observed, acceleration: Any, axis: Any, attitude: A
     Args:
         observed: By the law.
         acceleration: Demanded, m/s^2, world axes, shape (3,).
-        axis: Of the force, body axes, shape (3,).
+        axis: Axis of the force, body axes, shape (3,).
         attitude: `pointing_attitude`, shape (3, 3).
     """
     force = acceleration + observed.vehicle.gravity * xp.array(UP)

@@ -1,12 +1,12 @@
 """Linear-quadratic regulation about the orbit of a moving gait.
 
-The orbit is that of the vehicle under a first regulator about the hover of each moment: it holds
-the place as well as one that plans nothing ahead, and is one that the vehicle can fly (the
-projection of Hauser 2002, "A projection operator approach to the optimization of trajectory
-functionals"). About it the errors obey ``x' = A(t) x + B(t) u`` with the period of the gait. Gains
-``K = R^-1 B^T P(t)`` come from the periodic Riccati equation (Bittanti, Colaneri and De Nicolao
-1991, "The periodic Riccati equation", in "The Riccati Equation", Springer), solved as a discrete
-one from node to node of a table, backward until it repeats.
+The orbit is the vehicle's under a first regulator about the hover of each moment: it holds the
+place as well as one that plans nothing ahead, and is one that the vehicle can fly (the projection
+of Hauser 2002, "A projection operator approach to the optimization of trajectory functionals").
+About it the errors obey ``x' = A(t) x + B(t) u`` with the period of the gait. Gains ``K = R^-1 B^T
+P(t)`` come from the periodic Riccati equation (Bittanti, Colaneri and De Nicolao 1991, "The
+periodic Riccati equation", in "The Riccati Equation", Springer), solved as a discrete one from node
+to node of a table, backward until it repeats.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ class Regulator(NamedTuple):
 
     @property
     def multipliers(self) -> Floats:
-        """Of the closed loop over a period, complex, the largest first."""
+        """Multipliers of the closed loop over a period, complex, the largest first."""
         eigenvalues = np.linalg.eigvals(_product(self.transitions)).astype(complex)
         return eigenvalues[np.argsort(-np.abs(eigenvalues), kind="stable")]
 
@@ -116,7 +116,7 @@ def _times(matrices: Floats, vectors: Floats) -> Floats:
 
 
 def _product(transitions: Floats) -> Floats:
-    """Of transitions over a period, the first applied first."""
+    """Product of transitions over a period, the first applied first."""
     whole = np.eye(transitions.shape[-1])
     for transition in transitions:
         whole = transition @ whole
@@ -124,7 +124,7 @@ def _product(transitions: Floats) -> Floats:
 
 
 def _exponentials(matrices: Floats) -> Floats:
-    """Of many small matrices, for which scipy's starts threads of BLAS: by scaling and squaring."""
+    """Exponentials of small matrices by scaling and squaring; scipy's starts threads of BLAS."""
     halvings = max(0, int(np.ceil(np.log2(np.abs(matrices).sum(axis=-1).max()))) + 1)
     scaled, unit = matrices / 2.0**halvings, np.eye(matrices.shape[-1])
     whole = np.broadcast_to(unit, matrices.shape)
@@ -289,7 +289,7 @@ def regulator_about_hover(
 
     Args:
         vehicle: With its tilts, ``force`` and ``torque`` of shape (1, 3, N).
-        lean, hover, errors, share: As for `regulator_about_orbit`.
+        lean, hover, errors, share: See `regulator_about_orbit`.
     """
     from scipy.linalg import solve_continuous_are
 

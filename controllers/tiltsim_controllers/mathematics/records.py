@@ -30,7 +30,7 @@ def leaves(record: Iterable[Any]) -> list[Any]:
 
 
 def flatten(record: Iterable[Any]) -> Iterator[float]:
-    """The same as floats."""
+    """The numbers of a record as floats, in order."""
     return map(float, leaves(record))
 
 
@@ -64,7 +64,7 @@ def changed_record(record: Any, **fields: type) -> Any:
 
 @cache
 def vector_of(length: int) -> type:
-    """The type of a field with so many floats: a tuple in Python, an array in native code."""
+    """The type of a field of ``length`` floats: a tuple in Python, an array in native code."""
     return type(f"Vector{length}", (tuple,), {"length": length})
 
 

@@ -1,7 +1,7 @@
 """Vectors of any fixed length as scalar code: tuples, with every component written out.
 
-A loop would build lists, which are slower in native code by far, and in Python. Native code wants
-to know how long a tuple is, too. So the functions are made for a length, once, from the text of one
+A loop would build lists, which are slower in native code by far, and in Python. Native code also
+needs the length of a tuple. So the functions are made for a length, once, from the text of one
 component.
 """
 
@@ -78,7 +78,7 @@ def vectors_of(length: int) -> Vectors:
 
 @cache
 def entries_of(first: int, count: int) -> Callable[[Vector], Values]:
-    """Scalar code that reads so many entries of a vector, which native code may have as a list."""
+    """Scalar code that reads ``count`` entries of a vector, which may be a list in native code."""
     entries = tuple_text(f"vector[{i}]" for i in range(first, first + count))
     reads: Callable[[Vector], Values] = written_out(f"entries_{first}_{count}", "vector", entries)
     return reads

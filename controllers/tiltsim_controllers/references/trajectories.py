@@ -35,7 +35,7 @@ class ReferenceParameters(NamedTuple):
     """Parameters of a reference; each type reads the fields it needs."""
 
     type: float
-    x: float = 0.0  # m: set-point, start of the line, centre of circle and lissajous
+    x: float = 0.0  # m: set-point, start of the line, center of circle and lissajous
     y: float = 0.0
     z: float = 0.0
     velocity_x: float = 0.0  # m/s, line
@@ -69,8 +69,8 @@ def reference_motion(time: Any, reference: ReferenceParameters, knots: Any = NO_
     Args:
         time: s
         reference: Type and parameters.
-        knots: Table data of the flight; `ReferenceParameters.offset` is the index where those of
-            waypoints or of a table begin.
+        knots: Table data of the flight; `ReferenceParameters.offset` is the index where the knots
+            of waypoints or of a table begin.
 
     Returns:
         Position, velocity, acceleration, jerk and snap, m and s, world axes, shape (5, 3).

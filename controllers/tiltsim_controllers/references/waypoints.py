@@ -1,10 +1,10 @@
 """Minimum-snap motion through waypoints.
 
-Of all motions through given points at given times, from rest to rest, the one that minimizes the
-integral of squared snap consists of polynomials of degree seven whose first six derivatives are
-continuous at the points (D. Mellinger and V. Kumar, "Minimum snap trajectory generation and control
-for quadrotors", ICRA 2011): a spline of degree seven whose first three derivatives vanish at both
-ends. It is computed once; a flight evaluates it from its knots.
+The motion through given points at given times, from rest to rest, that minimizes the integral of
+squared snap consists of polynomials of degree seven whose first six derivatives are continuous at
+the points (D. Mellinger and V. Kumar, "Minimum snap trajectory generation and control for
+quadrotors", ICRA 2011): a spline of degree seven whose first three derivatives vanish at both ends.
+It is computed once; a flight evaluates it from its knots.
 """
 
 from __future__ import annotations

@@ -32,7 +32,7 @@ from tiltsim_controllers.tilt_car.vehicle import TiltCar, input_matrix, turn_per
 class Orbit(NamedTuple):
     """Uniform motion around a circle."""
 
-    acceleration: float  # [A] m/s^2, towards the centre
+    acceleration: float  # [A] m/s^2, toward the center
     angular_frequency: float  # [Omega] rad/s, positive counter-clockwise
 
 

@@ -29,8 +29,8 @@ THESIS_CAR: Final = TiltCar(
 )
 """Ch. 10's car.
 
-The thesis does not state the mass; 1 kg is our choice. Its ``I_B = 0.002`` is that of the whole
-car: only then Eq. (2) conserves angular momentum (see `turn_per_tilt`).
+The thesis does not state the mass; 1 kg is our choice. Its ``I_B = 0.002`` is the inertia of the
+whole car: only then Eq. (2) conserves angular momentum (see `turn_per_tilt`).
 """
 
 STATE_FIELDS: Final = ("x", "y", "vx", "vy", "yaw", "alpha", "rotor_speed_1", "rotor_speed_2")
@@ -83,8 +83,8 @@ def acceleration(direction: Any, squares: Any, car: TiltCar) -> Any:
     """Acceleration (m/s^2, world), shape (2,); Eq. (3).
 
     Args:
-        direction: Of the thrusts' bisector, rad.
-        squares: Of the rotor speeds, rad^2/s^2, shape (2,).
+        direction: Direction of the thrusts' bisector, rad.
+        squares: Squares of the rotor speeds, rad^2/s^2, shape (2,).
         car: The vehicle.
     """
     return rotation(direction) @ (thrust_map(car) @ squares)
@@ -97,7 +97,7 @@ def input_matrix(speeds: Any, car: TiltCar) -> Any:
     rotation to the world (Eq. 4) multiplies the whole matrix.
 
     Args:
-        speeds: Of the rotors, rad/s, shape (2,).
+        speeds: Rotor speeds, rad/s, shape (2,).
         car: The vehicle.
     """
     rotors = thrust_map(car) * (2.0 * speeds)

@@ -39,7 +39,7 @@ def drag_force(velocity: Any, drag: Drag) -> Any:
     """Force (N), body axes, on a body that moves through the air.
 
     ``F_i = -(linear_i + density / 2 area_i |v|) v_i``. The linear part models the drag of the
-    rotors (H-force), the quadratic part that of the fuselage.
+    rotors (H-force), the quadratic part the drag of the fuselage.
 
     Args:
         velocity: m/s, body axes, shape (3,).
@@ -106,8 +106,8 @@ def low_altitude_turbulence(
     Args:
         wind_at_20_ft: Mean wind 6 m above the ground, m/s.
         height: Above the ground, m; limited to 10 to 1000 ft.
-        speed: Airspeed of the vehicle, m/s; in hover that of the mean wind.
-        direction: Direction into which the mean wind blows, rad from +x towards +y.
+        speed: Airspeed of the vehicle, m/s; in hover, the speed of the mean wind.
+        direction: Direction into which the mean wind blows, rad from +x toward +y.
         sample_time: Time for which a draw of the noise is held, s.
         seed: An integer.
     """

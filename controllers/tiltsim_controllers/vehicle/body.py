@@ -13,7 +13,7 @@ from tiltsim_controllers.vehicle.parameters import Vehicle
 
 
 class Body(NamedTuple):
-    """A rigid body; its inertia is taken about the centre of mass in body axes."""
+    """A rigid body; its inertia is taken about the center of mass in body axes."""
 
     mass: float  # kg
     gravity: float  # m/s^2
@@ -40,7 +40,7 @@ def body_of(mass: float, inertia: ArrayLike, gravity: float) -> Body:
 
 
 def principal_body(vehicle: Vehicle) -> Body:
-    """The body of a vehicle whose principal axes are those of the body."""
+    """The body of a vehicle whose principal axes are the body axes."""
     moments = vehicle.inertia_xx, vehicle.inertia_yy, vehicle.inertia_zz
     xx, yy, zz = moments
     none = (0.0, 0.0, 0.0)
@@ -75,7 +75,7 @@ def angular_acceleration(body: Any, torque: Any, omega: Any, gyroscopic: float) 
     """Euler's equation: ``I^-1 (torque - gyroscopic omega x I omega)``, rad/s^2, shape (3,).
 
     Args:
-        body: Of the vehicle.
+        body: Body of the vehicle.
         torque: N m, body axes, shape (3,).
         omega: Body rates, rad/s, shape (3,).
         gyroscopic: Factor of the gyroscopic torque, 1 or 0.
@@ -90,7 +90,7 @@ def torque_rate(body: Any, omega: Any, omega_rate: Any, jerk: Any, gyroscopic: f
     It is the derivative of ``I omega' + gyroscopic omega x I omega``.
 
     Args:
-        body: Of the vehicle.
+        body: Body of the vehicle.
         omega, omega_rate, jerk: Body rates (rad/s) with two derivatives, shape (3,) each.
         gyroscopic: Factor of the gyroscopic torque, 1 or 0.
     """

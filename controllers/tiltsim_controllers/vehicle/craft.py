@@ -39,8 +39,8 @@ class Craft(NamedTuple):
             (3, 3, N).
         axes: Thrust axes, as ``places``, dimensionless.
         thrusts: Coefficients K_f, N s^2/rad^2, shape (N,).
-        along_hinges: Components of the thrust axes along their hinges, the same at all tilts,
-            shape (N,).
+        along_hinges: Components of the thrust axes along their hinges, equal at all tilts, shape
+            (N,).
         hinge_loads: See `Rotor.hinge_load`, shape (N,).
         hinges: Unit vectors along the hinges, shape (M, 3).
     """

@@ -1,6 +1,6 @@
 """The decoupling matrix of the tiltrotor in factored form (ch. 3, Eqs. 3, 5, 12, 16-18).
 
-Ch. 3 asks when ``[tau(alpha); r3^T F(alpha)]`` is invertible, with ``r3`` the third row of the
+Ch. 3 examines when ``[tau(alpha); r3^T F(alpha)]`` is invertible, with ``r3`` the third row of the
 body-to-world rotation (world up in body axes), and expands the determinant into some thirty
 products. The geometry is simpler. Only rotors 2 and 4 produce roll torque and only rotors 1 and 3
 pitch torque, so the rotor inputs with zero total torque follow pair by pair; their force has the

@@ -68,7 +68,7 @@ class Rotor(NamedTuple):
 
     @property
     def along_hinge(self) -> float:
-        """The component of its thrust axis along its hinge, the same at all tilts; 0 if fixed."""
+        """The component of its thrust axis along its hinge, equal at all tilts; 0 if fixed."""
         return float(np.dot(self.axis, self.hinge_axis))
 
     @property
@@ -206,7 +206,7 @@ _ROW_ARGUMENTS: Final = "constant, cosines, sines, table, at"
 
 
 def _rows(layout: TiltOfRotor, size: int, first: int, components: int) -> str:
-    """The text of components by rotor, from a table of so many floats a rotor.
+    """The text of components by rotor, from a table of ``size`` floats per rotor.
 
     The constants of a rotor begin at ``first``; its cosines and sines follow.
     """

@@ -10,14 +10,14 @@ from tiltsim_controllers.mathematics.scalar import scalar
 class Vehicle(NamedTuple):
     """A rotorcraft with four arms (thesis symbols in brackets).
 
-    The inertia is taken about the centre of mass in body axes, everything on board included.
+    The inertia is taken about the center of mass in body axes, everything on board included.
     """
 
     mass: float  # [m] kg
     inertia_xx: float  # [I_B] kg m^2
     inertia_yy: float  # kg m^2
     inertia_zz: float  # kg m^2
-    arm_length: float  # [L] m, from the centre of mass to the thrust axis
+    arm_length: float  # [L] m, from the center of mass to the thrust axis
     thrust_coefficient: float  # [K_f] N s^2/rad^2
     drag_coefficient: float  # [K_m] N m s^2/rad^2
     gravity: float  # [g] m/s^2
@@ -56,7 +56,7 @@ PRESETS: Final = {
     ),
     # ch. 2, Table A1: the same airframe with its inertia unrounded, flown as a plain quadrotor. The
     # table gives 8.048e-4 for both rotor coefficients. The inputs of ch. 2 are forces and torques
-    # and do not use them, so the rotors here are those of ch. 3.
+    # and do not use them, so the rotors here are taken from ch. 3.
     "ar_drone_2_unrounded": Vehicle(
         mass=0.429,
         inertia_xx=2.237568e-3,

@@ -176,7 +176,7 @@ def rotor_accelerations(rates: Any, speeds: Any, slowest: Any = 0.0) -> Any:
     """Accelerations (rad/s^2), shape (N,), that change ``w = varpi |varpi|`` at given rates.
 
     Args:
-        rates: Of ``w``, (rad/s)^2/s, shape (N,).
+        rates: Rates of ``w``, (rad/s)^2/s, shape (N,).
         speeds: rad/s, signed, shape (N,).
         slowest: A slower rotor counts as this fast, rad/s; NaN for a rotor at rest without it.
     """

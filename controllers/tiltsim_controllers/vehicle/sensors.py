@@ -40,7 +40,7 @@ def reading_error(sensor: Sensor, seed: float, channel: float, index: Any) -> An
 
     Args:
         sensor: Noise and bias.
-        seed, channel, index: As for `normal`; the sensor uses ``channel`` and the next two.
+        seed, channel, index: See `normal`; the sensor uses ``channel`` and the next two.
     """
 
     def noise() -> Any:

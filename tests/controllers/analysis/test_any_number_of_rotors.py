@@ -1,4 +1,4 @@
-"""What is singular for any number of rotors, from the forces that they make without torque.
+"""Singular attitudes for any number of rotors, from the forces that they make without torque.
 
 Checked without them: as the last row of ``B = [tau; up^T F]`` is linear in ``up``, the determinant
 of ``B B^T`` is a quadratic form in ``up``, found from six values of it. Its null space is the set
@@ -71,7 +71,7 @@ def by_determinants(force, torque):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_what_is_singular_follows_from_the_torque_free_forces(kind):
+def test_singularity_follows_from_the_torque_free_forces(kind):
     rng = np.random.default_rng(KINDS.index(kind))
     dimensions = set()
     for _ in range(40):
@@ -122,7 +122,7 @@ def random_unit(rng, *shape):
 
 
 def smallest_singular_value(matrices, up):
-    """Of ``[tau; up^T F]``, for many directions of world up, shape (..., 3)."""
+    """Smallest singular values of ``[tau; up^T F]`` for directions of world up, shape (..., 3)."""
     force, torque = matrices
     last = up[..., np.newaxis, :] @ force
     rows = np.concatenate([np.broadcast_to(torque, (*up.shape[:-1], *torque.shape)), last], axis=-2)
@@ -162,7 +162,7 @@ def by_brute_force(zeros, starts, up):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
-def test_classes_and_margins_are_those_of_a_search_over_attitudes(kind):
+def test_classes_and_margins_agree_with_a_search_over_attitudes(kind):
     rng, starts = np.random.default_rng(100 + KINDS.index(kind)), 16
     for _ in range(15):
         force, torque = random_vehicle(rng, kind)

@@ -48,7 +48,7 @@ def test_published_speed_limits() -> None:
     thrust=st.one_of(st.none(), st.floats(2.5, 4.5)),
     seed=st.integers(0, 2**16),
 )
-def test_support_function_is_that_of_a_linear_program(angles, thrust, seed) -> None:
+def test_support_function_agrees_with_a_linear_program(angles, thrust, seed) -> None:
     """The farthest vertex along any direction is the optimum of the LP over rotor inputs."""
     torque, force = wrench(angles)
     lower, upper = input_box(LIMITS)
@@ -155,7 +155,7 @@ def test_a_set_of_one_point_and_an_empty_one():
     assert np.isnan(heavy.upper).all()
 
 
-def test_the_published_limits_are_those_of_3_and_5_newtons():
+def test_the_published_limits_belong_to_3_and_5_newtons():
     least, greatest = published_speed_limits(AR_DRONE)
     assert 4.0 * AR_DRONE.thrust_coefficient * least**2 == pytest.approx(3.0)
     assert 4.0 * AR_DRONE.thrust_coefficient * greatest**2 == pytest.approx(5.0)

@@ -158,7 +158,7 @@ def test_mirrored_accelerations_have_mirrored_gaits(vehicle):
 
 
 def test_the_gust_of_chapter_1():
-    """1 m/s^2 along +x: figures of our own, the thesis prints none."""
+    """1 m/s^2 along +x: our own figures, the thesis prints none."""
     gust = (1.0, 0.0, 0.0)
     np.testing.assert_allclose(
         balanced_gait(gust, AR_DRONE), (-0.0346, -0.2258, -0.0346, 0.0725), atol=1e-4
@@ -187,7 +187,7 @@ def test_loads_at_the_point_where_the_torque_matrix_loses_rank():
         ((float("nan"), 0.0, 0.0), r"nan.*must be finite"),
     ],
 )
-def test_what_is_out_of_reach_is_named(acceleration, message):
+def test_unreachable_accelerations_are_named(acceleration, message):
     with pytest.raises(ValueError, match=message):
         balanced_gait(acceleration, AR_DRONE)
 

@@ -170,7 +170,7 @@ def test_more_thrust_never_needs_more_speed():
     [(-1.6, 413.93, 437.00), (3.1, 361.54, 480.11), (0.8, 373.31, 373.31)],
 )
 def test_a_stuck_servo_needs_the_globally_least_speed(angle, any_attitude, upright):
-    """Against a search from 300 directions, and at most that of a lost rotor."""
+    """Against a search from 300 directions, and at most the value for a lost rotor."""
     least = minimum_hover_speed(VEHICLE, stuck=(1, angle))
     assert least == pytest.approx(any_attitude, abs=0.01)
     assert minimum_hover_speed(VEHICLE, stuck=(1, angle), upright=True) == pytest.approx(

@@ -123,7 +123,7 @@ def test_a_hexarotor_with_spins_in_pairs_survives_some_losses():
 
 
 def test_side_force_of_a_fixed_cant_hexarotor():
-    """Without torque and at constant lift the three pairs of neighbours share the side force."""
+    """Without torque and at constant lift the three pairs of neighbors share the side force."""
     assert side_force_share(ring()) == 0.0
     assert level_side_forces(ring()).dimension == 0
     share = side_force_share(ring(cant=np.radians(25.0)))

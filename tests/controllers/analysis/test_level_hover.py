@@ -63,7 +63,7 @@ def test_two_rotors_on_a_pod_tilt_together():
     assert tilts.shape == (3,)
 
 
-def test_what_cannot_be_balanced_is_none():
+def test_without_a_balance_the_result_is_none():
     sideways = needed((1.0, 0.0, 0.0))
     assert level_hover(arms(6, hinged=False), sideways, box(6)) is None
     assert level_hover(arms(6), sideways, box(6), max_tilt=0.01) is None

@@ -130,7 +130,7 @@ def test_the_curve_lies_on_the_surface_and_passes_through_level():
     assert np.hypot(np.diff(roll), np.diff(pitch)).max() < 0.02
 
 
-def test_the_exact_determinant_is_that_of_the_law():
+def test_the_exact_determinant_equals_the_determinant_of_the_law():
     random = np.random.default_rng(1)
     for _ in range(20):
         roll, pitch, yaw = random.uniform(-1.5, 1.5, 3)

@@ -227,7 +227,7 @@ PRINTED_R_THETA = {
 CH12 = {1.000: 1.025, 2.000: 2.050, 2.880: 2.927, 4.000: 4.100}
 CH12 |= {5.592: 5.680, 0.9716: 0.9954, 0.1687: 0.1743}
 CH12_SCALE = 1.025
-"""Ch. 12 normalises differently: its coefficient of the plain products is 1.025, not 1."""
+"""Ch. 12 normalizes differently: its coefficient of the plain products is 1.025, not 1."""
 
 
 def expand(vehicle: Vehicle) -> list[dict[str, float]]:
@@ -277,7 +277,7 @@ def test_printed_coefficients_of_chapter_12() -> None:
         for term, chapter_3 in printed.items():
             value = np.copysign(CH12[abs(chapter_3)], chapter_3)
             scaled = computed[term] * CH12_SCALE
-            # 1.025 itself is printed with four digits: allow for its own rounding too.
+            # 1.025 itself is printed with four digits: also allow for its rounding.
             slack = digits(value) + abs(computed[term]) * 0.0005
             assert scaled == pytest.approx(value, abs=slack), term
 

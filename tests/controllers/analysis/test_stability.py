@@ -87,7 +87,7 @@ def test_first_column_of_a_textbook_array():
 
 @quick
 @given(gains, gains, gains, st.sampled_from([1.0, 722.0]))
-def test_third_order_verdict_is_that_of_the_roots(k1, k2, k3, loop_gain):
+def test_third_order_verdict_agrees_with_the_roots(k1, k2, k3, loop_gain):
     loop = third_order_loop("roll", (k1, k2, k3), loop_gain)
     expected = (1.0, loop_gain * k1, loop_gain * k2, loop_gain * k3)
     assert loop.polynomial == pytest.approx(expected)
@@ -132,7 +132,7 @@ def test_published_gains_pass_under_the_published_matrix(gain_set):
     assert all(loop.stable for loop in loops(gain_set, "published").values())
 
 
-def test_exact_gains_put_the_poles_where_they_are_said_to_be():
+def test_exact_gains_place_the_poles_as_documented():
     found = loops("exact", "exact")
     assert all(loop.stable for loop in found.values())
     for name in ("roll", "pitch", "yaw"):

@@ -122,7 +122,7 @@ def test_broken_and_far_paths_are_refused() -> None:
         Polyline((Leg("green", ((0.0, 0.0), (0.1, 0.0))),)),
     ],
 )
-def test_what_is_no_path_is_an_error(path) -> None:
+def test_an_invalid_path_is_an_error(path) -> None:
     with pytest.raises(ValueError, match=r"\w"):
         check_path(path, AR_DRONE)
 
@@ -174,7 +174,7 @@ def test_printed_vertices_lie_on_the_published_lines() -> None:
 
 
 @pytest.mark.parametrize("key", ["ch08_gait_2", "ch08_gait_3"])
-def test_the_circles_of_chapter_8_start_beside_their_centre(key) -> None:
+def test_the_circles_of_chapter_8_start_beside_their_center(key) -> None:
     phases = np.arange(4) / 4.0
     found = PUBLISHED_GAITS[key].gait.angles(phases)[:, :2]
     expected = [(0.8, -0.5), (0.5, -0.2), (0.2, -0.5), (0.5, -0.8)]

@@ -84,7 +84,7 @@ def test_share_of_red_blue_and_vertical() -> None:
 
 @pytest.mark.parametrize("steepness", [1e-3, 1e-5, 1e-7, 1e-9])
 @pytest.mark.parametrize("side", [1.0, -1.0])
-def test_share_of_a_nearly_vertical_curve_tends_to_that_of_the_line(steepness, side) -> None:
+def test_share_of_a_nearly_vertical_curve_tends_to_the_share_of_the_line(steepness, side) -> None:
     upright = (side * 0.8, 0.2, -side * 0.8, 0.2)
     tilted = (side * 0.8, 0.2, -side * 0.8, 0.2 + steepness)
     assert acceptable_share(tilted, AR_DRONE) == pytest.approx(

@@ -55,7 +55,7 @@ def nested(x):
         return a + 0.1 * step, xp.where(xp.isfinite(step) & (b < 3.0), b + 0.5, b)
 
     a, b = repeat(x[2], body, x[0], x[1], until=lambda a, b: a > 50.0)
-    return xp.array([a, b, xp.sin(x[0])])  # a sine that the loop has computed, too
+    return xp.array([a, b, xp.sin(x[0])])  # a sine that the loop has also computed
 
 
 def traced(function, size):

@@ -1,4 +1,4 @@
-"""Functions of all lanes at once: bit by bit those of the C library."""
+"""Functions of all lanes at once: equal to the C library bit by bit."""
 
 from __future__ import annotations
 

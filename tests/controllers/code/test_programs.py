@@ -70,7 +70,7 @@ def test_an_operation_that_occurs_twice_is_evaluated_once():
     assert [o.op for o in program.block.operations] == ["in", "sin", "add", "mul"]
 
 
-def test_what_no_result_needs_is_left_out():
+def test_operations_that_no_result_needs_are_left_out():
     def wasteful(x):
         make("exp", x[1])
         return [x[0] * 2.0]

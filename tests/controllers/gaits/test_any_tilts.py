@@ -60,6 +60,6 @@ def test_a_vehicle_without_pods_has_a_gait_without_tilts():
     assert gait.angles(0.0).shape == (0,)
 
 
-def test_waypoints_have_as_many_angles_as_there_are_tilts():
+def test_waypoints_have_one_angle_per_tilt():
     with pytest.raises(ValueError, match="needs a phase and 6 finite tilt angles"):
         plans.waypoints([(0.1,) * 5], 1.0, tilts=6)

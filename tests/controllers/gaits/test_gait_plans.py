@@ -155,7 +155,7 @@ def test_cat_gaits_keep_their_footfalls(name) -> None:
 
 
 def test_legs_that_lean_forward_push_forward() -> None:
-    """Towards +X and +Y alike, as the references of ch. 4 and 5 go, and without any torque."""
+    """Toward +X and +Y alike, as the references of ch. 4 and 5 go, and without any torque."""
     angles = 0.2 * np.array(FORWARD)
     R, R_phi, R_theta = residuals(angles, AR_DRONE)
     assert -R_theta / R == pytest.approx(0.5 * np.tan(0.2))
@@ -180,7 +180,7 @@ def test_scaling_reconstructed_gaits_leads_away_from_singular_matrices(name) -> 
     assert max(0.0, whole) < half < third
 
 
-def test_footfall_orders_are_those_of_the_sources() -> None:
+def test_footfall_orders_agree_with_the_sources() -> None:
     """Pods 1 to 4, around the body, are right fore, left fore, left hind, right hind."""
     feet = ("RF", "LF", "LH", "RH")
 

@@ -41,13 +41,13 @@ def red(angles):
 
 
 @given(angle, angle)
-def test_the_determinant_on_red_is_that_of_the_two_color_map(alpha_1, alpha_2):
+def test_the_determinant_on_red_agrees_with_the_two_color_map(alpha_1, alpha_2):
     desired = float(red_residual(alpha_1, alpha_2, VEHICLE))
     assert red_determinant(alpha_1, alpha_2, RATIO) == pytest.approx(desired, abs=1e-12)
 
 
 @given(st.floats(-1.4, 1.4))
-def test_it_vanishes_on_the_curve_l(alpha_1):
+def test_the_determinant_vanishes_on_the_curve_l(alpha_1):
     assert red_determinant(alpha_1, float(curve_l(alpha_1, VEHICLE)), RATIO) == pytest.approx(
         0.0, abs=1e-12
     )
@@ -104,7 +104,7 @@ def test_on_the_way_the_margin_of_a_level_vehicle_grows(angles, share):
 
 
 def test_pods_more_than_a_right_angle_apart_may_lean_further_before_they_lean_less():
-    """What the module says of the way from there: the margin of a level vehicle, in between."""
+    """The module's claim on the way from there: the margin of a level vehicle, in between."""
     start = np.array([-1.03, -1.21, -1.03, 1.91])
     way = red(start) - start
     leaning = [start + share * way for share in (0.0, 0.15, 1.0)]
@@ -114,7 +114,7 @@ def test_pods_more_than_a_right_angle_apart_may_lean_further_before_they_lean_le
     assert (determinant(np.array(leaning), 0.0, 0.0, VEHICLE) > 0.0).all()
 
 
-def test_rates_are_those_of_the_moving_angles():
+def test_rates_are_derivatives_of_the_moving_angles():
     def moving(time):
         return tuple(
             (a + r * time + 0.5 * c * time**2, r + c * time, c)

@@ -56,7 +56,7 @@ def test_roll_and_pitch_keep_their_direction_and_come_before_yaw(angles, magnitu
     assume(np.linalg.cond(matrix) < 1e4)
     found = limited_tiltrotor(desired, angles, signed, r, p, VEHICLE, RANGE)
     requested, allocated = matrix @ desired, matrix @ found
-    # What an allocation leaves of one rotor it takes from another: all are good to the largest.
+    # An allocation trades one rotor against another: errors are relative to the largest.
     scale = np.abs(matrix).sum(axis=1) * np.abs([*desired, *found]).max() + 1e-9
 
     # Within the limits, in the spin's sense, over the horizon.
@@ -71,7 +71,7 @@ def test_roll_and_pitch_keep_their_direction_and_come_before_yaw(angles, magnitu
             assert -1e-6 < allocated[axis] / requested[axis] < 1.0 + 1e-6
 
 
-def test_what_the_limits_allow_comes_back_untouched():
+def test_commands_within_the_limits_come_back_untouched():
     desired = (10.0, -20.0, 5.0, 1.0)
     speeds_now = (-300.0, 300.0, -300.0, 300.0)
     tilts_now = (0.1, -0.1, 0.2, 0.0)
@@ -115,7 +115,7 @@ def sequential_program(matrices, requested, low, high):
     tilting = block_diag(requested[:, :2, None])
     _, share = solve(-1.0, (0.0, 1.0), hstack([rows, -tilting]), np.zeros(2 * cases))
     known = tilting @ share
-    for axis in (2, 3):  # least distance from what is requested, a bound on both differences
+    for axis in (2, 3):  # least distance from the request, a bound on both differences
         row, requirement, one = (
             block_diag(matrices[:, None, axis]),
             requested[:, axis],
@@ -207,7 +207,7 @@ def test_a_rotor_that_stands_still_does_not_stop_the_others(stopped):
     np.testing.assert_allclose(matrix[:2] @ found, asked, rtol=1e-9, atol=1e-3)
 
 
-def test_what_is_no_number_comes_back():
+def test_non_finite_requests_come_back():
     for value in (nan, inf):
         requested = (value, 0.0, 0.0, 0.0)
         found = limited_tiltrotor(
@@ -275,7 +275,7 @@ def test_the_rest_is_nearest_to_the_request(rotors):
     assert apart > 0 or rotors == 5
 
 
-def test_what_the_box_contains_comes_back_and_its_edge_is_no_jump():
+def test_points_in_the_box_come_back_and_its_edge_is_no_jump():
     for rows, requested, box in random_vehicles(6, 40):
         edge = np.clip(requested, *box.T)
         np.testing.assert_array_equal(allocated(rows, edge, box), edge)

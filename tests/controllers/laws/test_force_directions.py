@@ -49,7 +49,7 @@ def unit(vector):
 
 @pytest.mark.parametrize(("vehicle", "dimension"), [("four", 1), ("five", 2)])
 def test_the_direction_turns_as_the_null_space_of_the_torque(vehicle, dimension):
-    """Of four rotors one force has no torque, of five those of a plane."""
+    """With four rotors one force has no torque, with five all forces in a plane."""
     table = tiltrotor().table if vehicle == "four" else ring(5, hinged=True)
     layout = tilt_of_rotor(table)
     rotors = rotors_in(table, 0, layout)

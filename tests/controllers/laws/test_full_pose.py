@@ -177,7 +177,7 @@ def test_the_outputs_move_as_demanded(weight):
     path = [reference(TIME, order) for order in range(4)]
     for case in range(CASES):
         state = random_state(random)
-        if case % 2:  # backwards, too
+        if case % 2:  # also backward
             state = (*state[:16], *(-speed for speed in state[16:]))
         inputs = full_pose_inputs(TIME, state, law)
 
@@ -206,7 +206,7 @@ def test_the_outputs_move_as_demanded(weight):
 
 @pytest.mark.parametrize("lost", [1, 2, 3, 4])
 def test_a_rotor_known_to_be_lost_is_counted_on_no_more(lost):
-    """From its time on the law is that of a vehicle whose rotor makes no thrust."""
+    """From its time on the law is the law of a vehicle whose rotor makes no thrust."""
     random = np.random.default_rng(6)
     law = parameters()
     warned = law._replace(failure=Failure(float(lost), 2.0))
@@ -246,7 +246,7 @@ def test_no_failure_is_the_default():
     assert full_pose_inputs(1.0, state, named) == full_pose_inputs(1.0, state, parameters())
 
 
-def test_the_even_weight_is_that_of_hover():
+def test_the_even_weight_follows_from_hover():
     """A tilt rate moves the force by ``w alpha'``, a rotor's acceleration by ``w'``."""
     weight = TILTROTOR.mass * TILTROTOR.gravity / (4.0 * TILTROTOR.thrust_coefficient)
     assert WEIGHTS["even"] == pytest.approx(weight, rel=1e-12)

@@ -233,7 +233,7 @@ def third_derivatives(state, tilt_rates, inputs):
 
 
 def demanded(state, law, integral_z):
-    """What the linear laws ask for, from the state alone."""
+    """The demands of the linear laws, from the state alone."""
     gains = law.gains
     now = outputs_second_derivatives(0.0, state, [0.0] * 4, [0.0] * 4)
     roll, pitch = state[6:8]
@@ -292,7 +292,7 @@ def test_a_rotor_at_rest_is_singular():
     assert [isnan(value) for value in found[:4]] == [False, False, False, True]
 
 
-def test_the_attitude_asked_for_points_the_gaits_force_along_the_wanted_acceleration():
+def test_the_requested_attitude_points_the_gaits_force_along_the_wanted_acceleration():
     gait = continuous_trot(0.5, 2.0)
     circle = ReferenceParameters(REFERENCE_TYPES["circle"], radius=2.0, angular_frequency=0.5)
     law = parameters(gait=gait.parameters, reference=circle, decoupler=DECOUPLERS["exact"])
@@ -356,7 +356,7 @@ def test_integrators_stop_where_they_would_wind_up():
 
 @quick
 @given(st.floats(0.5, 50), st.floats(0.3, 2), st.floats(0.05, 5))
-def test_the_poles_are_where_they_were_asked_for(bandwidth, damping, integral):
+def test_the_poles_are_where_they_were_requested(bandwidth, damping, integral):
     poles = Poles(bandwidth, damping, integral)
     pair = np.array([1.0, 2 * damping * bandwidth, bandwidth**2])
     second = np.polymul(pair, [1.0, integral])
@@ -365,7 +365,7 @@ def test_the_poles_are_where_they_were_asked_for(bandwidth, damping, integral):
     np.testing.assert_allclose((1.0, *third_order_gains(poles)), third, rtol=1e-12)
 
 
-def test_the_closed_loops_are_those_of_the_poles():
+def test_the_closed_loops_have_the_requested_poles():
     loops = {loop.name: loop.polynomial for loop in feedforward_loops(GAINS, INTEGRAL)}
     assert len(loops["position"]) == 4
     assert len(loops["altitude"]) == 5
@@ -399,7 +399,7 @@ def test_a_force_without_vertical_part_counts_as_along_its_direction():
 
 
 @pytest.mark.parametrize("counted", [0.0, 0.5, 1.0])
-def test_the_jerk_is_that_of_a_force_that_turns_with_the_body_and_with_its_direction(counted):
+def test_the_jerk_includes_the_turn_of_the_body_and_of_the_force_in_it(counted):
     random = np.random.default_rng(12)
     for _ in range(CASES):
         jets, paths = zip(*(path(random, 0.5, 2.0) for _ in range(3)))
@@ -412,7 +412,7 @@ def test_the_jerk_is_that_of_a_force_that_turns_with_the_body_and_with_its_direc
             return Rotation.from_rotvec(t * omega).apply(size * n / np.linalg.norm(n))
 
         now, rate, _ = differences(force)
-        for side in (1.0, -1.0):  # a direction that points down is that of a force against it
+        for side in (1.0, -1.0):  # a direction that points down stands for a force against it
             found = jerk_along(moving(jets) * side, now, omega, counted)
             np.testing.assert_allclose(found, rate, rtol=0, atol=1e-8)
 

@@ -194,7 +194,7 @@ def test_a_hexarotor_with_canted_rotors_flies_a_circle_level():
     assert np.abs(flight.up[:, :2]).max() < 1e-12
 
 
-def test_it_stays_level_in_a_side_wind_which_its_integrators_cancel():
+def test_a_vehicle_stays_level_in_a_side_wind_which_its_integrators_cancel():
     law, knots = parameters_of(CANTED)
     flight = fly(CANTED, law, knots, 3.0, wind=(0.0, 1.0, 0.0))
     assert flight.position[-1, 1] == pytest.approx(12.0 / 64.0, abs=1e-3)  # wind k1 / k3
@@ -224,7 +224,7 @@ def sway(tilts, periods=48):
     return plans.table(times.tolist(), angles.tolist(), repeats=True)
 
 
-def test_restoring_stops_the_drift_of_what_position_and_attitude_do_not_see():
+def test_restoring_stops_the_drift_that_position_and_attitude_do_not_show():
     vehicle, gait = Vehicle(ring(7, hinged=True), HEXAROTOR, 3), sway(7)
     drifting, restored = (
         fly(vehicle, *parameters_of(vehicle, gait, restoring=rate), 3.0, gait=gait, step=0.01)

@@ -48,7 +48,7 @@ def observed(seed, states=(), gyroscopic=1.0):
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_rates_are_those_of_the_attitude_that_points_the_force(seed):
+def test_rates_are_derivatives_of_the_attitude_that_points_the_force(seed):
     """By central differences of the attitude as the acceleration follows its jerk."""
     seen, h = observed(seed), 1e-5
     acceleration = seen.reference.velocity  # any
@@ -180,7 +180,7 @@ def test_indi_changes_the_torque_of_the_filtered_thrusts():
 
 
 def test_nothing_to_shorten_has_gradients():
-    """Of arrays: the side that is not selected must not make them NaN."""
+    """On arrays, the side that is not selected must not make them NaN."""
     jax = pytest.importorskip("jax")
     zero = jax.numpy.zeros(3)
     assert np.isfinite(jax.jacobian(lambda vector: shortened(vector, 1.0))(zero)).all()

@@ -31,7 +31,7 @@ def precise(rates, start, duration):
     return found.y[:, -1]
 
 
-def test_gains_are_those_of_the_periodic_riccati_equation():
+def test_gains_solve_the_periodic_riccati_equation():
     """``-P' = A^T P + P A - P B R^-1 B^T P + Q``, backward over a period, ends where it began."""
     nodes, step, phase = 64, 0.05, 2.0 * np.pi * np.arange(64) / 64
     a = np.zeros((nodes, 2, 2))
@@ -140,7 +140,7 @@ def test_an_orbit_is_flown_by_its_own_thrusts(regulated):
 
 
 def test_the_orbit_follows_the_lean_of_hover(regulated):
-    """With less than half of its swing missing, as the lean's rate is part of what is desired."""
+    """With less than half of its swing missing, as the lean's rate is part of the desired state."""
     _, lean, _, regulator = regulated
     swing = np.ptp(lean, axis=0).max()
     assert np.abs(regulator.states[:, 6:8] - lean).max() < 0.5 * swing

@@ -1,4 +1,4 @@
-"""Allocated thrusts and tilts make the force and torque that were asked for."""
+"""Allocated thrusts and tilts make the requested force and torque."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def test_planned_tilts_make_any_torque_and_force_along_one_axis(rotors):
 
 
 @pytest.mark.parametrize("rotors", [4, 6])
-def test_tilts_of_its_own_make_any_force_and_torque_with_the_least_thrusts(rotors):
+def test_independent_tilts_make_any_force_and_torque_with_the_least_thrusts(rotors):
     rng = np.random.default_rng(rotors)
     table = per_newton(ring(rotors, hinged=True))
     observed = SimpleNamespace(rotors=rotors_in(table, 0, tilt_of_rotor(table)))
@@ -60,7 +60,7 @@ def test_tilts_of_its_own_make_any_force_and_torque_with_the_least_thrusts(rotor
         assert thrusts == pytest.approx(np.hypot(*least.reshape(2, rotors)), rel=1e-8)
 
 
-def test_tilts_are_in_their_order_which_need_not_be_that_of_the_rotors():
+def test_tilts_need_not_be_in_the_order_of_the_rotors():
     layout = (2, 0, 3, 1)
     parts = np.random.default_rng(1).normal(size=(2, 6, 4))
     rotors = Rotors(layout, np.ones(4), np.zeros((6, 4)), *parts)

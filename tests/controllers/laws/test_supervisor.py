@@ -54,7 +54,7 @@ def regular(scales, tilts, roll, pitch):
 @settings(deadline=None, max_examples=150)
 @example((0.0, 0.0, -1.0, -1.5), 0.0, -0.5)
 @given(angles, leans, leans)
-def test_what_passes_is_regular_and_a_little_more_is_not(tilts, roll, pitch):
+def test_tilts_that_pass_are_regular_and_slightly_larger_ones_are_not(tilts, roll, pitch):
     scale = allowed_scale(tilts, roll, pitch, WATCH, RATIO)
     sixteenths = regular(np.arange(17) / 16, tilts, roll, pitch)
     if not sixteenths.any():
@@ -79,7 +79,7 @@ def random_cases(random):
 
 
 def test_the_scale_is_the_largest_that_is_allowed():
-    """Of a dense grid, but for a range of scales that lies between two sixteenths."""
+    """The largest scale of a dense grid, except for a range of scales between two sixteenths."""
     dense, unseen, nearest, partial, beyond = 128, 0, 0, 0, 0
     for number, (code, seen, tilts, lean) in enumerate(random_cases(np.random.default_rng(5))):
         limits = WATCH._replace(min_margin=0.3 if number % 2 else 1.1)
@@ -178,7 +178,7 @@ def test_a_supervisor_with_room_to_spare_rests(strategy):
 
 
 @pytest.mark.parametrize("strategy", WITH_STATES)
-def test_it_acts_as_soon_as_the_jump_comes_into_sight(strategy):
+def test_the_supervisor_acts_as_soon_as_the_jump_comes_into_sight(strategy):
     """In hover before the jump of the trot at 1 s, with the attitude that its tilts need."""
     n = torque_free_direction(JUMPS.angles(0.65), VEHICLE)
     roll, pitch = exact_decoupler(0.0, 0.0, 0.0, 0.0, 9.8, tuple(n))
@@ -194,7 +194,7 @@ def test_it_acts_as_soon_as_the_jump_comes_into_sight(strategy):
 
 
 def test_the_clock_slows_down_within_the_band():
-    """A gait towards L, at the instant whose last glance has half the band left."""
+    """A gait toward L, at the instant whose last glance has half the band left."""
     gait = waypoints([(-0.3, 0.3, -0.3, 0.3), (0.4, -0.2, 0.4, -0.2)], 4.0)
     supervisor = watch("hold", min_determinant=2.0)
     state = asked_rates = None
@@ -262,7 +262,7 @@ def test_one_threshold_is_enough_to_scale(threshold):
 
 
 @pytest.mark.parametrize("left", [1e-4, 1e-3])
-def test_towards_either_end_of_the_way_to_red_the_motion_is_critically_damped(left):
+def test_near_either_end_of_the_way_to_red_the_motion_is_critically_damped(left):
     """``s'' + s' / T + s / 4 T^2``, whose roots are equal: it comes to the end and not beyond."""
     eager = watch("return_to_red", max_rate=1e6)
     rates = np.linspace(-0.01, 0.01, 5)
@@ -302,7 +302,7 @@ def test_on_the_way_to_red_the_tilt_with_the_longest_way_has_the_maximum_rate(ro
 
 
 def test_the_way_to_red_undershoots_a_threshold_by_less_than_the_band():
-    """From red (at 0 s) towards blue (at 2 s) and back, level, as in beyond/supervisor_blue."""
+    """From red (at 0 s) toward blue (at 2 s) and back, level, as in beyond/supervisor_blue."""
     angles = ((-0.3, 0.3, -0.3, 0.3), (-0.3, 0.3, 0.634, -0.634))
     plan = waypoints(angles, 4.0)
     supervisor = watch("return_to_red", min_determinant=1.5, max_rate=1.0)
@@ -320,7 +320,7 @@ def test_the_way_to_red_undershoots_a_threshold_by_less_than_the_band():
     assert smallest == pytest.approx(1.464, abs=0.01)  # docs/supervisor.md
 
 
-def test_what_meets_its_threshold_exactly_is_allowed():
+def test_tilts_exactly_at_the_threshold_are_allowed():
     tilts, lean = (0.4, -0.2, 0.1, 0.3), (0.2, -0.3)
     margin, determinant_there, _ = assess(tilts, tuple(world_up(*lean)), RATIO)
     for threshold in ({"min_margin": margin}, {"min_determinant": determinant_there}):
@@ -338,14 +338,14 @@ def test_four_rotors_of_a_table_have_the_tiltrotor_s_margin_and_determinant(tilt
     table, up = cross_table(VEHICLE, tilting=True), tuple(world_up(roll, pitch))
     known = assess(tilts, up, RATIO)[:2]
     n = np.array(torque_free_direction(tilts, VEHICLE))
-    side = tuple(np.sign(known[1]) * np.sign(n @ up) * n)  # that of the determinant
+    side = tuple(np.sign(known[1]) * np.sign(n @ up) * n)  # the sign of the determinant
     general = multirotor_supervision_of(tilt_of_rotor(table), 1).assess
     found = general(tilts, up, watched(table, 0, side), table)[:2]
     np.testing.assert_allclose(found, known, rtol=0.0, atol=1e-7)
 
 
 @pytest.mark.parametrize(("dimension", "forward"), [(1, False), (2, True), (3, False)])
-def test_it_is_zero_where_the_outputs_depend_on_each_other(dimension, forward):
+def test_the_margin_is_zero_where_the_outputs_depend_on_each_other(dimension, forward):
     """Six arms without tilt push upwards only; sideways, none of them lifts."""
     table = ring(6, hinged=True)
     watch_all = multirotor_supervision_of(tilt_of_rotor(table), dimension, forward)

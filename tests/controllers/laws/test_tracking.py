@@ -2,7 +2,8 @@
 
 The vehicle flies without torque along its torque-free force, so that its acceleration, and with it
 every error and every feedback, is known as a function of time, and the references of roll and pitch
-are the exact decoupler's answer to it. Their derivatives, by differences, must be those in the law.
+are the exact decoupler's answer to it. Their derivatives, by differences, must equal the
+derivatives in the law.
 """
 
 from __future__ import annotations
@@ -129,7 +130,7 @@ def attitude_references(motion, law, euler_yaw):
 
 
 def demanded_third_derivatives(motion, law):
-    """Of roll, pitch, yaw and altitude, by linear laws around references that move."""
+    """Demands of roll, pitch, yaw and altitude, by linear laws around references that move."""
     state = motion.state()
     now = outputs_second_derivatives(0.0, state, GAIT.rates(TIME), [0.0] * 4)
 

@@ -49,7 +49,7 @@ def product(p, q):
 
 
 def is_vertical(q):
-    """Whether the pitch is so near +-90 degrees that the angles lose digits."""
+    """Whether the pitch is near enough to +-90 degrees that the angles lose digits."""
     w, x, y, z = q
     return abs(2 * (w * y - z * x)) > 0.999
 

@@ -67,7 +67,7 @@ def test_circle_is_eqs_43_and_44(time):
 
 @quick
 @given(times)
-def test_circle_passes_its_acceleration_on_when_asked(time):
+def test_circle_passes_its_acceleration_on_when_requested(time):
     *_, ax, ay, az = position_reference(time, CIRCLE._replace(acceleration_feedforward=1.0))
     expected = (-0.05 * np.cos(0.1 * time), -0.05 * np.sin(0.1 * time), 0.0)
     assert (ax, ay, az) == pytest.approx(expected, abs=1e-16)
@@ -197,7 +197,7 @@ def test_the_snap_of_a_table_begins_and_ends_at_zero():
 
 
 def snap_cost(shift):
-    """Integral of squared snap of the motion with a middle stretch bent by a bump of its own."""
+    """Integral of squared snap of the motion with a middle stretch bent by a bump."""
     times, snap = snap_along_the_way()
     # A bump that is zero with three derivatives at the knots 2 and 5: (s (1 - s))^4.
     s = np.clip((times - 2.0) / 3.0, 0.0, 1.0)
@@ -230,7 +230,7 @@ def test_waypoints_that_make_no_motion_are_refused(points, times, message):
         minimum_snap_knots(points, times)
 
 
-def test_what_a_reference_leaves_out_is_zero():
+def test_missing_parts_of_a_reference_are_zero():
     assert not any(ReferenceParameters(REFERENCE_TYPES["line"])[1:])
 
 

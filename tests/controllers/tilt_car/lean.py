@@ -82,7 +82,7 @@ def lean_of(square_1, square_2, car):
 def restored_lean(path, car, rate):
     """The lean (rad) at which a restoring rate (1/s) and the drift hold each other.
 
-    There is one for every rate above 0, for the drift dies away towards the half angle.
+    There is one for every rate above 0, for the drift dies away toward the half angle.
 
     Raises:
         ValueError: If the rate is not above 0.

@@ -1,4 +1,4 @@
-"""The drift of the tilt-car's states: closed forms, the law itself, and what undoes it."""
+"""The drift of the tilt-car's states: closed forms, the law itself, and its compensation."""
 
 from __future__ import annotations
 

@@ -231,7 +231,7 @@ def test_the_printed_tilt_column_lacks_the_yaws_answer():
     for name, values in inputs.items():
         factor = 1.0 / turn_per_tilt(CAR) if name == "published" else 1.0
         made[name] = matrix_at(90.0, 70.0) @ (values * [1.0, 1.0, factor])
-    # Each makes the same with its own columns: only the exact one's are the car's.
+    # Each is consistent with its own columns: only the exact one's are the car's.
     np.testing.assert_allclose(made["published"], made["exact"], rtol=1e-9)
     assert abs(inputs["published"][2] - inputs["exact"][2]) > 1e-3
 
@@ -265,7 +265,7 @@ def test_the_thrusts_direction_is_yaw_and_tilt_together():
 
 
 @given(st.floats(-0.5, 0.5), st.floats(-1.5, 1.5), st.sampled_from([-pi / 3, pi / 3]))
-def test_proposition_4_tells_which_rotors_push(error, error_rate, direction):
+def test_proposition_4_states_which_rotors_push(error, error_rate, direction):
     state = np.array([0.5, -error, 1.0, -error_rate, direction, 0.0])  # e_x = e_x' = 0 at 1 s
     square_1, square_2 = planned.demanded_squared_speeds(1.0, state, LAW)
     push = 9.0 * error_rate + 18.0 * error

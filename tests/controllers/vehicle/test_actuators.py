@@ -74,7 +74,7 @@ def test_faults_begin_at_their_time():
 
 
 @pytest.mark.parametrize("channel", [0.0, 3.0])
-def test_every_axis_has_noise_of_its_own(channel):
+def test_every_axis_has_independent_noise(channel):
     sensor = Sensor(0.3)
     errors = tuple(reading_error(as_arrays(sensor), 5.0, channel, 17.0))
     alone = [0.3 * normal(5.0, channel + axis, 17.0) for axis in (0.0, 1.0, 2.0)]

@@ -1,4 +1,4 @@
-"""The table of rotors against MuJoCo, and its equations of motion against those of four rotors."""
+"""The table of rotors against MuJoCo, and its equations of motion against four rotors."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ def test_effectiveness_is_what_mujoco_makes_of_unit_thrusts(seed):
     assert np.abs(found - expected).max() < 1e-14 * np.abs(expected).max()
 
 
-def test_equations_of_motion_are_those_of_chapter_3_for_its_tiltrotor():
+def test_equations_of_motion_agree_with_chapter_3_for_its_tiltrotor():
     vehicle = tiltrotor()
     motion = equations_of_motion_of(tilt_of_rotor(vehicle.table))
     inputs, gust = (1.0, -2.0, 3.0, -4.0), (0.1, 0.2, -0.3)

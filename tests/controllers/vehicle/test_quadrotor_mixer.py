@@ -14,7 +14,7 @@ WRENCHES = np.random.default_rng(4).uniform(-1.0, 1.0, (20, 4)) * (6.0, 0.5, 0.5
 
 @pytest.mark.parametrize("preset", PRESETS)
 @pytest.mark.parametrize("wrench", WRENCHES)
-def test_the_rotors_make_the_thrust_and_the_torques_asked_for(preset, wrench):
+def test_the_rotors_make_the_requested_thrust_and_torques(preset, wrench):
     vehicle = PRESETS[preset]
     speeds = [
         sign * speed_along_spin(control)

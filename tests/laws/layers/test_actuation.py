@@ -118,7 +118,7 @@ def test_the_full_pose_law_flies_in_the_layer():
 
 
 @pytest.mark.parametrize("plant", ["mujoco", "thesis"])
-def test_full_pose_tells_no_pod_more_than_its_limit(plant):
+def test_full_pose_commands_no_pod_beyond_its_limit(plant):
     """At the servo's stop a pod stays below the same limit, however long the law turns it on."""
     flight = tiltsim.simulate(
         tiltsim.parse_scenario(
@@ -140,7 +140,7 @@ def test_full_pose_tells_no_pod_more_than_its_limit(plant):
 # --- rotors ------------------------------------------------------------------------------------
 
 
-def test_rotors_follow_the_speeds_they_are_told_with_a_first_order_lag():
+def test_rotors_follow_commanded_speeds_with_a_first_order_lag():
     lag = 0.03
     plant = make_plant(
         assemble(scenario(vehicle={"rotor_time_constant": lag}, simulation={"timestep": 0.0005}))

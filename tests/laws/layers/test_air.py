@@ -65,7 +65,7 @@ def test_a_saved_state_restarts_bit_identically(timing):
 
 
 def test_a_steady_wind_is_leant_against_and_held_by_position_error():
-    """Drag balances the lean; the position loop, gain one, asks for it at an error."""
+    """Drag balances the lean; the position loop, gain one, demands it at an error."""
     wind, linear = 3.0, 0.2
     # The law's poles are at 1 rad/s and slower ones of the altitude; 12 s leave 4e-5 of the lean.
     air = {"drag": {"linear": [linear] * 3}, "wind": [wind, 0.0, 0.0]}

@@ -51,7 +51,7 @@ def furthest(one, other, names=MOTION):
 
 
 def test_the_tiltrotor_flies_in_air_near_the_ground_as_a_multirotor_does():
-    """The drag, the places of the rotors and what the ground adds to each, by tables."""
+    """The drag, the places of the rotors and the ground effect on each, by tables."""
     tables = {
         "air": {**STORM, "wind": [3.0, 1.0, 0.2]},
         "gait": {"type": "fixed", "angles": [-0.2, -0.2, 0.2, 0.2]},
@@ -90,7 +90,7 @@ def test_plants_agree_to_the_order_of_their_solvers():
 
 
 def angular_momentum(plant, rotors):
-    """Of body, pods and rotors about the centre of mass, world axes, shape (3,)."""
+    """Angular momentum of body, pods and rotors about the center of mass, world axes, (3,)."""
     model, data = plant.model, plant.data
     mujoco.mj_forward(model, data)
     mujoco.mj_subtreeVel(model, data)
@@ -177,7 +177,7 @@ MEASURED = {"angular_acceleration": "measured"}
 PRIORITIZED = {"allocation": "prioritized"}
 NARROW = {"min_rotor_speed": 345.0, "max_rotor_speed": 372.0}
 WEAK = [{"type": "partial_thrust", "rotor": 1, "time": 0.02, "factor": 0.95}]
-"""Unknown to the law: what is measured is not its model's."""
+"""Unknown to the law: measurements differ from its model."""
 
 
 @pytest.mark.parametrize(
@@ -229,7 +229,7 @@ def test_with_further_parts_the_tiltrotor_flies_as_a_multirotor_does(plant, laye
 
 
 def test_six_arms_hold_a_gait_that_would_push_aside_before_the_vehicle_leans():
-    """At a level attitude the tilts after 0.3 s have a margin of 1.4 rad, against 1.5 asked."""
+    """At a level attitude the tilts after 0.3 s have a margin of 1.4 rad, against 1.5 requested."""
     aside = (0.4 * np.sin(np.pi / 6.0 + np.pi / 3.0 * np.arange(6))).tolist()
     times = [0.0, *np.arange(0.2, 0.41, 0.01).tolist()]
     rows = [[time, *(aside if time > 0.305 else [0.0] * 6)] for time in times]
@@ -278,14 +278,14 @@ def test_once_a_rotor_is_known_to_be_lost_the_others_are_watched(strategy):
         ("hexarotor", "hold", "vehicle.mjcf has no tilts"),
     ],
 )
-def test_what_there_is_nothing_to_supervise_for_is_refused(name, strategy, message):
+def test_supervision_without_purpose_is_refused(name, strategy, message):
     controller = {"law": "attitude_force", "supervisor": {"strategy": strategy}}
     gait = {"gait": TILTS} if strategy == "scale" else {}
     line = refusal(scenario, name, controller=controller, **gait)
     assert f'controller.supervisor.strategy = "{strategy}": {message}' in line
 
 
-def test_scaling_is_refused_towards_angles_of_too_little_force_without_the_lost_rotor(tmp_path):
+def test_scaling_to_angles_with_too_little_force_without_the_lost_rotor_is_refused(tmp_path):
     """Untilted all but one of six rotors are parallel, and that one is lost."""
     text = fleet_file("tilt_hexarotor").read_text()
     text = text.replace("scene.xml", str(fleet_file("scene")))

@@ -31,13 +31,13 @@ def vehicle_file(folder, *, beside=0.0, inclined=0.0, armature=1e-5, pod=(1e-9, 
     """Rotors on tilting arms of 0.2 m, as MJCF: one on each of six, or six on five.
 
     Args:
-        folder: Of the file.
+        folder: Folder of the file.
         beside: Distance of each rotor from its hinge, m.
         inclined: Angle of its thrust to the right angle with the hinge, rad.
-        armature: Of each hinge, kg m^2.
+        armature: Armature of each hinge, kg m^2.
         pod: Mass (kg) and moment of inertia (kg m^2) of each pod, about its hinge.
-        seed: Of random places, directions, coefficients and products of inertia on five arms; None
-            for six regular arms.
+        seed: Seed of random places, directions, coefficients and products of inertia on five arms;
+            None for six regular arms.
     """
     rng, random = np.random.default_rng(seed), float(seed is not None)
     arms = [0, 1, 2, 3, 4, 5] if seed is None else [0, 1, 2, 3, 4, 4]
@@ -129,7 +129,7 @@ def test_a_servo_gives_way_until_it_carries_its_rotor(plant, tmp_path):
         ("thesis", 0.004, "hover, which the ideal pods of the thesis plant neglect; more armature"),
     ],
 )
-def test_a_soft_servo_is_told(plant, beside, words, tmp_path, capsys):
+def test_a_soft_servo_is_reported(plant, beside, words, tmp_path, capsys):
     path = tmp_path / "flight.toml"
     vehicle_file(tmp_path, beside=beside)
     path.write_text(
@@ -143,7 +143,7 @@ def test_a_soft_servo_is_told(plant, beside, words, tmp_path, capsys):
     assert error.count("\n") <= 1
 
 
-def test_a_centre_of_mass_to_the_side_is_told(tmp_path, capsys):
+def test_a_center_of_mass_to_the_side_is_reported(tmp_path, capsys):
     path, vehicle = tmp_path / "flight.toml", vehicle_file(tmp_path)
     file = Path(vehicle["mjcf"])
     file.write_text(file.read_text().replace('pos="0 0 0" mass="1.5"', 'pos="0.01 0 0" mass="1.5"'))

@@ -1,4 +1,4 @@
-"""Feeding back the angular acceleration of the plant instead of that of the law's model."""
+"""Feeding back the angular acceleration of the plant instead of the law's model."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ FINE = {"simulation": {"timestep": 0.0005}}
         (SIX, (HEAVY_POD, ASIDE), FINE, SPINNING, STORM, SLOW, MASS, HEAVY_ROTORS),
     ],
 )
-def test_it_is_the_acceleration_that_mujoco_integrates(changes, tmp_path):
+def test_the_measurement_is_the_acceleration_that_mujoco_integrates(changes, tmp_path):
     tables = [hexarotor(tmp_path, *this) if isinstance(this, tuple) else this for this in changes]
     plant = make_plant(assemble(scenario(*tables, MEASURED)))
     loop, parameters = plant._loop, plant._setup.parameters
@@ -96,7 +96,7 @@ def test_it_is_the_acceleration_that_mujoco_integrates(changes, tmp_path):
     assert largest > 5.0
 
 
-def test_it_is_the_acceleration_that_the_equations_integrate():
+def test_the_measurement_is_the_acceleration_that_the_equations_integrate():
     desired = scenario(*EVERYTHING, MEASURED, THESIS)
     assembly = assemble(desired)
     plant, loop = make_plant(assembly), assembly.loop
@@ -124,7 +124,7 @@ def test_on_the_ideal_thesis_plant_it_is_the_model_s():
 
 @pytest.mark.parametrize("changes", [(), (FEEDFORWARD,)], ids=["published", "feedforward"])
 def test_a_right_model_without_gyroscopic_torque_is_as_good_as_a_measurement(changes):
-    """A layer that does nothing makes the thesis plant measure, too."""
+    """A layer that does nothing makes even the thesis plant measure."""
     never = {"fault": [{"type": "rotor_loss", "rotor": 1, "time": 1e6}]}
     desired = (TILTROTOR, TROT, SPINNING, THESIS, *changes, never)
     known, measured = (tiltsim.simulate(scenario(*desired, setting)) for setting in ({}, MEASURED))
@@ -133,7 +133,7 @@ def test_a_right_model_without_gyroscopic_torque_is_as_good_as_a_measurement(cha
 
 
 @pytest.mark.slow
-def test_it_flies_the_same_three_ways():
+def test_the_measured_law_flies_equally_three_ways():
     """Inside every other layer, and on the equations: `tests/simulation/test_batch.py`."""
     engine = {"simulation": {"engine": "native", "duration": 0.2}}
     flights = [
@@ -147,7 +147,7 @@ def test_it_flies_the_same_three_ways():
 @pytest.mark.parametrize(
     "changes", [{"ground": {}}, {"vehicle": {"mjcf": FILE}}, {"vehicle": {"rotor_inertia": 1e-5}}]
 )
-def test_what_it_does_not_include_is_refused(changes):
+def test_unsupported_uses_of_the_measurement_are_refused(changes):
     (table,) = changes
     with pytest.raises(InputError, match=f'{table}.*not supported with .* = "measured"'):
         scenario(TILTROTOR, MEASURED, changes)
@@ -229,14 +229,14 @@ def test_untilted_it_makes_a_fourth_order_loop_of_yaw(form):
 
 @pytest.mark.parametrize("form", [{}, EXACT], ids=["published", "exact"])
 @pytest.mark.parametrize("angles", [[-0.65, -0.65, 0.65, 0.65], [0.3, 0.1, 0.0, -0.2]])
-def test_it_moves_the_pole_of_the_lag(form, angles):
+def test_the_measurement_moves_the_pole_of_the_lag(form, angles):
     desired = scenario(LAGGING, form, UNSTABLE, gait={"type": "fixed", "angles": angles})
     fastest = -(1.0 + gains_of_reaction(desired).max()) / LAG
     assert poles_of_hover(desired).real.min() == pytest.approx(fastest, rel=0.02)
 
 
 @pytest.mark.parametrize("norm", ["speed", "thrust"])
-def test_it_moves_the_pole_of_the_lag_of_six_rotors(norm):
+def test_the_measurement_moves_the_pole_of_the_lag_of_six_rotors(norm):
     """Canted, they push in all directions; a short lag leaves the law's own poles far behind."""
     law, lag = {"law": "attitude_force", "dimension": 3, "norm": norm}, 5e-4
     file = str(shipped_folder("mjcf") / "cant_hexarotor.xml")
@@ -285,7 +285,7 @@ def test_rotors_too_heavy_for_the_step_are_refused(changes, cause):
     "changes", [(), (HELD,), pytest.param((EXACT, LATER), marks=pytest.mark.slow)]
 )
 def test_the_largest_inertia_is_the_one_that_flies(changes):
-    """RK4 is stable up to 2.78, the check allows 2.6; what is held is exact."""
+    """RK4 is stable up to 2.78, the check allows 2.6; held values are exact."""
     with pytest.raises(InputError) as caught:
         scenario(LAGGING, *changes)
     largest = float(re.search("at most (.*) kg", str(caught.value))[1])

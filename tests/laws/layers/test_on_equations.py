@@ -1,4 +1,4 @@
-"""Layered loops on the thesis's equations, an integration of its own to check MuJoCo's by."""
+"""Layered loops on the thesis's equations, an independent integration to check MuJoCo's by."""
 
 from __future__ import annotations
 
@@ -115,8 +115,8 @@ def on_both(*changes):
 
 # --- both plants -------------------------------------------------------------------------------
 
-# What comes at an instant, within a step, costs an integrator one step: first order. A kink costs
-# it one order, and where all is smooth ode3's third order is left.
+# An event within a step costs an integrator one step: first order. A kink costs it one order, and
+# where all is smooth ode3's third order is left.
 FLIGHTS = {
     "rotor lag": (3, (TILTROTOR, {"vehicle": {"rotor_time_constant": 0.02}})),
     "late": (3, (TILTROTOR, LATE)),
@@ -200,12 +200,12 @@ def test_a_state_that_has_overflowed_is_seen_as_no_number(base):
         assert not np.isfinite(plant.observe()).all()
 
 
-def test_a_vehicle_that_does_as_told_flies_the_printed_equations():
+def test_an_ideal_vehicle_flies_the_printed_equations():
     desired = scenario(TILTROTOR, {"simulation": {"plant": "thesis"}})
     assert loop_of(desired) is LOOPS["attitude_altitude"]
 
 
-def test_they_are_the_printed_equations():
+def test_layered_equations_equal_the_printed_ones():
     """A layer that does nothing leaves how far the solver lets a rotation lose its length."""
     never = {"fault": [{"type": "rotor_loss", "rotor": 1, "time": 1e6}]}
     printed, driven = fly(TILTROTOR), fly(TILTROTOR, never)
@@ -242,7 +242,7 @@ def test_a_pod_stops_where_its_servo_does():
 
 @pytest.mark.parametrize("plant", ["mujoco", "thesis"])
 def test_rotors_hold_their_limits_within_a_step(plant):
-    """Else thrust outruns them by what a step adds, and a longer step flies another flight."""
+    """Else thrust outruns them by one step's change, and a longer step flies another flight."""
     changes = {"simulation.plant": plant, "simulation.engine": "python"}
     coarse, fine = (
         tiltsim.simulate(

@@ -54,8 +54,8 @@ def largest_difference(one, other, names=MOTION):
 
 
 # --- MuJoCo ------------------------------------------------------------------------------------
-# With one solver the plants differ by what MuJoCo's pods weigh: 1e-13 kg m^2 on a hinge of 1e-6,
-# so a pod answers to one ten-millionth of the body's angular acceleration.
+# With one solver the plants differ by the inertia of MuJoCo's pods: 1e-13 kg m^2 on a hinge of
+# 1e-6, so a pod answers to one ten-millionth of the body's angular acceleration.
 
 
 @pytest.mark.parametrize(
@@ -63,7 +63,7 @@ def largest_difference(one, other, names=MOTION):
     [(TILTROTOR, TROT, TURNING), (TILTROTOR, TROT, *FULL), (QUADROTOR, STORM)],
     ids=["turning", "limited", "quadrotor"],
 )
-def test_it_is_mujoco_without_its_pods(changes):
+def test_the_rigid_body_is_mujoco_without_its_pods(changes):
     mujoco, rigid = (fly(*changes, plant=plant) for plant in ("mujoco", "rigid_body"))
     assert rigid.end.kind == "completed"
     assert largest_difference(mujoco, rigid) < 1e-8
@@ -73,7 +73,7 @@ def test_it_is_mujoco_without_its_pods(changes):
 
 
 @pytest.mark.parametrize("name", MULTIROTORS)
-def test_it_is_mujoco_with_any_number_of_rotors(name):
+def test_the_rigid_body_is_mujoco_with_any_number_of_rotors(name):
     mujoco, rigid = (multirotor(name, plant) for plant in ("mujoco", "rigid_body"))
     assert largest_difference(mujoco, rigid) < 1e-8
     assert max(np.ptp(rigid[name]) for name in MOTION) > 0.01
@@ -81,7 +81,7 @@ def test_it_is_mujoco_with_any_number_of_rotors(name):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("gait", ["fixed", "trot_continuous", "two_color"])
-def test_at_fine_steps_mujoco_is_nanometres_away(gait):
+def test_at_fine_steps_mujoco_is_nanometers_away(gait):
     plan = {"type": gait, **GAITS[gait]}
     fine = {"timestep": 0.00025, "duration": 0.5, "record_timestep": 0.02}
     mujoco, rigid = (
@@ -176,7 +176,7 @@ def test_principal_moments_are_a_matrix():
         ({"ground": {}}, r"plant.*no ground contact; use mujoco"),
     ],
 )
-def test_what_it_does_not_have_is_refused(tables, message):
+def test_features_without_a_rigid_body_are_refused(tables, message):
     with pytest.raises(InputError, match=message):
         tiltsim.parse_scenario(merge(RIGID, tables))
 

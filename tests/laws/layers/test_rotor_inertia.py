@@ -52,7 +52,7 @@ def thrust_axes(tilts):
 
 
 def angular_momentum(plant):
-    """Of body, pods and rotors about the centre of mass, world axes, shape (3,)."""
+    """Angular momentum of body, pods and rotors about the center of mass, world axes, (3,)."""
     model, data = plant.model, plant.data
     mujoco.mj_forward(model, data)
     mujoco.mj_subtreeVel(model, data)
@@ -97,7 +97,7 @@ def spinning_model(own, inertia):
     return model
 
 
-def test_accelerations_are_those_of_bodies_that_spin():
+def test_accelerations_include_the_spin_of_bodies():
     """MuJoCo's own dynamics of spinning bodies knows nothing of the layer's formulas."""
     rng = np.random.default_rng(4)
     assembly = assemble(scenario(vehicle={"pod": {"mass": 0.01, "inertia": 1e-4}}))
@@ -221,7 +221,7 @@ def test_a_trot_turns_the_body_and_a_fixed_gait_does_not(plant):
 def test_stiff_servos_approach_pods_that_follow_exactly():
     """The torques by tilt rates and rotor accelerations against the momentum formulation.
 
-    What remains is the load on the servo: 1.7e-6 at 1e4 rad/s, a fourth at twice the frequency.
+    The remainder is the load on the servo: 1.7e-6 at 1e4 rad/s, a fourth at twice the frequency.
     """
     short = {"duration": 0.04, "timestep": 4e-5, "record_timestep": 0.01}
     exact = fly(THESIS, simulation=short)
@@ -279,7 +279,7 @@ def test_commanded_speeds_take_their_momentum_from_the_body(model):
         ({"vehicle": {"rotor_inertia": 1.3e-3}}, "all rotors"),
     ],
 )
-def test_what_has_no_such_rotors_is_refused(tables, message):
+def test_vehicles_without_such_rotors_are_refused(tables, message):
     tables = merge({"vehicle": {"rotor_inertia": INERTIA}}, tables)
     with pytest.raises(InputError, match=message):
         tiltsim.parse_scenario(tables)
@@ -295,7 +295,7 @@ def test_a_users_file_gets_the_same_rotors():
     assert furthest(own, still) > 1e-3
 
 
-def test_the_feedforward_law_knows_the_inertia_where_asked():
+def test_the_feedforward_law_knows_the_inertia_on_request():
     fed_forward = {"controller": {"gait_rate_feedforward": True, "gains": "feedforward"}}
     known = {"controller": {"rotor_inertia_feedforward": True}}
     plain, knowing = (fly(THESIS, fed_forward, change) for change in ({}, known))

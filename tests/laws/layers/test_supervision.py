@@ -145,7 +145,7 @@ def test_both_plants_fly_it_alike(strategy):
 
 
 @pytest.mark.parametrize("strategy", WITH_STATES)
-def test_it_flies_sampled_and_through_real_actuators(strategy):
+def test_a_supervised_gait_flies_sampled_and_through_real_actuators(strategy):
     supervisor = {"strategy": strategy, "min_margin": 0.8}
     simulation = {"duration": 1.3, "timestep": 0.002, "control_timestep": 0.004}
     tables = tiltrotor(
@@ -178,7 +178,7 @@ def test_sampled_as_seldom_as_allowed_it_stays_within_bounds(address):
         assert 0.5 < flight["supervisor_state"].max() <= 1.0
 
 
-def test_the_way_to_red_is_no_faster_than_asked():
+def test_the_way_to_red_is_no_faster_than_requested():
     """A planned gait that rests and is not allowed: the tilts set out for red."""
     tables = tiltrotor(
         gait={"type": "fixed", "angles": [-0.8, 0.1, 0.9, -0.2]},

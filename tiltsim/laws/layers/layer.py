@@ -1,7 +1,7 @@
 """Layers around a closed loop: stages between the controller and its vehicle.
 
-A layer has parameters and states of its own and replaces some functions; the rest stays as in the
-loop within. `wrap_loop` is the one place where that is put together.
+A layer has its own parameters and states and replaces some functions; the rest stays as in the loop
+within. `wrap_loop` is the one place where that is put together.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class Layer:
         name: Part of the name of the record of parameters.
         parameters: The type of the layer's parameters.
         read: ``(plan) -> parameters``.
-        controls, hold: As in `tiltsim.closed_loop.loop.Sampling`.
+        controls, hold: See `tiltsim.closed_loop.loop.Sampling`.
         adds: Traceable function ``(time, qpos, qvel, act, ctrl, parameters) -> further controls``,
             which follow the controls ``ctrl`` of the loop within, also while these are held. Its
             parameters are the layer's.
@@ -46,10 +46,10 @@ class Layer:
         derive: ``(inner columns, samples by field, setup) -> columns``; the first is a function.
         fields: Fields of a sample: the first activations of the layer's actuators.
         units: Columns of a flight that the layer adds, with their units.
-        equations: As in `ClosedLoop`, for these parameters. The equations of the loop within are
-            not used: they do not know the layer.
+        equations: See `ClosedLoop`; for these parameters. The equations of the loop within are not
+            used: they do not know the layer.
         of_controller: Whether it is part of the controller, as a supervisor is: the loop around it
-            is that of a controller itself, and has none ``within``.
+            counts as a controller's own loop, and has none ``within``.
     """
 
     name: str

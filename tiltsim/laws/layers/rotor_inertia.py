@@ -85,7 +85,7 @@ def with_rotor_inertia(loop: ClosedLoop) -> ClosedLoop:
 def _momentum_equations(equations: Equations, dynamics: Dynamics) -> Equations:
     """Equations of a vehicle whose rotors have spin inertia, and whose pods may jump.
 
-    Their body rates are those at which the body alone had the total angular momentum.
+    At their body rates the body alone would have the total angular momentum.
     """
     inner_inputs, inner_rates, inner_observe = equations.inputs, equations.rates, equations.observe
     tilts, tilted, rotors = equations.tilts, tilt_of_rotor(dynamics), len(dynamics.spins)

@@ -39,7 +39,7 @@ _OF_ROWS: Final = (
     "args", "case", "each", "flights", "in_kind", "key", "measure", "published",
     "error", "fault", "tolerance", "unit", "where", "why",
 )  # fmt: skip
-"""Keys of rows that a statement's table may have, too, as defaults."""
+"""Keys of rows that a statement's table may also have, as defaults."""
 
 
 @cache

@@ -1,4 +1,4 @@
-"""Our own findings, each with its proof, what shows it, and the tests that support it.
+"""Our own findings, each with its proof, a demonstration, and the tests that support it.
 
 The texts, in the TOML files of this folder, contain no measured number: functions compute them when
 the report is made.
@@ -116,7 +116,7 @@ def _blue_numbers() -> dict[str, str]:
 
 
 def _triangle_numbers() -> dict[str, str]:
-    """Grid points of ch. 6 that have a root with R > 0, and those of them below the diagonal."""
+    """Grid points of ch. 6 that have a root with R > 0, and how many lie below the diagonal."""
     positive = {
         (i, j)
         for i, row in enumerate(grid_roots(_VEHICLE)[1:-1])
@@ -157,7 +157,7 @@ def _matrix_gain() -> dict[str, str]:
 
 
 def _attainable_numbers() -> dict[str, str]:
-    """Rotor limits of ch. 9, and what gait 2 attains within them."""
+    """Rotor limits of ch. 9, and the accelerations that gait 2 attains within them."""
     limits = published_speed_limits(_VEHICLE)
     angles = PUBLISHED_GAITS["ch09_gait_2"].gait.angles(0.0)
     found = attainable_torque_thrust(angles, _VEHICLE, limits)

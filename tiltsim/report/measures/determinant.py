@@ -65,7 +65,7 @@ def coefficient(part: str, name: str, vehicle: str = "ar_drone_2", scale: float 
     """Absolute value of one coefficient of the determinant.
 
     Args:
-        part, vehicle, scale: As for `terms_hold`.
+        part, vehicle, scale: See `terms_hold`.
         name: The product: "csss" is c1 s2 s3 s4.
     """
     return scale * abs(float(getattr(determinant_coefficients(vehicle), part)[name]))
@@ -77,7 +77,7 @@ def terms_off(
     """By how much printed terms deviate from the exact ones, by product.
 
     Args:
-        part, formula, vehicle, scale: As for `terms_hold`.
+        part, formula, vehicle, scale: See `terms_hold`.
     """
     printed, exact = terms(formula), getattr(determinant_coefficients(vehicle), part)
     return {name: printed.get(name, 0.0) - scale * value for name, value in exact.items()}
@@ -157,7 +157,7 @@ def return_to_no_tilt_is_regular() -> bool:
 def rest_is_singular(rows: Sequence[int]) -> bool:
     """Whether the matrix of Eq. (12) is singular, level, with one rotor of gait 1 at rest.
 
-    ``rows`` are the numbers, from 0, of those with the factor 2|w| of the rotor's speed.
+    ``rows`` are the numbers, from 0, of the rows with the factor 2|w| of the rotor's speed.
     """
     matrix = decoupling_matrix(_GAIT_1, 0.0, 0.0, _VEHICLE)
     matrix = matrix / np.abs(matrix).max(axis=1, keepdims=True)

@@ -126,19 +126,19 @@ def second_half_is_smaller(flights: Flown, quantity: str) -> bool:
 
 
 def saves_most_where_largest(flights: Flown, quantity: str) -> bool:
-    """Of pairs, whether the one with the largest first value is the one that falls the most."""
+    """Whether the pair with the largest first value is the pair that falls the most."""
     values = _values(flights, quantity)
     saved = np.subtract(values[::2], values[1::2])
     return int(np.argmax(values[::2])) == int(np.argmax(saved))
 
 
 def least_mean_is_first(flights: Flown, quantity: str, size: int) -> bool:
-    """Of groups of ``size`` flights, whether the first has the smallest mean."""
+    """Whether the first of the groups of ``size`` flights has the smallest mean."""
     return int(np.argmin(_means(flights, quantity, size))) == 0
 
 
 def largest_mean_is_second(flights: Flown, quantity: str, size: int) -> bool:
-    """Of groups of ``size`` flights, whether the second has the largest mean."""
+    """Whether the second of the groups of ``size`` flights has the largest mean."""
     return int(np.argmax(_means(flights, quantity, size))) == 1
 
 
@@ -147,9 +147,9 @@ def means_are_alike(flights: Flown, quantity: str, size: int, share: float) -> b
 
     Args:
         flights: The metrics.
-        quantity: What is averaged.
+        quantity: The averaged quantity.
         size: Flights of a group.
-        share: Of the largest mean.
+        share: Share of the largest mean.
     """
     means = _means(flights, quantity, size)
     return max(means) - min(means) < share * max(means)

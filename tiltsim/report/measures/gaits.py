@@ -60,12 +60,12 @@ def margin_exceeds(key: str, limit: float) -> bool:
 
 
 def exact_margin_exceeds(key: str, limit: float) -> bool:
-    """The same on the exact lines."""
+    """Whether the smallest margin (rad) of a gait on the exact lines exceeds a limit."""
     return robustness(PUBLISHED_GAITS[key]).margin_exact > limit
 
 
 def biased_margin_exceeds(key: str, limit: float) -> bool:
-    """The same of its biased twin."""
+    """Whether the smallest margin (rad) of a gait's biased twin exceeds a limit."""
     margin = robustness(PUBLISHED_GAITS[key]).margin_biased
     return margin is not None and margin > limit
 
@@ -174,12 +174,12 @@ def _greater_advantage_over_99(margin: Callable[[float], float]) -> bool:
 
 
 def advantage_as_published(key: str, offset: float, formulas: list[str]) -> bool:
-    """The same with the printed offset and formulas."""
+    """`_greater_advantage_over_99` with the printed offset and formulas."""
     return _greater_advantage_over_99(lambda bias: _as_published(key, offset, formulas, bias)[0])
 
 
 def advantage_on_exact_lines(key: str) -> bool:
-    """The same on the exact lines."""
+    """`_greater_advantage_over_99` on the exact lines."""
     exact = PUBLISHED_GAITS[key].exact
     assert exact is not None
     return _greater_advantage_over_99(

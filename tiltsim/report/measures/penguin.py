@@ -186,7 +186,7 @@ def eq_44_holds(state: Pair) -> bool:
 
 
 def eq_47_holds(state: Pair) -> bool:
-    """The printed time equals that of the mirrored state."""
+    """The printed time equals the time of the mirrored state."""
     error, rate = state
     mirrored = _printed_time((-error, -rate), -1.0)
     return abs(mirrored - half_period(SWING, state).free_time) < 1e-9
@@ -257,7 +257,7 @@ def candidates_fall_as_printed() -> bool:
 
 
 def only_the_printed_switches_occur() -> bool:
-    """Lemma 4: which rotors push where the demand along x is 1 m/s^2, and what comes out of it."""
+    """Lemma 4: which rotors push where the demand along x is 1 m/s^2, and the result."""
     for turn in (-pi / 3, pi / 3):
         for along_y in np.linspace(-20.0, 20.0, 401).tolist():
             m, n = cos(turn) + sin(turn) * along_y, -sin(turn) + cos(turn) * along_y

@@ -241,7 +241,7 @@ def _accelerations(mended: bool) -> float:
 
 
 def _counter_yaw(mended: bool) -> float:
-    """Angular momentum left by Eq. (2), over that of the top disc, with I_B of the bottom disc."""
+    """Angular momentum left by Eq. (2), as a share of the top disc's; I_B of the bottom disc."""
     top, bottom = 0.001, 0.002
     yaw = counter_yaw(bottom) if mended else -top / bottom
     return abs(top * (yaw + 1.0) + bottom * yaw) / top

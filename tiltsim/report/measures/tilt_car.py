@@ -75,8 +75,8 @@ def third_derivative_columns_are_right() -> bool:
 def tilt_column_off(mended: bool) -> float:
     """By how much Eq. (27), or it times 1 - I_T/I_B, is not the column of the tilt, relatively.
 
-    The column of the tilt's second derivative in the fourth derivative of the position is that of
-    the tilt in the acceleration, yaw answering by Eq. (2): no other term contains it.
+    The column of the tilt's second derivative in the fourth derivative of the position equals the
+    column of the tilt in the acceleration, yaw following by Eq. (2): no other term contains it.
     """
     tilt, step, squares = 0.7, 1e-6, np.array([150.0**2, 120.0**2])
     turn = turn_per_tilt(THESIS_CAR)

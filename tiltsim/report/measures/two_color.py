@@ -1,4 +1,4 @@
-"""The Two Color Map: its roots, its lines, and what the planner accepts (ch. 6, 7, 8, 12)."""
+"""The Two Color Map: its roots, its lines, and the planner's verdicts (ch. 6, 7, 8, 12)."""
 
 from __future__ import annotations
 
@@ -137,7 +137,7 @@ def at_most_one_positive_root() -> bool:
 
 
 def positive_points_fill(edge: int) -> bool:
-    """Whether the points with R > 0 are those with α₂ at least α₁ + ``edge`` π/16.
+    """Whether R > 0 holds exactly at the points with α₂ at least α₁ + ``edge`` π/16.
 
     2 makes the printed triangle (-7, 7), (-7, -5), (5, 7), and 0 the triangle to the diagonal.
     """
@@ -208,7 +208,7 @@ def offset_over(half: int, vehicle: str = "ar_drone_2") -> float:
 
 
 def printed_offset_over(half: int, side: float, drag: float) -> float:
-    """The same from the printed coefficients ``side`` and ``drag`` of R_φ and R_θ."""
+    """`offset_over` from the printed coefficients ``side`` and ``drag`` of R_φ and R_θ."""
     return atan(side / drag) / half
 
 
@@ -278,7 +278,7 @@ def colors_meet_nowhere_else() -> bool:
 
 
 def _l_apart() -> float:
-    """Largest distance (rad) of L from that of ch. 12's vehicle along the second angle."""
+    """Largest distance (rad) of L from the curve of ch. 12's vehicle along the second angle."""
     axis = np.linspace(-1.0, 1.0, 41)
     return float(np.abs(curve_l(axis, PRESETS["luukkonen"]) - curve_l(axis, _VEHICLE)).max())
 
@@ -288,7 +288,7 @@ def _p_apart() -> float:
 
 
 def maps_are_similar(p_near: float, l_near: float) -> bool:
-    """The same counts of roots, P and L nearer than so many rad."""
+    """Whether root counts are equal, and P and L nearer than ``p_near`` and ``l_near`` (rad)."""
     own, former = (root_counts(grid_roots(PRESETS[n])) for n in ("luukkonen", "ar_drone_2"))
     return bool(np.array_equal(own, former)) and _p_apart() < p_near and _l_apart() < l_near
 

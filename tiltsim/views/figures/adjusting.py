@@ -39,11 +39,11 @@ def relabel(
 
     Args:
         figure: A finished figure.
-        labels: New texts by what the figure says now, or by the name of a metric or panel.
+        labels: New texts by present text, or by the name of a metric or panel.
         panels: Its panels by their names, if they have some.
 
     Raises:
-        InputError: If the figure does not say it.
+        InputError: If the figure does not have the text.
     """
     if not labels:
         return

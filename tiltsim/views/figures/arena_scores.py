@@ -17,7 +17,7 @@ from tiltsim.views.figures.layout import add_heading
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-DETAILED: Final = 2  # vehicles with a panel of their own; all have a row in the panel of totals
+DETAILED: Final = 2  # vehicles with a separate panel; all have a row in the panel of totals
 WIDE: Final = 9  # letters of a controller's name that fit above its column
 ALL: Final = "all tasks"
 LEGEND: Final = "100 without error; default → tuned gains; – where refused"
@@ -40,7 +40,7 @@ def arena_figure(every: Mapping[str, Sequence[Standing]]) -> Figure:
             vehicle: {one.controller: (one.total, one.tuned_total) for one in ranked}
             for vehicle, ranked in every.items()
         }
-    # The same columns in all panels.
+    # All panels have these columns.
     names = [*dict.fromkeys(one.controller for ranked in every.values() for one in ranked)]
     heights = [1 + len(cells) for cells in panels.values()]
     height = 1.1 + 0.5 * len(heights) + 0.24 * sum(heights)

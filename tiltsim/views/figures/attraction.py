@@ -27,7 +27,7 @@ CURVES: Final = 8  # curves of singular attitudes of a moving gait
 
 @style.paper_style()
 def attraction_figure(found: Attraction) -> Figure:
-    """Where a flight comes back from, with the gait's singular attitudes."""
+    """Initial states that come back, with the gait's singular attitudes."""
     figure = style.new_figure(5.0, 5.0)
     axes: Any = figure.subplots()
     handles = _draw_map(axes, found)
@@ -44,7 +44,7 @@ def attraction_figure(found: Attraction) -> Figure:
 
 @style.paper_style()
 def attraction_panels(maps: Mapping[str, Attraction], columns: int = 4) -> Figure:
-    """Maps of roll and pitch side by side, by title, with what comes back of which attitudes."""
+    """Maps of roll and pitch side by side, by title: the initial attitudes that come back."""
     rows = -(-len(maps) // columns)
     figure = style.new_figure(2.5 * columns, 2.9 * rows)
     grid: Any = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)

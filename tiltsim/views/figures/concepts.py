@@ -67,7 +67,7 @@ _SHOWN_GAITS: Final = (
 """Gaits of the drawing, with a period of 1 s."""
 
 _RED_GAITS: Final = "#B0122B"
-"""Redder than the color of what is singular."""
+"""Redder than the color of singular attitudes."""
 
 _LEANS: Final = "BrBG"  # color map of forward and backward leans
 
@@ -192,7 +192,7 @@ def gait_figure() -> Figure:
 
 @_drawing_style()
 def decoupler_figure(flights: Mapping[str, Flight]) -> Figure:
-    """What each decoupler, given by its name, does at the set point (0, 0)."""
+    """The response of each decoupler, given by its name, at the set point (0, 0)."""
     first = next(iter(flights.values()))
     vehicle, tilts = first.scenario.true_rotorcraft, first.assembly.gait.angles(0.0)
     n = torque_free_direction(tilts, vehicle)
@@ -310,7 +310,7 @@ def _roll_pitch_plane(axes: Axes, n: Floats, vehicle: Vehicle) -> None:
 
 @_drawing_style()
 def color_figure() -> Figure:
-    """Where red and blue gaits lie, and where red ones are singular (ch. 6 to 8)."""
+    """Angles of red and blue gaits, and the curve of singular red ones (ch. 6 to 8)."""
     vehicle = PRESETS["ar_drone_2"]
     angle = delta(vehicle)
     side = np.linspace(-pi / 2, pi / 2, 401)

@@ -1,4 +1,4 @@
-"""Controllers side by side: how far each stays from the reference, and what each survives."""
+"""Controllers side by side: tracking errors and tolerated disturbances of each."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ SURVIVED: Final = {
 SMALLEST: Final = 1e-6  # m, below which errors are as good as zero
 
 LEFT_OUT: Final = 0.02
-"""Share of the smallest errors, as those at the start, that the scale leaves out."""
+"""Share of the smallest errors, such as the start of a flight, that the scale leaves out."""
 
 
 @style.paper_style()
@@ -73,7 +73,7 @@ def _draw_errors(axes: Axes, rows: Sequence[Compared], looks: Mapping[str, Any])
 
 
 def _draw_survived(axes: Axes, rows: Sequence[Compared], looks: Mapping[str, Any]) -> None:
-    """What each survives, as a share of the best."""
+    """The largest disturbances that each survives, as a share of the best."""
     height = 0.8 / len(rows)
     for place, (key, (_, true, form)) in enumerate(SURVIVED.items()):
         values = [compared.row[key] for compared in rows]

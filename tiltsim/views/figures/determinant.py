@@ -24,7 +24,7 @@ _TICKS: Final = (-2, -1, 0, 1, 2)
 def determinant_figure(case: str, vehicle: Vehicle) -> Figure:
     """The five surfaces ``R(alpha_2, alpha_4)`` of a case, their zero curves, and sections.
 
-    The surfaces nearly coincide, so that each has axes of its own. ``case`` is a key of
+    The surfaces nearly coincide, so that each has separate axes. ``case`` is a key of
     `DETERMINANT_CASES`; the sections are along the directions of ch. 3, Eqs. (23)-(25).
     """
     from matplotlib import colormaps

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     Groups = Sequence[tuple[str, Column]]
 
 QUANTILES: Final = (0.05, 0.5, 0.95)  # that are marked on the curves
-MAX_KEYS: Final = 4  # largest number of sampled keys with a panel of their own
+MAX_KEYS: Final = 4  # largest number of sampled keys with a separate panel
 HATCHES: Final = (
     "",
     "///",

@@ -68,7 +68,7 @@ def new_page(over_time: Sequence[bool]) -> Page:
         parents = figure.subfigures(len(blocks), 1, height_ratios=heights)
     page = Page(figure, [], [])
     for parent, number, (kind, count) in zip(parents, rows, blocks, strict=True):
-        if kind:  # columns of their own, so that the shorter one leaves no hole
+        if kind:  # separate columns, so that the shorter one leaves no hole
             lengths = [count - number * (columns - 1), *[number] * (columns - 1)]
             stacks = parent.subfigures(1, len(lengths), squeeze=False)[0]
             for stack, length in zip(stacks, lengths, strict=True):
@@ -90,8 +90,8 @@ def fitting(draw: Callable[[], Page]) -> Figure:
     Raises:
         InputError: If the width is too small, or the height is given and too low.
     """
-    page, asked = draw(), style.asked_size()
-    if asked is None:
+    page, requested = draw(), style.requested_size()
+    if requested is None:
         return page.figure
     first, (width, height) = page, page.figure.get_size_inches()
     lowest, rows = _heights(page)
@@ -112,10 +112,10 @@ def fitting(draw: Callable[[], Page]) -> Figure:
         raise InputError(style.too_small(first.figure))
     if page is first:
         return page.figure
-    if asked.height is not None:
+    if requested.height is not None:
         number = f"{len(page.panels)} panel{'s' * (len(page.panels) > 1)}"
         least = f"at least {25.4 * height:.0f} mm"
-        raise InputError(f"{25.4 * asked.height:.0f} mm is too low for {number}; {least}")
+        raise InputError(f"{25.4 * requested.height:.0f} mm is too low for {number}; {least}")
     return page.figure
 
 
@@ -142,7 +142,7 @@ def add_heading(figure: Figure, title: str, more: str = "", legend: Sequence[Any
     Args:
         figure: Without a title or legend.
         title: Its title.
-        more: A line of facts, in grey.
+        more: A line of facts, in gray.
         legend: Handles of a legend.
     """
     from matplotlib import rcParams
@@ -172,7 +172,7 @@ def add_heading(figure: Figure, title: str, more: str = "", legend: Sequence[Any
 
 
 def add_legend(figure: Figure, handles: Sequence[Any], columns: int = 9, **look: Any) -> Legend:
-    """A legend of the whole figure, below it by default, in as many columns as fit."""
+    """A legend of the whole figure, below it by default, in the most columns that fit."""
     inches = figure.get_size_inches()[0]
     # Letters are a little wider in the resolution of print.
     width = min(0.96 * inches, 0.97 * (inches - 0.28)) * figure.dpi

@@ -117,8 +117,8 @@ def draw_set(
     Args:
         space: Axes in three dimensions.
         found: The set.
-        color, alpha: Of the faces.
-        unit: Of the coordinates.
+        color, alpha: Color and opacity of the faces.
+        unit: Unit of the coordinates, in SI units.
         edge: Whether edges are drawn.
     """
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection

@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from tiltsim.flight.flight import Flight
     from tiltsim_controllers.mathematics.scalar import Floats
 
-MAX_PERIODS: Final = 10  # of a gait: more of what moves with it would be a solid band
+MAX_PERIODS: Final = 10  # of a gait: more periods would be a solid band
 SHOWN_PERIODS: Final = 4  # the last ones, shown instead
 NARROW: Final = 8.0  # ratio of a path's extents above which its axes have different scales
 INSTANTS: Final = 120  # whose unreachable attitudes the roll-pitch plane shows
@@ -66,9 +66,9 @@ class Panel:
     Attributes:
         draw: ``(axes, shown)``: draws the flights, one or several, and labels the axes.
         over_time: Whether its x axis is the time; else it is a square.
-        signals: Over time: they decide the part of the time and the scale; without, `draw` does.
+        signals: Signals over time, which set the limits of both axes; without them, `draw` does.
         needs: A column that the flights must have.
-        on_request: Whether it is only drawn if asked for.
+        on_request: Whether it is only drawn on request.
     """
 
     draw: Callable[[Axes, Sequence[Shown]], None]
@@ -145,7 +145,7 @@ def _signals(axes: Axes, shown: Sequence[Shown], signals: Signals) -> None:
         style.zero_lines(axes, "x")
     for line, look in zip(lines, looks, strict=False):
         axes.plot(time, line.of(flight), label=line.label, **look)
-    # Those of tilt angles would cover the angles that follow them.
+    # References of tilt angles would cover the angles that follow them.
     references = [line.reference for line in lines if line.reference in flight.units]
     for number, name in enumerate([] if numbered else references):
         look = {"color": style.INK, "ls": ":", "lw": 0.8}
@@ -228,7 +228,7 @@ def _determinant(axes: Axes, shown: Sequence[Shown]) -> None:
 
 
 def _supervisor(axes: Axes, shown: Sequence[Shown]) -> None:
-    """How far each supervisor intervenes."""
+    """The intervention of each supervisor."""
     for one in shown:
         _plot(axes, one, one.flight[SUPERVISION])
     axes.set(ylim=(-0.03, 1.03), ylabel="supervisor (0 to 1)")
@@ -358,9 +358,9 @@ def many_periods(flights: Sequence[Flight]) -> float:
 
 
 def set_scale(axes: Axes, signals: Signals, shown: Sequence[Shown]) -> None:
-    """Limits of a panel over time: the last periods of moving gaits, the range of what is seen.
+    """Limits of a panel over time: the last periods of moving gaits, the range of the values.
 
-    Of flights of different lengths the periods are the last ones that all flights have.
+    For flights of different lengths, the periods are the last ones that all flights have.
     """
     flights = [one.flight for one in shown]
     ends = [float(flight["time"][-1]) for flight in flights]

@@ -61,8 +61,8 @@ def plot(
             default: all that suit the flights.
         size: Such as "85mm x 60mm", or width and height in inches; the panels are arranged to fit.
         title: Instead of the scenarios' title; empty for none.
-        labels: Names of the flights in their order, that of a single one as its title; or, as a
-            dict, texts instead of their names and of other texts of the figure.
+        labels: Names of the flights in their order, the title if there is only one flight; or, as a
+            dict, new texts by present names or texts of the figure.
 
     Raises:
         InputError: If an argument is wrong, there are more flights than colors, or the size is too
@@ -155,7 +155,7 @@ def _page(
 def _names_and_texts(
     flights: Sequence[Flight], labels: Sequence[str] | Mapping[str, str] | None
 ) -> tuple[Sequence[str], dict[str, str]]:
-    """The names of flights, and other texts by those that they replace."""
+    """The names of flights, and other texts by the texts that they replace."""
     names = flight_names([flight.scenario for flight in flights]) if len(flights) > 1 else [""]
     if labels is None:
         return names, {}
@@ -229,7 +229,7 @@ def _label_time(column: Sequence[Axes]) -> None:
 
 
 def _handles(shown: Sequence[Shown], axes: Sequence[Axes]) -> Iterator[Any]:
-    """The flights, and what the axes mark."""
+    """Handles of the flights and of the marks in the axes."""
     from matplotlib.lines import Line2D
 
     for flight, name, look in shown:

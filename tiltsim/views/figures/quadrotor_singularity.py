@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from tiltsim_controllers.mathematics.scalar import Floats
     from tiltsim_controllers.vehicle.parameters import Vehicle
 
-_LIMIT: Final = 0.45 * pi  # largest angle (rad); the exact surface is unbounded towards 90 degrees
+_LIMIT: Final = 0.45 * pi  # largest angle (rad); the exact surface is unbounded toward 90 degrees
 
 
 def surfaces(vehicle: Vehicle, samples: int = 121) -> tuple[Floats, ...]:

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 SWINGS: Final = 0.01  # imaginary part, as a share of a pole, below which it counts as real
 ALIKE: Final = 30.0  # parts of poles that differ by a smaller factor share a linear axis
 MOST: Final = 1e4
-"""Between the largest part of a pole and those that a logarithmic axis does not resolve."""
+"""Ratio of the largest part of a pole to the smallest that a logarithmic axis resolves."""
 
 
 @style.paper_style()
@@ -58,7 +58,7 @@ def stability_figure(found: Stability) -> Figure:
 
 @style.paper_style()
 def sweep_figure(key: str, sweeps: Mapping[str, Sequence[Point]]) -> Figure:
-    """The largest multiplier over a key, and the slowest mode but altitude, a line a scenario."""
+    """Largest multiplier, and slowest mode but altitude, over a key; one line per scenario."""
     figure = style.new_figure(6.4, 6.0)
     upper, lower = figure.subplots(2, 1, sharex=True)
     looks = zip(cycle(style.CYCLE), cycle(style.DASHES), cycle(style.MARKERS))
@@ -80,7 +80,7 @@ def sweep_figure(key: str, sweeps: Mapping[str, Sequence[Point]]) -> Figure:
         axes.axhspan(limit, axes.get_ylim()[1], color=style.UNREACHABLE, lw=0, zorder=0)
         axes.axhline(limit, color=style.INK, lw=0.8)
         axes.margins(x=0.02)
-    upper.set(ylabel="largest multiplier", title="What is left of a disturbance after a period")
+    upper.set(ylabel="largest multiplier", title="Remainder of a disturbance after one period")
     lower.set(ylabel="growth rate (1/s)", xlabel=quantity_of_key(key).text)
     lower.set_title("Slowest mode other than altitude")
     handles, labels = upper.get_legend_handles_labels()
@@ -133,7 +133,7 @@ def _unit_circle(axes: Any, color: str) -> None:
 
 
 def _frame_poles(axes: Any, poles: Floats) -> None:
-    """Scales on which poles of any size can be seen, and the half plane of those that grow."""
+    """Scales on which poles of any size can be seen, and the unstable half plane."""
     # Rounding splits equal real poles into pairs that hardly swing.
     swings = np.where(np.abs(poles.imag) > SWINGS * np.abs(poles), poles.imag, 0.0)
     least = _stretch(axes, "x", poles.real)

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from tiltsim_controllers.mathematics.scalar import Floats
 
-# After Okabe and Ito; each pair also differs in lightness, so that grey prints stay legible.
+# After Okabe and Ito; each pair also differs in lightness, so that gray prints stay legible.
 BLUE: Final = "#0072B2"
 RED: Final = "#D55E00"
 GREEN: Final = "#009E73"
@@ -80,7 +80,7 @@ AXIS_LINES: Final[tuple[dict[str, Any], ...]] = (
 FORMATS: Final = (".png", ".svg", ".pdf")  # suffixes of figure files
 SINGULAR: Final = RED  # curves of singular attitudes and of singular tilt angles, in every figure
 UNREACHABLE: Final = "#F3D3C3"
-"""The shade of what lies beyond singular attitudes or is as good as singular, in every figure."""
+"""The shade of attitudes that are singular, nearly so or beyond a singularity, in all figures."""
 
 _SETTINGS: Final = {
     "font.family": ["sans-serif"],
@@ -170,8 +170,9 @@ def parse_size(name: str, size: str | tuple[float, float] | None) -> Size | None
 def paper_style(file: Path | None = None, size: Size | None = None) -> Iterator[None]:
     """Apply the common style within this context, below the user's own settings.
 
-    Those are what a matplotlib style ``file`` sets, what differs from matplotlib's defaults, and
-    what the user's matplotlibrc sets. Contexts within this one only change the ``size`` of figures.
+    The user's settings are a matplotlib style ``file``, rcParams that differ from matplotlib's
+    defaults, and the user's matplotlibrc. Contexts within this one only change the ``size`` of
+    figures.
 
     Raises:
         InputError: If the file cannot be read or is no style.
@@ -204,7 +205,7 @@ def paper_style(file: Path | None = None, size: Size | None = None) -> Iterator[
 
 
 def _users_settings(keys: Iterable[str]) -> set[str]:
-    """Those of some settings that the user has changed or named in a matplotlibrc."""
+    """The settings among ``keys`` that the user has changed or named in a matplotlibrc."""
     import matplotlib
 
     # All of `rcParams` cannot be read without choosing a backend.
@@ -242,7 +243,7 @@ def _style_of(file: Path) -> dict[str, Any]:
 
 @contextmanager
 def _complaints() -> Iterator[list[str]]:
-    """What matplotlib logs as wrong within this context; warnings are raised."""
+    """Collect matplotlib's log of errors within this context; warnings are raised."""
     logged: list[str] = []
 
     def keep(record: logging.LogRecord) -> bool:
@@ -299,22 +300,22 @@ def new_figure(width: float, height: float) -> Figure:
     """
     from tiltsim.views.figures.shown import ShownFigure
 
-    asked = _size.get()
-    if asked is not None:
-        height = asked.height or height * asked.width / width
-        width = asked.width
+    requested = _size.get()
+    if requested is not None:
+        height = requested.height or height * requested.width / width
+        width = requested.width
     return ShownFigure(figsize=(width, height), layout="constrained")
 
 
-def asked_size() -> Size | None:
+def requested_size() -> Size | None:
     """The size of the context."""
     return _size.get()
 
 
 def figure_width(natural: float) -> float:
     """The width (inches) that a new figure will have if this is its natural one."""
-    asked = _size.get()
-    return natural if asked is None else asked.width
+    requested = _size.get()
+    return natural if requested is None else requested.width
 
 
 def angle_axis(axes: Axes, axis: str, limit: float) -> None:
@@ -376,7 +377,7 @@ def save(figure: Figure, path: Path) -> None:
 
 
 def too_small(figure: Figure) -> str:
-    """What is wrong with a figure into which its panels do not fit."""
+    """The error message for a figure into which its panels do not fit."""
     width, height = figure.get_size_inches() * 25.4
     size = f"{width:.0f} mm x {height:.0f} mm"
     return f"{size} are too small for these panels; choose fewer panels or a larger size"

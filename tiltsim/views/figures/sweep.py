@@ -89,7 +89,7 @@ def _metrics(results: SweepResults, requested: tuple[str, ...]) -> tuple[str, ..
 
 
 def _least_range(metric: str, values: Column) -> tuple[float, float, bool]:
-    """Lowest and highest value, no closer than what counts, and whether they are unequal."""
+    """Lowest and highest value, at least the smallest range apart, and whether they differ."""
     known = values[~np.isnan(values)]
     if not known.size:
         return 0.0, 1.0, False
@@ -175,7 +175,7 @@ def _lines_figure(results: SweepResults, metrics: tuple[str, ...]) -> Figure:
 
 
 def _share_limits(grid: Any, metrics: tuple[str, ...] = ()) -> None:
-    """Use one y scale per row, wide enough for what counts of its metric."""
+    """Use one y scale per row, at least as wide as the smallest range of its metric."""
     for number, row in enumerate(grid):
         ends = np.array([axes.get_ylim() for axes in row])
         low, high = ends.min(), ends.max()

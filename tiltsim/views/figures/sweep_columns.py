@@ -53,7 +53,7 @@ def text_of(value: Any) -> str:
 
 
 def label_of(results: SweepResults, name: str) -> str:
-    """What the sweep's ``[plot]`` table or else tiltsim calls a column, with its unit if known."""
+    """The label of a column, from the sweep's ``[plot]`` table or by default, with a known unit."""
     own = results.points.sweep.plot.labels.get(name)
     if own is not None:
         return verbatim(own)

@@ -24,7 +24,7 @@ NEARLY: Final = 0.5
 """Absolute R, 4 for a level untilted vehicle, below which red counts as nearly singular."""
 
 _COLORS: Final = {"red": "#C4001A", "blue": style.BLUE}
-"""The colors of the map's own name: this red is not that of what is singular."""
+"""The colors in the name of the map: this red is not the color of singular attitudes."""
 
 _SIDES: Final = (
     ((1.0, 1.0), "left", "bottom"),

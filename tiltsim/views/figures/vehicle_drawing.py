@@ -38,7 +38,7 @@ class View(NamedTuple):
 
     @property
     def axes(self) -> Floats:
-        """Unit vectors to the right, up, and towards the viewer, shape (3, 3), world axes."""
+        """Unit vectors to the right, up, and toward the viewer, shape (3, 3), world axes."""
         a, e = self.azimuth, self.elevation
         right = [-sin(a), cos(a), 0.0]
         up = [-sin(e) * cos(a), -sin(e) * sin(a), cos(e)]

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 ALONE: Final = "Attitude (shaded: unreachable attitudes)"
 NEARER: Final = 0.75  # than in videos, whose frames are larger
-OVERVIEW: Final = 1.35  # distance of the overview camera in lengths of what it shows completely
+OVERVIEW: Final = 1.35  # distance of the overview camera, in lengths of the scene that it shows
 LETTER: Final = 0.0155  # width of a letter of a legend, as a share of a plot
 MAX_LEGEND: Final = 0.34  # share of a plot before the flight, where legends cover no curve
 BACKGROUND: Final = (38, 48, 60)
@@ -37,8 +37,8 @@ def flight_blueprint(
     """Vehicle, trajectory, roll-pitch plane and events on the left, time series on the right.
 
     Args:
-        recorders: One a flight.
-        flights: Those whose values decide the ranges of the axes; without, the viewer does.
+        recorders: One per flight.
+        flights: Flights whose values set the ranges of the axes; without them, the viewer does.
         live: Whether the viewer follows the latest time instead of playing from the start.
     """
     trajectory, events = _trajectory_view(recorders, flights), _events_view()
@@ -152,7 +152,7 @@ def _events_view() -> rrb.View:
 
 
 def _plots(recorders: Sequence[FlightRecorder], flights: Sequence[Flight]) -> rrb.Container:
-    """The plots of the time series; for several flights, of what is compared.
+    """The plots of the time series; for several flights, of the compared signals.
 
     Only the first plot of a comparison has a legend: colors are the same in all plots.
     """
@@ -182,7 +182,7 @@ def _plots(recorders: Sequence[FlightRecorder], flights: Sequence[Flight]) -> rr
 def _compared(
     recorders: Sequence[FlightRecorder], flights: Sequence[Flight], times: tuple[float, float]
 ) -> Iterator[rrb.View]:
-    """A plot for every signal that is compared, with a line a flight."""
+    """A plot of each compared signal, with one line per flight."""
     names = dict.fromkeys(name for one in recorders for name in one.signals)
     legend = True
     for name in names:

@@ -1,6 +1,6 @@
 """The visual geometry of any compiled MuJoCo model as static Rerun entities.
 
-A body's entity lies below that of its parent body, so that poses are relative; its geoms are
+A body's entity lies below its parent's entity, so that poses are relative; its geoms are
 entities below the body's. Infinite planes are not drawn: the view has a grid.
 """
 
@@ -33,7 +33,7 @@ def xyzw(quaternion: npt.ArrayLike) -> npt.NDArray[np.float32]:
 
 
 def body_paths(model: mujoco.MjModel, root: str) -> list[str]:
-    """The entity path of every body; that of the world body is ``root``."""
+    """The entity path of every body; ``root`` is the path of the world body."""
     paths = [root]
     for body in range(1, model.nbody):
         name = _part(model.body(body).name or f"body_{body}")
@@ -123,7 +123,7 @@ def _mesh(model: mujoco.MjModel, geom: int) -> rr.Mesh3D:
 
 
 def geom_color(model: mujoco.MjModel, geom: int) -> npt.NDArray[np.uint8]:
-    """RGBA (0 to 255) of a geom, or of its material if the geom has no color of its own."""
+    """RGBA (0 to 255) of a geom, or of its material if the geom itself has no color."""
     rgba, material = model.geom_rgba[geom], model.geom_matid[geom]
     if material >= 0 and np.allclose(rgba, _UNSET_COLOR):
         rgba = model.mat_rgba[material]

@@ -37,7 +37,7 @@ class RecordingProcess:
 
     def __init__(self, scenario: Scenario) -> None:
         require_rerun()
-        # The same module search path as in this process, without the current folder in front.
+        # This process' module search path, without the current folder in front.
         self._process = subprocess.Popen(
             [sys.executable, "-P", "-c", _PROGRAM],
             stdin=subprocess.PIPE,

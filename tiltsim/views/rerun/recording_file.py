@@ -71,7 +71,7 @@ def new_recording(
     """A recording without rows, whose identifier depends on the arguments only, and its recorders.
 
     Args:
-        assemblies: Those of the flights.
+        assemblies: One per flight.
         names: Names of several flights, by default `flight_names`.
         salt: Distinguishes recordings of equal scenarios, which the viewer would merge.
         batching: When Rerun flushes rows; None for its default.

@@ -66,7 +66,7 @@ class Scene:
         self._log_styles(name)
 
     def _log_styles(self, name: str) -> None:
-        """Log what does not move, and the looks of what does; ``name`` is the vehicle's label."""
+        """Log static parts, and the looks of moving ones; ``name`` is the vehicle's label."""
         model = self._model
         self._log(self.root.partition("/")[0], rr.ViewCoordinates.RIGHT_HAND_Z_UP)
         for body in range(1, model.nbody):

@@ -33,13 +33,13 @@ def view(flights: Flight | Sequence[Flight], *, url: str | None = None) -> Any:
 
     Args:
         flights: One or several.
-        url: Of a viewer that is open, such as ``"rerun+http://127.0.0.1:9876/proxy"``; default: in
+        url: Address of an open viewer, such as ``"rerun+http://127.0.0.1:9876/proxy"``; default: in
             a notebook the viewer is part of the cell, and served to the browser by this machine
             unless the environment variable RERUN_NOTEBOOK_ASSET says otherwise; elsewhere one is
             opened.
 
     Returns:
-        In a notebook, what the cell has to end with: Rerun's widget. Else None.
+        In a notebook, Rerun's widget, with which the cell has to end. Else None.
 
     Raises:
         InputError: If an argument is wrong, no viewer listens at the address, there is no screen to
@@ -59,7 +59,7 @@ def _inline_viewer(flights: Sequence[Flight]) -> Any:
     """Rerun's widget for notebooks, which has got the flights."""
     # The browser gets the viewer from this machine: by default it would be from Rerun's website.
     os.environ.setdefault("RERUN_NOTEBOOK_ASSET", "serve-local")
-    with redirect_stdout(StringIO()):  # which tells how it is served
+    with redirect_stdout(StringIO()):  # which says how it is served
         optional_package("rerun_notebook", "Rerun in a notebook", "'rerun-sdk[notebook]'")
     from rerun.notebook import Viewer
 
@@ -114,7 +114,7 @@ def view_recordings(paths: Sequence[Path]) -> None:
 
 
 def _open_viewer(*arguments: str) -> None:
-    """Start the viewer in a process of its own; it listens to programs of this machine only."""
+    """Start the viewer in a separate process; it listens to programs of this machine only."""
     import rerun_cli
 
     program = Path(rerun_cli.__file__).with_name("rerun")

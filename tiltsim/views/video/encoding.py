@@ -72,7 +72,7 @@ def _write_gif(
     )
     # Median cut spends colors on the ground, maximum coverage on rare ones; an octree keeps both.
     palette = together.quantize(COLORS, Pillow.Quantize.FASTOCTREE)
-    # Without dithering areas of one color stay so from frame to frame, and the file small.
+    # Without dithering, areas of one color stay equal in all frames, and the file stays small.
     pictures = []
     for count, (_, image) in enumerate(frames(flight, video), start=1):
         picture = Pillow.fromarray(image)

@@ -45,7 +45,7 @@ def make_contexts(model: mujoco.MjModel, width: int, height: int) -> tuple[Any, 
                 context = make(width, height)
                 context.make_current()
                 return context, mujoco.MjrContext(model, font.value)
-            except Exception as error:  # every library has errors of its own
+            except Exception as error:  # every library raises other errors
                 message = str(caught[0].message if caught else error)
                 reason = message.strip().partition("\n")[0] or type(error).__name__
                 failures.append(f"{name}: {reason}")
@@ -82,7 +82,7 @@ class Canvas:
 
     Args:
         model: The model, whose settings for rendering are changed.
-        width, height: Of the frames, pixels.
+        width, height: Size of the frames, pixels.
         samples: Per pixel, against jagged edges; 0 for none.
         shadows: Whether to render shadows and reflections, which without a GPU takes twice the
             time.

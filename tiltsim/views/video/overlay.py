@@ -39,7 +39,7 @@ ATTITUDE: Final = (0, 90, 150)
 
 
 class Overlay:
-    """What is drawn over the frames of one flight, by the columns that it has."""
+    """Drawings over the frames of one flight, by the columns that it has."""
 
     def __init__(self, flight: Flight, height: int) -> None:
         """Prepare frames of a height (pixels)."""

@@ -20,7 +20,7 @@ HEIGHT: Final = 480  # pixels
 AZIMUTH: Final = 50.0
 ELEVATION: Final = -28.0  # of the camera's direction, degrees
 DISTANCE: Final = 2.5  # of the camera, by the radius of the rotors' places and of a rotor
-ROTOR_RADIUS: Final = 0.12  # about that of the rotors in the files, m
+ROTOR_RADIUS: Final = 0.12  # about the radius of the rotors in the files, m
 
 
 def save_portrait(model_file: Path, angles: Sequence[float], file: Path) -> None:

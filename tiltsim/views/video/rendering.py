@@ -43,8 +43,8 @@ class VideoFormat:
     fps: int = 25  # frames per second
     speed: float = 1.0  # seconds of flight per second of video
     start: float = 0.0  # s of the flight
-    end: float = inf  # s, or that of the flight if that is earlier
-    camera: CameraPose | None = None  # None for that of the vehicle's kind
+    end: float = inf  # s, or the end of the flight if that is earlier
+    camera: CameraPose | None = None  # None for the default of the vehicle's kind
     samples: int = 4  # per pixel, against jagged edges; 0 for none
     shadows: bool = False  # and reflections
 
@@ -66,7 +66,7 @@ def frame_times(flight: Flight, video: VideoFormat) -> Floats:
 def frames(
     flight: Flight, video: VideoFormat, times: Floats | None = None
 ) -> Iterator[tuple[float, Image]]:
-    """The frames of a flight's video, or those at some times, with the times (s) of the samples."""
+    """The frames of a flight's video, or at the given times, with the times (s) of the samples."""
     time = flight["time"]
     renderer = FlightRenderer(flight, video)
     with renderer.canvas:
