@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
 from tests.controllers.multirotors import ring
+from tiltsim_controllers.laws.observed import Observed
 from tiltsim_controllers.laws.rotor_allocation import (
     allocated_thrusts,
     allocated_with_tilts,
@@ -21,6 +20,11 @@ from tiltsim_controllers.vehicle.effectiveness import (
 from tiltsim_controllers.vehicle.rotors import Rotors, rotors_in, wrench_map
 
 
+def observing(**known):
+    """An observation of these quantities alone."""
+    return Observed(*(None,) * len(Observed._fields))._replace(**known)
+
+
 def per_newton(table):
     return table_per_newton(table, [8.5e-6] * len(tilt_of_rotor(table)))
 
@@ -31,7 +35,7 @@ def test_planned_tilts_make_any_torque_and_force_along_one_axis(rotors):
     table = per_newton(ring(rotors, hinged=True))
     for _ in range(20):
         force, torque = force_and_torque(table, rng.uniform(-0.6, 0.6, rotors))
-        observed = SimpleNamespace(force=force, torque=torque)
+        observed = observing(force=force, torque=torque)
         lift = lift_without_torque(observed)
         axis = force @ lift
         assert axis[2] == pytest.approx(1.0, rel=1e-9)
@@ -47,7 +51,7 @@ def test_planned_tilts_make_any_torque_and_force_along_one_axis(rotors):
 def test_independent_tilts_make_any_force_and_torque_with_the_least_thrusts(rotors):
     rng = np.random.default_rng(rotors)
     table = per_newton(ring(rotors, hinged=True))
-    observed = SimpleNamespace(rotors=rotors_in(table, 0, tilt_of_rotor(table)))
+    observed = observing(rotors=rotors_in(table, 0, tilt_of_rotor(table)))
     level, across = (
         np.vstack(force_and_torque(table, [angle] * rotors)) for angle in (0.0, np.pi / 2)
     )
@@ -64,7 +68,7 @@ def test_tilts_need_not_be_in_the_order_of_the_rotors():
     layout = (2, 0, 3, 1)
     parts = np.random.default_rng(1).normal(size=(2, 6, 4))
     rotors = Rotors(layout, np.ones(4), np.zeros((6, 4)), *parts)
-    observed = SimpleNamespace(rotors=rotors)
+    observed = observing(rotors=rotors)
     wrench = np.array([1.0, -2.0, 9.0, 0.1, 0.2, -0.1])
     thrusts, tilts = allocated_with_tilts(observed, wrench[:3], wrench[3:])
     assert wrench_map(rotors, tilts) @ thrusts == pytest.approx(wrench, rel=1e-8)
