@@ -161,7 +161,7 @@ class _Objective(NamedTuple):
             next_level = xp.where(gains | is_last, level, level + 1.0)
             return now, freed, next_level, xp.where(gains, 0.0, xp.where(is_last, 1.0, 0.0))
 
-        return branch(along > least * least, step, release)  # type: ignore[no-any-return]
+        return branch(along > least * least, step, release)
 
 
 @traceable

@@ -66,7 +66,7 @@ def watched_at(time: Any, parameters: Any) -> Watched:
     """
     whole, rest = parameters.watched, parameters.watched_without
     if rest.rotors == 0.0:  # no table without a rotor: no failure will be known
-        return whole  # type: ignore[no-any-return]
+        return whole
     known = time >= parameters.failure.known_from
     return Watched(*(xp.where(known, b, a) for a, b in zip(whole, rest, strict=True)))
 
