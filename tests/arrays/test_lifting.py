@@ -201,7 +201,6 @@ NEVER_CALLED = {
     *("_fixed_jet", "_table_jet"),  # these gaits with more than four tilts
     "jet_cross",  # of a plane of torque-free forces that moves
     "torque_for",  # of the example package
-    *("_as_planned", "_standing"),  # of multirotors, which have no way back to red
 }
 """Functions of modules that none of these flights calls."""
 
