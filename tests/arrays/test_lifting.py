@@ -17,14 +17,14 @@ from tests.arrays.recorded_calls import (
     short_flights,
 )
 from tests.laws.test_laws import LAWS
+from tiltsim.arrays import jax_programs
 from tiltsim.arrays.flying import double_precision
 from tiltsim.arrays.jax_arrays import JaxArrays
+from tiltsim.arrays.jax_programs import InJax
 from tiltsim.arrays.lifting import Lifting
 from tiltsim.arrays.values import LiftError
 from tiltsim.closed_loop.choices import CHOICES
-from tiltsim.closed_loop.loop import Equations
 from tiltsim.engines import sample_evaluation
-from tiltsim.equations.solvers import Integration, make_step
 from tiltsim_controllers.mathematics.scalar import scalar
 
 jax = pytest.importorskip("jax")
@@ -161,31 +161,27 @@ def test_functions_of_a_controller_have_the_same_values_on_arrays():
     assert len(calls) > 20
 
 
-def test_stages_of_a_step_do_not_multiply_the_operations():
-    @scalar
-    def rates(time, state, held, parameters, knots, disturbance):
-        x, y, z = state
-        size = x * x + y * y + z * z
-        return [size * y, size * z, size * x]
+@pytest.mark.parametrize("merges", [False, True])
+def test_a_long_program_is_compiled_in_segments_unless_xla_merges_loops(merges, monkeypatch):
+    """XLA would compute a value for each of its uses again."""
+    monkeypatch.setattr(jax_programs, "recomputes", lambda: not merges)
 
     @scalar
-    def inputs(time, state, parameters, knots):
-        return ()
+    def chained(state):
+        for _ in range(12):
+            x, y, z = state
+            size = x * x + y * y + z * z
+            state = size * y, size * z, size * x
+        return state
 
-    step = make_step(Equations(inputs, 0, rates, initial=None, observe=None), "ode3")
-    integration = Integration(0.1, 0, None, (), (0.0, 0.0, 0.0))
-    start = np.linspace(0.1, 0.3, 12).reshape(3, 4)
+    def fly(state):
+        return jax.vmap(lambda column: InJax("float64")(chained)([*column]), in_axes=1)(state)
 
-    def fly(separate, state):
-        lifted = Lifting(JaxArrays("float64"), separate=separate)(step)
-        each = lambda column: lifted(0.0, [*column], (), True, integration)[0]  # noqa: E731
-        return jax.vmap(each, in_axes=1)(state)
-
-    made = jax.jit(fly, static_argnums=0).lower((rates,), start).compile()
-    products = 3 * 3 * 4 + 3 + 3 + 3 * 4  # each of three results of each stage; stages; their sum
-    assert made.as_text().count(" multiply(") <= products
-    expected = [step(0.0, [*column], (), True, integration)[0] for column in start.T.tolist()]
-    np.testing.assert_allclose(np.transpose(made(start)), expected, rtol=ROUNDING)
+    start = np.linspace(0.5, 0.6, 12).reshape(3, 4)
+    lowered = jax.jit(fly).lower(start)
+    assert lowered.as_text().count("call @call") == (0 if merges else 2)
+    expected = [chained(column) for column in start.T.tolist()]
+    np.testing.assert_allclose(np.transpose(lowered.compile()(start)), expected, rtol=ROUNDING)
 
 
 def test_all_look_ups_in_a_table_are_in_one_constant():

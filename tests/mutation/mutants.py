@@ -35,7 +35,6 @@ SYMMETRIC = {
     "isclose",
     "gcd",
     "dot",
-    "jet_product",
     "isinstance",
     "issubclass",
     "NamedTuple",

@@ -1,4 +1,4 @@
-"""Flights on equations of motion in JAX: the scalar step and sample of a loop, lifted."""
+"""Flights on equations of motion in JAX: the step and the sample of a loop as programs."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from tiltsim.arrays.jax_arrays import JaxArrays, recomputes, require_jax
-from tiltsim.arrays.lifting import Lifting
+from tiltsim.arrays.jax_arrays import require_jax
+from tiltsim.arrays.jax_programs import InJax
 from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.closed_loop.limits import SINGULAR, WITHIN_LIMITS
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup
@@ -66,26 +66,21 @@ class Kernel:
         course: What is flown.
         setup: Parameters and knots, which may be arrays.
         disturbance: m/s^2, world axes.
-        guarded: See `Lifting`.
     """
 
-    def __init__(
-        self, course: Course, setup: ControlSetup, disturbance: Triple, *, guarded: bool = False
-    ) -> None:
+    def __init__(self, course: Course, setup: ControlSetup, disturbance: Triple) -> None:
         import jax
         import jax.numpy as jnp
 
         loop, equations = course.loop, course.loop.equations
         assert equations is not None  # other loops do not fly on equations
         self._jax, self._numpy, self.course, self.setup = jax, jnp, course, setup
-        self._arrays = arrays = JaxArrays(course.dtype)
-        separate = (equations.inputs, equations.rates) if recomputes() else ()
-        lifting = Lifting(arrays, guarded=guarded, separate=separate)
-        self._step = lifting(make_step(equations, course.solver))
-        self._inputs = lifting(equations.inputs)
-        self._observe = lifting(equations.observe)
-        self._check = lifting(loop.monitoring.sign_check_values)
-        self._limit = lifting(loop.kind.limit_exceeded)
+        run = InJax(course.dtype)
+        self._step = run(make_step(equations, course.solver))
+        self._inputs = run(equations.inputs)
+        self._observe = run(equations.observe)
+        self._check = run(loop.monitoring.sign_check_values)
+        self._limit = run(loop.kind.limit_exceeded)
         self._integration = Integration(
             course.timestep, course.control_steps, setup.parameters, setup.knots, disturbance
         )
@@ -93,6 +88,9 @@ class Kernel:
 
     def _floats(self, values: Iterable[Any]) -> tuple[Any, ...]:
         return tuple(self._numpy.asarray(value, self.course.dtype) for value in values)
+
+    def _vector(self, values: Iterable[Any]) -> Any:
+        return self._numpy.stack(self._floats(values))
 
     def start(self, state: Iterable[Any]) -> Carried:
         """A flight at time zero."""
@@ -144,13 +142,13 @@ class Kernel:
             if samples:
                 held = self._inputs(time, carried.state, parameters, knots)
             values = self._observe(time, carried.state, held, parameters, knots)
-            return self._arrays.vector((time, *values))
+            return self._vector((time, *values))
 
         return self._with_sampling(carried.index, take)
 
     def sides(self, sample: Any) -> Any:
         """The signs of the numbers that must keep them, 0 where one vanishes."""
-        checked = self._arrays.vector(self._check(sample[0], tuple(sample[1:]), *self.setup))
+        checked = self._vector(self._check(sample[0], tuple(sample[1:]), *self.setup))
         return self._numpy.where(abs(checked) < SINGULAR, 0.0, self._numpy.sign(checked))
 
     def goes_on(self, sample: Any, sides: Any, reference: Any) -> Any:

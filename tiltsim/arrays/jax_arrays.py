@@ -49,8 +49,7 @@ class JaxArrays:
         import jax
         import jax.numpy as jnp
 
-        self.dtype, self._jax = dtype, jax
-        self._separate: dict[Any, tuple[Function, list[Any]]] = {}
+        self.dtype = dtype
         # By the tuple's identity, which another one could get if the tuple were not kept.
         self._tables: dict[int, tuple[tuple[float, ...], Any]] = {}
         self._array, self._numpy = jax.Array, jnp
@@ -72,51 +71,6 @@ class JaxArrays:
         if table is None and isinstance(values, tuple) and not any(map(self.is_array, values)):
             table = self._tables[id(values)] = values, np.asarray(values, self.dtype)
         return (self.vector(values) if table is None else self._numpy.asarray(table[1]))[index]
-
-    def separately(self, function: Function, args: Any, key: Any) -> Any:
-        """A call that XLA compiles on its own and does not merge into its caller.
-
-        Where XLA `recomputes`, operations multiply over the stages of a solver: in a step of ode3
-        to seven times those of one stage.
-
-        Args:
-            function: Depends on nothing but its arguments.
-            args: Its arguments: arrays and other values, which may be nested.
-            key: Equal for the same function.
-        """
-        from jax.experimental.xla_metadata import set_xla_metadata
-
-        jax = self._jax
-        leaves, tree = jax.tree.flatten(args)
-        fixed = tuple(None if self.is_array(leaf) else leaf for leaf in leaves)
-        key = key, tree, fixed
-        if key not in self._separate:
-            self._separate[key] = self._compiled_alone(function, tree, fixed)
-        call, results = self._separate[key]
-        with set_xla_metadata(inlineable="false"):
-            made = iter(call(*filter(self.is_array, leaves)))
-        values, tree = results[0]
-        return jax.tree.unflatten(tree, [next(made) if v is None else v for v in values])
-
-    def _compiled_alone(
-        self, function: Function, tree: Any, fixed: tuple[Any, ...]
-    ) -> tuple[Function, list[Any]]:
-        """A function of the arrays among arguments, and how its results are arranged."""
-        from jax.experimental.xla_metadata import set_xla_metadata
-
-        results: list[Any] = []
-
-        def call(*arrays: Any) -> list[Any]:
-            following = iter(arrays)
-            args = [next(following) if value is None else value for value in fixed]
-            with set_xla_metadata(inlineable=None):  # calls within are merged
-                found, shape = self._jax.tree.flatten(
-                    function(*self._jax.tree.unflatten(tree, args))
-                )
-            results[:] = [([None if self.is_array(value) else value for value in found], shape)]
-            return list(filter(self.is_array, found))
-
-        return self._jax.jit(call), results
 
     def vector(self, values: Any) -> Any:
         """Numbers as an array of one dimension."""

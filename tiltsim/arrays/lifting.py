@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import inspect
 import operator
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import is_dataclass, replace
 from functools import partial
@@ -20,7 +20,6 @@ from typing import Any
 import numpy as np
 
 from tiltsim.arrays.evaluation import Frame
-from tiltsim.arrays.expressions import Borrowed
 from tiltsim.arrays.values import Arrays, Function, PlainNumberError, rebuilt
 from tiltsim_controllers.code.traceable import as_tuples, is_traceable
 from tiltsim_controllers.mathematics.scalar import Floats, scalar_functions
@@ -36,19 +35,10 @@ class Lifting:
         planning: Whether it lifts what comes before a flight, which calls more than scalar code.
             What works on arrays as it is runs as it is; an error that depends on arrays is not
             raised, as the scenario was checked before.
-        separate: Scalar functions that are compiled each on its own; see `Arrays.separately`.
     """
 
-    def __init__(
-        self,
-        arrays: Arrays,
-        *,
-        guarded: bool = False,
-        planning: bool = False,
-        separate: Collection[Function] = (),
-    ) -> None:
+    def __init__(self, arrays: Arrays, *, guarded: bool = False, planning: bool = False) -> None:
         self.arrays, self.guarded, self.planning = arrays, guarded, planning
-        self._separate = separate
         self._known = set(scalar_functions())
         self._active: Any = True  # the condition under which the present code runs
 
@@ -64,16 +54,9 @@ class Lifting:
 
     def run(self, function: Any, args: Iterable[Any], keywords: Mapping[str, Any]) -> Any:
         """Evaluate a function written in Python; a function of arrays runs as it is."""
-
-        def call(args: Iterable[Any], keywords: Mapping[str, Any]) -> Any:
-            if is_traceable(function):
-                return as_tuples(function(*args, **keywords))
-            return Frame(self, function).call(args, keywords)
-
-        if function in self._separate and self._active is True:
-            lists = [[*value] if isinstance(value, Borrowed) else value for value in args]
-            return self.arrays.separately(call, (lists, dict(keywords)), function)
-        return call(args, keywords)
+        if is_traceable(function):
+            return as_tuples(function(*args, **keywords))
+        return Frame(self, function).call(args, keywords)
 
     def is_scalar(self, function: FunctionType) -> bool:
         """Whether a function may be lifted."""

@@ -113,10 +113,6 @@ class TracedNumbers:
         """Numbers as they are."""
         return values
 
-    def separately(self, function: Function, args: Any, key: Any) -> Any:
-        """Call a function; an operation that occurs twice is evaluated once."""
-        return function(*args)
-
 
 def trace_scalar_code(
     function: Callable[[Lifting, tuple[InputVector, ...]], Iterable[Number]], **sizes: int

@@ -52,9 +52,6 @@ class Arrays(Protocol):
     def take(self, values: Any, index: Any) -> Any:
         """The entry of a vector at an index that is an array."""
 
-    def separately(self, function: Function, args: Any, key: Any) -> Any:
-        """Call a function in a way that it is compiled on its own."""
-
     def both(self, first: Any, second: Any) -> Any:
         """Conjunction."""
 

@@ -12,12 +12,12 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from tiltsim.arrays.jax_arrays import JaxArrays, recomputes, require_jax
-from tiltsim.arrays.lifting import Lifting
+from tiltsim.arrays.jax_arrays import require_jax
+from tiltsim.arrays.jax_programs import InJax
 from tiltsim.closed_loop.limits import WITHIN_LIMITS
 from tiltsim.closed_loop.loop import ClosedLoop
 from tiltsim.env.task import Task
-from tiltsim.equations.implicitfast import make_implicitfast_step, turned
+from tiltsim.equations.implicitfast import make_implicitfast_step
 from tiltsim.equations.rigid_body import rigid_body
 from tiltsim.errors import InputError
 from tiltsim.laws.assembling import loop_of
@@ -116,16 +116,12 @@ class EnvFunctions:
         self._commanded = self._act + self._rotors * lags
         equations = loop.equations
         assert equations is not None
-        separate = (equations.rates, turned) if recomputes() else ()
-        lifting = Lifting(JaxArrays(precision), guarded=True, separate=separate)
-        self._advance = lifting(make_implicitfast_step(equations, self._tilts))
-        self._inputs, self._sample = lifting(equations.inputs), lifting(equations.observe)
-        self._limit = lifting(loop.kind.limit_exceeded)
-        self._reference_at = lifting(reference_derivatives)
-        self._attitude_at = lifting(attitude_reference)
-        self._euler, self._rotation = map(
-            lifting, (euler_from_quaternion, rotation_from_quaternion)
-        )
+        run = InJax(precision)
+        self._advance = run(make_implicitfast_step(equations, self._tilts))
+        self._inputs, self._sample = run(equations.inputs), run(equations.observe)
+        self._limit = run(loop.kind.limit_exceeded)
+        self._reference_at, self._attitude_at = run(reference_derivatives), run(attitude_reference)
+        self._euler, self._rotation = map(run, (euler_from_quaternion, rotation_from_quaternion))
         first = {} if task.domain is None else task.domain.values(np.random.default_rng(0))
         self.keys = tuple(first)
         self._widths = [None if np.ndim(value) == 0 else len(value) for value in first.values()]

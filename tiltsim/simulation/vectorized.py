@@ -65,7 +65,7 @@ class Vectorized:
         except ValueError as error:  # of numbers that make no flight, such as a period of 0
             raise InputError(f"parameters: {error}") from error
         setup = ControlSetup(parameters, knots)
-        return Kernel(self._course, setup, disturbance, guarded=True), state
+        return Kernel(self._course, setup, disturbance), state
 
     def _fields(self, samples: Any) -> dict[str, Any]:
         return dict(zip(self._assembly.loop.sample_fields, samples.T, strict=True))

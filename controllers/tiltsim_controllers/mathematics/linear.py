@@ -47,28 +47,46 @@ def unit_remainder(row: Any, units: Any) -> Any:
     return xp.where(independent, 1.0 / xp.sqrt(xp.where(independent, square, 1.0)), xp.nan) * rest
 
 
+def _is_plain(*arrays: Any) -> bool:
+    """Whether arrays hold floats, for which NumPy's own functions are faster."""
+    return all(type(array) is np.ndarray and array.dtype == float for array in arrays)
+
+
 def determinant(matrix: Any) -> Any:
     """The determinant of a small square matrix, by expansion along its rows.
 
     A trace finds equal minors and omits the entries that it knows to be zero.
     """
+    if _is_plain(matrix):
+        return np.linalg.det(matrix)
     return matrix[0] @ kernel(matrix[1:]) if len(matrix) else 1.0
 
 
 def kernel(matrix: Any) -> Any:
     """The vector across the rows of a matrix (M - 1, M), as long as the volume that they span."""
     columns = np.arange(matrix.shape[1])
-    minors = (determinant(matrix[:, np.delete(columns, j)]) for j in columns)
-    return xp.array([(-1.0) ** j * minor for j, minor in enumerate(minors)])
+    others = [np.delete(columns, j) for j in columns]
+    signs = (-1.0) ** columns
+    if _is_plain(matrix):
+        return signs * np.linalg.det(matrix[:, others].swapaxes(0, 1))
+    minors = [determinant(matrix[:, kept]) for kept in others]
+    return xp.array([sign * minor for sign, minor in zip(signs.tolist(), minors)])
 
 
 def solved(matrix: Any, desired: Any) -> Any:
-    """The ``x`` with ``matrix x = desired`` by Cramer's rule; NaN where the matrix is singular.
+    """The ``x`` with ``matrix x = desired``; NaN where the matrix is singular.
+
+    A trace has Cramer's rule.
 
     Args:
         matrix: Small, shape (M, M).
         desired: Shape (M,).
     """
+    if _is_plain(matrix, desired):
+        try:
+            return np.linalg.solve(matrix, desired)
+        except np.linalg.LinAlgError:
+            return np.full(len(desired), np.nan)
     rows = np.arange(len(matrix))
     cofactors = xp.array([(-1.0) ** int(i) * kernel(matrix[np.delete(rows, i)]) for i in rows])
     volume = matrix[0] @ cofactors[0]

@@ -9,9 +9,11 @@ import pytest
 
 from tests.controllers.code.test_programs import SPECIAL, same
 from tests.natively import machine_code, machine_code_in_lanes
+from tiltsim_controllers.code import jax_function
 from tiltsim_controllers.code.arrays import flatten, xp
 from tiltsim_controllers.code.blocks import branch, repeat, signal, take
 from tiltsim_controllers.code.casadi_function import casadi_function
+from tiltsim_controllers.code.jax_function import results_in_jax
 from tiltsim_controllers.code.messages import TraceError
 from tiltsim_controllers.code.program import trace_vectors
 from tiltsim_controllers.code.python_source import python_function, python_source
@@ -106,6 +108,43 @@ def test_jax_agrees_and_differentiates(function):
         for x in points(function)[:20]:
             np.testing.assert_allclose(compiled(x), law(x.tolist()), rtol=1e-12, atol=1e-12)
         assert jax.jacfwd(function)(np.array([1.0, 0.5, 3.0])).shape[1] == 3
+
+
+@pytest.mark.parametrize("in_segments", [False, True])
+@pytest.mark.parametrize("function", [everything, nested])
+def test_a_program_has_the_same_values_in_jax(function, in_segments, monkeypatch):
+    jax = pytest.importorskip("jax")
+    monkeypatch.setattr(jax_function, "SEGMENT", 7)
+    program = traced(function, 3)
+    law = python_function(program)
+
+    def run(x):
+        return jax.numpy.stack(results_in_jax(program, [x], "float64", in_segments=in_segments))
+
+    with jax.enable_x64(True):
+        compiled = jax.jit(run)
+        for x in points(function)[:20]:
+            np.testing.assert_allclose(compiled(x), law(x.tolist()), rtol=1e-12, atol=1e-12)
+
+
+def test_loops_of_a_known_count_and_tables_have_derivatives_in_jax():
+    jax = pytest.importorskip("jax")
+
+    def search(x):
+        grown = repeat(4, lambda i, a: (a * x[0] + i,), 1.0, until=lambda a: a > 30.0)[0]
+        return [grown + take((1.0, 4.0, 9.0), x[1])]
+
+    program = trace_vectors(search, {"x": 2})
+
+    def run(x):
+        return results_in_jax(program, [x], "float64", in_segments=False)[0]
+
+    with jax.enable_x64(True):
+        start = np.array([2.0, 1.5])
+        # With x0 = a it is a^4 + a^2 + 2 a + 3, and the entry 4 of the table.
+        assert run(start) == python_function(program)([2.0, 1.5])[0] == 27.0 + 4.0
+        assert jax.grad(run)(start).tolist() == [38.0, 0.0]
+        assert run(np.array([4.0, 0.0])) == python_function(program)([4.0, 0.0])[0]
 
 
 def test_only_one_side_of_a_branch_is_evaluated():
