@@ -11,6 +11,7 @@ import numpy as np
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Monitoring
 from tiltsim.engines.sample_evaluation import flights_in
 from tiltsim.equations.tiltrotor import equations_of_motion
+from tiltsim.laws.parameters import parameters_of
 from tiltsim.laws.rotor_loop import RotorLaw, RotorLayout
 from tiltsim.laws.rotorcraft import rotor_stops, singular_attitude
 from tiltsim.laws.tracking import INTEGRALS, integrals_at_rest, tracking_loop, tracking_parameters
@@ -151,8 +152,10 @@ def _without_gait(
 
 
 def _setup(plan: FlightPlan) -> tuple[Any, Values]:
-    vehicle = plan.scenario.rotorcraft.resolve()
-    return tracking_parameters(plan, attitude_altitude.Parameters, vehicle=vehicle), ()
+    controller, rotorcraft = plan.scenario.controller, plan.scenario.rotorcraft
+    assert isinstance(controller, AttitudeAltitudeController)
+    known = {"vehicle": rotorcraft.resolve(), "gains": controller.resolve_gains()}
+    return parameters_of(plan, attitude_altitude.Parameters, **known), ()
 
 
 TILTROTOR, MEASURED_TILTROTOR = tiltrotor_loops(
