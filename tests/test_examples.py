@@ -1,4 +1,4 @@
-"""The short examples run, in a folder of their own, and print the results that they promise."""
+"""The short examples run, each in a separate folder, and print the results that they promise."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def test_every_short_example_is_run_and_listed():
 
 
 @pytest.mark.parametrize("name", SHORT)
-def test_it_begins_with_its_purpose(name):
+def test_every_short_example_begins_with_its_purpose(name):
     documented = ast.get_docstring(ast.parse((EXAMPLES / f"{name}.py").read_text()))
     assert documented
     assert documented.endswith(".")
@@ -54,7 +54,7 @@ def test_it_begins_with_its_purpose(name):
 @pytest.mark.parametrize(
     "name", [pytest.param(n, marks=[pytest.mark.slow] if n in SLOW else []) for n in PRINTED]
 )
-def test_it_runs(name, tmp_path, monkeypatch, capsys):
+def test_every_short_example_runs(name, tmp_path, monkeypatch, capsys):
     if name == "learning":
         pytest.importorskip("gymnasium")
     monkeypatch.chdir(tmp_path)

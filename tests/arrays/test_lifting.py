@@ -30,7 +30,7 @@ from tiltsim_controllers.mathematics.scalar import scalar
 jax = pytest.importorskip("jax")
 
 CHANGE = 1e-3
-"""Of the recorded arguments, relative: their values must not be in the lifted function."""
+"""Relative change of recorded arguments: their values must not be in the lifted function."""
 
 ROUNDING = 1e-12
 """Relative to the largest of the values: a few hundred roundings."""
@@ -99,7 +99,7 @@ def with_tables(value):
 
 
 class Compared(Lifting):
-    """Lifts functions, and compares each of them, at its first call, with what it is in Python."""
+    """Lifts functions, and compares each of them, at its first call, with its result in Python."""
 
     def __init__(self):
         super().__init__(JaxArrays("float64"))
@@ -131,7 +131,7 @@ def name_of(function):
 
 
 def differences(lifting, function, arguments, rng):
-    """What keeps a function from being lifted near its arguments; the rest notes the lifting."""
+    """Lift a function near its arguments, and note an error; ``lifting`` notes wrong values."""
     found = np.array([value for value, name in fields(function, arguments) if varies(value, name)])
     row = found * (1.0 + CHANGE * rng.standard_normal(len(found)))
     following = iter(map(jax.numpy.asarray, row))
@@ -149,7 +149,7 @@ def all_differences(flights):
         patch.setattr(sample_evaluation, "_in_python", called_rows)
         for tables, simulation in flights:
             record(lambda: flown(tables, **simulation).metrics(), calls)  # noqa: B023
-    for function in calls:  # callers first: most of what they call is compared with them
+    for function in calls:  # callers first: most functions that they call are compared with them
         if described(function) not in lifting.compared:
             differences(lifting, function, calls[function], rng)
     return lifting.wrong, calls

@@ -323,7 +323,7 @@ def test_reference_columns_hold_the_references_of_the_controller():
 
 def test_the_final_attitude_error_is_the_largest_of_the_last_second():
     ends = TIMES >= 29.0
-    pitch = np.where(ends, 0.0, 0.4)  # what is over does not count
+    pitch = np.where(ends, 0.0, 0.4)  # earlier errors do not count
     roll = np.where(TIMES == 29.25, -0.03, 0.01)
     assert fly(roll=roll, pitch=pitch).metrics()["final_attitude_error"] == pytest.approx(0.03)
 
@@ -398,7 +398,7 @@ def test_every_flight_has_position_errors(vehicle):
 
 @pytest.mark.parametrize("law", ["geometric", "pid", "indi", "lqr"])
 def test_a_law_that_leans_as_it_needs_has_no_attitude_error(law):
-    """Its lean on a circle was an error, since no column has the attitude it asks for."""
+    """Its lean on a circle used to count as an error: no column has its desired attitude."""
     circle = {"type": "circle", "radius": 2.0, "angular_frequency": 1.0}
     scenario = {"controller": {"law": law}, "reference": circle}
     scenario["simulation"] = {"duration": 0.1, "engine": "python"}
@@ -407,8 +407,8 @@ def test_a_law_that_leans_as_it_needs_has_no_attitude_error(law):
     assert "final_roll" in metrics
 
 
-def test_a_law_that_asks_for_an_attitude_is_compared_with_that():
-    """Parallel rotors lean on a circle, as the law asks."""
+def test_a_law_with_a_desired_attitude_is_compared_with_it():
+    """Parallel rotors lean on a circle, as the law requires."""
     changes = {"simulation.duration": 3.0, "simulation.engine": "native"}
     metrics = tiltsim.simulate(load_scenario("fleet/hexarotor#circle", changes)).metrics()
     assert metrics["max_abs_roll"] > 0.05

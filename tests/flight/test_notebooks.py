@@ -85,7 +85,7 @@ def test_the_files_of_a_controller_from_python_say_how_to_fly_it_again(own_fligh
         tiltsim.simulate(resolved)
     again = tiltsim.simulate(resolved, controller=hover)
     np.testing.assert_array_equal(again.samples, own_flight.samples)
-    own_flight.save(tmp_path)  # what tiltsim wrote, it replaces
+    own_flight.save(tmp_path)  # tiltsim replaces its own files
     loaded = tiltsim.load_flight(tmp_path)
     np.testing.assert_array_equal(loaded.samples, own_flight.samples)
 

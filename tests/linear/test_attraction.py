@@ -163,7 +163,7 @@ def test_a_duration_is_short_if_more_is_left_than_counts_as_back():
 
 
 def test_a_duration_that_is_too_short_to_come_back_is_refused(flown, monkeypatch):
-    """It was a warning, and the map of a stable vehicle said that 3 % come back."""
+    """It was a warning, and the map of a stable vehicle showed that 3 % come back."""
     monkeypatch.setattr(module, "slowest_mode", lambda scenario: SlowestMode("altitude", 0.2))
     scenario = tiltsim.load_scenario(SETPOINT, SHORT)
     with pytest.raises(InputError, match=r"duration = 1 s is short: .* altitude, .* take 16 s$"):

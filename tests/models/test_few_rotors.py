@@ -1,4 +1,4 @@
-"""Two and three tilting rotors: what they control, against MuJoCo and singular values of numpy."""
+"""Two and three tilting rotors: their controlled outputs, against MuJoCo and numpy."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tiltsim.studies.multirotor_analysis import multirotor_report
 STEP = {"reference": {"type": "setpoint", "position": [0.25, -0.15, 0.1]}}
 SHORT = {"simulation": {"duration": 0.2, "timestep": 0.002, "engine": "python"}}
 LOW = ('pos="0 0.25 0.08"', 'pos="0 0.25 0"'), ('pos="0 -0.25 0.08"', 'pos="0 -0.25 0"')
-"""Rotors at the height of the centre of mass."""
+"""Rotors at the height of the center of mass."""
 
 
 def file_of(name, folder, *changes):
@@ -29,7 +29,7 @@ def file_of(name, folder, *changes):
 
 
 def hinge(number, outwards):
-    """What fixes a rotor of the tricopter: its hinge, servo and sensor removed."""
+    """Changes that fix a rotor of the tricopter: without its hinge, servo and sensor."""
     return [
         (f'        <joint name="tilt_{number}" class="servo" axis="{outwards}"/>\n', ""),
         (f'    <position name="tilt_{number}" class="servo" joint="tilt_{number}"/>\n', ""),
@@ -54,7 +54,7 @@ def tail_tilts(folder):
 
 
 def accelerations(model, tilts, w):
-    """Of the body in MuJoCo, linear and angular, at tilt angles (rad) and rotor inputs."""
+    """Linear and angular accelerations of MuJoCo's body, at tilt angles (rad) and inputs."""
     data = mujoco.MjData(model)
     data.qpos[3], data.qpos[7:] = 1.0, tilts
     data.ctrl[: len(tilts)] = tilts
@@ -99,7 +99,7 @@ def states_controlled(rows, gravity=9.81):
         pytest.param(lambda folder: file_of("tricopter", folder), 4, 6, 12, id="tricopter"),
     ],
 )
-def test_outputs_that_rotors_and_tilts_move_are_those_of_mujoco(tmp_path, make, lift, pose, states):
+def test_outputs_moved_by_rotors_and_tilts_agree_with_mujoco(tmp_path, make, lift, pose, states):
     file = make(tmp_path)
     vehicle = read_user_vehicle(str(file), "multirotor").vehicle
     found = multirotor_report(vehicle, (0.0,) * vehicle.tilts)["with_tilts"]
@@ -140,7 +140,7 @@ def test_mujoco_flies_few_rotors_as_the_equations_do(name):
 
 
 def test_a_tricopter_whose_tail_tilts_leans_against_its_side_force(tmp_path):
-    """Allocation takes fixed rotors too, and the axis of the force is found, not assumed."""
+    """Allocation also takes fixed rotors, and the axis of the force is found, not assumed."""
     file = str(tail_tilts(tmp_path))
     flight = tiltsim.simulate(
         {

@@ -73,7 +73,7 @@ def test_python_and_native_turn_alike_in_every_bit(law, plant):
 
 
 @pytest.mark.parametrize("law", FLIGHTS)
-def test_the_attitude_asked_for_is_that_of_the_table(law):
+def test_the_reference_attitude_follows_the_table(law):
     flight = flown(law, "rigid_body")
     asked = np.array([pose(time)[3:] for time in flight["time"]])
     np.testing.assert_allclose(flight["reference_attitude"], asked, atol=1e-6)

@@ -11,7 +11,7 @@ from tiltsim.arrays.expressions import DATA_LENGTH, Borrowed, Expressions
 from tiltsim.arrays.values import LiftError, PlainNumberError
 
 Ends = dict[str, tuple[Any, Any]]
-"""How a block of code may end: by what, under which condition, with which variables or value."""
+"""Ends of a block of code by kind: the condition of each, and its variables or value."""
 
 NEXT, RETURN, BREAK, CONTINUE = "next", "return", "break", "continue"
 
@@ -67,8 +67,8 @@ class Frame(Expressions):
         Args:
             ends: The early return.
             condition: Whether there was none.
-            statements: What follows it.
-            variables: As they are without it.
+            statements: The statements that follow it.
+            variables: Their values without it.
         """
         lifting, arrays = self.lifting, cast(Any, self.lifting.arrays)
         with arrays.side() as side, lifting.under(condition):
@@ -81,7 +81,7 @@ class Frame(Expressions):
         return self.follow(ends, condition, later)
 
     def follow(self, ends: Ends, condition: Any, later: Ends) -> Ends:
-        """Ends of a block so far, and those of what comes next under a condition."""
+        """Ends of a block so far, joined with later ends under a condition."""
         joined = dict(ends)
         for kind, (its_condition, value) in later.items():
             its_condition = self.lifting.conjunction(condition, its_condition)

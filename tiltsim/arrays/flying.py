@@ -31,7 +31,7 @@ def double_precision() -> Iterator[None]:
 
 
 class Course(NamedTuple):
-    """What flights of a batch have in common."""
+    """Loop and settings that the flights of a batch share."""
 
     loop: ClosedLoop
     timestep: float  # s
@@ -63,7 +63,7 @@ class Kernel:
     """Step and sample of a loop's equations on arrays, for one flight.
 
     Args:
-        course: What is flown.
+        course: Loop and settings of the flight.
         setup: Parameters and knots, which may be arrays.
         disturbance: m/s^2, world axes.
     """
@@ -107,7 +107,7 @@ class Kernel:
         return exact.astype(self.course.dtype)
 
     def _with_sampling(self, index: Any, act: Callable[[bool], Any]) -> Any:
-        """What ``act(samples)`` returns at a step, at which the controller samples or not."""
+        """The result of ``act(samples)``, with ``samples`` whether the controller samples."""
         every = self.course.control_steps
         if every == 0:
             return act(True)
@@ -152,7 +152,7 @@ class Kernel:
         return self._numpy.where(abs(checked) < SINGULAR, 0.0, self._numpy.sign(checked))
 
     def goes_on(self, sample: Any, sides: Any, reference: Any) -> Any:
-        """Whether a flight with this sample goes on; ``sides`` are those of its first sample."""
+        """Whether a flight with this sample goes on; ``sides``: the signs of its first sample."""
         now = self.sides(sample)
         kept = ((now == sides) & (now != 0.0)).all()
         follows = self.course.follows_position
@@ -220,9 +220,9 @@ def kernel_of(course: Course, leaves: Iterable[Any], knots: Any, disturbance: An
     """A kernel whose parameters are given as the floats or arrays of their record.
 
     Args:
-        course: What is flown.
+        course: Loop and settings of the flight.
         leaves: The floats or arrays of the loop's record, in order.
-        knots: Those of the flight.
+        knots: Knots of the flight.
         disturbance: m/s^2, world axes.
     """
     parameters = unflatten(course.loop.parameters, leaves)
@@ -230,10 +230,10 @@ def kernel_of(course: Course, leaves: Iterable[Any], knots: Any, disturbance: An
 
 
 class Batch:
-    """Flights of one course that differ in numbers, as functions of arrays with a row a flight.
+    """Flights of one course that differ in numbers, as functions of arrays with one row per flight.
 
     Args:
-        course: What they have in common.
+        course: Loop and settings that they share.
         numbers: Parameters of the loop and of the reference, disturbance and initial state, one
             after the other; None where rows differ.
         knots: Common to all, or None.

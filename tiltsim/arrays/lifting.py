@@ -29,11 +29,11 @@ class Lifting:
     """Lifts scalar functions to arrays.
 
     Args:
-        arrays: What the lifted functions work on.
+        arrays: Values that the lifted functions work on.
         guarded: Whether a branch that is not selected gets harmless arguments for divisions and
             roots. Values do not need it; gradients do, as zero times infinity is no number.
-        planning: Whether it lifts what comes before a flight, which calls more than scalar code.
-            What works on arrays as it is runs as it is; an error that depends on arrays is not
+        planning: Whether it lifts the plan of a flight, which calls more than scalar code.
+            Functions that accept arrays run unchanged; an error that depends on arrays is not
             raised, as the scenario was checked before.
     """
 
@@ -82,7 +82,7 @@ class Lifting:
             return self.run(source, [*bound, *args], keywords)
 
     def affine(self, function: Any, bound: inspect.BoundArguments) -> tuple[Any, ...]:
-        """What a function that `affine_in` marks returns, from its values at unit vectors."""
+        """The result of a function marked by `affine_in`, from its values at unit vectors."""
         points = [[*point] for point in bound.arguments[function.affine_in]]
         entries = [entry for point in points for entry in point]
 

@@ -1,4 +1,4 @@
-"""What scalar functions are lifted to: arrays of JAX, symbols of CasADi."""
+"""Values that scalar functions are lifted to: arrays of JAX, symbols of CasADi."""
 
 from __future__ import annotations
 
@@ -34,11 +34,11 @@ class Arrays(Protocol):
 
     @property
     def domains(self) -> Mapping[Function, float]:
-        """Of those that are defined on a part of the reals only, a number in that part."""
+        """A number in the domain of each function that is defined on a part of the reals only."""
 
     @property
     def refusals(self) -> tuple[type[Exception], ...]:
-        """What arrays raise where a plain number is needed."""
+        """Exceptions that arrays raise where a plain number is needed."""
 
     def is_array(self, value: Any) -> bool:
         """Whether a value is known only when the lifted function runs."""

@@ -27,7 +27,7 @@ def _side_force(vehicle: dict[str, Any]) -> float | None:
 
 
 def _with_tilts(vehicle: dict[str, Any]) -> str:
-    """What rotors and tilts together move about a level hover."""
+    """Outputs that rotors and tilts together move about a level hover."""
     tilting = vehicle["with_tilts"]
     if tilting is None or tilting["attitude_and_lift"] < 4:
         return "-"

@@ -51,8 +51,8 @@ class Environment(dm_env.Environment):  # type: ignore[misc]
 
     Args:
         task: Its scenario, observation, reward and termination make an episode.
-        seed: Seed of the draws; default: the ``simulation.seed`` of the task's scenario. The
-            same seed and the same actions give the same episodes, bit for bit.
+        seed: Seed of the draws; default: the ``simulation.seed`` of the task's scenario. Equal
+            seeds and equal actions give equal episodes, bit for bit.
     """
 
     def __init__(self, task: Task, *, seed: int | None = None) -> None:

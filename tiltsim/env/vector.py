@@ -52,7 +52,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):  # type: ignore[misc]
         functions: One environment as pure functions; see `tiltsim.env.functions.EnvFunctions`.
 
     Raises:
-        InputError: As in `TiltrotorEnv` and `EnvFunctions`, and if a package is missing.
+        InputError: See `TiltrotorEnv` and `EnvFunctions`; also if a package is missing.
     """
 
     metadata = {"autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012, as in gymnasium
@@ -219,7 +219,7 @@ def task_of_registry(
         max_episode_steps: Control steps after which an episode is over, if its time is not before.
 
     Raises:
-        InputError: As in `VectorEnv`, and if observations are not to be flat.
+        InputError: See `VectorEnv`; also if observations are not to be flat.
     """
     if not flat:
         raise InputError("environment: flat = False: arrays have flat observations only")

@@ -74,7 +74,7 @@ def loop_of(
     """The closed loop of a scenario: its controller inside layers for all that is not ideal.
 
     Args:
-        scenario: What is flown.
+        scenario: The scenario to fly.
         adapted: May change the controller before layers go around it.
         recorded: See `assemble`.
     """
@@ -125,7 +125,7 @@ def assemble(
     """Plan the flight of a scenario and set up its closed loop.
 
     Args:
-        scenario: What is flown.
+        scenario: The scenario to fly.
         adapted: See `loop_of`.
         recorded: Whether its samples are there already: all of the loop but a user's function is
             then at hand, and no code that the scenario names is executed.

@@ -1,8 +1,8 @@
-"""Closed loops around laws of arrays: baselines, and those of packages and users.
+"""Closed loops around laws of arrays: baselines, and laws of packages and users.
 
-One loop serves every rotorcraft: its rotors are a table, as those of multirotors, and its layout is
-compiled in. The rotors' speeds are states that approach the commanded ones; so are the tilts of a
-law that commands them.
+One loop serves every rotorcraft: its rotors are a table, as in the loops of multirotors, and its
+layout is compiled in. The rotors' speeds are states that approach the commanded ones; so are the
+tilts of a law that commands them.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from tiltsim.scenario.scenario import FlightPlan
 
 CORRECTION: Final = 5.0
-"""1/s: the rate at which rotor speeds approach those of their model, slow beside any latency."""
+"""1/s: the rate at which rotors approach the speeds of their model, slow beside any latency."""
 
 
 REMEDY: Final = "write tiltsim.xp for functions of arrays, xp.where for an if"
@@ -87,7 +87,7 @@ class Key(NamedTuple):
 
     @property
     def code_name(self) -> str:
-        """Of the law, with its commands."""
+        """Name of the law, with its commands."""
         return f"{self.name}{'_free' * self.tilts}{'_late' * self.models_rotors}"
 
 
@@ -202,7 +202,7 @@ def _accelerations(command: Command, gain: Any, k: Any, speeds: Any) -> Any:
 
     Args:
         command: One of its vectors for the rotors is given.
-        gain: Of the errors of speed, 1/s.
+        gain: Gain of the speed errors, 1/s.
         k: Thrust coefficients, N s^2, shape (N,).
         speeds: rad/s along the spins, shape (N,).
     """
@@ -316,7 +316,7 @@ def law_loop(key: Key, law_of: Callable[[FlightPlan], FlownLaw]) -> ClosedLoop:
     """The closed loop of a law.
 
     Args:
-        key: What it is compiled for.
+        key: All that it is compiled for.
         law_of: Finds the law of a flight, whose numbers differ.
     """
     record, shown = record_of(key.parameters), key.layout.shown

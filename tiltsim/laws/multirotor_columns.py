@@ -27,7 +27,7 @@ REVERSING: Final = 'controller.norm = "thrust", with which rotors reverse'
 """The remedy where a rotor would have to reverse."""
 
 REFERENCES: Final = (*REFERENCE_COLUMNS, NULL_PART)
-"""Columns of what the law asks for."""
+"""Columns of the references of the law."""
 
 
 @cache

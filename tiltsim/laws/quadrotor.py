@@ -76,11 +76,11 @@ def references(
     attitude: Sequence[object] = (),
     tilts: tuple[str, ...] = TILT_REFERENCE_COLUMNS,
 ) -> dict[str, Floats]:
-    """The columns of references; those of the tilts are zero.
+    """The columns of references; tilts have zeros.
 
     Args:
         samples: By field.
-        reference, knots: Of the position.
+        reference, knots: Reference of the position, with its knots.
         attitude: Columns of roll, pitch and yaw (rad): arrays or constants; empty for the
             reference's.
         tilts: Names of the tilts' columns.

@@ -90,7 +90,7 @@ def _no_states(_plan: FlightPlan) -> Values:
 
 
 class RotorLaw(NamedTuple):
-    """A control law with rotor accelerations as inputs, and what its loop is made of.
+    """A control law with rotor accelerations as inputs, and the parts of its loop.
 
     Its parameters have ``reference``, where the tilts follow the gait ``gait``, and for the general
     margins and motion ``vehicle`` and ``rotors``, the index of the rotors' table in the knots.

@@ -163,7 +163,7 @@ def torque_free_columns(
 
     Args:
         layout: Layout of the vehicle.
-        table: Of its rotors.
+        table: Table of its rotors.
         samples: By field.
         dimension: How many components of force the controller controls; None for a controller
             without a decoupling matrix.

@@ -84,8 +84,8 @@ def motion_rates(motion: Any, direction: Any, squares: Any, car: TiltCar, distur
 
     Args:
         motion: Position and velocity, m and m/s, shape (4,).
-        direction: Of the thrusts' bisector, rad.
-        squares: Of the rotor speeds, (rad/s)^2, shape (2,).
+        direction: Direction of the thrusts' bisector, rad.
+        squares: Squares of the rotor speeds, (rad/s)^2, shape (2,).
         car: The vehicle.
         disturbance: An acceleration unknown to the controller, m/s^2, world axes, shape (3,).
     """
@@ -164,7 +164,7 @@ class _Integrating(NamedTuple):
     """A loop whose law integrates both rotor speeds and the servo's command.
 
     The controller's states are the command of the servo (rad) and, for the fourth derivative, its
-    rate and the rotor accelerations, which the law integrates, too. The state of the equations is
+    rate and the rotor accelerations, which the law also integrates. The state of the equations is
     position, velocity, tilt angle, rotor speeds and these.
 
     Attributes:
@@ -206,7 +206,7 @@ class _Integrating(NamedTuple):
         return xp.hstack([*disc, _running(act[:2]), act[2:], act[: 2 * self.twice]])
 
     def law_state(self, state: Any, parameters: Any) -> Any:
-        """State of the law from that of the equations."""
+        """State of the law from the state of the equations."""
         angles = xp.array([yaw(state[4], parameters), state[4]])
         speeds = self.law_speeds(state[5:7], parameters)
         return xp.hstack([state[:4], angles, speeds, state[7:]])

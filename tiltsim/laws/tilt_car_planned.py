@@ -59,7 +59,7 @@ def _planned_controls(
 
 
 def _planned_state(time: Any, state: Any, parameters: Any, knots: Any) -> Any:
-    """State of the law from that of the equations, with the planned tilt."""
+    """State of the law from the state of the equations, with the planned tilt."""
     tilt = _tilt(time, parameters, knots)[0]
     return xp.hstack([state[:4], xp.array([yaw(tilt, parameters), tilt])])
 

@@ -41,7 +41,7 @@ def tracking_parameters(plan: FlightPlan, record: Any, **own: Any) -> Any:
     """The parameters of a law that follows a gait.
 
     Args:
-        plan, record, own: As for `parameters_of`.
+        plan, record, own: See `parameters_of`.
     """
     scenario, controller = plan.scenario, plan.scenario.controller
     assert isinstance(controller, (AttitudeAltitudeController, AttitudeForceController))

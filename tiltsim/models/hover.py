@@ -31,7 +31,7 @@ def hover_speeds(
     """Signed rotor speeds (rad/s) without torque, whose force carries the weight.
 
     The force is as large as the weight, and as nearly along the body's z axis as the tilt angles
-    allow; a controller of fewer components of force leans instead of forcing the rest. Of all
+    allow; a controller of fewer components of force leans instead of forcing the rest. Among all
     inputs ``varpi |varpi|`` that make it, these have the least norm, or the least largest one where
     the limits exclude those.
 

@@ -96,7 +96,7 @@ def check_mjcf(path: Path) -> set[Path]:
 
 
 Version = tuple[tuple[Path, int, int], ...]
-"""Time of the last change (ns) and size of files; zeros for those that do not exist."""
+"""Time of the last change (ns) and size of files; zeros for files that do not exist."""
 
 _versions: dict[Path, Version] = {}
 

@@ -52,7 +52,7 @@ class _Element:
             if name.endswith(ending):
                 value = getattr(enumeration, prefix + value.upper())
         present = getattr(self.own, name)
-        if isinstance(present, np.ndarray):  # as in MJCF, what is not given stays
+        if isinstance(present, np.ndarray):  # as in MJCF, entries not given stay
             value = np.concatenate([value, present[len(value) :]])
         setattr(self.own, name, value)
 
@@ -130,12 +130,12 @@ class _Body(_Element):
 
 
 class _Actuator(_Element):
-    tag = "general"  # what MuJoCo makes of all kinds
+    tag = "general"  # MuJoCo turns all kinds into it
 
     def __setattr__(self, name: str, value: Any) -> None:
         super().__setattr__(name, value)
         if name == "ctrlrange":
-            self.own.inheritrange = 0.0  # a range of its own, not the joint's
+            self.own.inheritrange = 0.0  # its own range, not the joint's
 
     @property
     def site(self) -> str | None:

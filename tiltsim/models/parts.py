@@ -72,8 +72,8 @@ class Pod:
 class RotorLimits:
     """Limits on a rotor's speed, enforced by MuJoCo at the end of each step.
 
-    Within a step the stages of RK4 may see speeds beyond a limit by what one step adds. The thrust
-    also stays within the limits there.
+    Within a step the stages of RK4 may see speeds beyond a limit by the change in one step. The
+    thrust also stays within the limits there.
 
     Attributes:
         min_speed: Smallest ``|varpi|``, rad/s: the rotor cannot reverse. None lets it stop and

@@ -49,7 +49,7 @@ def _ring(
     """Rotors around the hull, turned about their arms by ``cant``, to either side by turns.
 
     Args:
-        title: Of the kind.
+        title: Title of the kind.
         rotors: Their number.
         radius: Length of the arms, m.
         cant: rad.
@@ -66,7 +66,7 @@ def _cube(title: str, radius: float) -> Starter:
     """Rotors on the corners of a cube (Brescianini and D'Andrea, 2016, eq. 16).
 
     Args:
-        title: Of the kind.
+        title: Title of the kind.
         radius: From the center to the corners, m.
     """
     a, b, c = 0.5 + 12**-0.5, 0.5 - 12**-0.5, 3**-0.5

@@ -27,9 +27,9 @@ if TYPE_CHECKING:
 
 TITLE: Final = "Reproduction report"
 SUBJECT: Final = (
-    "What the doctoral thesis “Advanced Feedback Linearization Control for Tiltrotor UAVs: Gait "
-    "Plan, Controller Design, and Stability Analysis” by Zhe Shen (The University of Tokyo, 2023) "
-    "states, with a number or a yes/no answer, compared with the results of tiltsim."
+    "The results that the doctoral thesis “Advanced Feedback Linearization Control for Tiltrotor "
+    "UAVs: Gait Plan, Controller Design, and Stability Analysis” by Zhe Shen (The University of "
+    "Tokyo, 2023) states with a number or a yes/no answer, compared with the results of tiltsim."
 )
 PROVENANCE: Final = (
     "We worked from a conversion of the thesis into text, without its figures: paths, curves and "

@@ -25,7 +25,7 @@ from tiltsim.scenario.vehicle import (
 )
 
 MAX_KNOTS: Final = 1500
-"""Numbers of a gait and a reference together, unless they are tables with a limit of their own."""
+"""Numbers of a gait and a reference together, except tables, which have a separate limit."""
 
 
 def check_consistency(scenario: ScenarioTables) -> None:

@@ -136,7 +136,7 @@ _BUILT_IN: Final[dict[str, type[ControllerTable]]] = {
 }
 
 CONTROLLERS: Final = _BUILT_IN | installed_controllers(_BUILT_IN)
-"""The tables of all laws by their names: built-in ones, then those of installed packages."""
+"""The tables of all laws by their names: built-in laws, then laws of installed packages."""
 
 if TYPE_CHECKING:
     Controller = ControllerTable

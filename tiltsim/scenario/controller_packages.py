@@ -1,7 +1,7 @@
 """Controllers that installed packages bring, by the entry-point group ``tiltsim.controllers``.
 
 An entry point names a law and its table, a subclass of
-`tiltsim.scenario.law_controller.LawController`. What cannot be used is left out with a
+`tiltsim.scenario.law_controller.LawController`. An entry that cannot be used is left out with a
 warning, so that a broken package does not stop flights that do not need it.
 """
 
@@ -25,7 +25,7 @@ GROUP: Final = "tiltsim.controllers"
 def installed_controllers(built_in: Container[str]) -> dict[str, type[ControllerTable]]:
     """The tables of all installed packages by the names of their laws.
 
-    Of several packages with one law the first by name is taken.
+    If several packages have the same law, the first package by name is taken.
     """
     found: dict[str, type[ControllerTable]] = {}
     owners: dict[str, str] = {}
@@ -43,7 +43,7 @@ def installed_controllers(built_in: Container[str]) -> dict[str, type[Controller
 
 
 def _entries() -> list[EntryPoint]:
-    """Those of all packages; a package whose list cannot be read is left out with a warning."""
+    """Entries of all packages; a package whose list cannot be read is left out with a warning."""
     try:
         return [*entry_points(group=GROUP)]
     except Exception:
@@ -86,7 +86,7 @@ def _loaded(entry: EntryPoint, built_in: Container[str]) -> type[ControllerTable
             return f"{entry.value} has no method {', '.join(sorted(table.__abstractmethods__))}"
         if get_args(table.model_fields["law"].annotation) != (entry.name,):
             return f'{entry.value} needs the field law: Literal["{entry.name}"]'
-        table.model_json_schema()  # completes the table, and is what tiltsim schema needs
+        table.model_json_schema()  # completes the table; tiltsim schema needs it
     except BaseException as error:
         return error_text(error)
     return table

@@ -17,7 +17,7 @@ from tiltsim_controllers.laws.supervisor import STRATEGIES, UNTILTED, Supervisor
 from tiltsim_controllers.vehicle.parameters import Vehicle, drag_ratio
 
 ReferenceKind = Literal["position", "attitude_altitude", "pose"]
-"""What a controller tracks: position and yaw, attitude and altitude, or position and attitude."""
+"""Tracked outputs: position and yaw, attitude and altitude, or position and attitude."""
 
 
 class SupervisorTable(Table):
@@ -115,7 +115,7 @@ class SupervisorTable(Table):
 
 
 class ControllerTable(Table):
-    """What every controller has; properties are neutral where a controller lacks the feature."""
+    """Base of every controller; properties are neutral where a controller lacks the feature."""
 
     table_name = "controller"
     vehicle_models: ClassVar[tuple[str, ...]]
@@ -124,10 +124,10 @@ class ControllerTable(Table):
     loop_gains: ClassVar[tuple[str, ...]] = ()  # keys of the gains of independent linear loops
     is_external: ClassVar[bool] = False  # commands come from Python code, not from a built-in law
     commands_tilts: ClassVar[bool] = False  # the tilt angles are inputs, not planned by a gait
-    rotors_have_speeds: ClassVar[bool] = False  # of the quadrotor, too, whose laws make thrusts
+    rotors_have_speeds: ClassVar[bool] = False  # also of the quadrotor, whose laws make thrusts
     follows_turns: ClassVar[bool] = False  # roll, pitch and yaw that vary with time
     needs_four_rotors: ClassVar[bool] = True  # or tilts that the law commands
-    leans_unrecorded: ClassVar[bool] = False  # towards a position; no column has this attitude
+    leans_unrecorded: ClassVar[bool] = False  # toward a position; no column has this attitude
 
     gain_sets: ClassVar[GainSets] = {}
 
@@ -153,7 +153,7 @@ class ControllerTable(Table):
         """Refuse the controller in a scenario, otherwise consistent. Raises `mistake`."""
 
     def records_attitude(self, scenario: Any) -> bool:
-        """Whether ``roll_ref`` and ``pitch_ref`` are the attitude that the law asks for."""
+        """Whether ``roll_ref`` and ``pitch_ref`` are the desired attitude of the law."""
         leans = self.leans_unrecorded and not self.commands_tilts
         return not leans or scenario.reference.kind != "position"
 
@@ -183,7 +183,7 @@ class ControllerTable(Table):
         return False
 
     def in_full(self) -> Self:
-        """The same with numbers in place of the names of sets of gains."""
+        """The table with numbers in place of the names of sets of gains."""
         named = [key for key in self.gain_sets if isinstance(getattr(self, key), str)]
         return self.model_copy(
             update={

@@ -156,7 +156,7 @@ class CatGait(GaitTable):
         description="swing of a leg to either side of its lean [rad]", examples=[0.5]
     )
     lean: Angle = Field(
-        0.0, description="mean angle of the legs, forward, towards +x and +y [rad]", examples=[0.5]
+        0.0, description="mean angle of the legs, forward, toward +x and +y [rad]", examples=[0.5]
     )
     period: Period = Field(description="T, of one stride [s]", examples=[1.0])
 

@@ -1,4 +1,4 @@
-"""Controllers whose law is one function of arrays: baselines, and those of packages and users.
+"""Controllers whose law is one function of arrays: baselines, and laws of packages and users.
 
 A package adds one by a subclass of `LawController`, which the entry-point group
 ``tiltsim.controllers`` names; see docs/controller_package.md.
@@ -48,11 +48,11 @@ def is_law(controller: object) -> bool:
 
 @dataclass(frozen=True)
 class Airframe:
-    """What a controller knows when a flight is planned.
+    """The data that a controller has when a flight is planned.
 
     Attributes:
         vehicle: All about it, its rotors as a table.
-        gait: Of its tilts.
+        gait: Gait of its tilts.
         initial_tilts: Its tilt angles at time zero, rad.
         initial_speeds: Its rotor speeds at time zero, rad/s along the spin.
         initial_body_rates: Its body rates at time zero, rad/s.
@@ -123,7 +123,7 @@ class LawController(LawTable):
 
         Args:
             observed: State and reference, see `tiltsim.Observed`.
-            p: What `law_parameters` returned, tuples as arrays.
+            p: Result of `law_parameters`, tuples as arrays.
         """
 
     def law_function(self, airframe: Airframe) -> Callable[..., Command]:

@@ -261,7 +261,7 @@ def parse_scenario(document: Mapping[str, Any], address: str = "scenario") -> Sc
         address: Name of the document in messages.
 
     Raises:
-        InputError: As in `load_scenario`.
+        InputError: See `load_scenario`.
     """
     if not isinstance(document, Mapping):
         raise InputError(f"scenario = {short_repr(document)}: must be a dict")

@@ -99,7 +99,7 @@ def _hover(
 def _regulator_of(
     vehicle: Multirotor, gait: Gait, tilts: Values, gyroscopic: float, lag: float, weights: Weights
 ) -> Regulator:
-    """The regulator about the orbit of a gait, kept: a flight asks for it several times."""
+    """The regulator about the orbit of a gait, kept because a flight needs it several times."""
     moves = not gait.is_constant
     period = gait.parameters.period if moves else 1.0
     places = node_count(period) * 2 * SUBSTEPS if moves else 1

@@ -63,7 +63,7 @@ def did_you_mean(name: object, names: Iterable[str]) -> str:
     names = list(names)
     close = get_close_matches(given, names, n=max(1, len(names)))
     close += [known for known in names if _shared_words(given, known) > ALIKE]
-    # Of close names, final_position_error_x shares more words with final_eror_x than final_roll.
+    # Among close names, final_position_error_x shares more words with final_eror_x than final_roll.
     best = max(close, key=lambda known: _shared_words(given, known), default="")
     return f"did you mean {best}? " if best else ""
 

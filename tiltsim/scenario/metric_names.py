@@ -153,7 +153,7 @@ METRICS: Final = {
         "speed relative to real time", "", "time flown over wall time of the integration"
     ),
 }
-"""Every metric by name, with its label, unit and meaning; a flight has those that apply to it."""
+"""Every metric by name, with its label, unit and meaning; a flight has the metrics that apply."""
 
 WALL_CLOCK_METRICS: Final = frozenset({"realtime_factor"})
 """Metrics that depend on the computer; they differ between equal flights."""

@@ -43,7 +43,7 @@ def check_full_pose(scenario: ScenarioTables, controller: FullPoseController, ga
 def _check_scaling(
     controller: AttitudeForceController, vehicle: Multirotor, dimension: int
 ) -> None:
-    """Refuse to scale a gait towards angles without the force that is controlled."""
+    """Refuse to scale a gait toward angles without the force that is controlled."""
     supervisor = controller.supervision
     if supervisor is None or supervisor.strategy != "scale":
         return

@@ -137,7 +137,7 @@ class LineReference(_PositionReference):
 
 
 class CircleReference(_PositionReference):
-    """Uniform motion on a horizontal circle, from +x towards +y; from -x where radius < 0."""
+    """Uniform motion on a horizontal circle, from +x toward +y; from -x where radius < 0."""
 
     type: Literal["circle"] = Field(description="a horizontal circle")
     position: Vector3 = Field(
@@ -170,7 +170,7 @@ class LissajousReference(_PositionReference):
 
 
 class FigureEightReference(_PositionReference):
-    """A horizontal figure eight, from its crossing towards +x and +y; a 1:2 lissajous."""
+    """A horizontal figure eight, from its crossing toward +x and +y; a 1:2 lissajous."""
 
     type: Literal["figure_eight"] = Field(description="a horizontal figure eight")
     position: Vector3 = Field(

@@ -1,4 +1,4 @@
-"""Vehicles in general, and those with any number of rotors, in a scenario's ``[vehicle]`` table."""
+"""Vehicles in general, and with any number of rotors, in a scenario's ``[vehicle]`` table."""
 
 from __future__ import annotations
 

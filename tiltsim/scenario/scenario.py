@@ -51,7 +51,7 @@ class Scenario(ScenarioTables):
     def model_validate(
         cls, obj: Any, *, address: str = "scenario", emptied: Collection[str] = (), **options: Any
     ) -> Self:
-        """As in pydantic, but mistakes raise an `InputError` of one line.
+        """Validate as pydantic does, but mistakes raise an `InputError` of one line.
 
         Args:
             obj: The tables.

@@ -39,7 +39,7 @@ SHORTEST_STEP: Final = 1e-4
 """Seconds between the rows of any table."""
 
 SEPARATORS: Final = ",;\t "
-"""What may separate the columns of a CSV file."""
+"""Characters that may separate the columns of a CSV file."""
 
 _NUMBERS: Final = ("double", "float", "int64", "int32")
 """Types of columns of a Parquet file."""
@@ -161,7 +161,7 @@ def _read_rows(file: Path, columns_among: ColumnsAmong) -> list[Values]:
 
 
 def _fields(text: str) -> list[list[str]]:
-    """Fields of the lines of a CSV file; the first line shows what separates them."""
+    """Fields of the lines of a CSV file; the first line shows the separator."""
     lines = [line.strip() for line in text.splitlines() if line.strip()]
     if not lines:
         raise InputError("is empty")

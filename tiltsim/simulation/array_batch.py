@@ -32,7 +32,7 @@ MEMORY: Final = 256 * 2**20
 """Bytes of the samples of all rows that fly together."""
 
 ROUND_ROWS: Final = 1024
-"""Large numbers of rows are multiples of it; it is also what fits the caches of a core."""
+"""Large numbers of rows are multiples of it; it also fits the caches of a core."""
 
 Result = TypeVar("Result")
 

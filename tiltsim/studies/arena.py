@@ -83,7 +83,7 @@ class Standing:
 
 
 def vehicles() -> dict[str, Vehicle]:
-    """The vehicles by name: those with a file of their own, then the fleet's others on a gait."""
+    """The vehicles by name: vehicles with their own file, then the fleet's others on a gait."""
     found: dict[str, list[str]] = {}
     for address in collect([str(shipped_folder("scenarios") / FOLDER)]):
         found.setdefault(address.partition("#")[0].rpartition("/")[2], []).append(address)

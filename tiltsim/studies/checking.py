@@ -75,7 +75,7 @@ def shard(addresses: list[str], number: int, count: int) -> list[str]:
     all parts.
 
     Args:
-        addresses: Of scenarios, as from `collect`.
+        addresses: Addresses of scenarios, as from `collect`.
         number: Number of the part, from 1.
         count: Number of parts.
     """
@@ -138,7 +138,7 @@ def check_all(
     processes at once.
 
     Args:
-        addresses: Of scenarios, as from `collect`.
+        addresses: Addresses of scenarios, as from `collect`.
         jobs: Number of processes.
         overrides: Values by dotted key, for every scenario.
         trusted: Whether to execute Python code that scenarios name.

@@ -116,7 +116,7 @@ class Entry:
         return load_scenario(self.address, changes, trusted=self.trusted)
 
     def _controller(self) -> Mapping[str, Any]:
-        """A whole table, even of the scenario's own law, which has gains of its own."""
+        """A whole table, even of the scenario's own law, which has its own gains."""
         if not self.table:
             return {}
         if any(key.startswith("controller") for key in self.overrides):

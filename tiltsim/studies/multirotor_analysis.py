@@ -1,6 +1,6 @@
 """Analysis of any multirotor at fixed tilt angles, as a plain dict ready for JSON.
 
-Angles are in rad, everything else in SI units and body axes; what does not exist is None.
+Angles are in rad, everything else in SI units and body axes; values that do not exist are None.
 """
 
 from __future__ import annotations

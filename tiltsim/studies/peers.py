@@ -1,4 +1,4 @@
-"""Other simulators of quadrotors, each timed in a process of its own."""
+"""Other simulators of quadrotors, each timed in a separate process."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ def speed(timings: Sequence[Timing], steps: int, timestep: float) -> dict[str, A
     """Columns of a row from the best of several timings but the first, which compiles.
 
     Args:
-        timings: Of equal flights.
-        steps: Of all vehicles together in one of them.
+        timings: Timings of equal flights.
+        steps: Steps of all vehicles together in one of them.
         timestep: s
     """
     (first, _), *others = timings
@@ -105,7 +105,7 @@ def _rotorpy(vehicles: int, steps: int) -> tuple[Description, Callable[[], None]
 
 
 class PeerCase(NamedTuple):
-    """What is timed of a peer."""
+    """The flights of a peer that are timed."""
 
     setup: Setup
     vehicles: int
@@ -123,13 +123,13 @@ PEERS: Final = {
 
 
 class Peer:
-    """A peer in a process of its own, which flies on request; see `running`."""
+    """A peer in a separate process, which flies on request; see `running`."""
 
     def __init__(self, name: str, process: subprocess.Popen[str]) -> None:
         assert process.stdin is not None
         assert process.stdout is not None
         self.name, self.case = name, PEERS[name]
-        self._told, self._answers = process.stdin, process.stdout
+        self._requests, self._answers = process.stdin, process.stdout
         self.timings: list[Timing] = []
         self.description: Description = self._answer()
 
@@ -141,12 +141,12 @@ class Peer:
 
     def time(self) -> None:
         """Fly once."""
-        self._told.write("fly\n")
-        self._told.flush()
+        self._requests.write("fly\n")
+        self._requests.flush()
         self.timings.append(self._answer())
 
     def row(self) -> dict[str, Any]:
-        """As those of ``tiltsim bench --json``."""
+        """A row as in ``tiltsim bench --json``."""
         steps, timestep = self.case.vehicles * self.case.steps, self.description["timestep"]
         return {
             "case": "peer",
@@ -181,7 +181,7 @@ def running(name: str, devices: int = 1) -> Iterator[Peer]:
 def _serve(name: str) -> None:
     """Fly whenever a line comes in; print the timing."""
     answers = os.fdopen(os.dup(1), "w")
-    os.dup2(2, 1)  # what the peer prints is no answer
+    os.dup2(2, 1)  # text that the peer prints is no answer
     case = PEERS[name]
     description, fly = case.setup(case.vehicles, case.steps)
     print(json.dumps(description), file=answers, flush=True)

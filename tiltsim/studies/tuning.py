@@ -127,7 +127,7 @@ def _name(path: Path) -> str:
 
 
 def _loop_name(path: Path) -> str:
-    """``gains.attitude`` is a table of coefficients by axes; yaw is a loop of its own."""
+    """``gains.attitude`` is a table of coefficients by axes; yaw is a separate loop."""
     name = ".".join(part for part in path if isinstance(part, str))
     return f"{name}, yaw" if path[-2:] in [(row, 2) for row in range(3)] else name
 

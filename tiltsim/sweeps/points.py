@@ -123,7 +123,7 @@ class SweepPoints:
         return values
 
     def along_each_group(self, most: int) -> list[dict[str, Any]]:
-        """The first point, and those at other values of one group of axes at a time.
+        """The first point, and points at other values of one group of axes at a time.
 
         A group with more than ``most`` values gives ``most`` of them, spread evenly, both ends
         included.

@@ -44,7 +44,7 @@ def run_sweep(
         The finished dataset, which does not depend on interruptions or on the machines.
 
     Raises:
-        InputError: As in `open_sweep_folder`, or if the cluster cannot be used or processes keep
+        InputError: See `open_sweep_folder`; also if the cluster cannot be used or processes keep
             dying.
     """
     points = SweepPoints(definition)

@@ -131,7 +131,7 @@ def terminations_as_interrupts() -> Iterator[Callable[[], bool]]:
     before = signal.signal(signal.SIGTERM, interrupt)
     try:
         yield lambda: terminated
-        with turn:  # what was sent before comes here, not after the block
+        with turn:  # interrupts sent before arrive here, not after the block
             ended = True
     finally:
         sys.unraisablehook = report

@@ -1,1 +1,1 @@
-"""Kinds of vehicles: what all closed loops around one kind share."""
+"""Kinds of vehicles: the parts that all closed loops around one kind share."""

@@ -200,7 +200,7 @@ def python_function(
     """
     try:
         fast = _compiled(program, name, fixed, careful=False)
-    except (ArithmeticError, ValueError):  # what does not change divides by zero
+    except (ArithmeticError, ValueError):  # constant parts divide by zero
         return _compiled(program, name, fixed, careful=True)
     careful: list[Callable[..., tuple[float, ...]]] = []
 

@@ -1,24 +1,24 @@
 """Rotor accelerations within limits: roll and pitch first, then yaw, lift, and the rest.
 
-A rotor's speed must stay within its limits, so its acceleration is limited to what keeps it there
-for a horizon: ``(min - |varpi|) / horizon <= |varpi|' <= (max - |varpi|) / horizon``. The requested
-accelerations may lie outside this box, and limiting each rotor separately would produce an
-arbitrary torque. Instead, among all accelerations in the box, the allocation takes
+A rotor's speed must stay within its limits, so its acceleration is limited to the range that keeps
+it there for a horizon: ``(min - |varpi|) / horizon <= |varpi|' <= (max - |varpi|) / horizon``. The
+requested accelerations may lie outside this box, and limiting each rotor separately would produce
+an arbitrary torque. Instead, among all accelerations in the box, the allocation takes
 
 1. the largest fraction, up to 1, of the requested roll and pitch torque rates together, so that
-   their direction is preserved, whatever that costs in all that follows;
+   their direction is preserved, whatever the cost in the levels below;
 2. of these, the yaw torque rate nearest to the requested one;
 3. of these, the lift rate nearest to the requested one;
 4. of these, the accelerations nearest to the requested ones, which have the side forces and the
    motion that no output sees.
 
 Roll and pitch decide where the lift points. Yaw, for which rotors have the least authority, must
-not cost any of them. It comes before lift, of which a climb may ask for too much as long as it
+not cost any of them. It comes before lift, of which a climb may demand too much as long as it
 lasts; side forces come last, as leaning replaces them.
 
 The first three are linear programs, the last is a quadratic one. All are solved by the same active
-set method, for any number of rotors: along the objective's gradient, as far as what comes before it
-and the rotors at their limits leave it; a rotor that the way meets at its limit stops there, and is
+set method, for any number of rotors: along the objective's gradient, as far as the levels before it
+and the rotors at their limits allow; a rotor that the way meets at its limit stops there, and is
 let go again where its multiplier says so.
 """
 
@@ -76,7 +76,7 @@ def _remainder(rows: Any, free: Any, gradient: Any) -> Any:
     ascent. Its other entries are the multipliers of the rotors that stopped.
 
     Args:
-        rows: Of length 1 or 0, shape (N,) each.
+        rows: Rows of length 1 or 0, shape (N,) each.
         free: 1 for rotors that move, 0 for rotors at a limit, shape (N,).
         gradient: Shape (N,).
     """
@@ -168,8 +168,8 @@ class _Objective(NamedTuple):
 def allocated(requested: Any, torque: Any, lift: Any, low: Any, high: Any) -> Any:
     """Rotor accelerations (rad/s^2) within limits, shape (N,).
 
-    Requested accelerations within the limits come back as they are, and so do those that are not
-    numbers.
+    Requested accelerations within the limits are returned unchanged, and so are infinite and NaN
+    ones.
 
     Args:
         requested: rad/s^2, shape (N,).

@@ -4,13 +4,14 @@ With the tilt angles as inputs a vehicle has more inputs than degrees of freedom
 attitude are tracked by third-order error dynamics. The inputs are the rates of the tilt angles and
 of ``w_i = varpi_i |varpi_i|``. Among the inputs that give the desired third derivatives the
 controller takes the shortest; the norm weights a tilt rate relative to a rate of ``w``. The
-published controller takes (rad/s)^2/s and rad/s as they are. One rad/s then moves the force as much
-as 1e5 (rad/s)^2/s, so that tilting does nearly all the work, even for the vertical force: a pod at
-a small angle hardly changes it, and its rate grows like 1/sin(alpha) down to angles of 1e-5 rad,
-faster than any step can follow. `force_balanced_tilt_weight` weights both by the force they move.
+published controller takes (rad/s)^2/s and rad/s as they are. One rad/s then changes the force by
+the same amount as 1e5 (rad/s)^2/s, so that tilting does nearly all the work, even for the vertical
+force: a pod at a small angle hardly changes it, and its rate grows like 1/sin(alpha) down to angles
+of 1e-5 rad, faster than any step can follow. `force_balanced_tilt_weight` weights both by the force
+they move.
 
 The thesis shows the flights but neither the control law nor its gains; both come from its author's
-public model of the tiltrotor. As in ch. 3, the gyroscopic torque is omitted. A rotor that
+public model of the tiltrotor. The gyroscopic torque is omitted, as in ch. 3. A rotor that
 is known to have failed is left out of the matrix, with the part of its tilt that moves it.
 """
 
@@ -143,11 +144,11 @@ def limited_tilt_rate(rates: Any, angles: Any, p: Any) -> Any:
 
 
 def turning_rates(target: Any, turn: Any, omega: Any, omega_rate: Any) -> Moving:
-    """Rates of a desired attitude in the axes of the body, which turn too: rad and s, shape (3,).
+    """Rates of a desired attitude in the turning axes of the body: rad and s, shape (3,).
 
     Args:
         target: Roll, pitch and yaw with three derivatives, rad and s, shape (4, 3).
-        turn: From the desired axes to those of the body, shape (3, 3).
+        turn: Matrix from the desired axes to the body axes, shape (3, 3).
         omega, omega_rate: Body rates (rad/s) and their rates (rad/s^2), shape (3,) each.
     """
     roll, pitch = (Moving(*target[:3, axis]) for axis in (0, 1))

@@ -1,7 +1,7 @@
 """Tracking control on SE(3) for any rotorcraft.
 
 Lee, Leok and McClamroch (2010), "Geometric tracking control of a quadrotor UAV on SE(3)", Eqs. 10
-to 16. The force is that of Eq. 12 along the axis in which the rotors push without torque, or, where
+to 16. The force follows Eq. 12 along the axis in which the rotors push without torque, or, where
 the law commands the tilts of enough rotors, in any direction. The torque is Eq. 16 with the desired
 angular acceleration zero.
 """

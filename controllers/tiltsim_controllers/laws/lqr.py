@@ -29,8 +29,8 @@ class Lqr(Keys):
 
     law: Literal["lqr"] = Field(
         description="linear-quadratic regulator about hover with fixed tilts, or with gains that "
-        "repeat with a moving gait about its orbit; weights are one over the square of what is "
-        "acceptable (Bryson's rule)"
+        "repeat with a moving gait about its orbit; weights are one over the square of an "
+        "acceptable deviation (Bryson's rule)"
     )
     position_error: Positive = Field(0.5, description="acceptable [m]")
     velocity_error: Positive = Field(1.0, description="acceptable [m/s]")

@@ -1,7 +1,7 @@
-"""Feedback linearization of any rotorcraft: attitude, and as much of the force as it has.
+"""Feedback linearization of any rotorcraft: attitude, and the force as far as possible.
 
 At zero torque the rotors push anywhere in ``V = F ker tau`` (body axes), of dimension 1, 2 or 3. So
-the outputs are the attitude and that many components of force:
+the outputs are the attitude and 1, 2 or 3 components of force:
 
 - 1: along world up. The horizontal position is controlled by leaning; with four rotors this is the
   attitude-altitude controller of ch. 3 and 4;
@@ -12,12 +12,12 @@ the outputs are the attitude and that many components of force:
 The decoupling matrix ``[tau; b^T F]`` with the directions ``b`` of the force has rank 3 + dimension
 wherever the margin is positive, for any number of rotors. Among the inputs that give the desired
 third derivatives, the controller takes the ones nearest to zero or, with ``restoring``, to a motion
-towards the least power; the part that no output sees would otherwise drift where the pods move. The
+toward the least power; the part that no output sees would otherwise drift where the pods move. The
 norm measures rotor accelerations (``speed``), in which no rotor comes to rest while the others can
 do its part, or rates of ``w = varpi |varpi|`` (``thrust``), for rotors that reverse; ``restoring``
 then leads to the least sum of ``w^2``.
 
-As with four rotors, the decoupler uses the side of the torque-free force that points up in body
+The decoupler, as with four rotors, uses the side of the torque-free force that points up in body
 axes. So the z axis of a vehicle has to be its upper side.
 
 The published controller (`tiltsim_controllers.laws.attitude_altitude`) treats the tilt angles and
@@ -183,7 +183,7 @@ def _per_unknown(wrench: Any, speeds: Any, published: bool, form: Form) -> tuple
 
 
 def _start(w: Any, speeds: Any, parameters: Any, form: Form) -> Any:
-    """Unknowns from which the solution is the nearest: zero, or towards the least power.
+    """Unknowns to which the solution is nearest: zero, or a motion toward the least power.
 
     The power is proportional to the sum of ``|varpi|^3``.
     """
@@ -245,7 +245,7 @@ def present_wrench(
     """Force and torque per unit of ``w`` (6, N) without failed rotors, and world up in body axes.
 
     Args:
-        time, state, parameters, knots, layout: As for `attitude_force`.
+        time, state, parameters, knots, layout: See `attitude_force`.
     """
     now, (_, rotors) = state_of(state, layout), airframe(parameters, knots, layout)
     works = working(time, parameters.failure, len(layout))

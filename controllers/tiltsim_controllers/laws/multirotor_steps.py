@@ -142,7 +142,7 @@ class AttitudeForce(Keys):
     )
     restoring: NonNegative | None = Field(
         None,
-        description="rate towards the rotor speeds of least power among those that do the same, "
+        description="rate toward the rotor speeds of least power among those that do the same, "
         "with norm = thrust to those whose thrusts have the least sum of squares; default: "
         f"{RESTORING:g} where they would drift, which is with moving tilts and more rotors than "
         "outputs, else 0 [1/s]",
@@ -155,7 +155,7 @@ class AttitudeForce(Keys):
 
 Parameters = record_of(
     AttitudeForce,
-    frozenset({"law", "dimension", "norm"}),  # those of a `Form`
+    frozenset({"law", "dimension", "norm"}),  # see `Form`
     vehicle=Body,
     gains=Gains,
     integral=IntegralGains,
@@ -167,7 +167,7 @@ Parameters = record_of(
     gait=GaitParameters,
     reference=ReferenceParameters,
     rotors=float,  # where in the knots the table of the rotors begins
-    restoring=float,  # 1/s, rate towards the least power or sum of w^2
+    restoring=float,  # 1/s, rate toward the least power or sum of w^2
     failure=Failure,
     limits=RotorRange,  # of prioritized allocation
     supervisor=Supervisor,

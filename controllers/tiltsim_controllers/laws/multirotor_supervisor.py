@@ -1,10 +1,11 @@
 """The supervisor of any multirotor: its margin and determinant, as the tiltrotor's at four rotors.
 
 The margin is the angle between world up and the nearest direction in which the controller has no
-lift: with one component of force that of the torque-free force with which it lifts; with two the
-normal of their plane; with three there is none. The determinant is the volume of the decoupling
-matrix's rows of torque and lift by that of the level untilted vehicle, times the share of every
-further row of force that the rows before it leave: zero where the matrix is singular.
+lift: with one component of force, the nearest direction across the torque-free force with which it
+lifts; with two, the normal of their plane; with three there is none. The determinant is the volume
+of the decoupling matrix's rows of torque and lift relative to the level untilted vehicle, times the
+share of every further row of force that the rows before it leave: zero where the matrix is
+singular.
 """
 
 from __future__ import annotations
@@ -52,7 +53,7 @@ def untilted_volume(table: Sequence[float]) -> float:
 
 
 def watched(table: Sequence[float], rotors: int, side: Triple) -> Watched:
-    """Of a vehicle whose table begins at an index of the knots."""
+    """Parameters of a vehicle whose table begins at an index of the knots."""
     return Watched(float(rotors), UNTILTED / untilted_volume(table), *side)
 
 
@@ -89,7 +90,7 @@ def multirotor_supervision_of(
 
     Args:
         layout: Layout of the table of rotors.
-        dimension, forward: As for `tiltsim_controllers.laws.force_directions.factors`.
+        dimension, forward: See `tiltsim_controllers.laws.force_directions.factors`.
     """
 
     @traceable

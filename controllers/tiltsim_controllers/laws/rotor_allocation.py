@@ -51,7 +51,7 @@ def allocated_thrusts(observed: Observed, lift: Any, push: Any, torque: Any) -> 
 
 
 def in_components(observed: Observed) -> Observed:
-    """The same vehicle with the components ``T cos(alpha), T sin(alpha)`` as its 2 N thrusts."""
+    """The vehicle with the components ``T cos(alpha), T sin(alpha)`` as its 2 N thrusts."""
     rotors = observed.rotors
     along = rotors.cosine
     if -1 in rotors.tilt_of_rotor:  # a fixed rotor has the first component alone
@@ -68,7 +68,7 @@ def of_components(rotors: Rotors, components: Any) -> tuple[Any, Any]:
         components: ``T cos(alpha)`` of all rotors, then ``T sin(alpha)``, N, shape (2 N,).
     """
     along, across = components.reshape(2, -1)
-    # In the order of the tilts, which need not be that of the rotors.
+    # Returned in the order of the tilts, which may differ from the order of the rotors.
     angles = xp.arctan2(across, along)
     layout = rotors.tilt_of_rotor
     of_tilt = [layout.index(tilt) for tilt in range(max(layout) + 1)]

@@ -1,18 +1,18 @@
 """A supervisor that keeps a planned gait away from singular decoupling matrices.
 
 It keeps two numbers above their thresholds: the singularity margin (rad, the distance of the
-attitude from a singular one) and the determinant of the matrix, scaled to that of the level
-untilted tiltrotor, `UNTILTED`. Only the determinant shows that a gait approaches tilt angles at
-which every attitude is singular. What they are is the vehicle's
+attitude from a singular one) and the determinant of the matrix, scaled to `UNTILTED`, its value for
+the level untilted tiltrotor. Only the determinant shows that a gait approaches tilt angles at which
+every attitude is singular. Both numbers depend on the kind of vehicle
 (`tiltsim_controllers.laws.tiltrotor_supervisor`, ``multirotor_supervisor``). There are three
 strategies.
 
-* ``SCALE`` scales all tilt angles towards zero as little as satisfies both thresholds. A function
+* ``SCALE`` scales all tilt angles toward zero as little as satisfies both thresholds. A function
   of planned angles and attitude, without memory.
 * ``HOLD`` looks ahead and slows the gait's clock until it stops where the thresholds would be
   violated; it continues when they would not. Its state is the delay (s) of the gait behind its
   plan.
-* ``RETURN_TO_RED`` looks ahead, too, and moves the tilts from the planned gait towards the nearest
+* ``RETURN_TO_RED`` also looks ahead, and moves the tilts from the planned gait toward the nearest
   red one (`gaits.red_gait`), at a rate that servos can follow, and back when the thresholds allow.
   Its state is the fraction of the path. Only the tiltrotor has red gaits.
 
@@ -61,15 +61,15 @@ FOLLOWED: Final = 0.0625
 BAND: Final = 0.1
 """`threshold_clearance` from which the clock of ``HOLD`` slows down, to stop at zero.
 
-As much below zero ``RETURN_TO_RED`` has full speed: it undershoots a threshold by up to this, times
-the share of the maximum tilt rate that the gait requires.
+``RETURN_TO_RED`` has full speed where the clearance is minus this: it undershoots a threshold by up
+to this, times the share of the maximum tilt rate that the gait requires.
 """
 
 LAG: Final = 0.025
 """Time constant of the supervisor's rate, s."""
 
 UNTILTED: Final = 4.0
-"""The determinant of the level untilted tiltrotor (ch. 3), and with it that of other vehicles."""
+"""Determinant of the level untilted tiltrotor (ch. 3); other vehicles are scaled to it."""
 
 SUPERVISOR_AT_REST: Final = (0.0, 0.0, 0.0)
 """State, rate and acceleration of a supervisor that does not act."""
@@ -115,10 +115,10 @@ class Supervision(NamedTuple):
     largest possible; negative below them."""
     allowed_scale: Callable[..., Any]
     """``(tilts, roll, pitch, supervisor, vehicle, knots)``: the largest scale in [0, 1] that
-    satisfies the thresholds, or that of the grid which comes nearest where none does. A range of
-    scales between two of the grid may pass unseen."""
+    satisfies the thresholds, or the scale of the grid that comes nearest where none does. A range
+    of scales between two of the grid may pass unseen."""
     gait_scale: Callable[..., Any]
-    """As ``allowed_scale``, and 1 unless the strategy is `SCALE`."""
+    """Like ``allowed_scale``, but 1 unless the strategy is `SCALE`."""
     tilts: Callable[..., Any]
     """``(planned, scale, motion, supervisor, vehicle)``: the supervised tilts with rates and
     accelerations (rad, s), shape (M, 3): of the gait at its `gait_time`, the ``gait_scale``, and
@@ -300,8 +300,8 @@ def supervision_of(
     ) -> Any:  # fmt: skip
         """``HOLD``: the clock runs (rate 0) with sufficient clearance and stops (rate 1) without.
 
-        ``RETURN_TO_RED``: towards red where the thresholds would be violated, back where they
-        allow it, slowing down towards both ends.
+        ``RETURN_TO_RED``: toward red where the thresholds would be violated, back where they
+        allow it, slowing down toward both ends.
         """
         still = xp.array([state, 0.0, 0.0])
 

@@ -3,7 +3,7 @@
 Ch. 2 considers its determinant surface singular near level attitude and switches to the
 attitude-altitude controller there. The choice is a function of the attitude only, without memory.
 
-Only the yaw-position controller has states of its own, the thrust ``zeta`` and its rate ``xi``. The
+Only the yaw-position controller has states, the thrust ``zeta`` and its rate ``xi``. The
 chapter does not state how they evolve while the other controller is active: under the inactive
 yaw-position controller (``running``), constant (``held``), or ``bumpless``. These follow the thrust
 and thrust rate of the attitude-altitude controller, so that both are continuous when the

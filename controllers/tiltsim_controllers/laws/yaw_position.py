@@ -126,7 +126,7 @@ def decoupling_matrix(state: Any, vehicle: Vehicle) -> Any:
     ``s_theta c_phi``.
 
     Args:
-        state, vehicle: As for `drift`.
+        state, vehicle: See `drift`.
     """
     roll, pitch, thrust = state[6], state[7], state[12]
     x, y, z = rotation_matrix(state[6:9]).T  # the body's axes
@@ -147,7 +147,7 @@ def yaw_position_inputs(time: Any, state: Any, p: Any, knots: Any = NO_KNOTS) ->
     Args:
         time: s
         state: `tiltsim_controllers.vehicle.states.EXTENDED_QUADROTOR_FIELDS`, shape (14,).
-        p: Its parameters, `Parameters` or those of `switching`.
+        p: `Parameters`, or the parameters of `switching`.
         knots: Table data of the reference.
     """
     vehicle, reference = p.vehicle, p.reference

@@ -6,7 +6,7 @@ derivatives are states of the controller. As printed, the tilt's column of the d
 ``exact`` includes.
 
 The rotor speeds that the controller integrates may drift below zero, where no thrust follows them.
-As in the chapter, the controller then continues with speeds that no rotor has (windup), and fails;
+The controller then continues, as in the chapter, with speeds that no rotor has (windup), and fails;
 with ``anti_windup`` they stop at zero, and the other rotor and the tilt continue alone.
 """
 

@@ -1,6 +1,6 @@
 """Control of the tilt-car with the direction of its thrusts planned (ch. 10, Sec. 5; ch. 11).
 
-The gait moves the tilt, the controller sets the squares of both rotor speeds: as many inputs as
+The gait moves the tilt, the controller sets the squares of both rotor speeds: two inputs for two
 outputs, so that no state drifts. A thrust cannot pull, so negative squares become zero (ch. 11,
 Eq. 13), which ch. 11 writes with the switch matrix ``S_pq``.
 """

@@ -3,7 +3,7 @@
 Three inputs, the rates of both rotor speeds and of the tilt angle, determine two outputs, the third
 derivatives of the position. The controller takes the shortest of all solutions (`minimum_norm`,
 Eq. 12), which makes its states drift (`tiltsim_controllers.tilt_car.state_drift`). Optionally a
-restoring rate in the null space turns the thrusts' bisector back towards the acceleration.
+restoring rate in the null space turns the thrusts' bisector back toward the acceleration.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ class ThirdDerivative(Keys):
     )
     restoring_rate: NonNegative = Field(
         0.0,
-        description="rate of turning the mean thrust direction towards the acceleration; "
+        description="rate of turning the mean thrust direction toward the acceleration; "
         "0 as published [1/s]",
         examples=[1.0],
     )

@@ -70,7 +70,7 @@ def spins_in(knots: Any, at: float, tilt_of_rotor: TiltOfRotor) -> Any:
     """Signs of the speeds with which the rotors push along their axes, shape (N,).
 
     Args:
-        knots, at, tilt_of_rotor: As for `rotors_in`.
+        knots, at, tilt_of_rotor: See `rotors_in`.
     """
     return rotors_in(knots, at, tilt_of_rotor).spins
 

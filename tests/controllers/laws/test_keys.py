@@ -69,7 +69,7 @@ def test_other_parameters_come_first_and_replace_keys():
     assert record_of(Law) is record_of(Law)
 
 
-def test_a_law_without_numbers_has_a_record_too():
+def test_a_law_without_numbers_has_a_record():
     assert numbers(Bare(), record_of(Bare)) == (0.0,)
 
 

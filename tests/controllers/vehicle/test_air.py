@@ -123,7 +123,7 @@ def filters(turbulence):
     matrix = np.array([dryden_rates(0.0, tuple(row), quiet) for row in np.eye(5)]).T
     output = np.array([dryden_velocity(tuple(row), turbulence) for row in np.eye(5)]).T
     drive = np.zeros((5, 3))
-    for noise, state in enumerate((0, 1, 3)):  # what noise drives, it drives at its decay rate
+    for noise, state in enumerate((0, 1, 3)):  # noise drives a state at its decay rate
         drive[state, noise] = -matrix[state, state]
     return matrix, drive, output
 

@@ -103,10 +103,10 @@ def with_actuation(loop: ClosedLoop, latency_steps: int, external: bool = False)
     """A loop around a rotorcraft with real sensors and actuators.
 
     Args:
-        loop: Without them.
+        loop: The loop without them.
         latency_steps: Control steps between a reading and its command taking effect.
-        external: Whether commands come from outside: with one number more, whether those of the
-            rotors are speeds (rad/s), which they take at once. `tiltsim.plants.commanded_plant`
+        external: Whether commands come from outside. One more number then states whether the rotor
+            commands are speeds (rad/s), which take effect at once: `tiltsim.plants.commanded_plant`
             moves these along the delay line, as no rate of activations makes a speed jump.
     """
     law_controls, dynamics = loop.sampling.controls, loop.dynamics

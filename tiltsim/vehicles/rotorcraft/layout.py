@@ -7,7 +7,7 @@ from typing import Final, NamedTuple
 from tiltsim.closed_loop.loop import Dynamics, Sizes
 from tiltsim_controllers.vehicle.states import BODY_FIELDS
 
-# Of ``qpos`` and ``qvel``: the quaternion, and the first tilt and tilt rate.
+# Places in ``qpos`` and ``qvel``: the quaternion, and the first tilt and tilt rate.
 QW, QX, QY, QZ, TILT_1 = range(3, 8)
 TILT_RATE_1: Final = 6
 

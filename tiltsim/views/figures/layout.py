@@ -137,7 +137,7 @@ def _heights(page: Page) -> tuple[float, int]:
 
 
 def add_heading(figure: Figure, title: str, more: str = "", legend: Sequence[Any] = ()) -> None:
-    """Write what stands above the panels, wrapped to the width.
+    """Write the title, facts and legend above the panels, wrapped to the width.
 
     Args:
         figure: Without a title or legend.
