@@ -22,7 +22,7 @@ def require_jax(purpose: str) -> Any:
 
 
 def recomputes() -> bool:
-    """Whether XLA computes an intermediate value anew wherever it is used."""
+    """Whether XLA computes an intermediate value again wherever it is used."""
     import jax
 
     return jax.default_backend() == "cpu" and not merges_loops()
@@ -88,7 +88,7 @@ def _functions() -> dict[Function, Function]:
     import jax.numpy as jnp
 
     def smallest(*values: Any) -> Any:
-        """Python's ``min``, which prefers the first of equal values and of those with NaN."""
+        """Python's ``min``, which prefers the first of equal values and of values with NaN."""
         first, *others = values if len(values) > 1 else values[0]
         for other in others:
             first = jnp.where(other < first, other, first)

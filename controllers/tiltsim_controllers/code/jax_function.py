@@ -26,7 +26,7 @@ _OPERATORS: Final[dict[str, Callable[..., Any]]] = {
 }
 
 SEGMENT: Final = 60
-"""Operations that XLA compiles together where it computes a value anew for every use."""
+"""Operations that XLA compiles together where it computes a value again for every use."""
 
 
 def results_in_jax(
