@@ -87,7 +87,11 @@ def describe_fields(app, what, name, obj, options, lines):
         lines.insert(0, "")  # else napoleon takes what is before a colon for a type
     if what != "class" or "Attributes:" in lines or not getattr(obj, "__annotations__", None):
         return
-    fields = re.findall(r"^    (\w+): .*?  # (.*)$", inspect.getsource(obj), re.MULTILINE)
+    try:
+        source = inspect.getsource(obj)
+    except OSError:  # made of a law's keys, which the page of the scenario lists
+        return
+    fields = re.findall(r"^    (\w+): .*?  # (.*)$", source, re.MULTILINE)
     if fields:
         lines += ["", "Attributes:", *(f"    {field}: {comment}" for field, comment in fields)]
 

@@ -12,10 +12,9 @@ import numpy as np
 import tiltsim
 from tests.laws.layers.test_actuation import EVERYTHING
 from tests.laws.layers.test_air import STORM
-from tests.laws.test_baselines import BASELINES
-from tests.laws.test_laws import GUST, LAWS
+from tests.laws.test_laws import LAWS
 from tests.laws.test_multirotor import ASIDE, CLIMB, HELD, PRIORITIZED, TILTS, WEAK, document
-from tests.simulation.test_batch import CAR, CAR_GAITS, EXACT, GAITS
+from tests.simulation.test_batch import EXACT
 from tiltsim.laws.assembling import assemble
 from tiltsim.scenario.loading import merge
 from tiltsim.simulation.simulate import simulate_assembly
@@ -98,40 +97,6 @@ def called_rows(row, _width, time, states, user):
     numbers, size = user.tolist(), record_size(row.record)
     setup = unflatten(row.record, numbers), tuple(numbers[size:])
     return np.array([row.function(t, s, *setup) for t, s in zip(time.tolist(), states.tolist())])
-
-
-def short_flights():
-    """Flights of every controller, gait, reference and layer.
-
-    Few of them in MuJoCo's plant, only flights that call functions of that plant: to compile its
-    model takes longer than the rest of a flight.
-    """
-    for law in LAWS.values():
-        yield {**law, "disturbance": GUST}, {"plant": "thesis"}
-        yield law, {"plant": "mujoco", "control_timestep": 0.004}
-    for name, table in GAITS.items():
-        yield {"gait": {"type": name, **table}, "controller": EXACT}, {"plant": "thesis"}
-    for name, table in CAR_GAITS.items():
-        yield {**CAR, "gait": {"type": name, **table}}, {"plant": "thesis"}
-    for name, table in REFERENCES.items():
-        controller = {**EXACT, "decoupler": "none" if "altitude" in name else "exact"}
-        yield {"reference": {"type": name, **table}, "controller": controller}, {"plant": "thesis"}
-    for tables in SUPERVISED.values():
-        yield tables, {"plant": "thesis"}
-    for tables in (LAWS["attitude_altitude"], LAYERED["heavy attitude_altitude"]):
-        yield tables, {"plant": "rigid_body"}
-    for tables in (LAWS["attitude_altitude"], MULTIROTORS["tilting"]):
-        yield merge(tables, HINGED), {"plant": "thesis"}
-    yield merge(MULTIROTORS["leaning"], HINGED), {"plant": "mujoco"}
-    for tables in MULTIROTORS.values():
-        yield tables, {"plant": "thesis", **LATE}
-    yield MULTIROTORS["tilting"], {"plant": "mujoco"}
-    for tables in BASELINES.values():
-        yield tables, {"plant": "thesis"}
-    for name in ("geometric free", "geometric quadrotor"):
-        yield BASELINES[name], {"plant": "mujoco", "control_timestep": 0.004}
-    for name, tables in LAYERED.items():
-        yield tables, {"plant": "thesis", **({} if "yaw" in name else LATE)}
 
 
 def record(action, calls):

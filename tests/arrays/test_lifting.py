@@ -7,15 +7,7 @@ from math import isfinite
 import numpy as np
 import pytest
 
-from tests.arrays.recorded_calls import (
-    called_rows,
-    described,
-    flown,
-    frozen,
-    mapped,
-    record,
-    short_flights,
-)
+from tests.arrays.recorded_calls import called_rows, described, flown, frozen, mapped, record
 from tests.laws.test_laws import LAWS
 from tiltsim.arrays import jax_programs
 from tiltsim.arrays.flying import double_precision
@@ -193,10 +185,3 @@ def test_all_look_ups_in_a_table_are_in_one_constant():
     lifted = Lifting(JaxArrays("float64"))(between)
     program = jax.make_jaxpr(lambda place: lifted(place, numbers))(2)
     assert [table.shape for table in program.consts] == [(LONG,)]
-
-
-@pytest.mark.slow(longest=True)
-def test_every_scalar_function_has_the_same_values_on_arrays():
-    wrong, calls = all_differences(short_flights())
-    assert wrong == {}
-    assert len(calls) > 80  # a function that no flight calls needs no form on arrays

@@ -6,8 +6,7 @@ body ``r3``, has rank 4 exactly where ``tau`` has rank 3 and ``r3`` is not perpe
 torque-free forces ``V = F ker tau``. So the dimension of V decides which attitudes are singular:
 
 - 1: attitudes with world up in the plane perpendicular to V, a great circle of directions. Rotors
-with
-  parallel thrust axes are of this kind, and all vehicles of four rotors (ch. 3);
+  with parallel thrust axes are of this kind, and all vehicles of four rotors (ch. 3);
 - 2: two opposite directions of world up;
 - 3: none; force and torque are independent of each other;
 - 0, and wherever ``tau`` has lost rank: all.

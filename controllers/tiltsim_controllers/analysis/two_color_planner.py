@@ -4,7 +4,7 @@ A path is a closed curve in the alpha_1-alpha_2 plane with a color on every part
 theorems give conditions:
 
 * the Two Color Map Theorem (ch. 6, Theorem 1): ``alpha_1`` and ``alpha_2`` move one at a time and
-the color stays;
+  the color stays;
 * the generalized theorem (ch. 8, Sec. 3): any continuous path within ``|alpha| <= 1``; red stays on
   its side of the curve L; the color changes only at P.
 

@@ -79,7 +79,7 @@ SWINGS: Final = {
   + (1/r - 2 r) (f_1 + f_2 - f_3 - f_4)`` to first order: this bounds all amplitudes, especially in
   the gallops, whose fore and hind pairs are half a stride apart.
 * The run flies unscaled; its errors are the largest, the walk's the smallest, and the two gallops'
-similar.
+  similar.
 """
 
 
