@@ -26,12 +26,23 @@ if TYPE_CHECKING:
 
 
 class Sizes(NamedTuple):
-    """Lengths of MuJoCo's vectors."""
+    """Lengths of MuJoCo's vectors, of ``qpos`` and ``qvel`` the vehicle's part.
+
+    Functions of a loop see the last two, which only flights with objects have, at the end of
+    ``act``.
+    """
 
     qpos: int
     qvel: int
     act: int
     ctrl: int
+    others: int = 0  # of qpos: objects behind the vehicle
+    history: int = 0  # readings of sensors in MuJoCo's state
+
+    @property
+    def after_act(self) -> int:
+        """Numbers that functions of a loop see behind ``act``."""
+        return self.others + self.history
 
 
 class ControlSetup(NamedTuple):

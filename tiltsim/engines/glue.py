@@ -29,6 +29,9 @@ fly:
   %qpos = load ptr, ptr %qpos_at
   %qvel_at = getelementptr i8, ptr %data, i64 <qvel>
   %qvel = load ptr, ptr %qvel_at
+  %others = getelementptr double, ptr %qpos, i64 <vehicle_size>
+  %history_at = getelementptr i8, ptr %data, i64 <history>
+  %history = load ptr, ptr %history_at
   %act_at = getelementptr i8, ptr %data, i64 <act>
   %act = load ptr, ptr %act_at
   %ctrl_at = getelementptr i8, ptr %data, i64 <ctrl>
@@ -43,10 +46,12 @@ fly:
   %samples = or i1 %continuous, %due
   br i1 %samples, label %sampled, label %held
 sampled:
-  call void @controls(ptr %header, ptr %qpos, ptr %qvel, ptr %act, ptr %ctrl, ptr %user, ptr %ctrl)
+  call void @controls(ptr %header, ptr %qpos, ptr %qvel, ptr %act, ptr %others, ptr %history,
+                      ptr %ctrl, ptr %user, ptr %ctrl)
   br label %controlled
 held:
-  call void @hold(ptr %header, ptr %qpos, ptr %qvel, ptr %act, ptr %ctrl, ptr %user, ptr %ctrl)
+  call void @hold(ptr %header, ptr %qpos, ptr %qvel, ptr %act, ptr %others, ptr %history,
+                  ptr %ctrl, ptr %user, ptr %ctrl)
   br label %controlled
 controlled:
   %recorder_at = getelementptr double, ptr %header, i64 <recorder>
@@ -68,8 +73,8 @@ take:
   %numbers = mul i64 %row_number, <width>
   %first = add i64 %numbers, <rows_at>
   %row = getelementptr double, ptr %recorder, i64 %first
-  call void @sample(ptr %header, ptr %qpos, ptr %qvel, ptr %act, ptr %ctrl, ptr %user,
-                    ptr %recorder, ptr %row)
+  call void @sample(ptr %header, ptr %qpos, ptr %qvel, ptr %act, ptr %others, ptr %history,
+                    ptr %ctrl, ptr %user, ptr %recorder, ptr %row)
   %ends_at = getelementptr double, ptr %row, i64 <width>
   %ends = load double, ptr %ends_at
   call void @took(ptr %recorder, i1 true, double %ends)

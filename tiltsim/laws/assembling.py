@@ -13,6 +13,7 @@ from tiltsim.laws.full_pose import FULL_POSE, full_pose_loop_of
 from tiltsim.laws.layers.actuation import with_actuation
 from tiltsim.laws.layers.air import with_air
 from tiltsim.laws.layers.allocation import ALLOCATED, with_allocation
+from tiltsim.laws.layers.contact import with_force_loop, with_objects
 from tiltsim.laws.layers.measured_acceleration import with_measured_acceleration
 from tiltsim.laws.layers.on_equations import on_equations
 from tiltsim.laws.layers.rotor_inertia import with_rotor_inertia
@@ -30,6 +31,7 @@ from tiltsim.laws.tiltrotor import (
 from tiltsim.scenario.law_controller import LawTable
 from tiltsim.scenario.scenario import plan_flight
 from tiltsim.system.locks import one_thread_at_a_time
+from tiltsim.vehicles.rotorcraft.others import others_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -96,6 +98,8 @@ def loop_of(
         loop = with_supervisor(loop, supervisor.strategy)
     if controller.prioritizes_attitude and loop.dynamics.model in ALLOCATED:
         loop = with_allocation(loop)
+    if scenario.reference.type == "push" and not external:
+        loop = with_force_loop(loop)
     if scenario.needs_actuation_layer:
         loop = with_actuation(loop, scenario.simulation.latency_steps, external)
     if scenario.has_air:
@@ -104,6 +108,8 @@ def loop_of(
         loop = with_rotor_inertia(loop)
     if measured:
         loop = with_measured_acceleration(loop)
+    if scenario.has_objects:
+        loop = with_objects(loop, others_of(scenario))
     if plant == "mujoco" or as_printed:
         return loop
     return on_equations(loop, _plant_of(scenario, loop))

@@ -10,12 +10,14 @@ from typing import TYPE_CHECKING, Any, Final
 import mujoco
 import numpy as np
 
+from tiltsim.models.objects import add_objects
 from tiltsim.resources import shipped_folder
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
     from pathlib import Path
 
+    from tiltsim.models.objects import Objects
     from tiltsim_controllers.mathematics.scalar import Floats
 
 DISC_SHARE: Final = 0.45  # of the least distance between rotors: their discs do not touch
@@ -29,12 +31,13 @@ PLANE: Final = mujoco.mjtGeom.mjGEOM_PLANE
 SKYBOX: Final = mujoco.mjtTexture.mjTEXTURE_SKYBOX
 
 
-def dressed(model: mujoco.MjModel, path: Path) -> mujoco.MjModel:
+def dressed(model: mujoco.MjModel, path: Path, objects: Objects | None = None) -> mujoco.MjModel:
     """The model of a user's file with the visuals that the file lacks.
 
     Args:
         model: The file as it flies, compiled.
         path: The file.
+        objects: Objects that the scenario adds to it.
 
     Returns:
         A model with the same bodies, joints and sites.
@@ -63,6 +66,8 @@ def dressed(model: mujoco.MjModel, path: Path) -> mujoco.MjModel:
     for body, shape in _missing_parts(model):
         mass = {"mass": 0.0, "contype": 0, "conaffinity": 0, "group": 2}
         spec.body(model.body(body).name).add_geom(**shape, **mass)
+    if objects is not None:
+        add_objects(spec, objects)
     return spec.compile()
 
 
