@@ -93,10 +93,7 @@ def test_every_way_to_give_a_table_gives_the_same_rows(files, monkeypatch):
         ("time,x,y,z,yaw,qw\n", "has roll, pitch or yaw beside a quaternion; remove one of them"),
         ("time,x,y,z,qw\n", "no column qx; needs one each of time, x, y, z, qw, qx, qy, qz; found"),
         (TURNS + "1,0,0,0,0.5,0,0,0\n", "row 2: norm of qw, qx, qy, qz = 0.5; must be 1"),
-        (
-            TURNS + "1,0,0,0,0.66,0,0.7513,0\n",
-            "row 2: too close to a pitch of pi/2, ",
-        ),
+        (TURNS + "1,0,0,0,0.66,0,0.7513,0\n", "row 2: too close to a pitch of pi/2, "),
         (HEAD + "1,0,0,0\n" * (MAX_ROWS + 1), "10002 rows; at most 10000: keep every second"),
         (b"\xff\xfe", "not UTF-8 text"),
     ],
