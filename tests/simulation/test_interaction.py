@@ -197,7 +197,7 @@ def test_the_built_in_command_among_objects_is_the_loop_s():
     commanded = simulation.command().rotor_accelerations
     simulation.step()
     sent = simulation.data.ctrl[layout.places.accelerations]
-    np.testing.assert_array_equal(commanded, np.array(layout.spins) * sent)
+    np.testing.assert_allclose(commanded, np.array(layout.spins) * sent, rtol=1e-9)
 
 
 def test_analyses_of_a_vehicle_alone_refuse_objects():

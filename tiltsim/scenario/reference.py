@@ -10,22 +10,26 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from tiltsim.errors import InputError
 from tiltsim.scenario.controller_table import ReferenceKind
 from tiltsim.scenario.push_reference import PushReference
 from tiltsim.scenario.reference_table import PositionReference, ReferenceTable, Tilt
 from tiltsim.scenario.table import Angle, Angles3, Positive, Vector3, example
 from tiltsim.scenario.time_table import (
     POSE_COLUMNS,
+    QUATERNION_COLUMNS,
     REFERENCE_COLUMNS,
+    WIDTHS,
     Rows,
     TimeTable,
     reference_columns_among,
+    rows_with_angles,
 )
 from tiltsim_controllers.mathematics.scalar import Triple, Values
 from tiltsim_controllers.references.trajectories import POSES, ReferenceParameters
 from tiltsim_controllers.references.waypoints import minimum_snap_knots, table_knots
 
-ReferenceRow = Annotated[tuple[float, ...], Field(strict=False, min_length=4, max_length=7)]
+ReferenceRow = Annotated[tuple[float, ...], Field(strict=False, min_length=4, max_length=8)]
 
 
 class SetpointReference(PositionReference):
@@ -153,14 +157,14 @@ class TableReference(PositionReference, TimeTable):
     file: str | None = Field(
         None,
         description="CSV or Parquet file with the columns time, x, y and z, in s and m, and for an "
-        "attitude that varies roll, pitch and yaw, in rad without jumps, relative to the "
-        "scenario's folder; times from 0, at least 1e-4 s apart; 2 to 10,000 rows",
+        "attitude that varies roll, pitch and yaw, in rad without jumps, or qw, qx, qy and qz, "
+        "relative to the scenario's folder; times from 0, at least 1e-4 s apart; 2 to 10,000 rows",
         examples=["my_reference.csv"],
     )
     rows: Annotated[tuple[ReferenceRow, ...], Field(strict=False)] | None = Field(
         None,
         description="the table itself in place of a file: time, x, y and z of each row, and roll, "
-        "pitch and yaw where they vary [s, m, m, m, rad, rad, rad]",
+        "pitch and yaw, or a quaternion, where they vary [s, m, m, m, rad, rad, rad]",
         examples=[[[0.0, 0.0, 0.0, 0.0], [2.0, 0.5, 0.0, 0.2]]],
     )
     interpolation: Literal["minimum_snap", "cubic"] = Field(
@@ -176,7 +180,7 @@ class TableReference(PositionReference, TimeTable):
 
     @classmethod
     def _columns_of_width(cls, width: int) -> tuple[str, ...]:
-        return POSE_COLUMNS if width == len(POSE_COLUMNS) else cls.columns
+        return WIDTHS.get(width, cls.columns)
 
     @property
     def turns(self) -> bool:
@@ -215,6 +219,11 @@ class TableReference(PositionReference, TimeTable):
 
     def _check_values(self) -> None:
         super()._check_values()
+        if len(self._rows[0]) == len(QUATERNION_COLUMNS):
+            try:
+                self._rows = rows_with_angles(self._rows)
+            except InputError as error:
+                raise self.mistake("file" if self.rows is None else "rows", str(error)) from None
         if self.turns:
             self._check_attitude()
         try:
