@@ -39,7 +39,7 @@ def beside_a_box(**changes):
     return tiltsim.load_scenario(PUSH, {**FREE, "object": [BOX], **changes})
 
 
-def test_the_force_is_the_rate_of_the_momentum_of_what_it_acts_on():
+def test_the_force_is_the_rate_of_the_momentum_of_a_free_box():
     """Newton's second law of a free box, at every step, in all components."""
     simulation = tiltsim.Simulation(beside_a_box())
     speeds, forces = [simulation.data.qvel[-6:-3].copy()], []
@@ -200,7 +200,7 @@ def test_the_built_in_command_among_objects_is_the_loop_s():
     np.testing.assert_allclose(commanded, np.array(layout.spins) * sent, rtol=1e-9)
 
 
-def test_analyses_of_a_vehicle_alone_refuse_objects():
+def test_linear_analysis_refuses_objects():
     hovering = tiltsim.load_scenario(PUSH, FREE)
     for analysis in (tiltsim.linearize, tiltsim.stability):
         assert "takes a vehicle alone" in refusal(analysis, hovering)

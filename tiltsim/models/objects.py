@@ -31,10 +31,10 @@ SLOWER: Final = 50.0
 """Time constant of friction over the contact's; see `_add_pairs`."""
 
 FIRMER: Final = 500.0
-"""MuJoCo's ``impratio``: it makes up for that, so that what is pressed does not creep."""
+"""MuJoCo's ``impratio``: it makes up for that, so that pressed things do not creep."""
 
 CONTACT_READING: Final = 6
-"""Numbers of a contact sensor's memory: two of MuJoCo's own, the time and a force."""
+"""Numbers in the memory of a contact sensor: two of MuJoCo, the time and a force."""
 
 CABLE_READING: Final = 4
 FORCE: Final = 3  # where the reading begins in a memory
@@ -60,7 +60,7 @@ class Body:
         friction: Coefficient of sliding friction.
         softness: Time constant of a contact, s.
         hinge, axis: A point of the hinge (m) and its direction, in its axes.
-        damping: Of the hinge, N m s/rad.
+        damping: Torque of the hinge per angular velocity, N m s/rad.
         floating: Whether a free one has no weight.
     """
 
@@ -94,11 +94,11 @@ class Tool:
     """A stick with a round tip, or a disc at the end of one; it cannot move on the vehicle.
 
     Attributes:
-        shape: Which of them.
+        shape: One of the two.
         position: Where it begins, m, body axes.
         direction: Body axes.
         length: To its tip, m.
-        radius: Of the stick or the disc, m.
+        radius: Radius of the stick or the disc, m.
         mass: kg.
     """
 
@@ -186,7 +186,7 @@ def add_objects(spec: mujoco.MjSpec, objects: Objects) -> None:
     """Add objects, tool and load to a vehicle. Its keyframes, which lack them, are removed."""
     for key in list(spec.keys):
         spec.delete(key)
-    spec.option.impratio = FIRMER
+    spec.option.impratio, spec.option.tolerance = FIRMER, 1e-12  # forces without noise
     for body in objects.bodies:
         _add_body(spec, body)
     if objects.tool is not None:

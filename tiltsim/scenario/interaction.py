@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from math import pi
-from typing import TYPE_CHECKING, Annotated, Final, Literal
+from typing import Annotated, Any, Final, Literal
 
 from pydantic import Field
 
 from tiltsim.models.objects import Body, Load, Objects, Tool
 from tiltsim.scenario.table import Angles3, NonNegative, Positive, Table, Vector3
 from tiltsim_controllers.mathematics.rotation import quaternion_from_euler
-
-if TYPE_CHECKING:
-    from tiltsim.scenario.scenario_tables import ScenarioTables
 
 SIZES: Final = {"wall": 2, "box": 3, "sphere": 1}
 """Numbers of the size of each type of object."""
@@ -184,7 +181,7 @@ class PayloadTable(Table):
         return Load(self.mass, self.length, self.attachment, self.radius, self.rigid)
 
 
-def objects_of(scenario: ScenarioTables) -> Objects | None:
+def objects_of(scenario: Any) -> Objects | None:
     """All that a scenario adds to its vehicle's model; None for a vehicle alone."""
     if not scenario.has_objects:
         return None
@@ -196,7 +193,7 @@ def objects_of(scenario: ScenarioTables) -> Objects | None:
     )
 
 
-def check_objects(scenario: ScenarioTables) -> None:
+def check_objects(scenario: Any) -> None:
     """Refuse objects, tools and loads where nothing could fly with them, or push them."""
     if scenario.reference.type == "push":
         scenario.reference.after_gait((), scenario)

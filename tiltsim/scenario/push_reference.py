@@ -17,7 +17,6 @@ from tiltsim_controllers.references.trajectories import REFERENCE_TYPES, Referen
 from tiltsim_controllers.references.waypoints import COEFFICIENTS, minimum_snap_knots
 
 if TYPE_CHECKING:
-    from tiltsim.scenario.scenario_tables import ScenarioTables
     from tiltsim_controllers.mathematics.scalar import Floats, Triple, Values
 
 SPEEDING_UP: Final = 1.0
@@ -83,7 +82,7 @@ class PushReference(PositionReference):
     )
     slide: Slide | None = Field(None, description="a path along the object; default: none")
 
-    def touch(self, scenario: ScenarioTables) -> Touch:
+    def touch(self, scenario: Any) -> Touch:
         """Where and when it touches. Raises `mistake` for an object that it cannot touch."""
         bodies = {table.name: table.body for table in scenario.object}
         if self.object not in bodies:
@@ -104,9 +103,7 @@ class PushReference(PositionReference):
         x, y, z = unit.tolist()
         return Touch((x, y, z), distance, rise, time)
 
-    def after_gait(
-        self, gait: Values, scenario: ScenarioTables
-    ) -> tuple[ReferenceParameters, Values]:
+    def after_gait(self, gait: Values, scenario: Any) -> tuple[ReferenceParameters, Values]:
         rows = self._rows(self.touch(scenario))
         knots = tuple(float(value) for row in rows for value in row)
         parameters = self.parameters._replace(segments=float(len(rows)), offset=float(len(gait)))

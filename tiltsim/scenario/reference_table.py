@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from math import pi
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import Annotated, Any, Final
 
 from pydantic import Field
 
@@ -13,9 +13,6 @@ from tiltsim.scenario.table import Angle, Table
 from tiltsim_controllers.gaits.parameters import NO_KNOTS
 from tiltsim_controllers.mathematics.scalar import Triple, Values
 from tiltsim_controllers.references.trajectories import REFERENCE_TYPES, ReferenceParameters
-
-if TYPE_CHECKING:
-    from tiltsim.scenario.scenario_tables import ScenarioTables
 
 Tilt = Annotated[float, Field(gt=-pi / 2, lt=pi / 2)]
 Roll = Annotated[float, Field(ge=-pi, le=pi)]
@@ -69,14 +66,12 @@ class ReferenceTable(Table, ABC):
         """Whether roll, pitch and yaw vary with time."""
         return False
 
-    def after_gait(
-        self, gait: Values, scenario: ScenarioTables
-    ) -> tuple[ReferenceParameters, Values]:
+    def after_gait(self, gait: Values, scenario: Any) -> tuple[ReferenceParameters, Values]:
         """The record, and the table data of a flight: the gait's, then the reference's.
 
         Args:
             gait: The gait's.
-            scenario: Of the flight.
+            scenario: The scenario of the flight.
         """
         if self.knots == NO_KNOTS:
             return self.parameters, gait

@@ -130,8 +130,7 @@ def with_objects(loop: ClosedLoop, others: Others) -> ClosedLoop:
     inner_controls, inner_hold = loop.sampling.controls, loop.sampling.hold
     inner_observe, sizes = loop.columns.observe, loop.dynamics.sizes
     size, ctrl_size, states = sizes.act, sizes.ctrl, 2 * bool(others.names)
-    first = size + states  # of what is behind the activations
-    readings = first + others.coordinates
+    readings = size + states + others.coordinates
     accumulated, observed = _accumulated(others, size, readings), _observed(others, size, readings)
 
     @traceable
