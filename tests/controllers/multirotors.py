@@ -8,7 +8,6 @@ from typing import NamedTuple
 import numpy as np
 
 from tests.natively import compiled
-from tests.tracing import seldom_traced
 from tiltsim_controllers.gaits import plans
 from tiltsim_controllers.laws.allocation import RotorRange
 from tiltsim_controllers.laws.attitude_altitude import EXACT_DECOUPLING
@@ -160,9 +159,11 @@ def fly(vehicle, law, knots, duration, *, gait=None, step=0.005, start=(), wind=
     still = (0.0,) * (12 + tilts + rotors), (0.0,) * tilts, (0.0,) * 3
     own = multirotor_law_of(layout, Form(vehicle.dimension, vehicle.norm))
     inputs = compiled(own, 0.0, *still, law, knots)
+    commands = inputs(0.0, *still, law, knots)
+    given = (0.0,) * (21 + rotors), still[1], commands, law.vehicle, knots, at, wind, 1.0
+    moved = compiled(motion, *given)
     seen = []
 
-    @seldom_traced
     def rates(time, state):
         angles, turning = planned.angles(time), planned.rates(time)
         angles, turning = tuple(angles.tolist()), tuple(turning.tolist())
@@ -171,8 +172,8 @@ def fly(vehicle, law, knots, duration, *, gait=None, step=0.005, start=(), wind=
         law_state = (*state[:6], *attitude, *state[15:18], *angles, *speeds)
         u = inputs(time, law_state, turning, integrals, law, knots)
         seen.append(u[-1])
-        moved = motion(state, angles, u, law.vehicle, knots, at, wind, 1.0)
-        return np.array((*moved, *u[rotors : rotors + 3]))
+        motions = moved(state, angles, u, law.vehicle, knots, at, wind, 1.0)
+        return np.array((*motions, *u[rotors : rotors + 3]))
 
     start = start or (0.0,) * 9
     speeds = hover_speeds(vehicle, planned.angles(0.0), start[6:])

@@ -9,6 +9,7 @@ import pytest
 import sympy
 
 from tests.controllers.flights import fly, quadrotor_rates, rk4_step
+from tests.natively import compiled
 from tiltsim_controllers.analysis.quadrotor_singularity import (
     normalized_determinant,
     published_determinant,
@@ -224,8 +225,9 @@ PARAMETERS = {name: Parameters(QUADROTOR, CIRCLE, gains) for name, gains in GAIN
 
 def flight(gains, duration, step):
     parameters = PARAMETERS[gains]
+    inputs = compiled(yaw_position_inputs, 0.0, START, parameters)
     return fly(
-        lambda time, state: yaw_position_inputs(time, np.array(state), parameters),
+        lambda time, state: inputs(time, state, parameters),
         quadrotor_rates,
         QUADROTOR,
         START,
