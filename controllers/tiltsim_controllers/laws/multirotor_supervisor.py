@@ -116,4 +116,4 @@ def multirotor_supervision_of(
             xp.where(regular, direction, up),
         )
 
-    return supervision_of(tilts_of(layout), assess)
+    return supervision_of(tilts_of(layout), watched_at, assess)

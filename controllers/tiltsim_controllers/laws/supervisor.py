@@ -71,9 +71,6 @@ LAG: Final = 0.025
 UNTILTED: Final = 4.0
 """Determinant of the level untilted tiltrotor (ch. 3); other vehicles are scaled to it."""
 
-SUPERVISOR_AT_REST: Final = (0.0, 0.0, 0.0)
-"""State, rate and acceleration of a supervisor that does not act."""
-
 
 class Supervisor(NamedTuple):
     """Thresholds, both 0 for no supervisor, and strategy."""
@@ -106,6 +103,9 @@ class Supervision(NamedTuple):
     (M,), roll and pitch are in rad.
     """
 
+    tilt_count: int
+    watched: Callable[..., Any]
+    """``(time, parameters)``: the ``vehicle``, from the parameters of a law."""
     assess: Callable[..., tuple[Any, Any, Any]]
     """``(tilts, up, vehicle, knots)``: margin (rad), determinant (`UNTILTED` at best), and the
     direction (body axes, of any length and sense) that keeps its attitude in hover; ``up`` is world
@@ -252,7 +252,10 @@ def _smallest_ahead(clock: Any, up: Any, tilts_at: Callable[..., Any], now: _Sup
 
 
 def supervision_of(
-    tilts: int, assess: Callable[..., tuple[Any, Any, Any]], way_back: WayBack = NO_WAY_BACK
+    tilts: int,
+    watched: Callable[..., Any],
+    assess: Callable[..., tuple[Any, Any, Any]],
+    way_back: WayBack = NO_WAY_BACK,
 ) -> Supervision:
     """The supervisor of vehicles with a number of tilts; see `Supervision`."""
 
@@ -323,4 +326,6 @@ def supervision_of(
             desired = xp.minimum((1.0 - state) / (4.0 * LAG), desired)
         return xp.array([state, rate, (desired - rate) / LAG])
 
-    return Supervision(assess, clearance, allowed_scale, gait_scale, supervised_tilts, derivative)
+    return Supervision(
+        tilts, watched, assess, clearance, allowed_scale, gait_scale, supervised_tilts, derivative
+    )

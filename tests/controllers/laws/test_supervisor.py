@@ -26,6 +26,8 @@ from tiltsim_controllers.vehicle.effectiveness import cross_table, tilt_of_rotor
 from tiltsim_controllers.vehicle.parameters import PRESETS, drag_ratio
 
 (
+    _,
+    _,
     assess,
     threshold_clearance,
     allowed_scale,
