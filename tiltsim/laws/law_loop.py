@@ -307,11 +307,6 @@ def law_loop(key: Key, law_of: Callable[[FlightPlan], FlownLaw]) -> ClosedLoop:
     knows_latency = key.models_rotors or key.models_latency
     return replace(
         rotor_loop(key.layout, law),
-<<<<<<< HEAD
-        with_latency=None if key.models_rotors else partial(law_loop, late, law_of),
-=======
-        follows_position=lambda scenario: scenario.reference.kind != "attitude_altitude",
         with_latency=None if knows_latency else partial(law_loop, late, law_of),
->>>>>>> main
         traced=key.traced,
     )
