@@ -61,7 +61,14 @@ def with_command(parameters: Any, command: Values) -> Any:
 def planned_servo_commands(
     time: float, tilts: int, gait: GaitParameters, knots: Vector, lead: float
 ) -> Values:
-    """Commands (rad) of the servos of a number of tilts, ahead of the gait by their lag (s)."""
+    """Commands (rad) of tilt servos, ahead of a gait by their lag.
+
+    Args:
+        time: s.
+        tilts: Number of tilts.
+        gait, knots: The gait and its table data.
+        lead: Lag of the servos, s.
+    """
     angles, rates = tilt_motion_of(tilts).moving(time, gait, knots)
     return tuple(angle + lead * rate for angle, rate in zip(angles, rates, strict=True))
 

@@ -48,7 +48,7 @@ class Law:
         initial: ``(plan) -> states`` at time zero.
         signals: Names of the first signals of a step, columns of a flight: roll, pitch and yaw that
             it tracks, and any more. None for the attitude of the reference.
-        units: Columns of a flight other than those of its kind and the states, with their units.
+        units: Columns of a flight other than the states and the columns of its kind, with units.
         tilts: See `Tilts`; None for `tilts_of_gait`.
         uses_gait: Whether the gait has a part in the flight.
         records_commands: Whether the commands of the tilt servos are part of a sample.

@@ -82,8 +82,13 @@ def supervised_gait(
 def gait_law_of(layout: TiltOfRotor, form: Form, supervision: Supervision) -> Callable[..., Step]:
     """The control law of vehicles of a layout, `attitude_force` with the tilts of the gait.
 
-    Its parameters are `Parameters`, or those of `multirotor_steps` with the table of the rotors in
-    the knots.
+    Its parameters are `Parameters`, or `multirotor_steps.Parameters` with the table of the rotors
+    in the knots.
+
+    Args:
+        layout: Layout of the vehicles.
+        form: Options of the law.
+        supervision: Functions of the supervisor, used where the form is supervised.
     """
     leans_with_gait = form.dimension < 3 and not form.forward and tilts_of(layout) > 0
 

@@ -14,7 +14,7 @@ from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.code.traceable import traceable
 from tiltsim_controllers.gaits.parameters import NO_KNOTS
 from tiltsim_controllers.gaits.red_gait import nearest_red_angles
-from tiltsim_controllers.laws.supervisor import Supervisor, WayBack, supervision_of
+from tiltsim_controllers.laws.supervisor import Supervision, Supervisor, WayBack
 from tiltsim_controllers.mathematics.linear import norm
 from tiltsim_controllers.mathematics.moving import Moving
 from tiltsim_controllers.vehicle.decoupling_matrix import torque_entries, torque_free_force
@@ -59,7 +59,7 @@ def _return_speed(planned: Any, supervisor: Supervisor, drag_ratio: Any) -> Any:
     return supervisor.max_rate / longest
 
 
-SUPERVISION: Final = supervision_of(
+SUPERVISION: Final = Supervision(
     4,
     lambda _time, parameters: drag_ratio(parameters.vehicle),
     assess,
