@@ -11,6 +11,7 @@ from tiltsim.arrays.traced_numbers import trace_scalar_code
 from tiltsim.closed_loop.choices import CHOICES
 from tiltsim.engines.machine_code import MachineCode
 from tiltsim_controllers.code.llvm_text import llvm_functions
+from tiltsim_controllers.code.program import trace_vectors
 
 RUN = """
 define void @run(ptr %values, ptr %results) nounwind {
@@ -103,6 +104,17 @@ def _inputs(entry, name=""):
         names = getattr(entry, "_fields", [name] * len(entry))
         return [value for part, inner in zip(entry, names) for value in _inputs(part, inner)]
     return [] if _is_constant(entry, name) else [entry]
+
+
+def compiled_law(inputs, size, law):
+    """A control law ``inputs(time, state, law)`` on arrays as machine code, ``size`` states."""
+
+    def traced(given):
+        time, *state = (given[i] for i in range(1 + size))
+        return inputs(time, np.array(state, dtype=object), law)
+
+    run = machine_code(trace_vectors(traced, {"given": 1 + size}))
+    return lambda time, state: run([time, *state])
 
 
 def natively(function, *arguments):

@@ -9,7 +9,7 @@ import pytest
 import sympy
 
 from tests.controllers.flights import fly, quadrotor_rates, rk4_step
-from tests.natively import compiled
+from tests.natively import compiled_law
 from tiltsim_controllers.analysis.quadrotor_singularity import (
     normalized_determinant,
     published_determinant,
@@ -224,10 +224,8 @@ PARAMETERS = {name: Parameters(QUADROTOR, CIRCLE, gains) for name, gains in GAIN
 
 
 def flight(gains, duration, step):
-    parameters = PARAMETERS[gains]
-    inputs = compiled(yaw_position_inputs, 0.0, START, parameters)
     return fly(
-        lambda time, state: inputs(time, state, parameters),
+        compiled_law(yaw_position_inputs, len(START), PARAMETERS[gains]),
         quadrotor_rates,
         QUADROTOR,
         START,
