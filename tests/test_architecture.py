@@ -314,7 +314,7 @@ GUARDED = {
     "tiltsim.engines.code_folder": {"os.getuid"},
     "tiltsim.report.made": {"/proc/"},
     "tiltsim.studies.benchmark": {"/proc/", "resource"},
-    "tiltsim.system.locks": {"fcntl", "os.O_NOFOLLOW"},
+    "tiltsim.system.files": {"fcntl", "os.O_NOFOLLOW"},
     "tiltsim.system.processes": {
         "signal.SIG_BLOCK",
         "signal.SIG_SETMASK",

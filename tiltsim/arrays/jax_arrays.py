@@ -11,7 +11,7 @@ from typing import Any, Final
 import numpy as np
 
 from tiltsim.arrays.xla_flags import merges_loops
-from tiltsim.system.optional import optional_package
+from tiltsim.system.public import optional_package
 
 Function = Callable[..., Any]
 

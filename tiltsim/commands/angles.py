@@ -11,9 +11,7 @@ if TYPE_CHECKING:
     from tiltsim_controllers.vehicle.parameters import Vehicle
 
 MIN_PARAMETER: Final = 1e-12
-MAX_PARAMETER: Final = 1e9
-"""Range of a parameter (SI units), far from underflow and overflow."""
-
+MAX_PARAMETER: Final = 1e9  # range of a parameter (SI units), far from underflow and overflow
 DEFAULT_VEHICLE: Final = "ar_drone_2"
 
 

@@ -26,6 +26,7 @@ from tiltsim.commands.text import (
     table,
     write_text,
 )
+from tiltsim.views import figures
 
 if TYPE_CHECKING:
     from tiltsim.studies.comparison import Compared
@@ -102,11 +103,9 @@ def run(
             searched = (*SEARCHES, "compiled_time_per_call")
             _print(rows, [key for key in MEASURES if not (nominal and key in searched)])
         if rows and out is not None:
-            from tiltsim.views.figures import style
-            from tiltsim.views.figures.controllers_compared import comparison_figure
-
             write_text(out / "comparison.json", json_text(rows))
-            style.save(comparison_figure(compared), out / "comparison.png")
+            drawn = figures.controllers_compared.comparison_figure(compared)
+            figures.style.save(drawn, out / "comparison.png")
             if not json:
                 print_line(f"comparison written to {out}")
     require_flown([refusal(one.row) for one in compared])

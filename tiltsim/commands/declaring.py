@@ -11,8 +11,6 @@ often an argument is given and how it is read:
 The docstring's section ``Args`` has a line ``name (METAVAR): help`` for each argument.
 """
 
-from __future__ import annotations
-
 import argparse
 import re
 from collections.abc import Callable, Iterator

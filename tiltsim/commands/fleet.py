@@ -1,7 +1,5 @@
 """``tiltsim fleet``: the vehicles that ship as MJCF files, and the abilities of each."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any, Final
 
@@ -70,7 +68,7 @@ def run(*, json: Json = False, markdown: bool = False, pictures: Path | None = N
 
     report = fleet_report()
     if pictures is not None:
-        from tiltsim.views.video.portrait import save_portrait
+        from tiltsim.views.video.rendering import save_portrait
 
         prepare_folder(pictures)
         for name, angles in FLEET.items():

@@ -12,6 +12,7 @@ from tiltsim.commands.gait_options import GaitFigure, GaitOptions
 from tiltsim.commands.options import Json
 from tiltsim.commands.text import json_text
 from tiltsim.errors import InputError
+from tiltsim.views import figures
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -69,8 +70,12 @@ def run(
     if figure.kind == "determinant":
         vehicle, case = gait.vehicle or parse_vehicle(DEFAULT_VEHICLE), figure.case or "equal"
         report = determinant_report(case, vehicle)
-        draw = partial(_draw_determinant, case, vehicle)
-        figure.show(draw, report, determinant_text(report), json=json)
+        figure.show(
+            lambda: figures.determinant.determinant_figure(case, vehicle),
+            report,
+            determinant_text(report),
+            json=json,
+        )
         return 0
     loaded = None
     if scenario is not None:
@@ -179,32 +184,24 @@ def _speed_limits(selected: SelectedGait, figure: GaitFigure) -> tuple[float, fl
     return figure.speed_limits or published_speed_limits(selected.vehicle)
 
 
-def _draw_determinant(case: str, vehicle: Vehicle) -> Figure:
-    from tiltsim.views.figures.determinant import determinant_figure
-
-    return determinant_figure(case, vehicle)
-
-
 def _draw(selected: SelectedGait, options: GaitFigure) -> Figure:
     """The ``--figure`` of a gait, by default its roll-pitch diagram."""
-    from tiltsim.views.figures import attainable, faults, gait
-
     chosen, vehicle = selected.gait, selected.vehicle
     compared = [(selected.title, chosen)]
     if selected.twin is not None:
         compared.append((selected.twin_title, selected.twin))
     match options.kind:
         case "faults":
-            return faults.fault_figure(vehicle)
+            return figures.gait.fault_figure(vehicle)
         case "attainable":
             if not chosen.is_constant:
                 raise InputError(f"--figure attainable: {chosen.name} moves; give fixed angles")
             limits = _speed_limits(selected, options)
-            return attainable.attainable_figure(chosen, vehicle, limits)
+            return figures.multirotor.attainable_figure(chosen, vehicle, limits)
         case "comparison":
             if len(compared) == 1:
                 raise InputError(f"--figure comparison: {chosen.name} has no bias to compare with")
-            return gait.comparison_figure(compared, vehicle)
+            return figures.gait.comparison_figure(compared, vehicle)
         case "margin":
-            return gait.margin_figure(compared, vehicle)
-    return gait.gait_figure(chosen, vehicle, tuple(options.panels))
+            return figures.gait.margin_figure(compared, vehicle)
+    return figures.gait.gait_figure(chosen, vehicle, tuple(options.panels))

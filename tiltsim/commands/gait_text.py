@@ -1,7 +1,5 @@
 """The reports of ``tiltsim gait`` as text: of a gait, of all gaits, of a multirotor."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, Final
 

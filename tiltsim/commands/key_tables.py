@@ -1,7 +1,5 @@
 """The tables that a JSON Schema describes, and their keys, in words."""
 
-from __future__ import annotations
-
 import json
 import re
 from dataclasses import dataclass, replace
@@ -13,8 +11,7 @@ from tiltsim.scenario.schema import TAG_KEYS, Node
 
 PLURAL: Final = re.compile(r"^(number|whole number|list|table)")
 
-NO_LIMIT: Final = 1e6
-"""Bounds from here on only keep arithmetic from overflowing, and are left out."""
+NO_LIMIT: Final = 1e6  # bounds from here on only keep arithmetic from overflowing, and are left out
 
 
 class Step(NamedTuple):
@@ -31,8 +28,7 @@ class Step(NamedTuple):
         return f"{self.name}.your-name" if self.is_named else self.name
 
 
-Place = tuple[Step, ...]
-"""Where a table is in the file; empty for the file itself."""
+Place = tuple[Step, ...]  # where a table is in the file; empty for the file itself
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,5 @@
 """The keys of a file for people: some of them on the terminal, or all as a Markdown page."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Sequence
 from textwrap import fill, indent
@@ -28,11 +26,8 @@ change a key without editing the file; entries of lists are counted from 0:
 `--set 'gait.angles[0]=0.2'`.
 """
 
-NOT_IN_ANCHOR: Final = re.compile(r"[^\w-]")
-"""Characters that the anchor of a heading leaves out."""
-
-FEW: Final = 2
-"""Most tables of one address that are printed in full; more are listed."""
+NOT_IN_ANCHOR: Final = re.compile(r"[^\w-]")  # characters that the anchor of a heading leaves out
+FEW: Final = 2  # most tables of one address that are printed in full; more are listed
 
 
 def page(tables: Sequence[KeyTable]) -> str:

@@ -8,6 +8,7 @@ from tiltsim.commands.declaring import mistakes_in
 from tiltsim.commands.gait_options import GaitFigure, GaitOptions
 from tiltsim.commands.gait_text import multirotor_text
 from tiltsim.errors import InputError
+from tiltsim.views import figures
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -15,8 +16,7 @@ if TYPE_CHECKING:
     from tiltsim.models.rotor_table import Multirotor
     from tiltsim.scenario.scenario import Scenario
 
-FIGURES: Final = ("roll_pitch", "attainable")
-"""Values of ``--figure`` for any multirotor."""
+FIGURES: Final = ("roll_pitch", "attainable")  # values of ``--figure`` for any multirotor
 
 
 def run_multirotor(
@@ -69,10 +69,8 @@ def run_multirotor(
         report |= period_report(vehicle, gait, roll, pitch)
 
     def draw() -> Figure:
-        from tiltsim.views.figures.multirotor import multirotor_figure
-
         rotors = tilted_rotors(vehicle, angles, limits)
-        return multirotor_figure(rotors, figure.kind or FIGURES[0])
+        return figures.multirotor.multirotor_figure(rotors, figure.kind or FIGURES[0])
 
     figure.show(draw, report, multirotor_text(report), json=json)
     return 0

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 from tiltsim.commands.declaring import Option
 from tiltsim.commands.text import json_text, print_line
 from tiltsim.errors import InputError
+from tiltsim.views import figures
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -104,15 +105,13 @@ class FigureOptions:
             path: The file.
             is_named: Whether `draw` has applied title and labels.
         """
-        from tiltsim.views.figures.adjusting import relabel, retitle
-        from tiltsim.views.figures.style import paper_style, parse_size, save
-
-        with paper_style(self.style, parse_size("--size", self.size)):
+        style, layout = figures.style, figures.layout
+        with style.paper_style(self.style, style.parse_size("--size", self.size)):
             figure = draw()
             if not is_named:
-                retitle(figure, self.title)
-                relabel(figure, dict(self.labels))
-            save(figure, path)
+                layout.retitle(figure, self.title)
+                layout.relabel(figure, dict(self.labels))
+            style.save(figure, path)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -159,9 +158,8 @@ class PlotOptions(FigureOptions):
 def prepare_figure(option: str, path: Path) -> None:
     """Raise `InputError` unless a figure can be written to ``path``."""
     from tiltsim.system.files import prepare_file
-    from tiltsim.views.figures.style import FORMATS
 
-    prepare_file(option, path, FORMATS)
+    prepare_file(option, path, figures.style.FORMATS)
 
 
 def file_in(out: Path | None, beside: Path, name: str) -> Path:

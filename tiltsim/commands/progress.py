@@ -16,9 +16,7 @@ from tiltsim.system.text import printable
 if TYPE_CHECKING:
     from tqdm import tqdm
 
-TICK: Final = 1.0
-"""Interval (s) at which the clock of a bar moves while nothing is finished."""
-
+TICK: Final = 1.0  # interval (s) at which the clock of a bar moves while nothing is finished
 LINE_INTERVAL: Final = 8.0
 """Interval (s) of the lines where there is no terminal: CI services end a job that is silent."""
 

@@ -1,7 +1,5 @@
 """``tiltsim schema``: the keys of the scenario or the sweep file, for editors and for people."""
 
-from __future__ import annotations
-
 import json
 from typing import Any, Final
 

@@ -3,16 +3,13 @@
 The controller of their scenarios is the built-in one that policies are compared with.
 """
 
-from __future__ import annotations
-
 from importlib.util import find_spec
 from math import pi
 from typing import Any, Final
 
 from tiltsim.env.environment import HOVER
 
-EPISODE_STEPS: Final = 500
-"""Control steps of an episode: 10 s at 50 Hz."""
+EPISODE_STEPS: Final = 500  # control steps of an episode: 10 s at 50 Hz
 
 SIMULATION: Final = {
     "duration": 10.0,

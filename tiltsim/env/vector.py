@@ -1,7 +1,5 @@
 """Many environments at once as a `gymnasium.vector.VectorEnv`, in JAX; needs both extras."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from contextlib import AbstractContextManager, nullcontext
 from functools import partial
@@ -19,7 +17,7 @@ from tiltsim.errors import InputError
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.messages import choose
 from tiltsim.system.numbers import is_number
-from tiltsim.system.optional import optional_package
+from tiltsim.system.public import optional_package
 from tiltsim.system.text import short_repr
 
 optional_package("gymnasium", "tiltsim.env.VectorEnv", "'tiltsim[rl]'")

@@ -29,7 +29,7 @@ from tiltsim.laws.tiltrotor import (
 )
 from tiltsim.scenario.law_controller import LawTable
 from tiltsim.scenario.scenario import plan_flight
-from tiltsim.system.locks import one_thread_at_a_time
+from tiltsim.system.files import one_thread_at_a_time
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -1,7 +1,5 @@
 """Rest points and periodic orbits of closed loops."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
@@ -14,21 +12,24 @@ from numpy.typing import NDArray
 from tiltsim.engines.base import EngineName
 from tiltsim.errors import InputError
 from tiltsim.laws.assembling import assemble
-from tiltsim.linear.differences import AVERAGED, CENTRAL, HALF_STENCIL, SHORTER
+from tiltsim.linear.coordinates import PLANE
 from tiltsim.linear.forcing import Forcing, forcing_of
 from tiltsim.linear.motion import LONG, Motion, make_motion
-from tiltsim.linear.naming import PLANE
-from tiltsim.linear.newton import Root, coordinate_steps, solve
+from tiltsim.linear.newton import (
+    AVERAGED,
+    CENTRAL,
+    HALF_STENCIL,
+    SHORTER,
+    Root,
+    coordinate_steps,
+    solve,
+)
 from tiltsim.plants.engine_choice import native_pays_off
 from tiltsim.scenario.scenario import Scenario
 from tiltsim_controllers.mathematics.scalar import Floats
 
-REST: Final = 1e-6
-"""Largest rate, in SI units, that counts as rest; solutions end far below."""
-
-ORBIT: Final = 1e-7
-"""Largest difference after a period, in SI units, that counts as periodic."""
-
+REST: Final = 1e-6  # largest rate, in SI units, that counts as rest; solutions end far below
+ORBIT: Final = 1e-7  # largest difference after a period, in SI units, that counts as periodic
 SETTLING_TIME: Final = 40.0  # s, flown at most to approach an orbit or a rest point
 RETURNS: Final = 10
 """Periods, flown at most to approach a long orbit: a derivative takes two for each state."""

@@ -1,7 +1,5 @@
 """The inputs from outside a closed loop: whether they are steady, periodic or neither."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from fractions import Fraction
 from math import gcd, lcm, pi
@@ -23,9 +21,7 @@ from tiltsim_controllers.references.trajectories import (
     ReferenceParameters,
 )
 
-MOST_PERIODS: Final = 1000
-"""Most periods of a gait or reference in their common period."""
-
+MOST_PERIODS: Final = 1000  # most periods of a gait or reference in their common period
 CONTROLLER_EVENTS: Final = ("turn_time", "failure_known_from")
 """Keys of controllers: times (s) until which they change."""
 

@@ -5,8 +5,6 @@ at a measured state. At all inputs together, a common gain or delay acts on the 
 loop's transfer matrix: ``det(I + g exp(-i w tau) L(i w)) = 0`` where one of them is -1.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from math import atan, inf, isfinite, pi
@@ -16,10 +14,10 @@ from typing import Any, Final
 import numpy as np
 
 from tiltsim.errors import InputError
+from tiltsim.linear.coordinates import is_of_vehicle
 from tiltsim.linear.equilibrium import equilibrium_of
 from tiltsim.linear.linearization import Linearization, linearization_at
 from tiltsim.linear.modes import NEUTRAL, exponents
-from tiltsim.linear.naming import is_of_vehicle
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.scenario import Scenario
 from tiltsim_controllers.mathematics.scalar import Floats

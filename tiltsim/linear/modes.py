@@ -1,7 +1,5 @@
 """Modes of a linear system: eigenvalues with the states that take part in them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Final
@@ -17,8 +15,7 @@ root of its error."""
 NEUTRAL: Final = 1e-6  # rad/s
 """Poles below this are zero."""
 
-SHARE: Final = 0.1
-"""States with less than this share of the largest part in a mode are not listed."""
+SHARE: Final = 0.1  # states with less than this share of the largest part in a mode are not listed
 
 WORDS: Final = {
     **dict.fromkeys(("x", "vx", "integral_x"), "x"),

@@ -4,8 +4,6 @@ The state is a vector of the plant's own numbers. Whichever plant, `Motion` give
 minimal coordinates at a time, and the state some physics steps later, as flights have it.
 """
 
-from __future__ import annotations
-
 import os
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
@@ -22,8 +20,8 @@ from tiltsim.closed_loop.userdata import EVALUATIONS, EVALUATIONS_PER_STEP, HEAD
 from tiltsim.engines.base import EngineName
 from tiltsim.engines.callback import control_callback
 from tiltsim.laws.assembling import assemble
-from tiltsim.linear.coordinates import Coordinates
-from tiltsim.linear.naming import (
+from tiltsim.linear.coordinates import (
+    Coordinates,
     Input,
     control_inputs,
     equation_coordinates,
@@ -40,8 +38,7 @@ LONG: Final = 1000
 """Steps, from which on a flight is long: worth a thread, and a derivative of fewer evaluations."""
 
 THREADS: Final = os.cpu_count() or 1
-ROWS_PER_THREAD: Final = 4
-"""Flights of a thread between reports of progress."""
+ROWS_PER_THREAD: Final = 4  # flights of a thread between reports of progress
 
 
 class Motion(ABC):

@@ -1,7 +1,5 @@
 """The tiltrotor and the quadrotor of the thesis as multirotors."""
 
-from __future__ import annotations
-
 from math import inf
 from typing import Final
 

@@ -3,8 +3,6 @@
 The limits are checked before MuJoCo allocates memory and time.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterable
 from math import isfinite, prod
@@ -14,9 +12,7 @@ from xml.etree import ElementTree
 
 from tiltsim.system.files import is_file, is_folder
 
-MAX_BYTES: Final = 4 * 2**20
-"""Size of the file and all files that it includes, together."""
-
+MAX_BYTES: Final = 4 * 2**20  # size of the file and all files that it includes, together
 MAX_ELEMENTS: Final = 2_000
 """XML elements, with included files and each replica counted.
 
@@ -24,21 +20,11 @@ Ten times the elements of eight rotors on tilting arms. The time to edit a file 
 square: with 2,000 some 3 s, with 5,000 above 15 s.
 """
 
-MAX_SAMPLES: Final = 4096**2
-"""Pixels of a texture, or points of a height field."""
-
-MAX_SIZE: Final = 100_000
-"""An attribute of ``<size>``."""
-
-MAX_VALUES: Final = 1_000
-"""User values of each element of a kind, or of a user's sensor."""
-
-MAX_FILES: Final = 10_000
-"""Places at which the files are searched that it names."""
-
-_MODELS: Final = ("include", "model")
-"""Elements that name MJCF."""
-
+MAX_SAMPLES: Final = 4096**2  # pixels of a texture, or points of a height field
+MAX_SIZE: Final = 100_000  # an attribute of ``<size>``
+MAX_VALUES: Final = 1_000  # user values of each element of a kind, or of a user's sensor
+MAX_FILES: Final = 10_000  # places at which the files are searched that it names
+_MODELS: Final = ("include", "model")  # elements that name MJCF
 _FOLDERS: Final = ("assetdir", "meshdir", "texturedir")
 """Attributes of ``<compiler>`` that say where files are."""
 

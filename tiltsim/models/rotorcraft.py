@@ -29,8 +29,8 @@ from tiltsim.models.parts import SERVO_ARMATURE, ExtraActuators, Ground, ModelSp
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.models.user_vehicle import UserVehicle
 from tiltsim.resources import shipped_folder
+from tiltsim.system.files import one_thread_at_a_time
 from tiltsim.system.hooks import mujoco_hooks
-from tiltsim.system.locks import one_thread_at_a_time
 from tiltsim_controllers.mathematics.scalar import Values
 from tiltsim_controllers.vehicle.parameters import PRESETS, SPIN, Vehicle
 from tiltsim_controllers.vehicle.states import ROTORS
@@ -38,8 +38,7 @@ from tiltsim_controllers.vehicle.states import ROTORS
 if TYPE_CHECKING:
     import mujoco
 
-START_SPEED: Final = 300.0
-"""Rotor speed (rad/s) of the keyframe ``start``."""
+START_SPEED: Final = 300.0  # rotor speed (rad/s) of the keyframe ``start``
 
 
 @dataclass(frozen=True)
@@ -122,9 +121,7 @@ def compile_model(spec: RotorcraftSpec, *, visuals: bool = True) -> mujoco.MjMod
     return compiled
 
 
-MODEL_CACHE_SIZE: Final = 32
-"""Number of models that are kept to derive others from."""
-
+MODEL_CACHE_SIZE: Final = 32  # number of models that are kept to derive others from
 _compiled: dict[tuple[RotorcraftSpec, bool], tuple[mujoco.MjModel, mujoco.MjData]] = {}
 """Compiled models, with data to work in, by structure and visuals.
 

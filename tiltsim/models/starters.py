@@ -1,7 +1,5 @@
 """Files to start from: a commented MJCF vehicle of each kind, and a scenario that flies it."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator
 from math import cos, pi, sin
@@ -11,14 +9,9 @@ import numpy as np
 
 from tiltsim_controllers.mathematics.scalar import Floats
 
-THRUST: Final = 8.5e-6
-"""Thrust coefficient, N s^2/rad^2."""
-
-DRAG: Final = 1.4e-7
-"""Drag-torque coefficient, N m s^2/rad^2."""
-
-MAX_SPEED: Final = 850.0
-"""Highest speed of the rotors, rad/s."""
+THRUST: Final = 8.5e-6  # thrust coefficient, N s^2/rad^2
+DRAG: Final = 1.4e-7  # drag torque coefficient, N m s^2/rad^2
+MAX_SPEED: Final = 850.0  # highest speed of the rotors, rad/s
 
 
 class Starter(NamedTuple):

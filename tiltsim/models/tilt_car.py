@@ -17,8 +17,8 @@ from tiltsim.models.mjcf_editing import (
 )
 from tiltsim.models.parts import ModelSpec
 from tiltsim.resources import shipped_folder
+from tiltsim.system.files import one_thread_at_a_time
 from tiltsim.system.hooks import mujoco_hooks
-from tiltsim.system.locks import one_thread_at_a_time
 from tiltsim_controllers.tilt_car.vehicle import TiltCar
 
 if TYPE_CHECKING:
@@ -26,8 +26,7 @@ if TYPE_CHECKING:
 
 ROTORS: Final = (1, 2)
 
-START_SPEED: Final = 200.0
-"""Rotor speed (rad/s) of the keyframe ``start``: ch. 10's."""
+START_SPEED: Final = 200.0  # rotor speed (rad/s) of the keyframe ``start``: ch. 10's
 
 
 @dataclass(frozen=True)

@@ -24,8 +24,8 @@ from tiltsim.models.vehicle_parts import (
     check_parts,
     parallel_axis,
 )
+from tiltsim.system.files import one_thread_at_a_time
 from tiltsim.system.hooks import mujoco_hooks
-from tiltsim.system.locks import one_thread_at_a_time
 from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.vehicle.parameters import Vehicle
 from tiltsim_controllers.vehicle.states import ROTORS

@@ -16,12 +16,11 @@ from tiltsim.report.claim import Metrics
 from tiltsim.report.flights import PLANTS, Plant, variant_for
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.simulation.simulate import simulate_to_end
-from tiltsim.views.figures.attainable import attainable_figure
-from tiltsim.views.figures.attraction import attraction_panels
-from tiltsim.views.figures.determinant import determinant_figure
+from tiltsim.views.figures.determinant import determinant_figure, singularity_figure
 from tiltsim.views.figures.gait import comparison_figure
+from tiltsim.views.figures.multirotor import attainable_figure
 from tiltsim.views.figures.plot import plot
-from tiltsim.views.figures.quadrotor_singularity import singularity_figure
+from tiltsim.views.figures.stability import attraction_panels
 from tiltsim.views.figures.tracking_errors import (
     PeriodErrors,
     SetpointErrors,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final, NamedTuple
 
-from tiltsim.system.quantity import Quantity
+from tiltsim.system.text import Quantity
 
 
 class Metric(NamedTuple):

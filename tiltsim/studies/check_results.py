@@ -1,7 +1,5 @@
 """Results of `tiltsim check`, and the files that other programs read: JSON and JUnit XML."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field

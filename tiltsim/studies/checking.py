@@ -1,7 +1,5 @@
 """Headless checks: fly many scenarios and evaluate their expectations."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping
 from concurrent.futures import Future
 from pathlib import Path

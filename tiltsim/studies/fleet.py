@@ -1,7 +1,5 @@
 """The vehicles in ``mjcf`` with any number of rotors, and their capabilities."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any, Final
 

@@ -3,8 +3,6 @@
 Angles are in rad, everything else in SI units; NaN becomes null.
 """
 
-from __future__ import annotations
-
 from math import isfinite
 from typing import Any, Final
 

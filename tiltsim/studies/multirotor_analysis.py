@@ -3,8 +3,6 @@
 Angles are in rad, everything else in SI units and body axes; values that do not exist are None.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, Final
 

@@ -1,7 +1,5 @@
 """Other simulators of quadrotors, each timed in a separate process."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess
@@ -15,8 +13,7 @@ from typing import Any, Final, NamedTuple
 from tiltsim.errors import InputError
 
 Description = dict[str, Any]
-Timing = Sequence[float]
-"""Seconds on the clock, and of all processor cores."""
+Timing = Sequence[float]  # seconds on the clock, and of all processor cores
 Setup = Callable[[int, int], tuple[Description, Callable[[], None]]]
 
 

@@ -1,7 +1,5 @@
 """Arithmetic in sweep files: only a few operators and functions over named numbers."""
 
-from __future__ import annotations
-
 import ast
 import math
 import operator
@@ -33,9 +31,7 @@ FUNCTIONS: Final[dict[str, Callable[..., Any]]] = {
     "sqrt": math.sqrt,
     "tan": math.tan,
 }
-MAX_DEPTH: Final = 200
-"""Operations in one another in an expression."""
-
+MAX_DEPTH: Final = 200  # operations in one another in an expression
 CONSTANTS: Final = {"pi": math.pi}
 
 

@@ -4,8 +4,6 @@ Everything follows from the `SweepDefinition`, so that processes and machines th
 every point.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from copy import deepcopy
 from functools import cached_property

@@ -1,7 +1,5 @@
 """Scenarios that differ in numbers: only the tables that hold these are validated again."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from functools import cache
 from typing import Any, Final, NamedTuple

@@ -1,13 +1,18 @@
 """The drawings of docs/concepts.md: vehicle, gaits, decouplers, singular attitudes, colors."""
 
-from __future__ import annotations
-
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from math import atan2, pi
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
+from matplotlib import rc_context
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 
+from tiltsim.flight.flight import Flight
 from tiltsim.views.attitude_plane import (
     HALF_WIDTH,
     nearest_singular,
@@ -36,18 +41,9 @@ from tiltsim_controllers.laws.decouplers import (
     exact_decoupler,
     modified_decoupler,
 )
-from tiltsim_controllers.vehicle.parameters import PRESETS, drag_ratio
+from tiltsim_controllers.mathematics.scalar import Floats
+from tiltsim_controllers.vehicle.parameters import PRESETS, Vehicle, drag_ratio
 from tiltsim_controllers.vehicle.states import ROTORS
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
-
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-    from tiltsim.flight.flight import Flight
-    from tiltsim_controllers.mathematics.scalar import Floats
-    from tiltsim_controllers.vehicle.parameters import Vehicle
 
 _WIDTH: Final = 6.4  # inches: about the width of a page of text
 POSITIVE_TILT: Final = 0.5  # tilt angle (rad) of all rotors in the drawing of the vehicle
@@ -75,8 +71,6 @@ _LEANS: Final = "BrBG"  # color map of forward and backward leans
 @contextmanager
 def _drawing_style() -> Iterator[None]:
     """The common style with larger text, for pictures that are also seen on phones."""
-    from matplotlib import rc_context
-
     sizes = ("font.size", "axes.labelsize", "legend.fontsize", "xtick.labelsize", "ytick.labelsize")
     with style.paper_style(), rc_context(dict.fromkeys(sizes, 10) | {"axes.titlesize": 11}):
         yield
@@ -142,9 +136,6 @@ def _spin_arrow(axes: Axes, rotor: Rotor) -> None:
 
 
 def _vehicle_legend(figure: Figure, pose: Pose) -> None:
-    from matplotlib.lines import Line2D
-    from matplotlib.patches import Patch
-
     names = {-1.0: "clockwise from above, ϖ < 0", 1.0: "counter-clockwise, ϖ > 0"}
     handles: list[Any] = [
         Patch(facecolor=(*rotor.color, 0.32), edgecolor=0.6 * rotor.color, label=names[rotor.spin])

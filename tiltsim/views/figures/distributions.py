@@ -1,12 +1,12 @@
 """The figure of randomly sampled flights: completed share, metrics, effect of the samples."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from math import sqrt
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from tiltsim.sweeps.dataset import Column, SweepResults
 from tiltsim.sweeps.tables import GridAxis
@@ -19,11 +19,7 @@ from tiltsim.views.figures.sweep_columns import (
     spans_decades,
 )
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-    Groups = Sequence[tuple[str, Column]]
+Groups = Sequence[tuple[str, Column]]
 
 QUANTILES: Final = (0.05, 0.5, 0.95)  # that are marked on the curves
 MAX_KEYS: Final = 4  # largest number of sampled keys with a separate panel

@@ -1,18 +1,18 @@
 """The panels of a page of flights: signals over time, paths from above, planes."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from math import ceil, log10, pi
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
+from matplotlib.axes import Axes
 
+from tiltsim.flight.flight import Flight
 from tiltsim.laws.layers.supervision import SUPERVISION
 from tiltsim.scenario.gait import PenguinGait
-from tiltsim.system.quantity import Quantity
+from tiltsim.system.text import Quantity
 from tiltsim.views.attitude_plane import (
     HALF_WIDTH,
     SUPERVISION_THRESHOLD,
@@ -35,12 +35,7 @@ from tiltsim.views.signals import (
     signals_of,
     vector_signals,
 )
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-    from tiltsim.flight.flight import Flight
-    from tiltsim_controllers.mathematics.scalar import Floats
+from tiltsim_controllers.mathematics.scalar import Floats
 
 MAX_PERIODS: Final = 10  # of a gait: more periods would be a solid band
 SHOWN_PERIODS: Final = 4  # the last ones, shown instead

@@ -1,22 +1,30 @@
 """Figures of flights: one flight on a page, or several compared."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from tiltsim.errors import InputError
-from tiltsim.flight.flight import as_flights
+from tiltsim.flight.flight import Flight, as_flights
 from tiltsim.flight.vectors import VECTORS, components
 from tiltsim.scenario.messages import choose
 from tiltsim.system.text import short_repr
 from tiltsim.views.figures import style
-from tiltsim.views.figures.adjusting import relabel
-from tiltsim.views.figures.layout import Page, add_heading, fitting, new_page, place_legends, wrap
+from tiltsim.views.figures.layout import (
+    Page,
+    add_heading,
+    fitting,
+    new_page,
+    place_legends,
+    relabel,
+    wrap,
+)
 from tiltsim.views.figures.panels import (
     Panel,
     Shown,
@@ -27,12 +35,6 @@ from tiltsim.views.figures.panels import (
 )
 from tiltsim.views.signals import stems, vector_signals
 from tiltsim.views.titles import common_title, describe_controller, describe_gait, flight_names
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-    from tiltsim.flight.flight import Flight
 
 MAX_FLIGHTS: Final = len(style.CYCLE)
 
@@ -230,8 +232,6 @@ def _label_time(column: Sequence[Axes]) -> None:
 
 def _handles(shown: Sequence[Shown], axes: Sequence[Axes]) -> Iterator[Any]:
     """Handles of the flights and of the marks in the axes."""
-    from matplotlib.lines import Line2D
-
     for flight, name, look in shown:
         end = flight.end
         more = "" if end.kind == "completed" else f", {end.kind} at {end.time:.2f} s"

@@ -1,7 +1,5 @@
 """Rows on the timeline, thinned out where they are too many, and the colors of all entities."""
 
-from __future__ import annotations
-
 from typing import Any, Final
 
 import numpy as np

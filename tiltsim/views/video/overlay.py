@@ -1,13 +1,12 @@
 """The text over the frames of a video, and the roll-pitch plane in their corner."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 from PIL import Image as Pillow
 from PIL import ImageDraw
 
+from tiltsim.flight.flight import Flight
 from tiltsim.views.attitude_plane import (
     HALF_WIDTH,
     MARGIN_THRESHOLD,
@@ -22,9 +21,6 @@ from tiltsim.views.figures import style
 from tiltsim.views.signals import has_attitude_plane
 from tiltsim.views.video.offscreen import Caption, Image
 from tiltsim_controllers.mathematics.scalar import Floats
-
-if TYPE_CHECKING:
-    from tiltsim.flight.flight import Flight
 
 INSET_SHARE: Final = 0.32  # of the frame's height
 GAP_SHARE: Final = 0.025
