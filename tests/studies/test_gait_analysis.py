@@ -16,9 +16,8 @@ from tests.refusals import refusal
 from tiltsim.cli import build_parser
 from tiltsim.commands import gait as gait_command
 from tiltsim.commands import map as map_command
-from tiltsim.commands.angles import parse_vehicle
 from tiltsim.commands.declaring import call
-from tiltsim.commands.gait_options import Case
+from tiltsim.commands.gait_options import Case, parse_vehicle
 from tiltsim.commands.text import json_text, number
 from tiltsim.errors import InputError
 from tiltsim.scenario.loading import load_scenario

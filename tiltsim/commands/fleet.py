@@ -64,7 +64,7 @@ def run(*, json: Json = False, markdown: bool = False, pictures: Path | None = N
         from tiltsim.views.video import prefer_offscreen_gl
 
         prefer_offscreen_gl()
-    from tiltsim.studies.fleet import FLEET, fleet_file, fleet_report
+    from tiltsim.studies.multirotor_analysis import FLEET, fleet_file, fleet_report
 
     report = fleet_report()
     if pictures is not None:

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import Any, Final
 
-from tiltsim.commands.angles import vehicle_text
+from tiltsim.commands.gait_options import vehicle_text
 from tiltsim.commands.text import Columns, aligned, number, numbers, table
 from tiltsim.system.text import printable
 

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from tiltsim.commands.angles import (
+from tiltsim.commands.declaring import mistakes_in
+from tiltsim.commands.gait_options import (
     DEFAULT_VEHICLE,
     VehicleOption,
     parse_angles,
     parse_vehicle,
     vehicle_text,
 )
-from tiltsim.commands.declaring import mistakes_in
 from tiltsim.commands.options import Json, PlotOptions, refuse_both
 from tiltsim.commands.text import aligned, tally
 from tiltsim.errors import InputError

@@ -16,8 +16,7 @@ def run(address: str | None = None, *, sweep: bool = False, markdown: bool = Fal
         sweep: print the keys of the sweep file instead
         markdown: print all keys as a page, docs/scenario.md
     """
-    from tiltsim.commands.key_tables import key_tables
-    from tiltsim.commands.key_text import description, page
+    from tiltsim.commands.key_tables import description, key_tables, page
 
     schema = sweep_schema() if sweep else scenario_schema()
     if address is not None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Literal
 
-from tiltsim.commands.angles import Pitch, Roll, VehicleOption, parse_vehicle
+from tiltsim.commands.gait_options import Pitch, Roll, VehicleOption, parse_vehicle
 from tiltsim.commands.options import Json, PlotOptions
 from tiltsim.commands.text import aligned
 from tiltsim.views import figures

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from tiltsim.models.mjcf_files import mjcf_version
+from tiltsim.models.mjcf_editing import mjcf_version
 from tiltsim.models.rotor_table import Multirotor, read_rotors, speed_range
 from tiltsim.models.vehicle_parts import (
     CROSSES,
