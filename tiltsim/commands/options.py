@@ -98,13 +98,7 @@ class FigureOptions:
     labels: Annotated[tuple[tuple[str, str], ...], Option("--label", _label)] = ()
 
     def save(self, draw: Callable[[], Figure], path: Path, *, is_named: bool = False) -> None:
-        """Draw a figure in this size and style, and save it.
-
-        Args:
-            draw: Draws it.
-            path: The file.
-            is_named: Whether `draw` has applied title and labels.
-        """
+        """Draw and save a figure in this size and style; ``is_named``: with title and labels."""
         style, layout = figures.style, figures.layout
         with style.paper_style(self.style, style.parse_size("--size", self.size)):
             figure = draw()
@@ -163,13 +157,7 @@ def prepare_figure(option: str, path: Path) -> None:
 
 
 def file_in(out: Path | None, beside: Path, name: str) -> Path:
-    """The file of ``--out``, which may be a folder for one called ``name``.
-
-    Args:
-        out: The option; None for a file beside the input.
-        beside: The input: a folder, or a file in it.
-        name: The file's name where ``out`` does not have one.
-    """
+    """The file of ``--out``, or ``name`` in that folder; without it ``name`` beside the input."""
     if out is None:
         return (beside if beside.is_dir() else beside.parent) / name
     return out if out.suffix and not out.is_dir() else out / name

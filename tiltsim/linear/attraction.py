@@ -248,13 +248,7 @@ class _Grid:
         return self._states.engine
 
     def fly(self, points: set[tuple[int, int]], width: int) -> None:
-        """Fly from those points that are new.
-
-        Args:
-            points: Indices of edges.
-            width: Width of the cells whose corners they are; all cells but the first are at the
-                boundary.
-        """
+        """Fly from new points, corners of cells of a width, all but the first at the boundary."""
         new = sorted(points - self.returned.keys())
         undisturbed = [self._scenario] if self._goal is None else []
         following = 8 * (self._across // width) if undisturbed else 2 * len(new)

@@ -71,12 +71,8 @@ def spectrum(matrix: Floats, error: float) -> tuple[Any, Any, Any]:
 
     An error of the matrix splits a multiple eigenvalue with too few eigenvectors by its root, but
     hardly moves the mean of the parts: where the split is no larger than the error explains, each
-    part is replaced by the mean. Others keep their values.
-
-    Args:
-        matrix: Shape (n, n).
-        error: Error of its entries, as a share of the largest of their row; 0 to keep all
-            eigenvalues.
+    part is replaced by the mean. Others keep their values, as all do for an error of 0; it is a
+    share of the largest entry of a row.
     """
     values, vectors = np.linalg.eig(matrix)
     values, left = values.astype(complex), np.linalg.pinv(vectors)

@@ -39,15 +39,7 @@ class Starter(NamedTuple):
 def _ring(
     title: str, rotors: int, radius: float, *, cant: float = 0.0, angles: tuple[float, ...] = ()
 ) -> Starter:
-    """Rotors around the hull, turned about their arms by ``cant``, to either side by turns.
-
-    Args:
-        title: Title of the kind.
-        rotors: Their number.
-        radius: Length of the arms, m.
-        cant: rad.
-        angles: Tilt angles, rad.
-    """
+    """Rotors around the hull, radius in m, turned to either side by ``cant`` (rad)."""
     heading = (2.0 * np.arange(rotors) + 1.0) * pi / rotors
     places = radius * np.stack([np.cos(heading), np.sin(heading), 0.0 * heading], axis=1)
     lean = sin(cant) * (-1.0) ** np.arange(rotors)
@@ -56,12 +48,7 @@ def _ring(
 
 
 def _cube(title: str, radius: float) -> Starter:
-    """Rotors on the corners of a cube (Brescianini and D'Andrea, 2016, eq. 16).
-
-    Args:
-        title: Title of the kind.
-        radius: From the center to the corners, m.
-    """
+    """Rotors on the corners of a cube, at a radius (m) (Brescianini and D'Andrea, 2016, eq. 16)."""
     a, b, c = 0.5 + 12**-0.5, 0.5 - 12**-0.5, 3**-0.5
     corners = [(x, y, z) for z in (1, -1) for y in (1, -1) for x in (1, -1)]
     upper = [(-a, b, c), (b, a, -c), (-b, -a, -c), (a, -b, c)]
@@ -183,12 +170,7 @@ _MJCF: Final = """\
 
 
 def starter_scenario(kind: str, mjcf: str) -> str:
-    """The scenario that flies a kind in `STARTERS` to a point.
-
-    Args:
-        kind: The vehicle.
-        mjcf: Name of its file, which is in the scenario's folder.
-    """
+    """The scenario that flies a kind in `STARTERS`, whose file lies in its folder, to a point."""
     starter = STARTERS[kind]
     return _SCENARIO.format(
         title=starter.title,

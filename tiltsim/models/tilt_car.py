@@ -42,9 +42,7 @@ class TiltCarSpec(ModelSpec):
 def compile_tilt_car(spec: TiltCarSpec, *, visuals: bool = True) -> mujoco.MjModel:
     """Compile the MuJoCo model of a tilt-car, with the keyframes ``rest`` and ``start``.
 
-    Args:
-        spec: The specification of the model.
-        visuals: Whether to keep parts that are only drawn or measured, as for rotorcraft.
+    ``visuals`` keeps parts that are only drawn or measured, as for rotorcraft.
     """
     complete, bare = _compose(spec)
     with mujoco_hooks():

@@ -97,16 +97,10 @@ class UserVehicle:
         return " and ".join(found)
 
     def set_inertia(self, root: Any, vehicle: Vehicle | Multirotor) -> None:
-        """Set mass and moments of inertia of the whole vehicle by changing the body ``vehicle``.
+        """Set mass and moments of inertia of the whole vehicle by changing its body in a tree.
 
-        Center of mass and products of inertia stay the file's.
-
-        Args:
-            root: The file as a tree.
-            vehicle: The parameters to set.
-
-        Raises:
-            ValueError: If no body could have the mass and moments that remain for it.
+        Center of mass and products of inertia stay the file's. Raises ValueError if no body could
+        have the mass and moments that remain for it.
         """
         about_center = self._inertia_about_center(vehicle)
         unchanged = np.array_equal(about_center, self._inertia_about_center(self.vehicle))
@@ -151,14 +145,9 @@ class UserVehicle:
 
 @one_thread_at_a_time
 def read_user_vehicle(path: str, model: str) -> UserVehicle:
-    """Check and measure an MJCF file.
+    """Check and measure an MJCF file that must have the names of a ``vehicle.model``.
 
-    Args:
-        path: The file.
-        model: ``tiltrotor``, ``quadrotor`` or ``multirotor``: the names that it must have.
-
-    Raises:
-        ValueError: In one line: the file cannot be read or compiled, or lacks a name.
+    Raises ValueError in one line if it cannot be read or compiled, or lacks a name.
     """
     try:
         Path(path).stat()

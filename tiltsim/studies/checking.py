@@ -147,15 +147,8 @@ def _add_case(suite: ElementTree.Element, result: CheckResult) -> None:
 def collect(paths: Iterable[str], word: str = "") -> list[str]:
     """Addresses of all scenarios under files and folders, families expanded into variants.
 
-    A path that does not exist is looked up in the library.
-
-    Args:
-        paths: Files, folders, or names in the library, with or without a variant.
-        word: Selects scenarios as `selected_entries` does; '' selects all.
-
-    Raises:
-        InputError: If a path is neither there nor in the library, a folder contains no scenario, or
-            the word selects none.
+    A path that does not exist is looked up in the library; ``word`` selects as `selected_entries`
+    does. Raises `InputError` if a path is nowhere, a folder has no scenario, or none is selected.
     """
     addresses: list[str] = []
     for path in paths:
@@ -186,15 +179,9 @@ def _selected(file: Path, base: str, word: str) -> list[str]:
 
 
 def shard(addresses: list[str], number: int, count: int) -> list[str]:
-    """One of several disjoint parts of some scenarios, which together are all of them.
+    """Part ``number``, from 1, of ``count`` disjoint parts of scenarios, together all of them.
 
-    The scenarios are dealt out in turn, so that a family, whose flights take equally long, is in
-    all parts.
-
-    Args:
-        addresses: Addresses of scenarios, as from `collect`.
-        number: Number of the part, from 1.
-        count: Number of parts.
+    They are dealt out in turn, so that a family, whose flights take equally long, is in all parts.
     """
     return addresses[number - 1 :: count]
 
@@ -213,11 +200,7 @@ def _find(name: str) -> Path:
 
 
 def check_one(loaded: tuple[str, Scenario]) -> CheckResult:
-    """Fly one scenario and evaluate its expectations; errors become part of the result.
-
-    Args:
-        loaded: The scenario and its address.
-    """
+    """Fly a scenario, given with its address, and check its expectations; errors are results."""
     start = perf_counter()
     address, scenario = loaded
     try:

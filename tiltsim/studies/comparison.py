@@ -119,13 +119,9 @@ class Entry:
 
 
 def controller_tables(names: Sequence[str]) -> dict[str, Mapping[str, Any]]:
-    """The tables of laws with their default gains, and of the scenario's own controller.
+    """The tables of laws with their default gains, or `GIVEN`, the scenario's own.
 
-    Args:
-        names: Laws, or `GIVEN`.
-
-    Raises:
-        InputError: If one does not exist.
+    Raises `InputError` if one does not exist.
     """
     known = [law for law in (GIVEN, *CONTROLLERS) if law not in ("python", "numpy")]
     for name in names:
@@ -207,10 +203,7 @@ def refusal(row: Mapping[str, Any]) -> str | None:
 def compare_one(entry: Entry, *, searches: bool, timed: bool = True) -> Compared:
     """One controller on one scenario; a scenario that refuses it is part of the result.
 
-    Args:
-        entry: The controller and the scenario.
-        searches: Whether robustness is sought.
-        timed: Whether control steps are timed.
+    ``searches`` seeks robustness, ``timed`` times control steps.
     """
     row: dict[str, Any] = {"controller": entry.name, "scenario": entry.address}
     try:

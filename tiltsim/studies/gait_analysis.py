@@ -160,18 +160,11 @@ def _backward_rotors(speeds: Quad | None) -> list[str]:
 
 
 def fault_report(tilts: Quad, vehicle: Vehicle, opposite_speed: float) -> dict[str, Any]:
-    """Hovering after the loss of each rotor (``tiltsim gait --faults``).
+    """Hovering after the loss of each rotor (``tiltsim gait --faults``); rad and rad/s.
 
-    Args:
-        tilts: Tilt angles, rad.
-        vehicle: Their vehicle.
-        opposite_speed: Speed of the rotor opposite the failed one in the hover with free tilt
-            angles, rad/s.
-
-    Returns:
-        For each rotor: how far (rad) the tilt angles are from a hover on the other three, and a
-        hover on three rotors with free tilt angles. ``least_speed`` is the maximum speed (rad/s)
-        that the rotors must reach for it.
+    For each rotor: how far the tilt angles are from a hover on the other three, and a hover on
+    three with free tilt angles, the rotor opposite the failed one at ``opposite_speed``;
+    ``least_speed`` is the maximum speed that the rotors must reach for it.
     """
     losses = []
     for failed in ROTORS:

@@ -39,13 +39,10 @@ UNLIMITED: Final = 100.0
 def tilted_rotors(
     vehicle: Multirotor, angles: Sequence[float], limits: tuple[float, float] | None = None
 ) -> TiltedRotors:
-    """The rotors of a vehicle at tilt angles (rad).
+    """The rotors of a vehicle at tilt angles (rad), one for each hinge.
 
-    Args:
-        vehicle: with the ranges of its rotor speeds
-        angles: one for each tilt hinge, rad
-        limits: minimum and maximum rotor speed (rad/s) in place of the file's; a rotor that
-            turns either way has the maximum both ways
+    ``limits``, minimum and maximum rotor speed (rad/s), replace the file's; a rotor that turns
+    either way has the maximum both ways.
     """
     ranges = np.array(vehicle.speed_ranges)
     if limits is not None:
@@ -198,13 +195,8 @@ def balance_report(
 ) -> dict[str, list[float]]:
     """Tilt angles and rotor speeds that hold the vehicle level under an acceleration (m/s^2).
 
-    Args:
-        vehicle: of any number of rotors
-        acceleration: constant, of the vehicle, world axes at yaw 0
-        limits: as for `tilted_rotors`
-
-    Raises:
-        ValueError: If no tilt angles and rotor speeds within the limits do.
+    The acceleration is constant, world axes at yaw 0; ``limits`` as for `tilted_rotors`. Raises
+    ValueError if no tilt angles and rotor speeds within the limits do.
     """
     rotors = tilted_rotors(vehicle, (0.0,) * vehicle.tilts, limits)
     weight = np.array([0.0, 0.0, vehicle.gravity])

@@ -25,13 +25,7 @@ def timed(fly: Callable[[], object]) -> Timing:
 
 
 def speed(timings: Sequence[Timing], steps: int, timestep: float) -> dict[str, Any]:
-    """Columns of a row from the best of several timings but the first, which compiles.
-
-    Args:
-        timings: Timings of equal flights.
-        steps: Steps of all vehicles together in one of them.
-        timestep: s
-    """
+    """Columns of a row from the best timing but the first, which compiles; time step in s."""
     (first, _), *others = timings
     wall, cpu = map(min, zip(*others, strict=True))
     return {

@@ -184,14 +184,7 @@ def _holds(points: SweepPoints, result: ScenarioResult) -> bool:
 def _row(
     points: SweepPoints, index: int, values: Mapping[str, Any], result: ScenarioResult
 ) -> dict[str, Any]:
-    """The row of a point, by column, without versions.
-
-    Args:
-        points: The points of the sweep.
-        index: Number of the point.
-        values: Values that the axes set, by key.
-        result: Result of the flight with these values.
-    """
+    """The row of a point, by column, without versions, for the values that the axes set."""
     if result.scenario is None:
         document = points.document(values)  # not valid, but it shows the mistake
     else:
@@ -213,14 +206,8 @@ def _fly_scenarios(
 ) -> list[ScenarioResult]:
     """Fly scenarios and return their results in the same order.
 
-    Args:
-        scenarios: The scenarios of a chunk.
-        keep_flights: Whether results hold their flights.
-        others: Makes a few scenarios from all over the sweep.
-
-    Raises:
-        InputError: If the first few crash, and the others, all with one Python error.
-        KeyboardInterrupt: If a flight was interrupted from the keyboard.
+    Raises `InputError` if the first few crash, and the few that ``others`` makes from all over the
+    sweep, all with one Python error; KeyboardInterrupt if a flight was interrupted.
     """
     try:
         return _fly(scenarios, keep_flights)

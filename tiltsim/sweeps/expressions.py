@@ -38,14 +38,9 @@ CONSTANTS: Final = {"pi": math.pi}
 def evaluate(expression: str, values: Mapping[str, Any]) -> float:
     """The value of an expression over named numbers.
 
-    Args:
-        expression: ``+ - * / **``, parentheses, numbers, `FUNCTIONS`, pi, and the names
-            in ``values``, dots and positions included, as in ``2 * gait.period``.
-        values: Numbers by name.
-
-    Raises:
-        ValueError: If the expression cannot be parsed or has no value; the message is a predicate
-            of it.
+    It has ``+ - * / **``, parentheses, numbers, `FUNCTIONS`, pi, and the names in ``values``, dots
+    and positions included, as in ``2 * gait.period``. Raises ValueError, whose message is a
+    predicate of the expression, if it cannot be parsed or has no value.
     """
     try:
         value = _value(_parse(expression), values)

@@ -64,15 +64,9 @@ def prepare_folder(folder: Path) -> None:
 
 
 def prepare_file(option: str, file: Path, suffixes: Sequence[str] = ()) -> None:
-    """Check that a file can be written, before the work for it begins.
+    """Raise `InputError` unless the file of an option can be written and its suffix fits.
 
-    Args:
-        option: Command-line option, for the message.
-        file: The file.
-        suffixes: Allowed suffixes, lower case with their dots; empty allows any.
-
-    Raises:
-        InputError: If the file cannot be written or its suffix is not allowed.
+    Called before the work for the file begins. Suffixes are in lower case; empty allows any.
     """
     _require_possible_name(f"{option} ", file)
     if suffixes and file.suffix.lower() not in suffixes:

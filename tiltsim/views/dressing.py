@@ -25,15 +25,7 @@ SKYBOX: Final = mujoco.mjtTexture.mjTEXTURE_SKYBOX
 
 
 def dressed(model: mujoco.MjModel, path: Path) -> mujoco.MjModel:
-    """The model of a user's file with the visuals that the file lacks.
-
-    Args:
-        model: The file as it flies, compiled.
-        path: The file.
-
-    Returns:
-        A model with the same bodies, joints and sites.
-    """
+    """The compiled model of a user's file, with the visuals that the file lacks."""
     spec = mujoco.MjSpec.from_file(str(path))
     scene = mujoco.MjSpec.from_file(str(shipped_folder("mjcf") / "scene.xml"))
     if SKYBOX not in [texture.type for texture in spec.textures]:

@@ -121,13 +121,8 @@ def scale(
 ) -> tuple[float, float, bool]:
     """Lower and upper end of an axis, and whether a line ends off its scale.
 
-    The last samples of flights that terminated early can be of any magnitude, which would make all
-    others a flat line.
-
-    Args:
-        drawn: The values of every line.
-        ended: Whether its flight terminated early.
-        least: Smallest range.
+    The last samples of lines whose flights ``ended`` early can be of any magnitude, which would
+    make all others a flat line. ``least`` is the smallest range.
     """
     before = [
         line[: -max(1, round(END_FRACTION * len(line)))] if early and len(line) > 1 else line

@@ -138,11 +138,7 @@ def draw_set(
 
 
 def _faces(vertices: NDArray[np.float64]) -> list[NDArray[np.float64]]:
-    """The polygons that bound a convex body, each with its corners in order.
-
-    Args:
-        vertices: of the body, shape (n, 3).
-    """
+    """The polygons, corners in order, that bound the convex body of vertices of shape (n, 3)."""
     size = np.abs(vertices).max(axis=0)
     hull = ConvexHull(vertices / size, qhull_options=ALMOST_FLAT)
     planes, face_of = np.unique(hull.equations.round(6), axis=0, return_inverse=True)

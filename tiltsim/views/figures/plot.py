@@ -122,14 +122,7 @@ def _page(
     heading: Callable[[float], tuple[str, str]],
     texts: Mapping[str, str],
 ) -> Page:
-    """Draw the panels.
-
-    Args:
-        shown: The flights.
-        chosen: The panels by name.
-        heading: Title and line below it for a width (inches).
-        texts: Texts instead of others.
-    """
+    """Draw the panels; ``heading`` is title and line below it for a width (inches)."""
     page = new_page([panel.over_time for panel in chosen.values()])
     for axes, panel in zip(page.panels, chosen.values(), strict=True):
         drawn = [one for one in shown if panel.needs in one.flight.units]
