@@ -16,6 +16,8 @@ matrix is singular in both cases, so `balanced_gait` minimizes the tilt with A a
 from zero.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from math import asin, atan, cos, hypot, inf, isfinite, pi, radians, sin
 from typing import Any, Final

@@ -21,6 +21,8 @@ the vehicle, and mirror it for rotors 2 and 4):
   must avoid is necessary to hover on the pair. Pitch is uncontrolled.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from itertools import product
 from math import asin, atan, atan2, cos, hypot, pi, sin, sqrt

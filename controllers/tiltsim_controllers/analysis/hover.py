@@ -7,6 +7,8 @@ hovers are its points at the distance of the weight from the origin. The one of 
 or on a face or an edge of the polytope, so it is found without search.
 """
 
+from __future__ import annotations
+
 from collections.abc import Iterator
 from itertools import combinations
 from math import acos

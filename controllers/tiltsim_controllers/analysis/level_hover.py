@@ -6,6 +6,8 @@ quadratic programming over tilts and rotor inputs together, from several starts.
 the least tilts would load some rotors fully and stop others.
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from math import radians
 from typing import Final, NamedTuple

@@ -16,6 +16,8 @@ Attitudes are roll ``phi`` and pitch ``theta`` in rad. Each expression is even i
 in the axes of ch. 2 (z down) and in ours.
 """
 
+from __future__ import annotations
+
 import numpy as np
 from numpy.typing import ArrayLike
 

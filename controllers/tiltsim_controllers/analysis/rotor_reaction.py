@@ -10,6 +10,8 @@ published matrix and ``K_yaw J / (2 varpi K_m)`` with the exact one, in yaw, and
 other tilts it can be larger, or negative where tilted thrusts turn the body against the reaction.
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from math import atan2, cos, exp, hypot, inf, pi, sin
 

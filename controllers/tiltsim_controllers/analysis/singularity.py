@@ -13,6 +13,8 @@ ratio, with these misprints: the term ``-2.880 s1 s2 c3 s4 sin(roll) cos(pitch)`
 scales everything by the constant 1.025.
 """
 
+from __future__ import annotations
+
 from typing import Any, NamedTuple
 
 import numpy as np

@@ -1,5 +1,7 @@
 """Routh-Hurwitz stability of the linear error dynamics (ch. 4, Propositions 4 and 5)."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from typing import NamedTuple
 

@@ -1,5 +1,7 @@
 """Rotor speeds in hover with fixed tilts, from statics alone (ch. 4, Remark 6)."""
 
+from __future__ import annotations
+
 from math import copysign, hypot, sqrt
 
 from tiltsim_controllers.analysis.singularity import torque_free_direction

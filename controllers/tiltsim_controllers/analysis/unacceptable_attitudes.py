@@ -5,6 +5,8 @@ perpendicular to the torque-free force ``n``: a great circle, known in closed fo
 rad; ``angles`` are the four tilt angles of one gait at one instant.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from itertools import pairwise
 from math import atan, atan2, cos, inf, pi
