@@ -1,7 +1,5 @@
 """JAX's arrays for lifted functions."""
 
-from __future__ import annotations
-
 import math
 import operator
 from collections.abc import Callable, Mapping

@@ -5,8 +5,6 @@ samples, so that a flight of any length runs without returning to Python and wit
 lock.
 """
 
-from __future__ import annotations
-
 import ctypes
 from functools import cache, lru_cache
 from math import nan

@@ -1,7 +1,5 @@
 """The Python engine: the traced control step as Python on floats."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import lru_cache, partial
 from struct import Struct

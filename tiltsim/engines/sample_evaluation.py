@@ -1,7 +1,5 @@
 """Scalar functions over the samples of a flight, compiled once that pays off."""
 
-from __future__ import annotations
-
 import ctypes
 from collections.abc import Callable, Iterator, Sequence
 from functools import lru_cache

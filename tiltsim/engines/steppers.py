@@ -1,7 +1,5 @@
 """Integration of the equations of motion: as Python on floats, and as machine code."""
 
-from __future__ import annotations
-
 import ctypes
 from collections.abc import Callable, Sequence
 from functools import cache, lru_cache

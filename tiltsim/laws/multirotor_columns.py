@@ -1,7 +1,5 @@
 """Columns and singularity checks of multirotors under the controller of attitude and force."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from functools import cache
 from typing import Any, Final

@@ -1,7 +1,5 @@
 """The figures of the report, a few per chapter, drawn with `tiltsim.views.figures`."""
 
-from __future__ import annotations
-
 import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """How many verdicts depend on the numbers of ours in criteria: each is halved and doubled."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import isfinite

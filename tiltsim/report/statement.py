@@ -1,7 +1,5 @@
 """Statements of the thesis, as the report judges them, and our own choices in their tests."""
 
-from __future__ import annotations
-
 import re
 import unicodedata
 from collections.abc import Iterable

@@ -1,7 +1,5 @@
 """Labels and units of the keys of scenario files, from the descriptions in the schema."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Final
 

@@ -1,7 +1,5 @@
 """Names, meanings and units of the metrics."""
 
-from __future__ import annotations
-
 from typing import Final, NamedTuple
 
 from tiltsim.system.text import Quantity

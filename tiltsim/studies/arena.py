@@ -1,7 +1,5 @@
 """The arena: fixed tasks for every vehicle, flown by every controller, and their scores."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from statistics import mean
