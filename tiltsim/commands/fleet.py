@@ -3,16 +3,8 @@
 from pathlib import Path
 from typing import Any, Final
 
+from tiltsim.commands import text
 from tiltsim.commands.options import Json, refuse_both
-from tiltsim.commands.text import (
-    Columns,
-    cells,
-    json_text,
-    markdown_table,
-    number,
-    print_line,
-    table,
-)
 
 
 def _margin(vehicle: dict[str, Any]) -> float | None:
@@ -32,11 +24,11 @@ def _with_tilts(vehicle: dict[str, Any]) -> str:
     return "position and attitude" if tilting["pose"] == 6 else "attitude and lift"
 
 
-COLUMNS: Final[Columns] = {
+COLUMNS: Final[text.Columns] = {
     "vehicle": ("name", ""),
     "rotors": ("rotors", "d"),
     "tilt hinges": ("tilts", "d"),
-    "tilt angles (rad)": (lambda row: ", ".join(map(number, row["angles"])) or "-", ""),
+    "tilt angles (rad)": (lambda row: ", ".join(map(text.number, row["angles"])) or "-", ""),
     "dimension": ("torque_free_dimension", "d"),
     "singular attitudes": ("singular_attitudes", ""),
     "margin (rad)": (_margin, ".4f"),
@@ -74,10 +66,10 @@ def run(*, json: Json = False, markdown: bool = False, pictures: Path | None = N
         for name, angles in FLEET.items():
             save_portrait(fleet_file(name), angles, pictures / f"fleet_{name}.png")
             if not (json or markdown):
-                print_line(f"picture written to {pictures / f'fleet_{name}.png'}")
+                text.print_line(f"picture written to {pictures / f'fleet_{name}.png'}")
     if markdown:
         linked = [row | {"name": f"[{row['name']}](../mjcf/{row['name']}.xml)"} for row in report]
-        print("\n".join(markdown_table([*COLUMNS], cells(COLUMNS, linked)[1:])))
+        print("\n".join(text.markdown_table([*COLUMNS], text.cells(COLUMNS, linked)[1:])))
     else:
-        print(json_text(report) if json else table(COLUMNS, report))
+        print(text.json_text(report) if json else text.table(COLUMNS, report))
     return 0

@@ -9,13 +9,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from tiltsim_controllers.analysis import two_color_map
-from tiltsim_controllers.analysis.fault_tolerance import (
-    fixed_tilt_hover,
-    fixed_tilt_imbalance,
-    minimum_hover_speed,
-    three_rotor_hover,
-)
+from tiltsim_controllers.analysis import fault_tolerance, two_color_map
 from tiltsim_controllers.analysis.published_gaits import DETERMINANT_CASES, TRIANGLE
 from tiltsim_controllers.analysis.singularity import (
     determinant,
@@ -168,15 +162,17 @@ def fault_report(tilts: Quad, vehicle: Vehicle, opposite_speed: float) -> dict[s
     """
     losses = []
     for failed in ROTORS:
-        free = three_rotor_hover(failed, vehicle, opposite_speed=opposite_speed)
+        free = fault_tolerance.three_rotor_hover(failed, vehicle, opposite_speed=opposite_speed)
         factors = [0.0 if rotor == failed else 1.0 for rotor in ROTORS]
         losses.append(
             {
                 "rotor": failed,
-                "fixed_tilts_miss": fixed_tilt_imbalance(tilts, failed, vehicle),
-                "hovers_with_fixed_tilts": fixed_tilt_hover(tilts, vehicle, lost=failed)
+                "fixed_tilts_miss": fault_tolerance.fixed_tilt_imbalance(tilts, failed, vehicle),
+                "hovers_with_fixed_tilts": fault_tolerance.fixed_tilt_hover(
+                    tilts, vehicle, lost=failed
+                )
                 is not None,
-                "least_speed": minimum_hover_speed(
+                "least_speed": fault_tolerance.minimum_hover_speed(
                     vehicle, factors=(factors[0], factors[1], factors[2], factors[3])
                 ),
                 "free_tilts": {

@@ -15,16 +15,7 @@ from tiltsim.flight.flight import Flight, as_flights
 from tiltsim.flight.vectors import VECTORS, components
 from tiltsim.scenario.messages import choose
 from tiltsim.system.text import short_repr
-from tiltsim.views.figures import style
-from tiltsim.views.figures.layout import (
-    Page,
-    add_heading,
-    fitting,
-    new_page,
-    place_legends,
-    relabel,
-    wrap,
-)
+from tiltsim.views.figures import layout, style
 from tiltsim.views.figures.panels import (
     Panel,
     Shown,
@@ -113,7 +104,7 @@ def draw_flights(
     shown = [Shown(*one) for one in zip(flights, names, looks, strict=True)]
     chosen = _chosen(flights, panels)
     heading = partial(_heading, shown, title)
-    return fitting(lambda: _page(shown, chosen, heading, others))
+    return layout.fitting(lambda: _page(shown, chosen, heading, others))
 
 
 def _page(
@@ -121,9 +112,9 @@ def _page(
     chosen: Mapping[str, Panel],
     heading: Callable[[float], tuple[str, str]],
     texts: Mapping[str, str],
-) -> Page:
+) -> layout.Page:
     """Draw the panels; ``heading`` is title and line below it for a width (inches)."""
-    page = new_page([panel.over_time for panel in chosen.values()])
+    page = layout.new_page([panel.over_time for panel in chosen.values()])
     for axes, panel in zip(page.panels, chosen.values(), strict=True):
         drawn = [one for one in shown if panel.needs in one.flight.units]
         if panel.over_time:
@@ -132,7 +123,7 @@ def _page(
         if panel.signals is not None:
             set_scale(axes, panel.signals, drawn)
     if len(shown) == 1:
-        place_legends(page)
+        layout.place_legends(page)
     for column in page.columns:
         _label_time(column)
     marks = [*_handles(shown, page.figure.axes)] if len(shown) > 1 else []
@@ -140,10 +131,10 @@ def _page(
     for name in said.keys() & texts.keys():
         said[name].set_label(style.verbatim(texts[name]))
     others = {name: text for name, text in texts.items() if name not in said}
-    relabel(page.figure, others, dict(zip(chosen, page.panels, strict=True)))
-    add_heading(page.figure, *heading(page.figure.get_figwidth()), marks)
+    layout.relabel(page.figure, others, dict(zip(chosen, page.panels, strict=True)))
+    layout.add_heading(page.figure, *heading(page.figure.get_figwidth()), marks)
     for axes in page.panels:
-        wrap(axes.yaxis.label, axes.get_window_extent().height)
+        layout.wrap(axes.yaxis.label, axes.get_window_extent().height)
     return page
 
 
