@@ -310,8 +310,7 @@ class FinalStates:
 
     def __init__(self, axes: str) -> None:
         self._axes = axes
-        self.engine: EngineName | None = None
-        """The engine of the last flight."""
+        self.engine: EngineName | None = None  # the engine of the last flight
 
     def fly(self, scenarios: Sequence[Scenario]) -> Iterator[tuple[End, Floats]]:
         """The end of each flight, and means over its last second, shape (3 + axes,).

@@ -26,8 +26,7 @@ class PublishedError:
     printed: str
     mended: str
     proof: str
-    changes: str
-    """Its consequences downstream."""
+    changes: str  # its consequences downstream
 
     @property
     def off(self) -> str:

@@ -41,8 +41,7 @@ class Picture:
     chapter: int
     name: str
     caption: str
-    draw: Callable[[FlightMetrics], Figure]
-    """From the metrics of the report's flights."""
+    draw: Callable[[FlightMetrics], Figure]  # from the metrics of the report's flights
     flights: tuple[tuple[str, Plant], ...] = ()
     """Flights that it shows; one without flights needs only analysis."""
 

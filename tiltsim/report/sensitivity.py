@@ -31,8 +31,7 @@ class Criterion:
     value: str
     reason: str
     rows: int
-    changed: tuple[int, ...]
-    """Verdicts that change by each of `FACTORS`."""
+    changed: tuple[int, ...]  # verdicts that change by each of `FACTORS`
 
 
 def criteria(rows: Sequence[Row], flights: Flights) -> list[Criterion]:
