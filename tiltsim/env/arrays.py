@@ -1,5 +1,7 @@
 """Conversions between a vehicle's quantities and the environment's arrays with their bounds."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Mapping
 from math import pi
 from operator import attrgetter

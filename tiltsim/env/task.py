@@ -1,5 +1,7 @@
 """The task of an episode: its scenario, observation, reward and termination."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Mapping, Sequence
 from math import dist
 from typing import Any, Final

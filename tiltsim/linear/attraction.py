@@ -1,5 +1,7 @@
 """The region of attraction of a flight: a map over two numbers of its initial state."""
 
+from __future__ import annotations
+
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace

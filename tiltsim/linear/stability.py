@@ -1,5 +1,7 @@
 """Stability of a rest point or periodic orbit: its modes, the slowest one, and over a key."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from itertools import pairwise

@@ -1,5 +1,7 @@
 """Reading the results of a sweep, finished or not."""
 
+from __future__ import annotations
+
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -1,5 +1,7 @@
 """Figures of flights: one flight on a page, or several compared."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
