@@ -1,7 +1,5 @@
 """The tables of objects, of a tool and of a load: ``[[object]]``, ``[tool]``, ``[payload]``."""
 
-from __future__ import annotations
-
 from math import pi
 from typing import Annotated, Any, Final, Literal
 

@@ -1,7 +1,5 @@
 """The common part of the ``[reference]`` tables."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from math import pi
 from typing import Annotated, Any, Final

@@ -9,7 +9,7 @@ import numpy as np
 
 from tiltsim.models.objects import CABLE_READING, CONTACT_READING, COORDINATES, FORCE
 from tiltsim.scenario.interaction import objects_of
-from tiltsim.system.quantity import Quantity
+from tiltsim.system.text import Quantity
 from tiltsim_controllers.mathematics.attitude import rotation_of_quaternion
 from tiltsim_controllers.mathematics.rotation import quaternion_from_euler
 
