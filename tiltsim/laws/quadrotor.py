@@ -4,11 +4,9 @@ They demand thrust and torques, which the rotors make at once: their speeds foll
 and are not states. The model's four rotor speed states stay at zero.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -26,6 +24,7 @@ from tiltsim.engines.sample_evaluation import evaluate_over_samples
 from tiltsim.equations.quadrotor import equations_of_motion, initial_state
 from tiltsim.laws.parameters import head_of, parameters_of
 from tiltsim.laws.rotorcraft import REFERENCE_COLUMNS
+from tiltsim.scenario.scenario import FlightPlan
 from tiltsim.vehicles.rotorcraft import ROTORCRAFT
 from tiltsim.vehicles.rotorcraft.layout import CROSS
 from tiltsim_controllers.analysis.quadrotor_singularity import (
@@ -45,9 +44,6 @@ from tiltsim_controllers.references.trajectories import (
 from tiltsim_controllers.vehicle.parameters import SPIN, Vehicle
 from tiltsim_controllers.vehicle.quadrotor_mixer import speed_along_spin, thrust_controls
 from tiltsim_controllers.vehicle.states import PITCH, ROLL
-
-if TYPE_CHECKING:
-    from tiltsim.scenario.scenario import FlightPlan
 
 EXTENSION_FIELDS: Final = ("extension_thrust", "extension_thrust_rate")
 """The controller's states, ``zeta`` and ``xi``, in a sample."""
