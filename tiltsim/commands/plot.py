@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 from tiltsim.commands.declaring import Option
 from tiltsim.commands.options import FigureOptions, Names, file_in, prepare_figure
 from tiltsim.commands.text import print_line
+from tiltsim.views import figures
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -64,12 +65,9 @@ def run(
 
     def draw() -> Figure:
         if sweep is not None:
-            from tiltsim.views.figures.sweep import sweep_figure
-
-            return sweep_figure(results, (*metrics, *panels))
-        from tiltsim.views.figures.plot import draw_flights
-
-        return draw_flights(loaded, names, texts, panels=panels, title=figure.title)
+            return figures.sweep.sweep_figure(results, (*metrics, *panels))
+        drawn = figures.plot.draw_flights
+        return drawn(loaded, names, texts, panels=panels, title=figure.title)
 
     file = file_in(out, first, "sweep.png" if sweep else "flights.png" if others else "flight.png")
     prepare_figure("--out", file)
