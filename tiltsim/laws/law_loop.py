@@ -83,6 +83,7 @@ class Key(NamedTuple):
     discrete: tuple[tuple[str, str], ...]  # likewise, discrete ones
     tilts: bool  # whether the law commands the tilts
     models_rotors: bool  # whether the rotors follow a model of theirs, as they do with latency
+    models_latency: bool = False  # whether the law knows its commands on their way
     traced: bool = True  # see `ClosedLoop.traced`
 
     @property
@@ -177,6 +178,7 @@ def _control_of(key: Key) -> Callable[..., Any]:
             torque=wrench[3:],
             rotors=pushing,
             table=knots[at + coefficients + rotors :],
+            tilt_commands=states[own + discrete : own + discrete + tilts * key.tilts],
         )
         try:
             command = key.law(observed, known.own)
@@ -337,9 +339,10 @@ def law_loop(key: Key, law_of: Callable[[FlightPlan], FlownLaw]) -> ClosedLoop:
         commands=len(key.states) + len(key.discrete) if key.tilts else None,
     )
     late = key._replace(models_rotors=True)
+    knows_latency = key.models_rotors or key.models_latency
     return replace(
         rotor_loop(key.layout, law),
         follows_position=lambda scenario: scenario.reference.kind != "attitude_altitude",
-        with_latency=None if key.models_rotors else partial(law_loop, late, law_of),
+        with_latency=None if knows_latency else partial(law_loop, late, law_of),
         traced=key.traced,
     )

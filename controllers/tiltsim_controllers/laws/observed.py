@@ -52,6 +52,7 @@ class Observed(NamedTuple):
     torque: Any  # (3, N), N m per newton, likewise
     rotors: Rotors  # force and torque per newton at any tilts
     table: Any  # further numbers of the law, such as gains over time
+    tilt_commands: Any  # (M,), rad, of a law that commands the tilts; otherwise none
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
