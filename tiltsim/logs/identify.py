@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 
 from tiltsim.errors import InputError
 from tiltsim.logs.log import Log
-from tiltsim.logs.model import INITIAL, LoggedVehicle, Parameter, residuals_of
+from tiltsim.logs.model import FACTORS, INITIAL, LoggedVehicle, Parameter, residuals_of
 from tiltsim.logs.reading import read_log
 from tiltsim.logs.windows import MEASURED, Windows, noise_of, windows_of
 from tiltsim.scenario.loading import load_scenario
@@ -54,7 +54,8 @@ class Estimate:
         windows: Windows of the log that were used.
         noise: Standard deviations of the measured vectors.
         residuals: Measured minus predicted, in their noise, shape (windows, samples, channels).
-        scenario: The scenario's address.
+        nominal: Their values in the scenario.
+        model: ``vehicle.model`` of the scenario.
     """
 
     values: dict[str, float]
@@ -68,7 +69,8 @@ class Estimate:
     windows: int
     noise: dict[str, float]
     residuals: Floats
-    scenario: str
+    nominal: dict[str, float]
+    model: str
 
     def report(self) -> dict[str, Any]:
         """Everything but the residuals, for JSON."""
@@ -76,11 +78,18 @@ class Estimate:
         return found | {"correlation": self.correlation.tolist(), "warnings": [*self.warnings]}
 
     def overrides(self) -> dict[str, Any]:
-        """Keys for `Scenario.replace`, vectors as lists."""
+        """Keys for `Scenario.replace`, vectors as lists.
+
+        The numbers of a vehicle from an MJCF file stand there; they become factors of model_error.
+        """
         found: dict[str, Any] = {}
         for name, value in self.values.items():
             key, _, entry = name.partition("[")
-            found[key] = [*found.get(key, []), value] if entry else value
+            error = key.replace("vehicle.", "model_error.")
+            if self.model == "multirotor" and error in FACTORS:
+                key, value = error, value / self.nominal[name]
+            if key != "vehicle.center_of_mass":  # no key of a scenario
+                found[key] = [*found.get(key, []), value] if entry else value
         return found
 
     def _repr_html_(self) -> str:
@@ -136,7 +145,7 @@ def identify(
     with jax.enable_x64(True):
         problem = Problem(vehicle, chosen, sigmas, cut)
         theta, residuals, information = problem.minimum(read.name)
-    return _estimate(loaded.address, chosen, theta, residuals, information, sigmas)
+    return _estimate(loaded.vehicle.model, chosen, theta, residuals, information, sigmas)
 
 
 def _noise(log: Log, given: Mapping[str, float]) -> dict[str, float]:
@@ -276,7 +285,7 @@ def _step(parts: list[Floats], damping: float) -> tuple[Floats, Floats]:
 
 
 def _estimate(
-    scenario: str,
+    model: str,
     chosen: Mapping[str, Parameter],
     theta: Floats,
     residuals: Floats,
@@ -324,7 +333,8 @@ def _estimate(
         windows=len(residuals),
         noise={name: value for name, value in noise.items() if name in MEASURED},
         residuals=residuals,
-        scenario=scenario,
+        nominal=dict(zip(names, np.array(starts).tolist(), strict=True)),
+        model=model,
     )
 
 

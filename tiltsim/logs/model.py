@@ -43,6 +43,11 @@ class Parameter(NamedTuple):
     scale: Floats
 
 
+FACTORS: Final = tuple(
+    f"model_error.{key}" for key in ("mass", "inertia", "thrust_coefficient", "drag_coefficient")
+)
+"""Parameters as factors on those of the scenario."""
+
 CONJUGATE: Final = np.array([1.0, -1.0, -1.0, -1.0])
 
 TINY: Final = 1e-12
@@ -102,10 +107,10 @@ class LoggedVehicle:
             "sensors.body_rates_bias": Parameter("bias", "rad/s", 0.0 * three, 0.01 * three),
         }
         nominal = {one.field: one.nominal for one in self.parameters.values()}
-        for key in ("mass", "inertia", "thrust_coefficient", "drag_coefficient"):
-            found = self.parameters[f"vehicle.{key}"]
+        for key in FACTORS:
+            found = self.parameters[key.replace("model_error.", "vehicle.")]
             size = np.ones(len(found.nominal))
-            self.parameters[f"model_error.{key}"] = Parameter(found.field, "-", size, size)
+            self.parameters[key] = Parameter(found.field, "-", size, size)
         pushes, turns = (
             rotors_in(np.concatenate(tables), 0, vehicle.tilt_of_rotor)[2:]
             for tables in (
