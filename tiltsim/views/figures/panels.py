@@ -270,7 +270,9 @@ def _path(axes: Axes, shown: Sequence[Shown]) -> None:
     else:
         axes.set_aspect("equal", adjustable="datalim")
         if long < FLOORS["m"]:
-            axes.set_xlim(data.x0 - FLOORS["m"], data.x1 + FLOORS["m"])
+            wider = ((data.x0 - FLOORS["m"], data.y0), (data.x1 + FLOORS["m"], data.y1))
+            axes.update_datalim(wider)
+            axes.autoscale_view()
 
 
 def _attitude_plane(axes: Axes, shown: Sequence[Shown]) -> None:
