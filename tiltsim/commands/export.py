@@ -20,7 +20,7 @@ def run(
 
     Args:
         flight (FLIGHT): a folder of results, or a flight.parquet
-        format: mcap (default), ulog or csv; by default that of the suffix of --out
+        format: mcap (default), ulog or csv; by default according to the suffix of --out
         out (FILE): the file, or a folder (default: flight.mcap, .ulg or .csv beside the flight)
     """
     from tiltsim.flight.reading import load_flight

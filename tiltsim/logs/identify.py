@@ -29,7 +29,7 @@ from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.vehicle.effectiveness import TiltOfRotor
 
 MOST_STEPS: Final = 30
-"""Gauss-Newton steps; a log that tells its parameters needs five."""
+"""Gauss-Newton steps; a log with enough motion needs five."""
 
 VAGUE: Final = 0.5
 """A combination of parameters with a larger deviation than this, in their scales, is refused."""
@@ -46,10 +46,10 @@ class Estimate:
         values: By key; entries of vectors as ``vehicle.inertia[0]``.
         sigma: Their standard deviations, from the noise; from the residuals if these are larger.
         units: Their units.
-        correlation: Of the values, shape (n, n), in their order.
+        correlation: Correlation of the values, shape (n, n), in their order.
         chi2: Squared residuals over their noise, per degree of freedom; 1 for a true model.
         chi2_band: Where chi2 of a true model lies with 95 % probability.
-        autocorrelation: Of neighboring residuals; near 0 for a true model.
+        autocorrelation: Correlation of neighboring residuals; near 0 for a true model.
         warnings: One line each.
         windows: Windows of the log that were used.
         noise: Standard deviations of the measured vectors.
@@ -263,7 +263,7 @@ def _guess(windows: Windows) -> tuple[Floats, ...]:
 
 
 def _reduced(parts: list[Floats], damping: float) -> tuple[Floats, Floats, Floats, Floats]:
-    """Normal equations of the parameters alone, and what brings the initial states back."""
+    """Normal equations of the parameters alone, and how the initial states follow."""
     both, mixed, own, slope, own_slope = parts
     # A part of the initial state that nothing measures stays as it is guessed.
     sizes = np.einsum("wii->wi", own)

@@ -46,7 +46,7 @@ UNITS: Final = {
 
 
 LOG_SUFFIXES: Final = (".mcap", ".ulg", ".ulog", ".csv")
-"""Of files in the formats of other tools."""
+"""Suffixes of files in the formats of other tools."""
 
 
 @dataclass(frozen=True, repr=False)

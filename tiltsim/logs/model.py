@@ -46,7 +46,7 @@ class Parameter(NamedTuple):
 FACTORS: Final = tuple(
     f"model_error.{key}" for key in ("mass", "inertia", "thrust_coefficient", "drag_coefficient")
 )
-"""Parameters as factors on those of the scenario."""
+"""Parameters as factors on the values of the scenario."""
 
 CONJUGATE: Final = np.array([1.0, -1.0, -1.0, -1.0])
 
@@ -71,7 +71,7 @@ class LoggedVehicle:
     """A scenario's vehicle as a model of a log, and its parameters by key.
 
     Args:
-        scenario: Of a rotorcraft.
+        scenario: The scenario of a rotorcraft.
 
     Raises:
         InputError: If it is of another vehicle.
@@ -205,7 +205,9 @@ def residuals_of(layout: TiltOfRotor, free: tuple[tuple[str, str], ...]) -> Call
         body, rotors = _body_and_rotors(layout, numbers, values)
         center = values["center"]
         drag = Drag(values["resistance"], numbers["area"], numbers["density"])
-        path = flown(values, body, rotors, drag, numbers["damping"], initial, guess, window)
+        path = _flown(
+            fields, values, body, rotors, drag, numbers["damping"], initial, guess, window
+        )
         rotation = jax.vmap(rotation_of_quaternion)(path[2])
         spun = jax.vmap(cross, (0, None))(path[3], center)
         error = jax.vmap(quaternion_product)(path[2] * CONJUGATE, window.attitude)
@@ -223,85 +225,115 @@ def residuals_of(layout: TiltOfRotor, free: tuple[tuple[str, str], ...]) -> Call
         found = jnp.concatenate(parts, axis=1)
         return jnp.where(jnp.isfinite(found), found, 0.0)
 
-    def flown(
-        values: Any,
-        body: Body,
-        rotors: Rotors,
-        drag: Drag,
-        damping: Any,
-        initial: Any,
-        guess: Any,
-        window: Windows,
-    ) -> Any:
-        """The states at all samples of a window: RK4 between them."""
-        center, frequency = values["center"], values["frequency"][0]
-
-        def rate(state: Any, speeds: Any, tilts: Any, command: Any) -> Any:
-            _, velocity, turn, omega, lagging, pods = state
-            if "lag" in fields:
-                speeds = lagging
-            if "frequency" in fields:
-                tilts = pods[0]
-            rotation = rotation_of_quaternion(turn)
-            wrench = wrench_map(rotors, tilts) @ (speeds * abs(speeds))
-            force, torque = wrench[:3], wrench[3:] - cross(center, wrench[:3])
-            force = force + drag_force(rotation.T @ velocity + TINY, drag)
-            wrench = jnp.concatenate([force, torque])
-            acceleration, spin = accelerations(body, rotation, omega, wrench, 0.0, 1.0)
-            pull = frequency**2 * (command[1] - pods[0]) - 2.0 * damping * frequency * pods[1]
-            return (
-                velocity,
-                acceleration,
-                0.5 * quaternion_product(turn, jnp.concatenate([jnp.zeros(1), omega])),
-                spin,
-                (command[0] - lagging) / values["lag"][0],
-                jnp.stack([pods[1], pull]),
-            )
-
-        def stage(carried: Any, given: Any) -> tuple[Any, None]:
-            # One stage for all four of RK4: the program is compiled once, not four times.
-            base, slope, total, size = carried
-            speeds, tilts, command, (reach, weight, is_last) = given
-            slope = rate(along(base, slope, reach * size), speeds, tilts, command)
-            total = along(total, slope, weight * size)
-            base = jax.tree.map(lambda old, new: jnp.where(is_last, new, old), base, total)
-            return (base, slope, total, size), None
-
-        def advance(state: Any, given: Any) -> tuple[Any, Any]:
-            step, speeds, tilts, command = given
-            substeps = (len(speeds) - 1) // 2
-            at = (2 * np.arange(substeps)[:, None] + STAGE_INPUTS).ravel()
-            held = jax.tree.map(lambda one: jnp.tile(one, (4 * substeps, 1)), command)
-            schedule = tuple(np.tile(one, substeps) for one in RUNGE_KUTTA)
-            carried = (state, jax.tree.map(jnp.zeros_like, state), state, step / substeps)
-            carried, _ = jax.lax.scan(stage, carried, (speeds[at], tilts[at], held, schedule))
-            return carried[0], carried[0]
-
-        place, velocity, turn, omega = guess
-        small = jnp.concatenate([jnp.ones(1), 0.5 * initial[6:9]])
-        turn = quaternion_product(turn, small / jnp.sqrt(small @ small))
-        omega = omega + initial[9:12]
-        arm = rotation_of_quaternion(turn) @ center
-        start = (
-            place + initial[:3] + arm,
-            velocity + initial[3:6] + rotation_of_quaternion(turn) @ cross(omega, center),
-            turn,
-            omega,
-            window.speeds[0, 0],
-            jnp.stack([window.tilts[0, 0], jnp.zeros(window.tilts.shape[-1])]),
-        )
-        commands = (window.speed_commands[:-1], window.tilt_commands[:-1])
-        if "lag" not in fields:
-            commands = (window.speeds[:, 0], commands[1])
-        if "frequency" not in fields:
-            commands = (commands[0], window.tilts[:, 0])
-        _, path = jax.lax.scan(advance, start, (window.step, window.speeds, window.tilts, commands))
-        return jax.tree.map(lambda a, b: jnp.concatenate([a[None], b]), start, path)
-
     def at_samples(stages: Any) -> Any:
         return jnp.concatenate([stages[:, 0], stages[-1:, -1]])
 
-    def along(state: Any, slope: Any, step: Any) -> Any:
-        return jax.tree.map(lambda a, b: a + step * b, state, slope)
-
     return residuals
+
+
+def _along(state: Any, slope: Any, step: Any) -> Any:
+    """A state after a step along a slope."""
+    import jax
+
+    return jax.tree.map(lambda a, b: a + step * b, state, slope)
+
+
+def _runge_kutta(rate: Callable[..., Any]) -> Callable[..., Any]:
+    """The fourth-order method from one sample to the next: ``(state, inputs) -> (state, state)``.
+
+    Args:
+        rate: ``(state, speeds, tilts, command)``: the derivative of a state.
+    """
+    import jax
+    import jax.numpy as jnp
+
+    def stage(carried: Any, given: Any) -> tuple[Any, None]:
+        # One stage for all four of RK4: the program is compiled once, not four times.
+        base, slope, total, size = carried
+        speeds, tilts, command, (reach, weight, is_last) = given
+        slope = rate(_along(base, slope, reach * size), speeds, tilts, command)
+        total = _along(total, slope, weight * size)
+        base = jax.tree.map(lambda old, new: jnp.where(is_last, new, old), base, total)
+        return (base, slope, total, size), None
+
+    def advance(state: Any, given: Any) -> tuple[Any, Any]:
+        step, speeds, tilts, command = given
+        substeps = (len(speeds) - 1) // 2
+        at = (2 * np.arange(substeps)[:, None] + STAGE_INPUTS).ravel()
+        held = jax.tree.map(lambda one: jnp.tile(one, (4 * substeps, 1)), command)
+        schedule = tuple(np.tile(one, substeps) for one in RUNGE_KUTTA)
+        carried = (state, jax.tree.map(jnp.zeros_like, state), state, step / substeps)
+        carried, _ = jax.lax.scan(stage, carried, (speeds[at], tilts[at], held, schedule))
+        return carried[0], carried[0]
+
+    return advance
+
+
+def _flown(
+    fields: set[str],
+    values: Any,
+    body: Body,
+    rotors: Rotors,
+    drag: Drag,
+    damping: Any,
+    initial: Any,
+    guess: Any,
+    window: Windows,
+) -> Any:
+    """The states at all samples of a window: RK4 between them.
+
+    Args:
+        fields: The free numbers; with the lag and the servo's frequency among them, rotor speeds
+            and tilts follow their commands.
+        values, body, rotors, drag, damping: The model.
+        initial, guess, window: See `residuals_of`.
+    """
+    import jax
+    import jax.numpy as jnp
+
+    center, frequency = values["center"], values["frequency"][0]
+
+    def rate(state: Any, speeds: Any, tilts: Any, command: Any) -> Any:
+        _, velocity, turn, omega, lagging, pods = state
+        if "lag" in fields:
+            speeds = lagging
+        if "frequency" in fields:
+            tilts = pods[0]
+        rotation = rotation_of_quaternion(turn)
+        wrench = wrench_map(rotors, tilts) @ (speeds * abs(speeds))
+        force, torque = wrench[:3], wrench[3:] - cross(center, wrench[:3])
+        force = force + drag_force(rotation.T @ velocity + TINY, drag)
+        wrench = jnp.concatenate([force, torque])
+        acceleration, spin = accelerations(body, rotation, omega, wrench, 0.0, 1.0)
+        pull = frequency**2 * (command[1] - pods[0]) - 2.0 * damping * frequency * pods[1]
+        return (
+            velocity,
+            acceleration,
+            0.5 * quaternion_product(turn, jnp.concatenate([jnp.zeros(1), omega])),
+            spin,
+            (command[0] - lagging) / values["lag"][0],
+            jnp.stack([pods[1], pull]),
+        )
+
+    place, velocity, turn, omega = guess
+    small = jnp.concatenate([jnp.ones(1), 0.5 * initial[6:9]])
+    turn = quaternion_product(turn, small / jnp.sqrt(small @ small))
+    omega = omega + initial[9:12]
+    arm = rotation_of_quaternion(turn) @ center
+    start = (
+        place + initial[:3] + arm,
+        velocity + initial[3:6] + rotation_of_quaternion(turn) @ cross(omega, center),
+        turn,
+        omega,
+        window.speeds[0, 0],
+        jnp.stack([window.tilts[0, 0], jnp.zeros(window.tilts.shape[-1])]),
+    )
+    commands = (window.speed_commands[:-1], window.tilt_commands[:-1])
+    if "lag" not in fields:
+        commands = (window.speeds[:, 0], commands[1])
+    if "frequency" not in fields:
+        commands = (commands[0], window.tilts[:, 0])
+    _, path = jax.lax.scan(
+        _runge_kutta(rate), start, (window.step, window.speeds, window.tilts, commands)
+    )
+    return jax.tree.map(lambda a, b: jnp.concatenate([a[None], b]), start, path)

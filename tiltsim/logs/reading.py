@@ -108,25 +108,25 @@ def _exported(file: Path, columns: dict[str, Floats], information: dict[str, str
 
 def _mapped(file: Path, signals: Signals, chart: LogMap) -> Log:
     """The columns of a map, in tiltsim's frames, at the times of one of them."""
-    wanted = {
+    sources = {
         name: one if isinstance(one, Signal) else Signal(signal=one)
         for name, one in chart.columns.items()
     }
-    named = [*chart.attitude, *(one.signal for one in wanted.values())]
+    named = [*chart.attitude, *(one.signal for one in sources.values())]
     for name in named:
         if name not in signals:
             hint = did_you_mean(name, signals) or f"found {', '.join(list(signals)[:8])} "
             raise InputError(f"{file}: signal {printable(name)}: not in this log; {hint.strip()}")
     if not named:
         raise InputError(f"{file}: the map names no signal")
-    base = signals[wanted["x"].signal if "x" in wanted else named[0]][0]
+    base = signals[sources["x"].signal if "x" in sources else named[0]][0]
     time = np.unique(base[np.isfinite(base)])
     notes = []
     if len(time) < len(base):
         notes.append(f"{len(base) - len(time)} of {len(base)} times are repeated, or no numbers")
     _check_times(file, time)
     columns = {"time": time - time[0]}
-    for name, one in wanted.items():
+    for name, one in sources.items():
         held = "command" in name
         column = _at(time, signals[one.signal], chart.max_gap, held=held)
         columns[name] = one.scale * column + one.offset

@@ -30,7 +30,7 @@ class Replay:
 
     Attributes:
         channels: The measured columns; attitude stands for small turns about the body axes.
-        time: Of the samples, s, shape (windows, samples).
+        time: Times of the samples, s, shape (windows, samples).
         mismatch: Measured minus predicted, in units, shape (windows, samples, channels).
     """
 

@@ -116,7 +116,7 @@ def _information(key: str, text: str) -> bytes:
 
 
 def _long_information(key: str, text: str) -> list[bytes]:
-    """A text of any length in as many messages as it needs; pieces of whole characters."""
+    """A text of any length in messages of limited size, divided between characters."""
     pieces = [
         text[start : start + LONGEST // 4] for start in range(0, max(1, len(text)), LONGEST // 4)
     ]
