@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from tiltsim.laws.layers.supervision import SUPERVISION
+from tiltsim.laws.supervision import SUPERVISION
 from tiltsim.scenario.gait import PenguinGait
 from tiltsim.system.quantity import Quantity
 from tiltsim.views.attitude_plane import (
