@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from tiltsim.simulation.stepwise import Simulation
     from tiltsim.simulation.symbolic import symbolic
     from tiltsim.simulation.vectorized import vectorized
-    from tiltsim.sweeps.sweep import sweep
+    from tiltsim.sweeps.running import sweep
     from tiltsim.views.figures.plot import plot
     from tiltsim.views.rerun.viewer import view
     from tiltsim.views.video.making import video
@@ -74,7 +74,7 @@ _HOMES = {
     "plot": "views.figures.plot",
     "show_progress": "commands.progress",  # for progress=True
     "stability": "linear.stability",
-    "sweep": "sweeps.sweep",
+    "sweep": "sweeps.running",
     "symbolic": "simulation.symbolic",
     "vectorized": "simulation.vectorized",
     "video": "views.video.making",

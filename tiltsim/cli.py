@@ -1,7 +1,5 @@
 """The command line: one subcommand per module of `tiltsim.commands`, each a thin layer."""
 
-from __future__ import annotations
-
 import argparse
 import atexit
 import gc

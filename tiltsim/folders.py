@@ -1,7 +1,5 @@
 """The order of the folders: each imports from itself and from those before it, never later ones."""
 
-from __future__ import annotations
-
 from typing import Final
 
 CONTROLLERS: Final = (

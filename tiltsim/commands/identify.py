@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 from tiltsim.commands.declaring import Option
 from tiltsim.commands.options import Json, Names, Overrides, PlotOptions, Trust, load_scenarios
 from tiltsim.commands.text import aligned
 from tiltsim.errors import InputError
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from tiltsim.views import figures
 
 
 def _noise(text: str) -> dict[str, float]:
@@ -69,11 +67,6 @@ def run(
         with replacing(out) as temporary:
             temporary.write_text(text, encoding="utf-8")
 
-    def draw() -> Figure:
-        from tiltsim.views.figures.logs import estimate_figure
-
-        return estimate_figure(found)
-
     rows = [
         (name, f"{value:.6g} ± {found.sigma[name]:.2g} {found.units[name]}")
         for name, value in found.values.items()
@@ -81,5 +74,7 @@ def run(
     low, high = found.chi2_band
     lines = [*aligned(rows), f"chi2 {found.chi2:.4g} ({low:.3f} to {high:.3f} for a true model)"]
     lines += [f"{found.windows} windows of {window:g} s", *found.warnings, *read.notes]
-    figure.show(draw, found.report(), "\n".join(lines), json=json)
+    figure.show(
+        lambda: figures.logs.estimate_figure(found), found.report(), "\n".join(lines), json=json
+    )
     return 0

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 from tiltsim.commands.declaring import Option
 from tiltsim.commands.options import FigureOptions, Names, file_in, prepare_figure
 from tiltsim.commands.text import print_line
+from tiltsim.views import figures
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -74,16 +75,12 @@ def run(
 
     def draw() -> Figure:
         if sweep is not None:
-            from tiltsim.views.figures.sweep import sweep_figure
-
-            return sweep_figure(results, (*metrics, *panels))
+            return figures.sweep.sweep_figure(results, (*metrics, *panels))
         if logs:
-            from tiltsim.views.figures.logs import logs_figure
-
-            return logs_figure(logs, [path.name for path in flights], figure.title)
-        from tiltsim.views.figures.plot import draw_flights
-
-        return draw_flights(loaded, names, texts, panels=panels, title=figure.title)
+            shown = [path.name for path in flights]
+            return figures.logs.logs_figure(logs, shown, figure.title)
+        drawn = figures.plot.draw_flights
+        return drawn(loaded, names, texts, panels=panels, title=figure.title)
 
     file = file_in(out, first, "sweep.png" if sweep else "flights.png" if others else "flight.png")
     prepare_figure("--out", file)

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import Annotated, Final
 
 from tiltsim.commands.declaring import Option
 from tiltsim.commands.options import Json, Overrides, PlotOptions, Trust, load_scenarios
 from tiltsim.commands.text import Columns, table
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from tiltsim.views import figures
 
 COLUMNS: Final[Columns] = {
     "channel": ("name", ""),
@@ -53,16 +51,13 @@ def run(
     read = read_log(log, chart)
     found = replay(read, loaded, window=window)
 
-    def draw() -> Figure:
-        from tiltsim.views.figures.logs import replay_figure
-
-        return replay_figure(found)
-
     rows = [
         {"name": name, "unit": UNITS[name], "rms": found.rms[name], "size": size, "at": at}
         for name, (size, at) in found.worst.items()
     ]
     text = table(COLUMNS, rows)
     lines = [f"{len(found.time)} windows of {window:g} s", *read.notes, text]
-    figure.show(draw, found.report(), "\n".join(lines), json=json)
+    figure.show(
+        lambda: figures.logs.replay_figure(found), found.report(), "\n".join(lines), json=json
+    )
     return 0

@@ -23,8 +23,7 @@ from tiltsim.flight.writing import write_flight
 from tiltsim.laws.assembling import assemble
 from tiltsim.scenario.messages import did_you_mean
 from tiltsim.scenario.metric_names import unit_of
-from tiltsim.system.optional import optional_package
-from tiltsim.system.public import public
+from tiltsim.system.public import optional_package, public
 from tiltsim.system.text import html_table, short_repr, shortened, valid_unicode
 from tiltsim_controllers.mathematics.scalar import Floats
 

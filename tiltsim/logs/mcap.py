@@ -16,7 +16,7 @@ import numpy as np
 from tiltsim.errors import InputError
 from tiltsim.logs.log import Log
 from tiltsim.logs.signals import Signals
-from tiltsim.system.optional import optional_package
+from tiltsim.system.public import optional_package
 from tiltsim_controllers.mathematics.scalar import Floats
 
 SAMPLE: Final = "/tiltsim/sample"

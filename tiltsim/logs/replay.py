@@ -19,7 +19,7 @@ from tiltsim.logs.windows import MEASURED, windows_of
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.system.numbers import is_finite
-from tiltsim.system.optional import optional_package
+from tiltsim.system.public import optional_package
 from tiltsim.system.text import short_repr
 from tiltsim_controllers.mathematics.scalar import Floats
 

@@ -51,7 +51,7 @@ def windows_of(log: Log, seconds: float, rotors: int, tilts: int) -> Windows:
         rotors, tilts: Numbers of the vehicle.
 
     Raises:
-        InputError: If the log lacks inputs or has the inputs of another vehicle, or no window is whole.
+        InputError: If the log lacks inputs, has the inputs of another vehicle or no whole window.
     """
     for name, count, part in (("rotor_speed", rotors, "rotors"), ("alpha", tilts, "tilting pods")):
         for number in range(1, count + 1):
