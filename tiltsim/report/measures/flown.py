@@ -1,7 +1,5 @@
 """Measures of one flight or several, from their metrics."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Sequence
 from itertools import pairwise, product
 from math import hypot, inf
@@ -182,6 +180,11 @@ def ratio_is_above(flights: Flown, larger: str, smaller: str, limit: float) -> b
 def all_complete(flights: Flown) -> bool:
     """Whether no flight is lost."""
     return not any(metrics["diverged"] for metrics in flights)
+
+
+def is_lost(flights: Flown) -> bool:
+    """Whether the only flight is lost."""
+    return not all_complete(flights)
 
 
 def no_rotor_stops(flights: Flown) -> bool:

@@ -1,7 +1,5 @@
 """The Two Color Map: its roots, its lines, and the planner's verdicts (ch. 6, 7, 8, 12)."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cache
 from math import atan, pi
@@ -162,6 +160,18 @@ def pairs_are_equal_on_red() -> bool:
         for root in _inside()
         if (root.plane_3, root.plane_4) == ("+", "+")
     )
+
+
+def planes_intersect() -> bool:
+    """Whether α₃ of both colors agrees on α₁ = δ, and α₄ on α₂ = -δ, whatever the other angle."""
+    first, second = _P
+    ratio = drag_ratio(_VEHICLE)
+    apart = [
+        abs(colored_angles(*angles, "blue", ratio)[axis] - angles[axis])
+        for other in np.linspace(-1.0, 1.0, 21).tolist()
+        for axis, angles in enumerate(((first, other), (other, second)))
+    ]
+    return max(apart) < 1e-12
 
 
 def one_color_is_accepted(color: str) -> bool:

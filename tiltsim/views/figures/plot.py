@@ -5,36 +5,23 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from tiltsim.errors import InputError
-from tiltsim.flight.flight import as_flights
+from tiltsim.flight.flight import Flight, as_flights
 from tiltsim.flight.vectors import VECTORS, components
 from tiltsim.scenario.messages import choose
 from tiltsim.system.text import short_repr
-from tiltsim.views.figures import style
-from tiltsim.views.figures.adjusting import relabel
-from tiltsim.views.figures.layout import Page, add_heading, fitting, new_page, place_legends, wrap
-from tiltsim.views.figures.panels import (
-    Panel,
-    Shown,
-    column_panel,
-    panels_of,
-    set_scale,
-    signals_panel,
-)
+from tiltsim.views.figures import layout, style
+from tiltsim.views.figures.flight_lines import MOST_LINES, Shown
+from tiltsim.views.figures.panels import Panel, column_panel, panels_of, set_scale, signals_panel
 from tiltsim.views.signals import stems, vector_signals
 from tiltsim.views.titles import common_title, describe_controller, describe_gait, flight_names
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-    from tiltsim.flight.flight import Flight
-
-MAX_FLIGHTS: Final = len(style.CYCLE)
 
 LARGEST: Final = 1e100
 """Magnitude up to which values are drawn: a diverged flight may end just below overflow."""
@@ -51,7 +38,7 @@ def plot(
     title: str | None = None,
     labels: Sequence[str] | Mapping[str, str] | None = None,
 ) -> Figure:
-    """One flight on a page, or several in the same axes.
+    """One flight on a page, several in the same axes, or quantiles of more than seven.
 
     The caller's rcParams take precedence over tiltsim's style, and stay as they are.
 
@@ -65,8 +52,7 @@ def plot(
             dict, new texts by present names or texts of the figure.
 
     Raises:
-        InputError: If an argument is wrong, there are more flights than colors, or the size is too
-            small.
+        InputError: If an argument is wrong, or the size is too small.
     """
     flights = as_flights(flights)
     panels = [panels] if isinstance(panels, str) else panels
@@ -96,8 +82,6 @@ def draw_flights(
         panels: Names; empty for all that suit the flights.
         title: Instead of the scenarios' title; empty for none.
     """
-    if len(flights) > MAX_FLIGHTS:
-        raise InputError(f"plot: {len(flights)} flights: at most {MAX_FLIGHTS} fit on one page")
     clipped = [np.clip(flight.samples, -LARGEST, LARGEST) for flight in flights]
     flights = [
         flight if np.array_equal(samples, flight.samples) else replace(flight, samples=samples)
@@ -107,11 +91,14 @@ def draw_flights(
     names = [others.pop(name, name) if name else "" for name in names]
     longest = max(len(flight) for flight in flights)
     looks = [style.marked_line(number, longest) for number in range(len(flights))]
-    looks = looks if len(flights) > 1 else [{"color": style.BLUE}]
+    if len(flights) == 1:
+        looks = [{"color": style.BLUE}]
+    elif len(flights) > MOST_LINES:
+        looks = [{"color": style.BLUE, "alpha": 0.3, "lw": 0.6, "marker": ""}] * len(flights)
     shown = [Shown(*one) for one in zip(flights, names, looks, strict=True)]
     chosen = _chosen(flights, panels)
     heading = partial(_heading, shown, title)
-    return fitting(lambda: _page(shown, chosen, heading, others))
+    return layout.fitting(lambda: _page(shown, chosen, heading, others))
 
 
 def _page(
@@ -119,16 +106,9 @@ def _page(
     chosen: Mapping[str, Panel],
     heading: Callable[[float], tuple[str, str]],
     texts: Mapping[str, str],
-) -> Page:
-    """Draw the panels.
-
-    Args:
-        shown: The flights.
-        chosen: The panels by name.
-        heading: Title and line below it for a width (inches).
-        texts: Texts instead of others.
-    """
-    page = new_page([panel.over_time for panel in chosen.values()])
+) -> layout.Page:
+    """Draw the panels; ``heading`` is title and line below it for a width (inches)."""
+    page = layout.new_page([panel.over_time for panel in chosen.values()])
     for axes, panel in zip(page.panels, chosen.values(), strict=True):
         drawn = [one for one in shown if panel.needs in one.flight.units]
         if panel.over_time:
@@ -137,7 +117,7 @@ def _page(
         if panel.signals is not None:
             set_scale(axes, panel.signals, drawn)
     if len(shown) == 1:
-        place_legends(page)
+        layout.place_legends(page)
     for column in page.columns:
         _label_time(column)
     marks = [*_handles(shown, page.figure.axes)] if len(shown) > 1 else []
@@ -145,10 +125,10 @@ def _page(
     for name in said.keys() & texts.keys():
         said[name].set_label(style.verbatim(texts[name]))
     others = {name: text for name, text in texts.items() if name not in said}
-    relabel(page.figure, others, dict(zip(chosen, page.panels, strict=True)))
-    add_heading(page.figure, *heading(page.figure.get_figwidth()), marks)
+    layout.relabel(page.figure, others, dict(zip(chosen, page.panels, strict=True)))
+    layout.add_heading(page.figure, *heading(page.figure.get_figwidth()), marks)
     for axes in page.panels:
-        wrap(axes.yaxis.label, axes.get_window_extent().height)
+        layout.wrap(axes.yaxis.label, axes.get_window_extent().height)
     return page
 
 
@@ -230,13 +210,15 @@ def _label_time(column: Sequence[Axes]) -> None:
 
 def _handles(shown: Sequence[Shown], axes: Sequence[Axes]) -> Iterator[Any]:
     """Handles of the flights and of the marks in the axes."""
-    from matplotlib.lines import Line2D
-
-    for flight, name, look in shown:
+    many = len(shown) > MOST_LINES
+    for flight, name, look in () if many else shown:
         end = flight.end
         more = "" if end.kind == "completed" else f", {end.kind} at {end.time:.2f} s"
         yield Line2D([], [], label=style.verbatim(name) + more, **{**look, "markevery": None})
-    if any(flight.end.kind != "completed" for flight, _, _ in shown):
+    lost = sum(flight.end.kind != "completed" for flight, _, _ in shown)
+    if lost and many:
+        yield Line2D([], [], ls="", label=f"{lost} of {len(shown)} terminated early")
+    elif lost:
         look = {"color": style.GREY, "marker": "X", "ls": "", "ms": 6}
         yield Line2D([], [], **look, label="terminated early")
     marks: dict[str, Any] = {}
