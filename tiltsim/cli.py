@@ -40,6 +40,12 @@ analyze:
   arena        score controllers on fixed tasks
   fleet        list the vehicles that ship as MJCF files
 
+logs:
+  export       write a flight as MCAP, ULog or CSV
+  import       read a log of a real vehicle or of another tool
+  replay       fly a model on the rotor speeds and tilts of a log
+  identify     find parameters of a vehicle in a log
+
 thesis:
   map          draw the Two Color Map and check a path on it
   singularity  compare the quadrotor's published and exact determinants

@@ -30,7 +30,7 @@ FLYING: Final = (
 )
 """Folders of `tiltsim` that a flight and its metrics depend on."""
 
-SHOWING: Final = ("linear", "sweeps", "studies", "views", "env", "report", "commands")
+SHOWING: Final = ("logs", "linear", "sweeps", "studies", "views", "env", "report", "commands")
 """Folders of `tiltsim` that use flights; none of them changes one."""
 
 FOUNDATION: Final = ("errors", "exit_codes", "resources", "folders")

@@ -161,6 +161,18 @@ class Flight:
         """Render this flight as a video; see `tiltsim.video` for the options."""
         return public("video")(self, path, **options)
 
+    def to_mcap(self, path: str | PathLike[str]) -> None:
+        """Write this flight as MCAP, for Foxglove and ROS 2; see `tiltsim.export`."""
+        public("export")(self, path, "mcap")
+
+    def to_ulog(self, path: str | PathLike[str]) -> None:
+        """Write this flight as ULog, for PlotJuggler and PX4's tools; see `tiltsim.export`."""
+        public("export")(self, path, "ulog")
+
+    def to_csv(self, path: str | PathLike[str]) -> None:
+        """Write this flight as CSV with all digits; see `tiltsim.export`."""
+        public("export")(self, path, "csv")
+
     def _repr_html_(self) -> str:
         """The end of the flight and its metrics, as a table for notebooks."""
         scenario, end = self.scenario, self.end

@@ -1,10 +1,10 @@
 """Which closed loop a scenario has, and its `Assembly`."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Final
+from collections.abc import Callable
+from typing import Final
 
 from tiltsim.closed_loop.assembly import Assembly
+from tiltsim.closed_loop.loop import ClosedLoop
 from tiltsim.equations.actuator_level import ActuatorPlant, actuator_plant
 from tiltsim.equations.rigid_body import rigid_body
 from tiltsim.laws.commanded import commanded_loop
@@ -25,15 +25,9 @@ from tiltsim.laws.tilt_car_planned import PLANNED_DIRECTION
 from tiltsim.laws.tiltrotor import LAYOUT as TILTROTOR
 from tiltsim.laws.tiltrotor import tiltrotor_loop
 from tiltsim.scenario.law_controller import LawTable
-from tiltsim.scenario.scenario import plan_flight
+from tiltsim.scenario.scenario import Scenario, plan_flight
 from tiltsim.system.files import one_thread_at_a_time
 from tiltsim.vehicles.rotorcraft.others import others_of
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from tiltsim.closed_loop.loop import ClosedLoop
-    from tiltsim.scenario.scenario import Scenario
 
 LOOPS: Final[dict[str, ClosedLoop]] = {
     "attitude_altitude": tiltrotor_loop("attitude_altitude", False, ""),

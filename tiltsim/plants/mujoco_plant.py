@@ -1,11 +1,9 @@
 """MuJoCo as the plant."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import cache, partial
 from math import nan
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import mujoco
 import numpy as np
@@ -25,15 +23,13 @@ from tiltsim.engines.base import EngineName, vectors_of
 from tiltsim.engines.callback import control_callback
 from tiltsim.engines.factory import make_engine
 from tiltsim.engines.python_engine import control_step
+from tiltsim.engines.recorder import Recorder
 from tiltsim.plants.engine_choice import choose_engine
 from tiltsim.plants.flight_model import evaluations_per_step, flight_model
 from tiltsim.plants.plant import Plant
 from tiltsim.plants.start_of_contact import check_start
 from tiltsim.vehicles.rotorcraft.others import motion_at_start
 from tiltsim_controllers.mathematics.scalar import Floats
-
-if TYPE_CHECKING:
-    from tiltsim.engines.recorder import Recorder
 
 
 class MujocoPlant(Plant):
