@@ -37,7 +37,7 @@ def attraction_figure(found: Attraction) -> Figure:
     handles.append(Line2D([], [], color=style.INK, marker="+", ls="", label="the scenario"))
     labels = [f"{in_words(name)} ({UNITS[PLACES[name][0]]})" for name in found.axes]
     axes.set(xlabel=f"initial {labels[0]}", ylabel=f"initial {labels[1]}")
-    axes.set_title(f"{100.0 * found.share.mean():.1f} % come back")
+    axes.set_title(f"{100.0 * found.share.mean():.1f} % of the initial states come back")
     figure.legend(handles=handles, loc="outside lower center", ncols=3)
     return figure
 

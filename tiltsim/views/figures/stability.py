@@ -15,6 +15,7 @@ from tiltsim.linear.stability import Stability
 from tiltsim.scenario.key_units import quantity_of_key
 from tiltsim.system.quantity import in_words
 from tiltsim.views.figures import style
+from tiltsim.views.titles import address_in_words
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -70,7 +71,7 @@ def sweep_figure(key: str, sweeps: Mapping[str, Sequence[Point]]) -> Figure:
             max((mode.growth_rate for mode in each.modes if mode.name != "altitude"), default=nan)
             for _, each in found
         ]
-        label = address.rpartition("/")[2]
+        label = style.verbatim(address_in_words(address))
         line: Any = {"color": color, "ls": dashes, "marker": marker, "ms": 3.5, "label": label}
         upper.plot(values, largest, **line)
         lower.plot(values, rates, **line)
