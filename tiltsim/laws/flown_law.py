@@ -129,7 +129,6 @@ def loop_of_law(scenario: Scenario, *, recorded: bool = False) -> ClosedLoop:
     key = Key(
         layout_of_vehicle(airframe_of(plan).vehicle, scenario.vehicle.model),
         law.function,
-        controller.law,
         type(law.parameters),
         tuple(law.states.items()),
         tuple(law.discrete.items()),

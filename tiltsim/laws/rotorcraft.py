@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import cache
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from tiltsim.closed_loop.loop import ControlSetup
 from tiltsim.engines.sample_evaluation import evaluate_over_samples
-from tiltsim.vehicles.rotorcraft.layout import QW, QX, QY, QZ, TILT_1, TILT_RATE_1, Layout
+from tiltsim.vehicles.rotorcraft.layout import Layout
 from tiltsim_controllers.analysis.singularity import world_up
 from tiltsim_controllers.analysis.torque_free import (
     controlled_axes,
@@ -18,132 +17,17 @@ from tiltsim_controllers.analysis.torque_free import (
     margin_over_flight,
     torque_free_forces,
 )
-from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.code.traceable import traceable
-from tiltsim_controllers.gaits.motion import tilt_motion_of
-from tiltsim_controllers.gaits.parameters import GaitParameters
 from tiltsim_controllers.laws.failures import UNHARMED, Failure
-from tiltsim_controllers.mathematics.attitude import euler_angles
-from tiltsim_controllers.mathematics.rotation import euler_from_quaternion
-from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector, scalar
-from tiltsim_controllers.mathematics.vectors import entries_of
+from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector
 from tiltsim_controllers.vehicle.effectiveness import force_and_torque
 
 if TYPE_CHECKING:
     from tiltsim.scenario.rotorcraft import ServoTable
 
 
-def _array(vector: Any) -> Any:
-    """A vector of MuJoCo as an array; a traced one is not an array yet."""
-    return vector if hasattr(vector, "shape") else xp.array(vector)
-
-
-@cache
-def seen_of(layout: Layout, states: int, measured: bool) -> Callable[..., tuple[Values, ...]]:
-    """A law's view of MuJoCo's vectors: ``(qpos, qvel, act)``.
-
-    It returns the vehicle's state (`tiltsim_controllers.vehicle.states.RotorcraftState` in one
-    vector), its tilt rates (rad/s) and the controller's states.
-
-    Args:
-        layout: Layout of the vehicle.
-        states: Number of the controller's states.
-        measured: Whether the tilt rates end with the plant's angular acceleration (rad/s^2).
-    """
-    rotors, tilts = layout
-
-    @traceable
-    def seen(qpos: Any, qvel: Any, act: Any) -> tuple[Any, ...]:
-        qpos, qvel, act = _array(qpos), _array(qvel), _array(act)
-        attitude, angles = euler_angles(qpos[QW:TILT_1]), qpos[TILT_1 : TILT_1 + tilts]
-        state = qpos[0:3], qvel[0:3], attitude, qvel[3:6], angles, act[:rotors]
-        rates = qvel[TILT_RATE_1 : TILT_RATE_1 + tilts + 3 * measured]
-        return xp.hstack(state), rates, act[rotors : rotors + states]
-
-    return seen
-
-
-@cache
-def observed_of(layout: Layout, shown: Layout, further: int) -> Callable[..., Values]:
-    """Scalar code of a sample, `Columns.observe` without controls.
-
-    Args:
-        layout: Layout of the vehicle.
-        shown: Layout of its samples, which may have tilts that are idle.
-        further: Number of the controller's states in a sample.
-    """
-    rotors, tilts = layout
-    idle = (0.0,) * (shown.tilts - tilts)
-    first, turning = entries_of(0, 3), entries_of(3, 3)
-    angles, rates = entries_of(TILT_1, tilts), entries_of(TILT_RATE_1, tilts)
-    speeds, states = entries_of(0, rotors), entries_of(rotors, further)
-
-    @scalar
-    def observed(qpos: Vector, qvel: Vector, act: Vector) -> Values:
-        attitude = euler_from_quaternion(qpos[QW], qpos[QX], qpos[QY], qpos[QZ])
-        body = (*first(qpos), *first(qvel), *attitude, *turning(qvel))
-        return (*body, *angles(qpos), *idle, *speeds(act), *rates(qvel), *idle, *states(act))
-
-    return observed
-
-
-@cache
-def thrust_controls_of(spins: Values) -> Callable[[Vector], Values]:
-    """Controls of the thrust actuators, ``s varpi |varpi|`` with the spin s, from ``act``."""
-
-    @traceable
-    def thrust_controls(act: Any) -> Any:
-        speeds = _array(act)[: len(spins)]
-        return xp.array(spins) * speeds * abs(speeds)
-
-    return thrust_controls
-
-
-@cache
-def held_controls_of(spins: Values, tilts: int) -> Callable[..., Values]:
-    """Scalar code of held controls with the thrusts of the present rotor speeds.
-
-    Args:
-        spins: Signs of the rotor speeds.
-        tilts: Number of hinges.
-    """
-    thrusts, further = thrust_controls_of(spins), Layout(len(spins), tilts).acceleration_1
-
-    @scalar
-    def held_controls(
-        time: float, qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector, parameters: object
-    ) -> Values:
-        return (*ctrl[:tilts], *thrusts(act), *ctrl[further:])
-
-    return held_controls
-
-
 def servo_lead(servo: ServoTable) -> float:
     """Lag (s) of a tilt servo behind a command of constant rate, ``2 zeta / omega_n``."""
     return 2.0 * servo.damping_ratio / servo.natural_frequency
-
-
-@traceable
-def ahead(angles: Any, rates: Any, lead: Any) -> Any:
-    """Angles (rad) ahead of themselves by a lag (s) at their rates (rad/s)."""
-    return angles + lead * rates
-
-
-@cache
-def servo_commands_of(tilts: int) -> Callable[..., Values]:
-    """Scalar code of the commands of tilt servos, ahead of a gait by their lag.
-
-    It is ``(time, lead, gait, knots) -> commands``, s and rad.
-    """
-    moving = tilt_motion_of(tilts).moving
-
-    @scalar
-    def servo_commands(time: float, lead: float, gait: GaitParameters, knots: Vector) -> Values:
-        angles, rates = moving(time, gait, knots)
-        commands: Values = ahead(angles, rates, lead)
-        return commands
-
-    return servo_commands
 
 
 REFERENCE_COLUMNS: Final = ("x_ref", "y_ref", "z_ref", "roll_ref", "pitch_ref", "yaw_ref")

@@ -8,7 +8,7 @@ from warnings import catch_warnings, simplefilter
 
 import numpy as np
 
-from tiltsim.laws.layers.supervision import SUPERVISION
+from tiltsim.laws.supervision import SUPERVISION
 from tiltsim.views.figures import style
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from tiltsim.laws.layers.supervision import SUPERVISION
+from tiltsim.laws.supervision import SUPERVISION
 from tiltsim.scenario.gait import PenguinGait
 from tiltsim.system.quantity import Quantity
 from tiltsim.views.attitude_plane import (
@@ -270,7 +270,9 @@ def _path(axes: Axes, shown: Sequence[Shown]) -> None:
     else:
         axes.set_aspect("equal", adjustable="datalim")
         if long < FLOORS["m"]:
-            axes.set_xlim(data.x0 - FLOORS["m"], data.x1 + FLOORS["m"])
+            wider = ((data.x0 - FLOORS["m"], data.y0), (data.x1 + FLOORS["m"], data.y1))
+            axes.update_datalim(wider)
+            axes.autoscale_view()
 
 
 def _attitude_plane(axes: Axes, shown: Sequence[Shown]) -> None:
