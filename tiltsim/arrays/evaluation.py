@@ -1,7 +1,5 @@
 """Evaluation of the statements of a function on arrays; see `tiltsim.arrays.lifting`."""
 
-from __future__ import annotations
-
 import ast
 import inspect
 from collections.abc import Callable, Iterable, Mapping

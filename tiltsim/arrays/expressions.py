@@ -1,7 +1,5 @@
 """The values of the expressions of a function on arrays; see `tiltsim.arrays.lifting`."""
 
-from __future__ import annotations
-
 import ast
 import builtins
 import linecache

@@ -1,7 +1,5 @@
 """JAX's arrays for lifted functions."""
 
-from __future__ import annotations
-
 import math
 import operator
 from collections.abc import Callable, Mapping
@@ -11,7 +9,7 @@ from typing import Any, Final
 import numpy as np
 
 from tiltsim.arrays.xla_flags import merges_loops
-from tiltsim.system.optional import optional_package
+from tiltsim.system.public import optional_package
 
 Function = Callable[..., Any]
 

@@ -1,7 +1,5 @@
 """Functions of a closed loop in JAX: the same programs as on every other engine."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any

@@ -6,8 +6,6 @@ Python. An ``if`` on arrays evaluates both branches and selects, variable by var
 early ``return`` or ``break``. A loop is unrolled: its length must not depend on arrays.
 """
 
-from __future__ import annotations
-
 import inspect
 import operator
 from collections.abc import Iterable, Iterator, Mapping

@@ -1,7 +1,5 @@
 """Traced numbers for lifted functions: they become programs."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager

@@ -1,7 +1,5 @@
 """Values that scalar functions are lifted to: arrays of JAX, symbols of CasADi."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, Protocol
 

@@ -1,7 +1,5 @@
 """Layout of MuJoCo's `userdata`, and the times at which a control step is evaluated."""
 
-from __future__ import annotations
-
 from math import floor
 from typing import Final, NamedTuple
 

@@ -14,7 +14,7 @@ from tiltsim.laws.assembling import assemble
 from tiltsim.plants.flight_model import disturbance_acceleration
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.scenario import Scenario
-from tiltsim.system.optional import optional_package
+from tiltsim.system.public import optional_package
 from tiltsim_controllers.code.casadi_function import casadi_function
 from tiltsim_controllers.code.messages import TraceError
 from tiltsim_controllers.code.program import InputVector

@@ -5,8 +5,6 @@ that is right. The truth is computed without the formula: by difference quotient
 eigenvalues or linear programs. `tiltsim.report.errors` lists them with their texts.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from math import asin, atan2, cos, exp, pi, sin, sqrt
 from typing import Final
