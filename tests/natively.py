@@ -6,10 +6,10 @@ import ctypes
 
 import numpy as np
 
-from tiltsim.arrays.traced_numbers import trace_scalar_code
 from tiltsim.closed_loop.choices import CHOICES
 from tiltsim.engines.machine_code import MachineCode
 from tiltsim_controllers.code.llvm_text import llvm_functions
+from tiltsim_controllers.code.traceable import as_tuples, program_of
 
 RUN = """
 define void @run(ptr %values, ptr %results) nounwind {
@@ -54,7 +54,7 @@ def machine_code(program):
 
 
 def compiled(function, *like):
-    """A scalar function as machine code: of arguments as these, it returns a list of numbers.
+    """A function as machine code: of arguments as these, it returns a list of numbers.
 
     Choices are constants, as in flights; all other numbers are inputs.
     """
@@ -72,17 +72,17 @@ def compiled(function, *like):
             return [value for part, inner in zip(entry, names) for value in inputs(part, inner)]
         return [] if name in CHOICES or isinstance(entry, bool | int) else [entry]
 
-    def traced(lifting, given):
-        entries = iter(given[0])
-        return numbers(lifting(function)(*(restored(entry, "", entries) for entry in like)))
+    def traced(values):
+        entries = iter(values)
+        return numbers(as_tuples(function(*(restored(entry, "", entries) for entry in like))))
 
     size = sum(len(inputs(entry)) for entry in like)
-    run = machine_code(trace_scalar_code(traced, values=size))
+    run = machine_code(program_of(traced, values=size))
     return lambda *arguments: run([value for entry in arguments for value in inputs(entry)])
 
 
 def natively(function, *arguments):
-    """The numbers that a scalar function returns at arguments, as machine code computes them."""
+    """The numbers that a function returns at arguments, as machine code computes them."""
     return compiled(function, *arguments)(*arguments)
 
 

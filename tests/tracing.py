@@ -66,8 +66,7 @@ def trace_seldom():
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from tiltsim.arrays import traced_numbers
-    from tiltsim.engines import programs
+    from tiltsim.engines import programs, sample_evaluation
     from tiltsim.linear.motion import EquationMotion, MujocoMotion
     from tiltsim.plants.equations_plant import EquationsPlant
     from tiltsim.plants.mujoco_plant import MujocoPlant
@@ -81,8 +80,8 @@ def trace_seldom():
     for motion in (EquationMotion, MujocoMotion):
         motion.flown = seldom_traced(motion.flown)
     elsewhere = {
-        traced_numbers: ["trace_scalar_code"],
-        programs: ["trace_scalar_code"],
+        programs: ["program_of"],
+        sample_evaluation: ["program_of"],
         difflib: ["get_close_matches"],
         email: ["message_from_string"],  # of a distribution's metadata
         tomllib: ["load", "loads"],

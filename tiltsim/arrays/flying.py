@@ -9,8 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from tiltsim.arrays.jax_arrays import require_jax
-from tiltsim.arrays.jax_programs import InJax
+from tiltsim.arrays.jax_programs import InJax, require_jax
 from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.closed_loop.limits import SINGULAR, WITHIN_LIMITS
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup

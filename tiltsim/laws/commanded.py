@@ -33,10 +33,11 @@ from tiltsim.vehicles.rotorcraft import (
     rotorcraft_kind,
 )
 from tiltsim.vehicles.rotorcraft.layout import CROSS, Layout
+from tiltsim_controllers.code.arrays import xp
+from tiltsim_controllers.code.traceable import traceable
 from tiltsim_controllers.gaits.parameters import GaitParameters
 from tiltsim_controllers.mathematics.records import make_record_type, vector_of
-from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector, scalar
-from tiltsim_controllers.mathematics.vectors import entries_of
+from tiltsim_controllers.mathematics.scalar import Floats, Values
 from tiltsim_controllers.references.trajectories import ReferenceParameters
 from tiltsim_controllers.vehicle.effectiveness import ROTOR_FLOATS, tilts_of
 from tiltsim_controllers.vehicle.parameters import SPIN, Vehicle
@@ -107,19 +108,17 @@ def _commanded_loop(
     planned, fields = layout.names("alpha_ref"), layout.names("tilt_command")
     idle = (len(kind.observed_fields) - len(layout.observed_fields)) // 2
     shown = layout._replace(tilts=tilts + idle)
-    observed, commands_in = observed_of(layout, shown, 0), entries_of(0, tilts)
+    observed = observed_of(layout, shown, 0)
     thrusts, servo_commands = thrust_controls_of(spins), servo_commands_of(tilts)
 
-    @scalar
-    def controls(
-        time: float, qpos: Vector, qvel: Vector, act: Vector, parameters: Any, knots: Vector
-    ) -> Values:
+    @traceable
+    def controls(time: Any, qpos: Any, qvel: Any, act: Any, parameters: Any, knots: Any) -> Any:
         command = parameters.command
-        return (*command.tilts, *thrusts(act), *command.accelerations)
+        return xp.hstack([command.tilts, thrusts(act), command.accelerations])
 
-    @scalar
-    def observe(qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector) -> Values:
-        return (*observed(qpos, qvel, act), *commands_in(ctrl))
+    @traceable
+    def observe(qpos: Any, qvel: Any, act: Any, ctrl: Any) -> Any:
+        return xp.hstack([observed(qpos, qvel, act), ctrl[:tilts]])
 
     def derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
         reference, names = setup.parameters.reference, shown.names("alpha_ref")

@@ -24,6 +24,7 @@ from tiltsim.laws.tiltrotor import TILTROTOR_LAYOUT, singularity_columns, tiltro
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.tiltrotor_controllers import FullPoseController
 from tiltsim.vehicles.rotorcraft import ROTORCRAFT, initial_tilts
+from tiltsim_controllers.code.traceable import traceable
 from tiltsim_controllers.laws.full_pose import (
     PUBLISHED_TILT_WEIGHT,
     Parameters,
@@ -31,8 +32,7 @@ from tiltsim_controllers.laws.full_pose import (
     full_pose,
 )
 from tiltsim_controllers.mathematics.records import changed_record
-from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector, scalar
-from tiltsim_controllers.mathematics.vectors import entries_of
+from tiltsim_controllers.mathematics.scalar import Floats, Values
 from tiltsim_controllers.references.trajectories import reference_derivatives
 from tiltsim_controllers.vehicle.parameters import Vehicle
 
@@ -42,21 +42,14 @@ if TYPE_CHECKING:
 
 @cache
 def _inputs_of(layout: RotorLayout) -> Callable[..., Values]:
-    """Scalar code of `RotorLaw.inputs`: the ``states`` are the commands of the servos."""
+    """`RotorLaw.inputs`: the ``states`` are the commands of the servos."""
     rotors = layout.tilt_of_rotor
 
-    @scalar
     def inputs(
-        time: float,
-        state: Values,
-        tilt_rates: Values,
-        states: Values,
-        parameters: Any,
-        knots: Vector,
-    ) -> Values:
+        time: Any, state: Any, tilt_rates: Any, states: Any, parameters: Any, knots: Any
+    ) -> Any:
         reference = reference_derivatives(time, parameters.law.reference, knots)
-        found: Values = full_pose(time, state, reference, parameters.law, knots, rotors, states)
-        return found
+        return full_pose(time, state, reference, parameters.law, knots, rotors, states)
 
     return inputs
 
@@ -93,13 +86,13 @@ def _setup_of(record: Any) -> Callable[[FlightPlan], tuple[Any, Values]]:
 def _loop(layout: RotorLayout, parameters: Any, **options: Any) -> ClosedLoop:
     """Full-pose control of all vehicles of a layout, with a type of parameters."""
     places = layout.places
-    speeds_in, stops = entries_of(places.speed_1, places.rotors), rotor_stops(places.rotors)
+    first, stops = places.speed_1, rotor_stops(places.rotors)
 
-    @scalar
-    def speeds(time: float, values: Vector, parameters: Any, knots: Vector) -> Values:
+    @traceable
+    def speeds(time: Any, values: Any, parameters: Any, knots: Any) -> Any:
         # A pod that turns across its thrust spans one plane with it at any angle: the rank of such
         # rotors' matrix changes only where one of them stops, whichever of them are lost.
-        return speeds_in(values)
+        return values[first : first + places.rotors]
 
     law = RotorLaw(
         "full_pose",

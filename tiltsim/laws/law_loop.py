@@ -20,14 +20,13 @@ from tiltsim.scenario.law_controller import LawTable
 from tiltsim.scenario.own_code import users_line
 from tiltsim.system.text import short_repr
 from tiltsim_controllers.code.arrays import is_jax, xp
-from tiltsim_controllers.code.traceable import traceable
 from tiltsim_controllers.code.tracing import as_array
 from tiltsim_controllers.gaits.motion import tilt_motion_of
 from tiltsim_controllers.gaits.parameters import GaitParameters
 from tiltsim_controllers.laws.observed import ROTOR_COMMANDS, Command, Desired, Observed
 from tiltsim_controllers.mathematics.attitude import rotation_matrix
 from tiltsim_controllers.mathematics.records import make_record_type
-from tiltsim_controllers.mathematics.scalar import Values, Vector, scalar
+from tiltsim_controllers.mathematics.scalar import Values
 from tiltsim_controllers.references.trajectories import (
     ReferenceParameters,
     attitude_reference,
@@ -137,7 +136,6 @@ def _control_of(key: Key) -> Callable[..., Any]:
     per_newton, coefficients = ROTOR_FLOATS * rotors, 2 * ROTOR_FLOATS * rotors
     is_cross = key.layout.model != "multirotor"
 
-    @traceable
     def control(
         time: Any,
         state: Any,
@@ -239,28 +237,21 @@ def _state_rates(key: Key, command: Command, states: Any, known: Any) -> tuple[A
 
 @cache
 def _inputs_of(key: Key) -> Callable[..., Values]:
-    """Scalar code of `RotorLaw.inputs`.
+    """`RotorLaw.inputs`.
 
     The ``states`` are the law's own, discrete ones last, the commanded tilts where it commands
     them, and the rotor speeds of their model where they have one.
     """
     control, moving = _control_of(key), tilt_motion_of(key.layout.places.tilts).moving
 
-    @scalar
     def inputs(
-        time: float,
-        state: Values,
-        tilt_rates: Values,
-        states: Values,
-        parameters: Any,
-        knots: Vector,
-    ) -> Values:
+        time: Any, state: Any, tilt_rates: Any, states: Any, parameters: Any, knots: Any
+    ) -> Any:
         known = parameters.law
         reference = known.reference
-        motion: Any = reference_derivatives(time, reference, knots)
-        angles, rates = moving(time, known.gait, knots)
+        motion = reference_derivatives(time, reference, knots)
+        planned = xp.hstack(moving(time, known.gait, knots))
         attitude = attitude_reference(time, reference, knots)
-        planned = (*angles, *rates)
         return control(
             time, state, tilt_rates, states, known, knots, motion[:12], attitude, planned
         )

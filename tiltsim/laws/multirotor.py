@@ -23,7 +23,7 @@ from tiltsim_controllers.laws.multirotor_supervisor import (
     watched_at,
 )
 from tiltsim_controllers.laws.supervisor import Supervisor
-from tiltsim_controllers.mathematics.scalar import Values, scalar
+from tiltsim_controllers.mathematics.scalar import Values
 from tiltsim_controllers.vehicle.effectiveness import without_rotor
 
 if TYPE_CHECKING:
@@ -65,8 +65,7 @@ def _setup(plan: FlightPlan) -> tuple[Any, Values]:
     return law._replace(watched_without=others), (*table, *without_rotor(table, lost))
 
 
-@scalar
-def _watched(time: float, parameters: Any) -> Watched:
+def _watched(time: Any, parameters: Any) -> Watched:
     """Vehicle parameters that the supervisor reads."""
     return watched_at(time, parameters.law)
 

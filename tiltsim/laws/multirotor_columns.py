@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from functools import cache
 from typing import Any, Final
 
+import numpy as np
+
 from tiltsim.closed_loop.loop import ControlSetup, Monitoring
 from tiltsim.laws.rotor_loop import Margins, RotorLayout, table_of
 from tiltsim.laws.rotorcraft import (
@@ -14,11 +16,11 @@ from tiltsim.laws.rotorcraft import (
     singular_attitude,
     torque_free_columns,
 )
+from tiltsim_controllers.code.arrays import xp
+from tiltsim_controllers.code.traceable import traceable
 from tiltsim_controllers.laws.attitude_altitude import PUBLISHED_DECOUPLING
 from tiltsim_controllers.laws.multirotor import independence, present_wrench
 from tiltsim_controllers.laws.multirotor_steps import Form
-from tiltsim_controllers.mathematics.scalar import Values, Vector, scalar
-from tiltsim_controllers.mathematics.vectors import entries_of
 
 NULL_PART: Final = "null_part"
 """A column: the share of the rotors' ``varpi |varpi|`` that neither force nor torque show."""
@@ -44,22 +46,23 @@ def monitoring_of(layout: RotorLayout, form: Form) -> Monitoring:
     """Where the outputs depend on each other or, in the norm of the speeds, a rotor stops."""
     places = layout.places
     turning = places.rotors if form.norm == "speed" else 0
-    speeds_in = entries_of(places.speed_1, turning)
     names, stops = places.names("alpha"), rotor_stops(turning, REVERSING)
-    rotors, state_in = layout.tilt_of_rotor, entries_of(0, places.speed_1 + places.rotors)
-    harmless = (1.0,) * len(stops)  # as published, the factor 2 |varpi| is in rows of force only
+    rotors, speed_1 = layout.tilt_of_rotor, places.speed_1
+    end, harmless = (
+        speed_1 + places.rotors,
+        np.ones(turning),
+    )  # as published, the factor 2 |varpi| is in rows of force only
 
-    @scalar
-    def sign_check_values(time: float, values: Vector, parameters: Any, knots: Vector) -> Values:
+    @traceable
+    def sign_check_values(time: Any, values: Any, parameters: Any, knots: Any) -> Any:
         own = parameters.law
-        side = own.upper_side
-        if time >= own.failure.known_from:
-            side = own.upper_side_without
-        rows, up = present_wrench(time, state_in(values), own, knots, rotors)
-        share = independence(rows, up, (side.x, side.y, side.z), form)
+        whole, without = xp.array(own.upper_side), xp.array(own.upper_side_without)
+        side = xp.where(time >= own.failure.known_from, without, whole)
+        rows, up = present_wrench(time, values[:end], own, knots, rotors)
+        speeds = values[speed_1 : speed_1 + turning]
         if own.decoupling == PUBLISHED_DECOUPLING:
-            return (share, *harmless)
-        return (share, *speeds_in(values))
+            speeds = harmless
+        return xp.hstack([independence(rows, up, side, form), speeds])
 
     def causes(sample: Mapping[str, float], setup: ControlSetup) -> tuple[str, ...]:
         failure, attitude = setup.parameters.law.failure, singular_attitude(sample, names)

@@ -39,9 +39,10 @@ from tiltsim.models.rotor_table import Multirotor
 from tiltsim.vehicles.rotorcraft import initial_rotor_speeds, rotorcraft_kind
 from tiltsim.vehicles.rotorcraft.layout import CROSS
 from tiltsim.vehicles.rotorcraft.layout import Layout as Places
+from tiltsim_controllers.code.arrays import xp
+from tiltsim_controllers.code.traceable import traceable
 from tiltsim_controllers.gaits.motion import tilt_motion_of
-from tiltsim_controllers.mathematics.scalar import Floats, Triple, Values, Vector, scalar
-from tiltsim_controllers.mathematics.vectors import entries_of
+from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector
 from tiltsim_controllers.references.trajectories import attitude_reference, position_reference
 from tiltsim_controllers.vehicle.body import Body, body_of
 from tiltsim_controllers.vehicle.effectiveness import ROTOR_FLOATS
@@ -98,7 +99,7 @@ class RotorLaw(NamedTuple):
 
     name: str  # of compiled code
     inputs: Callable[..., Values]
-    """Scalar code ``(time, state, tilt_rates, states, parameters, knots)``: rotor accelerations
+    """``(time, state, tilt_rates, states, parameters, knots)``: rotor accelerations
     (rad/s^2), then rates of the controller's ``states``. ``state`` is the vehicle's (`seen_of`),
     ``parameters`` the whole record."""
     parameters: type[tuple[Any, ...]]
@@ -107,7 +108,7 @@ class RotorLaw(NamedTuple):
     initial: Callable[[FlightPlan], Values] = _no_states  # these states at time zero
     commands: int | None = None  # which of them is the first commanded tilt; None: the gait's
     references: Callable[..., Values] | None = None
-    """Scalar code ``(time, values, parameters, knots)`` of the columns ``names``, from a sample;
+    """``(time, values, parameters, knots)`` of the columns ``names``, from a sample;
     None for the position and attitude of the reference."""
     names: tuple[str, ...] = REFERENCE_COLUMNS
     margins: Margins | None = None  # None for the angle to the nearest singular attitude
@@ -116,7 +117,7 @@ class RotorLaw(NamedTuple):
     """Whether ``tilt_rates`` end with the plant's angular acceleration (rad/s^2, body axes), of
     `tiltsim.laws.layers.measured_acceleration`."""
     motion: Callable[..., Values] | None = None
-    """Scalar code ``(state, tilts, inputs, parameters, knots, disturbance)`` of the derivative of
+    """``(state, tilts, inputs, parameters, knots, disturbance)`` of the derivative of
     body and rotor speeds on the thesis's equations; None for the equations of a rotor table."""
 
 
@@ -126,7 +127,7 @@ def body_of_vehicle(vehicle: Multirotor) -> Body:
 
 
 def _tilts_of(law: RotorLaw, tilts: int, state_1: int, rate_1: int) -> Callable[..., Any]:
-    """Scalar code of the tilts (rad) and their rates (rad/s), the gait's or a law's commands.
+    """Function for the tilts (rad) and their rates (rad/s), the gait's or a law's commands.
 
     It is ``(time, state, inputs, parameters, knots) -> angles, rates``; commanded tilts are states
     whose rates are inputs.
@@ -139,20 +140,14 @@ def _tilts_of(law: RotorLaw, tilts: int, state_1: int, rate_1: int) -> Callable[
     moving, first = tilt_motion_of(tilts).moving, law.commands
     if first is None:
 
-        @scalar
-        def planned(
-            time: float, state: Vector, inputs: Vector, parameters: Any, knots: Vector
-        ) -> tuple[Values, Values]:
+        def planned(time: Any, state: Any, inputs: Any, parameters: Any, knots: Any) -> Any:
             return moving(time, parameters.law.gait, knots)
 
         return planned
-    angles, rates = entries_of(state_1 + first, tilts), entries_of(rate_1 + first, tilts)
+    angle_1, moving_1 = state_1 + first, rate_1 + first
 
-    @scalar
-    def commanded(
-        time: float, state: Vector, inputs: Vector, parameters: Any, knots: Vector
-    ) -> tuple[Values, Values]:
-        return angles(state), rates(inputs)
+    def commanded(time: Any, state: Any, inputs: Any, parameters: Any, knots: Any) -> Any:
+        return state[angle_1 : angle_1 + tilts], inputs[moving_1 : moving_1 + tilts]
 
     return commanded
 
@@ -164,44 +159,40 @@ def _sampling_of(layout: RotorLayout, law: RotorLaw) -> Sampling:
     thrusts = thrust_controls_of(layout.spins)
     tilt_motion = _tilts_of(law, tilts, rotors, rotors)
 
-    @scalar
-    def controls(
-        time: float, qpos: Vector, qvel: Vector, act: Vector, parameters: Any, knots: Vector
-    ) -> Values:
+    @traceable
+    def controls(time: Any, qpos: Any, qvel: Any, act: Any, parameters: Any, knots: Any) -> Any:
         state, moving, states = seen(qpos, qvel, act)
         inputs = inputs_of(time, state, moving, states, parameters, knots)
         angles, rates = tilt_motion(time, act, inputs, parameters, knots)
-        return (*ahead(angles, rates, parameters.servo_lead), *thrusts(act), *inputs)
+        return xp.hstack([ahead(angles, rates, parameters.servo_lead), thrusts(act), inputs])
 
     return Sampling(controls, held_controls_of(layout.spins, tilts))
 
 
-@scalar
-def _pose(time: float, values: Vector, parameters: Any, knots: Vector) -> Values:
+def _pose(time: Any, values: Any, parameters: Any, knots: Any) -> Any:
     """Position and attitude of the reference, `REFERENCE_COLUMNS`."""
     reference = parameters.law.reference
-    x, y, z, _, _, _, _, _, _ = position_reference(time, reference, knots)
-    roll, pitch, yaw = attitude_reference(time, reference, knots)
-    return x, y, z, roll, pitch, yaw
+    position = position_reference(time, reference, knots)[:3]
+    return xp.hstack([position, attitude_reference(time, reference, knots)])
 
 
 def _columns_of(layout: RotorLayout, law: RotorLaw) -> Columns:
     """Samples of flights, and the columns of references and margin."""
     places, shown, references = layout.places, layout.shown, law.references or _pose
     fields, names = (*shown.observed_fields, *law.states), (*law.names, *shown.names("alpha_ref"))
-    observed, idle = observed_of(places, shown, len(law.states)), (0.0,) * (shown[1] - places[1])
+    observed, idle = observed_of(places, shown, len(law.states)), np.zeros(shown[1] - places[1])
     first = len(shown.observed_fields)
-    tilts, at_rest = _tilts_of(law, places.tilts, first, 0), (0.0,) * len(law.states)
+    tilts, at_rest = _tilts_of(law, places.tilts, first, 0), np.zeros(len(law.states))
 
-    @scalar
-    def observe(qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector) -> Values:
+    @traceable
+    def observe(qpos: Any, qvel: Any, act: Any, ctrl: Any) -> Any:
         return observed(qpos, qvel, act)
 
-    @scalar
-    def requested(time: float, values: Vector, parameters: Any, knots: Vector) -> Values:
+    @traceable
+    def requested(time: Any, values: Any, parameters: Any, knots: Any) -> Any:
         own = references(time, values, parameters, knots)
         angles, _ = tilts(time, values, at_rest, parameters, knots)
-        return (*own, *angles, *idle)
+        return xp.hstack([own, angles, idle])
 
     def margins(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
         return torque_free_columns(places, table_of(places, setup), samples)
@@ -226,15 +217,9 @@ def _motion_of(layout: RotorLayout) -> Callable[..., Values]:
     # The thesis's equations have no gyroscopic torque but the quadrotor's.
     gyroscopic = float(layout.model == "quadrotor")
 
-    @scalar
     def motion(
-        state: Vector,
-        tilts: Values,
-        inputs: Vector,
-        parameters: Any,
-        knots: Vector,
-        disturbance: Triple,
-    ) -> Values:
+        state: Any, tilts: Any, inputs: Any, parameters: Any, knots: Any, disturbance: Any
+    ) -> Any:
         own = parameters.law
         body, at = own.vehicle, int(own.rotors)
         return motion_of_body(state, tilts, inputs, body, knots, at, disturbance, gyroscopic)
@@ -246,43 +231,35 @@ def _equations_of(layout: RotorLayout, law: RotorLaw) -> Equations:
     """The law on the equations of motion, with pods that follow their commands exactly."""
     rotors, tilts = layout.places
     own, inputs_of, motion = len(law.states), law.inputs, law.motion or _motion_of(layout)
-    idle = (0.0,) * (layout.shown.tilts - tilts)
-    speeds_in, states_in = entries_of(BODY_STATES, rotors), entries_of(BODY_STATES + rotors, own)
-    state_rates, at_rest = entries_of(rotors, own), (0.0,) * (rotors + own)
+    idle, at_rest = np.zeros(layout.shown.tilts - tilts), np.zeros(rotors + own)
+    speeds = slice(BODY_STATES, BODY_STATES + rotors)
+    states = slice(speeds.stop, speeds.stop + own)
     moving_tilts = _tilts_of(law, tilts, BODY_STATES + rotors, rotors)
 
-    @scalar
-    def tilts_of(time: float, state: Vector, parameters: Any, knots: Vector) -> Values:
-        angles: Values = moving_tilts(time, state, at_rest, parameters, knots)[0]
-        return angles
+    @traceable
+    def tilts_of(time: Any, state: Any, parameters: Any, knots: Any) -> Any:
+        return moving_tilts(time, state, at_rest, parameters, knots)[0]
 
-    @scalar
-    def inputs(time: float, state: Vector, parameters: Any, knots: Vector) -> Values:
+    @traceable
+    def inputs(time: Any, state: Any, parameters: Any, knots: Any) -> Any:
         # Rates that the law is yet to command count as none.
         angles, moving = moving_tilts(time, state, at_rest, parameters, knots)
-        seen = (*body_fields(state), *angles, *speeds_in(state))
-        return inputs_of(time, seen, moving, states_in(state), parameters, knots)
+        seen = xp.hstack([body_fields(state), angles, state[speeds]])
+        return inputs_of(time, seen, moving, state[states], parameters, knots)
 
-    @scalar
+    @traceable
     def rates(
-        time: float,
-        state: Vector,
-        inputs: Vector,
-        parameters: Any,
-        knots: Vector,
-        disturbance: Triple,
-    ) -> Values:
+        time: Any, state: Any, inputs: Any, parameters: Any, knots: Any, disturbance: Any
+    ) -> Any:
         angles = tilts_of(time, state, parameters, knots)
         body = motion(state, angles, inputs, parameters, knots, disturbance)
-        return (*body, *state_rates(inputs))
+        return xp.hstack([body, inputs[rotors : rotors + own]])
 
-    @scalar
-    def observe(
-        time: float, state: Vector, inputs: Vector, parameters: Any, knots: Vector
-    ) -> Values:
+    @traceable
+    def observe(time: Any, state: Any, inputs: Any, parameters: Any, knots: Any) -> Any:
         angles, moving = moving_tilts(time, state, inputs, parameters, knots)
-        seen = (*body_fields(state), *angles, *idle, *speeds_in(state))
-        return (*seen, *moving, *idle, *states_in(state))
+        seen = body_fields(state), angles, idle, state[speeds]
+        return xp.hstack([*seen, moving, idle, state[states]])
 
     def initial(plan: FlightPlan, _setup: ControlSetup) -> Vector:
         return (*initial_state(plan.scenario, initial_rotor_speeds(plan)), *law.initial(plan))

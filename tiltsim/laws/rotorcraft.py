@@ -10,7 +10,7 @@ import numpy as np
 
 from tiltsim.closed_loop.loop import ControlSetup
 from tiltsim.engines.sample_evaluation import evaluate_over_samples
-from tiltsim.vehicles.rotorcraft.layout import QW, QX, QY, QZ, TILT_1, TILT_RATE_1, Layout
+from tiltsim.vehicles.rotorcraft.layout import QW, TILT_1, TILT_RATE_1, Layout
 from tiltsim_controllers.analysis.singularity import world_up
 from tiltsim_controllers.analysis.torque_free import (
     controlled_axes,
@@ -24,18 +24,11 @@ from tiltsim_controllers.gaits.motion import tilt_motion_of
 from tiltsim_controllers.gaits.parameters import GaitParameters
 from tiltsim_controllers.laws.failures import UNHARMED, Failure
 from tiltsim_controllers.mathematics.attitude import euler_angles
-from tiltsim_controllers.mathematics.rotation import euler_from_quaternion
-from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector, scalar
-from tiltsim_controllers.mathematics.vectors import entries_of
+from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector
 from tiltsim_controllers.vehicle.effectiveness import force_and_torque
 
 if TYPE_CHECKING:
     from tiltsim.scenario.rotorcraft import ServoTable
-
-
-def _array(vector: Any) -> Any:
-    """A vector of MuJoCo as an array; a traced one is not an array yet."""
-    return vector if hasattr(vector, "shape") else xp.array(vector)
 
 
 @cache
@@ -52,9 +45,7 @@ def seen_of(layout: Layout, states: int, measured: bool) -> Callable[..., tuple[
     """
     rotors, tilts = layout
 
-    @traceable
     def seen(qpos: Any, qvel: Any, act: Any) -> tuple[Any, ...]:
-        qpos, qvel, act = _array(qpos), _array(qvel), _array(act)
         attitude, angles = euler_angles(qpos[QW:TILT_1]), qpos[TILT_1 : TILT_1 + tilts]
         state = qpos[0:3], qvel[0:3], attitude, qvel[3:6], angles, act[:rotors]
         rates = qvel[TILT_RATE_1 : TILT_RATE_1 + tilts + 3 * measured]
@@ -64,8 +55,8 @@ def seen_of(layout: Layout, states: int, measured: bool) -> Callable[..., tuple[
 
 
 @cache
-def observed_of(layout: Layout, shown: Layout, further: int) -> Callable[..., Values]:
-    """Scalar code of a sample, `Columns.observe` without controls.
+def observed_of(layout: Layout, shown: Layout, further: int) -> Callable[..., Any]:
+    """A sample as a function, `Columns.observe` without controls.
 
     Args:
         layout: Layout of the vehicle.
@@ -73,27 +64,23 @@ def observed_of(layout: Layout, shown: Layout, further: int) -> Callable[..., Va
         further: Number of the controller's states in a sample.
     """
     rotors, tilts = layout
-    idle = (0.0,) * (shown.tilts - tilts)
-    first, turning = entries_of(0, 3), entries_of(3, 3)
-    angles, rates = entries_of(TILT_1, tilts), entries_of(TILT_RATE_1, tilts)
-    speeds, states = entries_of(0, rotors), entries_of(rotors, further)
+    idle, end = np.zeros(shown.tilts - tilts), TILT_RATE_1 + tilts
 
-    @scalar
-    def observed(qpos: Vector, qvel: Vector, act: Vector) -> Values:
-        attitude = euler_from_quaternion(qpos[QW], qpos[QX], qpos[QY], qpos[QZ])
-        body = (*first(qpos), *first(qvel), *attitude, *turning(qvel))
-        return (*body, *angles(qpos), *idle, *speeds(act), *rates(qvel), *idle, *states(act))
+    def observed(qpos: Any, qvel: Any, act: Any) -> Any:
+        attitude, angles = euler_angles(qpos[QW:TILT_1]), qpos[TILT_1 : TILT_1 + tilts]
+        body = qpos[:3], qvel[:3], attitude, qvel[3:6]
+        tilting = angles, idle, act[:rotors], qvel[TILT_RATE_1:end], idle
+        return xp.hstack([*body, *tilting, act[rotors : rotors + further]])
 
     return observed
 
 
 @cache
-def thrust_controls_of(spins: Values) -> Callable[[Vector], Values]:
+def thrust_controls_of(spins: Values) -> Callable[[Any], Any]:
     """Controls of the thrust actuators, ``s varpi |varpi|`` with the spin s, from ``act``."""
 
-    @traceable
     def thrust_controls(act: Any) -> Any:
-        speeds = _array(act)[: len(spins)]
+        speeds = act[: len(spins)]
         return xp.array(spins) * speeds * abs(speeds)
 
     return thrust_controls
@@ -101,7 +88,7 @@ def thrust_controls_of(spins: Values) -> Callable[[Vector], Values]:
 
 @cache
 def held_controls_of(spins: Values, tilts: int) -> Callable[..., Values]:
-    """Scalar code of held controls with the thrusts of the present rotor speeds.
+    """Held controls with the thrusts of the present rotor speeds.
 
     Args:
         spins: Signs of the rotor speeds.
@@ -109,11 +96,9 @@ def held_controls_of(spins: Values, tilts: int) -> Callable[..., Values]:
     """
     thrusts, further = thrust_controls_of(spins), Layout(len(spins), tilts).acceleration_1
 
-    @scalar
-    def held_controls(
-        time: float, qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector, parameters: object
-    ) -> Values:
-        return (*ctrl[:tilts], *thrusts(act), *ctrl[further:])
+    @traceable
+    def held_controls(time: Any, qpos: Any, qvel: Any, act: Any, ctrl: Any, parameters: Any) -> Any:
+        return xp.hstack([ctrl[:tilts], thrusts(act), ctrl[further:]])
 
     return held_controls
 
@@ -123,7 +108,6 @@ def servo_lead(servo: ServoTable) -> float:
     return 2.0 * servo.damping_ratio / servo.natural_frequency
 
 
-@traceable
 def ahead(angles: Any, rates: Any, lead: Any) -> Any:
     """Angles (rad) ahead of themselves by a lag (s) at their rates (rad/s)."""
     return angles + lead * rates
@@ -131,17 +115,15 @@ def ahead(angles: Any, rates: Any, lead: Any) -> Any:
 
 @cache
 def servo_commands_of(tilts: int) -> Callable[..., Values]:
-    """Scalar code of the commands of tilt servos, ahead of a gait by their lag.
+    """Function for the commands of tilt servos, ahead of a gait by their lag.
 
     It is ``(time, lead, gait, knots) -> commands``, s and rad.
     """
     moving = tilt_motion_of(tilts).moving
 
-    @scalar
-    def servo_commands(time: float, lead: float, gait: GaitParameters, knots: Vector) -> Values:
-        angles, rates = moving(time, gait, knots)
-        commands: Values = ahead(angles, rates, lead)
-        return commands
+    @traceable
+    def servo_commands(time: Any, lead: Any, gait: GaitParameters, knots: Any) -> Any:
+        return ahead(*moving(time, gait, knots), lead)
 
     return servo_commands
 
@@ -196,7 +178,7 @@ def reference_columns(
     """The columns of references, evaluated over samples.
 
     Args:
-        in_force: Scalar function ``(time, values, parameters, knots)`` of the columns' values.
+        in_force: Function ``(time, values, parameters, knots)`` of the columns' values.
         fields: Fields of a sample, its ``values``.
         samples: By field.
         setup: The flight's parameters and knots.

@@ -26,8 +26,7 @@ from tiltsim_controllers.laws.multirotor_steps import EULER_ANGLES
 from tiltsim_controllers.laws.tiltrotor_supervisor import SUPERVISION
 from tiltsim_controllers.mathematics.attitude import rotation_matrix
 from tiltsim_controllers.mathematics.linear import kernel
-from tiltsim_controllers.mathematics.scalar import Floats, Quad, Triple, Values, Vector, scalar
-from tiltsim_controllers.mathematics.vectors import entries_of
+from tiltsim_controllers.mathematics.scalar import Floats, Values
 from tiltsim_controllers.vehicle.parameters import SPIN, Vehicle, drag_ratio
 from tiltsim_controllers.vehicle.rotors import airframe, wrench_map
 from tiltsim_controllers.vehicle.states import ROTORS, TILT_FIELDS, TILTROTOR_FIELDS, state_of
@@ -43,26 +42,16 @@ TILTROTOR_LAYOUT: Final = RotorLayout((0, 1, 2, 3), SPIN, "tiltrotor")
 
 CROSS: Final = TILTROTOR_LAYOUT.tilt_of_rotor
 
-state_in = entries_of(0, len(TILTROTOR_FIELDS))
-"""Scalar code of the vehicle's state in a sample."""
 
-
-@scalar
-def four(values: Vector, first: int) -> Quad:
-    """Four consecutive values."""
-    return values[first], values[first + 1], values[first + 2], values[first + 3]
-
-
-@scalar
 def tiltrotor_motion(
-    state: Vector, tilts: Quad, inputs: Vector, parameters: Any, knots: Vector, disturbance: Triple
-) -> Values:
+    state: Any, tilts: Any, inputs: Any, parameters: Any, knots: Any, disturbance: Any
+) -> Any:
     """The thesis's equations.
 
     Args:
         state, tilts, inputs, parameters, knots, disturbance: See `RotorLaw.motion`.
     """
-    return equations_of_motion(state, tilts, four(inputs, 0), parameters.law.vehicle, disturbance)
+    return equations_of_motion(state, tilts, inputs[:4], parameters.law.vehicle, disturbance)
 
 
 def singularity_columns(samples: Mapping[str, Floats], vehicle: Vehicle) -> dict[str, Floats]:
@@ -77,8 +66,7 @@ def singularity_columns(samples: Mapping[str, Floats], vehicle: Vehicle) -> dict
     }
 
 
-@scalar
-def watched_vehicle(time: float, parameters: Any) -> float:
+def watched_vehicle(time: Any, parameters: Any) -> Any:
     """The vehicle parameter that the tiltrotor's supervisor reads."""
     return drag_ratio(parameters.law.vehicle)
 
@@ -88,7 +76,6 @@ def singularity_margins(samples: Mapping[str, Floats], setup: ControlSetup) -> d
     return singularity_columns(samples, setup.parameters.law.vehicle)
 
 
-@traceable
 def _determinant_and_speeds(values: Any, law: Any) -> Any:
     """Determinant of the decoupling matrix by its scale, and the rotor speeds (rad/s), shape (5,).
 
@@ -105,10 +92,9 @@ def _determinant_and_speeds(values: Any, law: Any) -> Any:
     return xp.hstack([determinant / scale, speeds])
 
 
-@scalar
-def _sign_check_values(time: float, values: Vector, parameters: Any, knots: Vector) -> Values:
-    numbers: Values = _determinant_and_speeds(state_in(values), parameters.law)
-    return numbers
+@traceable
+def _sign_check_values(time: Any, values: Any, parameters: Any, knots: Any) -> Any:
+    return _determinant_and_speeds(values[: len(TILTROTOR_FIELDS)], parameters.law)
 
 
 def _causes(sample: Mapping[str, float], _setup: ControlSetup) -> tuple[str, ...]:
@@ -136,17 +122,16 @@ def tiltrotor_loops(law: RotorLaw) -> tuple[ClosedLoop, ClosedLoop]:
     return loop(measured=False), loop(measured=True)
 
 
-@scalar
 def _without_gait(
-    time: float,
-    state: Values,
-    tilt_rates: Values,
-    states: Values,
+    time: Any,
+    state: Any,
+    tilt_rates: Any,
+    states: Any,
     parameters: Any,
-    knots: Vector,
-    motion: Triple,
-    measured: Triple | None = None,
-) -> Values:
+    knots: Any,
+    motion: Any,
+    measured: Any = None,
+) -> Any:
     """The law without feed-forward as `tiltsim.laws.tracking` takes it; it has no states."""
     return attitude_altitude.attitude_altitude_inputs(time, state, parameters, knots, measured)
 

@@ -19,10 +19,10 @@ from tiltsim.laws.rotor_loop import RotorLaw, RotorLayout, rotor_loop
 from tiltsim.laws.rotorcraft import REFERENCE_COLUMNS, seen_of
 from tiltsim.scenario.multirotor_controllers import AttitudeForceController
 from tiltsim.scenario.tiltrotor_controllers import AttitudeAltitudeController
+from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.laws.multirotor_steps import INTEGRAL_FIELDS
 from tiltsim_controllers.laws.supervisor import SUPERVISOR_AT_REST, Supervision
-from tiltsim_controllers.mathematics.scalar import Triple, Values, Vector, scalar
-from tiltsim_controllers.mathematics.vectors import entries_of
+from tiltsim_controllers.mathematics.scalar import Values
 from tiltsim_controllers.references.trajectories import position_reference
 
 if TYPE_CHECKING:
@@ -54,42 +54,31 @@ def tracking_parameters(plan: FlightPlan, record: Any, **own: Any) -> Any:
         record,
         gains=controller.resolve_gains(),
         integral=controller.resolve_integral_gains(),
-        anticipation=min(controller.anticipation, 0.5 * plan.gait.min_segment_time),
+        anticipation=xp.minimum(controller.anticipation, 0.5 * plan.gait.min_segment_time),
         terms=terms,
         **own,
     )
-
-
-@scalar
-def _by_model(moving: Values) -> None:
-    """For a law that computes the angular acceleration by its model."""
-    return
 
 
 @cache
 def _inputs_of(
     layout: RotorLayout, law: Callable[..., Values], states: int, measured: bool
 ) -> Callable[..., Values]:
-    """Scalar code of `SupervisedLaw.inputs`."""
+    """`SupervisedLaw.inputs`."""
     rotors, tilts = layout.places
-    tilt_rates_in, inputs_in = entries_of(0, tilts), entries_of(0, rotors + states)
-    acceleration_in = entries_of(tilts, 3) if measured else _by_model
 
-    @scalar
     def inputs(
-        time: float,
-        state: Values,
-        moving: Values,
-        own: Values,
+        time: Any,
+        state: Any,
+        moving: Any,
+        own: Any,
         parameters: Any,
-        knots: Vector,
-        motion: Triple = SUPERVISOR_AT_REST,
-    ) -> Values:
-        rates, acceleration = tilt_rates_in(moving), acceleration_in(moving)
-        found: Values = inputs_in(
-            law(time, state, rates, own, parameters.law, knots, motion, acceleration)
-        )
-        return found
+        knots: Any,
+        motion: Any = SUPERVISOR_AT_REST,
+    ) -> Any:
+        acceleration = moving[tilts : tilts + 3] if measured else None
+        found = law(time, state, moving[:tilts], own, parameters.law, knots, motion, acceleration)
+        return found[: rotors + states]
 
     return inputs
 
@@ -98,26 +87,19 @@ def _inputs_of(
 def _references_of(
     layout: RotorLayout, law: Callable[..., Values], states: int, further: int
 ) -> Callable[..., Values]:
-    """Scalar code of position, attitude and further numbers; see `SupervisedLaw.references`."""
+    """Position, attitude and further numbers; see `SupervisedLaw.references`."""
     rotors, tilts = layout.places
     first = layout.places.speed_1 + rotors
-    state_in, rates_of_sample = entries_of(0, first), entries_of(first, tilts)
-    states_of_sample = entries_of(first + tilts, states)
-    tracked_in = entries_of(rotors + states, 3 + further)  # roll, pitch, yaw and all that follows
+    end = first + tilts
+    tracked = slice(rotors + states, rotors + states + 3 + further)  # roll, pitch, yaw and further
 
-    @scalar
     def references(
-        time: float,
-        values: Vector,
-        parameters: Any,
-        knots: Vector,
-        motion: Triple = SUPERVISOR_AT_REST,
-    ) -> Values:
-        own = parameters.law
-        x, y, z, _, _, _, _, _, _ = position_reference(time, own.reference, knots)
-        moving, states_now = rates_of_sample(values), states_of_sample(values)
-        found = law(time, state_in(values), moving, states_now, own, knots, motion)
-        return (x, y, z, *tracked_in(found))
+        time: Any, values: Any, parameters: Any, knots: Any, motion: Any = SUPERVISOR_AT_REST
+    ) -> Any:
+        own, (state, moving) = parameters.law, (values[:first], values[first:end])
+        position = position_reference(time, own.reference, knots)[:3]
+        found = law(time, state, moving, values[end : end + states], own, knots, motion)
+        return xp.hstack([position, found[tracked]])
 
     return references
 

@@ -23,6 +23,8 @@ from typing import TYPE_CHECKING, Final, Literal, NamedTuple, TypeAlias
 import numpy as np
 
 from tiltsim_controllers.analysis.two_color_map import point_p, red_residual
+from tiltsim_controllers.code.arrays import xp
+from tiltsim_controllers.code.tracing import is_known
 from tiltsim_controllers.gaits import plans
 from tiltsim_controllers.gaits.colors import colored_angles, require_color
 from tiltsim_controllers.vehicle.parameters import drag_ratio
@@ -197,12 +199,12 @@ def four_angle_gait(
         )
     ratio = drag_ratio(vehicle)
     lengths = [
-        hypot(end[0] - start[0], end[1] - start[1])
+        xp.hypot(end[0] - start[0], end[1] - start[1])
         for leg in path.legs
         for start, end in pairwise(leg.vertices)
     ]
     total = sum(lengths)
-    if not total > 0.0:
+    if is_known(total) and not total > 0.0:
         raise ValueError("the path has no length: use a fixed gait")
     covered = 0.0
     rows: list[tuple[float, ...]] = []

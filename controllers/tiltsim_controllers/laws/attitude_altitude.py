@@ -26,7 +26,6 @@ from tiltsim_controllers.laws.gains import Gains, GivenGains
 from tiltsim_controllers.laws.keys import Keys, record_of
 from tiltsim_controllers.mathematics.attitude import rotation_matrix, wrapped
 from tiltsim_controllers.mathematics.linear import cross, kernel, solved
-from tiltsim_controllers.mathematics.scalar import Triple, Values, Vector, scalar
 from tiltsim_controllers.references.trajectories import ReferenceParameters, position_reference
 from tiltsim_controllers.vehicle.body import inertia_matrix, inverse_inertia_matrix
 from tiltsim_controllers.vehicle.parameters import Vehicle
@@ -178,14 +177,10 @@ def attitude_altitude(state: Any, target: Any, parameters: Any, measured: Any = 
     return xp.hstack([inputs, tracked])
 
 
-@scalar
+@traceable
 def attitude_altitude_inputs(
-    time: float,
-    state: Values,
-    parameters: Any,
-    knots: Vector = NO_KNOTS,
-    measured: Triple | None = None,
-) -> Values:
+    time: Any, state: Any, parameters: Any, knots: Any = NO_KNOTS, measured: Any = None
+) -> Any:
     """Rotor accelerations (rad/s^2) that track the reference, and the attitude tracked (rad).
 
     See `attitude_altitude`.
@@ -196,5 +191,4 @@ def attitude_altitude_inputs(
         knots: Table data of the reference.
     """
     target = position_reference(time, parameters.reference, knots)
-    inputs: Values = attitude_altitude(state, target, parameters, measured)
-    return inputs
+    return attitude_altitude(state, target, parameters, measured)

@@ -6,12 +6,9 @@ normal of the plane of torque-free forces for two; see `tiltsim_controllers.laws
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import cache
 from typing import Any, NamedTuple
 
 from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.code.traceable import traceable
 from tiltsim_controllers.mathematics.linear import (
     cross,
     nearest_solution,
@@ -151,30 +148,3 @@ def share(row: Any, unit: Any) -> Any:
     """The share of a row (N,) that lies along a unit row; 0 for a row of zeros."""
     square = row @ row
     return xp.where(square > 0.0, row @ unit / xp.sqrt(xp.where(square > 0.0, square, 1.0)), 0.0)
-
-
-# --- for scalar code ---------------------------------------------------------------------------
-
-
-@cache
-def factors_of(length: int, dimension: int, forward: bool = False) -> Callable[..., Any]:
-    """`factors` for scalar code: ``(rows, pushes, up) -> axes, rows, units, direction``."""
-
-    @traceable
-    def found(rows: Any, pushes: Any, up: Any) -> Any:
-        axes, along, units, direction = factors(rows, pushes, up, dimension, forward)
-        return axes, along, xp.array(units), direction
-
-    return found
-
-
-@cache
-def combination_of(length: int) -> Callable[..., Any]:
-    """A linear combination of three rows for scalar code: ``(factors, x, y, z)``."""
-    return traceable(lambda f, x, y, z: f[0] * x + f[1] * y + f[2] * z)
-
-
-@cache
-def share_of(length: int) -> Callable[..., Any]:
-    """`share` for scalar code: ``(row, unit)``."""
-    return traceable(share)

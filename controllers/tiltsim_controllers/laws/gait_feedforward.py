@@ -10,7 +10,9 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any, Final
 
-from tiltsim_controllers.gaits.motion import Jets, tilt_motion_of
+from tiltsim_controllers.code.arrays import xp
+from tiltsim_controllers.code.traceable import traceable
+from tiltsim_controllers.gaits.motion import tilt_motion_of
 from tiltsim_controllers.gaits.parameters import FIXED, NO_KNOTS, GaitParameters
 from tiltsim_controllers.laws.allocation import limited_accelerations
 from tiltsim_controllers.laws.attitude_altitude import OPTIONS, AttitudeAltitude
@@ -22,7 +24,6 @@ from tiltsim_controllers.laws.multirotor_steps import FeedforwardTerms, Form
 from tiltsim_controllers.laws.multirotor_supervisor import multirotor_supervision_of, watched_at
 from tiltsim_controllers.laws.supervisor import SUPERVISOR_AT_REST, Supervisor, gait_time
 from tiltsim_controllers.laws.tiltrotor_supervisor import SUPERVISION
-from tiltsim_controllers.mathematics.scalar import Quad, Triple, Values, Vector, scalar
 from tiltsim_controllers.references.trajectories import ReferenceParameters, reference_derivatives
 from tiltsim_controllers.vehicle.effectiveness import TiltOfRotor, tilts_of
 from tiltsim_controllers.vehicle.parameters import Vehicle, drag_ratio
@@ -59,17 +60,17 @@ _TILTS: Final = tilt_motion_of(4)
 _gait_scale, _supervised_tilts = SUPERVISION.gait_scale, SUPERVISION.tilts
 
 
-@scalar
+@traceable
 def tracking_inputs(
-    time: float,
-    state: Values,
-    tilt_rates: Quad,
-    integrals: Triple,
+    time: Any,
+    state: Any,
+    tilt_rates: Any,
+    integrals: Any,
     parameters: Any,
-    knots: Vector = NO_KNOTS,
-    supervisor_motion: Triple = SUPERVISOR_AT_REST,
-    measured: Triple | None = None,
-) -> Values:
+    knots: Any = NO_KNOTS,
+    supervisor_motion: Any = SUPERVISOR_AT_REST,
+    measured: Any = None,
+) -> Any:
     """Rotor accelerations (rad/s^2, singular: NaN), integrator rates (m), attitude to track (rad).
 
     Args:
@@ -91,7 +92,7 @@ def tracking_inputs(
         scale = _gait_scale(planned, state[ROLL], state[PITCH], supervisor, ratio, knots)
         tilts = _TILTS.anticipated(clock, parameters.gait, knots, parameters.anticipation)
         plan = _supervised_tilts(tilts, scale, supervisor_motion, supervisor, ratio)
-    found: Values = attitude_force(
+    found = attitude_force(
         time, state, tilt_rates, integrals, reference, plan, parameters, (), TILTROTOR, FORM,
         measured,
     )  # fmt: skip
@@ -99,8 +100,8 @@ def tracking_inputs(
 
 
 @cache
-def _plan_of(layout: TiltOfRotor, form: Form) -> Callable[..., Jets]:
-    """Scalar code of the gait's tilts with derivatives.
+def _plan_of(layout: TiltOfRotor, form: Form) -> Callable[..., Any]:
+    """The gait's tilts with derivatives.
 
     ``(time, state, motion, parameters, knots)``: they are the anticipated ones of the plan or,
     under a supervisor whose state is ``motion``, the supervised ones.
@@ -108,8 +109,7 @@ def _plan_of(layout: TiltOfRotor, form: Form) -> Callable[..., Jets]:
     motion_of = tilt_motion_of(tilts_of(layout))
     moving, anticipated = motion_of.moving, motion_of.anticipated
 
-    @scalar
-    def planned(time: float, state: Values, motion: Triple, parameters: Any, knots: Vector) -> Jets:
+    def planned(time: Any, state: Any, motion: Any, parameters: Any, knots: Any) -> Any:
         return anticipated(time, parameters.gait, knots, parameters.anticipation)
 
     if not form.supervised:
@@ -117,10 +117,7 @@ def _plan_of(layout: TiltOfRotor, form: Form) -> Callable[..., Jets]:
     supervision = multirotor_supervision_of(layout, form.dimension, form.forward)
     gait_scale, supervised_tilts = supervision.gait_scale, supervision.tilts
 
-    @scalar
-    def supervised(
-        time: float, state: Values, motion: Triple, parameters: Any, knots: Vector
-    ) -> Jets:
+    def supervised(time: Any, state: Any, motion: Any, parameters: Any, knots: Any) -> Any:
         supervisor, vehicle = parameters.supervisor, watched_at(time, parameters)
         clock = gait_time(time, motion, supervisor)
         now, _ = moving(clock, parameters.gait, knots)
@@ -132,8 +129,8 @@ def _plan_of(layout: TiltOfRotor, form: Form) -> Callable[..., Jets]:
 
 
 @cache
-def multirotor_law_of(layout: TiltOfRotor, form: Form) -> Callable[..., Values]:
-    """The control law of multirotors of a layout, scalar code as `tracking_inputs`.
+def multirotor_law_of(layout: TiltOfRotor, form: Form) -> Callable[..., Any]:
+    """The control law of multirotors of a layout, a function as `tracking_inputs`.
 
     Its parameters are `tiltsim_controllers.laws.multirotor_steps.Parameters`, the table of the
     rotors is in the knots, and it also returns the null part.
@@ -143,23 +140,23 @@ def multirotor_law_of(layout: TiltOfRotor, form: Form) -> Callable[..., Values]:
     leans_with_gait = form.dimension < 3 and not form.forward and tilts_of(layout) > 0
     supervised = form.supervised
 
-    @scalar
+    @traceable
     def inputs(
-        time: float,
-        state: Values,
-        tilt_rates: Values,
-        integrals: Triple,
+        time: Any,
+        state: Any,
+        tilt_rates: Any,
+        integrals: Any,
         parameters: Any,
-        knots: Vector = NO_KNOTS,
-        supervisor_motion: Triple = SUPERVISOR_AT_REST,
-        measured: Triple | None = None,
-    ) -> Values:
+        knots: Any = NO_KNOTS,
+        supervisor_motion: Any = SUPERVISOR_AT_REST,
+        measured: Any = None,
+    ) -> Any:
         reference = reference_derivatives(time, parameters.reference, knots)
         plan = None
         moves = parameters.gait.type != FIXED or supervised
         if leans_with_gait and moves and parameters.terms.attitude_rates != 0.0:
             plan = plan_of(time, state, supervisor_motion, parameters, knots)
-        found: Values = attitude_force(
+        found = attitude_force(
             time, state, tilt_rates, integrals, reference, plan, parameters, knots, layout, form,
             measured,
         )  # fmt: skip
@@ -170,6 +167,6 @@ def multirotor_law_of(layout: TiltOfRotor, form: Form) -> Callable[..., Values]:
         accelerations = limited_accelerations(
             found[:count], wrench, up, state[speeds], spins, parameters.limits
         )
-        return (*accelerations, *found[count:])
+        return xp.hstack([accelerations, found[count:]])
 
     return inputs

@@ -13,6 +13,7 @@ from tests.controllers.laws.test_tracking import PATH, TIME, reference
 from tests.controllers.multirotors import FOUR, HEXAROTOR, Vehicle, random_states, ring, tiltrotor
 from tests.natively import compiled, natively
 from tiltsim_controllers.analysis.stability import is_hurwitz
+from tiltsim_controllers.code.traceable import traceable
 from tiltsim_controllers.gaits.parameters import FIXED, GaitParameters
 from tiltsim_controllers.laws import attitude_altitude
 from tiltsim_controllers.laws.attitude_altitude import attitude_altitude_inputs
@@ -32,7 +33,6 @@ from tiltsim_controllers.laws.gains import GAIN_SETS as ATTITUDE_GAINS
 from tiltsim_controllers.mathematics.attitude import attitude_error, rotation_matrix
 from tiltsim_controllers.mathematics.linear import least_norm
 from tiltsim_controllers.mathematics.rotation import rotation_from_euler
-from tiltsim_controllers.mathematics.scalar import scalar
 from tiltsim_controllers.references.trajectories import (
     CIRCLE,
     REFERENCE_TYPES,
@@ -59,7 +59,7 @@ CASES = 20
 ROTORS = rotors_in(cross_table(TILTROTOR, tilting=True), 0, (0, 1, 2, 3))
 
 
-@scalar
+@traceable
 def full_pose_inputs(time, state, parameters, knots=()):
     """The law of the tiltrotor, with its reference."""
     target = reference_derivatives(time, parameters.reference, knots)

@@ -21,7 +21,7 @@ from tiltsim_controllers.gaits.motion import planned_tilts
 from tiltsim_controllers.gaits.parameters import GaitParameters
 from tiltsim_controllers.laws.supervisor import HOLD, Supervisor, gait_time
 from tiltsim_controllers.mathematics.attitude import euler_angles
-from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector, scalar
+from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.vehicle.states import PITCH, ROLL
 
 if TYPE_CHECKING:
@@ -50,12 +50,6 @@ def _supervised(loop: ClosedLoop) -> SupervisedLaw:
     return loop.supervised
 
 
-@traceable
-def attitude_in(qpos: Any) -> Any:
-    """Roll, pitch and yaw (rad), shape (3,), of a vehicle."""
-    return euler_angles(qpos[QW:TILT_1])
-
-
 def _scaling(loop: ClosedLoop) -> Layer:
     """A supervisor that scales the gait, without states."""
     inner_controls, law = loop.sampling.controls, _supervised(loop)
@@ -64,32 +58,18 @@ def _scaling(loop: ClosedLoop) -> Layer:
     gait_scale, vehicle_of = law.code.gait_scale, law.vehicle
 
     @traceable
-    def scale_at(
-        time: Any, attitude: Any, gait: GaitParameters, layer: Supervisor, vehicle: Any, knots: Any
-    ) -> Any:
+    def scale_of(time: Any, attitude: Any, parameters: Any, knots: Any) -> Any:
         """The factor of the planned gait at an attitude (rad), shape (1,)."""
-        planned = planned_tilts(time, gait, knots, tilts)[:, 0]
-        return xp.array([gait_scale(planned, attitude[0], attitude[1], layer, vehicle, knots)])
+        inner, (roll, pitch) = parameters.inner, attitude[:2]
+        planned = planned_tilts(time, inner.law.gait, knots, tilts)[:, 0]
+        vehicle = vehicle_of(time, inner)
+        return xp.array([gait_scale(planned, roll, pitch, parameters.layer, vehicle, knots)])
 
     @traceable
-    def scaled(scale: Any, ctrl: Any) -> Any:
-        """Controls with scaled tilt angles."""
+    def controls(time: Any, qpos: Any, qvel: Any, act: Any, parameters: Any, knots: Any) -> Any:
+        ctrl = inner_controls(time, qpos, qvel, act, parameters.inner, knots)
+        scale = scale_of(time, euler_angles(qpos[QW:TILT_1]), parameters, knots)
         return xp.hstack([scale * ctrl[:tilts], ctrl[tilts:]])
-
-    @scalar
-    def scale_of(time: float, attitude: Vector, parameters: Any, knots: Vector) -> Values:
-        """The factor at a sample."""
-        inner, layer = parameters.inner, parameters.layer
-        vehicle = vehicle_of(time, inner)
-        return scale_at(time, (*attitude,), inner.law.gait, layer, vehicle, knots)
-
-    @scalar
-    def controls(
-        time: float, qpos: Vector, qvel: Vector, act: Vector, parameters: Any, knots: Vector
-    ) -> Values:
-        planned = inner_controls(time, qpos, qvel, act, parameters.inner, knots)
-        attitude = attitude_in((*qpos,))
-        return scaled(scale_of(time, attitude, parameters, knots), planned)
 
     def derive(
         inner: Callable[[], dict[str, Floats]], samples: Samples, setup: ControlSetup
@@ -118,7 +98,6 @@ def _servo_commands_of(law: SupervisedLaw, tilts: int) -> Callable[..., Any]:
     """
     supervised_tilts = law.code.tilts
 
-    @traceable
     def servo_commands(
         time: Any,
         motion: Any,
@@ -143,32 +122,25 @@ def _with_states(loop: ClosedLoop, units: tuple[str, ...]) -> Layer:
     thrusts = thrust_controls_of(loop.dynamics.spins)
     first, seen = loop.dynamics.sizes.act, len(law.fields)
 
-    @scalar
-    def controls(
-        time: float, qpos: Vector, qvel: Vector, act: Vector, parameters: Any, knots: Vector
-    ) -> Values:
+    @traceable
+    def controls(time: Any, qpos: Any, qvel: Any, act: Any, parameters: Any, knots: Any) -> Any:
         inner, supervisor = parameters.inner, parameters.layer
         state, moving, states = seen_in(qpos, qvel, act)
         gait, lead, vehicle = inner.law.gait, inner.servo_lead, vehicle_of(time, inner)
         roll, pitch, delay, rate = state[ROLL], state[PITCH], act[first], act[first + 1]
         motion = derivative(time, roll, pitch, delay, rate, gait, knots, supervisor, vehicle)
-        return (
-            *servo_commands(time, motion, gait, knots, supervisor, vehicle, lead),
-            *thrusts(act),
-            *inputs(time, state, moving, states, inner, knots, motion),
-            motion[1],
-            motion[2],
-        )
+        commands = servo_commands(time, motion, gait, knots, supervisor, vehicle, lead)
+        own = inputs(time, state, moving, states, inner, knots, motion)
+        return xp.hstack([commands, thrusts(act), own, motion[1], motion[2]])
 
-    @scalar
-    def reference_values(time: float, state: Vector, parameters: Any, knots: Vector) -> Values:
+    @traceable
+    def reference_values(time: Any, state: Any, parameters: Any, knots: Any) -> Any:
         inner, supervisor = parameters.inner, parameters.layer
-        motion = (state[seen], state[seen + 1], 0.0)
+        motion = xp.array([state[seen], state[seen + 1], 0.0])
         gait, vehicle = inner.law.gait, vehicle_of(time, inner)
-        return (
-            *references(time, state, inner, knots, motion),
-            *servo_commands(time, motion, gait, knots, supervisor, vehicle, 0.0),
-        )
+        tracked = references(time, state, inner, knots, motion)
+        commands = servo_commands(time, motion, gait, knots, supervisor, vehicle, 0.0)
+        return xp.hstack([tracked, commands])
 
     def derive(
         _inner: Callable[[], dict[str, Floats]], samples: Samples, setup: ControlSetup
