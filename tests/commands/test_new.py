@@ -20,6 +20,7 @@ def test_each_kind_passes_its_check(kind, capsys):
     assert main(["new", kind]) == 0
     assert main(["check", f"{kind}.toml"]) == 0
     assert "3/3 hold" in capsys.readouterr().out
+    assert main(["run", f"{kind}.toml", "--quiet", "--set", "reference.position=[2, 0, 0]"]) == 0
 
 
 def test_a_name_with_quotes_is_found(folder):
@@ -41,7 +42,7 @@ def test_files_are_overwritten_only_by_force(existing, folder, capsys):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["pentarotor"], "KIND 'pentarotor': unknown; choose quadrotor, hexarotor, "),
+        (["pentarotor"], "KIND 'pentarotor': unknown; choose bicopter, tricopter, "),
         (["quadrotor", "mine.txt"], "FILE mine.txt: unknown format '.txt'; choose .xml"),
         (["quadrotor", "none/mine.xml"], "FILE none/mine.xml: its folder does not exist"),
     ],

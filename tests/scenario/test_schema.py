@@ -19,7 +19,7 @@ from tiltsim.sweeps.tables import Sweep
         (("gait", "fixed", "angles", 2), ""),  # the list has it
         (("gait", "fixed", "angles"), "rad"),
         (("initial", "rotor_speed"), "rad/s"),  # may be null
-        (("disturbance", 1, "value"), "m/s^2"),
+        (("disturbance", 1, "force", "value"), "N"),
         (("vehicle", "tiltrotor", "tilt_servo", "max_rate"), "rad/s"),
         (("simulation", "no_such_key"), ""),
     ],

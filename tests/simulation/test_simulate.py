@@ -295,10 +295,14 @@ def test_the_end_of_a_step_that_would_reverse_a_rotor_says_what_helps():
     step = {"reference.position": [2.0, 0.0, 0.0], "simulation.duration": 0.1, "expect": []}
     lost = tiltsim.load_scenario("fleet/cant_hexarotor#hover", step)
     assert tiltsim.simulate(lost).end.cause.endswith(
-        'rotor 2 came to a stop; controller.norm = "thrust", with which rotors reverse, a smaller '
-        "step of the reference or wider limits of the rotor speeds may help"
+        "rotor 2 came to a stop; vehicle.min_rotor_speed = 100, controller.norm = "
+        '"thrust", with which rotors reverse, or a smaller step of the reference may help'
     )
-    for remedy in ({"controller.norm": "thrust"}, {"reference.position": [0.3, 0.0, 0.0]}):
+    for remedy in (
+        {"vehicle.min_rotor_speed": 100.0},
+        {"controller.norm": "thrust"},
+        {"reference.position": [0.3, 0.0, 0.0]},
+    ):
         assert tiltsim.simulate(lost.replace(remedy)).end.kind == "completed"
 
 

@@ -17,7 +17,7 @@ def run(kind: str, file: Path | None = None, *, force: bool = False) -> int:
 
     Note:
         kinds: quadrotor, hexarotor, octorotor; canted_hexarotor and omni_octorotor, which also push
-        sideways; tiltrotor and tilt_hexarotor, whose arms tilt
+        sideways; bicopter, tricopter, tiltrotor and tilt_hexarotor, whose rotors tilt
 
     Args:
         kind (KIND): one of the kinds below

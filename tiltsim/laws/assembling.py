@@ -13,6 +13,7 @@ from tiltsim.laws.full_pose import FULL_POSE, full_pose_loop_of
 from tiltsim.laws.layers.actuation import with_actuation
 from tiltsim.laws.layers.air import with_air
 from tiltsim.laws.layers.allocation import ALLOCATED, with_allocation
+from tiltsim.laws.layers.loads import with_loads
 from tiltsim.laws.layers.measured_acceleration import with_measured_acceleration
 from tiltsim.laws.layers.on_equations import on_equations
 from tiltsim.laws.layers.rotor_inertia import with_rotor_inertia
@@ -100,6 +101,8 @@ def loop_of(
         loop = with_actuation(loop, scenario.simulation.latency_steps, external)
     if scenario.has_air:
         loop = with_air(loop)
+    if scenario.loads:
+        loop = with_loads(loop, len(scenario.loads))
     if scenario.has_rotor_inertia:
         loop = with_rotor_inertia(loop)
     if measured:

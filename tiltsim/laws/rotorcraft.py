@@ -196,8 +196,8 @@ def rotor_stops(rotors: int, remedy: str = "") -> tuple[str, ...]:
         rotors: Their number.
         remedy: A key that also helps.
     """
-    remedies = [remedy] * bool(remedy) + ["a smaller step of the reference"]
-    advice = ", ".join(remedies) + " or wider limits of the rotor speeds may help"
+    remedies = ["vehicle.min_rotor_speed = 100", *[remedy] * bool(remedy)]
+    advice = ", ".join(remedies) + ", or a smaller step of the reference may help"
     return tuple(
         f"the decoupling matrix became singular: rotor {rotor} came to a stop; {advice}"
         for rotor in range(1, rotors + 1)

@@ -39,8 +39,8 @@ class Forcing(NamedTuple):
         period: s; None if only the motion of the frame depends on time.
         velocity, acceleration: Motion of a frame in which the reference repeats, at time zero, m/s
         and m/s^2, world axes.
-        start: Time (s) from which this holds: faults have happened and are known, gusts have
-            passed, the commanded attitude is reached.
+        start: Time (s) from which this holds: faults have happened and are known, gusts and
+            pushes have passed, the commanded attitude is reached.
     """
 
     period: float | None
@@ -89,6 +89,7 @@ def forcing_of(assembly: Assembly) -> Forcing:
     gust = None if scenario.air is None else scenario.air.gust
     passed = 0.0 if gust is None else gust.start + 2.0 * gust.rise + gust.duration
     events = [passed, *(fault.time for fault in scenario.fault)]
+    events += [load.end or load.start for load in scenario.loads]
     events += [getattr(scenario.controller, key, 0.0) for key in CONTROLLER_EVENTS]
     return Forcing(_common(periods, scenario), velocity, acceleration, max(events))
 

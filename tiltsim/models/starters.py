@@ -30,6 +30,7 @@ class Starter(NamedTuple):
         axes: (N, 3), unit vectors of their thrusts, at zero tilt angles.
         angles: (N,), rad, tilt angles that the scenario holds; empty if the rotors do not tilt.
         reverses: Whether the rotors also turn backwards.
+        controller: The table of the scenario, as text.
     """
 
     title: str
@@ -37,6 +38,7 @@ class Starter(NamedTuple):
     axes: Floats
     angles: tuple[float, ...] = ()
     reverses: bool = False
+    controller: str = ""
 
     def spin(self, rotor: int) -> int:
         """Sense of rotation of a rotor, from 0: 1 is counter-clockwise about its thrust."""
@@ -44,7 +46,13 @@ class Starter(NamedTuple):
 
 
 def _ring(
-    title: str, rotors: int, radius: float, *, cant: float = 0.0, angles: tuple[float, ...] = ()
+    title: str,
+    rotors: int,
+    radius: float,
+    *,
+    cant: float = 0.0,
+    angles: tuple[float, ...] = (),
+    controller: str = "",
 ) -> Starter:
     """Rotors around the hull, turned about their arms by ``cant``, to either side by turns.
 
@@ -54,12 +62,13 @@ def _ring(
         radius: Length of the arms, m.
         cant: rad.
         angles: Tilt angles, rad.
+        controller: See `Starter`.
     """
     heading = (2.0 * np.arange(rotors) + 1.0) * pi / rotors
     places = radius * np.stack([np.cos(heading), np.sin(heading), 0.0 * heading], axis=1)
     lean = sin(cant) * (-1.0) ** np.arange(rotors)
     axes = np.stack([lean * np.sin(heading), -lean * np.cos(heading), 0.0 * heading + cos(cant)], 1)
-    return Starter(title, places, axes, angles)
+    return Starter(title, places, axes, angles, controller=controller or _ATTITUDE_FORCE + _LIMITED)
 
 
 def _cube(title: str, radius: float) -> Starter:
@@ -73,10 +82,48 @@ def _cube(title: str, radius: float) -> Starter:
     corners = [(x, y, z) for z in (1, -1) for y in (1, -1) for x in (1, -1)]
     upper = [(-a, b, c), (b, a, -c), (-b, -a, -c), (a, -b, c)]
     axes = np.array([*upper, *reversed(upper)])
-    return Starter(title, radius * c * np.array(corners), axes, reverses=True)
+    places = radius * c * np.array(corners)
+    return Starter(title, places, axes, reverses=True, controller=_ATTITUDE_FORCE + _NORM)
 
+
+def _pair(title: str, width: float, height: float) -> Starter:
+    """Two rotors beside the hull that tilt about the lateral axis.
+
+    Args:
+        title: Title of the kind.
+        width: Length of each arm, m.
+        height: From the hull's center up to the rotors, m.
+    """
+    places, axes = np.array([[0.0, width, height], [0.0, -width, height]]), np.eye(3)[[2, 2]]
+    return Starter(title, places, axes, (0.0, 0.0), controller=_GEOMETRIC)
+
+
+_ATTITUDE_FORCE: Final = """\
+law = "attitude_force"               # controls the attitude and all forces that need no torque
+"""
+
+_LIMITED: Final = """\
+allocation = "prioritized"           # within rotor limits first the attitude, then the lift
+"""
+
+_NORM: Final = """\
+norm = "thrust"                      # least changes of the thrusts: rotors may reverse
+"""
+
+_GEOMETRIC: Final = """\
+law = "geometric"                    # two rotors and two tilts control attitude and lift
+tilts = "free"
+attitude_bandwidth = 8.0             # rad/s
+"""
+
+_FULL_POSE: Final = """\
+law = "full_pose"                    # three rotors and three tilts control position and attitude
+gains = { position = [6.0, 12.0, 8.0], attitude = [18.0, 108.0, 216.0] }
+"""
 
 STARTERS: Final[dict[str, Starter]] = {
+    "bicopter": _pair("Bicopter", 0.25, 0.12),
+    "tricopter": _ring("Tricopter", 3, 0.25, angles=(0.0,) * 3, controller=_FULL_POSE),
     "quadrotor": _ring("Quadrotor", 4, 0.18),
     "hexarotor": _ring("Hexarotor", 6, 0.22),
     "octorotor": _ring("Octorotor", 8, 0.26),
@@ -120,13 +167,14 @@ def starter_mjcf(kind: str) -> str:
 def _rotor(starter: Starter, rotor: int) -> Iterator[str]:
     """An arm with its motor and the site of its thrust, on a hinge if the rotors tilt."""
     number, place, axis = rotor + 1, _row(starter.places[rotor]), _row(starter.axes[rotor])
+    hinge = _row(starter.places[rotor] * [1.0, 1.0, 0.0])
     yield f'<geom class="arm" fromto="0 0 0 {place}"/>'
     if not starter.angles:
         yield f'<geom class="motor" pos="{place}" zaxis="{axis}"/>'
         yield f'<site name="rotor_{number}" pos="{place}" zaxis="{axis}"/>'
         return
     yield f'<body name="pod_{number}" pos="{place}">'
-    yield f'  <joint name="tilt_{number}" class="hinge" axis="{place}"/>'
+    yield f'  <joint name="tilt_{number}" class="hinge" axis="{hinge}"/>'
     yield '  <geom class="motor"/>'
     yield f'  <site name="rotor_{number}"/>'
     yield "</body>"
@@ -201,13 +249,14 @@ def starter_scenario(kind: str, mjcf: str) -> str:
         title=starter.title,
         mjcf=json.dumps(mjcf, ensure_ascii=False),
         speed=MAX_SPEED,
-        norm=_NORM if starter.reverses else "",
+        controller=starter.controller,
+        least="" if starter.reverses else _LEAST,
         gait=_GAIT.format(angles=list(starter.angles)) if starter.angles else "",
     )
 
 
-_NORM: Final = """\
-norm = "thrust"                      # least changes of the thrusts: rotors may reverse
+_LEAST: Final = """\
+min_rotor_speed = 100.0              # a rotor that stops would leave the vehicle without control
 """
 
 _GAIT: Final = """
@@ -224,14 +273,14 @@ title = "{title} moves to a point and stays there"
 model = "multirotor"
 mjcf = {mjcf}  # in the folder of this file
 max_rotor_speed = {speed}              # rad/s
+{least}\
 
 [simulation]
-duration = 16.0                      # s
+duration = 20.0                      # s
 timestep = 0.004                     # s
 
 [controller]
-law = "attitude_force"               # controls the attitude and all forces that need no torque
-{norm}\
+{controller}\
 {gait}
 [reference]
 type = "setpoint"                    # or "circle", "figure_eight", "waypoints", "table"

@@ -49,8 +49,9 @@ def evaluations_per_step(model: mujoco.MjModel) -> int:
 
 
 def disturbance_acceleration(scenario: Scenario) -> Triple:
-    """The sum of a scenario's disturbances, m/s^2, world."""
-    x, y, z = (sum((d.value[axis] for d in scenario.disturbance), 0.0) for axis in range(3))
+    """The sum of the accelerations among a scenario's disturbances, m/s^2, world."""
+    values = [each.value for each in scenario.disturbance if each.type == "acceleration"]
+    x, y, z = (sum((value[axis] for value in values), 0.0) for axis in range(3))
     return x, y, z
 
 

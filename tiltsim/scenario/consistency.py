@@ -142,6 +142,9 @@ def _check_actuators(scenario: ScenarioTables) -> None:
         raise scenario.mistake(
             "vehicle.model", "aerodynamic effects are not supported; remove [air]"
         )
+    for load in scenario.loads if vehicle.is_planar else ():
+        reason = f"not supported for the {vehicle.model}; choose acceleration"
+        raise InvalidValueError("disturbance.type", load.type, reason)
     supported = vehicle.model in {"tiltrotor", "multirotor"}
     for key, value, ideal in scenario.actuator_options:
         if value != ideal and not supported:

@@ -13,7 +13,16 @@ from tiltsim.scenario.gait import FixedGait, Gait
 from tiltsim.scenario.reference import Reference, SetpointReference
 from tiltsim.scenario.rotorcraft import MultirotorTable, RotorcraftTable, TiltServoTable
 from tiltsim.scenario.simulation_table import InitialTable, SimulationTable
-from tiltsim.scenario.surroundings import AirTable, Disturbance, Fault, GroundTable, SensorTable
+from tiltsim.scenario.surroundings import (
+    Acceleration,
+    AirTable,
+    Disturbance,
+    Fault,
+    Force,
+    GroundTable,
+    SensorTable,
+    Torque,
+)
 from tiltsim.scenario.table import Table
 from tiltsim.scenario.tiltrotor_controllers import AttitudeAltitudeController
 from tiltsim.scenario.time_table import TimeTable
@@ -60,7 +69,7 @@ class ScenarioTables(Table):
         None, description="ground to take off from and land on; default: none"
     )
     disturbance: Annotated[tuple[Disturbance, ...], Field(strict=False)] = Field(
-        (), description="constant accelerations that the controller does not know of"
+        (), description="accelerations, forces and torques that the controller does not know of"
     )
     air: AirTable = Field(AirTable(), description="wind, gusts, drag and ground effect")
     sensors: SensorTable = Field(SensorTable(), description="errors of the measurements")
@@ -132,13 +141,18 @@ class ScenarioTables(Table):
         return self.air != AirTable()
 
     @property
+    def loads(self) -> tuple[Force | Torque, ...]:
+        """Forces and torques among the disturbances."""
+        return tuple(each for each in self.disturbance if not isinstance(each, Acceleration))
+
+    @property
     def has_rotor_inertia(self) -> bool:
         """Whether the rotors have spin inertia."""
         return isinstance(self.vehicle, RotorcraftTable) and self.vehicle.rotor_inertia > 0.0
 
     @property
     def has_ideal_actuators_in_still_air(self) -> bool:
-        """Whether pods and rotors follow their commands exactly and no air acts, as in the thesis.
+        """Whether pods and rotors follow their commands, and nothing else acts, as in the thesis.
 
         Otherwise `tiltsim.laws.layers.on_equations` wraps the controller for the thesis plant.
         """
@@ -152,6 +166,7 @@ class ScenarioTables(Table):
             or self.controller.supervision is not None
             or self.needs_actuation_layer
             or self.has_air
+            or self.loads
         )
 
     @property

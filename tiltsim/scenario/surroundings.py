@@ -21,14 +21,50 @@ class GroundTable(Table):
     friction: Positive = Field(Ground.friction, description="coefficient of sliding friction [-]")
 
 
-class Disturbance(Table):
+class Acceleration(Table):
     """A constant acceleration that the controller does not know of."""
 
-    type: Literal["acceleration"] = Field(description="the only kind")
-    value: Vector3 = Field(
-        description="in the world; acts on every mass, as gravity does [m/s^2]",
-        examples=[[1.0, 0.0, 0.0]],
+    type: Literal["acceleration"] = Field(description="acts on every mass, as gravity does")
+    value: Vector3 = Field(description="in the world [m/s^2]", examples=[[1.0, 0.0, 0.0]])
+
+
+class Load(Table):
+    """A force or torque on the vehicle that the controller does not know of."""
+
+    table_name = "disturbance"
+
+    frame: Literal["world", "body"] = Field("world", description="axes of value")
+    start: NonNegative = Field(0.0, description="when it begins [s]", examples=[5.0])
+    end: Positive | None = Field(
+        None, description="when it ends; default: it lasts [s]", examples=[5.2]
     )
+
+    def _check_values(self) -> None:
+        if self.end is not None and self.end <= self.start:
+            raise self.mistake("end", f"must be after start = {self.start}")
+
+
+class Force(Load):
+    """A force at a point of the vehicle: a push, a pull on a cable, a load hung on an arm."""
+
+    type: Literal["force"] = Field(description="acts at a point of the body")
+    value: Vector3 = Field(description="the force [N]", examples=[[2.0, 0.0, 0.0]])
+    point: Vector3 = Field(
+        (0.0, 0.0, 0.0),
+        description="from the center of mass, body axes [m]",
+        examples=[[0.0, 0.1, 0.05]],
+    )
+
+
+class Torque(Load):
+    """A torque on the vehicle."""
+
+    type: Literal["torque"] = Field(description="acts on the body")
+    value: Vector3 = Field(description="the torque [N m]", examples=[[0.0, 0.02, 0.0]])
+
+
+Disturbance = Annotated[Acceleration | Force | Torque, Field(discriminator="type")]
+"""A ``[[disturbance]]`` table, discriminated by its type."""
 
 
 class SensorTable(Table):
