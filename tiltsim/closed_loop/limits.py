@@ -40,7 +40,7 @@ def altitude_error(time: Any, values: Any, reference: ReferenceParameters, knots
     """Absolute altitude error (m).
 
     Args:
-        time, values, reference, knots: As in `horizontal_error`.
+        time, values, reference, knots: See `horizontal_error`.
     """
     return abs(position_reference(time, reference, knots)[2] - values[2])
 

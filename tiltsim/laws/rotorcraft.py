@@ -123,7 +123,8 @@ def servo_commands_of(tilts: int) -> Callable[..., Values]:
 
     @traceable
     def servo_commands(time: Any, lead: Any, gait: GaitParameters, knots: Any) -> Any:
-        return ahead(*moving(time, gait, knots), lead)
+        angles, rates = moving(time, gait, knots)
+        return ahead(angles, rates, lead)
 
     return servo_commands
 

@@ -31,7 +31,7 @@ from tiltsim_controllers.analysis.two_color_planner import (
     four_angle_gait,
     rectangle,
 )
-from tiltsim_controllers.code.tracing import is_known
+from tiltsim_controllers.code.arrays import is_known
 from tiltsim_controllers.gaits import plans
 from tiltsim_controllers.gaits.plans import Gait as PlannedGait
 from tiltsim_controllers.tilt_car.vehicle import TiltCar, turn_per_tilt

@@ -138,7 +138,7 @@ class ArrayPlan:
     def __call__(self, tree: Mapping[str, Any]) -> PlannedFlight:
         """The plan of a flight with the numbers of a tree, which are not checked."""
         jax = self._jax
-        flight: PlannedFlight = self._planned(jax.tree.map(_entries, dict(tree)))
+        flight: PlannedFlight = self._planned(_entries(tree))
         knots = flight.knots
         if any(isinstance(knot, jax.Array) for knot in knots):
             knots = jax.numpy.stack([*map(jax.numpy.asarray, knots)])
@@ -146,7 +146,9 @@ class ArrayPlan:
 
 
 def _entries(value: Any) -> Any:
-    """An array as nested tuples of its entries, and numbers of NumPy as Python's."""
-    if getattr(value, "ndim", 0):
+    """A tree with tuples for lists and arrays, and Python's numbers for NumPy's."""
+    if isinstance(value, Mapping):
+        return {key: _entries(entry) for key, entry in value.items()}
+    if isinstance(value, tuple | list) or getattr(value, "ndim", 0):
         return tuple(map(_entries, value))
     return value.item() if isinstance(value, np.ndarray | np.generic) else value

@@ -23,8 +23,7 @@ from typing import TYPE_CHECKING, Final, Literal, NamedTuple, TypeAlias
 import numpy as np
 
 from tiltsim_controllers.analysis.two_color_map import point_p, red_residual
-from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.code.tracing import is_known
+from tiltsim_controllers.code.arrays import is_known, xp
 from tiltsim_controllers.gaits import plans
 from tiltsim_controllers.gaits.colors import colored_angles, require_color
 from tiltsim_controllers.vehicle.parameters import drag_ratio

@@ -280,16 +280,6 @@ def _number(value: Any) -> float | bool:
         refuse(f"{type(value).__name__} is no number", "use arrays of equal shapes")
 
 
-def is_known(value: Any) -> bool:
-    """Whether a number is no symbolic one, so that it can be checked."""
-    return not isinstance(value, Expr)
-
-
-def as_number(value: Any) -> Number:
-    """A number as a float; a symbolic one as it is."""
-    return float(value) if is_known(value) else value
-
-
 def is_condition(value: Any) -> bool:
     """Whether a number is true or false."""
     if isinstance(value, Expr):

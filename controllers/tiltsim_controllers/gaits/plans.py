@@ -15,8 +15,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.code.tracing import as_number, is_known
+from tiltsim_controllers.code.arrays import as_number, is_known, xp
 from tiltsim_controllers.gaits.cat import FOOTFALLS, cat_keyframes
 from tiltsim_controllers.gaits.colors import colored_angles
 from tiltsim_controllers.gaits.motion import planned_tilts, tilt_motion_of
@@ -28,6 +27,7 @@ from tiltsim_controllers.gaits.parameters import (
     NO_KNOTS,
     POWERS,
     GaitParameters,
+    check_phases,
 )
 from tiltsim_controllers.mathematics.splines import spline_knots
 from tiltsim_controllers.vehicle.parameters import drag_ratio
@@ -319,7 +319,7 @@ def keyframes(
             )
     phases = [frame[0] for frame in frames]
     if all(map(is_known, phases)):
-        _check_phases(phases)
+        check_phases(phases)
     pieces = [
         (
             first[0] * period,
@@ -338,18 +338,6 @@ def keyframes(
     knots = tuple([value for row in pieces for value in row])
     parameters = GaitParameters(LINEAR, period=_positive(period), keyframes=float(len(pieces)))
     return Gait(name, parameters, knots, source, tilts)
-
-
-def _check_phases(phases: Sequence[float]) -> None:
-    """Raise `ValueError` for phases that make no `keyframes`."""
-    if len(phases) < 2 or phases[0] != 0.0 or phases[-1] != 1.0:
-        raise ValueError(f"keyframe phases {phases}: must start at 0 and end at 1")
-    if any(later < earlier for earlier, later in itertools.pairwise(phases)):
-        raise ValueError(f"keyframe phases {phases}: must not decrease")
-    if phases[1] == 0.0 or phases[-2] == 1.0:
-        raise ValueError(f"keyframe phases {phases}: only one row may be at 0 and one at 1")
-    if any(third == first for first, third in zip(phases, phases[2:], strict=False)):
-        raise ValueError(f"keyframe phases {phases}: at most two rows may share a phase")
 
 
 def table(times: Sequence[float], angles: Sequence[Sequence[float]], *, repeats: bool) -> Gait:

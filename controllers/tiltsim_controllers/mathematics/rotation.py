@@ -10,7 +10,7 @@ from tiltsim_controllers.code.tracing import make
 from tiltsim_controllers.mathematics.scalar import Quad, Triple
 
 sin, cos = partial(make, "sin"), partial(make, "cos")
-"""Of plain and traced numbers."""
+"""Sine and cosine of plain and traced numbers."""
 
 
 def euler_from_quaternion(w: float, x: float, y: float, z: float) -> Triple:

@@ -14,8 +14,7 @@ from collections.abc import Sequence
 from math import isfinite
 from typing import Any, Final
 
-from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.code.tracing import is_known
+from tiltsim_controllers.code.arrays import is_known, xp
 from tiltsim_controllers.mathematics.pieces import piece_at, polynomial_derivatives
 from tiltsim_controllers.mathematics.scalar import Values
 from tiltsim_controllers.mathematics.splines import spline_knots

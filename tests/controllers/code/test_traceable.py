@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 from tests.natively import natively
-from tiltsim_controllers.code.arrays import xp
+from tiltsim_controllers.code.arrays import as_number, is_known, xp
 from tiltsim_controllers.code.traceable import program_of, traceable
-from tiltsim_controllers.code.tracing import as_number, is_known
 from tiltsim_controllers.mathematics.linear import least_norm
 
 
