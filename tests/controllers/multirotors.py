@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from tests.controllers.flat_laws import flat
 from tests.natively import compiled
 from tests.tracing import seldom_traced
 from tiltsim_controllers.gaits import plans
@@ -34,8 +35,9 @@ from tiltsim_controllers.vehicle.effectiveness import (
     tilt_of_rotor,
     tilts_of,
 )
-from tiltsim_controllers.vehicle.motion import equations_of_motion_of
+from tiltsim_controllers.vehicle.motion import equations_of_motion
 from tiltsim_controllers.vehicle.parameters import PRESETS, SPIN
+from tiltsim_controllers.vehicle.rotors import rotors_in
 
 FOUR = PRESETS["ar_drone_2"]
 HEXAROTOR = body_of(1.53, np.diag((0.0348, 0.0459, 0.08)), 9.81)
@@ -154,11 +156,10 @@ def fly(vehicle, law, knots, duration, *, gait=None, step=0.005, start=(), wind=
     """Fly along a gait; ``start`` is position, velocity and acceleration, level and at rest."""
     layout = tilt_of_rotor(vehicle.table)
     rotors, tilts = len(layout), tilts_of(layout)
-    motion = equations_of_motion_of(layout)
-    at = int(law.rotors)
+    own_rotors = rotors_in(np.array(knots), int(law.rotors), layout)
     planned = gait or plans.fixed((0.0,) * tilts)
     still = (0.0,) * (12 + tilts + rotors), (0.0,) * tilts, (0.0,) * 3
-    own = multirotor_law_of(layout, Form(vehicle.dimension, vehicle.norm))
+    own = flat(multirotor_law_of(layout, Form(vehicle.dimension, vehicle.norm)))
     inputs = compiled(own, 0.0, *still, law, knots)
     seen = []
 
@@ -171,7 +172,9 @@ def fly(vehicle, law, knots, duration, *, gait=None, step=0.005, start=(), wind=
         law_state = (*state[:6], *attitude, *state[15:18], *angles, *speeds)
         u = inputs(time, law_state, turning, integrals, law, knots)
         seen.append(u[-1])
-        moved = motion(state, angles, u, law.vehicle, knots, at, wind, 1.0)
+        moved = equations_of_motion(
+            state, np.array(angles), np.array(u), law.vehicle, own_rotors, wind, 1.0
+        )
         return np.array((*moved, *u[rotors : rotors + 3]))
 
     start = start or (0.0,) * 9

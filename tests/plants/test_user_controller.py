@@ -21,14 +21,14 @@ from tiltsim.errors import InputError
 from tiltsim.flight.reading import load_flight
 from tiltsim.laws.assembling import assemble, loop_of
 from tiltsim.laws.commanded import COMMANDED_LOOPS
-from tiltsim.laws.rotorcraft import seen_of
-from tiltsim.laws.tiltrotor import TILTROTOR_LAYOUT
 from tiltsim.plants.built_in_command import BuiltInController
 from tiltsim.plants.command import Command, check_command
 from tiltsim.plants.commanded_plant import CommandedPlant
 from tiltsim.studies.fleet import fleet_file
 from tiltsim.vehicles.rotorcraft.layout import CROSS
-from tiltsim_controllers.laws.attitude_altitude import Parameters, attitude_altitude_inputs
+from tiltsim_controllers.laws.attitude_altitude import Parameters, attitude_altitude
+from tiltsim_controllers.laws.observed import Seen
+from tiltsim_controllers.mathematics.attitude import euler_angles
 from tiltsim_controllers.references.trajectories import reference_derivatives
 from tiltsim_controllers.vehicle.parameters import PRESETS, SPIN
 
@@ -188,18 +188,14 @@ def test_a_shipped_law_flown_as_a_users_own_flies_the_same_flight(layers):
     while not isinstance(parameters, Parameters):
         parameters = getattr(parameters, "inner", None) or parameters.law
 
-    seen = seen_of(TILTROTOR_LAYOUT.places, 0, measured=False)
-
     def own(observation):
-        state, _, _ = seen(
-            [*observation.position, *observation.quaternion, *observation.tilt_angles],
-            [*observation.velocity, *observation.body_rates, *observation.tilt_rates],
-            np.array(SPIN) * observation.rotor_speeds,
-        )
+        seen = observation
+        body = seen.position, seen.velocity, euler_angles(seen.quaternion), seen.body_rates
+        state = np.hstack([*body, seen.tilt_angles, SPIN * seen.rotor_speeds])
         # A shipped law sees the instant just after the one that it is given.
         time = evaluation_time(round(observation.time / timestep), 1.0, timestep)
-        rates = attitude_altitude_inputs(time, tuple(map(float, state)), parameters)[:4]
-        return Command(rotor_accelerations=np.array(SPIN) * rates)
+        step = attitude_altitude(Seen(time, state), parameters)
+        return Command(rotor_accelerations=np.array(SPIN) * step.inputs)
 
     ours, theirs = tiltsim.simulate(shipped), tiltsim.simulate(shipped, controller=own)
     assert theirs.scenario.controller.law == "python"

@@ -40,6 +40,7 @@ from tiltsim.report.pictures import Picture
 from tiltsim.report.sensitivity import Criterion
 from tiltsim.report.store import flight_key
 from tiltsim.report.table import rows_csv, rows_json
+from tiltsim.scenario.loading import load_scenario
 from tiltsim.studies.checking import collect
 from tiltsim.views.figures.style import CYCLE, new_figure
 
@@ -164,6 +165,26 @@ def test_a_flights_key_covers_all_that_its_numbers_depend_on(library):
     assert len(keys) == 3
     retitled = scenario.model_copy(update={"title": "another", "source": "ours", "expect": ()})
     assert flight_key(retitled) == flight_key(scenario)
+
+
+@pytest.mark.parametrize(
+    ("keys", "name", "before", "after"),
+    [
+        ('[controller]\nlaw = "python"\nfunction = "mine.py:hover"', "mine.py", "A = 1", "A = 2"),
+        ('[reference]\ntype = "table"\nfile = "way.csv"', "way.csv", "0,0,0,0", "0,1,0,0"),
+    ],
+)
+def test_a_changed_file_of_the_users_means_another_key(tmp_path, keys, name, before, after):
+    """Files that a scenario names: its controller's code, or the table of its reference."""
+    flown = tmp_path / "own.toml"
+    flown.write_text(f'title = "own"\n{keys}\n', encoding="utf-8")
+    head = "" if name.endswith(".py") else "time,x,y,z\n"
+    found = []
+    for text in (before, after, before):
+        rows = f"{head}{text}\n" + ("1,1,1,1\n" if head else "")
+        (tmp_path / name).write_text(rows, encoding="utf-8")
+        found.append(flight_key(load_scenario(str(flown))))
+    assert found[0] == found[2] != found[1]
 
 
 def test_a_changed_source_means_another_key(library, monkeypatch):

@@ -23,6 +23,7 @@ SHORT = {"simulation": {"duration": 0.4}, "controller": {"decoupling": "exact", 
 TIMES = np.linspace(0.0, 0.4, 9)
 COLUMNS = {"time": TIMES, "x": np.sin(TIMES), "y": np.cos(TIMES), "z": TIMES**2}
 HEAD = "time,x,y,z\n0,0,0,0\n"
+TURNS = "time,x,y,z,qw,qx,qy,qz\n0,0,0,0,0.7648,0,0.6442,0\n"
 POSES = "time,x,y,z,roll,pitch,yaw\n0,0,0,0,0,0,0\n"
 
 
@@ -89,6 +90,10 @@ def test_every_way_to_give_a_table_gives_the_same_rows(files, monkeypatch):
         ("time,x,y,z,vx\n", "column 'vx' is unknown; needs time, x, y, z, and may have roll, pit"),
         (POSES + "1,0,0,0,0,1.6,0\n", "row 2, column pitch = 1.6: must be between -pi/2 and pi/2"),
         (POSES + "1,0,0,0,3.2,0,0\n", "row 2, column roll = 3.2: jumps by 3.2 rad; unwrap the a"),
+        ("time,x,y,z,yaw,qw\n", "has roll, pitch or yaw beside a quaternion; remove one of them"),
+        ("time,x,y,z,qw\n", "no column qx; needs one each of time, x, y, z, qw, qx, qy, qz; found"),
+        (TURNS + "1,0,0,0,0.5,0,0,0\n", "row 2: norm of qw, qx, qy, qz = 0.5; must be 1"),
+        (TURNS + "1,0,0,0,0.66,0,0.7513,0\n", "row 2: too close to a pitch of pi/2, "),
         (HEAD + "1,0,0,0\n" * (MAX_ROWS + 1), "10002 rows; at most 10000: keep every second"),
         (b"\xff\xfe", "not UTF-8 text"),
     ],

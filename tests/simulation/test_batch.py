@@ -17,6 +17,7 @@ from tests.flights import TILT_CAR
 from tests.laws.layers.test_actuation import EVERYTHING
 from tests.laws.layers.test_air import STORM
 from tests.laws.test_laws import GUST, LAWS
+from tests.refusals import refusal
 from tiltsim.laws.assembling import LOOPS, assemble, loop_of
 from tiltsim.plants.flight_model import flight_model, model_cache_key
 from tiltsim.plants.mujoco_plant import MujocoPlant
@@ -478,6 +479,29 @@ def test_a_batch_takes_whatever_describes_a_scenario_and_flies_own_controllers()
     assert models == ["tiltrotor", "tiltrotor", "tilt_car"]
     assert results[0].flight["thrusts"][-1] == pytest.approx([2.0] * 4)
     np.testing.assert_array_equal(results[1].flight.samples, tiltsim.simulate(short).samples)
+
+
+def falling(_):
+    """A controller that other processes import."""
+    return tiltsim.Command(rotor_accelerations=[-50.0] * 4)
+
+
+def test_processes_fly_own_controllers_alike():
+    short = {"simulation": {"duration": 0.02}}
+    own = [tiltsim.load_scenario({**short, "title": name}, controller=falling) for name in "abc"]
+    alone, shared = ([*tiltsim.fly(own, jobs=jobs, keep_samples=True)] for jobs in (1, 2))
+    assert [result.scenario for result in shared] == own
+    for one, other in zip(alone, shared, strict=True):
+        np.testing.assert_array_equal(one.flight.samples, other.flight.samples)
+        assert without_speed(one.metrics) == without_speed(other.metrics)
+        assert other.flight.scenario.own_controller is falling
+
+
+def test_functions_that_processes_cannot_import_are_refused():
+    local = tiltsim.load_scenario({"simulation": {"duration": 0.02}}, controller=lambda _: None)
+    line = refusal(lambda: [*tiltsim.fly([local] * 2, jobs=2)])
+    assert line.startswith("jobs = 2: other processes cannot import a function given in Python (")
+    assert line.endswith("define it in a module, or leave jobs out")
 
 
 def test_a_batch_reports_flights_whose_results_wait_for_others(monkeypatch):

@@ -7,6 +7,7 @@ from math import cos, pi, sin
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import tiltsim
 from tests.refusals import refusal
@@ -55,6 +56,24 @@ def test_a_csv_is_followed_as_the_function_that_it_was_made_of(law, plant, tmp_p
     assert np.abs(by_function["roll"]).max() > 0.5
     assert turned_by(by_function, by_file) < 1e-6
     assert np.abs(by_function["position"] - by_file["position"]).max() < 1e-6
+
+
+@pytest.mark.parametrize("plant", PLANTS)
+def test_quaternions_of_any_sign_and_rounded_norm_are_the_same_attitude(plant, tmp_path):
+    """The turn over, past the roll and yaw of pi; quaternions of SciPy."""
+    rows = np.array(tiltsim.load_scenario(TURNS).reference.table)
+    signs = np.where(np.arange(len(rows)) % 3, -1.0, 1.0)[:, np.newaxis] * 1.001
+    turned = Rotation.from_euler("ZYX", rows[:, :3:-1]).as_quat(scalar_first=True)
+    file = tmp_path / "turns.csv"
+    head, table = "time,x,y,z,qw,qx,qy,qz", np.hstack([rows[:, :4], signs * turned])
+    np.savetxt(file, table, delimiter=",", header=head, comments="", fmt="%.17g")
+    changes = {"simulation.plant": plant, "simulation.duration": 12.0, "expect": []}
+    by_angles = tiltsim.load_scenario(TURNS, changes)
+    flights = [tiltsim.simulate(by_angles)]
+    flights.append(tiltsim.simulate(tiltsim.load_scenario(by_angles, reference=str(file))))
+    assert np.ptp(flights[0]["roll"]) > 6.0
+    assert np.abs(flights[0]["position"] - flights[1]["position"]).max() < 1e-9
+    assert turned_by(*flights) < 1e-9
 
 
 @pytest.mark.parametrize("law", FLIGHTS)

@@ -293,3 +293,28 @@ def test_values_near_overflow_are_drawn(name, values, tmp_path):
 def test_a_quadrotor_has_no_panel_of_tilt_angles():
     tables = BASE | {"vehicle": {"model": "quadrotor"}, "controller": {"law": "pid"}}
     assert {*axes_by_title(plot(tiltsim.simulate(tables)))} == PANELS - {"Tilt angles"}
+
+
+# --- many flights ------------------------------------------------------------------------------
+
+
+def test_many_flights_are_quantiles_of_the_flights_that_still_fly():
+    """The roll of flight i is i; the last flight ends halfway."""
+    whole = flight("fixed")
+    roll = whole.assembly.loop.sample_fields.index("roll")
+    flights = []
+    for value in range(21):
+        samples = whole.samples.copy()
+        samples[:, roll] = 0.01 * value
+        flights.append(replace(whole, samples=samples))
+    half = len(whole) // 2
+    flights[20] = replace(flights[20], samples=samples[:half].copy(), end=End("diverged", 1.0, ""))
+    figure = plot(flights, panels=["roll", "path"])
+    (axes,) = (axes for axes in figure.axes if "roll" in axes.get_ylabel())
+    median = next(line for line in axes.lines if line.get_label() == "median").get_ydata()
+    np.testing.assert_allclose(median[:half], 0.10)
+    np.testing.assert_allclose(median[half:], 0.095)
+    bands = [band.get_paths()[0].vertices[:, 1] for band in axes.collections]
+    np.testing.assert_allclose([band[1] for band in bands], [0.01, 0.05])
+    assert "90 % of 21 flights" in legend_of(figure)
+    assert "1 of 21 terminated early" in legend_of(figure)

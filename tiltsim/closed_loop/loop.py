@@ -17,7 +17,6 @@ import numpy as np
 from tiltsim.closed_loop.vehicle_kind import VehicleKind
 from tiltsim.models.parts import ExtraActuators
 from tiltsim.system.quantity import Quantity, in_words
-from tiltsim_controllers.laws.supervisor import Supervision
 from tiltsim_controllers.mathematics.records import flatten, record_dtype, record_size
 from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector
 
@@ -165,27 +164,6 @@ class Equations:
     tilts: Callable[..., Values] | None = None
 
 
-class SupervisedLaw(NamedTuple):
-    """A controller as a supervisor (`tiltsim.laws.layers.supervision`) uses it.
-
-    ``motion``, the supervisor's state with its rate and acceleration, is the last argument: at rest
-    by default, as an unsupervised loop calls the same functions without it.
-    """
-
-    code: Supervision
-    vehicle: Callable[..., Any]  # (time, parameters): vehicle parameters that this code reads
-    seen: Callable[..., tuple[Values, ...]]
-    """``(qpos, qvel, act)``: state, the body first, tilt rates and the states of the controller."""
-    inputs: Callable[..., Values]
-    """``(time, *seen, parameters, knots, motion)``: the controls from rotor accelerations on."""
-    references: Callable[..., Values]
-    """``(time, sample, parameters, knots, motion)``: columns of references, without the tilts."""
-    names: tuple[str, ...]  # of these columns
-    fields: tuple[str, ...]  # fields of a sample that the references need
-    margins: Callable[[Mapping[str, Floats], ControlSetup], dict[str, Floats]]
-    """``(samples by field, setup) -> columns`` that depend on the samples alone."""
-
-
 @dataclass(frozen=True, eq=False)
 class ClosedLoop:
     """A controller around the model of a vehicle.
@@ -198,7 +176,6 @@ class ClosedLoop:
         dynamics, sampling, columns, monitoring: See there.
         equations: This controller on the thesis's equations; None where it is supported in MuJoCo
             only or, inside a layer, by `tiltsim.laws.layers.on_equations`.
-        supervised: The controller for a supervisor; None where it cannot be supervised.
         follows_position: Whether a scenario has the controller follow the reference's horizontal
             position.
         uses_gait: Whether the scenario's gait has a part in the flight.
@@ -217,7 +194,6 @@ class ClosedLoop:
     columns: Columns
     monitoring: Monitoring = field(default_factory=Monitoring)
     equations: Equations | None = None
-    supervised: SupervisedLaw | None = None
     follows_position: Callable[[Scenario], bool] = lambda _scenario: True
     uses_gait: bool = True
     within: ClosedLoop | None = None

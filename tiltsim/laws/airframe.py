@@ -35,7 +35,7 @@ def airframe(scenario: Scenario | str | PathLike[str] | Mapping[str, Any]) -> Ai
 
 def airframe_of(plan: FlightPlan) -> Airframe:
     """The airframe of a planned flight."""
-    scenario = plan.scenario
+    scenario, simulation = plan.scenario, plan.scenario.simulation
     table = scenario.any_rotorcraft
     vehicle, tilting = table.resolve(), table.has_tilting_rotors
     speeds = initial_rotor_speeds(plan)
@@ -44,7 +44,15 @@ def airframe_of(plan: FlightPlan) -> Airframe:
         plan.gait,
         initial_tilts(plan)[0] if tilting else (),
         tuple(spin * speed for spin, speed in zip(table.spins, speeds, strict=True)),
+        scenario.initial.velocity,
         scenario.initial.angular_velocity,
         # The thesis's equations omit the gyroscopic torque but for the quadrotor's.
-        float(scenario.simulation.plant != "thesis" or table.model == "quadrotor"),
+        float(simulation.plant != "thesis" or table.model == "quadrotor"),
+        simulation.timestep,
+        simulation.control_timestep,
+        simulation.latency_steps,
+        table.speeds_along_spin,
+        table.rotor_time_constant,
+        table.tilt_servo.natural_frequency,
+        table.tilt_servo.damping_ratio,
     )

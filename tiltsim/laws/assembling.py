@@ -9,7 +9,7 @@ from tiltsim.equations.actuator_level import ActuatorPlant, actuator_plant
 from tiltsim.equations.rigid_body import rigid_body
 from tiltsim.laws.commanded import commanded_loop
 from tiltsim.laws.flown_law import loop_of_law
-from tiltsim.laws.full_pose import FULL_POSE, full_pose_loop_of
+from tiltsim.laws.full_pose import full_pose_loop, full_pose_loop_of
 from tiltsim.laws.layers.actuation import with_actuation
 from tiltsim.laws.layers.air import with_air
 from tiltsim.laws.layers.allocation import ALLOCATED, with_allocation
@@ -17,17 +17,12 @@ from tiltsim.laws.layers.loads import with_loads
 from tiltsim.laws.layers.measured_acceleration import with_measured_acceleration
 from tiltsim.laws.layers.on_equations import on_equations
 from tiltsim.laws.layers.rotor_inertia import with_rotor_inertia
-from tiltsim.laws.layers.supervision import with_supervisor
 from tiltsim.laws.multirotor import loop_of_multirotor
 from tiltsim.laws.quadrotor import QUADROTOR_ATTITUDE_ALTITUDE, SWITCHING, YAW_POSITION
 from tiltsim.laws.tilt_car import FOURTH_DERIVATIVE, THIRD_DERIVATIVE
 from tiltsim.laws.tilt_car_planned import PLANNED_DIRECTION
-from tiltsim.laws.tiltrotor import (
-    GAIT_FEEDFORWARD,
-    MEASURED_GAIT_FEEDFORWARD,
-    MEASURED_TILTROTOR,
-    TILTROTOR,
-)
+from tiltsim.laws.tiltrotor import LAYOUT as TILTROTOR
+from tiltsim.laws.tiltrotor import tiltrotor_loop
 from tiltsim.scenario.law_controller import LawTable
 from tiltsim.scenario.scenario import plan_flight
 from tiltsim.system.locks import one_thread_at_a_time
@@ -39,9 +34,10 @@ if TYPE_CHECKING:
     from tiltsim.scenario.scenario import Scenario
 
 LOOPS: Final[dict[str, ClosedLoop]] = {
-    "attitude_altitude": TILTROTOR,
-    "gait_feedforward": GAIT_FEEDFORWARD,  # the same law with gait_rate_feedforward = true
-    "full_pose": FULL_POSE,
+    "attitude_altitude": tiltrotor_loop("attitude_altitude", False, ""),
+    # the same law with gait_rate_feedforward = true
+    "gait_feedforward": tiltrotor_loop("gait_feedforward", False, ""),
+    "full_pose": full_pose_loop(TILTROTOR),
     "yaw_position": YAW_POSITION,
     "switching": SWITCHING,
     "quadrotor_attitude_altitude": QUADROTOR_ATTITUDE_ALTITUDE,
@@ -53,12 +49,6 @@ LOOPS: Final[dict[str, ClosedLoop]] = {
 
 MULTIROTOR_LOOPS: Final = {"attitude_force": loop_of_multirotor, "full_pose": full_pose_loop_of}
 """Makers of the loops of multirotors, which depend on the vehicle's layout."""
-
-MEASURED_LOOPS: Final = {
-    "attitude_altitude": MEASURED_TILTROTOR,
-    "gait_feedforward": MEASURED_GAIT_FEEDFORWARD,
-}
-"""Loops that feed back the angular acceleration of the plant."""
 
 
 def _unchanged(loop: ClosedLoop) -> ClosedLoop:
@@ -84,17 +74,18 @@ def loop_of(
     # The thesis's equations have no torque but the model's, as long as all is ideal.
     as_printed = plant == "thesis" and scenario.has_ideal_actuators_in_still_air
     measured = not as_printed and controller.measures_angular_acceleration
+    strategy = controller.supervision.strategy if controller.supervision else ""
     if external:
         loop = commanded_loop(scenario)
     elif isinstance(controller, LawTable):
         loop = loop_of_law(scenario, recorded=recorded)
     elif scenario.vehicle.model == "multirotor":
-        loop = MULTIROTOR_LOOPS[controller.loop_name](scenario, measured)
+        loop = MULTIROTOR_LOOPS[controller.loop_name](scenario, measured, strategy)
+    elif measured or strategy:
+        loop = tiltrotor_loop(controller.loop_name, measured, strategy)
     else:
-        loop = (MEASURED_LOOPS if measured else LOOPS)[controller.loop_name]
-    loop, supervisor = adapted(loop), controller.supervision
-    if supervisor is not None:
-        loop = with_supervisor(loop, supervisor.strategy)
+        loop = LOOPS[controller.loop_name]
+    loop = adapted(loop)
     if controller.prioritizes_attitude and loop.dynamics.model in ALLOCATED:
         loop = with_allocation(loop)
     if scenario.needs_actuation_layer:

@@ -129,12 +129,12 @@ def loop_of_law(scenario: Scenario, *, recorded: bool = False) -> ClosedLoop:
     key = Key(
         layout_of_vehicle(airframe_of(plan).vehicle, scenario.vehicle.model),
         law.function,
-        controller.law,
         type(law.parameters),
         tuple(law.states.items()),
         tuple(law.discrete.items()),
         controller.commands_tilts,
-        scenario.simulation.latency_steps > 0,
+        scenario.simulation.latency_steps > 0 and not controller.models_latency,
+        controller.models_latency,
     )
     loop, module = law_loop(key, find), law.function.__module__
     if recorded or (module.startswith("tiltsim_controllers.")):

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cache
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Monitoring
+from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup
+from tiltsim.laws.law import Law, tilts_in_states
 from tiltsim.laws.parameters import parameters_of
 from tiltsim.laws.rotor_loop import (
-    RotorLaw,
     RotorLayout,
     body_of_vehicle,
     layout_of_vehicle,
@@ -20,38 +20,24 @@ from tiltsim.laws.rotor_loop import (
     table_of,
 )
 from tiltsim.laws.rotorcraft import rotor_stops, torque_free_columns
-from tiltsim.laws.tiltrotor import TILTROTOR_LAYOUT, singularity_columns, tiltrotor_motion
+from tiltsim.laws.tiltrotor import singularity_columns
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.tiltrotor_controllers import FullPoseController
 from tiltsim.vehicles.rotorcraft import ROTORCRAFT, initial_tilts
-from tiltsim_controllers.code.traceable import traceable
 from tiltsim_controllers.laws.full_pose import (
     PUBLISHED_TILT_WEIGHT,
     Parameters,
     force_balanced_tilt_weight,
     full_pose,
 )
+from tiltsim_controllers.laws.observed import Seen
 from tiltsim_controllers.mathematics.records import changed_record
 from tiltsim_controllers.mathematics.scalar import Floats, Values
-from tiltsim_controllers.references.trajectories import reference_derivatives
 from tiltsim_controllers.vehicle.parameters import Vehicle
+from tiltsim_controllers.vehicle.states import state_of
 
 if TYPE_CHECKING:
     from tiltsim.scenario.scenario import FlightPlan, Scenario
-
-
-@cache
-def _inputs_of(layout: RotorLayout) -> Callable[..., Values]:
-    """`RotorLaw.inputs`: the ``states`` are the commands of the servos."""
-    rotors = layout.tilt_of_rotor
-
-    def inputs(
-        time: Any, state: Any, tilt_rates: Any, states: Any, parameters: Any, knots: Any
-    ) -> Any:
-        reference = reference_derivatives(time, parameters.law.reference, knots)
-        return full_pose(time, state, reference, parameters.law, knots, rotors, states)
-
-    return inputs
 
 
 def _margins(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
@@ -63,7 +49,7 @@ def _margins(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Fl
 
 
 def _setup_of(record: Any) -> Callable[[FlightPlan], tuple[Any, Values]]:
-    """`RotorLaw.setup` with a type of record."""
+    """`Law.setup` with a type of record."""
 
     def setup(plan: FlightPlan) -> tuple[Any, Values]:
         controller = plan.scenario.controller
@@ -83,63 +69,40 @@ def _setup_of(record: Any) -> Callable[[FlightPlan], tuple[Any, Values]]:
     return setup
 
 
-def _loop(layout: RotorLayout, parameters: Any, **options: Any) -> ClosedLoop:
-    """Full-pose control of all vehicles of a layout, with a type of parameters."""
-    places = layout.places
-    first, stops = places.speed_1, rotor_stops(places.rotors)
-
-    @traceable
-    def speeds(time: Any, values: Any, parameters: Any, knots: Any) -> Any:
-        # A pod that turns across its thrust spans one plane with it at any angle: the rank of such
-        # rotors' matrix changes only where one of them stops, whichever of them are lost.
-        return values[first : first + places.rotors]
-
-    law = RotorLaw(
-        "full_pose",
-        _inputs_of(layout),
-        parameters,
-        _setup_of(parameters),
-        states=dict.fromkeys(places.names("tilt_command"), "rad"),
-        initial=lambda plan: initial_tilts(plan)[0],
-        commands=0,
-        **options,
-    )
-    return replace(
-        rotor_loop(layout, law),
-        monitoring=Monitoring(speeds, lambda _sample, _setup: stops),
-        uses_gait=True,  # its angles at time zero
-    )
-
-
-FULL_POSE: Final = replace(
-    _loop(
-        TILTROTOR_LAYOUT,
-        changed_record(Parameters, vehicle=Vehicle),
-        margins=_margins,
-        motion=tiltrotor_motion,
-    ),
-    kind=ROTORCRAFT,
-)
-"""Full-pose control of the tiltrotor."""
-
-
 @cache
 def full_pose_loop(layout: RotorLayout) -> ClosedLoop:
-    """Full-pose control of all multirotors of a layout."""
-    return _loop(
-        layout,
-        Parameters,
-        margins=lambda samples, setup: torque_free_columns(
-            layout.places,
-            table_of(layout.places, setup),
-            samples,
-            failure=setup.parameters.law.failure,
-        ),
+    """Full-pose control of all vehicles of a layout."""
+    rotors, places = layout.tilt_of_rotor, layout.places
+    is_multirotor = layout.model == "multirotor"
+    record = Parameters if is_multirotor else changed_record(Parameters, vehicle=Vehicle)
+
+    def margins(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
+        failure, table = setup.parameters.law.failure, table_of(places, setup)
+        return torque_free_columns(places, table, samples, failure=failure)
+
+    def speeds(seen: Seen, p: Any, knots: Any) -> Any:
+        # A pod that turns across its thrust spans one plane with it at any angle: the rank of such
+        # rotors' matrix changes only where one of them stops, whichever of them are lost.
+        return state_of(seen.state, rotors).speeds
+
+    stops = rotor_stops(places.rotors)
+    law = Law(
+        lambda seen, p, knots: full_pose(seen, p, knots, rotors),
+        record,
+        _setup_of(record),
+        states=dict.fromkeys(places.names("tilt_command"), "rad"),
+        initial=lambda plan: initial_tilts(plan)[0],
+        tilts=tilts_in_states(0, places.tilts),
+        margins=margins if is_multirotor else _margins,
+        signs=speeds,
+        causes=lambda _sample, _setup: stops,
     )
+    loop = rotor_loop(layout, law)
+    return loop if is_multirotor else replace(loop, kind=ROTORCRAFT)
 
 
-def full_pose_loop_of(scenario: Scenario, _measured: bool) -> ClosedLoop:
-    """The full-pose loop of a scenario's multirotor, without layers; it measures nothing."""
+def full_pose_loop_of(scenario: Scenario, _measured: bool, _strategy: str) -> ClosedLoop:
+    """The full-pose loop of a scenario's multirotor, without layers."""
     vehicle = scenario.vehicle.resolve()
     assert isinstance(vehicle, Multirotor)
     return full_pose_loop(layout_of_vehicle(vehicle))

@@ -15,28 +15,30 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 from tiltsim.closed_loop.loop import ClosedLoop
 from tiltsim.errors import TiltsimError
 from tiltsim.laws.airframe import airframe_of
-from tiltsim.laws.rotor_loop import RotorLaw, RotorLayout, body_of_vehicle, rotor_loop
+from tiltsim.laws.law import Law, tilts_in_states
+from tiltsim.laws.rotor_loop import RotorLayout, body_of_vehicle, rotor_loop
 from tiltsim.scenario.law_controller import LawTable
 from tiltsim.scenario.own_code import users_line
 from tiltsim.system.text import short_repr
 from tiltsim_controllers.code.arrays import is_jax, xp
 from tiltsim_controllers.code.tracing import as_array
-from tiltsim_controllers.gaits.motion import tilt_motion_of
+from tiltsim_controllers.gaits.motion import planned_tilts
 from tiltsim_controllers.gaits.parameters import GaitParameters
-from tiltsim_controllers.laws.observed import ROTOR_COMMANDS, Command, Desired, Observed
+from tiltsim_controllers.laws.observed import ROTOR_COMMANDS, Command, Desired, Observed, Seen, Step
 from tiltsim_controllers.mathematics.attitude import rotation_matrix
 from tiltsim_controllers.mathematics.records import make_record_type
 from tiltsim_controllers.mathematics.scalar import Values
 from tiltsim_controllers.references.trajectories import (
     ReferenceParameters,
-    attitude_reference,
-    reference_derivatives,
+    reference_attitude,
+    reference_motion,
 )
 from tiltsim_controllers.vehicle.actuators import held_gain
 from tiltsim_controllers.vehicle.body import Body, inertia_matrix
 from tiltsim_controllers.vehicle.effectiveness import ROTOR_FLOATS, table_per_newton
 from tiltsim_controllers.vehicle.parameters import Vehicle
 from tiltsim_controllers.vehicle.rotors import rotors_in, wrench_map
+from tiltsim_controllers.vehicle.states import state_of
 
 if TYPE_CHECKING:
     from tiltsim.scenario.scenario import FlightPlan
@@ -76,18 +78,13 @@ class Key(NamedTuple):
 
     layout: RotorLayout
     law: Callable[..., Command]
-    name: str
     parameters: type[tuple[Any, ...]]  # of the law
     states: tuple[tuple[str, str], ...]  # of the law, with their units
     discrete: tuple[tuple[str, str], ...]  # likewise, discrete ones
     tilts: bool  # whether the law commands the tilts
     models_rotors: bool  # whether the rotors follow a model of theirs, as they do with latency
+    models_latency: bool = False  # whether the law knows its commands on their way
     traced: bool = True  # see `ClosedLoop.traced`
-
-    @property
-    def code_name(self) -> str:
-        """Name of the law, with its commands."""
-        return f"{self.name}{'_free' * self.tilts}{'_late' * self.models_rotors}"
 
 
 @cache
@@ -128,46 +125,45 @@ def _vector(command: Command, name: str, size: int) -> Any:
     return array
 
 
-@cache
-def _control_of(key: Key) -> Callable[..., Any]:
-    """The NumPy part of `RotorLaw.inputs`."""
+def _step_of(key: Key) -> Callable[..., Step]:
+    """The function of `Law.step`.
+
+    The states are the law's own, discrete ones last, the commanded tilts where it commands them,
+    and the rotor speeds of their model where they have one.
+    """
     rotors, tilts = key.layout.places
     own, discrete, layout = len(key.states), len(key.discrete), key.layout.tilt_of_rotor
     per_newton, coefficients = ROTOR_FLOATS * rotors, 2 * ROTOR_FLOATS * rotors
     is_cross = key.layout.model != "multirotor"
 
-    def control(
-        time: Any,
-        state: Any,
-        tilt_rates: Any,
-        states: Any,
-        known: Any,
-        knots: Any,
-        motion: Any,
-        attitude: Any,
-        planned: Any,
-    ) -> Any:
+    def step(seen: Seen, known: Any, knots: Any) -> Step:
         # An array that outlives a trace would keep its precision in the next one of JAX.
-        spins = xp.array(key.layout.spins)
-        at, angles = int(known.rotors), state[12 : 12 + tilts]
-        turning = spins * state[12 + tilts : 12 + tilts + rotors]
+        spins, time, states = xp.array(key.layout.spins), seen.time, seen.states
+        at, now = int(known.rotors), state_of(seen.state, layout)
+        motion = reference_motion(time, known.reference, knots)
+        planned = planned_tilts(time, known.gait, knots, tilts)
+        turning = spins * now.speeds
         k = xp.array(knots[at + coefficients : at + coefficients + rotors])
         pushing = rotors_in(knots, at + per_newton, layout)
-        wrench = wrench_map(pushing, angles)
+        wrench = wrench_map(pushing, now.tilts)
         observed = Observed(
             time=time,
-            position=state[0:3],
-            velocity=state[3:6],
-            attitude=state[6:9],
-            rotation=rotation_matrix(state[6:9]),
-            body_rates=state[9:12],
-            tilt_angles=angles,
-            tilt_rates=tilt_rates[:tilts],
+            position=now.position,
+            velocity=now.velocity,
+            attitude=now.attitude,
+            rotation=rotation_matrix(now.attitude),
+            body_rates=now.omega,
+            tilt_angles=now.tilts,
+            tilt_rates=seen.tilt_rates,
             rotor_speeds=turning,
             thrusts=k * turning * abs(turning),
             states=states[:own],
             discrete=states[own : own + discrete],
-            reference=Desired(*motion.reshape(4, 3), attitude, *planned.reshape(2, -1)),  # type: ignore[call-arg]
+            reference=Desired(
+                *motion[:4],  # type: ignore[call-arg]
+                reference_attitude(time, known.reference, knots)[0],
+                *planned[:, :2].T,
+            ),
             vehicle=known.cross if is_cross else known.vehicle,
             inertia=inertia_matrix(known.vehicle),
             gyroscopic=known.gyroscopic,
@@ -175,11 +171,12 @@ def _control_of(key: Key) -> Callable[..., Any]:
             torque=wrench[3:],
             rotors=pushing,
             table=knots[at + coefficients + rotors :],
+            tilt_commands=states[own + discrete : own + discrete + tilts * key.tilts],
         )
         try:
             command = key.law(observed, known.own)
         except TypeError as error:
-            if not is_jax(state):
+            if not is_jax(seen.state):
                 raise
             raise LawError(
                 f"{users_line(error)}{type(error).__name__} on arrays of JAX; {REMEDY}"
@@ -188,11 +185,11 @@ def _control_of(key: Key) -> Callable[..., Any]:
         along = _accelerations(command, known.rotor_gain, k, reached)
         rates, moving = _state_rates(key, command, states, known)
         if not key.models_rotors:
-            return xp.hstack([spins * along, rates, moving])
+            return Step(spins * along, xp.hstack([rates, moving]))
         following = spins * (along + CORRECTION * (reached - turning))
-        return xp.hstack([following, rates, moving, along])
+        return Step(following, xp.hstack([rates, moving, along]))
 
-    return control
+    return step
 
 
 def _accelerations(command: Command, gain: Any, k: Any, speeds: Any) -> Any:
@@ -235,34 +232,10 @@ def _state_rates(key: Key, command: Command, states: Any, known: Any) -> tuple[A
     return rates, moving
 
 
-@cache
-def _inputs_of(key: Key) -> Callable[..., Values]:
-    """`RotorLaw.inputs`.
-
-    The ``states`` are the law's own, discrete ones last, the commanded tilts where it commands
-    them, and the rotor speeds of their model where they have one.
-    """
-    control, moving = _control_of(key), tilt_motion_of(key.layout.places.tilts).moving
-
-    def inputs(
-        time: Any, state: Any, tilt_rates: Any, states: Any, parameters: Any, knots: Any
-    ) -> Any:
-        known = parameters.law
-        reference = known.reference
-        motion = reference_derivatives(time, reference, knots)
-        planned = xp.hstack(moving(time, known.gait, knots))
-        attitude = attitude_reference(time, reference, knots)
-        return control(
-            time, state, tilt_rates, states, known, knots, motion[:12], attitude, planned
-        )
-
-    return inputs
-
-
 def _setup_of(
     record: Any, law_of: Callable[[FlightPlan], FlownLaw]
 ) -> Callable[[FlightPlan], tuple[Any, Values]]:
-    """`RotorLaw.setup` of a law with a record of parameters."""
+    """`Law.setup` of a law with a record of parameters."""
 
     def setup(plan: FlightPlan) -> tuple[Any, Values]:
         scenario, airframe, law = plan.scenario, airframe_of(plan), law_of(plan)
@@ -291,7 +264,7 @@ def _setup_of(
 def _initial_of(
     law_of: Callable[[FlightPlan], FlownLaw], *, models_rotors: bool
 ) -> Callable[[FlightPlan], Values]:
-    """`RotorLaw.initial`, with the states of a model of the rotors or without."""
+    """`Law.initial`, with the states of a model of the rotors or without."""
 
     def initial(plan: FlightPlan) -> Values:
         airframe = airframe_of(plan)
@@ -313,9 +286,8 @@ def law_loop(key: Key, law_of: Callable[[FlightPlan], FlownLaw]) -> ClosedLoop:
     record, shown = record_of(key.parameters), key.layout.shown
     commands = shown.names("tilt_command") if key.tilts else ()
     modelled = shown.names("modelled_rotor_speed") if key.models_rotors else ()
-    law = RotorLaw(
-        key.code_name,
-        _inputs_of(key),
+    law = Law(
+        _step_of(key),
         record,
         _setup_of(record, law_of),
         states={
@@ -325,12 +297,16 @@ def law_loop(key: Key, law_of: Callable[[FlightPlan], FlownLaw]) -> ClosedLoop:
             **dict.fromkeys(modelled, "rad/s"),
         },
         initial=_initial_of(law_of, models_rotors=key.models_rotors),
-        commands=len(key.states) + len(key.discrete) if key.tilts else None,
+        tilts=tilts_in_states(len(key.states) + len(key.discrete), key.layout.places.tilts)
+        if key.tilts
+        else None,
+        uses_gait=not key.tilts,
+        follows_position=lambda scenario: scenario.reference.kind != "attitude_altitude",
     )
     late = key._replace(models_rotors=True)
+    knows_latency = key.models_rotors or key.models_latency
     return replace(
         rotor_loop(key.layout, law),
-        follows_position=lambda scenario: scenario.reference.kind != "attitude_altitude",
-        with_latency=None if key.models_rotors else partial(law_loop, late, law_of),
+        with_latency=None if knows_latency else partial(law_loop, late, law_of),
         traced=key.traced,
     )

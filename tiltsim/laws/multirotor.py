@@ -2,32 +2,51 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Mapping
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
-from tiltsim.closed_loop.loop import ClosedLoop
-from tiltsim.laws.multirotor_columns import NULL_PART, REFERENCES, margins_of, monitoring_of
-from tiltsim.laws.rotor_loop import RotorLaw, RotorLayout, body_of_vehicle, layout_of_vehicle
-from tiltsim.laws.rotorcraft import CONDITION
-from tiltsim.laws.tracking import INTEGRALS, integrals_at_rest, tracking_loop, tracking_parameters
+from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup
+from tiltsim.laws.law import Law
+from tiltsim.laws.parameters import (
+    INTEGRALS,
+    decouples_position,
+    integrals_at_rest,
+    tracking_parameters,
+)
+from tiltsim.laws.rotor_loop import (
+    RotorLayout,
+    body_of_vehicle,
+    layout_of_vehicle,
+    rotor_loop,
+    table_of,
+)
+from tiltsim.laws.rotorcraft import CONDITION, rotor_stops, singular_attitude, torque_free_columns
+from tiltsim.laws.supervision import supervised
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.multirotor_controllers import AttitudeForceController, upper_side
+from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.laws.allocation import RotorRange
+from tiltsim_controllers.laws.attitude_altitude import PUBLISHED_DECOUPLING
 from tiltsim_controllers.laws.gait_feedforward import multirotor_law_of
+from tiltsim_controllers.laws.multirotor import NULL_PART, SIGNALS, independence, present_wrench
 from tiltsim_controllers.laws.multirotor_steps import Direction, Form, Parameters
 from tiltsim_controllers.laws.multirotor_supervisor import (
     Watched,
     multirotor_supervision_of,
     watched,
-    watched_at,
 )
+from tiltsim_controllers.laws.observed import Seen
 from tiltsim_controllers.laws.supervisor import Supervisor
-from tiltsim_controllers.mathematics.scalar import Values
+from tiltsim_controllers.mathematics.scalar import Floats, Values
 from tiltsim_controllers.vehicle.effectiveness import without_rotor
+from tiltsim_controllers.vehicle.states import state_of
 
 if TYPE_CHECKING:
     from tiltsim.scenario.scenario import FlightPlan, Scenario
+
+REVERSING: Final = 'controller.norm = "thrust", with which rotors reverse'
+"""The remedy where a rotor would have to reverse."""
 
 
 def _setup(plan: FlightPlan) -> tuple[Any, Values]:
@@ -65,44 +84,62 @@ def _setup(plan: FlightPlan) -> tuple[Any, Values]:
     return law._replace(watched_without=others), (*table, *without_rotor(table, lost))
 
 
-def _watched(time: Any, parameters: Any) -> Watched:
-    """Vehicle parameters that the supervisor reads."""
-    return watched_at(time, parameters.law)
-
-
 @cache
-def multirotor_loop(layout: RotorLayout, form: Form, measured: bool = False) -> ClosedLoop:
-    """The controller of attitude and force of all multirotors of a layout.
+def multirotor_loop(layout: RotorLayout, form: Form, measured: bool, strategy: str) -> ClosedLoop:
+    """The closed loop of all multirotors of a layout.
 
     Args:
         layout: Layout of the vehicles.
         form: Options of the law.
-        measured: Whether it feeds back the angular acceleration of the plant, which
-            `tiltsim.laws.layers.measured_acceleration` measures.
+        measured, strategy: See `tiltsim.laws.tiltrotor.tiltrotor_loop`.
     """
-    rotors = layout.tilt_of_rotor
-    law = RotorLaw(
-        f"attitude_force_{form.name}",
+    rotors, places = layout.tilt_of_rotor, layout.places
+    turning = places.rotors if form.norm == "speed" else 0  # else they may stop
+    stops = rotor_stops(turning, REVERSING)
+
+    def margins(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
+        failure, table = setup.parameters.law.failure, table_of(places, setup)
+        return torque_free_columns(places, table, samples, form.dimension, failure)
+
+    def signs(seen: Seen, p: Any, knots: Any) -> Any:
+        """Independence of the outputs and, in the norm of the speeds, the rotors' speeds."""
+        side, without = xp.array(p.upper_side), xp.array(p.upper_side_without)
+        rows, up = present_wrench(seen, p, knots, rotors)
+        side = xp.where(seen.time >= p.failure.known_from, without, side)
+        speeds = state_of(seen.state, rotors).speeds[:turning]
+        if p.decoupling == PUBLISHED_DECOUPLING:  # the factor 2 |varpi| is in rows of force only
+            speeds = xp.ones(turning)
+        return xp.hstack([independence(rows, up, side, form), speeds])
+
+    def causes(sample: Mapping[str, float], setup: ControlSetup) -> tuple[str, ...]:
+        failure = setup.parameters.law.failure
+        attitude = singular_attitude(sample, places.names("alpha"))
+        if sample["time"] >= failure.known_from:
+            attitude += f", without rotor {failure.rotor:g}"
+        return (attitude, *stops)
+
+    law = Law(
         multirotor_law_of(rotors, form),
         Parameters,
         _setup,
-        names=REFERENCES,
-        margins=margins_of(layout, form.dimension),
-        measured=measured,
-        units={NULL_PART: "1", CONDITION: "1"},
         states=INTEGRALS,
         initial=integrals_at_rest,
+        signals=SIGNALS,
+        units={NULL_PART: "1", CONDITION: "1"},
+        margins=margins,
+        signs=signs,
+        causes=causes,
+        measured=measured,
+        follows_position=decouples_position,
     )
     supervision = multirotor_supervision_of(rotors, form.dimension, form.forward)
-    return replace(
-        tracking_loop(layout, law, supervision, _watched), monitoring=monitoring_of(layout, form)
-    )
+    return rotor_loop(layout, supervised(law, supervision, strategy))
 
 
-def loop_of_multirotor(scenario: Scenario, measured: bool) -> ClosedLoop:
+def loop_of_multirotor(scenario: Scenario, measured: bool, strategy: str) -> ClosedLoop:
     """The `multirotor_loop` of a scenario, without layers."""
     controller, vehicle = scenario.controller, scenario.vehicle.resolve()
     assert isinstance(controller, AttitudeForceController)
     assert isinstance(vehicle, Multirotor)
     form = controller.resolve_force(vehicle, scenario.gait.plan(vehicle))
-    return multirotor_loop(layout_of_vehicle(vehicle), form, measured)
+    return multirotor_loop(layout_of_vehicle(vehicle), form, measured, strategy)

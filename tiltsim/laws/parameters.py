@@ -3,13 +3,20 @@
 from __future__ import annotations
 
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
+from tiltsim.scenario.multirotor_controllers import AttitudeForceController
+from tiltsim.scenario.tiltrotor_controllers import AttitudeAltitudeController
+from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.laws.keys import number_of
+from tiltsim_controllers.laws.multirotor_steps import INTEGRAL_FIELDS
 from tiltsim_controllers.mathematics.records import make_record_type
 
 if TYPE_CHECKING:
-    from tiltsim.scenario.scenario import FlightPlan
+    from tiltsim.scenario.scenario import FlightPlan, Scenario
+
+INTEGRALS: Final = dict.fromkeys(INTEGRAL_FIELDS, "m s")
+"""States of a law that integrates the position error, with their units."""
 
 
 @cache
@@ -43,3 +50,38 @@ def parameters_of(plan: FlightPlan, record: Any, **own: Any) -> Any:
     return record(
         *(known[key] if key in known else number_of(controller, key) for key in record._fields)
     )
+
+
+def tracking_parameters(plan: FlightPlan, record: Any, **own: Any) -> Any:
+    """The parameters of a law with feed-forward of a gait.
+
+    Args:
+        plan, record, own: See `parameters_of`.
+    """
+    scenario, controller = plan.scenario, plan.scenario.controller
+    assert isinstance(controller, (AttitudeAltitudeController, AttitudeForceController))
+    # The thesis's equations omit the gyroscopic torque.
+    terms = controller.resolve_feedforward_terms(
+        gyroscopic_torque=scenario.simulation.plant != "thesis"
+    )
+    return parameters_of(
+        plan,
+        record,
+        gains=controller.resolve_gains(),
+        integral=controller.resolve_integral_gains(),
+        anticipation=xp.minimum(controller.anticipation, 0.5 * plan.gait.min_segment_time),
+        terms=terms,
+        **own,
+    )
+
+
+def integrals_at_rest(_plan: FlightPlan) -> tuple[float, ...]:
+    """The states `INTEGRALS` at time zero."""
+    return (0.0,) * len(INTEGRALS)
+
+
+def decouples_position(scenario: Scenario) -> bool:
+    """Whether a decoupler steers the vehicle to the reference's horizontal position."""
+    controller = scenario.controller
+    assert isinstance(controller, (AttitudeAltitudeController, AttitudeForceController))
+    return controller.decoupler != "none"

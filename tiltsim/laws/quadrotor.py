@@ -26,8 +26,8 @@ from tiltsim.engines.sample_evaluation import evaluate_over_samples
 from tiltsim.equations.quadrotor import equations_of_motion, initial_state
 from tiltsim.laws.parameters import head_of, parameters_of
 from tiltsim.laws.rotorcraft import REFERENCE_COLUMNS
-from tiltsim.laws.tiltrotor import TILT_REFERENCE_COLUMNS
 from tiltsim.vehicles.rotorcraft import ROTORCRAFT
+from tiltsim.vehicles.rotorcraft.layout import CROSS
 from tiltsim_controllers.analysis.quadrotor_singularity import (
     normalized_determinant,
     published_determinant,
@@ -74,7 +74,6 @@ def references(
     reference: ReferenceParameters,
     knots: Vector,
     attitude: Sequence[object] = (),
-    tilts: tuple[str, ...] = TILT_REFERENCE_COLUMNS,
 ) -> dict[str, Floats]:
     """The columns of references; tilts have zeros.
 
@@ -83,14 +82,13 @@ def references(
         reference, knots: Reference of the position, with its knots.
         attitude: Columns of roll, pitch and yaw (rad): arrays or constants; empty for the
             reference's.
-        tilts: Names of the tilts' columns.
     """
     time = samples["time"]
     states, setup = np.empty((len(time), 0)), ControlSetup(reference, tuple(knots))
     columns = [*evaluate_over_samples(_reference_pose, 6, time, states, setup).T]
     angles, columns = attitude or columns[3:], columns[:3]
     columns += [np.broadcast_to(np.asarray(angle, dtype=float), time.shape) for angle in angles]
-    idle = dict.fromkeys(tilts, np.zeros_like(time))
+    idle = dict.fromkeys(CROSS.names("alpha_ref"), np.zeros_like(time))
     return dict(zip(REFERENCE_COLUMNS, columns, strict=True)) | idle
 
 

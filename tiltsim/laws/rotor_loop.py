@@ -1,15 +1,14 @@
-"""Closed loops with any number of rotors: one factory for every control law.
+"""Closed loops with any number of rotors: one for every control law.
 
-Native code wants to know how many rotors there are, which tilt together and which way they turn, so
-a loop is made for each such `RotorLayout`, once. All other numbers of the vehicle are data. The
-rotors' speeds are states whose accelerations a law commands; tilts follow the gait, or are commands
-that a law integrates as its states.
+Programs are made for the number of rotors, which of them tilt together and which way they turn, so
+a loop is made for each such `RotorLayout`. All other numbers of the vehicle are data. The rotors'
+speeds are states whose accelerations a law commands.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from functools import cache
+from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -20,19 +19,16 @@ from tiltsim.closed_loop.loop import (
     ControlSetup,
     Dynamics,
     Equations,
+    Monitoring,
     Sampling,
 )
 from tiltsim.equations.tiltrotor import body_fields, initial_state
+from tiltsim.laws.law import Law, Tilts, parts, tilts_of_gait
 from tiltsim.laws.parameters import head_of
 from tiltsim.laws.rotorcraft import (
     REFERENCE_COLUMNS,
-    ahead,
-    held_controls_of,
-    observed_of,
     reference_columns,
-    seen_of,
     servo_lead,
-    thrust_controls_of,
     torque_free_columns,
 )
 from tiltsim.models.rotor_table import Multirotor
@@ -41,18 +37,18 @@ from tiltsim.vehicles.rotorcraft.layout import CROSS
 from tiltsim.vehicles.rotorcraft.layout import Layout as Places
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.code.traceable import traceable
-from tiltsim_controllers.gaits.motion import tilt_motion_of
+from tiltsim_controllers.laws.observed import Seen
+from tiltsim_controllers.mathematics.attitude import euler_angles
 from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector
-from tiltsim_controllers.references.trajectories import attitude_reference, position_reference
+from tiltsim_controllers.references.trajectories import reference_attitude, reference_motion
 from tiltsim_controllers.vehicle.body import Body, body_of
 from tiltsim_controllers.vehicle.effectiveness import ROTOR_FLOATS
-from tiltsim_controllers.vehicle.motion import BODY_STATES, equations_of_motion_of
+from tiltsim_controllers.vehicle.motion import BODY_STATES, equations_of_motion
+from tiltsim_controllers.vehicle.rotors import airframe
+from tiltsim_controllers.vehicle.states import BODY_FIELDS
 
 if TYPE_CHECKING:
     from tiltsim.scenario.scenario import FlightPlan
-
-Margins = Callable[[Mapping[str, Floats], ControlSetup], dict[str, Floats]]
-"""``(samples by field, setup) -> columns`` that a sample's state alone decides."""
 
 
 class RotorLayout(NamedTuple):
@@ -86,122 +82,9 @@ def layout_of_vehicle(vehicle: Multirotor, model: str = "multirotor") -> RotorLa
     return RotorLayout(vehicle.tilt_of_rotor, vehicle.spins, model)
 
 
-def _no_states(_plan: FlightPlan) -> Values:
-    return ()
-
-
-class RotorLaw(NamedTuple):
-    """A control law with rotor accelerations as inputs, and the parts of its loop.
-
-    Its parameters have ``reference``, where the tilts follow the gait ``gait``, and for the general
-    margins and motion ``vehicle`` and ``rotors``, the index of the rotors' table in the knots.
-    """
-
-    name: str  # of compiled code
-    inputs: Callable[..., Values]
-    """``(time, state, tilt_rates, states, parameters, knots)``: rotor accelerations
-    (rad/s^2), then rates of the controller's ``states``. ``state`` is the vehicle's (`seen_of`),
-    ``parameters`` the whole record."""
-    parameters: type[tuple[Any, ...]]
-    setup: Callable[[FlightPlan], tuple[Any, Values]]  # parameters, and knots to append
-    states: Mapping[str, str] = {}  # the controller's, with their units; part of a sample
-    initial: Callable[[FlightPlan], Values] = _no_states  # these states at time zero
-    commands: int | None = None  # which of them is the first commanded tilt; None: the gait's
-    references: Callable[..., Values] | None = None
-    """``(time, values, parameters, knots)`` of the columns ``names``, from a sample;
-    None for the position and attitude of the reference."""
-    names: tuple[str, ...] = REFERENCE_COLUMNS
-    margins: Margins | None = None  # None for the angle to the nearest singular attitude
-    units: Mapping[str, str] = {}  # further columns of a flight
-    measured: bool = False
-    """Whether ``tilt_rates`` end with the plant's angular acceleration (rad/s^2, body axes), of
-    `tiltsim.laws.layers.measured_acceleration`."""
-    motion: Callable[..., Values] | None = None
-    """``(state, tilts, inputs, parameters, knots, disturbance)`` of the derivative of
-    body and rotor speeds on the thesis's equations; None for the equations of a rotor table."""
-
-
 def body_of_vehicle(vehicle: Multirotor) -> Body:
     """The rigid body that a law knows of a vehicle."""
     return body_of(vehicle.mass, np.reshape(vehicle.inertia, (3, 3)), vehicle.gravity)
-
-
-def _tilts_of(law: RotorLaw, tilts: int, state_1: int, rate_1: int) -> Callable[..., Any]:
-    """Function for the tilts (rad) and their rates (rad/s), the gait's or a law's commands.
-
-    It is ``(time, state, inputs, parameters, knots) -> angles, rates``; commanded tilts are states
-    whose rates are inputs.
-
-    Args:
-        law: Its ``commands`` tell which.
-        tilts: Number of tilts.
-        state_1, rate_1: Where the controller's states begin in a state, and their rates in inputs.
-    """
-    moving, first = tilt_motion_of(tilts).moving, law.commands
-    if first is None:
-
-        def planned(time: Any, state: Any, inputs: Any, parameters: Any, knots: Any) -> Any:
-            return moving(time, parameters.law.gait, knots)
-
-        return planned
-    angle_1, moving_1 = state_1 + first, rate_1 + first
-
-    def commanded(time: Any, state: Any, inputs: Any, parameters: Any, knots: Any) -> Any:
-        return state[angle_1 : angle_1 + tilts], inputs[moving_1 : moving_1 + tilts]
-
-    return commanded
-
-
-def _sampling_of(layout: RotorLayout, law: RotorLaw) -> Sampling:
-    """The control step in MuJoCo."""
-    rotors, tilts = layout.places
-    seen, inputs_of = seen_of(layout.places, len(law.states), law.measured), law.inputs
-    thrusts = thrust_controls_of(layout.spins)
-    tilt_motion = _tilts_of(law, tilts, rotors, rotors)
-
-    @traceable
-    def controls(time: Any, qpos: Any, qvel: Any, act: Any, parameters: Any, knots: Any) -> Any:
-        state, moving, states = seen(qpos, qvel, act)
-        inputs = inputs_of(time, state, moving, states, parameters, knots)
-        angles, rates = tilt_motion(time, act, inputs, parameters, knots)
-        return xp.hstack([ahead(angles, rates, parameters.servo_lead), thrusts(act), inputs])
-
-    return Sampling(controls, held_controls_of(layout.spins, tilts))
-
-
-def _pose(time: Any, values: Any, parameters: Any, knots: Any) -> Any:
-    """Position and attitude of the reference, `REFERENCE_COLUMNS`."""
-    reference = parameters.law.reference
-    position = position_reference(time, reference, knots)[:3]
-    return xp.hstack([position, attitude_reference(time, reference, knots)])
-
-
-def _columns_of(layout: RotorLayout, law: RotorLaw) -> Columns:
-    """Samples of flights, and the columns of references and margin."""
-    places, shown, references = layout.places, layout.shown, law.references or _pose
-    fields, names = (*shown.observed_fields, *law.states), (*law.names, *shown.names("alpha_ref"))
-    observed, idle = observed_of(places, shown, len(law.states)), np.zeros(shown[1] - places[1])
-    first = len(shown.observed_fields)
-    tilts, at_rest = _tilts_of(law, places.tilts, first, 0), np.zeros(len(law.states))
-
-    @traceable
-    def observe(qpos: Any, qvel: Any, act: Any, ctrl: Any) -> Any:
-        return observed(qpos, qvel, act)
-
-    @traceable
-    def requested(time: Any, values: Any, parameters: Any, knots: Any) -> Any:
-        own = references(time, values, parameters, knots)
-        angles, _ = tilts(time, values, at_rest, parameters, knots)
-        return xp.hstack([own, angles, idle])
-
-    def margins(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
-        return torque_free_columns(places, table_of(places, setup), samples)
-
-    def derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
-        found = reference_columns(requested, fields, samples, setup, names)
-        return {**found, **(law.margins or margins)(samples, setup)}
-
-    return Columns(observe, derive, fields=tuple(law.states), units={**law.states, **law.units})
 
 
 def table_of(places: Places, setup: ControlSetup) -> Values:
@@ -210,75 +93,191 @@ def table_of(places: Places, setup: ControlSetup) -> Values:
     return setup.knots[first : first + ROTOR_FLOATS * places.rotors]
 
 
-@cache
-def _motion_of(layout: RotorLayout) -> Callable[..., Values]:
-    """`RotorLaw.motion` by a table of rotors."""
-    motion_of_body = equations_of_motion_of(layout.tilt_of_rotor)
-    # The thesis's equations have no gyroscopic torque but the quadrotor's.
-    gyroscopic = float(layout.model == "quadrotor")
+@dataclass(frozen=True, eq=False)
+class _Functions:
+    """The functions of a law's loop on arrays, for N rotors, M tilts and S states."""
 
-    def motion(
-        state: Any, tilts: Any, inputs: Any, parameters: Any, knots: Any, disturbance: Any
+    layout: RotorLayout
+    law: Law
+    tilts: Tilts
+
+    @property
+    def sizes(self) -> tuple[int, int, int]:
+        """N, M and S."""
+        return (*self.layout.places, len(self.law.states))
+
+    @property
+    def idle(self) -> int:
+        """Number of tilts in a sample that the vehicle does not have."""
+        return self.layout.shown.tilts - self.layout.places.tilts
+
+    # --- states of the vehicle, from the vectors that hold them
+
+    def in_mujoco(self, time: Any, qpos: Any, qvel: Any, act: Any) -> Seen:
+        """From MuJoCo's vectors."""
+        N, M, S = self.sizes
+        q = parts(qpos, position=3, quaternion=4, tilts=M)
+        v = parts(qvel, velocity=3, omega=3, tilt_rates=M, measured=3)
+        a = parts(act, speeds=N, states=S)
+        body = q.position, v.velocity, euler_angles(q.quaternion), v.omega
+        measured = v.measured if self.law.measured else None
+        return Seen(time, xp.hstack([*body, q.tilts, a.speeds]), v.tilt_rates, a.states, measured)
+
+    def in_sample(self, time: Any, values: Any) -> Seen:
+        """From a sample."""
+        N, M, S = self.sizes
+        idle, body = self.idle, len(BODY_FIELDS)
+        v = parts(values, body=body, tilts=M, _1=idle, speeds=N, tilt_rates=M, _2=idle, states=S)
+        state = xp.hstack([v.body, v.tilts, v.speeds])
+        return Seen(time, state, v.tilt_rates, v.states, recorded=True)
+
+    def in_equations(self, time: Any, state: Any, rates: Any, p: Any, knots: Any) -> Seen:
+        """From a state of the equations, whose pods follow their commands exactly.
+
+        Args:
+            time: s.
+            state: `BODY_STATES` numbers, N rotor speeds and S states of the controller.
+            rates: Rates of these, which move commanded tilts; zeros for rates yet to be commanded.
+            p, knots: Parameters of the law, and table data of the flight.
+        """
+        N, M, S = self.sizes
+        now, body = parts(state, body=BODY_STATES, speeds=N, states=S), body_fields(state)
+        still = Seen(time, xp.hstack([body, xp.zeros(M), now.speeds]), xp.zeros(M), now.states)
+        moving = self.tilts(still, rates, p, knots)
+        whole = xp.hstack([body, moving[:, 0], now.speeds])
+        return still._replace(state=whole, tilt_rates=moving[:, 1])
+
+    def sample(self, seen: Seen) -> Any:
+        """The values of a sample."""
+        end, idle = len(BODY_FIELDS) + self.layout.places.tilts, xp.zeros(self.idle)
+        body_and_tilts, speeds = seen.state[:end], seen.state[end:]
+        return xp.hstack([body_and_tilts, idle, speeds, seen.tilt_rates, idle, seen.states])
+
+    # --- in MuJoCo
+
+    def thrusts(self, act: Any) -> Any:
+        """Controls of the thrusts: ``s varpi |varpi|`` with the spins s."""
+        spins = xp.array(self.layout.spins)
+        speeds = act[: len(spins)]
+        return spins * speeds * abs(speeds)
+
+    def controls(
+        self, time: Any, qpos: Any, qvel: Any, act: Any, parameters: Any, knots: Any
     ) -> Any:
-        own = parameters.law
-        body, at = own.vehicle, int(own.rotors)
-        return motion_of_body(state, tilts, inputs, body, knots, at, disturbance, gyroscopic)
+        """Tilt servos, ahead by their lag; thrusts; rotor accelerations; rates of the states."""
+        seen, p = self.in_mujoco(time, qpos, qvel, act), parameters.law
+        step = self.law.step(seen, p, knots)
+        moving = self.tilts(seen, step.rates, p, knots)
+        servos = moving[:, 0] + parameters.servo_lead * moving[:, 1]
+        return xp.hstack([servos, self.thrusts(act), step.inputs, step.rates])
 
-    return motion
+    def hold(self, time: Any, qpos: Any, qvel: Any, act: Any, ctrl: Any, parameters: Any) -> Any:
+        """Held controls with the thrusts of the present rotor speeds."""
+        places = self.layout.places
+        return xp.hstack([ctrl[: places.tilts], self.thrusts(act), ctrl[places.acceleration_1 :]])
 
+    def observe(self, qpos: Any, qvel: Any, act: Any, ctrl: Any) -> Any:
+        """A sample."""
+        sample = self.sample(self.in_mujoco(0.0, qpos, qvel, act))
+        if self.law.records_commands:
+            sample = xp.hstack([sample, ctrl[: self.layout.places.tilts]])
+        return sample
 
-def _equations_of(layout: RotorLayout, law: RotorLaw) -> Equations:
-    """The law on the equations of motion, with pods that follow their commands exactly."""
-    rotors, tilts = layout.places
-    own, inputs_of, motion = len(law.states), law.inputs, law.motion or _motion_of(layout)
-    idle, at_rest = np.zeros(layout.shown.tilts - tilts), np.zeros(rotors + own)
-    speeds = slice(BODY_STATES, BODY_STATES + rotors)
-    states = slice(speeds.stop, speeds.stop + own)
-    moving_tilts = _tilts_of(law, tilts, BODY_STATES + rotors, rotors)
+    # --- of a sample
 
-    @traceable
-    def tilts_of(time: Any, state: Any, parameters: Any, knots: Any) -> Any:
-        return moving_tilts(time, state, at_rest, parameters, knots)[0]
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the columns of `references`."""
+        signals = REFERENCE_COLUMNS[3:] if self.law.signals is None else self.law.signals
+        return (*REFERENCE_COLUMNS[:3], *signals, *self.layout.shown.names("alpha_ref"))
 
-    @traceable
-    def inputs(time: Any, state: Any, parameters: Any, knots: Any) -> Any:
-        # Rates that the law is yet to command count as none.
-        angles, moving = moving_tilts(time, state, at_rest, parameters, knots)
-        seen = xp.hstack([body_fields(state), angles, state[speeds]])
-        return inputs_of(time, seen, moving, state[states], parameters, knots)
+    def references(self, time: Any, values: Any, parameters: Any, knots: Any) -> Any:
+        """Position, attitude, further signals and tilts to track."""
+        seen, p, law = self.in_sample(time, values), parameters.law, self.law
+        position = reference_motion(time, p.reference, knots)[0]
+        if law.signals is None:
+            signals = reference_attitude(time, p.reference, knots)[0]
+        else:
+            signals = law.step(seen, p, knots).signals[: len(law.signals)]
+        tilts = self.tilts(seen, xp.zeros(len(law.states)), p, knots)[:, 0]
+        return xp.hstack([position, signals, tilts, xp.zeros(self.idle)])
 
-    @traceable
-    def rates(
-        time: Any, state: Any, inputs: Any, parameters: Any, knots: Any, disturbance: Any
+    def signs(self, time: Any, values: Any, parameters: Any, knots: Any) -> Any:
+        """See `tiltsim.closed_loop.loop.Monitoring`."""
+        assert self.law.signs is not None
+        return self.law.signs(self.in_sample(time, values), parameters.law, knots)
+
+    # --- on equations of motion
+
+    def equation_inputs(self, time: Any, state: Any, parameters: Any, knots: Any) -> Any:
+        """Rotor accelerations, then rates of the states."""
+        p, still = parameters.law, xp.zeros(len(self.law.states))
+        step = self.law.step(self.in_equations(time, state, still, p, knots), p, knots)
+        return xp.hstack([step.inputs, step.rates])
+
+    def equation_tilts(self, time: Any, state: Any, parameters: Any, knots: Any) -> Any:
+        """Tilt angles, rad."""
+        N, M, S = self.sizes
+        states = parts(state, _=BODY_STATES + N, states=S).states
+        seen = Seen(time, state, xp.zeros(M), states)
+        return self.tilts(seen, xp.zeros(S), parameters.law, knots)[:, 0]
+
+    def equation_rates(
+        self, time: Any, state: Any, inputs: Any, parameters: Any, knots: Any, disturbance: Any
     ) -> Any:
-        angles = tilts_of(time, state, parameters, knots)
-        body = motion(state, angles, inputs, parameters, knots, disturbance)
-        return xp.hstack([body, inputs[rotors : rotors + own]])
+        """Rates of the vehicle's and the controller's states.
 
-    @traceable
-    def observe(time: Any, state: Any, inputs: Any, parameters: Any, knots: Any) -> Any:
-        angles, moving = moving_tilts(time, state, inputs, parameters, knots)
-        seen = body_fields(state), angles, idle, state[speeds]
-        return xp.hstack([*seen, moving, idle, state[states]])
+        The thesis's equations have no gyroscopic torque but the quadrotor's.
+        """
+        N, _, S = self.sizes
+        body, rotors = airframe(parameters.law, knots, self.layout.tilt_of_rotor)
+        gyroscopic = float(self.layout.model == "quadrotor")
+        tilts = self.equation_tilts(time, state, parameters, knots)
+        moved = equations_of_motion(state, tilts, inputs, body, rotors, disturbance, gyroscopic)
+        return xp.hstack([moved, inputs[N : N + S]])
 
-    def initial(plan: FlightPlan, _setup: ControlSetup) -> Vector:
-        return (*initial_state(plan.scenario, initial_rotor_speeds(plan)), *law.initial(plan))
+    def observe_equations(
+        self, time: Any, state: Any, inputs: Any, parameters: Any, knots: Any
+    ) -> Any:
+        """A sample."""
+        rates = inputs[self.layout.places.rotors :]
+        return self.sample(self.in_equations(time, state, rates, parameters.law, knots))
 
-    return Equations(inputs, rotors + own, rates, initial, observe, tilts=tilts_of)
 
-
-def rotor_loop(layout: RotorLayout, law: RotorLaw) -> ClosedLoop:
+def rotor_loop(layout: RotorLayout, law: Law) -> ClosedLoop:
     """The closed loop of a control law with all vehicles of a layout."""
     places, record = layout.places, head_of(law.parameters, servo_lead=float)
-    sampling, equations = _sampling_of(layout, law), None
-    if not law.measured:  # the equations have no other acceleration than the law's
-        equations = _equations_of(layout, law)
+    functions = _Functions(layout, law, law.tilts or tilts_of_gait(places.tilts))
+    references, names = traceable(functions.references), functions.names
+    commands = places.names("tilt_command") if law.records_commands else ()
+    fields = (*layout.shown.observed_fields, *law.states)
 
     def setup(plan: FlightPlan, signature: float) -> ControlSetup:
         parameters, further = law.setup(plan)
         lead = servo_lead(plan.scenario.any_rotorcraft.tilt_servo)
         return ControlSetup(record(signature, lead, parameters), (*plan.knots, *further))
 
+    def margins(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
+        return torque_free_columns(places, table_of(places, setup), samples)
+
+    def derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
+        found = reference_columns(references, fields, samples, setup, names)
+        return {**found, **(law.margins or margins)(samples, setup)}
+
+    def initial(plan: FlightPlan, _setup: ControlSetup) -> Vector:
+        return (*initial_state(plan.scenario, initial_rotor_speeds(plan)), *law.initial(plan))
+
+    equations = None
+    if not (law.measured or law.records_commands):  # they need a plant with servos
+        equations = Equations(
+            inputs=traceable(functions.equation_inputs),
+            inputs_size=places.rotors + len(law.states),
+            rates=traceable(functions.equation_rates),
+            initial=initial,
+            observe=traceable(functions.observe_equations),
+            tilts=traceable(functions.equation_tilts),
+        )
+    monitoring = Monitoring(traceable(functions.signs), law.causes) if law.signs else Monitoring()
     return ClosedLoop(
         kind=rotorcraft_kind(layout.shown, ("singularity_margin",)),
         parameters=record,
@@ -291,8 +290,15 @@ def rotor_loop(layout: RotorLayout, law: RotorLaw) -> ClosedLoop:
             layout.spins,
             layout.tilt_of_rotor if layout.model == "multirotor" else (),
         ),
-        sampling=sampling,
-        columns=_columns_of(layout, law),
+        sampling=Sampling(traceable(functions.controls), traceable(functions.hold)),
+        columns=Columns(
+            traceable(functions.observe),
+            derive,
+            fields=(*law.states, *commands),
+            units={**law.states, **dict.fromkeys(commands, "rad"), **law.units},
+        ),
+        monitoring=monitoring,
         equations=equations,
-        uses_gait=places.tilts > 0 and law.commands is None,
+        follows_position=law.follows_position,
+        uses_gait=places.tilts > 0 and law.uses_gait,
     )

@@ -18,8 +18,8 @@ from tiltsim.closed_loop.choices import program_key
 from tiltsim.closed_loop.userdata import EVALUATIONS, HEADER_SIZE
 from tiltsim.engines.callback import control_callback
 from tiltsim.engines.python_engine import control_program, control_step
-from tiltsim.laws.commanded import commanded_parameters, with_command
-from tiltsim.laws.rotorcraft import servo_commands_of
+from tiltsim.laws.commanded import commanded_parameters, planned_servo_commands, with_command
+from tiltsim.laws.rotorcraft import servo_lead
 from tiltsim.plants.command import CheckedCommand, ControllerError, Observation
 from tiltsim.plants.mujoco_plant import MujocoPlant
 from tiltsim.plants.observing import Observer, flip_by_spin
@@ -49,7 +49,7 @@ class CommandedPlant(MujocoPlant):
         # Along the spin, from the model: limits of the scenario or of a user's file.
         self._limits = [self._limits_along_spin(i, spin) for i, spin in enumerate(vehicle.spins, 1)]
         self._commanded = commanded_parameters(self._setup.parameters)
-        self._servo_commands = servo_commands_of(layout.tilts)
+        self._lead = servo_lead(vehicle.tilt_servo)
         self._observer = Observer(assembly)
         program = control_program(program_key(assembly), "controls")
         self._controls = python_function(program, "controls")
@@ -122,8 +122,8 @@ class CommandedPlant(MujocoPlant):
         """The commanded tilt angles, rad; by default the planned gait."""
         if command.tilt_angles is not None:
             return command.tilt_angles
-        lead, gait = self._commanded.servo_lead, self._commanded.gait
-        return self._servo_commands(self.evaluation_time, lead, gait, self._setup.knots)
+        time, gait, tilts = self.evaluation_time, self._commanded.gait, self.layout.tilts
+        return planned_servo_commands(time, tilts, gait, self._setup.knots, self._lead)
 
     def _hold_command(self, command: Values) -> None:
         data, knots = self.data, self._setup.knots

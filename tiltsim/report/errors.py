@@ -50,4 +50,4 @@ ERRORS: Final = {
         (Path(__file__).parent / "errors.toml").read_text(encoding="utf-8")
     ).items()
 }
-"""All entries by key, the most consequential first."""
+"""All entries by key: first the one of most consequence, then in the order of the text."""

@@ -1,8 +1,8 @@
 """Results that the report stores in a folder, so that a second report takes seconds.
 
 Files are named by a digest of everything that their content depends on: the resolved scenario
-(without titles and expectations), the sources of the core and of the models, and the versions of
-the packages that compute.
+(without titles and expectations), the files that it names, the sources of the core and of the
+models, and the versions of the packages that compute.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ import tiltsim_controllers
 from tiltsim.errors import InputError
 from tiltsim.folders import FLYING
 from tiltsim.resources import shipped_folder
+from tiltsim.scenario.loading import named_files
 from tiltsim.scenario.scenario_tables import DESCRIPTIVE
 from tiltsim.system.files import replacing
 from tiltsim.system.processes import in_processes
@@ -40,6 +41,7 @@ def flight_key(scenario: Scenario) -> str:
     """Digest of everything that the numbers of a flight depend on."""
     content = scenario.model_dump(mode="json", exclude=set(DESCRIPTIVE))
     digest = hashlib.sha256(json.dumps(content, sort_keys=True).encode())
+    digest.update(sources_digest(sorted(named_files(content))))
     digest.update(code_digest())
     return digest.hexdigest()[:24]
 

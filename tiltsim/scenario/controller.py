@@ -28,6 +28,7 @@ from tiltsim.scenario.tilt_car_controllers import (
     ThirdDerivativeController,
 )
 from tiltsim.scenario.tiltrotor_controllers import AttitudeAltitudeController, FullPoseController
+from tiltsim.scenario.vectoring_controller import VectoringController
 
 DEFAULT_LAW: Final = "attitude_altitude"
 
@@ -128,6 +129,7 @@ _BUILT_IN: Final[dict[str, type[ControllerTable]]] = {
     "pid": PidController,
     "indi": IndiController,
     "lqr": LqrController,
+    "vectoring": VectoringController,
     "python": PythonController,
     "numpy": NumpyController,
     "tilt_car_third_derivative": ThirdDerivativeController,

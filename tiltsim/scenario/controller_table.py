@@ -129,6 +129,7 @@ class ControllerTable(Table):
     rotors_have_speeds: ClassVar[bool] = False  # also of the quadrotor, whose laws make thrusts
     follows_turns: ClassVar[bool] = False  # roll, pitch and yaw that vary with time
     needs_four_rotors: ClassVar[bool] = True  # or tilts that the law commands
+    models_latency: ClassVar[bool] = False  # the law knows its commands on their way
     leans_unrecorded: ClassVar[bool] = False  # toward a position; no column has this attitude
 
     gain_sets: ClassVar[GainSets] = {}

@@ -55,16 +55,32 @@ class Airframe:
         gait: Gait of its tilts.
         initial_tilts: Its tilt angles at time zero, rad.
         initial_speeds: Its rotor speeds at time zero, rad/s along the spin.
+        initial_velocity: Its velocity at time zero, m/s, world axes.
         initial_body_rates: Its body rates at time zero, rad/s.
         gyroscopic: 1 where the plant has gyroscopic torque, else 0.
+        timestep: Step of the integration, s.
+        control_timestep: Period of control samples, s; 0 if continuous.
+        latency: Control samples from a reading to its command.
+        speed_limits: Lowest and highest rotor speeds that the plant enforces, rad/s along the
+            spin; infinite without limits.
+        rotor_time_constant: Time constant of the rotors' lag, s; None for no lag.
+        servo_frequency, servo_damping: Natural frequency (rad/s) and damping ratio of the servos.
     """
 
     vehicle: Multirotor
     gait: Gait
     initial_tilts: Values
     initial_speeds: Values
+    initial_velocity: Triple
     initial_body_rates: Triple
     gyroscopic: float
+    timestep: float
+    control_timestep: float
+    latency: int
+    speed_limits: tuple[float, float]
+    rotor_time_constant: float | None
+    servo_frequency: float
+    servo_damping: float
 
     @property
     def rotors(self) -> int:

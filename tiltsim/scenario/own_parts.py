@@ -21,8 +21,8 @@ from tiltsim.scenario.scenario import Scenario
 from tiltsim.scenario.simulation_table import SimulationTable
 from tiltsim.scenario.time_table import (
     GAIT_COLUMNS,
-    POSE_COLUMNS,
     REFERENCE_COLUMNS,
+    WIDTHS,
     reference_columns_among,
     rows_of_columns,
 )
@@ -125,8 +125,8 @@ def sample_functions(document: Mapping[str, Any], own: Mapping[str, Any]) -> Non
             size = len(COLUMNS[name]) - 1
             if name == "gait" and _is_multirotor(document):
                 size = _tilts_of(own[name])
-            if name == "reference" and _size_of(own[name]) == len(POSE_COLUMNS) - 1:
-                size = len(POSE_COLUMNS) - 1
+            if name == "reference" and (given := _size_of(own[name])) + 1 in WIDTHS:
+                size = given
             rows[:] = _samples(name, own[name], size, span)
 
 

@@ -11,14 +11,18 @@ from typing import Annotated, Final, Literal
 
 from pydantic import Field
 
+from tiltsim.errors import InputError
 from tiltsim.scenario.controller_table import ReferenceKind
 from tiltsim.scenario.table import Angle, Angles3, Positive, Table, Vector3, example
 from tiltsim.scenario.time_table import (
     POSE_COLUMNS,
+    QUATERNION_COLUMNS,
     REFERENCE_COLUMNS,
+    WIDTHS,
     Rows,
     TimeTable,
     reference_columns_among,
+    rows_with_angles,
 )
 from tiltsim_controllers.gaits.parameters import NO_KNOTS
 from tiltsim_controllers.mathematics.scalar import Triple, Values
@@ -27,7 +31,7 @@ from tiltsim_controllers.references.waypoints import minimum_snap_knots, table_k
 
 Tilt = Annotated[float, Field(gt=-pi / 2, lt=pi / 2)]
 Roll = Annotated[float, Field(ge=-pi, le=pi)]
-ReferenceRow = Annotated[tuple[float, ...], Field(strict=False, min_length=4, max_length=7)]
+ReferenceRow = Annotated[tuple[float, ...], Field(strict=False, min_length=4, max_length=8)]
 
 
 _PREFIXES: Final = {"position": "", "angular_frequency": "frequency_"}
@@ -237,14 +241,14 @@ class TableReference(_PositionReference, TimeTable):
     file: str | None = Field(
         None,
         description="CSV or Parquet file with the columns time, x, y and z, in s and m, and for an "
-        "attitude that varies roll, pitch and yaw, in rad without jumps, relative to the "
-        "scenario's folder; times from 0, at least 1e-4 s apart; 2 to 10,000 rows",
+        "attitude that varies roll, pitch and yaw, in rad without jumps, or qw, qx, qy and qz, "
+        "relative to the scenario's folder; times from 0, at least 1e-4 s apart; 2 to 10,000 rows",
         examples=["my_reference.csv"],
     )
     rows: Annotated[tuple[ReferenceRow, ...], Field(strict=False)] | None = Field(
         None,
         description="the table itself in place of a file: time, x, y and z of each row, and roll, "
-        "pitch and yaw where they vary [s, m, m, m, rad, rad, rad]",
+        "pitch and yaw, or a quaternion, where they vary [s, m, m, m, rad, rad, rad]",
         examples=[[[0.0, 0.0, 0.0, 0.0], [2.0, 0.5, 0.0, 0.2]]],
     )
     interpolation: Literal["minimum_snap", "cubic"] = Field(
@@ -260,7 +264,7 @@ class TableReference(_PositionReference, TimeTable):
 
     @classmethod
     def _columns_of_width(cls, width: int) -> tuple[str, ...]:
-        return POSE_COLUMNS if width == len(POSE_COLUMNS) else cls.columns
+        return WIDTHS.get(width, cls.columns)
 
     @property
     def turns(self) -> bool:
@@ -299,6 +303,11 @@ class TableReference(_PositionReference, TimeTable):
 
     def _check_values(self) -> None:
         super()._check_values()
+        if len(self._rows[0]) == len(QUATERNION_COLUMNS):
+            try:
+                self._rows = rows_with_angles(self._rows)
+            except InputError as error:
+                raise self.mistake("file" if self.rows is None else "rows", str(error)) from None
         if self.turns:
             self._check_attitude()
         try:

@@ -8,6 +8,7 @@ from math import isfinite
 from pathlib import Path
 from typing import Any, ClassVar, Final, Self
 
+import numpy as np
 from pydantic import Field, PrivateAttr
 
 from tiltsim.errors import InputError
@@ -17,15 +18,47 @@ from tiltsim.system.files import exists, is_file
 from tiltsim.system.numbers import real_array
 from tiltsim.system.parquet import open_parquet
 from tiltsim.system.text import short_repr
+from tiltsim_controllers.mathematics.rotation import euler_from_quaternion
 from tiltsim_controllers.mathematics.scalar import Values
+
+Rows = tuple[Values, ...]
 
 REFERENCE_COLUMNS: Final = ("time", "x", "y", "z")
 POSE_COLUMNS: Final = (*REFERENCE_COLUMNS, "roll", "pitch", "yaw")
+QUATERNION_COLUMNS: Final = (*REFERENCE_COLUMNS, "qw", "qx", "qy", "qz")
+
+WIDTHS: Final = {len(names): names for names in (POSE_COLUMNS, QUATERNION_COLUMNS)}
+"""Columns of rows of a reference with an attitude, by their number."""
 
 
 def reference_columns_among(names: Sequence[str]) -> tuple[str, ...]:
     """The columns that a reference with columns of these names has to have."""
-    return POSE_COLUMNS if {"roll", "pitch", "yaw"} & {*names} else REFERENCE_COLUMNS
+    has = [columns for columns in WIDTHS.values() if {*columns[4:]} & {*names}]
+    if len(has) > 1:
+        raise InputError("has roll, pitch or yaw beside a quaternion; remove one of them")
+    return has[0] if has else REFERENCE_COLUMNS
+
+
+def rows_with_angles(rows: Rows) -> Rows:
+    """Rows with roll, pitch and yaw, unwrapped, for rows with quaternions.
+
+    Raises `InputError` for a quaternion whose norm is not one within 1 %, and where the motion
+    passes so close to a pitch of pi/2 that roll and yaw turn much faster than the vehicle.
+    """
+    quaternions = np.array([row[4:] for row in rows])
+    norms = np.linalg.norm(quaternions, axis=1)
+    for number in np.flatnonzero(np.abs(norms - 1.0) > NORM_TOLERANCE) + 1:
+        raise InputError(
+            f"row {number}: norm of qw, qx, qy, qz = {norms[number - 1]:.3g}; must be 1"
+        )
+    quaternions /= norms[:, np.newaxis]
+    angles = np.unwrap([euler_from_quaternion(*row) for row in quaternions.tolist()], axis=0)
+    overlap = np.abs(np.sum(quaternions[1:] * quaternions[:-1], axis=1))
+    turns, steps = 2.0 * np.arccos(np.minimum(overlap, 1.0)), np.abs(np.diff(angles, axis=0))
+    fast = steps.max(axis=1, initial=0.0) > np.maximum(LARGEST_STEP, FASTER * turns)
+    for number in np.flatnonzero(fast) + 2:
+        raise InputError(f"row {number}: too close to a pitch of pi/2, where roll and yaw jump")
+    return tuple((*row[:4], *own) for row, own in zip(rows, angles.tolist(), strict=True))
 
 
 def gait_columns(tilts: int) -> tuple[str, ...]:
@@ -38,13 +71,20 @@ GAIT_COLUMNS: Final = gait_columns(4)
 SHORTEST_STEP: Final = 1e-4
 """Seconds between the rows of any table."""
 
+NORM_TOLERANCE: Final = 0.01
+"""By which the norm of a quaternion may differ from one."""
+
+LARGEST_STEP: Final = 0.3
+"""Change of roll or yaw (rad) from row to row up to which they may turn at any rate."""
+
+FASTER: Final = 5.0
+"""Times the turn of the vehicle that roll or yaw may turn by beyond this."""
+
 SEPARATORS: Final = ",;\t "
 """Characters that may separate the columns of a CSV file."""
 
 _NUMBERS: Final = ("double", "float", "int64", "int32")
 """Types of columns of a Parquet file."""
-
-Rows = tuple[Values, ...]
 
 
 class TimeTable(Table):
@@ -191,7 +231,8 @@ def _check_names(names: Sequence[str], columns: Sequence[str]) -> None:
             raise InputError(f"{problem} {name}; needs one each of {needed}; found {found}")
     for name in names:
         if name not in columns:
-            may = "" if columns != REFERENCE_COLUMNS else ", and may have roll, pitch and yaw"
+            may = ", and may have roll, pitch and yaw, or qw, qx, qy and qz"
+            may = may if columns == REFERENCE_COLUMNS else ""
             needed = ", ".join(columns)
             raise InputError(f"column {short_repr(name)} is unknown; needs {needed}{may}")
 

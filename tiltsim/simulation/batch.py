@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import os
+import pickle
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import count
 from os import PathLike
@@ -27,9 +28,12 @@ from tiltsim.simulation.lane_batch import LaneBatch, lanes_for
 from tiltsim.simulation.native_batch import NativeBatch
 from tiltsim.simulation.simulate import simulate_assembly
 from tiltsim.system.numbers import true_or_false, whole_number
-from tiltsim.system.processes import in_order
+from tiltsim.system.processes import ProcessDiedError, in_order, in_processes
 from tiltsim.system.progress import Report, check_progress, reported
 from tiltsim.system.text import short_repr
+
+PARTS: Final = 4
+"""Parts of the scenarios that each process gets in turn."""
 
 WINDOW: Final = 2048
 """Number of scenarios that are grouped into batches at a time."""
@@ -68,6 +72,7 @@ def fly(
     scenarios: Iterable[Scenario | str | PathLike[str] | Mapping[str, Any]],
     *,
     threads: int | None = None,
+    jobs: int = 1,
     keep_samples: bool = False,
     progress: Report | bool | None = None,
 ) -> Iterator[FlightResult]:
@@ -78,7 +83,10 @@ def fly(
             differ in anything. Scenarios that share a closed loop and do not request the Python
             engine are flown in batches if they are long enough together, flights of the jax engine
             always.
-        threads: Maximum number of threads; None takes all cores.
+        threads: Maximum number of threads of each process; None shares out all cores.
+        jobs: Processes, for controllers in Python, whose flights threads do not speed up. A script
+            has to call this under ``if __name__ == "__main__":``, and functions given in Python
+            come from a module that other processes can import.
         keep_samples: Whether results hold their flights. Without them memory does not grow with the
             number of scenarios.
         progress: True for a bar; or a function, called with the number of finished flights.
@@ -98,18 +106,77 @@ def fly(
     is_one = isinstance(scenarios, str | Mapping | Scenario) or getattr(scenarios, "shape", 1) == ()
     if is_one or not isinstance(scenarios, Iterable):
         raise InputError(f"scenarios = {short_repr(scenarios)}: must be a list of scenarios")
-    threads = (os.cpu_count() or 1) if threads is None else whole_number("threads", threads)
+    jobs, cores = whole_number("jobs", jobs), os.cpu_count() or 1
+    threads = max(1, cores // jobs) if threads is None else whole_number("threads", threads)
     true_or_false("keep_samples", keep_samples)
     check_progress(progress)
     chosen = [as_scenario(scenario) for scenario in scenarios]
     for scenario in chosen:
         require_trust(scenario)
 
-    def result(flight: Flight) -> FlightResult:
-        kept = flight if keep_samples else None
-        return FlightResult(flight.scenario, flight.end, flight.metrics(), kept)
+    result = partial(_result, keep_samples)
+    flying = partial(fly_each, chosen, result, threads)
+    if jobs > 1 and len(chosen) > 1:
+        flying = partial(_fly_on_processes, chosen, result, threads, jobs)
+    return _with_progress(flying, len(chosen), progress)
 
-    return _with_progress(partial(fly_each, chosen, result, threads), len(chosen), progress)
+
+def _result(keep: bool, flight: Flight) -> FlightResult:
+    return FlightResult(flight.scenario, flight.end, flight.metrics(), flight if keep else None)
+
+
+def _fly_on_processes(
+    scenarios: Sequence[Scenario],
+    finish: Callable[[Flight], FlightResult],
+    threads: int,
+    jobs: int,
+    finished: Callable[[], None],
+) -> Iterator[FlightResult]:
+    """Fly as `fly_each` does, on several processes."""
+    size = -(-len(scenarios) // (PARTS * jobs))
+    starts = range(0, len(scenarios), size)
+    try:
+        parts = [
+            (start, pickle.dumps([(one, one._own) for one in scenarios[start : start + size]]))
+            for start in starts
+        ]
+    except (AttributeError, TypeError, pickle.PicklingError) as error:
+        raise InputError(_not_importable(jobs, error)) from None
+
+    def flown() -> Iterator[tuple[int, FlightResult]]:
+        work = partial(_fly_part, jobs, finish, threads)
+        for (start, _), future in in_processes(work, parts, jobs):
+            if isinstance(future.exception(), ProcessDiedError):
+                reason = 'a script has to call fly under if __name__ == "__main__"'
+                raise InputError(f"jobs = {jobs}: {future.exception()}; {reason}")
+            for place, result in enumerate(future.result(), start):
+                scenario, flight = scenarios[place], result.flight
+                if flight is not None:
+                    flight = replace(flight, assembly=assemble(scenario))
+                yield place, replace(result, scenario=scenario, flight=flight)
+
+    yield from in_order(_counted(flown(), finished))
+
+
+def _fly_part(
+    jobs: int, finish: Callable[[Flight], FlightResult], threads: int, part: tuple[int, bytes]
+) -> list[FlightResult]:
+    """Results of the scenarios of a part, in the process that flies them."""
+    try:
+        scenarios = []
+        for scenario, own in pickle.loads(part[1]):
+            scenario._own = own
+            scenarios.append(scenario)
+    except (AttributeError, ImportError) as error:
+        raise InputError(_not_importable(jobs, error)) from None
+    return [*fly_each(scenarios, finish, threads)]
+
+
+def _not_importable(jobs: int, error: Exception) -> str:
+    return (
+        f"jobs = {jobs}: other processes cannot import a function given in Python "
+        f"({' '.join(str(error).split())}); define it in a module, or leave jobs out"
+    )
 
 
 def _with_progress(

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final, Literal
 import numpy as np
 import numpy.typing as npt
 
-from tiltsim.laws.layers.supervision import SUPERVISION
+from tiltsim.laws.supervision import SUPERVISION
 from tiltsim.vehicles.spans import at_lower_limit, at_upper_limit
 from tiltsim.views.attitude_plane import SUPERVISION_THRESHOLD, margin_threshold
 from tiltsim.views.titles import describe_controller, describe_gait

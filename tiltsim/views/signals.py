@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 
 from tiltsim.flight.vectors import VECTORS, components
-from tiltsim.laws.layers.supervision import SUPERVISION
+from tiltsim.laws.supervision import SUPERVISION
 from tiltsim.scenario.vehicle import VehicleTable
 from tiltsim.system.quantity import Quantity, in_words, subscript
 from tiltsim.views.attitude_plane import margin_threshold

@@ -24,6 +24,8 @@ from tiltsim_controllers.laws.decouplers import (
 )
 from tiltsim_controllers.laws.gains import Gains, GivenGains
 from tiltsim_controllers.laws.keys import Keys, record_of
+from tiltsim_controllers.laws.observed import Seen, Step
+from tiltsim_controllers.laws.supervisor import Supervisor
 from tiltsim_controllers.mathematics.attitude import rotation_matrix, wrapped
 from tiltsim_controllers.mathematics.linear import cross, kernel, solved
 from tiltsim_controllers.references.trajectories import ReferenceParameters, position_reference
@@ -93,6 +95,7 @@ Parameters = record_of(
     gains=Gains,
     gait=GaitParameters,
     reference=ReferenceParameters,
+    supervisor=Supervisor,
 )
 
 
@@ -127,8 +130,8 @@ def _attitude_reference(now: RotorcraftState, target: Any, wrench: Any, paramete
 
 
 @traceable
-def attitude_altitude(state: Any, target: Any, parameters: Any, measured: Any = None) -> Any:
-    """The rotor accelerations (rad/s^2), 4, and the attitude that they track (rad), 3.
+def attitude_altitude(seen: Seen, parameters: Any, knots: Any = NO_KNOTS) -> Step:
+    """The rotor accelerations (rad/s^2), 4, and as signals the attitude that they track (rad), 3.
 
     Third-order error dynamics (ch. 4, Eqs. 26-27) give the desired third derivatives of the
     outputs; the decoupling matrix and ``Ma`` (Eq. 18) convert them to inputs (Eq. 19). Body rates
@@ -136,14 +139,14 @@ def attitude_altitude(state: Any, target: Any, parameters: Any, measured: Any = 
     singular.
 
     Args:
-        state: `tiltsim_controllers.vehicle.states.TILTROTOR_FIELDS`, shape (20,).
-        target: Position (m), velocity and acceleration to track, world axes, shape (9,).
-        parameters: Any of the controller.
-        measured: Angular acceleration, rad/s^2, body axes, shape (3,); None takes the model's,
-            ``I^-1 tau w``.
+        seen: The state has `tiltsim_controllers.vehicle.states.TILTROTOR_FIELDS`; the model's
+            angular acceleration is ``I^-1 tau w``.
+        parameters: `Parameters`.
+        knots: Table data of the reference.
     """
-    now, (body, rotors) = state_of(state, ROTORS), airframe(parameters, (), ROTORS)
-    target, gains = target.reshape(3, 3), parameters.gains
+    now, (body, rotors) = state_of(seen.state, ROTORS), airframe(parameters, (), ROTORS)
+    gains, measured = parameters.gains, seen.measured
+    target = position_reference(seen.time, parameters.reference, knots).reshape(3, 3)
     wrench = wrench_map(rotors, now.tilts)
     force, torque = wrench[:3], wrench[3:]
     w = now.speeds * abs(now.speeds)
@@ -174,21 +177,4 @@ def attitude_altitude(state: Any, target: Any, parameters: Any, measured: Any = 
         inputs = solved(xp.vstack([torque, lift * (2.0 * abs(now.speeds))]), desired)
     else:
         inputs = rotor_accelerations(solved(xp.vstack([torque, lift]), desired), now.speeds)
-    return xp.hstack([inputs, tracked])
-
-
-@traceable
-def attitude_altitude_inputs(
-    time: Any, state: Any, parameters: Any, knots: Any = NO_KNOTS, measured: Any = None
-) -> Any:
-    """Rotor accelerations (rad/s^2) that track the reference, and the attitude tracked (rad).
-
-    See `attitude_altitude`.
-
-    Args:
-        time: s.
-        state, parameters, measured: See `attitude_altitude`.
-        knots: Table data of the reference.
-    """
-    target = position_reference(time, parameters.reference, knots)
-    return attitude_altitude(state, target, parameters, measured)
+    return Step(inputs, signals=tracked)

@@ -30,6 +30,7 @@ from tiltsim_controllers.code.traceable import traceable
 from tiltsim_controllers.laws.failures import Failure, working
 from tiltsim_controllers.laws.feedback import body_rate_matrix
 from tiltsim_controllers.laws.keys import GainSets, Keys, NamedGains, Positive, Vector3, record_of
+from tiltsim_controllers.laws.observed import Seen, Step
 from tiltsim_controllers.mathematics.attitude import attitude_error, rotation_matrix
 from tiltsim_controllers.mathematics.linear import cross, least_norm
 from tiltsim_controllers.mathematics.moving import Moving
@@ -37,6 +38,7 @@ from tiltsim_controllers.references.trajectories import (
     POSES,
     ReferenceParameters,
     reference_attitude,
+    reference_motion,
 )
 from tiltsim_controllers.vehicle.body import Body, angular_acceleration, inertia_matrix
 from tiltsim_controllers.vehicle.effectiveness import TiltOfRotor, tilt_of_rotor
@@ -160,32 +162,21 @@ def turning_rates(target: Any, turn: Any, omega: Any, omega_rate: Any) -> Moving
 
 
 @traceable
-def full_pose(
-    time: Any,
-    state: Any,
-    reference: Any,
-    p: Any,
-    knots: Any,
-    tilt_of_rotor: TiltOfRotor,
-    commands: Any = None,
-) -> Any:
-    """The N rotor accelerations (rad/s^2) and M tilt rates (rad/s), shape (N + M,).
+def full_pose(seen: Seen, p: Any, knots: Any, tilt_of_rotor: TiltOfRotor) -> Step:
+    """The N rotor accelerations (rad/s^2) and the M tilt rates (rad/s).
 
     NaN where the six outputs depend on each other, and for a rotor at rest, whose acceleration does
     not change its thrust.
 
     Args:
-        time: s, by which a failure is known.
-        state: `tiltsim_controllers.vehicle.states.RotorcraftState` in one vector.
-        reference: Position with four derivatives, m and s, world axes, shape (15,); its attitude
-            is read from the parameters and knots.
+        seen: Its states are the commanded tilt angles, rad, shape (M,), if their limit also counts:
+            they are beyond the angle of a pod that its servo's stop holds.
         p: `Parameters`.
         knots: Table data of the flight, with the table of the rotors.
         tilt_of_rotor: The layout.
-        commands: Commanded tilt angles, rad, shape (M,), if their limit also counts: they are
-            beyond the angle of a pod that its servo's stop holds.
     """
-    now, (body, rotors) = state_of(state, tilt_of_rotor), airframe(p, knots, tilt_of_rotor)
+    time = seen.time
+    now, (body, rotors) = state_of(seen.state, tilt_of_rotor), airframe(p, knots, tilt_of_rotor)
     works = working(time, p.failure, len(tilt_of_rotor))
     rotors = rotors.masked(works)
     w = works * now.speeds * abs(now.speeds)
@@ -198,7 +189,8 @@ def full_pose(
     omega_rate = angular_acceleration(body, torque, now.omega, 0.0)
 
     # Third-order error dynamics.
-    ref, target = reference.reshape(5, 3), reference_attitude(time, p.reference, knots)
+    ref = reference_motion(time, p.reference, knots)
+    target = reference_attitude(time, p.reference, knots)
     k1, k2, k3 = p.gains.position
     jerk = (
         ref[3]
@@ -219,10 +211,10 @@ def full_pose(
     rates = least_norm(rows, xp.hstack([inertia_matrix(body) @ omega_jerk, force_rate]))
     count = len(tilt_of_rotor)
     tilt_rates = rates[count:] / p.tilt_weight
-    for angles in (now.tilts, commands):
-        if angles is not None:
+    for angles in (now.tilts, seen.states):
+        if len(angles):
             tilt_rates = limited_tilt_rate(tilt_rates, angles, p)
-    return xp.hstack([rotor_accelerations(rates[:count], now.speeds), tilt_rates])
+    return Step(rotor_accelerations(rates[:count], now.speeds), tilt_rates)
 
 
 def pose_rank(table: Sequence[float], tilts: ArrayLike, w: ArrayLike) -> int:

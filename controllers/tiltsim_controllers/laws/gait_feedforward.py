@@ -1,7 +1,7 @@
-"""Laws with feed-forward of the gait: references and planned tilts around `attitude_force`.
+"""Laws of vehicles whose tilts follow a gait: references and planned tilts around `attitude_force`.
 
-The tiltrotor's law is the one of attitude and one component of force, with Euler angles; its
-parameters and its supervisor are its own.
+The tiltrotor's law with feed-forward is the one of attitude and one component of force, with Euler
+angles; its parameters and its supervisor are its own.
 """
 
 from __future__ import annotations
@@ -10,25 +10,24 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any, Final
 
-from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.code.traceable import traceable
-from tiltsim_controllers.gaits.motion import tilt_motion_of
+from tiltsim_controllers.gaits.motion import anticipated_tilts, planned_tilts
 from tiltsim_controllers.gaits.parameters import FIXED, NO_KNOTS, GaitParameters
 from tiltsim_controllers.laws.allocation import limited_accelerations
 from tiltsim_controllers.laws.attitude_altitude import OPTIONS, AttitudeAltitude
-from tiltsim_controllers.laws.decouplers import NONE
 from tiltsim_controllers.laws.gains import Gains, IntegralGains
 from tiltsim_controllers.laws.keys import record_of
 from tiltsim_controllers.laws.multirotor import attitude_force, present_wrench
 from tiltsim_controllers.laws.multirotor_steps import FeedforwardTerms, Form
-from tiltsim_controllers.laws.multirotor_supervisor import multirotor_supervision_of, watched_at
-from tiltsim_controllers.laws.supervisor import SUPERVISOR_AT_REST, Supervisor, gait_time
+from tiltsim_controllers.laws.multirotor_supervisor import multirotor_supervision_of
+from tiltsim_controllers.laws.observed import Seen, Step
+from tiltsim_controllers.laws.supervisor import Supervision, Supervisor, gait_time
 from tiltsim_controllers.laws.tiltrotor_supervisor import SUPERVISION
-from tiltsim_controllers.references.trajectories import ReferenceParameters, reference_derivatives
+from tiltsim_controllers.references.trajectories import ReferenceParameters
 from tiltsim_controllers.vehicle.effectiveness import TiltOfRotor, tilts_of
-from tiltsim_controllers.vehicle.parameters import Vehicle, drag_ratio
-from tiltsim_controllers.vehicle.rotors import spins_in
-from tiltsim_controllers.vehicle.states import PITCH, ROLL
+from tiltsim_controllers.vehicle.parameters import Vehicle
+from tiltsim_controllers.vehicle.rotors import airframe
+from tiltsim_controllers.vehicle.states import PITCH, ROLL, state_of
 
 Parameters = record_of(
     AttitudeAltitude,
@@ -56,117 +55,70 @@ TILTROTOR: Final = (0, 1, 2, 3)
 FORM: Final = Form(1, "thrust", own_yaw=True, spin=True)
 """Its form of the law; four equations in four unknowns have one solution in every norm."""
 
-_TILTS: Final = tilt_motion_of(4)
-_gait_scale, _supervised_tilts = SUPERVISION.gait_scale, SUPERVISION.tilts
 
-
-@traceable
-def tracking_inputs(
-    time: Any,
-    state: Any,
-    tilt_rates: Any,
-    integrals: Any,
-    parameters: Any,
-    knots: Any = NO_KNOTS,
-    supervisor_motion: Any = SUPERVISOR_AT_REST,
-    measured: Any = None,
-) -> Any:
-    """Rotor accelerations (rad/s^2, singular: NaN), integrator rates (m), attitude to track (rad).
+def supervised_gait(
+    seen: Seen, p: Any, knots: Any, supervision: Supervision, half: Any = None
+) -> tuple[Any, Any]:
+    """Tilt angles (rad) of a gait under a supervisor with two derivatives, (M, 3), and their scale.
 
     Args:
-        time: s.
-        state: `tiltsim_controllers.vehicle.states.TILTROTOR_FIELDS`.
-        tilt_rates: Rates of its tilt angles, rad/s.
-        integrals: `tiltsim_controllers.laws.multirotor_steps.INTEGRAL_FIELDS`.
-        parameters: Any of the controller.
-        knots: Table data of gait and reference.
-        supervisor_motion: The supervisor's state with its rate and acceleration.
-        measured: The angular acceleration (rad/s^2, body axes); None takes the model's.
+        seen: By the law; the supervisor's state is part of it.
+        p: Parameters of the law.
+        knots: Table data of the flight.
+        supervision: The supervisor's functions.
+        half: Time (s) by which corners are anticipated; None for the gait as the pods follow it.
     """
-    reference = reference_derivatives(time, parameters.reference, knots)
-    plan = None
-    if parameters.decoupler != NONE:
-        supervisor, ratio = parameters.supervisor, drag_ratio(parameters.vehicle)
-        clock = gait_time(time, supervisor_motion, supervisor)
-        planned, _ = _TILTS.moving(clock, parameters.gait, knots)
-        scale = _gait_scale(planned, state[ROLL], state[PITCH], supervisor, ratio, knots)
-        tilts = _TILTS.anticipated(clock, parameters.gait, knots, parameters.anticipation)
-        plan = _supervised_tilts(tilts, scale, supervisor_motion, supervisor, ratio)
-    found = attitude_force(
-        time, state, tilt_rates, integrals, reference, plan, parameters, (), TILTROTOR, FORM,
-        measured,
-    )  # fmt: skip
-    return found[0:10]
+    supervisor, vehicle = p.supervisor, supervision.watched(seen.time, p)
+    clock, tilts = gait_time(seen.time, seen.supervisor, supervisor), supervision.tilt_count
+    planned = planned_tilts(clock, p.gait, knots, tilts)
+    angles, roll, pitch = planned[:, 0], seen.state[ROLL], seen.state[PITCH]
+    scale = supervision.gait_scale(angles, roll, pitch, supervisor, vehicle, knots)
+    if half is not None:
+        planned = anticipated_tilts(clock, p.gait, knots, tilts, half)
+    return supervision.tilts(planned, scale, seen.supervisor, supervisor, vehicle), scale
 
 
 @cache
-def _plan_of(layout: TiltOfRotor, form: Form) -> Callable[..., Any]:
-    """The gait's tilts with derivatives.
+def gait_law_of(layout: TiltOfRotor, form: Form, supervision: Supervision) -> Callable[..., Step]:
+    """The control law of vehicles of a layout, `attitude_force` with the tilts of the gait.
 
-    ``(time, state, motion, parameters, knots)``: they are the anticipated ones of the plan or,
-    under a supervisor whose state is ``motion``, the supervised ones.
+    Its parameters are `Parameters`, or `multirotor_steps.Parameters` with the table of the rotors
+    in the knots.
+
+    Args:
+        layout: Layout of the vehicles.
+        form: Options of the law.
+        supervision: Functions of the supervisor, used where the form is supervised.
     """
-    motion_of = tilt_motion_of(tilts_of(layout))
-    moving, anticipated = motion_of.moving, motion_of.anticipated
-
-    def planned(time: Any, state: Any, motion: Any, parameters: Any, knots: Any) -> Any:
-        return anticipated(time, parameters.gait, knots, parameters.anticipation)
-
-    if not form.supervised:
-        return planned
-    supervision = multirotor_supervision_of(layout, form.dimension, form.forward)
-    gait_scale, supervised_tilts = supervision.gait_scale, supervision.tilts
-
-    def supervised(time: Any, state: Any, motion: Any, parameters: Any, knots: Any) -> Any:
-        supervisor, vehicle = parameters.supervisor, watched_at(time, parameters)
-        clock = gait_time(time, motion, supervisor)
-        now, _ = moving(clock, parameters.gait, knots)
-        scale = gait_scale(now, state[ROLL], state[PITCH], supervisor, vehicle, knots)
-        ahead = planned(clock, state, motion, parameters, knots)
-        return supervised_tilts(ahead, scale, motion, supervisor, vehicle)
-
-    return supervised
-
-
-@cache
-def multirotor_law_of(layout: TiltOfRotor, form: Form) -> Callable[..., Any]:
-    """The control law of multirotors of a layout, a function as `tracking_inputs`.
-
-    Its parameters are `tiltsim_controllers.laws.multirotor_steps.Parameters`, the table of the
-    rotors is in the knots, and it also returns the null part.
-    """
-    count, plan_of, prioritized = len(layout), _plan_of(layout, form), form.prioritized
-    speeds = slice(12 + tilts_of(layout), 12 + tilts_of(layout) + count)
     leans_with_gait = form.dimension < 3 and not form.forward and tilts_of(layout) > 0
-    supervised = form.supervised
 
     @traceable
-    def inputs(
-        time: Any,
-        state: Any,
-        tilt_rates: Any,
-        integrals: Any,
-        parameters: Any,
-        knots: Any = NO_KNOTS,
-        supervisor_motion: Any = SUPERVISOR_AT_REST,
-        measured: Any = None,
-    ) -> Any:
-        reference = reference_derivatives(time, parameters.reference, knots)
+    def law(seen: Seen, p: Any, knots: Any = NO_KNOTS) -> Step:
         plan = None
-        moves = parameters.gait.type != FIXED or supervised
-        if leans_with_gait and moves and parameters.terms.attitude_rates != 0.0:
-            plan = plan_of(time, state, supervisor_motion, parameters, knots)
-        found = attitude_force(
-            time, state, tilt_rates, integrals, reference, plan, parameters, knots, layout, form,
-            measured,
-        )  # fmt: skip
-        if not prioritized:
-            return found
-        wrench, up = present_wrench(time, state, parameters, knots, layout)
-        spins = spins_in(knots, parameters.rotors, layout)
-        accelerations = limited_accelerations(
-            found[:count], wrench, up, state[speeds], spins, parameters.limits
-        )
-        return xp.hstack([accelerations, found[count:]])
+        moves = p.gait.type != FIXED or form.supervised
+        if leans_with_gait and moves and p.terms.attitude_rates != 0.0:
+            if form.supervised:
+                plan, _ = supervised_gait(seen, p, knots, supervision, p.anticipation)
+            else:
+                tilts = tilts_of(layout)
+                plan = anticipated_tilts(seen.time, p.gait, knots, tilts, p.anticipation)
+        step = attitude_force(seen, plan, p, knots, layout, form)
+        if not form.prioritized:
+            return step
+        wrench, up = present_wrench(seen, p, knots, layout)
+        speeds, (_, rotors) = state_of(seen.state, layout).speeds, airframe(p, knots, layout)
+        limited = limited_accelerations(step.inputs, wrench, up, speeds, rotors.spins, p.limits)
+        return step._replace(inputs=limited)
 
-    return inputs
+    return law
+
+
+def multirotor_law_of(layout: TiltOfRotor, form: Form) -> Callable[..., Step]:
+    """The `gait_law_of` multirotors of a layout."""
+    supervision = multirotor_supervision_of(layout, form.dimension, form.forward)
+    return gait_law_of(layout, form, supervision)
+
+
+def tiltrotor_law_of(form: Form = FORM) -> Callable[..., Step]:
+    """The `gait_law_of` the tiltrotor."""
+    return gait_law_of(TILTROTOR, form, SUPERVISION)

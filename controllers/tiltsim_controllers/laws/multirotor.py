@@ -40,7 +40,7 @@ Each of these terms can be omitted, to measure its effect.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.code.traceable import traceable
@@ -68,14 +68,21 @@ from tiltsim_controllers.laws.multirotor_steps import (
     tracking,
     turned,
 )
+from tiltsim_controllers.laws.observed import Seen, Step
 from tiltsim_controllers.mathematics.attitude import rotation_matrix
 from tiltsim_controllers.mathematics.linear import cross, nearest_solution
 from tiltsim_controllers.mathematics.moving import Moving, at_rest, stacked
-from tiltsim_controllers.references.trajectories import POSES, reference_attitude
+from tiltsim_controllers.references.trajectories import POSES, reference_attitude, reference_motion
 from tiltsim_controllers.vehicle.body import angular_acceleration, torque_rate
 from tiltsim_controllers.vehicle.effectiveness import TiltOfRotor
 from tiltsim_controllers.vehicle.rotors import airframe, moving_wrench_map, rotor_accelerations
 from tiltsim_controllers.vehicle.states import RotorcraftState, state_of
+
+NULL_PART: Final = "null_part"
+"""A signal: the share of the rotors' ``varpi |varpi|`` that neither force nor torque show."""
+
+SIGNALS: Final = ("roll_ref", "pitch_ref", "yaw_ref", NULL_PART)
+"""Signals of the law: the attitude that it tracks, rad, and the null part."""
 
 
 class Present(NamedTuple):
@@ -238,63 +245,45 @@ def independence(wrench: Any, up: Any, side: Any, form: Form) -> Any:
     return xp.where(product > 0.0, product, 0.0)
 
 
-@traceable
-def present_wrench(
-    time: Any, state: Any, parameters: Any, knots: Any, layout: TiltOfRotor
-) -> tuple[Any, Any]:
+def present_wrench(seen: Seen, parameters: Any, knots: Any, layout: TiltOfRotor) -> tuple[Any, Any]:
     """Force and torque per unit of ``w`` (6, N) without failed rotors, and world up in body axes.
 
     Args:
-        time, state, parameters, knots, layout: See `attitude_force`.
+        seen, parameters, knots, layout: See `attitude_force`.
     """
-    now, (_, rotors) = state_of(state, layout), airframe(parameters, knots, layout)
-    works = working(time, parameters.failure, len(layout))
+    now, (_, rotors) = state_of(seen.state, layout), airframe(parameters, knots, layout)
+    works = working(seen.time, parameters.failure, len(layout))
     wrench = moving_wrench_map(rotors.masked(works), at_rest(now.tilts)).value
     return wrench, rotation_matrix(now.attitude)[2]
 
 
-@traceable
 def attitude_force(
-    time: Any,
-    state: Any,
-    tilt_rates: Any,
-    integrals: Any,
-    reference: Any,
-    plan: Any,
-    parameters: Any,
-    knots: Any,
-    layout: TiltOfRotor,
-    form: Form,
-    measured: Any = None,
-) -> Any:
-    """Rotor accelerations (N), integrator rates (3), references of roll, pitch and yaw, null part.
+    seen: Seen, plan: Any, parameters: Any, knots: Any, layout: TiltOfRotor, form: Form
+) -> Step:
+    """Rotor accelerations (rad/s^2), integrator rates (m), and as signals (`SIGNALS`) the rest.
 
-    They are in rad/s^2, m and rad; NaN where the decoupling matrix is singular. The null part is
-    the share, from 0 to 1, of ``w`` that the outputs do not see; ``restoring`` keeps it near its
-    least.
+    NaN where the decoupling matrix is singular. The null part is the share, from 0 to 1, of ``w``
+    that the outputs do not see; ``restoring`` keeps it near its least.
 
     Args:
-        time: s.
-        state: `tiltsim_controllers.vehicle.states.RotorcraftState` in one vector.
-        tilt_rates: rad/s, shape (M,).
-        integrals: `INTEGRAL_FIELDS`, shape (3,).
-        reference: Position with four derivatives, m and s, world axes, shape (15,).
+        seen: Its states are the `INTEGRAL_FIELDS`.
         plan: Tilt angles (rad) with two derivatives by which the body is to turn, shape (M, 3);
             None for pods that do not move, or whose motion does not count.
         parameters: `Parameters` of `multirotor_steps` or of `gait_feedforward`.
         knots: Table data of the flight, with the table of the rotors.
         layout: Tilts of the rotors.
         form: Options of the law.
-        measured: Angular acceleration, rad/s^2, body axes, shape (3,); None takes the model's.
     """
-    now, (body, rotors) = state_of(state, layout), airframe(parameters, knots, layout)
+    time, measured = seen.time, seen.measured
+    now, (body, rotors) = state_of(seen.state, layout), airframe(parameters, knots, layout)
+    reference = reference_motion(time, parameters.reference, knots)
     terms, omega, w = parameters.terms, now.omega, now.speeds * abs(now.speeds)
     if form.losses:
         works = working(time, parameters.failure, len(layout))
         rotors, w = rotors.masked(works), works * w
 
     # Force and torque, and their rates as the pods turn at constant rotor speeds.
-    turning = moving_wrench_map(rotors, Moving(now.tilts, terms.gait_rates * tilt_rates, 0.0))
+    turning = moving_wrench_map(rotors, Moving(now.tilts, terms.gait_rates * seen.tilt_rates, 0.0))
     rows, wrench, change = turning.value, turning.value @ w, turning.rate @ w
     force, torque = wrench[:3], wrench[3:]
     momentum = Moving(*xp.zeros((3, 3)))  # of the rotors' spin
@@ -320,7 +309,7 @@ def attitude_force(
     present = Present(now, rotation, omega_rate, specific, direction)
     target = _target(time, parameters, knots)
     jerk, omega_jerk, rates, lean_ref = _control(
-        present, reference.reshape(5, 3), target, integrals, parameters, form
+        present, reference, target, seen.states, parameters, form
     )
 
     # Rates of torque and force that remain for the rotors.
@@ -332,4 +321,4 @@ def attitude_force(
     if form.norm == "thrust":
         inputs = rotor_accelerations(inputs, now.speeds, parameters.slowest_rotor)
     unseen = null_part(rows, rotation[2], w, form)
-    return xp.hstack([inputs, rates, lean_ref, target[2].value, unseen])
+    return Step(inputs, rates, xp.hstack([lean_ref, target[2].value, unseen]))

@@ -21,7 +21,7 @@ from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.code.traceable import traceable
 from tiltsim_controllers.gaits.parameters import NO_KNOTS
 from tiltsim_controllers.laws.force_directions import factors, share
-from tiltsim_controllers.laws.supervisor import UNTILTED, Supervision, supervision_of
+from tiltsim_controllers.laws.supervisor import UNTILTED, Supervision
 from tiltsim_controllers.mathematics.linear import norm
 from tiltsim_controllers.mathematics.scalar import Triple
 from tiltsim_controllers.vehicle.effectiveness import (
@@ -116,4 +116,4 @@ def multirotor_supervision_of(
             xp.where(regular, direction, up),
         )
 
-    return supervision_of(tilts_of(layout), assess)
+    return Supervision(tilts_of(layout), watched_at, assess)

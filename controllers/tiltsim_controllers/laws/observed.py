@@ -1,7 +1,7 @@
-"""Observation and command of a control law for any rotorcraft.
+"""Arguments and results of control laws of rotorcraft with N rotors and M tilts.
 
-A law is a function ``(observed, parameters) -> Command`` of small NumPy arrays for a vehicle with N
-rotors and M tilts.
+A law is a function of small NumPy arrays: ``(observed, parameters) -> Command``, or, for rotor
+accelerations, ``(seen, parameters, knots) -> Step``.
 """
 
 from __future__ import annotations
@@ -9,12 +9,34 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Final, NamedTuple
 
+import numpy as np
+
 from tiltsim_controllers.vehicle.body import Body
 from tiltsim_controllers.vehicle.parameters import Vehicle
 from tiltsim_controllers.vehicle.rotors import Rotors
 
 ROTOR_COMMANDS: Final = ("thrusts", "rotor_speeds", "rotor_accelerations")
 """Commands for the rotors; a `Command` gives one of them."""
+
+
+class Seen(NamedTuple):
+    """The measured state of a vehicle, and the states of its controller."""
+
+    time: Any  # s
+    state: Any  # `tiltsim_controllers.vehicle.states.RotorcraftState` in one vector
+    tilt_rates: Any = np.zeros(0)  # (M,), rad/s
+    states: Any = np.zeros(0)  # (S,), of the controller
+    measured: Any = None  # (3,), angular acceleration, rad/s^2, body axes; None: by the law's model
+    supervisor: Any = np.zeros(3)  # (3,), its state with rate and acceleration; zero at rest
+    recorded: bool = False  # whether it is a sample of a flight, of which signals alone are needed
+
+
+class Step(NamedTuple):
+    """The output of a law at an instant."""
+
+    inputs: Any  # (N,), rotor accelerations, rad/s^2
+    rates: Any = np.zeros(0)  # (S,), of the controller's states, per second
+    signals: Any = np.zeros(0)  # further numbers, columns of a flight
 
 
 class Desired(NamedTuple):
@@ -52,6 +74,7 @@ class Observed(NamedTuple):
     torque: Any  # (3, N), N m per newton, likewise
     rotors: Rotors  # force and torque per newton at any tilts
     table: Any  # further numbers of the law, such as gains over time
+    tilt_commands: Any  # (M,), rad, of a law that commands the tilts; otherwise none
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -71,9 +71,6 @@ LAG: Final = 0.025
 UNTILTED: Final = 4.0
 """Determinant of the level untilted tiltrotor (ch. 3); other vehicles are scaled to it."""
 
-SUPERVISOR_AT_REST: Final = (0.0, 0.0, 0.0)
-"""State, rate and acceleration of a supervisor that does not act."""
-
 
 class Supervisor(NamedTuple):
     """Thresholds, both 0 for no supervisor, and strategy."""
@@ -97,35 +94,6 @@ class WayBack(NamedTuple):
 
 NO_WAY_BACK: Final = WayBack(lambda planned, *_: planned, lambda *_: 0.0)
 """For vehicles without `RETURN_TO_RED`, which is refused for them."""
-
-
-class Supervision(NamedTuple):
-    """Functions of a supervisor of vehicles with M tilts.
-
-    ``vehicle`` holds the parameters that ``assess`` needs beside the ``knots``. Tilt angles, shape
-    (M,), roll and pitch are in rad.
-    """
-
-    assess: Callable[..., tuple[Any, Any, Any]]
-    """``(tilts, up, vehicle, knots)``: margin (rad), determinant (`UNTILTED` at best), and the
-    direction (body axes, of any length and sense) that keeps its attitude in hover; ``up`` is world
-    up in body axes."""
-    clearance: Callable[..., Any]
-    """``(tilts, up, supervisor, vehicle, knots)``: distance above the thresholds relative to the
-    largest possible; negative below them."""
-    allowed_scale: Callable[..., Any]
-    """``(tilts, roll, pitch, supervisor, vehicle, knots)``: the largest scale in [0, 1] that
-    satisfies the thresholds, or the scale of the grid that comes nearest where none does. A range
-    of scales between two of the grid may pass unseen."""
-    gait_scale: Callable[..., Any]
-    """Like ``allowed_scale``, but 1 unless the strategy is `SCALE`."""
-    tilts: Callable[..., Any]
-    """``(planned, scale, motion, supervisor, vehicle)``: the supervised tilts with rates and
-    accelerations (rad, s), shape (M, 3): of the gait at its `gait_time`, the ``gait_scale``, and
-    the supervisor's state with its rate and acceleration."""
-    derivative: Callable[..., Any]
-    """``(time, roll, pitch, state, rate, gait, knots, supervisor, vehicle)``: the supervisor's
-    state (s or a fraction), its rate and the resulting acceleration, shape (3,)."""
 
 
 @traceable
@@ -251,76 +219,124 @@ def _smallest_ahead(clock: Any, up: Any, tilts_at: Callable[..., Any], now: _Sup
     return repeat(LOOKAHEAD_SAMPLES, glance, xp.minimum(1.0, smallest), start)[0]
 
 
-def supervision_of(
-    tilts: int, assess: Callable[..., tuple[Any, Any, Any]], way_back: WayBack = NO_WAY_BACK
-) -> Supervision:
-    """The supervisor of vehicles with a number of tilts; see `Supervision`."""
+class Supervision(NamedTuple):
+    """A supervisor of vehicles with M tilts.
+
+    ``vehicle`` holds the parameters that ``assess`` needs beside the ``knots``. Tilt angles, shape
+    (M,), roll and pitch are in rad.
+
+    Attributes:
+        tilt_count: M.
+        watched: ``(time, parameters)``: the ``vehicle``, from the parameters of a law.
+        assess: ``(tilts, up, vehicle, knots)``: margin (rad), determinant (`UNTILTED` at best), and
+            the direction (body axes, of any length and sense) that keeps its attitude in hover;
+            ``up`` is world up in body axes.
+        way_back: The gait to which the tilts can return.
+    """
+
+    tilt_count: int
+    watched: Callable[..., Any]
+    assess: Callable[..., tuple[Any, Any, Any]]
+    way_back: WayBack = NO_WAY_BACK
 
     @traceable
     def clearance(
-        angles: Any, up: Any, supervisor: Supervisor, vehicle: Any, knots: Any = NO_KNOTS
+        self, tilts: Any, up: Any, supervisor: Supervisor, vehicle: Any, knots: Any = NO_KNOTS
     ) -> Any:
-        return _Supervised(assess, supervisor, vehicle, knots).look(angles, up)[0]
+        """Distance above the thresholds by the largest possible; negative below them.
+
+        Args:
+            tilts, up, vehicle, knots: See this class.
+            supervisor: Thresholds.
+        """
+        return _Supervised(self.assess, supervisor, vehicle, knots).look(tilts, up)[0]
 
     @traceable
     def allowed_scale(
-        angles: Any, roll: Any, pitch: Any, supervisor: Supervisor, vehicle: Any,
+        self, tilts: Any, roll: Any, pitch: Any, supervisor: Supervisor, vehicle: Any,
         knots: Any = NO_KNOTS,
     ) -> Any:  # fmt: skip
-        supervised = _Supervised(assess, supervisor, vehicle, knots)
-        return _largest_scale(angles, _up(roll, pitch), supervised)
+        """The largest scale in [0, 1] that satisfies the thresholds, or the nearest of the grid.
+
+        A range of scales between two of the grid may pass unseen.
+
+        Args:
+            tilts, roll, pitch, vehicle, knots: See this class.
+            supervisor: Thresholds.
+        """
+        supervised = _Supervised(self.assess, supervisor, vehicle, knots)
+        return _largest_scale(tilts, _up(roll, pitch), supervised)
 
     @traceable
     def gait_scale(
-        angles: Any, roll: Any, pitch: Any, supervisor: Supervisor, vehicle: Any,
+        self, tilts: Any, roll: Any, pitch: Any, supervisor: Supervisor, vehicle: Any,
         knots: Any = NO_KNOTS,
     ) -> Any:  # fmt: skip
+        """Like `allowed_scale`, but 1 unless the strategy is `SCALE`.
+
+        Args:
+            tilts, roll, pitch, supervisor, vehicle, knots: See `allowed_scale`.
+        """
         if supervisor.strategy != SCALE:
             return 1.0
         return branch(
             (supervisor.min_margin > 0.0) | (supervisor.min_determinant > 0.0),
-            lambda: allowed_scale(angles, roll, pitch, supervisor, vehicle, knots),
+            lambda: self.allowed_scale(tilts, roll, pitch, supervisor, vehicle, knots),
             lambda: 1.0,
         )
 
     @traceable
-    def supervised_tilts(
-        planned: Any, scale: Any, motion: Any, supervisor: Supervisor, vehicle: Any
+    def tilts(
+        self, planned: Any, scale: Any, motion: Any, supervisor: Supervisor, vehicle: Any
     ) -> Any:
+        """The supervised tilts with rates and accelerations (rad, s), shape (M, 3).
+
+        Args:
+            planned: Tilts of the gait at its `gait_time`, likewise.
+            scale: `gait_scale`.
+            motion: The supervisor's state with its rate and acceleration, shape (3,).
+            supervisor, vehicle: See this class.
+        """
         if supervisor.strategy == HOLD:
             return _on_clock(planned, motion)
         if supervisor.strategy == RETURN_TO_RED:
-            return way_back.tilts(planned, motion, supervisor, vehicle)
+            return self.way_back.tilts(planned, motion, supervisor, vehicle)
         return scale * planned
 
     @traceable
     def derivative(
-        time: Any, roll: Any, pitch: Any, state: Any, rate: Any, gait: GaitParameters, knots: Any,
-        supervisor: Supervisor, vehicle: Any,
+        self, time: Any, roll: Any, pitch: Any, state: Any, rate: Any, gait: GaitParameters,
+        knots: Any, supervisor: Supervisor, vehicle: Any,
     ) -> Any:  # fmt: skip
-        """``HOLD``: the clock runs (rate 0) with sufficient clearance and stops (rate 1) without.
+        """The supervisor's state (s or a fraction), its rate and its acceleration, shape (3,).
 
+        ``HOLD``: the clock runs (rate 0) with sufficient clearance and stops (rate 1) without.
         ``RETURN_TO_RED``: toward red where the thresholds would be violated, back where they
         allow it, slowing down toward both ends.
+
+        Args:
+            time: s.
+            roll, pitch, vehicle, knots: See this class.
+            state, rate: The supervisor's state and its rate.
+            gait: The gait.
+            supervisor: Thresholds and strategy.
         """
         still = xp.array([state, 0.0, 0.0])
 
         def tilts_at(clock: Any) -> Any:
-            planned = planned_tilts(clock, gait, knots, tilts)
-            return supervised_tilts(planned, 1.0, still, supervisor, vehicle)[:, 0]
+            planned = planned_tilts(clock, gait, knots, self.tilt_count)
+            return self.tilts(planned, 1.0, still, supervisor, vehicle)[:, 0]
 
         clock = gait_time(time, still, supervisor)
-        now = _Supervised(assess, supervisor, vehicle, knots)
+        now = _Supervised(self.assess, supervisor, vehicle, knots)
         share = _smallest_ahead(clock, _up(roll, pitch), tilts_at, now) / BAND
         if supervisor.strategy == HOLD:
             desired = 1.0 - xp.minimum(1.0, xp.maximum(0.0, share))
         else:
-            planned = planned_tilts(time, gait, knots, tilts)
-            speed = way_back.speed(planned, supervisor, vehicle)
+            planned = planned_tilts(time, gait, knots, self.tilt_count)
+            speed = self.way_back.speed(planned, supervisor, vehicle)
             desired = -speed * xp.minimum(1.0, xp.maximum(-1.0, share))
             # Four lags: the motion to either end is critically damped.
             desired = xp.maximum(-state / (4.0 * LAG), desired)
             desired = xp.minimum((1.0 - state) / (4.0 * LAG), desired)
         return xp.array([state, rate, (desired - rate) / LAG])
-
-    return Supervision(assess, clearance, allowed_scale, gait_scale, supervised_tilts, derivative)

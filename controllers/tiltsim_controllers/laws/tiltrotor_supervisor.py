@@ -14,10 +14,11 @@ from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.code.traceable import traceable
 from tiltsim_controllers.gaits.parameters import NO_KNOTS
 from tiltsim_controllers.gaits.red_gait import nearest_red_angles
-from tiltsim_controllers.laws.supervisor import Supervisor, WayBack, supervision_of
+from tiltsim_controllers.laws.supervisor import Supervision, Supervisor, WayBack
 from tiltsim_controllers.mathematics.linear import norm
 from tiltsim_controllers.mathematics.moving import Moving
 from tiltsim_controllers.vehicle.decoupling_matrix import torque_entries, torque_free_force
+from tiltsim_controllers.vehicle.parameters import drag_ratio
 
 NEAR: Final = 0.05
 """rad: the distance from red, for the speed of the return, is at least this."""
@@ -58,5 +59,10 @@ def _return_speed(planned: Any, supervisor: Supervisor, drag_ratio: Any) -> Any:
     return supervisor.max_rate / longest
 
 
-SUPERVISION: Final = supervision_of(4, assess, WayBack(_towards_red, _return_speed))
+SUPERVISION: Final = Supervision(
+    4,
+    lambda _time, parameters: drag_ratio(parameters.vehicle),
+    assess,
+    WayBack(_towards_red, _return_speed),
+)
 """Its functions; the ``vehicle`` is the drag ratio ``r = K_m / (L K_f)``."""

@@ -141,3 +141,26 @@ def least_norm(matrix: Any, desired: Any) -> Any:
     units = orthonormal_rows(matrix)
     first = nearest_solution(matrix, desired, xp.zeros(matrix.shape[1]), units)
     return nearest_solution(matrix, desired, first, units)
+
+
+def solved_symmetric(matrix: Any, desired: Any) -> Any:
+    """The ``x`` with ``matrix x = desired`` of a positive definite matrix, by ``L D L^T``.
+
+    Args:
+        matrix: Symmetric, of which the lower triangle is read, shape (M, M).
+        desired: Shape (M,).
+    """
+    size = len(desired)
+    lower: list[list[Any]] = [[None] * size for _ in range(size)]
+    pivots: list[Any] = []
+    x: list[Any] = []
+    for i in range(size):
+        scaled: list[Any] = []  # entries of the row times the pivots
+        for j in range(i):
+            scaled.append(matrix[i, j] - sum(scaled[k] * lower[j][k] for k in range(j)))
+            lower[i][j] = scaled[j] / pivots[j]
+        pivots.append(matrix[i, i] - sum(s * e for s, e in zip(scaled, lower[i])))
+        x.append(desired[i] - sum(lower[i][k] * x[k] for k in range(i)))
+    for i in reversed(range(size)):
+        x[i] = x[i] / pivots[i] - sum(lower[k][i] * x[k] for k in range(i + 1, size))
+    return xp.array(x)

@@ -43,12 +43,6 @@ def quaternion_from_euler(roll: float, pitch: float, yaw: float) -> Quad:
     )
 
 
-def world_up_in_body(roll: float, pitch: float) -> Triple:
-    """World up in body axes, ``r3``: third row of the body-to-world rotation (ch. 3, Eq. 2)."""
-    cos_pitch = cos(pitch)
-    return -sin(pitch), sin(roll) * cos_pitch, cos(roll) * cos_pitch
-
-
 def rotation_from_euler(roll: float, pitch: float, yaw: float) -> tuple[float, ...]:
     """The body-to-world rotation (ch. 3, Eq. 2) of angles in rad: nine entries, row by row."""
     sr, cr = sin(roll), cos(roll)

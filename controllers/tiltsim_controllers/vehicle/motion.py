@@ -6,17 +6,14 @@ follow.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from functools import cache
+from collections.abc import Iterable
 from typing import Any, Final, NamedTuple
 
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.code.traceable import traceable
 from tiltsim_controllers.mathematics.linear import cross
-from tiltsim_controllers.mathematics.scalar import Values
 from tiltsim_controllers.vehicle.body import Body, angular_acceleration
-from tiltsim_controllers.vehicle.effectiveness import TiltOfRotor
-from tiltsim_controllers.vehicle.rotors import rotors_in, wrench_map
+from tiltsim_controllers.vehicle.rotors import Rotors, wrench_map
 
 BODY_STATES: Final = 18
 """Numbers of a state before the rotor speeds."""
@@ -64,33 +61,31 @@ def accelerations(
     return acceleration, angular_acceleration(body, wrench[3:], omega, gyroscopic)
 
 
-@cache
-def equations_of_motion_of(layout: TiltOfRotor) -> Callable[..., Values]:
-    """The equations of motion of vehicles of a layout with massless pods (ch. 3, Eqs. 1-7).
+@traceable
+def equations_of_motion(
+    state: Any,
+    tilts: Any,
+    inputs: Any,
+    body: Body,
+    rotors: Rotors,
+    disturbance: Any,
+    gyroscopic: float,
+) -> Any:
+    """Derivative of a state of a vehicle with massless pods (ch. 3, Eqs. 1-7), (18 + N,).
 
-    They are ``(state, tilts, inputs, body, table, at, disturbance, gyroscopic) -> derivative`` of a
-    state of `BODY_STATES` + N numbers. ``inputs`` are the N rotor accelerations (rad/s^2), first of
-    a vector that may have more; ``disturbance`` an acceleration unknown to the controller (m/s^2,
-    world axes); ``table`` and ``at`` as in `tiltsim_controllers.vehicle.rotors.rotors_in`.
+    Args:
+        state: `BODY_STATES` numbers and N rotor speeds, rad/s, shape (18 + N + any,).
+        tilts: rad, shape (M,).
+        inputs: Rotor accelerations, rad/s^2, shape (N + any,).
+        body: Body of the vehicle.
+        rotors: Its N rotors.
+        disturbance: An acceleration unknown to the controller, m/s^2, world axes, shape (3,).
+        gyroscopic: Factor of the gyroscopic torque, 1 or 0.
     """
-    rotors = len(layout)
-
-    @traceable
-    def equations_of_motion(
-        state: Any,
-        tilts: Any,
-        inputs: Any,
-        body: Body,
-        table: Any,
-        at: float,
-        disturbance: Any,
-        gyroscopic: float,
-    ) -> Any:
-        motion, speeds = rigid_state(state), state[BODY_STATES : BODY_STATES + rotors]
-        wrench = wrench_map(rotors_in(table, at, layout), tilts) @ (speeds * abs(speeds))
-        _, velocity, rotation, omega = motion
-        moved = accelerations(body, rotation, omega, wrench, disturbance, gyroscopic)
-        rates = RigidState(velocity, moved[0], rotation_rate(rotation, omega), moved[1])
-        return joined((*rates, inputs[:rotors]))
-
-    return equations_of_motion
+    count = len(rotors.tilt_of_rotor)
+    motion, speeds = rigid_state(state), state[BODY_STATES : BODY_STATES + count]
+    wrench = wrench_map(rotors, tilts) @ (speeds * abs(speeds))
+    _, velocity, rotation, omega = motion
+    moved = accelerations(body, rotation, omega, wrench, disturbance, gyroscopic)
+    rates = RigidState(velocity, moved[0], rotation_rate(rotation, omega), moved[1])
+    return joined((*rates, inputs[:count]))

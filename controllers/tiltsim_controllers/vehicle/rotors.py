@@ -13,7 +13,6 @@ import numpy as np
 
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.code.blocks import take_span
-from tiltsim_controllers.code.traceable import traceable
 from tiltsim_controllers.mathematics.moving import Moving, cosine, sine
 from tiltsim_controllers.vehicle.body import Body, principal_body
 from tiltsim_controllers.vehicle.effectiveness import (
@@ -63,16 +62,6 @@ def rotors_in(knots: Any, at: float, tilt_of_rotor: TiltOfRotor) -> Rotors:
     moves = np.array([float(tilt >= 0) for tilt in tilt_of_rotor])  # a trace knows these zeros
     still, along, across = (table[:, part : part + 6].T for part in (CONSTANT, COSINE, SINE))
     return Rotors(tilt_of_rotor, table[:, SPIN_SIGN], still, moves * along, moves * across)
-
-
-@traceable
-def spins_in(knots: Any, at: float, tilt_of_rotor: TiltOfRotor) -> Any:
-    """Signs of the speeds with which the rotors push along their axes, shape (N,).
-
-    Args:
-        knots, at, tilt_of_rotor: See `rotors_in`.
-    """
-    return rotors_in(knots, at, tilt_of_rotor).spins
 
 
 def airframe(parameters: Any, knots: Any, tilt_of_rotor: TiltOfRotor) -> tuple[Body, Rotors]:

@@ -8,14 +8,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from tests.controllers.flat_laws import attitude_altitude_inputs
 from tests.thesis import force_matrix, torque_matrix
 from tiltsim_controllers.gaits.parameters import FIXED, GaitParameters
-from tiltsim_controllers.laws.attitude_altitude import (
-    DECOUPLINGS,
-    Gains,
-    Parameters,
-    attitude_altitude_inputs,
-)
+from tiltsim_controllers.laws.attitude_altitude import DECOUPLINGS, Gains, Parameters
 from tiltsim_controllers.laws.decouplers import (
     DECOUPLERS,
     conventional_decoupler,
@@ -23,6 +19,7 @@ from tiltsim_controllers.laws.decouplers import (
     modified_decoupler,
 )
 from tiltsim_controllers.laws.gains import GAIN_SETS
+from tiltsim_controllers.laws.supervisor import Supervisor
 from tiltsim_controllers.mathematics.records import flatten, unflatten
 from tiltsim_controllers.references.trajectories import REFERENCE_TYPES, ReferenceParameters
 from tiltsim_controllers.vehicle.decoupling_matrix import (
@@ -114,6 +111,7 @@ def random_case(seed, decoupling, decoupler):
             acceleration_feedforward=float(random.integers(2)),
             **dict(zip(ACCELERATIONS, spread(3, 0.2))),
         ),
+        supervisor=Supervisor(),
         decoupler=DECOUPLERS[decoupler],
         decoupling=DECOUPLINGS[decoupling],
     )
@@ -230,6 +228,7 @@ def test_hover_at_the_setpoint_needs_no_rotor_acceleration(decoupling, decoupler
         gains=GAIN_SETS["ch04"],
         gait=GaitParameters(FIXED),
         reference=ReferenceParameters(REFERENCE_TYPES["setpoint"], 1.0, 2.0, 3.0, yaw=0.3),
+        supervisor=Supervisor(),
         decoupler=DECOUPLERS[decoupler],
         decoupling=DECOUPLINGS[decoupling],
     )

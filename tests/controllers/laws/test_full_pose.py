@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from tests.controllers.flat_laws import attitude_altitude_inputs, numbers
 from tests.controllers.flights import fly, rk4_step, tiltrotor_rates
 from tests.controllers.laws.test_tracking import PATH, TIME, reference
 from tests.controllers.multirotors import FOUR, HEXAROTOR, Vehicle, random_states, ring, tiltrotor
@@ -16,7 +17,6 @@ from tiltsim_controllers.analysis.stability import is_hurwitz
 from tiltsim_controllers.code.traceable import traceable
 from tiltsim_controllers.gaits.parameters import FIXED, GaitParameters
 from tiltsim_controllers.laws import attitude_altitude
-from tiltsim_controllers.laws.attitude_altitude import attitude_altitude_inputs
 from tiltsim_controllers.laws.failures import UNHARMED, Failure
 from tiltsim_controllers.laws.full_pose import (
     GAIN_SETS,
@@ -30,6 +30,8 @@ from tiltsim_controllers.laws.full_pose import (
     turning_rates,
 )
 from tiltsim_controllers.laws.gains import GAIN_SETS as ATTITUDE_GAINS
+from tiltsim_controllers.laws.observed import Seen
+from tiltsim_controllers.laws.supervisor import Supervisor
 from tiltsim_controllers.mathematics.attitude import attitude_error, rotation_matrix
 from tiltsim_controllers.mathematics.linear import least_norm
 from tiltsim_controllers.mathematics.rotation import rotation_from_euler
@@ -37,7 +39,7 @@ from tiltsim_controllers.references.trajectories import (
     CIRCLE,
     REFERENCE_TYPES,
     ReferenceParameters,
-    reference_derivatives,
+    reference_motion,
 )
 from tiltsim_controllers.vehicle.effectiveness import (
     cross_table,
@@ -61,9 +63,8 @@ ROTORS = rotors_in(cross_table(TILTROTOR, tilting=True), 0, (0, 1, 2, 3))
 
 @traceable
 def full_pose_inputs(time, state, parameters, knots=()):
-    """The law of the tiltrotor, with its reference."""
-    target = reference_derivatives(time, parameters.reference, knots)
-    return full_pose(time, state, target, parameters, knots, (0, 1, 2, 3))
+    """The law of the tiltrotor."""
+    return numbers(full_pose(Seen(time, state), parameters, knots, (0, 1, 2, 3)))
 
 
 def law_of(vehicle, weight, limits, failure=UNHARMED, reference=HERE):
@@ -289,6 +290,7 @@ def planned(gait, duration, step):
         ATTITUDE_GAINS["ch03"],
         GaitParameters(FIXED),
         ReferenceParameters(REFERENCE_TYPES["attitude_altitude"]),
+        Supervisor(),
         decoupling=0.0,
         decoupler=0.0,
     )
@@ -399,14 +401,14 @@ def test_force_and_torque_change_as_desired_with_the_least_inputs(table, failure
     vehicle, layout = Vehicle(table, HEXAROTOR, 3), tilt_of_rotor(table)
     rotors, tilts = len(layout), tilts_of(layout)
     parameters = law_of(vehicle.body, 3e5, NO_LIMITS, failure, ON_CIRCLE)
-    target = np.array(reference_derivatives(1.0, ON_CIRCLE)).reshape(5, 3)
+    target = reference_motion(1.0, ON_CIRCLE)
     works = np.array([rotor + 1.0 != failure.rotor for rotor in range(rotors)], float)
     rng = np.random.default_rng(4)
     for _ in range(3):
         body, angles = 0.3 * rng.normal(size=12), rng.uniform(-0.5, 0.5, tilts)
         speeds = rng.uniform(300.0, 500.0, rotors) * rng.choice((-1.0, 1.0), rotors)
         state = np.array([*body, *angles, *speeds])
-        inputs = np.array(full_pose(1.0, state, target.ravel(), parameters, table, layout))
+        inputs = numbers(full_pose(Seen(1.0, state), parameters, np.array(table), layout))
         turned, accelerations = inputs[rotors:], inputs[:rotors]
 
         def wrench(step, angles=angles, speeds=speeds, inputs=(turned, accelerations)):

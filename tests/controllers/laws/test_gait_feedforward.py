@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from tests.controllers.flat_laws import tracking_inputs
 from tests.thesis import force_matrix, torque_matrix
 from tiltsim_controllers.analysis.stability import feedforward_loops
 from tiltsim_controllers.gaits.parameters import FIXED, GaitParameters
@@ -32,7 +33,7 @@ from tiltsim_controllers.laws.gains import (
     second_order_gains,
     third_order_gains,
 )
-from tiltsim_controllers.laws.gait_feedforward import Parameters, tracking_inputs
+from tiltsim_controllers.laws.gait_feedforward import Parameters
 from tiltsim_controllers.laws.multirotor_steps import EULER_ANGLES, FeedforwardTerms
 from tiltsim_controllers.laws.supervisor import Supervisor
 from tiltsim_controllers.mathematics.moving import Moving

@@ -7,6 +7,7 @@ from math import pi
 import numpy as np
 import pytest
 
+from tests.controllers.flat_laws import attitude_altitude_inputs, flat, tracking_inputs
 from tests.controllers.laws.test_gait_feedforward import parameters as gait_parameters
 from tests.controllers.multirotors import (
     FOUR,
@@ -27,7 +28,7 @@ from tiltsim_controllers.analysis.torque_free import (
     torque_free_forces,
 )
 from tiltsim_controllers.gaits import plans
-from tiltsim_controllers.laws import attitude_altitude, gait_feedforward
+from tiltsim_controllers.laws import attitude_altitude
 from tiltsim_controllers.laws.decouplers import DECOUPLERS
 from tiltsim_controllers.laws.failures import Failure
 from tiltsim_controllers.laws.gains import GAIN_SETS, Poles, gains_from_poles
@@ -42,6 +43,7 @@ from tiltsim_controllers.laws.multirotor_steps import (
     side_control,
     turned,
 )
+from tiltsim_controllers.laws.supervisor import Supervisor
 from tiltsim_controllers.mathematics.attitude import attitude_error
 from tiltsim_controllers.mathematics.moving import Moving
 from tiltsim_controllers.mathematics.rotation import rotation_from_euler
@@ -77,15 +79,21 @@ def test_the_law_of_chapters_3_and_4_is_a_case(decoupler, decoupling):
     gains = GAIN_SETS["ch04" if decoupling == "published" else "exact"]
     codes = DECOUPLERS[decoupler], attitude_altitude.DECOUPLINGS[decoupling]
     special = attitude_altitude.Parameters(
-        FOUR, gains, gait.parameters, ON_CIRCLE, decoupler=codes[0], decoupling=codes[1]
+        FOUR,
+        gains,
+        gait.parameters,
+        ON_CIRCLE,
+        Supervisor(),
+        decoupler=codes[0],
+        decoupling=codes[1],
     )
     law, knots = parameters_of(
         vehicle, gait, ON_CIRCLE, gains=gains, terms=AS_PUBLISHED, decoupler=codes[0],
         decoupling=codes[1], attitude_error=EULER_ANGLES,
     )  # fmt: skip
-    inputs, rest = multirotor_law_of(tilt_of_rotor(vehicle.table), Form(1)), (0.0,) * 4
+    inputs, rest = flat(multirotor_law_of(tilt_of_rotor(vehicle.table), Form(1))), (0.0,) * 4
     found = differences(
-        lambda time, state: attitude_altitude.attitude_altitude_inputs(time, state, special)[:4],
+        lambda time, state: attitude_altitude_inputs(time, state, special)[:4],
         lambda time, state: inputs(time, state, rest, (0.0,) * 3, law, knots),
     )
     # Beside a singular attitude rounding grows without bound; it is rare among these states.
@@ -119,11 +127,9 @@ def test_gait_feedforward_is_a_case(gait):
         vehicle, gait, ON_CIRCLE, gains=gains, integral=integral, max_acceleration=3.0,
         max_angular_acceleration=200.0, anticipation=0.05, attitude_error=EULER_ANGLES,
     )  # fmt: skip
-    inputs = multirotor_law_of(tilt_of_rotor(vehicle.table), Form(1))
+    inputs = flat(multirotor_law_of(tilt_of_rotor(vehicle.table), Form(1)))
     found = differences(
-        lambda time, state: gait_feedforward.tracking_inputs(
-            time, state, rates, integrals, special, knots
-        ),
+        lambda time, state: tracking_inputs(time, state, rates, integrals, special, knots),
         lambda time, state: inputs(time, state, rates, integrals, law, knots),
     )
     assert np.median(found) < 2e-15
@@ -165,8 +171,8 @@ def test_a_rotor_known_to_have_failed_is_as_if_it_were_not_there(dimension):
     lost = list(knots)
     first = int(law.rotors) + 2 * ROTOR_FLOATS + CONSTANT
     lost[first : first + ROTOR_FLOATS - CONSTANT] = [0.0] * (ROTOR_FLOATS - CONSTANT)
-    aware = multirotor_law_of(layout, Form(dimension, "speed", forward, True))
-    unaware = multirotor_law_of(layout, Form(dimension, "speed", forward))
+    aware = flat(multirotor_law_of(layout, Form(dimension, "speed", forward, True)))
+    unaware = flat(multirotor_law_of(layout, Form(dimension, "speed", forward)))
     body = 0.2 * np.random.default_rng(5).normal(size=12)
     speeds = 450.0 * (-1.0) ** np.arange(1, 8)
     state = (*body.tolist(), *angles[0], *speeds.tolist())
@@ -244,7 +250,8 @@ def test_of_all_inputs_that_do_the_same_it_takes_those_nearest_to_restoring(
     """Rotor accelerations, or rates of ``w``; by pseudo-inverses."""
     rng, rate = np.random.default_rng(rotors), 0.7
     vehicle = Vehicle(ring(rotors, hinged=True), HEXAROTOR, dimension, norm)
-    inputs = multirotor_law_of(tilt_of_rotor(vehicle.table), Form(dimension, norm, dimension == 2))
+    law_of = Form(dimension, norm, dimension == 2)
+    inputs = flat(multirotor_law_of(tilt_of_rotor(vehicle.table), law_of))
     for senses in (1.0, rng.choice([-1.0, 1.0], rotors)):
         angles = tuple(rng.uniform(-0.5, 0.5, rotors).tolist())
         speeds = rng.uniform(250.0, 600.0, rotors) * (-1.0) ** np.arange(rotors) * senses

@@ -25,14 +25,12 @@ from tiltsim_controllers.laws.tiltrotor_supervisor import SUPERVISION
 from tiltsim_controllers.vehicle.effectiveness import cross_table, tilt_of_rotor
 from tiltsim_controllers.vehicle.parameters import PRESETS, drag_ratio
 
-(
-    assess,
-    threshold_clearance,
-    allowed_scale,
-    supervised_gait_scale,
-    supervised_tilts,
-    supervised_derivative,
-) = SUPERVISION
+assess = SUPERVISION.assess
+threshold_clearance = SUPERVISION.clearance
+allowed_scale = SUPERVISION.allowed_scale
+supervised_gait_scale = SUPERVISION.gait_scale
+supervised_tilts = SUPERVISION.tilts
+supervised_derivative = SUPERVISION.derivative
 VEHICLE = PRESETS["ar_drone_2"]
 RATIO = drag_ratio(VEHICLE)
 WATCH = Supervisor(min_margin=0.3, min_determinant=1.0)

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from tests.controllers.flat_laws import tracking_inputs
 from tests.controllers.laws.test_gait_feedforward import (
     GAINS,
     INTEGRAL,
@@ -25,7 +26,6 @@ from tests.thesis import force_matrix, torque_matrix
 from tiltsim_controllers.gaits.plans import keyframes
 from tiltsim_controllers.laws.decouplers import DECOUPLERS, exact_decoupler
 from tiltsim_controllers.laws.feedback import attitude_jerk
-from tiltsim_controllers.laws.gait_feedforward import tracking_inputs
 from tiltsim_controllers.laws.multirotor_steps import FeedforwardTerms
 from tiltsim_controllers.mathematics.moving import Moving
 from tiltsim_controllers.references.trajectories import REFERENCE_TYPES, ReferenceParameters

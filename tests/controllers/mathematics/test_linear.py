@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tiltsim_controllers.mathematics.linear import determinant, kernel, solved
+from tiltsim_controllers.mathematics.linear import determinant, kernel, solved, solved_symmetric
 
 SIZES = (1, 2, 3, 4)
 
@@ -31,3 +31,11 @@ def test_the_kernel_is_across_the_rows_and_as_long_as_their_volume(size):
 
 def test_a_singular_matrix_has_no_solution():
     assert np.isnan(solved(np.array([[1.0, 2.0], [2.0, 4.0]]), np.ones(2))).all()
+
+
+@pytest.mark.parametrize("size", [1, 3, 6])
+def test_symmetric_equations_are_solved(size):
+    random = np.random.default_rng(size)
+    rows, desired = random.normal(size=(size, size + 2)), random.normal(size=size)
+    found = solved_symmetric(np.tril(rows @ rows.T), desired)
+    np.testing.assert_allclose(found, np.linalg.solve(rows @ rows.T, desired), rtol=1e-9)

@@ -16,7 +16,6 @@ from tiltsim_controllers.mathematics.rotation import (
     rotation_from_euler,
     rotation_from_quaternion,
     to_world,
-    world_up_in_body,
 )
 
 eulers = st.tuples(st.floats(-pi, pi), st.floats(-pi / 2, pi / 2), st.floats(-pi, pi))
@@ -77,12 +76,6 @@ def test_rotation_is_orthogonal_and_keeps_hands(euler):
     turn = matrix(euler)
     np.testing.assert_allclose(turn @ turn.T, np.eye(3), rtol=0, atol=1e-15)
     assert np.linalg.det(turn) == pytest.approx(1.0, abs=1e-15)
-
-
-@quick
-@given(eulers)
-def test_world_up_in_body_is_the_third_row(euler):
-    np.testing.assert_array_equal(world_up_in_body(*euler[:2]), matrix(euler)[2])
 
 
 @quick

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from tests.controllers.multirotors import FOUR, random_states, ring, tiltrotor
-from tiltsim.equations import tiltrotor as printed
+from tests.thesis import force_matrix, torque_matrix
 from tiltsim_controllers.mathematics.rotation import rotation_from_euler
 from tiltsim_controllers.vehicle.effectiveness import (
     force_and_torque,
@@ -16,7 +16,8 @@ from tiltsim_controllers.vehicle.effectiveness import (
     tilts_of,
     without_rotor,
 )
-from tiltsim_controllers.vehicle.motion import equations_of_motion_of
+from tiltsim_controllers.vehicle.motion import equations_of_motion
+from tiltsim_controllers.vehicle.rotors import rotors_in
 
 
 def numbers(values):
@@ -85,13 +86,21 @@ def test_effectiveness_is_what_mujoco_makes_of_unit_thrusts(seed):
 
 def test_equations_of_motion_agree_with_chapter_3_for_its_tiltrotor():
     vehicle = tiltrotor()
-    motion = equations_of_motion_of(tilt_of_rotor(vehicle.table))
-    inputs, gust = (1.0, -2.0, 3.0, -4.0), (0.1, 0.2, -0.3)
+    rotors = rotors_in(np.array(vehicle.table), 0, tilt_of_rotor(vehicle.table))
+    inertia = (FOUR.inertia_xx, FOUR.inertia_yy, FOUR.inertia_zz)
+    inputs, gust = np.array([1.0, -2.0, 3.0, -4.0]), np.array([0.1, 0.2, -0.3])
     for _, (*body, a1, a2, a3, a4, s1, s2, s3, s4) in random_states(50):
-        tilts, speeds = (a1, a2, a3, a4), (s1, s2, s3, s4)
-        state = [*body[:6], *rotation_from_euler(*body[6:9]), *body[9:], *speeds]
-        found = motion(state, tilts, inputs, vehicle.body, vehicle.table, 0, gust, 0.0)
-        expected = printed.equations_of_motion(state, tilts, inputs, FOUR, gust)
+        tilts, speeds = np.array([a1, a2, a3, a4]), np.array([s1, s2, s3, s4])
+        rotation, (p, q, r) = np.reshape(rotation_from_euler(*body[6:9]), (3, 3)), body[9:]
+        state = np.array([*body[:6], *rotation.ravel(), p, q, r, *speeds])
+        found = equations_of_motion(state, tilts, inputs, vehicle.body, rotors, gust, 0.0)
+        w = speeds * np.abs(speeds)
+        acceleration = rotation @ force_matrix(FOUR, tilts) @ w / FOUR.mass + gust
+        turning = rotation @ [[0.0, -r, q], [r, 0.0, -p], [-q, p, 0.0]]
+        expected = [
+            *body[3:6], *acceleration - (0.0, 0.0, FOUR.gravity), *turning.ravel(),
+            *torque_matrix(FOUR, tilts) @ w / inertia, *inputs,
+        ]  # fmt: skip
         np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-11)
 
 

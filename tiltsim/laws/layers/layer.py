@@ -129,7 +129,6 @@ def wrap_loop(inner: ClosedLoop, layer: Layer) -> ClosedLoop:
             sign_check_values, lambda sample, setup: inner.monitoring.causes(sample, within(setup))
         ),
         equations=layer.equations,
-        supervised=None,
         within=None if layer.of_controller else inner,
     )
 

@@ -184,6 +184,11 @@ def all_complete(flights: Flown) -> bool:
     return not any(metrics["diverged"] for metrics in flights)
 
 
+def is_lost(flights: Flown) -> bool:
+    """Whether the only flight is lost."""
+    return not all_complete(flights)
+
+
 def no_rotor_stops(flights: Flown) -> bool:
     """Whether all rotors keep turning in all flights."""
     return all(float(metrics["min_rotor_speed"]) > 0.0 for metrics in flights)

@@ -46,6 +46,15 @@ def scaling_enlarges(gait: str) -> bool:
     return all(first < second for first, second in pairwise(margins))
 
 
+def scaling_costs_side_force(gait: str) -> bool:
+    """Whether the largest side share of a rotor's thrust falls from 1 over 1/2 to 1/3."""
+    swing = SWINGS[gait]
+    plan = plans.cat(gait, swing.amplitude, 1.0, swing.lean)
+    times = plan.sample_times(401)
+    shares = [np.abs(np.sin(plan.scaled(scale).angles(times))).max() for scale in (1, 2, 3)]
+    return all(first > second for first, second in pairwise(shares))
+
+
 def beats_its_biased_twin(key: str) -> bool:
     """Whether a published gait, on the exact lines, is more robust than its biased twin.
 

@@ -21,6 +21,7 @@ from tiltsim_controllers.analysis.singularity import force_matrix, residuals, to
 from tiltsim_controllers.analysis.two_color_map import curve_l, grid_roots
 from tiltsim_controllers.laws.gains import GAIN_SETS
 from tiltsim_controllers.laws.yaw_position import GAIN_SETS as QUADROTOR_GAINS
+from tiltsim_controllers.mathematics.attitude import rotation_matrix
 from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.tilt_car.vehicle import THESIS_CAR, input_matrix
 from tiltsim_controllers.vehicle.parameters import PRESETS
@@ -160,6 +161,21 @@ def _ch2_entry(mended: bool) -> float:
     return worst
 
 
+def yaw_position_matrix_holds() -> bool:
+    """Eq. (42) with M_1 and M_2 mended, beside difference quotients by turns about body axes."""
+    worst, step = 0.0, 1e-6
+    for angles in np.random.default_rng(4).uniform(-1.2, 1.2, (50, 3)):
+        exact, attitude = np.zeros((4, 3)), rotation_matrix(angles)
+        for axis, turn in enumerate(step * np.eye(3)):
+            ahead, behind = (attitude @ rotation_matrix(sign * turn) for sign in (1.0, -1.0))
+            yaws = (atan2(matrix[1, 0], matrix[0, 0]) for matrix in (ahead, behind))
+            exact[:, axis] = np.append(behind[:, 2] - ahead[:, 2], np.subtract(*yaws)) / (2 * step)
+        printed = _ch2_matrices(*angles.tolist())[2]
+        worst = max(worst, float(np.abs(printed[:, 1:] - exact).max()))
+        worst = max(worst, float(np.abs(printed[:3, 0] + attitude[:, 2]).max()))
+    return worst < RIGHT
+
+
 def eq_43_is_the_product() -> bool:
     """Whether P Delta Q, with printed P and Q and the exact Delta, is the matrix of Eq. (43)."""
     roll, pitch, yaw = 0.3, 0.4, 0.5
@@ -170,6 +186,17 @@ def eq_43_is_the_product() -> bool:
     printed[1, :3] = sp * st * cf - sp * st * sf - cp * sf - cp * cf, -cp * cf, sp
     printed[2, 1] = sf
     return _relative(p @ delta @ q, printed) < RIGHT
+
+
+def _ch2_reference(mended: bool) -> float:
+    """Whether experiment 2, published as unstable, completes with the reference, or the goal."""
+    from tiltsim.scenario.loading import load_scenario
+    from tiltsim.simulation.simulate import simulate_to_end
+
+    name = "goal" if mended else "reference"
+    keys = {"simulation.plant": "thesis", "simulation.engine": "native"}
+    address = f"ch02_singular_zone/experiments#experiment_2_{name}"
+    return float(not simulate_to_end(load_scenario(address, keys)).metrics()["diverged"])
 
 
 def _derivative_by_yaw(mended: bool) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import asin, cos, inf, sin
+from math import asin, cos, inf, pi, sin
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from tiltsim_controllers.tilt_car.vehicle import (
     acceleration,
     counter_yaw_per_tilt,
     input_matrix,
+    rotation,
     thrust_map,
     turn_per_tilt,
 )
@@ -70,6 +71,39 @@ def third_derivative_columns_are_right() -> bool:
         if np.abs((ahead - behind) / (2.0 * step) - column).max() > 1e-6:
             return False
     return True
+
+
+def fourth_derivative_is_right() -> bool:
+    """Eq. (21), its six terms as printed, beside second difference quotients of Eq. (3)."""
+    per_tilt, step = counter_yaw_per_tilt(THESIS_CAR), 1e-3
+    motion = np.array([[150.0, 3.0, 1.0], [120.0, -2.0, 2.0], [0.7, 0.4, 0.3]])
+
+    def at(time: float) -> np.ndarray:
+        first, second, tilt = motion @ (1.0, time, 0.5 * time**2)
+        direction = tilt - per_tilt * tilt
+        return np.array(acceleration(direction, np.array([first**2, second**2]), THESIS_CAR))
+
+    def turns(angle: float, rate: float, change: float) -> tuple[np.ndarray, ...]:
+        """J of Eq. (22) or (23) with its first and second derivatives."""
+        matrix, turned = np.array(rotation(angle)), np.array(rotation(angle + 0.5 * pi))
+        return matrix, rate * turned, change * turned - rate**2 * matrix
+
+    yaw, yaw_1, yaw_2 = turns(*(-per_tilt * motion[2]))
+    tilt, tilt_1, tilt_2 = turns(*motion[2])
+    speeds, rates, changes = motion[:2].T
+    squares, squares_1 = speeds**2, 2.0 * speeds * rates
+    squares_2 = 2.0 * rates**2 + 2.0 * speeds * changes
+    forces = thrust_map(THESIS_CAR)
+    printed = (
+        yaw @ tilt_2 @ forces @ squares
+        + 2.0 * yaw @ tilt_1 @ forces @ squares_1
+        + yaw @ tilt @ forces @ squares_2
+        + 2.0 * yaw_1 @ tilt_1 @ forces @ squares
+        + 2.0 * yaw_1 @ tilt @ forces @ squares_1
+        + yaw_2 @ tilt @ forces @ squares
+    )
+    exact = (at(step) - 2.0 * at(0.0) + at(-step)) / step**2
+    return bool(np.abs(printed - exact).max() < 1e-5 * np.abs(exact).max())
 
 
 def tilt_column_off(mended: bool) -> float:

@@ -164,6 +164,18 @@ def pairs_are_equal_on_red() -> bool:
     )
 
 
+def planes_intersect() -> bool:
+    """Whether α₃ of both colors agrees on α₁ = δ, and α₄ on α₂ = -δ, whatever the other angle."""
+    first, second = _P
+    ratio = drag_ratio(_VEHICLE)
+    apart = [
+        abs(colored_angles(*angles, "blue", ratio)[axis] - angles[axis])
+        for other in np.linspace(-1.0, 1.0, 21).tolist()
+        for axis, angles in enumerate(((first, other), (other, second)))
+    ]
+    return max(apart) < 1e-12
+
+
 def one_color_is_accepted(color: str) -> bool:
     """Whether the planner accepts a rectangle in this color."""
     return check_path(rectangle((0.2, 0.8), (-0.8, -0.2), color), _VEHICLE).accepted

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from math import ceil, log10, pi
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from tiltsim.laws.layers.supervision import SUPERVISION
+from tiltsim.laws.supervision import SUPERVISION
 from tiltsim.scenario.gait import PenguinGait
 from tiltsim.system.quantity import Quantity
 from tiltsim.views.attitude_plane import (
@@ -24,6 +24,13 @@ from tiltsim.views.attitude_plane import (
     unreachable_pitch,
 )
 from tiltsim.views.figures import style
+from tiltsim.views.figures.flight_lines import (
+    MOST_LINES,
+    Shown,
+    many_periods,
+    mark_end,
+    plot_flights,
+)
 from tiltsim.views.signals import (
     AXES,
     FLOORS,
@@ -42,21 +49,12 @@ if TYPE_CHECKING:
     from tiltsim.flight.flight import Flight
     from tiltsim_controllers.mathematics.scalar import Floats
 
-MAX_PERIODS: Final = 10  # of a gait: more periods would be a solid band
 SHOWN_PERIODS: Final = 4  # the last ones, shown instead
 NARROW: Final = 8.0  # ratio of a path's extents above which its axes have different scales
 INSTANTS: Final = 120  # whose unreachable attitudes the roll-pitch plane shows
 SETTLED: Final = 0.01  # share of the largest error below which errors have settled
 SHORT: Final = 0.1  # share of a flight below which only the time until then is shown
 ROUNDING: Final = 1e-9  # m, below which errors are rounding
-
-
-class Shown(NamedTuple):
-    """A flight of a figure, with the text of its legend and the look of its lines."""
-
-    flight: Flight
-    name: str
-    look: Mapping[str, Any]
 
 
 @dataclass(frozen=True)
@@ -118,13 +116,16 @@ def column_panel(flights: Sequence[Flight], name: str) -> Panel:
     about = None if one is None else vector_signals(one.assembly, name, [name])
 
     def draw(axes: Axes, shown: Sequence[Shown]) -> None:
-        for one in shown:
-            time, values = one.flight["time"], one.flight[name]
-            axes.plot(time, values, **one.look, lw=1.2)
-            if reference := reference_of(one.flight.assembly, name):
-                color = one.look["color"] if "marker" in one.look else style.INK
-                axes.plot(time, one.flight[reference], color=color, ls=":", lw=0.8)
-            _mark_end(axes, one, values)
+        if len(shown) > MOST_LINES:
+            plot_flights(axes, shown, [one.flight[name] for one in shown])
+        else:
+            for one in shown:
+                time, values = one.flight["time"], one.flight[name]
+                axes.plot(time, values, **one.look, lw=1.2)
+                if reference := reference_of(one.flight.assembly, name):
+                    color = one.look["color"] if "marker" in one.look else style.INK
+                    axes.plot(time, one.flight[reference], color=color, ls=":", lw=0.8)
+                mark_end(axes, one, values)
         axes.set_ylabel(shown[0].flight.assembly.loop.label(name).text)
 
     return Panel(draw, signals=about, needs=name)
@@ -179,10 +180,12 @@ def _zoom_to_start(axes: Axes, flight: Flight) -> None:
 
 def _distance(axes: Axes, shown: Sequence[Shown]) -> None:
     """The distance of every flight from its reference."""
-    for one in shown:
-        names = AXES if one.flight.assembly.follows_position else "z"
-        values = distance(one.flight, [axis for axis in names if axis in one.flight.columns])
-        _plot(axes, one, values)
+
+    def away(flight: Flight) -> Floats:
+        names = AXES if flight.assembly.follows_position else "z"
+        return distance(flight, [axis for axis in names if axis in flight.columns])
+
+    plot_flights(axes, shown, [away(one.flight) for one in shown])
     axes.set_ylabel("position error (m)")
 
 
@@ -192,16 +195,16 @@ def _margins(axes: Axes, shown: Sequence[Shown]) -> None:
     single = "marker" not in shown[0].look
     text = f"below {threshold:g}" if single else f"margin below {threshold:g} rad"
     axes.axhspan(0.0, threshold, color=style.UNREACHABLE, lw=0.0, label=text)
-    for one in shown:
-        flight = one.flight
-        margin = flight["singularity_margin"]
-        _plot(axes, one, np.abs(margin) if single else np.maximum(margin, 0.0))
-        if single and SUPERVISION in flight.columns:
+    margins = [one.flight["singularity_margin"] for one in shown]
+    sided = [np.abs(margin) if single else np.maximum(margin, 0.0) for margin in margins]
+    plot_flights(axes, shown, sided)
+    if single:
+        flight, margin = shown[0].flight, margins[0]
+        if SUPERVISION in flight.columns:
             active = flight[SUPERVISION] > SUPERVISION_THRESHOLD
             look: dict[str, Any] = {"color": style.PALE, "lw": 0.0, "zorder": 0.5}
             look |= {"transform": axes.get_xaxis_transform(), "label": "supervisor active"}
             axes.fill_between(flight["time"], 0.0, 1.0, where=active, **look)
-    if single:
         closest = int(np.argmin(np.abs(margin)))
         least = abs(margin[closest])
         dot: dict[str, Any] = {"color": style.SINGULAR, "ms": 5, "zorder": 5}
@@ -221,40 +224,15 @@ def _determinant(axes: Axes, shown: Sequence[Shown]) -> None:
         text = f"determinant below {lowest:g}"
         axes.axhspan(0.0, lowest, color=style.UNREACHABLE, lw=0.0, label=text)
     values = [np.maximum(one.flight["determinant"], 0.0) for one in shown]
-    for one, determinant in zip(shown, values, strict=True):
-        _plot(axes, one, determinant)
+    plot_flights(axes, shown, values)
     axes.set_ylim(0.0, max(4.0, *(1.05 * float(each.max()) for each in values)))
     axes.set_ylabel("determinant n · r₃")
 
 
 def _supervisor(axes: Axes, shown: Sequence[Shown]) -> None:
     """The intervention of each supervisor."""
-    for one in shown:
-        _plot(axes, one, one.flight[SUPERVISION])
+    plot_flights(axes, shown, [one.flight[SUPERVISION] for one in shown])
     axes.set(ylim=(-0.03, 1.03), ylabel="supervisor (0 to 1)")
-
-
-def _plot(axes: Axes, one: Shown, values: Floats) -> None:
-    """A line over a whole flight; where it would be a solid band, its range over every period."""
-    time, period = one.flight["time"], many_periods([one.flight])
-    if period > 0.0:
-        starts = np.searchsorted(time, np.arange(0.0, time[-1], period))
-        low, high = np.minimum.reduceat(values, starts), np.maximum.reduceat(values, starts)
-        color, middle = one.look["color"], time[starts] + 0.5 * period
-        label = "range over each period"
-        axes.fill_between(middle, low, high, color=color, alpha=0.3, lw=0.0, label=label)
-        axes.plot(middle, 0.5 * (low + high), **{**one.look, "markevery": None, "marker": ""})
-    else:
-        axes.plot(time, values, **one.look)
-    if "marker" in one.look:
-        _mark_end(axes, one, values)
-
-
-def _mark_end(axes: Axes, one: Shown, values: Floats) -> None:
-    """A cross where a flight terminated early."""
-    if one.flight.end.kind != "completed":
-        at, color = (one.flight["time"][-1], values[-1]), one.look["color"]
-        axes.plot(*at, "X", color=color, ms=6, zorder=6, clip_on=False)
 
 
 def _path(axes: Axes, shown: Sequence[Shown]) -> None:
@@ -292,7 +270,9 @@ def _path(axes: Axes, shown: Sequence[Shown]) -> None:
     else:
         axes.set_aspect("equal", adjustable="datalim")
         if long < FLOORS["m"]:
-            axes.set_xlim(data.x0 - FLOORS["m"], data.x1 + FLOORS["m"])
+            wider = ((data.x0 - FLOORS["m"], data.y0), (data.x1 + FLOORS["m"], data.y1))
+            axes.update_datalim(wider)
+            axes.autoscale_view()
 
 
 def _attitude_plane(axes: Axes, shown: Sequence[Shown]) -> None:
@@ -342,19 +322,6 @@ def _portrait(axes: Axes, shown: Sequence[Shown]) -> None:
     for part, least in (("x", FLOORS["m"]), ("y", FLOORS["m/s"])):
         low, high = scale([np.array(getattr(axes, f"get_{part}lim")())], [False], least)[:2]
         getattr(axes, f"set_{part}lim")(low, high)
-
-
-def many_periods(flights: Sequence[Flight]) -> float:
-    """The longest period (s) of gaits whose periods would be a solid band, else 0."""
-    end = max(float(flight["time"][-1]) for flight in flights)
-    if any(SUPERVISION in flight.units for flight in flights):
-        return 0.0
-    periods = [
-        flight.assembly.gait.period or 0.0
-        for flight in flights
-        if flight.scenario.vehicle.has_tilting_rotors
-    ]
-    return max((period for period in periods if end > MAX_PERIODS * period), default=0.0)
 
 
 def set_scale(axes: Axes, signals: Signals, shown: Sequence[Shown]) -> None:

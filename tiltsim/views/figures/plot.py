@@ -16,15 +16,9 @@ from tiltsim.scenario.messages import choose
 from tiltsim.system.text import short_repr
 from tiltsim.views.figures import style
 from tiltsim.views.figures.adjusting import relabel
+from tiltsim.views.figures.flight_lines import MOST_LINES, Shown
 from tiltsim.views.figures.layout import Page, add_heading, fitting, new_page, place_legends, wrap
-from tiltsim.views.figures.panels import (
-    Panel,
-    Shown,
-    column_panel,
-    panels_of,
-    set_scale,
-    signals_panel,
-)
+from tiltsim.views.figures.panels import Panel, column_panel, panels_of, set_scale, signals_panel
 from tiltsim.views.signals import stems, vector_signals
 from tiltsim.views.titles import common_title, describe_controller, describe_gait, flight_names
 
@@ -33,8 +27,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from tiltsim.flight.flight import Flight
-
-MAX_FLIGHTS: Final = len(style.CYCLE)
 
 LARGEST: Final = 1e100
 """Magnitude up to which values are drawn: a diverged flight may end just below overflow."""
@@ -51,7 +43,7 @@ def plot(
     title: str | None = None,
     labels: Sequence[str] | Mapping[str, str] | None = None,
 ) -> Figure:
-    """One flight on a page, or several in the same axes.
+    """One flight on a page, several in the same axes, or quantiles of more than seven.
 
     The caller's rcParams take precedence over tiltsim's style, and stay as they are.
 
@@ -65,8 +57,7 @@ def plot(
             dict, new texts by present names or texts of the figure.
 
     Raises:
-        InputError: If an argument is wrong, there are more flights than colors, or the size is too
-            small.
+        InputError: If an argument is wrong, or the size is too small.
     """
     flights = as_flights(flights)
     panels = [panels] if isinstance(panels, str) else panels
@@ -96,8 +87,6 @@ def draw_flights(
         panels: Names; empty for all that suit the flights.
         title: Instead of the scenarios' title; empty for none.
     """
-    if len(flights) > MAX_FLIGHTS:
-        raise InputError(f"plot: {len(flights)} flights: at most {MAX_FLIGHTS} fit on one page")
     clipped = [np.clip(flight.samples, -LARGEST, LARGEST) for flight in flights]
     flights = [
         flight if np.array_equal(samples, flight.samples) else replace(flight, samples=samples)
@@ -107,7 +96,10 @@ def draw_flights(
     names = [others.pop(name, name) if name else "" for name in names]
     longest = max(len(flight) for flight in flights)
     looks = [style.marked_line(number, longest) for number in range(len(flights))]
-    looks = looks if len(flights) > 1 else [{"color": style.BLUE}]
+    if len(flights) == 1:
+        looks = [{"color": style.BLUE}]
+    elif len(flights) > MOST_LINES:
+        looks = [{"color": style.BLUE, "alpha": 0.3, "lw": 0.6, "marker": ""}] * len(flights)
     shown = [Shown(*one) for one in zip(flights, names, looks, strict=True)]
     chosen = _chosen(flights, panels)
     heading = partial(_heading, shown, title)
@@ -232,11 +224,15 @@ def _handles(shown: Sequence[Shown], axes: Sequence[Axes]) -> Iterator[Any]:
     """Handles of the flights and of the marks in the axes."""
     from matplotlib.lines import Line2D
 
-    for flight, name, look in shown:
+    many = len(shown) > MOST_LINES
+    for flight, name, look in () if many else shown:
         end = flight.end
         more = "" if end.kind == "completed" else f", {end.kind} at {end.time:.2f} s"
         yield Line2D([], [], label=style.verbatim(name) + more, **{**look, "markevery": None})
-    if any(flight.end.kind != "completed" for flight, _, _ in shown):
+    lost = sum(flight.end.kind != "completed" for flight, _, _ in shown)
+    if lost and many:
+        yield Line2D([], [], ls="", label=f"{lost} of {len(shown)} terminated early")
+    elif lost:
         look = {"color": style.GREY, "marker": "X", "ls": "", "ms": 6}
         yield Line2D([], [], **look, label="terminated early")
     marks: dict[str, Any] = {}

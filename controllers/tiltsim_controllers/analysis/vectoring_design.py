@@ -1,0 +1,262 @@
+"""Parameters of `vectoring` from a vehicle, its actuators and the times of the control loop.
+
+Bandwidths come from the delay that no prediction removes, braking limits from the thrusts that the
+limits leave, and the side force that needs no lean from a linear program.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import exp, inf
+from typing import Any, Final
+
+import numpy as np
+from scipy.linalg import expm
+from scipy.optimize import linprog
+
+from tiltsim_controllers.laws.vectoring import Vectoring
+from tiltsim_controllers.laws.vectoring_state import Parameters
+from tiltsim_controllers.mathematics.scalar import Floats, Values
+from tiltsim_controllers.vehicle.effectiveness import force_and_torque
+
+SIDE_SHARE: Final = 0.65
+"""Share of the greatest thrusts that side force may take."""
+TOTAL_SHARE: Final = 0.9
+"""Share of the greatest thrusts that is demanded in all."""
+DELAY_MARGIN: Final = 0.25
+"""Attitude bandwidth times the delay that is left."""
+POSITION_SHARE: Final = 0.3
+"""Position bandwidth over attitude bandwidth."""
+FASTEST: Final = (40.0, 23.0, 8.0)
+"""rad/s: attitude, yaw and position without lag and latency."""
+OBSERVERS: Final = (20.0, 40.0)
+"""1/s: the fastest observers of force and torque."""
+TRACKING: Final = 250.0
+"""1/s: how fast the wrench follows its demand where rotors have no lag."""
+REACH: Final = 10.0
+"""Greatest thrust over hover thrust where nothing else limits it."""
+DIRECTIONS: Final = 8
+"""Directions of side force in the linear programs."""
+
+
+@dataclass(frozen=True)
+class Craft:
+    """A vehicle as the design sees it, N rotors with M tilts.
+
+    Attributes:
+        table: Table of the rotors, per newton.
+        mass, gravity: kg, m/s^2.
+        inertia: kg m^2, shape (3, 3).
+        thrust: N s^2/rad^2, shape (N,).
+        slowest, fastest: rad/s, along the spin, shape (N,).
+        tilts: At the start, rad, shape (M,).
+        commanded: Whether the law commands the tilts.
+        moving: Whether a gait moves them.
+        levers: m, of the rotors from the center of mass, shape (N,).
+    """
+
+    table: Values
+    mass: float
+    gravity: float
+    inertia: Floats
+    thrust: Floats
+    slowest: Floats
+    fastest: Floats
+    tilts: Floats
+    commanded: bool
+    moving: bool
+    levers: Floats
+
+    @property
+    def hover(self) -> float:
+        """Thrust (N) of a rotor in hover, were all upward."""
+        return self.mass * self.gravity / len(self.thrust)
+
+    @property
+    def limits(self) -> tuple[Floats, Floats]:
+        """Least and greatest thrusts, N, shape (N,) each."""
+        low, high = (self.thrust * s * np.abs(s) for s in (self.slowest, self.fastest))
+        return low, high
+
+    def wrench(self, tilts: Floats) -> Floats:
+        """Force and torque per newton, shape (6, N)."""
+        force, torque = force_and_torque(self.table, tilts[np.newaxis])
+        return np.vstack([force[0], torque[0]])
+
+
+@dataclass(frozen=True)
+class Timing:
+    """Times of a control loop.
+
+    Attributes:
+        period: s, between control samples, or of integration.
+        sampled: Whether there are samples.
+        latency: Samples from a reading to its command.
+        lag: s, of the rotors; 0 for none.
+        servo: Natural frequency (rad/s) and damping ratio of the tilt servos.
+        tilt_gain: 1/s, of the loop that moves the commanded tilts.
+    """
+
+    period: float
+    sampled: bool
+    latency: int
+    lag: float
+    servo: tuple[float, float]
+    tilt_gain: float
+
+
+def preferred_tilts(craft: Craft) -> Floats:
+    """The gait's angles or level ones, whichever are farther from singular, rad, shape (M,)."""
+    if not craft.commanded:
+        return craft.tilts
+
+    def margin(tilts: Floats) -> float:
+        scale = np.repeat([1.0, 1.0 / float(craft.levers.mean())], 3)[:, np.newaxis]
+        rows = scale * craft.wrench(tilts)
+        sizes = [np.linalg.svd(part, compute_uv=False)[-1] for part in (rows, rows[2:])]
+        return float((sizes[0] if len(craft.thrust) >= 6 else 0.0) + 1e-3 * sizes[1])
+
+    return max((craft.tilts, np.zeros(len(craft.tilts))), key=margin)
+
+
+def side_slope(craft: Craft, rows: Floats) -> float:
+    """Side force per lift that level hover has in every direction within the limits.
+
+    Args:
+        craft: The vehicle.
+        rows: Force and torque per newton, shape (6, N).
+    """
+    if craft.moving:
+        return 0.0
+    if craft.commanded:
+        return 0.5
+    if np.linalg.matrix_rank(rows, tol=1e-6) < 6:
+        return 0.0
+    low, high = craft.limits
+    bounds = [*zip(low, np.minimum(SIDE_SHARE * high, 2.4 * craft.hover), strict=True), (0, None)]
+    weight, least = craft.mass * craft.gravity, inf
+    for angle in 2.0 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS:
+        aside = np.array([-np.cos(angle), -np.sin(angle), 0.0, 0.0, 0.0, 0.0])
+        found = linprog(
+            np.array([*np.zeros(len(low)), -1.0]),
+            A_eq=np.column_stack([rows, aside]),
+            b_eq=weight * np.eye(6)[2],
+            bounds=bounds,
+        )
+        least = min(least, -float(found.fun) if found.status == 0 else 0.0)
+    return 0.8 * least / weight
+
+
+def free_axis(rows: Floats) -> Floats:
+    """Unit axis of the force of the least thrusts that lift without torque, shape (3,)."""
+    up, torque = rows[2], rows[3:]
+    free = up - np.linalg.pinv(torque, rcond=1e-9) @ (torque @ up)
+    force = rows[:3] @ free
+    size = float(np.linalg.norm(force))
+    return force / size if size > 1e-9 else np.array([0.0, 0.0, 1.0])
+
+
+def _servo_step(servo: tuple[float, float], period: float) -> tuple[Values, Values]:
+    """Angle and rate of a servo after a period, per angle, rate and set point."""
+    w, z = servo
+    system = np.array([[0.0, 1.0, 0.0], [-w * w, -2.0 * z * w, w * w], [0.0, 0.0, 0.0]])
+    angle, rate, _ = map(tuple, expm(system * period).tolist())
+    return angle, rate
+
+
+def _rotor_step(timing: Timing, lag: float) -> dict[str, float]:
+    """Shares of speeds and commands in the speeds after a period of commands that ramp."""
+    h = timing.period
+    if lag == 0.0:
+        return {"keep": 0.0, "old": 0.0, "new": 1.0, "begun": 1.0, "gone": 1.0, "reads": 1.0}
+    keep = exp(-h / lag)
+    mean = lag / h * (1.0 - keep)
+    begun = 1.0 - exp(-0.5 * h / lag) if timing.sampled else 0.0
+    gone = 1.0 - keep
+    return {
+        "keep": keep,
+        "old": mean - keep,
+        "new": 1.0 - mean,
+        "begun": begun,
+        "gone": gone,
+        "reads": 0.0,
+    }
+
+
+def _authority(craft: Craft, rows: Floats) -> tuple[float, float]:
+    """Angular accelerations (rad/s^2) about x and y, and about z, that hover leaves."""
+    low, high = craft.limits
+    room = np.maximum(np.minimum(high - craft.hover, craft.hover - low), 0.05 * craft.hover)
+    turn = np.abs(rows[3:]) @ room / np.diag(craft.inertia)
+    return min(500.0, float(turn[:2].min())), min(350.0, float(turn[2]))
+
+
+def _observer_gains(bandwidth: float, period: float) -> tuple[float, float]:
+    """Gains of an observer with a double pole, on the motion and on the disturbance (1/s)."""
+    pole = exp(-bandwidth * period)
+    return 1.0 - pole * pole, (1.0 - pole) ** 2 / period
+
+
+def design(keys: Vectoring, craft: Craft, timing: Timing) -> tuple[Parameters, Values]:
+    """Parameters of the law, and its table."""
+    h, preferred = timing.period, preferred_tilts(craft)
+    rows = craft.wrench(preferred)
+    high = craft.limits[1]
+    lag = timing.lag if keys.lag_model else 0.0
+    slope = side_slope(craft, rows)
+    angular, yaw_angular = _authority(craft, rows)
+    greatest = float(high.sum()) / craft.mass
+    lift = max(0.0, (greatest / craft.gravity) ** 2 - 1.0) ** 0.5
+    tracking = min(TRACKING, keys.lead / lag) if lag else TRACKING
+    latency = timing.latency * h
+    sample = h * timing.sampled
+    left = 1.5 * sample + 1.0 / tracking + (0.3 if keys.prediction else 1.0) * latency
+    attitude = keys.attitude_bandwidth or min(FASTEST[0], DELAY_MARGIN / left)
+    position = keys.position_bandwidth or min(FASTEST[2], POSITION_SHARE * attitude)
+    force = keys.observer * min(OBSERVERS[0], attitude)
+    delay = 1.5 * sample + 1.0 / tracking + latency
+    torque = keys.observer * min(OBSERVERS[1], 0.5 / delay)
+    velocity_gain, force_gain = _observer_gains(2.0 * force, h)
+    rate_gain, torque_gain = _observer_gains(2.0 * torque, h)
+    servo_angle, servo_rate = _servo_step(timing.servo, h)
+    parameters = Parameters(
+        period=h,
+        late=(1.5 * h if lag else h) if timing.sampled else 0.0,
+        **_rotor_step(timing, lag),
+        predicts=float(keys.prediction),
+        bounded=float(keys.bounded),
+        position=position,
+        damping=1.0,
+        acceleration=min(20.0, 0.7 * craft.gravity * lift),
+        descent=6.0,
+        greatest=TOTAL_SHARE * greatest,
+        lean_time=1.5 / attitude if slope < 1.0 else 0.0,
+        attitude=attitude,
+        attitude_damping=0.9,
+        yaw=min(FASTEST[1], attitude),
+        angular=angular,
+        yaw_angular=yaw_angular,
+        reversal=lag + h if lag else 0.0,
+        share=1.0 - exp(-tracking * h),
+        velocity_gain=velocity_gain,
+        force_gain=force_gain,
+        rate_gain=rate_gain,
+        torque_gain=torque_gain,
+        slope=slope,
+        hover=craft.hover,
+        lever=max(0.02, float(craft.levers.mean())),
+        axis=tuple(free_axis(rows).tolist()),
+        side_softness=3e-4 if len(craft.thrust) >= 6 else 1.0,
+        pull=min(1.0, keys.restoring * h),
+        tilt_step=keys.max_tilt_rate * h,
+        tilt_range=keys.max_tilt,
+        tilt_gain=timing.tilt_gain,
+        servo_angle=servo_angle,
+        servo_rate=servo_rate,
+        servo_lead=2.0 * timing.servo[1] / timing.servo[0],
+        patience=5.0 / timing.servo[0] + 3.0 * h,
+    )
+    numbers: list[Any] = [craft.thrust, craft.slowest, craft.fastest]
+    if craft.commanded:
+        numbers.append(preferred)
+    return parameters, tuple(float(value) for part in numbers for value in part)

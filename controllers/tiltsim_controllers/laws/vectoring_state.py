@@ -1,0 +1,252 @@
+"""State of `vectoring`: memory, observers of disturbances, and the motion to where commands act."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from tiltsim_controllers.code.arrays import xp
+from tiltsim_controllers.code.blocks import repeat, take_row
+from tiltsim_controllers.laws.observed import Observed
+from tiltsim_controllers.laws.vectoring_steps import Frame, Motion, accelerations, moved
+from tiltsim_controllers.mathematics.records import Vector3
+from tiltsim_controllers.vehicle.rotors import wrench_map
+
+
+class Parameters(NamedTuple):
+    """Numbers of the law, see `tiltsim_controllers.analysis.vectoring_design`."""
+
+    period: float  # s, between calls
+    late: float  # s, from the arrival of a command to the middle of its effect
+    keep: float  # share of a rotor's speed, ...
+    old: float  # ... of its former and ...
+    new: float  # ... of its next speed command in its speed after a period
+    begun: float  # share of the way to a speed command when its effect begins
+    gone: float  # share of the way to a constant command after a period
+    reads: float  # 1: rotors are where they are commanded to, else 0
+    predicts: float  # 1 or 0
+    bounded: float  # 1 or 0
+    position: float  # rad/s
+    damping: float
+    acceleration: float  # m/s^2, of the feedback
+    descent: float  # m/s^2, likewise downward
+    greatest: float  # m/s^2, of the rotors
+    lean_time: float  # s, until a braking begins
+    attitude: float  # rad/s
+    attitude_damping: float
+    yaw: float  # rad/s
+    angular: float  # rad/s^2, about x and y
+    yaw_angular: float  # rad/s^2
+    reversal: float  # s, until a braking begins
+    share: float  # of a demanded change of the wrench in a period
+    velocity_gain: float  # of the observers, per call
+    force_gain: float  # 1/s, likewise
+    rate_gain: float
+    torque_gain: float
+    slope: float  # side force per lift without lean
+    hover: float  # N, thrust of a rotor
+    lever: float  # m
+    axis: Vector3  # along which it pushes with fixed rotors or preferred tilts
+    side_softness: float
+    pull: float  # share of the way to the preferred inputs in a period
+    tilt_step: float  # rad, in a period
+    tilt_range: float  # rad
+    tilt_gain: float  # 1/s, of the loop around the law
+    servo_angle: Vector3  # of a servo after a period, per angle, rate and set point
+    servo_rate: Vector3  # likewise
+    servo_lead: float  # s
+    patience: float  # s, until a servo that does not move counts as stuck
+
+
+class Memory(NamedTuple):
+    """The law's states of N rotors and M commanded tilts, with d samples of latency."""
+
+    velocity: Any  # (3,), m/s, modeled, world axes
+    omega: Any  # (3,), rad/s, modeled, body axes
+    force: Any  # (3,), m/s^2, of the disturbance
+    torque: Any  # (3,), rad/s^2, of the disturbance
+    speeds: Any  # (d + 1, N), rad/s: commanded, at the present and the next samples
+    points: Any  # (d, M), rad: set points of the servos on their way
+    doubt: Any  # (M,), s, for which servos did not move
+
+
+def state_units(rotors: int, tilts: int, latency: int) -> dict[str, str]:
+    """Names and units of the states, in the order of `Memory`."""
+    numbers, pods, steps = range(1, rotors + 1), range(1, tilts + 1), range(latency + 1)
+    return {
+        **{f"state_modeled_velocity_{axis}": "m/s" for axis in "xyz"},
+        **{f"state_modeled_rate_{axis}": "rad/s" for axis in "xyz"},
+        **{f"state_disturbing_acceleration_{axis}": "m/s^2" for axis in "xyz"},
+        **{f"state_disturbing_angular_acceleration_{axis}": "rad/s^2" for axis in "xyz"},
+        **{f"state_speed_command_{step}_{i}": "rad/s" for step in steps for i in numbers},
+        **{f"state_set_point_{step}_{i}": "rad" for step in steps[1:] for i in pods},
+        **{f"state_still_{i}": "s" for i in pods},
+    }
+
+
+def memory_of(observed: Observed) -> Memory:
+    """The law's states by name."""
+    states, rotors = observed.states, len(observed.thrusts)
+    tilts = len(observed.tilt_commands)
+    steps = (len(states) - 12 - rotors - tilts) // (rotors + tilts)
+    first = 12 + rotors * (steps + 1)
+    speeds, points = states[12:first], states[first : first + steps * tilts]
+    velocity, omega, force, torque = states[:12].reshape(4, 3)
+    return Memory(
+        velocity,
+        omega,
+        force,
+        torque,
+        speeds.reshape(steps + 1, rotors),
+        points.reshape(steps, tilts),
+        states[first + steps * tilts :],
+    )
+
+
+class Known(NamedTuple):
+    """The law's knowledge at a call: observation, parameters, memory and `law_table`."""
+
+    seen: Observed
+    p: Parameters
+    memory: Memory
+    frame: Frame
+    now: Motion
+    asked: Any  # (d + 1, N), rad/s: `Memory.speeds`, from measured speeds on without lag
+    thrust: Any  # (N,), N s^2/rad^2
+    slowest: Any  # (N,), rad/s, along the spin
+    fastest: Any
+    preferred: Any  # (M,), rad
+
+    def thrusts(self, speeds: Any) -> Any:
+        """Thrusts (N) at speeds (rad/s), shape (N,) each."""
+        return self.thrust * speeds * abs(speeds)
+
+    def speeds(self, thrusts: Any) -> Any:
+        """The inverse of `thrusts`."""
+        return xp.copysign(xp.sqrt(abs(thrusts) / self.thrust), thrusts)
+
+    def wrench(self, speeds: Any, tilts: Any) -> Any:
+        """Force (N) and torque (N m) of the rotors, body axes, shape (6,)."""
+        return wrench_map(self.seen.rotors, tilts) @ self.thrusts(speeds)
+
+
+class Ahead(NamedTuple):
+    """The state at which a command will act."""
+
+    now: Motion
+    speeds: Any  # (N,), rad/s, of the rotors
+    asked: Any  # (N,), rad/s, last commanded
+    tilts: Any  # (M,), rad
+    tilt_rates: Any  # (M,), rad/s
+    time: Any  # s from now
+
+
+def known_of(observed: Observed, p: Parameters) -> Known:
+    """The law's knowledge at a call."""
+    body, memory = observed.vehicle, memory_of(observed)
+    inertia, turns = observed.inertia, observed.gyroscopic
+    rotors, table = len(observed.thrusts), xp.array(observed.table)
+    thrust, slowest, fastest = table[: 3 * rotors].reshape(3, rotors)
+    return Known(
+        observed,
+        p,
+        memory,
+        Frame(body.mass, body.gravity, inertia, turns, memory.force, memory.torque),
+        Motion(observed.position, observed.velocity, observed.rotation, observed.body_rates),
+        memory.speeds + p.reads * (observed.rotor_speeds - memory.speeds[0]),
+        thrust,
+        slowest,
+        fastest,
+        table[3 * rotors :],
+    )
+
+
+def observer_rates(known: Known) -> Any:
+    """Rates of modeled motion and estimated disturbance, shape (12,)."""
+    seen, p, now, memory = known.seen, known.p, known.now, known.memory
+    after = following(known, seen.rotor_speeds, known.asked[:2])
+    speeds = 0.5 * (seen.rotor_speeds + after)
+    wrench = known.wrench(speeds, seen.tilt_angles + 0.5 * p.period * seen.tilt_rates)
+    push, turn = accelerations(now, wrench, known.frame)
+    faster, spun = now.velocity - memory.velocity, now.omega - memory.omega
+    return xp.hstack(
+        [
+            push + p.velocity_gain / p.period * faster,
+            turn + p.rate_gain / p.period * spun,
+            p.force_gain / p.period * faster,
+            p.torque_gain / p.period * spun,
+        ]
+    )
+
+
+def following(known: Known, speeds: Any, commands: Any) -> Any:
+    """Rotor speeds (rad/s) after a period, shape (N,).
+
+    Args:
+        known: See `Known`.
+        speeds: At its beginning, rad/s.
+        commands: At its beginning and end, or equal ones once, rad/s, shape (2, N) or (1, N).
+    """
+    p = known.p
+    return p.keep * speeds + p.old * commands[0] + p.new * commands[-1]
+
+
+def servo_doubts(known: Known) -> tuple[Any, Any]:
+    """Rates of the doubts in the servos, and 1 for a servo that works, else 0: shape (M,) each."""
+    seen, p, before = known.seen, known.p, known.memory.doubt
+    if len(seen.tilt_commands) == 0:
+        return xp.zeros(0), xp.zeros(0)
+    way = abs(seen.tilt_commands - seen.tilt_angles)
+    still = (way > 0.02) & (abs(seen.tilt_rates) * p.patience < 0.5 * way)
+    doubt = xp.where(still, xp.minimum(before + p.period, 2.0 * p.patience), 0.0)
+    doubt = xp.where((way > 0.02) | (before == 0.0), doubt, before)
+    return (doubt - before) / p.period, xp.where(doubt > p.patience, 0.0, 1.0)
+
+
+def served(known: Known, tilts: Any, rates: Any, point: Any, usable: Any) -> tuple[Any, Any]:
+    """Tilts (rad) and their rates (rad/s) after a period, shape (M,) each.
+
+    Args:
+        known: See `Known`.
+        tilts, rates: At its beginning, rad and rad/s.
+        point: Set point of the servos, rad.
+        usable: 0 for a servo that is stuck, else 1.
+    """
+    state = xp.vstack([tilts, rates, point])
+    angle = xp.where(usable > 0.5, xp.array(known.p.servo_angle) @ state, tilts)
+    return angle, usable * (xp.array(known.p.servo_rate) @ state)
+
+
+def predicted(known: Known, usable: Any) -> Ahead:
+    """The state at which this call's command will act, by the commands on their way."""
+    seen, p, asked, now = known.seen, known.p, known.asked, known.now
+    steps, rotors, free = len(asked) - 1, len(seen.thrusts), len(seen.tilt_commands) > 0
+    tilts, rates, speeds = seen.tilt_angles, seen.tilt_rates, seen.rotor_speeds
+    planned, h = seen.reference.tilt_rates, p.period
+    queue, points = asked.ravel(), known.memory.points.ravel()
+
+    def turn(i: Any, *state: Any) -> tuple[Any, ...]:
+        body, speeds, tilts, rates = Motion(*state[:4]), *state[4:]
+        commands = take_row(queue, i, rotors), take_row(queue, i + 1.0, rotors)
+        next_speeds = following(known, speeds, commands)
+        if free:
+            point = take_row(points, i, len(tilts))
+            next_tilts, next_rates = served(known, tilts, rates, point, usable)
+        else:
+            next_tilts, next_rates = tilts + h * planned, planned
+        mean = 0.5 * (speeds + next_speeds), 0.5 * (tilts + next_tilts)
+        body = moved(body, known.wrench(*mean), known.frame, h)
+        return (*body, next_speeds, next_tilts, next_rates)
+
+    state: tuple[Any, ...] = (*now, speeds, tilts, rates)
+    if steps:
+        state = repeat(steps * p.predicts, turn, *state)
+    now, (speeds, tilts, rates) = Motion(*state[:4]), state[4:]
+    speeds = speeds + p.begun * (asked[-1] - speeds)
+    late = p.predicts * p.late
+    if free:
+        at = served(known, tilts, rates, seen.tilt_commands, usable)[0]
+        tilts = xp.where(p.predicts * late > 0.0, at, tilts)
+    else:
+        tilts = tilts + late * planned
+    now = moved(now, known.wrench(speeds, tilts), known.frame, late)
+    return Ahead(now, speeds, asked[-1], tilts, rates, p.predicts * steps * h + late)

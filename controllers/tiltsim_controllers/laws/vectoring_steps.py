@@ -1,0 +1,199 @@
+"""Steps of `vectoring`: motion ahead, demanded acceleration, direction of the force, attitude."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from tiltsim_controllers.code.arrays import xp
+from tiltsim_controllers.laws.decouplers import exact_decoupler
+from tiltsim_controllers.laws.feedback import body_rate_matrix
+from tiltsim_controllers.mathematics.attitude import rotation_matrix
+from tiltsim_controllers.mathematics.linear import cross, norm, solved_symmetric
+from tiltsim_controllers.mathematics.moving import Moving, square_root, stacked, value_of, where
+
+TINY = 1e-24
+
+
+class Motion(NamedTuple):
+    """A rigid body in motion."""
+
+    position: Any  # (3,), m, world axes
+    velocity: Any  # (3,), m/s, world axes
+    rotation: Any  # (3, 3), body to world
+    omega: Any  # (3,), rad/s, body axes
+
+
+class Frame(NamedTuple):
+    """A rigid body under disturbances."""
+
+    mass: Any  # kg
+    gravity: Any  # m/s^2
+    inertia: Any  # (3, 3), kg m^2
+    gyroscopic: Any  # 1 or 0
+    force: Any  # (3,), m/s^2, world axes, of the disturbance
+    torque: Any  # (3,), rad/s^2, body axes, likewise
+
+
+def accelerations(now: Motion, wrench: Any, frame: Frame) -> tuple[Any, Any]:
+    """Acceleration (m/s^2, world axes) and angular acceleration (rad/s^2, body axes).
+
+    Args:
+        now: Motion of the body.
+        wrench: Force (N) and torque (N m) of the rotors, body axes, shape (6,).
+        frame: The body.
+    """
+    weight = xp.array([0.0, 0.0, -frame.gravity])
+    momentum = frame.inertia @ now.omega
+    turning = wrench[3:] - frame.gyroscopic * cross(now.omega, momentum)
+    return (
+        now.rotation @ wrench[:3] / frame.mass + frame.force + weight,
+        solved_symmetric(frame.inertia, turning) + frame.torque,
+    )
+
+
+def turn_by(vector: Any) -> Any:
+    """The rotation, shape (3, 3), of a rotation vector (rad), shape (3,)."""
+    angle = xp.sqrt(vector @ vector + TINY)
+    half = xp.sin(0.5 * angle) / (0.5 * angle)
+    sine, versine = xp.sin(angle) / angle, 0.5 * half * half
+    x, y, z = vector
+    k = xp.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return xp.eye(3) + sine * k + versine * (k @ k)
+
+
+def moved(now: Motion, wrench: Any, frame: Frame, time: Any) -> Motion:
+    """A body after a time under a constant wrench.
+
+    Args:
+        now: Its motion.
+        wrench: Force (N) and torque (N m) of its rotors, body axes, shape (6,).
+        frame: The body.
+        time: s.
+    """
+    push, turning = accelerations(now, wrench, frame)
+    half = 0.5 * time
+    return Motion(
+        now.position + time * (now.velocity + half * push),
+        now.velocity + time * push,
+        now.rotation @ turn_by(time * (now.omega + half * turning)),
+        now.omega + time * turning,
+    )
+
+
+def braked(error: Any, gain: Any, limit: Any, delay: Any) -> Any:
+    """Speed toward zero of an error's length: proportional, or of a braking at a limit.
+
+    Args:
+        error: Its length, which may move.
+        gain: 1/s, near zero.
+        limit: The largest deceleration.
+        delay: s, until it begins.
+    """
+    lost = limit * delay
+    slow = gain * value_of(error) < xp.sqrt(lost * lost + 2.0 * limit * value_of(error)) - lost
+    root = square_root(where(slow, 1.0, lost * lost + 2.0 * limit * error))
+    return where(slow, gain * error, root - lost)
+
+
+def demanded(error: Moving, jerk_error: Any, ahead: Moving, frame: Frame, p: Any) -> Moving:
+    """Acceleration (m/s^2, world axes) that the rotors shall make on top of gravity's, shape (3,).
+
+    The feedback follows a braking curve; all is within the thrust that the vehicle has, lift first.
+
+    Args:
+        error: Position error, m.
+        jerk_error: Its third derivative, m/s^3.
+        ahead: Acceleration of the reference, m/s^2.
+        frame: The body.
+        p: Parameters of the law.
+    """
+    stiffness = p.position / (2.0 * p.damping)  # speed per error, 1/s
+    slope = Moving(error.rate, error.acceleration, jerk_error)
+    size = square_root(error @ error + TINY)
+    speed = braked(size, stiffness, 0.6 * p.acceleration, p.lean_time) / size
+    feedback = 2.0 * p.damping * p.position * (speed * error + slope)
+    side = _within(feedback[:2], p.acceleration)
+    rise = _clipped(feedback[2], -p.descent, p.acceleration)
+    wanted = ahead + stacked(side[0], side[1], rise) - frame.force
+    lift = _clipped(wanted[2] + frame.gravity, 0.2 * frame.gravity, p.greatest)
+    # No more side force than leaves the lift, and no lean beyond 60 degrees.
+    up = lift.value
+    left = xp.sqrt(xp.maximum(p.greatest * p.greatest - up * up, 0.04 * p.greatest * p.greatest))
+    side = _within(wanted[:2], xp.minimum(left, 1.7 * up))
+    return stacked(side[0], side[1], lift)
+
+
+def _within(vector: Moving, limit: Any) -> Moving:
+    """A moving vector no longer than a limit."""
+    square = vector @ vector
+    is_long = square.value > limit * limit
+    scale = where(is_long, limit, 1.0) / square_root(where(is_long, square, 1.0))
+    return vector * scale
+
+
+def _clipped(x: Moving, low: Any, high: Any) -> Moving:
+    """A moving number within limits, at rest there."""
+    return where(x.value < low, low, where(x.value > high, high, x))
+
+
+def pointing(force: Moving, axis: Any, yaw: Any, slope: Any) -> tuple[Any, Any, Any]:
+    """The attitude that points an axis along a force, less what the force may leave the axis.
+
+    Args:
+        force: Per mass, gravity included, m/s^2, world axes, shape (3,), upward.
+        axis: Body axes, moving or not, shape (3,).
+        yaw: rad.
+        slope: Side force per lift that needs no lean.
+
+    Returns:
+        Body to world, shape (3, 3), and its rates (rad/s) and their rates (rad/s^2), shape (3,)
+        each, in its own axes.
+    """
+    side, lift = force[:2], force[2]
+    square, own = side @ side, slope * lift
+    leans = square.value >= own.value * own.value
+    safe = square_root(where(leans & (square.value > 0.0), square, 1.0))
+    share = where(leans, 1.0 - own / safe, 0.0)
+    x, y = share * side[0], share * side[1]
+    roll, pitch = exact_decoupler(x, y, lift, yaw, 0.0, axis)
+    first = xp.array([roll.rate, pitch.rate, 0.0])
+    second = xp.array([roll.acceleration, pitch.acceleration, 0.0])
+    omega = body_rate_matrix(roll, pitch) @ Moving(first, second, xp.zeros(3))
+    return rotation_matrix(xp.array([roll.value, pitch.value, yaw])), omega.value, omega.rate
+
+
+def turning(now: Motion, desired: Any, rates: Any, second: Any, p: Any) -> Any:
+    """Angular acceleration (rad/s^2, body axes) toward a moving attitude, shape (3,).
+
+    The body's z axis first turns to its desired direction by the shortest way; yaw is apart.
+
+    Args:
+        now: Motion of the body.
+        desired, rates, second: Results of `pointing`.
+        p: Parameters of the law.
+    """
+    error = now.rotation.T @ desired
+    z = error[:, 2]
+    sine = xp.sqrt(z[0] * z[0] + z[1] * z[1] + TINY)
+    angle = xp.arctan2(sine, z[2])
+    way = xp.array([-z[1], z[0], 0.0]) / sine
+    rest = turn_by(-angle * way) @ error
+    yaw = xp.arctan2(rest[1, 0], rest[0, 0])
+    gain = p.attitude / (2.0 * p.attitude_damping)
+    gain_yaw = p.yaw / (2.0 * p.attitude_damping)
+    lean = braked(angle, gain, 0.6 * p.angular, p.reversal) * way
+    spin = braked(abs(yaw), gain_yaw, 0.6 * p.yaw_angular, p.reversal) * xp.copysign(1.0, yaw)
+    led = error @ rates
+    gap = lean + spin * xp.array([0.0, 0.0, 1.0]) + led - now.omega
+    damping = 2.0 * p.attitude_damping * xp.array([p.attitude, p.attitude, p.yaw])
+    limits = p.angular, p.yaw_angular
+    ahead = _shared(error @ second - cross(now.omega, led), 0.5, limits)
+    return ahead + _shared(damping * gap, 1.0, limits)
+
+
+def _shared(vector: Any, share: Any, limits: tuple[Any, Any]) -> Any:
+    """Angular accelerations about x and y, and about z, within a share of their limits."""
+    tilt, yaw = share * limits[0], share * limits[1]
+    size = norm(vector[:2] + xp.array([TINY, 0.0]))
+    scale = xp.where(size > tilt, tilt / size, 1.0)
+    return xp.hstack([scale * vector[:2], xp.clip(vector[2], -yaw, yaw)])

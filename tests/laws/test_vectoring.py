@@ -1,0 +1,152 @@
+"""The law `vectoring`: disturbances, limits, latency, lag, faults, plants and engines."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import tiltsim
+from tests.laws.test_multirotor import mjcf
+from tiltsim_controllers.analysis.vectoring_design import Craft, side_slope
+from tiltsim_controllers.laws.vectoring_steps import braked, turn_by
+from tiltsim_controllers.vehicle.effectiveness import table_per_newton
+
+LAG = {"rotor_time_constant": 0.03, "min_rotor_speed": 60.0, "max_rotor_speed": 838.0}
+LATE = {"timestep": 0.002, "control_timestep": 0.004, "control_latency": 0.008}
+CIRCLE = {
+    "reference": {"type": "circle", "radius": 1.7, "angular_frequency": 0.9},
+    "initial": {"position": [1.7, 0.0, 0.0], "velocity": [0.0, 1.53, 0.0]},
+}
+
+
+def tables(vehicle, duration, late=LATE, **changes):
+    """A vehicle of the fleet in the world of these tests."""
+    free = {"tilts": "free"} if vehicle.startswith("tilt") else {}
+    return {
+        "vehicle": {"model": "multirotor", "mjcf": mjcf(vehicle), **LAG},
+        "controller": {"law": "vectoring", **free},
+        "model_error": {"mass": 1.1, "thrust_coefficient": 0.9},
+        "simulation": {"duration": duration, "engine": "native", **late},
+        **changes,
+    }
+
+
+def fly(vehicle, duration, **changes):
+    flight = tiltsim.simulate(tables(vehicle, duration, **changes))
+    assert flight.end.kind == "completed", flight.end
+    return flight
+
+
+def position_error(flight):
+    return np.linalg.norm(flight["reference_position"] - flight["position"], axis=1)
+
+
+def test_observers_remove_a_constant_force_and_a_weak_rotor():
+    flight = fly(
+        "quadrotor",
+        4.0,
+        disturbance=[{"type": "acceleration", "value": [1.5, -1.0, 0.8]}],
+        fault=[{"type": "partial_thrust", "rotor": 1, "time": 1.0, "factor": 0.85}],
+    )
+    error = position_error(flight)
+    assert error.max() < 0.1
+    assert error[-10:].max() < 1e-4
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("vehicle", ["hexarotor", "cant_hexarotor", "tilt_octorotor"])
+def test_a_circle_is_followed_with_rotors_that_lag(vehicle):
+    assert position_error(fly(vehicle, 4.0, **CIRCLE))[500:].max() < 0.01
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("vehicle", ["quadrotor", "tilt_octorotor"])
+def test_native_flights_are_those_in_python(vehicle):
+    for late in (LATE, {"timestep": 0.002}):
+        python, native = (
+            tiltsim.simulate(tables(vehicle, 0.2, late={**late, "engine": engine}, **CIRCLE))
+            for engine in ("python", "native")
+        )
+        np.testing.assert_array_equal(python.samples, native.samples)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("vehicle", ["hexarotor", "tilt_octorotor"])
+def test_the_rigid_body_flies_as_in_mujoco(vehicle):
+    mujoco, equations = (
+        fly(vehicle, 1.0, late={**LATE, "plant": plant}, **CIRCLE)
+        for plant in ("mujoco", "rigid_body")
+    )
+    assert np.abs(mujoco["position"] - equations["position"]).max() < 1e-9
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "late", [LATE, {"timestep": 0.002, "control_timestep": 0.01, "control_latency": 0.02}]
+)
+@pytest.mark.parametrize("vehicle", ["quadrotor", "tilt_hexarotor"])
+def test_a_step_is_flown_at_the_limits_of_the_rotors(vehicle, late):
+    target = {"type": "setpoint", "position": [1.3, -0.7, 0.5]}
+    flight = fly(vehicle, 4.0, late=late, reference=target)
+    speeds = np.abs(flight["rotor_speeds"])
+    assert speeds.max() <= 838.0
+    assert speeds.min() >= 60.0
+    assert position_error(flight)[-1] < 0.02
+
+
+@pytest.mark.slow
+def test_a_stuck_servo_is_left_out():
+    stuck = [{"type": "stuck_servo", "rotor": 2, "time": 1.0, "angle": 0.4}]
+    error = position_error(fly("tilt_hexarotor", 4.0, fault=stuck, **CIRCLE))
+    assert error.max() < 0.05
+    assert error[-100:].max() < 0.01
+
+
+# --- steps -------------------------------------------------------------------------------------
+
+
+def test_rotation_vectors_turn():
+    vector = np.array([0.3, -0.2, 0.9])
+    turn = turn_by(vector)
+    np.testing.assert_allclose(turn @ turn.T, np.eye(3), atol=1e-15)
+    np.testing.assert_allclose(turn @ vector, vector, atol=1e-15)
+    assert np.trace(turn) == pytest.approx(1.0 + 2.0 * np.cos(np.linalg.norm(vector)), rel=1e-14)
+    np.testing.assert_allclose(turn_by(np.zeros(3)), np.eye(3), atol=1e-20)
+
+
+def test_a_braking_curve_ends_at_rest():
+    """From any distance, at the demanded speed, the limit stops the error after the delay."""
+    for error in (0.5, 2.0, 10.0):
+        speed = braked(error, 1e3, 4.0, 0.1)
+        assert speed * 0.1 + speed**2 / (2.0 * 4.0) == pytest.approx(error, rel=1e-12)
+    assert braked(1e-3, 2.0, 4.0, 0.1) == 2e-3
+
+
+def craft(vehicle, **changes):
+    loaded = tiltsim.airframe(tables(vehicle, 1.0)).vehicle
+    speeds = np.full(len(loaded.spins), 838.0)
+    numbers = {
+        "table": table_per_newton(loaded.table, loaded.thrust_coefficients),
+        "mass": loaded.mass,
+        "gravity": loaded.gravity,
+        "inertia": np.reshape(loaded.inertia, (3, 3)),
+        "thrust": np.array(loaded.thrust_coefficients),
+        "slowest": 0.0 * speeds,
+        "fastest": speeds,
+        "tilts": np.zeros(loaded.tilts),
+        "commanded": False,
+        "moving": False,
+        "levers": np.ones(len(speeds)),
+    }
+    return Craft(**{**numbers, **changes})
+
+
+def test_only_canted_rotors_have_side_force_without_leaning():
+    flat, canted = craft("hexarotor"), craft("cant_hexarotor")
+    assert side_slope(flat, flat.wrench(flat.tilts)) == 0.0
+    rows = canted.wrench(canted.tilts)
+    slope = side_slope(canted, rows)
+    assert 0.02 < slope < 1.0
+    stronger = craft("cant_hexarotor", fastest=1.2 * canted.fastest)
+    assert side_slope(stronger, rows) >= slope
+    assert side_slope(craft("cant_hexarotor", moving=True), rows) == 0.0

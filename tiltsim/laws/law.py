@@ -1,0 +1,87 @@
+"""The record of a control law of a rotorcraft, from which `rotor_loop` makes a closed loop."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any
+
+from tiltsim.closed_loop.loop import ControlSetup
+from tiltsim_controllers.code.arrays import xp
+from tiltsim_controllers.gaits.motion import planned_tilts
+from tiltsim_controllers.laws.observed import Seen, Step
+from tiltsim_controllers.mathematics.scalar import Floats, Values
+
+if TYPE_CHECKING:
+    from tiltsim.scenario.scenario import FlightPlan, Scenario
+
+Margins = Callable[[Mapping[str, Floats], ControlSetup], dict[str, Floats]]
+"""``(samples by field, setup) -> columns`` that a sample's state alone decides."""
+
+Tilts = Callable[[Seen, Any, Any, Any], Any]
+"""``(seen, rates of the states, parameters, knots)``: tilt angles (rad) and rates, shape (M, 2)."""
+
+
+def tilts_of_gait(tilts: int) -> Tilts:
+    """Tilts that follow the gait of a law's parameters."""
+    return lambda seen, _rates, p, knots: planned_tilts(seen.time, p.gait, knots, tilts)[:, :2]
+
+
+def tilts_in_states(first: int, tilts: int) -> Tilts:
+    """Tilts that a law commands: they are its states, from an index on."""
+    own = slice(first, first + tilts)
+    return lambda seen, rates, _p, _knots: xp.stack([seen.states[own], rates[own]], 1)
+
+
+@dataclass(frozen=True, eq=False)
+class Law:
+    """A control law with rotor accelerations as inputs.
+
+    Attributes:
+        step: The law, a function of arrays ``(seen, parameters, knots) -> Step``.
+        parameters: Type of its record. It has ``reference``; ``gait`` where the tilts follow it;
+            and ``vehicle``, with ``rotors`` as the index of the rotors' table in the knots, see
+            `tiltsim_controllers.vehicle.rotors.airframe`.
+        setup: ``(plan) -> parameters, knots to append``.
+        states: Names of the controller's states, part of a sample, and their units.
+        initial: ``(plan) -> states`` at time zero.
+        signals: Names of the first signals of a step, columns of a flight: roll, pitch and yaw that
+            it tracks, and any more. None for the attitude of the reference.
+        units: Columns of a flight other than the states and the columns of its kind, with units.
+        tilts: See `Tilts`; None for `tilts_of_gait`.
+        uses_gait: Whether the gait has a part in the flight.
+        records_commands: Whether the commands of the tilt servos are part of a sample.
+        margins: See `Margins`; None for the angle to the nearest singular attitude.
+        signs: Function of arrays ``(seen, parameters, knots)``: numbers that keep their sign until
+            the law becomes singular. None for a law that is singular nowhere.
+        causes: ``(sample by field, setup) -> texts``: why a flight ends where each reaches zero.
+        measured: Whether it sees the plant's angular acceleration, of
+            `tiltsim.laws.layers.measured_acceleration`.
+        follows_position: See `tiltsim.closed_loop.loop.ClosedLoop`.
+    """
+
+    step: Callable[[Seen, Any, Any], Step]
+    parameters: type[tuple[Any, ...]]
+    setup: Callable[[FlightPlan], tuple[Any, Values]]
+    states: Mapping[str, str] = field(default_factory=dict)
+    initial: Callable[[FlightPlan], Values] = lambda _plan: ()
+    signals: tuple[str, ...] | None = None
+    units: Mapping[str, str] = field(default_factory=dict)
+    tilts: Tilts | None = None
+    uses_gait: bool = True
+    records_commands: bool = False
+    margins: Margins | None = None
+    signs: Callable[[Seen, Any, Any], Any] | None = None
+    causes: Callable[[Mapping[str, float], ControlSetup], tuple[str, ...]] = lambda *_: ("",)
+    measured: bool = False
+    follows_position: Callable[[Scenario], bool] = lambda _scenario: True
+
+
+def parts(vector: Any, **sizes: int) -> SimpleNamespace:
+    """Consecutive parts of a vector by name."""
+    found, first = {}, 0
+    for name, size in sizes.items():
+        found[name] = vector[first : first + size]
+        first += size
+    return SimpleNamespace(**found)

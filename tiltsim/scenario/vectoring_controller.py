@@ -1,0 +1,93 @@
+"""The ``[controller]`` table of the law for every rotorcraft."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import hypot, inf
+from typing import Any, ClassVar
+
+import numpy as np
+
+from tiltsim.scenario.law_controller import Airframe, LawController, TiltingTable
+from tiltsim_controllers.analysis.stability import ErrorLoop
+from tiltsim_controllers.analysis.vectoring_design import REACH, Craft, Timing, design
+from tiltsim_controllers.laws.vectoring import Vectoring, vectoring
+from tiltsim_controllers.laws.vectoring_state import Parameters, state_units
+from tiltsim_controllers.mathematics.scalar import Floats, Values
+from tiltsim_controllers.vehicle.actuators import held_gain
+from tiltsim_controllers.vehicle.effectiveness import table_per_newton
+
+
+class VectoringController(Vectoring, TiltingTable, LawController):
+    """Observers, prediction and allocation within limits, for any rotorcraft."""
+
+    models_latency = True
+    control: ClassVar = staticmethod(vectoring)
+
+    def error_loops(self, vehicle: Any) -> list[ErrorLoop]:
+        return []
+
+    def state_units(self, airframe: Airframe) -> Mapping[str, str]:
+        tilts = len(airframe.initial_tilts) if self.commands_tilts else 0
+        return state_units(airframe.rotors, tilts, airframe.latency)
+
+    def initial_states(self, airframe: Airframe) -> Values:
+        tilts = airframe.initial_tilts if self.commands_tilts else ()
+        return (
+            *airframe.initial_velocity,
+            *airframe.initial_body_rates,
+            *(0.0,) * 6,
+            *airframe.initial_speeds * (airframe.latency + 1),
+            *tilts * airframe.latency,
+            *(0.0,) * len(tilts),
+        )
+
+    def law_parameters(self, airframe: Airframe) -> Parameters:
+        return self._design(airframe)[0]
+
+    def law_table(self, airframe: Airframe) -> Values:
+        return self._design(airframe)[1]
+
+    def _design(self, airframe: Airframe) -> tuple[Parameters, Values]:
+        vehicle = airframe.vehicle
+        thrust = np.array(vehicle.thrust_coefficients)
+        slowest, fastest = _speeds(airframe, thrust)
+        craft = Craft(
+            table_per_newton(vehicle.table, vehicle.thrust_coefficients),
+            vehicle.mass,
+            vehicle.gravity,
+            np.reshape(vehicle.inertia, (3, 3)),
+            thrust,
+            slowest,
+            fastest,
+            np.array(airframe.initial_tilts),
+            self.commands_tilts and len(airframe.initial_tilts) > 0,
+            len(airframe.initial_tilts) > 0 and not airframe.gait.is_constant,
+            np.array([hypot(*rotor.place) for rotor in vehicle.rotors]),
+        )
+        sampled = airframe.control_timestep > 0.0
+        timing = Timing(
+            airframe.control_timestep or airframe.timestep,
+            sampled,
+            airframe.latency,
+            airframe.rotor_time_constant or 0.0,
+            (airframe.servo_frequency, airframe.servo_damping),
+            held_gain(self.tilt_rate_gain, airframe.control_timestep),
+        )
+        return design(self, craft, timing)
+
+
+def _speeds(airframe: Airframe, thrust: Floats) -> tuple[Floats, Floats]:
+    """Lowest and highest speeds of the rotors along their spins, rad/s, shape (N,) each.
+
+    Limits that the plant enforces, else the range in the vehicle's file, else the speeds of a
+    multiple of the hover thrust.
+    """
+    vehicle = airframe.vehicle
+    spins = np.array(vehicle.spins)[:, np.newaxis]
+    low, high = np.sort(spins * np.array(vehicle.speed_ranges), axis=1).T
+    slowest, fastest = airframe.speed_limits
+    if fastest < inf:
+        low, high = np.full(len(thrust), slowest), np.full(len(thrust), fastest)
+    most = np.sqrt(REACH * vehicle.mass * vehicle.gravity / len(thrust) / thrust)
+    return np.maximum(low, -most), np.minimum(high, most)
