@@ -149,6 +149,6 @@ def _entries(value: Any) -> Any:
     """A tree with tuples for lists and arrays, and Python's numbers for NumPy's."""
     if isinstance(value, Mapping):
         return {key: _entries(entry) for key, entry in value.items()}
-    if isinstance(value, tuple | list) or getattr(value, "ndim", 0):
+    if isinstance(value, tuple | list) or getattr(value, "ndim", None):
         return tuple(map(_entries, value))
     return value.item() if isinstance(value, np.ndarray | np.generic) else value

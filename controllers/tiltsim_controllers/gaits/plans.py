@@ -320,21 +320,12 @@ def keyframes(
     phases = [frame[0] for frame in frames]
     if all(map(is_known, phases)):
         check_phases(phases)
-    pieces = [
-        (
-            first[0] * period,
-            *[
-                entry
-                for before, after in zip(first[1:], second[1:])
-                # Two rows at one phase make a jump, whose piece is never in force.
-                for entry in (
-                    (after - before) / xp.maximum(second[0] - first[0], 1e-12) / period,
-                    before,
-                )
-            ],
-        )
-        for first, second in itertools.pairwise(frames)
-    ]
+    pieces = []
+    for (phase, *angles), (end, *ends) in itertools.pairwise(frames):
+        # Two rows at one phase make a jump, whose piece is never in force.
+        span = xp.maximum(end - phase, 1e-12)
+        lines = (((after - before) / span / period, before) for before, after in zip(angles, ends))
+        pieces.append((phase * period, *itertools.chain.from_iterable(lines)))
     knots = tuple([value for row in pieces for value in row])
     parameters = GaitParameters(LINEAR, period=_positive(period), keyframes=float(len(pieces)))
     return Gait(name, parameters, knots, source, tilts)
