@@ -7,9 +7,10 @@ import signal
 import sys
 
 import pytest
+from coverage import Coverage
 from hypothesis import settings
 
-from tests.tracing import trace_few_rows, trace_seldom
+from tests import tracing
 
 # A busy machine may take long for an example; nothing that is tested depends on it.
 settings.register_profile("tiltsim", deadline=None)
@@ -24,12 +25,15 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
-@pytest.hookimpl(tryfirst=True)
+@pytest.hookimpl(wrapper=True)
 def pytest_collection(session):
-    """Under coverage, most steps of a flight run without its tracer."""
-    runs_tests = hasattr(session.config, "workerinput") or not session.config.getoption("-n", None)
-    if runs_tests and sys.gettrace() is not None:
-        trace_seldom()
+    """Under coverage, trace no other packages here, and later only the beginning of each test."""
+    if sys.gettrace() is None or tracing.BEGINNING is None:
+        return (yield)
+    with tracing.others_imported_untraced():
+        result = yield
+    session.config.pluginmanager.register(tracing.TracedBeginnings(Coverage.current()))
+    return result
 
 
 def pytest_collection_finish():
@@ -40,13 +44,11 @@ def pytest_collection_finish():
 
 
 def pytest_collection_modifyitems(items):
-    """Order the tests, and choose the tests that coverage traces.
+    """Order the tests.
 
     The longest of the slow tests begin first, and tests that wait for the viewer: at the end, one
     process would run them alone.
     """
-    if sys.gettrace() is not None:
-        trace_few_rows(items)
 
     def is_late(item):
         slow = item.get_closest_marker("slow")

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import ctypes
+from functools import lru_cache
 
 import numpy as np
 
 from tiltsim.closed_loop.choices import CHOICES
 from tiltsim.engines.machine_code import MachineCode
 from tiltsim_controllers.code.llvm_text import llvm_functions
+from tiltsim_controllers.code.program import trace_vectors
 from tiltsim_controllers.code.traceable import as_tuples, program_of
 
 RUN = """
@@ -58,27 +60,61 @@ def compiled(function, *like):
 
     Choices are constants, as in flights; all other numbers are inputs.
     """
+    run = _compiled(function, _form(like))
+    return lambda *arguments: run(_inputs(arguments))
 
-    def restored(entry, name, entries):
-        if isinstance(entry, tuple | list):
-            names = getattr(entry, "_fields", [name] * len(entry))
-            parts = [restored(part, inner, entries) for part, inner in zip(entry, names)]
-            return type(entry)(*parts) if hasattr(entry, "_fields") else type(entry)(parts)
-        return entry if name in CHOICES or isinstance(entry, bool | int) else next(entries)
 
-    def inputs(entry, name=""):
-        if isinstance(entry, tuple | list):
-            names = getattr(entry, "_fields", [name] * len(entry))
-            return [value for part, inner in zip(entry, names) for value in inputs(part, inner)]
-        return [] if name in CHOICES or isinstance(entry, bool | int) else [entry]
-
+@lru_cache(maxsize=64)
+def _compiled(function, form):
     def traced(values):
-        entries = iter(values)
-        return numbers(as_tuples(function(*(restored(entry, "", entries) for entry in like))))
+        return numbers(as_tuples(function(*_restored(form, iter(values)))))
 
-    size = sum(len(inputs(entry)) for entry in like)
-    run = machine_code(program_of(traced, values=size))
-    return lambda *arguments: run([value for entry in arguments for value in inputs(entry)])
+    return machine_code(program_of(traced, values=_size(form)))
+
+
+def _form(entry, name=""):
+    """The types and constants of an argument, hashable, with None for each input."""
+    if isinstance(entry, tuple | list):
+        return type(entry), tuple(map(_form, entry, getattr(entry, "_fields", [name] * len(entry))))
+    return (type(entry), entry) if _is_constant(entry, name) else None
+
+
+def _is_constant(entry, name):
+    return name in CHOICES or isinstance(entry, bool | int)
+
+
+def _restored(form, entries):
+    if form is None:
+        return next(entries)
+    kind, inner = form
+    if not isinstance(inner, tuple):
+        return inner
+    parts = [_restored(part, entries) for part in inner]
+    return kind(*parts) if hasattr(kind, "_fields") else kind(parts)
+
+
+def _size(form):
+    if form is None:
+        return 1
+    return sum(map(_size, form[1])) if isinstance(form[1], tuple) else 0
+
+
+def _inputs(entry, name=""):
+    if isinstance(entry, tuple | list):
+        names = getattr(entry, "_fields", [name] * len(entry))
+        return [value for part, inner in zip(entry, names) for value in _inputs(part, inner)]
+    return [] if _is_constant(entry, name) else [entry]
+
+
+def compiled_law(inputs, size, law):
+    """A control law ``inputs(time, state, law)`` on arrays as machine code, ``size`` states."""
+
+    def traced(given):
+        time, *state = (given[i] for i in range(1 + size))
+        return inputs(time, np.array(state, dtype=object), law)
+
+    run = machine_code(trace_vectors(traced, {"given": 1 + size}))
+    return lambda time, state: run([time, *state])
 
 
 def natively(function, *arguments):

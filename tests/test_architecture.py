@@ -15,7 +15,7 @@ import pytest
 
 import tiltsim
 import tiltsim_controllers
-from tiltsim.commands import angles, gait_options, options, video
+from tiltsim.commands import gait_options, options, video
 from tiltsim.folders import CONTROLLERS, ENTRANCE, FLYING, FOUNDATION, SHOWING
 
 ROOT = Path(tiltsim.__file__).parent
@@ -224,7 +224,7 @@ FOUR_ROTORS = {"ROTORS", "SPIN", "TILT_FIELDS", "ROTOR_FIELDS", "TILTROTOR_FIELD
 """Names that presume the four rotors of the thesis's vehicles."""
 
 OF_FOUR_ROTORS = {
-    *("commanded", "quadrotor", "tiltrotor"),
+    *("quadrotor", "tiltrotor"),
     *("cross", "metrics", "user_vehicle", "vehicle", "vehicle_parts"),
     *("attitude_plane", "concepts", "gait_analysis", "vehicle_drawing"),
     *("attainable", "effectiveness", "fault_tolerance", "rotorcraft", "statics"),
@@ -271,7 +271,7 @@ def test_every_public_function_documents_its_arguments():
     Options that several commands share are documented where they are declared.
     """
     bare = []
-    kinds = {**vars(options), **vars(angles)}
+    kinds = {**vars(options)}
     kinds |= {**vars(gait_options), **vars(video)}
     options_of_commands = [getattr(kind, "__metadata__", ()) for kind in kinds.values()]
     shared = {name for name, found in zip(kinds, options_of_commands) if found and found[0].help}
@@ -314,7 +314,7 @@ GUARDED = {
     "tiltsim.engines.code_folder": {"os.getuid"},
     "tiltsim.report.made": {"/proc/"},
     "tiltsim.studies.benchmark": {"/proc/", "resource"},
-    "tiltsim.system.locks": {"fcntl", "os.O_NOFOLLOW"},
+    "tiltsim.system.files": {"fcntl", "os.O_NOFOLLOW"},
     "tiltsim.system.processes": {
         "signal.SIG_BLOCK",
         "signal.SIG_SETMASK",

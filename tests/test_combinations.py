@@ -26,7 +26,7 @@ from tiltsim.scenario.controller import CONTROLLERS, OwnFunctionController
 from tiltsim.scenario.scenario_tables import DESCRIPTIVE
 from tiltsim.scenario.simulation_table import SimulationTable
 from tiltsim.scenario.vehicle import VehicleUnion
-from tiltsim.studies.fleet import FLEET, fleet_file
+from tiltsim.studies.multirotor_analysis import FLEET, fleet_file
 from tiltsim.views.figures.style import save
 from tiltsim.views.rerun.recording_file import save_recording
 from tiltsim.views.video.overlay import Overlay

@@ -23,6 +23,11 @@ if TYPE_CHECKING:
     from tiltsim.linear.linearization import linearize
     from tiltsim.linear.margins import margins
     from tiltsim.linear.stability import stability
+    from tiltsim.logs.export import export
+    from tiltsim.logs.identify import Estimate, identify
+    from tiltsim.logs.log import Log
+    from tiltsim.logs.reading import read_log
+    from tiltsim.logs.replay import Replay, replay
     from tiltsim.plants.command import Observation
     from tiltsim.scenario.law_controller import Airframe, Command, LawController, Observed, law, xp
     from tiltsim.scenario.loading import load_scenario, parse_scenario
@@ -32,7 +37,7 @@ if TYPE_CHECKING:
     from tiltsim.simulation.stepwise import Simulation
     from tiltsim.simulation.symbolic import symbolic
     from tiltsim.simulation.vectorized import vectorized
-    from tiltsim.sweeps.sweep import sweep
+    from tiltsim.sweeps.running import sweep
     from tiltsim.views.figures.plot import plot
     from tiltsim.views.rerun.viewer import view
     from tiltsim.views.video.making import video
@@ -41,28 +46,35 @@ _HOMES = {
     "Airframe": "scenario.law_controller",
     "Command": "scenario.law_controller",
     "End": "flight.end",
+    "Estimate": "logs.identify",
     "Flight": "flight.flight",
     "InputError": "errors",
     "LawController": "scenario.law_controller",
+    "Log": "logs.log",
     "Observation": "plants.command",
     "Observed": "scenario.law_controller",
+    "Replay": "logs.replay",
     "Scenario": "scenario.scenario",
     "Simulation": "simulation.stepwise",
     "TiltsimError": "errors",
     "airframe": "laws.airframe",
     "attraction": "linear.attraction",
+    "export": "logs.export",
     "fly": "simulation.batch",
+    "identify": "logs.identify",
     "law": "scenario.law_controller",
     "linearize": "linear.linearization",
     "load_flight": "flight.reading",
     "load_scenario": "scenario.loading",
     "margins": "linear.margins",
     "parse_scenario": "scenario.loading",
+    "read_log": "logs.reading",
+    "replay": "logs.replay",
     "simulate": "simulation.simulate",
     "plot": "views.figures.plot",
     "show_progress": "commands.progress",  # for progress=True
     "stability": "linear.stability",
-    "sweep": "sweeps.sweep",
+    "sweep": "sweeps.running",
     "symbolic": "simulation.symbolic",
     "vectorized": "simulation.vectorized",
     "video": "views.video.making",
@@ -74,17 +86,22 @@ __all__ = [
     "Airframe",
     "Command",
     "End",
+    "Estimate",
     "Flight",
     "InputError",
     "LawController",
+    "Log",
     "Observation",
     "Observed",
+    "Replay",
     "Scenario",
     "Simulation",
     "TiltsimError",
     "airframe",
     "attraction",
+    "export",
     "fly",
+    "identify",
     "law",
     "linearize",
     "load_flight",
@@ -92,6 +109,8 @@ __all__ = [
     "margins",
     "parse_scenario",
     "plot",
+    "read_log",
+    "replay",
     "simulate",
     "stability",
     "sweep",

@@ -1,7 +1,5 @@
 """The command line: one subcommand per module of `tiltsim.commands`, each a thin layer."""
 
-from __future__ import annotations
-
 import argparse
 import atexit
 import gc
@@ -41,6 +39,12 @@ analyze:
   compare      fly scenarios under several controllers
   arena        score controllers on fixed tasks
   fleet        list the vehicles that ship as MJCF files
+
+logs:
+  export       write a flight as MCAP, ULog or CSV
+  import       read a log of a real vehicle or of another tool
+  replay       fly a model on the rotor speeds and tilts of a log
+  identify     find parameters of a vehicle in a log
 
 thesis:
   map          draw the Two Color Map and check a path on it

@@ -1,7 +1,5 @@
 """Exceptions with one-line messages."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 

@@ -1,7 +1,5 @@
 """Exit codes of the command line, the same for every command."""
 
-from __future__ import annotations
-
 from typing import Final
 
 DONE: Final = 0

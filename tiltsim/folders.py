@@ -1,7 +1,5 @@
 """The order of the folders: each imports from itself and from those before it, never later ones."""
 
-from __future__ import annotations
-
 from typing import Final
 
 CONTROLLERS: Final = (
@@ -32,7 +30,7 @@ FLYING: Final = (
 )
 """Folders of `tiltsim` that a flight and its metrics depend on."""
 
-SHOWING: Final = ("linear", "sweeps", "studies", "views", "env", "report", "commands")
+SHOWING: Final = ("logs", "linear", "sweeps", "studies", "views", "env", "report", "commands")
 """Folders of `tiltsim` that use flights; none of them changes one."""
 
 FOUNDATION: Final = ("errors", "exit_codes", "resources", "folders")

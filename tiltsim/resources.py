@@ -1,7 +1,5 @@
 """Files that ship with the package: vehicle models and the scenario library."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 

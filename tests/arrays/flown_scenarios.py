@@ -1,7 +1,5 @@
 """Scenarios that fly on arrays: controllers inside layers, references, multirotors."""
 
-from __future__ import annotations
-
 from tests.laws.layers.test_actuation import EVERYTHING
 from tests.laws.layers.test_air import STORM
 from tests.laws.test_laws import LAWS

@@ -1,7 +1,5 @@
 """Flights in JAX agree with the other engines."""
 
-from __future__ import annotations
-
 import sys
 
 import numpy as np

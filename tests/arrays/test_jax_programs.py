@@ -1,7 +1,5 @@
 """Functions as programs in JAX."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

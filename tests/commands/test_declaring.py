@@ -163,7 +163,7 @@ def test_the_help_lists_every_command_once_in_a_group(capsys):
         main(["--help"])
     text = capsys.readouterr().out
     groups = [line for line in text.splitlines() if line.endswith(":") and line[0] != " "]
-    assert groups == ["options:", "fly:", "look:", "analyze:", "thesis:", "tool:"]
+    assert groups == ["options:", "fly:", "look:", "analyze:", "logs:", "thesis:", "tool:"]
     folder = Path(__file__).parents[2] / "tiltsim" / "commands"
     commands = {file.stem for file in folder.glob("*.py") if "\ndef run(" in file.read_text()}
     listed = [

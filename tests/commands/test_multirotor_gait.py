@@ -11,8 +11,7 @@ import pytest
 from tiltsim.cli import main
 from tiltsim.models.user_vehicle import read_user_vehicle
 from tiltsim.resources import shipped_folder
-from tiltsim.studies.fleet import FLEET, fleet_file
-from tiltsim.studies.multirotor_analysis import tilted_rotors
+from tiltsim.studies.multirotor_analysis import FLEET, fleet_file, tilted_rotors
 from tiltsim.views.figures.multirotor import multirotor_figure
 from tiltsim_controllers.analysis.attainable import TiltedRotors
 from tiltsim_controllers.analysis.singularity import singularity_margin

@@ -19,9 +19,10 @@ SCHEMA = scenario_schema()
 TABLES = key_tables(SCHEMA)
 PAGE = Path(__file__).parents[2] / "docs" / "scenario.md"
 DEFINITIONS = {"": SCHEMA} | SCHEMA["$defs"]
+SWEEP = sweep_schema()
 PROPERTIES = [
     (name, key, value)
-    for name, table in {**sweep_schema()["$defs"], "Sweep": sweep_schema(), **DEFINITIONS}.items()
+    for name, table in {**SWEEP["$defs"], "Sweep": SWEEP, **DEFINITIONS}.items()
     for key, value in table["properties"].items()
 ]
 
@@ -43,7 +44,7 @@ def test_every_number_has_a_unit():
     missing = [
         f"{name}.{key}"
         for name, key, value in PROPERTIES
-        if (node := Node(value, {**sweep_schema()["$defs"], **DEFINITIONS})).has_numbers
+        if (node := Node(value, {**SWEEP["$defs"], **DEFINITIONS})).has_numbers
         and not node.meaning_and_unit[1]
     ]
     assert not missing, "end these descriptions with the unit in brackets, or with [-]"

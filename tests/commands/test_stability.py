@@ -12,9 +12,14 @@ import tiltsim
 from tiltsim.cli import main
 from tiltsim.commands.stability import parse_sweep
 from tiltsim.linear.attraction import Attraction
-from tiltsim.linear.sweeping import sweep_stability
-from tiltsim.views.figures.attraction import attraction_figure, attraction_panels
-from tiltsim.views.figures.stability import loop_figure, stability_figure, sweep_figure
+from tiltsim.linear.stability import sweep_stability
+from tiltsim.views.figures.stability import (
+    attraction_figure,
+    attraction_panels,
+    loop_figure,
+    stability_figure,
+    sweep_figure,
+)
 
 SETPOINT = "ch04_tracking/setpoint#rho_065_modified"
 THESIS = ["--set", "simulation.plant=thesis"]

@@ -6,7 +6,6 @@ from math import cos, isfinite, pi, sin
 
 import numpy as np
 
-from tests.tracing import BEGINNING, seldom_traced
 from tiltsim_controllers.mathematics.rotation import rotation_from_euler
 from tiltsim_controllers.vehicle.decoupling_matrix import (
     body_force,
@@ -77,9 +76,6 @@ def rk4_step(rates, time, state, step):
     )
 
 
-step_of_flight = seldom_traced(rk4_step, lambda _, time, *_rest: time < BEGINNING)
-
-
 def fly(law, plant, vehicle, state, duration, step):
     """Times and states until the end or until the attitude leaves +-90 degrees."""
 
@@ -88,7 +84,7 @@ def fly(law, plant, vehicle, state, duration, step):
 
     times, states = [0.0], [state]
     for index in range(round(duration / step)):
-        state = step_of_flight(rates, index * step, state, step)
+        state = rk4_step(rates, index * step, state, step)
         times.append((index + 1) * step)
         states.append(state)
         lost = max(abs(state[6]), abs(state[7])) > pi / 2

@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from tests.controllers.flat_laws import flat
-from tests.natively import compiled
-from tests.tracing import seldom_traced
+from tests.natively import compiled, machine_code
+from tiltsim_controllers.code.program import trace_vectors
 from tiltsim_controllers.gaits import plans
 from tiltsim_controllers.laws.allocation import RotorRange
 from tiltsim_controllers.laws.attitude_altitude import EXACT_DECOUPLING
@@ -161,9 +161,16 @@ def fly(vehicle, law, knots, duration, *, gait=None, step=0.005, start=(), wind=
     still = (0.0,) * (12 + tilts + rotors), (0.0,) * tilts, (0.0,) * 3
     own = flat(multirotor_law_of(layout, Form(vehicle.dimension, vehicle.norm)))
     inputs = compiled(own, 0.0, *still, law, knots)
+    states, used = 21 + rotors, 21 + rotors + tilts
+
+    def moving(given):
+        state, angles, u = np.split(np.array([*given], dtype=object), [states, used])
+        return equations_of_motion(state, angles, u, law.vehicle, own_rotors, wind, 1.0)
+
+    size = used + len(inputs(0.0, *still, law, knots))
+    motion = machine_code(trace_vectors(moving, {"given": size}))
     seen = []
 
-    @seldom_traced
     def rates(time, state):
         angles, turning = planned.angles(time), planned.rates(time)
         angles, turning = tuple(angles.tolist()), tuple(turning.tolist())
@@ -172,9 +179,7 @@ def fly(vehicle, law, knots, duration, *, gait=None, step=0.005, start=(), wind=
         law_state = (*state[:6], *attitude, *state[15:18], *angles, *speeds)
         u = inputs(time, law_state, turning, integrals, law, knots)
         seen.append(u[-1])
-        moved = equations_of_motion(
-            state, np.array(angles), np.array(u), law.vehicle, own_rotors, wind, 1.0
-        )
+        moved = motion([*state, *angles, *u])
         return np.array((*moved, *u[rotors : rotors + 3]))
 
     start = start or (0.0,) * 9

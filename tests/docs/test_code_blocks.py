@@ -18,6 +18,7 @@ from tests.docs.shell import commands
 from tiltsim.cli import build_parser, main
 from tiltsim.errors import InputError
 from tiltsim.exit_codes import DONE, EXPECTATION_FAILED, VEHICLE_LOST
+from tiltsim.logs.map import LogMap
 from tiltsim.scenario.loading import find_scenario_file
 from tiltsim.scenario.scenario_tables import ScenarioTables
 from tiltsim.studies.checking import collect
@@ -102,6 +103,9 @@ def save_blocks(name, folder):
 def check_toml(text, folder):
     """Validate a whole scenario, a whole sweep, or some tables of either."""
     document = tomllib.loads(text)
+    if "columns" in document:
+        LogMap.model_validate(document)
+        return
     if {"axis", "sample", "bisect"} & document.keys():
         if "scenario" in document:
             (folder / "sweep.toml").write_text(text)

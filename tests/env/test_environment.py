@@ -20,7 +20,7 @@ from tiltsim.errors import InputError
 from tiltsim.flight.end import End
 from tiltsim.flight.reading import load_flight
 from tiltsim.plants.command import Command, ControllerError
-from tiltsim.studies.fleet import fleet_file
+from tiltsim.studies.multirotor_analysis import fleet_file
 from tiltsim_controllers.vehicle.parameters import PRESETS
 
 DOCS = Path(__file__).parents[2] / "docs" / "environment.md"

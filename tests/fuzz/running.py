@@ -57,7 +57,6 @@ def fuzz(count, seed, report=lambda done, mistake: None):
     import_module("matplotlib.backends.backend_agg")
     with ExitStack() as stack:
         # An interrupt within a tracer of coverage would leave its lock locked for ever.
-        stack.callback(sys.settrace, sys.gettrace())
         sys.settrace(None)
         folder = Path(mkdtemp(prefix="fuzz"))
         stack.callback(shutil.rmtree, folder)

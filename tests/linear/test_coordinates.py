@@ -9,8 +9,13 @@ import pytest
 
 from tiltsim import load_scenario
 from tiltsim.laws.assembling import assemble
-from tiltsim.linear.coordinates import MATRIX, QUATERNION, ROTATION_NAMES, Coordinates
-from tiltsim.linear.naming import equation_inputs
+from tiltsim.linear.coordinates import (
+    MATRIX,
+    QUATERNION,
+    ROTATION_NAMES,
+    Coordinates,
+    equation_inputs,
+)
 from tiltsim.resources import shipped_folder
 from tiltsim_controllers.mathematics.rotation import rotation_from_quaternion
 

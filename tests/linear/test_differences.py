@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tiltsim.linear.differences import CENTRAL, HALF_STENCIL, jacobian
+from tiltsim.linear.newton import CENTRAL, HALF_STENCIL, jacobian
 
 
 def derivative(function, stencil=HALF_STENCIL):

@@ -9,11 +9,10 @@ import pytest
 
 import tiltsim
 from tiltsim.commands.stability import stability_text
-from tiltsim.linear.differences import ERROR
 from tiltsim.linear.equilibrium import equilibrium_of
 from tiltsim.linear.modes import exponents, is_stable, modes_of, spectrum
 from tiltsim.linear.motion import make_motion
-from tiltsim.linear.newton import derivative_at
+from tiltsim.linear.newton import ERROR, derivative_at
 from tiltsim_controllers.analysis.stability import error_loops
 
 SETPOINT = "ch04_tracking/setpoint#rho_065_modified"

@@ -9,7 +9,7 @@ import pytest
 
 import tiltsim
 from tiltsim.errors import InputError
-from tiltsim.models.mjcf_files import check_mjcf
+from tiltsim.models.mjcf_editing import check_mjcf
 from tiltsim.resources import shipped_folder
 
 SHIPPED = sorted(shipped_folder("mjcf").glob("*.xml"))

@@ -87,7 +87,7 @@ class TestMap:
 
     def measure(self, file: Path) -> int:
         """Run all tests under a tracer that sees every line."""
-        tracing.trace_seldom = tracing.trace_few_rows = lambda *_: None
+        tracing.BEGINNING = None
         data = file.with_suffix(".coverage")
         self._coverage = Coverage(data, source=[str(SOURCE_ROOT / PACKAGE)], config_file=False)
         self._coverage.start()

@@ -24,7 +24,7 @@ from tiltsim.laws.commanded import COMMANDED_LOOPS
 from tiltsim.plants.built_in_command import BuiltInController
 from tiltsim.plants.command import Command, check_command
 from tiltsim.plants.commanded_plant import CommandedPlant
-from tiltsim.studies.fleet import fleet_file
+from tiltsim.studies.multirotor_analysis import fleet_file
 from tiltsim.vehicles.rotorcraft.layout import CROSS
 from tiltsim_controllers.laws.attitude_altitude import Parameters, attitude_altitude
 from tiltsim_controllers.laws.observed import Seen

@@ -12,8 +12,7 @@ import pytest
 import tiltsim
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.models.user_vehicle import read_user_vehicle
-from tiltsim.studies.fleet import fleet_file
-from tiltsim.studies.multirotor_analysis import multirotor_report, tilted_rotors
+from tiltsim.studies.multirotor_analysis import fleet_file, multirotor_report, tilted_rotors
 from tiltsim_controllers.analysis.hover import rotor_losses
 
 ASIDE = (0.03, -0.02, 0.02)

@@ -12,7 +12,7 @@ from tiltsim.errors import InputError
 from tiltsim.studies import arena, tuning
 from tiltsim.studies.arena_page import arena_page
 from tiltsim.studies.comparison import Compared, Entry, compare_one, controller_tables
-from tiltsim.studies.fleet import FEW_ROTORS, FLEET
+from tiltsim.studies.multirotor_analysis import FEW_ROTORS, FLEET
 from tiltsim.views.figures.arena_scores import arena_figure
 
 

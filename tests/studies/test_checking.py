@@ -10,8 +10,7 @@ from tiltsim.resources import shipped_folder
 from tiltsim.scenario.library import library_entries, library_families
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.studies import checking
-from tiltsim.studies.check_results import CheckResult, exit_code
-from tiltsim.studies.checking import check_all, collect, shard
+from tiltsim.studies.checking import CheckResult, check_all, collect, exit_code, shard
 
 SHIPPED = [str(shipped_folder("scenarios"))]
 LIBRARY = collect(SHIPPED)

@@ -16,9 +16,8 @@ from tests.refusals import refusal
 from tiltsim.cli import build_parser
 from tiltsim.commands import gait as gait_command
 from tiltsim.commands import map as map_command
-from tiltsim.commands.angles import parse_vehicle
 from tiltsim.commands.declaring import call
-from tiltsim.commands.gait_options import Case
+from tiltsim.commands.gait_options import Case, parse_vehicle
 from tiltsim.commands.text import json_text, number
 from tiltsim.errors import InputError
 from tiltsim.scenario.loading import load_scenario
@@ -26,8 +25,8 @@ from tiltsim.simulation.simulate import simulate
 from tiltsim.studies.gait_analysis import gait_report, map_report, vehicle_name
 from tiltsim.system import files
 from tiltsim.views.figures import style
-from tiltsim.views.figures.attainable import attainable_figure
 from tiltsim.views.figures.gait import gait_figure
+from tiltsim.views.figures.multirotor import attainable_figure
 from tiltsim.views.figures.two_color_map import map_figure
 from tiltsim_controllers.analysis.fault_tolerance import fixed_tilt_hover
 from tiltsim_controllers.analysis.published_gaits import (

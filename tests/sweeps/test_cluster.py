@@ -15,9 +15,8 @@ import pytest
 from tests.sweeps.files import short_sweep
 from tiltsim.cli import main
 from tiltsim.errors import InputError
-from tiltsim.sweeps.cluster import _connect
 from tiltsim.sweeps.loading import load_sweep
-from tiltsim.sweeps.running import run_sweep
+from tiltsim.sweeps.running import _connect, run_sweep
 
 pytest.importorskip("distributed", reason="needs the extra tiltsim[cluster]")
 
@@ -80,7 +79,7 @@ def test_a_cluster_that_loses_a_worker_gives_the_local_dataset(tmp_path):
 
 @pytest.mark.filterwarnings("ignore")
 def test_an_unreachable_cluster_is_one_line(tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr("tiltsim.sweeps.cluster.CONNECT_TIMEOUT", 1.0)
+    monkeypatch.setattr("tiltsim.sweeps.running.CONNECT_TIMEOUT", 1.0)
     file = short_sweep(tmp_path / "sweep.toml")
     address = f"tcp://127.0.0.1:{free_port()}"
     start = time.monotonic()

@@ -9,11 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import tiltsim.sweeps.checks
+import tiltsim.sweeps.loading
 from tiltsim.errors import InputError
-from tiltsim.sweeps.checks import check_points
 from tiltsim.sweeps.definition import SweepDefinition
-from tiltsim.sweeps.loading import load_sweep
+from tiltsim.sweeps.loading import check_points, load_sweep
 from tiltsim.sweeps.points import SweepPoints
 from tiltsim.sweeps.tables import LinspaceAxis
 
@@ -319,7 +318,7 @@ def test_keys_that_came_after_a_definition_was_written_have_their_defaults(point
 def test_huge_axes_are_refused_or_tried_in_a_few_places(points_of, count, monkeypatch):
     axis = PERIODS.replace("5", str(count))
     if count == 20_000:
-        monkeypatch.setattr(tiltsim.sweeps.checks, "VALUES_TRIED", 50)
+        monkeypatch.setattr(tiltsim.sweeps.loading, "VALUES_TRIED", 50)
         assert len(check_points(points_of(axis))) == 50
     with pytest.raises(InputError, match="more than 10000000 points"):
         points_of(axis + AMPLITUDES + MASS + "[sample]\ncount = 1000000")

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tiltsim.sweeps.search import Boundary, boundary
+from tiltsim.sweeps.chunks import Boundary, boundary
 
 
 def search(holds, start, stop, step, tolerance):

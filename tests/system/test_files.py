@@ -10,8 +10,7 @@ from pathlib import Path
 import pytest
 
 from tiltsim.errors import InputError
-from tiltsim.system.files import prepare_file, prepare_folder, remove_leftovers, replacing
-from tiltsim.system.locks import locked
+from tiltsim.system.files import locked, prepare_file, prepare_folder, remove_leftovers, replacing
 
 HEX = "0123456789abcdef"
 """Digits of the random part of the names of files that are being written."""

@@ -9,7 +9,7 @@ import pytest
 from tests.views.recordings import entities
 from tiltsim.models.rotorcraft import RotorcraftSpec, compile_model
 from tiltsim.models.vehicle_parts import CROSSES
-from tiltsim.views.rerun.geometry import geom_archetypes, log_geometry
+from tiltsim.views.rerun.scene import geom_archetypes, log_geometry
 from tiltsim_controllers.vehicle.parameters import PRESETS
 
 SHAPES = """

@@ -21,11 +21,16 @@ from tests.refusals import refusal
 from tiltsim.cli import main
 from tiltsim.errors import InputError
 from tiltsim.views.attitude_plane import MOVING_TRAIL_TIME, torque_free_directions
-from tiltsim.views.video import encoding, has_display, offscreen, overlay, rendering
-from tiltsim.views.video.encoding import write_video
+from tiltsim.views.video import has_display, offscreen, overlay, rendering
 from tiltsim.views.video.offscreen import make_contexts
 from tiltsim.views.video.overlay import Overlay, overlay_inset
-from tiltsim.views.video.rendering import FlightRenderer, VideoFormat, frame_times, frames
+from tiltsim.views.video.rendering import (
+    FlightRenderer,
+    VideoFormat,
+    frame_times,
+    frames,
+    write_video,
+)
 from tiltsim_controllers.vehicle.parameters import PRESETS
 
 SMALL = VideoFormat(width=320, height=180, fps=10, speed=2.0)
@@ -166,7 +171,7 @@ def test_the_video_plays(tmp_path, monkeypatch):
 
     path = tmp_path / "flight.mp4"
     counts = []
-    monkeypatch.setattr(encoding, "frames", lambda *_: rendered_frames())
+    monkeypatch.setattr(rendering, "frames", lambda *_: rendered_frames())
     write_video(flight("trot"), path, SMALL, counts.append)
     assert [file.name for file in tmp_path.iterdir()] == ["flight.mp4"]
     with av.open(str(path)) as video:
@@ -187,7 +192,7 @@ def test_a_gif_repeats_at_the_videos_speed_in_the_frames_colors(tmp_path, monkey
         image = np.repeat(np.linspace(90, 160, 64).astype(np.uint8), 64 * 3).reshape(64, 64, 3)
         image[8 * number : 8 * number + 4, :4] = (213, 94, 0)
         rendered.append((0.2 * number, image))
-    monkeypatch.setattr(encoding, "frames", lambda *_: rendered)
+    monkeypatch.setattr(rendering, "frames", lambda *_: rendered)
     write_video(flight("fixed"), tmp_path / "flight.gif", video)
     with Image.open(tmp_path / "flight.gif") as gif:
         assert (gif.size, gif.info["loop"], gif.n_frames) == ((64, 64), 0, 7)
@@ -321,7 +326,7 @@ def test_arguments_out_of_range_are_refused(name, value, tmp_path):
 
 def test_a_flight_makes_its_video(tmp_path, monkeypatch):
     made = []
-    monkeypatch.setattr(encoding, "write_video", lambda *given: given[3](9) or made.append(given))
+    monkeypatch.setattr(rendering, "write_video", lambda *given: given[3](9) or made.append(given))
     path = tmp_path / "flight.gif"
     counts = []
     options = {"start": 0.2, "end": 1, "fps": 10, "size": (64, 96)}

@@ -1,7 +1,5 @@
 """Flights on equations of motion in JAX: the step and the sample of a loop as programs."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from functools import lru_cache, partial
@@ -14,7 +12,7 @@ from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.closed_loop.limits import SINGULAR, WITHIN_LIMITS
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup
 from tiltsim.equations.solvers import Integration, make_step
-from tiltsim.system.locks import one_thread_at_a_time
+from tiltsim.system.files import one_thread_at_a_time
 from tiltsim_controllers.mathematics.records import flatten, record_size, unflatten
 from tiltsim_controllers.mathematics.scalar import Floats, Triple
 from tiltsim_controllers.references.trajectories import ReferenceParameters

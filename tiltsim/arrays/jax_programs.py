@@ -1,13 +1,11 @@
 """Functions of a closed loop in JAX: the same programs as on every other engine."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable
 from typing import Any
 
 from tiltsim.arrays.xla_flags import merges_loops
-from tiltsim.system.optional import optional_package
+from tiltsim.system.public import optional_package
 from tiltsim_controllers.code.jax_function import results_in_jax
 from tiltsim_controllers.code.traceable import as_tuples, program_of
 

@@ -3,8 +3,6 @@
 Loaded at every start: imports the standard library only.
 """
 
-from __future__ import annotations
-
 import os
 from typing import Final
 

@@ -1,7 +1,5 @@
 """Everything that is prepared for one flight, once."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup

@@ -1,7 +1,5 @@
 """Parameters that choose code: compiled programs and batches on arrays have them as constants."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any, Final, NamedTuple
 

@@ -1,7 +1,5 @@
 """Limits beyond which a vehicle has diverged, so wide that none returns from there."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from typing import Any, Final
 

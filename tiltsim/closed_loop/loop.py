@@ -16,7 +16,7 @@ import numpy as np
 
 from tiltsim.closed_loop.vehicle_kind import VehicleKind
 from tiltsim.models.parts import ExtraActuators
-from tiltsim.system.quantity import Quantity, in_words
+from tiltsim.system.text import Quantity, in_words
 from tiltsim_controllers.mathematics.records import flatten, record_dtype, record_size
 from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector
 

@@ -1,7 +1,5 @@
 """Layout of MuJoCo's `userdata`, and the times at which a control step is evaluated."""
 
-from __future__ import annotations
-
 from typing import Any, Final, NamedTuple
 
 from tiltsim_controllers.code.arrays import xp

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from tiltsim.models.parts import ExtraActuators
     from tiltsim.scenario.scenario import FlightPlan, Scenario
-    from tiltsim.system.quantity import Quantity
+    from tiltsim.system.text import Quantity
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,9 +24,7 @@ from tiltsim.errors import InputError
 if TYPE_CHECKING:
     from tiltsim.studies.arena import Vehicle
 
-Tables = dict[str, dict[str, Mapping[str, Any]]]
-"""Tables of controllers, by vehicle and name."""
-
+Tables = dict[str, dict[str, Mapping[str, Any]]]  # tables of controllers, by vehicle and name
 GAINS_FILE: Final = "tuned_gains.json"
 """Gains of the shipped tasks, and the file that ``--tune`` writes."""
 

@@ -13,11 +13,10 @@ from tiltsim.commands.options import Json, Overrides, PlotOptions, Quiet, Trust,
 from tiltsim.commands.progress import Progress, show_progress
 from tiltsim.commands.text import aligned, number
 from tiltsim.errors import InputError
-from tiltsim.linear.map_size import COARSE, REFINEMENTS
+from tiltsim.linear import COARSE, REFINEMENTS
+from tiltsim.views import figures
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from tiltsim.linear.attraction import Attraction
 
 OPTIONS: Final = {"axes": "--axes", "coarse": "--coarse", "refinements": "--refine"}
@@ -82,12 +81,9 @@ def run(
             progress=partial(progress.tell, "flights"),
         )
 
-    def draw() -> Figure:
-        from tiltsim.views.figures.attraction import attraction_figure
-
-        return attraction_figure(found)
-
-    figure.show(draw, found.report(), _text(found), json=json)
+    figure.show(
+        lambda: figures.stability.attraction_figure(found), found.report(), _text(found), json=json
+    )
     return 0
 
 

@@ -1,7 +1,5 @@
 """``tiltsim bench``: closed-loop speed as a ratio to bare MuJoCo."""
 
-from __future__ import annotations
-
 from functools import partial
 from typing import Any, Final, Literal
 

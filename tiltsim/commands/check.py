@@ -13,7 +13,7 @@ from tiltsim.commands.text import counted, json_text, print_line, tally, write_t
 from tiltsim.system.interrupts import defer_interrupts
 
 if TYPE_CHECKING:
-    from tiltsim.studies.check_results import CheckResult
+    from tiltsim.studies.checking import CheckResult
 
 STANDARD_OUTPUT: Final = Path("-")
 
@@ -57,8 +57,14 @@ def run(
         quiet: print only scenarios that did not pass
     """
     from tiltsim.resources import shipped_folder
-    from tiltsim.studies.check_results import exit_code, json_document, not_flown, write_junit
-    from tiltsim.studies.checking import check_all, collect
+    from tiltsim.studies.checking import (
+        check_all,
+        collect,
+        exit_code,
+        json_document,
+        not_flown,
+        write_junit,
+    )
     from tiltsim.studies.checking import shard as part_of
     from tiltsim.system.files import prepare_file
 

@@ -6,6 +6,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from tiltsim.commands import text
 from tiltsim.commands.options import (
     CORES,
     Jobs,
@@ -17,15 +18,7 @@ from tiltsim.commands.options import (
     Trust,
 )
 from tiltsim.commands.progress import show_progress
-from tiltsim.commands.text import (
-    Columns,
-    json_text,
-    number,
-    print_line,
-    require_flown,
-    table,
-    write_text,
-)
+from tiltsim.views import figures
 
 if TYPE_CHECKING:
     from tiltsim.studies.comparison import Compared
@@ -97,38 +90,36 @@ def run(
     finally:  # finished flights are shown, even if the rest is interrupted
         rows = [one.row for one in compared]
         if rows and json:
-            print(json_text(rows))
+            print(text.json_text(rows))
         elif rows:
             searched = (*SEARCHES, "compiled_time_per_call")
             _print(rows, [key for key in MEASURES if not (nominal and key in searched)])
         if rows and out is not None:
-            from tiltsim.views.figures import style
-            from tiltsim.views.figures.controllers_compared import comparison_figure
-
-            write_text(out / "comparison.json", json_text(rows))
-            style.save(comparison_figure(compared), out / "comparison.png")
+            text.write_text(out / "comparison.json", text.json_text(rows))
+            drawn = figures.controllers_compared.comparison_figure(compared)
+            figures.style.save(drawn, out / "comparison.png")
             if not json:
-                print_line(f"comparison written to {out}")
-    require_flown([refusal(one.row) for one in compared])
+                text.print_line(f"comparison written to {out}")
+    text.require_flown([refusal(one.row) for one in compared])
     return 0
 
 
 def _print(rows: list[dict[str, Any]], shown: list[str]) -> None:
     """A table for every scenario, and below it why flights ended or were refused."""
-    columns: Columns = {
+    columns: text.Columns = {
         "controller": ("controller", ""),
         **{MEASURES[key][0]: (partial(_cell, key), ">") for key in shown},
     }
     for scenario in dict.fromkeys(row["scenario"] for row in rows):
         chosen = [row for row in rows if row["scenario"] == scenario]
-        print_line(scenario)
-        print(table(columns, chosen))
+        text.print_line(scenario)
+        print(text.table(columns, chosen))
         for row in chosen:
             if row["end"] != "completed":
-                print_line(f"{row['controller']}: {row['refused'] or row['end']}")
+                text.print_line(f"{row['controller']}: {row['refused'] or row['end']}")
             elif row["latency_refused"]:
-                print_line(f"{row['controller']}: {row['latency_refused']}")
-        print_line("")
+                text.print_line(f"{row['controller']}: {row['latency_refused']}")
+        text.print_line("")
 
 
 def _cell(key: str, row: dict[str, Any]) -> str:
@@ -137,4 +128,4 @@ def _cell(key: str, row: dict[str, Any]) -> str:
     _, form, factor = MEASURES[key]
     if row[key] is None:
         return why_none(row, key)
-    return number(factor * row[key], form) + "+" * is_last_tried(row, key)
+    return text.number(factor * row[key], form) + "+" * is_last_tried(row, key)

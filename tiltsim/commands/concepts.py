@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from tiltsim.commands.progress import show_progress
+from tiltsim.views import figures
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -32,22 +33,20 @@ def run(*, out: Path = Path("concepts")) -> int:
         out (DIR): folder for the SVG files concepts_*.svg (default: concepts)
     """
     from tiltsim.system.files import prepare_folder
-    from tiltsim.views.figures.style import save
 
     prepare_folder(out)
     with show_progress(shown=True) as progress:
         for name, draw in drawings().items():
             progress.begin(f"drawing {name}")
             file = out / f"concepts_{name}.svg"
-            save(draw(), file)
+            figures.style.save(draw(), file)
             progress.print(f"figure written to {file}")
     return 0
 
 
 def drawings() -> dict[str, Callable[[], Figure]]:
     """The pictures by their names, in the order of the page."""
-    from tiltsim.views.figures import concepts
-
+    concepts = figures.concepts
     return {
         "vehicle": concepts.vehicle_figure,
         "gaits": concepts.gait_figure,

@@ -1,7 +1,5 @@
 """Controllers that the command line names, with their gains."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any

@@ -11,8 +11,6 @@ often an argument is given and how it is read:
 The docstring's section ``Args`` has a line ``name (METAVAR): help`` for each argument.
 """
 
-from __future__ import annotations
-
 import argparse
 import re
 from collections.abc import Callable, Iterator
@@ -132,14 +130,10 @@ def _parts(function: Callable[..., Any]) -> dict[str, _Argument | type]:
 
 
 def declare(parser: argparse.ArgumentParser, run: Callable[..., int]) -> None:
-    """Give a parser the arguments and the docstring of a command.
+    """Give an empty parser the arguments and the docstring of a command, all annotated.
 
     The docstring's section ``Note`` is printed below the options. The parsed arguments are for
     `call`, and the command is one of them.
-
-    Args:
-        parser: A parser without arguments.
-        run: The command, all of whose parameters are annotated.
     """
     text = cleandoc(run.__doc__ or "").partition("\n\nArgs:\n")[0]
     parser.description, _, parser.epilog = text.partition("\n\nNote:\n")

@@ -1,20 +1,10 @@
 """``tiltsim fleet``: the vehicles that ship as MJCF files, and the abilities of each."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any, Final
 
+from tiltsim.commands import text
 from tiltsim.commands.options import Json, refuse_both
-from tiltsim.commands.text import (
-    Columns,
-    cells,
-    json_text,
-    markdown_table,
-    number,
-    print_line,
-    table,
-)
 
 
 def _margin(vehicle: dict[str, Any]) -> float | None:
@@ -34,11 +24,11 @@ def _with_tilts(vehicle: dict[str, Any]) -> str:
     return "position and attitude" if tilting["pose"] == 6 else "attitude and lift"
 
 
-COLUMNS: Final[Columns] = {
+COLUMNS: Final[text.Columns] = {
     "vehicle": ("name", ""),
     "rotors": ("rotors", "d"),
     "tilt hinges": ("tilts", "d"),
-    "tilt angles (rad)": (lambda row: ", ".join(map(number, row["angles"])) or "-", ""),
+    "tilt angles (rad)": (lambda row: ", ".join(map(text.number, row["angles"])) or "-", ""),
     "dimension": ("torque_free_dimension", "d"),
     "singular attitudes": ("singular_attitudes", ""),
     "margin (rad)": (_margin, ".4f"),
@@ -66,20 +56,20 @@ def run(*, json: Json = False, markdown: bool = False, pictures: Path | None = N
         from tiltsim.views.video import prefer_offscreen_gl
 
         prefer_offscreen_gl()
-    from tiltsim.studies.fleet import FLEET, fleet_file, fleet_report
+    from tiltsim.studies.multirotor_analysis import FLEET, fleet_file, fleet_report
 
     report = fleet_report()
     if pictures is not None:
-        from tiltsim.views.video.portrait import save_portrait
+        from tiltsim.views.video.rendering import save_portrait
 
         prepare_folder(pictures)
         for name, angles in FLEET.items():
             save_portrait(fleet_file(name), angles, pictures / f"fleet_{name}.png")
             if not (json or markdown):
-                print_line(f"picture written to {pictures / f'fleet_{name}.png'}")
+                text.print_line(f"picture written to {pictures / f'fleet_{name}.png'}")
     if markdown:
         linked = [row | {"name": f"[{row['name']}](../mjcf/{row['name']}.xml)"} for row in report]
-        print("\n".join(markdown_table([*COLUMNS], cells(COLUMNS, linked)[1:])))
+        print("\n".join(text.markdown_table([*COLUMNS], text.cells(COLUMNS, linked)[1:])))
     else:
-        print(json_text(report) if json else table(COLUMNS, report))
+        print(text.json_text(report) if json else text.table(COLUMNS, report))
     return 0

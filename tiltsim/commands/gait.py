@@ -6,22 +6,23 @@ from dataclasses import asdict, replace
 from functools import partial
 from typing import TYPE_CHECKING, Annotated, Final, NamedTuple
 
-from tiltsim.commands.angles import DEFAULT_VEHICLE, parse_vehicle
 from tiltsim.commands.declaring import Option, mistakes_in
-from tiltsim.commands.gait_options import GaitFigure, GaitOptions
+from tiltsim.commands.gait_options import DEFAULT_VEHICLE, GaitFigure, GaitOptions, parse_vehicle
 from tiltsim.commands.options import Json
 from tiltsim.commands.text import json_text
 from tiltsim.errors import InputError
+from tiltsim.views import figures
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from tiltsim.models.rotor_table import Multirotor
     from tiltsim.scenario.scenario import Scenario
     from tiltsim_controllers.gaits.plans import Gait
     from tiltsim_controllers.vehicle.parameters import Vehicle
 
-OPPOSITE_SPEED_RATIO: Final = 0.7
-"""Speed of the rotor opposite a failed one, relative to hover, in the fault report."""
+MULTIROTOR_FIGURES: Final = ("roll_pitch", "attainable")  # ``--figure`` for any multirotor
+OPPOSITE_SPEED_RATIO: Final = 0.7  # in fault reports: speed of the rotor opposite a failed one
 
 
 class SelectedGait(NamedTuple):
@@ -52,7 +53,6 @@ def run(
         list_gaits: list the thesis's gaits and their robustness claims
     """
     from tiltsim.commands.gait_text import determinant_text, gait_text, list_text
-    from tiltsim.commands.multirotor_gait import run_multirotor
     from tiltsim.studies.gait_analysis import determinant_report, fault_report, gait_report
 
     if list_gaits:
@@ -64,13 +64,17 @@ def run(
         print(json_text([asdict(row) for row in rows]) if json else list_text(rows))
         return 0
     if gait.mjcf is not None:
-        return run_multirotor(scenario, None, gait, figure, json=json)
+        return _run_multirotor(scenario, None, gait, figure, json=json)
     _check_options(scenario, gait, figure)
     if figure.kind == "determinant":
         vehicle, case = gait.vehicle or parse_vehicle(DEFAULT_VEHICLE), figure.case or "equal"
         report = determinant_report(case, vehicle)
-        draw = partial(_draw_determinant, case, vehicle)
-        figure.show(draw, report, determinant_text(report), json=json)
+        figure.show(
+            lambda: figures.determinant.determinant_figure(case, vehicle),
+            report,
+            determinant_text(report),
+            json=json,
+        )
         return 0
     loaded = None
     if scenario is not None:
@@ -80,7 +84,7 @@ def run(
         if gait.vehicle is not None:
             raise InputError("--vehicle: the scenario defines its own vehicle; remove one of them")
         if loaded.vehicle.model == "multirotor":
-            return run_multirotor(scenario, loaded, gait, figure, json=json)
+            return _run_multirotor(scenario, loaded, gait, figure, json=json)
     selected = _select(gait) if loaded is None else _of_scenario(str(scenario), loaded)
     report = gait_report(selected.gait, selected.vehicle, roll=gait.roll, pitch=gait.pitch)
     if gait.faults:
@@ -179,32 +183,121 @@ def _speed_limits(selected: SelectedGait, figure: GaitFigure) -> tuple[float, fl
     return figure.speed_limits or published_speed_limits(selected.vehicle)
 
 
-def _draw_determinant(case: str, vehicle: Vehicle) -> Figure:
-    from tiltsim.views.figures.determinant import determinant_figure
-
-    return determinant_figure(case, vehicle)
-
-
 def _draw(selected: SelectedGait, options: GaitFigure) -> Figure:
     """The ``--figure`` of a gait, by default its roll-pitch diagram."""
-    from tiltsim.views.figures import attainable, faults, gait
-
     chosen, vehicle = selected.gait, selected.vehicle
     compared = [(selected.title, chosen)]
     if selected.twin is not None:
         compared.append((selected.twin_title, selected.twin))
     match options.kind:
         case "faults":
-            return faults.fault_figure(vehicle)
+            return figures.gait.fault_figure(vehicle)
         case "attainable":
             if not chosen.is_constant:
                 raise InputError(f"--figure attainable: {chosen.name} moves; give fixed angles")
             limits = _speed_limits(selected, options)
-            return attainable.attainable_figure(chosen, vehicle, limits)
+            return figures.multirotor.attainable_figure(chosen, vehicle, limits)
         case "comparison":
             if len(compared) == 1:
                 raise InputError(f"--figure comparison: {chosen.name} has no bias to compare with")
-            return gait.comparison_figure(compared, vehicle)
+            return figures.gait.comparison_figure(compared, vehicle)
         case "margin":
-            return gait.margin_figure(compared, vehicle)
-    return gait.gait_figure(chosen, vehicle, tuple(options.panels))
+            return figures.gait.margin_figure(compared, vehicle)
+    return figures.gait.gait_figure(chosen, vehicle, tuple(options.panels))
+
+
+def _run_multirotor(
+    address: str | None,
+    scenario: Scenario | None,
+    options: GaitOptions,
+    figure: GaitFigure,
+    *,
+    json: bool,
+) -> int:
+    """Analyze the file of ``--mjcf``, without a scenario, or the scenario's vehicle."""
+    from tiltsim.commands.gait_text import multirotor_text
+    from tiltsim.models.rotor_table import Multirotor
+    from tiltsim.studies.multirotor_analysis import (
+        balance_report,
+        multirotor_report,
+        period_report,
+        tilted_rotors,
+    )
+
+    _check_multirotor_options(address, options, figure)
+    limits, balance, gait = figure.speed_limits, None, None
+    if scenario is not None:
+        resolved = scenario.vehicle.resolve()
+        assert isinstance(resolved, Multirotor)
+        vehicle, gait = resolved, scenario.gait.plan(resolved)
+        angles = tuple(gait.angles(0.0).tolist())
+    else:
+        vehicle = _read_multirotor(str(options.mjcf))
+        angles = _tilt_angles(options, vehicle)
+        if options.balance is not None:
+            with mistakes_in(f"--balance {options.acceleration}"):
+                balance = balance_report(vehicle, options.balance, limits)
+            angles = tuple(balance["angles"])
+    roll, pitch = options.roll or 0.0, options.pitch or 0.0
+    report = {
+        "vehicle": options.mjcf or address,
+        **multirotor_report(
+            vehicle, angles, limits=limits, roll=roll, pitch=pitch, faults=options.faults
+        ),
+    }
+    if balance is not None:
+        report["balance"] = balance
+    if gait is not None and not gait.is_constant:
+        report |= period_report(vehicle, gait, roll, pitch)
+
+    def draw() -> Figure:
+        rotors = tilted_rotors(vehicle, angles, limits)
+        return figures.multirotor.multirotor_figure(rotors, figure.kind or MULTIROTOR_FIGURES[0])
+
+    figure.show(draw, report, multirotor_text(report), json=json)
+    return 0
+
+
+def _check_multirotor_options(
+    address: str | None, options: GaitOptions, figure: GaitFigure
+) -> None:
+    """Refuse options of the thesis's vehicle, and files that cannot be written."""
+    of_four_rotors = {
+        "SCENARIO": address,
+        "--published": options.published,
+        "--vehicle": options.vehicle,
+        "--case": figure.case,
+    }
+    for option, value in of_four_rotors.items():
+        if options.mjcf is not None and value is not None:
+            raise InputError(f"--mjcf: cannot be combined with {option}")
+    if options.angles is not None and options.balance is not None:
+        raise InputError("--mjcf: give either --angles or --balance")
+    kind = figure.kind
+    if kind is not None and kind not in MULTIROTOR_FIGURES:
+        raise InputError(
+            f"--figure {kind}: of a multirotor, choose {' or '.join(MULTIROTOR_FIGURES)}"
+        )
+    figure.check_kind()
+    if figure.panels:
+        raise InputError("--panels: this figure has no panels to choose from")
+
+
+def _read_multirotor(path: str) -> Multirotor:
+    from tiltsim.models.rotor_table import Multirotor
+    from tiltsim.models.user_vehicle import read_user_vehicle
+
+    with mistakes_in(f"--mjcf {path}"):
+        vehicle = read_user_vehicle(path, "multirotor").vehicle
+    assert isinstance(vehicle, Multirotor)
+    return vehicle
+
+
+def _tilt_angles(options: GaitOptions, vehicle: Multirotor) -> tuple[float, ...]:
+    """One angle (rad) for each hinge of the file; all zero by default."""
+    text = options.angles
+    if text is None:
+        return (0.0,) * vehicle.tilts
+    if vehicle.tilts == 0:
+        raise InputError(f"--angles {text}: no rotor of {options.mjcf} tilts; leave it out")
+    return options.read_angles(vehicle.tilts)

@@ -1,11 +1,9 @@
 """The reports of ``tiltsim gait`` as text: of a gait, of all gaits, of a multirotor."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, Final
 
-from tiltsim.commands.angles import vehicle_text
+from tiltsim.commands.gait_options import vehicle_text
 from tiltsim.commands.text import Columns, aligned, number, numbers, table
 from tiltsim.system.text import printable
 

@@ -1,7 +1,5 @@
 """``tiltsim list``: prints the scenario library."""
 
-from __future__ import annotations
-
 from tiltsim.commands.options import Json
 from tiltsim.commands.text import fitted, json_text
 from tiltsim.errors import InputError

@@ -4,22 +4,21 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from tiltsim.commands.angles import (
+from tiltsim.commands.declaring import mistakes_in
+from tiltsim.commands.gait_options import (
     DEFAULT_VEHICLE,
     VehicleOption,
     parse_angles,
     parse_vehicle,
     vehicle_text,
 )
-from tiltsim.commands.declaring import mistakes_in
 from tiltsim.commands.options import Json, PlotOptions, refuse_both
 from tiltsim.commands.text import aligned, tally
 from tiltsim.errors import InputError
 from tiltsim.exit_codes import DONE, EXPECTATION_FAILED
+from tiltsim.views import figures
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from tiltsim_controllers.analysis.two_color_planner import Circle, Polyline
     from tiltsim_controllers.vehicle.parameters import Vehicle
 
@@ -53,12 +52,13 @@ def run(
     with mistakes_in("path" if path else f"--vehicle {vehicle_text(parameters._asdict())}"):
         report = map_report(parameters, path)
 
-    def draw() -> Figure:
-        from tiltsim.views.figures.two_color_map import map_figure
-
-        return map_figure(parameters, [("path", path)] if path else None)
-
-    figure.show(draw, report, _summary(report), json=json)
+    paths = [("path", path)] if path else None
+    figure.show(
+        lambda: figures.two_color_map.map_figure(parameters, paths),
+        report,
+        _summary(report),
+        json=json,
+    )
     return DONE if path is None or report["path"]["sound"] else EXPECTATION_FAILED
 
 

@@ -1,7 +1,5 @@
 """``tiltsim new``: writes an MJCF vehicle and a scenario that flies it, to start from."""
 
-from __future__ import annotations
-
 import shlex
 from pathlib import Path
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 from tiltsim.commands.declaring import Option
 from tiltsim.commands.text import json_text, print_line
 from tiltsim.errors import InputError
+from tiltsim.views import figures
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -97,22 +98,14 @@ class FigureOptions:
     labels: Annotated[tuple[tuple[str, str], ...], Option("--label", _label)] = ()
 
     def save(self, draw: Callable[[], Figure], path: Path, *, is_named: bool = False) -> None:
-        """Draw a figure in this size and style, and save it.
-
-        Args:
-            draw: Draws it.
-            path: The file.
-            is_named: Whether `draw` has applied title and labels.
-        """
-        from tiltsim.views.figures.adjusting import relabel, retitle
-        from tiltsim.views.figures.style import paper_style, parse_size, save
-
-        with paper_style(self.style, parse_size("--size", self.size)):
+        """Draw and save a figure in this size and style; ``is_named``: with title and labels."""
+        style, layout = figures.style, figures.layout
+        with style.paper_style(self.style, style.parse_size("--size", self.size)):
             figure = draw()
             if not is_named:
-                retitle(figure, self.title)
-                relabel(figure, dict(self.labels))
-            save(figure, path)
+                layout.retitle(figure, self.title)
+                layout.relabel(figure, dict(self.labels))
+            style.save(figure, path)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -159,19 +152,12 @@ class PlotOptions(FigureOptions):
 def prepare_figure(option: str, path: Path) -> None:
     """Raise `InputError` unless a figure can be written to ``path``."""
     from tiltsim.system.files import prepare_file
-    from tiltsim.views.figures.style import FORMATS
 
-    prepare_file(option, path, FORMATS)
+    prepare_file(option, path, figures.style.FORMATS)
 
 
 def file_in(out: Path | None, beside: Path, name: str) -> Path:
-    """The file of ``--out``, which may be a folder for one called ``name``.
-
-    Args:
-        out: The option; None for a file beside the input.
-        beside: The input: a folder, or a file in it.
-        name: The file's name where ``out`` does not have one.
-    """
+    """The file of ``--out``, or ``name`` in that folder; without it ``name`` beside the input."""
     if out is None:
         return (beside if beside.is_dir() else beside.parent) / name
     return out if out.suffix and not out.is_dir() else out / name

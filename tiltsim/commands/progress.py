@@ -16,9 +16,7 @@ from tiltsim.system.text import printable
 if TYPE_CHECKING:
     from tqdm import tqdm
 
-TICK: Final = 1.0
-"""Interval (s) at which the clock of a bar moves while nothing is finished."""
-
+TICK: Final = 1.0  # interval (s) at which the clock of a bar moves while nothing is finished
 LINE_INTERVAL: Final = 8.0
 """Interval (s) of the lines where there is no terminal: CI services end a job that is silent."""
 
@@ -31,12 +29,10 @@ class Progress:
     _total = _done = _initial = _start = 0.0
 
     def begin(self, stage: str, total: float = 0, done: float = 0) -> None:
-        """Begin a stage.
+        """Begin a stage; one that counts is called like the things counted, as ``flights``.
 
-        Args:
-            stage: Its name; if it counts, the things counted, as in ``flights``.
-            total: How many there are, or seconds if it is a float; 0 if that is not known.
-            done: How many an earlier run has finished, which the rate leaves out.
+        ``total`` are seconds if a float, a number of things if an integer, and 0 if not known;
+        ``done`` is the number that an earlier run has finished, which the rate leaves out.
         """
         self._stage, self._total, self._done, self._initial = stage, total, done, done
         self._start = monotonic()

@@ -1,7 +1,5 @@
 """``tiltsim report``: compares the thesis's claims with the simulated flights, on one page."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

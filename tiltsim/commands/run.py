@@ -25,9 +25,7 @@ if TYPE_CHECKING:
 GREATEST_DEFLECTION: Final = 0.01
 """Angle (rad) of a pod against its servo at hover, beyond which `tiltsim run` warns."""
 
-ROUNDING: Final = 1e-12
-"""Rounding errors of quantities of order one."""
-
+ROUNDING: Final = 1e-12  # rounding errors of quantities of order one
 SOLVER_ERROR: Final = 1e-6
 """Errors that the solver's step may leave in such quantities (docs/performance.md)."""
 

@@ -1,7 +1,5 @@
 """``tiltsim schema``: the keys of the scenario or the sweep file, for editors and for people."""
 
-from __future__ import annotations
-
 import json
 from typing import Any, Final
 
@@ -18,8 +16,7 @@ def run(address: str | None = None, *, sweep: bool = False, markdown: bool = Fal
         sweep: print the keys of the sweep file instead
         markdown: print all keys as a page, docs/scenario.md
     """
-    from tiltsim.commands.key_tables import key_tables
-    from tiltsim.commands.key_text import description, page
+    from tiltsim.commands.key_tables import description, key_tables, page
 
     schema = sweep_schema() if sweep else scenario_schema()
     if address is not None:

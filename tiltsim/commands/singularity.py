@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Literal
 
-from tiltsim.commands.angles import Pitch, Roll, VehicleOption, parse_vehicle
+from tiltsim.commands.gait_options import Pitch, Roll, VehicleOption, parse_vehicle
 from tiltsim.commands.options import Json, PlotOptions
 from tiltsim.commands.text import aligned
+from tiltsim.views import figures
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from tiltsim_controllers.vehicle.parameters import Vehicle
 
 
@@ -36,12 +35,12 @@ def run(
     figure.check()
     report = _report(parameters, roll or 0.0, pitch or 0.0)
 
-    def draw() -> Figure:
-        from tiltsim.views.figures.quadrotor_singularity import singularity_figure
-
-        return singularity_figure(parameters)
-
-    figure.show(draw, report, _summary(report), json=json)
+    figure.show(
+        lambda: figures.determinant.singularity_figure(parameters),
+        report,
+        _summary(report),
+        json=json,
+    )
     return 0
 
 

@@ -10,6 +10,7 @@ from tiltsim.commands.options import Json, Overrides, PlotOptions, Quiet, Trust,
 from tiltsim.commands.progress import show_progress
 from tiltsim.commands.text import Columns, aligned, number, table
 from tiltsim.errors import InputError
+from tiltsim.views import figures
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -17,8 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from tiltsim.linear.linearization import Linearization
-    from tiltsim.linear.stability import Stability
-    from tiltsim.linear.sweeping import Point
+    from tiltsim.linear.stability import Point, Stability
     from tiltsim.scenario.scenario import Scenario
 
 SHORT_KEYS: Final = {"period": "gait.period", "amplitude": "gait.amplitude"}
@@ -101,9 +101,8 @@ def run(
         text = f"{text}\n\n{table(MARGINS, measured)}"
 
     def draw() -> Figure:
-        from tiltsim.views.figures.stability import loop_figure, stability_figure
-
-        return stability_figure(found) if system is None else loop_figure(system)
+        drawn = figures.stability
+        return drawn.stability_figure(found) if system is None else drawn.loop_figure(system)
 
     figure.show(draw, report, text, json=json)
     return 0
@@ -144,7 +143,7 @@ def _run_sweep(
     text: str, scenarios: Sequence[Scenario], figure: PlotOptions, *, quiet: bool, json: bool
 ) -> int:
     """Sweep, draw, print."""
-    from tiltsim.linear.sweeping import crossings, sweep_stability
+    from tiltsim.linear.stability import crossings, sweep_stability
 
     key, values = parse_sweep(text, scenarios)
     sweeps: dict[str, list[Point]] = {}
@@ -165,18 +164,13 @@ def _run_sweep(
         for address, points in sweeps.items()
     ]
 
-    def draw() -> Figure:
-        from tiltsim.views.figures.stability import sweep_figure
-
-        return sweep_figure(key, sweeps)
-
     lines = "\n\n".join(_sweep_text(key, *item) for item in sweeps.items())
-    figure.show(draw, report, lines, json=json)
+    figure.show(lambda: figures.stability.sweep_figure(key, sweeps), report, lines, json=json)
     return 0
 
 
 def _sweep_text(key: str, address: str, points: Sequence[Point]) -> str:
-    from tiltsim.linear.sweeping import crossings
+    from tiltsim.linear.stability import crossings
 
     rests = any(point.found is not None and point.found.period is None for point in points)
     columns: Columns = {

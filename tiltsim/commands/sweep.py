@@ -1,7 +1,5 @@
 """``tiltsim sweep``: flies a scenario along axes, into one dataset."""
 
-from __future__ import annotations
-
 from collections import Counter
 from pathlib import Path
 from typing import Final
@@ -11,9 +9,7 @@ from tiltsim.commands.progress import show_progress
 from tiltsim.commands.text import counted, most_frequent, print_line, require_flown, tally
 from tiltsim.exit_codes import INTERRUPTED
 
-NOT_FLOWN: Final = frozenset({"invalid", "crashed"})
-"""Ends of rows without a flight."""
-
+NOT_FLOWN: Final = frozenset({"invalid", "crashed"})  # ends of rows without a flight
 MISTAKES: Final = NOT_FLOWN | {"failed"}
 """Ends whose reason is a mistake in a scenario or in a controller's code."""
 

@@ -1,7 +1,5 @@
 """Text output: aligned lines, tables, and JSON without negative zeros."""
 
-from __future__ import annotations
-
 import json
 import shlex
 import shutil

@@ -1,7 +1,5 @@
 """``tiltsim video``: renders a flight as a video."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -68,8 +66,7 @@ def run(
         progress.begin("reading the flight")
         flown, file = load_flight(flight), file_in(out, flight, "flight.mp4")
         video = video_format(flown, file, vars(recording), prefix="--")
-        from tiltsim.views.video.encoding import write_video
-        from tiltsim.views.video.rendering import frame_times
+        from tiltsim.views.video.rendering import frame_times, write_video
 
         progress.begin("frames", len(frame_times(flown, video)))
         write_video(flown, file, video, progress.move)

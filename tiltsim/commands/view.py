@@ -1,7 +1,5 @@
 """``tiltsim view``: shows flights and recordings in the Rerun viewer."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from tiltsim.commands.options import refuse_both

@@ -5,8 +5,6 @@ native callback (`tiltsim.engines.native_engine`). MuJoCo's control callback is 
 process, so an engine checks that a model is ours before it writes to it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any, Literal, Protocol
 

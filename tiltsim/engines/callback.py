@@ -1,7 +1,5 @@
 """Install an engine's control callback in MuJoCo."""
 
-from __future__ import annotations
-
 from contextlib import AbstractContextManager
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The folder of compiled code."""
 
-from __future__ import annotations
-
 import os
 from contextlib import suppress
 from pathlib import Path

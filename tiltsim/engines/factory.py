@@ -1,7 +1,5 @@
 """Building the engine of a plant."""
 
-from __future__ import annotations
-
 import mujoco
 
 from tiltsim.closed_loop.assembly import Assembly

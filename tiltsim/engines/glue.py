@@ -3,8 +3,6 @@
 The text is a template: words in ``<...>`` are numbers that are known when it is compiled.
 """
 
-from __future__ import annotations
-
 from typing import Final
 
 from tiltsim.engines.programs import HEAD_SIZE, SIDES, RecorderHead

@@ -1,7 +1,5 @@
 """LLVM text as machine code, which is kept on disk."""
 
-from __future__ import annotations
-
 import ctypes
 import platform
 import tempfile

@@ -8,8 +8,6 @@ in the running library: a small model has, at these offsets, the addresses and v
 Python bindings report.
 """
 
-from __future__ import annotations
-
 import ctypes
 from functools import cache
 from typing import Any, Final, NamedTuple

@@ -5,8 +5,6 @@ samples, so that a flight of any length runs without returning to Python and wit
 lock.
 """
 
-from __future__ import annotations
-
 import ctypes
 from functools import cache, lru_cache
 from math import nan
@@ -23,7 +21,7 @@ from tiltsim.engines.glue import RECORDER as RECORDER_TEXT
 from tiltsim.engines.machine_code import MachineCode
 from tiltsim.engines.mjdata_layout import mjdata_layout
 from tiltsim.engines.programs import KEPT, LoopPrograms
-from tiltsim.system.locks import one_thread_at_a_time
+from tiltsim.system.files import one_thread_at_a_time
 from tiltsim_controllers.code.llvm_text import llvm_functions
 
 _POINTER: Final = ctypes.c_void_p

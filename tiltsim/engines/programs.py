@@ -1,7 +1,5 @@
 """The functions of a closed loop as programs of a few vectors."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any, Final, NamedTuple
 

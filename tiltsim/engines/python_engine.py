@@ -1,7 +1,5 @@
 """The Python engine: the traced control step as Python on floats."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import lru_cache, partial
 from struct import Struct
@@ -21,7 +19,7 @@ from tiltsim.closed_loop.userdata import (
 )
 from tiltsim.engines.base import Callback, Engine, EngineName, check_model
 from tiltsim.engines.programs import KEPT, LoopPrograms
-from tiltsim.system.locks import one_thread_at_a_time
+from tiltsim.system.files import one_thread_at_a_time
 from tiltsim_controllers.code.program import Program
 from tiltsim_controllers.code.python_source import python_function
 from tiltsim_controllers.mathematics.records import unflatten

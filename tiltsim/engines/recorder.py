@@ -1,7 +1,5 @@
 """Recording of samples by machine code."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from math import copysign, inf
 from typing import Final

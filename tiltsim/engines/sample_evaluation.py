@@ -1,7 +1,5 @@
 """Functions over the samples of a flight, compiled once that pays off."""
 
-from __future__ import annotations
-
 import ctypes
 from collections.abc import Callable, Iterator
 from functools import lru_cache
@@ -16,7 +14,7 @@ from tiltsim.closed_loop.loop import ControlSetup
 from tiltsim.engines.glue import ROWS, filled
 from tiltsim.engines.machine_code import MachineCode
 from tiltsim.engines.programs import KEPT, record_with_choices
-from tiltsim.system.locks import one_thread_at_a_time
+from tiltsim.system.files import one_thread_at_a_time
 from tiltsim_controllers.code.llvm_text import llvm_functions
 from tiltsim_controllers.code.program import InputVector, Program
 from tiltsim_controllers.code.python_source import python_function

@@ -1,7 +1,5 @@
 """Integration of the equations of motion: as Python on floats, and as machine code."""
 
-from __future__ import annotations
-
 import ctypes
 from collections.abc import Callable, Sequence
 from functools import cache, lru_cache
@@ -16,7 +14,7 @@ from tiltsim.engines.machine_code import MachineCode, lane_math
 from tiltsim.engines.programs import HEAD_SIZE, KEPT, SIDES, LoopPrograms
 from tiltsim.engines.recorder import UNLIMITED, Recorder
 from tiltsim.equations.solvers import Integration, make_step
-from tiltsim.system.locks import one_thread_at_a_time
+from tiltsim.system.files import one_thread_at_a_time
 from tiltsim_controllers.code.llvm_text import llvm_functions
 from tiltsim_controllers.code.program import Program
 from tiltsim_controllers.code.python_source import python_function

@@ -19,18 +19,10 @@ from tiltsim.plants.built_in_command import BuiltInController
 from tiltsim.plants.command import Command
 from tiltsim_controllers.mathematics.scalar import Floats
 
-Policy = Callable[[Any], Floats]
-"""From the observation to the action, both scaled to -1 .. 1."""
-
-EPISODES: Final = range(20)
-"""The seeds of the episodes that make a score."""
-
-CANDIDATES: Final = 200
-"""Policies that the random search tries, each on one episode."""
-
-UNSEEN: Final = 1000
-"""The seed of that episode, which no score is made of."""
-
+Policy = Callable[[Any], Floats]  # from the observation to the action, both scaled to -1 .. 1.
+EPISODES: Final = range(20)  # the seeds of the episodes that make a score
+CANDIDATES: Final = 200  # policies that the random search tries, each on one episode
+UNSEEN: Final = 1000  # the seed of that episode, which no score is made of
 SLOWEST: Final = 100.0
 """Rotor speed (rad/s) below which no rotor is commanded: the law is singular where one stops."""
 

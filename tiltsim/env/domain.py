@@ -15,9 +15,8 @@ from tiltsim.errors import InputError
 from tiltsim.scenario.loading import without_none
 from tiltsim.scenario.messages import one_line_message
 from tiltsim.scenario.scenario import Scenario
-from tiltsim.sweeps.checks import check_points
 from tiltsim.sweeps.definition import UNUSED, SweepDefinition
-from tiltsim.sweeps.loading import load_sweep
+from tiltsim.sweeps.loading import check_points, load_sweep
 from tiltsim.sweeps.points import SweepPoints
 from tiltsim.sweeps.tables import Axis, NormalAxis, SeedAxis, Sweep, UniformAxis
 from tiltsim.system.text import short_repr

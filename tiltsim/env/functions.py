@@ -34,9 +34,7 @@ from tiltsim_controllers.mathematics.rotation import euler_from_quaternion, rota
 from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.references.trajectories import attitude_reference, reference_derivatives
 
-NOT_FINITE: Final = -1
-"""In place of the code of a limit."""
-
+NOT_FINITE: Final = -1  # in place of the code of a limit
 LEAST_THRUST: Final = 1e-30  # N; a root has no derivative at zero
 
 

@@ -24,8 +24,7 @@ from tiltsim_controllers.mathematics.scalar import Floats
 Reward = Callable[[Mapping[str, Floats], Floats], float]
 """``(observation, action) -> reward``, called after every step."""
 
-ENVIRONMENT: Final = "tiltsim.env.TiltrotorEnv"
-"""The controller named in the scenarios of episodes."""
+ENVIRONMENT: Final = "tiltsim.env.TiltrotorEnv"  # the controller named in the scenarios of episodes
 
 
 def hover_reward(observation: Mapping[str, Any], action: Any) -> Any:

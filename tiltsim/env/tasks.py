@@ -11,8 +11,7 @@ from typing import Any, Final
 
 from tiltsim.env.environment import HOVER
 
-EPISODE_STEPS: Final = 500
-"""Control steps of an episode: 10 s at 50 Hz."""
+EPISODE_STEPS: Final = 500  # control steps of an episode: 10 s at 50 Hz
 
 SIMULATION: Final = {
     "duration": 10.0,

@@ -19,7 +19,7 @@ from tiltsim.errors import InputError
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.messages import choose
 from tiltsim.system.numbers import is_number
-from tiltsim.system.optional import optional_package
+from tiltsim.system.public import optional_package
 from tiltsim.system.text import short_repr
 
 optional_package("gymnasium", "tiltsim.env.VectorEnv", "'tiltsim[rl]'")

@@ -5,8 +5,6 @@ the velocities, then the positions with the new velocities. For a body without h
 torque is taken at the end of the step as well, to first order (MuJoCo 4; for others it is not).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cache
 from typing import Any

@@ -3,8 +3,6 @@
 One controller runs here and in MuJoCo: the difference between the plants is a result.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cache
 from typing import Any, Final, NamedTuple

@@ -1,7 +1,5 @@
 """Checking a flight against the expectations of its scenario."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import isnan

@@ -23,8 +23,7 @@ from tiltsim.flight.writing import write_flight
 from tiltsim.laws.assembling import assemble
 from tiltsim.scenario.messages import did_you_mean
 from tiltsim.scenario.metric_names import unit_of
-from tiltsim.system.optional import optional_package
-from tiltsim.system.public import public
+from tiltsim.system.public import optional_package, public
 from tiltsim.system.text import html_table, short_repr, shortened, valid_unicode
 from tiltsim_controllers.mathematics.scalar import Floats
 
@@ -161,6 +160,18 @@ class Flight:
     def video(self, path: str | PathLike[str], **options: Any) -> Any:
         """Render this flight as a video; see `tiltsim.video` for the options."""
         return public("video")(self, path, **options)
+
+    def to_mcap(self, path: str | PathLike[str]) -> None:
+        """Write this flight as MCAP, for Foxglove and ROS 2; see `tiltsim.export`."""
+        public("export")(self, path, "mcap")
+
+    def to_ulog(self, path: str | PathLike[str]) -> None:
+        """Write this flight as ULog, for PlotJuggler and PX4's tools; see `tiltsim.export`."""
+        public("export")(self, path, "ulog")
+
+    def to_csv(self, path: str | PathLike[str]) -> None:
+        """Write this flight as CSV with all digits; see `tiltsim.export`."""
+        public("export")(self, path, "csv")
 
     def _repr_html_(self) -> str:
         """The end of the flight and its metrics, as a table for notebooks."""

@@ -1,7 +1,5 @@
 """A flight in numbers: the metrics that expectations check and sweeps collect."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from math import isfinite
 from typing import Any, NoReturn

@@ -38,10 +38,23 @@ def load_flight(path: str | PathLike[str]) -> Flight:
     Raises:
         InputError: If there is no such file, it is damaged, or it is not a flight of tiltsim.
     """
-    file = _flight_file(path)
+    file = flight_file(path)
     with open_parquet(file) as opened:
         table = opened.read()
         table.validate(full=True)
+    return flight_of_table(table, file)
+
+
+def flight_of_table(table: pyarrow.Table, file: Path) -> Flight:
+    """The flight whose columns and origin a table holds.
+
+    Args:
+        table: See `Flight.to_arrow`.
+        file: Its place, for messages.
+
+    Raises:
+        InputError: If it is not a flight of tiltsim.
+    """
     origin = _origin(file, table)
     try:
         document = dict(json.loads(origin["scenario"]))
@@ -80,7 +93,7 @@ def _samples(file: Path, table: pyarrow.Table, fields: Sequence[str]) -> Floats:
     return np.column_stack(columns)
 
 
-def _flight_file(given: str | PathLike[str]) -> Path:
+def flight_file(given: str | PathLike[str]) -> Path:
     """The Parquet file of a path, which may be its folder."""
     if not isinstance(given, str | PathLike):
         raise InputError(f"path = {short_repr(given)}: must be the name of a folder or file")
@@ -98,7 +111,9 @@ def _flight_file(given: str | PathLike[str]) -> Path:
 def _origin(file: Path, table: pyarrow.Table) -> dict[str, str]:
     metadata = table.schema.metadata or {}
     if b"scenario" not in metadata:
-        raise InputError(f"{file}: not a flight of tiltsim: no scenario in its metadata")
+        hint = "; it is an imported log, for tiltsim plot, replay and identify"
+        is_log = hint if b"log" in metadata else ""
+        raise InputError(f"{file}: not a flight of tiltsim: no scenario in its metadata{is_log}")
     return {k.decode(errors="replace"): v.decode(errors="replace") for k, v in metadata.items()}
 
 

@@ -1,7 +1,5 @@
 """Columns of a flight that are the components of one vector, under the names of `Observation`."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from typing import Final
 

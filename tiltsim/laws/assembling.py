@@ -25,7 +25,7 @@ from tiltsim.laws.tiltrotor import LAYOUT as TILTROTOR
 from tiltsim.laws.tiltrotor import tiltrotor_loop
 from tiltsim.scenario.law_controller import LawTable
 from tiltsim.scenario.scenario import plan_flight
-from tiltsim.system.locks import one_thread_at_a_time
+from tiltsim.system.files import one_thread_at_a_time
 
 if TYPE_CHECKING:
     from collections.abc import Callable

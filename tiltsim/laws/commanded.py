@@ -11,12 +11,11 @@ from dataclasses import replace
 from functools import cache
 from typing import TYPE_CHECKING, Any, Final
 
-import numpy as np
-
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup
 from tiltsim.closed_loop.vehicle_kind import VehicleKind
 from tiltsim.laws.law import Law
-from tiltsim.laws.quadrotor import upright_margin
+from tiltsim.laws.quadrotor import LAYOUT as QUADROTOR
+from tiltsim.laws.quadrotor import upright_columns
 from tiltsim.laws.rotor_loop import RotorLayout, layout_of_vehicle, rotor_loop
 from tiltsim.laws.rotorcraft import servo_lead, torque_free_columns
 from tiltsim.laws.tiltrotor import LAYOUT, singularity_columns
@@ -30,7 +29,7 @@ from tiltsim_controllers.mathematics.records import make_record_type, vector_of
 from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector
 from tiltsim_controllers.references.trajectories import ReferenceParameters
 from tiltsim_controllers.vehicle.effectiveness import ROTOR_FLOATS
-from tiltsim_controllers.vehicle.parameters import SPIN, Vehicle
+from tiltsim_controllers.vehicle.parameters import Vehicle
 
 if TYPE_CHECKING:
     from tiltsim.scenario.scenario import FlightPlan, Scenario
@@ -123,16 +122,9 @@ def _commanded_loop(
     return replace(rotor_loop(layout, law), kind=kind)
 
 
-def _upright(samples: Mapping[str, Floats], _vehicle: Vehicle) -> dict[str, Floats]:
-    """Determinant of the quadrotor's attitude-altitude law, and its margin."""
-    return {"determinant": np.cos(samples["roll"]), "singularity_margin": upright_margin(samples)}
-
-
 COMMANDED_LOOPS: Final[dict[str, ClosedLoop]] = {
     "tiltrotor": _commanded_loop(LAYOUT, ROTORCRAFT, Vehicle, singularity_columns),
-    "quadrotor": _commanded_loop(
-        RotorLayout((-1,) * 4, SPIN, "quadrotor"), ROTORCRAFT, Vehicle, _upright
-    ),
+    "quadrotor": _commanded_loop(QUADROTOR, ROTORCRAFT, Vehicle, upright_columns),
 }
 """Loops under commands, by the vehicle's model; commands of its servos are part of a sample."""
 

@@ -24,7 +24,9 @@ Tilts = Callable[[Seen, Any, Any, Any], Any]
 
 
 def tilts_of_gait(tilts: int) -> Tilts:
-    """Tilts that follow the gait of a law's parameters."""
+    """Tilts that follow the gait of a law's parameters, if there are any."""
+    if tilts == 0:
+        return lambda *_: xp.zeros((0, 2))
     return lambda seen, _rates, p, knots: planned_tilts(seen.time, p.gait, knots, tilts)[:, :2]
 
 

@@ -1,7 +1,5 @@
 """The tilt-car with a planned direction of its thrusts (ch. 10, Sec. 5; ch. 11)."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any, Final
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+import os
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from itertools import permutations
 from math import inf, pi
 from os import PathLike
@@ -12,16 +13,20 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from tiltsim.engines.base import EngineName
 from tiltsim.errors import InputError
+from tiltsim.flight.end import End
+from tiltsim.flight.flight import Flight
 from tiltsim.laws.assembling import assemble
-from tiltsim.linear.final_states import FinalStates
-from tiltsim.linear.map_size import COARSE, REFINEMENTS
-from tiltsim.linear.settling import SlowestMode, advice_on_duration, slowest_mode
+from tiltsim.linear import COARSE, REFINEMENTS
+from tiltsim.linear.stability import SlowestMode, advice_on_duration, slowest_mode
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.scenario import Scenario
+from tiltsim.simulation.batch import fly_each
 from tiltsim.system.numbers import is_number
 from tiltsim.system.progress import check_function
 from tiltsim.system.text import short_repr
+from tiltsim.vehicles.spans import in_last_second
 from tiltsim_controllers.analysis.singularity import determinant
 from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.vehicle.parameters import Vehicle
@@ -245,13 +250,7 @@ class _Grid:
         return self._states.engine
 
     def fly(self, points: set[tuple[int, int]], width: int) -> None:
-        """Fly from those points that are new.
-
-        Args:
-            points: Indices of edges.
-            width: Width of the cells whose corners they are; all cells but the first are at the
-                boundary.
-        """
+        """Fly from new points, corners of cells of a width, all but the first at the boundary."""
         new = sorted(points - self.returned.keys())
         undisturbed = [self._scenario] if self._goal is None else []
         following = 8 * (self._across // width) if undisturbed else 2 * len(new)
@@ -299,3 +298,34 @@ def _acceptable(scenario: Scenario, roll: Floats, pitch: Floats) -> NDArray[np.b
         level = determinant(angles, 0.0, 0.0, vehicle)
         inside &= determinant(angles, across, up, vehicle) * level > 0.0
     return inside
+
+
+ANGLES: Final = ("roll", "pitch", "yaw")
+
+
+class FinalStates:
+    """Flights of one scenario from other initial states: where each of them ends.
+
+    Args:
+        axes: Whose errors count: some of x, y and z.
+    """
+
+    def __init__(self, axes: str) -> None:
+        self._axes = axes
+        self.engine: EngineName | None = None  # the engine of the last flight
+
+    def fly(self, scenarios: Sequence[Scenario]) -> Iterator[tuple[End, Floats]]:
+        """The end of each flight, and means over its last second, shape (3 + axes,).
+
+        They are the angles (rad), which may exceed a revolution, and the errors (m).
+        """
+        return fly_each(scenarios, self._final, os.cpu_count() or 1)
+
+    def _final(self, flight: Flight) -> tuple[End, Floats]:
+        self.engine = flight.engine
+        timestep = flight.scenario.simulation.timestep
+        last = in_last_second(flight.samples[:, 0], timestep)
+        columns = replace(flight, samples=flight.samples[last]).columns
+        angles = [np.unwrap(columns[name]).mean() for name in ANGLES]
+        errors = [(columns[f"{axis}_ref"] - columns[axis]).mean() for axis in self._axes]
+        return flight.end, np.array([*angles, *errors])

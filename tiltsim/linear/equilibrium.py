@@ -1,7 +1,5 @@
 """Rest points and periodic orbits of closed loops."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
@@ -14,21 +12,16 @@ from numpy.typing import NDArray
 from tiltsim.engines.base import EngineName
 from tiltsim.errors import InputError
 from tiltsim.laws.assembling import assemble
-from tiltsim.linear.differences import AVERAGED, CENTRAL, HALF_STENCIL, SHORTER
+from tiltsim.linear import newton
+from tiltsim.linear.coordinates import PLANE
 from tiltsim.linear.forcing import Forcing, forcing_of
 from tiltsim.linear.motion import LONG, Motion, make_motion
-from tiltsim.linear.naming import PLANE
-from tiltsim.linear.newton import Root, coordinate_steps, solve
 from tiltsim.plants.engine_choice import native_pays_off
 from tiltsim.scenario.scenario import Scenario
 from tiltsim_controllers.mathematics.scalar import Floats
 
-REST: Final = 1e-6
-"""Largest rate, in SI units, that counts as rest; solutions end far below."""
-
-ORBIT: Final = 1e-7
-"""Largest difference after a period, in SI units, that counts as periodic."""
-
+REST: Final = 1e-6  # largest rate, in SI units, that counts as rest; solutions end far below
+ORBIT: Final = 1e-7  # largest difference after a period, in SI units, that counts as periodic
 SETTLING_TIME: Final = 40.0  # s, flown at most to approach an orbit or a rest point
 RETURNS: Final = 10
 """Periods, flown at most to approach a long orbit: a derivative takes two for each state."""
@@ -59,7 +52,7 @@ class Equilibrium:
 
     motion: Motion
     forcing: Forcing
-    root: Root
+    root: newton.Root
     step: int
     steps: int
     left_out: tuple[str, ...] = ()
@@ -101,7 +94,7 @@ class Equilibrium:
     def _at_limits(self) -> NDArray[np.bool_]:
         """Whether coordinates would pass a limit in the shortest step of a difference."""
         coordinates, state = self.motion.coordinates, self.root.state
-        steps = SHORTER[-1] * coordinate_steps(coordinates, state)
+        steps = newton.SHORTER[-1] * newton.coordinate_steps(coordinates, state)
         moved = [coordinates.moved(state, by) for step in (steps, -steps) for by in np.diag(step)]
         kept = [coordinates.between(at, self.motion.limited(at)) for at in moved]
         passed = np.abs(kept).max(axis=1) > 0.1 * np.concatenate((steps, steps))
@@ -220,7 +213,7 @@ class _Search:
         self._held = np.ones(motion.coordinates.size, dtype=bool)
         self._sides = self._signs(motion.initial)
 
-    def root(self, near: Floats | None = None) -> tuple[Root, tuple[str, ...]]:
+    def root(self, near: Floats | None = None) -> tuple[newton.Root, tuple[str, ...]]:
         """The state, sought near another one first, and names left out, or an `InputError`.
 
         Where no law holds x and y, a vehicle that drifts rests in its other coordinates: in air in
@@ -244,16 +237,18 @@ class _Search:
         drifts = "" if assembly.follows_position else ", also without x and y, which nothing holds"
         raise InputError(f"{address}: found no {what} near its flight{drifts}{left}")
 
-    def _is_apart(self, root: Root) -> bool:
+    def _is_apart(self, root: newton.Root) -> bool:
         """Whether no other coordinate depends on those left out."""
         rows = np.abs(root.derivative[self._held])
         largest = np.maximum(1.0, rows.max(axis=1, keepdims=True))
         return bool((rows[:, ~self._held] < REST * largest).all())
 
-    def _solve(self, state: Floats, tolerance: float) -> Root | None:
-        of_period = CENTRAL if self._steps > LONG else AVERAGED
-        stencil = HALF_STENCIL if self._forcing.period is None else of_period
-        root = solve(self._changes, self._motion.coordinates, state, 1e-4 * tolerance, stencil)
+    def _solve(self, state: Floats, tolerance: float) -> newton.Root | None:
+        of_period = newton.CENTRAL if self._steps > LONG else newton.AVERAGED
+        stencil = newton.HALF_STENCIL if self._forcing.period is None else of_period
+        root = newton.solve(
+            self._changes, self._motion.coordinates, state, 1e-4 * tolerance, stencil
+        )
         regular = np.array_equal(self._signs(root.state), self._sides)
         passed = self._motion.coordinates.between(root.state, self._motion.limited(root.state))
         if not (regular and np.abs(passed).max() <= REST and np.isfinite(root.derivative).all()):

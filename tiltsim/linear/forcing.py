@@ -1,7 +1,5 @@
 """The inputs from outside a closed loop: whether they are steady, periodic or neither."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from fractions import Fraction
 from math import gcd, lcm, pi
@@ -14,18 +12,9 @@ from tiltsim.errors import InputError
 from tiltsim.scenario.scenario import Scenario
 from tiltsim_controllers.gaits.parameters import CUBIC
 from tiltsim_controllers.mathematics.scalar import Floats, Triple
-from tiltsim_controllers.references.trajectories import (
-    ATTITUDE_ALTITUDE,
-    CIRCLE,
-    LINE,
-    LISSAJOUS,
-    SETPOINT,
-    ReferenceParameters,
-)
+from tiltsim_controllers.references import trajectories
 
-MOST_PERIODS: Final = 1000
-"""Most periods of a gait or reference in their common period."""
-
+MOST_PERIODS: Final = 1000  # most periods of a gait or reference in their common period
 CONTROLLER_EVENTS: Final = ("turn_time", "failure_known_from")
 """Keys of controllers: times (s) until which they change."""
 
@@ -70,7 +59,7 @@ def forcing_of(assembly: Assembly) -> Forcing:
     reference = assembly.reference
     periods = _periods(reference, scenario)
     velocity, acceleration = _AT_REST, _AT_REST
-    if reference.type == LINE:
+    if reference.type == trajectories.LINE:
         velocity = reference.velocity_x, reference.velocity_y, reference.velocity_z
         acceleration = reference.acceleration_x, reference.acceleration_y, reference.acceleration_z
         _check_line(scenario, velocity, acceleration)
@@ -126,13 +115,13 @@ def _check_line(scenario: Scenario, velocity: Triple, acceleration: Triple) -> N
         )
 
 
-def _periods(reference: ReferenceParameters, scenario: Scenario) -> list[float]:
+def _periods(reference: trajectories.ReferenceParameters, scenario: Scenario) -> list[float]:
     """The periods (s) of a reference."""
-    if reference.type in {SETPOINT, ATTITUDE_ALTITUDE, LINE}:
+    if reference.type in {trajectories.SETPOINT, trajectories.ATTITUDE_ALTITUDE, trajectories.LINE}:
         return []
-    if reference.type == CIRCLE:
+    if reference.type == trajectories.CIRCLE:
         rates = [reference.angular_frequency]
-    elif reference.type == LISSAJOUS:
+    elif reference.type == trajectories.LISSAJOUS:
         rates = [
             getattr(reference, f"frequency_{axis}")
             for axis in "xyz"

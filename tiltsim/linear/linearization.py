@@ -10,14 +10,12 @@ from typing import Any, Final, Literal, NamedTuple
 import numpy as np
 
 from tiltsim.errors import InputError
-from tiltsim.linear.coordinates import QUATERNION
-from tiltsim.linear.differences import jacobian, steps_at
+from tiltsim.linear.coordinates import QUATERNION, ROTOR_INPUT, unit_of
 from tiltsim.linear.equilibrium import Equilibrium, equilibrium_of
-from tiltsim.linear.naming import ROTOR_INPUT, unit_of
-from tiltsim.linear.newton import derivative_at
+from tiltsim.linear.newton import derivative_at, jacobian, steps_at
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.scenario import Scenario
-from tiltsim.system.optional import optional_package
+from tiltsim.system.public import optional_package
 from tiltsim.system.text import short_repr
 from tiltsim_controllers.mathematics.scalar import Floats
 

@@ -16,10 +16,10 @@ from typing import Any, Final
 import numpy as np
 
 from tiltsim.errors import InputError
+from tiltsim.linear.coordinates import is_of_vehicle
 from tiltsim.linear.equilibrium import equilibrium_of
 from tiltsim.linear.linearization import Linearization, linearization_at
 from tiltsim.linear.modes import NEUTRAL, exponents
-from tiltsim.linear.naming import is_of_vehicle
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.scenario import Scenario
 from tiltsim_controllers.mathematics.scalar import Floats
@@ -278,15 +278,7 @@ def _tracked(eigenvalues: Any) -> Any:
 def _crossings(
     loop: BrokenLoop, grid: Floats, locus: Any, signs: Floats, measure: Any
 ) -> Iterator[tuple[float, complex]]:
-    """Frequencies and values at which a measure of a locus vanishes.
-
-    Args:
-        loop: The loop.
-        grid: Frequencies, rad/s.
-        locus: An eigenvalue of the transfer matrix at these.
-        signs: Its measure at these.
-        measure: ``(value) -> number``.
-    """
+    """Frequencies (rad/s) and values of a locus at which ``measure(value)`` vanishes."""
     for index in np.flatnonzero(np.sign(signs[1:]) != np.sign(signs[:-1])):
         low, high = first, last = float(grid[index]), float(grid[index + 1])
         value, rise = complex(locus[index]), complex(locus[index + 1] - locus[index])

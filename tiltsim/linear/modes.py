@@ -1,7 +1,5 @@
 """Modes of a linear system: eigenvalues with the states that take part in them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Final
@@ -17,8 +15,7 @@ root of its error."""
 NEUTRAL: Final = 1e-6  # rad/s
 """Poles below this are zero."""
 
-SHARE: Final = 0.1
-"""States with less than this share of the largest part in a mode are not listed."""
+SHARE: Final = 0.1  # states with less than this share of the largest part in a mode are not listed
 
 WORDS: Final = {
     **dict.fromkeys(("x", "vx", "integral_x"), "x"),
@@ -74,12 +71,8 @@ def spectrum(matrix: Floats, error: float) -> tuple[Any, Any, Any]:
 
     An error of the matrix splits a multiple eigenvalue with too few eigenvectors by its root, but
     hardly moves the mean of the parts: where the split is no larger than the error explains, each
-    part is replaced by the mean. Others keep their values.
-
-    Args:
-        matrix: Shape (n, n).
-        error: Error of its entries, as a share of the largest of their row; 0 to keep all
-            eigenvalues.
+    part is replaced by the mean. Others keep their values, as all do for an error of 0; it is a
+    share of the largest entry of a row.
     """
     values, vectors = np.linalg.eig(matrix)
     values, left = values.astype(complex), np.linalg.pinv(vectors)

@@ -4,8 +4,6 @@ The state is a vector of the plant's own numbers. Whichever plant, `Motion` give
 minimal coordinates at a time, and the state some physics steps later, as flights have it.
 """
 
-from __future__ import annotations
-
 import os
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
@@ -22,14 +20,7 @@ from tiltsim.closed_loop.userdata import EVALUATIONS, EVALUATIONS_PER_STEP, HEAD
 from tiltsim.engines.base import EngineName
 from tiltsim.engines.callback import control_callback
 from tiltsim.laws.assembling import assemble
-from tiltsim.linear.coordinates import Coordinates
-from tiltsim.linear.naming import (
-    Input,
-    control_inputs,
-    equation_coordinates,
-    equation_inputs,
-    mujoco_coordinates,
-)
+from tiltsim.linear import coordinates
 from tiltsim.plants.equations_plant import EquationsPlant
 from tiltsim.plants.flight_model import disturbance_acceleration
 from tiltsim.plants.mujoco_plant import MujocoPlant
@@ -40,8 +31,7 @@ LONG: Final = 1000
 """Steps, from which on a flight is long: worth a thread, and a derivative of fewer evaluations."""
 
 THREADS: Final = os.cpu_count() or 1
-ROWS_PER_THREAD: Final = 4
-"""Flights of a thread between reports of progress."""
+ROWS_PER_THREAD: Final = 4  # flights of a thread between reports of progress
 
 
 class Motion(ABC):
@@ -62,7 +52,7 @@ class Motion(ABC):
     def __init__(self, scenario: Scenario, engine: EngineName | None, late: bool = False) -> None:
         self.scenario, self.engine, self._late = scenario, engine, late
         self._commanded: Values = ()
-        self._inputs: tuple[Input, ...] = ()
+        self._inputs: tuple[coordinates.Input, ...] = ()
         self.offsets = np.zeros(0)
         self.assembly = assemble(scenario, self._adapted)
         self.coordinates, self._inputs = self._names()
@@ -104,7 +94,7 @@ class Motion(ABC):
         return np.array([self._commanded[each.place] / each.per_unit for each in self._inputs])
 
     @abstractmethod
-    def _names(self) -> tuple[Coordinates, tuple[Input, ...]]:
+    def _names(self) -> tuple[coordinates.Coordinates, tuple[coordinates.Input, ...]]:
         """The coordinates, and the inputs."""
 
     @property
@@ -152,9 +142,9 @@ class Motion(ABC):
 class EquationMotion(Motion):
     """On equations of motion."""
 
-    def _names(self) -> tuple[Coordinates, tuple[Input, ...]]:
-        inputs = equation_inputs(self.assembly, self._equations.inputs_size)
-        return equation_coordinates(self.assembly, len(self.initial)), inputs
+    def _names(self) -> tuple[coordinates.Coordinates, tuple[coordinates.Input, ...]]:
+        inputs = coordinates.equation_inputs(self.assembly, self._equations.inputs_size)
+        return coordinates.equation_coordinates(self.assembly, len(self.initial)), inputs
 
     @cached_property
     def _equations(self) -> Equations:
@@ -219,8 +209,10 @@ class EquationMotion(Motion):
 class MujocoMotion(Motion):
     """In MuJoCo; a state is `qpos`, `qvel` and `act`."""
 
-    def _names(self) -> tuple[Coordinates, tuple[Input, ...]]:
-        return mujoco_coordinates(self.assembly.loop), control_inputs(self.assembly)
+    def _names(self) -> tuple[coordinates.Coordinates, tuple[coordinates.Input, ...]]:
+        return coordinates.mujoco_coordinates(self.assembly.loop), coordinates.control_inputs(
+            self.assembly
+        )
 
     @cached_property
     def _varied(self) -> MujocoPlant:

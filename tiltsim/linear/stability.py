@@ -1,19 +1,22 @@
-"""Stability of a scenario's rest point or periodic orbit."""
+"""Stability of a rest point or periodic orbit: its modes, the slowest one, and over a key."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from math import log
+from itertools import pairwise
+from math import ceil, exp, log
 from os import PathLike
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from tiltsim.errors import InputError
-from tiltsim.linear.differences import ERROR
+from tiltsim.laws.assembling import assemble
 from tiltsim.linear.equilibrium import Equilibrium, equilibrium_of
-from tiltsim.linear.modes import Mode, exponents, is_stable, modes_of, spectrum
+from tiltsim.linear.forcing import forcing_of
+from tiltsim.linear.modes import KINDS, Mode, exponents, is_stable, modes_of, spectrum
+from tiltsim.linear.newton import ERROR
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.system.progress import check_function
@@ -139,3 +142,161 @@ def stability_at(found: Equilibrium) -> Stability:
         left_out=found.left_out,
         corners=found.corners,
     )
+
+
+MOST_STEPS: Final = 5_000
+"""Longest orbit that is sought for its modes alone: some seconds of compiled steps."""
+
+
+class SlowestMode(NamedTuple):
+    """The mode of attitude and position that decays most slowly."""
+
+    name: str
+    decay_rate: float  # 1/s
+
+    def left_after(self, time: float) -> float:
+        """The share of a disturbance that is left after a time (s)."""
+        return exp(-self.decay_rate * time)
+
+    def time_until(self, left: float) -> float:
+        """When this share of a disturbance is left, s."""
+        return -log(left) / self.decay_rate
+
+
+def slowest_mode(scenario: Scenario) -> SlowestMode | None:
+    """The slowest mode of a flight, as `tiltsim.linear.stability` has it.
+
+    Horizontal motion counts if the law follows the reference's. None without a decaying mode, and
+    for flights that are neither at rest nor periodic or that take more than `MOST_STEPS` a period.
+    """
+    assembly = assemble(scenario)
+    without = {*KINDS.values()} if assembly.follows_position else {*KINDS.values(), "x", "y"}
+    try:
+        period = forcing_of(assembly).period or 0.0
+        if period > MOST_STEPS * scenario.simulation.timestep:
+            return None
+        modes = stability(scenario).modes
+    except InputError:
+        return None
+    named = [(mode.growth_rate, mode.name) for mode in modes if mode.frequency > 0.0]
+    decaying = [(r, name) for r, name in named if r < 0.0 and not {*name.split(", ")} <= without]
+    if not decaying:
+        return None
+    rate, name = max(decaying)
+    return SlowestMode(name, -rate)
+
+
+def advice_on_duration(slowest: SlowestMode, duration: float, near: float, mean: float) -> str:
+    """One line if a flight is too short to tell what comes back; empty if it is long enough.
+
+    Args:
+        slowest: Its slowest mode.
+        duration: Duration of the flight, s.
+        near: Admissible remainder of a disturbance of 1 m or rad.
+        mean: Seconds at the end over which the mean is taken.
+    """
+    left = slowest.left_after(max(0.0, duration - mean))
+    if left <= near:
+        return ""
+    enough = ceil(slowest.time_until(near) + mean)
+    return (
+        f"simulation.duration = {duration:g} s is short: the slowest mode, {slowest.name}, decays "
+        f"as exp(-{slowest.decay_rate:.3g} t) and leaves {100.0 * left:.2g} % of a disturbance, "
+        f"more than the {100.0 * near:g} % that count as back; take {enough} s"
+    )
+
+
+ON_AXIS: Final = 1e-6  # multipliers with a smaller imaginary part are real
+
+
+@dataclass(frozen=True)
+class Point:
+    """A value of the key and its result."""
+
+    value: float
+    found: Stability | None  # None where there is no orbit
+    reason: str = ""  # why there is none
+
+    @property
+    def largest(self) -> float | None:
+        """The size of the largest multiplier; of a rest point, in one second."""
+        return None if self.found is None else self.found.growth
+
+    def report(self) -> dict[str, Any]:
+        """As JSON."""
+        report: dict[str, Any] = {"value": self.value, "largest": self.largest}
+        if self.found is None:
+            return {**report, "stable": None, "multipliers": None, "reason": self.reason}
+        of_it = self.found.report()
+        return {**report, **{key: of_it.get(key) for key in ("stable", "multipliers", "poles")}}
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """A value at which the largest multiplier leaves or enters the unit circle."""
+
+    value: float
+    leaves: bool  # for larger values, else it enters
+    how: str
+
+    def report(self) -> dict[str, Any]:
+        """As JSON."""
+        return dict(vars(self))
+
+
+def sweep_stability(
+    scenario: Scenario,
+    key: str,
+    values: Iterable[float],
+    seen: Callable[[Point], None] = lambda _point: None,
+) -> list[Point]:
+    """The stability for each value of a key.
+
+    An orbit is followed from value to value: where several exist, it is the same one as long as it
+    changes steadily, also where it has become unstable and no flight approaches it.
+
+    Args:
+        scenario: The scenario.
+        key: Dotted, of a number.
+        values: For the key.
+        seen: Called with each point when it is found.
+    """
+    points: list[Point] = []
+    last: Stability | None = None
+    every = [(value, scenario.replace({key: value})) for value in values]  # refused: a mistake
+    for value, changed in every:
+        try:
+            last = stability(changed, near=last)
+            point = Point(value, last)
+        except InputError as error:
+            point = Point(value, None, str(error))
+        points.append(point)
+        seen(point)
+    return points
+
+
+def crossings(points: Iterable[Point]) -> list[Crossing]:
+    """Where the largest multiplier crosses the unit circle, between points of a sweep."""
+    found = []
+    for before, after in pairwise(points):
+        low, high = before.largest, after.largest
+        if low is None or high is None or (low > 1.0) == (high > 1.0):
+            continue
+        share = log(low) / (log(low) - log(high))
+        outside = before if low > 1.0 else after
+        assert outside.found is not None  # it has a largest multiplier
+        value = before.value + share * (after.value - before.value)
+        found.append(Crossing(value, high > 1.0, _how(outside.found)))
+    return found
+
+
+def _how(found: Stability) -> str:
+    if found.multipliers is None:
+        pole = max(found.poles, key=lambda value: value.real) if found.poles is not None else 0.0
+        return "at a rest point, with a swing" if abs(pole.imag) > ON_AXIS else "at a rest point"
+    largest = complex(found.multipliers[0])
+    if abs(largest.imag) > ON_AXIS:
+        return "as a pair: a slow swing about the orbit"
+    if largest.real < 0.0:
+        return "at -1: the orbit's period doubles"
+    return "at +1: it leaves the orbit to one side"

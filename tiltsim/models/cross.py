@@ -1,7 +1,5 @@
 """The tiltrotor and the quadrotor of the thesis as multirotors."""
 
-from __future__ import annotations
-
 from math import inf
 from typing import Final
 
@@ -16,11 +14,9 @@ ARMS: Final = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (-1.0, 0.0, 0.0), (0.0, -1.0, 0
 
 
 def as_multirotor(vehicle: Vehicle | Multirotor, *, tilting: bool) -> Multirotor:
-    """A vehicle with four equal arms at right angles, by its rotors.
+    """A vehicle with four equal arms at right angles, by its rotors, ``tilting`` about the arms.
 
-    Args:
-        vehicle: Its parameters; a multirotor is returned as it is.
-        tilting: Whether every rotor turns about its arm.
+    A multirotor is returned as it is.
     """
     if isinstance(vehicle, Multirotor):
         return vehicle

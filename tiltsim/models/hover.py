@@ -1,7 +1,5 @@
 """Rotor speeds with which a multirotor hovers, from statics."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from tiltsim.errors import InputError
@@ -15,14 +13,9 @@ from tiltsim_controllers.analysis.torque_free import (
 from tiltsim_controllers.mathematics.scalar import Floats, Values
 from tiltsim_controllers.vehicle.effectiveness import force_and_torque
 
-TOLERANCE = 1e-9
-"""Relative tolerance of the singular values of force and torque and of the limits."""
-
-NEARLY = 1e-3
-"""Share of the weight by which the force of fewer than four rotors may miss it."""
-
-REST = 1e-12
-"""A rotor with this part of the largest input is at rest."""
+TOLERANCE = 1e-9  # relative tolerance of the singular values of force and torque and of the limits
+NEARLY = 1e-3  # share of the weight by which the force of fewer than four rotors may miss it
+REST = 1e-12  # a rotor with this part of the largest input is at rest
 
 
 def hover_speeds(

@@ -14,23 +14,13 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from tiltsim.models.mjcf_editing import (
-    Compile,
-    add_hinge_torques,
-    add_memories,
-    add_states,
-    add_wrench,
-    compiler_of,
-    parse_mjcf,
-    remove_visuals,
-    set_servos,
-)
+from tiltsim.models import mjcf_editing
 from tiltsim.models.parts import SERVO_ARMATURE, ExtraActuators, Ground, ModelSpec, Pod, RotorLimits
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.models.user_vehicle import UserVehicle
 from tiltsim.resources import shipped_folder
+from tiltsim.system.files import one_thread_at_a_time
 from tiltsim.system.hooks import mujoco_hooks
-from tiltsim.system.locks import one_thread_at_a_time
 from tiltsim_controllers.mathematics.scalar import Values
 from tiltsim_controllers.vehicle.parameters import PRESETS, SPIN, Vehicle
 from tiltsim_controllers.vehicle.states import ROTORS
@@ -38,8 +28,7 @@ from tiltsim_controllers.vehicle.states import ROTORS
 if TYPE_CHECKING:
     import mujoco
 
-START_SPEED: Final = 300.0
-"""Rotor speed (rad/s) of the keyframe ``start``."""
+START_SPEED: Final = 300.0  # rotor speed (rad/s) of the keyframe ``start``
 
 
 @dataclass(frozen=True)
@@ -122,9 +111,7 @@ def compile_model(spec: RotorcraftSpec, *, visuals: bool = True) -> mujoco.MjMod
     return compiled
 
 
-MODEL_CACHE_SIZE: Final = 32
-"""Number of models that are kept to derive others from."""
-
+MODEL_CACHE_SIZE: Final = 32  # number of models that are kept to derive others from
 _compiled: dict[tuple[RotorcraftSpec, bool], tuple[mujoco.MjModel, mujoco.MjData]] = {}
 """Compiled models, with data to work in, by structure and visuals.
 
@@ -161,14 +148,14 @@ def _with_parameters(
 
 
 @lru_cache(maxsize=64)  # dm_control takes several times longer than MuJoCo's compiler
-def _compose(spec: RotorcraftSpec) -> tuple[Compile, Compile]:
+def _compose(spec: RotorcraftSpec) -> tuple[mjcf_editing.Compile, mjcf_editing.Compile]:
     """Functions that compile the complete vehicle, and the vehicle without visuals.
 
     A flight is simulated with the one and shown with the other, so both are made at once.
     """
     vehicle, servo, user_vehicle = spec.vehicle, spec.tilt_servo, spec.user_vehicle
     shipped = shipped_folder("mjcf") / f"{spec.model}.xml"
-    root = parse_mjcf(shipped if user_vehicle is None else Path(user_vehicle.path))
+    root = mjcf_editing.parse_mjcf(shipped if user_vehicle is None else Path(user_vehicle.path))
     contacts = spec.ground is not None
 
     root.option.timestep = spec.timestep
@@ -198,24 +185,24 @@ def _compose(spec: RotorcraftSpec) -> tuple[Compile, Compile]:
             inertias = tuple(spec.pod.inertia + SERVO_ARMATURE for _ in hinges)
         else:
             inertias = user_vehicle.hinge_inertias
-        set_servos(root, hinges, servo, inertias)
-    add_states(root, "law", spec.law_states)
+        mjcf_editing.set_servos(root, hinges, servo, inertias)
+    mjcf_editing.add_states(root, "law", spec.law_states)
     center = _center_site(root, spec)
     for index, extra in enumerate(spec.extra_actuators, start=1):
-        add_states(root, f"layer_{index}_state", extra.states)
+        mjcf_editing.add_states(root, f"layer_{index}_state", extra.states)
         if extra.begins_with_rotor_speeds:
             _limit_speeds(root, f"layer_{index}_state", spec)
-        add_memories(root, f"layer_{index}_memory", extra.memories)
+        mjcf_editing.add_memories(root, f"layer_{index}_memory", extra.memories)
         if extra.wrench:
-            add_wrench(root, f"layer_{index}", center)
-        add_hinge_torques(root, f"layer_{index}", extra.hinge_torques)
+            mjcf_editing.add_wrench(root, f"layer_{index}", center)
+        mjcf_editing.add_hinge_torques(root, f"layer_{index}", extra.hinge_torques)
     if spec.ground is not None:
         _set_ground(root, spec.ground)
-    complete = compiler_of(root)
+    complete = mjcf_editing.compiler_of(root)
     if user_vehicle is not None and spec.model != "multirotor":
         return complete, complete
-    remove_visuals(root, contacts=contacts)
-    bare = compiler_of(root)
+    mjcf_editing.remove_visuals(root, contacts=contacts)
+    bare = mjcf_editing.compiler_of(root)
     return complete, bare if user_vehicle is None or _moves_alike(complete, bare) else complete
 
 
@@ -229,7 +216,7 @@ def _center_site(root: Any, spec: RotorcraftSpec) -> str:
     return name
 
 
-def _moves_alike(complete: Compile, bare: Compile) -> bool:
+def _moves_alike(complete: mjcf_editing.Compile, bare: mjcf_editing.Compile) -> bool:
     """Whether drawn and measured parts give a user's vehicle no mass, spring or damper."""
     try:
         with mujoco_hooks():

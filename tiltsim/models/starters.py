@@ -1,7 +1,5 @@
 """Files to start from: a commented MJCF vehicle of each kind, and a scenario that flies it."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator
 from math import cos, pi, sin
@@ -11,14 +9,9 @@ import numpy as np
 
 from tiltsim_controllers.mathematics.scalar import Floats
 
-THRUST: Final = 8.5e-6
-"""Thrust coefficient, N s^2/rad^2."""
-
-DRAG: Final = 1.4e-7
-"""Drag-torque coefficient, N m s^2/rad^2."""
-
-MAX_SPEED: Final = 850.0
-"""Highest speed of the rotors, rad/s."""
+THRUST: Final = 8.5e-6  # thrust coefficient, N s^2/rad^2
+DRAG: Final = 1.4e-7  # drag torque coefficient, N m s^2/rad^2
+MAX_SPEED: Final = 850.0  # highest speed of the rotors, rad/s
 
 
 class Starter(NamedTuple):
@@ -54,16 +47,7 @@ def _ring(
     angles: tuple[float, ...] = (),
     controller: str = "",
 ) -> Starter:
-    """Rotors around the hull, turned about their arms by ``cant``, to either side by turns.
-
-    Args:
-        title: Title of the kind.
-        rotors: Their number.
-        radius: Length of the arms, m.
-        cant: rad.
-        angles: Tilt angles, rad.
-        controller: See `Starter`.
-    """
+    """Rotors around the hull, radius in m, turned to either side by ``cant`` (rad)."""
     heading = (2.0 * np.arange(rotors) + 1.0) * pi / rotors
     places = radius * np.stack([np.cos(heading), np.sin(heading), 0.0 * heading], axis=1)
     lean = sin(cant) * (-1.0) ** np.arange(rotors)
@@ -72,12 +56,7 @@ def _ring(
 
 
 def _cube(title: str, radius: float) -> Starter:
-    """Rotors on the corners of a cube (Brescianini and D'Andrea, 2016, eq. 16).
-
-    Args:
-        title: Title of the kind.
-        radius: From the center to the corners, m.
-    """
+    """Rotors on the corners of a cube, at a radius (m) (Brescianini and D'Andrea, 2016, eq. 16)."""
     a, b, c = 0.5 + 12**-0.5, 0.5 - 12**-0.5, 3**-0.5
     corners = [(x, y, z) for z in (1, -1) for y in (1, -1) for x in (1, -1)]
     upper = [(-a, b, c), (b, a, -c), (-b, -a, -c), (a, -b, c)]
@@ -238,12 +217,7 @@ _MJCF: Final = """\
 
 
 def starter_scenario(kind: str, mjcf: str) -> str:
-    """The scenario that flies a kind in `STARTERS` to a point.
-
-    Args:
-        kind: The vehicle.
-        mjcf: Name of its file, which is in the scenario's folder.
-    """
+    """The scenario that flies a kind in `STARTERS`, whose file lies in its folder, to a point."""
     starter = STARTERS[kind]
     return _SCENARIO.format(
         title=starter.title,

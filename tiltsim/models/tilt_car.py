@@ -7,18 +7,11 @@ from functools import lru_cache
 from math import cos, sin
 from typing import TYPE_CHECKING, Any, Final
 
-from tiltsim.models.mjcf_editing import (
-    Compile,
-    add_states,
-    compiler_of,
-    parse_mjcf,
-    remove_visuals,
-    set_servos,
-)
+from tiltsim.models import mjcf_editing
 from tiltsim.models.parts import ModelSpec
 from tiltsim.resources import shipped_folder
+from tiltsim.system.files import one_thread_at_a_time
 from tiltsim.system.hooks import mujoco_hooks
-from tiltsim.system.locks import one_thread_at_a_time
 from tiltsim_controllers.tilt_car.vehicle import TiltCar
 
 if TYPE_CHECKING:
@@ -26,8 +19,7 @@ if TYPE_CHECKING:
 
 ROTORS: Final = (1, 2)
 
-START_SPEED: Final = 200.0
-"""Rotor speed (rad/s) of the keyframe ``start``: ch. 10's."""
+START_SPEED: Final = 200.0  # rotor speed (rad/s) of the keyframe ``start``: ch. 10's
 
 
 @dataclass(frozen=True)
@@ -43,9 +35,7 @@ class TiltCarSpec(ModelSpec):
 def compile_tilt_car(spec: TiltCarSpec, *, visuals: bool = True) -> mujoco.MjModel:
     """Compile the MuJoCo model of a tilt-car, with the keyframes ``rest`` and ``start``.
 
-    Args:
-        spec: The specification of the model.
-        visuals: Whether to keep parts that are only drawn or measured, as for rotorcraft.
+    ``visuals`` keeps parts that are only drawn or measured, as for rotorcraft.
     """
     complete, bare = _compose(spec)
     with mujoco_hooks():
@@ -53,9 +43,9 @@ def compile_tilt_car(spec: TiltCarSpec, *, visuals: bool = True) -> mujoco.MjMod
 
 
 @lru_cache(maxsize=16)
-def _compose(spec: TiltCarSpec) -> tuple[Compile, Compile]:
+def _compose(spec: TiltCarSpec) -> tuple[mjcf_editing.Compile, mjcf_editing.Compile]:
     """Functions that compile the complete car, and the car without visuals."""
-    root, car = parse_mjcf(shipped_folder("mjcf") / "tilt_car.xml"), spec.car
+    root, car = mjcf_editing.parse_mjcf(shipped_folder("mjcf") / "tilt_car.xml"), spec.car
     root.option.timestep = spec.timestep
     root.option.integrator = spec.integrator
     root.option.flag.contact = "disable"
@@ -65,7 +55,7 @@ def _compose(spec: TiltCarSpec) -> tuple[Compile, Compile]:
     _set_thrusts(root, car)
     # The inertia that the hinge feels while both discs are free to turn.
     inertia = car.top_inertia * car.bottom_inertia / (car.top_inertia + car.bottom_inertia)
-    set_servos(root, ["tilt"], replace(spec.tilt_servo, max_angle=None), [inertia])
+    mjcf_editing.set_servos(root, ["tilt"], replace(spec.tilt_servo, max_angle=None), [inertia])
     if not spec.rotor_floor:
         for rotor in ROTORS:
             speed = root.find("actuator", f"rotor_speed_{rotor}")
@@ -73,10 +63,10 @@ def _compose(spec: TiltCarSpec) -> tuple[Compile, Compile]:
     start = root.find("key", "start")
     start.act = [START_SPEED] * 2
     start.ctrl = [0.0, START_SPEED**2, START_SPEED**2, 0.0, 0.0]
-    add_states(root, "law", spec.law_states)
-    complete = compiler_of(root)
-    remove_visuals(root, contacts=False)
-    return complete, compiler_of(root)
+    mjcf_editing.add_states(root, "law", spec.law_states)
+    complete = mjcf_editing.compiler_of(root)
+    mjcf_editing.remove_visuals(root, contacts=False)
+    return complete, mjcf_editing.compiler_of(root)
 
 
 def _set_inertia(root: Any, car: TiltCar) -> None:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from tiltsim.models.mjcf_files import mjcf_version
+from tiltsim.models.mjcf_editing import mjcf_version
 from tiltsim.models.rotor_table import Multirotor, read_rotors, speed_range
 from tiltsim.models.vehicle_parts import (
     CROSSES,
@@ -24,8 +24,8 @@ from tiltsim.models.vehicle_parts import (
     check_parts,
     parallel_axis,
 )
+from tiltsim.system.files import one_thread_at_a_time
 from tiltsim.system.hooks import mujoco_hooks
-from tiltsim.system.locks import one_thread_at_a_time
 from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.vehicle.parameters import Vehicle
 from tiltsim_controllers.vehicle.states import ROTORS
@@ -97,16 +97,10 @@ class UserVehicle:
         return " and ".join(found)
 
     def set_inertia(self, root: Any, vehicle: Vehicle | Multirotor) -> None:
-        """Set mass and moments of inertia of the whole vehicle by changing the body ``vehicle``.
+        """Set mass and moments of inertia of the whole vehicle by changing its body in a tree.
 
-        Center of mass and products of inertia stay the file's.
-
-        Args:
-            root: The file as a tree.
-            vehicle: The parameters to set.
-
-        Raises:
-            ValueError: If no body could have the mass and moments that remain for it.
+        Center of mass and products of inertia stay the file's. Raises ValueError if no body could
+        have the mass and moments that remain for it.
         """
         about_center = self._inertia_about_center(vehicle)
         unchanged = np.array_equal(about_center, self._inertia_about_center(self.vehicle))
@@ -151,14 +145,9 @@ class UserVehicle:
 
 @one_thread_at_a_time
 def read_user_vehicle(path: str, model: str) -> UserVehicle:
-    """Check and measure an MJCF file.
+    """Check and measure an MJCF file that must have the names of a ``vehicle.model``.
 
-    Args:
-        path: The file.
-        model: ``tiltrotor``, ``quadrotor`` or ``multirotor``: the names that it must have.
-
-    Raises:
-        ValueError: In one line: the file cannot be read or compiled, or lacks a name.
+    Raises ValueError in one line if it cannot be read or compiled, or lacks a name.
     """
     try:
         Path(path).stat()

@@ -1,7 +1,5 @@
 """Commands of a built-in controller: in its plant's present state, or for an observation."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -5,8 +5,6 @@ Commands and observations pass the layers of the shipped controllers. Only the d
 take at once.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from math import inf, nan, sqrt
 

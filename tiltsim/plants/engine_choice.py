@@ -1,7 +1,5 @@
 """Choice of the engine that flies a scenario."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from typing import Final
 

@@ -1,7 +1,5 @@
 """Equations of motion as the plant, either the thesis's equations or a rigid body's."""
 
-from __future__ import annotations
-
 from math import nan
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The MuJoCo model that a flight integrates."""
 
-from __future__ import annotations
-
 from typing import Final
 
 import mujoco

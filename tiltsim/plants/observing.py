@@ -1,7 +1,5 @@
 """Observations of a rotorcraft in MuJoCo, as a controller gets them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The interface of the plants."""
 
-from __future__ import annotations
-
 from typing import Protocol
 
 import numpy as np

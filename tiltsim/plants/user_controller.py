@@ -5,8 +5,6 @@ object with ``__call__`` for one with a memory. It is called at every control sa
 command is held until the next.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -83,35 +83,26 @@ class Claim:
     _: KW_ONLY
     published: Published = True
     """The published value; True if the thesis says that the statement holds."""
-    case: str = ""
-    """Label, if the statement has several rows."""
-    key: str = ""
-    """End of the row's id; default: from its label."""
-    where: str = ""
-    """Place in the thesis, if it differs from the statement's."""
+    case: str = ""  # label, if the statement has several rows
+    key: str = ""  # end of the row's id; default: from its label
+    where: str = ""  # place in the thesis, if it differs from the statement's
     unit: str = ""
     tolerance: float | None = None
     """Difference up to which numbers count as equal; default: half of the last printed digit."""
     in_kind: tuple[float, float] | None = None
     """Range in which the statement still holds although the number differs."""
-    why: str = ""
-    """The reason if it is not reproduced."""
+    why: str = ""  # the reason if it is not reproduced
     fault: str = ""
     """Verdict if it does not hold and a proof says why: ``refuted``, ``misprint``, ``rounding``."""
-    thresholds: tuple[str, ...] = ()
-    """Names of the numbers of ours in its criterion."""
-    missing: str = ""
-    """Information that the text omits, so that this row is not testable."""
+    thresholds: tuple[str, ...] = ()  # names of the numbers of ours in its criterion
+    missing: str = ""  # information that the text omits, so that this row is not testable
     error: str = ""
     """Key of the entry in the list of errors that a refuted or misprinted row belongs to."""
-    note: str = ""
-    """Note that a reader needs to judge the row, whatever its verdict."""
+    note: str = ""  # note that a reader needs to judge the row, whatever its verdict
     origins: tuple[Origin, ...] = ()
     """Our own choices in this row, in addition to ``ours`` of its statement and flights."""
-    fitted: bool = False
-    """Whether parameters were chosen so that this row holds."""
-    finding: str = ""
-    """Key of the finding that settles it; default: the statement's."""
+    fitted: bool = False  # whether parameters were chosen so that this row holds
+    finding: str = ""  # key of the finding that settles it; default: the statement's
 
     def __post_init__(self) -> None:
         yes_or_no = isinstance(self.published, bool)
@@ -185,16 +176,14 @@ class Claim:
 class AnalysisClaim(Claim):
     """A claim that is computed, without a flight."""
 
-    measure: Callable[[], Value] | None = None
-    """None if its statement is not testable."""
+    measure: Callable[[], Value] | None = None  # None if its statement is not testable
 
 
 @dataclass(frozen=True)
 class FlightClaim(Claim):
     """A claim about several flights, for example that one tracks better than another."""
 
-    flights: tuple[str, ...]
-    """Addresses in the scenario library."""
+    flights: tuple[str, ...]  # addresses in the scenario library
     measure: Callable[[Sequence[Metrics]], Value]
     """From the metrics of the flights, in order, to the measured value; called per plant."""
 

@@ -5,8 +5,6 @@ file) names the flight to compare with; the metrics of its expectations are comp
 key only its own values are shown.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Final
 

@@ -155,7 +155,8 @@ class Group:
     def described(self) -> str:
         """Statement, criterion and notes in one cell of Markdown."""
         statement = self.statement
-        text = f"**{statement.text}** ({self.sources}; `{statement.id}`)"
+        place = "; ".join(filter(None, (self.sources, f"`{statement.id}`")))
+        text = f"**{statement.text}** ({place})"
         criterion = f"Criterion: {statement.criterion.rstrip('.')}." if statement.criterion else ""
         return "\n".join(filter(None, (text, criterion, statement.note, self.shared_why)))
 

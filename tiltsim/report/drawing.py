@@ -1,7 +1,5 @@
 """Drawing of the report's pictures; drawings are stored like flights."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass

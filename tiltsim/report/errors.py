@@ -4,8 +4,6 @@ An entry counts if a row with the verdict refuted or misprint names it
 (`tiltsim.report.claim_rows.errors`); its proof runs when the report is made.
 """
 
-from __future__ import annotations
-
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path
@@ -28,8 +26,7 @@ class PublishedError:
     printed: str
     mended: str
     proof: str
-    changes: str
-    """Its consequences downstream."""
+    changes: str  # its consequences downstream
 
     @property
     def off(self) -> str:

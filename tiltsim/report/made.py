@@ -1,7 +1,5 @@
 """The versions that made a report, and how to cite it."""
 
-from __future__ import annotations
-
 import os
 import platform
 import subprocess

@@ -1,7 +1,5 @@
 """Makes a report from paths of scenarios."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path

@@ -6,8 +6,6 @@ Markdown is reproducible, without machine details: the summary, the findings, an
 not reproduced. The templates are in the folder ``templates``.
 """
 
-from __future__ import annotations
-
 import re
 import tomllib
 from base64 import b64encode

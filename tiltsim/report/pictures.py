@@ -1,7 +1,5 @@
 """The figures of the report, a few per chapter, drawn with `tiltsim.views.figures`."""
 
-from __future__ import annotations
-
 import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -16,12 +14,11 @@ from tiltsim.report.claim import Metrics
 from tiltsim.report.flights import PLANTS, Plant, variant_for
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.simulation.simulate import simulate_to_end
-from tiltsim.views.figures.attainable import attainable_figure
-from tiltsim.views.figures.attraction import attraction_panels
-from tiltsim.views.figures.determinant import determinant_figure
+from tiltsim.views.figures.determinant import determinant_figure, singularity_figure
 from tiltsim.views.figures.gait import comparison_figure
+from tiltsim.views.figures.multirotor import attainable_figure
 from tiltsim.views.figures.plot import plot
-from tiltsim.views.figures.quadrotor_singularity import singularity_figure
+from tiltsim.views.figures.stability import attraction_panels
 from tiltsim.views.figures.tracking_errors import (
     PeriodErrors,
     SetpointErrors,
@@ -44,8 +41,7 @@ class Picture:
     chapter: int
     name: str
     caption: str
-    draw: Callable[[FlightMetrics], Figure]
-    """From the metrics of the report's flights."""
+    draw: Callable[[FlightMetrics], Figure]  # from the metrics of the report's flights
     flights: tuple[tuple[str, Plant], ...] = ()
     """Flights that it shows; one without flights needs only analysis."""
 

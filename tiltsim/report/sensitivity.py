@@ -1,7 +1,5 @@
 """How many verdicts depend on the numbers of ours in criteria: each is halved and doubled."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import isfinite
@@ -33,8 +31,7 @@ class Criterion:
     value: str
     reason: str
     rows: int
-    changed: tuple[int, ...]
-    """Verdicts that change by each of `FACTORS`."""
+    changed: tuple[int, ...]  # verdicts that change by each of `FACTORS`
 
 
 def criteria(rows: Sequence[Row], flights: Flights) -> list[Criterion]:

@@ -1,7 +1,5 @@
 """Statements of the thesis, as the report judges them, and our own choices in their tests."""
 
-from __future__ import annotations
-
 import re
 import unicodedata
 from collections.abc import Iterable
@@ -55,26 +53,19 @@ class Statement:
     Raises `ValueError` if a field is empty or the fields contradict each other.
     """
 
-    id: str
-    """Anchor on the page, never changed once published: "ch4-period"."""
-    source: str
-    """Chapter first, then section, figure or equation: "ch. 3, Sec. 4, Eq. (19)"."""
-    text: str
-    """The statement in one sentence of ours."""
-    thesis: str
-    """The sentence that makes it, quoted or paraphrased, or a description of the figure."""
+    id: str  # anchor on the page, never changed once published: "ch4-period"
+    source: str  # chapter first, then section, figure or equation: "ch. 3, Sec. 4, Eq. (19)".
+    text: str  # the statement in one sentence of ours
+    thesis: str  # the sentence that makes it, quoted or paraphrased, or a description of the figure
     criterion: str = ""
     """Criterion of reproduction, and of failure, in words; none if it is not testable."""
-    note: str = ""
-    """Note that a reader needs to judge it, shown with every row."""
+    note: str = ""  # note that a reader needs to judge it, shown with every row
     origins: tuple[Origin, ...] = ()
     """Our own choices in every row, in addition to ``ours`` of its flights."""
-    fitted: bool = False
-    """Whether parameters were chosen so that it holds."""
+    fitted: bool = False  # whether parameters were chosen so that it holds
     finding: str = ""
     """Key of the finding that settles it; rows refuted by one finding are one error."""
-    missing: str = ""
-    """Information that the text omits, so that the statement is not testable."""
+    missing: str = ""  # information that the text omits, so that the statement is not testable
     pictures: tuple[str, ...] = ()
     """Names of pictures that show it, in addition to the pictures of its flights."""
     tests: tuple[str, ...] = ()

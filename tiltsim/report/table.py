@@ -1,7 +1,5 @@
 """The rows of the report as records: for the files ``rows.csv`` and ``rows.json``."""
 
-from __future__ import annotations
-
 import csv
 import io
 import json

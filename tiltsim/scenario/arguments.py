@@ -1,7 +1,5 @@
 """Arguments given in Python, as the values that a scenario file would have."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from os import PathLike, fsdecode
 from typing import Any

@@ -1,7 +1,5 @@
 """The ``[controller]`` tables of the baselines: known controllers to compare with."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from typing import Any, ClassVar
 

@@ -1,7 +1,5 @@
 """Checks between the tables of a scenario, each valid alone."""
 
-from __future__ import annotations
-
 import re
 from math import pi
 from typing import Final

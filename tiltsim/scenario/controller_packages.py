@@ -5,8 +5,6 @@ An entry point names a law and its table, a subclass of
 warning, so that a broken package does not stop flights that do not need it.
 """
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Container
 from contextlib import suppress

@@ -1,7 +1,5 @@
 """The common part of the tables of all controllers."""
 
-from __future__ import annotations
-
 from math import atan, pi
 from typing import Annotated, Any, ClassVar, Literal, Self
 

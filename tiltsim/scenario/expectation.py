@@ -1,7 +1,5 @@
 """The tables ``[[expect]]`` and ``[claim.NAME]``: bounds on metrics, statements of the thesis."""
 
-from __future__ import annotations
-
 from typing import Annotated, Final, Literal
 
 from pydantic import Field

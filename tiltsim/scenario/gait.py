@@ -1,7 +1,5 @@
 """The ``[gait]`` table of a scenario: one model per type, which plans its gait."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from functools import lru_cache

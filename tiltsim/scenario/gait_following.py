@@ -1,7 +1,5 @@
 """Keys shared by the ``[controller]`` tables of laws that follow a planned gait."""
 
-from __future__ import annotations
-
 from typing import Annotated, Literal, Self
 
 from pydantic import Field

@@ -1,13 +1,11 @@
 """Labels and units of the keys of scenario files, from the descriptions in the schema."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Final
 
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.scenario.schema import schema_of
-from tiltsim.system.quantity import SUBSCRIPTS, Quantity, in_words
+from tiltsim.system.text import SUBSCRIPTS, Quantity, in_words
 
 _WITHOUT_NAME: Final = ("simulation", "vehicle", "controller", "sensors")
 """Tables whose keys speak for themselves."""

@@ -1,7 +1,5 @@
 """The shipped files: the scenario library and the MJCF models."""
 
-from __future__ import annotations
-
 import re
 import tomllib
 from collections.abc import Iterator, Mapping

@@ -1,7 +1,5 @@
 """Limits on the content of files, checked before any work is done with them."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Final
 

@@ -12,7 +12,7 @@ import tomli_w
 from pydantic import ValidationError
 
 from tiltsim.errors import InputError
-from tiltsim.models.mjcf_files import check_mjcf
+from tiltsim.models.mjcf_editing import check_mjcf
 from tiltsim.scenario.arguments import check_keys, check_no_other, own_title, plain
 from tiltsim.scenario.controller import DEFAULT_LAW
 from tiltsim.scenario.library import find_scenario_file, library_name, read_toml

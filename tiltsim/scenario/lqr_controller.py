@@ -1,7 +1,5 @@
 """The ``[controller]`` table of the linear-quadratic regulator."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 from math import inf
 from typing import Any, ClassVar, NamedTuple

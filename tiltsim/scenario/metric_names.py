@@ -1,10 +1,8 @@
 """Names, meanings and units of the metrics."""
 
-from __future__ import annotations
-
 from typing import Final, NamedTuple
 
-from tiltsim.system.quantity import Quantity
+from tiltsim.system.text import Quantity
 
 
 class Metric(NamedTuple):

@@ -1,7 +1,5 @@
 """The ``[controller]`` table of a multirotor."""
 
-from __future__ import annotations
-
 from typing import Self
 
 from pydantic import model_validator

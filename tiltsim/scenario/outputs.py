@@ -1,7 +1,5 @@
 """Checks that a vehicle can control the outputs of its law, with its gait and without a rotor."""
 
-from __future__ import annotations
-
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.messages import InvalidValueError
 from tiltsim.scenario.multirotor_controllers import AttitudeForceController

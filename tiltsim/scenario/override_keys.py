@@ -1,7 +1,5 @@
 """Values by dotted key, as in ``--set`` and in the overrides of `load_scenario`."""
 
-from __future__ import annotations
-
 import re
 import tomllib
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """Loading of the user's Python code that scenario files name, and its errors in one line."""
 
-from __future__ import annotations
-
 import importlib.util
 import sys
 import traceback

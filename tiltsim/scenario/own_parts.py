@@ -1,7 +1,5 @@
 """Parts of a scenario given in Python: controllers, references and gaits."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from math import ceil
 from os import PathLike

@@ -1,7 +1,5 @@
 """The ``[controller]`` tables of the quadrotor."""
 
-from __future__ import annotations
-
 from typing import Self
 
 from pydantic import model_validator

@@ -1,7 +1,5 @@
 """The ``[reference]`` table of a scenario: the motion to track."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from functools import lru_cache

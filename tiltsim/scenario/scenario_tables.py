@@ -1,7 +1,5 @@
 """The tables of a scenario together, and properties that follow from several of them."""
 
-from __future__ import annotations
-
 from typing import Annotated, Any, Final
 
 from pydantic import Field, PrivateAttr

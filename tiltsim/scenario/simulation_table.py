@@ -1,7 +1,5 @@
 """The tables ``[simulation]`` and ``[initial]``."""
 
-from __future__ import annotations
-
 from typing import Annotated, Final, Literal
 
 from pydantic import Field

@@ -1,7 +1,5 @@
 """The tables of a vehicle's surroundings, disturbances, sensors and faults."""
 
-from __future__ import annotations
-
 from typing import Annotated, Literal
 
 from pydantic import Field

@@ -1,7 +1,5 @@
 """Base class and number types of the tables of a scenario file."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from math import pi
 from operator import attrgetter

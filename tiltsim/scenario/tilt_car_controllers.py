@@ -1,7 +1,5 @@
 """The ``[controller]`` tables of the tilt-car."""
 
-from __future__ import annotations
-
 from tiltsim.scenario.controller_table import ControllerTable
 from tiltsim_controllers.tilt_car.fourth_derivative import FourthDerivative
 from tiltsim_controllers.tilt_car.planned_direction import PlannedDirection

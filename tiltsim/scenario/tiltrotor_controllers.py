@@ -1,7 +1,5 @@
 """The ``[controller]`` tables of the tiltrotor."""
 
-from __future__ import annotations
-
 from typing import Final, Self
 
 from pydantic import model_validator

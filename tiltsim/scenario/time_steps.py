@@ -1,7 +1,5 @@
 """Checks that the integrators can follow a scenario's servos, rotors, supervisor and law."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 from typing import Any, Final
 

@@ -1,7 +1,5 @@
 """Tables over time, of references and gaits: in a file, in the scenario, or of other libraries."""
 
-from __future__ import annotations
-
 import csv
 from collections.abc import Callable, Sequence
 from math import isfinite

@@ -4,8 +4,6 @@ The permission is a property of the scenario and goes with it, also to other pro
 scenario gives none; `tiltsim.scenario.own_code`, which alone executes such files, checks it here.
 """
 
-from __future__ import annotations
-
 import os
 from typing import Final
 

@@ -1,7 +1,5 @@
 """The tables of a scenario that describe the vehicle: ``[vehicle]`` and ``[model_error]``."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import pi, sqrt
 from typing import Annotated, Any, Final, Literal

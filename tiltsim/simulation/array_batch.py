@@ -5,8 +5,6 @@ of the scenario. All fly to the end of the duration; a row that ends early is cu
 last interval is repeated step by step to find the step.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from time import perf_counter

@@ -1,7 +1,5 @@
 """Plans of a scenario's flights in JAX: functions of its numbers."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Mapping
 from typing import Any, Final, NamedTuple

@@ -1,7 +1,5 @@
 """Completed flights whose metrics are computed together."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import cache
 from typing import Final

@@ -4,8 +4,6 @@ A lane holds a flight with its own parameters. It records its own samples and re
 of them or ends early; then the next flight takes its place.
 """
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor

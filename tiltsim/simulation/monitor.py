@@ -1,7 +1,5 @@
 """The conditions that end a flight, checked on its samples."""
 
-from __future__ import annotations
-
 from math import copysign, isfinite
 
 from tiltsim.closed_loop.assembly import Assembly

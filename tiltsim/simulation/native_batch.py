@@ -5,8 +5,6 @@ stops when it has all of them or ends early; its place goes to the next flight a
 holds one flight per row, for any number of flights.
 """
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor

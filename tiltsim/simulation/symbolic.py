@@ -1,7 +1,5 @@
 """A scenario as functions of CasADi's symbols, for optimization and linearization."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from os import PathLike
 from typing import Any, NamedTuple
@@ -11,7 +9,7 @@ from tiltsim.laws.assembling import assemble
 from tiltsim.plants.flight_model import disturbance_acceleration
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.scenario import Scenario
-from tiltsim.system.optional import optional_package
+from tiltsim.system.public import optional_package
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.code.casadi_function import casadi_function
 from tiltsim_controllers.code.messages import TraceError

@@ -1,7 +1,5 @@
 """A scenario as pure functions of its numbers in JAX, for ``jit``, ``vmap`` and ``grad``."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from os import PathLike
 from typing import Any

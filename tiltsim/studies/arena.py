@@ -1,7 +1,5 @@
 """The arena: fixed tasks for every vehicle, flown by every controller, and their scores."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from statistics import mean
@@ -15,7 +13,7 @@ from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.messages import choose
 from tiltsim.studies.checking import collect
 from tiltsim.studies.comparison import GIVEN, Entry, fly_entries
-from tiltsim.studies.fleet import FEW_ROTORS, FLEET, fleet_file
+from tiltsim.studies.multirotor_analysis import FEW_ROTORS, FLEET, fleet_file
 
 FOLDER: Final = "arena"
 """Folder of the library with one file for each vehicle and one variant for each task."""

@@ -1,7 +1,5 @@
 """The arena's page in Markdown."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 

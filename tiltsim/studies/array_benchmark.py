@@ -1,7 +1,5 @@
 """Speed of many flights on the equations: steps per second, by engine and number of vehicles."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -33,9 +31,7 @@ STEADY: Final = "ch04_tracking/circle#fixed_modified"
 EXACT: Final = {f"controller.{key}": "exact" for key in ("decoupling", "gains", "decoupler")}
 
 VEHICLES: Final = (1, 64, 1024, 16_384, 262_144)
-TOTAL_STEPS: Final = 1_000_000
-"""Steps of all vehicles together in one timing, roughly."""
-
+TOTAL_STEPS: Final = 1_000_000  # steps of all vehicles together in one timing, roughly
 ROUNDS: Final = 3
 PEER_ROUNDS: Final = 5
 PEER_STEP: Final = 0.002  # s

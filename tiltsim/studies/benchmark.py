@@ -5,8 +5,6 @@ of a variant is the median over the rounds of bare time over its time, so that a
 change of its clock, affects all variants of a round alike.
 """
 
-from __future__ import annotations
-
 import os
 import sys
 from collections.abc import Callable
@@ -47,12 +45,8 @@ BATCH_ROWS: Final = 64
 BATCH_STEPS: Final = 200
 BATCH_ROUNDS: Final = 9
 
-CALLS: Final = 200
-"""Control steps that are timed together."""
-
-CALL_ROUNDS: Final = 40
-"""Timings of compiled code, of which the least counts."""
-
+CALLS: Final = 200  # control steps that are timed together
+CALL_ROUNDS: Final = 40  # timings of compiled code, of which the least counts
 ACCURACY_STEPS: Final = (0.008, 0.004, 0.002, 0.001, 0.0005)
 REFERENCE_STEP: Final = 0.0001
 ACCURACY_DURATION: Final = 8.0

@@ -1,7 +1,5 @@
 """Controllers side by side: errors, effort, cost and robustness in the same flights."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -21,17 +19,13 @@ from tiltsim.scenario.scenario import Scenario
 from tiltsim.scenario.trust import require_trust
 from tiltsim.simulation.simulate import simulate_to_end
 from tiltsim.studies.benchmark import compiled_time_per_call, time_per_call
-from tiltsim.sweeps.search import boundary
+from tiltsim.sweeps.chunks import boundary
 from tiltsim.system.processes import in_order, in_processes
 from tiltsim.vehicles.spans import in_last_second
 from tiltsim_controllers.mathematics.scalar import Floats
 
-GIVEN: Final = "given"
-"""In place of a law: the scenario's own controller."""
-
-CONTROL_PERIOD: Final = 0.005
-"""s, of continuous controllers when latencies are sought."""
-
+GIVEN: Final = "given"  # in place of a law: the scenario's own controller
+CONTROL_PERIOD: Final = 0.005  # s, of continuous controllers when latencies are sought
 WITHIN: Final = 1.0
 """m: largest position error in the last second of a flight that counts as survived."""
 
@@ -42,7 +36,7 @@ class Search:
 
     Attributes:
         key: Key of the scenario; the values of the latency are control periods.
-        start, stop, step, tolerance: See `tiltsim.sweeps.search.boundary`.
+        start, stop, step, tolerance: See `tiltsim.sweeps.chunks.boundary`.
     """
 
     key: str
@@ -125,13 +119,9 @@ class Entry:
 
 
 def controller_tables(names: Sequence[str]) -> dict[str, Mapping[str, Any]]:
-    """The tables of laws with their default gains, and of the scenario's own controller.
+    """The tables of laws with their default gains, or `GIVEN`, the scenario's own.
 
-    Args:
-        names: Laws, or `GIVEN`.
-
-    Raises:
-        InputError: If one does not exist.
+    Raises `InputError` if one does not exist.
     """
     known = [law for law in (GIVEN, *CONTROLLERS) if law not in ("python", "numpy")]
     for name in names:
@@ -213,10 +203,7 @@ def refusal(row: Mapping[str, Any]) -> str | None:
 def compare_one(entry: Entry, *, searches: bool, timed: bool = True) -> Compared:
     """One controller on one scenario; a scenario that refuses it is part of the result.
 
-    Args:
-        entry: The controller and the scenario.
-        searches: Whether robustness is sought.
-        timed: Whether control steps are timed.
+    ``searches`` seeks robustness, ``timed`` times control steps.
     """
     row: dict[str, Any] = {"controller": entry.name, "scenario": entry.address}
     try:

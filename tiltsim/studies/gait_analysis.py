@@ -3,21 +3,13 @@
 Angles are in rad, everything else in SI units; NaN becomes null.
 """
 
-from __future__ import annotations
-
 from math import isfinite
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tiltsim_controllers.analysis import two_color_map
-from tiltsim_controllers.analysis.fault_tolerance import (
-    fixed_tilt_hover,
-    fixed_tilt_imbalance,
-    minimum_hover_speed,
-    three_rotor_hover,
-)
+from tiltsim_controllers.analysis import fault_tolerance, two_color_map
 from tiltsim_controllers.analysis.published_gaits import DETERMINANT_CASES, TRIANGLE
 from tiltsim_controllers.analysis.singularity import (
     determinant,
@@ -162,30 +154,25 @@ def _backward_rotors(speeds: Quad | None) -> list[str]:
 
 
 def fault_report(tilts: Quad, vehicle: Vehicle, opposite_speed: float) -> dict[str, Any]:
-    """Hovering after the loss of each rotor (``tiltsim gait --faults``).
+    """Hovering after the loss of each rotor (``tiltsim gait --faults``); rad and rad/s.
 
-    Args:
-        tilts: Tilt angles, rad.
-        vehicle: Their vehicle.
-        opposite_speed: Speed of the rotor opposite the failed one in the hover with free tilt
-            angles, rad/s.
-
-    Returns:
-        For each rotor: how far (rad) the tilt angles are from a hover on the other three, and a
-        hover on three rotors with free tilt angles. ``least_speed`` is the maximum speed (rad/s)
-        that the rotors must reach for it.
+    For each rotor: how far the tilt angles are from a hover on the other three, and a hover on
+    three with free tilt angles, the rotor opposite the failed one at ``opposite_speed``;
+    ``least_speed`` is the maximum speed that the rotors must reach for it.
     """
     losses = []
     for failed in ROTORS:
-        free = three_rotor_hover(failed, vehicle, opposite_speed=opposite_speed)
+        free = fault_tolerance.three_rotor_hover(failed, vehicle, opposite_speed=opposite_speed)
         factors = [0.0 if rotor == failed else 1.0 for rotor in ROTORS]
         losses.append(
             {
                 "rotor": failed,
-                "fixed_tilts_miss": fixed_tilt_imbalance(tilts, failed, vehicle),
-                "hovers_with_fixed_tilts": fixed_tilt_hover(tilts, vehicle, lost=failed)
+                "fixed_tilts_miss": fault_tolerance.fixed_tilt_imbalance(tilts, failed, vehicle),
+                "hovers_with_fixed_tilts": fault_tolerance.fixed_tilt_hover(
+                    tilts, vehicle, lost=failed
+                )
                 is not None,
-                "least_speed": minimum_hover_speed(
+                "least_speed": fault_tolerance.minimum_hover_speed(
                     vehicle, factors=(factors[0], factors[1], factors[2], factors[3])
                 ),
                 "free_tilts": {

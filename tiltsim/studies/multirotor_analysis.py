@@ -1,16 +1,17 @@
-"""Analysis of any multirotor at fixed tilt angles, as a plain dict ready for JSON.
+"""Analysis of any multirotor at fixed tilt angles, and of the fleet, as plain dicts for JSON.
 
 Angles are in rad, everything else in SI units and body axes; values that do not exist are None.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
 from tiltsim.models.rotor_table import Multirotor
+from tiltsim.models.user_vehicle import read_user_vehicle
+from tiltsim.resources import shipped_folder
 from tiltsim_controllers.analysis.attainable import (
     AttainableSet,
     TiltedRotors,
@@ -38,13 +39,10 @@ UNLIMITED: Final = 100.0
 def tilted_rotors(
     vehicle: Multirotor, angles: Sequence[float], limits: tuple[float, float] | None = None
 ) -> TiltedRotors:
-    """The rotors of a vehicle at tilt angles (rad).
+    """The rotors of a vehicle at tilt angles (rad), one for each hinge.
 
-    Args:
-        vehicle: with the ranges of its rotor speeds
-        angles: one for each tilt hinge, rad
-        limits: minimum and maximum rotor speed (rad/s) in place of the file's; a rotor that
-            turns either way has the maximum both ways
+    ``limits``, minimum and maximum rotor speed (rad/s), replace the file's; a rotor that turns
+    either way has the maximum both ways.
     """
     ranges = np.array(vehicle.speed_ranges)
     if limits is not None:
@@ -197,13 +195,8 @@ def balance_report(
 ) -> dict[str, list[float]]:
     """Tilt angles and rotor speeds that hold the vehicle level under an acceleration (m/s^2).
 
-    Args:
-        vehicle: of any number of rotors
-        acceleration: constant, of the vehicle, world axes at yaw 0
-        limits: as for `tilted_rotors`
-
-    Raises:
-        ValueError: If no tilt angles and rotor speeds within the limits do.
+    The acceleration is constant, world axes at yaw 0; ``limits`` as for `tilted_rotors`. Raises
+    ValueError if no tilt angles and rotor speeds within the limits do.
     """
     rotors = tilted_rotors(vehicle, (0.0,) * vehicle.tilts, limits)
     weight = np.array([0.0, 0.0, vehicle.gravity])
@@ -281,3 +274,68 @@ def _warnings(report: dict[str, Any], *, is_limited: bool) -> list[str]:
             " can attain is not known; give --speed-limits MIN,MAX"
         )
     return warnings
+
+
+BY_TURNS: Final = (0.35, -0.35, 0.35, -0.35, 0.35, -0.35)
+"""Tilt angles (rad), about as large as a fixed cant of 20 degrees."""
+
+FLEET: Final[dict[str, tuple[float, ...]]] = {
+    "bicopter": (0.0, 0.0),
+    "tricopter": (-0.02127199, -0.02127199, -0.02121423),
+    "quadrotor": (),
+    "cant_quadrotor": (),
+    "tiltrotor": (-0.65, -0.65, 0.65, 0.65),
+    "hexarotor": (),
+    "cant_hexarotor": (),
+    "tilt_hexarotor": BY_TURNS,
+    "tilt_heptarotor": (*BY_TURNS, 0.0),
+    "tilt_octorotor": (*BY_TURNS, 0.35, -0.35),
+    "omni_octorotor": (),
+}
+"""Names of the files, with tilt angles (rad) that show the vehicle's capabilities."""
+
+FEW_ROTORS: Final = ("bicopter", "tricopter")
+"""Vehicles whose tilts a law has to command, since a gait leaves too few inputs."""
+
+KEYS: Final = (
+    "rotors",
+    "tilts",
+    "angles",
+    "torque_free_dimension",
+    "singular_attitudes",
+    "singularity_margin",
+    "side_force_share",
+)
+
+
+def fleet_file(name: str) -> Path:
+    """The MJCF file of a vehicle of the fleet."""
+    return shipped_folder("mjcf") / f"{name}.xml"
+
+
+def fleet_report() -> list[dict[str, Any]]:
+    """The vehicles, in the order of `FLEET` (``tiltsim fleet --json``).
+
+    ``survives`` lists the rotors, from 1, whose loss leaves a hover that can be controlled, if need
+    be with other tilt angles.
+    """
+    rows = []
+    for name, angles in FLEET.items():
+        vehicle = read_user_vehicle(str(fleet_file(name)), "multirotor").vehicle
+        assert isinstance(vehicle, Multirotor)
+        report = multirotor_report(vehicle, angles, faults=True)
+        rows.append(
+            {
+                "name": name,
+                **{key: report[key] for key in KEYS},
+                "with_tilts": report.get("with_tilts"),
+                "max_rotor_speed": report["hover"]["max_rotor_speed"],
+                "survives": [loss["rotor"] for loss in report["faults"] if _survives(loss)],
+            }
+        )
+    return rows
+
+
+def _survives(loss: dict[str, Any]) -> bool:
+    hovers = [hover for hover in (loss["hover"], loss["free_tilts"]) if hover is not None]
+    return any(hover["controllable"] for hover in hovers)

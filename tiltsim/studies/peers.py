@@ -1,7 +1,5 @@
 """Other simulators of quadrotors, each timed in a separate process."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess
@@ -15,8 +13,7 @@ from typing import Any, Final, NamedTuple
 from tiltsim.errors import InputError
 
 Description = dict[str, Any]
-Timing = Sequence[float]
-"""Seconds on the clock, and of all processor cores."""
+Timing = Sequence[float]  # seconds on the clock, and of all processor cores
 Setup = Callable[[int, int], tuple[Description, Callable[[], None]]]
 
 
@@ -28,13 +25,7 @@ def timed(fly: Callable[[], object]) -> Timing:
 
 
 def speed(timings: Sequence[Timing], steps: int, timestep: float) -> dict[str, Any]:
-    """Columns of a row from the best of several timings but the first, which compiles.
-
-    Args:
-        timings: Timings of equal flights.
-        steps: Steps of all vehicles together in one of them.
-        timestep: s
-    """
+    """Columns of a row from the best timing but the first, which compiles; time step in s."""
     (first, _), *others = timings
     wall, cpu = map(min, zip(*others, strict=True))
     return {

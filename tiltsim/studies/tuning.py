@@ -7,8 +7,6 @@ simplex from the best; where the other half is too small for a simplex, all of t
 hypercube. A flight that is refused or ends early scores 0.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress

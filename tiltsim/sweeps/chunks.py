@@ -3,14 +3,13 @@
 Only this module of the sweeps calls the simulation.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any, Final
+from math import ceil, copysign
+from typing import Any, Final, NamedTuple
 
 from tiltsim.engines.base import EngineName
 from tiltsim.errors import InputError
@@ -23,14 +22,12 @@ from tiltsim.simulation.batch import fly
 from tiltsim.sweeps.definition import SweepDefinition
 from tiltsim.sweeps.points import SweepPoints
 from tiltsim.sweeps.rows import installed_versions, rows_to_table
-from tiltsim.sweeps.search import boundary
 from tiltsim.system.parquet import parquet_bytes
 from tiltsim.system.text import valid_unicode
 
 Row = dict[str, Any]
 
-FEW: Final = 3
-"""Crashed flights after which others of the sweep are tried before more are flown."""
+FEW: Final = 3  # crashed flights after which others of the sweep are tried before more are flown
 
 
 @dataclass(frozen=True)
@@ -187,14 +184,7 @@ def _holds(points: SweepPoints, result: ScenarioResult) -> bool:
 def _row(
     points: SweepPoints, index: int, values: Mapping[str, Any], result: ScenarioResult
 ) -> dict[str, Any]:
-    """The row of a point, by column, without versions.
-
-    Args:
-        points: The points of the sweep.
-        index: Number of the point.
-        values: Values that the axes set, by key.
-        result: Result of the flight with these values.
-    """
+    """The row of a point, by column, without versions, for the values that the axes set."""
     if result.scenario is None:
         document = points.document(values)  # not valid, but it shows the mistake
     else:
@@ -216,14 +206,8 @@ def _fly_scenarios(
 ) -> list[ScenarioResult]:
     """Fly scenarios and return their results in the same order.
 
-    Args:
-        scenarios: The scenarios of a chunk.
-        keep_flights: Whether results hold their flights.
-        others: Makes a few scenarios from all over the sweep.
-
-    Raises:
-        InputError: If the first few crash, and the others, all with one Python error.
-        KeyboardInterrupt: If a flight was interrupted from the keyboard.
+    Raises `InputError` if the first few crash, and the few that ``others`` makes from all over the
+    sweep, all with one Python error; KeyboardInterrupt if a flight was interrupted.
     """
     try:
         return _fly(scenarios, keep_flights)
@@ -274,3 +258,51 @@ def _flight_file(flight: Flight) -> bytes:
     # Two equal flights make equal files.
     origin = {**table.schema.metadata, b"wall_time": b"0.0"}
     return parquet_bytes(table.replace_schema_metadata(origin))
+
+
+class Boundary(NamedTuple):
+    """The last value found at which the condition holds, and the first at which it fails.
+
+    ``holds`` is None if it fails at the start, ``fails`` is None if it holds up to the end.
+    """
+
+    holds: float | None
+    fails: float | None
+
+
+def boundary(
+    start: float, stop: float, step: float, tolerance: float
+) -> Generator[float, bool, Boundary]:
+    """Search a boundary; yields values, and is sent whether the condition holds there.
+
+    The value walks from ``start`` to ``stop`` (up or down) in steps, so that the condition holds at
+    all values before the boundary, as in ch. 3, Eq. (26). After the first failure the bracket is
+    halved.
+
+    Args:
+        start, stop: Ends of the walk.
+        step: Its step; the last one may be shorter.
+        tolerance: Maximum width of the final bracket, unless floats are coarser.
+    """
+    length = abs(stop - start)
+    last = start
+    holding: float | None = None
+    for number in range(ceil(length / step - 1e-9) + 1):
+        # Decimal steps stay decimal: 0.3, not 0.30000000000000004.
+        last = round(start + copysign(min(number * step, length), stop - start), 12)
+        if not (yield last):
+            break
+        holding = last
+    else:
+        return Boundary(holding, None)
+    if holding is None:
+        return Boundary(None, last)
+    while abs(last - holding) > tolerance * (1.0 + 1e-9):
+        middle = 0.5 * (holding + last)
+        if middle in (holding, last):
+            break
+        if (yield middle):
+            holding = middle
+        else:
+            last = middle
+    return Boundary(holding, last)

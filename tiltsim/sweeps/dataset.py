@@ -6,10 +6,11 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
+import pyarrow as pa
 from pydantic import ValidationError
 
 from tiltsim.errors import InputError
@@ -20,15 +21,10 @@ from tiltsim.sweeps.points import SweepPoints
 from tiltsim.sweeps.rows import finished_parts, read_rows
 from tiltsim.sweeps.tables import Sweep
 from tiltsim.system.files import is_file
-from tiltsim.system.optional import optional_package
+from tiltsim.system.public import optional_package
 from tiltsim.system.text import html_table, short_repr
 
-if TYPE_CHECKING:
-    import pyarrow
-
-MAX_SHOWN: Final = 6
-"""Metrics in the table for notebooks."""
-
+MAX_SHOWN: Final = 6  # metrics in the table for notebooks
 Column = npt.NDArray[Any]
 
 
@@ -42,7 +38,7 @@ class SweepResults:
 
     points: SweepPoints
     columns: Mapping[str, Column]
-    table: pyarrow.Table  # the columns as they are stored
+    table: pa.Table  # the columns as they are stored
 
     def __len__(self) -> int:
         """Number of rows."""
@@ -72,7 +68,7 @@ class SweepResults:
         """A column, or arithmetic on columns; see `values`."""
         return self.values(name)
 
-    def to_arrow(self) -> pyarrow.Table:
+    def to_arrow(self) -> pa.Table:
         """The rows as an Arrow table: values of the axes, how the flight ended, metrics."""
         return self.table
 
@@ -112,8 +108,6 @@ def load_results(folder: Path, *, scenarios: bool = False) -> SweepResults:
     ``scenarios`` also reads the column ``scenario``, a few kB per row. Raises `InputError` if there
     is nothing yet, or it cannot be read.
     """
-    import pyarrow as pa
-
     definition = read_definition(folder / DEFINITION)
     try:
         points = SweepPoints(definition)

@@ -18,11 +18,8 @@ from tiltsim.system.files import digest, file_digests
 VERSIONS: Final = ("tiltsim", "mujoco", "numpy", "scipy")
 """Packages whose arithmetic the rows depend on."""
 
-COSMETIC: Final = (*DESCRIPTIVE, "plot")
-"""Keys of a sweep file that change no flight."""
-
-UNUSED: Final = {"expect", "claim"}
-"""Tables of a scenario that have no effect in a sweep of it."""
+COSMETIC: Final = (*DESCRIPTIVE, "plot")  # keys of a sweep file that change no flight
+UNUSED: Final = {"expect", "claim"}  # tables of a scenario that have no effect in a sweep of it
 
 
 @dataclass(frozen=True)

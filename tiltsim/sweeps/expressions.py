@@ -1,7 +1,5 @@
 """Arithmetic in sweep files: only a few operators and functions over named numbers."""
 
-from __future__ import annotations
-
 import ast
 import math
 import operator
@@ -33,23 +31,16 @@ FUNCTIONS: Final[dict[str, Callable[..., Any]]] = {
     "sqrt": math.sqrt,
     "tan": math.tan,
 }
-MAX_DEPTH: Final = 200
-"""Operations in one another in an expression."""
-
+MAX_DEPTH: Final = 200  # operations in one another in an expression
 CONSTANTS: Final = {"pi": math.pi}
 
 
 def evaluate(expression: str, values: Mapping[str, Any]) -> float:
     """The value of an expression over named numbers.
 
-    Args:
-        expression: ``+ - * / **``, parentheses, numbers, `FUNCTIONS`, pi, and the names
-            in ``values``, dots and positions included, as in ``2 * gait.period``.
-        values: Numbers by name.
-
-    Raises:
-        ValueError: If the expression cannot be parsed or has no value; the message is a predicate
-            of it.
+    It has ``+ - * / **``, parentheses, numbers, `FUNCTIONS`, pi, and the names in ``values``, dots
+    and positions included, as in ``2 * gait.period``. Raises ValueError, whose message is a
+    predicate of the expression, if it cannot be parsed or has no value.
     """
     try:
         value = _value(_parse(expression), values)

@@ -8,21 +8,20 @@
 A folder that is not new or of the same sweep is refused before anything in it is touched.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Final
 
+import pyarrow as pa
+
 from tiltsim.errors import InputError
 from tiltsim.sweeps.chunks import FinishedChunk
 from tiltsim.sweeps.definition import SweepDefinition
 from tiltsim.sweeps.points import SweepPoints
 from tiltsim.sweeps.rows import finished_parts, part_file, read_rows, schema
-from tiltsim.system.files import is_folder, prepare_folder, remove_leftovers, replacing
-from tiltsim.system.locks import locked
+from tiltsim.system.files import is_folder, locked, prepare_folder, remove_leftovers, replacing
 from tiltsim.system.parquet import UnreadableError, parquet_writer
 
 DEFINITION: Final = "sweep.json"
@@ -31,11 +30,8 @@ LOCK: Final = ".lock"
 PARTS: Final = "parts"
 FLIGHTS: Final = "flights"
 
-ROW_GROUP: Final = 4096
-"""Rows held in memory while the parts are joined."""
-
-_TABLES: Final = re.compile(r"\d{6,}\.parquet")
-"""Names in the folders of parts and flights."""
+ROW_GROUP: Final = 4096  # rows held in memory while the parts are joined
+_TABLES: Final = re.compile(r"\d{6,}\.parquet")  # names in the folders of parts and flights
 
 
 class SweepFolder:
@@ -96,8 +92,6 @@ class SweepFolder:
 
     def join(self) -> None:
         """Write the whole dataset from the parts, a few thousand rows at a time."""
-        import pyarrow as pa
-
         columns = schema(self._points)
         waiting: list[pa.Table] = []
         with (

@@ -4,8 +4,6 @@ Everything follows from the `SweepDefinition`, so that processes and machines th
 every point.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from copy import deepcopy
 from functools import cached_property
@@ -21,19 +19,10 @@ from tiltsim.scenario.metric_names import METRICS, WALL_CLOCK_METRICS
 from tiltsim.scenario.override_keys import value_at
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.scenario.vehicle import MOMENTS, VehicleTable
+from tiltsim.sweeps import tables
 from tiltsim.sweeps.definition import SweepDefinition
 from tiltsim.sweeps.expressions import evaluate
 from tiltsim.sweeps.similar import SimilarScenarios
-from tiltsim.sweeps.tables import (
-    AxisTable,
-    CasesAxis,
-    GridAxis,
-    NormalAxis,
-    SampleTable,
-    SeedAxis,
-    Sweep,
-    UniformAxis,
-)
 from tiltsim.system.numbers import is_number
 from tiltsim_controllers.mathematics.scalar import Floats
 
@@ -54,14 +43,16 @@ class SweepPoints:
 
     def __init__(self, definition: SweepDefinition) -> None:
         self.definition = definition
-        self.sweep = Sweep.model_validate(definition.sweep)
+        self.sweep = tables.Sweep.model_validate(definition.sweep)
         self._scenarios = SimilarScenarios(definition.address)
         self._check_count()
         self._groups = self._make_groups()
         axes = self.sweep.axis
-        self._drawn = [axis for axis in axes if isinstance(axis, UniformAxis | NormalAxis)]
-        self._seeds = [axis for axis in axes if isinstance(axis, SeedAxis)]
-        self.cases = [axis for axis in axes if isinstance(axis, CasesAxis)]
+        self._drawn = [
+            axis for axis in axes if isinstance(axis, tables.UniformAxis | tables.NormalAxis)
+        ]
+        self._seeds = [axis for axis in axes if isinstance(axis, tables.SeedAxis)]
+        self.cases = [axis for axis in axes if isinstance(axis, tables.CasesAxis)]
         samples = self.sweep.sample.count if self.sweep.sample is not None else 1
         self._lengths = [*(len(group) for group in self._groups), samples]
 
@@ -174,7 +165,7 @@ class SweepPoints:
         kind = tuple(values[axis.key] for axis in self.cases)
         return self._scenarios.scenario(kind, given, lambda: self.document(values))
 
-    def place(self, axis: AxisTable, values: Sequence[Any]) -> dict[str, Any]:
+    def place(self, axis: tables.AxisTable, values: Sequence[Any]) -> dict[str, Any]:
         """The values that an axis sets, by key, from one value for each of its targets."""
         placed = dict(zip(axis.targets, values, strict=True))
         if not axis.relative:
@@ -229,7 +220,7 @@ class SweepPoints:
         points = 1 if sample is None else sample.count
         groups: set[str] = set()
         for axis in self.sweep.axis:
-            if isinstance(axis, GridAxis) and axis.group not in groups:
+            if isinstance(axis, tables.GridAxis) and axis.group not in groups:
                 points *= axis.length
                 groups |= {axis.group} if axis.group else set()
         if points > MAX_POINTS:
@@ -238,7 +229,7 @@ class SweepPoints:
     def _make_groups(self) -> list[list[dict[str, Any]]]:
         members: dict[str, list[list[dict[str, Any]]]] = {}
         for number, axis in enumerate(self.sweep.axis):
-            if isinstance(axis, GridAxis):
+            if isinstance(axis, tables.GridAxis):
                 columns = [_of_one_type(column) for column in zip(*axis.rows())]
                 rows = [self.place(axis, row) for row in zip(*columns)]
                 # A group's name is never a number.
@@ -270,12 +261,14 @@ def _of_one_type(values: Sequence[Any]) -> Sequence[Any]:
     return [float(value) for value in values] if mixed else values
 
 
-def _draw_samples(axes: Sequence[UniformAxis | NormalAxis], sample: SampleTable) -> Floats:
+def _draw_samples(
+    axes: Sequence[tables.UniformAxis | tables.NormalAxis], sample: tables.SampleTable
+) -> Floats:
     """Values of drawn axes, shape (samples, axes); equal for equal seeds."""
     unit = _unit_points(sample, len(axes))
     columns = []
     for axis, column in zip(axes, unit.T, strict=True):
-        if isinstance(axis, UniformAxis):
+        if isinstance(axis, tables.UniformAxis):
             columns.append(axis.low + (axis.high - axis.low) * column)
         else:
             from scipy.special import ndtri
@@ -285,7 +278,7 @@ def _draw_samples(axes: Sequence[UniformAxis | NormalAxis], sample: SampleTable)
     return cast(Floats, np.stack(columns, axis=-1))
 
 
-def _unit_points(sample: SampleTable, dimensions: int) -> Floats:
+def _unit_points(sample: tables.SampleTable, dimensions: int) -> Floats:
     """Points in the unit cube, shape (samples, dimensions)."""
     generator = np.random.default_rng(sample.seed)
     if sample.method == "random":

@@ -4,12 +4,14 @@ Rows depend neither on the computer nor on the other flights, so that a chunk gi
 wherever and whenever it is flown.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
+from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.compute as pc
 
 from tiltsim.errors import InputError
 from tiltsim.scenario.metric_names import BOOLEAN_METRICS
@@ -17,30 +19,21 @@ from tiltsim.sweeps.definition import VERSIONS, SweepDefinition
 from tiltsim.sweeps.points import SweepPoints
 from tiltsim.system.parquet import UnreadableError, open_parquet
 
-if TYPE_CHECKING:
-    import pyarrow
-
 
 @lru_cache(maxsize=1)
 def installed_versions() -> dict[str, str]:
     """Versions of the packages that rows depend on."""
-    from importlib.metadata import version
-
     return {name: version(name) for name in VERSIONS}
 
 
-def rows_to_table(points: SweepPoints, rows: Sequence[Mapping[str, Any]]) -> pyarrow.Table:
+def rows_to_table(points: SweepPoints, rows: Sequence[Mapping[str, Any]]) -> pa.Table:
     """Rows as an Arrow table, in the schema of the sweep, versions added."""
-    import pyarrow as pa
-
     versions = {f"{name}_version": number for name, number in installed_versions().items()}
     return pa.Table.from_pylist([{**row, **versions} for row in rows], schema=schema(points))
 
 
-def schema(points: SweepPoints) -> pyarrow.Schema:
+def schema(points: SweepPoints) -> pa.Schema:
     """The columns of a sweep's dataset; the definition is among the schema's metadata."""
-    import pyarrow as pa
-
     first = points.point(0)
     bisect = points.sweep.bisect
     searched = {} if bisect is None else {bisect.key: bisect.start}
@@ -62,9 +55,7 @@ def schema(points: SweepPoints) -> pyarrow.Schema:
     return pa.schema(fields, metadata={"sweep": points.definition.to_json()})
 
 
-def _column_type(value: object) -> pyarrow.DataType:
-    import pyarrow as pa
-
+def _column_type(value: object) -> pa.DataType:
     if isinstance(value, list | tuple):
         return pa.list_(_column_type(value[0] if value else 0.0))
     for kind, column in ((bool, pa.bool_()), (int, pa.int64()), (str, pa.string())):
@@ -86,7 +77,7 @@ def finished_parts(folder: Path, points: SweepPoints) -> dict[int, Path]:
 
 def read_rows(
     file: Path, points: SweepPoints, indices: Sequence[int], *, scenarios: bool = True
-) -> pyarrow.Table:
+) -> pa.Table:
     """The rows in one file of a sweep.
 
     Args:
@@ -130,7 +121,7 @@ def _difference(found: str, expected: str) -> str:
     return f"of another sweep: {difference}" if difference else ""
 
 
-def _wrong_column(found: pyarrow.Schema, points: SweepPoints) -> str:
+def _wrong_column(found: pa.Schema, points: SweepPoints) -> str:
     """The first column that is there twice, has another type, or is missing.
 
     Versions differ in their metrics, which are optional here.
@@ -148,14 +139,11 @@ def _wrong_column(found: pyarrow.Schema, points: SweepPoints) -> str:
     return ""
 
 
-def _damaged_column(table: pyarrow.Table, points: SweepPoints) -> str:
+def _damaged_column(table: pa.Table, points: SweepPoints) -> str:
     """The first column with a NaN or an infinity, which no sweep stores, or an axis without values.
 
     Values that a flight does not have are stored as null.
     """
-    import pyarrow as pa
-    import pyarrow.compute as pc
-
     axes = {key for axis in points.sweep.axis for key in axis.targets}
     for name in table.column_names:
         values = table[name]

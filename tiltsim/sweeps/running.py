@@ -1,21 +1,32 @@
-"""Running a sweep: flies its chunks in this process, in several, or on a cluster."""
+"""Running a sweep in one call, in this process, in several, or on a Dask cluster."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import hashlib
+import logging
+import re
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import CancelledError
+from os import PathLike
 from pathlib import Path
-from typing import Final
+from tempfile import TemporaryDirectory
+from typing import Any, Final, cast
 
 from tiltsim.engines.base import EngineName
 from tiltsim.errors import InputError
 from tiltsim.plants.engine_choice import MIN_STEPS_TO_COMPILE
 from tiltsim.scenario.trust import is_trusted, require_trust, with_trust
-from tiltsim.sweeps.checks import check_points
 from tiltsim.sweeps.chunks import ChunkWork, FinishedChunk
+from tiltsim.sweeps.dataset import SweepResults, load_results
 from tiltsim.sweeps.definition import SweepDefinition
 from tiltsim.sweeps.folder import open_sweep_folder
+from tiltsim.sweeps.loading import check_points, load_sweep
 from tiltsim.sweeps.points import SweepPoints
+from tiltsim.sweeps.rows import installed_versions
+from tiltsim.system.numbers import true_or_false, whole_number
 from tiltsim.system.processes import ProcessDiedError, in_processes
+from tiltsim.system.progress import Report, reported
+from tiltsim.system.text import short_repr
 
 MAX_DEATHS: Final = 3
 """Number of times in a row that all processes may die without finishing a chunk."""
@@ -75,8 +86,6 @@ def _fly(
     engine: EngineName | None = "native" if steps >= MIN_STEPS_TO_COMPILE else None
     work = ChunkWork(points.definition.to_json(), engine, trusted)
     if cluster is not None:
-        from tiltsim.sweeps.cluster import fly_on_cluster
-
         return fly_on_cluster(work, numbers, cluster)
     if jobs == 1 or len(numbers) == 1:
         return map(work, numbers)
@@ -105,3 +114,150 @@ def fly_on_processes(work: ChunkWork, numbers: list[int], jobs: int) -> Iterator
                     "there too little memory? Finished chunks are kept"
                 )
         waiting = sorted(died)
+
+
+CONNECT_TIMEOUT: Final = 10.0  # s
+
+
+def fly_on_cluster(work: ChunkWork, numbers: list[int], address: str) -> Iterator[FinishedChunk]:
+    """Fly chunks on the workers of a Dask scheduler, yielding each when it is finished.
+
+    Workers may come and go. Raises `InputError` if Dask is not installed, the scheduler does not
+    answer or has no workers, or a worker fails or has other versions of the packages.
+    """
+    client = _connect(address)
+    with client:
+        yield from _fly_chunks(client, work, numbers, address)
+
+
+def _connect(address: str) -> Any:
+    if not re.fullmatch(r"((tcp|tls|ucx|wss?)://)?[^/]*[\w\]]:\d+", address):
+        raise InputError(
+            f"--cluster {address}: not a scheduler address, such as tcp://192.168.0.1:8786"
+        )
+    try:
+        from distributed import Client
+    except ImportError as error:
+        reason = f"cannot load Dask: {str(error).partition(chr(10))[0]}"
+        if error.name in {"distributed", "dask"}:
+            reason = "needs Dask; install it with: pip install 'tiltsim[cluster]'"
+        raise InputError(f"--cluster {address}: {reason}") from error
+    for name in ("distributed", "distributed.client"):
+        logging.getLogger(name).setLevel(logging.CRITICAL)
+    try:
+        client = Client(address, timeout=CONNECT_TIMEOUT, set_as_default=False)
+    except (OSError, TimeoutError, ValueError) as error:
+        reason = str(error).partition("\n")[0] or "no answer"
+        raise InputError(f"--cluster {address}: cannot reach a scheduler: {reason}") from None
+    if not client.scheduler_info()["workers"]:
+        client.close()
+        raise InputError(
+            f"--cluster {address}: the scheduler has no workers; start some: dask worker {address}"
+        )
+    return client
+
+
+def _fly_chunks(
+    client: Any, work: ChunkWork, numbers: list[int], address: str
+) -> Iterator[FinishedChunk]:
+    from distributed import as_completed
+    from distributed.comm import CommClosedError
+
+    digest = hashlib.sha256(work.definition_json.encode()).hexdigest()[:16]
+    waiting = list(reversed(numbers))
+
+    def submit() -> Any:
+        number = waiting.pop()
+        key = f"tiltsim-{digest}-{number}"
+        return client.submit(work, number, key=key)
+
+    try:
+        first = [submit() for _ in range(min(len(waiting), _window(client)))]
+        submitted = as_completed(first, loop=client.loop)
+        for future in submitted:
+            part = _result(future, address)
+            _compare_versions(part, address)
+            future.release()
+            while waiting and submitted.count() < _window(client):
+                submitted.add(submit())
+            yield part
+    except (CancelledError, CommClosedError) as error:
+        raise InputError(
+            f"--cluster {address}: the scheduler no longer answers; finished flights are kept, and "
+            "the same command continues"
+        ) from error
+
+
+def _result(future: Any, address: str) -> FinishedChunk:
+    """The result of a chunk; without the scheduler, Dask's errors of a lost connection."""
+    from distributed.comm import CommClosedError
+
+    try:
+        return cast("FinishedChunk", future.result())
+    except (CancelledError, CommClosedError):
+        raise
+    except Exception as error:
+        raise InputError(
+            f"--cluster {address}: a worker failed: {type(error).__name__}: "
+            f"{str(error).partition(chr(10))[0]}"
+        ) from error
+
+
+def _window(client: Any) -> int:
+    """Number of chunks to have submitted: two per thread, so that no thread waits for work."""
+    workers = client.scheduler_info()["workers"].values()
+    return 2 * max(1, sum(int(worker["nthreads"]) for worker in workers))
+
+
+def _compare_versions(part: FinishedChunk, address: str) -> None:
+    for name, here in installed_versions().items():
+        there = part.versions[name]
+        if there != here:
+            raise InputError(
+                f"--cluster {address}: a worker runs {name} {there}, this machine {here}; install "
+                "the same versions"
+            )
+
+
+def sweep(
+    source: str | PathLike[str] | Mapping[str, Any],
+    overrides: Mapping[str, Any] | None = None,
+    *,
+    out: str | PathLike[str] | None = None,
+    jobs: int = 1,
+    progress: Report | bool | None = None,
+    trusted: bool = False,
+) -> SweepResults:
+    """Fly a scenario along axes.
+
+    Args:
+        source: A TOML file, the name of a sweep in the library, or the tables of a file as a dict
+            (docs/sweeps.md), whose ``scenario`` is an address, a table or a `tiltsim.Scenario`.
+        overrides: Values by dotted key of the scenario, on top of ``[set]``.
+        out: A folder for the rows, which a later call with the same sweep continues; default: the
+            rows are in memory only.
+        jobs: Processes. With several, a script has to call this under
+            ``if __name__ == "__main__":``, as for any use of processes in Python.
+        progress: True for a bar; or a function, called with the number of finished rows.
+        trusted: Whether to execute Python files that scenarios name.
+
+    Returns:
+        One row for each point; see `SweepResults.to_pandas` and `SweepResults.to_arrow`.
+
+    Raises:
+        InputError: In one line: the sweep, the key, the value and the allowed values.
+    """
+    jobs, trusted = whole_number("jobs", jobs), true_or_false("trusted", trusted)
+    if out is not None and not isinstance(out, str | PathLike):
+        raise InputError(f"out = {short_repr(out)}: must be the name of a folder")
+    definition = load_sweep(source, overrides)
+    points = SweepPoints(definition)
+    if points.sweep.keep_flights and out is None:
+        raise InputError(f"{definition.address}: keep_flights = true: needs out, a folder for them")
+    with (
+        reported(progress, "flights", len(points)) as report,
+        TemporaryDirectory(prefix="tiltsim-sweep-") as temporary,
+    ):
+        folder = Path(temporary if out is None else out)
+        run_sweep(definition, folder, jobs=jobs, report=report, trusted=trusted)
+        return load_results(folder, scenarios=True)

@@ -1,7 +1,5 @@
 """Scenarios that differ in numbers: only the tables that hold these are validated again."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from functools import cache
 from typing import Any, Final, NamedTuple
@@ -39,12 +37,9 @@ class SimilarScenarios:
     def scenario(
         self, kind: object, values: Mapping[str, Any], document: Callable[[], Document]
     ) -> Scenario:
-        """A scenario. Raises `InputError` if it is not valid.
+        """A scenario, from values by dotted key. Raises `InputError` if it is not valid.
 
-        Args:
-            kind: Equal for documents in which only ``values`` differ.
-            values: By dotted key.
-            document: Makes the document, with the values in it.
+        ``kind`` is equal for documents in which only ``values`` differ.
         """
         known = self._known.get(kind)
         if known is not None:

@@ -1,7 +1,5 @@
 """The tables of a sweep file and their keys, validated like a scenario's."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from math import isfinite
 from typing import Annotated, Any, Literal
@@ -191,9 +189,7 @@ class CasesAxis(AxisTable):
         return [(name,) for name in self.cases]
 
 
-SampledAxis = UniformAxis | NormalAxis | SeedAxis
-"""Axes with a value for every sample."""
-
+SampledAxis = UniformAxis | NormalAxis | SeedAxis  # axes with a value for every sample
 GridAxis = ListAxis | LinspaceAxis | CasesAxis
 """Axes with rows of values, crossed with the other axes or advancing with a group."""
 

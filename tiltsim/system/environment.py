@@ -1,7 +1,5 @@
 """Environment variables for the processes that libraries start."""
 
-from __future__ import annotations
-
 import os
 from importlib.util import find_spec
 from pathlib import Path

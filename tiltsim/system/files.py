@@ -1,22 +1,21 @@
 """Output files and folders: checked before the work, written atomically."""
 
-from __future__ import annotations
-
 import errno
 import os
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from functools import wraps
 from pathlib import Path
-from typing import Final
+from threading import RLock
+from typing import Final, ParamSpec, TypeVar
 
 from tiltsim.errors import InputError
 
 TEMPORARY_SUFFIX: Final = ".new"
 """Suffix of unfinished files, whose names begin with a dot; a killed process leaves them."""
 
-_RANDOM_BYTES: Final = 8
-"""In the name of such a file, in hexadecimal digits."""
+_RANDOM_BYTES: Final = 8  # in the name of such a file, in hexadecimal digits
 
 
 def digest(content: bytes) -> str:
@@ -65,15 +64,9 @@ def prepare_folder(folder: Path) -> None:
 
 
 def prepare_file(option: str, file: Path, suffixes: Sequence[str] = ()) -> None:
-    """Check that a file can be written, before the work for it begins.
+    """Raise `InputError` unless the file of an option can be written and its suffix fits.
 
-    Args:
-        option: Command-line option, for the message.
-        file: The file.
-        suffixes: Allowed suffixes, lower case with their dots; empty allows any.
-
-    Raises:
-        InputError: If the file cannot be written or its suffix is not allowed.
+    Called before the work for the file begins. Suffixes are in lower case; empty allows any.
     """
     _require_possible_name(f"{option} ", file)
     if suffixes and file.suffix.lower() not in suffixes:
@@ -163,3 +156,41 @@ def _is_without_folder() -> bool:
     except FileNotFoundError:
         return True
     return False
+
+
+Parameters = ParamSpec("Parameters")
+Result = TypeVar("Result")
+
+_BUILDING: Final = RLock()
+
+
+def one_thread_at_a_time(function: Callable[Parameters, Result]) -> Callable[Parameters, Result]:
+    """Let threads call a function, and all others decorated so, one after the other.
+
+    For what builds and caches the parts that flights share: models, closed loops, compiled code.
+    """
+
+    @wraps(function)
+    def alone(*arguments: Parameters.args, **keywords: Parameters.kwargs) -> Result:
+        with _BUILDING:
+            return function(*arguments, **keywords)
+
+    return alone
+
+
+@contextmanager
+def locked(path: Path, *, wait: bool) -> Iterator[None]:
+    """Hold an exclusive lock during the block; it is released even if the process is killed.
+
+    ``path`` is the lock file, which is created and not removed; the content of an existing one
+    stays, and links are refused. Raises BlockingIOError if another process holds the lock, unless
+    ``wait`` is true. Without ``fcntl`` this has no effect.
+    """
+    try:
+        import fcntl
+    except ImportError:
+        yield
+        return
+    with os.fdopen(os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o666)) as file:
+        fcntl.flock(file, fcntl.LOCK_EX if wait else fcntl.LOCK_EX | fcntl.LOCK_NB)
+        yield

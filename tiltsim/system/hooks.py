@@ -1,7 +1,5 @@
 """MuJoCo's hooks (control callback, clock, warnings), which all threads of a process share."""
 
-from __future__ import annotations
-
 import ctypes
 import sys
 from collections import deque
@@ -69,9 +67,7 @@ def mujoco_hooks(control: Any = None, clock: Any = None) -> Iterator[None]:
 
 _turns: Final = Condition()
 _waiting: Final[deque[_Block]] = deque()
-_inside: Final[dict[int, _Block]] = {}
-"""The blocks that threads are in, by thread."""
-
+_inside: Final[dict[int, _Block]] = {}  # the blocks that threads are in, by thread
 _replaced: Final[list[tuple[Any, Any, Any]]] = []
 """Callback, clock and handler of warnings as they were before the first of those blocks."""
 

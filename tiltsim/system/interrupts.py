@@ -9,15 +9,11 @@ from _thread import interrupt_main, start_new_thread
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from time import sleep
-from typing import TYPE_CHECKING, Final
+from types import FrameType
+from typing import Final
 
-if TYPE_CHECKING:
-    from types import FrameType
-
-    Handler = Callable[[int, FrameType | None], object] | int | None
-
-SOON: Final = 0.1
-"""Time (s) after which a swallowed interrupt is sent again."""
+Handler = Callable[[int, FrameType | None], object] | int | None
+SOON: Final = 0.1  # time (s) after which a swallowed interrupt is sent again
 
 
 class _Interrupt(KeyboardInterrupt):

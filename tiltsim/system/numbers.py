@@ -1,7 +1,5 @@
 """Checks of numbers."""
 
-from __future__ import annotations
-
 import sys
 from numbers import Real
 from operator import index

@@ -1,7 +1,5 @@
 """Distributing work over several processes."""
 
-from __future__ import annotations
-
 import multiprocessing
 import os
 import pickle

@@ -1,7 +1,5 @@
 """Progress of long work, as its caller wants to hear of it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from time import monotonic
@@ -11,9 +9,7 @@ from tiltsim.errors import InputError
 from tiltsim.system.public import public
 from tiltsim.system.text import short_repr
 
-INTERVAL: Final = 0.1
-"""Wall time (s) between reports; the last one always comes."""
-
+INTERVAL: Final = 0.1  # wall time (s) between reports; the last one always comes
 Report = Callable[[float], None]
 
 

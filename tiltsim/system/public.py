@@ -1,9 +1,10 @@
-"""Public names of the package, for methods that are short for a function of a later folder."""
-
-from __future__ import annotations
+"""Public names of tiltsim, and packages that it uses where they are installed."""
 
 import sys
+from importlib import import_module
 from typing import Any
+
+from tiltsim.errors import InputError
 
 
 def public(name: str) -> Any:
@@ -14,3 +15,16 @@ def public(name: str) -> Any:
     itself knows them all.
     """
     return getattr(sys.modules["tiltsim"], name)
+
+
+def optional_package(name: str, purpose: str, distribution: str = "") -> Any:
+    """A package by name. Raises `InputError` if it is not installed.
+
+    ``purpose`` begins the message; ``distribution`` is the name for pip, if it differs.
+    """
+    try:
+        return import_module(name)
+    except ImportError as error:
+        raise InputError(
+            f"{purpose} needs {name}, which is not installed: pip install {distribution or name}"
+        ) from error

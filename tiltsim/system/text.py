@@ -1,15 +1,11 @@
-"""Text from files, names and messages, made safe to show."""
-
-from __future__ import annotations
+"""Text from files, names and messages, made safe to show; labels and units of quantities."""
 
 import re
 import unicodedata
 from collections.abc import Iterable, Sequence
-from typing import Final
+from typing import Final, NamedTuple
 
-LONGEST_WORD: Final = 300
-"""Longer than any ordinary path."""
-
+LONGEST_WORD: Final = 300  # longer than any ordinary path
 _NUMBER: Final = re.compile(r"\d+(\.\d+)?(e[+-]?\d+)?")
 
 
@@ -103,3 +99,29 @@ def html_table(
     ]
     table = "".join(f"<tr>{cells}</tr>" for cells in [head, *body] if cells)
     return f"<div>{'<br>'.join(title)}<table>{table}</table></div>"
+
+
+SUBSCRIPTS: Final = "₀₁₂₃₄₅₆₇₈₉"  # digits as subscripts
+
+
+class Quantity(NamedTuple):
+    """The label of a quantity in tables and figures, and its unit; empty or 1 if dimensionless."""
+
+    label: str
+    unit: str = ""
+
+    @property
+    def text(self) -> str:
+        """The label with the unit in brackets."""
+        unit = self.unit.replace("^2", "²").replace("^3", "³")
+        return f"{self.label} ({unit})" if unit not in {"", "1"} else self.label
+
+
+def subscript(number: int) -> str:
+    """A whole number, 0 or more, as a subscript."""
+    return "".join(SUBSCRIPTS[int(digit)] for digit in str(number))
+
+
+def in_words(name: str) -> str:
+    """A name of code, such as ``gait.bias_angle``, in words."""
+    return name.replace("_", " ").replace(".", " ").strip()

@@ -4,8 +4,6 @@ Columns have shape (..., N): one flight, or several in rows, with equal times (N
 Spans are counted in physics steps instead of sums of their lengths.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from typing import Any, Final
 

@@ -10,21 +10,17 @@ Points of the plane are (roll, pitch) in rad. ``n``, shape (N, 3), holds one uni
 zero where every attitude is singular.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from math import pi
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 
+from tiltsim.scenario.scenario import Scenario
 from tiltsim_controllers.analysis.singularity import torque_free_direction, world_up
 from tiltsim_controllers.mathematics.scalar import Floats
+from tiltsim_controllers.vehicle.parameters import Vehicle
 from tiltsim_controllers.vehicle.states import TILT_FIELDS
-
-if TYPE_CHECKING:
-    from tiltsim.scenario.scenario import Scenario
-    from tiltsim_controllers.vehicle.parameters import Vehicle
 
 HALF_WIDTH: Final = pi / 2  # largest absolute roll and pitch in the plane, rad
 MARGIN_THRESHOLD: Final = 0.2

@@ -3,20 +3,15 @@
 Only pictures have it; the file flies as it is.
 """
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any, Final
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any, Final
 
 import mujoco
 import numpy as np
 
 from tiltsim.resources import shipped_folder
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
-    from pathlib import Path
-
-    from tiltsim_controllers.mathematics.scalar import Floats
+from tiltsim_controllers.mathematics.scalar import Floats
 
 DISC_SHARE: Final = 0.45  # of the least distance between rotors: their discs do not touch
 MAX_DISC: Final = 0.6  # of a rotor's distance from the body, so that the arms can be seen
@@ -30,15 +25,7 @@ SKYBOX: Final = mujoco.mjtTexture.mjTEXTURE_SKYBOX
 
 
 def dressed(model: mujoco.MjModel, path: Path) -> mujoco.MjModel:
-    """The model of a user's file with the visuals that the file lacks.
-
-    Args:
-        model: The file as it flies, compiled.
-        path: The file.
-
-    Returns:
-        A model with the same bodies, joints and sites.
-    """
+    """The compiled model of a user's file, with the visuals that the file lacks."""
     spec = mujoco.MjSpec.from_file(str(path))
     scene = mujoco.MjSpec.from_file(str(shipped_folder("mjcf") / "scene.xml"))
     if SKYBOX not in [texture.type for texture in spec.textures]:

@@ -1,24 +1,20 @@
 """Log messages of a flight: saturation, small singularity margins, switches, the end."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final, Literal
+from typing import Final, Literal
 
 import numpy as np
 import numpy.typing as npt
 
+from tiltsim.closed_loop.assembly import Assembly
+from tiltsim.flight.end import End
+from tiltsim.flight.flight import Flight
 from tiltsim.laws.supervision import SUPERVISION
 from tiltsim.vehicles.spans import at_lower_limit, at_upper_limit
 from tiltsim.views.attitude_plane import SUPERVISION_THRESHOLD, margin_threshold
 from tiltsim.views.titles import describe_controller, describe_gait
 from tiltsim_controllers.mathematics.scalar import Floats
-
-if TYPE_CHECKING:
-    from tiltsim.closed_loop.assembly import Assembly
-    from tiltsim.flight.end import End
-    from tiltsim.flight.flight import Flight
 
 Level = Literal["INFO", "WARN", "ERROR"]
 

@@ -5,25 +5,21 @@ the column of its name (`COLUMN_OF_JOINT` lists the exceptions); a joint without
 model's default.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from math import cos, floor, log10, radians, sin
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import mujoco
 import numpy as np
 
+from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.plants.flight_model import build_model
+from tiltsim.scenario.scenario import Scenario
 from tiltsim.views.dressing import dressed
 from tiltsim_controllers.mathematics.rotation import quaternion_from_euler
 from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.references.trajectories import position_reference
-
-if TYPE_CHECKING:
-    from tiltsim.closed_loop.assembly import Assembly
-    from tiltsim.scenario.scenario import Scenario
 
 Columns = Mapping[str, Floats]
 

@@ -6,26 +6,22 @@ column of a new law, vehicle or sensor has its panel at once. `_chosen` adds tit
 signals computed from several columns.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from tiltsim.closed_loop.assembly import Assembly
+from tiltsim.flight.flight import Flight
 from tiltsim.flight.vectors import VECTORS, components
 from tiltsim.laws.supervision import SUPERVISION
 from tiltsim.scenario.vehicle import VehicleTable
-from tiltsim.system.quantity import Quantity, in_words, subscript
+from tiltsim.system.text import Quantity, in_words, subscript
 from tiltsim.views.attitude_plane import margin_threshold
-
-if TYPE_CHECKING:
-    from tiltsim.closed_loop.assembly import Assembly
-    from tiltsim.flight.flight import Flight
-    from tiltsim_controllers.mathematics.scalar import Floats
+from tiltsim_controllers.mathematics.scalar import Floats
 
 FLOORS: Final = {"m": 0.02, "rad": 0.02, "m/s": 0.02, "rad/s": 0.02, "N": 0.02}
 """Smallest range of an axis by its unit: smaller differences are as good as none."""
@@ -125,13 +121,8 @@ def scale(
 ) -> tuple[float, float, bool]:
     """Lower and upper end of an axis, and whether a line ends off its scale.
 
-    The last samples of flights that terminated early can be of any magnitude, which would make all
-    others a flat line.
-
-    Args:
-        drawn: The values of every line.
-        ended: Whether its flight terminated early.
-        least: Smallest range.
+    The last samples of lines whose flights ``ended`` early can be of any magnitude, which would
+    make all others a flat line. ``least`` is the smallest range.
     """
     before = [
         line[: -max(1, round(END_FRACTION * len(line)))] if early and len(line) > 1 else line

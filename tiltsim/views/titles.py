@@ -1,22 +1,16 @@
 """Titles: names of flights that are shown together, and descriptions of gait and controller."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from itertools import chain, takewhile
-from typing import TYPE_CHECKING, Final
+from pathlib import Path
+from typing import Final
 
+from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.scenario.arguments import leaves
+from tiltsim.scenario.scenario import Scenario
 from tiltsim.scenario.scenario_tables import DESCRIPTIVE
 from tiltsim.scenario.tiltrotor_controllers import AttitudeAltitudeController
-from tiltsim.system.quantity import in_words
-from tiltsim.system.text import valid_unicode
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from tiltsim.closed_loop.assembly import Assembly
-    from tiltsim.scenario.scenario import Scenario
+from tiltsim.system.text import in_words, valid_unicode
 
 MIN_WORDS: Final = 4  # words that titles must share to make a common title
 _MARKS: Final = ",:;."

@@ -14,23 +14,18 @@ Two published findings are not reproduced: the body accelerations of +-2 m/s^2 (
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations, product
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from tiltsim_controllers.analysis.singularity import force_matrix, torque_matrix
 from tiltsim_controllers.analysis.torque_free import RANK_TOLERANCE
-from tiltsim_controllers.vehicle.parameters import SPIN
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import ArrayLike, NDArray
-
-    from tiltsim_controllers.mathematics.scalar import Floats
-    from tiltsim_controllers.vehicle.parameters import Vehicle
+from tiltsim_controllers.mathematics.scalar import Floats
+from tiltsim_controllers.vehicle.parameters import SPIN, Vehicle
 
 MIN_TOTAL_THRUST: Final = 3.0
 """N, of four untilted rotors at the lower speed limit (ch. 9, Sec. 3.1)."""

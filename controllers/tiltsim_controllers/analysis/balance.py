@@ -18,20 +18,16 @@ from zero.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import asin, atan, cos, hypot, inf, isfinite, pi, radians, sin
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 from scipy.optimize import minimize
 
+from tiltsim_controllers.mathematics.scalar import Floats, Quad, Triple
 from tiltsim_controllers.vehicle.decoupling_matrix import torque_entries, torque_free_force
-from tiltsim_controllers.vehicle.parameters import drag_ratio
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from tiltsim_controllers.mathematics.scalar import Floats, Quad, Triple
-    from tiltsim_controllers.vehicle.parameters import Vehicle
+from tiltsim_controllers.vehicle.parameters import Vehicle, drag_ratio
 
 MAX_TILT: Final = radians(60.0)
 MIN_LEVER: Final = 0.5

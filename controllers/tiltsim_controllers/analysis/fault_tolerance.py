@@ -26,21 +26,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 from itertools import product
 from math import asin, atan, atan2, cos, hypot, pi, sin, sqrt
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 
 from tiltsim_controllers.analysis.singularity import force_matrix, torque_matrix
 from tiltsim_controllers.laws.full_pose import input_matrix
+from tiltsim_controllers.mathematics.scalar import Floats, Quad
 from tiltsim_controllers.vehicle.effectiveness import cross_table
-from tiltsim_controllers.vehicle.parameters import SPIN, drag_ratio
+from tiltsim_controllers.vehicle.parameters import SPIN, Vehicle, drag_ratio
 from tiltsim_controllers.vehicle.rotors import rotors_in
 from tiltsim_controllers.vehicle.states import ROTORS
-
-if TYPE_CHECKING:
-    from tiltsim_controllers.mathematics.scalar import Floats, Quad
-    from tiltsim_controllers.vehicle.parameters import Vehicle
-
 
 BALANCED: Final = 1e-9
 """Torque, in units of ``L m g``, that counts as zero."""

@@ -9,22 +9,23 @@ or on a face or an edge of the polytope, so it is found without search.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from itertools import combinations
 from math import acos
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 from scipy.optimize import linprog
 from scipy.spatial import ConvexHull
 
-from tiltsim_controllers.analysis.attainable import ALMOST_FLAT, TiltedRotors, attainable_forces
+from tiltsim_controllers.analysis.attainable import (
+    ALMOST_FLAT,
+    AttainableSet,
+    TiltedRotors,
+    attainable_forces,
+)
 from tiltsim_controllers.analysis.torque_free import torque_free_forces
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from tiltsim_controllers.analysis.attainable import AttainableSet
-    from tiltsim_controllers.mathematics.scalar import Floats
+from tiltsim_controllers.mathematics.scalar import Floats
 
 INSIDE: Final = 1e-7
 """Share of the weight that counts as none; the linear programs are as accurate."""

@@ -8,21 +8,18 @@ the least tilts would load some rotors fully and stop others.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import radians
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 from scipy.optimize import minimize
 
 from tiltsim_controllers.analysis.torque_free import RANK_TOLERANCE
 from tiltsim_controllers.laws.full_pose import input_matrix
+from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.vehicle.effectiveness import ROTOR_FLOATS, SPIN_SIGN, tilt_of_rotor
 from tiltsim_controllers.vehicle.rotors import by_tilt, rotors_in, wrench_map, wrench_slope
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from tiltsim_controllers.mathematics.scalar import Floats
 
 BALANCED: Final = 1e-9
 """Force, as a share of the weight, and torque, of that on the longest lever, that count as none."""

@@ -7,9 +7,10 @@ sizes of our choice, and `PublishedGait.printed` is False.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import pi
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import Final, NamedTuple
 
 from tiltsim_controllers.analysis.singularity import margin_over_gait, singular_values
 from tiltsim_controllers.analysis.two_color_map import point_p
@@ -24,13 +25,8 @@ from tiltsim_controllers.analysis.two_color_planner import (
 )
 from tiltsim_controllers.gaits import plans
 from tiltsim_controllers.gaits.colors import colored_angles
-from tiltsim_controllers.vehicle.parameters import PRESETS, drag_ratio
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from tiltsim_controllers.gaits.plans import Gait
-    from tiltsim_controllers.vehicle.parameters import Vehicle
+from tiltsim_controllers.gaits.plans import Gait
+from tiltsim_controllers.vehicle.parameters import PRESETS, Vehicle, drag_ratio
 
 _AR_DRONE: Final = PRESETS["ar_drone_2"]
 _P: Final = point_p(_AR_DRONE)

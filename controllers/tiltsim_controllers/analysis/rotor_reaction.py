@@ -12,22 +12,17 @@ other tilts it can be larger, or negative where tilted thrusts turn the body aga
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import atan2, cos, exp, hypot, inf, pi, sin
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from tiltsim_controllers.analysis.torque_free import LEVEL, controlled_axes, torque_free_forces
 from tiltsim_controllers.laws.attitude_altitude import EXACT_DECOUPLING
 from tiltsim_controllers.laws.gains import Gains
+from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.vehicle.effectiveness import ROTOR_FLOATS, SPIN_SIGN, force_and_torque
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import ArrayLike
-
-    from tiltsim_controllers.mathematics.scalar import Floats
 
 
 def attitude_feedback(gains: Gains, inertia: Floats) -> Floats:

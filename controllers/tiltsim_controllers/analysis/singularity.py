@@ -15,11 +15,13 @@ scales everything by the constant 1.025.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from tiltsim_controllers.analysis.torque_free import RANK_TOLERANCE
+from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.vehicle.decoupling_matrix import (
     torque_entries,
     torque_free_force,
@@ -27,11 +29,6 @@ from tiltsim_controllers.vehicle.decoupling_matrix import (
     vertical_force_entries,
 )
 from tiltsim_controllers.vehicle.parameters import Vehicle, drag_ratio
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
-
-    from tiltsim_controllers.mathematics.scalar import Floats
 
 
 class Residuals(NamedTuple):

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Sequence
+from typing import NamedTuple
 
 from tiltsim_controllers.laws.attitude_altitude import PUBLISHED_DECOUPLING
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from tiltsim_controllers.laws.gains import Gains, IntegralGains
+from tiltsim_controllers.laws.gains import Gains, IntegralGains
 
 
 class ErrorLoop(NamedTuple):

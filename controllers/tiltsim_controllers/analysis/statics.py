@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from math import copysign, hypot, sqrt
-from typing import TYPE_CHECKING
 
 from tiltsim_controllers.analysis.singularity import torque_free_direction
+from tiltsim_controllers.mathematics.scalar import Quad
 from tiltsim_controllers.vehicle.decoupling_matrix import (
     body_force,
     sines_and_cosines,
@@ -13,9 +13,6 @@ from tiltsim_controllers.vehicle.decoupling_matrix import (
     torque_free_inputs,
 )
 from tiltsim_controllers.vehicle.parameters import SPIN, Vehicle, drag_ratio
-
-if TYPE_CHECKING:
-    from tiltsim_controllers.mathematics.scalar import Quad
 
 
 def hover_rotor_speeds(tilts: Quad, vehicle: Vehicle) -> Quad | None:

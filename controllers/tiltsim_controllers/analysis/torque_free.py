@@ -14,14 +14,12 @@ torque-free forces ``V = F ker tau``. So the dimension of V decides which attitu
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
-
-    from tiltsim_controllers.mathematics.scalar import Floats
+from tiltsim_controllers.mathematics.scalar import Floats
 
 SINGULAR_ATTITUDES: Final = ("all", "great circle", "two directions", "none")
 """The set of singular directions of world up, by the dimension of the torque-free forces."""

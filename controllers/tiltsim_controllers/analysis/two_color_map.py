@@ -42,18 +42,14 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass
 from math import acos, atan, atan2, cos, hypot, pi, sin
-from typing import TYPE_CHECKING, Final, Literal
+from typing import Final, Literal
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from tiltsim_controllers.analysis.singularity import residuals
-from tiltsim_controllers.vehicle.parameters import drag_ratio
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
-
-    from tiltsim_controllers.mathematics.scalar import Floats
-    from tiltsim_controllers.vehicle.parameters import Vehicle
+from tiltsim_controllers.mathematics.scalar import Floats
+from tiltsim_controllers.vehicle.parameters import Vehicle, drag_ratio
 
 Region = Literal["S_U", "S_D", "L"]
 

@@ -18,7 +18,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 from math import hypot, isfinite, pi
-from typing import TYPE_CHECKING, Final, Literal, NamedTuple, TypeAlias
+from typing import Final, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -26,12 +26,9 @@ from tiltsim_controllers.analysis.two_color_map import point_p, red_residual
 from tiltsim_controllers.code.arrays import is_known, xp
 from tiltsim_controllers.gaits import plans
 from tiltsim_controllers.gaits.colors import colored_angles, require_color
-from tiltsim_controllers.vehicle.parameters import drag_ratio
-
-if TYPE_CHECKING:
-    from tiltsim_controllers.gaits.plans import Gait
-    from tiltsim_controllers.mathematics.scalar import Floats
-    from tiltsim_controllers.vehicle.parameters import Vehicle
+from tiltsim_controllers.gaits.plans import Gait
+from tiltsim_controllers.mathematics.scalar import Floats
+from tiltsim_controllers.vehicle.parameters import Vehicle, drag_ratio
 
 Point: TypeAlias = tuple[float, float]
 Theorem = Literal["two_color", "generalized"]

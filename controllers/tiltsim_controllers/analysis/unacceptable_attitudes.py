@@ -10,17 +10,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from itertools import pairwise
 from math import atan, atan2, cos, inf, pi
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from tiltsim_controllers.analysis.singularity import residuals, torque_free_direction
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-
-    from tiltsim_controllers.mathematics.scalar import Floats
-    from tiltsim_controllers.vehicle.parameters import Vehicle
+from tiltsim_controllers.mathematics.scalar import Floats
+from tiltsim_controllers.vehicle.parameters import Vehicle
 
 CurveKind = Literal["graph", "vertical", "none", "everywhere"]
 

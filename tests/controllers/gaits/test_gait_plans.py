@@ -10,7 +10,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.natively import natively
-from tests.tracing import untraced
 from tiltsim_controllers.analysis.published_gaits import smallest_margin
 from tiltsim_controllers.analysis.singularity import residuals
 from tiltsim_controllers.gaits import plans
@@ -100,7 +99,7 @@ def test_accelerations_are_derivatives_and_smooth_gaits_need_no_rounded_corners(
 def test_gaits_know_their_amplitude_rate_and_continuity(gait: Gait) -> None:
     period = gait.period or 1.0
     time = np.linspace(0.0, period, 2_001)
-    angles, rates = untraced(gait.angles)(time), untraced(gait.rates)(time)
+    angles, rates = gait.angles(time), gait.rates(time)
     assert gait.amplitude == pytest.approx(np.abs(angles).max(), rel=1e-3)
     assert gait.is_constant == (not np.ptp(angles, axis=0).any())
     largest_step = np.abs(np.diff(angles, axis=0)).max()

@@ -246,7 +246,7 @@ def allocated(rows, requested, box):
     return allocation.allocated(requested, rows[:3], rows[3], *box.T)
 
 
-@pytest.mark.parametrize("rotors", range(4, 13))
+@pytest.mark.parametrize("rotors", [4, 5, 7, 12])
 def test_any_number_of_rotors_reaches_the_optima_of_the_linear_programs(rotors):
     vehicles = random_vehicles(rotors, 200)
     rows, requests, boxes = (np.array(part) for part in zip(*vehicles, strict=True))

@@ -10,6 +10,7 @@ import pytest
 import tiltsim_controllers.laws.quadrotor_attitude_altitude as attitude_altitude
 import tiltsim_controllers.laws.yaw_position as yaw_position
 from tests.controllers.flights import fly, quadrotor_rates, rk4_step
+from tests.natively import compiled_law
 from tiltsim_controllers.laws.keys import choice, number_of
 from tiltsim_controllers.laws.quadrotor_attitude_altitude import attitude_altitude_inputs
 from tiltsim_controllers.laws.switching import (
@@ -169,7 +170,7 @@ def test_the_flown_thrust_rate_is_the_thrusts_derivative(reference):
 
 def flight(law, duration, step=0.004):
     times, states = fly(
-        lambda time, state: switching_inputs(time, np.array(state), law),
+        compiled_law(switching_inputs, len(START), law),
         quadrotor_rates,
         QUADROTOR,
         START,

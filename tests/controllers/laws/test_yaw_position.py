@@ -9,6 +9,7 @@ import pytest
 import sympy
 
 from tests.controllers.flights import fly, quadrotor_rates, rk4_step
+from tests.natively import compiled_law
 from tiltsim_controllers.analysis.quadrotor_singularity import (
     normalized_determinant,
     published_determinant,
@@ -223,9 +224,8 @@ PARAMETERS = {name: Parameters(QUADROTOR, CIRCLE, gains) for name, gains in GAIN
 
 
 def flight(gains, duration, step):
-    parameters = PARAMETERS[gains]
     return fly(
-        lambda time, state: yaw_position_inputs(time, np.array(state), parameters),
+        compiled_law(yaw_position_inputs, len(START), PARAMETERS[gains]),
         quadrotor_rates,
         QUADROTOR,
         START,

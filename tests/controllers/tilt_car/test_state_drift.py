@@ -117,12 +117,11 @@ def test_lean_and_split_are_one(lean):
 # --- the law itself ----------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("omega", [1.0, -1.0, 0.5])
-@pytest.mark.parametrize("lean", [0.0, 0.3])
+@pytest.mark.parametrize(("omega", "lean"), [(1.0, 0.3), (-1.0, 0.0), (0.5, 0.3)])
 def test_a_lap_advances_the_lean_by_the_holonomy(omega, lean):
     path = Orbit(10.0, omega)
     lap = 2.0 * pi / abs(omega)
-    end = follow(circling(path), inputs_of(lean, 10.0, THESIS_CAR), lap, 2000, THESIS_CAR)
+    end = follow(circling(path), inputs_of(lean, 10.0, THESIS_CAR), lap, 500, THESIS_CAR)
     advanced = lean_at(end, THESIS_CAR) - lean
     assert advanced == pytest.approx(holonomy(lean, path, THESIS_CAR), rel=1e-6)
     assert np.sign(advanced) == np.sign(omega)
@@ -168,7 +167,7 @@ def test_small_loops_miss_by_the_twist_times_their_area(lean):
 
 def test_restoring_holds_the_lean_where_drift_and_rate_balance():
     inputs = inputs_of(0.2, 10.0, THESIS_CAR)
-    end = follow(circling(PATH), inputs, 15.0, 6000, THESIS_CAR, rate=1.0)
+    end = follow(circling(PATH), inputs, 15.0, 1500, THESIS_CAR, rate=1.0)
     desired = restored_lean(PATH, THESIS_CAR, 1.0)
     assert lean_at(end, THESIS_CAR) == pytest.approx(desired, rel=1e-3)
     assert desired == pytest.approx(drift_rate(0.0, PATH, THESIS_CAR), rel=1e-5)

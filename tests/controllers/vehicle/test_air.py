@@ -8,7 +8,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import integrate, linalg, signal
 
-from tests.tracing import untraced
 from tiltsim_controllers.vehicle.air import (
     FOOT,
     Air,
@@ -171,7 +170,7 @@ def test_the_rates_are_driven_by_the_noise():
 
 def test_the_process_has_the_spectrum():
     fast = TURBULENCE._replace(sample_time=0.02, length_u=6.0, length_w=3.0)  # 1 s and 0.5 s
-    velocity = untraced(simulated)(fast, 60_000)
+    velocity = simulated(fast, 60_000)
     for column, axis in enumerate("uvw"):
         frequency, density = signal.welch(velocity[:, column], fs=50.0, nperseg=2048)
         band = (frequency > 0.05) & (frequency < 4.0)

@@ -14,7 +14,7 @@ from tiltsim.plants.command import Command, check_command
 from tiltsim.plants.commanded_plant import CommandedPlant
 from tiltsim.plants.factory import make_plant
 from tiltsim.plants.flight_model import build_model
-from tiltsim.studies.fleet import fleet_file
+from tiltsim.studies.multirotor_analysis import fleet_file
 from tiltsim.vehicles.rotorcraft.layout import Layout
 
 INERTIA = 3e-5  # kg m^2, of a rotor

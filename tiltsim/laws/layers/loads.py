@@ -4,8 +4,6 @@ They act through six actuators on the body, force and torque in body axes, which
 loads have.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cache
 from math import inf

@@ -44,16 +44,11 @@ class Finding:
     chapters: str
     text: Sequence[str]
     """Paragraphs with ``{names}`` of ``numbers``; text between backticks is code."""
-    proof: str
-    """Why it is true, or where that is derived; also with ``{names}``."""
-    tests: Mapping[str, Sequence[str]]
-    """Names of tests by their file in the folder of the tests."""
-    flights: Sequence[str] = ()
-    """Addresses in the scenario library that show it."""
-    sweep: str = ""
-    """Name of a sweep of the library that shows it."""
-    pictures: Sequence[str] = ()
-    """Names of pictures of the report that show it."""
+    proof: str  # why it is true, or where that is derived; also with ``{names}``
+    tests: Mapping[str, Sequence[str]]  # names of tests by their file in the folder of the tests
+    flights: Sequence[str] = ()  # addresses in the scenario library that show it
+    sweep: str = ""  # name of a sweep of the library that shows it
+    pictures: Sequence[str] = ()  # names of pictures of the report that show it
     numbers: Callable[[], dict[str, str]] = dict
 
     @property

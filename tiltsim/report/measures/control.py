@@ -1,7 +1,5 @@
 """Gains and decouplers of the attitude-altitude law (ch. 4 and 5)."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Final
 

@@ -1,7 +1,5 @@
 """The decoupling matrix of the tiltrotor and its determinant, term by term (ch. 3 to 12)."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from functools import cache

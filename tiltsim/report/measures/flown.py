@@ -1,7 +1,5 @@
 """Measures of one flight or several, from their metrics."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Sequence
 from itertools import pairwise, product
 from math import hypot, inf

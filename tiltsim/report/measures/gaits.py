@@ -1,7 +1,5 @@
 """Singularity margins of the gaits of ch. 5 to 8, exact and with the printed digits."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cache
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """Torques, thrusts and accelerations under rotor limits (ch. 9)."""
 
-from __future__ import annotations
-
 from typing import Final
 
 import numpy as np

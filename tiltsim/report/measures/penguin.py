@@ -1,7 +1,5 @@
 """The proof of ch. 11, step by step: whether its lemmas and printed equations hold."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cache
 from math import cos, exp, log, pi, sin, sqrt

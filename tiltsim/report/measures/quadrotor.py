@@ -1,7 +1,5 @@
 """Yaw-position control of the quadrotor and its alleged singular zone (ch. 2)."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from math import comb
 from typing import Final

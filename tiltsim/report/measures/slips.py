@@ -5,8 +5,6 @@ that is right. The truth is computed without the formula: by difference quotient
 eigenvalues or linear programs. `tiltsim.report.errors` lists them with their texts.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from math import asin, atan2, cos, exp, pi, sin, sqrt
 from typing import Final
@@ -168,8 +166,8 @@ def yaw_position_matrix_holds() -> bool:
         exact, attitude = np.zeros((4, 3)), rotation_matrix(angles)
         for axis, turn in enumerate(step * np.eye(3)):
             ahead, behind = (attitude @ rotation_matrix(sign * turn) for sign in (1.0, -1.0))
-            yaws = (atan2(matrix[1, 0], matrix[0, 0]) for matrix in (ahead, behind))
-            exact[:, axis] = np.append(behind[:, 2] - ahead[:, 2], np.subtract(*yaws)) / (2 * step)
+            yaw, back = (atan2(matrix[1, 0], matrix[0, 0]) for matrix in (ahead, behind))
+            exact[:, axis] = np.append(behind[:, 2] - ahead[:, 2], yaw - back) / (2 * step)
         printed = _ch2_matrices(*angles.tolist())[2]
         worst = max(worst, float(np.abs(printed[:, 1:] - exact).max()))
         worst = max(worst, float(np.abs(printed[:3, 0] + attitude[:, 2]).max()))

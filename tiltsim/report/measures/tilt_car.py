@@ -1,7 +1,5 @@
 """The tilt-car, and the state drift of its over-actuated control (ch. 10)."""
 
-from __future__ import annotations
-
 from math import asin, cos, inf, pi, sin
 
 import numpy as np

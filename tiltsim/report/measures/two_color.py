@@ -1,7 +1,5 @@
 """The Two Color Map: its roots, its lines, and the planner's verdicts (ch. 6, 7, 8, 12)."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cache
 from math import atan, pi

@@ -1,7 +1,5 @@
 """Places of a rotorcraft's numbers in a sample and in MuJoCo's vectors."""
 
-from __future__ import annotations
-
 from typing import Final, NamedTuple
 
 from tiltsim.closed_loop.loop import Dynamics, Sizes

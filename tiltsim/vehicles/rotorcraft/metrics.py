@@ -1,7 +1,5 @@
 """Metrics of the flights of tiltrotors and quadrotors."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any, Final
 

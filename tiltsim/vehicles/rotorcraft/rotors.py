@@ -1,7 +1,5 @@
 """The rotors of the vehicle inside a layer."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

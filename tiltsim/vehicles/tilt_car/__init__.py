@@ -16,7 +16,7 @@ from tiltsim.closed_loop.limits import (
 from tiltsim.closed_loop.vehicle_kind import VehicleKind
 from tiltsim.models.parts import ExtraActuators, TiltServo
 from tiltsim.scenario.scenario import FlightPlan, Scenario
-from tiltsim.system.quantity import Quantity
+from tiltsim.system.text import Quantity
 from tiltsim.vehicles.tilt_car.metrics import tilt_car_metrics
 from tiltsim_controllers.code.traceable import traceable
 from tiltsim_controllers.gaits.motion import tilt_motion_of

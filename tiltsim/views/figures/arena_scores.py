@@ -1,21 +1,17 @@
 """The scores of the arena: tasks by controllers for two vehicles, and the totals of all."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from itertools import islice
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from tiltsim.studies.arena import Standing
 from tiltsim.studies.arena_page import cell
-from tiltsim.system.quantity import in_words
+from tiltsim.system.text import in_words
 from tiltsim.views.figures import style
 from tiltsim.views.figures.layout import add_heading
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 DETAILED: Final = 2  # vehicles with a separate panel; all have a row in the panel of totals
 WIDE: Final = 9  # letters of a controller's name that fit above its column

@@ -1,31 +1,21 @@
 """The drawings of docs/concepts.md: vehicle, gaits, decouplers, singular attitudes, colors."""
 
-from __future__ import annotations
-
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from math import atan2, pi
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
+from matplotlib import rc_context
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 
-from tiltsim.views.attitude_plane import (
-    HALF_WIDTH,
-    nearest_singular,
-    singular_curves,
-    unreachable_pitch,
-)
+from tiltsim.flight.flight import Flight
+from tiltsim.views import attitude_plane
 from tiltsim.views.figures import style
-from tiltsim.views.figures.vehicle_drawing import (
-    ABOVE,
-    Pose,
-    Rotor,
-    View,
-    arrow,
-    badge,
-    blank,
-    text,
-    turn,
-)
+from tiltsim.views.figures import vehicle_drawing as drawing
 from tiltsim_controllers.analysis.singularity import singularity_margin, torque_free_direction
 from tiltsim_controllers.analysis.two_color_map import curve_l, delta, point_p, red_residual
 from tiltsim_controllers.gaits.cat import FORWARD, SWINGS
@@ -36,22 +26,13 @@ from tiltsim_controllers.laws.decouplers import (
     exact_decoupler,
     modified_decoupler,
 )
-from tiltsim_controllers.vehicle.parameters import PRESETS, drag_ratio
+from tiltsim_controllers.mathematics.scalar import Floats
+from tiltsim_controllers.vehicle.parameters import PRESETS, Vehicle, drag_ratio
 from tiltsim_controllers.vehicle.states import ROTORS
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
-
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-    from tiltsim.flight.flight import Flight
-    from tiltsim_controllers.mathematics.scalar import Floats
-    from tiltsim_controllers.vehicle.parameters import Vehicle
 
 _WIDTH: Final = 6.4  # inches: about the width of a page of text
 POSITIVE_TILT: Final = 0.5  # tilt angle (rad) of all rotors in the drawing of the vehicle
-BESIDE: Final = View(azimuth=-0.65, elevation=0.6)  # from the right, in front and above
+BESIDE: Final = drawing.View(azimuth=-0.65, elevation=0.6)  # from the right, in front and above
 TROT_ANGLES: Final = (-0.65, -0.65, 0.65, 0.65)  # tilt angles (rad) of the trot at rho = 0.65
 LEANING: Final = (-0.45, -0.41)  # roll and pitch (rad) of the vehicle whose margin is drawn
 _LEGS: Final = ("right fore", "left fore", "left hind", "right hind")
@@ -75,8 +56,6 @@ _LEANS: Final = "BrBG"  # color map of forward and backward leans
 @contextmanager
 def _drawing_style() -> Iterator[None]:
     """The common style with larger text, for pictures that are also seen on phones."""
-    from matplotlib import rc_context
-
     sizes = ("font.size", "axes.labelsize", "legend.fontsize", "xtick.labelsize", "ytick.labelsize")
     with style.paper_style(), rc_context(dict.fromkeys(sizes, 10) | {"axes.titlesize": 11}):
         yield
@@ -93,58 +72,55 @@ def _new_figure(height: float) -> Figure:
 @_drawing_style()
 def vehicle_figure() -> Figure:
     """Body axes, rotor numbers, spins and positive tilts, as the compiled model has them."""
-    pose = Pose((POSITIVE_TILT,) * 4)
+    pose = drawing.Pose((POSITIVE_TILT,) * 4)
     figure = _new_figure(3.7)
     row: Any = figure.subplots(1, 2, width_ratios=[1.12, 1.0])
     beside, above = row
-    for axes, view in ((beside, BESIDE), (above, ABOVE)):
-        blank(axes)
+    for axes, view in ((beside, BESIDE), (above, drawing.ABOVE)):
+        drawing.blank(axes)
         pose.draw(axes, view)
     _body_axes(beside, pose, BESIDE)
-    _body_axes(above, pose, ABOVE)
+    _body_axes(above, pose, drawing.ABOVE)
     for number, rotor in enumerate(pose.rotors, 1):
         _tilt_arrow(beside, rotor, pose, BESIDE)
         _spin_arrow(above, rotor)
-        for axes, view in ((beside, BESIDE), (above, ABOVE)):
-            badge(axes, view.project(rotor.hub), number)
+        for axes, view in ((beside, BESIDE), (above, drawing.ABOVE)):
+            drawing.badge(axes, view.project(rotor.hub), number)
     _vehicle_legend(figure, pose)
     return figure
 
 
-def _body_axes(axes: Axes, pose: Pose, view: View) -> None:
+def _body_axes(axes: Axes, pose: drawing.Pose, view: drawing.View) -> None:
     origin = view.project(np.zeros(3))
     for name, axis in zip("xyz", np.eye(3), strict=True):
         end = view.project(pose.to_world(0.36 * axis))
         if np.hypot(*(end - origin)) < 0.05:
             continue
-        arrow(axes, [origin, end], style.INK, width=1.4)
-        text(axes, origin + 1.09 * (end - origin), name, fontsize=11, fontstyle="italic")
+        drawing.arrow(axes, [origin, end], style.INK, width=1.4)
+        drawing.text(axes, origin + 1.09 * (end - origin), name, fontsize=11, fontstyle="italic")
 
 
-def _tilt_arrow(axes: Axes, rotor: Rotor, pose: Pose, view: View) -> None:
+def _tilt_arrow(axes: Axes, rotor: drawing.Rotor, pose: drawing.Pose, view: drawing.View) -> None:
     """The thrust untilted and tilted, and the angle from the one to the other."""
     up = pose.to_world([0.0, 0.0, 1.0])
     base, length = rotor.hub - 0.026 * rotor.thrust, 0.24
     ends = view.project([base, base + length * up])
     axes.plot(*ends.T, color=style.BLUE, lw=1.0, ls=(0, (3, 2)), zorder=5.0)
-    arrow(axes, view.project([base, base + length * rotor.thrust]), style.BLUE)
-    arc = turn(up, rotor.hinge, np.linspace(0.0, POSITIVE_TILT, 20))
-    arrow(axes, view.project(base + 0.66 * length * arc), style.BLUE, width=1.2)
-    (middle,) = turn(up, rotor.hinge, [0.5 * POSITIVE_TILT])
-    text(axes, view.project(base + 0.9 * length * middle), "α", color=style.BLUE)
+    drawing.arrow(axes, view.project([base, base + length * rotor.thrust]), style.BLUE)
+    arc = drawing.turn(up, rotor.hinge, np.linspace(0.0, POSITIVE_TILT, 20))
+    drawing.arrow(axes, view.project(base + 0.66 * length * arc), style.BLUE, width=1.2)
+    (middle,) = drawing.turn(up, rotor.hinge, [0.5 * POSITIVE_TILT])
+    drawing.text(axes, view.project(base + 0.9 * length * middle), "α", color=style.BLUE)
 
 
-def _spin_arrow(axes: Axes, rotor: Rotor) -> None:
+def _spin_arrow(axes: Axes, rotor: drawing.Rotor) -> None:
     start = np.cross(rotor.thrust, rotor.hinge)
     angles = rotor.spin * np.linspace(-2.2, 2.2, 60)
-    rim = rotor.hub + 0.62 * rotor.radius * turn(start, rotor.thrust, angles)
-    arrow(axes, ABOVE.project(rim), 0.55 * rotor.color)
+    rim = rotor.hub + 0.62 * rotor.radius * drawing.turn(start, rotor.thrust, angles)
+    drawing.arrow(axes, drawing.ABOVE.project(rim), 0.55 * rotor.color)
 
 
-def _vehicle_legend(figure: Figure, pose: Pose) -> None:
-    from matplotlib.lines import Line2D
-    from matplotlib.patches import Patch
-
+def _vehicle_legend(figure: Figure, pose: drawing.Pose) -> None:
     names = {-1.0: "clockwise from above, ϖ < 0", 1.0: "counter-clockwise, ϖ > 0"}
     handles: list[Any] = [
         Patch(facecolor=(*rotor.color, 0.32), edgecolor=0.6 * rotor.color, label=names[rotor.spin])
@@ -204,7 +180,7 @@ def decoupler_figure(flights: Mapping[str, Flight]) -> Figure:
     for sketch, (name, flight), line in zip(
         sketches, flights.items(), style.AXIS_LINES, strict=True
     ):
-        _lean(sketch, name, Pose(tuple(tilts), _lean_at_rest(name, n, vehicle)), n)
+        _lean(sketch, name, drawing.Pose(tuple(tilts), _lean_at_rest(name, n, vehicle)), n)
         away = np.hypot(flight["x_ref"] - flight["x"], flight["y_ref"] - flight["y"])
         plan.plot(flight["x"], flight["y"], label=name, **line)
         plan.plot(flight["x"][-1], flight["y"][-1], "o", ms=6, color=line["color"])
@@ -234,10 +210,10 @@ def _lean_at_rest(name: str, n: Floats, vehicle: Vehicle) -> tuple[float, float,
     return (*leans[name](), 0.0)
 
 
-def _lean(axes: Axes, name: str, pose: Pose, n: Floats) -> None:
+def _lean(axes: Axes, name: str, pose: drawing.Pose, n: Floats) -> None:
     """A vehicle at rest, seen from the side, with the force at zero torque."""
-    view, length = View(azimuth=pi / 4, elevation=0.12), 0.4
-    blank(axes)
+    view, length = drawing.View(azimuth=pi / 4, elevation=0.12), 0.4
+    drawing.blank(axes)
     pose.draw(axes, view)
     force, up = pose.to_world(n), np.array([0.0, 0.0, 1.0])
     axes.plot(
@@ -247,9 +223,9 @@ def _lean(axes: Axes, name: str, pose: Pose, n: Floats) -> None:
         lw=1.0,
         zorder=5.0,
     )
-    arrow(axes, view.project([0.0 * force, length * force]), style.BLUE, width=2.4)
+    drawing.arrow(axes, view.project([0.0 * force, length * force]), style.BLUE, width=2.4)
     axes.set_title(name, loc="center")
-    text(axes, (0.0, -0.2), f"force {np.degrees(np.arccos(force[2])):.1f}° off vertical")
+    drawing.text(axes, (0.0, -0.2), f"force {np.degrees(np.arccos(force[2])):.1f}° off vertical")
 
 
 @_drawing_style()
@@ -266,10 +242,10 @@ def attitude_figure() -> Figure:
 
 def _side_view(axes: Axes, n: Floats) -> None:
     """A leaning vehicle in the vertical plane of its force at zero torque."""
-    pose = Pose(TROT_ANGLES, (*LEANING, 0.0))
+    pose = drawing.Pose(TROT_ANGLES, (*LEANING, 0.0))
     force = pose.to_world(n)
-    view, length = View(azimuth=atan2(force[1], force[0]) - pi / 2, elevation=0.0), 0.34
-    blank(axes)
+    view, length = drawing.View(azimuth=atan2(force[1], force[0]) - pi / 2, elevation=0.0), 0.34
+    drawing.blank(axes)
     up = view.project([0.0, 0.0, 1.0])
     along = view.project(force)
     border = np.array([-along[1], along[0]])
@@ -280,26 +256,26 @@ def _side_view(axes: Axes, n: Floats) -> None:
     )  # fmt: skip
     axes.plot(*(1.1 * length * np.stack([-border, border])).T, color=style.SINGULAR, zorder=1.0)
     pose.draw(axes, view)
-    arrow(axes, [0.0 * along, length * along], style.BLUE, width=2.4)
-    text(axes, 1.12 * length * along, "n", color=style.BLUE, fontsize=13, style="italic")
-    arrow(axes, [0.0 * up, length * up], style.INK)
-    text(axes, 1.1 * length * up, "world up")
+    drawing.arrow(axes, [0.0 * along, length * along], style.BLUE, width=2.4)
+    drawing.text(axes, 1.12 * length * along, "n", color=style.BLUE, fontsize=13, style="italic")
+    drawing.arrow(axes, [0.0 * up, length * up], style.INK)
+    drawing.text(axes, 1.1 * length * up, "world up")
     turned = np.linspace(atan2(up[1], up[0]), atan2(border[1], border[0]), 30)
     arc = 0.75 * length * np.stack([np.cos(turned), np.sin(turned)], axis=1)
     axes.plot(*arc.T, color=style.PURPLE, lw=2.4, zorder=5.0)
-    text(axes, arc[-1] - (0.02, 0.0), "margin", ha="right")
-    text(axes, -0.8 * length * along, "unreachable", color=style.SINGULAR)
+    drawing.text(axes, arc[-1] - (0.02, 0.0), "margin", ha="right")
+    drawing.text(axes, -0.8 * length * along, "unreachable", color=style.SINGULAR)
 
 
 def _roll_pitch_plane(axes: Axes, n: Floats, vehicle: Vehicle) -> None:
-    roll = np.linspace(-HALF_WIDTH, HALF_WIDTH, 361)
-    low, high = unreachable_pitch(n, 1.0, roll)[0].T
+    roll = np.linspace(-attitude_plane.HALF_WIDTH, attitude_plane.HALF_WIDTH, 361)
+    low, high = attitude_plane.unreachable_pitch(n, 1.0, roll)[0].T
     axes.fill_between(roll, low, high, color=style.UNREACHABLE, lw=0.0, zorder=0.5)
-    axes.plot(*singular_curves(n)[0].T, color=style.SINGULAR, lw=1.8)
+    axes.plot(*attitude_plane.singular_curves(n)[0].T, color=style.SINGULAR, lw=1.8)
     style.roll_pitch_axes(axes)
-    text(axes, (-0.9, -1.33), "unreachable\nmargin < 0", color=style.SINGULAR)
+    drawing.text(axes, (-0.9, -1.33), "unreachable\nmargin < 0", color=style.SINGULAR)
     hover = exact_decoupler(0.0, 0.0, 0.0, 0.0, vehicle.gravity, tuple(n[0]))
-    nearest = nearest_singular(n, np.array([LEANING]))[0]
+    nearest = attitude_plane.nearest_singular(n, np.array([LEANING]))[0]
     axes.plot(*np.array([LEANING, nearest]).T, color=style.PURPLE, lw=2.4)
     for attitude, name in ((LEANING, "leaning"), ((0.0, 0.0), "level"), (hover, "hover")):
         margin = float(singularity_margin(TROT_ANGLES, vehicle, *attitude))
@@ -325,8 +301,8 @@ def color_figure() -> Figure:
     lines.plot(side, blue[0], color=style.BLUE, lw=2.4, ls=(0, (4, 1.5)))
     lines.plot(angle, angle, "o", color=style.AMBER, mec=style.INK, ms=7, zorder=5)
     lines.annotate("α₁ = α₃ = δ", (angle, angle), (10, -4), textcoords="offset points")
-    text(lines, (0.75, 1.2), "red", color=_RED_GAITS, fontweight="bold")
-    text(lines, (-0.95, 0.35), "blue:\nsingular", color=style.BLUE, fontweight="bold")
+    drawing.text(lines, (0.75, 1.2), "red", color=_RED_GAITS, fontweight="bold")
+    drawing.text(lines, (-0.95, 0.35), "blue:\nsingular", color=style.BLUE, fontweight="bold")
     lines.set(xlabel="α₁ (rad)", ylabel="α₃ (rad)", title="Two families of gaits")
 
     first, second = np.meshgrid(side, side)
@@ -337,8 +313,8 @@ def color_figure() -> Figure:
     plane.annotate("P", point_p(vehicle), (7, -3), textcoords="offset points")
     plane.plot(0.0, 0.0, "+", color=style.INK, ms=9, mew=1.4)
     plane.annotate("untilted", (0.0, 0.0), (-5, 5), textcoords="offset points", ha="right")
-    text(plane, (0.75, -0.9), "unreachable\nR < 0", color=style.SINGULAR)
-    text(plane, (-0.8, 0.95), "R > 0")
+    drawing.text(plane, (0.75, -0.9), "unreachable\nR < 0", color=style.SINGULAR)
+    drawing.text(plane, (-0.8, 0.95), "R > 0")
     plane.set(xlabel="α₁ = α₃ (rad)", ylabel="α₂ = α₄ (rad)", title="Red gaits")
     for axes in row:
         for axis in "xy":

@@ -1,20 +1,15 @@
 """Controllers side by side: tracking errors and tolerated disturbances of each."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from tiltsim.studies.comparison import Compared, is_last_tried, why_none
 from tiltsim.views.figures import style
 from tiltsim.views.figures.layout import add_legend
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
 
 SURVIVED: Final = {
     "max_latency": ("latency", 0.0, "{:.3f} s"),

@@ -1,12 +1,12 @@
 """The figure of randomly sampled flights: completed share, metrics, effect of the samples."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
-from math import sqrt
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from scipy.stats import binomtest, spearmanr
 
 from tiltsim.sweeps.dataset import Column, SweepResults
 from tiltsim.sweeps.tables import GridAxis
@@ -19,24 +19,11 @@ from tiltsim.views.figures.sweep_columns import (
     spans_decades,
 )
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-    Groups = Sequence[tuple[str, Column]]
+Groups = Sequence[tuple[str, Column]]
 
 QUANTILES: Final = (0.05, 0.5, 0.95)  # that are marked on the curves
 MAX_KEYS: Final = 4  # largest number of sampled keys with a separate panel
-HATCHES: Final = (
-    "",
-    "///",
-    "...",
-    "\\\\\\",
-    "xxx",
-    "---",
-    "+++",
-)  # of bars in the colors of `CYCLE`
-NORMAL_95: Final = 1.959963984540054
+HATCHES: Final = ("", "///", "...", "\\\\\\", "xxx", "---", "+++")  # of bars, by `CYCLE`
 
 
 def distributions_figure(results: SweepResults, metrics: tuple[str, ...]) -> Figure:
@@ -93,10 +80,8 @@ def distributions_figure(results: SweepResults, metrics: tuple[str, ...]) -> Fig
 
 def wilson_interval(successes: int, trials: int) -> tuple[float, float]:
     """The 95 percent confidence interval of a probability (Wilson, 1927)."""
-    share, square = successes / trials, NORMAL_95**2 / trials
-    middle = (share + square / 2.0) / (1.0 + square)
-    half = sqrt(share * (1.0 - share) * square + square**2 / 4.0) / (1.0 + square)
-    return max(0.0, middle - half), min(1.0, middle + half)
+    interval = binomtest(successes, trials).proportion_ci(method="wilson")
+    return float(interval.low), float(interval.high)
 
 
 def _draw_shares(axes: Axes, completed: Column, groups: Groups) -> None:
@@ -152,23 +137,13 @@ def _most_effective(results: SweepResults, metric: str, groups: Groups) -> list[
         draws = results.columns[key]
         # Both too large and too small values may be harmful.
         both = (draws, np.abs(draws - np.median(draws)))
-        pairs = [(_ranks(d[group]), _ranks(values[group])) for _, group in groups for d in both]
-        # Spearman's rank correlation; 0 if either is constant.
-        constant = [np.ptp(left) == 0.0 or np.ptp(right) == 0.0 for left, right in pairs]
-        return max(
-            0.0 if same else abs(float(np.corrcoef(*pair)[0, 1]))
-            for same, pair in zip(constant, pairs, strict=True)
-        )
+        pairs = [(d[group], values[group]) for _, group in groups for d in both]
+        # A constant has no correlation.
+        varied = [pair for pair in pairs if all(len(np.unique(part)) > 1 for part in pair)]
+        return max((abs(float(spearmanr(*pair).statistic)) for pair in varied), default=0.0)
 
     chosen = sorted(keys, key=strength, reverse=True)[:MAX_KEYS]
     return [key for key in keys if key in chosen]
-
-
-def _ranks(values: Column) -> Column:
-    """Ranks; equal values share their mean rank."""
-    _, places, counts = np.unique(values, return_inverse=True, return_counts=True)
-    last = np.cumsum(counts)
-    return np.asarray((last - (counts - 1) / 2.0)[places])
 
 
 def _draw_scatter(axes: Axes, results: SweepResults, key: str, metric: str, groups: Groups) -> None:

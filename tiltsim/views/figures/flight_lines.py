@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple
 from warnings import catch_warnings, simplefilter
 
 import numpy as np
+from matplotlib.axes import Axes
 
+from tiltsim.flight.flight import Flight
 from tiltsim.laws.supervision import SUPERVISION
 from tiltsim.views.figures import style
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-    from tiltsim.flight.flight import Flight
-    from tiltsim_controllers.mathematics.scalar import Floats
+from tiltsim_controllers.mathematics.scalar import Floats
 
 MAX_PERIODS: Final = 10
 """Periods of a gait beyond which a line would be a solid band."""

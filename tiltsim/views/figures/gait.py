@@ -1,12 +1,17 @@
-"""Figures of gaits: roll-pitch diagram (ch. 5 to 8), tilt angles and margin over a period."""
-
-from __future__ import annotations
+"""Figures of gaits: roll-pitch diagrams, tilt angles and margins, hover after a rotor loss."""
 
 from collections.abc import Sequence
-from math import pi
-from typing import TYPE_CHECKING, Any, Final
+from math import atan, pi
+from typing import Any, Final
 
 import numpy as np
+from matplotlib import colormaps
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 
 from tiltsim.errors import InputError
 from tiltsim.scenario.messages import choose
@@ -14,6 +19,7 @@ from tiltsim.studies.gait_analysis import NEARLY_SINGULAR
 from tiltsim.views.attitude_plane import MIN_DIRECTION_TILT
 from tiltsim.views.figures import style
 from tiltsim.views.figures.layout import Page, add_legend, new_page, place_legends
+from tiltsim_controllers.analysis.fault_tolerance import minimum_hover_speed
 from tiltsim_controllers.analysis.singularity import (
     determinant,
     margin_over_gait,
@@ -21,23 +27,15 @@ from tiltsim_controllers.analysis.singularity import (
     torque_free_direction,
 )
 from tiltsim_controllers.analysis.unacceptable_attitudes import unacceptable_attitudes
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-    from tiltsim_controllers.gaits.plans import Gait
-    from tiltsim_controllers.vehicle.parameters import Vehicle
+from tiltsim_controllers.gaits.plans import Gait
+from tiltsim_controllers.vehicle.parameters import Vehicle, drag_ratio
 
 _CURVES: Final = 24  # instants of a period for which the curve of singular attitudes is drawn
 _LAST_SHADE: Final = 0.92  # of the color map; the rest is too bright on white
 
-AREA, CURVE = "area", "curve"
-"""Optional contents of a roll-pitch diagram."""
-
+AREA, CURVE = "area", "curve"  # optional contents of a roll-pitch diagram
 ATTITUDES: Final = "attitude_plane"
-PANELS: Final = ("tilt_angles", "margin", ATTITUDES)
-"""Panels of the figure of a gait."""
+PANELS: Final = ("tilt_angles", "margin", ATTITUDES)  # panels of the figure of a gait
 
 
 @style.paper_style()
@@ -104,8 +102,6 @@ def _roll_pitch(axes: Axes, gait: Gait, vehicle: Vehicle) -> set[str]:
 
     Returns which of `AREA` and `CURVE` the diagram contains.
     """
-    from matplotlib import colormaps
-
     period = gait.period or 1.0
     times = np.zeros(1) if gait.is_constant else np.arange(_CURVES) / _CURVES * period
     angles = gait.angles(times)
@@ -154,11 +150,6 @@ def _roll_pitch_legend(
     figure: Figure, diagrams: list[Axes], gait: Gait, shown: set[str], *, alone: bool = False
 ) -> None:
     """The legend and, of a moving gait, the time bar; ``alone`` for a single constant gait."""
-    from matplotlib.cm import ScalarMappable
-    from matplotlib.colors import Normalize
-    from matplotlib.lines import Line2D
-    from matplotlib.patches import Patch
-
     if CURVE in shown and gait.period is not None:
         mapping = ScalarMappable(Normalize(0.0, gait.period / _LAST_SHADE), style.SEQUENTIAL)
         look: dict[str, Any] = {"shrink": 0.8, "pad": 0.02, "label": "time (s)"}
@@ -188,3 +179,44 @@ def _margin(axes: Axes, gaits: list[tuple[Gait, str]], vehicle: Vehicle) -> None
     low = -pi / 2 * 1.05 if lowest < -0.05 else -0.12
     axes.set(xlim=(0.0, longest), ylim=(low, pi / 2 * 1.05), xlabel="time (s)", ylabel="rad")
     axes.set_title("Singularity margin")
+
+
+@style.paper_style()
+def fault_figure(vehicle: Vehicle) -> Figure:
+    """Maximum rotor speed in hover over a servo's stuck angle and over the remaining thrust."""
+    figure = style.new_figure(6.6, 2.7)
+    row: Any = figure.subplots(1, 2, sharey=True)
+    stuck, partial = row
+    angles = np.linspace(-pi, pi, 49)
+    for upright, line, place, text in (
+        (False, "-", (-3.0, 395.0), "at any\nattitude"),
+        (True, "--", (-1.75, 465.0), "upright"),
+    ):
+        speeds = [
+            minimum_hover_speed(vehicle, stuck=(1, angle), upright=upright)
+            for angle in angles.tolist()
+        ]
+        (drawn,) = stuck.plot(angles, speeds, line)
+        stuck.text(*place, text, color=drawn.get_color(), size="small")
+    intact = vehicle.hover_rotor_speed
+    stuck.axhline(intact, color=style.GREY, lw=0.8)
+    note: dict[str, Any] = {"xytext": (3, 2), "textcoords": "offset points", "size": "x-small"}
+    place = (-0.8 * pi, intact)
+    stuck.annotate(f"intact vehicle, {intact:.0f}", place, color=style.GREY, **note)
+    limit = 2.0 * atan(drag_ratio(vehicle))
+    stuck.axvline(limit, color=style.AMBER, ls="--", lw=1.0)
+    look: dict[str, Any] = {"color": style.AMBER, "size": "small", "va": "top"}
+    look["transform"] = stuck.get_xaxis_transform()
+    stuck.text(limit, 0.9, " no level gait\n beyond", **look)
+    style.angle_axis(stuck, "x", pi)
+    stuck.set(xlabel="angle at which servo 1 is stuck (rad)", title="Stuck servo, other tilts free")
+    stuck.set_ylabel("maximum rotor speed needed (rad/s)")
+    factors = np.linspace(0.0, 1.0, 21)
+    speeds = [minimum_hover_speed(vehicle, factors=(f, 1.0, 1.0, 1.0)) for f in factors.tolist()]
+    partial.plot(100.0 * factors, speeds)
+    partial.plot([0.0], speeds[:1], "o", ms=4, color=style.RED, clip_on=False)
+    text = f"failed rotor, {speeds[0]:.0f}"
+    partial.text(4.0, speeds[0], text, color=style.RED, size="small", va="center")
+    partial.set(xlim=(0.0, 100.0), xlabel="remaining thrust of rotor 1 (%)")
+    partial.set_title("Partial thrust, tilts free")
+    return figure

@@ -1,21 +1,21 @@
-"""Layout of figures at any size: panels in columns, and headings and legends that fit."""
-
-from __future__ import annotations
+"""Layout of figures at any size: panels in columns, headings, legends; the user's own words."""
 
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import groupby
 from math import ceil
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple
+
+from matplotlib import rcParams
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.legend import Legend
+from matplotlib.text import Text
 
 from tiltsim.errors import InputError
+from tiltsim.scenario.messages import did_you_mean
+from tiltsim.scenario.metric_names import METRICS
 from tiltsim.views.figures import style
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-    from matplotlib.legend import Legend
-    from matplotlib.text import Text
 
 HEADING: Final = "heading"  # identifies the title of a figure
 MIN_COLUMN: Final = 2.9  # width (inches) that a column of panels needs
@@ -145,8 +145,6 @@ def add_heading(figure: Figure, title: str, more: str = "", legend: Sequence[Any
         more: A line of facts, in gray.
         legend: Handles of a legend.
     """
-    from matplotlib import rcParams
-
     width, height = figure.get_size_inches() * figure.dpi
     gap = 0.07 * figure.dpi
     top = height - gap
@@ -221,8 +219,6 @@ def place_legends(page: Page) -> None:
 
 
 def _place_legend(axes: Axes, entries: int, *, below: bool) -> None:
-    from matplotlib import rcParams
-
     box, points = axes.get_window_extent(), 72.0 / axes.figure.dpi
     look: dict[str, Any] = {"handlelength": 1.4, "columnspacing": 0.9, "handletextpad": 0.4}
     if below:
@@ -237,3 +233,74 @@ def _place_legend(axes: Axes, entries: int, *, below: bool) -> None:
             break
     if not below and drawn.width + axes.set_title(title).get_window_extent().width > box.width:
         axes.set_title(title, pad=drawn.height * points)
+
+
+def retitle(figure: Figure, title: str | None) -> None:
+    """Replace the title of a figure, or of its only panel; empty for none, None for no change."""
+    if title is None:
+        return
+    headings = [text for text in figure.texts if text.get_gid() == HEADING]
+    if headings:
+        headings[0].set_text(style.verbatim(title))
+        return
+    single = [axes for axes in figure.axes if axes.get_title(loc="left")]
+    if len(figure.axes) == 1 and single:
+        figure.axes[0].set_title(style.verbatim(title))
+    else:
+        figure.suptitle(style.verbatim(title), x=0.01, ha="left", wrap=True)
+
+
+def relabel(
+    figure: Figure, labels: Mapping[str, str], panels: Mapping[str, Axes] | None = None
+) -> None:
+    """Replace labels of axes, panels and legends; a unit in brackets behind them stays.
+
+    Args:
+        figure: A finished figure.
+        labels: New texts by present text, or by the name of a metric or panel.
+        panels: Its panels by their names, if they have some.
+
+    Raises:
+        InputError: If the figure does not have the text.
+    """
+    if not labels:
+        return
+    texts = [text for text in _texts(figure) if text.get_text()]
+    for name, new in labels.items():
+        old = METRICS[name].label if name in METRICS else style.verbatim(name)
+        if panels and name in panels and not any(_says(text, old) for text in texts):
+            axes = panels[name]
+            old = _said(axes._left_title) or _said(axes.yaxis.label)  # type: ignore[attr-defined]
+            old = old.partition(" (")[0]
+        found = False
+        for text in texts:
+            said = _said(text)
+            _, bracket, unit = said.partition(" (")
+            if _says(text, old):
+                text.set_text(style.verbatim(new) + ("" if said == old else bracket + unit))
+                found = True
+        if not found:
+            said_now = [_said(text).partition(" (")[0] for text in texts]
+            known = [*dict.fromkeys([*said_now, *(panels or ())])]
+            says = ", ".join(map(repr, known))
+            raise InputError(f"label {name!r}: {did_you_mean(name, known)}the figure says {says}")
+
+
+def _said(text: Text) -> str:
+    return text.get_text().replace("\n", " ")
+
+
+def _says(text: Text, label: str) -> bool:
+    """Whether a text is this label, with or without a unit."""
+    return label in {_said(text), _said(text).partition(" (")[0]}
+
+
+def _texts(figure: Figure) -> Iterator[Text]:
+    """The labels, titles and legends of a figure."""
+    for axes in figure.axes:
+        yield from (axes.xaxis.label, axes.yaxis.label)
+        legend = axes.get_legend()
+        yield from (axes.title, axes._left_title)  # type: ignore[attr-defined]
+        yield from [] if legend is None else [*legend.get_texts(), legend.get_title()]
+    for legend in figure.legends:
+        yield from [*legend.get_texts(), legend.get_title()]

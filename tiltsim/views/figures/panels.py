@@ -1,28 +1,19 @@
 """The panels of a page of flights: signals over time, paths from above, planes."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from math import ceil, log10, pi
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
+from matplotlib.axes import Axes
 
+from tiltsim.flight.flight import Flight
 from tiltsim.laws.supervision import SUPERVISION
 from tiltsim.scenario.gait import PenguinGait
-from tiltsim.system.quantity import Quantity
-from tiltsim.views.attitude_plane import (
-    HALF_WIDTH,
-    SUPERVISION_THRESHOLD,
-    margin_threshold,
-    nearest_singular,
-    side_of,
-    singular_curves,
-    torque_free_directions,
-    unreachable_pitch,
-)
+from tiltsim.system.text import Quantity
+from tiltsim.views import attitude_plane
 from tiltsim.views.figures import style
 from tiltsim.views.figures.flight_lines import (
     MOST_LINES,
@@ -42,12 +33,7 @@ from tiltsim.views.signals import (
     signals_of,
     vector_signals,
 )
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-    from tiltsim.flight.flight import Flight
-    from tiltsim_controllers.mathematics.scalar import Floats
+from tiltsim_controllers.mathematics.scalar import Floats
 
 SHOWN_PERIODS: Final = 4  # the last ones, shown instead
 NARROW: Final = 8.0  # ratio of a path's extents above which its axes have different scales
@@ -191,7 +177,7 @@ def _distance(axes: Axes, shown: Sequence[Shown]) -> None:
 
 def _margins(axes: Axes, shown: Sequence[Shown]) -> None:
     """The singularity margin of every flight, and how much of it counts as nearly singular."""
-    threshold = max(margin_threshold(one.flight.scenario) for one in shown)
+    threshold = max(attitude_plane.margin_threshold(one.flight.scenario) for one in shown)
     single = "marker" not in shown[0].look
     text = f"below {threshold:g}" if single else f"margin below {threshold:g} rad"
     axes.axhspan(0.0, threshold, color=style.UNREACHABLE, lw=0.0, label=text)
@@ -201,7 +187,7 @@ def _margins(axes: Axes, shown: Sequence[Shown]) -> None:
     if single:
         flight, margin = shown[0].flight, margins[0]
         if SUPERVISION in flight.columns:
-            active = flight[SUPERVISION] > SUPERVISION_THRESHOLD
+            active = flight[SUPERVISION] > attitude_plane.SUPERVISION_THRESHOLD
             look: dict[str, Any] = {"color": style.PALE, "lw": 0.0, "zorder": 0.5}
             look |= {"transform": axes.get_xaxis_transform(), "label": "supervisor active"}
             axes.fill_between(flight["time"], 0.0, 1.0, where=active, **look)
@@ -278,22 +264,24 @@ def _path(axes: Axes, shown: Sequence[Shown]) -> None:
 def _attitude_plane(axes: Axes, shown: Sequence[Shown]) -> None:
     """The attitudes flown, unreachable ones, and the closest approach to a singular one."""
     flight = shown[0].flight
-    n = torque_free_directions(flight.columns, flight.scenario.rotorcraft.resolve())
+    n = attitude_plane.torque_free_directions(flight.columns, flight.scenario.rotorcraft.resolve())
     margin = flight["singularity_margin"]
     closest = int(np.argmin(np.abs(margin)))
     instants = np.unique(np.linspace(0, len(n) - 1, INSTANTS).round().astype(int))
-    edges = np.linspace(-HALF_WIDTH, HALF_WIDTH, 361)
+    edges = np.linspace(-attitude_plane.HALF_WIDTH, attitude_plane.HALF_WIDTH, 361)
     centres = 0.5 * (edges[1:] + edges[:-1])
-    intervals = unreachable_pitch(n[instants], side_of(margin), centres)[:, np.newaxis]
+    intervals = attitude_plane.unreachable_pitch(
+        n[instants], attitude_plane.side_of(margin), centres
+    )[:, np.newaxis]
     pitch = centres[:, np.newaxis]
     share = ((pitch > intervals[..., 0]) & (pitch < intervals[..., 1])).mean(axis=0)
     style.shade_share(axes, edges, share)
     attitude = np.stack([flight["roll"], flight["pitch"]], axis=1)
     axes.plot(*attitude.T, color=style.BLUE, lw=0.9, label="flown")
-    curve, here = singular_curves(n[[closest]], 181)[0], attitude[closest]
+    curve, here = attitude_plane.singular_curves(n[[closest]], 181)[0], attitude[closest]
     if np.isfinite(curve).any():
         axes.plot(*curve.T, color=style.SINGULAR, lw=1.8, label="singular")
-        there = nearest_singular(n[[closest]], attitude[[closest]])[0]
+        there = attitude_plane.nearest_singular(n[[closest]], attitude[[closest]])[0]
         text = f"minimum margin, at {flight['time'][closest]:.2f} s"
         axes.plot(*np.stack([here, there]).T, color=style.INK, lw=1.0, ls="--", label=text)
     axes.plot(*here, "o", color=style.SINGULAR, ms=5, zorder=5)

@@ -5,28 +5,23 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from tiltsim.errors import InputError
-from tiltsim.flight.flight import as_flights
+from tiltsim.flight.flight import Flight, as_flights
 from tiltsim.flight.vectors import VECTORS, components
 from tiltsim.scenario.messages import choose
 from tiltsim.system.text import short_repr
-from tiltsim.views.figures import style
-from tiltsim.views.figures.adjusting import relabel
+from tiltsim.views.figures import layout, style
 from tiltsim.views.figures.flight_lines import MOST_LINES, Shown
-from tiltsim.views.figures.layout import Page, add_heading, fitting, new_page, place_legends, wrap
 from tiltsim.views.figures.panels import Panel, column_panel, panels_of, set_scale, signals_panel
 from tiltsim.views.signals import stems, vector_signals
 from tiltsim.views.titles import common_title, describe_controller, describe_gait, flight_names
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-    from tiltsim.flight.flight import Flight
 
 LARGEST: Final = 1e100
 """Magnitude up to which values are drawn: a diverged flight may end just below overflow."""
@@ -103,7 +98,7 @@ def draw_flights(
     shown = [Shown(*one) for one in zip(flights, names, looks, strict=True)]
     chosen = _chosen(flights, panels)
     heading = partial(_heading, shown, title)
-    return fitting(lambda: _page(shown, chosen, heading, others))
+    return layout.fitting(lambda: _page(shown, chosen, heading, others))
 
 
 def _page(
@@ -111,16 +106,9 @@ def _page(
     chosen: Mapping[str, Panel],
     heading: Callable[[float], tuple[str, str]],
     texts: Mapping[str, str],
-) -> Page:
-    """Draw the panels.
-
-    Args:
-        shown: The flights.
-        chosen: The panels by name.
-        heading: Title and line below it for a width (inches).
-        texts: Texts instead of others.
-    """
-    page = new_page([panel.over_time for panel in chosen.values()])
+) -> layout.Page:
+    """Draw the panels; ``heading`` is title and line below it for a width (inches)."""
+    page = layout.new_page([panel.over_time for panel in chosen.values()])
     for axes, panel in zip(page.panels, chosen.values(), strict=True):
         drawn = [one for one in shown if panel.needs in one.flight.units]
         if panel.over_time:
@@ -129,7 +117,7 @@ def _page(
         if panel.signals is not None:
             set_scale(axes, panel.signals, drawn)
     if len(shown) == 1:
-        place_legends(page)
+        layout.place_legends(page)
     for column in page.columns:
         _label_time(column)
     marks = [*_handles(shown, page.figure.axes)] if len(shown) > 1 else []
@@ -137,10 +125,10 @@ def _page(
     for name in said.keys() & texts.keys():
         said[name].set_label(style.verbatim(texts[name]))
     others = {name: text for name, text in texts.items() if name not in said}
-    relabel(page.figure, others, dict(zip(chosen, page.panels, strict=True)))
-    add_heading(page.figure, *heading(page.figure.get_figwidth()), marks)
+    layout.relabel(page.figure, others, dict(zip(chosen, page.panels, strict=True)))
+    layout.add_heading(page.figure, *heading(page.figure.get_figwidth()), marks)
     for axes in page.panels:
-        wrap(axes.yaxis.label, axes.get_window_extent().height)
+        layout.wrap(axes.yaxis.label, axes.get_window_extent().height)
     return page
 
 
@@ -222,8 +210,6 @@ def _label_time(column: Sequence[Axes]) -> None:
 
 def _handles(shown: Sequence[Shown], axes: Sequence[Axes]) -> Iterator[Any]:
     """Handles of the flights and of the marks in the axes."""
-    from matplotlib.lines import Line2D
-
     many = len(shown) > MOST_LINES
     for flight, name, look in () if many else shown:
         end = flight.end

@@ -1,27 +1,30 @@
 """The common style: sizes, fonts and colors that survive print and color blindness."""
 
-from __future__ import annotations
-
 import logging
 import re
 import warnings
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
+from io import BytesIO
 from math import pi
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple
+
+import matplotlib
+from cycler import cycler
+from matplotlib import rc_context, rcParams
+from matplotlib import style as styles
+from matplotlib.axes import Axes
+from matplotlib.backend_bases import RendererBase
+from matplotlib.colors import LinearSegmentedColormap
+from matplotlib.figure import Figure
 
 from tiltsim.errors import InputError
 from tiltsim.system.files import replacing
 from tiltsim.system.numbers import is_finite
 from tiltsim.system.text import short_repr, shortened
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-    from tiltsim_controllers.mathematics.scalar import Floats
+from tiltsim_controllers.mathematics.scalar import Floats
 
 # After Okabe and Ito; each pair also differs in lightness, so that gray prints stay legible.
 BLUE: Final = "#0072B2"
@@ -177,11 +180,6 @@ def paper_style(file: Path | None = None, size: Size | None = None) -> Iterator[
     Raises:
         InputError: If the file cannot be read or is no style.
     """
-    from cycler import cycler
-    from matplotlib import rc_context, rcParams
-
-    from tiltsim.views.figures.shown import missing_glyphs_as_boxes
-
     outer = _size.set(size if size is not None else _size.get())
     try:
         if _styled.get():
@@ -206,8 +204,6 @@ def paper_style(file: Path | None = None, size: Size | None = None) -> Iterator[
 
 def _users_settings(keys: Iterable[str]) -> set[str]:
     """The settings among ``keys`` that the user has changed or named in a matplotlibrc."""
-    import matplotlib
-
     # All of `rcParams` cannot be read without choosing a backend.
     changed = {key for key in keys if matplotlib.rcParams[key] != matplotlib.rcParamsDefault[key]}
     file = Path(matplotlib.matplotlib_fname())
@@ -219,9 +215,6 @@ def _users_settings(keys: Iterable[str]) -> set[str]:
 
 def _style_of(file: Path) -> dict[str, Any]:
     """The settings of a matplotlib style, given as a file or by its name."""
-    import matplotlib
-    from matplotlib import style as styles
-
     if str(file) in styles.library:
         return dict(styles.library[str(file)])
     settings: dict[str, Any] = {}
@@ -278,8 +271,6 @@ def marked_line(number: int, samples: int) -> dict[str, Any]:
 
 def cycle_color(number: int) -> str:
     """The color of the line with this number, from 0: `CYCLE`, unless the user has another."""
-    from matplotlib import rcParams
-
     colors = rcParams["axes.prop_cycle"].by_key().get("color", CYCLE)
     return str(colors[number % len(colors)])
 
@@ -298,8 +289,6 @@ def new_figure(width: float, height: float) -> Figure:
     It has the size of the context or, without one, this size (inches); with the width alone given,
     the same proportions.
     """
-    from tiltsim.views.figures.shown import ShownFigure
-
     requested = _size.get()
     if requested is not None:
         height = requested.height or height * requested.width / width
@@ -338,8 +327,6 @@ def roll_pitch_axes(axes: Axes) -> None:
 
 def shade_share(axes: Axes, edges: Floats, share: Floats) -> None:
     """Shade a plane by the share (0 to 1) of the time at which its points are unreachable."""
-    from matplotlib.colors import LinearSegmentedColormap
-
     shades = LinearSegmentedColormap.from_list("unreachable", ["#FFFFFF", UNREACHABLE])
     axes.grid(visible=False)
     axes.pcolormesh(edges, edges, share, cmap=shades, vmin=0.0, vmax=1.0, rasterized=True)
@@ -381,3 +368,28 @@ def too_small(figure: Figure) -> str:
     width, height = figure.get_size_inches() * 25.4
     size = f"{width:.0f} mm x {height:.0f} mm"
     return f"{size} are too small for these panels; choose fewer panels or a larger size"
+
+
+@contextmanager
+def missing_glyphs_as_boxes() -> Iterator[None]:
+    """Let matplotlib draw letters without a glyph, such as Chinese ones, without a warning."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", r"Glyph \d+ .* missing from font")
+        yield
+
+
+class ShownFigure(Figure):
+    """A figure that is the picture below a notebook's cell that ends with it.
+
+    Without pyplot, which would keep every figure, notebooks know no picture of matplotlib's own.
+    """
+
+    def draw(self, renderer: RendererBase) -> None:
+        """Draw on a renderer."""
+        with missing_glyphs_as_boxes():
+            super().draw(renderer)
+
+    def _repr_png_(self) -> bytes:
+        picture = BytesIO()
+        self.savefig(picture, format="png", dpi=self.dpi)
+        return picture.getvalue()

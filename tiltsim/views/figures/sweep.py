@@ -1,11 +1,12 @@
 """Figures of sweeps: lines, maps and boundaries."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import LogNorm, Normalize
+from matplotlib.figure import Figure
 
 from tiltsim.errors import InputError
 from tiltsim.scenario.messages import choose
@@ -23,10 +24,6 @@ from tiltsim.views.figures.sweep_columns import (
     text_of,
 )
 from tiltsim.views.signals import FLOORS, SMALLEST, scale
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 MAX_PANELS: Final = 24
 MAX_TICKS: Final = 8  # values of an axis of a map that are written beside it
@@ -187,8 +184,6 @@ def _share_limits(grid: Any, metrics: tuple[str, ...] = ()) -> None:
 
 
 def _map_figure(results: SweepResults, metrics: tuple[str, ...]) -> Figure:
-    from matplotlib.colors import LogNorm, Normalize
-
     plot, numeric = results.points.sweep.plot, _axes_of(results, numeric=True)
     x = plot.x or next((key for key in numeric if key != plot.y), None)
     y = plot.y or next((key for key in numeric if key != x), None)

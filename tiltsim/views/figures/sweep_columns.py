@@ -1,7 +1,5 @@
 """Columns of sweep results for figures: groups, labels, units, completed flights."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 

@@ -1,15 +1,12 @@
 """Errors of many flights: at setpoints (ch. 4, Fig. 4) and by period (Figs. 8 to 14)."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
+
+from matplotlib.figure import Figure
 
 from tiltsim.views.figures import style
 from tiltsim.views.figures.layout import add_legend
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
 class SetpointErrors(NamedTuple):

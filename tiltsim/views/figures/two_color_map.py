@@ -1,24 +1,19 @@
 """The Two Color Map in the alpha_1-alpha_2 plane (ch. 6 to 8, 12)."""
 
-from __future__ import annotations
-
 from math import pi
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 
 from tiltsim.views.figures import style
 from tiltsim.views.figures.layout import add_legend
 from tiltsim_controllers.analysis.two_color_map import curve_l, delta, point_p, red_residual
-from tiltsim_controllers.analysis.two_color_planner import Circle, check_path
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-    from tiltsim_controllers.analysis.two_color_planner import Path
-    from tiltsim_controllers.vehicle.parameters import Vehicle
-
+from tiltsim_controllers.analysis.two_color_planner import Circle, Path, check_path
+from tiltsim_controllers.vehicle.parameters import Vehicle
 
 NEARLY: Final = 0.5
 """Absolute R, 4 for a level untilted vehicle, below which red counts as nearly singular."""
@@ -97,9 +92,6 @@ def _draw_path(axes: Axes, label: str, path: Path, vehicle: Vehicle, number: int
 
 
 def _legend(figure: Figure, label_of_p: str, shown: set[str]) -> None:
-    from matplotlib.lines import Line2D
-    from matplotlib.patches import Patch
-
     dashed = (0, (5, 3))
     handles = [
         Line2D([], [], color=style.SINGULAR, lw=1.8, label="singular: R = 0, the curve L"),

@@ -4,14 +4,16 @@ A drawing is a parallel projection: a point ``(x, y, z)`` of the world (m) appea
 up)``. All that is near covers what is far.
 """
 
-from __future__ import annotations
-
 from functools import cache
 from math import cos, pi, sin
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import mujoco
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.patches import FancyArrowPatch
+from matplotlib.path import Path
+from numpy.typing import ArrayLike
 from scipy.spatial import ConvexHull
 
 from tiltsim.models.rotorcraft import RotorcraftSpec, compile_model
@@ -20,10 +22,6 @@ from tiltsim_controllers.mathematics.rotation import quaternion_from_euler
 from tiltsim_controllers.mathematics.scalar import Floats, Quad
 from tiltsim_controllers.vehicle.parameters import PRESETS
 from tiltsim_controllers.vehicle.states import ROTORS
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from numpy.typing import ArrayLike
 
 _VISUAL: Final = 2  # group of the geoms that are drawn
 _ON_TOP: Final = 5.0  # draw order of lines and texts that nothing covers
@@ -123,9 +121,6 @@ def arrow(axes: Axes, points: ArrayLike, color: Any, *, width: float = 1.8) -> N
         color: A color of matplotlib.
         width: Points.
     """
-    from matplotlib.patches import FancyArrowPatch
-    from matplotlib.path import Path
-
     path = np.asarray(points, float)
     look = "-|>,head_width=2.4,head_length=5.4"
     axes.update_datalim(path)

@@ -12,8 +12,6 @@ Entities of a recording, each below the flight's own name where there are severa
 - ``events``: the log
 """
 
-from __future__ import annotations
-
 import os
 import socket
 import sys

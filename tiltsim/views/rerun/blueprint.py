@@ -1,27 +1,21 @@
 """The blueprint: the views that the viewer opens for a recording, and their layout."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
+from tiltsim.flight.flight import Flight
 from tiltsim.views.attitude_plane import MOVING_TRAIL_TIME, curve_is_constant
 from tiltsim.views.replay import camera_of, positions, reference_path, thrust_scale, vehicle_radius
-from tiltsim.views.rerun.flight_recorder import plotted_lines
-from tiltsim.views.rerun.geometry import ground_height
+from tiltsim.views.rerun.flight_recorder import FlightRecorder, plotted_lines
 from tiltsim.views.rerun.plane import BOUND
-from tiltsim.views.rerun.scene import REFERENCE_POINTS
+from tiltsim.views.rerun.scene import REFERENCE_POINTS, ground_height
 from tiltsim.views.rerun.timeline import TIMELINE
-
-if TYPE_CHECKING:
-    from tiltsim.flight.flight import Flight
-    from tiltsim.views.rerun.flight_recorder import FlightRecorder
-    from tiltsim_controllers.mathematics.scalar import Floats
+from tiltsim_controllers.mathematics.scalar import Floats
 
 ALONE: Final = "Attitude (shaded: unreachable attitudes)"
 NEARER: Final = 0.75  # than in videos, whose frames are larger

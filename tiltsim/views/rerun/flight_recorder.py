@@ -1,13 +1,14 @@
 """Writing one flight into a recording: static data first, then its rows, then its end."""
 
-from __future__ import annotations
-
 import re
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 import rerun as rr
 
+from tiltsim.closed_loop.assembly import Assembly
+from tiltsim.flight.end import End
+from tiltsim.flight.flight import Flight
 from tiltsim.views.events import Event, EventDetector
 from tiltsim.views.replay import visible_model
 from tiltsim.views.rerun import timeline
@@ -15,11 +16,6 @@ from tiltsim.views.rerun.plane import AttitudePlane
 from tiltsim.views.rerun.scene import Scene
 from tiltsim.views.rerun.timeline import Color, dimmed, send_rows
 from tiltsim.views.signals import Signal, Signals, has_attitude_plane, signals_of
-
-if TYPE_CHECKING:
-    from tiltsim.closed_loop.assembly import Assembly
-    from tiltsim.flight.end import End
-    from tiltsim.flight.flight import Flight
 
 MEASURED_WIDTH: Final = 1.8
 REFERENCE_WIDTH: Final = 1.0

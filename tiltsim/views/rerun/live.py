@@ -1,11 +1,9 @@
 """Streaming a flight to a viewer while it is simulated."""
 
-from __future__ import annotations
-
 import sys
 from queue import Empty, SimpleQueue
 from threading import Event, Thread
-from typing import TYPE_CHECKING, Final, Self
+from typing import Final, Self
 from uuid import uuid4
 
 import numpy as np
@@ -13,13 +11,11 @@ import numpy as np
 from tiltsim.flight.end import End
 from tiltsim.flight.flight import Flight
 from tiltsim.laws.assembling import assemble
+from tiltsim.scenario.scenario import Scenario
 from tiltsim.system.text import printable
 from tiltsim.views.rerun import require_viewer
 from tiltsim.views.rerun.viewer import attach_viewer
 from tiltsim_controllers.mathematics.scalar import Floats
-
-if TYPE_CHECKING:
-    from tiltsim.scenario.scenario import Scenario
 
 SEND_INTERVAL: Final = 0.25  # s of wall time between pieces; each costs about 0.04 s
 SHUTDOWN_TIMEOUT: Final = 5.0

@@ -3,15 +3,15 @@
 The y axis of Rerun's two-dimensional views points down, so pitch is drawn with its sign reversed.
 """
 
-from __future__ import annotations
-
 from math import pi
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 import rerun as rr
 
+from tiltsim.flight.flight import Flight
+from tiltsim.scenario.scenario import Scenario
 from tiltsim.views.attitude_plane import (
     HALF_WIDTH,
     MARGIN_THRESHOLD,
@@ -22,13 +22,8 @@ from tiltsim.views.attitude_plane import (
     unreachable_pitch,
 )
 from tiltsim.views.rerun import timeline
-from tiltsim.views.rerun.timeline import Ticks, Trail, send_rows
+from tiltsim.views.rerun.timeline import Color, Ticks, Trail, send_rows
 from tiltsim_controllers.mathematics.scalar import Floats
-
-if TYPE_CHECKING:
-    from tiltsim.flight.flight import Flight
-    from tiltsim.scenario.scenario import Scenario
-    from tiltsim.views.rerun.timeline import Color
 
 INTERVAL: Final = 0.05  # s between curves of a moving gait, and between points of the trail
 MIN_ROTATION: Final = 0.005  # rotation of ``n`` (rad) above which the curve is drawn again

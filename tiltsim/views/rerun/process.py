@@ -4,8 +4,6 @@ Importing Rerun and logging a vehicle take most of a second of Python. In a sepa
 does not slow the simulation down if a second core is free.
 """
 
-from __future__ import annotations
-
 import gc
 import os
 import pickle
@@ -13,14 +11,12 @@ import subprocess
 import sys
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, Self
+from typing import Final, Self
 
 from tiltsim.errors import InputError
+from tiltsim.flight.flight import Flight
+from tiltsim.scenario.scenario import Scenario
 from tiltsim.views.rerun import require_rerun
-
-if TYPE_CHECKING:
-    from tiltsim.flight.flight import Flight
-    from tiltsim.scenario.scenario import Scenario
 
 _PROGRAM: Final = "from tiltsim.views.rerun.process import serve; serve()"
 

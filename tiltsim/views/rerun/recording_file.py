@@ -1,25 +1,20 @@
 """Writing complete flights into recordings."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import rerun as rr
 
+from tiltsim.closed_loop.assembly import Assembly
+from tiltsim.flight.flight import Flight
 from tiltsim.system.files import replacing
 from tiltsim.views.rerun import require_rerun
 from tiltsim.views.rerun.blueprint import flight_blueprint
 from tiltsim.views.rerun.flight_recorder import FlightRecorder
 from tiltsim.views.rerun.timeline import FLIGHTS
 from tiltsim.views.titles import common_title, flight_names
-
-if TYPE_CHECKING:
-    from tiltsim.closed_loop.assembly import Assembly
-    from tiltsim.flight.flight import Flight
-
 
 APPLICATION: Final = "tiltsim"
 

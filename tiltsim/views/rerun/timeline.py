@@ -1,7 +1,5 @@
 """Rows on the timeline, thinned out where they are too many, and the colors of all entities."""
 
-from __future__ import annotations
-
 from typing import Any, Final
 
 import numpy as np
@@ -36,14 +34,7 @@ def dimmed(color: Color, factor: float = 0.62) -> Color:
 
 
 def send_rows(recording: rr.RecordingStream, path: str, times: Floats, *columns: Any) -> None:
-    """Send one row per time to an entity.
-
-    Args:
-        recording: The recording to write to.
-        path: The entity.
-        times: Times of the rows, s.
-        columns: Values with one row per time, from the ``columns`` methods of archetypes.
-    """
+    """Send one row per time (s) to an entity: ``columns`` of archetypes with one row per time."""
     if len(times) == 0:
         return
     # Rounded to nanoseconds: Rerun truncates, which would show 0.57 s as 0.569999999 s.

@@ -13,16 +13,14 @@ from time import monotonic, sleep
 from typing import TYPE_CHECKING, Any, Final
 
 from tiltsim.errors import InputError
-from tiltsim.flight.flight import as_flights
-from tiltsim.system.optional import optional_package
+from tiltsim.flight.flight import Flight, as_flights
+from tiltsim.system.public import optional_package
 from tiltsim.system.text import short_repr
 from tiltsim.views.rerun import DEFAULT_URL, require_viewer, viewer_listens
 
 if TYPE_CHECKING:
     import rerun as rr
     import rerun.blueprint as rrb
-
-    from tiltsim.flight.flight import Flight
 
 RECORDING_START: Final = b"RRF"  # first bytes of every recording; the version follows
 START_TIME: Final = 20.0  # time (s) that the viewer may take to start

@@ -1,9 +1,7 @@
 """Videos of flights, MP4 or GIF: rendered by MuJoCo with a camera that follows the vehicle.
 
-`tiltsim.views.video.encoding.write_video` writes a video; no display is needed.
+`tiltsim.views.video.rendering.write_video` writes a video; no display is needed.
 """
-
-from __future__ import annotations
 
 import os
 import sys

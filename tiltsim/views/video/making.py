@@ -68,8 +68,7 @@ def video(
         raise InputError(f"path = {short_repr(path)}: must be the name of a file")
     file = Path(fsdecode(path))
     chosen = video_format(flight, file, options)
-    from tiltsim.views.video.encoding import write_video
-    from tiltsim.views.video.rendering import frame_times
+    from tiltsim.views.video.rendering import frame_times, write_video
 
     with reported(progress, "frames", len(frame_times(flight, chosen))) as report:
         write_video(flight, file, chosen, report)

@@ -1,7 +1,5 @@
 """Rendering MuJoCo scenes offscreen, with any OpenGL implementation of the machine."""
 
-from __future__ import annotations
-
 import os
 import sys
 import warnings

@@ -1,30 +1,17 @@
 """The text over the frames of a video, and the roll-pitch plane in their corner."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 from PIL import Image as Pillow
 from PIL import ImageDraw
 
-from tiltsim.views.attitude_plane import (
-    HALF_WIDTH,
-    MARGIN_THRESHOLD,
-    MOVING_TRAIL_TIME,
-    curve_is_constant,
-    side_of,
-    singular_curves,
-    torque_free_directions,
-    unreachable_pitch,
-)
+from tiltsim.flight.flight import Flight
+from tiltsim.views import attitude_plane
 from tiltsim.views.figures import style
 from tiltsim.views.signals import has_attitude_plane
 from tiltsim.views.video.offscreen import Caption, Image
 from tiltsim_controllers.mathematics.scalar import Floats
-
-if TYPE_CHECKING:
-    from tiltsim.flight.flight import Flight
 
 INSET_SHARE: Final = 0.32  # of the frame's height
 GAP_SHARE: Final = 0.025
@@ -48,7 +35,7 @@ class Overlay:
         self.caption = Caption("", 0, 0)
         if self._inset:
             vehicle = flight.scenario.rotorcraft.resolve()
-            self._n = torque_free_directions(flight.columns, vehicle)
+            self._n = attitude_plane.torque_free_directions(flight.columns, vehicle)
             self._attitude = np.stack([flight["roll"], flight["pitch"]], axis=1)
             self._gap = gap = round(GAP_SHARE * height)
             self.caption = Caption("shaded: unreachable attitudes", gap, self._inset + gap)
@@ -72,15 +59,17 @@ class Overlay:
         if not self._inset:
             return
         start, flight = 0, self._flight
-        if not curve_is_constant(flight.scenario):
+        if not attitude_plane.curve_is_constant(flight.scenario):
             time = flight["time"]
-            start = int(np.searchsorted(time, time[sample] - MOVING_TRAIL_TIME))
+            start = int(np.searchsorted(time, time[sample] - attitude_plane.MOVING_TRAIL_TIME))
         # From an even sample on, so that the trail does not shimmer.
         trail = self._attitude[start - start % 2 : sample + 1 : 2]
         trail = np.concatenate([trail, self._attitude[sample : sample + 1]])
         margin = flight["singularity_margin"]
-        near = abs(margin[sample]) < MARGIN_THRESHOLD
-        inset = plane(self._inset, self._n[sample], side_of(margin), trail, near=near)
+        near = abs(margin[sample]) < attitude_plane.MARGIN_THRESHOLD
+        inset = plane(
+            self._inset, self._n[sample], attitude_plane.side_of(margin), trail, near=near
+        )
         overlay_inset(image, inset, self._gap)
 
 
@@ -100,18 +89,18 @@ def plane(size: int, n: Floats, side: float, trail: Floats, *, near: bool) -> Im
 
     def pixels(attitude: Floats) -> Any:
         """Columns and rows of attitudes; those outside the plane are moved to its edge."""
-        shares = 0.5 + 0.5 * np.clip(attitude / HALF_WIDTH, -1.0, 1.0) * (1.0, -1.0)
+        shares = 0.5 + 0.5 * np.clip(attitude / attitude_plane.HALF_WIDTH, -1.0, 1.0) * (1.0, -1.0)
         return [tuple(place) for place in (shares * end).round().tolist()]
 
-    roll = np.linspace(-HALF_WIDTH, HALF_WIDTH, 91)
-    low, high = unreachable_pitch(n[np.newaxis], side, roll)[0].T
+    roll = np.linspace(-attitude_plane.HALF_WIDTH, attitude_plane.HALF_WIDTH, 91)
+    low, high = attitude_plane.unreachable_pitch(n[np.newaxis], side, roll)[0].T
     if (high > low).any():
         outline = np.concatenate([np.stack([roll, low], 1), np.stack([roll, high], 1)[::-1]])
         pen.polygon(pixels(outline), fill=UNREACHABLE)
     for line in (round(share * end) for share in (0.25, 0.5, 0.75)):
         pen.line([(0, line), (end, line)], fill=GRID)
         pen.line([(line, 0), (line, end)], fill=GRID)
-    curve = singular_curves(n[np.newaxis])[0]
+    curve = attitude_plane.singular_curves(n[np.newaxis])[0]
     if np.isfinite(curve).all():
         pen.line(pixels(curve), fill=CURVE, width=2)
     if len(trail) > 1:

@@ -1,24 +1,26 @@
-"""Frames of a flight: the vehicle with its thrusts and trail, followed by the camera."""
+"""Frames of a flight, their MP4 (by PyAV) or animated GIF (by Pillow), and portraits of vehicles.
 
-from __future__ import annotations
+The camera follows the vehicle with its thrusts and trail.
+"""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from math import inf
-from typing import TYPE_CHECKING, Final
+from pathlib import Path
+from typing import Final
 
 import mujoco
 import numpy as np
+from PIL import Image as Pillow
 
+from tiltsim.flight.flight import Flight
+from tiltsim.system.files import replacing
 from tiltsim.views import replay
-from tiltsim.views.replay import CameraPose
-from tiltsim.views.video.offscreen import Canvas, Image
+from tiltsim.views.replay import CameraPose, vehicle_radius
+from tiltsim.views.video.offscreen import Canvas, Caption, Image
 from tiltsim.views.video.overlay import Overlay
 from tiltsim_controllers.mathematics.scalar import Floats
-
-if TYPE_CHECKING:
-    from tiltsim.flight.flight import Flight
 
 TRAIL_TIME: Final = 20.0  # s, length of the trail
 TRAIL_INTERVAL: Final = 0.1  # s between its points
@@ -178,3 +180,97 @@ class FlightRenderer:
         colors = np.array(rgba, dtype=np.float32)
         mujoco.mjv_initGeom(geom, shape, np.zeros(3), np.zeros(3), np.eye(3).ravel(), colors)
         return geom
+
+
+H264_QUALITY: Final = "21"  # constant rate factor: 18 is visually lossless, 28 coarse
+
+COLORS: Final = 255  # of a GIF's 256; one is left for pixels that do not change
+PALETTE_FRAMES: Final = 6  # evenly spaced frames from which the colors of a GIF are chosen
+
+
+def write_video(
+    flight: Flight,
+    path: Path,
+    video: VideoFormat,
+    progress: Callable[[int], None] = lambda frames: None,
+) -> None:
+    """Write a video of a flight, atomically, in the format of its suffix, ``.mp4`` or ``.gif``.
+
+    Args:
+        flight: The flight.
+        path: The file.
+        video: Size, rate and part of the flight.
+        progress: Called with the number of finished frames.
+
+    Raises:
+        InputError: If no OpenGL implementation works or the file cannot be written.
+    """
+    write = WRITERS[path.suffix.lower()]
+    with replacing(path) as temporary:
+        write(flight, temporary, video, progress)
+
+
+def _write_mp4(
+    flight: Flight, path: Path, video: VideoFormat, progress: Callable[[int], None]
+) -> None:
+    import av
+
+    with av.open(str(path), "w", format="mp4") as file:
+        stream = file.add_stream("libx264", rate=video.fps)
+        stream.width, stream.height = video.width, video.height
+        stream.pix_fmt = "yuv420p"  # the format that every player supports
+        stream.options = {"crf": H264_QUALITY, "preset": "medium"}
+        for count, (_, image) in enumerate(frames(flight, video), start=1):
+            frame = av.VideoFrame.from_ndarray(image, format="rgb24")
+            file.mux(stream.encode(frame))
+            progress(count)
+        file.mux(stream.encode(None))
+
+
+def _write_gif(
+    flight: Flight, path: Path, video: VideoFormat, progress: Callable[[int], None]
+) -> None:
+    times = frame_times(flight, video)
+    chosen = times[np.linspace(0, len(times) - 1, PALETTE_FRAMES).astype(int)]
+    together = Pillow.fromarray(
+        np.concatenate([image for _, image in frames(flight, video, chosen)])
+    )
+    # Median cut spends colors on the ground, maximum coverage on rare ones; an octree keeps both.
+    palette = together.quantize(COLORS, Pillow.Quantize.FASTOCTREE)
+    # Without dithering, areas of one color stay equal in all frames, and the file stays small.
+    pictures = []
+    for count, (_, image) in enumerate(frames(flight, video), start=1):
+        picture = Pillow.fromarray(image)
+        pictures.append(picture.quantize(palette=palette, dither=Pillow.Dither.NONE))
+        progress(count)
+    # Delays are in hundredths of a second; rounded one by one they would change the speed.
+    ends = np.rint(np.arange(len(pictures) + 1) * 100.0 / video.fps)
+    delays = [10 * int(end - start) for start, end in pairwise(ends)]
+    first, *others = pictures
+    first.save(
+        path, "GIF", save_all=True, append_images=others, duration=delays, loop=0, optimize=False
+    )
+
+
+WRITERS: Final = {".mp4": _write_mp4, ".gif": _write_gif}  # by the suffix of the file
+
+
+PORTRAIT_SIZE: Final = (720, 480)  # pixels
+PORTRAIT_ANGLES: Final = (50.0, -28.0)  # azimuth and elevation of the camera's direction, degrees
+PORTRAIT_DISTANCE: Final = 2.5  # of the camera, by the radius of the rotors' places and of a rotor
+ROTOR_RADIUS: Final = 0.12  # about the radius of the rotors in the files, m
+
+
+def save_portrait(model_file: Path, angles: Sequence[float], file: Path) -> None:
+    """Render an MJCF file as a PNG, from behind and above, at tilt angles (rad)."""
+    model = mujoco.MjModel.from_xml_path(str(model_file))
+    data = mujoco.MjData(model)
+    data.qpos[7:] = angles
+    mujoco.mj_forward(model, data)
+    camera = mujoco.MjvCamera()
+    camera.distance = PORTRAIT_DISTANCE * (vehicle_radius(model) + ROTOR_RADIUS)
+    camera.azimuth, camera.elevation = PORTRAIT_ANGLES
+    with Canvas(model, *PORTRAIT_SIZE, samples=8, shadows=True) as canvas:
+        canvas.compose(data, camera)
+        image = canvas.draw("", "", Caption("", 0, 0))
+    Pillow.fromarray(np.ascontiguousarray(image)).save(file, optimize=True)

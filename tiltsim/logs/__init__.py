@@ -1,0 +1,1 @@
+"""Logs: flights in the formats of other tools, and flights of real vehicles."""

@@ -1,0 +1,149 @@
+"""A log: columns over time in tiltsim's names, units and frames, from a flight or a real vehicle.
+
+World axes have z up, body axes x forward, y left, z up (FLU); attitudes are roll, pitch and yaw of
+the rotation from body to world. Dropouts are NaN.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from tiltsim.errors import InputError
+from tiltsim.flight.vectors import VECTORS, components
+from tiltsim.flight.writing import FLIGHT
+from tiltsim.scenario.messages import did_you_mean
+from tiltsim.system.files import is_file, is_folder, prepare_folder, replacing
+from tiltsim.system.parquet import open_parquet, parquet_bytes
+from tiltsim.system.text import short_repr
+from tiltsim_controllers.mathematics.scalar import Floats
+
+if TYPE_CHECKING:
+    import pyarrow
+
+    from tiltsim.flight.flight import Flight
+
+UNITS: Final = {
+    "time": "s",
+    **dict.fromkeys(VECTORS["position"] + VECTORS["reference_position"], "m"),
+    **dict.fromkeys(VECTORS["velocity"], "m/s"),
+    **dict.fromkeys(VECTORS["attitude"] + VECTORS["reference_attitude"], "rad"),
+    **dict.fromkeys(VECTORS["body_rates"], "rad/s"),
+    **dict.fromkeys(VECTORS["tilt_angles"] + VECTORS["reference_tilt_angles"], "rad"),
+    **dict.fromkeys(VECTORS["tilt_rates"] + VECTORS["rotor_speeds"], "rad/s"),
+    **dict.fromkeys(VECTORS["thrusts"], "N"),
+    **{f"accelerometer_{axis}": "m/s^2" for axis in "xyz"},
+    **{name.replace("speed", "command"): "rad/s" for name in VECTORS["rotor_speeds"]},
+    **{name.replace("alpha", "alpha_command"): "rad" for name in VECTORS["tilt_angles"]},
+}
+"""Columns of a log of a real vehicle and their units; a flight has more."""
+
+
+LOG_SUFFIXES: Final = (".mcap", ".ulg", ".ulog", ".csv")
+"""Suffixes of files in the formats of other tools."""
+
+
+@dataclass(frozen=True, repr=False)
+class Log:
+    """Columns over time, each of shape (N,), with their units."""
+
+    name: str
+    columns: Mapping[str, Floats]
+    units: Mapping[str, str]
+    notes: tuple[str, ...] = ()  # one line for each defect that was found while reading
+    origin: Mapping[str, str] = field(default_factory=dict)  # of a flight: `Flight.origin`
+
+    @classmethod
+    def of_flight(cls, flight: Flight, name: str = "") -> Log:
+        """The columns of a flight of tiltsim."""
+        name = name or flight.scenario.address or flight.scenario.title
+        return cls(name, flight.columns, flight.units, (), flight.origin())
+
+    def __repr__(self) -> str:
+        """Duration, samples and columns, in one line."""
+        size = f"{self.duration:g} s, {len(self)} samples of {len(self.units)} columns"
+        return f"<Log of {self.name}: {size}>"
+
+    def __len__(self) -> int:
+        """Number of samples."""
+        return len(self.columns["time"])
+
+    def __contains__(self, name: object) -> bool:
+        """Whether there is a column or vector of this name."""
+        return isinstance(name, str) and (name in self.units or bool(components(name, self.units)))
+
+    def __getitem__(self, name: str) -> Floats:
+        """A column, shape (N,), or a vector such as ``position``, shape (N, components).
+
+        Raises `InputError` for other names.
+        """
+        if name in self.columns:
+            return self.columns[name]
+        found = components(name, self.units) if isinstance(name, str) else []
+        if not found:
+            hint = did_you_mean(name, self.units)
+            raise InputError(f"{short_repr(name)}: no column of this log; {hint}see Log.units")
+        return np.stack([self.columns[one] for one in found], axis=-1)
+
+    @property
+    def duration(self) -> float:
+        """Seconds from the first sample to the last."""
+        return float(self.columns["time"][-1] - self.columns["time"][0])
+
+    def quaternions(self, kind: str = "attitude") -> Floats:
+        """Rotations from body to world, w x y z, shape (N, 4), of a vector of angles (rad)."""
+        angles = self[kind]
+        finite = np.isfinite(angles).all(axis=1)
+        turns = np.full((len(self), 4), np.nan)
+        turns[finite] = Rotation.from_euler("ZYX", angles[finite, ::-1]).as_quat()[:, [3, 0, 1, 2]]
+        return turns
+
+    def to_arrow(self) -> pyarrow.Table:
+        """The columns as an Arrow table with units and `origin` as metadata."""
+        import pyarrow as pa
+
+        fields = [
+            pa.field(name, pa.float64(), nullable=False, metadata={"unit": unit})
+            for name, unit in self.units.items()
+        ]
+        metadata = dict(self.origin) or {"log": self.name}
+        return pa.table(
+            [pa.array(self.columns[name]) for name in self.units], pa.schema(fields, metadata)
+        )
+
+    def to_pandas(self) -> Any:
+        """The columns as a pandas DataFrame."""
+        return self.to_arrow().to_pandas()
+
+    def save(self, folder: str | PathLike[str]) -> None:
+        """Write the log into a folder as flight.parquet; as a whole flight if tiltsim flew it.
+
+        Raises `InputError` if that is impossible or would replace a file of another kind.
+        """
+        folder = Path(folder)
+        if self.origin:
+            from tiltsim.flight.reading import flight_of_table
+
+            flight_of_table(self.to_arrow(), Path(self.name)).save(folder)
+            return
+        prepare_folder(folder)
+        file = folder / FLIGHT
+        if file.exists() and not is_log(file):
+            raise InputError(f"{file}: exists and is not an imported log; choose another folder")
+        with replacing(file) as temporary:
+            temporary.write_bytes(parquet_bytes(self.to_arrow()))
+
+
+def is_log(path: Path) -> bool:
+    """Whether a path is a log of another format, or an imported one."""
+    file = path / FLIGHT if is_folder(path) else path
+    if file.suffix.lower() != ".parquet" or not is_file(file):
+        return file.suffix.lower() in LOG_SUFFIXES
+    with open_parquet(file) as opened:
+        return b"log" in (opened.schema_arrow.metadata or {})
