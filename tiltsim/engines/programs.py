@@ -57,7 +57,7 @@ class LoopPrograms:
     def __init__(self, key: ProgramKey) -> None:
         self._loop, self._key = key.loop, key
 
-    def _setup(self, user: InputVector) -> tuple[Any, InputVector]:
+    def setup(self, user: InputVector) -> tuple[Any, InputVector]:
         """Parameters and knots from their vector."""
         loop, choices = self._loop, self._key.parameters
         parameters = record_with_choices(loop.parameters, user, choices)
@@ -83,11 +83,11 @@ class LoopPrograms:
         def controls(lifting: Lifting, given: Sequence[InputVector]) -> Any:
             header, qpos, qvel, act, _, user = given
             time = _next_time(lifting, header)
-            return lifting(sampling.controls)(time, qpos, qvel, act, *self._setup(user))
+            return lifting(sampling.controls)(time, qpos, qvel, act, *self.setup(user))
 
         def hold(lifting: Lifting, given: Sequence[InputVector]) -> Any:
             header, qpos, qvel, act, ctrl, user = given
-            time, (parameters, _) = _next_time(lifting, header), self._setup(user)
+            time, (parameters, _) = _next_time(lifting, header), self.setup(user)
             return lifting(sampling.hold)(time, qpos, qvel, act, tuple(ctrl), parameters)
 
         def sample(lifting: Lifting, given: Sequence[InputVector]) -> Iterable[Number]:
@@ -124,7 +124,7 @@ class LoopPrograms:
         def stepped(samples: bool) -> Traced:
             def run(lifting: Lifting, given: Sequence[InputVector]) -> Iterable[Number]:
                 (index,), now, (timestep, *disturbance), user = given
-                setup = *self._setup(user), tuple(disturbance)
+                setup = *self.setup(user), tuple(disturbance)
                 integration = Integration(timestep, int(held), *setup)
                 time, force = make("mul", index, timestep), tuple(now[states:])
                 state, force = lifting(step)(time, list(now[:states]), force, samples, integration)
@@ -135,7 +135,7 @@ class LoopPrograms:
         def sampled(samples: bool) -> Traced:
             def run(lifting: Lifting, given: Sequence[InputVector]) -> Iterable[Number]:
                 (index,), now, (timestep, *_), user, recorder = given
-                time, setup = make("mul", index, timestep), self._setup(user)
+                time, setup = make("mul", index, timestep), self.setup(user)
                 state, force = list(now[:states]), now[states:]
                 if samples:
                     force = lifting(equations.inputs)(time, state, *setup)
@@ -168,7 +168,7 @@ class LoopPrograms:
 
         A sign that is zero in the recorder is not known yet.
         """
-        loop, values, (parameters, knots) = self._loop, tuple(values), self._setup(user)
+        loop, values, (parameters, knots) = self._loop, tuple(values), self.setup(user)
         reference = record_with_choices(
             ReferenceParameters, recorder[REFERENCE:], self._key.reference
         )
