@@ -4,23 +4,21 @@ The control law is to hold a command; layers treat it as any controller's comman
 of all vehicles are states here, so that commands may be speeds, thrusts or accelerations.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cache
-from typing import TYPE_CHECKING, Any, Final
-
-import numpy as np
+from typing import Any, Final
 
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup
 from tiltsim.closed_loop.vehicle_kind import VehicleKind
 from tiltsim.laws.law import Law
-from tiltsim.laws.quadrotor import upright_margin
+from tiltsim.laws.quadrotor import LAYOUT as QUADROTOR
+from tiltsim.laws.quadrotor import upright_columns
 from tiltsim.laws.rotor_loop import RotorLayout, layout_of_vehicle, rotor_loop
 from tiltsim.laws.rotorcraft import servo_lead, torque_free_columns
 from tiltsim.laws.tiltrotor import LAYOUT, singularity_columns
 from tiltsim.models.rotor_table import Multirotor
+from tiltsim.scenario.scenario import FlightPlan, Scenario
 from tiltsim.vehicles.rotorcraft import OTHER_LAYOUT, ROTORCRAFT, rotorcraft_kind
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.gaits.motion import tilt_motion_of
@@ -30,10 +28,7 @@ from tiltsim_controllers.mathematics.records import make_record_type, vector_of
 from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector
 from tiltsim_controllers.references.trajectories import ReferenceParameters
 from tiltsim_controllers.vehicle.effectiveness import ROTOR_FLOATS
-from tiltsim_controllers.vehicle.parameters import SPIN, Vehicle
-
-if TYPE_CHECKING:
-    from tiltsim.scenario.scenario import FlightPlan, Scenario
+from tiltsim_controllers.vehicle.parameters import Vehicle
 
 Singularity = Callable[[Mapping[str, Floats], Any], dict[str, Floats]]
 """``(samples, vehicle) -> columns``: how close a vehicle is to a singular attitude."""
@@ -123,16 +118,9 @@ def _commanded_loop(
     return replace(rotor_loop(layout, law), kind=kind)
 
 
-def _upright(samples: Mapping[str, Floats], _vehicle: Vehicle) -> dict[str, Floats]:
-    """Determinant of the quadrotor's attitude-altitude law, and its margin."""
-    return {"determinant": np.cos(samples["roll"]), "singularity_margin": upright_margin(samples)}
-
-
 COMMANDED_LOOPS: Final[dict[str, ClosedLoop]] = {
     "tiltrotor": _commanded_loop(LAYOUT, ROTORCRAFT, Vehicle, singularity_columns),
-    "quadrotor": _commanded_loop(
-        RotorLayout((-1,) * 4, SPIN, "quadrotor"), ROTORCRAFT, Vehicle, _upright
-    ),
+    "quadrotor": _commanded_loop(QUADROTOR, ROTORCRAFT, Vehicle, upright_columns),
 }
 """Loops under commands, by the vehicle's model; commands of its servos are part of a sample."""
 

@@ -5,11 +5,9 @@ a loop is made for each such `RotorLayout`. All other numbers of the vehicle are
 speeds are states whose accelerations a law commands.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -32,6 +30,7 @@ from tiltsim.laws.rotorcraft import (
     torque_free_columns,
 )
 from tiltsim.models.rotor_table import Multirotor
+from tiltsim.scenario.scenario import FlightPlan
 from tiltsim.vehicles.rotorcraft import initial_rotor_speeds, rotorcraft_kind
 from tiltsim.vehicles.rotorcraft.layout import CROSS
 from tiltsim.vehicles.rotorcraft.layout import Layout as Places
@@ -46,9 +45,6 @@ from tiltsim_controllers.vehicle.effectiveness import ROTOR_FLOATS
 from tiltsim_controllers.vehicle.motion import BODY_STATES, equations_of_motion
 from tiltsim_controllers.vehicle.rotors import airframe
 from tiltsim_controllers.vehicle.states import BODY_FIELDS
-
-if TYPE_CHECKING:
-    from tiltsim.scenario.scenario import FlightPlan
 
 
 class RotorLayout(NamedTuple):
@@ -94,12 +90,13 @@ def table_of(places: Places, setup: ControlSetup) -> Values:
 
 
 @dataclass(frozen=True, eq=False)
-class _Functions:
+class RotorFunctions:
     """The functions of a law's loop on arrays, for N rotors, M tilts and S states."""
 
     layout: RotorLayout
     law: Law
     tilts: Tilts
+    commands_thrusts: ClassVar[bool] = False
 
     @property
     def sizes(self) -> tuple[int, int, int]:
@@ -114,7 +111,12 @@ class _Functions:
     # --- states of the vehicle, from the vectors that hold them
 
     def in_mujoco(self, time: Any, qpos: Any, qvel: Any, act: Any) -> Seen:
-        """From MuJoCo's vectors."""
+        """From MuJoCo's vectors.
+
+        Args:
+            time: s.
+            qpos, qvel, act: May have further entries, of layers.
+        """
         N, M, S = self.sizes
         q = parts(qpos, position=3, quaternion=4, tilts=M)
         v = parts(qvel, velocity=3, omega=3, tilt_rates=M, measured=3)
@@ -154,6 +156,10 @@ class _Functions:
         return xp.hstack([body_and_tilts, idle, speeds, seen.tilt_rates, idle, seen.states])
 
     # --- in MuJoCo
+
+    def initial_speeds(self, plan: FlightPlan) -> Vector:
+        """Rotor speeds among the activations at time zero."""
+        return initial_rotor_speeds(plan)
 
     def thrusts(self, act: Any) -> Any:
         """Controls of the thrusts: ``s varpi |varpi|`` with the spins s."""
@@ -209,6 +215,10 @@ class _Functions:
 
     # --- on equations of motion
 
+    def initial_state(self, plan: FlightPlan) -> Vector:
+        """The vehicle's states at time zero."""
+        return initial_state(plan.scenario, initial_rotor_speeds(plan))
+
     def equation_inputs(self, time: Any, state: Any, parameters: Any, knots: Any) -> Any:
         """Rotor accelerations, then rates of the states."""
         p, still = parameters.law, xp.zeros(len(self.law.states))
@@ -244,10 +254,18 @@ class _Functions:
         return self.sample(self.in_equations(time, state, rates, parameters.law, knots))
 
 
-def rotor_loop(layout: RotorLayout, law: Law) -> ClosedLoop:
-    """The closed loop of a control law with all vehicles of a layout."""
+def rotor_loop(
+    layout: RotorLayout, law: Law, kind: type[RotorFunctions] = RotorFunctions
+) -> ClosedLoop:
+    """The closed loop of a control law with all vehicles of a layout.
+
+    Args:
+        layout: Layout of the vehicles.
+        law: The law.
+        kind: How the inputs of the law move a vehicle.
+    """
     places, record = layout.places, head_of(law.parameters, servo_lead=float)
-    functions = _Functions(layout, law, law.tilts or tilts_of_gait(places.tilts))
+    functions = kind(layout, law, law.tilts or tilts_of_gait(places.tilts))
     references, names = traceable(functions.references), functions.names
     commands = places.names("tilt_command") if law.records_commands else ()
     fields = (*layout.shown.observed_fields, *law.states)
@@ -265,7 +283,7 @@ def rotor_loop(layout: RotorLayout, law: Law) -> ClosedLoop:
         return {**found, **(law.margins or margins)(samples, setup)}
 
     def initial(plan: FlightPlan, _setup: ControlSetup) -> Vector:
-        return (*initial_state(plan.scenario, initial_rotor_speeds(plan)), *law.initial(plan))
+        return (*functions.initial_state(plan), *law.initial(plan))
 
     equations = None
     if not (law.measured or law.records_commands):  # they need a plant with servos
@@ -285,10 +303,11 @@ def rotor_loop(layout: RotorLayout, law: Law) -> ClosedLoop:
         dynamics=Dynamics(
             layout.name,
             places.sizes(len(law.states)),
-            lambda plan, _setup: (*initial_rotor_speeds(plan), *law.initial(plan)),
+            lambda plan, _setup: (*functions.initial_speeds(plan), *law.initial(plan)),
             len(law.states),
             layout.spins,
             layout.tilt_of_rotor if layout.model == "multirotor" else (),
+            commands_thrusts=functions.commands_thrusts,
         ),
         sampling=Sampling(traceable(functions.controls), traceable(functions.hold)),
         columns=Columns(
@@ -296,6 +315,7 @@ def rotor_loop(layout: RotorLayout, law: Law) -> ClosedLoop:
             derive,
             fields=(*law.states, *commands),
             units={**law.states, **dict.fromkeys(commands, "rad"), **law.units},
+            observe_reads_controls=functions.commands_thrusts,
         ),
         monitoring=monitoring,
         equations=equations,
