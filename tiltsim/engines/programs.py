@@ -12,6 +12,7 @@ from tiltsim.closed_loop.userdata import (
     TIMESTEP,
     evaluation_time,
 )
+from tiltsim.engines.base import Vectors
 from tiltsim.equations.solvers import Integration, make_step
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.code.program import InputVector, Program
@@ -53,7 +54,7 @@ class LoopPrograms:
     def __init__(self, key: ProgramKey) -> None:
         self._loop, self._key = key.loop, key
 
-    def _setup(self, user: InputVector) -> tuple[Any, InputVector]:
+    def setup(self, user: InputVector) -> tuple[Any, InputVector]:
         """Parameters and knots from their vector."""
         loop, choices = self._loop, self._key.parameters
         parameters = record_with_choices(loop.parameters, user, choices)
@@ -74,21 +75,22 @@ class LoopPrograms:
         """
         loop, sampling = self._loop, self._loop.sampling
         sizes = loop.dynamics.sizes._asdict()
-        vectors = {"header": HEADER_SIZE, **sizes, "user": self.user_size}
+        state = {name: sizes[name] for name in (*Vectors._fields, "ctrl")}
+        vectors = {"header": HEADER_SIZE, **state, "user": self.user_size}
 
-        def controls(
-            header: Any, qpos: Any, qvel: Any, act: Any, _ctrl: Any, user: InputVector
-        ) -> Any:
-            return sampling.controls(_next_time(header), qpos, qvel, act, *self._setup(user))
+        def controls(header: Any, qpos: Any, qvel: Any, *given: Any) -> Any:
+            *act, _, user = given
+            return sampling.controls(
+                _next_time(header), qpos, qvel, xp.hstack(act), *self.setup(user)
+            )
 
-        def hold(header: Any, qpos: Any, qvel: Any, act: Any, ctrl: Any, user: InputVector) -> Any:
-            parameters, _ = self._setup(user)
-            return sampling.hold(_next_time(header), qpos, qvel, act, ctrl, parameters)
+        def hold(header: Any, qpos: Any, qvel: Any, *given: Any) -> Any:
+            (*act, ctrl, user), time = given, _next_time(header)
+            return sampling.hold(time, qpos, qvel, xp.hstack(act), ctrl, self.setup(user)[0])
 
-        def observe(
-            _header: Any, qpos: Any, qvel: Any, act: Any, ctrl: Any, _user: InputVector
-        ) -> Any:
-            return loop.columns.observe(qpos, qvel, act, ctrl)
+        def observe(_header: Any, qpos: Any, qvel: Any, *given: Any) -> Any:
+            *act, ctrl, _ = given
+            return loop.columns.observe(qpos, qvel, xp.hstack(act), ctrl)
 
         def sample(header: Any, *given: Any) -> Any:
             *_, user, recorder = given
@@ -122,7 +124,7 @@ class LoopPrograms:
 
         def stepped(samples: bool) -> Callable[..., Any]:
             def run(index: Any, now: Any, settings: Any, user: InputVector) -> Any:
-                timestep, setup = settings[0], self._setup(user)
+                timestep, setup = settings[0], self.setup(user)
                 integration = Integration(timestep, int(held), *setup, settings[1:])
                 return step(index[0] * timestep, now[:states], now[states:], samples, integration)
 
@@ -130,7 +132,7 @@ class LoopPrograms:
 
         def sampled(samples: bool) -> Callable[..., Any]:
             def run(index: Any, now: Any, settings: Any, user: InputVector, recorder: Any) -> Any:
-                time, setup = index[0] * settings[0], self._setup(user)
+                time, setup = index[0] * settings[0], self.setup(user)
                 state, force = now[:states], now[states:]
                 if samples:
                     force = equations.inputs(time, state, *setup)
@@ -156,7 +158,7 @@ class LoopPrograms:
 
         A sign that is zero in the recorder is not known yet.
         """
-        loop, (parameters, knots) = self._loop, self._setup(user)
+        loop, (parameters, knots) = self._loop, self.setup(user)
         reference = record_with_choices(
             ReferenceParameters, recorder[REFERENCE:], self._key.reference
         )
