@@ -1,9 +1,7 @@
 """Common parts of closed loops with rotorcraft of any number of rotors and tilt hinges."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 
@@ -18,10 +16,6 @@ from tiltsim_controllers.analysis.torque_free import (
 from tiltsim_controllers.laws.failures import UNHARMED, Failure
 from tiltsim_controllers.mathematics.scalar import Floats, Vector
 from tiltsim_controllers.vehicle.effectiveness import force_and_torque
-
-if TYPE_CHECKING:
-    pass
-
 
 REFERENCE_COLUMNS: Final = ("x_ref", "y_ref", "z_ref", "roll_ref", "pitch_ref", "yaw_ref")
 

@@ -4,11 +4,9 @@ Two laws integrate the rotor speeds and the command of the tilt servo; with the 
 follows a gait and the thrusts are commanded (`tiltsim.laws.tilt_car_planned`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -16,6 +14,7 @@ from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Dynamics, Sizes
 from tiltsim.laws.law import Law
 from tiltsim.laws.parameters import parameters_of
 from tiltsim.laws.vehicle_loop import VehicleFunctions, parts, servo_lead
+from tiltsim.scenario.scenario import FlightPlan, Scenario
 from tiltsim.vehicles.tilt_car import ROTORS, TILT_CAR, initial_tilt
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.laws.observed import Seen, Step
@@ -23,9 +22,6 @@ from tiltsim_controllers.mathematics.scalar import Floats, Vector
 from tiltsim_controllers.references.trajectories import reference_motion
 from tiltsim_controllers.tilt_car import fourth_derivative, third_derivative
 from tiltsim_controllers.tilt_car.vehicle import TiltCar, acceleration, counter_yaw_per_tilt
-
-if TYPE_CHECKING:
-    from tiltsim.scenario.scenario import FlightPlan, Scenario
 
 DEMANDED: Final = ("demanded_x", "demanded_y")
 """Signals: the acceleration (m/s^2) whose direction the thrusts are to bracket."""

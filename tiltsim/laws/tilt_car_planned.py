@@ -1,9 +1,7 @@
 """The tilt-car with a planned direction of its thrusts (ch. 10, Sec. 5; ch. 11)."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from tiltsim.closed_loop.loop import ControlSetup
 from tiltsim.laws.law import Law
@@ -16,6 +14,7 @@ from tiltsim.laws.tilt_car import (
     motion_rates,
     yaw,
 )
+from tiltsim.scenario.scenario import FlightPlan
 from tiltsim.vehicles.tilt_car import ROTORS
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.gaits.motion import planned_tilts
@@ -23,9 +22,6 @@ from tiltsim_controllers.laws.observed import Seen, Step
 from tiltsim_controllers.mathematics.scalar import Floats, Vector
 from tiltsim_controllers.tilt_car import planned_direction
 from tiltsim_controllers.tilt_car.vehicle import counter_yaw_per_tilt
-
-if TYPE_CHECKING:
-    from tiltsim.scenario.scenario import FlightPlan
 
 WANTED: Final = tuple(f"wanted_square_{rotor}" for rotor in ROTORS)
 

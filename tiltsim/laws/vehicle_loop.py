@@ -1,12 +1,10 @@
 """Closed loops of laws with any kind of vehicle."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -23,13 +21,11 @@ from tiltsim.closed_loop.vehicle_kind import VehicleKind
 from tiltsim.engines.sample_evaluation import evaluate_over_samples
 from tiltsim.laws.law import Law
 from tiltsim.laws.parameters import head_of
+from tiltsim.scenario.rotorcraft import ServoTable
+from tiltsim.scenario.scenario import FlightPlan
 from tiltsim_controllers.code.traceable import traceable
 from tiltsim_controllers.laws.observed import Seen
 from tiltsim_controllers.mathematics.scalar import Floats, Vector
-
-if TYPE_CHECKING:
-    from tiltsim.scenario.rotorcraft import ServoTable
-    from tiltsim.scenario.scenario import FlightPlan
 
 
 def servo_lead(servo: ServoTable) -> float:
