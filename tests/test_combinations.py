@@ -186,6 +186,9 @@ USES_OF_FLIGHTS = {
     "_repr_html_": lambda flight, _folder: flight._repr_html_(),
     "to_pandas": lambda flight, _folder: flight.to_pandas(),
     "to_arrow": lambda flight, _folder: flight.to_arrow(),
+    "to_csv": lambda flight, folder: flight.to_csv(folder / "flight.csv"),
+    "to_mcap": lambda flight, folder: flight.to_mcap(folder / "flight.mcap"),
+    "to_ulog": lambda flight, folder: flight.to_ulog(folder / "flight.ulg"),
     "origin": lambda flight, _folder: flight.origin(),
     "save": of_file,
 }
