@@ -337,6 +337,17 @@ NOT_FLOWN = {*DESCRIPTIVE, "variant"}
 """Tables that change nothing in a flight."""
 
 
+def companions(document):
+    """Values without which these tables are refused: a wall to push, an integrator."""
+    pushes = document.get("reference", {}).get("type") == "push"
+    if not pushes and not {"object", "tool", "payload"} & document.keys():
+        return {}
+    wall = {"name": "wall", "type": "wall", "position": [0.8, 0.0, 1.0], "size": [4.0, 4.0]}
+    below = {"position": [0.0, 0.0, -0.3], "length": 0.4}
+    touched = {"object": [wall], "tool": below} if pushes else {}
+    return {"simulation.integrator": "implicitfast", **touched}
+
+
 def changes(table, key=None):
     """The example of a table, and of one of its keys, as values by dotted key."""
     document = at = tomllib.loads(table.toml)
@@ -345,7 +356,7 @@ def changes(table, key=None):
         at = at[0] if isinstance(at, list) else at
     if key is not None:
         at[key.name] = tomllib.loads(f"value = {key.example}")["value"]
-    needed = dict(leaves(document))
+    needed = dict(leaves(document)) | companions(document)
     return {key: needed[key] for key in needed.keys() - {"controller.function", "vehicle.mjcf"}}
 
 

@@ -10,27 +10,36 @@ import zlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from tiltsim.closed_loop.vehicle_kind import VehicleKind
 from tiltsim.models.parts import ExtraActuators
+from tiltsim.scenario.scenario import FlightPlan, Scenario
 from tiltsim.system.text import Quantity, in_words
 from tiltsim_controllers.mathematics.records import flatten, record_dtype, record_size
 from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector, scalar
 
-if TYPE_CHECKING:
-    from tiltsim.scenario.scenario import FlightPlan, Scenario
-
 
 class Sizes(NamedTuple):
-    """Lengths of MuJoCo's vectors."""
+    """Lengths of MuJoCo's vectors, of ``qpos`` and ``qvel`` the vehicle's part.
+
+    Functions of a loop see the last two, which only flights with objects have, at the end of
+    ``act``.
+    """
 
     qpos: int
     qvel: int
     act: int
     ctrl: int
+    others: int = 0  # of qpos: objects behind the vehicle
+    history: int = 0  # readings of sensors in MuJoCo's state
+
+    @property
+    def after_act(self) -> int:
+        """Numbers that functions of a loop see behind ``act``."""
+        return self.others + self.history
 
 
 class ControlSetup(NamedTuple):

@@ -6,15 +6,14 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from tiltsim.models.parts import ExtraActuators
 from tiltsim.models.vehicle_parts import MAX_ROTORS
+from tiltsim.scenario.scenario import FlightPlan, Scenario
+from tiltsim.system.text import Quantity
 from tiltsim_controllers.mathematics.scalar import Floats, Vector
 
 if TYPE_CHECKING:
     import mujoco
-
-    from tiltsim.models.parts import ExtraActuators
-    from tiltsim.scenario.scenario import FlightPlan, Scenario
-    from tiltsim.system.text import Quantity
 
 
 @dataclass(frozen=True, eq=False)

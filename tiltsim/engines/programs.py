@@ -15,6 +15,7 @@ from tiltsim.closed_loop.userdata import (
     TIMESTEP,
     evaluation_time,
 )
+from tiltsim.engines.base import Vectors
 from tiltsim.equations.solvers import Integration, make_step
 from tiltsim_controllers.code.program import InputVector, Program
 from tiltsim_controllers.code.tracing import Number, make
@@ -78,28 +79,34 @@ class LoopPrograms:
         """
         loop, sampling = self._loop, self._loop.sampling
         sizes = loop.dynamics.sizes._asdict()
-        vectors = {"header": HEADER_SIZE, **sizes, "user": self.user_size}
+        state = {name: sizes[name] for name in (*Vectors._fields, "ctrl")}
+        vectors = {"header": HEADER_SIZE, **state, "user": self.user_size}
+
+        def act_of(act: InputVector, *behind: InputVector) -> Any:
+            seen = tuple(number for vector in behind for number in vector)
+            return (*act, *seen) if seen else act
 
         def controls(lifting: Lifting, given: Sequence[InputVector]) -> Any:
-            header, qpos, qvel, act, _, user = given
+            header, qpos, qvel, *act, _, user = given
             time = _next_time(lifting, header)
-            return lifting(sampling.controls)(time, qpos, qvel, act, *self._setup(user))
+            return lifting(sampling.controls)(time, qpos, qvel, act_of(*act), *self._setup(user))
 
         def hold(lifting: Lifting, given: Sequence[InputVector]) -> Any:
-            header, qpos, qvel, act, ctrl, user = given
+            header, qpos, qvel, *act, ctrl, user = given
             time, (parameters, _) = _next_time(lifting, header), self._setup(user)
-            return lifting(sampling.hold)(time, qpos, qvel, act, tuple(ctrl), parameters)
+            held = tuple(ctrl)
+            return lifting(sampling.hold)(time, qpos, qvel, act_of(*act), held, parameters)
 
         def sample(lifting: Lifting, given: Sequence[InputVector]) -> Iterable[Number]:
-            header, qpos, qvel, act, ctrl, user, recorder = given
+            header, qpos, qvel, *act, ctrl, user, recorder = given
             count, per_step = header[EVALUATIONS], header[EVALUATIONS_PER_STEP]
             start = make("mul", make("div", count, per_step), header[TIMESTEP])
-            values = lifting(loop.columns.observe)(qpos, qvel, act, tuple(ctrl))
+            values = lifting(loop.columns.observe)(qpos, qvel, act_of(*act), tuple(ctrl))
             return self._checked(lifting, start, values, user, recorder)[0]
 
         def observe(lifting: Lifting, given: Sequence[InputVector]) -> Iterable[Number]:
-            _, qpos, qvel, act, ctrl, _ = given
-            return lifting(loop.columns.observe)(qpos, qvel, act, tuple(ctrl))
+            _, qpos, qvel, *act, ctrl, _ = given
+            return lifting(loop.columns.observe)(qpos, qvel, act_of(*act), tuple(ctrl))
 
         functions = {"controls": controls, "hold": hold, "observe": observe, "sample": sample}
         sizes = {"sample": {**vectors, "recorder": HEAD_SIZE + SIDES}}

@@ -288,6 +288,9 @@ def _check_supported(scenario: Scenario) -> None:
     allowed: dict[str, object] = {
         "vehicle.rotor_inertia": 0.0,
         "ground": None,
+        "object": (),
+        "tool": None,
+        "payload": None,
         "fault": (),
         "sensors": SensorTable(),
         "simulation.control_latency": 0.0,

@@ -7,16 +7,16 @@ follow the equation of their servo, and on rotors with limits. Only the order of
 MuJoCo's, so these flights can check MuJoCo's.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cache
 from math import inf
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from tiltsim.closed_loop.loop import Dynamics
 from tiltsim.models.parts import WRENCH_SIZE
+from tiltsim.scenario.scenario import FlightPlan
 from tiltsim.vehicles.rotorcraft import initial_tilts
 from tiltsim.vehicles.rotorcraft.layout import layout_of, tilt_of_rotor
 from tiltsim.vehicles.rotorcraft.rotors import rotors_record, true_rotors
@@ -37,11 +37,6 @@ from tiltsim_controllers.vehicle.craft import Craft, craft_of
 from tiltsim_controllers.vehicle.effectiveness import TiltOfRotor, tilts_of
 from tiltsim_controllers.vehicle.motion import accelerations, joined, rotation_rate
 from tiltsim_controllers.vehicle.rotors import of_tilts, wrench_map
-
-if TYPE_CHECKING:
-    from tiltsim.closed_loop.loop import Dynamics
-    from tiltsim.scenario.scenario import FlightPlan
-
 
 # --- parameters -------------------------------------------------------------------------------
 

@@ -1,11 +1,9 @@
 """Full-pose control in closed loops: the tilt angles are inputs (ch. 3, Sec. 6.3)."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -22,6 +20,7 @@ from tiltsim.laws.rotor_loop import (
 from tiltsim.laws.rotorcraft import rotor_stops, torque_free_columns
 from tiltsim.laws.tiltrotor import singularity_columns
 from tiltsim.models.rotor_table import Multirotor
+from tiltsim.scenario.scenario import FlightPlan, Scenario
 from tiltsim.scenario.tiltrotor_controllers import FullPoseController
 from tiltsim.vehicles.rotorcraft import ROTORCRAFT, initial_tilts
 from tiltsim_controllers.laws.full_pose import (
@@ -35,9 +34,6 @@ from tiltsim_controllers.mathematics.records import changed_record
 from tiltsim_controllers.mathematics.scalar import Floats, Values
 from tiltsim_controllers.vehicle.parameters import Vehicle
 from tiltsim_controllers.vehicle.states import state_of
-
-if TYPE_CHECKING:
-    from tiltsim.scenario.scenario import FlightPlan, Scenario
 
 
 def _margins(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:

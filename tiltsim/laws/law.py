@@ -1,20 +1,16 @@
 """The record of a control law of a rotorcraft, from which `rotor_loop` makes a closed loop."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from tiltsim.closed_loop.loop import ControlSetup
+from tiltsim.scenario.scenario import FlightPlan, Scenario
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.gaits.motion import planned_tilts
 from tiltsim_controllers.laws.observed import Seen, Step
 from tiltsim_controllers.mathematics.scalar import Floats, Values
-
-if TYPE_CHECKING:
-    from tiltsim.scenario.scenario import FlightPlan, Scenario
 
 Margins = Callable[[Mapping[str, Floats], ControlSetup], dict[str, Floats]]
 """``(samples by field, setup) -> columns`` that a sample's state alone decides."""

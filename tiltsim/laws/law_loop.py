@@ -5,12 +5,10 @@ layout is compiled in. The rotors' speeds are states that approach the commanded
 tilts of a law that commands them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cache, partial
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from tiltsim.closed_loop.loop import ClosedLoop
 from tiltsim.errors import TiltsimError
@@ -19,6 +17,7 @@ from tiltsim.laws.law import Law, tilts_in_states
 from tiltsim.laws.rotor_loop import RotorLayout, body_of_vehicle, rotor_loop
 from tiltsim.scenario.law_controller import LawTable
 from tiltsim.scenario.own_code import users_line
+from tiltsim.scenario.scenario import FlightPlan
 from tiltsim.system.text import short_repr
 from tiltsim_controllers.code.arrays import is_jax, xp
 from tiltsim_controllers.code.tracing import as_array
@@ -39,9 +38,6 @@ from tiltsim_controllers.vehicle.effectiveness import ROTOR_FLOATS, table_per_ne
 from tiltsim_controllers.vehicle.parameters import Vehicle
 from tiltsim_controllers.vehicle.rotors import rotors_in, wrench_map
 from tiltsim_controllers.vehicle.states import state_of
-
-if TYPE_CHECKING:
-    from tiltsim.scenario.scenario import FlightPlan
 
 CORRECTION: Final = 5.0
 """1/s: the rate at which rotors approach the speeds of their model, slow beside any latency."""

@@ -5,11 +5,9 @@ a loop is made for each such `RotorLayout`. All other numbers of the vehicle are
 speeds are states whose accelerations a law commands.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -32,6 +30,7 @@ from tiltsim.laws.rotorcraft import (
     torque_free_columns,
 )
 from tiltsim.models.rotor_table import Multirotor
+from tiltsim.scenario.scenario import FlightPlan
 from tiltsim.vehicles.rotorcraft import initial_rotor_speeds, rotorcraft_kind
 from tiltsim.vehicles.rotorcraft.layout import CROSS
 from tiltsim.vehicles.rotorcraft.layout import Layout as Places
@@ -46,9 +45,6 @@ from tiltsim_controllers.vehicle.effectiveness import ROTOR_FLOATS
 from tiltsim_controllers.vehicle.motion import BODY_STATES, equations_of_motion
 from tiltsim_controllers.vehicle.rotors import airframe
 from tiltsim_controllers.vehicle.states import BODY_FIELDS
-
-if TYPE_CHECKING:
-    from tiltsim.scenario.scenario import FlightPlan
 
 
 class RotorLayout(NamedTuple):

@@ -1,14 +1,13 @@
 """Common parts of closed loops with rotorcraft of any number of rotors and tilt hinges."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 
 from tiltsim.closed_loop.loop import ControlSetup
 from tiltsim.engines.sample_evaluation import evaluate_over_samples
+from tiltsim.scenario.rotorcraft import ServoTable
 from tiltsim.vehicles.rotorcraft.layout import Layout
 from tiltsim_controllers.analysis.singularity import world_up
 from tiltsim_controllers.analysis.torque_free import (
@@ -20,9 +19,6 @@ from tiltsim_controllers.analysis.torque_free import (
 from tiltsim_controllers.laws.failures import UNHARMED, Failure
 from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector
 from tiltsim_controllers.vehicle.effectiveness import force_and_torque
-
-if TYPE_CHECKING:
-    from tiltsim.scenario.rotorcraft import ServoTable
 
 
 def servo_lead(servo: ServoTable) -> float:

@@ -4,10 +4,8 @@ Two laws integrate the rotor speeds and the command of the tilt servo; with the 
 follows a gait and the thrusts are commanded.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -24,6 +22,7 @@ from tiltsim.closed_loop.loop import (
 from tiltsim.engines.sample_evaluation import evaluate_over_samples
 from tiltsim.laws.parameters import head_of, parameters_of
 from tiltsim.laws.rotorcraft import servo_lead
+from tiltsim.scenario.scenario import FlightPlan, Scenario
 from tiltsim.vehicles.tilt_car import ROTORS, SPEED_1, SPEED_2, TILT_CAR, initial_tilt
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.code.traceable import traceable
@@ -31,9 +30,6 @@ from tiltsim_controllers.mathematics.scalar import Floats, Vector
 from tiltsim_controllers.references.trajectories import ReferenceParameters, reference_motion
 from tiltsim_controllers.tilt_car import fourth_derivative, third_derivative
 from tiltsim_controllers.tilt_car.vehicle import TiltCar, acceleration, counter_yaw_per_tilt
-
-if TYPE_CHECKING:
-    from tiltsim.scenario.scenario import FlightPlan, Scenario
 
 
 def car_record(law: Any, **own: type) -> Any:

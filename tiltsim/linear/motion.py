@@ -19,6 +19,7 @@ from tiltsim.closed_loop.loop import ClosedLoop, Equations
 from tiltsim.closed_loop.userdata import EVALUATIONS, EVALUATIONS_PER_STEP, HEADER_SIZE
 from tiltsim.engines.base import EngineName
 from tiltsim.engines.callback import control_callback
+from tiltsim.errors import InputError
 from tiltsim.laws.assembling import assemble
 from tiltsim.linear import coordinates
 from tiltsim.plants.equations_plant import EquationsPlant
@@ -50,6 +51,12 @@ class Motion(ABC):
     """
 
     def __init__(self, scenario: Scenario, engine: EngineName | None, late: bool = False) -> None:
+        if scenario.has_objects:
+            where = scenario.address or "scenario"
+            raise InputError(
+                f"{where}: linear analysis takes a vehicle alone; remove [[object]], [tool] and "
+                "[payload]"
+            )
         self.scenario, self.engine, self._late = scenario, engine, late
         self._commanded: Values = ()
         self._inputs: tuple[coordinates.Input, ...] = ()

@@ -157,6 +157,15 @@ class ControllerTable(Table):
         return not leans or scenario.reference.kind != "position"
 
     @property
+    def position_stiffness(self) -> float | None:
+        """Force per mass and per error of position that a vehicle at rest makes, 1/s^2.
+
+        A force loop pushes through it, see `tiltsim.laws.layers.contact`; None for a law that
+        cannot push.
+        """
+        return None
+
+    @property
     def linearization(self) -> str:
         """The condition under which the closed loops are linear, for messages."""
         return "the exact decoupling matrix"

@@ -9,11 +9,13 @@ evaluates it.
 from __future__ import annotations
 
 import itertools
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from math import inf, isfinite, pi
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from tiltsim_controllers.gaits.cat import FOOTFALLS, cat_keyframes
 from tiltsim_controllers.gaits.colors import colored_angles
@@ -27,16 +29,9 @@ from tiltsim_controllers.gaits.parameters import (
     POWERS,
     GaitParameters,
 )
+from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.mathematics.splines import spline_knots
-from tiltsim_controllers.vehicle.parameters import drag_ratio
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-
-    from numpy.typing import ArrayLike
-
-    from tiltsim_controllers.mathematics.scalar import Floats
-    from tiltsim_controllers.vehicle.parameters import Vehicle
+from tiltsim_controllers.vehicle.parameters import Vehicle, drag_ratio
 
 _JUMP: Final = 1e-9
 """Change of an angle (rad) between two pieces that is more than rounding."""

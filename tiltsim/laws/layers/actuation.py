@@ -10,12 +10,10 @@ actuators that act on nothing. So the control step remains a pure function that 
 and a scenario with ideal actuators runs without the layer.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cache
 from math import inf
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -24,6 +22,7 @@ from tiltsim.laws.layers.layer import Layer, Samples, wrap_loop
 from tiltsim.laws.layers.sensing import measured, sensor_parameters
 from tiltsim.laws.rotorcraft import servo_lead
 from tiltsim.models.parts import ExtraActuators
+from tiltsim.scenario.scenario import FlightPlan
 from tiltsim.vehicles.rotorcraft import initial_tilts
 from tiltsim.vehicles.rotorcraft.layout import TILT_1, layout_of
 from tiltsim_controllers.code.arrays import xp
@@ -37,9 +36,6 @@ from tiltsim_controllers.vehicle.actuators import (
     thrust_factors,
 )
 from tiltsim_controllers.vehicle.sensors import Sensors
-
-if TYPE_CHECKING:
-    from tiltsim.scenario.scenario import FlightPlan
 
 
 @cache

@@ -5,12 +5,10 @@ actuators on the body instead, force and torque in body axes, which only models 
 filters of the turbulence are activations, so a flight restarts anywhere.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cache
 from math import atan2, hypot
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -18,6 +16,7 @@ from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup
 from tiltsim.engines.sample_evaluation import evaluate_over_samples
 from tiltsim.laws.layers.layer import Layer, Samples, wrap_loop
 from tiltsim.models.parts import ExtraActuators
+from tiltsim.scenario.scenario import FlightPlan
 from tiltsim.vehicles.rotorcraft.layout import QW, TILT_1, layout_of, tilt_of_rotor
 from tiltsim.vehicles.rotorcraft.rotors import rotors_record, true_rotors
 from tiltsim_controllers.code.arrays import xp
@@ -41,9 +40,6 @@ from tiltsim_controllers.vehicle.air import (
     stationary_states,
 )
 from tiltsim_controllers.vehicle.craft import Craft, craft_of, places, wrench_of_lift
-
-if TYPE_CHECKING:
-    from tiltsim.scenario.scenario import FlightPlan
 
 AIR_COLUMNS: Final = ("air_vx", "air_vy", "air_vz")
 DRYDEN_FIELDS: Final = tuple(f"dryden_{index}" for index in range(1, DRYDEN_STATES + 1))

@@ -1,14 +1,13 @@
 """Rotor accelerations of a controller within speed limits, where its law does not see to that."""
 
-from __future__ import annotations
-
 from functools import cache
 from math import inf
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from tiltsim.closed_loop.loop import ClosedLoop
 from tiltsim.laws.layers.layer import Layer, wrap_loop
 from tiltsim.scenario.gait_following import GaitFollowingController
+from tiltsim.scenario.scenario import FlightPlan
 from tiltsim.vehicles.rotorcraft.layout import QW, TILT_1, layout_of, tilt_of_rotor
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.code.traceable import traceable
@@ -17,9 +16,6 @@ from tiltsim_controllers.mathematics.attitude import euler_angles, rotation_matr
 from tiltsim_controllers.mathematics.scalar import Values, Vector, scalar
 from tiltsim_controllers.vehicle.parameters import Vehicle
 from tiltsim_controllers.vehicle.rotors import airframe, wrench_map
-
-if TYPE_CHECKING:
-    from tiltsim.scenario.scenario import FlightPlan
 
 ALLOCATED: Final = frozenset({"tiltrotor"})
 """Models whose controllers this layer limits; the law of multirotors limits itself."""

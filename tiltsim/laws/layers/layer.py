@@ -4,20 +4,16 @@ A layer has its own parameters and states and replaces some functions; the rest 
 within. `wrap_loop` is the one place where that is put together.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Equations, Monitoring, Sampling
 from tiltsim.models.parts import ExtraActuators
+from tiltsim.scenario.scenario import FlightPlan
 from tiltsim_controllers.code.traceable import traceable
 from tiltsim_controllers.mathematics.records import make_record_type
 from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector, scalar
-
-if TYPE_CHECKING:
-    from tiltsim.scenario.scenario import FlightPlan
 
 _NO_ACTUATORS: Final = ExtraActuators()
 

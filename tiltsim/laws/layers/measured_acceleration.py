@@ -5,17 +5,16 @@ a controller commands, so the angular acceleration is known at the instant of a 
 controls are computed once to find it, and once more with it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cache
 from math import inf
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from tiltsim.closed_loop.loop import ClosedLoop, Dynamics
 from tiltsim.equations.actuator_level import mechanics, mechanics_record, servo_accelerations
 from tiltsim.laws.layers.layer import Layer, wrap_loop
 from tiltsim.laws.layers.on_equations import read_actuators
+from tiltsim.scenario.scenario import FlightPlan
 from tiltsim.vehicles.rotorcraft import rotor_limits
 from tiltsim.vehicles.rotorcraft.layout import TILT_1, TILT_RATE_1, layout_of, tilt_of_rotor
 from tiltsim.vehicles.rotorcraft.rotors import body_less, rotors_record
@@ -27,9 +26,6 @@ from tiltsim_controllers.mathematics.scalar import Values, Vector, scalar
 from tiltsim_controllers.vehicle.body import Body, inertia_matrix, inverse_inertia_matrix
 from tiltsim_controllers.vehicle.craft import craft_of
 from tiltsim_controllers.vehicle.rotors import wrench_map
-
-if TYPE_CHECKING:
-    from tiltsim.scenario.scenario import FlightPlan
 
 
 @cache

@@ -5,11 +5,9 @@ sensors, noise and latency. Only the plant on which they act differs: the thesis
 (`tiltsim.equations.actuator_level`) or a rigid body (`tiltsim.equations.rigid_body`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -17,13 +15,11 @@ from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Dynamics, Equatio
 from tiltsim.equations.actuator_level import ActuatorPlant, limit_speeds_of, mechanics
 from tiltsim.laws.layers.layer import Layer, wrap_loop
 from tiltsim.models.parts import WRENCH_SIZE, ExtraActuators
+from tiltsim.scenario.scenario import FlightPlan
 from tiltsim.vehicles.rotorcraft.layout import layout_of
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.code.traceable import traceable
 from tiltsim_controllers.mathematics.scalar import Triple, Values, Vector, scalar
-
-if TYPE_CHECKING:
-    from tiltsim.scenario.scenario import FlightPlan
 
 
 @cache

@@ -8,15 +8,14 @@ On the thesis's equations with ideal actuators, pods may jump, which turns the b
 the three states of the body rates hold the total angular momentum instead, which does not jump.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Dynamics, Equations
 from tiltsim.laws.layers.layer import Layer, wrap_loop
 from tiltsim.models.parts import ExtraActuators
+from tiltsim.scenario.scenario import FlightPlan
 from tiltsim.vehicles.rotorcraft.layout import TILT_1, TILT_RATE_1, layout_of, tilt_of_rotor
 from tiltsim.vehicles.rotorcraft.rotors import rotors_record, true_rotors
 from tiltsim_controllers.code.arrays import xp
@@ -32,9 +31,6 @@ from tiltsim_controllers.vehicle.rotor_inertia import (
     hinge_torques,
     spin_torque,
 )
-
-if TYPE_CHECKING:
-    from tiltsim.scenario.scenario import FlightPlan
 
 
 @cache

@@ -25,6 +25,7 @@ from tiltsim.closed_loop.vehicle_kind import VehicleKind
 from tiltsim.models.hover import hover_speeds
 from tiltsim.models.parts import ExtraActuators, Ground, Pod, RotorLimits, TiltServo
 from tiltsim.models.rotor_table import Multirotor
+from tiltsim.scenario.interaction import objects_of
 from tiltsim.scenario.multirotor_controllers import AttitudeForceController
 from tiltsim.scenario.scenario import FlightPlan, Scenario
 from tiltsim.scenario.vehicle import VehicleTable
@@ -150,6 +151,7 @@ def _compile(
         law_states=law_states,
         extra_actuators=extra_actuators,
         ground=None if ground is None else Ground(ground.height, ground.friction),
+        objects=objects_of(scenario),
         user_vehicle=vehicle.user_vehicle,
     )
     return compile_model(spec, visuals=visuals)
