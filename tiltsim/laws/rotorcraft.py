@@ -76,7 +76,7 @@ def reference_columns(
     """The columns of references, evaluated over samples.
 
     Args:
-        in_force: Scalar function ``(time, values, parameters, knots)`` of the columns' values.
+        in_force: Function ``(time, values, parameters, knots)`` of the columns' values.
         fields: Fields of a sample, its ``values``.
         samples: By field.
         setup: The flight's parameters and knots.

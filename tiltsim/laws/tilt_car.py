@@ -52,7 +52,7 @@ def car_setup_of(law: Any, record: Any) -> Callable[[FlightPlan, float], Control
     """
 
     def setup(plan: FlightPlan, signature: float) -> ControlSetup:
-        car, heading = plan.scenario.tilt_car, float(plan.scenario.initial.attitude[2])
+        car, heading = plan.scenario.tilt_car, plan.scenario.initial.attitude[2]
         own = parameters_of(plan, law, car=car.resolve())
         gait = {"gait": plan.gait.parameters} if "gait" in record._fields else {}
         lead = servo_lead(car.tilt_servo)
