@@ -1,7 +1,5 @@
 """Many flights at once, as in sweeps, Monte Carlo studies and stability maps."""
 
-from __future__ import annotations
-
 import os
 import pickle
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence

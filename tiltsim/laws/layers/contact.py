@@ -19,7 +19,7 @@ from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.code.traceable import traceable
 from tiltsim_controllers.mathematics.attitude import euler_angles
 from tiltsim_controllers.mathematics.records import Vector3
-from tiltsim_controllers.mathematics.scalar import Values, Vector, scalar
+from tiltsim_controllers.mathematics.scalar import Values
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -67,7 +67,6 @@ def with_force_loop(loop: ClosedLoop) -> ClosedLoop:
     """
     inner_controls, first = loop.sampling.controls, loop.dynamics.sizes.act
 
-    @traceable
     def displaced(time: Any, qpos: Any, act: Any, own: ForceLoop) -> tuple[Any, Any]:
         """``qpos`` as the law sees it, and the rates of the two states."""
         direction = xp.array(own.direction)
@@ -79,12 +78,10 @@ def with_force_loop(loop: ClosedLoop) -> ClosedLoop:
         rates = xp.hstack([FILTER * (measured - filtered), own.gain * error])
         return xp.hstack([place, qpos[3:]]), rates
 
-    @scalar
-    def controls(
-        time: float, qpos: Vector, qvel: Vector, act: Vector, parameters: Any, knots: Vector
-    ) -> Values:
-        seen, rates = displaced(time, (*qpos,), (*act,), parameters.layer)
-        return (*inner_controls(time, seen, qvel, act, parameters.inner, knots), *rates)
+    @traceable
+    def controls(time: Any, qpos: Any, qvel: Any, act: Any, parameters: Any, knots: Any) -> Any:
+        seen, rates = displaced(time, qpos, act, parameters.layer)
+        return xp.hstack([inner_controls(time, seen, qvel, act, parameters.inner, knots), rates])
 
     layer = Layer(
         "with_force_loop",
@@ -133,27 +130,22 @@ def with_objects(loop: ClosedLoop, others: Others) -> ClosedLoop:
     readings = size + states + others.coordinates
     accumulated, observed = _accumulated(others, size, readings), _observed(others, size, readings)
 
-    @traceable
     def within(act: Any) -> Any:
         return xp.hstack([act[:size], *_pushing(act[readings:], others)])
 
-    @scalar
-    def controls(
-        time: float, qpos: Vector, qvel: Vector, act: Vector, parameters: Any, knots: Vector
-    ) -> Values:
-        ctrl = inner_controls(time, qpos, qvel, within((*act,)), parameters.inner, knots)
-        return (*ctrl, *accumulated((*act,), parameters.layer))
+    @traceable
+    def controls(time: Any, qpos: Any, qvel: Any, act: Any, parameters: Any, knots: Any) -> Any:
+        ctrl = inner_controls(time, qpos, qvel, within(act), parameters.inner, knots)
+        return xp.hstack([ctrl, accumulated(act, parameters.layer)])
 
-    @scalar
-    def hold(
-        time: float, qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector, parameters: Any
-    ) -> Values:
-        held = inner_hold(time, qpos, qvel, within((*act,)), ctrl[:ctrl_size], parameters.inner)
-        return (*held, *accumulated((*act,), parameters.layer))
+    @traceable
+    def hold(time: Any, qpos: Any, qvel: Any, act: Any, ctrl: Any, parameters: Any) -> Any:
+        held = inner_hold(time, qpos, qvel, within(act), ctrl[:ctrl_size], parameters.inner)
+        return xp.hstack([held, accumulated(act, parameters.layer)])
 
-    @scalar
-    def observe(qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector) -> Values:
-        return (*inner_observe(qpos, qvel, act[:size], ctrl[:ctrl_size]), *observed((*act,)))
+    @traceable
+    def observe(qpos: Any, qvel: Any, act: Any, ctrl: Any) -> Any:
+        return xp.hstack([inner_observe(qpos, qvel, act[:size], ctrl[:ctrl_size]), observed(act)])
 
     layer = Layer(
         "with_objects",
