@@ -225,7 +225,9 @@ def _file_keys(document: Mapping[str, Any]) -> Iterator[tuple[dict[str, Any], st
     for table, key, mark in FILE_KEYS:
         found = document.get(table)
         for keys in found if isinstance(found, list) else [found]:
-            name = keys.get(key) if isinstance(keys, dict) else None
+            if not isinstance(keys, dict):
+                continue
+            name = keys.get(key)
             if isinstance(name, str) and mark in name:
                 yield keys, f"{table}.{key}", bool(mark)
 
