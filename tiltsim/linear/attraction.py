@@ -47,6 +47,8 @@ MEAN: Final = 1.0  # s, at the end of a flight, over which the mean is taken
 MOST_CELLS: Final = 1_000
 INSTANTS: Final = 24  # of a moving gait
 
+ANGLES: Final = ("roll", "pitch", "yaw")
+
 
 @dataclass(frozen=True, eq=False)
 class Attraction:
@@ -298,9 +300,6 @@ def _acceptable(scenario: Scenario, roll: Floats, pitch: Floats) -> NDArray[np.b
         level = determinant(angles, 0.0, 0.0, vehicle)
         inside &= determinant(angles, across, up, vehicle) * level > 0.0
     return inside
-
-
-ANGLES: Final = ("roll", "pitch", "yaw")
 
 
 class FinalStates:

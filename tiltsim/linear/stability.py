@@ -24,6 +24,8 @@ from tiltsim_controllers.mathematics.scalar import Floats
 RESOLVED: Final = 1e-8
 """Modes of an orbit with a smaller multiplier are lost in the rounding of a period."""
 
+ON_AXIS: Final = 1e-6  # multipliers with a smaller imaginary part are real
+
 
 @dataclass(frozen=True, eq=False)
 class Stability:
@@ -140,9 +142,6 @@ def stability_at(found: Equilibrium) -> Stability:
         left_out=found.left_out,
         corners=found.corners,
     )
-
-
-ON_AXIS: Final = 1e-6  # multipliers with a smaller imaginary part are real
 
 
 @dataclass(frozen=True)
