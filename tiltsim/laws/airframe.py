@@ -40,7 +40,9 @@ def airframe_of(plan: FlightPlan) -> Airframe:
         plan.gait,
         initial_tilts(plan)[0] if tilting else (),
         tuple(spin * speed for spin, speed in zip(table.spins, speeds, strict=True)),
+        scenario.initial.position,
         scenario.initial.velocity,
+        scenario.initial.attitude,
         scenario.initial.angular_velocity,
         # The thesis's equations omit the gyroscopic torque but for the quadrotor's.
         float(simulation.plant != "thesis" or table.model == "quadrotor"),

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 from xml.etree import ElementTree
 
+from tiltsim.models.objects import Objects, add_objects
 from tiltsim.models.parts import TiltServo
 
 if TYPE_CHECKING:
@@ -92,18 +93,29 @@ def _with_inclusions(path: Path) -> bytes:
 Compile = Callable[[], "mujoco.MjModel"]
 
 
-def compiler_of(root: Any) -> Compile:
-    """A function that compiles a tree as it is now, whatever is edited afterwards."""
+def compiler_of(root: Any, objects: Objects | None = None) -> Compile:
+    """A function that compiles a tree as it is now, whatever is edited afterwards.
+
+    Args:
+        root: The tree.
+        objects: Added to it.
+    """
     import mujoco
 
     from tiltsim.models.mjspec_tree import MjSpecTree
 
     if isinstance(root, MjSpecTree):
-        compile_copy: Compile = root.spec.copy().compile
-        return compile_copy
-    unnamed = r' name="//unnamed_[^"]*"'  # dm_control's names of unnamed elements
-    text = re.sub(unnamed, "", root.to_xml_string())
-    return partial(mujoco.MjModel.from_xml_string, text, root.get_assets())
+        spec = root.spec.copy()
+    else:
+        unnamed = r' name="//unnamed_[^"]*"'  # dm_control's names of unnamed elements
+        text = re.sub(unnamed, "", root.to_xml_string())
+        if objects is None:
+            return partial(mujoco.MjModel.from_xml_string, text, root.get_assets())
+        spec = mujoco.MjSpec.from_string(text, assets=root.get_assets())
+    if objects is not None:
+        add_objects(spec, objects)
+    compile_copy: Compile = spec.compile
+    return compile_copy
 
 
 def remove_visuals(root: Any, *, contacts: bool) -> None:

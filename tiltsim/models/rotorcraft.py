@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from tiltsim.models import mjcf_editing
+from tiltsim.models.objects import Objects, touchable
 from tiltsim.models.parts import SERVO_ARMATURE, ExtraActuators, Ground, ModelSpec, Pod, RotorLimits
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.models.user_vehicle import UserVehicle
@@ -43,6 +44,7 @@ class RotorcraftSpec(ModelSpec):
         rotor_limits: Limits on the rotor speeds.
         extra_actuators: Actuators that layers append after the law's states.
         ground: Ground to take off from and land on; None disables contacts.
+        objects: Objects, tool and load; None for a vehicle alone.
         user_vehicle: A user's file in place of the shipped one, with its own arms and pods; its
             geoms may have mass and are always kept.
     """
@@ -54,6 +56,7 @@ class RotorcraftSpec(ModelSpec):
     rotor_limits: RotorLimits = field(default=RotorLimits())
     extra_actuators: tuple[ExtraActuators, ...] = ()
     ground: Ground | None = None
+    objects: Objects | None = None
     user_vehicle: UserVehicle | None = None
 
     @property
@@ -79,7 +82,7 @@ def compile_model(spec: RotorcraftSpec, *, visuals: bool = True) -> mujoco.MjMod
     """Compile the MuJoCo model of a rotorcraft.
 
     Mass and inertia of the compiled model are the vehicle's at any tilt: the pods' are
-    subtracted from the body's. There are no contacts but those between vehicle and ground.
+    subtracted from the body's. There are no contacts but with the ground and with objects.
 
     Args:
         spec: The specification of the model.
@@ -94,6 +97,10 @@ def compile_model(spec: RotorcraftSpec, *, visuals: bool = True) -> mujoco.MjMod
     """
     import mujoco
 
+    if spec.objects is not None:
+        complete, bare = _compose(spec)
+        with mujoco_hooks():
+            return complete() if visuals else bare()
     # A preset's parameters in place of all that `_with_parameters` sets.
     key = spec, visuals
     if isinstance(spec.vehicle, Vehicle):
@@ -156,7 +163,7 @@ def _compose(spec: RotorcraftSpec) -> tuple[mjcf_editing.Compile, mjcf_editing.C
     vehicle, servo, user_vehicle = spec.vehicle, spec.tilt_servo, spec.user_vehicle
     shipped = shipped_folder("mjcf") / f"{spec.model}.xml"
     root = mjcf_editing.parse_mjcf(shipped if user_vehicle is None else Path(user_vehicle.path))
-    contacts = spec.ground is not None
+    contacts = spec.ground is not None or spec.objects is not None
 
     root.option.timestep = spec.timestep
     root.option.integrator = spec.integrator
@@ -196,13 +203,15 @@ def _compose(spec: RotorcraftSpec) -> tuple[mjcf_editing.Compile, mjcf_editing.C
         if extra.wrench:
             mjcf_editing.add_wrench(root, f"layer_{index}", center)
         mjcf_editing.add_hinge_torques(root, f"layer_{index}", extra.hinge_torques)
+    if contacts:
+        touchable(root, ground=spec.ground is not None)
     if spec.ground is not None:
         _set_ground(root, spec.ground)
-    complete = mjcf_editing.compiler_of(root)
+    complete = mjcf_editing.compiler_of(root, spec.objects)
     if user_vehicle is not None and spec.model != "multirotor":
         return complete, complete
     mjcf_editing.remove_visuals(root, contacts=contacts)
-    bare = mjcf_editing.compiler_of(root)
+    bare = mjcf_editing.compiler_of(root, spec.objects)
     return complete, bare if user_vehicle is None or _moves_alike(complete, bare) else complete
 
 
@@ -313,17 +322,12 @@ def _body_inertia(spec: RotorcraftSpec, vehicle: Vehicle) -> tuple[float, list[f
 
 
 def _set_ground(root: Any, ground: Ground) -> None:
-    """Let the vehicle's collision shapes touch the ground, and nothing else."""
-    root.option.cone = "elliptic"  # a pyramid holds 29 % less along its diagonals
-    root.option.impratio = 10.0  # friction ten times as stiff as the contact: it creeps less
+    """Let the vehicle's collision shapes touch the ground."""
     plane = root.find("geom", "ground")
     plane.pos = (0.0, 0.0, ground.height)
     plane.friction = (ground.friction, 0.005, 0.0001)
     plane.priority = 1  # its friction counts, not the larger of the two
     plane.conaffinity = 1
-    for geom in root.find("body", "vehicle").find_all("geom"):
-        if (geom.name or "").endswith("collision"):
-            geom.contype = 1
 
 
 def _set_keyframe(key: Any, rotor_speed: float, hinges: int) -> None:

@@ -17,6 +17,16 @@ def is_jax(value: Any) -> bool:
     return "jax" in sys.modules and isinstance(value, sys.modules["jax"].Array)
 
 
+def is_known(value: Any) -> bool:
+    """Whether a number is no symbolic one, so that it can be checked."""
+    return not isinstance(value, Expr)
+
+
+def as_number(value: Any) -> Any:
+    """A number as a float; a symbolic one as it is."""
+    return float(value) if is_known(value) else value
+
+
 def numbers_in(values: Any) -> Iterator[Any]:
     """The numbers and arrays of nested tuples and lists."""
     if isinstance(values, tuple | list):

@@ -32,7 +32,7 @@ SEGMENT: Final = 60
 def results_in_jax(
     program: Program, vectors: Sequence[Any], dtype: str, *, in_segments: bool
 ) -> list[Any]:
-    """The results of a program, each an array without dimensions.
+    """The results of a program: arrays without dimensions, and floats that no input decides.
 
     Both sides of a branch, and loops with a known count, have derivatives in both modes.
 
@@ -43,7 +43,8 @@ def results_in_jax(
         in_segments: Whether to keep XLA from computing intermediate values once per use.
     """
     run = _Evaluation(vectors, dtype, in_segments=in_segments)
-    return [run.floating(value) for value in run.block(program.block)]
+    results = zip(program.block.results, run.block(program.block), strict=True)
+    return [run.floating(value) if isinstance(made, Expr) else made for made, value in results]
 
 
 def _uses(operations: Sequence[Expr]) -> set[int]:
