@@ -177,6 +177,13 @@ def paint(flight, _folder):
     overlay.paint(np.zeros((90, 160, 3), dtype=np.uint8), 0)
 
 
+def through_a_log(flight, folder):
+    """Write a flight as logs and read them."""
+    for suffix in ("mcap", "ulg"):
+        tiltsim.export(flight, folder / f"flight.{suffix}")
+        assert len(tiltsim.read_log(folder / f"flight.{suffix}")) == len(flight)
+
+
 USES_OF_FLIGHTS = {
     "plot": lambda flight, _folder: tiltsim.plot(flight),
     "several": lambda flight, _folder: tiltsim.plot([flight] * 2, labels=["a", "b"]),
@@ -186,6 +193,7 @@ USES_OF_FLIGHTS = {
     "_repr_html_": lambda flight, _folder: flight._repr_html_(),
     "to_pandas": lambda flight, _folder: flight.to_pandas(),
     "to_arrow": lambda flight, _folder: flight.to_arrow(),
+    "to_csv": lambda flight, folder: flight.to_csv(folder / "flight.csv"),
     "origin": lambda flight, _folder: flight.origin(),
     "save": of_file,
 }
@@ -279,6 +287,7 @@ def test_the_whole_public_interface_is_here():
     known = {*USES_OF_FLIGHTS, *USES_OF_SCENARIOS, *SLOW_USES_OF_SCENARIOS}
     # Loading is a part of saving; the base of environments and many of them are used by the others.
     known |= {"law", "xp", "load_flight", "Environment", "VectorEnv"}
+    known |= {"export", "read_log", "replay", "identify", "to_mcap", "to_ulog"}  # through_a_log
     assert public | methods | environments <= known
 
 
@@ -296,6 +305,13 @@ def test_every_flight_can_be_rendered(law, vehicle, tmp_path):
         for use in SLOW_USES_OF_FLIGHTS.values():
             _, line = attempt(use, flown(law, vehicle), tmp_path)
             assert not line or "OpenGL" in line
+
+
+@each_pair
+def test_every_flight_becomes_a_log_unless_it_stays_in_a_plane(law, vehicle, tmp_path):
+    if fits(law, vehicle):
+        _, line = attempt(through_a_log, flown(law, vehicle), tmp_path)
+        assert ("moves in a plane; choose csv" in line) == ("tilt_car" in vehicle), line
 
 
 @each_pair

@@ -14,7 +14,7 @@ from tiltsim.closed_loop.loop import ClosedLoop
 from tiltsim.errors import TiltsimError
 from tiltsim.laws.airframe import airframe_of
 from tiltsim.laws.law import Law, tilts_in_states
-from tiltsim.laws.rotor_loop import RotorLayout, body_of_vehicle, rotor_loop
+from tiltsim.laws.rotor_loop import RotorLayout, body_of_vehicle, margins_of, rotor_loop
 from tiltsim.scenario.law_controller import LawTable
 from tiltsim.scenario.scenario import FlightPlan
 from tiltsim.system.text import short_repr
@@ -285,6 +285,7 @@ def law_loop(key: Key, law_of: Callable[[FlightPlan], FlownLaw]) -> ClosedLoop:
             **dict.fromkeys(modelled, "rad/s"),
         },
         initial=_initial_of(law_of, models_rotors=key.models_rotors),
+        margins=margins_of(key.layout),
         tilts=tilts_in_states(len(key.states) + len(key.discrete), key.layout.places.tilts)
         if key.tilts
         else None,

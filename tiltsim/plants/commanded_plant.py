@@ -18,7 +18,7 @@ from tiltsim.engines.base import vectors_of
 from tiltsim.engines.callback import control_callback
 from tiltsim.engines.python_engine import control_program, control_step
 from tiltsim.laws.commanded import commanded_parameters, planned_servo_commands, with_command
-from tiltsim.laws.rotorcraft import servo_lead
+from tiltsim.laws.vehicle_loop import servo_lead
 from tiltsim.plants.command import CheckedCommand, ControllerError, Observation
 from tiltsim.plants.mujoco_plant import MujocoPlant
 from tiltsim.plants.observing import Observer, flip_by_spin

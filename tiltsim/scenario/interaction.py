@@ -110,16 +110,6 @@ class ObjectTable(Table):
             self.floating,
         )
 
-    @property
-    def columns(self) -> dict[str, str]:
-        """Its columns in a flight, with their units."""
-        if self.joint == "fixed":
-            return {}
-        if self.joint == "hinged":
-            return {f"{self.name}_angle": "rad"}
-        places = {f"{self.name}_{axis}": "m" for axis in "xyz"}
-        return places | {f"{self.name}_{angle}": "rad" for angle in ("roll", "pitch", "yaw")}
-
 
 class ToolTable(Table):
     """A tool that the vehicle carries; the controller does not know its mass."""

@@ -20,7 +20,7 @@ import numpy as np
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup
 from tiltsim.laws.layers.layer import Layer, Samples, wrap_loop
 from tiltsim.laws.layers.sensing import measured, sensor_parameters
-from tiltsim.laws.rotorcraft import servo_lead
+from tiltsim.laws.vehicle_loop import servo_lead
 from tiltsim.models.parts import ExtraActuators
 from tiltsim.scenario.scenario import FlightPlan
 from tiltsim.vehicles.rotorcraft import initial_tilts

@@ -54,11 +54,11 @@ def distributions_figure(results: SweepResults, metrics: tuple[str, ...]) -> Fig
         middles = [np.median([value for _, value in one.values()] or [0.0]) for one in marked]
         for number, one in enumerate(marked):
             left = len(marked) > 1 and number == int(np.argmin(middles))
-            # Above a rising curve on its left, below it on its right.
-            shift, side = ((-5.0, 2.0), "right") if left else ((5.0, -8.0), "left")
             for text, (share, value) in one.items():
-                above = shift if left or share > LOW else (shift[0], 2.0)  # clear of the axis
-                place: dict[str, Any] = {"xytext": above, "textcoords": "offset points"}
+                # Above a rising curve on its left, below it on its right, clear of the axis.
+                above = left or share < LOW
+                shift, side = ((-5.0, 2.0), "right") if above else ((5.0, -8.0), "left")
+                place: dict[str, Any] = {"xytext": shift, "textcoords": "offset points"}
                 written = panel.annotate(text, (value, share), **place)
                 written.set(size="small", color=CYCLE[number % len(CYCLE)], ha=side)
                 written.set_in_layout(False)
