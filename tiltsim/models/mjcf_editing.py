@@ -23,6 +23,34 @@ from math import isfinite, prod
 
 from tiltsim.system.files import is_file, is_folder
 
+_PLAIN: Final = {
+    "gear": [1.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+    "dyntype": "none",
+    "gaintype": "fixed",
+    "gainprm": [1.0],
+    "biastype": "none",
+    "ctrllimited": "false",
+    "actlimited": "false",
+    "forcelimited": "false",
+}
+"""An actuator whose force is its control, whatever a user's file has as default."""
+MAX_BYTES: Final = 4 * 2**20  # size of the file and all files that it includes, together
+MAX_ELEMENTS: Final = 2_000
+"""XML elements, with included files and each replica counted.
+
+Ten times the elements of eight rotors on tilting arms. The time to edit a file grows with their
+square: with 2,000 some 3 s, with 5,000 above 15 s.
+"""
+MAX_SAMPLES: Final = 4096**2  # pixels of a texture, or points of a height field
+MAX_SIZE: Final = 100_000  # an attribute of ``<size>``
+MAX_VALUES: Final = 1_000  # user values of each element of a kind, or of a user's sensor
+MAX_FILES: Final = 10_000  # places at which the files are searched that it names
+_MODELS: Final = ("include", "model")  # elements that name MJCF
+_FOLDERS: Final = ("assetdir", "meshdir", "texturedir")
+"""Attributes of ``<compiler>`` that say where files are."""
+_TEXTS: Final = frozenset(("name", "class", "childclass", "file", "model"))
+"""Attributes that are names, of any spelling."""
+
 
 def parse_mjcf(path: Path) -> Any:
     """An MJCF file as dm_control's tree, or as one of the same interface on `mujoco.MjSpec`.
@@ -185,19 +213,6 @@ def add_hinge_torques(root: Any, name: str, hinges: int) -> None:
     _extend_keyframes(root, ctrl=hinges)
 
 
-_PLAIN: Final = {
-    "gear": [1.0, 0.0, 0.0, 0.0, 0.0, 0.0],
-    "dyntype": "none",
-    "gaintype": "fixed",
-    "gainprm": [1.0],
-    "biastype": "none",
-    "ctrllimited": "false",
-    "actlimited": "false",
-    "forcelimited": "false",
-}
-"""An actuator whose force is its control, whatever a user's file has as default."""
-
-
 def _add_actuator(root: Any, name: str, **attributes: Any) -> None:
     root.actuator.add("general", name=name, **(_PLAIN | attributes))
 
@@ -208,26 +223,6 @@ def _extend_keyframes(root: Any, act: int = 0, ctrl: int = 0) -> None:
             values = getattr(key, name)
             if values is not None:  # else MuJoCo takes zeros for all
                 setattr(key, name, [*values, *[0.0] * count])
-
-
-MAX_BYTES: Final = 4 * 2**20  # size of the file and all files that it includes, together
-MAX_ELEMENTS: Final = 2_000
-"""XML elements, with included files and each replica counted.
-
-Ten times the elements of eight rotors on tilting arms. The time to edit a file grows with their
-square: with 2,000 some 3 s, with 5,000 above 15 s.
-"""
-
-MAX_SAMPLES: Final = 4096**2  # pixels of a texture, or points of a height field
-MAX_SIZE: Final = 100_000  # an attribute of ``<size>``
-MAX_VALUES: Final = 1_000  # user values of each element of a kind, or of a user's sensor
-MAX_FILES: Final = 10_000  # places at which the files are searched that it names
-_MODELS: Final = ("include", "model")  # elements that name MJCF
-_FOLDERS: Final = ("assetdir", "meshdir", "texturedir")
-"""Attributes of ``<compiler>`` that say where files are."""
-
-_TEXTS: Final = frozenset(("name", "class", "childclass", "file", "model"))
-"""Attributes that are names, of any spelling."""
 
 
 def check_mjcf(path: Path) -> set[Path]:
