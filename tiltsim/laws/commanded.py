@@ -15,8 +15,9 @@ from tiltsim.laws.law import Law
 from tiltsim.laws.quadrotor import LAYOUT as QUADROTOR
 from tiltsim.laws.quadrotor import upright_columns
 from tiltsim.laws.rotor_loop import RotorLayout, layout_of_vehicle, rotor_loop
-from tiltsim.laws.rotorcraft import servo_lead, torque_free_columns
+from tiltsim.laws.rotorcraft import torque_free_columns
 from tiltsim.laws.tiltrotor import LAYOUT, singularity_columns
+from tiltsim.laws.vehicle_loop import servo_lead
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.scenario import FlightPlan, Scenario
 from tiltsim.vehicles.rotorcraft import OTHER_LAYOUT, ROTORCRAFT, rotorcraft_kind
@@ -111,6 +112,7 @@ def _commanded_loop(
         record,
         setup,
         tilts=lambda _seen, _rates, p, _knots: xp.stack([p.command.tilts, xp.zeros(tilts)], 1),
+        units=dict.fromkeys(sent, "rad"),
         records_commands=True,
         margins=margins,
         follows_position=lambda scenario: scenario.reference.kind != "attitude_altitude",

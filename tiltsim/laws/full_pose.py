@@ -14,10 +14,10 @@ from tiltsim.laws.rotor_loop import (
     RotorLayout,
     body_of_vehicle,
     layout_of_vehicle,
+    margins_of,
     rotor_loop,
-    table_of,
 )
-from tiltsim.laws.rotorcraft import rotor_stops, torque_free_columns
+from tiltsim.laws.rotorcraft import rotor_stops
 from tiltsim.laws.tiltrotor import singularity_columns
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.scenario import FlightPlan, Scenario
@@ -72,10 +72,6 @@ def full_pose_loop(layout: RotorLayout) -> ClosedLoop:
     is_multirotor = layout.model == "multirotor"
     record = Parameters if is_multirotor else changed_record(Parameters, vehicle=Vehicle)
 
-    def margins(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
-        failure, table = setup.parameters.law.failure, table_of(places, setup)
-        return torque_free_columns(places, table, samples, failure=failure)
-
     def speeds(seen: Seen, p: Any, knots: Any) -> Any:
         # A pod that turns across its thrust spans one plane with it at any angle: the rank of such
         # rotors' matrix changes only where one of them stops, whichever of them are lost.
@@ -89,7 +85,7 @@ def full_pose_loop(layout: RotorLayout) -> ClosedLoop:
         states=dict.fromkeys(places.names("tilt_command"), "rad"),
         initial=lambda plan: initial_tilts(plan)[0],
         tilts=tilts_in_states(0, places.tilts),
-        margins=margins if is_multirotor else _margins,
+        margins=margins_of(layout) if is_multirotor else _margins,
         signs=speeds,
         causes=lambda _sample, _setup: stops,
     )

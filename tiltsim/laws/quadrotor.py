@@ -45,7 +45,7 @@ class _Thrusting(RotorFunctions):
         return (0.0,) * 4
 
     def initial_state(self, plan: FlightPlan) -> Vector:
-        return initial_state(plan.scenario)
+        return (*initial_state(plan.scenario), *self.law.initial(plan))
 
     def controls(
         self, time: Any, qpos: Any, qvel: Any, act: Any, parameters: Any, knots: Any

@@ -22,7 +22,6 @@ from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.code.traceable import traceable
 from tiltsim_controllers.mathematics.linear import cross
 from tiltsim_controllers.mathematics.records import make_record_type, vector_of
-from tiltsim_controllers.mathematics.scalar import Values, Vector, scalar
 from tiltsim_controllers.vehicle.body import Body, inertia_matrix, inverse_inertia_matrix
 from tiltsim_controllers.vehicle.craft import craft_of
 from tiltsim_controllers.vehicle.rotors import wrench_map
@@ -100,15 +99,11 @@ def with_measured_acceleration(loop: ClosedLoop) -> ClosedLoop:
             turning=body_less(scenario, carried),
         )
 
-    @scalar
-    def controls(
-        time: float, qpos: Vector, qvel: Vector, act: Vector, parameters: Any, knots: Vector
-    ) -> Values:
+    @traceable
+    def controls(time: Any, qpos: Any, qvel: Any, act: Any, parameters: Any, knots: Any) -> Any:
         inner = parameters.inner
-        ctrl = inner_controls(time, qpos, (*qvel, 0.0, 0.0, 0.0), act, inner, knots)
-        measured = plant_angular_acceleration(
-            (*qpos,), (*qvel,), ctrl, loads(ctrl), parameters.layer
-        )
-        return inner_controls(time, qpos, (*qvel, *measured), act, inner, knots)
+        ctrl = inner_controls(time, qpos, xp.hstack([qvel, xp.zeros(3)]), act, inner, knots)
+        measured = plant_angular_acceleration(qpos, qvel, ctrl, loads(ctrl), parameters.layer)
+        return inner_controls(time, qpos, xp.hstack([qvel, measured]), act, inner, knots)
 
     return wrap_loop(loop, Layer("with_measured_acceleration", record, read, controls=controls))
