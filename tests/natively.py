@@ -7,11 +7,11 @@ from functools import lru_cache
 
 import numpy as np
 
-from tiltsim.arrays.traced_numbers import trace_scalar_code
 from tiltsim.closed_loop.choices import CHOICES
 from tiltsim.engines.machine_code import MachineCode
 from tiltsim_controllers.code.llvm_text import llvm_functions
 from tiltsim_controllers.code.program import trace_vectors
+from tiltsim_controllers.code.traceable import as_tuples, program_of
 
 RUN = """
 define void @run(ptr %values, ptr %results) nounwind {
@@ -56,7 +56,7 @@ def machine_code(program):
 
 
 def compiled(function, *like):
-    """A scalar function as machine code: of arguments as these, it returns a list of numbers.
+    """A function as machine code: of arguments as these, it returns a list of numbers.
 
     Choices are constants, as in flights; all other numbers are inputs.
     """
@@ -66,10 +66,10 @@ def compiled(function, *like):
 
 @lru_cache(maxsize=64)
 def _compiled(function, form):
-    def traced(lifting, given):
-        return numbers(lifting(function)(*_restored(form, iter(given[0]))))
+    def traced(values):
+        return numbers(as_tuples(function(*_restored(form, iter(values)))))
 
-    return machine_code(trace_scalar_code(traced, values=_size(form)))
+    return machine_code(program_of(traced, values=_size(form)))
 
 
 def _form(entry, name=""):
@@ -118,7 +118,7 @@ def compiled_law(inputs, size, law):
 
 
 def natively(function, *arguments):
-    """The numbers that a scalar function returns at arguments, as machine code computes them."""
+    """The numbers that a function returns at arguments, as machine code computes them."""
     return compiled(function, *arguments)(*arguments)
 
 

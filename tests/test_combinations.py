@@ -177,6 +177,13 @@ def paint(flight, _folder):
     overlay.paint(np.zeros((90, 160, 3), dtype=np.uint8), 0)
 
 
+def through_a_log(flight, folder):
+    """Write a flight as logs and read them."""
+    for suffix in ("mcap", "ulg"):
+        tiltsim.export(flight, folder / f"flight.{suffix}")
+        assert len(tiltsim.read_log(folder / f"flight.{suffix}")) == len(flight)
+
+
 USES_OF_FLIGHTS = {
     "plot": lambda flight, _folder: tiltsim.plot(flight),
     "several": lambda flight, _folder: tiltsim.plot([flight] * 2, labels=["a", "b"]),
@@ -186,6 +193,7 @@ USES_OF_FLIGHTS = {
     "_repr_html_": lambda flight, _folder: flight._repr_html_(),
     "to_pandas": lambda flight, _folder: flight.to_pandas(),
     "to_arrow": lambda flight, _folder: flight.to_arrow(),
+    "to_csv": lambda flight, folder: flight.to_csv(folder / "flight.csv"),
     "origin": lambda flight, _folder: flight.origin(),
     "save": of_file,
 }
@@ -279,6 +287,7 @@ def test_the_whole_public_interface_is_here():
     known = {*USES_OF_FLIGHTS, *USES_OF_SCENARIOS, *SLOW_USES_OF_SCENARIOS}
     # Loading is a part of saving; the base of environments and many of them are used by the others.
     known |= {"law", "xp", "load_flight", "Environment", "VectorEnv"}
+    known |= {"export", "read_log", "replay", "identify", "to_mcap", "to_ulog"}  # through_a_log
     assert public | methods | environments <= known
 
 
@@ -296,6 +305,13 @@ def test_every_flight_can_be_rendered(law, vehicle, tmp_path):
         for use in SLOW_USES_OF_FLIGHTS.values():
             _, line = attempt(use, flown(law, vehicle), tmp_path)
             assert not line or "OpenGL" in line
+
+
+@each_pair
+def test_every_flight_becomes_a_log_unless_it_stays_in_a_plane(law, vehicle, tmp_path):
+    if fits(law, vehicle):
+        _, line = attempt(through_a_log, flown(law, vehicle), tmp_path)
+        assert ("moves in a plane; choose csv" in line) == ("tilt_car" in vehicle), line
 
 
 @each_pair
@@ -334,6 +350,17 @@ NOT_FLOWN = {*DESCRIPTIVE, "variant"}
 """Tables that change nothing in a flight."""
 
 
+def companions(document):
+    """Values without which these tables are refused: a wall to push, an integrator."""
+    pushes = document.get("reference", {}).get("type") == "push"
+    if not pushes and not {"object", "tool", "payload"} & document.keys():
+        return {}
+    wall = {"name": "wall", "type": "wall", "position": [0.8, 0.0, 1.0], "size": [4.0, 4.0]}
+    below = {"position": [0.0, 0.0, -0.3], "length": 0.4}
+    touched = {"object": [wall], "tool": below} if pushes else {}
+    return {"simulation.integrator": "implicitfast", **touched}
+
+
 def changes(table, key=None):
     """The example of a table, and of one of its keys, as values by dotted key."""
     document = at = tomllib.loads(table.toml)
@@ -342,7 +369,7 @@ def changes(table, key=None):
         at = at[0] if isinstance(at, list) else at
     if key is not None:
         at[key.name] = tomllib.loads(f"value = {key.example}")["value"]
-    needed = dict(leaves(document))
+    needed = dict(leaves(document)) | companions(document)
     return {key: needed[key] for key in needed.keys() - {"controller.function", "vehicle.mjcf"}}
 
 

@@ -26,11 +26,12 @@ PRINTED = {
     "singularity_margins": r"amplitude 0\.7 rad: completed, smallest margin 1\.034 rad",
     "stability": r"stable: True\n.*altitude: 1\.021 rad/s",
     "linear_system": r"real parts from -31\.\d+ to -0\.0\d",
+    "identify": r"assumed: rms position error 0\.268\d m\nidentified: .* 0\.048\d m",
     "learning": r"actions \(6,\), best score [1-9]\d*\.\d",
 }
 """Text that each prints."""
 
-SLOW = {"first_flight", "stability", "csv_reference", "controllers", "learning", "wind"}
+SLOW = {"identify", "first_flight", "stability", "csv_reference", "controllers", "learning", "wind"}
 """Examples that take more than 3 s."""
 
 SHORT = sorted(

@@ -1,14 +1,12 @@
 """Flights in JAX agree with the other engines."""
 
-from __future__ import annotations
-
 import sys
 
 import numpy as np
 import pytest
 
 import tiltsim
-from tests.arrays.recorded_calls import LAYERED, MULTIROTORS, REFERENCES, SUPERVISED
+from tests.arrays.flown_scenarios import LAYERED, MULTIROTORS, REFERENCES, SUPERVISED
 from tests.laws.test_baselines import BASELINES
 from tests.laws.test_laws import GUST, LAWS
 from tests.laws.test_multirotor import TILTS, document

@@ -29,6 +29,16 @@ def test_a_name_with_quotes_is_found(folder):
     assert {file.name for file in folder.iterdir()} == {'my "own".xml', 'my "own".toml'}
 
 
+def test_a_wall_without_contacts_is_pointed_out(folder, capsys):
+    assert main(["new", "quadrotor"]) == 0
+    file = folder / "quadrotor.xml"
+    for name, words in {"wall": "passes through geom 'wall'", "wall_collision": ""}.items():
+        wall = f'<worldbody><geom name="{name}" type="box" size=".1 2 2" pos="3 0 0"/>'
+        file.write_text(file.read_text().replace("<worldbody>", wall, 1))
+        main(["run", "quadrotor.toml", "--set", "simulation.duration=0.04"])
+        assert words in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("existing", ["mine.xml", "mine.toml"])
 def test_files_are_overwritten_only_by_force(existing, folder, capsys):
     (folder / existing).write_text("kept")

@@ -154,7 +154,7 @@ def test_figures_of_sweeps_loops_and_maps():
         scenario, ("roll", "pitch"), (edges, edges), back, 25, "jax", None, all_of_them
     )
     (axes,) = attraction_figure(found).axes
-    assert axes.get_title(loc="left") == "37.5 % come back"
+    assert axes.get_title(loc="left") == "37.5 % of the initial states come back"
     assert len(axes.lines) == 2  # the curve and the scenario
     panels = attraction_panels({"one": found, "two": found}, columns=2).axes
     assert [axes.get_title(loc="left") for axes in panels] == ["one\n37.5 % | -", "two\n37.5 % | -"]

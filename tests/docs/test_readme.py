@@ -45,7 +45,7 @@ def test_the_first_blocks_of_the_readme_set_up_a_clone():
 def test_the_picture_of_the_readme_moves_and_loads_quickly():
     (name,) = re.findall(r"!\[[^\]]+\]\(([^)]+)\)", README)
     file = ROOT / name
-    assert file.stat().st_size < 3_000_000
+    assert file.stat().st_size < 1_500_000
     with Image.open(file) as picture:
         assert (picture.n_frames > 50, picture.info["loop"]) == (True, 0)
 

@@ -452,7 +452,7 @@ def test_the_documented_examples_run(tmp_path, monkeypatch, capsys):
     pytest.importorskip("gymnasium")
     monkeypatch.chdir(tmp_path)
     blocks = documented(arrays=False)
-    assert len(blocks) == 4
+    assert len(blocks) == 5
     names = {}
     for block in blocks:
         exec(compile(block, str(DOCS), "exec"), names)

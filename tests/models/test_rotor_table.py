@@ -88,6 +88,11 @@ SERVO = '<position name="tilt_2" joint="tilt_2" kp="1"/>'
         ('"rotor_3"', '"rotor_9"', "2 sites named rotor_1, rotor_2, ... without a gap"),
         ('name="rotor_speed_5"', 'name="spare"', "no actuator 'rotor_speed_5'"),
         ('"tilt_1"', '"swing"', "joint 'swing' is not one of a multirotor's"),
+        (
+            "</worldbody>",
+            '<body><freejoint/><geom size="1"/></body></worldbody>',
+            "joint without a name is not one of a multirotor's",
+        ),
         ('gear="0 0 8e-6 0 0 0"', "", "must be a general one with gear 0 0 Kf 0 0 +-Km"),
         (
             '<inertial pos="0 0 0"',

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import tiltsim
-from tests.arrays.recorded_calls import MULTIROTORS
+from tests.arrays.flown_scenarios import MULTIROTORS
 from tests.laws.test_laws import LAWS
 from tests.simulation.test_batch import EXACT, GAITS
 from tiltsim.errors import InputError, TiltsimError

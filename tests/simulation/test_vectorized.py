@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from contextlib import nullcontext
-
 import numpy as np
 import pytest
 
 import tiltsim
-from tests.arrays.recorded_calls import MULTIROTORS
+from tests.arrays.flown_scenarios import MULTIROTORS
 from tests.laws.test_baselines import BASELINES
 from tests.laws.test_laws import LAWS
 from tiltsim.arrays.flying import double_precision
-from tiltsim.arrays.values import LiftError
 from tiltsim.errors import InputError
 from tiltsim.laws.assembling import loop_of
 from tiltsim.scenario.loading import merge
@@ -82,16 +79,6 @@ def test_knots_of_other_points_come_from_the_plan_of_each():
     knots = jax.jit(lambda tree: plan(tree).knots)(changes)
     expected = plan_flight(tiltsim.parse_scenario(merge({**tables, **THESIS}, changes)))
     np.testing.assert_allclose(knots, expected.knots, rtol=0.0, atol=1e-13)
-
-
-def test_a_plan_that_cannot_be_lifted_hides_no_parameter(monkeypatch):
-    def plan_in_a_context(scenario):
-        with nullcontext():
-            return plan_flight(scenario) if scenario.vehicle.mass > 0.1 else None
-
-    monkeypatch.setattr("tiltsim.simulation.array_plan.plan_flight", plan_in_a_context)
-    with pytest.raises(LiftError, match=r"plan_in_a_context.*With has no form on arrays"):
-        tiltsim.vectorized(tiltsim.parse_scenario({**LAWS["attitude_altitude"], **THESIS}))
 
 
 @pytest.mark.parametrize("name", ["tilting hexarotor", "lqr"])

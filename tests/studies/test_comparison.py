@@ -68,7 +68,10 @@ def test_the_figure_has_every_flight(rows):
     figure = comparison_figure(rows)
     (axes,) = figure.axes
     assert len([line for line in axes.lines if len(line.get_xdata())]) == 2
-    assert [text.get_text() for text in figure.legends[0].get_texts()][:2] == ["given", "lqr"]
+    assert [text.get_text() for text in figure.legends[0].get_texts()][:2] == [
+        "the scenario's own",
+        "LQR",
+    ]
 
 
 @pytest.mark.parametrize(("fails_at", "found"), [(9.0, None), (2.3, 2.2), (0.9, 0.8)])

@@ -1,1 +1,1 @@
-"""Scalar code on arrays and symbols: lifted functions, and flights in JAX."""
+"""Flights in JAX: the programs of closed loops on arrays."""

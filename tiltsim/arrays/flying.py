@@ -1,7 +1,5 @@
 """Flights on equations of motion in JAX: the step and the sample of a loop as programs."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from functools import lru_cache, partial
@@ -9,8 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from tiltsim.arrays.jax_arrays import require_jax
-from tiltsim.arrays.jax_programs import InJax
+from tiltsim.arrays.jax_programs import InJax, require_jax
 from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.closed_loop.limits import SINGULAR, WITHIN_LIMITS
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup

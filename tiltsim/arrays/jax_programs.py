@@ -1,16 +1,27 @@
 """Functions of a closed loop in JAX: the same programs as on every other engine."""
 
 import sys
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable
 from typing import Any
 
-from tiltsim.arrays.jax_arrays import recomputes
-from tiltsim.arrays.lifting import Lifting
-from tiltsim.arrays.traced_numbers import trace_scalar_code
+from tiltsim.arrays.xla_flags import merges_loops
+from tiltsim.system.public import optional_package
 from tiltsim_controllers.code.jax_function import results_in_jax
-from tiltsim_controllers.code.program import InputVector
+from tiltsim_controllers.code.traceable import as_tuples, program_of
 
 Function = Callable[..., Any]
+
+
+def require_jax(purpose: str) -> Any:
+    """JAX. Raises `InputError`, which begins with the purpose, unless it is installed."""
+    return optional_package("jax", purpose, "'tiltsim[jax]'")
+
+
+def recomputes() -> bool:
+    """Whether XLA computes an intermediate value again wherever it is used."""
+    import jax
+
+    return jax.default_backend() == "cpu" and not merges_loops()
 
 
 class InJax:
@@ -28,7 +39,10 @@ class InJax:
         self._known: dict[Any, Function] = {}
 
     def __call__(self, function: Function) -> Function:
-        """A function whose arguments and results are nested tuples of numbers and arrays."""
+        """A function whose arguments and results are nested tuples of numbers and arrays.
+
+        A result that no array decides is a plain number.
+        """
 
         def run(*args: Any) -> Any:
             jax = sys.modules["jax"]
@@ -48,19 +62,16 @@ class InJax:
         sizes = {f"array_{i}": len(a) if a.ndim else 1 for i, a in enumerate(like)}
         structure: list[Any] = []
 
-        def traced(lifting: Lifting, given: tuple[InputVector, ...]) -> Iterable[Any]:
-            def entries() -> Iterator[Any]:
-                for vector, array in zip(given, like, strict=True):
-                    yield vector if array.ndim else vector[0]
-
-            following = entries()
-            leaves = [next(following) if leaf is None else leaf for leaf in fixed]
-            result = lifting(function)(*jax.tree.unflatten(tree, leaves))
-            found, shape = jax.tree.flatten(result)
+        def traced(*given: Any) -> list[Any]:
+            pairs = zip(given, like, strict=True)
+            entries = iter([vector if array.ndim else vector[0] for vector, array in pairs])
+            leaves = [next(entries) if leaf is None else leaf for leaf in fixed]
+            result = function(*jax.tree.unflatten(tree, leaves))
+            found, shape = jax.tree.flatten(as_tuples(result))
             structure[:] = [shape]
             return found
 
-        program = trace_scalar_code(traced, **sizes)
+        program = program_of(traced, **sizes)
         in_segments = recomputes()
 
         def run(arrays: list[Any]) -> Any:

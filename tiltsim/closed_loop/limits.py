@@ -1,9 +1,9 @@
 """Limits beyond which a vehicle has diverged, so wide that none returns from there."""
 
-from math import hypot
-from typing import Final
+from collections.abc import Iterable
+from typing import Any, Final
 
-from tiltsim_controllers.mathematics.scalar import Vector, scalar
+from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.references.trajectories import ReferenceParameters, position_reference
 
 MAX_POSITION_ERROR: Final = 1e4  # m
@@ -22,28 +22,34 @@ ROTOR_SPEED: Final = 6
 """The code of the first rotor; the other rotors have the next ones."""
 
 
-@scalar
-def horizontal_error(
-    time: float, values: Vector, reference: ReferenceParameters, knots: Vector
-) -> float:
+def horizontal_error(time: Any, values: Any, reference: ReferenceParameters, knots: Any) -> Any:
     """Horizontal distance (m) to the reference.
 
     Args:
-        time: s
-        values: fields of a sample after its time; they begin with the position, m
-        reference, knots: the reference trajectory
+        time: s.
+        values: Fields of a sample after its time; they begin with the position, m.
+        reference, knots: The reference trajectory.
     """
     target = position_reference(time, reference, knots)
-    return hypot(target[0] - values[0], target[1] - values[1])
+    return xp.hypot(target[0] - values[0], target[1] - values[1])
 
 
-@scalar
-def altitude_error(
-    time: float, values: Vector, reference: ReferenceParameters, knots: Vector
-) -> float:
+def altitude_error(time: Any, values: Any, reference: ReferenceParameters, knots: Any) -> Any:
     """Absolute altitude error (m).
 
     Args:
-        time, values, reference, knots: as in `horizontal_error`
+        time, values, reference, knots: See `horizontal_error`.
     """
     return abs(position_reference(time, reference, knots)[2] - values[2])
+
+
+def first_limit(exceeded: Iterable[tuple[Any, int]]) -> Any:
+    """The code of the first limit that is exceeded, `WITHIN_LIMITS` for none.
+
+    Args:
+        exceeded: Whether each is exceeded, and its code.
+    """
+    found: Any = float(WITHIN_LIMITS)
+    for is_exceeded, code in reversed([*exceeded]):
+        found = xp.where(is_exceeded, float(code), found)
+    return found

@@ -1,4 +1,4 @@
-"""A closed loop: a controller, as scalar code, around the model of a vehicle.
+"""A closed loop: a controller, as functions of arrays, around the model of a vehicle.
 
 Whichever controller it holds, a closed loop has four parts: the `Dynamics` of the model, the
 `Sampling` of the controller, the `Columns` of a flight and the `Monitoring` of its end.
@@ -10,27 +10,36 @@ import zlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from tiltsim.closed_loop.vehicle_kind import VehicleKind
 from tiltsim.models.parts import ExtraActuators
+from tiltsim.scenario.scenario import FlightPlan, Scenario
 from tiltsim.system.text import Quantity, in_words
 from tiltsim_controllers.mathematics.records import flatten, record_dtype, record_size
-from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector, scalar
-
-if TYPE_CHECKING:
-    from tiltsim.scenario.scenario import FlightPlan, Scenario
+from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector
 
 
 class Sizes(NamedTuple):
-    """Lengths of MuJoCo's vectors."""
+    """Lengths of MuJoCo's vectors, of ``qpos`` and ``qvel`` the vehicle's part.
+
+    Functions of a loop see the last two, which only flights with objects have, at the end of
+    ``act``.
+    """
 
     qpos: int
     qvel: int
     act: int
     ctrl: int
+    others: int = 0  # of qpos: objects behind the vehicle
+    history: int = 0  # readings of sensors in MuJoCo's state
+
+    @property
+    def after_act(self) -> int:
+        """Numbers that functions of a loop see behind ``act``."""
+        return self.others + self.history
 
 
 class ControlSetup(NamedTuple):
@@ -73,12 +82,9 @@ class Dynamics:
     commands_thrusts: bool = False
 
 
-@scalar
-def _held_controls(
-    time: float, qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector, parameters: Any
-) -> Values:
+def _held_controls(time: Any, qpos: Any, qvel: Any, act: Any, ctrl: Any, parameters: Any) -> Any:
     """For controllers whose controls stay as they were sampled."""
-    return (*ctrl,)
+    return ctrl
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,9 +92,9 @@ class Sampling:
     """The control step, at the samples of the controller and between them.
 
     Attributes:
-        controls: Scalar function ``(time, qpos, qvel, act, parameters, knots) -> ctrl``: the whole
+        controls: Function ``(time, qpos, qvel, act, parameters, knots) -> ctrl``: the whole
             step.
-        hold: Scalar function ``(time, qpos, qvel, act, ctrl, parameters) -> ctrl``: the controls
+        hold: Function ``(time, qpos, qvel, act, ctrl, parameters) -> ctrl``: the controls
             between the samples of a held controller.
     """
 
@@ -101,7 +107,7 @@ class Columns:
     """The samples of a flight, and the columns derived from them.
 
     Attributes:
-        observe: Scalar function ``(qpos, qvel, act, ctrl) -> values`` of the kind's fields and
+        observe: Function ``(qpos, qvel, act, ctrl) -> values`` of the kind's fields and
             ``fields``.
         derive: ``(samples by field, setup) -> columns``: references, determinant, margin and the
             columns in ``units``.
@@ -118,8 +124,7 @@ class Columns:
     observe_reads_controls: bool = False
 
 
-@scalar
-def nothing_singular(time: float, values: Vector, parameters: Any, knots: Vector) -> tuple[float]:
+def nothing_singular(time: Any, values: Any, parameters: Any, knots: Any) -> tuple[float]:
     """For controllers that are singular nowhere."""
     return (1.0,)
 
@@ -129,7 +134,7 @@ class Monitoring:
     """Where the controller becomes singular: numbers that have to keep their sign.
 
     Attributes:
-        sign_check_values: Scalar function ``(time, values, parameters, knots) -> numbers``, from
+        sign_check_values: Function ``(time, values, parameters, knots) -> numbers``, from
             the time (s) of a sample and its ``values`` as `Columns.observe` returns them.
         causes: ``(sample by field, setup) -> texts``: why the flight ends where each of them
             reaches zero.
@@ -146,16 +151,16 @@ class Equations:
     """A controller on equations of motion: as the thesis prints them, or of a rigid body.
 
     Attributes:
-        inputs: Scalar function ``(time, state, parameters, knots) -> inputs``: the controller.
+        inputs: Function ``(time, state, parameters, knots) -> inputs``: the controller.
         inputs_size: Number of inputs.
-        rates: Scalar function ``(time, state, inputs, parameters, knots, disturbance) ->
+        rates: Function ``(time, state, inputs, parameters, knots, disturbance) ->
             derivative`` of the state; the disturbance is an acceleration (m/s^2, world).
         initial: ``(plan, setup) -> state`` at time zero.
-        observe: Scalar function ``(time, state, inputs, parameters, knots) -> values`` of the
+        observe: Function ``(time, state, inputs, parameters, knots) -> values`` of the
             loop's `sample_fields` after the time; ``inputs`` are in force at that time.
-        project_onto_limits: Scalar function ``(state, parameters) -> state`` for the end of each
+        project_onto_limits: Function ``(state, parameters) -> state`` for the end of each
             step: puts back what has passed a limit. None where there are no limits.
-        tilts: Scalar function ``(time, state, parameters, knots) -> tilt angles`` (rad), where
+        tilts: Function ``(time, state, parameters, knots) -> tilt angles`` (rad), where
             they follow the plan exactly.
     """
 

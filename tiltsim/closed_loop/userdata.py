@@ -1,9 +1,9 @@
 """Layout of MuJoCo's `userdata`, and the times at which a control step is evaluated."""
 
-from math import floor
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
-from tiltsim_controllers.mathematics.scalar import Floats, Vector, scalar
+from tiltsim_controllers.code.arrays import xp
+from tiltsim_controllers.mathematics.scalar import Floats, Vector
 
 
 class Header(NamedTuple):
@@ -35,20 +35,17 @@ def steps_taken(header: Vector | Floats) -> int:
     return int(header[EVALUATIONS] // header[EVALUATIONS_PER_STEP])
 
 
-@scalar
-def just_after(time: float) -> float:
+def just_after(time: Any) -> Any:
     """A time (s) at which an event at ``time`` has begun."""
     return time * _AFTER
 
 
-@scalar
-def just_before(time: float) -> float:
+def just_before(time: Any) -> Any:
     """A time (s) at which an event at ``time`` has not begun."""
     return time * _BEFORE
 
 
-@scalar
-def evaluation_time(evaluations: float, evaluations_per_step: float, timestep: float) -> float:
+def evaluation_time(evaluations: Any, evaluations_per_step: Any, timestep: Any) -> Any:
     """Time (s) for the next evaluation of the control step.
 
     An event between two steps, as a fault or a corner of a gait, belongs wholly to the later one:
@@ -60,10 +57,7 @@ def evaluation_time(evaluations: float, evaluations_per_step: float, timestep: f
         evaluations_per_step: 4 for RK4, else 1.
         timestep: s.
     """
-    step = floor(evaluations / evaluations_per_step)
+    step = xp.floor(evaluations / evaluations_per_step)
     stage = evaluations - step * evaluations_per_step
-    if stage == 0.0:
-        return _AFTER * (step * timestep)  # `just_after`, written out: a call takes time in Python
-    if stage == 3.0:
-        return _BEFORE * ((step + 1.0) * timestep)  # `just_before`
-    return (step + 0.5) * timestep
+    begin, end = just_after(step * timestep), just_before((step + 1.0) * timestep)
+    return xp.where(stage == 0.0, begin, xp.where(stage == 3.0, end, (step + 0.5) * timestep))

@@ -6,15 +6,14 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from tiltsim.models.parts import ExtraActuators
 from tiltsim.models.vehicle_parts import MAX_ROTORS
+from tiltsim.scenario.scenario import FlightPlan, Scenario
+from tiltsim.system.text import Quantity
 from tiltsim_controllers.mathematics.scalar import Floats, Vector
 
 if TYPE_CHECKING:
     import mujoco
-
-    from tiltsim.models.parts import ExtraActuators
-    from tiltsim.scenario.scenario import FlightPlan, Scenario
-    from tiltsim.system.text import Quantity
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +27,7 @@ class VehicleKind:
         compile: ``(scenario, law_states, extra_actuators, userdata_size, visuals) -> model``.
             Raises `ValueError` where MuJoCo cannot build it.
         initial_motion: ``(plan) -> qpos, qvel`` at time zero.
-        limit_exceeded: Scalar function ``(time, values, reference, knots, follows_position) ->
+        limit_exceeded: Function ``(time, values, reference, knots, follows_position) ->
             code`` of the first limit of `tiltsim.closed_loop.limits` that a sample exceeds;
             ``values`` begin with the observed fields.
         metrics: ``(columns, scenario, follows_position) -> metrics``, without the metrics that all
@@ -41,7 +40,7 @@ class VehicleKind:
     thrusts: Callable[[Mapping[str, Floats], Scenario], dict[str, Floats]]
     compile: Callable[[Scenario, int, tuple[ExtraActuators, ...], int, bool], mujoco.MjModel]
     initial_motion: Callable[[FlightPlan], tuple[Vector, Vector]]
-    limit_exceeded: Callable[..., int]
+    limit_exceeded: Callable[..., Any]
     metrics: Callable[[Mapping[str, Floats], Scenario, bool], dict[str, Any]]
 
     @property

@@ -5,6 +5,7 @@ The text is a template: words in ``<...>`` are numbers that are known when it is
 
 from typing import Final
 
+from tiltsim.engines.base import Vectors
 from tiltsim.engines.programs import HEAD_SIZE, SIDES, RecorderHead
 from tiltsim_controllers.code.lanes import Lanes
 
@@ -27,6 +28,9 @@ fly:
   %qpos = load ptr, ptr %qpos_at
   %qvel_at = getelementptr i8, ptr %data, i64 <qvel>
   %qvel = load ptr, ptr %qvel_at
+  %others = getelementptr double, ptr %qpos, i64 <vehicle_size>
+  %history_at = getelementptr i8, ptr %data, i64 <history>
+  %history = load ptr, ptr %history_at
   %act_at = getelementptr i8, ptr %data, i64 <act>
   %act = load ptr, ptr %act_at
   %ctrl_at = getelementptr i8, ptr %data, i64 <ctrl>
@@ -41,10 +45,10 @@ fly:
   %samples = or i1 %continuous, %due
   br i1 %samples, label %sampled, label %held
 sampled:
-  call void @controls(ptr %header, ptr %qpos, ptr %qvel, ptr %act, ptr %ctrl, ptr %user, ptr %ctrl)
+  call void @controls(<state>, ptr %ctrl)
   br label %controlled
 held:
-  call void @hold(ptr %header, ptr %qpos, ptr %qvel, ptr %act, ptr %ctrl, ptr %user, ptr %ctrl)
+  call void @hold(<state>, ptr %ctrl)
   br label %controlled
 controlled:
   %recorder_at = getelementptr double, ptr %header, i64 <recorder>
@@ -66,8 +70,7 @@ take:
   %numbers = mul i64 %row_number, <width>
   %first = add i64 %numbers, <rows_at>
   %row = getelementptr double, ptr %recorder, i64 %first
-  call void @sample(ptr %header, ptr %qpos, ptr %qvel, ptr %act, ptr %ctrl, ptr %user,
-                    ptr %recorder, ptr %row)
+  call void @sample(<state>, ptr %recorder, ptr %row)
   %ends_at = getelementptr double, ptr %row, i64 <width>
   %ends = load double, ptr %ends_at
   call void @took(ptr %recorder, i1 true, double %ends)
@@ -90,7 +93,7 @@ count_on:
 exit:
   ret void
 }
-"""
+""".replace("<state>", "ptr %" + ", ptr %".join(("header", *Vectors._fields, "ctrl", "user")))
 """The control callback: it evaluates the control step and, if it is due, takes a sample.
 
 Once a recording is over, the controls are NaN: MuJoCo warns of them and a batch stops there.

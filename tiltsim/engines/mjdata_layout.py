@@ -22,11 +22,11 @@ _PROBE: Final = """
   <size nuserdata="40503"/>
   <worldbody><body><joint name="hinge"/><geom size="1"/></body></worldbody>
   <actuator><general joint="hinge" dyntype="integrator"/></actuator>
-  <sensor><jointpos joint="hinge"/></sensor>
+  <sensor><jointpos joint="hinge" nsample="1"/></sensor>
 </mujoco>
 """
 _TIME: Final = 0.7853981634123456
-_ARRAYS: Final = ("qpos", "qvel", "act", "ctrl", "userdata")
+_ARRAYS: Final = ("qpos", "qvel", "act", "history", "ctrl", "userdata")
 
 _MODEL_BYTES: Final = 2048
 _DATA_BYTES: Final = 1 << 20
@@ -43,6 +43,7 @@ class Layout(NamedTuple):
     qpos: int  # in mjData, as all below: the address of an array of floats
     qvel: int
     act: int
+    history: int
     ctrl: int
     userdata: int
 

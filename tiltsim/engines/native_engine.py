@@ -43,6 +43,7 @@ def compile_control(key: ProgramKey) -> Any:
         control_period=CONTROL_PERIOD,
         recorder=RECORDER,
         controls=loop.dynamics.sizes.ctrl,
+        vehicle_size=loop.dynamics.sizes.qpos,
         nan=nan,
         width=width,
     )

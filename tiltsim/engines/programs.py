@@ -1,11 +1,8 @@
 """The functions of a closed loop as programs of a few vectors."""
 
-from collections.abc import Callable, Iterable, Sequence
-from math import isfinite
+from collections.abc import Callable
 from typing import Any, Final, NamedTuple
 
-from tiltsim.arrays.lifting import Lifting
-from tiltsim.arrays.traced_numbers import FUNCTIONS, trace_scalar_code
 from tiltsim.closed_loop.choices import Choices, ProgramKey
 from tiltsim.closed_loop.limits import SINGULAR, WITHIN_LIMITS
 from tiltsim.closed_loop.userdata import (
@@ -15,13 +12,13 @@ from tiltsim.closed_loop.userdata import (
     TIMESTEP,
     evaluation_time,
 )
+from tiltsim.engines.base import Vectors
 from tiltsim.equations.solvers import Integration, make_step
+from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.code.program import InputVector, Program
-from tiltsim_controllers.code.tracing import Number, make
+from tiltsim_controllers.code.traceable import program_of
 from tiltsim_controllers.mathematics.records import record_size, unflatten
 from tiltsim_controllers.references.trajectories import ReferenceParameters
-
-Traced = Callable[..., Iterable[Number]]
 
 KEPT: Final = 64
 """Programs of each kind that are kept; each closed loop, gait type and decoupler has its own."""
@@ -57,7 +54,7 @@ class LoopPrograms:
     def __init__(self, key: ProgramKey) -> None:
         self._loop, self._key = key.loop, key
 
-    def _setup(self, user: InputVector) -> tuple[Any, InputVector]:
+    def setup(self, user: InputVector) -> tuple[Any, InputVector]:
         """Parameters and knots from their vector."""
         loop, choices = self._loop, self._key.parameters
         parameters = record_with_choices(loop.parameters, user, choices)
@@ -78,32 +75,36 @@ class LoopPrograms:
         """
         loop, sampling = self._loop, self._loop.sampling
         sizes = loop.dynamics.sizes._asdict()
-        vectors = {"header": HEADER_SIZE, **sizes, "user": self.user_size}
+        state = {name: sizes[name] for name in (*Vectors._fields, "ctrl")}
+        vectors = {"header": HEADER_SIZE, **state, "user": self.user_size}
 
-        def controls(lifting: Lifting, given: Sequence[InputVector]) -> Any:
-            header, qpos, qvel, act, _, user = given
-            time = _next_time(lifting, header)
-            return lifting(sampling.controls)(time, qpos, qvel, act, *self._setup(user))
+        def controls(header: Any, qpos: Any, qvel: Any, *given: Any) -> Any:
+            *act, _, user = given
+            return sampling.controls(
+                _next_time(header), qpos, qvel, xp.hstack(act), *self.setup(user)
+            )
 
-        def hold(lifting: Lifting, given: Sequence[InputVector]) -> Any:
-            header, qpos, qvel, act, ctrl, user = given
-            time, (parameters, _) = _next_time(lifting, header), self._setup(user)
-            return lifting(sampling.hold)(time, qpos, qvel, act, tuple(ctrl), parameters)
+        def hold(header: Any, qpos: Any, qvel: Any, *given: Any) -> Any:
+            (*act, ctrl, user), time = given, _next_time(header)
+            return sampling.hold(time, qpos, qvel, xp.hstack(act), ctrl, self.setup(user)[0])
 
-        def sample(lifting: Lifting, given: Sequence[InputVector]) -> Iterable[Number]:
-            header, qpos, qvel, act, ctrl, user, recorder = given
-            count, per_step = header[EVALUATIONS], header[EVALUATIONS_PER_STEP]
-            start = make("mul", make("div", count, per_step), header[TIMESTEP])
-            values = lifting(loop.columns.observe)(qpos, qvel, act, tuple(ctrl))
-            return self._checked(lifting, start, values, user, recorder)[0]
+        def observe(_header: Any, qpos: Any, qvel: Any, *given: Any) -> Any:
+            *act, ctrl, _ = given
+            return loop.columns.observe(qpos, qvel, xp.hstack(act), ctrl)
 
-        def observe(lifting: Lifting, given: Sequence[InputVector]) -> Iterable[Number]:
-            _, qpos, qvel, act, ctrl, _ = given
-            return lifting(loop.columns.observe)(qpos, qvel, act, tuple(ctrl))
+        def sample(header: Any, *given: Any) -> Any:
+            *_, user, recorder = given
+            start = header[EVALUATIONS] / header[EVALUATIONS_PER_STEP] * header[TIMESTEP]
+            return self._checked(start, observe(header, *given[:-1]), user, recorder)[0]
 
-        functions = {"controls": controls, "hold": hold, "observe": observe, "sample": sample}
+        functions: dict[str, Callable[..., Any]] = {
+            "controls": controls,
+            "hold": hold,
+            "observe": observe,
+            "sample": sample,
+        }
         sizes = {"sample": {**vectors, "recorder": HEAD_SIZE + SIDES}}
-        return {n: trace_scalar_code(functions[n], **sizes.get(n, vectors)) for n in names}
+        return {n: program_of(functions[n], **sizes.get(n, vectors)) for n in names}
 
     def on_equations(self, states: int, solver: str, held: bool, *names: str) -> dict[str, Program]:
         """Programs of the equations' state with the inputs in force.
@@ -121,27 +122,23 @@ class LoopPrograms:
         assert equations is not None  # other loops do not fly on equations
         step, size = make_step(equations, solver), states + equations.inputs_size
 
-        def stepped(samples: bool) -> Traced:
-            def run(lifting: Lifting, given: Sequence[InputVector]) -> Iterable[Number]:
-                (index,), now, (timestep, *disturbance), user = given
-                setup = *self._setup(user), tuple(disturbance)
-                integration = Integration(timestep, int(held), *setup)
-                time, force = make("mul", index, timestep), tuple(now[states:])
-                state, force = lifting(step)(time, list(now[:states]), force, samples, integration)
-                return (*state, *force)
+        def stepped(samples: bool) -> Callable[..., Any]:
+            def run(index: Any, now: Any, settings: Any, user: InputVector) -> Any:
+                timestep, setup = settings[0], self.setup(user)
+                integration = Integration(timestep, int(held), *setup, settings[1:])
+                return step(index[0] * timestep, now[:states], now[states:], samples, integration)
 
             return run
 
-        def sampled(samples: bool) -> Traced:
-            def run(lifting: Lifting, given: Sequence[InputVector]) -> Iterable[Number]:
-                (index,), now, (timestep, *_), user, recorder = given
-                time, setup = make("mul", index, timestep), self._setup(user)
-                state, force = list(now[:states]), now[states:]
+        def sampled(samples: bool) -> Callable[..., Any]:
+            def run(index: Any, now: Any, settings: Any, user: InputVector, recorder: Any) -> Any:
+                time, setup = index[0] * settings[0], self.setup(user)
+                state, force = now[:states], now[states:]
                 if samples:
-                    force = lifting(equations.inputs)(time, state, *setup)
-                values = lifting(equations.observe)(time, state, tuple(force), *setup)
-                sample, checked = self._checked(lifting, time, values, user, recorder)
-                return *sample, *(make("copysign", 1.0, number) for number in checked)
+                    force = equations.inputs(time, state, *setup)
+                values = equations.observe(time, state, force, *setup)
+                sample, checked = self._checked(time, values, user, recorder)
+                return sample, xp.copysign(1.0, checked)
 
             return run
 
@@ -152,43 +149,31 @@ class LoopPrograms:
         def traced(name: str) -> Program:
             what, _, when = name.partition("_")
             function, vectors = kinds[what]
-            return trace_scalar_code(function(when == "sampled"), **vectors)
+            return program_of(function(when == "sampled"), **vectors)
 
         return {name: traced(name) for name in names}
 
-    def _checked(
-        self,
-        lifting: Lifting,
-        time: Number,
-        values: Iterable[Number],
-        user: InputVector,
-        recorder: InputVector,
-    ) -> tuple[tuple[Number, ...], tuple[Number, ...]]:
+    def _checked(self, time: Any, values: Any, user: InputVector, recorder: Any) -> tuple[Any, Any]:
         """A sample and whether it ends the flight as the monitor would; numbers with sign checks.
 
         A sign that is zero in the recorder is not known yet.
         """
-        loop, values, (parameters, knots) = self._loop, tuple(values), self._setup(user)
+        loop, (parameters, knots) = self._loop, self.setup(user)
         reference = record_with_choices(
             ReferenceParameters, recorder[REFERENCE:], self._key.reference
         )
-        checked = tuple(lifting(loop.monitoring.sign_check_values)(time, values, parameters, knots))
-        follows = make("ne", recorder[REFERENCE - 1], 0.0)
-        code = lifting(loop.kind.limit_exceeded)(time, values, reference, knots, follows)
-        ends = make("ne", code, float(WITHIN_LIMITS))
-        for value in values:
-            ends = make("or", ends, make("not", FUNCTIONS[isfinite](value)))
-        for number, before in zip(checked, recorder[HEAD_SIZE:]):
-            vanishes = make("lt", make("abs", number), SINGULAR)
-            differs = make("ne", make("copysign", 1.0, number), before)
-            crossed = make("and", make("ne", before, 0.0), differs)
-            ends = make("or", ends, make("or", vanishes, crossed))
-        return (time, *values, ends), checked
+        checked = xp.array(loop.monitoring.sign_check_values(time, values, parameters, knots))
+        follows = recorder[REFERENCE - 1] != 0.0
+        limit = loop.kind.limit_exceeded(time, values, reference, knots, follows)
+        before = recorder[HEAD_SIZE : HEAD_SIZE + len(checked)]
+        crossed = (before != 0.0) & (xp.copysign(1.0, checked) != before)
+        ends = limit != float(WITHIN_LIMITS)
+        for has_ended in (*~xp.isfinite(values), *((abs(checked) < SINGULAR) | crossed)):
+            ends = ends | has_ended
+        return xp.hstack([time, values, ends]), checked
 
 
-def record_with_choices(
-    record: type[tuple[Any, ...]], numbers: InputVector, choices: Choices
-) -> Any:
+def record_with_choices(record: type[tuple[Any, ...]], numbers: Any, choices: Choices) -> Any:
     """A record whose choices are constants.
 
     Args:
@@ -201,7 +186,6 @@ def record_with_choices(
     return unflatten(record, (known[i] if i in known else numbers[i] for i in range(size)))
 
 
-def _next_time(lifting: Lifting, header: InputVector) -> Number:
+def _next_time(header: Any) -> Any:
     """The time (s) of the next evaluation of the control step."""
-    numbers = header[EVALUATIONS], header[EVALUATIONS_PER_STEP], header[TIMESTEP]
-    return lifting(evaluation_time)(*numbers)
+    return evaluation_time(header[EVALUATIONS], header[EVALUATIONS_PER_STEP], header[TIMESTEP])

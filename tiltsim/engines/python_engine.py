@@ -17,7 +17,7 @@ from tiltsim.closed_loop.userdata import (
     TIMESTEP,
     evaluation_time,
 )
-from tiltsim.engines.base import Callback, Engine, EngineName, check_model
+from tiltsim.engines.base import Callback, Engine, EngineName, check_model, vectors_of
 from tiltsim.engines.programs import KEPT, LoopPrograms
 from tiltsim.system.files import one_thread_at_a_time
 from tiltsim_controllers.code.program import Program
@@ -34,7 +34,9 @@ def control_program(key: ProgramKey, name: str) -> Program:
 
 
 def control_step(assembly: Assembly, user: list[float], name: str) -> Callable[..., Values]:
-    """A function ``(header, qpos, qvel, act, ctrl)`` of a loop, with parameters and knots bound.
+    """A function ``(header, *vectors, ctrl)`` of a loop, with parameters and knots bound.
+
+    The vectors are `tiltsim.engines.base.Vectors`.
 
     Expressions of these alone are evaluated once.
 
@@ -54,14 +56,17 @@ def control_step(assembly: Assembly, user: list[float], name: str) -> Callable[.
         numbers = header[EVALUATIONS], header[EVALUATIONS_PER_STEP], header[TIMESTEP]
         return evaluation_time(*numbers)
 
-    def controls(header: list[float], *state: Vector) -> Values:
-        return loop.sampling.controls(time_of(header), *state[:3], parameters, knots)
+    def controls(header: list[float], qpos: Vector, qvel: Vector, *act: Vector) -> Values:
+        seen = [number for part in act[:-1] for number in part]
+        return loop.sampling.controls(time_of(header), qpos, qvel, seen, parameters, knots)
 
-    def hold(header: list[float], *state: Vector) -> Values:
-        return loop.sampling.hold(time_of(header), *state, parameters)
+    def hold(header: list[float], qpos: Vector, qvel: Vector, *act: Vector) -> Values:
+        seen, ctrl = [number for part in act[:-1] for number in part], act[-1]
+        return loop.sampling.hold(time_of(header), qpos, qvel, seen, ctrl, parameters)
 
-    def observe(_header: list[float], *state: Vector) -> Values:
-        return loop.columns.observe(*state)
+    def observe(_header: list[float], qpos: Vector, qvel: Vector, *act: Vector) -> Values:
+        seen = [number for part in act[:-1] for number in part]
+        return loop.columns.observe(qpos, qvel, seen, act[-1])
 
     return {"controls": controls, "hold": hold, "observe": observe}[name]
 
@@ -76,8 +81,8 @@ class PythonEngine(Engine):
         user = data.userdata[HEADER_SIZE:].tolist()
         controls = control_step(assembly, user, "controls")
         # Views of MuJoCo's memory; a look-up at every call would take a tenth of the callback.
-        vectors = data.qpos, data.qvel, data.act, data.ctrl
-        qpos, qvel, act, ctrl = (memoryview(vector) for vector in vectors)
+        vectors: Any = *vectors_of(assembly.loop, data), data.ctrl
+        qpos, qvel, act, others, history, ctrl = (memoryview(vector) for vector in vectors)
         header: Any = memoryview(data.userdata[:HEADER_SIZE])
         period = header[CONTROL_PERIOD]
         hold = control_step(assembly, user, "hold") if period else controls
@@ -90,7 +95,7 @@ class PythonEngine(Engine):
             sampled = period == 0.0 or count % period == 0.0
             step = controls if sampled else hold
             held = () if sampled else ctrl.tolist()
-            state = qpos.tolist(), qvel.tolist(), act.tolist()
+            state = qpos.tolist(), qvel.tolist(), act.tolist(), others.tolist(), history.tolist()
             write_controls(*step(header.tolist(), *state, held))
             header[EVALUATIONS] = count + 1.0
 

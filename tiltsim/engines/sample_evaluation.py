@@ -1,7 +1,7 @@
-"""Scalar functions over the samples of a flight, compiled once that pays off."""
+"""Functions over the samples of a flight, compiled once that pays off."""
 
 import ctypes
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from functools import lru_cache
 from itertools import pairwise
 from typing import Any, Final, NamedTuple
@@ -9,8 +9,6 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from tiltsim.arrays.lifting import Lifting
-from tiltsim.arrays.traced_numbers import trace_scalar_code
 from tiltsim.closed_loop.choices import Choices, choices_of
 from tiltsim.closed_loop.loop import ControlSetup
 from tiltsim.engines.glue import ROWS, filled
@@ -20,6 +18,7 @@ from tiltsim.system.files import one_thread_at_a_time
 from tiltsim_controllers.code.llvm_text import llvm_functions
 from tiltsim_controllers.code.program import InputVector, Program
 from tiltsim_controllers.code.python_source import python_function
+from tiltsim_controllers.code.traceable import program_of
 from tiltsim_controllers.mathematics.records import leaves, record_size, unflatten
 from tiltsim_controllers.mathematics.scalar import Floats, Values
 
@@ -38,10 +37,10 @@ def flights_in(time: Floats) -> int:
 def evaluate_over_samples(
     function: Callable[..., Values], width: int, time: Floats, states: Floats, setup: ControlSetup
 ) -> Floats:
-    """Evaluate a scalar function for every sample.
+    """Evaluate a function for every sample.
 
     Args:
-        function: Scalar function ``(time, state, parameters, knots) -> values``.
+        function: Function ``(time, state, parameters, knots) -> values``.
         width: Number of values that it returns.
         time: Times of the samples (N,), s.
         states: The fields of the samples that the function reads, shape (N, fields).
@@ -62,7 +61,7 @@ def evaluate_over_samples(
 
 
 class Row(NamedTuple):
-    """A scalar function ``(time, state, parameters, knots) -> values`` and its tracing arguments.
+    """A function ``(time, state, parameters, knots) -> values`` and its tracing arguments.
 
     Attributes:
         function: The function.
@@ -97,12 +96,11 @@ def _flights(setup: ControlSetup, samples: int) -> Iterator[tuple[slice, Control
 @one_thread_at_a_time
 @lru_cache(maxsize=KEPT)
 def _program(row: Row) -> Program:
-    def traced(lifting: Lifting, given: Sequence[InputVector]) -> Any:
-        (time,), state, user = given
+    def traced(time: Any, state: Any, user: InputVector) -> Any:
         parameters = record_with_choices(row.record, user, row.choices)
-        return lifting(row.function)(time, state, parameters, user[record_size(row.record) :])
+        return row.function(time[0], state, parameters, user[record_size(row.record) :])
 
-    return trace_scalar_code(traced, time=1, state=row.state, user=row.user)
+    return program_of(traced, time=1, state=row.state, user=row.user)
 
 
 def _in_python(row: Row, _width: int, time: Floats, states: Floats, user: Floats) -> Floats:

@@ -12,8 +12,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from tiltsim.arrays.jax_arrays import require_jax
-from tiltsim.arrays.jax_programs import InJax
+from tiltsim.arrays.jax_programs import InJax, require_jax
 from tiltsim.closed_loop.limits import WITHIN_LIMITS
 from tiltsim.closed_loop.loop import ClosedLoop
 from tiltsim.env.task import Task
@@ -229,7 +228,7 @@ class EnvFunctions:
         qvel, act, names = self._qvel, self._act, self._task.observed.bounds
         quaternion = state[QW : QW + 4]
         rotation = self._rotation(*quaternion)
-        reference, spins = planned.plan.reference, jnp.asarray(self._spins, self._dtype)
+        reference, spins = planned.reference, jnp.asarray(self._spins, self._dtype)
         none, tilts = jnp.zeros(0, self._dtype), self._tilts  # a stack of none is an error
         motion = jnp.asarray(self._reference_at(time, reference, planned.knots)[:9])
         unseen = np.full(3, np.nan)  # values that are not observed, as the gait
@@ -258,10 +257,10 @@ class EnvFunctions:
     def _limits(self, episode: Episode, planned: PlannedFlight) -> tuple[Any, Any]:
         """The code of the limit of all flights that a state exceeds, and its `Outcome.distance`."""
         episode = self._jax.lax.stop_gradient(episode)
-        time, (_, parameters, knots, _, _) = self._time(episode.index), planned
+        time, parameters, knots = self._time(episode.index), planned.parameters, planned.knots
         inputs = self._inputs(time, episode.state, parameters, knots)
         values = self._sample(time, episode.state, inputs, parameters, knots)
-        reference = planned.plan.reference
+        reference = planned.reference
         code = self._limit(time, values, reference, knots, self._follows)
         target = self._reference_at(time, reference, knots)
         squares = sum((episode.state[axis] - target[axis]) ** 2 for axis in range(3))
@@ -288,6 +287,9 @@ def _check_supported(scenario: Scenario) -> None:
     allowed: dict[str, object] = {
         "vehicle.rotor_inertia": 0.0,
         "ground": None,
+        "object": (),
+        "tool": None,
+        "payload": None,
         "fault": (),
         "sensors": SensorTable(),
         "simulation.control_latency": 0.0,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from math import dist
+from os import PathLike
 from typing import Any, Final
 
 import numpy as np
@@ -16,6 +17,7 @@ from tiltsim.flight.end import End
 from tiltsim.plants.command import CheckedCommand
 from tiltsim.plants.commanded_plant import CommandedPlant
 from tiltsim.scenario.controller import PythonController
+from tiltsim.scenario.loading import as_scenario
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.system.text import short_repr
 from tiltsim_controllers.mathematics.rotation import rotation_from_quaternion
@@ -53,12 +55,13 @@ class Task:
 
     A subclass may replace any of them.
 
-    It takes the parameters of `tiltsim.env.TiltrotorEnv`; ``domain`` may also be a `Domain`.
+    It takes the parameters of `tiltsim.env.TiltrotorEnv`, of which ``scenario`` is required;
+    ``domain`` may also be a `Domain`.
     """
 
     def __init__(
         self,
-        scenario: Scenario,
+        scenario: Scenario | str | PathLike[str] | Mapping[str, Any],
         *,
         control_timestep: float | None = None,
         domain: Domain | Sequence[Mapping[str, Any]] = (),
@@ -67,6 +70,7 @@ class Task:
         observations: Mapping[str, float] | None = None,
         max_tilt_angle: float | None = None,
     ) -> None:
+        scenario = as_scenario(scenario)
         check_bound("max_position_error", max_position_error)
         if not callable(reward):
             raise InputError(f"environment: reward = {short_repr(reward)}: must be a function")

@@ -7,21 +7,20 @@ follow the equation of their servo, and on rotors with limits. Only the order of
 MuJoCo's, so these flights can check MuJoCo's.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cache
 from math import inf
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from tiltsim.closed_loop.loop import Dynamics
 from tiltsim.models.parts import WRENCH_SIZE
+from tiltsim.scenario.scenario import FlightPlan
 from tiltsim.vehicles.rotorcraft import initial_tilts
 from tiltsim.vehicles.rotorcraft.layout import layout_of, tilt_of_rotor
 from tiltsim.vehicles.rotorcraft.rotors import rotors_record, true_rotors
 from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.code.traceable import traceable
 from tiltsim_controllers.mathematics.attitude import (
     euler_rates,
     quaternion_of_euler,
@@ -37,11 +36,6 @@ from tiltsim_controllers.vehicle.craft import Craft, craft_of
 from tiltsim_controllers.vehicle.effectiveness import TiltOfRotor, tilts_of
 from tiltsim_controllers.vehicle.motion import accelerations, joined, rotation_rate
 from tiltsim_controllers.vehicle.rotors import of_tilts, wrench_map
-
-if TYPE_CHECKING:
-    from tiltsim.closed_loop.loop import Dynamics
-    from tiltsim.scenario.scenario import FlightPlan
-
 
 # --- parameters -------------------------------------------------------------------------------
 
@@ -253,7 +247,6 @@ def limit_speeds_of(spins: Values, first: int) -> Callable[..., Any]:
     """
     end = first + len(spins)
 
-    @traceable
     def limit_speeds(state: Any, mechanics: Any) -> Any:
         signs = xp.array(spins)
         speeds = signs * xp.clip(signs * state[first:end], mechanics.min_speed, mechanics.max_speed)
@@ -278,17 +271,14 @@ def plant_of(form: PlantForm) -> ActuatorPlant:
     rotors, tilts = len(tilt_of_rotor), tilts_of(tilt_of_rotor)
     limit_speeds = limit_speeds_of(form.spins, layout.size)
 
-    @traceable
     def qpos(state: Any) -> Any:
         motion = layout.split(state)
         return joined((motion.position, form.attitude.quaternion(motion.attitude), motion.tilts))
 
-    @traceable
     def qvel(state: Any) -> Any:
         motion = layout.split(state)
         return joined((motion.velocity, motion.omega, motion.tilt_rates))
 
-    @traceable
     def rates(state: Any, ctrl: Any, loads: Any, mechanics: Any, disturbance: Any) -> Any:
         motion, craft = layout.split(state), craft_of(mechanics.vehicle, tilt_of_rotor)
         thrusts, spins = ctrl[tilts : tilts + rotors], xp.array(form.spins)
@@ -310,12 +300,10 @@ def plant_of(form: PlantForm) -> ActuatorPlant:
         )
         return layout.joined(moved)
 
-    @traceable
     def project_onto_limits(state: Any, mechanics: Any) -> Any:
         stopped = _stopped(layout.split(state), mechanics.max_tilt)
         return limit_speeds(joined((layout.joined(stopped), state[layout.size :])), mechanics)
 
-    @traceable
     def normalized(state: Any, mechanics: Any) -> Any:
         """With a quaternion of length one, which no solver keeps."""
         motion = layout.split(state)

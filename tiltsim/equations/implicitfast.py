@@ -17,13 +17,11 @@ from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.code.traceable import traceable
 from tiltsim_controllers.mathematics.attitude import quaternion_product
 from tiltsim_controllers.mathematics.linear import cross
-from tiltsim_controllers.mathematics.scalar import Triple, Vector, scalar
 from tiltsim_controllers.vehicle.body import Body, inertia_matrix
 from tiltsim_controllers.vehicle.craft import body_in
 from tiltsim_controllers.vehicle.motion import joined
 
 
-@traceable
 def turned(quaternion: Any, angle: Any) -> Any:
     """An attitude after a turn about an axis of the body, whose length is the angle (rad)."""
     whole = xp.sqrt(angle @ angle + 1e-30)  # never zero: so the quotient has derivatives
@@ -50,7 +48,7 @@ def turning_at_the_end(body: Body, omega: Any, turning: Any, timestep: float) ->
 
 
 @cache
-def make_implicitfast_step(equations: Equations, tilts: int) -> Callable[..., Vector]:
+def make_implicitfast_step(equations: Equations, tilts: int) -> Callable[..., Any]:
     """One step of the equations of a loop on a `tiltsim.equations.rigid_body`.
 
     Args:
@@ -58,14 +56,13 @@ def make_implicitfast_step(equations: Equations, tilts: int) -> Callable[..., Ve
         tilts: Number of the vehicle's tilts.
 
     Returns:
-        Scalar code ``(time, state, inputs, timestep, parameters, knots, disturbance) -> state``,
+        ``(time, state, inputs, timestep, parameters, knots, disturbance) -> state``,
         from a time (s) on, with the inputs since the last control sample.
     """
     rates_of, project_onto_limits = equations.rates, equations.project_onto_limits
     assert project_onto_limits is not None  # which keeps the quaternion's length
     layout = as_in_mujoco(tilts)
 
-    @traceable
     def advanced(state: Any, rates: Any, timestep: Any, mechanics: Any) -> Any:
         now, change = layout.split(state), layout.split(rates)
         turning = change.omega
@@ -85,19 +82,17 @@ def make_implicitfast_step(equations: Equations, tilts: int) -> Callable[..., Ve
         activations = state[layout.size :] + timestep * rates[layout.size :]
         return joined((layout.joined(moved), activations))
 
-    @scalar
+    @traceable
     def step(
-        time: float,
-        state: Vector,
-        inputs: Vector,
-        timestep: float,
+        time: Any,
+        state: Any,
+        inputs: Any,
+        timestep: Any,
         parameters: Any,
-        knots: Vector,
-        disturbance: Triple,
-    ) -> Vector:
+        knots: Any,
+        disturbance: Any,
+    ) -> Any:
         rates = rates_of(time, state, inputs, parameters, knots, disturbance)
-        new: Vector = advanced(state, rates, timestep, parameters.layer)
-        limited: Vector = project_onto_limits(new, parameters)
-        return limited
+        return project_onto_limits(advanced(state, rates, timestep, parameters.layer), parameters)
 
     return step

@@ -4,26 +4,21 @@ The state begins with position, velocity, roll, pitch, yaw and body rates, the i
 thrust and the three torques. Two states of the controller and their rates may follow.
 """
 
-from __future__ import annotations
+from typing import Any
 
-from typing import TYPE_CHECKING, Any
-
+from tiltsim.scenario.scenario import Scenario
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.code.traceable import traceable
 from tiltsim_controllers.mathematics.attitude import euler_rates, rotation_matrix
-from tiltsim_controllers.mathematics.scalar import Values, Vector, scalar
+from tiltsim_controllers.mathematics.scalar import Values
 from tiltsim_controllers.vehicle.body import principal_body
 from tiltsim_controllers.vehicle.motion import accelerations
 from tiltsim_controllers.vehicle.parameters import Vehicle
 
-if TYPE_CHECKING:
-    from tiltsim.scenario.scenario import Scenario
 
-
-@scalar
-def rigid_body(state: Vector) -> Values:
+def rigid_body(state: Any) -> Any:
     """The twelve states of the rigid body."""
-    return (*state[:12],)
+    return state[:12]
 
 
 @traceable

@@ -4,10 +4,6 @@ Gyroscopic torque, tilt servos of second order with stops, rotors with limits. T
 ``qpos``, ``qvel`` and ``act``, so the controls are the same function of it.
 """
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 from tiltsim.equations.actuator_level import (
     QUATERNION,
     ActuatorPlant,
@@ -15,10 +11,8 @@ from tiltsim.equations.actuator_level import (
     as_in_mujoco,
     plant_of,
 )
+from tiltsim.scenario.scenario import Scenario
 from tiltsim.vehicles.rotorcraft.rotors import true_rotors
-
-if TYPE_CHECKING:
-    from tiltsim.scenario.scenario import Scenario
 
 
 def rigid_body(scenario: Scenario) -> ActuatorPlant:

@@ -10,7 +10,7 @@ from typing import Any, Final, NamedTuple
 from tiltsim.closed_loop.loop import Equations
 from tiltsim.closed_loop.userdata import just_after, just_before
 from tiltsim_controllers.code.traceable import traceable
-from tiltsim_controllers.mathematics.scalar import Triple, Values, Vector, scalar
+from tiltsim_controllers.mathematics.scalar import Triple
 
 
 class Integration(NamedTuple):
@@ -23,24 +23,20 @@ class Integration(NamedTuple):
     disturbance: Triple  # m/s^2, world axes
 
 
-@traceable
 def stage(state: Any, step: Any, rates: Any) -> Any:
     """The state one explicit stage further."""
     return state + step * rates
 
 
-@traceable
 def _euler(state: Any, step: Any, rates: Any) -> Any:
     return state + step * rates[0]
 
 
-@traceable
 def _ode3(state: Any, step: Any, rates: Any) -> Any:
     a, b, c = rates
     return state + step * (2.0 / 9.0 * a + 1.0 / 3.0 * b + 4.0 / 9.0 * c)
 
 
-@traceable
 def _rk4(state: Any, step: Any, rates: Any) -> Any:
     a, b, c, d = rates
     return state + step / 6.0 * (a + 2.0 * (b + c) + d)
@@ -70,8 +66,8 @@ SOLVERS: Final = {
 
 
 @cache
-def make_step(equations: Equations, solver: str) -> Callable[..., tuple[Vector, Values]]:
-    """One step of a loop's equations, as scalar code.
+def make_step(equations: Equations, solver: str) -> Callable[..., tuple[Any, Any]]:
+    """One step of a loop's equations.
 
     Returns:
         ``(time, state, held, samples, integration) -> state, held``: one step of a solver of
@@ -82,10 +78,10 @@ def make_step(equations: Equations, solver: str) -> Callable[..., tuple[Vector, 
     inputs, rates_of = equations.inputs, equations.rates
     project = equations.project_onto_limits
 
-    @scalar
+    @traceable
     def step(
-        time: float, state: Vector, held: Values, samples: bool, integration: Integration
-    ) -> tuple[Vector, Values]:
+        time: Any, state: Any, held: Any, samples: bool, integration: Integration
+    ) -> tuple[Any, Any]:
         timestep, control_steps, parameters, knots, disturbance = integration
         start = just_after(time) if sees_events else time
         if samples:

@@ -4,19 +4,15 @@ A state begins with `RigidState`, followed by rotor speeds. Tilt angles follow t
 are further states where the controller moves them.
 """
 
-from __future__ import annotations
+from typing import Any
 
-from typing import TYPE_CHECKING, Any
-
+from tiltsim.scenario.scenario import Scenario
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.code.traceable import traceable
 from tiltsim_controllers.mathematics.attitude import euler_of_rotation
 from tiltsim_controllers.mathematics.rotation import rotation_from_euler
 from tiltsim_controllers.mathematics.scalar import Values, Vector
 from tiltsim_controllers.vehicle.motion import rigid_state
-
-if TYPE_CHECKING:
-    from tiltsim.scenario.scenario import Scenario
 
 
 @traceable

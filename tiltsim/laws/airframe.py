@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping
+from os import PathLike
+from typing import Any
 
 from tiltsim.errors import InputError
 from tiltsim.models.cross import as_multirotor
 from tiltsim.scenario.law_controller import Airframe
 from tiltsim.scenario.loading import load_scenario
-from tiltsim.scenario.scenario import plan_flight
+from tiltsim.scenario.scenario import FlightPlan, Scenario, plan_flight
 from tiltsim.vehicles.rotorcraft import initial_rotor_speeds, initial_tilts
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-    from os import PathLike
-
-    from tiltsim.scenario.scenario import FlightPlan, Scenario
 
 
 def airframe(scenario: Scenario | str | PathLike[str] | Mapping[str, Any]) -> Airframe:
@@ -44,7 +40,9 @@ def airframe_of(plan: FlightPlan) -> Airframe:
         plan.gait,
         initial_tilts(plan)[0] if tilting else (),
         tuple(spin * speed for spin, speed in zip(table.spins, speeds, strict=True)),
+        scenario.initial.position,
         scenario.initial.velocity,
+        scenario.initial.attitude,
         scenario.initial.angular_velocity,
         # The thesis's equations omit the gyroscopic torque but for the quadrotor's.
         float(simulation.plant != "thesis" or table.model == "quadrotor"),

@@ -1,10 +1,10 @@
 """Which closed loop a scenario has, and its `Assembly`."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Final
+from collections.abc import Callable
+from typing import Final
 
 from tiltsim.closed_loop.assembly import Assembly
+from tiltsim.closed_loop.loop import ClosedLoop
 from tiltsim.equations.actuator_level import ActuatorPlant, actuator_plant
 from tiltsim.equations.rigid_body import rigid_body
 from tiltsim.laws.commanded import commanded_loop
@@ -13,6 +13,7 @@ from tiltsim.laws.full_pose import full_pose_loop, full_pose_loop_of
 from tiltsim.laws.layers.actuation import with_actuation
 from tiltsim.laws.layers.air import with_air
 from tiltsim.laws.layers.allocation import ALLOCATED, with_allocation
+from tiltsim.laws.layers.contact import with_force_loop, with_objects
 from tiltsim.laws.layers.loads import with_loads
 from tiltsim.laws.layers.measured_acceleration import with_measured_acceleration
 from tiltsim.laws.layers.on_equations import on_equations
@@ -24,14 +25,9 @@ from tiltsim.laws.tilt_car_planned import PLANNED_DIRECTION
 from tiltsim.laws.tiltrotor import LAYOUT as TILTROTOR
 from tiltsim.laws.tiltrotor import tiltrotor_loop
 from tiltsim.scenario.law_controller import LawTable
-from tiltsim.scenario.scenario import plan_flight
+from tiltsim.scenario.scenario import Scenario, plan_flight
 from tiltsim.system.files import one_thread_at_a_time
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from tiltsim.closed_loop.loop import ClosedLoop
-    from tiltsim.scenario.scenario import Scenario
+from tiltsim.vehicles.rotorcraft.others import others_of
 
 LOOPS: Final[dict[str, ClosedLoop]] = {
     "attitude_altitude": tiltrotor_loop("attitude_altitude", False, ""),
@@ -88,6 +84,8 @@ def loop_of(
     loop = adapted(loop)
     if controller.prioritizes_attitude and loop.dynamics.model in ALLOCATED:
         loop = with_allocation(loop)
+    if scenario.reference.type == "push" and not external:
+        loop = with_force_loop(loop)
     if scenario.needs_actuation_layer:
         loop = with_actuation(loop, scenario.simulation.latency_steps, external)
     if scenario.has_air:
@@ -98,6 +96,8 @@ def loop_of(
         loop = with_rotor_inertia(loop)
     if measured:
         loop = with_measured_acceleration(loop)
+    if scenario.has_objects:
+        loop = with_objects(loop, others_of(scenario))
     if plant == "mujoco" or as_printed:
         return loop
     return on_equations(loop, _plant_of(scenario, loop))

@@ -4,12 +4,10 @@ The control law is to hold a command; layers treat it as any controller's comman
 of all vehicles are states here, so that commands may be speeds, thrusts or accelerations.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cache
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup
 from tiltsim.closed_loop.vehicle_kind import VehicleKind
@@ -17,9 +15,11 @@ from tiltsim.laws.law import Law
 from tiltsim.laws.quadrotor import LAYOUT as QUADROTOR
 from tiltsim.laws.quadrotor import upright_columns
 from tiltsim.laws.rotor_loop import RotorLayout, layout_of_vehicle, rotor_loop
-from tiltsim.laws.rotorcraft import servo_lead, torque_free_columns
+from tiltsim.laws.rotorcraft import torque_free_columns
 from tiltsim.laws.tiltrotor import LAYOUT, singularity_columns
+from tiltsim.laws.vehicle_loop import servo_lead
 from tiltsim.models.rotor_table import Multirotor
+from tiltsim.scenario.scenario import FlightPlan, Scenario
 from tiltsim.vehicles.rotorcraft import OTHER_LAYOUT, ROTORCRAFT, rotorcraft_kind
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.gaits.motion import tilt_motion_of
@@ -30,9 +30,6 @@ from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector
 from tiltsim_controllers.references.trajectories import ReferenceParameters
 from tiltsim_controllers.vehicle.effectiveness import ROTOR_FLOATS
 from tiltsim_controllers.vehicle.parameters import Vehicle
-
-if TYPE_CHECKING:
-    from tiltsim.scenario.scenario import FlightPlan, Scenario
 
 Singularity = Callable[[Mapping[str, Floats], Any], dict[str, Floats]]
 """``(samples, vehicle) -> columns``: how close a vehicle is to a singular attitude."""
@@ -115,6 +112,7 @@ def _commanded_loop(
         record,
         setup,
         tilts=lambda _seen, _rates, p, _knots: xp.stack([p.command.tilts, xp.zeros(tilts)], 1),
+        units=dict.fromkeys(sent, "rad"),
         records_commands=True,
         margins=margins,
         follows_position=lambda scenario: scenario.reference.kind != "attitude_altitude",

@@ -1,16 +1,14 @@
 """Laws of scenarios, built-in, from packages or from users, checked before flights."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Callable
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pydantic import ValidationError
 
 from tiltsim.closed_loop.choices import ProgramKey, choices_of
-from tiltsim.closed_loop.loop import ControlSetup
+from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup
 from tiltsim.engines.programs import LoopPrograms
 from tiltsim.errors import InputError
 from tiltsim.laws.airframe import airframe_of
@@ -20,18 +18,13 @@ from tiltsim.scenario.controller import NumpyController
 from tiltsim.scenario.law_controller import LawController
 from tiltsim.scenario.messages import InvalidValueError, one_line_message
 from tiltsim.scenario.own_code import load_law, users_line
-from tiltsim.scenario.scenario import plan_flight
+from tiltsim.scenario.scenario import FlightPlan, Scenario, plan_flight
 from tiltsim.system.text import error_text
 from tiltsim.vehicles.rotorcraft import initial_tilts
 from tiltsim_controllers.code.messages import TraceError
 from tiltsim_controllers.laws.observed import Command, Observed
 from tiltsim_controllers.mathematics.records import make_record_type
 from tiltsim_controllers.mathematics.rotation import quaternion_from_euler
-
-if TYPE_CHECKING:
-    from tiltsim.closed_loop.loop import ClosedLoop
-    from tiltsim.scenario.scenario import FlightPlan, Scenario
-
 
 NO_PARAMETERS = make_record_type("NoParameters", none=float)(0.0)
 """For laws without parameters."""

@@ -1,11 +1,9 @@
 """Full-pose control in closed loops: the tilt angles are inputs (ch. 3, Sec. 6.3)."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -16,12 +14,13 @@ from tiltsim.laws.rotor_loop import (
     RotorLayout,
     body_of_vehicle,
     layout_of_vehicle,
+    margins_of,
     rotor_loop,
-    table_of,
 )
-from tiltsim.laws.rotorcraft import rotor_stops, torque_free_columns
+from tiltsim.laws.rotorcraft import rotor_stops
 from tiltsim.laws.tiltrotor import singularity_columns
 from tiltsim.models.rotor_table import Multirotor
+from tiltsim.scenario.scenario import FlightPlan, Scenario
 from tiltsim.scenario.tiltrotor_controllers import FullPoseController
 from tiltsim.vehicles.rotorcraft import ROTORCRAFT, initial_tilts
 from tiltsim_controllers.laws.full_pose import (
@@ -35,9 +34,6 @@ from tiltsim_controllers.mathematics.records import changed_record
 from tiltsim_controllers.mathematics.scalar import Floats, Values
 from tiltsim_controllers.vehicle.parameters import Vehicle
 from tiltsim_controllers.vehicle.states import state_of
-
-if TYPE_CHECKING:
-    from tiltsim.scenario.scenario import FlightPlan, Scenario
 
 
 def _margins(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
@@ -76,10 +72,6 @@ def full_pose_loop(layout: RotorLayout) -> ClosedLoop:
     is_multirotor = layout.model == "multirotor"
     record = Parameters if is_multirotor else changed_record(Parameters, vehicle=Vehicle)
 
-    def margins(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
-        failure, table = setup.parameters.law.failure, table_of(places, setup)
-        return torque_free_columns(places, table, samples, failure=failure)
-
     def speeds(seen: Seen, p: Any, knots: Any) -> Any:
         # A pod that turns across its thrust spans one plane with it at any angle: the rank of such
         # rotors' matrix changes only where one of them stops, whichever of them are lost.
@@ -93,7 +85,7 @@ def full_pose_loop(layout: RotorLayout) -> ClosedLoop:
         states=dict.fromkeys(places.names("tilt_command"), "rad"),
         initial=lambda plan: initial_tilts(plan)[0],
         tilts=tilts_in_states(0, places.tilts),
-        margins=margins if is_multirotor else _margins,
+        margins=margins_of(layout) if is_multirotor else _margins,
         signs=speeds,
         causes=lambda _sample, _setup: stops,
     )

@@ -1,23 +1,18 @@
-"""The record of a control law of a rotorcraft, from which `rotor_loop` makes a closed loop."""
-
-from __future__ import annotations
+"""The record of a control law, from which `tiltsim.laws.vehicle_loop` makes a closed loop."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from tiltsim.closed_loop.loop import ControlSetup
+from tiltsim.scenario.scenario import FlightPlan, Scenario
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.gaits.motion import planned_tilts
 from tiltsim_controllers.laws.observed import Seen, Step
 from tiltsim_controllers.mathematics.scalar import Floats, Values
 
-if TYPE_CHECKING:
-    from tiltsim.scenario.scenario import FlightPlan, Scenario
-
 Margins = Callable[[Mapping[str, Floats], ControlSetup], dict[str, Floats]]
-"""``(samples by field, setup) -> columns`` that a sample's state alone decides."""
+"""``(samples by field, with the columns of references, setup) -> columns``."""
 
 Tilts = Callable[[Seen, Any, Any, Any], Any]
 """``(seen, rates of the states, parameters, knots)``: tilt angles (rad) and rates, shape (M, 2)."""
@@ -38,7 +33,7 @@ def tilts_in_states(first: int, tilts: int) -> Tilts:
 
 @dataclass(frozen=True, eq=False)
 class Law:
-    """A control law with rotor accelerations as inputs.
+    """A control law.
 
     Attributes:
         step: The law, a function of arrays ``(seen, parameters, knots) -> Step``.
@@ -50,11 +45,12 @@ class Law:
         initial: ``(plan) -> states`` at time zero.
         signals: Names of the first signals of a step, columns of a flight: roll, pitch and yaw that
             it tracks, and any more. None for the attitude of the reference.
-        units: Columns of a flight other than the states and the columns of its kind, with units.
+        units: Columns of a flight other than the states and the columns of its kind, with units;
+            also the fields of a sample beside the states.
         tilts: See `Tilts`; None for `tilts_of_gait`.
         uses_gait: Whether the gait has a part in the flight.
         records_commands: Whether the commands of the tilt servos are part of a sample.
-        margins: See `Margins`; None for the angle to the nearest singular attitude.
+        margins: See `Margins`.
         signs: Function of arrays ``(seen, parameters, knots)``: numbers that keep their sign until
             the law becomes singular. None for a law that is singular nowhere.
         causes: ``(sample by field, setup) -> texts``: why a flight ends where each reaches zero.
@@ -73,17 +69,8 @@ class Law:
     tilts: Tilts | None = None
     uses_gait: bool = True
     records_commands: bool = False
-    margins: Margins | None = None
+    margins: Margins = lambda _samples, _setup: {}
     signs: Callable[[Seen, Any, Any], Any] | None = None
     causes: Callable[[Mapping[str, float], ControlSetup], tuple[str, ...]] = lambda *_: ("",)
     measured: bool = False
     follows_position: Callable[[Scenario], bool] = lambda _scenario: True
-
-
-def parts(vector: Any, **sizes: int) -> SimpleNamespace:
-    """Consecutive parts of a vector by name."""
-    found, first = {}, 0
-    for name, size in sizes.items():
-        found[name] = vector[first : first + size]
-        first += size
-    return SimpleNamespace(**found)

@@ -5,22 +5,20 @@ layout is compiled in. The rotors' speeds are states that approach the commanded
 tilts of a law that commands them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cache, partial
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from tiltsim.closed_loop.loop import ClosedLoop
 from tiltsim.errors import TiltsimError
 from tiltsim.laws.airframe import airframe_of
 from tiltsim.laws.law import Law, tilts_in_states
-from tiltsim.laws.rotor_loop import RotorLayout, body_of_vehicle, rotor_loop
+from tiltsim.laws.rotor_loop import RotorLayout, body_of_vehicle, margins_of, rotor_loop
 from tiltsim.scenario.law_controller import LawTable
-from tiltsim.scenario.own_code import users_line
+from tiltsim.scenario.scenario import FlightPlan
 from tiltsim.system.text import short_repr
-from tiltsim_controllers.code.arrays import is_jax, xp
+from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.code.tracing import as_array
 from tiltsim_controllers.gaits.motion import planned_tilts
 from tiltsim_controllers.gaits.parameters import GaitParameters
@@ -39,9 +37,6 @@ from tiltsim_controllers.vehicle.effectiveness import ROTOR_FLOATS, table_per_ne
 from tiltsim_controllers.vehicle.parameters import Vehicle
 from tiltsim_controllers.vehicle.rotors import rotors_in, wrench_map
 from tiltsim_controllers.vehicle.states import state_of
-
-if TYPE_CHECKING:
-    from tiltsim.scenario.scenario import FlightPlan
 
 CORRECTION: Final = 5.0
 """1/s: the rate at which rotors approach the speeds of their model, slow beside any latency."""
@@ -173,14 +168,7 @@ def _step_of(key: Key) -> Callable[..., Step]:
             table=knots[at + coefficients + rotors :],
             tilt_commands=states[own + discrete : own + discrete + tilts * key.tilts],
         )
-        try:
-            command = key.law(observed, known.own)
-        except TypeError as error:
-            if not is_jax(seen.state):
-                raise
-            raise LawError(
-                f"{users_line(error)}{type(error).__name__} on arrays of JAX; {REMEDY}"
-            ) from error
+        command = key.law(observed, known.own)
         reached = states[len(states) - rotors :] if key.models_rotors else turning
         along = _accelerations(command, known.rotor_gain, k, reached)
         rates, moving = _state_rates(key, command, states, known)
@@ -297,6 +285,7 @@ def law_loop(key: Key, law_of: Callable[[FlightPlan], FlownLaw]) -> ClosedLoop:
             **dict.fromkeys(modelled, "rad/s"),
         },
         initial=_initial_of(law_of, models_rotors=key.models_rotors),
+        margins=margins_of(key.layout),
         tilts=tilts_in_states(len(key.states) + len(key.discrete), key.layout.places.tilts)
         if key.tilts
         else None,

@@ -1,10 +1,8 @@
 """The controller of attitude and force in closed loops with multirotors of any layout."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from functools import cache
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup
 from tiltsim.laws.law import Law
@@ -25,6 +23,7 @@ from tiltsim.laws.rotorcraft import CONDITION, rotor_stops, singular_attitude, t
 from tiltsim.laws.supervision import supervised
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.multirotor_controllers import AttitudeForceController, upper_side
+from tiltsim.scenario.scenario import FlightPlan, Scenario
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.laws.allocation import RotorRange
 from tiltsim_controllers.laws.attitude_altitude import PUBLISHED_DECOUPLING
@@ -41,9 +40,6 @@ from tiltsim_controllers.laws.supervisor import Supervisor
 from tiltsim_controllers.mathematics.scalar import Floats, Values
 from tiltsim_controllers.vehicle.effectiveness import without_rotor
 from tiltsim_controllers.vehicle.states import state_of
-
-if TYPE_CHECKING:
-    from tiltsim.scenario.scenario import FlightPlan, Scenario
 
 REVERSING: Final = 'controller.norm = "thrust", with which rotors reverse'
 """The remedy where a rotor would have to reverse."""

@@ -1,18 +1,15 @@
 """Parameters of a law in a flight: numbers of its keys, its vehicle, gait and reference."""
 
-from __future__ import annotations
-
 from functools import cache
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from tiltsim.scenario.multirotor_controllers import AttitudeForceController
+from tiltsim.scenario.scenario import FlightPlan, Scenario
 from tiltsim.scenario.tiltrotor_controllers import AttitudeAltitudeController
+from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.laws.keys import number_of
 from tiltsim_controllers.laws.multirotor_steps import INTEGRAL_FIELDS
 from tiltsim_controllers.mathematics.records import make_record_type
-
-if TYPE_CHECKING:
-    from tiltsim.scenario.scenario import FlightPlan, Scenario
 
 INTEGRALS: Final = dict.fromkeys(INTEGRAL_FIELDS, "m s")
 """States of a law that integrates the position error, with their units."""
@@ -68,7 +65,7 @@ def tracking_parameters(plan: FlightPlan, record: Any, **own: Any) -> Any:
         record,
         gains=controller.resolve_gains(),
         integral=controller.resolve_integral_gains(),
-        anticipation=min(controller.anticipation, 0.5 * plan.gait.min_segment_time),
+        anticipation=xp.minimum(controller.anticipation, 0.5 * plan.gait.min_segment_time),
         terms=terms,
         **own,
     )

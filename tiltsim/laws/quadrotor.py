@@ -4,11 +4,9 @@ They demand thrust and torques, which the rotors make at once: their speeds foll
 and are not states. The model's four rotor speed states stay at zero.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, ClassVar, Final
+from typing import Any, ClassVar, Final
 
 import numpy as np
 
@@ -18,6 +16,7 @@ from tiltsim.laws.law import Law
 from tiltsim.laws.parameters import parameters_of
 from tiltsim.laws.rotor_loop import RotorFunctions, RotorLayout, rotor_loop
 from tiltsim.laws.rotorcraft import REFERENCE_COLUMNS
+from tiltsim.scenario.scenario import FlightPlan
 from tiltsim.vehicles.rotorcraft import ROTORCRAFT
 from tiltsim_controllers.analysis.quadrotor_singularity import (
     normalized_determinant,
@@ -30,9 +29,6 @@ from tiltsim_controllers.mathematics.scalar import Floats, Vector
 from tiltsim_controllers.vehicle.parameters import SPIN
 from tiltsim_controllers.vehicle.quadrotor_mixer import speed_along_spin, thrust_controls
 from tiltsim_controllers.vehicle.states import PITCH, ROLL
-
-if TYPE_CHECKING:
-    from tiltsim.scenario.scenario import FlightPlan
 
 LAYOUT: Final = RotorLayout((-1, -1, -1, -1), SPIN, "quadrotor")
 
@@ -49,7 +45,7 @@ class _Thrusting(RotorFunctions):
         return (0.0,) * 4
 
     def initial_state(self, plan: FlightPlan) -> Vector:
-        return initial_state(plan.scenario)
+        return (*initial_state(plan.scenario), *self.law.initial(plan))
 
     def controls(
         self, time: Any, qpos: Any, qvel: Any, act: Any, parameters: Any, knots: Any

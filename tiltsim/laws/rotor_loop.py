@@ -5,38 +5,25 @@ a loop is made for each such `RotorLayout`. All other numbers of the vehicle are
 speeds are states whose accelerations a law commands.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from tiltsim.closed_loop.loop import (
-    ClosedLoop,
-    Columns,
-    ControlSetup,
-    Dynamics,
-    Equations,
-    Monitoring,
-    Sampling,
-)
+from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Dynamics
 from tiltsim.equations.tiltrotor import body_fields, initial_state
-from tiltsim.laws.law import Law, Tilts, parts, tilts_of_gait
-from tiltsim.laws.parameters import head_of
-from tiltsim.laws.rotorcraft import (
-    REFERENCE_COLUMNS,
-    reference_columns,
-    servo_lead,
-    torque_free_columns,
-)
+from tiltsim.laws.law import Law, Margins, Tilts, tilts_of_gait
+from tiltsim.laws.rotorcraft import REFERENCE_COLUMNS, torque_free_columns
+from tiltsim.laws.vehicle_loop import VehicleFunctions, parts, servo_lead
 from tiltsim.models.rotor_table import Multirotor
+from tiltsim.scenario.scenario import FlightPlan
 from tiltsim.vehicles.rotorcraft import initial_rotor_speeds, rotorcraft_kind
 from tiltsim.vehicles.rotorcraft.layout import CROSS
 from tiltsim.vehicles.rotorcraft.layout import Layout as Places
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.code.traceable import traceable
+from tiltsim_controllers.laws.failures import UNHARMED
 from tiltsim_controllers.laws.observed import Seen
 from tiltsim_controllers.mathematics.attitude import euler_angles
 from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector
@@ -46,9 +33,6 @@ from tiltsim_controllers.vehicle.effectiveness import ROTOR_FLOATS
 from tiltsim_controllers.vehicle.motion import BODY_STATES, equations_of_motion
 from tiltsim_controllers.vehicle.rotors import airframe
 from tiltsim_controllers.vehicle.states import BODY_FIELDS
-
-if TYPE_CHECKING:
-    from tiltsim.scenario.scenario import FlightPlan
 
 
 class RotorLayout(NamedTuple):
@@ -93,12 +77,22 @@ def table_of(places: Places, setup: ControlSetup) -> Values:
     return setup.knots[first : first + ROTOR_FLOATS * places.rotors]
 
 
+def margins_of(layout: RotorLayout) -> Margins:
+    """The angle (rad) to the nearest singular attitude, for a law that knows of failures or not."""
+    places = layout.places
+
+    def margins(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
+        failure = getattr(setup.parameters.law, "failure", UNHARMED)
+        return torque_free_columns(places, table_of(places, setup), samples, failure=failure)
+
+    return margins
+
+
 @dataclass(frozen=True, eq=False)
-class RotorFunctions:
+class RotorFunctions(VehicleFunctions):
     """The functions of a law's loop on arrays, for N rotors, M tilts and S states."""
 
     layout: RotorLayout
-    law: Law
     tilts: Tilts
     commands_thrusts: ClassVar[bool] = False
 
@@ -212,16 +206,11 @@ class RotorFunctions:
         tilts = self.tilts(seen, xp.zeros(len(law.states)), p, knots)[:, 0]
         return xp.hstack([position, signals, tilts, xp.zeros(self.idle)])
 
-    def signs(self, time: Any, values: Any, parameters: Any, knots: Any) -> Any:
-        """See `tiltsim.closed_loop.loop.Monitoring`."""
-        assert self.law.signs is not None
-        return self.law.signs(self.in_sample(time, values), parameters.law, knots)
-
     # --- on equations of motion
 
     def initial_state(self, plan: FlightPlan) -> Vector:
-        """The vehicle's states at time zero."""
-        return initial_state(plan.scenario, initial_rotor_speeds(plan))
+        speeds, states = initial_rotor_speeds(plan), self.law.initial(plan)
+        return (*initial_state(plan.scenario, speeds), *states)
 
     def equation_inputs(self, time: Any, state: Any, parameters: Any, knots: Any) -> Any:
         """Rotor accelerations, then rates of the states."""
@@ -259,70 +248,35 @@ class RotorFunctions:
 
 
 def rotor_loop(
-    layout: RotorLayout, law: Law, kind: type[RotorFunctions] = RotorFunctions
+    layout: RotorLayout, law: Law, functions: type[RotorFunctions] = RotorFunctions
 ) -> ClosedLoop:
     """The closed loop of a control law with all vehicles of a layout.
 
     Args:
         layout: Layout of the vehicles.
         law: The law.
-        kind: How the inputs of the law move a vehicle.
+        functions: How the inputs of the law move a vehicle.
     """
-    places, record = layout.places, head_of(law.parameters, servo_lead=float)
-    functions = kind(layout, law, law.tilts or tilts_of_gait(places.tilts))
-    references, names = traceable(functions.references), functions.names
-    commands = places.names("tilt_command") if law.records_commands else ()
-    fields = (*layout.shown.observed_fields, *law.states)
-
-    def setup(plan: FlightPlan, signature: float) -> ControlSetup:
-        parameters, further = law.setup(plan)
-        lead = servo_lead(plan.scenario.any_rotorcraft.tilt_servo)
-        return ControlSetup(record(signature, lead, parameters), (*plan.knots, *further))
-
-    def margins(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
-        return torque_free_columns(places, table_of(places, setup), samples)
-
-    def derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
-        found = reference_columns(references, fields, samples, setup, names)
-        return {**found, **(law.margins or margins)(samples, setup)}
-
-    def initial(plan: FlightPlan, _setup: ControlSetup) -> Vector:
-        return (*functions.initial_state(plan), *law.initial(plan))
-
-    equations = None
-    if not (law.measured or law.records_commands):  # they need a plant with servos
-        equations = Equations(
-            inputs=traceable(functions.equation_inputs),
-            inputs_size=places.rotors + len(law.states),
-            rates=traceable(functions.equation_rates),
-            initial=initial,
-            observe=traceable(functions.observe_equations),
-            tilts=traceable(functions.equation_tilts),
-        )
-    monitoring = Monitoring(traceable(functions.signs), law.causes) if law.signs else Monitoring()
-    return ClosedLoop(
-        kind=rotorcraft_kind(layout.shown, ("singularity_margin",)),
-        parameters=record,
-        setup=setup,
-        dynamics=Dynamics(
-            layout.name,
-            places.sizes(len(law.states)),
-            lambda plan, _setup: (*functions.initial_speeds(plan), *law.initial(plan)),
-            len(law.states),
-            layout.spins,
-            layout.tilt_of_rotor if layout.model == "multirotor" else (),
-            commands_thrusts=functions.commands_thrusts,
-        ),
-        sampling=Sampling(traceable(functions.controls), traceable(functions.hold)),
-        columns=Columns(
-            traceable(functions.observe),
-            derive,
-            fields=(*law.states, *commands),
-            units={**law.states, **dict.fromkeys(commands, "rad"), **law.units},
-            observe_reads_controls=functions.commands_thrusts,
-        ),
-        monitoring=monitoring,
-        equations=equations,
-        follows_position=law.follows_position,
-        uses_gait=places.tilts > 0 and law.uses_gait,
+    places = layout.places
+    flown = functions(law, layout, law.tilts or tilts_of_gait(places.tilts))
+    dynamics = Dynamics(
+        layout.name,
+        places.sizes(len(law.states)),
+        lambda plan, _setup: (*flown.initial_speeds(plan), *law.initial(plan)),
+        len(law.states),
+        layout.spins,
+        layout.tilt_of_rotor if layout.model == "multirotor" else (),
+        commands_thrusts=functions.commands_thrusts,
     )
+    loop = flown.closed_loop(
+        rotorcraft_kind(layout.shown, ("singularity_margin",)),
+        dynamics,
+        {"servo_lead": lambda plan: servo_lead(plan.scenario.any_rotorcraft.tilt_servo)},
+        places.rotors + len(law.states),
+        places.names("tilt_command") if law.records_commands else (),
+    )
+    if law.measured or law.records_commands:  # they need a plant with servos
+        return replace(loop, equations=None)
+    assert loop.equations is not None
+    tilts = replace(loop.equations, tilts=traceable(flown.equation_tilts))
+    return replace(loop, equations=tilts, uses_gait=places.tilts > 0 and law.uses_gait)

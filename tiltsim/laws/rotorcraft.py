@@ -1,14 +1,10 @@
 """Common parts of closed loops with rotorcraft of any number of rotors and tilt hinges."""
 
-from __future__ import annotations
-
-from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Final
+from collections.abc import Mapping
+from typing import Final
 
 import numpy as np
 
-from tiltsim.closed_loop.loop import ControlSetup
-from tiltsim.engines.sample_evaluation import evaluate_over_samples
 from tiltsim.vehicles.rotorcraft.layout import Layout
 from tiltsim_controllers.analysis.singularity import world_up
 from tiltsim_controllers.analysis.torque_free import (
@@ -18,17 +14,8 @@ from tiltsim_controllers.analysis.torque_free import (
     torque_free_forces,
 )
 from tiltsim_controllers.laws.failures import UNHARMED, Failure
-from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector
+from tiltsim_controllers.mathematics.scalar import Floats, Vector
 from tiltsim_controllers.vehicle.effectiveness import force_and_torque
-
-if TYPE_CHECKING:
-    from tiltsim.scenario.rotorcraft import ServoTable
-
-
-def servo_lead(servo: ServoTable) -> float:
-    """Lag (s) of a tilt servo behind a command of constant rate, ``2 zeta / omega_n``."""
-    return 2.0 * servo.damping_ratio / servo.natural_frequency
-
 
 REFERENCE_COLUMNS: Final = ("x_ref", "y_ref", "z_ref", "roll_ref", "pitch_ref", "yaw_ref")
 
@@ -68,27 +55,6 @@ def torque_free_columns(
         axes = controlled_axes(forces, up, dimension)
         columns[CONDITION] = decoupling_condition(*pushing, axes)
     return columns
-
-
-def reference_columns(
-    in_force: Callable[..., Values],
-    fields: Sequence[str],
-    samples: Mapping[str, Floats],
-    setup: ControlSetup,
-    names: tuple[str, ...],
-) -> dict[str, Floats]:
-    """The columns of references, evaluated over samples.
-
-    Args:
-        in_force: Scalar function ``(time, values, parameters, knots)`` of the columns' values.
-        fields: Fields of a sample, its ``values``.
-        samples: By field.
-        setup: The flight's parameters and knots.
-        names: Names of the columns.
-    """
-    states = np.stack([samples[name] for name in fields], axis=-1)
-    rows = evaluate_over_samples(in_force, len(names), samples["time"], states, setup)
-    return dict(zip(names, rows.T, strict=True))
 
 
 def rotor_stops(rotors: int, remedy: str = "") -> tuple[str, ...]:

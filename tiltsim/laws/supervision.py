@@ -1,7 +1,5 @@
 """A supervisor of the laws that follow a planned gait."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any, Final
 

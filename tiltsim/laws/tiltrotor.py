@@ -1,11 +1,9 @@
 """Attitude-altitude control of the tiltrotor in closed loops (ch. 3 and 4)."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -22,6 +20,7 @@ from tiltsim.laws.parameters import (
 from tiltsim.laws.rotor_loop import RotorLayout, rotor_loop
 from tiltsim.laws.rotorcraft import rotor_stops, singular_attitude
 from tiltsim.laws.supervision import supervised
+from tiltsim.scenario.scenario import FlightPlan
 from tiltsim.scenario.tiltrotor_controllers import AttitudeAltitudeController
 from tiltsim.vehicles.rotorcraft import ROTORCRAFT
 from tiltsim_controllers.analysis.singularity import determinant, margin_over_gait
@@ -38,9 +37,6 @@ from tiltsim_controllers.mathematics.scalar import Floats, Values
 from tiltsim_controllers.vehicle.parameters import SPIN, Vehicle
 from tiltsim_controllers.vehicle.rotors import airframe, wrench_map
 from tiltsim_controllers.vehicle.states import TILT_FIELDS, state_of
-
-if TYPE_CHECKING:
-    from tiltsim.scenario.scenario import FlightPlan
 
 LAYOUT: Final = RotorLayout((0, 1, 2, 3), SPIN, "tiltrotor")
 

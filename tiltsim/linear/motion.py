@@ -19,12 +19,15 @@ from tiltsim.closed_loop.loop import ClosedLoop, Equations
 from tiltsim.closed_loop.userdata import EVALUATIONS, EVALUATIONS_PER_STEP, HEADER_SIZE
 from tiltsim.engines.base import EngineName
 from tiltsim.engines.callback import control_callback
+from tiltsim.errors import InputError
 from tiltsim.laws.assembling import assemble
 from tiltsim.linear import coordinates
+from tiltsim.linear.traced_loop import offset, traced_function
 from tiltsim.plants.equations_plant import EquationsPlant
 from tiltsim.plants.flight_model import disturbance_acceleration
 from tiltsim.plants.mujoco_plant import MujocoPlant
 from tiltsim.scenario.scenario import Scenario
+from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.mathematics.scalar import Floats, Values
 
 LONG: Final = 1000
@@ -50,6 +53,12 @@ class Motion(ABC):
     """
 
     def __init__(self, scenario: Scenario, engine: EngineName | None, late: bool = False) -> None:
+        if scenario.has_objects:
+            where = scenario.address or "scenario"
+            raise InputError(
+                f"{where}: linear analysis takes a vehicle alone; remove [[object]], [tool] and "
+                "[payload]"
+            )
         self.scenario, self.engine, self._late = scenario, engine, late
         self._commanded: Values = ()
         self._inputs: tuple[coordinates.Input, ...] = ()
@@ -62,6 +71,11 @@ class Motion(ABC):
     def _as_flown(self, loop: ClosedLoop) -> ClosedLoop:
         """A controller without layers, or its replacement for a flight with a latency."""
         return loop.with_latency() if self._late and loop.with_latency else loop
+
+    @cached_property
+    def _flown_assembly(self) -> Assembly:
+        """The flight without offsets."""
+        return assemble(self.scenario, self._as_flown)
 
     def _adapted(self, loop: ClosedLoop) -> ClosedLoop:
         """A controller without layers, to whose inputs of the vehicle the offsets are added.
@@ -81,10 +95,7 @@ class Motion(ABC):
 
         def step(*args: Any) -> Values:
             self._commanded = function(*args)
-            values = list(self._commanded)
-            for each, offset in zip(self._inputs, self.offsets.tolist(), strict=True):
-                values[each.place] += offset * each.per_unit
-            return tuple(values)
+            return tuple(offset(self._commanded, self._inputs, self.offsets.tolist()))
 
         return step
 
@@ -153,12 +164,8 @@ class EquationMotion(Motion):
         return equations
 
     @cached_property
-    def _plant_assembly(self) -> Assembly:
-        return assemble(self.scenario, self._as_flown)
-
-    @cached_property
     def _plant(self) -> EquationsPlant:
-        return EquationsPlant(self._plant_assembly, self.engine)
+        return EquationsPlant(self._flown_assembly, self.engine)
 
     @cached_property
     def _varied(self) -> EquationsPlant:
@@ -168,11 +175,31 @@ class EquationMotion(Motion):
     def initial(self) -> Floats:
         return np.array(self._equations.initial(self.assembly, self.assembly.setup), dtype=float)
 
+    @cached_property
+    def _moved(self) -> Callable[..., Values]:
+        """Rates of the state at a time, of a state and offsets; traced if the loop can be."""
+        disturbance = disturbance_acceleration(self.scenario)
+        flown, varied = self._flown_assembly, self._equations
+        equations = flown.loop.equations
+        if not flown.traced or equations is None:
+            setup = self.assembly.setup
+
+            def called(time: tuple[float], state: Values, _offsets: Values) -> Values:
+                inputs = varied.inputs(*time, state, *setup)
+                return varied.rates(*time, state, inputs, *setup, disturbance)
+
+            return called
+
+        def rates(setup: Any, time: Any, state: Any, offsets: Any) -> Any:
+            commanded = equations.inputs(time[0], state, *setup)
+            inputs = xp.array(offset(commanded, self._inputs, offsets))
+            return equations.rates(time[0], state, inputs, *setup, disturbance)
+
+        sizes = {"time": 1, "state": len(self.initial), "offsets": len(self.offsets)}
+        return traced_function(flown, rates, **sizes)
+
     def rates(self, time: float, state: Floats) -> Floats:
-        parameters, knots = self.assembly.setup
-        values, disturbance = state.tolist(), disturbance_acceleration(self.scenario)
-        inputs = self._equations.inputs(time, values, parameters, knots)
-        moved = self._equations.rates(time, values, inputs, parameters, knots, disturbance)
+        moved = self._moved((time,), state.tolist(), self.offsets.tolist())
         return self.coordinates.rates(state, np.array(moved))
 
     def limited(self, state: Floats) -> Floats:
@@ -192,7 +219,7 @@ class EquationMotion(Motion):
         self._plant.advance(0)  # compiles before threads do
 
         def fly(state: Floats) -> Floats:
-            plant = EquationsPlant(self._plant_assembly, self.engine)
+            plant = EquationsPlant(self._flown_assembly, self.engine)
             plant.state = np.array((step, *held, *state))
             plant.advance(steps)
             return plant.state[1 + len(held) :]
@@ -220,8 +247,7 @@ class MujocoMotion(Motion):
 
     @cached_property
     def _plant(self) -> MujocoPlant:
-        flown = assemble(self.scenario, self._as_flown)
-        return MujocoPlant(flown, self._varied.model, self.engine)
+        return MujocoPlant(self._flown_assembly, self._varied.model, self.engine)
 
     @cached_property
     def _whole(self) -> Floats:
@@ -241,9 +267,26 @@ class MujocoMotion(Motion):
         sizes = self.assembly.loop.dynamics.sizes
         return np.split(state, (sizes.qpos, sizes.qpos + sizes.qvel))
 
+    @cached_property
+    def _traced_controls(self) -> Callable[..., Values] | None:
+        """The commands at a time and state, if the loop can be traced."""
+        flown = self._flown_assembly
+        if not flown.traced:
+            return None
+        controls, sizes = flown.loop.sampling.controls, flown.loop.dynamics.sizes
+
+        def commanded(setup: Any, time: Any, *parts: Any) -> Any:
+            return controls(time[0], *parts, *setup)
+
+        parts = {"qpos": sizes.qpos, "qvel": sizes.qvel, "act": sizes.act}
+        return traced_function(flown, commanded, time=1, **parts)
+
     def _controls(self, time: float, state: Floats) -> Values:
-        parts = (part.tolist() for part in self._split(state))
-        return self.assembly.loop.sampling.controls(time, *parts, *self.assembly.setup)
+        parts, traced = (part.tolist() for part in self._split(state)), self._traced_controls
+        if traced is None:
+            return self.assembly.loop.sampling.controls(time, *parts, *self.assembly.setup)
+        self._commanded = traced((time,), *parts)
+        return tuple(offset(self._commanded, self._inputs, self.offsets.tolist()))
 
     def rates(self, time: float, state: Floats) -> Floats:
         import mujoco

@@ -48,8 +48,8 @@ def export(
         raise InputError(f"{given}: choose {', '.join(FORMATS)}")
     prepare_file("path", file)
     log = Log.of_flight(flight)
-    if chosen != "csv" and "yaw" not in log:
-        raise InputError(f"{file}: a {flight.scenario.vehicle.model} moves in a plane; choose csv")
+    if chosen != "csv" and flight.scenario.vehicle.model == "tilt_car":
+        raise InputError(f"{file}: a tilt-car moves in a plane; choose csv")
     with replacing(file) as temporary:
         if chosen == "csv":
             _write_csv(log, temporary)

@@ -60,7 +60,8 @@ def windows_of(log: Log, seconds: float, rotors: int, tilts: int) -> Windows:
                     f"{log.name}: no column {name}_{number}; the scenario's vehicle has {count} "
                     f"{part}: give the scenario of the vehicle that was logged, or map the column"
                 )
-        if f"{name}_{count + 1}" in log.columns:
+        further = log.columns.get(f"{name}_{count + 1}", np.zeros(1))
+        if (further != 0.0).any():  # a quadrotor's flight has tilts that stay at zero
             raise InputError(
                 f"{log.name}: has column {name}_{count + 1}, but the scenario's vehicle has "
                 f"{count} {part}: it is the log of another vehicle"

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from tiltsim.models import mjcf_editing
+from tiltsim.models.objects import Objects, touchable
 from tiltsim.models.parts import SERVO_ARMATURE, ExtraActuators, Ground, ModelSpec, Pod, RotorLimits
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.models.user_vehicle import UserVehicle
@@ -43,6 +44,7 @@ class RotorcraftSpec(ModelSpec):
         rotor_limits: Limits on the rotor speeds.
         extra_actuators: Actuators that layers append after the law's states.
         ground: Ground to take off from and land on; None disables contacts.
+        objects: Objects, tool and load; None for a vehicle alone.
         user_vehicle: A user's file in place of the shipped one, with its own arms and pods; its
             geoms may have mass and are always kept.
     """
@@ -54,6 +56,7 @@ class RotorcraftSpec(ModelSpec):
     rotor_limits: RotorLimits = field(default=RotorLimits())
     extra_actuators: tuple[ExtraActuators, ...] = ()
     ground: Ground | None = None
+    objects: Objects | None = None
     user_vehicle: UserVehicle | None = None
 
     @property
@@ -79,7 +82,7 @@ def compile_model(spec: RotorcraftSpec, *, visuals: bool = True) -> mujoco.MjMod
     """Compile the MuJoCo model of a rotorcraft.
 
     Mass and inertia of the compiled model are the vehicle's at any tilt: the pods' are
-    subtracted from the body's. There are no contacts but those between vehicle and ground.
+    subtracted from the body's. There are no contacts but with the ground and with objects.
 
     Args:
         spec: The specification of the model.
@@ -94,6 +97,10 @@ def compile_model(spec: RotorcraftSpec, *, visuals: bool = True) -> mujoco.MjMod
     """
     import mujoco
 
+    if spec.objects is not None:
+        complete, bare = _compose(spec)
+        with mujoco_hooks():
+            return complete() if visuals else bare()
     # A preset's parameters in place of all that `_with_parameters` sets.
     key = spec, visuals
     if isinstance(spec.vehicle, Vehicle):
@@ -147,16 +154,18 @@ def _with_parameters(
     return model
 
 
-@lru_cache(maxsize=64)  # dm_control takes several times longer than MuJoCo's compiler
+@lru_cache(maxsize=64)
 def _compose(spec: RotorcraftSpec) -> tuple[mjcf_editing.Compile, mjcf_editing.Compile]:
     """Functions that compile the complete vehicle, and the vehicle without visuals.
 
     A flight is simulated with the one and shown with the other, so both are made at once.
     """
+    from tiltsim.models.mjspec_tree import MjSpecTree  # which loads MuJoCo
+
     vehicle, servo, user_vehicle = spec.vehicle, spec.tilt_servo, spec.user_vehicle
     shipped = shipped_folder("mjcf") / f"{spec.model}.xml"
-    root = mjcf_editing.parse_mjcf(shipped if user_vehicle is None else Path(user_vehicle.path))
-    contacts = spec.ground is not None
+    root = MjSpecTree(shipped if user_vehicle is None else Path(user_vehicle.path))
+    contacts = spec.ground is not None or spec.objects is not None
 
     root.option.timestep = spec.timestep
     root.option.integrator = spec.integrator
@@ -196,13 +205,15 @@ def _compose(spec: RotorcraftSpec) -> tuple[mjcf_editing.Compile, mjcf_editing.C
         if extra.wrench:
             mjcf_editing.add_wrench(root, f"layer_{index}", center)
         mjcf_editing.add_hinge_torques(root, f"layer_{index}", extra.hinge_torques)
+    if contacts:
+        touchable(root, ground=spec.ground is not None)
     if spec.ground is not None:
         _set_ground(root, spec.ground)
-    complete = mjcf_editing.compiler_of(root)
+    complete = mjcf_editing.compiler_of(root, spec.objects)
     if user_vehicle is not None and spec.model != "multirotor":
         return complete, complete
     mjcf_editing.remove_visuals(root, contacts=contacts)
-    bare = mjcf_editing.compiler_of(root)
+    bare = mjcf_editing.compiler_of(root, spec.objects)
     return complete, bare if user_vehicle is None or _moves_alike(complete, bare) else complete
 
 
@@ -235,8 +246,7 @@ def _moves_alike(complete: mjcf_editing.Compile, bare: mjcf_editing.Compile) -> 
 def _scale_lengths(root: Any, arm_length: float) -> None:
     """Scale the vehicle's positions and shapes so that its arms have this length (m)."""
     ratio = arm_length / root.find("body", "pod_1").pos[0]
-    defaults = root.find("default", "vehicle")  # None where the elements have taken them
-    pending = [root.find("body", "vehicle"), *([] if defaults is None else [defaults])]
+    pending = [root.find("body", "vehicle")]
     while pending:
         element = pending.pop()
         pending.extend(element.all_children())
@@ -313,17 +323,12 @@ def _body_inertia(spec: RotorcraftSpec, vehicle: Vehicle) -> tuple[float, list[f
 
 
 def _set_ground(root: Any, ground: Ground) -> None:
-    """Let the vehicle's collision shapes touch the ground, and nothing else."""
-    root.option.cone = "elliptic"  # a pyramid holds 29 % less along its diagonals
-    root.option.impratio = 10.0  # friction ten times as stiff as the contact: it creeps less
+    """Let the vehicle's collision shapes touch the ground."""
     plane = root.find("geom", "ground")
     plane.pos = (0.0, 0.0, ground.height)
     plane.friction = (ground.friction, 0.005, 0.0001)
     plane.priority = 1  # its friction counts, not the larger of the two
     plane.conaffinity = 1
-    for geom in root.find("body", "vehicle").find_all("geom"):
-        if (geom.name or "").endswith("collision"):
-            geom.contype = 1
 
 
 def _set_keyframe(key: Any, rotor_speed: float, hinges: int) -> None:

@@ -65,6 +65,7 @@ class UserVehicle:
         radius: Distance of the rotor that is farthest from the body's origin, m.
         products: The entries xy, xz and yz of its inertia about the center of mass, kg m^2.
         has_contact_geoms: Whether it has the geoms that contacts with a scenario's ground need.
+        obstacles: Names of the world's geoms that could collide, but for ``ground``.
     """
 
     path: str
@@ -79,6 +80,7 @@ class UserVehicle:
     radius: float
     products: tuple[float, float, float]
     has_contact_geoms: bool
+    obstacles: tuple[str, ...]
 
     @property
     def unmodeled_properties(self) -> str:
@@ -203,6 +205,7 @@ def _read(path: str, model: str, _version: object) -> UserVehicle:
         radius=max(float(np.linalg.norm(pose.point(data.site(s).xpos))) for s in parts.sites),
         products=(float(inertia[0, 1]), float(inertia[0, 2]), float(inertia[1, 2])),
         has_contact_geoms=_has_contact_geoms(compiled),
+        obstacles=_obstacles(compiled),
     )
 
 
@@ -246,6 +249,13 @@ def _pods_are_balanced(pose: VehiclePose, tilts: int, bodies: list[int], untilte
 def _has_contact_geoms(compiled: mujoco.MjModel) -> bool:
     names = [compiled.geom(g).name for g in range(compiled.ngeom)]
     return "ground" in names and any(name.endswith("collision") for name in names)
+
+
+def _obstacles(compiled: mujoco.MjModel) -> tuple[str, ...]:
+    fixed = compiled.body_weldid[compiled.geom_bodyid] == 0
+    collides = (compiled.geom_contype != 0) | (compiled.geom_conaffinity != 0)
+    names = [compiled.geom(geom).name for geom in np.flatnonzero(fixed & collides)]
+    return tuple(name for name in names if name != "ground")
 
 
 def _cross(

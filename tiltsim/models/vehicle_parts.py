@@ -100,9 +100,10 @@ def _check_names(compiled: mujoco.MjModel, model: str, parts: Parts) -> None:
         found, required = kinds[kind]
         superfluous = [name for name in found if name not in required]
         if superfluous:
+            name = repr(superfluous[0]) if superfluous[0] else "without a name"
+            more = "; the file has one vehicle, without arms and payloads" * (kind == "joint")
             raise ValueError(
-                f"{kind} {superfluous[0]!r} is not one of a {model}'s, which are "
-                f"{', '.join(required)}"
+                f"{kind} {name} is not one of a {model}'s, which are {', '.join(required)}{more}"
             )
         if tuple(found) != required:
             raise ValueError(f"its {kind}s must be in the order {', '.join(required)}")

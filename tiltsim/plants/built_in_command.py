@@ -6,8 +6,10 @@ import numpy as np
 
 from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.closed_loop.loop import Dynamics
+from tiltsim.engines.base import vectors_of
 from tiltsim.errors import InputError
 from tiltsim.laws.assembling import assemble
+from tiltsim.laws.layers.contact import seen_within
 from tiltsim.laws.layers.measured_acceleration import plant_angular_acceleration_of
 from tiltsim.laws.layers.on_equations import read_actuators
 from tiltsim.laws.layers.sensing import measured
@@ -17,6 +19,7 @@ from tiltsim.plants.observing import flip_by_spin
 from tiltsim.scenario.controller import PythonController
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.vehicles.rotorcraft.layout import layout_of
+from tiltsim.vehicles.rotorcraft.others import others_of
 from tiltsim_controllers.mathematics.scalar import Values
 
 
@@ -27,9 +30,9 @@ def built_in_command(assembly: Assembly, plant: MujocoPlant) -> Command:
     """
     loop, parameters, knots = assembly.loop, assembly.setup.parameters, assembly.setup.knots
     time, data = plant.evaluation_time, plant.data
-    qpos: Sequence[float] = data.qpos.tolist()
-    qvel: Sequence[float] = data.qvel.tolist()
-    act = data.act.tolist()
+    qpos: Sequence[float]
+    qvel: Sequence[float]
+    qpos, qvel, act = vectors_of(loop, data).joined()
     while loop.within is not None:
         layer, within, inner = parameters.layer, loop.within, parameters.inner
         if hasattr(layer, "pod_inertias"):  # of measured acceleration: a record for the model
@@ -39,6 +42,8 @@ def built_in_command(assembly: Assembly, plant: MujocoPlant) -> Command:
             qvel = (*qvel, *turning(qpos, qvel, ctrl, loads, layer))
         elif hasattr(layer, "sensors"):  # of actuation: a record for the number of rotors
             qpos, qvel = measured(time, qpos, qvel, layer.sensors)
+        elif hasattr(layer, "direction"):  # of objects
+            act = seen_within(within, others_of(assembly.scenario), act)
         loop, parameters = within, inner
     ctrl = loop.sampling.controls(time, qpos, qvel, act, parameters, knots)
     return _command(assembly, loop.dynamics, ctrl)
@@ -60,7 +65,8 @@ class BuiltInController:
     def __init__(self, scenario: Scenario) -> None:
         controller, simulation = scenario.controller, scenario.simulation
         observed = scenario.vehicle.model in PythonController.vehicle_models
-        if not observed or controller.is_external or controller.measures_angular_acceleration:
+        feeds_back = controller.measures_angular_acceleration or scenario.reference.type == "push"
+        if not observed or controller.is_external or feeds_back:
             raise InputError("controller: must be a built-in one that needs observations only")
         self._assembly = assembly = assemble(scenario)
         loop, parameters = assembly.loop, assembly.setup.parameters

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import isfinite, pi
 from typing import Any
 
@@ -51,6 +51,8 @@ class Observation:
     rotor_speeds: Floats  # (N,), rad/s, positive along each rotor's spin
     reference: Reference
     vehicle: Vehicle | Multirotor  # mass, inertia, gravity, and the rotors' coefficients
+    contact_force: Floats = field(default_factory=lambda: np.zeros(3))
+    """(3,), N, world: of the vehicle on all objects, over the last physics step."""
 
 
 Controller = Callable[[Observation], Command]

@@ -14,10 +14,11 @@ import numpy as np
 from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.closed_loop.choices import program_key
 from tiltsim.closed_loop.userdata import EVALUATIONS, HEADER_SIZE
+from tiltsim.engines.base import vectors_of
 from tiltsim.engines.callback import control_callback
 from tiltsim.engines.python_engine import control_program, control_step
 from tiltsim.laws.commanded import commanded_parameters, planned_servo_commands, with_command
-from tiltsim.laws.rotorcraft import servo_lead
+from tiltsim.laws.vehicle_loop import servo_lead
 from tiltsim.plants.command import CheckedCommand, ControllerError, Observation
 from tiltsim.plants.mujoco_plant import MujocoPlant
 from tiltsim.plants.observing import Observer, flip_by_spin
@@ -125,7 +126,7 @@ class CommandedPlant(MujocoPlant):
 
     def _hold_command(self, command: Values) -> None:
         data, knots = self.data, self._setup.knots
-        vectors = data.userdata[:HEADER_SIZE], data.qpos, data.qvel, data.act, data.ctrl
+        vectors = data.userdata[:HEADER_SIZE], *vectors_of(self._loop, data), data.ctrl
         user = [*flatten(with_command(self._setup.parameters, command)), *knots]
         try:
             data.ctrl[:] = self._controls(*(vector.tolist() for vector in vectors), user)
@@ -168,7 +169,7 @@ class CommandedPlant(MujocoPlant):
             return
         header = data.userdata[:HEADER_SIZE].tolist()
         data.userdata[EVALUATIONS] += 1.0
-        state = data.qpos.tolist(), data.qvel.tolist(), data.act.tolist()
+        state = vectors_of(self._loop, data).lists()
         try:
             data.ctrl[:] = self._held(header, *state, data.ctrl.tolist())
         except (ArithmeticError, ValueError):

@@ -23,9 +23,9 @@ def flight_model(
     """The model that a flight integrates; see `build_model`.
 
     With ``visuals`` the flight is equal bit for bit and the model also has drawn and measured
-    parts, unless there is a ground to touch.
+    parts, unless there is something to touch.
     """
-    visuals = visuals and assembly.scenario.ground is None
+    visuals = visuals and not assembly.scenario.has_contacts
     model = build_model(assembly, knots=knots, visuals=visuals)
     if visuals:
         model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)

@@ -1,11 +1,9 @@
 """MuJoCo as the plant."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import cache, partial
 from math import nan
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import mujoco
 import numpy as np
@@ -21,17 +19,17 @@ from tiltsim.closed_loop.userdata import (
     evaluation_time,
     steps_taken,
 )
-from tiltsim.engines.base import EngineName
+from tiltsim.engines.base import EngineName, vectors_of
 from tiltsim.engines.callback import control_callback
 from tiltsim.engines.factory import make_engine
 from tiltsim.engines.python_engine import control_step
+from tiltsim.engines.recorder import Recorder
 from tiltsim.plants.engine_choice import choose_engine
 from tiltsim.plants.flight_model import evaluations_per_step, flight_model
 from tiltsim.plants.plant import Plant
+from tiltsim.plants.start_of_contact import check_start
+from tiltsim.vehicles.rotorcraft.others import motion_at_start
 from tiltsim_controllers.mathematics.scalar import Floats
-
-if TYPE_CHECKING:
-    from tiltsim.engines.recorder import Recorder
 
 
 class MujocoPlant(Plant):
@@ -68,10 +66,17 @@ class MujocoPlant(Plant):
         )
         parameters = self._setup.userdata  # a shared model may have room for more
         data.userdata[HEADER_SIZE : HEADER_SIZE + len(parameters)] = parameters
-        data.qpos[:], data.qvel[:] = self._loop.kind.initial_motion(assembly)
+        sizes = self._loop.dynamics.sizes
+        motion = self._loop.kind.initial_motion(assembly)
+        data.qpos[: sizes.qpos], data.qvel[: sizes.qvel] = motion
+        if assembly.scenario.has_objects:
+            others = motion_at_start(assembly)
+            data.qpos[sizes.qpos :], data.qvel[sizes.qvel :] = others
         data.act[:] = self._loop.dynamics.initial_activations(assembly, self._setup)
         with control_callback(None):
             mujoco.mj_forward(self.model, data)
+        if assembly.scenario.has_objects:
+            check_start(assembly.scenario, self.model, data)
 
     @property
     def time(self) -> float:
@@ -164,8 +169,7 @@ class MujocoPlant(Plant):
         return np.vstack([recorder.samples, (self.time, *self.observe())])
 
     def observe(self) -> tuple[float, ...]:
-        data = self.data
-        state = data.qpos.tolist(), data.qvel.tolist(), data.act.tolist()
+        data, state = self.data, vectors_of(self._loop, self.data).lists()
         # MuJoCo keeps the controls of its last integrator stage.
         period = data.userdata[CONTROL_PERIOD]
         stale = period == 0.0 or data.userdata[EVALUATIONS] % period == 0.0
@@ -177,13 +181,11 @@ class MujocoPlant(Plant):
         except (ArithmeticError, ValueError):
             return (nan,) * (len(self._loop.sample_fields) - 1)
 
-    def controls(
-        self, qpos: Sequence[float], qvel: Sequence[float], act: Sequence[float]
-    ) -> Sequence[float]:
-        """The controls for a state of MuJoCo's at the present time; NaN where there are none."""
+    def controls(self, *vectors: Sequence[float]) -> Sequence[float]:
+        """The controls for a state (`Vectors`) at the present time; NaN where there are none."""
         header = self.data.userdata[:HEADER_SIZE].tolist()
         try:
-            return self._evaluate("controls")(header, qpos, qvel, act, ())
+            return self._evaluate("controls")(header, *vectors, ())
         except (ArithmeticError, ValueError):
             return [nan] * len(self.data.ctrl)
 

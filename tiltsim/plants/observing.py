@@ -9,6 +9,7 @@ from tiltsim.laws.layers.sensing import measured, sensor_parameters
 from tiltsim.plants.command import Observation, Reference
 from tiltsim.plants.mujoco_plant import MujocoPlant
 from tiltsim.scenario.gait import tilts_of
+from tiltsim.vehicles.rotorcraft.others import others_of
 from tiltsim_controllers.code.traceable import as_arrays
 from tiltsim_controllers.mathematics.rotation import euler_from_quaternion
 from tiltsim_controllers.mathematics.scalar import Values
@@ -26,6 +27,8 @@ class Observer:
         vehicle = assembly.scenario.any_rotorcraft
         self._vehicle, self._tilting = vehicle.resolve(), vehicle.has_tilting_rotors
         self._tilts, self._spins = tilts_of(self._vehicle), np.array(vehicle.spins)
+        others = others_of(assembly.scenario)
+        self._forces = [others.force_places(index) for index in range(len(others.names))]
         self._assembly, self._sensors = assembly, as_arrays(sensor_parameters(assembly.scenario))
 
     def observe(self, plant: MujocoPlant, rotor_speeds: Sequence[float]) -> Observation:
@@ -48,6 +51,7 @@ class Observer:
             rotor_speeds=self._spins * rotor_speeds,
             reference=self._reference(time),
             vehicle=self._vehicle,
+            contact_force=sum((data.history[p] for p in self._forces), np.zeros(3)),
         )
 
     def _reference(self, time: float) -> Reference:

@@ -8,15 +8,13 @@ from decimal import Decimal
 from enum import Enum
 from math import isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, TypeAlias
+from typing import Final, TypeAlias
 
 from tiltsim.flight.expectations import Verdict
 from tiltsim.report.statement import CHAPTER, Origin, Statement, slug
+from tiltsim.scenario.expectation import Expectation
 from tiltsim.scenario.metric_names import METRICS
-
-if TYPE_CHECKING:
-    from tiltsim.scenario.expectation import Expectation
-    from tiltsim.scenario.scenario import Scenario
+from tiltsim.scenario.scenario import Scenario
 
 Value: TypeAlias = "float | bool | tuple[float, ...]"
 """A measured value: a number, yes or no, or several numbers."""

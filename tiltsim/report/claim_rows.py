@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import json
 from collections import Counter
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from tiltsim.flight.expectations import Verdict, check_expectations
 from tiltsim.report.claim import (
@@ -26,9 +26,6 @@ from tiltsim.report.flights import PLANTS, FlightRecord, Flights, Plant, ReportE
 from tiltsim.report.statement import Origin, Statement
 from tiltsim.report.store import code_digest, sources_digest, store
 from tiltsim.scenario.scenario import Scenario
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from decimal import Decimal
 from itertools import groupby
 from math import floor, inf, isfinite, log10
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from tiltsim.report.claim import Claim, ClaimVerdict, ExpectationClaim, FlightClaim
 from tiltsim.report.claim_rows import Cell, Failure, Row, count, count_statements, errors
@@ -16,14 +16,12 @@ from tiltsim.report.comparisons import Comparison
 from tiltsim.report.drawing import Drawing
 from tiltsim.report.errors import ERRORS, PublishedError
 from tiltsim.report.findings import FINDINGS, Finding
+from tiltsim.report.flights import Flights, ReportEntry
 from tiltsim.report.pictures import Picture
 from tiltsim.report.sensitivity import Criterion
 from tiltsim.report.statement import Origin, Statement
 from tiltsim.scenario.metric_names import METRICS
 from tiltsim.scenario.scenario import Scenario
-
-if TYPE_CHECKING:
-    from tiltsim.report.flights import Flights, ReportEntry
 
 TITLE: Final = "Reproduction report"
 SUBJECT: Final = (

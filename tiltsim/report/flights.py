@@ -4,23 +4,19 @@ The folder holds one JSON file per flight (`tiltsim.report.store`). Flights are 
 so an interrupted report resumes where it stopped.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, Literal
+from typing import Final, Literal
 
 from tiltsim.errors import InputError
+from tiltsim.flight.flight import Flight
 from tiltsim.report.store import flight_key, results, store
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.metric_names import WALL_CLOCK_METRICS
-
-if TYPE_CHECKING:
-    from tiltsim.flight.flight import Flight
-    from tiltsim.scenario.scenario import Scenario
+from tiltsim.scenario.scenario import Scenario
 from tiltsim.scenario.trust import require_trust
 
 Plant = Literal["thesis", "mujoco"]

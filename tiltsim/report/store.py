@@ -5,27 +5,23 @@ Files are named by a digest of everything that their content depends on: the res
 models, and the versions of the packages that compute.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 from collections.abc import Callable, Iterator, Sequence
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 import tiltsim_controllers
 from tiltsim.errors import InputError
 from tiltsim.folders import FLYING
 from tiltsim.resources import shipped_folder
 from tiltsim.scenario.loading import named_files
+from tiltsim.scenario.scenario import Scenario
 from tiltsim.scenario.scenario_tables import DESCRIPTIVE
 from tiltsim.system.files import replacing
 from tiltsim.system.processes import in_processes
-
-if TYPE_CHECKING:
-    from tiltsim.scenario.scenario import Scenario
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")

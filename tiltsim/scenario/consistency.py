@@ -7,6 +7,7 @@ from typing import Final
 from tiltsim.scenario.controller import CONTROLLERS, laws_for
 from tiltsim.scenario.expectation import NAME
 from tiltsim.scenario.gait import FixedGait, TableGait
+from tiltsim.scenario.interaction import check_objects
 from tiltsim.scenario.messages import InvalidValueError, choose
 from tiltsim.scenario.multirotor_controllers import AttitudeForceController
 from tiltsim.scenario.outputs import check_decoupler, check_dimension, check_full_pose
@@ -39,6 +40,7 @@ def check_consistency(scenario: ScenarioTables) -> None:
     _check_time_tables(scenario)
     _check_rotor_limits(scenario)
     _check_ground(scenario)
+    check_objects(scenario)
     _check_claims(scenario)
     _check_engine(scenario)
     scenario.controller.check_scenario(scenario)

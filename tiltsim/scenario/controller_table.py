@@ -8,6 +8,7 @@ from pydantic import Field, model_validator
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.table import Positive, Table, example
 from tiltsim_controllers.analysis.stability import ErrorLoop, linear_loop
+from tiltsim_controllers.code.arrays import is_known
 from tiltsim_controllers.gaits.red_gait import determinant_at_clearance
 from tiltsim_controllers.laws.keys import GainSets, number_of, table_of
 from tiltsim_controllers.laws.multirotor_supervisor import untilted_volume
@@ -79,8 +80,9 @@ class SupervisorTable(Table):
         """
         if isinstance(vehicle, Multirotor):
             self._check_multirotor(vehicle)
-        elif self.strategy == "return_to_red":
-            ratio = drag_ratio(vehicle)
+        elif self.strategy == "return_to_red" and all(
+            map(is_known, (ratio := drag_ratio(vehicle), self.clearance, self.min_determinant))
+        ):
             delta, reached = atan(ratio), determinant_at_clearance(self.clearance, ratio)
             if self.clearance >= delta:
                 reason = f"must be below {delta:.4g}, which the untilted vehicle keeps"
@@ -155,6 +157,15 @@ class ControllerTable(Table):
         """Whether ``roll_ref`` and ``pitch_ref`` are the desired attitude of the law."""
         leans = self.leans_unrecorded and not self.commands_tilts
         return not leans or scenario.reference.kind != "position"
+
+    @property
+    def position_stiffness(self) -> float | None:
+        """Force per mass and per error of position that a vehicle at rest makes, 1/s^2.
+
+        A force loop pushes through it, see `tiltsim.laws.layers.contact`; None for a law that
+        cannot push.
+        """
+        return None
 
     @property
     def linearization(self) -> str:

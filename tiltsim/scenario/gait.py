@@ -29,6 +29,7 @@ from tiltsim_controllers.analysis.two_color_planner import (
     four_angle_gait,
     rectangle,
 )
+from tiltsim_controllers.code.arrays import is_known
 from tiltsim_controllers.gaits import plans
 from tiltsim_controllers.gaits.plans import Gait as PlannedGait
 from tiltsim_controllers.tilt_car.vehicle import TiltCar, turn_per_tilt
@@ -78,7 +79,7 @@ class GaitTable(Table, ABC):
         needed = tilts_of(vehicle)
         if self.tilts not in {None, needed} and not isinstance(vehicle, TiltCar):
             raise ValueError(f"has {self.tilts} tilt angles; the vehicle has {needed}")
-        if self.bias != 1.0 and needed not in {1, 4}:
+        if needed not in {1, 4} and self.bias != 1.0:
             raise ValueError(f"gait.bias needs four tilt angles; the vehicle has {needed}")
         return self._unscaled(vehicle).scaled(1.0 / self.scale).biased(self.bias)
 
@@ -112,7 +113,8 @@ class FixedGait(GaitTable):
 
     @property
     def tilts(self) -> int | None:
-        return len(self.angles) if any(self.angles) else None
+        some = any(not is_known(angle) or angle for angle in self.angles)
+        return len(self.angles) if some else None
 
     def _unscaled(self, vehicle: AnyVehicle) -> PlannedGait:
         if isinstance(vehicle, Multirotor) and self.tilts is None:

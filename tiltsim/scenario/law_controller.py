@@ -55,7 +55,9 @@ class Airframe:
         gait: Gait of its tilts.
         initial_tilts: Its tilt angles at time zero, rad.
         initial_speeds: Its rotor speeds at time zero, rad/s along the spin.
+        initial_position: Its position at time zero, m.
         initial_velocity: Its velocity at time zero, m/s, world axes.
+        initial_attitude: Its roll, pitch and yaw at time zero, rad.
         initial_body_rates: Its body rates at time zero, rad/s.
         gyroscopic: 1 where the plant has gyroscopic torque, else 0.
         timestep: Step of the integration, s.
@@ -71,7 +73,9 @@ class Airframe:
     gait: Gait
     initial_tilts: Values
     initial_speeds: Values
+    initial_position: Triple
     initial_velocity: Triple
+    initial_attitude: Triple
     initial_body_rates: Triple
     gyroscopic: float
     timestep: float

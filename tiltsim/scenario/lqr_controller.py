@@ -108,9 +108,9 @@ def _regulator_of(
     thrusts, lean = zip(*(_hover(vehicle, force[node], torque[node]) for node in nodes))
     known = PeriodicVehicle(
         period,
-        vehicle.mass,
-        vehicle.gravity,
-        np.reshape(vehicle.inertia, (3, 3)),
+        float(vehicle.mass),
+        float(vehicle.gravity),
+        np.array(vehicle.inertia, float).reshape(3, 3),
         gyroscopic,
         lag,
         force,
@@ -122,8 +122,8 @@ def _regulator_of(
             known,
             np.array(lean),
             np.array(thrusts),
-            np.array(weights.errors),
-            weights.thrust_change,
+            np.array(weights.errors, float),
+            float(weights.thrust_change),
         )
     except (ValueError, np.linalg.LinAlgError) as error:
         reason = "found no orbit of the gait about which it can regulate"

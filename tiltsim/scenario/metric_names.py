@@ -130,6 +130,18 @@ METRICS: Final = {
         "largest share of the gait's angles (scale) or of its speed (hold) that the supervisor "
         "takes away, or of the way to red; 0 where it never acted",
     ),
+    "peak_force": Metric(
+        "largest contact force", "N", "largest force on all objects together, at any physics step"
+    ),
+    "time_in_contact": Metric(
+        "time in contact", "s", "time for which the vehicle touched an object"
+    ),
+    "max_cable_tension": Metric("largest tension of the cable", "N", "of the recorded samples"),
+    "rms_force_error": Metric(
+        "rms error of the force",
+        "N",
+        "root mean square error of the force of a push, from 1 s after the full force is commanded",
+    ),
     "saturated_fraction": Metric(
         "share of time with a saturated rotor",
         "",

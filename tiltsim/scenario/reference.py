@@ -1,17 +1,18 @@
 """The ``[reference]`` table of a scenario: the motion to track."""
 
-from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from functools import lru_cache
 from itertools import pairwise
 from math import pi
-from typing import Annotated, Final, Literal
+from typing import Annotated, Literal
 
 from pydantic import Field
 
 from tiltsim.errors import InputError
 from tiltsim.scenario.controller_table import ReferenceKind
-from tiltsim.scenario.table import Angle, Angles3, Positive, Table, Vector3, example
+from tiltsim.scenario.push_reference import PushReference
+from tiltsim.scenario.reference_table import PositionReference, ReferenceTable, Tilt
+from tiltsim.scenario.table import Angle, Angles3, Positive, Vector3, example
 from tiltsim.scenario.time_table import (
     POSE_COLUMNS,
     QUATERNION_COLUMNS,
@@ -22,99 +23,14 @@ from tiltsim.scenario.time_table import (
     reference_columns_among,
     rows_with_angles,
 )
-from tiltsim_controllers.gaits.parameters import NO_KNOTS
 from tiltsim_controllers.mathematics.scalar import Triple, Values
-from tiltsim_controllers.references.trajectories import POSES, REFERENCE_TYPES, ReferenceParameters
+from tiltsim_controllers.references.trajectories import POSES, ReferenceParameters
 from tiltsim_controllers.references.waypoints import minimum_snap_knots, table_knots
 
-Tilt = Annotated[float, Field(gt=-pi / 2, lt=pi / 2)]
-Roll = Annotated[float, Field(ge=-pi, le=pi)]
 ReferenceRow = Annotated[tuple[float, ...], Field(strict=False, min_length=4, max_length=8)]
 
 
-_PREFIXES: Final = {"position": "", "angular_frequency": "frequency_"}
-"""Beginnings of the fields of `ReferenceParameters` that hold a vector, unless they are its key."""
-
-
-class _Reference(Table, ABC):
-    """The keys and properties of every reference."""
-
-    table_name = "reference"
-
-    @property
-    @abstractmethod
-    def kind(self) -> ReferenceKind:
-        """The kind of motion that a controller must be able to track."""
-
-    @property
-    def parameters(self) -> ReferenceParameters:
-        """The record that the law reads: keys by their names, vectors by their components."""
-        given = dict(self)
-        fields = {angle: given[angle] for angle in ("roll", "pitch", "yaw")}
-        fields["acceleration_feedforward"] = float(self.adds_acceleration)
-        for key, value in self._motion().items():
-            if isinstance(value, tuple):
-                prefix = _PREFIXES.get(key, f"{key}_")
-                fields |= {f"{prefix}{axis}": n for axis, n in zip("xyz", value, strict=True)}
-            else:
-                fields[key] = value
-        return ReferenceParameters(REFERENCE_TYPES[given["type"]], **fields)
-
-    def _motion(self) -> dict[str, float | Triple]:
-        """The parameters of the motion: by default all keys of the reference's own type."""
-        shared = _PositionReference.model_fields
-        return {key: value for key, value in self if key not in shared}
-
-    @property
-    def knots(self) -> Values:
-        """Table data of references of any length, which the record does not hold."""
-        return NO_KNOTS
-
-    @property
-    def adds_acceleration(self) -> bool:
-        """Whether ``acceleration_feedforward`` is set."""
-        return False
-
-    @property
-    def turns(self) -> bool:
-        """Whether roll, pitch and yaw vary with time."""
-        return False
-
-    def after_gait(self, gait: Values) -> tuple[ReferenceParameters, Values]:
-        """The record, and the table data of a flight: the gait's, then the reference's."""
-        if self.knots == NO_KNOTS:
-            return self.parameters, gait
-        return self.parameters._replace(offset=float(len(gait))), (*gait, *self.knots)
-
-
-class _PositionReference(_Reference):
-    """A position, and the attitude at it."""
-
-    roll: Roll = Field(
-        0.0,
-        description="angle to hold; for controller.law attitude_force, which alone takes pi/2 and "
-        "more, full_pose, switching or python [rad]",
-        examples=[0.2],
-    )
-    pitch: Tilt = Field(0.0, description="as roll [rad]", examples=[0.2])
-    yaw: Angle = Field(0.0, description="heading to hold [rad]", examples=[0.5])
-    acceleration_feedforward: bool = Field(
-        False,
-        description="also demand the reference's acceleration; ch. 4 omits it, laws of higher "
-        "order always include it",
-    )
-    type: str
-
-    @property
-    def adds_acceleration(self) -> bool:
-        return self.acceleration_feedforward
-
-    @property
-    def kind(self) -> ReferenceKind:
-        return "position" if self.roll == self.pitch == 0.0 else "pose"
-
-
-class SetpointReference(_PositionReference):
+class SetpointReference(PositionReference):
     """A point to hold."""
 
     model_config = example(type="setpoint", position=[1.0, 0.0, 0.5])
@@ -125,7 +41,7 @@ class SetpointReference(_PositionReference):
     )
 
 
-class LineReference(_PositionReference):
+class LineReference(PositionReference):
     """Motion along a line, uniform or at a constant acceleration."""
 
     type: Literal["line"] = Field(description="a straight line")
@@ -138,7 +54,7 @@ class LineReference(_PositionReference):
     )
 
 
-class CircleReference(_PositionReference):
+class CircleReference(PositionReference):
     """Uniform motion on a horizontal circle, from +x toward +y; from -x where radius < 0."""
 
     type: Literal["circle"] = Field(description="a horizontal circle")
@@ -155,7 +71,7 @@ class CircleReference(_PositionReference):
             raise self.mistake("radius", "must not be 0")
 
 
-class LissajousReference(_PositionReference):
+class LissajousReference(PositionReference):
     """A sine along each axis: ``position + amplitude sin(angular_frequency t + phase)``."""
 
     type: Literal["lissajous"] = Field(description="a sine along each axis")
@@ -171,7 +87,7 @@ class LissajousReference(_PositionReference):
     )
 
 
-class FigureEightReference(_PositionReference):
+class FigureEightReference(PositionReference):
     """A horizontal figure eight, from its crossing toward +x and +y; a 1:2 lissajous."""
 
     type: Literal["figure_eight"] = Field(description="a horizontal figure eight")
@@ -193,7 +109,7 @@ class FigureEightReference(_PositionReference):
         }
 
 
-class WaypointReference(_PositionReference):
+class WaypointReference(PositionReference):
     """Minimum-snap motion from rest to rest through points at given times."""
 
     type: Literal["waypoints"] = Field(
@@ -226,7 +142,7 @@ class WaypointReference(_PositionReference):
             raise self.mistake("times", str(error)) from None
 
 
-class TableReference(_PositionReference, TimeTable):
+class TableReference(PositionReference, TimeTable):
     """Motion through the rows of a table, along polynomials; after the last row it holds that."""
 
     model_config = example(
@@ -323,7 +239,7 @@ def _reference_table_knots(rows: Rows, interpolation: str) -> Values:
 _minimum_snap_knots = lru_cache(maxsize=64)(minimum_snap_knots)
 
 
-class AttitudeAltitudeReference(_Reference):
+class AttitudeAltitudeReference(ReferenceTable):
     """Attitude and altitude to hold (ch. 3); x = y = 0 for laws that control them as well.
 
     Four rotors under a planned gait, and a quadrotor, leave the horizontal position free; the
@@ -354,7 +270,8 @@ Reference = Annotated[
     | FigureEightReference
     | WaypointReference
     | TableReference
-    | AttitudeAltitudeReference,
+    | AttitudeAltitudeReference
+    | PushReference,
     Field(discriminator="type"),
 ]
 """The ``[reference]`` table, discriminated by its type."""

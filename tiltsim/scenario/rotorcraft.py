@@ -1,22 +1,18 @@
 """Vehicles in general, and with any number of rotors, in a scenario's ``[vehicle]`` table."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from math import inf, pi
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
 from tiltsim.models.parts import TiltServo
 from tiltsim.models.rotor_table import Multirotor
+from tiltsim.models.user_vehicle import UserVehicle
 from tiltsim.scenario.table import NonNegative, Positive, Table, example
 from tiltsim_controllers.mathematics.scalar import Values
 from tiltsim_controllers.tilt_car.vehicle import TiltCar
 from tiltsim_controllers.vehicle.parameters import Vehicle
-
-if TYPE_CHECKING:
-    from tiltsim.models.user_vehicle import UserVehicle
 
 
 class ServoTable(Table):

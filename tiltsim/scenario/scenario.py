@@ -129,4 +129,4 @@ class FlightPlan:
 def plan_flight(scenario: Scenario) -> FlightPlan:
     """Plan a scenario's gait, and append the table data of its reference to the gait's."""
     gait = scenario.gait.plan(scenario.vehicle.resolve())
-    return FlightPlan(scenario, gait, *scenario.reference.after_gait(gait.knots))
+    return FlightPlan(scenario, gait, *scenario.reference.after_gait(gait.knots, scenario))

@@ -8,6 +8,7 @@ from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.controller import Controller
 from tiltsim.scenario.expectation import ClaimName, ClaimTable, Expectation, Origin
 from tiltsim.scenario.gait import FixedGait, Gait
+from tiltsim.scenario.interaction import ObjectTable, PayloadTable, ToolTable
 from tiltsim.scenario.reference import Reference, SetpointReference
 from tiltsim.scenario.rotorcraft import MultirotorTable, RotorcraftTable, TiltServoTable
 from tiltsim.scenario.simulation_table import InitialTable, SimulationTable
@@ -66,6 +67,13 @@ class ScenarioTables(Table):
     ground: GroundTable | None = Field(
         None, description="ground to take off from and land on; default: none"
     )
+    object: Annotated[tuple[ObjectTable, ...], Field(strict=False)] = Field(
+        (), description="things to touch, push, open and land on"
+    )
+    tool: ToolTable | None = Field(
+        None, description="a tool that the vehicle carries; default: none"
+    )
+    payload: PayloadTable | None = Field(None, description="a load to carry; default: none")
     disturbance: Annotated[tuple[Disturbance, ...], Field(strict=False)] = Field(
         (), description="accelerations, forces and torques that the controller does not know of"
     )
@@ -105,16 +113,26 @@ class ScenarioTables(Table):
         return {**state, "__pydantic_private__": private}
 
     @property
+    def has_contacts(self) -> bool:
+        """Whether the vehicle can touch anything."""
+        return self.ground is not None or self.has_objects
+
+    @property
+    def has_objects(self) -> bool:
+        """Whether the model has more in it than the vehicle and the ground."""
+        return bool(self.object) or self.tool is not None or self.payload is not None
+
+    @property
     def time_tables(self) -> dict[str, TimeTable]:
         """Reference and gait by name, if they are tables over time."""
         named = {"reference": self.reference, "gait": self.gait}
         return {name: table for name, table in named.items() if isinstance(table, TimeTable)}
 
     @property
-    def actuator_options(self) -> list[tuple[str, object, object]]:
+    def actuator_options(self) -> list[tuple[str, Any, Any]]:
         """Settings of the actuation layer: key, value and the value of ideal actuators."""
         controller, vehicle = self.controller, self.vehicle
-        options: list[tuple[str, object, object]] = [
+        options: list[tuple[str, Any, Any]] = [
             ("simulation.control_latency", self.simulation.control_latency, 0.0),
             ("sensors", self.sensors.have_errors, False),
             ("fault", [fault.type for fault in self.fault], []),

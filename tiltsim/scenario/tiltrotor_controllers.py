@@ -67,3 +67,9 @@ class FullPoseController(FullPose, FailureAwareController):
     loop_gains = ("gains",)
     commands_tilts = True
     follows_turns = True
+
+    @property
+    def position_stiffness(self) -> float:
+        on_acceleration, _, on_position = self.resolve_gains().position
+        stiffness: float = on_position / on_acceleration
+        return stiffness

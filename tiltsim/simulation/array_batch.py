@@ -13,7 +13,7 @@ from typing import Final, Generic, TypeVar
 import numpy as np
 
 from tiltsim.arrays.flying import Batch, Recording, compile_batch, course_of, double_precision
-from tiltsim.arrays.jax_arrays import require_jax
+from tiltsim.arrays.jax_programs import require_jax
 from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.closed_loop.choices import program_key
 from tiltsim.flight.end import End

@@ -4,16 +4,17 @@ import warnings
 from collections.abc import Mapping
 from typing import Any, Final, NamedTuple
 
+import numpy as np
 from pydantic import BaseModel
 
-from tiltsim.arrays.jax_arrays import JaxArrays
-from tiltsim.arrays.lifting import Lifting
-from tiltsim.arrays.values import PlainNumberError
+from tiltsim.arrays.jax_programs import InJax
 from tiltsim.closed_loop.loop import ClosedLoop
 from tiltsim.plants.flight_model import disturbance_acceleration
-from tiltsim.scenario.scenario import FlightPlan, Scenario, plan_flight
+from tiltsim.scenario.scenario import Scenario, plan_flight
 from tiltsim.scenario.vehicle import VehicleTable
-from tiltsim_controllers.mathematics.scalar import Triple
+from tiltsim_controllers.code.messages import TraceError
+from tiltsim_controllers.code.traceable import program_of
+from tiltsim_controllers.code.tracing import Expr
 from tiltsim_controllers.vehicle.parameters import Vehicle
 
 Tree = dict[str, Any]
@@ -73,15 +74,18 @@ def replaced(table: Any, tree: Mapping[str, Any]) -> Any:
 class PlannedFlight(NamedTuple):
     """A flight as functions of arrays see it; any of its numbers may be an array."""
 
-    plan: FlightPlan
     parameters: Any  # the loop's record
+    reference: Any  # parameters of the reference
     knots: Any
-    disturbance: Triple  # m/s^2, world axes
+    disturbance: Any  # m/s^2, world axes
     state: Any  # at time zero
 
 
 class ArrayPlan:
     """Plans flights of a scenario with other numbers, which may be arrays of JAX.
+
+    The plan of a flight is traced as control laws are. A number that it needs as such, to decide or
+    to solve equations, is not among the `parameters`.
 
     Args:
         scenario: The scenario; its numbers are in `parameters`.
@@ -96,7 +100,7 @@ class ArrayPlan:
         import jax
 
         self._jax, self._loop, self._full = jax, loop, in_full(scenario)
-        self._lifting = Lifting(JaxArrays(dtype), guarded=True, planning=True)
+        self._planned = InJax(dtype)(self._plan)
         self.parameters: Tree = {}
         for name in TABLES:
             for key, value in _numbers(getattr(self._full, name)).items():
@@ -104,34 +108,45 @@ class ArrayPlan:
                     self.parameters.setdefault(name, {})[key] = jax.tree.map(float, value)
 
     def _matters(self, tree: Tree) -> bool:
-        """Whether a flight depends on numbers, and its plan can have arrays in their place.
+        """Whether a flight depends on numbers, and its plan can be traced without their values."""
+        leaves, shape = self._jax.tree.flatten(tree)
 
-        Raises:
-            LiftError: If code of the plan has no form on arrays, whatever numbers it is given.
-        """
-        refusals: tuple[type[Exception], ...] = (PlainNumberError, *self._lifting.arrays.refusals)
+        def traced(numbers: Any) -> Any:
+            return self._plan(self._jax.tree.unflatten(shape, [*numbers]))
+
         try:
-            traced = self._jax.make_jaxpr(lambda t: self(t)[1:])(tree).jaxpr
-        except refusals:
+            program = program_of(traced, numbers=len(leaves))
+        except (TraceError, TypeError, ValueError):  # of NumPy, or as no plan suits any number
             return False
-        reached = {*map(id, traced.invars)}
-        for equation in traced.eqns:
-            if any(id(v) in reached for v in equation.invars):
-                reached.update(map(id, equation.outvars))
-        return any(id(v) in reached for v in traced.outvars)
+        return any(isinstance(result, Expr) for result in program.block.results)
 
-    def __call__(self, tree: Mapping[str, Any]) -> PlannedFlight:
+    def _plan(self, tree: Mapping[str, Any]) -> PlannedFlight:
         """The plan with its numbers replaced by the numbers of a tree, which are not checked."""
-        loop, lifting = self._loop, self._lifting
-        equations = loop.equations
+        loop, equations = self._loop, self._loop.equations
         assert equations is not None  # or flights on arrays are none of it
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # pydantic expects no arrays
+            warnings.simplefilter("ignore")  # pydantic expects no symbolic numbers
             scenario = replaced(self._full, tree)
-            plan = lifting.plan(plan_flight, [scenario], {})
-            setup = lifting.plan(loop.setup, [plan, loop.signature], {})
-            if any(map(lifting.arrays.is_array, setup.knots)):
-                setup = setup._replace(knots=lifting.arrays.vector(setup.knots))
-            state = lifting.plan(equations.initial, [plan, setup], {})
+            plan = plan_flight(scenario)
+            setup = loop.setup(plan, loop.signature)
+            state = equations.initial(plan, setup)
         disturbance = disturbance_acceleration(scenario)
-        return PlannedFlight(plan, setup.parameters, setup.knots, disturbance, state)
+        return PlannedFlight(setup.parameters, plan.reference, setup.knots, disturbance, state)
+
+    def __call__(self, tree: Mapping[str, Any]) -> PlannedFlight:
+        """The plan of a flight with the numbers of a tree, which are not checked."""
+        jax = self._jax
+        flight: PlannedFlight = self._planned(_entries(tree))
+        knots = flight.knots
+        if any(isinstance(knot, jax.Array) for knot in knots):
+            knots = jax.numpy.stack([*map(jax.numpy.asarray, knots)])
+        return flight._replace(knots=knots)
+
+
+def _entries(value: Any) -> Any:
+    """A tree with tuples for lists and arrays, and Python's numbers for NumPy's."""
+    if isinstance(value, Mapping):
+        return {key: _entries(entry) for key, entry in value.items()}
+    if isinstance(value, tuple | list) or getattr(value, "ndim", None):
+        return tuple(map(_entries, value))
+    return value.item() if isinstance(value, np.ndarray | np.generic) else value

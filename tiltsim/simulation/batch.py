@@ -1,7 +1,5 @@
 """Many flights at once, as in sweeps, Monte Carlo studies and stability maps."""
 
-from __future__ import annotations
-
 import os
 import pickle
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -20,6 +18,7 @@ from tiltsim.flight.end import End
 from tiltsim.flight.flight import Flight
 from tiltsim.laws.assembling import assemble
 from tiltsim.plants.engine_choice import native_pays_off
+from tiltsim.scenario.interaction import objects_of
 from tiltsim.scenario.loading import as_scenario
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.scenario.trust import require_trust
@@ -277,8 +276,9 @@ def _way_to_fly(assembly: Assembly, native: bool) -> object:
     if simulation.plant != "mujoco":
         held = simulation.control_steps > 0
         return key, simulation.solver, held, simulation.batch_functions
-    # Stops of the tilt servos are constraints, which lengthen a state; ground adds geoms; a layer
-    # has its own states and controls; a user's file may have other bodies.
+    # Stops of the tilt servos are constraints, which lengthen a state; ground and objects add
+    # geoms; a layer has its own states and controls; a user's file may have other bodies.
     vehicle = scenario.vehicle
     file = vehicle.mjcf if isinstance(vehicle, VehicleTable) else None
-    return key, vehicle.tilt_servo.angle_limit is not None, scenario.ground is not None, file
+    stops, ground = vehicle.tilt_servo.angle_limit is not None, scenario.ground is not None
+    return key, stops, ground, objects_of(scenario), file

@@ -53,7 +53,7 @@ class TerminationMonitor:
     def _check_limits(self, time: float, state: dict[str, float]) -> End | None:
         values = list(state.values())[1:]
         limits = self._reference, self._knots, self._follows_position
-        code = self._loop.kind.limit_exceeded(time, values, *limits)
+        code = int(self._loop.kind.limit_exceeded(time, values, *limits))
         if code == WITHIN_LIMITS:
             return None
         if code == HORIZONTAL_ERROR:

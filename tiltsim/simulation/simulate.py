@@ -1,7 +1,5 @@
 """Simulate a scenario: advance the plant, record samples, find the end."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping
 from os import PathLike
 from time import perf_counter

@@ -1,7 +1,5 @@
 """A flight that is stepped by its caller, with MuJoCo's own model and data."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from os import PathLike
 from time import perf_counter

@@ -1,23 +1,19 @@
 """A scenario as functions of CasADi's symbols, for optimization and linearization."""
 
-from __future__ import annotations
-
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping
 from os import PathLike
 from typing import Any, NamedTuple
 
-from tiltsim.arrays.lifting import Lifting
-from tiltsim.arrays.traced_numbers import trace_scalar_code
-from tiltsim.engines.programs import Traced
 from tiltsim.errors import InputError, TiltsimError
 from tiltsim.laws.assembling import assemble
 from tiltsim.plants.flight_model import disturbance_acceleration
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.system.public import optional_package
+from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.code.casadi_function import casadi_function
 from tiltsim_controllers.code.messages import TraceError
-from tiltsim_controllers.code.program import InputVector
+from tiltsim_controllers.code.traceable import program_of
 
 
 class Symbolic(NamedTuple):
@@ -62,28 +58,22 @@ def symbolic(scenario: Scenario | str | PathLike[str] | Mapping[str, Any]) -> Sy
     initial = tuple(map(float, equations.initial(assembly, setup)))
     moved = *setup, disturbance_acceleration(scenario)
 
-    def dynamics(lifting: Lifting, given: Sequence[InputVector]) -> Any:
-        (time,), state, inputs = given
-        return lifting(equations.rates)(time, [*state], tuple(inputs), *moved)
+    def dynamics(time: Any, state: Any, inputs: Any) -> Any:
+        return equations.rates(time[0], state, inputs, *moved)
 
-    def controller(lifting: Lifting, given: Sequence[InputVector]) -> Any:
-        (time,), state = given
-        return lifting(equations.inputs)(time, [*state], *setup)
+    def controller(time: Any, state: Any) -> Any:
+        return equations.inputs(time[0], state, *setup)
 
-    def closed_loop(lifting: Lifting, given: Sequence[InputVector]) -> Any:
-        (time,), state = given
-        chosen = tuple(controller(lifting, given))
-        return lifting(equations.rates)(time, [*state], chosen, *moved)
+    def closed_loop(time: Any, state: Any) -> Any:
+        return dynamics(time, state, xp.array(controller(time, state)))
 
-    def sample(lifting: Lifting, given: Sequence[InputVector]) -> Any:
-        (time,), state = given
-        chosen = tuple(controller(lifting, given))
-        return lifting(equations.observe)(time, [*state], chosen, *setup)
+    def sample(time: Any, state: Any) -> Any:
+        return equations.observe(time[0], state, xp.array(controller(time, state)), *setup)
 
     sizes = {"time": 1, "state": len(initial)}
 
-    def function(traced: Traced, result: str, **more: int) -> Any:
-        program = trace_scalar_code(traced, **sizes, **more)
+    def function(traced: Callable[..., Any], result: str, **more: int) -> Any:
+        program = program_of(traced, **sizes, **more)
         try:
             return casadi_function(program, traced.__name__, result)
         except TraceError as error:

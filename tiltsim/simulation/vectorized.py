@@ -1,13 +1,11 @@
 """A scenario as pure functions of its numbers in JAX, for ``jit``, ``vmap`` and ``grad``."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from os import PathLike
 from typing import Any
 
 from tiltsim.arrays.flying import Carried, Kernel, course_of
-from tiltsim.arrays.jax_arrays import require_jax
+from tiltsim.arrays.jax_programs import require_jax
 from tiltsim.closed_loop.loop import ControlSetup
 from tiltsim.errors import InputError
 from tiltsim.laws.assembling import assemble
@@ -61,7 +59,7 @@ class Vectorized:
                 'simulation.precision = "float64": needs jax.config.update("jax_enable_x64", True)'
             )
         try:
-            _, parameters, knots, disturbance, state = self._planned(tree)
+            parameters, _, knots, disturbance, state = self._planned(tree)
         except ValueError as error:  # of numbers that make no flight, such as a period of 0
             raise InputError(f"parameters: {error}") from error
         setup = ControlSetup(parameters, knots)

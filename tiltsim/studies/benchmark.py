@@ -267,7 +267,7 @@ def time_per_call(assembly: Assembly) -> float:
     act = tuple(map(float, loop.dynamics.initial_activations(assembly, setup)))
     header = [*Header(assembly.scenario.simulation.timestep)]
     none: list[float] = []
-    vectors = [*map(float, qpos)], [*map(float, qvel)], [*act], none
+    vectors = [*map(float, qpos)], [*map(float, qvel)], [*act], none, none, none
     step = control_step(assembly, setup.userdata.tolist(), "controls")
 
     def calls() -> None:

@@ -10,6 +10,7 @@ from typing import Any, Final
 import mujoco
 import numpy as np
 
+from tiltsim.models.objects import Objects, add_objects
 from tiltsim.resources import shipped_folder
 from tiltsim_controllers.mathematics.scalar import Floats
 
@@ -24,8 +25,8 @@ PLANE: Final = mujoco.mjtGeom.mjGEOM_PLANE
 SKYBOX: Final = mujoco.mjtTexture.mjTEXTURE_SKYBOX
 
 
-def dressed(model: mujoco.MjModel, path: Path) -> mujoco.MjModel:
-    """The compiled model of a user's file, with the visuals that the file lacks."""
+def dressed(model: mujoco.MjModel, path: Path, objects: Objects | None = None) -> mujoco.MjModel:
+    """The compiled model of a user's file among objects, with the visuals that the file lacks."""
     spec = mujoco.MjSpec.from_file(str(path))
     scene = mujoco.MjSpec.from_file(str(shipped_folder("mjcf") / "scene.xml"))
     if SKYBOX not in [texture.type for texture in spec.textures]:
@@ -50,6 +51,8 @@ def dressed(model: mujoco.MjModel, path: Path) -> mujoco.MjModel:
     for body, shape in _missing_parts(model):
         mass = {"mass": 0.0, "contype": 0, "conaffinity": 0, "group": 2}
         spec.body(model.body(body).name).add_geom(**shape, **mass)
+    if objects is not None:
+        add_objects(spec, objects)
     return spec.compile()
 
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.plants.flight_model import build_model
+from tiltsim.scenario.interaction import objects_of
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.views.dressing import dressed
 from tiltsim_controllers.mathematics.rotation import quaternion_from_euler
@@ -59,7 +60,7 @@ def visible_model(assembly: Assembly) -> mujoco.MjModel:
     """The compiled model of a flight's vehicle; a user's file is dressed for the picture."""
     scenario, model = assembly.scenario, build_model(assembly, visuals=True)
     own = None if scenario.vehicle.is_planar else scenario.any_rotorcraft.user_vehicle
-    return model if own is None else dressed(model, Path(own.path))
+    return model if own is None else dressed(model, Path(own.path), objects_of(scenario))
 
 
 def joint_positions(model: mujoco.MjModel, columns: Columns) -> Floats:
@@ -67,13 +68,15 @@ def joint_positions(model: mujoco.MjModel, columns: Columns) -> Floats:
     qpos = np.tile(model.qpos0, (len(columns["time"]), 1))
     for joint in range(model.njnt):
         address = model.jnt_qposadr[joint]
-        kind = mujoco.mjtJoint(model.jnt_type[joint])
+        kind, name = mujoco.mjtJoint(model.jnt_type[joint]), model.joint(joint).name
         if kind == mujoco.mjtJoint.mjJNT_FREE:
-            qpos[:, address : address + 3] = _stack(columns, ("x", "y", "z"))
-            angles = _stack(columns, ("roll", "pitch", "yaw")).tolist()
+            of = "" if joint == 0 else f"{name}_"  # the vehicle's is the first
+            qpos[:, address : address + 3] = _stack(columns, (f"{of}x", f"{of}y", f"{of}z"))
+            if f"{of}roll" not in columns:  # a load, of which the attitude does not count
+                continue
+            angles = _stack(columns, (f"{of}roll", f"{of}pitch", f"{of}yaw")).tolist()
             qpos[:, address + 3 : address + 7] = [quaternion_from_euler(*row) for row in angles]
         elif kind in (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE):
-            name = model.joint(joint).name
             column = COLUMN_OF_JOINT.get(name, name)
             if column in columns:
                 qpos[:, address] = columns[column]

@@ -13,6 +13,9 @@ from tiltsim.scenario.tiltrotor_controllers import AttitudeAltitudeController
 from tiltsim.system.text import in_words, valid_unicode
 
 MIN_WORDS: Final = 4  # words that titles must share to make a common title
+ABBREVIATIONS: Final = ("indi", "lqr", "pid")
+"""Names of laws that are none in words."""
+
 _MARKS: Final = ",:;."
 
 
@@ -60,6 +63,20 @@ def common_title(scenarios: Sequence[Scenario]) -> str:
     return words[:1].upper() + words[1:]
 
 
+def address_in_words(address: str) -> str:
+    """An address for readers: its file and variant, such as ``Line, continuous t2 modified``."""
+    file, _, variant = address.partition("#")
+    name = in_words(file.rpartition("/")[2].removesuffix(".toml"))
+    return ", ".join(filter(None, (name[:1].upper() + name[1:], in_words(variant))))
+
+
+def law_in_words(name: str) -> str:
+    """The name of a controller for readers; abbreviations in capitals."""
+    if name == "given":
+        return "the scenario's own"
+    return name.upper() if name in ABBREVIATIONS else name.replace("_", "-")
+
+
 def _folder(path: Path) -> str:
     """The absolute path of a flight's folder, or of its Parquet file if that has another name."""
     # Links are not resolved: their names are the user's own.
@@ -85,7 +102,7 @@ def describe_gait(assembly: Assembly) -> list[str]:
 def describe_controller(scenario: Scenario) -> list[str]:
     """The controller of a scenario for titles, most specific part first."""
     controller = scenario.controller
-    parts = [f"{controller.law.replace('_', '-')} controller"]
+    parts = [f"{law_in_words(controller.law)} controller"]
     if not isinstance(controller, AttitudeAltitudeController):
         return parts
     if controller.gait_rate_feedforward:

@@ -18,13 +18,8 @@ from scipy.optimize import minimize
 from tiltsim_controllers.analysis.torque_free import RANK_TOLERANCE
 from tiltsim_controllers.laws.full_pose import input_matrix
 from tiltsim_controllers.mathematics.scalar import Floats
-from tiltsim_controllers.vehicle.effectiveness import (
-    ROTOR_FLOATS,
-    SPIN_SIGN,
-    effectiveness_of,
-    tilt_of_rotor,
-)
-from tiltsim_controllers.vehicle.rotors import rotors_in
+from tiltsim_controllers.vehicle.effectiveness import ROTOR_FLOATS, SPIN_SIGN, tilt_of_rotor
+from tiltsim_controllers.vehicle.rotors import by_tilt, rotors_in, wrench_map, wrench_slope
 
 BALANCED: Final = 1e-9
 """Force, as a share of the weight, and torque, of that on the longest lever, that count as none."""
@@ -108,36 +103,23 @@ class _Problem:
 
     def __init__(self, table: Sequence[float], force: Floats) -> None:
         layout = tilt_of_rotor(table)
-        self._functions = effectiveness_of(layout)
-        self._table = table
+        self._map = rotors_in(table, 0, layout)
         self.rotors, self.tilts = len(layout), max(layout) + 1
-        self._tilt_of = np.array(layout)
         self.spins = np.array(table[SPIN_SIGN::ROTOR_FLOATS])
-        rows = self._rows(1.0, *self._turned(np.zeros(self.tilts)))
+        rows = wrench_map(self._map, np.zeros(self.tilts))
         self.unit = float(np.linalg.norm(force) / np.linalg.norm(rows[:3], axis=0).max())
         lever = np.linalg.norm(rows[3:], axis=0).max() * self.unit
         self._scale = np.repeat([1.0 / np.linalg.norm(force), 1.0 / lever], 3)
         self._wanted = np.concatenate([force, np.zeros(3)])
 
-    def _turned(self, tilts: Floats) -> tuple[Floats, Floats]:
-        return np.cos(tilts), np.sin(tilts)
-
-    def _rows(self, constant: float, cosines: Floats, sines: Floats) -> Floats:
-        return np.array(self._functions.rows(constant, cosines, sines, self._table, 0))
-
     def imbalance(self, x: Floats) -> Floats:
         """Force less the desired one, and torque, shape (6,)."""
-        cosines, sines = self._turned(x[: self.tilts])
-        wrench = self._rows(1.0, cosines, sines) @ (x[self.tilts :] * self.unit)
+        wrench = wrench_map(self._map, x[: self.tilts]) @ (x[self.tilts :] * self.unit)
         return np.asarray((wrench - self._wanted) * self._scale)
 
     def slopes(self, x: Floats) -> Floats:
         """Its derivatives by tilts and inputs, shape (6, tilts + rotors)."""
-        cosines, sines = self._turned(x[: self.tilts])
-        per_input = self._rows(1.0, cosines, sines) * self.unit
-        turning = self._rows(0.0, -sines, cosines) * (x[self.tilts :] * self.unit)
-        per_tilt = np.zeros((6, self.tilts))
-        for rotor, tilt in enumerate(self._tilt_of):
-            if tilt >= 0:
-                per_tilt[:, tilt] += turning[:, rotor]
+        tilts, inputs = x[: self.tilts], x[self.tilts :] * self.unit
+        per_input = wrench_map(self._map, tilts) * self.unit
+        per_tilt = by_tilt(self._map, wrench_slope(self._map, tilts) * inputs)
         return np.asarray(np.hstack([per_tilt, per_input]) * self._scale[:, np.newaxis])

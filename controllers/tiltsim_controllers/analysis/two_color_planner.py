@@ -23,6 +23,7 @@ from typing import Final, Literal, NamedTuple, TypeAlias
 import numpy as np
 
 from tiltsim_controllers.analysis.two_color_map import point_p, red_residual
+from tiltsim_controllers.code.arrays import is_known, xp
 from tiltsim_controllers.gaits import plans
 from tiltsim_controllers.gaits.colors import colored_angles, require_color
 from tiltsim_controllers.gaits.plans import Gait
@@ -194,12 +195,12 @@ def four_angle_gait(
         )
     ratio = drag_ratio(vehicle)
     lengths = [
-        hypot(end[0] - start[0], end[1] - start[1])
+        xp.hypot(end[0] - start[0], end[1] - start[1])
         for leg in path.legs
         for start, end in pairwise(leg.vertices)
     ]
     total = sum(lengths)
-    if not total > 0.0:
+    if is_known(total) and not total > 0.0:
         raise ValueError("the path has no length: use a fixed gait")
     covered = 0.0
     rows: list[tuple[float, ...]] = []

@@ -14,27 +14,39 @@ import numpy as np
 from scipy.linalg import expm
 from scipy.optimize import linprog
 
+from tiltsim_controllers.laws.failures import Failure
+from tiltsim_controllers.laws.full_pose import pose_rank
 from tiltsim_controllers.laws.vectoring import Vectoring
 from tiltsim_controllers.laws.vectoring_state import Parameters
 from tiltsim_controllers.mathematics.scalar import Floats, Values
-from tiltsim_controllers.vehicle.effectiveness import force_and_torque
+from tiltsim_controllers.vehicle.effectiveness import (
+    ROTOR_FLOATS,
+    SPIN_SIGN,
+    force_and_torque,
+    tilt_of_rotor,
+)
+from tiltsim_controllers.vehicle.rotors import by_tilt, rotors_in, wrench_slope
 
 SIDE_SHARE: Final = 0.65
 """Share of the greatest thrusts that side force may take."""
 TOTAL_SHARE: Final = 0.9
 """Share of the greatest thrusts that is demanded in all."""
-DELAY_MARGIN: Final = 0.25
+DELAY_MARGIN: Final = 0.22
 """Attitude bandwidth times the delay that is left."""
 POSITION_SHARE: Final = 0.3
 """Position bandwidth over attitude bandwidth."""
 FASTEST: Final = (40.0, 23.0, 8.0)
 """rad/s: attitude, yaw and position without lag and latency."""
-OBSERVERS: Final = (20.0, 40.0)
-"""1/s: the fastest observers of force and torque."""
+YAW_ERROR: Final = 0.1
+"""rad: the error of yaw that demands all of the yaw torque, or more."""
+TORQUE_OBSERVER: Final = 40.0
+"""1/s: the fastest observer of torque."""
 TRACKING: Final = 250.0
 """1/s: how fast the wrench follows its demand where rotors have no lag."""
 REACH: Final = 10.0
 """Greatest thrust over hover thrust where nothing else limits it."""
+SERVO_ANGLE: Final = 0.3
+"""rad: the tilt by which braking counts about an axis that only tilts turn."""
 DIRECTIONS: Final = 8
 """Directions of side force in the linear programs."""
 
@@ -77,6 +89,11 @@ class Craft:
         """Least and greatest thrusts, N, shape (N,) each."""
         low, high = (self.thrust * s * np.abs(s) for s in (self.slowest, self.fastest))
         return low, high
+
+    def outputs(self, tilts: Floats) -> int:
+        """How many of the six outputs rotors and tilts move."""
+        spins = np.reshape(self.table, (len(self.thrust), ROTOR_FLOATS))[:, SPIN_SIGN]
+        return pose_rank(self.table, tilts, spins)
 
     def wrench(self, tilts: Floats) -> Floats:
         """Force and torque per newton, shape (6, N)."""
@@ -129,7 +146,7 @@ def side_slope(craft: Craft, rows: Floats) -> float:
     if craft.moving:
         return 0.0
     if craft.commanded:
-        return 0.5
+        return 0.5 if craft.outputs(craft.tilts) == 6 else 0.0
     if np.linalg.matrix_rank(rows, tol=1e-6) < 6:
         return 0.0
     low, high = craft.limits
@@ -183,41 +200,73 @@ def _rotor_step(timing: Timing, lag: float) -> dict[str, float]:
     }
 
 
-def _authority(craft: Craft, rows: Floats) -> tuple[float, float]:
-    """Angular accelerations (rad/s^2) about x and y, and about z, that hover leaves."""
+def _authority(craft: Craft, rows: Floats, tilts: Floats) -> tuple[float, float]:
+    """Angular accelerations (rad/s^2) about x and y, and about z, that hover leaves.
+
+    By the thrusts; about an axis that only tilts turn, by these.
+    """
     low, high = craft.limits
     room = np.maximum(np.minimum(high - craft.hover, craft.hover - low), 0.05 * craft.hover)
     turn = np.abs(rows[3:]) @ room / np.diag(craft.inertia)
+    if craft.commanded:
+        rotors = rotors_in(craft.table, 0, tilt_of_rotor(craft.table))
+        slopes = np.abs(by_tilt(rotors, wrench_slope(rotors, tilts)))[3:]
+        turning = SERVO_ANGLE * craft.hover * slopes.sum(axis=1) / np.diag(craft.inertia)
+        turn = np.where(turn < 0.1 * turn.max(), np.maximum(turn, turning), turn)
     return min(500.0, float(turn[:2].min())), min(350.0, float(turn[2]))
 
 
-def _observer_gains(bandwidth: float, period: float) -> tuple[float, float]:
-    """Gains of an observer with a double pole, on the motion and on the disturbance (1/s)."""
-    pole = exp(-bandwidth * period)
-    return 1.0 - pole * pole, (1.0 - pole) ** 2 / period
+def _observers(factor: float, bandwidths: Values, period: float) -> dict[str, Any]:
+    """Gains of the observers, which have double poles; without them all measurements are taken.
+
+    Args:
+        factor: Multiplies the bandwidths; 0 for no observers.
+        bandwidths: The observers' of force and torque, and the bandwidth of yaw, 1/s.
+        period: s, between calls.
+    """
+    if factor == 0.0:
+        trusts = dict.fromkeys(("position_trust", "velocity_trust", "attitude_trust"), 1.0)
+        return {**trusts, "rate_trust": (1.0,) * 3, "force_gain": 0.0, "torque_gain": (0.0,) * 3}
+    force, torque, yaw = (2.0 * factor * bandwidth * period for bandwidth in bandwidths)
+    turning = torque, torque, min(torque, 2.0 * yaw)
+    return {
+        "position_trust": 1.0 - exp(-force),
+        "velocity_trust": 1.0 - exp(-2.0 * force),
+        "attitude_trust": 1.0 - exp(-torque),
+        "rate_trust": tuple(1.0 - exp(-2.0 * pole) for pole in turning),
+        "force_gain": (1.0 - exp(-force)) ** 2 / period,
+        "torque_gain": tuple((1.0 - exp(-pole)) ** 2 / period for pole in turning),
+    }
 
 
-def design(keys: Vectoring, craft: Craft, timing: Timing) -> tuple[Parameters, Values]:
-    """Parameters of the law, and its table."""
+def design(
+    keys: Vectoring, craft: Craft, timing: Timing, failure: Failure
+) -> tuple[Parameters, Values]:
+    """Parameters of the law, and its table.
+
+    Args:
+        keys: Keys of the law.
+        craft, timing: The vehicle and the loop.
+        failure: A rotor that is known to have failed, and since when.
+    """
     h, preferred = timing.period, preferred_tilts(craft)
     rows = craft.wrench(preferred)
+    works = np.arange(1, len(craft.thrust) + 1) != failure.rotor
     high = craft.limits[1]
     lag = timing.lag if keys.lag_model else 0.0
     slope = side_slope(craft, rows)
-    angular, yaw_angular = _authority(craft, rows)
+    angular, yaw_angular = _authority(craft, rows, preferred)
     greatest = float(high.sum()) / craft.mass
     lift = max(0.0, (greatest / craft.gravity) ** 2 - 1.0) ** 0.5
     tracking = min(TRACKING, keys.lead / lag) if lag else TRACKING
     latency = timing.latency * h
     sample = h * timing.sampled
-    left = 1.5 * sample + 1.0 / tracking + (0.3 if keys.prediction else 1.0) * latency
+    # The prediction removes most of the delay; its error grows with the delay.
+    left = 1.0 / tracking + (0.6 * sample + 0.25 * latency if keys.prediction else sample + latency)
     attitude = keys.attitude_bandwidth or min(FASTEST[0], DELAY_MARGIN / left)
     position = keys.position_bandwidth or min(FASTEST[2], POSITION_SHARE * attitude)
-    force = keys.observer * min(OBSERVERS[0], attitude)
     delay = 1.5 * sample + 1.0 / tracking + latency
-    torque = keys.observer * min(OBSERVERS[1], 0.5 / delay)
-    velocity_gain, force_gain = _observer_gains(2.0 * force, h)
-    rate_gain, torque_gain = _observer_gains(2.0 * torque, h)
+    yaw = min(FASTEST[1], attitude, (yaw_angular / YAW_ERROR) ** 0.5)
     servo_angle, servo_rate = _servo_step(timing.servo, h)
     parameters = Parameters(
         period=h,
@@ -227,25 +276,24 @@ def design(keys: Vectoring, craft: Craft, timing: Timing) -> tuple[Parameters, V
         bounded=float(keys.bounded),
         position=position,
         damping=1.0,
-        acceleration=min(20.0, 0.7 * craft.gravity * lift),
+        acceleration=min(20.0, 0.45 * craft.gravity * lift),
         descent=6.0,
         greatest=TOTAL_SHARE * greatest,
         lean_time=1.5 / attitude if slope < 1.0 else 0.0,
         attitude=attitude,
         attitude_damping=0.9,
-        yaw=min(FASTEST[1], attitude),
+        yaw=yaw,
         angular=angular,
         yaw_angular=yaw_angular,
         reversal=lag + h if lag else 0.0,
         share=1.0 - exp(-tracking * h),
-        velocity_gain=velocity_gain,
-        force_gain=force_gain,
-        rate_gain=rate_gain,
-        torque_gain=torque_gain,
+        **_observers(keys.observer, (2.5 * position, min(TORQUE_OBSERVER, 0.5 / delay), yaw), h),
         slope=slope,
         hover=craft.hover,
         lever=max(0.02, float(craft.levers.mean())),
         axis=tuple(free_axis(rows).tolist()),
+        axis_after=tuple(free_axis(rows * works).tolist()),
+        failure=failure,
         side_softness=3e-4 if len(craft.thrust) >= 6 else 1.0,
         pull=min(1.0, keys.restoring * h),
         tilt_step=keys.max_tilt_rate * h,

@@ -6,6 +6,8 @@ first of a flight's ``knots``.
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Sequence
 from typing import Final, NamedTuple
 
 NO_KNOTS: Final = (0.0,)
@@ -34,3 +36,15 @@ class GaitParameters(NamedTuple):
     bias: float = 1.0  # [eta] factor of alpha_3 and alpha_4 (ch. 6, Eqs. 12-15)
     keyframes: float = 1.0  # number of pieces
     repeats: float = 1.0  # 1 or 0: whether the gait starts over after its period
+
+
+def check_phases(phases: Sequence[float]) -> None:
+    """Raise `ValueError` for phases that make no gait through keyframes, in order."""
+    if len(phases) < 2 or phases[0] != 0.0 or phases[-1] != 1.0:
+        raise ValueError(f"keyframe phases {phases}: must start at 0 and end at 1")
+    if any(later < earlier for earlier, later in itertools.pairwise(phases)):
+        raise ValueError(f"keyframe phases {phases}: must not decrease")
+    if phases[1] == 0.0 or phases[-2] == 1.0:
+        raise ValueError(f"keyframe phases {phases}: only one row may be at 0 and one at 1")
+    if any(third == first for first, third in zip(phases, phases[2:], strict=False)):
+        raise ValueError(f"keyframe phases {phases}: at most two rows may share a phase")

@@ -9,12 +9,15 @@ evaluates it.
 from __future__ import annotations
 
 import itertools
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from math import inf, isfinite, pi
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from tiltsim_controllers.code.arrays import as_number, is_known, xp
 from tiltsim_controllers.gaits.cat import FOOTFALLS, cat_keyframes
 from tiltsim_controllers.gaits.colors import colored_angles
 from tiltsim_controllers.gaits.motion import planned_tilts, tilt_motion_of
@@ -26,17 +29,11 @@ from tiltsim_controllers.gaits.parameters import (
     NO_KNOTS,
     POWERS,
     GaitParameters,
+    check_phases,
 )
+from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.mathematics.splines import spline_knots
-from tiltsim_controllers.vehicle.parameters import drag_ratio
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-
-    from numpy.typing import ArrayLike
-
-    from tiltsim_controllers.mathematics.scalar import Floats
-    from tiltsim_controllers.vehicle.parameters import Vehicle
+from tiltsim_controllers.vehicle.parameters import Vehicle, drag_ratio
 
 _JUMP: Final = 1e-9
 """Change of an angle (rad) between two pieces that is more than rounding."""
@@ -130,17 +127,19 @@ class Gait:
         Raises:
             ValueError: If the divisor is not positive and finite.
         """
-        if not (isfinite(divisor) and divisor > 0.0):
+        if is_known(divisor) and not (isfinite(divisor) and divisor > 0.0):
             raise ValueError(f"scale 1/{divisor}: must be positive and finite")
         # Also where the number is 1: the result depends on it, which gradients need.
         parameters = self.parameters._replace(scale=self.parameters.scale / divisor)
-        name = self.name if divisor == 1.0 else f"{self.name} / {divisor:g}"
+        scales = is_known(divisor) and divisor != 1.0
+        name = f"{self.name} / {divisor:g}" if scales else self.name
         return replace(self, name=name, parameters=parameters)
 
     def biased(self, eta: float) -> Gait:
         """The gait with ``alpha_3`` and ``alpha_4`` multiplied by ``eta`` (ch. 6, Eqs. 12-15)."""
         parameters = self.parameters._replace(bias=self.parameters.bias * eta)
-        name = self.name if eta == 1.0 else f"{self.name}, biased {eta:.0%}"
+        biases = is_known(eta) and eta != 1.0
+        name = f"{self.name}, biased {eta:.0%}" if biases else self.name
         return replace(self, name=name, parameters=parameters)
 
     def _factors(self) -> Floats:
@@ -187,7 +186,7 @@ class Gait:
 
 def fixed(angles: Sequence[float], *, name: str = "fixed", source: str = "") -> Gait:
     """Constant tilt angles (rad) (ch. 3; ch. 4, Eq. 32), of any number of tilts."""
-    knots = (0.0, *[float(angle) for angle in angles])
+    knots = (0.0, *map(as_number, angles))
     return Gait(name, GaitParameters(FIXED), knots, source, len(angles))
 
 
@@ -235,7 +234,7 @@ def penguin(name: str, amplitude: float, period: float) -> Gait:
 
 def rotating(start: float, rate: float) -> Gait:
     """A tilt that grows from ``start`` (rad) at a constant rate (rad/s) (ch. 10, Eq. 18)."""
-    period = _positive(2.0 * pi / abs(rate)) if rate else 1.0
+    period = _positive(2.0 * pi / abs(xp.where(rate == 0.0, 2.0 * pi, rate)))
     gait = _swinging("rotating", "ch. 10, Eq. (18)", period, (1.0,), [(0.0, rate, start)])
     return replace(gait, parameters=gait.parameters._replace(repeats=0.0))
 
@@ -306,34 +305,22 @@ def keyframes(
             from 0 to 1 or decrease, three rows share a phase (two make a jump), or the period is
             not positive.
     """
-    frames = [tuple(map(float, row)) for row in rows]
+    frames = [tuple(map(as_number, row)) for row in rows]
     for frame in frames:
-        if len(frame) != 1 + tilts or not all(map(isfinite, frame)):
+        if len(frame) != 1 + tilts or not all(map(isfinite, filter(is_known, frame))):
             count = "four" if tilts == 4 else tilts
             raise ValueError(
                 f"keyframe {list(frame)}: needs a phase and {count} finite tilt angles"
             )
     phases = [frame[0] for frame in frames]
-    if len(phases) < 2 or phases[0] != 0.0 or phases[-1] != 1.0:
-        raise ValueError(f"keyframe phases {phases}: must start at 0 and end at 1")
-    if any(later < earlier for earlier, later in itertools.pairwise(phases)):
-        raise ValueError(f"keyframe phases {phases}: must not decrease")
-    if phases[1] == 0.0 or phases[-2] == 1.0:
-        raise ValueError(f"keyframe phases {phases}: only one row may be at 0 and one at 1")
-    if any(third == first for first, third in zip(phases, phases[2:], strict=False)):
-        raise ValueError(f"keyframe phases {phases}: at most two rows may share a phase")
-    pieces = [
-        (
-            first[0] * period,
-            *[
-                entry
-                for before, after in zip(first[1:], second[1:])
-                # Two rows at one phase make a jump, whose piece is never in force.
-                for entry in ((after - before) / max(second[0] - first[0], 1e-12) / period, before)
-            ],
-        )
-        for first, second in itertools.pairwise(frames)
-    ]
+    if all(map(is_known, phases)):
+        check_phases(phases)
+    pieces = []
+    for (phase, *angles), (end, *ends) in itertools.pairwise(frames):
+        # Two rows at one phase make a jump, whose piece is never in force.
+        span = xp.maximum(end - phase, 1e-12)
+        lines = (((after - before) / span / period, before) for before, after in zip(angles, ends))
+        pieces.append((phase * period, *itertools.chain.from_iterable(lines)))
     knots = tuple([value for row in pieces for value in row])
     parameters = GaitParameters(LINEAR, period=_positive(period), keyframes=float(len(pieces)))
     return Gait(name, parameters, knots, source, tilts)
@@ -394,7 +381,7 @@ def two_color_circle(
     return Gait(name, parameters, (*front, *back), source)
 
 
-def _positive(period: float) -> float:
-    if not (isfinite(period) and period > 0.0):
+def _positive(period: Any) -> Any:
+    if is_known(period) and not (isfinite(period) and period > 0.0):
         raise ValueError(f"period = {period}: must be positive and finite")
-    return float(period)
+    return as_number(period)

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, NamedTuple
+from collections.abc import Sequence
+from typing import Annotated, Any, Final, Literal, NamedTuple
 
 from pydantic import ConfigDict, Discriminator, Field, Tag
 
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.laws.keys import Gains2, Keys, NonNegative, Positive, Vector3, gain_kind
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 
 class Gains(NamedTuple):

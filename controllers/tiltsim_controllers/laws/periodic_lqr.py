@@ -11,14 +11,12 @@ to node of a table, backward until it repeats.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from tiltsim_controllers.laws.lqr import BODY
-
-if TYPE_CHECKING:
-    from tiltsim_controllers.mathematics.scalar import Floats
+from tiltsim_controllers.mathematics.scalar import Floats
 
 LONGEST_STEP: Final = 0.005  # s, between two nodes
 FEWEST_NODES: Final = 64

@@ -6,10 +6,19 @@ from typing import Any, NamedTuple
 
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.code.blocks import repeat, take_row
+from tiltsim_controllers.laws.failures import Failure, working
 from tiltsim_controllers.laws.observed import Observed
-from tiltsim_controllers.laws.vectoring_steps import Frame, Motion, accelerations, moved
+from tiltsim_controllers.laws.vectoring_steps import Frame, Motion, moved, turn_by
+from tiltsim_controllers.mathematics.attitude import (
+    attitude_error,
+    quaternion_of_rotation,
+    rotation_of_quaternion,
+)
 from tiltsim_controllers.mathematics.records import Vector3
 from tiltsim_controllers.vehicle.rotors import wrench_map
+
+MOTION = 19
+"""States of the modeled motion and its disturbance."""
 
 
 class Parameters(NamedTuple):
@@ -38,14 +47,18 @@ class Parameters(NamedTuple):
     yaw_angular: float  # rad/s^2
     reversal: float  # s, until a braking begins
     share: float  # of a demanded change of the wrench in a period
-    velocity_gain: float  # of the observers, per call
-    force_gain: float  # 1/s, likewise
-    rate_gain: float
-    torque_gain: float
+    position_trust: float  # share of a measured position in its estimate, per call
+    velocity_trust: float
+    attitude_trust: float
+    rate_trust: Vector3
+    force_gain: float  # 1/s, of the estimated disturbance, per call
+    torque_gain: Vector3
     slope: float  # side force per lift without lean
     hover: float  # N, thrust of a rotor
     lever: float  # m
-    axis: Vector3  # along which it pushes with fixed rotors or preferred tilts
+    axis: Vector3  # along which it pushes with fixed rotors or preferred tilts, ...
+    axis_after: Vector3  # ... and without the failed rotor
+    failure: Failure
     side_softness: float
     pull: float  # share of the way to the preferred inputs in a period
     tilt_step: float  # rad, in a period
@@ -60,7 +73,9 @@ class Parameters(NamedTuple):
 class Memory(NamedTuple):
     """The law's states of N rotors and M commanded tilts, with d samples of latency."""
 
-    velocity: Any  # (3,), m/s, modeled, world axes
+    position: Any  # (3,), m, modeled, world axes
+    velocity: Any  # (3,), m/s, likewise
+    attitude: Any  # (4,), modeled, a unit quaternion, scalar first
     omega: Any  # (3,), rad/s, modeled, body axes
     force: Any  # (3,), m/s^2, of the disturbance
     torque: Any  # (3,), rad/s^2, of the disturbance
@@ -73,7 +88,9 @@ def state_units(rotors: int, tilts: int, latency: int) -> dict[str, str]:
     """Names and units of the states, in the order of `Memory`."""
     numbers, pods, steps = range(1, rotors + 1), range(1, tilts + 1), range(latency + 1)
     return {
+        **{f"state_modeled_position_{axis}": "m" for axis in "xyz"},
         **{f"state_modeled_velocity_{axis}": "m/s" for axis in "xyz"},
+        **{f"state_modeled_quaternion_{part}": "1" for part in "wxyz"},
         **{f"state_modeled_rate_{axis}": "rad/s" for axis in "xyz"},
         **{f"state_disturbing_acceleration_{axis}": "m/s^2" for axis in "xyz"},
         **{f"state_disturbing_angular_acceleration_{axis}": "rad/s^2" for axis in "xyz"},
@@ -87,15 +104,16 @@ def memory_of(observed: Observed) -> Memory:
     """The law's states by name."""
     states, rotors = observed.states, len(observed.thrusts)
     tilts = len(observed.tilt_commands)
-    steps = (len(states) - 12 - rotors - tilts) // (rotors + tilts)
-    first = 12 + rotors * (steps + 1)
-    speeds, points = states[12:first], states[first : first + steps * tilts]
-    velocity, omega, force, torque = states[:12].reshape(4, 3)
+    steps = (len(states) - MOTION - rotors - tilts) // (rotors + tilts)
+    first = MOTION + rotors * (steps + 1)
+    speeds, points = states[MOTION:first], states[first : first + steps * tilts]
     return Memory(
-        velocity,
-        omega,
-        force,
-        torque,
+        states[0:3],
+        states[3:6],
+        states[6:10],
+        states[10:13],
+        states[13:16],
+        states[16:MOTION],
         speeds.reshape(steps + 1, rotors),
         points.reshape(steps, tilts),
         states[first + steps * tilts :],
@@ -145,13 +163,17 @@ def known_of(observed: Observed, p: Parameters) -> Known:
     body, memory = observed.vehicle, memory_of(observed)
     inertia, turns = observed.inertia, observed.gyroscopic
     rotors, table = len(observed.thrusts), xp.array(observed.table)
+    works = working(observed.time, p.failure, rotors)
+    harmed = observed.time >= p.failure.known_from
+    axis = xp.where(harmed, xp.array(p.axis_after), xp.array(p.axis))
+    p = p._replace(axis=axis, slope=xp.where(harmed, 0.0, p.slope))
     thrust, slowest, fastest = table[: 3 * rotors].reshape(3, rotors)
     return Known(
-        observed,
+        observed._replace(rotors=observed.rotors.masked(works)),
         p,
         memory,
         Frame(body.mass, body.gravity, inertia, turns, memory.force, memory.torque),
-        Motion(observed.position, observed.velocity, observed.rotation, observed.body_rates),
+        _estimated(observed, memory, p),
         memory.speeds + p.reads * (observed.rotor_speeds - memory.speeds[0]),
         thrust,
         slowest,
@@ -160,22 +182,36 @@ def known_of(observed: Observed, p: Parameters) -> Known:
     )
 
 
+def _estimated(seen: Observed, memory: Memory, p: Parameters) -> Motion:
+    """The motion between the modeled and the measured one, which is noisier and never late."""
+    rotation = rotation_of_quaternion(memory.attitude)
+    turn = turn_by(p.attitude_trust * attitude_error(rotation, seen.rotation))
+    return Motion(
+        memory.position + p.position_trust * (seen.position - memory.position),
+        memory.velocity + p.velocity_trust * (seen.velocity - memory.velocity),
+        rotation @ turn,
+        memory.omega + xp.array(p.rate_trust) * (seen.body_rates - memory.omega),
+    )
+
+
 def observer_rates(known: Known) -> Any:
-    """Rates of modeled motion and estimated disturbance, shape (12,)."""
-    seen, p, now, memory = known.seen, known.p, known.now, known.memory
+    """Rates of modeled motion and estimated disturbance, shape (MOTION,)."""
+    seen, p, memory = known.seen, known.p, known.memory
     after = following(known, seen.rotor_speeds, known.asked[:2])
     speeds = 0.5 * (seen.rotor_speeds + after)
     wrench = known.wrench(speeds, seen.tilt_angles + 0.5 * p.period * seen.tilt_rates)
-    push, turn = accelerations(now, wrench, known.frame)
-    faster, spun = now.velocity - memory.velocity, now.omega - memory.omega
-    return xp.hstack(
-        [
-            push + p.velocity_gain / p.period * faster,
-            turn + p.rate_gain / p.period * spun,
-            p.force_gain / p.period * faster,
-            p.torque_gain / p.period * spun,
-        ]
-    )
+    then = moved(known.now, wrench, known.frame, p.period)
+    attitude = quaternion_of_rotation(then.rotation)
+    attitude = attitude * xp.copysign(1.0, attitude @ memory.attitude)
+    change = [
+        then.position - memory.position,
+        then.velocity - memory.velocity,
+        attitude - memory.attitude,
+        then.omega - memory.omega,
+        p.force_gain * (seen.velocity - memory.velocity),
+        xp.array(p.torque_gain) * (seen.body_rates - memory.omega),
+    ]
+    return xp.hstack(change) / p.period
 
 
 def following(known: Known, speeds: Any, commands: Any) -> Any:

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import asin, atan2, cos, sin, sqrt
+from functools import partial
+from math import asin, atan2, sqrt
 
-from tiltsim_controllers.mathematics.scalar import Quad, Triple, scalar
+from tiltsim_controllers.code.tracing import make
+from tiltsim_controllers.mathematics.scalar import Quad, Triple
+
+sin, cos = partial(make, "sin"), partial(make, "cos")
+"""Sine and cosine of plain and traced numbers."""
 
 
-@scalar
 def euler_from_quaternion(w: float, x: float, y: float, z: float) -> Triple:
     """Roll, pitch and yaw (rad) of a unit quaternion.
 
@@ -26,7 +30,6 @@ def euler_from_quaternion(w: float, x: float, y: float, z: float) -> Triple:
     )
 
 
-@scalar
 def quaternion_from_euler(roll: float, pitch: float, yaw: float) -> Quad:
     """The unit quaternion ``(w, x, y, z)`` of roll, pitch and yaw (rad)."""
     cr, sr = cos(0.5 * roll), sin(0.5 * roll)
@@ -40,7 +43,6 @@ def quaternion_from_euler(roll: float, pitch: float, yaw: float) -> Quad:
     )
 
 
-@scalar
 def rotation_from_euler(roll: float, pitch: float, yaw: float) -> tuple[float, ...]:
     """The body-to-world rotation (ch. 3, Eq. 2) of angles in rad: nine entries, row by row."""
     sr, cr = sin(roll), cos(roll)
@@ -59,7 +61,6 @@ def rotation_from_euler(roll: float, pitch: float, yaw: float) -> tuple[float, .
     )
 
 
-@scalar
 def rotation_from_quaternion(w: float, x: float, y: float, z: float) -> tuple[float, ...]:
     """The body-to-world rotation of a unit quaternion: nine entries, row by row.
 
@@ -79,7 +80,6 @@ def rotation_from_quaternion(w: float, x: float, y: float, z: float) -> tuple[fl
     )
 
 
-@scalar
 def to_world(rotation: Sequence[float], vector: Triple) -> Triple:
     """A body-frame vector in world axes; ``rotation`` holds nine entries, row by row."""
     r11, r12, r13, r21, r22, r23, r31, r32, r33 = rotation
@@ -87,7 +87,6 @@ def to_world(rotation: Sequence[float], vector: Triple) -> Triple:
     return (r11 * x + r12 * y + r13 * z, r21 * x + r22 * y + r23 * z, r31 * x + r32 * y + r33 * z)
 
 
-@scalar
 def to_body(rotation: Sequence[float], vector: Triple) -> Triple:
     """A world vector in body axes; ``rotation`` is body to world as in `to_world`."""
     r11, r12, r13, r21, r22, r23, r31, r32, r33 = rotation
@@ -95,7 +94,6 @@ def to_body(rotation: Sequence[float], vector: Triple) -> Triple:
     return (r11 * x + r21 * y + r31 * z, r12 * x + r22 * y + r32 * z, r13 * x + r23 * y + r33 * z)
 
 
-@scalar
 def quaternion_from_rotation(rotation: tuple[float, ...]) -> Quad:
     """A unit quaternion ``(w, x, y, z)`` of a body-to-world rotation, nine entries, row by row.
 

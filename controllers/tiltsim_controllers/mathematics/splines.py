@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tiltsim_controllers.mathematics.scalar import Values, affine_in
+from tiltsim_controllers.code.arrays import xp
+from tiltsim_controllers.mathematics.scalar import Values
 
 
-@affine_in("points")
 def spline_knots(
     times: Sequence[float], points: ArrayLike, coefficients: int, *, degree: int, ends: Any = None
 ) -> Values:
@@ -33,7 +33,16 @@ def spline_knots(
     """
     from scipy.interpolate import make_interp_spline  # a third of a second to import
 
-    values = np.asarray(points, dtype=float)
+    values = xp.array(points)
+    if values.dtype == object:  # traced: the knots are affine in the points
+
+        def knots_of(numbers: Any) -> Any:
+            plain = np.reshape(numbers, values.shape)
+            return np.array(spline_knots(times, plain, coefficients, degree=degree, ends=ends))
+
+        offset = knots_of(np.zeros(values.size))
+        columns = np.array([knots_of(unit) - offset for unit in np.eye(values.size)])
+        return (*(offset + values.ravel() @ columns),)
     spline = make_interp_spline(times, values, k=degree, bc_type=ends)
     starts = np.asarray(times[:-1], dtype=float)
     rows = np.zeros((len(values), values.shape[1], coefficients))

@@ -26,6 +26,7 @@ REFERENCE_TYPES: Final = {
     "lissajous": LISSAJOUS,
     "figure_eight": LISSAJOUS,
     "waypoints": WAYPOINTS,
+    "push": WAYPOINTS,
     "table": WAYPOINTS,  # POSES if its roll, pitch and yaw vary
 }
 """Reference types by their name in a scenario."""

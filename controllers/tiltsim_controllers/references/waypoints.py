@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from math import isfinite
 from typing import Any, Final
 
-from tiltsim_controllers.code.arrays import xp
+from tiltsim_controllers.code.arrays import is_known, xp
 from tiltsim_controllers.mathematics.pieces import piece_at, polynomial_derivatives
 from tiltsim_controllers.mathematics.scalar import Values
 from tiltsim_controllers.mathematics.splines import spline_knots
@@ -55,7 +55,8 @@ def minimum_snap_knots(
         raise ValueError(f"{len(points)} waypoints: at least 2 are needed")
     if len(times) != len(points):
         raise ValueError(f"{len(points)} waypoints but {len(times)} times")
-    if not all(map(isfinite, (*times, *(value for point in points for value in point)))):
+    numbers = (*times, *(value for point in points for value in point))
+    if not all(map(isfinite, filter(is_known, numbers))):
         raise ValueError("waypoints and times must be finite numbers")
     if times[0] != 0.0 or any(b <= a for a, b in itertools.pairwise(times)):
         raise ValueError(f"times {list(times)}: must start at 0 and increase")

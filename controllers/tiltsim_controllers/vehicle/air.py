@@ -9,12 +9,12 @@ velocities are in world axes, z up.
 
 from __future__ import annotations
 
-from math import cos, sin
 from typing import Any, Final, NamedTuple
 
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.code.blocks import branch, normal
 from tiltsim_controllers.code.traceable import traceable
+from tiltsim_controllers.code.tracing import make
 from tiltsim_controllers.mathematics.linear import norm
 from tiltsim_controllers.mathematics.records import Vector3
 
@@ -111,7 +111,7 @@ def low_altitude_turbulence(
         sample_time: Time for which a draw of the noise is held, s.
         seed: An integer.
     """
-    feet = min(1000.0, max(10.0, height / FOOT))
+    feet = xp.clip(height / FOOT, 10.0, 1000.0)
     base = 0.177 + 0.000823 * feet
     intensity_w = 0.1 * wind_at_20_ft
     return Turbulence(
@@ -120,8 +120,8 @@ def low_altitude_turbulence(
         length_u=feet / base**1.2 * FOOT,
         length_w=feet * FOOT,
         speed=speed,
-        along_x=cos(direction),
-        along_y=sin(direction),
+        along_x=make("cos", direction),
+        along_y=make("sin", direction),
         sample_time=sample_time,
         seed=seed,
     )

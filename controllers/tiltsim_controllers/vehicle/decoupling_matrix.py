@@ -20,10 +20,9 @@ from __future__ import annotations
 
 from math import cos, sin
 
-from tiltsim_controllers.mathematics.scalar import Octet, Quad, Triple, scalar
+from tiltsim_controllers.mathematics.scalar import Octet, Quad, Triple
 
 
-@scalar
 def sines_and_cosines(a1: float, a2: float, a3: float, a4: float) -> Octet:
     """``(sin alpha_1, cos alpha_1, ..., sin alpha_4, cos alpha_4)``.
 
@@ -33,7 +32,6 @@ def sines_and_cosines(a1: float, a2: float, a3: float, a4: float) -> Octet:
     return sin(a1), cos(a1), sin(a2), cos(a2), sin(a3), cos(a3), sin(a4), cos(a4)
 
 
-@scalar
 def torque_entries(trig: Octet, drag_ratio: float) -> Octet:
     """The eight non-zero entries of ``tau(alpha) / (L K_f)`` (ch. 3, Eq. 5).
 
@@ -54,7 +52,6 @@ def torque_entries(trig: Octet, drag_ratio: float) -> Octet:
     )
 
 
-@scalar
 def body_force(trig: Octet, w1: float, w2: float, w3: float, w4: float) -> Triple:
     """The force ``F(alpha) w / K_f`` in body axes (ch. 3, Eq. 3).
 
@@ -66,7 +63,6 @@ def body_force(trig: Octet, w1: float, w2: float, w3: float, w4: float) -> Tripl
     return (s2 * w2 - s4 * w4, s1 * w1 - s3 * w3, -c1 * w1 + c2 * w2 - c3 * w3 + c4 * w4)
 
 
-@scalar
 def vertical_force_entries(trig: Octet, ux: float, uy: float, uz: float) -> Quad:
     """The row ``u^T F(alpha) / K_f``: force along the direction ``u``, by rotor.
 
@@ -80,7 +76,6 @@ def vertical_force_entries(trig: Octet, ux: float, uy: float, uz: float) -> Quad
     return (s1 * uy - c1 * uz, s2 * ux + c2 * uz, -s3 * uy - c3 * uz, -s4 * ux + c4 * uz)
 
 
-@scalar
 def torque_free_inputs(torque: Octet) -> Quad:
     """The rotor inputs that span ``ker tau(alpha)``; they may vanish where its rank is below 3.
 
@@ -94,7 +89,6 @@ def torque_free_inputs(torque: Octet) -> Quad:
     return (-y3 * yaw_of_24, x4 * yaw_of_13, y1 * yaw_of_24, -x2 * yaw_of_13)
 
 
-@scalar
 def torque_free_force(trig: Octet, torque: Octet, drag_ratio: float) -> Triple:
     """The force at zero torque, ``n = (-R_theta, R_phi, R)``, body axes.
 

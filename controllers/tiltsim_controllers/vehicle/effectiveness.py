@@ -14,21 +14,13 @@ index ``at`` on. Rotors on one pod have the same tilt.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from functools import cache
-from math import cos, sin
+from collections.abc import Sequence
 from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tiltsim_controllers.mathematics.scalar import Floats, Triple, Values, Vector, scalar
-from tiltsim_controllers.mathematics.vectors import (
-    componentwise,
-    tuple_text,
-    vectors_of,
-    written_out,
-)
+from tiltsim_controllers.mathematics.scalar import Floats, Triple, Values
 from tiltsim_controllers.vehicle.parameters import SPIN, Vehicle
 
 ROTOR_FLOATS: Final = 20
@@ -41,7 +33,7 @@ ARMS: Final = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (-1.0, 0.0, 0.0), (0.0, -1.0, 0
 """Directions of the arms of rotors 1 to 4 on a cross; pods of the tiltrotor turn about them."""
 
 TiltOfRotor = tuple[int, ...]
-"""The number of every rotor's tilt, from 0; -1: fixed. Scalar code is made for a layout."""
+"""The number of every rotor's tilt, from 0; -1: fixed. Programs are made for a layout."""
 
 Rows = tuple[Values, Values, Values, Values, Values, Values]
 """Force x, y, z and torque x, y, z by rotor."""
@@ -165,62 +157,6 @@ def tilt_of_rotor(table: Sequence[float]) -> TiltOfRotor:
 def tilts_of(layout: TiltOfRotor) -> int:
     """The number of tilts of a layout."""
     return max(layout) + 1
-
-
-class Effectiveness(NamedTuple):
-    """Scalar functions for vehicles of one layout; ``table`` and ``at`` as in this module."""
-
-    cosines: Callable[..., Values]  # (tilts): of every tilt
-    sines: Callable[..., Values]
-    rows: Callable[..., Rows]
-    """``(constant, cosines, sines, table, at)``: ``constant A + B cosines + C sines``; derivatives
-    have the constant 0 and the derivatives of cosines and sines."""
-    squares: Callable[..., Values]  # (speeds): squares with sign, w, of every rotor
-    wrench: Callable[..., Values]  # (tilts, squares, table, at): force (N) and torque (N m)
-
-
-@cache
-def effectiveness_of(layout: TiltOfRotor) -> Effectiveness:
-    """The functions for a layout."""
-    name = "_".join(str(tilt) if tilt >= 0 else "f" for tilt in layout)
-    tilts = tilts_of(layout)
-
-    rows = written_out(f"rows_{name}", _ROW_ARGUMENTS, _rows(layout, ROTOR_FLOATS, CONSTANT, 6))
-    cosines = componentwise("cosines", "tilts", "cos(tilts#)", tilts, cos=cos)
-    sines = componentwise("sines", "tilts", "sin(tilts#)", tilts, sin=sin)
-    squares = componentwise("squares", "speeds", "speeds# * abs(speeds#)", len(layout))
-    dot = vectors_of(len(layout)).dot
-
-    @scalar
-    def wrench(tilts: Values, squares: Values, table: Vector, at: int) -> Values:
-        fx, fy, fz, tx, ty, tz = rows(1.0, cosines(tilts), sines(tilts), table, at)
-        return (
-            *(dot(fx, squares), dot(fy, squares), dot(fz, squares)),
-            *(dot(tx, squares), dot(ty, squares), dot(tz, squares)),
-        )
-
-    return Effectiveness(cosines, sines, rows, squares, wrench)
-
-
-_ROW_ARGUMENTS: Final = "constant, cosines, sines, table, at"
-
-
-def _rows(layout: TiltOfRotor, size: int, first: int, components: int) -> str:
-    """The text of components by rotor, from a table of ``size`` floats per rotor.
-
-    The constants of a rotor begin at ``first``; its cosines and sines follow.
-    """
-
-    def entry(rotor: int, component: int) -> str:
-        at, tilt = rotor * size + first + component, layout[rotor]
-        text = f"constant * table[at + {at}]"
-        if tilt < 0:
-            return text
-        cosine = f"cosines[{tilt}] * table[at + {at + components}]"
-        return f"{text} + {cosine} + sines[{tilt}] * table[at + {at + 2 * components}]"
-
-    rotors = range(len(layout))
-    return tuple_text(tuple_text(entry(i, k) for i in rotors) for k in range(components))
 
 
 def force_and_torque(table: Sequence[float], tilts: ArrayLike = ()) -> tuple[Floats, Floats]:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
-
-from tiltsim_controllers.mathematics.scalar import scalar
+from typing import Any, Final, NamedTuple
 
 
 class Vehicle(NamedTuple):
@@ -28,12 +26,11 @@ class Vehicle(NamedTuple):
         return self[1:4]
 
     @property
-    def hover_rotor_speed(self) -> float:
+    def hover_rotor_speed(self) -> Any:
         """The speed (rad/s) at which four untilted rotors carry the weight."""
-        return float((self.mass * self.gravity / (4.0 * self.thrust_coefficient)) ** 0.5)
+        return (self.mass * self.gravity / (4.0 * self.thrust_coefficient)) ** 0.5
 
 
-@scalar
 def drag_ratio(vehicle: Vehicle) -> float:
     """Drag torque over thrust torque of a rotor, ``r = K_m / (L K_f)``, dimensionless."""
     return vehicle.drag_coefficient / (vehicle.arm_length * vehicle.thrust_coefficient)

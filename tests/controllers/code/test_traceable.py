@@ -1,4 +1,4 @@
-"""Functions of arrays called by scalar code: as they are, traced and on arrays of JAX."""
+"""Functions of arrays: called with tuples, traced, and checked numbers of a plan."""
 
 from __future__ import annotations
 
@@ -9,11 +9,9 @@ import numpy as np
 import pytest
 
 from tests.natively import natively
-from tiltsim.arrays.lifting import Lifting
-from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.code.traceable import traceable
+from tiltsim_controllers.code.arrays import as_number, is_known, xp
+from tiltsim_controllers.code.traceable import program_of, traceable
 from tiltsim_controllers.mathematics.linear import least_norm
-from tiltsim_controllers.mathematics.scalar import scalar
 
 
 class Gains(NamedTuple):
@@ -27,37 +25,41 @@ def shortest(gains, desired, columns=3):
     return gains.size * least_norm(matrix, desired)
 
 
-@scalar
+@traceable
 def law(gains, x, y):
-    side = shortest(gains, (x, math.sin(y)))
-    if x > 0.0:
-        return (*side,)
-    return -side[0], -side[1], -side[2]
+    side = shortest(gains, xp.array([x, xp.sin(y)]))
+    return xp.where(x > 0.0, side, -side)
 
 
 GAINS = Gains((1.0, 2.0, 0.5, -0.3, 1.0, 2.0), 3.0)
 
 
 @pytest.mark.parametrize("x", [0.4, -0.4])
-def test_scalar_code_calls_a_function_of_arrays(x):
+def test_a_function_calls_another_and_takes_tuples_in_records(x):
     matrix = np.reshape(GAINS.rows, (2, 3))
     expected = math.copysign(3.0, x) * np.linalg.pinv(matrix) @ [x, math.sin(0.7)]
     np.testing.assert_allclose(law(GAINS, x, 0.7), expected, rtol=1e-13)
     np.testing.assert_allclose(natively(law, GAINS, x, 0.7), expected, rtol=1e-13)
 
 
-def test_on_arrays_of_jax():
-    jax = pytest.importorskip("jax")
-    from tiltsim.arrays.jax_arrays import JaxArrays
-
-    with jax.enable_x64(True):
-        lifted = Lifting(JaxArrays("float64"))(law)
-        found = jax.jit(lambda x: xp.array(lifted(GAINS, x, 0.7)))(-0.4)
-    np.testing.assert_allclose(found, law(GAINS, -0.4, 0.7), rtol=1e-13)
-
-
-def test_scalar_code_gets_floats_of_python_and_no_warnings():
+def test_tuples_give_floats_of_python_and_no_warnings():
     twice = traceable(lambda vector: (vector * 2.0, vector @ vector, vector / 0.0))
     double, square, beyond = twice((1.0, -2.0))
     assert (double, square, beyond) == ((2.0, -4.0), 5.0, (math.inf, -math.inf))
     assert {type(value) for value in (*double, square, *beyond)} == {float}
+
+
+def test_arrays_give_arrays_whatever_is_beside_them():
+    found = traceable(lambda vector, more: vector + more)(np.ones(2), (1.0, 2.0))
+    np.testing.assert_array_equal(found, [2.0, 3.0])
+
+
+def test_a_plan_checks_numbers_that_it_knows():
+    def planned(numbers):
+        assert is_known(1.0)
+        assert not is_known(numbers[0])
+        assert as_number(2) == 2.0
+        return as_number(numbers[0])
+
+    program = program_of(lambda numbers: (planned(numbers),), numbers=1)
+    assert [result.op for result in program.block.results] == ["in"]

@@ -33,6 +33,7 @@ from tiltsim.plants.factory import make_plant
 from tiltsim.resources import shipped_folder
 from tiltsim.scenario.time_steps import _reaction_gains
 from tiltsim_controllers.analysis.statics import hover_rotor_speeds
+from tiltsim_controllers.code.traceable import as_arrays
 from tiltsim_controllers.vehicle.parameters import SPIN
 
 MEASURED = {"controller": {"angular_acceleration": "measured"}}
@@ -102,7 +103,7 @@ def test_the_measurement_is_the_acceleration_that_the_equations_integrate():
     plant, loop = make_plant(assembly), assembly.loop
     plant.advance(60)
     first = 1 + len(plant._held)
-    state, setup = plant.state[first:].tolist(), assembly.setup
+    state, setup = plant.state[first:], as_arrays(assembly.setup)
     inputs = loop.equations.inputs(plant.time, state, setup.parameters, setup.knots)
     rates = loop.equations.rates(
         plant.time, state, inputs, setup.parameters, setup.knots, (0.0,) * 3
@@ -111,7 +112,7 @@ def test_the_measurement_is_the_acceleration_that_the_equations_integrate():
     qpos, qvel, act = body.qpos(state), body.qvel(state), state[body.motion :]
     unmeasured = loop.within.within
     ctrl = unmeasured.sampling.controls(
-        plant.time, qpos, (*qvel, 0.0, 0.0, 0.0), act, inner, setup.knots
+        plant.time, qpos, np.hstack([qvel, np.zeros(3)]), act, inner, setup.knots
     )
     loads = read_actuators(unmeasured.dynamics)[1](ctrl)
     seen = plant_angular_acceleration_of(loop.dynamics)(qpos, qvel, ctrl, loads, layer)

@@ -15,9 +15,9 @@ from tiltsim.laws import assembling
 from tiltsim.laws.assembling import LOOPS, assemble, loop_of
 from tiltsim.plants.factory import make_plant
 from tiltsim.scenario.loading import merge
+from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.code.traceable import traceable
 from tiltsim_controllers.laws.yaw_position import gyroscopic_acceleration
-from tiltsim_controllers.mathematics.scalar import scalar
 
 MOTION = ("x", "y", "z", "roll", "pitch", "yaw")
 TILTROTOR = {
@@ -77,15 +77,14 @@ def fly(*changes, plant="thesis", **more):
 
 def with_gyroscopic_torque(loop):
     """A loop on the thesis's equations with the torque that chapter 3 leaves out."""
-    rates, turned = loop.equations.rates, traceable(gyroscopic_acceleration)
+    rates = loop.equations.rates
 
-    @scalar
+    @traceable
     def turning(time, state, inputs, parameters, table, disturbance):
         found = rates(time, state, inputs, parameters, table, disturbance)
         vehicle = parameters.layer.vehicle
-        torque = turned(tuple(state[15:18]), vehicle)
-        moved = [rate + more for rate, more in zip(found[15:18], torque)]
-        return (*found[:15], *moved, *found[18:])
+        moved = found[15:18] + gyroscopic_acceleration(state[15:18], vehicle)
+        return xp.hstack([found[:15], moved, found[18:]])
 
     return replace(loop, equations=replace(loop.equations, rates=turning))
 

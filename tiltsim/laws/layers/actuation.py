@@ -10,26 +10,25 @@ actuators that act on nothing. So the control step remains a pure function that 
 and a scenario with ideal actuators runs without the layer.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cache
 from math import inf
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup
 from tiltsim.laws.layers.layer import Layer, Samples, wrap_loop
 from tiltsim.laws.layers.sensing import measured, sensor_parameters
-from tiltsim.laws.rotorcraft import servo_lead
+from tiltsim.laws.vehicle_loop import servo_lead
 from tiltsim.models.parts import ExtraActuators
+from tiltsim.scenario.scenario import FlightPlan
 from tiltsim.vehicles.rotorcraft import initial_tilts
 from tiltsim.vehicles.rotorcraft.layout import TILT_1, layout_of
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.code.traceable import traceable
 from tiltsim_controllers.mathematics.records import make_record_type
-from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector, scalar
+from tiltsim_controllers.mathematics.scalar import Floats, Vector
 from tiltsim_controllers.vehicle.actuators import (
     faults_record,
     rate_limited_command,
@@ -37,9 +36,6 @@ from tiltsim_controllers.vehicle.actuators import (
     thrust_factors,
 )
 from tiltsim_controllers.vehicle.sensors import Sensors
-
-if TYPE_CHECKING:
-    from tiltsim.scenario.scenario import FlightPlan
 
 
 @cache
@@ -128,7 +124,6 @@ def with_actuation(loop: ClosedLoop, latency_steps: int, external: bool = False)
         head = driven(time, qpos[TILT_1:], act[:rotors], act[asked], commands, spins, actuation)
         return xp.hstack([head, ctrl[states], commands[tilts:], rates, commands])
 
-    @traceable
     def sampled(time: Any, qpos: Any, act: Any, ctrl: Any, actuation: Any) -> Any:
         commands = xp.hstack([ctrl[:tilts], ctrl[layout.accelerations]])
         rates = xp.zeros(under_way)  # the plant moves the line of external commands
@@ -137,25 +132,20 @@ def with_actuation(loop: ClosedLoop, latency_steps: int, external: bool = False)
             commands, rates = along_line(before, commands, actuation.control_timestep)
         return controls_of(time, qpos, act, ctrl, commands, rates.ravel(), actuation)
 
-    @traceable
     def between(time: Any, qpos: Any, act: Any, ctrl: Any, actuation: Any) -> Any:
         commands = ctrl[line_rates.stop :]
         return controls_of(time, qpos, act, ctrl, commands, ctrl[line_rates], actuation)
 
-    @scalar
-    def controls(
-        time: float, qpos: Vector, qvel: Vector, act: Vector, parameters: Any, knots: Vector
-    ) -> Values:
-        actuation, true = parameters.layer, (*qpos,)
-        seen_qpos, seen_qvel = measured(time, true, (*qvel,), actuation.sensors)
+    @traceable
+    def controls(time: Any, qpos: Any, qvel: Any, act: Any, parameters: Any, knots: Any) -> Any:
+        actuation = parameters.layer
+        seen_qpos, seen_qvel = measured(time, qpos, qvel, actuation.sensors)
         ctrl = law_controls(time, seen_qpos, seen_qvel, act, parameters.inner, knots)
-        return sampled(time, true, (*act,), ctrl, actuation)
+        return sampled(time, qpos, act, ctrl, actuation)
 
-    @scalar
-    def hold(
-        time: float, qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector, parameters: Any
-    ) -> Values:
-        return between(time, (*qpos,), (*act,), (*ctrl,), parameters.layer)
+    @traceable
+    def hold(time: Any, qpos: Any, qvel: Any, act: Any, ctrl: Any, parameters: Any) -> Any:
+        return between(time, qpos, act, ctrl, parameters.layer)
 
     def initial_activations(plan: FlightPlan, _layer: Any, inner: Vector) -> Vector:
         angles, at_rest = initial_tilts(plan)[0][:tilts], (0.0,) * rotors

@@ -5,12 +5,9 @@ actuators on the body instead, force and torque in body axes, which only models 
 filters of the turbulence are activations, so a flight restarts anywhere.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cache
-from math import atan2, hypot
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -18,14 +15,16 @@ from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup
 from tiltsim.engines.sample_evaluation import evaluate_over_samples
 from tiltsim.laws.layers.layer import Layer, Samples, wrap_loop
 from tiltsim.models.parts import ExtraActuators
+from tiltsim.scenario.scenario import FlightPlan
 from tiltsim.vehicles.rotorcraft.layout import QW, TILT_1, layout_of, tilt_of_rotor
 from tiltsim.vehicles.rotorcraft.rotors import rotors_record, true_rotors
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.code.blocks import branch
 from tiltsim_controllers.code.traceable import traceable
+from tiltsim_controllers.code.tracing import make
 from tiltsim_controllers.mathematics.attitude import rotation_of_quaternion
 from tiltsim_controllers.mathematics.records import make_record_type
-from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector, scalar
+from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.vehicle.air import (
     DRYDEN_STATES,
     Air,
@@ -41,9 +40,6 @@ from tiltsim_controllers.vehicle.air import (
     stationary_states,
 )
 from tiltsim_controllers.vehicle.craft import Craft, craft_of, places, wrench_of_lift
-
-if TYPE_CHECKING:
-    from tiltsim.scenario.scenario import FlightPlan
 
 AIR_COLUMNS: Final = ("air_vx", "air_vy", "air_vz")
 DRYDEN_FIELDS: Final = tuple(f"dryden_{index}" for index in range(1, DRYDEN_STATES + 1))
@@ -113,11 +109,10 @@ def _derive(
     return {**inner(), **dict(zip(AIR_COLUMNS, velocity.T, strict=True))}
 
 
-@scalar
-def _velocity(time: float, states: Vector, air: Air, knots: Vector) -> Values:
+@traceable
+def _velocity(time: Any, states: Any, air: Air, knots: Any) -> Any:
     """`air_velocity` of a sample."""
-    velocity: Values = air_velocity(time, (*states,), air)
-    return velocity
+    return air_velocity(time, states, air)
 
 
 def _air(plan: FlightPlan) -> Air:
@@ -125,12 +120,13 @@ def _air(plan: FlightPlan) -> Air:
     table = scenario.air
     turbulence = Turbulence()
     if table.turbulence is not None:
-        x, y, _ = table.wind
+        (x, y, _), wind = table.wind, table.turbulence.wind_at_6m
+        squares = x * x + y * y
         turbulence = low_altitude_turbulence(
-            table.turbulence.wind_at_6m,
+            wind,
             table.turbulence.height,
-            speed=hypot(x, y) or table.turbulence.wind_at_6m,
-            direction=atan2(y, x),
+            speed=xp.sqrt(xp.where(squares == 0.0, wind * wind, squares)),
+            direction=make("atan2", y, x),
             sample_time=table.turbulence.sample_time,
             seed=float(scenario.simulation.seed),
         )

@@ -4,20 +4,17 @@ A layer has its own parameters and states and replaces some functions; the rest 
 within. `wrap_loop` is the one place where that is put together.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Equations, Monitoring, Sampling
 from tiltsim.models.parts import ExtraActuators
+from tiltsim.scenario.scenario import FlightPlan
+from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.code.traceable import traceable
 from tiltsim_controllers.mathematics.records import make_record_type
-from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector, scalar
-
-if TYPE_CHECKING:
-    from tiltsim.scenario.scenario import FlightPlan
+from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector
 
 _NO_ACTUATORS: Final = ExtraActuators()
 
@@ -132,9 +129,8 @@ def wrap_loop(inner: ClosedLoop, layer: Layer) -> ClosedLoop:
     )
 
 
-@traceable
-def _none_added(time: Any, qpos: Any, qvel: Any, act: Any, ctrl: Any, parameters: Any) -> tuple[()]:
-    return ()
+def _none_added(time: Any, qpos: Any, qvel: Any, act: Any, ctrl: Any, parameters: Any) -> Any:
+    return xp.zeros(0)
 
 
 def _functions_within(inner: ClosedLoop, layer: Layer) -> tuple[Callable[..., Values], ...]:
@@ -148,31 +144,28 @@ def _functions_within(inner: ClosedLoop, layer: Layer) -> tuple[Callable[..., Va
     inner_check = inner.monitoring.sign_check_values
     act_size, ctrl_size = inner.dynamics.sizes.act, inner.dynamics.sizes.ctrl
     end = act_size + len(layer.fields)
-    adds, held = layer.adds or _none_added, None if layer.adds else ctrl_size
+    adds = layer.adds or _none_added
 
-    @scalar
-    def controls(
-        time: float, qpos: Vector, qvel: Vector, act: Vector, parameters: Any, knots: Vector
-    ) -> Values:
+    @traceable
+    def controls(time: Any, qpos: Any, qvel: Any, act: Any, parameters: Any, knots: Any) -> Any:
         ctrl = inner_controls(time, qpos, qvel, act, parameters.inner, knots)
-        return (*ctrl, *adds(time, (*qpos,), (*qvel,), (*act,), ctrl, parameters.layer))
+        return xp.hstack([ctrl, adds(time, qpos, qvel, act, ctrl, parameters.layer)])
 
-    @scalar
-    def hold(
-        time: float, qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector, parameters: Any
-    ) -> Values:
+    @traceable
+    def hold(time: Any, qpos: Any, qvel: Any, act: Any, ctrl: Any, parameters: Any) -> Any:
         inner = inner_hold(time, qpos, qvel, act, ctrl[:ctrl_size], parameters.inner)
-        if held is not None:
-            return (*inner, *ctrl[held:])
-        return (*inner, *adds(time, (*qpos,), (*qvel,), (*act,), inner, parameters.layer))
+        further = ctrl[ctrl_size:]
+        if layer.adds:
+            further = adds(time, qpos, qvel, act, inner, parameters.layer)
+        return xp.hstack([inner, further])
 
-    @scalar
-    def observe(qpos: Vector, qvel: Vector, act: Vector, ctrl: Vector) -> Values:
-        own = act[act_size:end]
-        return (*inner_observe(qpos, qvel, act[:act_size], ctrl[:ctrl_size]), *own)
+    @traceable
+    def observe(qpos: Any, qvel: Any, act: Any, ctrl: Any) -> Any:
+        inner = inner_observe(qpos, qvel, act[:act_size], ctrl[:ctrl_size])
+        return xp.hstack([inner, act[act_size:end]])
 
-    @scalar
-    def sign_check_values(time: float, values: Vector, parameters: Any, knots: Vector) -> Values:
+    @traceable
+    def sign_check_values(time: Any, values: Any, parameters: Any, knots: Any) -> Any:
         return inner_check(time, values, parameters.inner, knots)
 
     return controls, hold, observe, sign_check_values

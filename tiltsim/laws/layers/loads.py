@@ -20,7 +20,7 @@ from tiltsim.vehicles.rotorcraft.layout import QW, TILT_1
 from tiltsim_controllers.code.traceable import traceable
 from tiltsim_controllers.mathematics.attitude import rotation_matrix, rotation_of_quaternion
 from tiltsim_controllers.mathematics.records import make_record_type
-from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector, scalar
+from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.vehicle.loads import Load, wrench_of_loads
 
 LOAD_COLUMNS: Final = tuple(f"load_{kind}_{axis}" for kind in ("force", "torque") for axis in "xyz")
@@ -64,12 +64,7 @@ def _derive(
     return {**inner(), **dict(zip(LOAD_COLUMNS, wrenches.T, strict=True))}
 
 
-@scalar
-def _acting(time: float, attitude: Vector, loads: Any, knots: Vector) -> Values:
-    """Force and torque of a sample, body axes."""
-    return _wrench(time, (*attitude,), loads)
-
-
 @traceable
-def _wrench(time: Any, attitude: Any, loads: Any) -> Any:
+def _acting(time: Any, attitude: Any, loads: Any, knots: Any) -> Any:
+    """Force and torque of a sample, body axes."""
     return wrench_of_loads(time, rotation_matrix(attitude), loads)

@@ -5,17 +5,16 @@ a controller commands, so the angular acceleration is known at the instant of a 
 controls are computed once to find it, and once more with it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cache
 from math import inf
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from tiltsim.closed_loop.loop import ClosedLoop, Dynamics
 from tiltsim.equations.actuator_level import mechanics, mechanics_record, servo_accelerations
 from tiltsim.laws.layers.layer import Layer, wrap_loop
 from tiltsim.laws.layers.on_equations import read_actuators
+from tiltsim.scenario.scenario import FlightPlan
 from tiltsim.vehicles.rotorcraft import rotor_limits
 from tiltsim.vehicles.rotorcraft.layout import TILT_1, TILT_RATE_1, layout_of, tilt_of_rotor
 from tiltsim.vehicles.rotorcraft.rotors import body_less, rotors_record
@@ -23,13 +22,9 @@ from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.code.traceable import traceable
 from tiltsim_controllers.mathematics.linear import cross
 from tiltsim_controllers.mathematics.records import make_record_type, vector_of
-from tiltsim_controllers.mathematics.scalar import Values, Vector, scalar
 from tiltsim_controllers.vehicle.body import Body, inertia_matrix, inverse_inertia_matrix
 from tiltsim_controllers.vehicle.craft import craft_of
 from tiltsim_controllers.vehicle.rotors import wrench_map
-
-if TYPE_CHECKING:
-    from tiltsim.scenario.scenario import FlightPlan
 
 
 @cache
@@ -104,15 +99,11 @@ def with_measured_acceleration(loop: ClosedLoop) -> ClosedLoop:
             turning=body_less(scenario, carried),
         )
 
-    @scalar
-    def controls(
-        time: float, qpos: Vector, qvel: Vector, act: Vector, parameters: Any, knots: Vector
-    ) -> Values:
+    @traceable
+    def controls(time: Any, qpos: Any, qvel: Any, act: Any, parameters: Any, knots: Any) -> Any:
         inner = parameters.inner
-        ctrl = inner_controls(time, qpos, (*qvel, 0.0, 0.0, 0.0), act, inner, knots)
-        measured = plant_angular_acceleration(
-            (*qpos,), (*qvel,), ctrl, loads(ctrl), parameters.layer
-        )
-        return inner_controls(time, qpos, (*qvel, *measured), act, inner, knots)
+        ctrl = inner_controls(time, qpos, xp.hstack([qvel, xp.zeros(3)]), act, inner, knots)
+        measured = plant_angular_acceleration(qpos, qvel, ctrl, loads(ctrl), parameters.layer)
+        return inner_controls(time, qpos, xp.hstack([qvel, measured]), act, inner, knots)
 
     return wrap_loop(loop, Layer("with_measured_acceleration", record, read, controls=controls))

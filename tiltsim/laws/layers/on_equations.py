@@ -5,11 +5,9 @@ sensors, noise and latency. Only the plant on which they act differs: the thesis
 (`tiltsim.equations.actuator_level`) or a rigid body (`tiltsim.equations.rigid_body`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -17,13 +15,11 @@ from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Dynamics, Equatio
 from tiltsim.equations.actuator_level import ActuatorPlant, limit_speeds_of, mechanics
 from tiltsim.laws.layers.layer import Layer, wrap_loop
 from tiltsim.models.parts import WRENCH_SIZE, ExtraActuators
+from tiltsim.scenario.scenario import FlightPlan
 from tiltsim.vehicles.rotorcraft.layout import layout_of
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.code.traceable import traceable
-from tiltsim_controllers.mathematics.scalar import Triple, Values, Vector, scalar
-
-if TYPE_CHECKING:
-    from tiltsim.scenario.scenario import FlightPlan
+from tiltsim_controllers.mathematics.scalar import Vector
 
 
 @cache
@@ -46,11 +42,9 @@ def read_actuators(dynamics: Dynamics) -> tuple[Callable[..., Any], Callable[...
         hinges += [slice(hinge, hinge + layout.tilts)] if this.hinge_torques else []
         first += this.controls
 
-    @traceable
     def rates(ctrl: Any) -> Any:
         return xp.hstack([ctrl[part] for part in states])
 
-    @traceable
     def loads(ctrl: Any) -> Any:
         wrench = sum((ctrl[part] for part in wrenches), np.zeros(WRENCH_SIZE))
         torques = sum((ctrl[part] for part in hinges), np.zeros(layout.tilts))
@@ -59,8 +53,8 @@ def read_actuators(dynamics: Dynamics) -> tuple[Callable[..., Any], Callable[...
     return rates, loads
 
 
-def _projection(plant: ActuatorPlant, dynamics: Dynamics) -> Callable[..., Vector]:
-    """Scalar code ``(state, mechanics) -> state`` with motion and speed commands within limits."""
+def _projection(plant: ActuatorPlant, dynamics: Dynamics) -> Callable[..., Any]:
+    """Function ``(state, mechanics) -> state`` with motion and speed commands within limits."""
     first = plant.motion + len(dynamics.spins) + dynamics.controller_states
     projections = [plant.project_onto_limits] if plant.project_onto_limits else []
     for this in dynamics.extra_actuators:
@@ -68,8 +62,7 @@ def _projection(plant: ActuatorPlant, dynamics: Dynamics) -> Callable[..., Vecto
             projections += [limit_speeds_of(dynamics.spins, first)]
         first += this.states
 
-    @scalar
-    def project(state: Vector, mechanics: Any) -> Vector:
+    def project(state: Any, mechanics: Any) -> Any:
         for projection in projections:
             state = projection(state, mechanics)
         return state
@@ -91,42 +84,32 @@ def on_equations(loop: ClosedLoop, plant: ActuatorPlant) -> ClosedLoop:
     activation_rates, loads = read_actuators(dynamics)
     project_motion = _projection(plant, dynamics)
 
-    @scalar
-    def equation_inputs(time: float, state: Vector, parameters: Any, knots: Vector) -> Values:
+    @traceable
+    def equation_inputs(time: Any, state: Any, parameters: Any, knots: Any) -> Any:
         return controls(
             time, qpos_of(state), qvel_of(state), state[first:], parameters.inner, knots
         )
 
-    @scalar
-    def controls_in_force(time: float, state: Vector, inputs: Vector, parameters: Any) -> Values:
+    def controls_in_force(time: Any, state: Any, inputs: Any, parameters: Any) -> Any:
         return held(time, qpos_of(state), qvel_of(state), state[first:], inputs, parameters.inner)
 
-    @scalar
+    @traceable
     def equation_rates(
-        time: float,
-        state: Vector,
-        inputs: Vector,
-        parameters: Any,
-        knots: Vector,
-        disturbance: Triple,
-    ) -> Values:
+        time: Any, state: Any, inputs: Any, parameters: Any, knots: Any, disturbance: Any
+    ) -> Any:
         # A stage may pass a rotor's limit by up to one step.
         state = project_motion(state, parameters.layer)
         ctrl = controls_in_force(time, state, inputs, parameters)
-        return (
-            *motion_rates(state, ctrl, loads(ctrl), parameters.layer, disturbance),
-            *activation_rates(ctrl),
-        )
+        moved = motion_rates(state, ctrl, loads(ctrl), parameters.layer, disturbance)
+        return xp.hstack([moved, activation_rates(ctrl)])
 
-    @scalar
-    def observe_equations(
-        time: float, state: Vector, inputs: Vector, parameters: Any, knots: Vector
-    ) -> Values:
+    @traceable
+    def observe_equations(time: Any, state: Any, inputs: Any, parameters: Any, knots: Any) -> Any:
         ctrl = controls_in_force(time, state, inputs, parameters)
         return observe(qpos_of(state), qvel_of(state), state[first:], ctrl)
 
-    @scalar
-    def project_onto_limits(state: Vector, parameters: Any) -> Vector:
+    @traceable
+    def project_onto_limits(state: Any, parameters: Any) -> Any:
         if finish is not None:
             state = finish(state, parameters.layer)
         return project_motion(state, parameters.layer)

@@ -8,22 +8,21 @@ On the thesis's equations with ideal actuators, pods may jump, which turns the b
 the three states of the body rates hold the total angular momentum instead, which does not jump.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Dynamics, Equations
 from tiltsim.laws.layers.layer import Layer, wrap_loop
 from tiltsim.models.parts import ExtraActuators
+from tiltsim.scenario.scenario import FlightPlan
 from tiltsim.vehicles.rotorcraft.layout import TILT_1, TILT_RATE_1, layout_of, tilt_of_rotor
 from tiltsim.vehicles.rotorcraft.rotors import rotors_record, true_rotors
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.code.traceable import traceable
 from tiltsim_controllers.mathematics.linear import cross
 from tiltsim_controllers.mathematics.records import make_record_type
-from tiltsim_controllers.mathematics.scalar import Triple, Values, Vector, scalar
+from tiltsim_controllers.mathematics.scalar import Vector
 from tiltsim_controllers.vehicle.body import inertia_matrix, inverse_inertia_matrix
 from tiltsim_controllers.vehicle.craft import craft_of, thrust_axes
 from tiltsim_controllers.vehicle.motion import BODY_STATES, joined, rigid_state
@@ -32,9 +31,6 @@ from tiltsim_controllers.vehicle.rotor_inertia import (
     hinge_torques,
     spin_torque,
 )
-
-if TYPE_CHECKING:
-    from tiltsim.scenario.scenario import FlightPlan
 
 
 @cache
@@ -100,7 +96,6 @@ def _momentum_equations(equations: Equations, dynamics: Dynamics) -> Equations:
         spin = inverse_inertia_matrix(craft.body) @ momentum
         return joined((*body._replace(omega=body.omega + sign * spin), state[BODY_STATES:]))
 
-    @traceable
     def turning_along(moving: Any, state: Any, own: Any, layer: Any) -> Any:
         """The rotors' momentum turns with the body: ``-omega x sum_i J_r varpi_i d_i``."""
         rates, omega = rigid_state(moving), rigid_state(own).omega
@@ -109,34 +104,25 @@ def _momentum_equations(equations: Equations, dynamics: Dynamics) -> Equations:
         lost = inverse_inertia_matrix(body) @ cross(omega, momentum)
         return joined((*rates._replace(omega=rates.omega - lost), moving[BODY_STATES:]))
 
-    @scalar
-    def body_state(time: float, state: Vector, parameters: Any, knots: Vector) -> Vector:
+    def body_state(time: Any, state: Any, parameters: Any, knots: Any) -> Any:
         angles = tilts(time, state, parameters.inner, knots)
-        own: Vector = with_spin((*state,), angles, parameters.layer, -1.0)
-        return own
+        return with_spin(state, angles, parameters.layer, -1.0)
 
-    @scalar
-    def inputs(time: float, state: Vector, parameters: Any, knots: Vector) -> Values:
+    @traceable
+    def inputs(time: Any, state: Any, parameters: Any, knots: Any) -> Any:
         own = body_state(time, state, parameters, knots)
         return inner_inputs(time, own, parameters.inner, knots)
 
-    @scalar
+    @traceable
     def rates(
-        time: float,
-        state: Vector,
-        inputs: Vector,
-        parameters: Any,
-        knots: Vector,
-        disturbance: Triple,
-    ) -> Values:
+        time: Any, state: Any, inputs: Any, parameters: Any, knots: Any, disturbance: Any
+    ) -> Any:
         own = body_state(time, state, parameters, knots)
         moving = inner_rates(time, own, inputs, parameters.inner, knots, disturbance)
-        return turning_along(moving, (*state,), own, parameters.layer)
+        return turning_along(moving, state, own, parameters.layer)
 
-    @scalar
-    def observe(
-        time: float, state: Vector, inputs: Vector, parameters: Any, knots: Vector
-    ) -> Values:
+    @traceable
+    def observe(time: Any, state: Any, inputs: Any, parameters: Any, knots: Any) -> Any:
         own = body_state(time, state, parameters, knots)
         return inner_observe(time, own, inputs, parameters.inner, knots)
 

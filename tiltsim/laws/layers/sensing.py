@@ -1,9 +1,8 @@
 """The sensors of a rotorcraft, between its state and its controller."""
 
-from __future__ import annotations
+from typing import Any, Final
 
-from typing import TYPE_CHECKING, Any, Final
-
+from tiltsim.scenario.scenario import Scenario
 from tiltsim.vehicles.rotorcraft.layout import QW, TILT_1
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.code.traceable import traceable
@@ -14,9 +13,6 @@ from tiltsim_controllers.vehicle.sensors import (
     reading_index,
     rotate_by_small_angle,
 )
-
-if TYPE_CHECKING:
-    from tiltsim.scenario.scenario import Scenario
 
 DEFAULT_SAMPLE_TIME: Final = 0.01
 """s between readings of the sensors, if neither they nor a held controller define it."""

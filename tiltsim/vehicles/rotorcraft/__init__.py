@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from functools import cache
 from math import inf
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -17,22 +17,25 @@ from tiltsim.closed_loop.limits import (
     MAX_POSITION_ERROR,
     MAX_ROTOR_SPEED,
     ROTOR_SPEED,
-    WITHIN_LIMITS,
     altitude_error,
+    first_limit,
     horizontal_error,
 )
 from tiltsim.closed_loop.vehicle_kind import VehicleKind
 from tiltsim.models.hover import hover_speeds
 from tiltsim.models.parts import ExtraActuators, Ground, Pod, RotorLimits, TiltServo
 from tiltsim.models.rotor_table import Multirotor
+from tiltsim.scenario.interaction import objects_of
 from tiltsim.scenario.multirotor_controllers import AttitudeForceController
 from tiltsim.scenario.scenario import FlightPlan, Scenario
 from tiltsim.scenario.vehicle import VehicleTable
 from tiltsim.system.text import Quantity, subscript
 from tiltsim.vehicles.rotorcraft.layout import CROSS, Layout
 from tiltsim.vehicles.rotorcraft.metrics import rotorcraft_metrics
+from tiltsim_controllers.code.arrays import xp
+from tiltsim_controllers.code.traceable import traceable
 from tiltsim_controllers.mathematics.rotation import quaternion_from_euler
-from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector, clipped, scalar
+from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector
 from tiltsim_controllers.references.trajectories import ReferenceParameters
 from tiltsim_controllers.vehicle.states import P
 
@@ -67,30 +70,26 @@ def rotorcraft_columns(layout: Layout) -> dict[str, Quantity]:
 
 
 @cache
-def limit_exceeded_of(layout: Layout) -> Callable[..., int]:
-    """Scalar code of the first limit that a sample exceeds; see `VehicleKind.limit_exceeded`."""
+def limit_exceeded_of(layout: Layout) -> Callable[..., Any]:
+    """Function for the first limit that a sample exceeds; see `VehicleKind.limit_exceeded`."""
     first, rotors = layout.speed_1, layout.rotors
 
-    @scalar
+    @traceable
     def limit_exceeded(
-        time: float,
-        values: Vector,
-        reference: ReferenceParameters,
-        knots: Vector,
-        follows_position: float,
-    ) -> int:
+        time: Any, values: Any, reference: ReferenceParameters, knots: Any, follows_position: Any
+    ) -> Any:
         away = follows_position * horizontal_error(time, values, reference, knots)
-        if away > MAX_POSITION_ERROR:
-            return HORIZONTAL_ERROR
-        if altitude_error(time, values, reference, knots) > MAX_POSITION_ERROR:
-            return ALTITUDE_ERROR
-        for axis in range(3):
-            if abs(values[P + axis]) > MAX_BODY_RATE:
-                return BODY_RATE + axis
-        for rotor in range(rotors):
-            if abs(values[first + rotor]) > MAX_ROTOR_SPEED:
-                return ROTOR_SPEED + rotor
-        return WITHIN_LIMITS
+        height = altitude_error(time, values, reference, knots)
+        turning = abs(values[P : P + 3]) > MAX_BODY_RATE
+        spinning = abs(values[first : first + rotors]) > MAX_ROTOR_SPEED
+        return first_limit(
+            [
+                (away > MAX_POSITION_ERROR, HORIZONTAL_ERROR),
+                (height > MAX_POSITION_ERROR, ALTITUDE_ERROR),
+                *((too_fast, BODY_RATE + axis) for axis, too_fast in enumerate(turning)),
+                *((too_fast, ROTOR_SPEED + rotor) for rotor, too_fast in enumerate(spinning)),
+            ]
+        )
 
     return limit_exceeded
 
@@ -150,6 +149,7 @@ def _compile(
         law_states=law_states,
         extra_actuators=extra_actuators,
         ground=None if ground is None else Ground(ground.height, ground.friction),
+        objects=objects_of(scenario),
         user_vehicle=vehicle.user_vehicle,
     )
     return compile_model(spec, visuals=visuals)
@@ -164,7 +164,7 @@ def initial_tilts(plan: FlightPlan) -> tuple[Values, Values]:
     jets = plan.gait.jets(0.0)
     fastest = plan.scenario.any_rotorcraft.tilt_servo.max_rate or inf
     angles = tuple(angle for angle, _, _ in jets)
-    return angles, tuple(clipped(rate, -fastest, fastest) for _, rate, _ in jets)
+    return angles, tuple(xp.clip(rate, -fastest, fastest) for _, rate, _ in jets)
 
 
 def initial_rotor_speeds(plan: FlightPlan) -> Values:

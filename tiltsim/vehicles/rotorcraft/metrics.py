@@ -27,6 +27,9 @@ from tiltsim_controllers.vehicle.states import TILT_FIELDS
 
 SETTLED_ALTITUDE: Final = 0.005  # m
 
+SETTLED_FORCE: Final = 1.0
+"""s after the full force is commanded, from where on the error of the force counts."""
+
 
 def rotorcraft_metrics(
     columns: Mapping[str, Floats], scenario: Scenario, follows_position: bool
@@ -50,6 +53,7 @@ def rotorcraft_metrics(
         "max_tilt_rate": largest(rates) if rates else np.zeros(spins.shape[1:-1]),
         **_singularity_metrics(columns, limits.resolve()),
         **_controller_metrics(columns),
+        **_contact_metrics(columns),
         **saturation_metrics(time, saturated),
     }
 
@@ -130,6 +134,26 @@ def _controller_metrics(columns: Mapping[str, Floats]) -> dict[str, Any]:
     """The largest values of columns that some controllers have."""
     names = [name for name in ("null_part", "supervision") if name in columns]
     return {f"max_{name}": columns[name].max(axis=-1) for name in names}
+
+
+def _contact_metrics(columns: Mapping[str, Floats]) -> dict[str, Any]:
+    """Forces on objects, where a flight has any; peak and time are kept at every step."""
+    metrics = {}
+    if "peak_contact_force" in columns:
+        metrics["peak_force"] = columns["peak_contact_force"][..., -1]
+        metrics["time_in_contact"] = columns["contact_time"][..., -1]
+    if "cable_tension" in columns:
+        metrics["max_cable_tension"] = columns["cable_tension"].max(axis=-1)
+    if "push_force_ref" in columns:
+        time, commanded = columns["time"], columns["push_force_ref"]
+        full = commanded == commanded.max(axis=-1, keepdims=True)
+        _, ramp_end = first_and_last(~full)
+        settled = time > (time[ramp_end] + SETTLED_FORCE)[..., np.newaxis]
+        error = np.where(settled, columns["push_force"] - commanded, 0.0)
+        count = settled.sum(axis=-1)
+        with np.errstate(invalid="ignore", divide="ignore"):  # NaN where the flight is too short
+            metrics["rms_force_error"] = np.sqrt((error * error).sum(axis=-1) / count)
+    return metrics
 
 
 def _singularity_metrics(

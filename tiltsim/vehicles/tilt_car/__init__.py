@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from tiltsim.closed_loop.limits import (
     HORIZONTAL_ERROR,
     MAX_POSITION_ERROR,
     MAX_ROTOR_SPEED,
     ROTOR_SPEED,
-    WITHIN_LIMITS,
+    first_limit,
     horizontal_error,
 )
 from tiltsim.closed_loop.vehicle_kind import VehicleKind
@@ -18,8 +18,9 @@ from tiltsim.models.parts import ExtraActuators, TiltServo
 from tiltsim.scenario.scenario import FlightPlan, Scenario
 from tiltsim.system.text import Quantity
 from tiltsim.vehicles.tilt_car.metrics import tilt_car_metrics
+from tiltsim_controllers.code.traceable import traceable
 from tiltsim_controllers.gaits.motion import tilt_motion_of
-from tiltsim_controllers.mathematics.scalar import Floats, Vector, scalar
+from tiltsim_controllers.mathematics.scalar import Floats, Vector
 from tiltsim_controllers.references.trajectories import ReferenceParameters
 from tiltsim_controllers.tilt_car.vehicle import counter_yaw_per_tilt
 
@@ -73,22 +74,15 @@ nearest to ``direction``. ``input_split`` is ``omega_1^2 - omega_2^2``.
 """
 
 
-@scalar
+@traceable
 def tilt_car_limit_exceeded(
-    time: float,
-    values: Vector,
-    reference: ReferenceParameters,
-    knots: Vector,
-    follows_position: float,
-) -> int:
+    time: Any, values: Any, reference: ReferenceParameters, knots: Any, follows_position: Any
+) -> Any:
     """The code of the first limit that a sample of the car exceeds, see `VehicleKind`."""
     away = follows_position * horizontal_error(time, values, reference, knots)
-    if away > MAX_POSITION_ERROR:
-        return HORIZONTAL_ERROR
-    for rotor in range(2):
-        if abs(values[SPEED_1 + rotor]) > MAX_ROTOR_SPEED:
-            return ROTOR_SPEED + rotor
-    return WITHIN_LIMITS
+    spinning = enumerate(abs(values[SPEED_1 : SPEED_2 + 1]) > MAX_ROTOR_SPEED)
+    rotors = ((too_fast, ROTOR_SPEED + rotor) for rotor, too_fast in spinning)
+    return first_limit([(away > MAX_POSITION_ERROR, HORIZONTAL_ERROR), *rotors])
 
 
 def _thrusts(columns: Mapping[str, Floats], scenario: Scenario) -> dict[str, Floats]:

@@ -10,12 +10,13 @@ from matplotlib.figure import Figure
 from tiltsim.studies.comparison import Compared, is_last_tried, why_none
 from tiltsim.views.figures import style
 from tiltsim.views.figures.layout import add_legend
+from tiltsim.views.titles import address_in_words, law_in_words
 
 SURVIVED: Final = {
     "max_latency": ("latency", 0.0, "{:.3f} s"),
-    "max_mass_factor": ("mass", 1.0, "× {:.2f}"),
-    "min_thrust_factor": ("thrust", 1.0, "× {:.2f}"),
-    "max_inertia_factor": ("inertia", 1.0, "× {:.1f}"),
+    "max_mass_factor": ("larger mass", 1.0, "× {:.2f}"),
+    "min_thrust_factor": ("less thrust", 1.0, "× {:.2f}"),
+    "max_inertia_factor": ("larger inertia", 1.0, "× {:.1f}"),
 }
 """Measures: name, true value, and form of the value."""
 
@@ -40,10 +41,13 @@ def comparison_figure(rows: Sequence[Compared]) -> Figure:
     for line, scenario in zip(grid, scenarios, strict=True):
         chosen = [c for c in rows if c.row["scenario"] == scenario]
         _draw_errors(line[0], chosen, looks)
-        line[0].set_title(style.verbatim(scenario))
+        line[0].set_title(style.verbatim(address_in_words(scenario)))
         if searched:
             _draw_survived(line[1], chosen, looks)
-    handles = [grid[0][0].plot([], [], label=name, **looks[name])[0] for name in names]
+    handles = [
+        grid[0][0].plot([], [], label=style.verbatim(law_in_words(name)), **looks[name])[0]
+        for name in names
+    ]
     add_legend(figure, handles)
     return figure
 
@@ -81,7 +85,11 @@ def _draw_survived(axes: Axes, rows: Sequence[Compared], looks: Mapping[str, Any
             text = why_none(compared.row, key) if value is None else form.format(value)
             text += ", the last tried" * is_last_tried(compared.row, key)
             axes.text(share + 0.02, y, text, va="center", size="x-small")
-    axes.set(title="survived", xlabel="share of the best", xlim=(0.0, 1.45))
+    axes.set(
+        title="Errors of the model, and latency, survived",
+        xlabel="share of the best",
+        xlim=(0.0, 1.45),
+    )
     axes.set_yticks(range(len(SURVIVED)), [name for name, _, _ in SURVIVED.values()])
     axes.set_xticks([0.0, 0.5, 1.0])
     axes.invert_yaxis()

@@ -22,6 +22,7 @@ from tiltsim.views.figures.sweep_columns import (
 Groups = Sequence[tuple[str, Column]]
 
 QUANTILES: Final = (0.05, 0.5, 0.95)  # that are marked on the curves
+LOW: Final = 0.1  # share below which numbers are written above their marks
 MAX_KEYS: Final = 4  # largest number of sampled keys with a separate panel
 HATCHES: Final = ("", "///", "...", "\\\\\\", "xxx", "---", "+++")  # of bars, by `CYCLE`
 
@@ -53,9 +54,10 @@ def distributions_figure(results: SweepResults, metrics: tuple[str, ...]) -> Fig
         middles = [np.median([value for _, value in one.values()] or [0.0]) for one in marked]
         for number, one in enumerate(marked):
             left = len(marked) > 1 and number == int(np.argmin(middles))
-            # Above a rising curve on its left, below it on its right.
-            shift, side = ((-5.0, 2.0), "right") if left else ((5.0, -8.0), "left")
             for text, (share, value) in one.items():
+                # Above a rising curve on its left, below it on its right, clear of the axis.
+                above = left or share < LOW
+                shift, side = ((-5.0, 2.0), "right") if above else ((5.0, -8.0), "left")
                 place: dict[str, Any] = {"xytext": shift, "textcoords": "offset points"}
                 written = panel.annotate(text, (value, share), **place)
                 written.set(size="small", color=CYCLE[number % len(CYCLE)], ha=side)

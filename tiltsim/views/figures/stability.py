@@ -21,6 +21,7 @@ from tiltsim.linear.stability import Point, Stability
 from tiltsim.scenario.key_units import quantity_of_key
 from tiltsim.system.text import in_words
 from tiltsim.views.figures import style
+from tiltsim.views.titles import address_in_words
 from tiltsim_controllers.analysis.unacceptable_attitudes import unacceptable_attitudes
 from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.vehicle.parameters import Vehicle
@@ -29,6 +30,9 @@ SWINGS: Final = 0.01  # imaginary part, as a share of a pole, below which it cou
 ALIKE: Final = 30.0  # parts of poles that differ by a smaller factor share a linear axis
 MOST: Final = 1e4
 """Ratio of the largest part of a pole to the smallest that a logarithmic axis resolves."""
+
+UNITS: Final = {"position": "m", "velocity": "m/s", "attitude": "rad", "angular_velocity": "rad/s"}
+CURVES: Final = 8  # curves of singular attitudes of a moving gait
 
 
 @style.paper_style()
@@ -70,7 +74,7 @@ def sweep_figure(key: str, sweeps: Mapping[str, Sequence[Point]]) -> Figure:
             max((mode.growth_rate for mode in each.modes if mode.name != "altitude"), default=nan)
             for _, each in found
         ]
-        label = address.rpartition("/")[2]
+        label = style.verbatim(address_in_words(address))
         line: Any = {"color": color, "ls": dashes, "marker": marker, "ms": 3.5, "label": label}
         upper.plot(values, largest, **line)
         lower.plot(values, rates, **line)
@@ -163,10 +167,6 @@ def _stretch(axes: Any, name: str, parts: Floats) -> float:
     return float(least)
 
 
-UNITS: Final = {"position": "m", "velocity": "m/s", "attitude": "rad", "angular_velocity": "rad/s"}
-CURVES: Final = 8  # curves of singular attitudes of a moving gait
-
-
 @style.paper_style()
 def attraction_figure(found: Attraction) -> Figure:
     """Initial states that come back, with the gait's singular attitudes."""
@@ -179,7 +179,7 @@ def attraction_figure(found: Attraction) -> Figure:
     handles.append(Line2D([], [], color=style.INK, marker="+", ls="", label="the scenario"))
     labels = [f"{in_words(name)} ({UNITS[PLACES[name][0]]})" for name in found.axes]
     axes.set(xlabel=f"initial {labels[0]}", ylabel=f"initial {labels[1]}")
-    axes.set_title(f"{100.0 * found.share.mean():.1f} % come back")
+    axes.set_title(f"{100.0 * found.share.mean():.1f} % of the initial states come back")
     figure.legend(handles=handles, loc="outside lower center", ncols=3)
     return figure
 

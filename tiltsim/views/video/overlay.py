@@ -38,7 +38,7 @@ class Overlay:
             self._n = attitude_plane.torque_free_directions(flight.columns, vehicle)
             self._attitude = np.stack([flight["roll"], flight["pitch"]], axis=1)
             self._gap = gap = round(GAP_SHARE * height)
-            self.caption = Caption("shaded: unreachable attitudes", gap, self._inset + gap)
+            self.caption = Caption("shaded: unreachable", gap, self._inset + gap)
 
     def rows(self, sample: int) -> dict[str, str]:
         """Rows of the frame's table but time and position error."""

@@ -1,0 +1,245 @@
+"""Objects around the loop: their columns, the peak of the contact force, and a law that pushes.
+
+The force of a step is a reading of a sensor that MuJoCo keeps in its state. Functions of the loop
+see objects' coordinates and readings behind ``act``, and the laws within see none of it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup
+from tiltsim.laws.layers.layer import Layer, Samples, wrap_loop
+from tiltsim.models.objects import CABLE_READING, COORDINATES, FORCE
+from tiltsim.models.parts import ExtraActuators
+from tiltsim.vehicles.rotorcraft.others import CONTACT_FORCE, Others
+from tiltsim_controllers.code.arrays import xp
+from tiltsim_controllers.code.traceable import traceable
+from tiltsim_controllers.mathematics.attitude import euler_angles
+from tiltsim_controllers.mathematics.records import Vector3
+from tiltsim_controllers.mathematics.scalar import Values
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from tiltsim.scenario.scenario import FlightPlan
+    from tiltsim_controllers.mathematics.scalar import Floats
+
+FILTER: Final = 60.0
+"""rad/s, bandwidth in which a force loop sees the contact force."""
+
+
+class Accumulation(NamedTuple):
+    """Parameters of the states that keep the peak and the time of contact."""
+
+    timestep: float  # s
+    direction: Vector3  # of a push, unit vector, world; zero without one
+
+
+class ForceLoop(NamedTuple):
+    """Parameters of a push."""
+
+    direction: Vector3  # unit vector, world
+    force: float  # N
+    begin: float  # s, when the tool touches
+    ramp: float  # s, from there to the full force
+    gain: float  # 1/s
+    proportional: float
+    stiffness: float  # N/m, of the law within against an error of position
+
+
+@traceable
+def commanded_force(time: Any, loop: ForceLoop) -> Any:
+    """The force (N) along the direction of the push at a time (s), shape ()."""
+    return loop.force * xp.clip((time - loop.begin) / loop.ramp, 0.0, 1.0)
+
+
+@cache
+def with_force_loop(loop: ClosedLoop) -> ClosedLoop:
+    """A law of position in a loop of force: it sees the vehicle behind its place.
+
+    Where an object stops the vehicle, a law that feeds back position pushes with its stiffness
+    times the error. So an error that follows the force makes any force: the commanded one, plus the
+    filtered error of the force times a gain, plus its integral. Before the touch there is neither
+    force nor error, and the law flies as it is. Further numbers in ``act`` are the contact force.
+    """
+    inner_controls, first = loop.sampling.controls, loop.dynamics.sizes.act
+
+    def displaced(time: Any, qpos: Any, act: Any, own: ForceLoop) -> tuple[Any, Any]:
+        """``qpos`` as the law sees it, and the rates of the two states."""
+        direction = xp.array(own.direction)
+        filtered, integral = act[first], act[first + 1]
+        error = commanded_force(time, own) - filtered
+        force = commanded_force(time, own) + own.proportional * error + integral
+        place = qpos[:3] - force / own.stiffness * direction
+        measured = act[-3:] @ direction
+        rates = xp.hstack([FILTER * (measured - filtered), own.gain * error])
+        return xp.hstack([place, qpos[3:]]), rates
+
+    @traceable
+    def controls(time: Any, qpos: Any, qvel: Any, act: Any, parameters: Any, knots: Any) -> Any:
+        seen, rates = displaced(time, qpos, act, parameters.layer)
+        return xp.hstack([inner_controls(time, seen, qvel, act, parameters.inner, knots), rates])
+
+    layer = Layer(
+        "with_force_loop",
+        ForceLoop,
+        _force_loop,
+        controls=controls,
+        actuators=ExtraActuators(states=2),
+        initial_activations=lambda _plan, _own, _inner: (0.0, 0.0),
+        derive=_derive_push,
+        fields=("filtered_push_force", "push_integral"),
+        units={"filtered_push_force": "N", "push_integral": "N", "push_force_ref": "N"},
+        of_controller=True,
+    )
+    return wrap_loop(loop, layer)
+
+
+def _force_loop(plan: FlightPlan) -> ForceLoop:
+    scenario = plan.scenario
+    reference: Any = scenario.reference
+    touch, vehicle = reference.touch(scenario), scenario.any_rotorcraft.resolve()
+    stiffness = scenario.controller.position_stiffness
+    assert stiffness is not None  # else the scenario is refused
+    return ForceLoop(
+        touch.direction,
+        reference.force,
+        touch.time,
+        reference.ramp,
+        reference.gain,
+        reference.proportional_gain,
+        vehicle.mass * stiffness,
+    )
+
+
+def _derive_push(
+    inner: Callable[[], dict[str, Floats]], samples: Samples, setup: ControlSetup
+) -> dict[str, Floats]:
+    return {**inner(), "push_force_ref": commanded_force(samples["time"], setup.parameters.layer)}
+
+
+@cache
+def with_objects(loop: ClosedLoop, others: Others) -> ClosedLoop:
+    """A loop among objects; it goes around all other layers."""
+    inner_controls, inner_hold = loop.sampling.controls, loop.sampling.hold
+    inner_observe, sizes = loop.columns.observe, loop.dynamics.sizes
+    size, ctrl_size, states = sizes.act, sizes.ctrl, 2 * bool(others.names)
+    readings = size + states + others.coordinates
+    accumulated, observed = _accumulated(others, size, readings), _observed(others, size, readings)
+
+    def within(act: Any) -> Any:
+        return xp.hstack([act[:size], *_pushing(act[readings:], others)])
+
+    @traceable
+    def controls(time: Any, qpos: Any, qvel: Any, act: Any, parameters: Any, knots: Any) -> Any:
+        ctrl = inner_controls(time, qpos, qvel, within(act), parameters.inner, knots)
+        return xp.hstack([ctrl, accumulated(act, parameters.layer)])
+
+    @traceable
+    def hold(time: Any, qpos: Any, qvel: Any, act: Any, ctrl: Any, parameters: Any) -> Any:
+        held = inner_hold(time, qpos, qvel, within(act), ctrl[:ctrl_size], parameters.inner)
+        return xp.hstack([held, accumulated(act, parameters.layer)])
+
+    @traceable
+    def observe(qpos: Any, qvel: Any, act: Any, ctrl: Any) -> Any:
+        return xp.hstack([inner_observe(qpos, qvel, act[:size], ctrl[:ctrl_size]), observed(act)])
+
+    layer = Layer(
+        "with_objects",
+        Accumulation,
+        _accumulation,
+        controls=controls,
+        hold=hold,
+        actuators=ExtraActuators(states=states),
+        initial_activations=lambda _plan, _own, _inner: (0.0,) * states,
+        derive=_derive,
+        units=others.columns | ({"push_force": "N"} if others.pushed >= 0 else {}),
+    )
+    wrapped = wrap_loop(loop, layer)
+    behind = {"others": others.coordinates, "history": others.readings}
+    return replace(
+        wrapped,
+        dynamics=replace(wrapped.dynamics, sizes=wrapped.dynamics.sizes._replace(**behind)),
+        columns=replace(
+            wrapped.columns, observe=observe, fields=(*loop.columns.fields, *others.columns)
+        ),
+    )
+
+
+def _accumulation(plan: FlightPlan) -> Accumulation:
+    scenario, direction = plan.scenario, (0.0, 0.0, 0.0)
+    if scenario.reference.type == "push":
+        direction = scenario.reference.touch(scenario).direction
+    return Accumulation(scenario.simulation.timestep, direction)
+
+
+def _derive(
+    inner: Callable[[], dict[str, Floats]], samples: Samples, setup: ControlSetup
+) -> dict[str, Floats]:
+    columns, direction = inner(), setup.parameters.layer.direction
+    if "push_force_ref" in columns:
+        along = zip(CONTACT_FORCE, direction, strict=True)
+        columns["push_force"] = sum(samples[name] * component for name, component in along)
+    return columns
+
+
+def _pushing(readings: Any, others: Others) -> list[Any]:
+    """The force (N, world), shape (3,), on the object that is pushed, if there is one."""
+    return [readings[others.force_places(others.pushed)]] if others.pushed >= 0 else []
+
+
+def seen_within(inner: ClosedLoop, others: Others, act: Sequence[float]) -> list[float]:
+    """``act`` as the loop within `with_objects` sees it.
+
+    Args:
+        inner: The loop within.
+        others: The objects.
+        act: As the loop around it sees it.
+    """
+    readings = act[len(act) - others.readings :]
+    forces = _pushing(readings, others)
+    return [*act[: inner.dynamics.sizes.act], *(number for force in forces for number in force)]
+
+
+def _total(readings: Any, others: Others) -> Any:
+    """The force (N, world) on all objects, shape (3,)."""
+    return sum(readings[others.force_places(index)] for index in range(len(others.names)))
+
+
+def _accumulated(others: Others, size: int, readings: int) -> Callable[..., Values]:
+    """A function ``(act, own)`` of the rates of the largest force and of the time in contact."""
+
+    @traceable
+    def accumulated(act: Any, own: Accumulation) -> Any:
+        if not others.names:
+            return act[:0]
+        force, peak = _total(act[readings:], others), act[size]
+        magnitude = xp.sqrt(force @ force)
+        rise = (xp.maximum(magnitude, peak) - peak) / own.timestep
+        return xp.array([rise, xp.where(magnitude > 0.0, 1.0, 0.0)])
+
+    return accumulated
+
+
+def _observed(others: Others, size: int, readings: int) -> Callable[..., Values]:
+    """A function ``(act)`` of the columns of `Others`."""
+
+    @traceable
+    def observed(act: Any) -> Any:
+        parts, at = [], readings - others.coordinates
+        if others.names:
+            parts += [_total(act[readings:], others), act[size : size + 2]]
+        for joint in others.joints:
+            pose = act[at : at + COORDINATES[joint]]
+            if joint == "free":
+                pose = xp.hstack([pose[:3], euler_angles(pose[3:])])
+            parts, at = [*parts, pose], at + COORDINATES[joint]
+        if others.hangs:
+            tension = readings + others.readings - CABLE_READING + FORCE
+            parts += [act[at : at + 3], act[tension : tension + 1]]
+        return xp.hstack(parts) if parts else act[:0]
+
+    return observed

@@ -1,0 +1,162 @@
+"""Closed loops of laws with any kind of vehicle."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from tiltsim.closed_loop.loop import (
+    ClosedLoop,
+    Columns,
+    ControlSetup,
+    Dynamics,
+    Equations,
+    Monitoring,
+    Sampling,
+)
+from tiltsim.closed_loop.vehicle_kind import VehicleKind
+from tiltsim.engines.sample_evaluation import evaluate_over_samples
+from tiltsim.laws.law import Law
+from tiltsim.laws.parameters import head_of
+from tiltsim.scenario.rotorcraft import ServoTable
+from tiltsim.scenario.scenario import FlightPlan
+from tiltsim_controllers.code.traceable import traceable
+from tiltsim_controllers.laws.observed import Seen
+from tiltsim_controllers.mathematics.scalar import Floats, Vector
+
+
+def servo_lead(servo: ServoTable) -> float:
+    """Lag (s) of a tilt servo behind a command of constant rate, ``2 zeta / omega_n``."""
+    return 2.0 * servo.damping_ratio / servo.natural_frequency
+
+
+def parts(vector: Any, **sizes: int) -> SimpleNamespace:
+    """Consecutive parts of a vector by name."""
+    found, first = {}, 0
+    for name, size in sizes.items():
+        found[name] = vector[first : first + size]
+        first += size
+    return SimpleNamespace(**found)
+
+
+@dataclass(frozen=True, eq=False)
+class VehicleFunctions(ABC):
+    """The functions of arrays by which a law moves a kind of vehicle.
+
+    In MuJoCo and on the equations of motion, ``parameters`` are a record with the law's own as
+    ``law``, and ``knots`` the table data of a flight; see `tiltsim.closed_loop.loop`.
+    """
+
+    law: Law
+
+    @abstractmethod
+    def controls(
+        self, time: Any, qpos: Any, qvel: Any, act: Any, parameters: Any, knots: Any
+    ) -> Any:
+        """The control step, see `Sampling`."""
+
+    def hold(self, time: Any, qpos: Any, qvel: Any, act: Any, ctrl: Any, parameters: Any) -> Any:
+        """The controls between samples, see `Sampling`."""
+        return ctrl
+
+    @abstractmethod
+    def observe(self, qpos: Any, qvel: Any, act: Any, ctrl: Any) -> Any:
+        """A sample, see `Columns`."""
+
+    @abstractmethod
+    def in_sample(self, time: Any, values: Any) -> Seen:
+        """The vehicle as the law sees it, from the fields of a sample."""
+
+    @property
+    @abstractmethod
+    def names(self) -> tuple[str, ...]:
+        """Names of the columns of `references`."""
+
+    @abstractmethod
+    def references(self, time: Any, values: Any, parameters: Any, knots: Any) -> Any:
+        """References and signals of a sample."""
+
+    def signs(self, time: Any, values: Any, parameters: Any, knots: Any) -> Any:
+        """See `Monitoring`."""
+        assert self.law.signs is not None
+        return self.law.signs(self.in_sample(time, values), parameters.law, knots)
+
+    @abstractmethod
+    def initial_state(self, plan: FlightPlan) -> Vector:
+        """The state of the equations at time zero."""
+
+    @abstractmethod
+    def equation_inputs(self, time: Any, state: Any, parameters: Any, knots: Any) -> Any:
+        """See `Equations`."""
+
+    @abstractmethod
+    def equation_rates(
+        self, time: Any, state: Any, inputs: Any, parameters: Any, knots: Any, disturbance: Any
+    ) -> Any:
+        """See `Equations`."""
+
+    @abstractmethod
+    def observe_equations(
+        self, time: Any, state: Any, inputs: Any, parameters: Any, knots: Any
+    ) -> Any:
+        """See `Equations`."""
+
+    def closed_loop(
+        self,
+        kind: VehicleKind,
+        dynamics: Dynamics,
+        head: Mapping[str, Callable[[FlightPlan], float]],
+        inputs_size: int,
+        fields: tuple[str, ...] = (),
+    ) -> ClosedLoop:
+        """The closed loop.
+
+        Args:
+            kind: Kind of the vehicle.
+            dynamics: Its model.
+            head: Parameters beside the law's, by name.
+            inputs_size: Number of inputs of the equations.
+            fields: Fields of a sample after the kind's and the states of the law.
+        """
+        law, references, names = self.law, traceable(self.references), self.names
+        record = head_of(law.parameters, **dict.fromkeys(head, float))
+        read, units = (*kind.observed_fields, *law.states), {**law.states, **law.units}
+
+        def setup(plan: FlightPlan, signature: float) -> ControlSetup:
+            parameters, further = law.setup(plan)
+            own = [value(plan) for value in head.values()]
+            return ControlSetup(record(signature, *own, parameters), (*plan.knots, *further))
+
+        def derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
+            states = np.stack([samples[name] for name in read], axis=-1)
+            rows = evaluate_over_samples(references, len(names), samples["time"], states, setup)
+            found = dict(zip(names, rows.T, strict=True))
+            return {**found, **law.margins({**samples, **found}, setup)}
+
+        return ClosedLoop(
+            kind=kind,
+            parameters=record,
+            setup=setup,
+            dynamics=dynamics,
+            sampling=Sampling(traceable(self.controls), traceable(self.hold)),
+            columns=Columns(
+                traceable(self.observe),
+                derive,
+                fields=(*law.states, *fields),
+                units={name: unit for name, unit in units.items() if name not in kind.columns},
+                observe_reads_controls=dynamics.commands_thrusts,
+            ),
+            monitoring=Monitoring(traceable(self.signs), law.causes) if law.signs else Monitoring(),
+            equations=Equations(
+                inputs=traceable(self.equation_inputs),
+                inputs_size=inputs_size,
+                rates=traceable(self.equation_rates),
+                initial=lambda plan, _setup: self.initial_state(plan),
+                observe=traceable(self.observe_equations),
+            ),
+            follows_position=law.follows_position,
+            uses_gait=law.uses_gait,
+        )

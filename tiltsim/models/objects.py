@@ -1,0 +1,366 @@
+"""Objects around a vehicle, a tool on it and a load below it, in MuJoCo's model.
+
+They are added to the composed vehicle as `mujoco.MjSpec`, behind the vehicle's own coordinates.
+Sensors with a memory of one reading, which is part of MuJoCo's state, measure the contact forces
+and the cable's tension over each step.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Final, Literal
+
+import numpy as np
+
+from tiltsim_controllers.mathematics.attitude import rotation_of_quaternion
+from tiltsim_controllers.mathematics.scalar import Floats, Triple, Values
+
+if TYPE_CHECKING:
+    import mujoco
+
+WALL_THICKNESS: Final = 0.1  # m
+PLATE_THICKNESS: Final = 0.004  # m
+IMPEDANCE: Final = (0.95, 0.99, 0.001, 0.5, 2.0)
+"""MuJoCo's ``solimp``: how firmly contacts and the cable hold."""
+
+COORDINATES: Final = {"fixed": 0, "hinged": 1, "free": 7}
+"""Numbers in ``qpos`` of an object, by its joint."""
+
+SLOWER: Final = 50.0
+"""Time constant of friction over the contact's; see `_add_pairs`."""
+
+FIRMER: Final = 500.0
+"""MuJoCo's ``impratio``: it makes up for that, so that pressed things do not creep."""
+
+CONTACT_READING: Final = 6
+"""Numbers in the memory of a contact sensor: two of MuJoCo, the time and a force."""
+
+CABLE_READING: Final = 4
+FORCE: Final = 3  # where the reading begins in a memory
+
+FIXED_COLOR: Final = (0.55, 0.60, 0.66, 1.0)
+MOVING_COLOR: Final = (0.80, 0.52, 0.22, 1.0)
+TOOL_COLOR: Final = (0.85, 0.20, 0.16, 1.0)
+LOAD_COLOR: Final = (0.25, 0.42, 0.30, 1.0)
+
+
+@dataclass(frozen=True)
+class Body:
+    """An object.
+
+    Attributes:
+        name: Its name.
+        shape: A wall's face is at its position and looks along its own -x.
+        position: m, world.
+        quaternion: From its axes to the world, scalar first.
+        size: m: of a wall width (y) and height (z), of a box its edges, of a sphere its radius, of
+            a mesh its unit.
+        joint: Whether it moves.
+        mass: kg, of one that moves.
+        friction: Coefficient of sliding friction.
+        softness: Time constant of a contact, s.
+        hinge, axis: A point of the hinge (m) and its direction, in its axes.
+        damping: Torque of the hinge per angular velocity, N m s/rad.
+        floating: Whether a free one has no weight.
+        file: File of a mesh.
+    """
+
+    name: str
+    shape: Literal["wall", "box", "sphere", "mesh"]
+    position: Triple
+    quaternion: Values
+    size: Values
+    joint: Literal["fixed", "hinged", "free"]
+    mass: float
+    friction: float
+    softness: float
+    hinge: Triple
+    axis: Triple
+    damping: float
+    floating: bool
+    file: str = ""
+
+    @property
+    def box(self) -> tuple[Triple, Triple]:
+        """Center (m, its axes) and half edges (m) of a wall or box."""
+        if self.shape == "wall":
+            width, height = self.size
+            half = 0.5 * WALL_THICKNESS
+            return (half, 0.0, 0.0), (half, 0.5 * width, 0.5 * height)
+        x, y, z = self.size
+        return (0.0, 0.0, 0.0), (0.5 * x, 0.5 * y, 0.5 * z)
+
+
+@dataclass(frozen=True)
+class Tool:
+    """A stick with a round tip, or a disc at the end of one; it cannot move on the vehicle.
+
+    Attributes:
+        shape: One of the two.
+        position: Where it begins, m, body axes.
+        direction: Body axes.
+        length: To its tip, m.
+        radius: Radius of the stick or the disc, m.
+        mass: kg.
+    """
+
+    shape: Literal["stick", "plate"]
+    position: Triple
+    direction: Triple
+    length: float
+    radius: float
+    mass: float
+
+    @property
+    def unit(self) -> Floats:
+        """The unit vector from its beginning to its tip, body axes, shape (3,)."""
+        direction = np.array(self.direction)
+        return np.asarray(direction / np.linalg.norm(direction))
+
+    @property
+    def tip(self) -> Floats:
+        """Its tip, m, body axes, shape (3,)."""
+        return np.asarray(np.array(self.position) + self.length * self.unit)
+
+
+@dataclass(frozen=True)
+class Load:
+    """A ball below the vehicle, on a cable or fixed.
+
+    Attributes:
+        mass: kg.
+        length: From the attachment to its center, m.
+        attachment: m, body axes.
+        radius: m.
+        rigid: Whether a rod that cannot turn replaces the cable.
+    """
+
+    mass: float
+    length: float
+    attachment: Triple
+    radius: float
+    rigid: bool
+
+
+@dataclass(frozen=True)
+class Objects:
+    """All that a scenario adds to a vehicle."""
+
+    bodies: tuple[Body, ...] = ()
+    tool: Tool | None = None
+    load: Load | None = None
+
+    @cached_property
+    def hangs(self) -> bool:
+        """Whether a load hangs on a cable."""
+        return self.load is not None and not self.load.rigid
+
+    @property
+    def coordinates(self) -> int:
+        """Numbers in ``qpos`` behind the vehicle's."""
+        own = sum(COORDINATES[body.joint] for body in self.bodies)
+        return own + COORDINATES["free"] * self.hangs
+
+    @property
+    def readings(self) -> int:
+        """Numbers in the sensors' memories."""
+        return CONTACT_READING * len(self.bodies) + CABLE_READING * self.hangs
+
+
+def touchable(root: Any, *, ground: bool) -> None:
+    """Let the vehicle's collision shapes touch other things, but not each other.
+
+    Args:
+        root: The vehicle as a tree.
+        ground: Whether its ground can be touched.
+    """
+    root.option.cone = "elliptic"  # a pyramid holds 29 % less along its diagonals
+    root.option.impratio = 10.0  # friction ten times as stiff as the contact: it creeps less
+    plane = root.find("geom", "ground")
+    if plane is not None and not ground:
+        plane.contype = plane.conaffinity = 0
+    for geom in root.find("body", "vehicle").find_all("geom"):
+        if (geom.name or "").endswith("collision"):
+            geom.contype = 1
+
+
+def add_objects(spec: mujoco.MjSpec, objects: Objects) -> None:
+    """Add objects, tool and load to a vehicle. Its keyframes, which lack them, are removed."""
+    for key in list(spec.keys):
+        spec.delete(key)
+    spec.option.impratio, spec.option.tolerance = FIRMER, 1e-12  # forces without noise
+    for body in objects.bodies:
+        _add_body(spec, body)
+    if objects.tool is not None:
+        _add_tool(spec, objects.tool)
+    if objects.load is not None:
+        _add_load(spec, objects.load)
+    for body in objects.bodies:
+        _add_pairs(spec, body)
+        _add_force_sensor(spec, body.name)
+    if objects.hangs:
+        import mujoco
+
+        cable, force = mujoco.mjtObj.mjOBJ_TENDON, mujoco.mjtSensor.mjSENS_TENDONLIMITFRC
+        spec.add_sensor(name="cable", type=force, objtype=cable, objname="cable", nsample=1)
+
+
+def _add_body(spec: mujoco.MjSpec, body: Body) -> None:
+    import mujoco
+
+    own = spec.worldbody.add_body(
+        name=f"object_{body.name}", pos=body.position, quat=body.quaternion
+    )
+    if body.joint == "free":
+        own.add_freejoint(name=body.name)
+        own.gravcomp = float(body.floating)
+    elif body.joint == "hinged":
+        hinge = mujoco.mjtJoint.mjJNT_HINGE
+        own.add_joint(name=f"{body.name}_angle", type=hinge, pos=body.hinge, axis=body.axis)
+        own.joints[0].damping = [body.damping, 0.0, 0.0]
+    if body.floating or body.damping:  # passive forces, which a vehicle alone does not have
+        spec.option.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_DAMPER)
+    shape: dict[str, Any] = {"type": mujoco.mjtGeom.mjGEOM_BOX}
+    if body.shape == "mesh":
+        mesh = spec.add_mesh(name=f"object_{body.name}", file=body.file, scale=body.size * 3)
+        shape = {"type": mujoco.mjtGeom.mjGEOM_MESH, "meshname": mesh.name}
+    elif body.shape == "sphere":
+        shape = {"type": mujoco.mjtGeom.mjGEOM_SPHERE, "size": (*body.size, 0.0, 0.0)}
+    else:
+        shape["pos"], shape["size"] = body.box
+    own.add_geom(
+        name=f"object_{body.name}",
+        **shape,
+        mass=body.mass,
+        rgba=FIXED_COLOR if body.joint == "fixed" else MOVING_COLOR,
+        **_touching(body.friction, body.softness),
+        priority=1,  # its friction and softness count
+    )
+
+
+def _touching(friction: float, softness: float) -> dict[str, Any]:
+    """Attributes of a shape that vehicles, the ground and other objects touch."""
+    return {
+        "group": 2,
+        "condim": 3,
+        "contype": 1,
+        "conaffinity": 1,
+        "friction": (friction, 0.005, 0.0001),
+        "solref": (softness, 1.0),
+        "solimp": IMPEDANCE,
+    }
+
+
+def _add_tool(spec: mujoco.MjSpec, tool: Tool) -> None:
+    import mujoco
+
+    own = spec.body("vehicle").add_body(name="tool")
+    begin, tip, unit = np.array(tool.position), tool.tip, tool.unit
+    touches = {"group": 2, "condim": 3, "contype": 1, "conaffinity": 0, "rgba": TOOL_COLOR}
+    capsule = mujoco.mjtGeom.mjGEOM_CAPSULE
+    if tool.shape == "stick":
+        end, radius = tip - tool.radius * unit, (tool.radius, 0.0, 0.0)
+        ends = (*begin, *end)
+        shape = {"type": capsule, "size": radius, "fromto": ends}
+    else:
+        rod = {"type": capsule, "size": (0.2 * tool.radius, 0.0, 0.0), "mass": 0.0}
+        rod |= {"fromto": (*begin, *(tip - tool.radius * 0.2 * unit)), "rgba": TOOL_COLOR}
+        own.add_geom(name="tool_rod", group=2, contype=0, conaffinity=0, **rod)
+        ends = (*(tip - PLATE_THICKNESS * unit), *tip)
+        radius = (tool.radius, 0.0, 0.0)
+        shape = {"type": mujoco.mjtGeom.mjGEOM_CYLINDER, "size": radius, "fromto": ends}
+    own.add_geom(name="tool_collision", mass=tool.mass, **touches, **shape)
+
+
+def _add_load(spec: mujoco.MjSpec, load: Load) -> None:
+    import mujoco
+
+    vehicle, attachment = spec.body("vehicle"), np.array(load.attachment)
+    place = attachment - (0.0, 0.0, load.length)
+    own = (vehicle if load.rigid else spec.worldbody).add_body(name="payload", pos=place)
+    own.add_geom(
+        name="payload_collision",
+        type=mujoco.mjtGeom.mjGEOM_SPHERE,
+        size=(load.radius, 0.0, 0.0),
+        mass=load.mass,
+        rgba=LOAD_COLOR,
+        **_touching(0.5, 0.005) | ({"conaffinity": 0} if load.rigid else {}),
+    )
+    if load.rigid:
+        rod = {"type": mujoco.mjtGeom.mjGEOM_CAPSULE, "size": (0.003, 0.0, 0.0), "mass": 0.0}
+        rod |= {"fromto": (*attachment, *place), "rgba": TOOL_COLOR}
+        vehicle.add_geom(name="payload_rod", group=2, contype=0, conaffinity=0, **rod)
+        return
+    own.add_freejoint(name="payload")
+    own.add_site(name="payload")
+    vehicle.add_site(name="payload_attachment", pos=attachment)
+    cable = spec.add_tendon(name="cable", limited=1, range=(0.0, load.length), width=0.003)
+    cable.wrap_site("payload_attachment")
+    cable.wrap_site("payload")
+    cable.solref_limit = (2.0 * spec.option.timestep, 1.0)  # as stiff as MuJoCo allows
+    cable.solimp_limit = IMPEDANCE
+
+
+def _add_pairs(spec: mujoco.MjSpec, body: Body) -> None:
+    """Let every shape of the vehicle that can touch touch an object, with a slow friction.
+
+    MuJoCo's cone of friction is convex: bodies that slide at a speed are pushed apart at friction
+    times that speed, and chatter. A longer time constant of friction alone divides that.
+    """
+    for geom in spec.body("vehicle").find_all("geom"):
+        if geom.name.endswith("collision"):
+            spec.add_pair(
+                geomname1=geom.name,
+                geomname2=f"object_{body.name}",
+                condim=3,
+                friction=(body.friction, body.friction, 0.005, 0.0001, 0.0001),
+                solref=(body.softness, 1.0),
+                solreffriction=(SLOWER * body.softness, 1.0),
+                solimp=IMPEDANCE,
+            )
+
+
+def _add_force_sensor(spec: mujoco.MjSpec, name: str) -> None:
+    """Measure the force (N, world) of the vehicle with all that it carries on an object."""
+    import mujoco
+
+    sensor = spec.add_sensor(
+        name=f"force_{name}",
+        type=mujoco.mjtSensor.mjSENS_CONTACT,
+        objtype=mujoco.mjtObj.mjOBJ_XBODY,  # with the bodies that it carries
+        objname="vehicle",
+        reftype=mujoco.mjtObj.mjOBJ_BODY,
+        refname=f"object_{name}",
+        nsample=1,
+    )
+    force, net = 1 << int(mujoco.mjtConDataField.mjCONDATA_FORCE), 3  # the sum of all contacts
+    sensor.intprm = [force, net, 1]
+
+
+def distance_ahead(body: Body, point: Floats, direction: Floats) -> float | None:
+    """Distance (m) from a point to an object at its initial place; None if it is not ahead.
+
+    Args:
+        body: The object.
+        point: m, world, shape (3,).
+        direction: Unit vector, world, shape (3,).
+    """
+    turn = rotation_of_quaternion(np.array(body.quaternion))
+    begin, along = turn.T @ (point - body.position), turn.T @ direction
+    if body.shape == "sphere":
+        radius, across = body.size[0], begin - (begin @ along) * along
+        beside = radius**2 - across @ across
+        return None if beside < 0.0 else _ahead(-begin @ along - np.sqrt(beside))
+    center, half = (np.array(part) for part in body.box)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        faces = np.sort([(center - half - begin) / along, (center + half - begin) / along], axis=0)
+    endless = np.array([[-np.inf], [np.inf]])  # beside a face that it does not approach
+    within = np.where(np.abs(begin - center) <= half, endless, -endless)
+    faces = np.where(along == 0.0, within, faces)
+    entry, leaving = float(faces[0].max()), float(faces[1].min())
+    return _ahead(entry) if entry <= leaving else None
+
+
+def _ahead(distance: float) -> float | None:
+    return float(distance) if distance > 0.0 else None

@@ -1,0 +1,51 @@
+"""Shapes that lie in each other at the start of a flight: refused before anything moves."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+import mujoco
+import numpy as np
+
+from tiltsim.errors import InputError
+
+if TYPE_CHECKING:
+    from tiltsim.scenario.scenario import Scenario
+
+OVERLAP: Final = 1e-4
+"""Depth (m) from which shapes count as lying in each other."""
+
+
+def check_start(scenario: Scenario, model: mujoco.MjModel, data: mujoco.MjData) -> None:
+    """Refuse an overlap.
+
+    Raises:
+        InputError: In one line, if an object lies in another thing, or the tool in a rotor.
+    """
+    where = scenario.address or "scenario"
+    for contact in data.contact:
+        if contact.dist < -OVERLAP:
+            names = sorted(_name(model, geom) for geom in (contact.geom1, contact.geom2))
+            raise InputError(
+                f"{where}: {names[0]} and {names[1]} overlap by {-contact.dist:.3g} m at the "
+                "start; move one of them"
+            )
+    if scenario.tool is not None:
+        tool = model.geom("tool_collision").id
+        for geom in range(model.ngeom):
+            name = model.geom(geom).name
+            if name.startswith(("pod_", "rotor_")) and name.endswith("collision"):
+                ends = np.zeros(6)
+                if mujoco.mj_geomDistance(model, data, tool, geom, 1.0, ends) < 0.0:
+                    rotor = name.removesuffix("_collision")
+                    raise InputError(
+                        f"{where}: tool: touches {rotor} of its own vehicle; change tool.position, "
+                        "tool.direction or tool.length"
+                    )
+
+
+def _name(model: mujoco.MjModel, geom: int) -> str:
+    name = model.geom(geom).name or "a shape of the vehicle"
+    if name.startswith("object_"):
+        return f"object {name.removeprefix('object_')}"
+    return name.removesuffix("_collision")

@@ -1,0 +1,243 @@
+"""The tables of objects, of a tool and of a load: ``[[object]]``, ``[tool]``, ``[payload]``."""
+
+from math import pi
+from pathlib import Path
+from typing import Annotated, Any, Final, Literal
+
+from pydantic import Field
+
+from tiltsim.models.mjcf_editing import MAX_BYTES
+from tiltsim.models.objects import Body, Load, Objects, Tool
+from tiltsim.scenario.table import Angles3, NonNegative, Positive, Table, Vector3
+from tiltsim.system.files import is_file
+from tiltsim_controllers.mathematics.rotation import quaternion_from_euler
+
+SIZES: Final = {"wall": 2, "box": 3, "sphere": 1, "mesh": 1}
+"""Numbers of the size of each type of object."""
+
+MESHES: Final = (".stl", ".obj")
+
+RESERVED: Final = frozenset({"vehicle", "payload", "contact_force", "air", "tilt", "law"})
+"""Names that columns and parts of the vehicle already have."""
+
+Mass = Annotated[float, Field(gt=1e-9, le=1e6)]
+Softness = Annotated[float, Field(ge=1e-4, le=1.0)]
+Direction = Annotated[Vector3, Field(examples=[[1.0, 0.0, 0.0]])]
+
+
+class ObjectTable(Table):
+    """Something to touch: fixed in the world, on a hinge, or free."""
+
+    table_name = "object"
+
+    name: Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,30}$")] = Field(
+        description="its name, which begins the names of its columns", examples=["wall"]
+    )
+    type: Literal["wall", "box", "sphere", "mesh"] = Field(
+        description="a wall 0.1 m thick whose face looks along its -x, a box, a sphere, or the "
+        "convex hull of a mesh",
+        examples=["wall"],
+    )
+    position: Vector3 = Field(
+        description="of the face's center or of the center, in the world [m]",
+        examples=[[1.0, 0.0, 0.0]],
+    )
+    attitude: Angles3 = Field(
+        (0.0, 0.0, 0.0),
+        description="roll, pitch and yaw from the world's axes to its own [rad]",
+        examples=[[0.0, 0.0, 0.5]],
+    )
+    size: Annotated[tuple[Positive, ...], Field(strict=False, min_length=1, max_length=3)] = Field(
+        description="width along y and height along z of a wall, edges of a box, radius of a "
+        "sphere, length of the unit of a mesh [m]",
+        examples=[[2.0, 2.0]],
+    )
+    file: str | None = Field(
+        None,
+        description="STL or OBJ file of a mesh, relative to the scenario's folder",
+        examples=["valve.stl"],
+    )
+    joint: Literal["fixed", "hinged", "free"] = Field(
+        "fixed", description="whether it moves, and how"
+    )
+    mass: Mass | None = Field(
+        None, description="of one that moves; evenly spread [kg]", examples=[1.0]
+    )
+    friction: NonNegative = Field(0.5, description="coefficient of sliding friction [-]")
+    softness: Softness = Field(
+        0.01,
+        description="time constant of its contacts, at least two time steps: twice as soft, half "
+        "the force of an impact [s]",
+    )
+    hinge: Vector3 = Field(
+        (0.0, 0.0, 0.0),
+        description="a point of the hinge, in its own axes [m]",
+        examples=[[0.0, 0.5, 0.0]],
+    )
+    axis: Direction = Field((0.0, 0.0, 1.0), description="of the hinge, in its own axes [-]")
+    damping: NonNegative = Field(0.0, description="of the hinge [N m s/rad]", examples=[0.1])
+    velocity: Vector3 = Field(
+        (0.0, 0.0, 0.0),
+        description="of a free one at time zero, in the world [m/s]",
+        examples=[[0.2, 0.0, 0.0]],
+    )
+    floating: bool = Field(
+        False, description="whether a free one has no weight, as on a cart or a boat"
+    )
+
+    def _check_values(self) -> None:
+        if len(self.size) != SIZES[self.type]:
+            raise self.mistake("size", f"a {self.type} has {SIZES[self.type]} of them")
+        if self.type == "mesh":
+            self._check_file()
+        else:
+            self.require("file", None, f"a {self.type} has none; set type = mesh, or remove it")
+        if self.name in RESERVED:
+            raise self.mistake("name", "is taken; choose another")
+        if self.joint == "fixed":
+            self.require("mass", None, "it is fixed; set joint = free or hinged, or remove it")
+        elif self.mass is None:
+            raise self.mistake("mass", f"must be given, as joint = {self.joint}")
+        if self.joint != "hinged":
+            needs = "needs joint = hinged"
+            self.require_defaults(("hinge", "axis", "damping"), needs)
+        elif not any(self.axis):
+            raise self.mistake("axis", "must not be zero")
+        if self.joint != "free":
+            self.require_defaults(("velocity", "floating"), "needs joint = free")
+
+    def _check_file(self) -> None:
+        file = Path(self.file or "")
+        if file.suffix.lower() not in MESHES:
+            raise self.mistake("file", f"a mesh needs one of {' or '.join(MESHES)}")
+        if not is_file(file):
+            raise self.mistake("file", "is not a file")
+        if file.stat().st_size > MAX_BYTES:
+            raise self.mistake("file", f"has more than {MAX_BYTES // 2**20} MiB")
+
+    @property
+    def body(self) -> Body:
+        """The object for MuJoCo's model."""
+        return Body(
+            self.name,
+            self.type,
+            self.position,
+            tuple(quaternion_from_euler(*self.attitude)),
+            self.size,
+            self.joint,
+            self.mass or 0.0,
+            self.friction,
+            self.softness,
+            self.hinge,
+            self.axis,
+            self.damping,
+            self.floating,
+            self.file or "",
+        )
+
+
+class ToolTable(Table):
+    """A tool that the vehicle carries; the controller does not know its mass."""
+
+    table_name = "tool"
+
+    type: Literal["stick", "plate"] = Field(
+        "stick", description="a stick with a round tip, or a disc at the end of one"
+    )
+    position: Vector3 = Field(
+        (0.0, 0.0, 0.0),
+        description="where it begins, in body axes [m]",
+        examples=[[0.05, 0.0, 0.0]],
+    )
+    direction: Direction = Field((1.0, 0.0, 0.0), description="toward its tip, body axes [-]")
+    length: Positive = Field(description="to its tip [m]", examples=[0.3])
+    radius: Positive = Field(0.01, description="of the stick or of the disc [m]")
+    mass: Annotated[float, Field(ge=0.0, le=1e6)] = Field(0.0, description="evenly spread [kg]")
+
+    def _check_values(self) -> None:
+        if not any(self.direction):
+            raise self.mistake("direction", "must not be zero")
+        if self.type == "stick" and self.length <= 2.0 * self.radius:
+            raise self.mistake("length", f"must exceed twice the radius = {self.radius}")
+
+    @property
+    def tool(self) -> Tool:
+        """The tool for MuJoCo's model."""
+        return Tool(self.type, self.position, self.direction, self.length, self.radius, self.mass)
+
+
+class PayloadTable(Table):
+    """A load below the vehicle, on a cable that may be slack; the controller does not know it."""
+
+    table_name = "payload"
+
+    mass: Mass = Field(description="of the load [kg]", examples=[0.1])
+    length: Positive = Field(
+        description="from the attachment to the center of the load [m]", examples=[1.0]
+    )
+    attachment: Vector3 = Field(
+        (0.0, 0.0, 0.0), description="in body axes [m]", examples=[[0.0, 0.0, -0.05]]
+    )
+    radius: Positive = Field(0.03, description="of the load, a ball [m]")
+    rigid: bool = Field(False, description="whether a fixed rod replaces the cable")
+    swing: Annotated[float, Field(ge=-0.5 * pi, le=0.5 * pi)] = Field(
+        0.0, description="angle of the cable at time zero, from straight down toward +x [rad]"
+    )
+
+    def _check_values(self) -> None:
+        if self.rigid:
+            self.require_defaults(("swing",), "a rigid load does not swing; remove it")
+
+    @property
+    def load(self) -> Load:
+        """The load for MuJoCo's model."""
+        return Load(self.mass, self.length, self.attachment, self.radius, self.rigid)
+
+
+def objects_of(scenario: Any) -> Objects | None:
+    """All that a scenario adds to its vehicle's model; None for a vehicle alone."""
+    if not scenario.has_objects:
+        return None
+    tool, payload = scenario.tool, scenario.payload
+    return Objects(
+        tuple(table.body for table in scenario.object),
+        None if tool is None else tool.tool,
+        None if payload is None else payload.load,
+    )
+
+
+def check_objects(scenario: Any) -> None:
+    """Refuse objects, tools and loads where nothing could fly with them, or push them."""
+    if scenario.reference.type == "push":
+        scenario.reference.after_gait((), scenario)
+        controller = scenario.controller
+        if controller.position_stiffness is None and not controller.is_external:
+            reason = f"the {controller.law} law cannot push; choose full_pose or python"
+            raise scenario.mistake("reference.type", reason)
+    if not scenario.has_objects:
+        return
+    key = next(name for name in ("object", "tool", "payload") if getattr(scenario, name))
+    if scenario.vehicle.is_planar:
+        raise scenario.mistake("vehicle.model", f"[{key}] is for rotorcraft only; remove it")
+    plant = f"its equations have no contacts and no [{key}]; use mujoco"
+    scenario.require("simulation.plant", "mujoco", plant)
+    if scenario.simulation.integrator != "implicitfast":
+        raise scenario.mistake(
+            "simulation.integrator",
+            f'must be "implicitfast" with [{key}]: the others gain energy at contacts and cables',
+        )
+    if scenario.controller.measures_angular_acceleration:
+        reason = f"does not know the forces of [{key}]; choose model"
+        raise scenario.mistake("controller.angular_acceleration", reason)
+    names = [table.name for table in scenario.object]
+    for table in scenario.object:
+        if names.count(table.name) > 1:
+            raise table.mistake("name", "there are two of this name")
+        if table.softness < 2.0 * scenario.simulation.timestep:
+            least = 2.0 * scenario.simulation.timestep
+            raise table.mistake("softness", f"must be at least two time steps, {least:g}")
+    file = scenario.any_rotorcraft.user_vehicle
+    bare = scenario.tool is None and file is not None and not file.has_contact_geoms
+    if scenario.object and bare:
+        reason = "add a [tool], or name geoms that end in 'collision'"
+        raise scenario.mistake("object", f"nothing of vehicle.mjcf can touch it: {reason}")

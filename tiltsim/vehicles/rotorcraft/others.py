@@ -1,0 +1,96 @@
+"""Objects and a load beside a rotorcraft: their motion at time zero, and their columns."""
+
+from __future__ import annotations
+
+from math import cos, sin
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+import numpy as np
+
+from tiltsim.models.objects import CABLE_READING, CONTACT_READING, COORDINATES, FORCE
+from tiltsim.scenario.interaction import objects_of
+from tiltsim_controllers.mathematics.attitude import rotation_of_quaternion
+from tiltsim_controllers.mathematics.rotation import quaternion_from_euler
+
+if TYPE_CHECKING:
+    from tiltsim.scenario.scenario import FlightPlan, Scenario
+    from tiltsim_controllers.mathematics.scalar import Values, Vector
+
+CONTACT_FORCE: Final = ("contact_force_x", "contact_force_y", "contact_force_z")
+
+CONTACT_COLUMNS: Final = dict.fromkeys((*CONTACT_FORCE, "peak_contact_force"), "N") | {
+    "contact_time": "s"
+}
+"""Columns of flights with objects; the force is the vehicle's on all of them, world axes."""
+
+LOAD_COLUMNS: Final = {**{f"payload_{axis}": "m" for axis in "xyz"}, "cable_tension": "N"}
+
+
+class Others(NamedTuple):
+    """Which objects and loads a flight has; flights with equal ones share their programs."""
+
+    names: tuple[str, ...] = ()
+    joints: tuple[str, ...] = ()
+    hangs: bool = False  # a load on a cable
+    pushed: int = -1  # the object that the reference pushes, -1 for none
+
+    @property
+    def coordinates(self) -> int:
+        """Numbers in ``qpos`` behind the vehicle's."""
+        return sum(COORDINATES[joint] for joint in self.joints) + 7 * self.hangs
+
+    @property
+    def readings(self) -> int:
+        """Numbers in the memories of the sensors."""
+        return CONTACT_READING * len(self.names) + CABLE_READING * self.hangs
+
+    @property
+    def columns(self) -> dict[str, str]:
+        """The columns of their motion and forces, with their units."""
+        columns = dict(CONTACT_COLUMNS) if self.names else {}
+        for name, joint in zip(self.names, self.joints, strict=True):
+            if joint == "hinged":
+                columns[f"{name}_angle"] = "rad"
+            elif joint == "free":
+                columns |= {f"{name}_{axis}": "m" for axis in "xyz"}
+                columns |= {f"{name}_{angle}": "rad" for angle in ("roll", "pitch", "yaw")}
+        return columns | (LOAD_COLUMNS if self.hangs else {})
+
+    def force_places(self, index: int) -> slice:
+        """Where the force of an object is among the sensors' readings."""
+        first = CONTACT_READING * index + FORCE
+        return slice(first, first + 3)
+
+
+def others_of(scenario: Scenario) -> Others:
+    """The objects and the load of a scenario."""
+    objects = objects_of(scenario)
+    if objects is None:
+        return Others()
+    names = tuple(body.name for body in objects.bodies)
+    reference = scenario.reference
+    pushed = names.index(reference.object) if reference.type == "push" else -1
+    return Others(names, tuple(body.joint for body in objects.bodies), objects.hangs, pushed)
+
+
+def motion_at_start(plan: FlightPlan) -> tuple[Vector, Vector]:
+    """``qpos`` and ``qvel`` of objects and load at time zero, behind the vehicle's."""
+    scenario = plan.scenario
+    positions: list[float] = []
+    velocities: list[float] = []
+    for table in scenario.object:
+        if table.joint == "hinged":
+            positions, velocities = [*positions, 0.0], [*velocities, 0.0]
+        elif table.joint == "free":
+            positions += [*table.position, *table.body.quaternion]
+            velocities += [*table.velocity, 0.0, 0.0, 0.0]
+    payload, initial = scenario.payload, scenario.initial
+    if payload is not None and not payload.rigid:
+        turn = rotation_of_quaternion(np.array(quaternion_from_euler(*initial.attitude)))
+        down = np.array([sin(payload.swing), 0.0, -cos(payload.swing)])
+        arm = turn @ np.array(payload.attachment)
+        place: Values = tuple((arm + payload.length * down + initial.position).tolist())
+        moving = np.cross(turn @ np.array(initial.angular_velocity), arm) + initial.velocity
+        positions += [*place, 1.0, 0.0, 0.0, 0.0]
+        velocities += [*moving.tolist(), 0.0, 0.0, 0.0]
+    return positions, velocities
