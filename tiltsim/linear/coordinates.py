@@ -8,10 +8,7 @@ from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.closed_loop.loop import ClosedLoop
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.vehicles.rotorcraft.layout import layout_of
-from tiltsim_controllers.mathematics.rotation import (
-    quaternion_from_rotation,
-    rotation_from_quaternion,
-)
+from tiltsim_controllers.mathematics.attitude import quaternion_of_rotation, rotation_of_quaternion
 from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.vehicle.states import BODY_FIELDS
 
@@ -20,6 +17,30 @@ ROTATION_NAMES: Final = ("rotation_x", "rotation_y", "rotation_z")
 
 MATRIX: Final = 9
 QUATERNION: Final = 4
+
+POSITION: Final = BODY_FIELDS[:3]
+VELOCITY: Final = BODY_FIELDS[3:6]
+BODY_RATES: Final = BODY_FIELDS[9:]
+PLANE: Final = ("x", "y", "vx", "vy")
+UNITS: Final = {
+    **dict.fromkeys(POSITION, "m"),
+    **dict.fromkeys(VELOCITY, "m/s"),
+    **dict.fromkeys((*ROTATION_NAMES, "roll", "pitch", "yaw"), "rad"),
+    **dict.fromkeys(BODY_RATES, "rad/s"),
+    **dict.fromkeys(("squared_speed_1", "squared_speed_2"), "rad^2/s^2"),
+    "force": "N",
+    **dict.fromkeys(("torque_x", "torque_y", "torque_z"), "N m"),
+}
+ROTOR_INPUT: Final = "rotor_acceleration"
+KINDS: Final = {
+    "alpha_rate": "rad/s",
+    "alpha": "rad",
+    "rotor_speed": "rad/s",
+    "speed_command": "rad/s",
+    ROTOR_INPUT: "rad/s^2",
+    "tilt_command": "rad",
+}
+"""Units of numbered quantities."""
 
 
 class Coordinates(NamedTuple):
@@ -84,7 +105,7 @@ def _turn_rates(rotation: Floats, derivative: Floats) -> Floats:
 def _quaternion(rotation: Floats) -> Floats:
     """The unit quaternion of a rotation, which may be a matrix."""
     if len(rotation) == MATRIX:
-        rotation = np.array(quaternion_from_rotation(tuple(rotation.tolist())))
+        rotation = quaternion_of_rotation(rotation.reshape(3, 3))
     return rotation / np.linalg.norm(rotation)
 
 
@@ -94,7 +115,8 @@ def _turned(rotation: Floats, vector: Floats) -> Floats:
     turn = np.array((np.cos(half), *(0.5 * np.sinc(half / np.pi) * vector)))
     turned = _product(_quaternion(rotation), turn)
     if len(rotation) == MATRIX:
-        return np.array(rotation_from_quaternion(*turned.tolist()))
+        matrix: Floats = rotation_of_quaternion(turned).ravel()
+        return matrix
     return turned
 
 
@@ -106,31 +128,6 @@ def _turn(start: Floats, end: Floats) -> Floats:
         turn = -turn
     half = np.arctan2(np.linalg.norm(turn[1:]), turn[0])
     return np.asarray(2.0 * turn[1:] / np.sinc(half / np.pi))
-
-
-POSITION: Final = BODY_FIELDS[:3]
-VELOCITY: Final = BODY_FIELDS[3:6]
-BODY_RATES: Final = BODY_FIELDS[9:]
-PLANE: Final = ("x", "y", "vx", "vy")
-UNITS: Final = {
-    **dict.fromkeys(POSITION, "m"),
-    **dict.fromkeys(VELOCITY, "m/s"),
-    **dict.fromkeys((*ROTATION_NAMES, "roll", "pitch", "yaw"), "rad"),
-    **dict.fromkeys(BODY_RATES, "rad/s"),
-    **dict.fromkeys(("squared_speed_1", "squared_speed_2"), "rad^2/s^2"),
-    "force": "N",
-    **dict.fromkeys(("torque_x", "torque_y", "torque_z"), "N m"),
-}
-ROTOR_INPUT: Final = "rotor_acceleration"
-KINDS: Final = {
-    "alpha_rate": "rad/s",
-    "alpha": "rad",
-    "rotor_speed": "rad/s",
-    "speed_command": "rad/s",
-    ROTOR_INPUT: "rad/s^2",
-    "tilt_command": "rad",
-}
-"""Units of numbered quantities."""
 
 
 def unit_of(name: str, loop: ClosedLoop) -> str:
