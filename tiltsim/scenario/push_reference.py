@@ -88,6 +88,8 @@ class PushReference(PositionReference):
         if self.object not in bodies:
             reason = choose(self.object, bodies) if bodies else "there is no [[object]]"
             raise self.mistake("object", reason)
+        if bodies[self.object].shape == "mesh":
+            raise self.mistake("object", "is a mesh; a push needs a wall, box or sphere")
         if scenario.tool is None:
             raise self.mistake("object", "needs a [tool] to push with")
         turn = np.reshape(rotation_from_euler(self.roll, self.pitch, self.yaw), (3, 3))

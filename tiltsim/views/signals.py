@@ -8,7 +8,7 @@ signals computed from several columns.
 
 import re
 from collections.abc import Callable, Collection, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, Final, NamedTuple
 
@@ -236,6 +236,11 @@ def _chosen(assembly: Assembly) -> Iterator[Signals]:
         lines = [Signal("candidate", "candidate", "lyapunov")]
         title = "Lyapunov candidate, ½ ė² + ½ K e², along y"
         yield Signals("lyapunov", title, "m^2/s^2", lines, floor=1e-6, moves=True)
+    for name in ("contact_force", "push_force", "cable_tension"):
+        columns = [name] if name in units else [f"{name}_{axis}" for axis in AXES]
+        if columns[0] in units:
+            panel = vector_signals(assembly, name, columns)
+            yield replace(panel, moves=False, on_request=False, plotted=True)
 
 
 def _direction(assembly: Assembly) -> Iterator[Signals]:

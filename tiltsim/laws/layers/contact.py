@@ -156,10 +156,7 @@ def with_objects(loop: ClosedLoop, others: Others) -> ClosedLoop:
         actuators=ExtraActuators(states=states),
         initial_activations=lambda _plan, _own, _inner: (0.0,) * states,
         derive=_derive,
-        units={
-            **{name: column.unit for name, column in others.columns.items()},
-            **({"push_force": "N"} if others.pushed >= 0 else {}),
-        },
+        units=others.columns | ({"push_force": "N"} if others.pushed >= 0 else {}),
     )
     wrapped = wrap_loop(loop, layer)
     behind = {"others": others.coordinates, "history": others.readings}

@@ -9,7 +9,6 @@ import numpy as np
 
 from tiltsim.models.objects import CABLE_READING, CONTACT_READING, COORDINATES, FORCE
 from tiltsim.scenario.interaction import objects_of
-from tiltsim.system.text import Quantity
 from tiltsim_controllers.mathematics.attitude import rotation_of_quaternion
 from tiltsim_controllers.mathematics.rotation import quaternion_from_euler
 
@@ -19,17 +18,12 @@ if TYPE_CHECKING:
 
 CONTACT_FORCE: Final = ("contact_force_x", "contact_force_y", "contact_force_z")
 
-CONTACT_COLUMNS: Final = {
-    **{name: Quantity(f"contact force along {name[-1]}", "N") for name in CONTACT_FORCE},
-    "peak_contact_force": Quantity("largest contact force so far", "N"),
-    "contact_time": Quantity("time in contact so far", "s"),
+CONTACT_COLUMNS: Final = dict.fromkeys((*CONTACT_FORCE, "peak_contact_force"), "N") | {
+    "contact_time": "s"
 }
 """Columns of flights with objects; the force is the vehicle's on all of them, world axes."""
 
-LOAD_COLUMNS: Final = {
-    **{f"payload_{axis}": Quantity(f"{axis} of the load", "m") for axis in "xyz"},
-    "cable_tension": Quantity("tension of the cable", "N"),
-}
+LOAD_COLUMNS: Final = {**{f"payload_{axis}": "m" for axis in "xyz"}, "cable_tension": "N"}
 
 
 class Others(NamedTuple):
@@ -51,17 +45,15 @@ class Others(NamedTuple):
         return CONTACT_READING * len(self.names) + CABLE_READING * self.hangs
 
     @property
-    def columns(self) -> dict[str, Quantity]:
-        """The columns of their motion and forces."""
+    def columns(self) -> dict[str, str]:
+        """The columns of their motion and forces, with their units."""
         columns = dict(CONTACT_COLUMNS) if self.names else {}
         for name, joint in zip(self.names, self.joints, strict=True):
-            shown = name.replace("_", " ")
             if joint == "hinged":
-                columns[f"{name}_angle"] = Quantity(f"angle of the {shown}", "rad")
+                columns[f"{name}_angle"] = "rad"
             elif joint == "free":
-                columns |= {f"{name}_{a}": Quantity(f"{a} of the {shown}", "m") for a in "xyz"}
-                angles = ("roll", "pitch", "yaw")
-                columns |= {f"{name}_{a}": Quantity(f"{a} of the {shown}", "rad") for a in angles}
+                columns |= {f"{name}_{axis}": "m" for axis in "xyz"}
+                columns |= {f"{name}_{angle}": "rad" for angle in ("roll", "pitch", "yaw")}
         return columns | (LOAD_COLUMNS if self.hangs else {})
 
     def force_places(self, index: int) -> slice:
