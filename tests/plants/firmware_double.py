@@ -22,7 +22,7 @@ class Firmware(threading.Thread):
         wrench_map: Force and torque, body axes, of each output at 1, shape (6, outputs).
         linear: Whether outputs are thrusts about 1500 us; else speeds from 1000 us.
         weight: N; inertia: kg m^2, shape (3,).
-        exchanges: After so many it is silent; then ``last``, a message, if there is one.
+        exchanges: Their number, after which it is silent; then ``last``, if it is not empty.
         repeat: Whether it sends each output twice, as when an answer comes late.
     """
 

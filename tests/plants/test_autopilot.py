@@ -151,7 +151,7 @@ def test_mistakes_get_one_line(changes, message):
     assert "\n" not in str(caught.value)
 
 
-def test_a_port_in_use_is_said():
+def test_a_port_in_use_is_refused():
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
         taken.bind(("127.0.0.1", 0))
         with pytest.raises(tiltsim.InputError, match="choose another port"):

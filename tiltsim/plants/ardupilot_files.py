@@ -17,6 +17,11 @@ PARAMETERS = {
 """Parameters of every frame; the user's own file of parameters comes after them."""
 
 
+def motor_offset(motor: int) -> int:
+    """The function of a servo output for a motor, less the motor's number."""
+    return 32 if motor <= 8 else 73 if motor <= 12 else 147
+
+
 def ardupilot_files(scenario: Scenario) -> dict[str, str]:
     """The contents of ``parameters.parm`` and ``frame.lua``, by name.
 
@@ -32,7 +37,8 @@ def ardupilot_files(scenario: Scenario) -> dict[str, str]:
     if scenario.autopilot is None:
         raise InputError(f"{scenario.address}: autopilot: this scenario has no [autopilot] table")
     factors = Mixer(scenario).factors()
-    if np.linalg.matrix_rank(factors / np.abs(factors).max(axis=1, keepdims=True)) < 6:
+    sizes = np.maximum(np.abs(factors).max(axis=1, keepdims=True), 1e-300)
+    if np.linalg.matrix_rank(factors / sizes) < 6:
         raise InputError(
             f"{scenario.address}: autopilot.outputs: they do not give every force and torque; fly "
             "one of the firmware's own frames"
@@ -47,12 +53,9 @@ def ardupilot_files(scenario: Scenario) -> dict[str, str]:
         )
         for channel, (turn, force) in enumerate(zip(turns, forces, strict=True))
     ]
-    lines += [
-        f"assert(Motors_6DoF:init({len(lines)}), 'frame')",
-        "motors:set_frame_string('tiltsim')",
-    ]
+    lines.append(f"assert(Motors_6DoF:init({len(lines)}), 'frame')")
+    lines.append("motors:set_frame_string('tiltsim')")
     parameters = [f"{name} {value}" for name, value in PARAMETERS.items()]
-    parameters += [
-        f"SERVO{channel}_FUNCTION {32 + channel}" for channel in range(1, len(least) + 1)
-    ]
+    for motor in range(1, len(least) + 1):
+        parameters.append(f"SERVO{motor}_FUNCTION {motor + motor_offset(motor)}")
     return {"parameters.parm": "\n".join(parameters) + "\n", "frame.lua": "\n".join(lines) + "\n"}

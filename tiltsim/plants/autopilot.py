@@ -119,7 +119,7 @@ class Mixer:
     def factors(self) -> Floats:
         """How much each output gives of force (N) and torque (N m), body axes, shape (6, outputs).
 
-        Outputs are shares of the full thrust, in which rotors that do not reverse are linear too,
+        Outputs are shares of the full thrust, in which rotors that do not reverse are also linear,
         since the firmware takes the root of theirs.
         """
         full = self._coefficients * self._top**2
