@@ -69,17 +69,9 @@ class Form(NamedTuple):
     norm: str = "speed"  # in `NORMS`
     forward: bool = False  # two components are those along x and z, of a vehicle that has three
     losses: bool = False  # whether the controller knows of failures
-    prioritized: bool = False  # whether it keeps within rotor limits (`allocation`)
     supervised: bool = False  # whether a supervisor changes its gait
-    own_yaw: bool = False  # whether its decoupler takes the present yaw even if references rest
+    own_yaw: bool = False  # whether its decoupler takes yaw and planned tilts even if all rests
     spin: bool = False  # whether it takes along the angular momentum of the rotors
-
-    @property
-    def name(self) -> str:
-        """For file names."""
-        options = "_forward" * self.forward, "_losses" * self.losses
-        further = "_prioritized" * self.prioritized, "_supervised" * self.supervised
-        return f"{self.dimension}{''.join((*options, *further))}_{self.norm}"
 
 
 class Direction(NamedTuple):
