@@ -13,9 +13,9 @@ from tests.laws.test_laws import LAWS
 from tiltsim.errors import InputError
 from tiltsim.flight.end import End
 from tiltsim.linear import attraction as module
-from tiltsim.linear import stability as settling
+from tiltsim.linear import settling
 from tiltsim.linear.attraction import FinalStates, attraction
-from tiltsim.linear.stability import SlowestMode, advice_on_duration, slowest_mode
+from tiltsim.linear.settling import SlowestMode, advice_on_duration, slowest_mode
 from tiltsim.scenario.loading import merge
 
 SETPOINT = "ch04_tracking/setpoint#rho_065_modified"

@@ -35,11 +35,10 @@ from tiltsim.report.findings import FINDINGS
 from tiltsim.report.flights import FlightRecord, Unsupported, fly, report_entries
 from tiltsim.report.made import Made
 from tiltsim.report.making import make_report
-from tiltsim.report.pages import errors_page, markdown, page
+from tiltsim.report.pages import errors_page, markdown, page, rows_csv, rows_json
 from tiltsim.report.pictures import Picture
 from tiltsim.report.sensitivity import Criterion
 from tiltsim.report.store import flight_key
-from tiltsim.report.table import rows_csv, rows_json
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.studies.checking import collect
 from tiltsim.views.figures.style import CYCLE, new_figure

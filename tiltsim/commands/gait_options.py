@@ -18,6 +18,9 @@ MIN_PARAMETER: Final = 1e-12
 MAX_PARAMETER: Final = 1e9  # range of a parameter (SI units), far from underflow and overflow
 DEFAULT_VEHICLE: Final = "ar_drone_2"
 
+_ROLL: Final = "roll angle of the attitude to analyze (default: level)"
+_VEHICLE: Final = "ar_drone_2 (default), luukkonen, KEY=VALUE,..., or a preset with KEY=VALUE,..."
+
 
 def parse_angles(text: str, count: int) -> tuple[float, ...]:
     """Angles in rad, separated by commas; raises ValueError unless each is at most half a turn."""
@@ -117,9 +120,6 @@ def _positive(name: str, text: str) -> float:
         raise ValueError(f"{name} = {text}: {allowed}")
     return value
 
-
-_ROLL: Final = "roll angle of the attitude to analyze (default: level)"
-_VEHICLE: Final = "ar_drone_2 (default), luukkonen, KEY=VALUE,..., or a preset with KEY=VALUE,..."
 
 Roll = Annotated[float | None, Option("--roll", _angle, "RAD", _ROLL)]
 Pitch = Annotated[float | None, Option("--pitch", _angle, "RAD", "pitch angle of the attitude")]

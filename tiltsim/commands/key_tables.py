@@ -18,6 +18,24 @@ PLURAL: Final = re.compile(r"^(number|whole number|list|table)")
 
 NO_LIMIT: Final = 1e6  # bounds from here on only keep arithmetic from overflowing, and are left out
 
+INTRODUCTION: Final = """\
+# Scenario file
+
+Every key of a scenario file, with its unit, default and allowed values. `tiltsim schema gait.walk`
+prints one table on the terminal; `tiltsim schema > scenario.schema.json` writes the JSON Schema
+with which editors complete and check the file. `tiltsim schema --markdown` prints this page.
+
+A key that is left out has its default. Units are SI, angles are in radians; [-] marks numbers
+without a unit. [Concepts](concepts.md) explains words, axes and signs. Numbers beyond a billion,
+and coordinates beyond a million meters, are refused. Chapters (ch.) are chapters of the thesis.
+
+`--set simulation.duration=20` on the command line and `{"simulation.duration": 20}` in Python
+change a key without editing the file; entries of lists are counted from 0:
+`--set 'gait.angles[0]=0.2'`.
+"""
+NOT_IN_ANCHOR: Final = re.compile(r"[^\w-]")  # characters that the anchor of a heading leaves out
+FEW: Final = 2  # most tables of one address that are printed in full; more are listed
+
 
 class Step(NamedTuple):
     """A part of a table's place in the file, such as ``gait`` with the tags of one of its types."""
@@ -210,26 +228,6 @@ def _limit(bound: float) -> str:
         if abs(bound) == pi / part:
             return ("-" if bound < 0 else "") + ("pi" if part == 1 else f"pi/{part}")
     return f"{bound:g}"
-
-
-INTRODUCTION: Final = """\
-# Scenario file
-
-Every key of a scenario file, with its unit, default and allowed values. `tiltsim schema gait.walk`
-prints one table on the terminal; `tiltsim schema > scenario.schema.json` writes the JSON Schema
-with which editors complete and check the file. `tiltsim schema --markdown` prints this page.
-
-A key that is left out has its default. Units are SI, angles are in radians; [-] marks numbers
-without a unit. [Concepts](concepts.md) explains words, axes and signs. Numbers beyond a billion,
-and coordinates beyond a million meters, are refused. Chapters (ch.) are chapters of the thesis.
-
-`--set simulation.duration=20` on the command line and `{"simulation.duration": 20}` in Python
-change a key without editing the file; entries of lists are counted from 0:
-`--set 'gait.angles[0]=0.2'`.
-"""
-
-NOT_IN_ANCHOR: Final = re.compile(r"[^\w-]")  # characters that the anchor of a heading leaves out
-FEW: Final = 2  # most tables of one address that are printed in full; more are listed
 
 
 def page(tables: Sequence[KeyTable]) -> str:

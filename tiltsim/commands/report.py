@@ -40,10 +40,9 @@ def run(
         from tiltsim.report.content import failure_text
         from tiltsim.report.made import Made
         from tiltsim.report.making import make_report
-        from tiltsim.report.pages import errors_page, page
+        from tiltsim.report.pages import errors_page, page, rows_csv, rows_json
         from tiltsim.report.pages import markdown as markdown_of
         from tiltsim.report.store import store
-        from tiltsim.report.table import rows_csv, rows_json
         from tiltsim.scenario.trust import VARIABLE
         from tiltsim.system.files import prepare_file, prepare_folder
 

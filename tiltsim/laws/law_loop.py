@@ -16,10 +16,9 @@ from tiltsim.laws.airframe import airframe_of
 from tiltsim.laws.law import Law, tilts_in_states
 from tiltsim.laws.rotor_loop import RotorLayout, body_of_vehicle, margins_of, rotor_loop
 from tiltsim.scenario.law_controller import LawTable
-from tiltsim.scenario.own_code import users_line
 from tiltsim.scenario.scenario import FlightPlan
 from tiltsim.system.text import short_repr
-from tiltsim_controllers.code.arrays import is_jax, xp
+from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.code.tracing import as_array
 from tiltsim_controllers.gaits.motion import planned_tilts
 from tiltsim_controllers.gaits.parameters import GaitParameters
@@ -169,14 +168,7 @@ def _step_of(key: Key) -> Callable[..., Step]:
             table=knots[at + coefficients + rotors :],
             tilt_commands=states[own + discrete : own + discrete + tilts * key.tilts],
         )
-        try:
-            command = key.law(observed, known.own)
-        except TypeError as error:
-            if not is_jax(seen.state):
-                raise
-            raise LawError(
-                f"{users_line(error)}{type(error).__name__} on arrays of JAX; {REMEDY}"
-            ) from error
+        command = key.law(observed, known.own)
         reached = states[len(states) - rotors :] if key.models_rotors else turning
         along = _accelerations(command, known.rotor_gain, k, reached)
         rates, moving = _state_rates(key, command, states, known)

@@ -19,7 +19,7 @@ from tiltsim.flight.end import End
 from tiltsim.flight.flight import Flight
 from tiltsim.laws.assembling import assemble
 from tiltsim.linear import COARSE, REFINEMENTS
-from tiltsim.linear.stability import SlowestMode, advice_on_duration, slowest_mode
+from tiltsim.linear.settling import SlowestMode, advice_on_duration, slowest_mode
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.simulation.batch import fly_each
@@ -46,6 +46,8 @@ NEAR: Final = 0.05  # m and rad
 MEAN: Final = 1.0  # s, at the end of a flight, over which the mean is taken
 MOST_CELLS: Final = 1_000
 INSTANTS: Final = 24  # of a moving gait
+
+ANGLES: Final = ("roll", "pitch", "yaw")
 
 
 @dataclass(frozen=True, eq=False)
@@ -298,9 +300,6 @@ def _acceptable(scenario: Scenario, roll: Floats, pitch: Floats) -> NDArray[np.b
         level = determinant(angles, 0.0, 0.0, vehicle)
         inside &= determinant(angles, across, up, vehicle) * level > 0.0
     return inside
-
-
-ANGLES: Final = ("roll", "pitch", "yaw")
 
 
 class FinalStates:

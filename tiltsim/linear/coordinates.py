@@ -21,6 +21,30 @@ ROTATION_NAMES: Final = ("rotation_x", "rotation_y", "rotation_z")
 MATRIX: Final = 9
 QUATERNION: Final = 4
 
+POSITION: Final = BODY_FIELDS[:3]
+VELOCITY: Final = BODY_FIELDS[3:6]
+BODY_RATES: Final = BODY_FIELDS[9:]
+PLANE: Final = ("x", "y", "vx", "vy")
+UNITS: Final = {
+    **dict.fromkeys(POSITION, "m"),
+    **dict.fromkeys(VELOCITY, "m/s"),
+    **dict.fromkeys((*ROTATION_NAMES, "roll", "pitch", "yaw"), "rad"),
+    **dict.fromkeys(BODY_RATES, "rad/s"),
+    **dict.fromkeys(("squared_speed_1", "squared_speed_2"), "rad^2/s^2"),
+    "force": "N",
+    **dict.fromkeys(("torque_x", "torque_y", "torque_z"), "N m"),
+}
+ROTOR_INPUT: Final = "rotor_acceleration"
+KINDS: Final = {
+    "alpha_rate": "rad/s",
+    "alpha": "rad",
+    "rotor_speed": "rad/s",
+    "speed_command": "rad/s",
+    ROTOR_INPUT: "rad/s^2",
+    "tilt_command": "rad",
+}
+"""Units of numbered quantities."""
+
 
 class Coordinates(NamedTuple):
     """Minimal coordinates of the states near a given one.
@@ -106,31 +130,6 @@ def _turn(start: Floats, end: Floats) -> Floats:
         turn = -turn
     half = np.arctan2(np.linalg.norm(turn[1:]), turn[0])
     return np.asarray(2.0 * turn[1:] / np.sinc(half / np.pi))
-
-
-POSITION: Final = BODY_FIELDS[:3]
-VELOCITY: Final = BODY_FIELDS[3:6]
-BODY_RATES: Final = BODY_FIELDS[9:]
-PLANE: Final = ("x", "y", "vx", "vy")
-UNITS: Final = {
-    **dict.fromkeys(POSITION, "m"),
-    **dict.fromkeys(VELOCITY, "m/s"),
-    **dict.fromkeys((*ROTATION_NAMES, "roll", "pitch", "yaw"), "rad"),
-    **dict.fromkeys(BODY_RATES, "rad/s"),
-    **dict.fromkeys(("squared_speed_1", "squared_speed_2"), "rad^2/s^2"),
-    "force": "N",
-    **dict.fromkeys(("torque_x", "torque_y", "torque_z"), "N m"),
-}
-ROTOR_INPUT: Final = "rotor_acceleration"
-KINDS: Final = {
-    "alpha_rate": "rad/s",
-    "alpha": "rad",
-    "rotor_speed": "rad/s",
-    "speed_command": "rad/s",
-    ROTOR_INPUT: "rad/s^2",
-    "tilt_command": "rad",
-}
-"""Units of numbered quantities."""
 
 
 def unit_of(name: str, loop: ClosedLoop) -> str:

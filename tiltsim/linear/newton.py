@@ -18,6 +18,23 @@ from tiltsim_controllers.mathematics.scalar import Floats
 
 STEP: Final = 5e-3  # for coordinates of order one; larger ones are moved by this share of them
 
+ERROR: Final = 2e-11
+"""Error of `HALF_STENCIL` as a share of the largest entry of a row, against symbolic
+derivatives."""
+SHORTER: Final = (1.0, 0.1, 0.01, 1e-3, 1e-4)
+"""Shares of a step that are tried until the function is smooth within it."""
+BETTER: Final = 0.2
+"""Shorter steps count where they leave this share of the highest differences, else are rounding."""
+QUIET: Final = 1e-10  # SI units; smaller values may be rounding
+CORNER: Final = 1e-3
+"""Larger shares of the highest differences, at every step, are a corner at the point itself."""
+ITERATIONS: Final = 30
+HALVINGS: Final = 12
+GOOD: Final = 0.1  # a step that shrinks the value to this share needs no new derivative
+NEAR: Final = 1e-5  # steps of the differences; so near the derivative is the same
+NEUTRAL: Final = 1e-9
+"""Directions in which the function changes less than this share of the largest are left alone."""
+
 
 class Stencil(NamedTuple):
     """Where a function is evaluated, and weights of its differences and sums from side to side."""
@@ -34,9 +51,6 @@ HALF_STENCIL: Final = Stencil(
 )
 """Sixth order; its fifth and sixth differences vanish."""
 
-ERROR: Final = 2e-11
-"""Error of `HALF_STENCIL` as a share of the largest entry of a row, against symbolic
-derivatives."""
 
 AVERAGED: Final = HALF_STENCIL._replace(smooth=0.1)
 """For flights over a period: an event within it that passes from one time step to the next is a
@@ -45,17 +59,6 @@ small corner, which the stencil averages out."""
 CENTRAL: Final = Stencil((0.02,), (25.0,), (0.0,), (1.0,), AVERAGED.smooth)
 """Central differences, a third of the evaluations, for long flights: second order at a step of
 1e-4."""
-
-SHORTER: Final = (1.0, 0.1, 0.01, 1e-3, 1e-4)
-"""Shares of a step that are tried until the function is smooth within it."""
-
-BETTER: Final = 0.2
-"""Shorter steps count where they leave this share of the highest differences, else are rounding."""
-
-QUIET: Final = 1e-10  # SI units; smaller values may be rounding
-
-CORNER: Final = 1e-3
-"""Larger shares of the highest differences, at every step, are a corner at the point itself."""
 
 
 class Derivative(NamedTuple):
@@ -115,14 +118,6 @@ def jacobian(
 def _weighted(weights: tuple[float, ...], of: Floats) -> Floats:
     """A sum over the offsets, values in rows and entries in columns."""
     return np.asarray(np.einsum("j,ijk->ki", weights, of))
-
-
-ITERATIONS: Final = 30
-HALVINGS: Final = 12
-GOOD: Final = 0.1  # a step that shrinks the value to this share needs no new derivative
-NEAR: Final = 1e-5  # steps of the differences; so near the derivative is the same
-NEUTRAL: Final = 1e-9
-"""Directions in which the function changes less than this share of the largest are left alone."""
 
 
 OfEach = Callable[[list[Floats]], Iterable[Floats]]

@@ -6,6 +6,9 @@ Markdown is reproducible, without machine details: the summary, the findings, an
 not reproduced. The templates are in the folder ``templates``.
 """
 
+import csv
+import io
+import json
 import re
 import tomllib
 from base64 import b64encode
@@ -24,7 +27,15 @@ from PIL import Image
 from tiltsim.report import comparisons, content
 from tiltsim.report.claim import Claim, ClaimVerdict
 from tiltsim.report.claim_rows import Row, count, count_statements
-from tiltsim.report.content import Group, Report
+from tiltsim.report.content import (
+    Group,
+    Report,
+    criterion_text,
+    flights_of,
+    measured_text,
+    published_text,
+    why_of,
+)
 from tiltsim.report.drawing import Drawing
 from tiltsim.report.flights import PLANTS
 from tiltsim.report.made import Made
@@ -33,8 +44,7 @@ from tiltsim.system.text import printable_markdown
 
 _TEMPLATES: Final = Path(__file__).parent / "templates"
 
-THUMBNAIL: Final = (240, 150)
-"""Largest width and height, pixels."""
+THUMBNAIL: Final = (240, 150)  # largest width and height, pixels
 
 
 def page(report: Report, made: Made) -> str:
@@ -188,3 +198,58 @@ def markdown_cell(text: str) -> str:
     """Text in a cell of a table, whose lines are separated there."""
     lines: Iterable[str] = (printable_markdown(line) for line in text.split("\n"))
     return "<br>".join(lines).replace("|", "\\|")
+
+
+def records(report: Report) -> list[dict[str, str | int | list[str]]]:
+    """One record per row, in the order of the page."""
+    rows = [
+        row
+        for chapter in report.chapters
+        for group in report.chapter_groups(chapter)
+        for row in group.rows
+    ]
+    found: list[dict[str, str | int | list[str]]] = []
+    for row in rows:
+        claim = row.claim
+        shown = {plant: row.cell(plant) for plant in PLANTS} | {"computed": row.analysis}
+        found.append(
+            {
+                "id": claim.id,
+                "statement_id": row.statement.id,
+                "chapter": claim.chapter,
+                "place": claim.source,
+                "statement": row.statement.text,
+                "case": claim.case,
+                "thesis": row.statement.thesis,
+                "criterion": criterion_text(claim),
+                "published": published_text(row),
+                **{
+                    name: measured_text(claim, cell) if cell else "" for name, cell in shown.items()
+                },
+                "verdict": row.verdict.value,
+                "why": why_of(row),
+                "error": claim.error,
+                "ours": [origin.name.lower() for origin in row.origins],
+                "thresholds": list(claim.thresholds),
+                "flights": list(flights_of(claim)),
+            }
+        )
+    return found
+
+
+def rows_json(report: Report) -> str:
+    """All rows as a JSON list."""
+    return json.dumps(records(report), indent=1, ensure_ascii=False) + "\n"
+
+
+def rows_csv(report: Report) -> str:
+    """All rows as CSV; lists are separated by spaces."""
+    rows = [
+        {key: " ".join(value) if isinstance(value, list) else value for key, value in one.items()}
+        for one in records(report)
+    ]
+    text = io.StringIO()
+    writer = csv.DictWriter(text, fieldnames=list(rows[0]) if rows else ["id"], lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    return text.getvalue()

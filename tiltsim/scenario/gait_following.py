@@ -136,6 +136,11 @@ class FailureAwareController(ControllerTable):
         0.0, description="time from which failed_rotor is known [s]", examples=[10.0]
     )
 
+    def check_failed_rotor(self, rotors: int) -> None:
+        """Refuse a failed rotor that is not one of some number. Raises `mistake`."""
+        if self.failed_rotor is not None and self.failed_rotor > rotors:
+            raise self.mistake("failed_rotor", f"the vehicle has {rotors} rotors")
+
     def resolve_failure(self) -> Failure:
         """The failed rotor that the law knows of."""
         if self.failed_rotor is None:

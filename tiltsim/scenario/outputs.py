@@ -1,20 +1,11 @@
 """Checks that a vehicle can control the outputs of its law, with its gait and without a rotor."""
 
 from tiltsim.models.rotor_table import Multirotor
-from tiltsim.scenario.messages import InvalidValueError
 from tiltsim.scenario.multirotor_controllers import AttitudeForceController
 from tiltsim.scenario.scenario_tables import ScenarioTables
 from tiltsim.scenario.tiltrotor_controllers import FullPoseController
 from tiltsim_controllers.gaits.plans import Gait, fixed
 from tiltsim_controllers.laws.full_pose import pose_rank
-
-
-def _check_failed_rotor(scenario: ScenarioTables, failed: int | None) -> None:
-    rotors = scenario.vehicle.rotor_count
-    if failed is not None and failed > rotors:
-        raise InvalidValueError(
-            "controller.failed_rotor", failed, f"the vehicle has {rotors} rotors"
-        )
 
 
 def check_decoupler(scenario: ScenarioTables, decoupler: str) -> None:
@@ -29,7 +20,7 @@ def check_decoupler(scenario: ScenarioTables, decoupler: str) -> None:
 def check_full_pose(scenario: ScenarioTables, controller: FullPoseController, gait: Gait) -> None:
     """Refuse a failed rotor that is not there, and inputs that do not move six outputs."""
     vehicle, failed = scenario.vehicle.resolve(), controller.failed_rotor
-    _check_failed_rotor(scenario, failed)
+    controller.check_failed_rotor(scenario.vehicle.rotor_count)
     if isinstance(vehicle, Multirotor):
         w = [spin * (rotor != failed) for rotor, spin in enumerate(vehicle.spins, start=1)]
         rank = pose_rank(vehicle.table, gait.angles(0.0).tolist(), w)
@@ -60,7 +51,7 @@ def check_dimension(
     scenario: ScenarioTables, controller: AttitudeForceController, gait: Gait
 ) -> None:
     """Refuse more components of force than a multirotor has, and a pose that it cannot take."""
-    _check_failed_rotor(scenario, controller.failed_rotor)
+    controller.check_failed_rotor(scenario.vehicle.rotor_count)
     vehicle = scenario.vehicle.resolve()
     assert isinstance(vehicle, Multirotor)
     dimension = controller.resolve_force(vehicle, gait).dimension

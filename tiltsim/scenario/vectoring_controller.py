@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from tiltsim.scenario.gait_following import FailureAwareController
 from tiltsim.scenario.law_controller import Airframe, LawController, TiltingTable
 from tiltsim_controllers.analysis.stability import ErrorLoop
 from tiltsim_controllers.analysis.vectoring_design import REACH, Craft, Timing, design
@@ -19,11 +20,15 @@ from tiltsim_controllers.vehicle.actuators import held_gain
 from tiltsim_controllers.vehicle.effectiveness import table_per_newton
 
 
-class VectoringController(Vectoring, TiltingTable, LawController):
+class VectoringController(Vectoring, FailureAwareController, TiltingTable, LawController):
     """Observers, prediction and allocation within limits, for any rotorcraft."""
 
     models_latency = True
     control: ClassVar = staticmethod(vectoring)
+
+    def check_scenario(self, scenario: Any) -> None:
+        super().check_scenario(scenario)
+        self.check_failed_rotor(scenario.vehicle.rotor_count)
 
     def error_loops(self, vehicle: Any) -> list[ErrorLoop]:
         return []
@@ -77,7 +82,7 @@ class VectoringController(Vectoring, TiltingTable, LawController):
             (airframe.servo_frequency, airframe.servo_damping),
             held_gain(self.tilt_rate_gain, airframe.control_timestep),
         )
-        return design(self, craft, timing)
+        return design(self, craft, timing, self.resolve_failure())
 
 
 def _speeds(airframe: Airframe, thrust: Floats) -> tuple[Floats, Floats]:

@@ -35,6 +35,34 @@ from tiltsim_controllers.vehicle.effectiveness import ROTOR_FLOATS, force_and_to
 UNLIMITED: Final = 100.0
 """Share of the weight that a rotor without a speed limit can carry, in a search for a hover."""
 
+BY_TURNS: Final = (0.35, -0.35, 0.35, -0.35, 0.35, -0.35)
+"""Tilt angles (rad), about as large as a fixed cant of 20 degrees."""
+FLEET: Final[dict[str, tuple[float, ...]]] = {
+    "bicopter": (0.0, 0.0),
+    "tricopter": (-0.02127199, -0.02127199, -0.02121423),
+    "quadrotor": (),
+    "cant_quadrotor": (),
+    "tiltrotor": (-0.65, -0.65, 0.65, 0.65),
+    "hexarotor": (),
+    "cant_hexarotor": (),
+    "tilt_hexarotor": BY_TURNS,
+    "tilt_heptarotor": (*BY_TURNS, 0.0),
+    "tilt_octorotor": (*BY_TURNS, 0.35, -0.35),
+    "omni_octorotor": (),
+}
+"""Names of the files, with tilt angles (rad) that show the vehicle's capabilities."""
+FEW_ROTORS: Final = ("bicopter", "tricopter")
+"""Vehicles whose tilts a law has to command, since a gait leaves too few inputs."""
+KEYS: Final = (
+    "rotors",
+    "tilts",
+    "angles",
+    "torque_free_dimension",
+    "singular_attitudes",
+    "singularity_margin",
+    "side_force_share",
+)
+
 
 def tilted_rotors(
     vehicle: Multirotor, angles: Sequence[float], limits: tuple[float, float] | None = None
@@ -274,38 +302,6 @@ def _warnings(report: dict[str, Any], *, is_limited: bool) -> list[str]:
             " can attain is not known; give --speed-limits MIN,MAX"
         )
     return warnings
-
-
-BY_TURNS: Final = (0.35, -0.35, 0.35, -0.35, 0.35, -0.35)
-"""Tilt angles (rad), about as large as a fixed cant of 20 degrees."""
-
-FLEET: Final[dict[str, tuple[float, ...]]] = {
-    "bicopter": (0.0, 0.0),
-    "tricopter": (-0.02127199, -0.02127199, -0.02121423),
-    "quadrotor": (),
-    "cant_quadrotor": (),
-    "tiltrotor": (-0.65, -0.65, 0.65, 0.65),
-    "hexarotor": (),
-    "cant_hexarotor": (),
-    "tilt_hexarotor": BY_TURNS,
-    "tilt_heptarotor": (*BY_TURNS, 0.0),
-    "tilt_octorotor": (*BY_TURNS, 0.35, -0.35),
-    "omni_octorotor": (),
-}
-"""Names of the files, with tilt angles (rad) that show the vehicle's capabilities."""
-
-FEW_ROTORS: Final = ("bicopter", "tricopter")
-"""Vehicles whose tilts a law has to command, since a gait leaves too few inputs."""
-
-KEYS: Final = (
-    "rotors",
-    "tilts",
-    "angles",
-    "torque_free_dimension",
-    "singular_attitudes",
-    "singularity_margin",
-    "side_force_share",
-)
 
 
 def fleet_file(name: str) -> Path:

@@ -47,6 +47,11 @@ from tiltsim.system.text import short_repr, valid_unicode
 _FILE_KEYS: Final = frozenset(f"{table}.{key}" for table, key, _ in FILE_KEYS)
 """Keys of a scenario that name files."""
 
+MAX_SEARCH: Final = 1_000_000  # maximum steps of a search at one point
+VALUES_TRIED: Final = 1000  # maximum values of an axis that are checked before any is flown
+RESERVED: Final = ("index", "end", "end_time", "cause", "scenario", "flights")
+"""Columns of every dataset, in addition to metrics and versions."""
+
 
 def load_sweep(
     source: str | PathLike[str] | Mapping[str, Any], overrides: Mapping[str, Any] | None = None
@@ -203,12 +208,6 @@ def _scenario(
         scenario = parse_scenario(document, f"{address}: scenario")
     base: dict[str, Any] = without_none(scenario.model_dump(mode="json", exclude=UNUSED))
     return base
-
-
-MAX_SEARCH: Final = 1_000_000  # maximum steps of a search at one point
-VALUES_TRIED: Final = 1000  # maximum values of an axis that are checked before any is flown
-RESERVED: Final = ("index", "end", "end_time", "cause", "scenario", "flights")
-"""Columns of every dataset, in addition to metrics and versions."""
 
 
 def check_points(points: SweepPoints) -> list[Scenario]:

@@ -31,6 +31,8 @@ from tiltsim.system.text import short_repr
 MAX_DEATHS: Final = 3
 """Number of times in a row that all processes may die without finishing a chunk."""
 
+CONNECT_TIMEOUT: Final = 10.0  # s
+
 
 def run_sweep(
     definition: SweepDefinition,
@@ -114,9 +116,6 @@ def fly_on_processes(work: ChunkWork, numbers: list[int], jobs: int) -> Iterator
                     "there too little memory? Finished chunks are kept"
                 )
         waiting = sorted(died)
-
-
-CONNECT_TIMEOUT: Final = 10.0  # s
 
 
 def fly_on_cluster(work: ChunkWork, numbers: list[int], address: str) -> Iterator[FinishedChunk]:

@@ -17,6 +17,8 @@ TEMPORARY_SUFFIX: Final = ".new"
 
 _RANDOM_BYTES: Final = 8  # in the name of such a file, in hexadecimal digits
 
+_BUILDING: Final = RLock()
+
 
 def digest(content: bytes) -> str:
     """The SHA-256 of the content of a file, in hexadecimal digits."""
@@ -160,8 +162,6 @@ def _is_without_folder() -> bool:
 
 Parameters = ParamSpec("Parameters")
 Result = TypeVar("Result")
-
-_BUILDING: Final = RLock()
 
 
 def one_thread_at_a_time(function: Callable[Parameters, Result]) -> Callable[Parameters, Result]:

@@ -8,6 +8,8 @@ from typing import Final, NamedTuple
 LONGEST_WORD: Final = 300  # longer than any ordinary path
 _NUMBER: Final = re.compile(r"\d+(\.\d+)?(e[+-]?\d+)?")
 
+SUBSCRIPTS: Final = "₀₁₂₃₄₅₆₇₈₉"  # digits as subscripts
+
 
 def printable(text: object) -> str:
     """Text with line breaks, terminal sequences and other invisible characters escaped.
@@ -99,9 +101,6 @@ def html_table(
     ]
     table = "".join(f"<tr>{cells}</tr>" for cells in [head, *body] if cells)
     return f"<div>{'<br>'.join(title)}<table>{table}</table></div>"
-
-
-SUBSCRIPTS: Final = "₀₁₂₃₄₅₆₇₈₉"  # digits as subscripts
 
 
 class Quantity(NamedTuple):

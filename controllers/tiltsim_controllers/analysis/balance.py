@@ -121,7 +121,10 @@ def _best_on_grid(
         across = a * _cosine(x * middle / a) + b * _cosine(y * middle / b)
         above = upright + across > middle
         low, high = np.where(above, middle, low), np.where(above, high, middle)
-    d24, d13 = np.arcsin(_clipped(x * low / a)), np.arcsin(_clipped(-y * low / b))
+    d24, d13 = (
+        np.arcsin(np.clip(x * low / a, -1.0, 1.0)),
+        np.arcsin(np.clip(-y * low / b, -1.0, 1.0)),
+    )
     tilts = 0.5 * np.stack([e13 + d13, e24 + d24, e13 - d13, e24 - d24])
     size = np.sum(tilts**2, axis=0)
     size[(high >= reach) | (np.abs(tilts).max(axis=0) > max_tilt)] = inf
@@ -190,10 +193,6 @@ def _jacobian(function: Callable[[Any], Any], point: Floats) -> Floats:
 
 def _cosine(sine: Any) -> Any:
     return np.sqrt(np.maximum(0.0, 1.0 - sine * sine))
-
-
-def _clipped(sine: Any) -> Any:
-    return np.minimum(1.0, np.maximum(-1.0, sine))
 
 
 def _shown(acceleration: Triple) -> str:

@@ -50,35 +50,30 @@ def is_hurwitz(polynomial: Sequence[float]) -> bool:
 
 def third_order_loop(name: str, gains: tuple[float, float, float], loop_gain: float) -> ErrorLoop:
     """The loop ``y''' + N K1 y'' + N K2 y' + N K3 y = 0`` (Eqs. 35-38), ``N`` the loop gain."""
-    scaled = tuple(loop_gain * gain for gain in gains)
-    k1, k2, k3 = scaled
-    polynomial = (1.0, *scaled)
-    if is_hurwitz(polynomial):
-        return ErrorLoop(name, polynomial, True, "")
-    for index, gain in enumerate(gains, start=1):
-        if gain <= 0.0:
-            return ErrorLoop(
-                name, polynomial, False, f"{name} K{index} = {gain:g} must be positive"
-            )
-    return ErrorLoop(name, polynomial, False, f"{name} K1 K2 = {k1 * k2:g} must exceed K3 = {k3:g}")
+    k1, k2, k3 = scaled = tuple(loop_gain * gain for gain in gains)
+    condition = f"{name} K1 K2 = {k1 * k2:g} must exceed K3 = {k3:g}"
+    return _loop(name, "K", gains, (1.0, *scaled), condition)
 
 
 def linear_loop(name: str, gains: Sequence[float]) -> ErrorLoop:
     """The loop with the characteristic polynomial ``s^n + gains[0] s^(n-1) + ...``."""
-    polynomial = (1.0, *gains)
-    if is_hurwitz(polynomial):
-        return ErrorLoop(name, polynomial, True, "")
-    for index, gain in enumerate(gains, start=1):
-        if gain <= 0.0:
-            return ErrorLoop(
-                name, polynomial, False, f"{name} k{index} = {gain:g} must be positive"
-            )
-    column = routh_first_column(polynomial)
+    column = routh_first_column((1.0, *gains))
     condition = (
         f"{name} {list(gains)}: entry {len(column)} of the Routh array's first column is "
         f"{column[-1]:g}, must be positive"
     )
-    return ErrorLoop(name, polynomial, False, condition)
+    return _loop(name, "k", gains, (1.0, *gains), condition)
+
+
+def _loop(
+    name: str, key: str, gains: Sequence[float], polynomial: tuple[float, ...], condition: str
+) -> ErrorLoop:
+    """A loop; if it is unstable, with its first gain that is not positive, or else a condition."""
+    if is_hurwitz(polynomial):
+        return ErrorLoop(name, polynomial, True, "")
+    numbered = enumerate(gains, start=1)
+    wrong = (f"{name} {key}{i} = {gain:g} must be positive" for i, gain in numbered if gain <= 0.0)
+    return ErrorLoop(name, polynomial, False, next(wrong, condition))
 
 
 def error_loops(gains: Gains, hover_rotor_speed: float, decoupling: float) -> list[ErrorLoop]:

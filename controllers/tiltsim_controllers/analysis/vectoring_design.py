@@ -14,10 +14,18 @@ import numpy as np
 from scipy.linalg import expm
 from scipy.optimize import linprog
 
+from tiltsim_controllers.laws.failures import Failure
+from tiltsim_controllers.laws.full_pose import pose_rank
 from tiltsim_controllers.laws.vectoring import Vectoring
 from tiltsim_controllers.laws.vectoring_state import Parameters
 from tiltsim_controllers.mathematics.scalar import Floats, Values
-from tiltsim_controllers.vehicle.effectiveness import force_and_torque
+from tiltsim_controllers.vehicle.effectiveness import (
+    ROTOR_FLOATS,
+    SPIN_SIGN,
+    force_and_torque,
+    tilt_of_rotor,
+)
+from tiltsim_controllers.vehicle.rotors import by_tilt, rotors_in, wrench_slope
 
 SIDE_SHARE: Final = 0.65
 """Share of the greatest thrusts that side force may take."""
@@ -37,6 +45,8 @@ TRACKING: Final = 250.0
 """1/s: how fast the wrench follows its demand where rotors have no lag."""
 REACH: Final = 10.0
 """Greatest thrust over hover thrust where nothing else limits it."""
+SERVO_ANGLE: Final = 0.3
+"""rad: the tilt by which braking counts about an axis that only tilts turn."""
 DIRECTIONS: Final = 8
 """Directions of side force in the linear programs."""
 
@@ -79,6 +89,11 @@ class Craft:
         """Least and greatest thrusts, N, shape (N,) each."""
         low, high = (self.thrust * s * np.abs(s) for s in (self.slowest, self.fastest))
         return low, high
+
+    def outputs(self, tilts: Floats) -> int:
+        """How many of the six outputs rotors and tilts move."""
+        spins = np.reshape(self.table, (len(self.thrust), ROTOR_FLOATS))[:, SPIN_SIGN]
+        return pose_rank(self.table, tilts, spins)
 
     def wrench(self, tilts: Floats) -> Floats:
         """Force and torque per newton, shape (6, N)."""
@@ -131,7 +146,7 @@ def side_slope(craft: Craft, rows: Floats) -> float:
     if craft.moving:
         return 0.0
     if craft.commanded:
-        return 0.5
+        return 0.5 if craft.outputs(craft.tilts) == 6 else 0.0
     if np.linalg.matrix_rank(rows, tol=1e-6) < 6:
         return 0.0
     low, high = craft.limits
@@ -185,11 +200,19 @@ def _rotor_step(timing: Timing, lag: float) -> dict[str, float]:
     }
 
 
-def _authority(craft: Craft, rows: Floats) -> tuple[float, float]:
-    """Angular accelerations (rad/s^2) about x and y, and about z, that hover leaves."""
+def _authority(craft: Craft, rows: Floats, tilts: Floats) -> tuple[float, float]:
+    """Angular accelerations (rad/s^2) about x and y, and about z, that hover leaves.
+
+    By the thrusts; about an axis that only tilts turn, by these.
+    """
     low, high = craft.limits
     room = np.maximum(np.minimum(high - craft.hover, craft.hover - low), 0.05 * craft.hover)
     turn = np.abs(rows[3:]) @ room / np.diag(craft.inertia)
+    if craft.commanded:
+        rotors = rotors_in(craft.table, 0, tilt_of_rotor(craft.table))
+        slopes = np.abs(by_tilt(rotors, wrench_slope(rotors, tilts)))[3:]
+        turning = SERVO_ANGLE * craft.hover * slopes.sum(axis=1) / np.diag(craft.inertia)
+        turn = np.where(turn < 0.1 * turn.max(), np.maximum(turn, turning), turn)
     return min(500.0, float(turn[:2].min())), min(350.0, float(turn[2]))
 
 
@@ -216,14 +239,23 @@ def _observers(factor: float, bandwidths: Values, period: float) -> dict[str, An
     }
 
 
-def design(keys: Vectoring, craft: Craft, timing: Timing) -> tuple[Parameters, Values]:
-    """Parameters of the law, and its table."""
+def design(
+    keys: Vectoring, craft: Craft, timing: Timing, failure: Failure
+) -> tuple[Parameters, Values]:
+    """Parameters of the law, and its table.
+
+    Args:
+        keys: Keys of the law.
+        craft, timing: The vehicle and the loop.
+        failure: A rotor that is known to have failed, and since when.
+    """
     h, preferred = timing.period, preferred_tilts(craft)
     rows = craft.wrench(preferred)
+    works = np.arange(1, len(craft.thrust) + 1) != failure.rotor
     high = craft.limits[1]
     lag = timing.lag if keys.lag_model else 0.0
     slope = side_slope(craft, rows)
-    angular, yaw_angular = _authority(craft, rows)
+    angular, yaw_angular = _authority(craft, rows, preferred)
     greatest = float(high.sum()) / craft.mass
     lift = max(0.0, (greatest / craft.gravity) ** 2 - 1.0) ** 0.5
     tracking = min(TRACKING, keys.lead / lag) if lag else TRACKING
@@ -260,6 +292,8 @@ def design(keys: Vectoring, craft: Craft, timing: Timing) -> tuple[Parameters, V
         hover=craft.hover,
         lever=max(0.02, float(craft.levers.mean())),
         axis=tuple(free_axis(rows).tolist()),
+        axis_after=tuple(free_axis(rows * works).tolist()),
+        failure=failure,
         side_softness=3e-4 if len(craft.thrust) >= 6 else 1.0,
         pull=min(1.0, keys.restoring * h),
         tilt_step=keys.max_tilt_rate * h,

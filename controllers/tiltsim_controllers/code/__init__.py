@@ -2,5 +2,5 @@
 
 `tracing.trace` runs a function on symbolic numbers and keeps the operations in order, as a
 `program.Program`. The function is ordinary NumPy (`arrays.xp`), so it also runs on real arrays, in
-a debugger, and on arrays of JAX.
+a debugger.
 """

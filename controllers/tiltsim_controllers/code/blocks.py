@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
-from tiltsim_controllers.code.arrays import flatten, is_jax, numbers_in, xp
+from tiltsim_controllers.code.arrays import flatten, xp
 from tiltsim_controllers.code.messages import refuse
-from tiltsim_controllers.code.noise import WORD, hash_word
 from tiltsim_controllers.code.program import InputVector
 from tiltsim_controllers.code.tracing import (
     Expr,
@@ -50,11 +48,6 @@ def take_row(values: Sequence[Number], index: Number, width: int) -> Any:
         width: Length of a row.
     """
     last = float(len(values) // width - 1)
-    if is_jax(index) or is_jax(values):
-        jnp = sys.modules["jax"].numpy
-        place = jnp.clip(jnp.floor(jnp.where(index == index, index, 0.0)), 0, last)
-        rows = jnp.asarray(values).reshape(-1, width)
-        return jnp.where(index == index, rows[place.astype(int)], jnp.nan)
     place = make("where", make("gt", index, 0.0), index, 0.0)  # NaN becomes 0
     place = make("floor", make("where", make("lt", place, last), place, last))
     first, nan = make("mul", place, float(width)), float("nan")
@@ -80,10 +73,6 @@ def take_span(values: Sequence[Number], start: Any, size: int) -> Any:
     if isinstance(start, Expr):
         place = xp.floor(xp.clip(start, 0.0, float(last)))
         return xp.array([_entry(values, place, k) for k in range(size)])
-    if is_jax(start) or is_jax(values):
-        jnp = sys.modules["jax"].numpy
-        first = jnp.clip(jnp.asarray(start), 0, last).astype(int)
-        return jnp.asarray(values)[first + jnp.arange(size).reshape(-1, *[1] * first.ndim)]
     first = np.clip(np.asarray(start), 0, last).astype(int)
     offsets = np.arange(size).reshape(-1, *[1] * first.ndim)
     if isinstance(values, np.ndarray):
@@ -105,14 +94,7 @@ def uniform(*integers: Number) -> Number:
     Args:
         integers: Seed, channel and index.
     """
-    if not any(map(is_jax, integers)):
-        return make("uniform", *integers)
-    jax = sys.modules["jax"]
-    whole = jax.numpy.int64 if jax.config.jax_enable_x64 else jax.numpy.uint32
-    word = whole(0)
-    for integer in integers:
-        word = hash_word((word + jax.numpy.asarray(integer).astype(whole)) & whole(WORD), whole)
-    return (word + 0.5) / 4294967296.0
+    return make("uniform", *integers)
 
 
 def normal(seed: Number, channel: Number, index: Number) -> Number:
@@ -133,8 +115,6 @@ def branch(condition: Number, then: Callable[[], Any], otherwise: Callable[[], A
         condition: True or false.
         then, otherwise: Return numbers, arrays or tuples of them, both of the same shape.
     """
-    if is_jax(condition):
-        return sys.modules["jax"].lax.cond(condition, then, otherwise)
     condition = as_condition(condition)
     if not isinstance(condition, Expr):
         return then() if condition else otherwise()
@@ -165,8 +145,6 @@ def repeat(
         state: Numbers and arrays.
         until: ``(*state)``: whether to stop before the next turn.
     """
-    if any(map(is_jax, numbers_in(state))):
-        return _repeat_in_jax(count, body, state, until)
     leaves, build = flatten(state)
     graph = current_graph()
     plain = until is None and not any(isinstance(value, Expr) for value in (count, *leaves))
@@ -185,25 +163,3 @@ def repeat(
     node = graph.add("loop", [as_real(count), *map(as_real, leaves)], (test, inner))
     made: tuple[Any, ...] = build([graph.add("get", [node, i]) for i in range(len(leaves))])
     return made
-
-
-def _repeat_in_jax(
-    count: Number,
-    body: Callable[..., tuple[Any, ...]],
-    state: tuple[Any, ...],
-    until: Callable[..., Number] | None,
-) -> tuple[Any, ...]:
-    lax = sys.modules["jax"].lax
-
-    def turn(index: Any, now: Any) -> Any:
-        return tuple(map(xp.array, body(1.0 * index, *now)))
-
-    if until is None:
-        looped: tuple[Any, ...] = lax.fori_loop(0, count, turn, state)
-        return looped
-    stopped: tuple[Any, ...] = lax.while_loop(
-        lambda carried: (carried[0] < count) & ~until(*carried[1]),
-        lambda carried: (carried[0] + 1, turn(*carried)),
-        (0, state),
-    )[1]
-    return stopped

@@ -9,7 +9,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from tiltsim_controllers.code.blocks import uniform
+from tiltsim_controllers.code.noise import WORD, hash_word
 from tiltsim_controllers.code.operations import OPERATIONS
 from tiltsim_controllers.code.program import Program, operations_of
 from tiltsim_controllers.code.tracing import Block, Expr
@@ -17,13 +17,7 @@ from tiltsim_controllers.code.tracing import Block, Expr
 _OPERATORS: Final[dict[str, Callable[..., Any]]] = {
     name: getattr(operator, name)
     for name in ("add", "sub", "mul", "neg", "lt", "le", "gt", "ge", "eq", "ne")
-} | {
-    "div": operator.truediv,
-    "and": operator.and_,
-    "or": operator.or_,
-    "not": operator.invert,
-    "uniform": uniform,
-}
+} | {"div": operator.truediv, "and": operator.and_, "or": operator.or_, "not": operator.invert}
 
 SEGMENT: Final = 60
 """Operations that XLA compiles together where it computes a value again for every use."""
@@ -136,11 +130,22 @@ class _Evaluation:
         values = [self.value(argument) for argument in args]
         if op == "where":
             return self._numpy.where(*values)
+        if op == "uniform":
+            return self._uniform(values)
         if op in _OPERATORS:
             return _OPERATORS[op](*values)
         ufunc = OPERATIONS[op].ufunc
         assert ufunc is not None  # all others are above
         return getattr(self._numpy, ufunc.__name__)(*values)
+
+    def _uniform(self, integers: Sequence[Any]) -> Any:
+        """A draw of `tiltsim_controllers.code.noise.uniform`."""
+        whole = self._numpy.int64 if self._jax.config.jax_enable_x64 else self._numpy.uint32
+        word = whole(0)
+        for integer in integers:
+            number = self._numpy.asarray(integer).astype(whole)
+            word = hash_word((word + number) & whole(WORD), whole)
+        return (word + 0.5) / 4294967296.0
 
     def _vector(self, values: Any) -> Any:
         """Numbers as an array of one dimension."""

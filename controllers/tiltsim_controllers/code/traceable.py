@@ -9,7 +9,7 @@ from typing import Any, Final, TypeVar
 
 import numpy as np
 
-from tiltsim_controllers.code.arrays import flatten, is_jax, xp
+from tiltsim_controllers.code.arrays import flatten, xp
 from tiltsim_controllers.code.program import InputVector, Program, trace_vectors
 from tiltsim_controllers.code.tracing import Graph
 
@@ -19,11 +19,11 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 def traceable(function: Function) -> Function:
     """Let a function of arrays be called with tuples for arrays.
 
-    The function runs as it is on real arrays, on arrays of traced numbers and on arrays of JAX: it
-    uses arithmetic, `xp` and the blocks of `tiltsim_controllers.code.blocks`, no ``if`` on a number
-    that may be traced, and no assignment to an entry of an array. Given tuples or lists and no
-    array, it returns tuples; given an array, it returns arrays. An input of a program arrives as an
-    array, but for an argument named ``knots``: look-ups read that by index.
+    The function runs as it is on real arrays and on arrays of traced numbers: it uses arithmetic,
+    `xp` and the blocks of `tiltsim_controllers.code.blocks`, no ``if`` on a number that may be
+    traced, and no assignment to an entry of an array. Given tuples or lists and no array, it
+    returns tuples; given an array, it returns arrays. An input of a program arrives as an array,
+    but for an argument named ``knots``: look-ups read that by index.
     """
     names = tuple(signature(function).parameters)
 
@@ -62,7 +62,7 @@ def as_tuples(value: Any) -> Any:
     """Arrays as tuples of numbers, also in tuples and records."""
     if isinstance(value, np.ndarray | np.generic) and value.dtype != object:
         value = value.tolist()  # Python's floats
-    elif isinstance(value, np.ndarray) or is_jax(value):
+    elif isinstance(value, np.ndarray):
         return tuple(map(as_tuples, value)) if value.ndim else value
     if isinstance(value, tuple | list):
         entries = map(as_tuples, value)

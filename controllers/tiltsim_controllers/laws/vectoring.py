@@ -85,6 +85,7 @@ class Vectoring(Keys):
 def vectoring(observed: Observed, p: Parameters) -> Command:
     """The law, with the states `state_units`."""
     known = known_of(observed, p)
+    p = known.p
     doubt, usable = servo_doubts(known)
     ahead = predicted(known, usable)
     speeds, tilt_rates = _allocated(known, ahead, _demand(known, ahead), usable)
@@ -111,7 +112,7 @@ def _demand(known: Known, ahead: Ahead) -> Any:
     """Force (N) and torque (N m) that the rotors shall make, body axes, shape (6,)."""
     seen, p, frame, now = known.seen, known.p, known.frame, ahead.now
     reference, t = seen.reference, ahead.time
-    axis: Any = xp.array(p.axis)
+    axis: Any = p.axis
     if len(ahead.tilts) and len(seen.tilt_commands) == 0:
         rates = reference.tilt_rates
         tilts = Moving(ahead.tilts, rates, 0.0 * rates)

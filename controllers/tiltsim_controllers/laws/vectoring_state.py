@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.code.blocks import repeat, take_row
+from tiltsim_controllers.laws.failures import Failure, working
 from tiltsim_controllers.laws.observed import Observed
 from tiltsim_controllers.laws.vectoring_steps import Frame, Motion, moved, turn_by
 from tiltsim_controllers.mathematics.attitude import (
@@ -55,7 +56,9 @@ class Parameters(NamedTuple):
     slope: float  # side force per lift without lean
     hover: float  # N, thrust of a rotor
     lever: float  # m
-    axis: Vector3  # along which it pushes with fixed rotors or preferred tilts
+    axis: Vector3  # along which it pushes with fixed rotors or preferred tilts, ...
+    axis_after: Vector3  # ... and without the failed rotor
+    failure: Failure
     side_softness: float
     pull: float  # share of the way to the preferred inputs in a period
     tilt_step: float  # rad, in a period
@@ -160,9 +163,13 @@ def known_of(observed: Observed, p: Parameters) -> Known:
     body, memory = observed.vehicle, memory_of(observed)
     inertia, turns = observed.inertia, observed.gyroscopic
     rotors, table = len(observed.thrusts), xp.array(observed.table)
+    works = working(observed.time, p.failure, rotors)
+    harmed = observed.time >= p.failure.known_from
+    axis = xp.where(harmed, xp.array(p.axis_after), xp.array(p.axis))
+    p = p._replace(axis=axis, slope=xp.where(harmed, 0.0, p.slope))
     thrust, slowest, fastest = table[: 3 * rotors].reshape(3, rotors)
     return Known(
-        observed,
+        observed._replace(rotors=observed.rotors.masked(works)),
         p,
         memory,
         Frame(body.mass, body.gravity, inertia, turns, memory.force, memory.torque),

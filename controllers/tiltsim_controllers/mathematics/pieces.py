@@ -1,7 +1,7 @@
 """Piecewise polynomials as flat data: rows of the time at which a piece begins, and coefficients.
 
-They are computed once, before a flight; the functions here evaluate them, on real arrays, traced
-numbers and arrays of JAX.
+They are computed once, before a flight; the functions here evaluate them, on real arrays and
+traced numbers.
 """
 
 from __future__ import annotations

@@ -7,7 +7,9 @@ import pytest
 from scipy import stats
 
 from tiltsim_controllers.code.blocks import normal
+from tiltsim_controllers.code.jax_function import results_in_jax
 from tiltsim_controllers.code.noise import hash_word, uniform
+from tiltsim_controllers.code.traceable import program_of
 
 COUNT = 4000
 
@@ -76,7 +78,13 @@ def test_successive_draws_are_uncorrelated():
 @pytest.mark.parametrize("wide", [True, False])
 def test_on_arrays_of_jax_a_draw_is_the_one_in_python(wide):
     jax = pytest.importorskip("jax")
+    program = program_of(lambda index: normal(7.0, 3.0, index[0]), index=1)
+
+    def drawn(index):
+        dtype = "float64" if wide else "float32"
+        return results_in_jax(program, [(index,)], dtype, in_segments=False)[0]
+
     with jax.enable_x64(wide):
-        found = jax.vmap(lambda index: normal(7.0, 3.0, index))(np.arange(50.0))
+        found = jax.vmap(drawn)(np.arange(50.0))
     expected = [normal(7.0, 3.0, float(index)) for index in range(50)]
     np.testing.assert_allclose(found, expected, rtol=1e-13 if wide else 2e-3)

@@ -20,8 +20,7 @@ from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.vehicle.parameters import PRESETS
 
 _VEHICLE = PRESETS["ar_drone_2"]
-_GAIT_1 = (-0.1, 0.1, -0.2, 0.1)
-"""The fixed gait 1 of ch. 3, rad."""
+_GAIT_1 = (-0.1, 0.1, -0.2, 0.1)  # the fixed gait 1 of ch. 3, rad.
 
 
 class Coefficients(NamedTuple):

@@ -24,12 +24,9 @@ from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.tilt_car.vehicle import THESIS_CAR, input_matrix
 from tiltsim_controllers.vehicle.parameters import PRESETS
 
-RIGHT: Final = 1e-6
-"""Deviation below which a formula counts as right."""
-
+RIGHT: Final = 1e-6  # deviation below which a formula counts as right
 _VEHICLE: Final = PRESETS["ar_drone_2"]
-_TILTS: Final = (-0.1, 0.1, -0.2, 0.1)
-"""Gait 1 of ch. 3, rad."""
+_TILTS: Final = (-0.1, 0.1, -0.2, 0.1)  # gait 1 of ch. 3, rad
 _SPEEDS: Final = np.array([-310.0, 350.0, -330.0, 370.0])  # rad/s
 
 

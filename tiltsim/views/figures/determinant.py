@@ -22,6 +22,8 @@ from tiltsim_controllers.vehicle.parameters import Vehicle
 _SIDE: Final = np.linspace(-2.0, 2.0, 121)  # rad
 _TICKS: Final = (-2, -1, 0, 1, 2)
 
+_LIMIT: Final = 0.45 * pi  # largest angle (rad); the exact surface is unbounded toward 90 degrees
+
 
 @style.paper_style()
 def determinant_figure(case: str, vehicle: Vehicle) -> Figure:
@@ -87,9 +89,6 @@ def _surface(surface: Any, cells: Any, largest: float) -> None:
     surface.tick_params(pad=-3, labelsize=7)
     surface.view_init(elev=32, azim=-115)
     surface.set_box_aspect((1.0, 1.0, 0.8), zoom=1.0)
-
-
-_LIMIT: Final = 0.45 * pi  # largest angle (rad); the exact surface is unbounded toward 90 degrees
 
 
 def surfaces(vehicle: Vehicle, samples: int = 121) -> tuple[Floats, ...]:

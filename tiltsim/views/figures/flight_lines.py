@@ -14,12 +14,8 @@ from tiltsim.laws.supervision import SUPERVISION
 from tiltsim.views.figures import style
 from tiltsim_controllers.mathematics.scalar import Floats
 
-MAX_PERIODS: Final = 10
-"""Periods of a gait beyond which a line would be a solid band."""
-
-MOST_LINES: Final = len(style.CYCLE)
-"""Flights up to which each has its own line."""
-
+MAX_PERIODS: Final = 10  # periods of a gait beyond which a line would be a solid band
+MOST_LINES: Final = len(style.CYCLE)  # flights up to which each has its own line
 BANDS: Final = ((0.05, 0.95, 0.18, "90 % of {} flights"), (0.25, 0.75, 0.35, "half of them"))
 """Lower and upper quantile, opacity and name of each band."""
 

@@ -37,6 +37,8 @@ from tiltsim_controllers.vehicle.parameters import Vehicle
 
 _POINTS: Final = 241
 
+_SLICES: Final = 7
+
 
 @style.paper_style()
 def multirotor_figure(rotors: TiltedRotors, kind: str) -> Figure:
@@ -149,9 +151,6 @@ def _faces(vertices: NDArray[np.float64]) -> list[NDArray[np.float64]]:
         across, along = np.linalg.svd(plane[None, :3])[2][1:]
         faces.append(vertices[corners[np.argsort(np.arctan2(points @ along, points @ across))]])
     return faces
-
-
-_SLICES: Final = 7
 
 
 @style.paper_style()

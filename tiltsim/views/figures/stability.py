@@ -31,6 +31,9 @@ ALIKE: Final = 30.0  # parts of poles that differ by a smaller factor share a li
 MOST: Final = 1e4
 """Ratio of the largest part of a pole to the smallest that a logarithmic axis resolves."""
 
+UNITS: Final = {"position": "m", "velocity": "m/s", "attitude": "rad", "angular_velocity": "rad/s"}
+CURVES: Final = 8  # curves of singular attitudes of a moving gait
+
 
 @style.paper_style()
 def stability_figure(found: Stability) -> Figure:
@@ -162,10 +165,6 @@ def _stretch(axes: Any, name: str, parts: Floats) -> float:
     getattr(axes, f"set_{name}scale")("symlog", linthresh=least, subs=range(2, 10))
     getattr(axes, f"{name}axis").set_major_formatter("{x:g}")
     return float(least)
-
-
-UNITS: Final = {"position": "m", "velocity": "m/s", "attitude": "rad", "angular_velocity": "rad/s"}
-CURVES: Final = 8  # curves of singular attitudes of a moving gait
 
 
 @style.paper_style()

@@ -59,32 +59,18 @@ ROTOR_LINES: Final[tuple[dict[str, Any], ...]] = (
 )
 """Styles of the lines of rotors 1 to 4 in one panel."""
 
-
-def rotor_lines(count: int) -> list[dict[str, Any]]:
-    """Styles of the lines of some rotors: `ROTOR_LINES`, then thin ones of all hues."""
-    hues = (GREEN, RED, *(line["color"] for line in ROTOR_LINES))
-    more = [
-        {"color": hues[i % len(hues)], "ls": _ROTOR_DASHES[i % len(_ROTOR_DASHES)], "lw": 1.2}
-        for i in range(count)
-    ]
-    return [*ROTOR_LINES, *more][:count]
-
-
 _ROTOR_DASHES: Final = ("-", (0, (6, 1.5)), (0, (2, 1)), (0, (5, 1, 1, 1)), (0, (1, 2)))
 """Dashes of further lines; with six hues they repeat after thirty."""
-
 AXIS_LINES: Final[tuple[dict[str, Any], ...]] = (
     {"color": BLUE, "ls": "-", "lw": 1.4},
     {"color": RED, "ls": (0, (5, 1.2)), "lw": 1.4},
     {"color": GREEN, "ls": (0, (5, 1.2, 1, 1.2)), "lw": 1.4},
 )
 """Styles of the lines of x, y, z, or roll, pitch, yaw, in one panel."""
-
 FORMATS: Final = (".png", ".svg", ".pdf")  # suffixes of figure files
 SINGULAR: Final = RED  # curves of singular attitudes and of singular tilt angles, in every figure
 UNREACHABLE: Final = "#F3D3C3"
 """The shade of attitudes that are singular, nearly so or beyond a singularity, in all figures."""
-
 _SETTINGS: Final = {
     "font.family": ["sans-serif"],
     "font.sans-serif": ["DejaVu Sans"],
@@ -116,9 +102,25 @@ _SETTINGS: Final = {
     "svg.hashsalt": "tiltsim",
     "pdf.fonttype": 42,
 }
-
 _GLYPHS: Final = "DejaVu Sans"
 """The font, part of matplotlib, of letters that the chosen ones lack, such as subscripts."""
+PRINT_DPI: Final = 300.0
+"""Resolution of pixel formats of a figure whose size is given, unless the user sets another."""
+_LENGTH: Final = r"(\d+(?:\.\d*)?|\.\d+)\s*(mm|cm|in)?"
+_SIZE: Final = re.compile(rf"{_LENGTH}(?:\s*x\s*{_LENGTH})?")
+_INCHES: Final = {"in": 1.0, "cm": 1.0 / 2.54, "mm": 1.0 / 25.4}
+_ALLOWED: Final = (0.5, 80.0)  # smallest and largest width or height of a figure, inches
+LONGEST_TEXT: Final = 300  # letters of a user's text that a figure has room for
+
+
+def rotor_lines(count: int) -> list[dict[str, Any]]:
+    """Styles of the lines of some rotors: `ROTOR_LINES`, then thin ones of all hues."""
+    hues = (GREEN, RED, *(line["color"] for line in ROTOR_LINES))
+    more = [
+        {"color": hues[i % len(hues)], "ls": _ROTOR_DASHES[i % len(_ROTOR_DASHES)], "lw": 1.2}
+        for i in range(count)
+    ]
+    return [*ROTOR_LINES, *more][:count]
 
 
 class Size(NamedTuple):
@@ -130,15 +132,6 @@ class Size(NamedTuple):
 
 _styled: ContextVar[bool] = ContextVar("styled", default=False)
 _size: ContextVar[Size | None] = ContextVar("size", default=None)
-
-PRINT_DPI: Final = 300.0
-"""Resolution of pixel formats of a figure whose size is given, unless the user sets another."""
-
-
-_LENGTH: Final = r"(\d+(?:\.\d*)?|\.\d+)\s*(mm|cm|in)?"
-_SIZE: Final = re.compile(rf"{_LENGTH}(?:\s*x\s*{_LENGTH})?")
-_INCHES: Final = {"in": 1.0, "cm": 1.0 / 2.54, "mm": 1.0 / 25.4}
-_ALLOWED: Final = (0.5, 80.0)  # smallest and largest width or height of a figure, inches
 
 
 def parse_size(name: str, size: str | tuple[float, float] | None) -> Size | None:
@@ -273,9 +266,6 @@ def cycle_color(number: int) -> str:
     """The color of the line with this number, from 0: `CYCLE`, unless the user has another."""
     colors = rcParams["axes.prop_cycle"].by_key().get("color", CYCLE)
     return str(colors[number % len(colors)])
-
-
-LONGEST_TEXT: Final = 300  # letters of a user's text that a figure has room for
 
 
 def verbatim(text: str) -> str:

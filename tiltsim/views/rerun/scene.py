@@ -24,6 +24,13 @@ DOT: Final = -4.0  # of vehicle and reference, visible from any distance
 FLOOR_CELL: Final = 1.0  # m
 FLOOR_CELLS: Final = 12  # to each side of the vehicle
 
+VISIBLE_GROUPS: Final = (0, 1, 2)
+"""Geom groups that are drawn; collision geometry is in group 3 by convention."""
+_XYZW: Final = [1, 2, 3, 0]
+"""Permutation from MuJoCo's quaternion order, scalar first, to Rerun's, scalar last."""
+_UNSET_COLOR: Final = (0.5, 0.5, 0.5, 1.0)
+"""MuJoCo's default RGBA; a geom with it has its material's color instead."""
+
 
 class Scene:
     """The entities below ``world`` for one flight.
@@ -142,16 +149,6 @@ class Scene:
         if np.ptp(path, axis=0).max() > 0.0:
             line = rr.LineStrips3D([path], colors=[timeline.GREY], radii=[REFERENCE_WIDTH])
             self._log(f"{self.root}/reference/path", line)
-
-
-VISIBLE_GROUPS: Final = (0, 1, 2)
-"""Geom groups that are drawn; collision geometry is in group 3 by convention."""
-
-_XYZW: Final = [1, 2, 3, 0]
-"""Permutation from MuJoCo's quaternion order, scalar first, to Rerun's, scalar last."""
-
-_UNSET_COLOR: Final = (0.5, 0.5, 0.5, 1.0)
-"""MuJoCo's default RGBA; a geom with it has its material's color instead."""
 
 
 def xyzw(quaternion: npt.ArrayLike) -> npt.NDArray[np.float32]:

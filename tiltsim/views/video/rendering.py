@@ -35,6 +35,14 @@ LINE: Final = mujoco.mjtGeom.mjGEOM_CYLINDER
 
 Color = tuple[float, float, float, float]
 
+H264_QUALITY: Final = "21"  # constant rate factor: 18 is visually lossless, 28 coarse
+COLORS: Final = 255  # of a GIF's 256; one is left for pixels that do not change
+PALETTE_FRAMES: Final = 6  # evenly spaced frames from which the colors of a GIF are chosen
+PORTRAIT_SIZE: Final = (720, 480)  # pixels
+PORTRAIT_ANGLES: Final = (50.0, -28.0)  # azimuth and elevation of the camera's direction, degrees
+PORTRAIT_DISTANCE: Final = 2.5  # of the camera, by the radius of the rotors' places and of a rotor
+ROTOR_RADIUS: Final = 0.12  # about the radius of the rotors in the files, m
+
 
 @dataclass(frozen=True)
 class VideoFormat:
@@ -182,12 +190,6 @@ class FlightRenderer:
         return geom
 
 
-H264_QUALITY: Final = "21"  # constant rate factor: 18 is visually lossless, 28 coarse
-
-COLORS: Final = 255  # of a GIF's 256; one is left for pixels that do not change
-PALETTE_FRAMES: Final = 6  # evenly spaced frames from which the colors of a GIF are chosen
-
-
 def write_video(
     flight: Flight,
     path: Path,
@@ -253,12 +255,6 @@ def _write_gif(
 
 
 WRITERS: Final = {".mp4": _write_mp4, ".gif": _write_gif}  # by the suffix of the file
-
-
-PORTRAIT_SIZE: Final = (720, 480)  # pixels
-PORTRAIT_ANGLES: Final = (50.0, -28.0)  # azimuth and elevation of the camera's direction, degrees
-PORTRAIT_DISTANCE: Final = 2.5  # of the camera, by the radius of the rotors' places and of a rotor
-ROTOR_RADIUS: Final = 0.12  # about the radius of the rotors in the files, m
 
 
 def save_portrait(model_file: Path, angles: Sequence[float], file: Path) -> None:
