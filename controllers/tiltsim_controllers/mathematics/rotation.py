@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import partial
 from math import asin, atan2, sqrt
 
@@ -78,20 +77,6 @@ def rotation_from_quaternion(w: float, x: float, y: float, z: float) -> tuple[fl
         2.0 * (y * z + w * x),
         1.0 - 2.0 * (x * x + y * y),
     )
-
-
-def to_world(rotation: Sequence[float], vector: Triple) -> Triple:
-    """A body-frame vector in world axes; ``rotation`` holds nine entries, row by row."""
-    r11, r12, r13, r21, r22, r23, r31, r32, r33 = rotation
-    x, y, z = vector
-    return (r11 * x + r12 * y + r13 * z, r21 * x + r22 * y + r23 * z, r31 * x + r32 * y + r33 * z)
-
-
-def to_body(rotation: Sequence[float], vector: Triple) -> Triple:
-    """A world vector in body axes; ``rotation`` is body to world as in `to_world`."""
-    r11, r12, r13, r21, r22, r23, r31, r32, r33 = rotation
-    x, y, z = vector
-    return (r11 * x + r21 * y + r31 * z, r12 * x + r22 * y + r32 * z, r13 * x + r23 * y + r33 * z)
 
 
 def quaternion_from_rotation(rotation: tuple[float, ...]) -> Quad:
