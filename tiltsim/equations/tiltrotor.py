@@ -9,8 +9,7 @@ from typing import Any
 from tiltsim.scenario.scenario import Scenario
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.code.traceable import traceable
-from tiltsim_controllers.mathematics.attitude import euler_of_rotation
-from tiltsim_controllers.mathematics.rotation import rotation_from_euler
+from tiltsim_controllers.mathematics.attitude import euler_of_rotation, rotation_matrix
 from tiltsim_controllers.mathematics.scalar import Values, Vector
 from tiltsim_controllers.vehicle.body import Body, principal_body
 from tiltsim_controllers.vehicle.effectiveness import TiltOfRotor, cross_table
@@ -57,6 +56,6 @@ def airframe_of(law: Any, knots: Any, layout: TiltOfRotor) -> tuple[Body, Rotors
 def initial_state(scenario: Scenario, rotor_speeds: Vector) -> Values:
     """The state at time zero, with signed rotor speeds (rad/s)."""
     initial = scenario.initial
-    rotation = rotation_from_euler(*initial.attitude)
+    rotation = rotation_matrix(initial.attitude).ravel()
     motion = (*initial.position, *initial.velocity)
     return (*motion, *rotation, *initial.angular_velocity, *rotor_speeds)

@@ -14,7 +14,7 @@ from tiltsim_controllers.analysis.stability import ErrorLoop
 from tiltsim_controllers.analysis.vectoring_design import REACH, Craft, Timing, design
 from tiltsim_controllers.laws.vectoring import Vectoring, vectoring
 from tiltsim_controllers.laws.vectoring_state import Parameters, state_units
-from tiltsim_controllers.mathematics.rotation import quaternion_from_euler
+from tiltsim_controllers.mathematics.attitude import quaternion_of_euler
 from tiltsim_controllers.mathematics.scalar import Floats, Values
 from tiltsim_controllers.vehicle.actuators import held_gain
 from tiltsim_controllers.vehicle.effectiveness import table_per_newton
@@ -42,7 +42,7 @@ class VectoringController(Vectoring, FailureAwareController, TiltingTable, LawCo
         return (
             *airframe.initial_position,
             *airframe.initial_velocity,
-            *quaternion_from_euler(*airframe.initial_attitude),
+            *quaternion_of_euler(airframe.initial_attitude),
             *airframe.initial_body_rates,
             *(0.0,) * 6,
             *airframe.initial_speeds * (airframe.latency + 1),

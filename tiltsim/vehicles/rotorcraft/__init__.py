@@ -34,7 +34,7 @@ from tiltsim.vehicles.rotorcraft.layout import CROSS, Layout
 from tiltsim.vehicles.rotorcraft.metrics import rotorcraft_metrics
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.code.traceable import traceable
-from tiltsim_controllers.mathematics.rotation import quaternion_from_euler
+from tiltsim_controllers.mathematics.attitude import quaternion_of_euler
 from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector
 from tiltsim_controllers.references.trajectories import ReferenceParameters
 from tiltsim_controllers.vehicle.states import P
@@ -186,7 +186,7 @@ def initial_motion(plan: FlightPlan) -> tuple[Vector, Vector]:
     tilting = plan.scenario.vehicle.has_tilting_rotors
     angles, rates = initial_tilts(plan) if tilting else ((), ())
     return (
-        (*initial.position, *quaternion_from_euler(*initial.attitude), *angles),
+        (*initial.position, *quaternion_of_euler(initial.attitude), *angles),
         (*initial.velocity, *initial.angular_velocity, *rates),
     )
 
