@@ -193,7 +193,13 @@ def initial_motion(plan: FlightPlan) -> tuple[Vector, Vector]:
 
 @cache
 def rotorcraft_kind(layout: Layout, extra_columns: tuple[str, ...] = ()) -> VehicleKind:
-    """The kind of rotorcraft with a layout, and its columns among `EXTRA_COLUMNS`."""
+    """The kind of rotorcraft with a layout, and its columns among `EXTRA_COLUMNS`.
+
+    Fewer than four rotors control attitude and lift only by their tilts, and have no margin at
+    given tilts.
+    """
+    if layout.rotors < FEWEST_WITH_MARGIN:
+        extra_columns = tuple(name for name in extra_columns if name != "singularity_margin")
     return VehicleKind(
         observed_fields=layout.observed_fields,
         columns=rotorcraft_columns(layout) | {name: EXTRA_COLUMNS[name] for name in extra_columns},
@@ -204,6 +210,8 @@ def rotorcraft_kind(layout: Layout, extra_columns: tuple[str, ...] = ()) -> Vehi
         metrics=rotorcraft_metrics,
     )
 
+
+FEWEST_WITH_MARGIN: Final = 4
 
 EXTRA_COLUMNS: Final = {
     "singularity_margin": Quantity("singularity margin", "rad"),
