@@ -154,7 +154,8 @@ WALL = {
         ({"object": [{**WALL, "softness": 1e-3}]}, "at least two time steps, 0.002"),
         ({"object": [{**WALL, "axis": [1.0, 0.0, 0.0]}]}, "needs joint = hinged"),
         ({"object": [{**WALL, "name": "vehicle"}]}, "is taken"),
-        ({"object": [{**WALL, "type": "mesh"}]}, "wall, box"),
+        ({"object": [{**WALL, "type": "cone"}]}, "wall, box"),
+        ({"object": [{**WALL, "type": "mesh", "size": [1.0]}]}, ".stl or .obj"),
         ({"tool": {"length": -0.1}}, "tool.length = -0.1"),
         ({"tool": {"length": 0.3, "mass": -0.1}}, "tool.mass = -0.1"),
         ({"tool": {"length": 0.01}}, "must exceed twice the radius"),
@@ -172,6 +173,35 @@ WALL = {
 )
 def test_wrong_objects_tools_and_pushes_are_refused(changes, words):
     assert words in refusal(tiltsim.load_scenario, PUSH, changes)
+
+
+def test_a_mesh_is_touched_where_its_hull_is(tmp_path):
+    """A tetrahedron with its right angle at the origin, twice as large; it falls on the tool."""
+    corners = ["v 0 0 0", "v 1 0 0", "v 0 1 0", "v 0 0 1"]
+    faces = ["f 1 3 2", "f 1 2 4", "f 1 4 3", "f 2 3 4"]
+    (tmp_path / "corner.obj").write_text("\n".join(corners + faces) + "\n")
+    scenario = """
+tool = { direction = [0.0, 1.0, 0.0], length = 0.5 }
+simulation = { duration = 0.3, integrator = "implicitfast", record_timestep = 0.001 }
+
+[[object]]
+name = "corner"
+type = "mesh"
+file = "corner.obj"
+size = [0.1]
+joint = "free"
+mass = 0.02
+position = [-0.02, 0.4, 0.05]
+"""
+    (tmp_path / "mesh.toml").write_text(scenario)
+    flight = tiltsim.simulate(tmp_path / "mesh.toml")
+    touch = np.flatnonzero(flight["contact_time"])[0]
+    assert touch > 80
+    top = flight["z"] + 0.4 * np.sin(flight["roll"]) + 0.01  # of the tool below the corner
+    assert flight["corner_z"][touch] == pytest.approx(top[touch], abs=2e-3)
+    missing = scenario.replace("corner.obj", "other.obj")
+    (tmp_path / "mesh.toml").write_text(missing)
+    assert "other.obj" in refusal(tiltsim.load_scenario, tmp_path / "mesh.toml")
 
 
 @pytest.mark.parametrize(
@@ -204,3 +234,16 @@ def test_linear_analysis_refuses_objects():
     hovering = tiltsim.load_scenario(PUSH, FREE)
     for analysis in (tiltsim.linearize, tiltsim.stability):
         assert "takes a vehicle alone" in refusal(analysis, hovering)
+
+
+def test_a_push_of_a_custom_controller_has_its_columns_and_metric():
+    def resting(_observation):
+        return tiltsim.Command(thrusts=[4.0] * 6)
+
+    scenario = push(simulation__duration=0.8, reference__position=[0.0, 0.5, 0.0])
+    scenario = scenario.replace({"reference.start": 0.0, "initial.position": [0.0, 0.54, 0.0]})
+    scenario = scenario.replace({"initial.velocity": [0.0, 0.2, 0.0]})
+    flight = tiltsim.simulate(scenario, controller=resting)
+    assert flight["push_force_ref"][-1] > 0.0
+    assert flight.metrics()["peak_force"] > 1.0
+    np.testing.assert_array_equal(flight["push_force"], flight["contact_force_y"])

@@ -54,7 +54,8 @@ class Body:
         shape: A wall's face is at its position and looks along its own -x.
         position: m, world.
         quaternion: From its axes to the world, scalar first.
-        size: m: of a wall width (y) and height (z), of a box its edges, of a sphere its radius.
+        size: m: of a wall width (y) and height (z), of a box its edges, of a sphere its radius, of
+            a mesh its unit.
         joint: Whether it moves.
         mass: kg, of one that moves.
         friction: Coefficient of sliding friction.
@@ -62,10 +63,11 @@ class Body:
         hinge, axis: A point of the hinge (m) and its direction, in its axes.
         damping: Torque of the hinge per angular velocity, N m s/rad.
         floating: Whether a free one has no weight.
+        file: File of a mesh.
     """
 
     name: str
-    shape: Literal["wall", "box", "sphere"]
+    shape: Literal["wall", "box", "sphere", "mesh"]
     position: Triple
     quaternion: Values
     size: Values
@@ -77,6 +79,7 @@ class Body:
     axis: Triple
     damping: float
     floating: bool
+    file: str = ""
 
     @property
     def box(self) -> tuple[Triple, Triple]:
@@ -218,15 +221,17 @@ def _add_body(spec: mujoco.MjSpec, body: Body) -> None:
         own.joints[0].damping = [body.damping, 0.0, 0.0]
     if body.floating or body.damping:  # passive forces, which a vehicle alone does not have
         spec.option.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_DAMPER)
-    if body.shape == "sphere":
-        center, size, kind = (0.0, 0.0, 0.0), (*body.size, 0.0, 0.0), "SPHERE"
+    shape: dict[str, Any] = {"type": mujoco.mjtGeom.mjGEOM_BOX}
+    if body.shape == "mesh":
+        mesh = spec.add_mesh(name=f"object_{body.name}", file=body.file, scale=body.size * 3)
+        shape = {"type": mujoco.mjtGeom.mjGEOM_MESH, "meshname": mesh.name}
+    elif body.shape == "sphere":
+        shape = {"type": mujoco.mjtGeom.mjGEOM_SPHERE, "size": (*body.size, 0.0, 0.0)}
     else:
-        (center, size), kind = body.box, "BOX"
+        shape["pos"], shape["size"] = body.box
     own.add_geom(
         name=f"object_{body.name}",
-        type=getattr(mujoco.mjtGeom, f"mjGEOM_{kind}"),
-        pos=center,
-        size=size,
+        **shape,
         mass=body.mass,
         rgba=FIXED_COLOR if body.joint == "fixed" else MOVING_COLOR,
         **_touching(body.friction, body.softness),

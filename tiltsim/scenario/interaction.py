@@ -1,16 +1,21 @@
 """The tables of objects, of a tool and of a load: ``[[object]]``, ``[tool]``, ``[payload]``."""
 
 from math import pi
+from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
 from pydantic import Field
 
+from tiltsim.models.mjcf_editing import MAX_BYTES
 from tiltsim.models.objects import Body, Load, Objects, Tool
 from tiltsim.scenario.table import Angles3, NonNegative, Positive, Table, Vector3
-from tiltsim_controllers.mathematics.rotation import quaternion_from_euler
+from tiltsim.system.files import is_file
+from tiltsim_controllers.mathematics.attitude import quaternion_of_euler
 
-SIZES: Final = {"wall": 2, "box": 3, "sphere": 1}
+SIZES: Final = {"wall": 2, "box": 3, "sphere": 1, "mesh": 1}
 """Numbers of the size of each type of object."""
+
+MESHES: Final = (".stl", ".obj")
 
 RESERVED: Final = frozenset({"vehicle", "payload", "contact_force", "air", "tilt", "law"})
 """Names that columns and parts of the vehicle already have."""
@@ -28,8 +33,9 @@ class ObjectTable(Table):
     name: Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,30}$")] = Field(
         description="its name, which begins the names of its columns", examples=["wall"]
     )
-    type: Literal["wall", "box", "sphere"] = Field(
-        description="a wall 0.1 m thick whose face looks along its -x, a box, or a sphere",
+    type: Literal["wall", "box", "sphere", "mesh"] = Field(
+        description="a wall 0.1 m thick whose face looks along its -x, a box, a sphere, or the "
+        "convex hull of a mesh",
         examples=["wall"],
     )
     position: Vector3 = Field(
@@ -43,8 +49,13 @@ class ObjectTable(Table):
     )
     size: Annotated[tuple[Positive, ...], Field(strict=False, min_length=1, max_length=3)] = Field(
         description="width along y and height along z of a wall, edges of a box, radius of a "
-        "sphere [m]",
+        "sphere, length of the unit of a mesh [m]",
         examples=[[2.0, 2.0]],
+    )
+    file: str | None = Field(
+        None,
+        description="STL or OBJ file of a mesh, relative to the scenario's folder",
+        examples=["valve.stl"],
     )
     joint: Literal["fixed", "hinged", "free"] = Field(
         "fixed", description="whether it moves, and how"
@@ -77,6 +88,10 @@ class ObjectTable(Table):
     def _check_values(self) -> None:
         if len(self.size) != SIZES[self.type]:
             raise self.mistake("size", f"a {self.type} has {SIZES[self.type]} of them")
+        if self.type == "mesh":
+            self._check_file()
+        else:
+            self.require("file", None, f"a {self.type} has none; set type = mesh, or remove it")
         if self.name in RESERVED:
             raise self.mistake("name", "is taken; choose another")
         if self.joint == "fixed":
@@ -91,6 +106,15 @@ class ObjectTable(Table):
         if self.joint != "free":
             self.require_defaults(("velocity", "floating"), "needs joint = free")
 
+    def _check_file(self) -> None:
+        file = Path(self.file or "")
+        if file.suffix.lower() not in MESHES:
+            raise self.mistake("file", f"a mesh needs one of {' or '.join(MESHES)}")
+        if not is_file(file):
+            raise self.mistake("file", "is not a file")
+        if file.stat().st_size > MAX_BYTES:
+            raise self.mistake("file", f"has more than {MAX_BYTES // 2**20} MiB")
+
     @property
     def body(self) -> Body:
         """The object for MuJoCo's model."""
@@ -98,7 +122,7 @@ class ObjectTable(Table):
             self.name,
             self.type,
             self.position,
-            tuple(quaternion_from_euler(*self.attitude)),
+            tuple(quaternion_of_euler(self.attitude).tolist()),
             self.size,
             self.joint,
             self.mass or 0.0,
@@ -108,6 +132,7 @@ class ObjectTable(Table):
             self.axis,
             self.damping,
             self.floating,
+            self.file or "",
         )
 
 
@@ -187,7 +212,8 @@ def check_objects(scenario: Any) -> None:
         scenario.reference.after_gait((), scenario)
         controller = scenario.controller
         if controller.position_stiffness is None and not controller.is_external:
-            reason = f"the {controller.law} law cannot push; choose full_pose or python"
+            able = "choose full_pose, vectoring with position_bandwidth, or python"
+            reason = f"the {controller.law} law cannot push; {able}"
             raise scenario.mistake("reference.type", reason)
     if not scenario.has_objects:
         return

@@ -42,6 +42,7 @@ FILE_KEYS: Final = (
     ("vehicle", "mjcf", ""),
     ("reference", "file", ""),
     ("gait", "file", ""),
+    ("object", "file", ""),
 )
 """Keys that name files: table, key, and a string that marks the value as a file name."""
 
@@ -190,40 +191,45 @@ def locate_named_files(
     Raises:
         InputError: If the code lies elsewhere.
     """
-    for table, key, is_code in _file_keys(document):
-        name = document[table][key]
+    for keys, key, is_code in _file_keys(document):
+        *_, last = key.rpartition(".")
+        name = keys[last]
         if address is not None and is_code and not _lies_in(folder, name.rpartition(":")[0]):
             raise InputError(
-                f"{address}: {table}.{key} = {show(name)}: must lie in the folder of the "
+                f"{address}: {key} = {show(name)}: must lie in the folder of the "
                 "scenario file, by a relative path; for other files use tiltsim run "
                 "--controller FILE.py:NAME"
             )
-        document[table][key] = str((folder / name).absolute())
+        keys[last] = str((folder / name).absolute())
 
 
 def named_files(document: Mapping[str, Any]) -> set[Path]:
     """The files that a document names, with all files that its MJCF can include and name."""
     files: set[Path] = set()
-    for table, key, is_code in _file_keys(document):
-        name = document[table][key]
+    for keys, key, is_code in _file_keys(document):
+        *_, last = key.rpartition(".")
+        name = keys[last]
         if is_code:
             files.add(Path(name.rpartition(":")[0]))
             continue
         files.add(Path(name))
-        if key != "mjcf":
+        if last != "mjcf":
             continue
         with suppress(ValueError, OSError):  # where it is flown, it is refused
             files |= check_mjcf(Path(name))
     return files
 
 
-def _file_keys(document: Mapping[str, Any]) -> Iterator[tuple[str, str, bool]]:
-    """Table and key of each file that a document names, and whether it is code."""
+def _file_keys(document: Mapping[str, Any]) -> Iterator[tuple[dict[str, Any], str, bool]]:
+    """Table and dotted key of each file that a document names, and whether it is code."""
     for table, key, mark in FILE_KEYS:
-        keys = document.get(table)
-        name = keys.get(key) if isinstance(keys, dict) else None
-        if isinstance(name, str) and mark in name:
-            yield table, key, bool(mark)
+        found = document.get(table)
+        for keys in found if isinstance(found, list) else [found]:
+            if not isinstance(keys, dict):
+                continue
+            name = keys.get(key)
+            if isinstance(name, str) and mark in name:
+                yield keys, f"{table}.{key}", bool(mark)
 
 
 def _lies_in(folder: Path, name: str) -> bool:

@@ -14,7 +14,7 @@ from tiltsim_controllers.analysis.stability import ErrorLoop
 from tiltsim_controllers.analysis.vectoring_design import REACH, Craft, Timing, design
 from tiltsim_controllers.laws.vectoring import Vectoring, vectoring
 from tiltsim_controllers.laws.vectoring_state import Parameters, state_units
-from tiltsim_controllers.mathematics.rotation import quaternion_from_euler
+from tiltsim_controllers.mathematics.attitude import quaternion_of_euler
 from tiltsim_controllers.mathematics.scalar import Floats, Values
 from tiltsim_controllers.vehicle.actuators import held_gain
 from tiltsim_controllers.vehicle.effectiveness import table_per_newton
@@ -25,6 +25,10 @@ class VectoringController(Vectoring, FailureAwareController, TiltingTable, LawCo
 
     models_latency = True
     control: ClassVar = staticmethod(vectoring)
+
+    @property
+    def position_stiffness(self) -> float | None:
+        return None if self.position_bandwidth is None else self.position_bandwidth**2
 
     def check_scenario(self, scenario: Any) -> None:
         super().check_scenario(scenario)
@@ -42,7 +46,7 @@ class VectoringController(Vectoring, FailureAwareController, TiltingTable, LawCo
         return (
             *airframe.initial_position,
             *airframe.initial_velocity,
-            *quaternion_from_euler(*airframe.initial_attitude),
+            *quaternion_of_euler(airframe.initial_attitude),
             *airframe.initial_body_rates,
             *(0.0,) * 6,
             *airframe.initial_speeds * (airframe.latency + 1),
