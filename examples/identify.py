@@ -7,9 +7,9 @@ are found in a log of 6 s with the noise of a camera system; the controller then
 import numpy as np
 
 import tiltsim
-from tiltsim.flight.vectors import VECTORS
 
-NOISE = {"position": 0.002, "velocity": 0.01, "attitude": 0.002, "body_rates": 0.01}
+NOISE = dict.fromkeys(["x", "y", "z", "roll", "pitch", "yaw"], 0.002)
+NOISE |= dict.fromkeys(["vx", "vy", "vz", "p", "q", "r"], 0.01)
 
 assumed = tiltsim.load_scenario("arena/quadrotor#figure_eight").replace(
     {
@@ -34,9 +34,8 @@ def fly(mass: float, inertia: np.ndarray) -> tiltsim.Flight:
 def logged(flight: tiltsim.Flight) -> tiltsim.Log:
     """The flight as its sensors tell it."""
     rng, columns = np.random.default_rng(0), dict(flight.columns)
-    for vector, size in NOISE.items():
-        for name in VECTORS[vector]:
-            columns[name] = columns[name] + size * rng.standard_normal(len(flight))
+    for name, size in NOISE.items():
+        columns[name] = columns[name] + size * rng.standard_normal(len(flight))
     return tiltsim.Log("the first flight", columns, flight.units)
 
 

@@ -123,14 +123,19 @@ def _thrust_axis_and_thrust(seen: Seen, p: Any, knots: Any) -> Any:
     return xp.hstack([_thrust_axis(seen, p, knots), seen.states[:1]])
 
 
-def _causes(sample: Mapping[str, float], _setup: ControlSetup) -> tuple[str, ...]:
-    """A roll or pitch of 90 degrees, or no thrust."""
+def _level(sample: Mapping[str, float], _setup: ControlSetup) -> tuple[str, ...]:
+    """A roll or pitch of 90 degrees."""
     roll, pitch = sample["roll"], sample["pitch"]
     return (
         "the decoupling matrix became singular: the thrust axis came level, "
         f"at roll = {roll:.3g} rad, pitch = {pitch:.3g} rad",
-        "the decoupling matrix became singular: the thrust came to zero",
     )
+
+
+def _level_or_without_thrust(sample: Mapping[str, float], setup: ControlSetup) -> tuple[str, ...]:
+    """A roll or pitch of 90 degrees, or no thrust."""
+    zero = "the decoupling matrix became singular: the thrust came to zero"
+    return (*_level(sample, setup), zero)
 
 
 # --- loops -------------------------------------------------------------------------------------
@@ -174,7 +179,7 @@ def _loop(step: Callable[[Seen, Any, Any], Step], record: Any, **options: Any) -
     def setup(plan: FlightPlan) -> tuple[Any, tuple[float, ...]]:
         return parameters_of(plan, record, vehicle=plan.scenario.rotorcraft.resolve()), ()
 
-    law = Law(step, record, setup, causes=_causes, **options)
+    law = Law(step, record, setup, **options)
     return replace(rotor_loop(LAYOUT, law, _Thrusting), kind=ROTORCRAFT)
 
 
@@ -187,6 +192,7 @@ YAW_POSITION: Final = _loop(
     units={"published_determinant": "1"},
     margins=_extended_singularity,
     signs=_thrust_axis_and_thrust,
+    causes=_level_or_without_thrust,
 )
 """The yaw-position controller of the quadrotor."""
 
@@ -195,6 +201,7 @@ QUADROTOR_ATTITUDE_ALTITUDE: Final = _loop(
     quadrotor_attitude_altitude.Parameters,
     margins=upright_columns,
     signs=_thrust_axis,
+    causes=_level,
     follows_position=lambda _scenario: False,
 )
 """The attitude-altitude controller of the quadrotor (ch. 2, Appendix B)."""
@@ -208,6 +215,7 @@ SWITCHING: Final = _loop(
     units={"published_determinant": "1", "attitude_zone": "1"},
     margins=_extended_singularity,
     signs=_thrust_axis,  # the thrust may be anything while the other law is active
+    causes=_level,
     # In the zone, where the vehicle is meant to end up, the position is free.
     follows_position=lambda _scenario: False,
 )

@@ -243,7 +243,7 @@ class Problem:
         raise InputError(f"{name}: no fit after {MOST_STEPS} steps: is it a log of this vehicle?")
 
 
-def _guess(windows: Windows) -> tuple[Floats, ...]:
+def _guess(windows: Windows) -> Floats:
     """The measured states at the beginning of each window; derivatives where none is measured."""
     first = windows.step[:, :1]
     place = np.nan_to_num(windows.position)
@@ -254,12 +254,8 @@ def _guess(windows: Windows) -> tuple[Floats, ...]:
     before, after = turned[::2], turned[1::2]
     rates = (before.inv() * after).as_rotvec() / first
     measured = windows.body_rates[:, 0]
-    return (
-        place[:, 0],
-        velocity,
-        windows.attitude[:, 0],
-        np.where(np.isfinite(measured), measured, rates),
-    )
+    rates = np.where(np.isfinite(measured), measured, rates)
+    return np.hstack([place[:, 0], velocity, windows.attitude[:, 0], rates])
 
 
 def _reduced(parts: list[Floats], damping: float) -> tuple[Floats, Floats, Floats, Floats]:

@@ -11,18 +11,20 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from tiltsim.arrays.jax_programs import InJax
 from tiltsim.errors import InputError
-from tiltsim.logs.windows import Windows
+from tiltsim.logs.windows import MEASURED, Windows
 from tiltsim.models.cross import as_multirotor
 from tiltsim.scenario.messages import choose
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.system.text import short_repr
+from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.mathematics.attitude import quaternion_product, rotation_of_quaternion
-from tiltsim_controllers.mathematics.linear import cross
+from tiltsim_controllers.mathematics.linear import cross, norm
 from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.vehicle.air import Drag, drag_force
 from tiltsim_controllers.vehicle.body import Body
-from tiltsim_controllers.vehicle.effectiveness import TiltOfRotor
+from tiltsim_controllers.vehicle.effectiveness import TiltOfRotor, tilts_of
 from tiltsim_controllers.vehicle.motion import accelerations
 from tiltsim_controllers.vehicle.rotors import Rotors, rotors_in, wrench_map
 
@@ -163,28 +165,141 @@ def _values(free: tuple[tuple[str, str], ...], numbers: Any, theta: Any) -> dict
     return found
 
 
-def _body_and_rotors(layout: TiltOfRotor, numbers: Any, values: Any) -> tuple[Body, Rotors]:
-    """Mass, inertia and rotors with the model's numbers."""
+class Numbers(NamedTuple):
+    """The numbers of a model, each an array, which a compiled program takes as inputs."""
+
+    body: Body
+    constant: Any  # parts of the rotors' wrenches, shape (6 N,) each; see `Rotors`
+    cosine: Any
+    sine: Any
+    center: Any  # m, shape (3,)
+    drag: Drag
+    lag: Any  # s
+    frequency: Any  # rad/s
+    damping: Any
+    bias: Any  # rad/s, shape (3,)
+
+
+def _numbers(known: Any, values: dict[str, Any]) -> Numbers:
+    """The numbers of a model, of which some are free; see `LoggedVehicle.numbers`."""
     import jax.numpy as jnp
 
-    size = jnp.sqrt(values["inertia"] / jnp.diag(numbers["inertia"]))
-    inertia = numbers["inertia"] * jnp.outer(size, size)
+    size = jnp.sqrt(values["inertia"] / jnp.diag(known["inertia"]))
+    inertia = known["inertia"] * jnp.outer(size, size)
     inverse = jnp.linalg.inv(inertia)
     places = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
     entries = [matrix[place] for matrix in (inertia, inverse) for place in places]
-    nominal = numbers["nominal"]
-    thrust = values["thrust"] / nominal["thrust"]
-    torque = values["torque"] / nominal["torque"]
-    parts = [
-        thrust * push + torque * turn
-        for push, turn in zip(numbers["pushes"], numbers["turns"], strict=True)
-    ]
-    body = Body(values["mass"][0], numbers["gravity"], *entries)
-    return body, Rotors(layout, jnp.ones(len(layout)), *parts)
+    thrust = values["thrust"] / known["nominal"]["thrust"]
+    torque = values["torque"] / known["nominal"]["torque"]
+    constant, cosine, sine = (
+        (thrust * push + torque * turn).ravel()
+        for push, turn in zip(known["pushes"], known["turns"], strict=True)
+    )
+    return Numbers(
+        Body(values["mass"][0], known["gravity"], *entries),
+        constant,
+        cosine,
+        sine,
+        values["center"],
+        Drag(values["resistance"], known["area"], known["density"]),
+        values["lag"][0],
+        values["frequency"][0],
+        known["damping"],
+        values["bias"],
+    )
+
+
+class Motion:
+    """The equations of a vehicle's model for one layout, as functions of small arrays.
+
+    A state is position, velocity, quaternion, body rates, speeds that follow commands, tilts that
+    do, and their rates.
+
+    Args:
+        layout: The tilt of each rotor.
+        fields: The free numbers; with ``lag`` and ``frequency`` among them, the rotors and the
+            tilts follow commands, else the log.
+    """
+
+    def __init__(self, layout: TiltOfRotor, fields: frozenset[str]) -> None:
+        self._layout, self._fields = layout, fields
+        self._rotors, self._tilts = len(layout), tilts_of(layout)
+
+    def start(self, guess: Any, initial: Any, speeds: Any, tilts: Any, center: Any) -> Any:
+        """The first state of a window.
+
+        Args:
+            guess: Measured position, velocity, quaternion and body rates, shape (13,).
+            initial: Their changes, the rotation's as a small turn, shape (12,).
+            speeds, tilts: Measured, rad/s and rad.
+            center: Of mass, from where the scenario has it, m, shape (3,).
+        """
+        small = xp.hstack([1.0, 0.5 * initial[6:9]])
+        turn = quaternion_product(guess[6:10], small / norm(small))
+        rotation, omega = rotation_of_quaternion(turn), guess[10:] + initial[9:]
+        place = guess[:3] + initial[:3] + rotation @ center
+        velocity = guess[3:6] + initial[3:6] + rotation @ cross(omega, center)
+        return xp.hstack([place, velocity, turn, omega, speeds, tilts, 0.0 * tilts])
+
+    def rate(self, state: Any, speeds: Any, tilts: Any, commands: Any, p: Numbers) -> Any:
+        """The derivative of a state.
+
+        Args:
+            state: See the class.
+            speeds, tilts: Measured, rad/s and rad, shapes (N,) and (M,).
+            commands: Speeds (rad/s), then tilts (rad), shape (N + M,).
+            p: The model's numbers.
+        """
+        n, m = self._rotors, self._tilts
+        velocity, turn, omega = state[3:6], state[6:10], state[10:13]
+        lagging, followed = state[13 : 13 + n], state[13 + n :]
+        pods, pod_rates = followed[:m], followed[m:]
+        speeds = lagging if "lag" in self._fields else speeds
+        tilts = pods if "frequency" in self._fields else tilts
+        parts = (part.reshape(6, n) for part in (p.constant, p.cosine, p.sine))
+        rotors = Rotors(self._layout, np.ones(n), *parts)
+        wrench = wrench_map(rotors, tilts) @ (speeds * abs(speeds))
+        rotation = rotation_of_quaternion(turn)
+        force = wrench[:3] + drag_force(rotation.T @ velocity + TINY, p.drag)
+        torque = wrench[3:] - cross(p.center, wrench[:3])
+        acceleration, spin = accelerations(
+            p.body, rotation, omega, xp.hstack([force, torque]), np.zeros(3), 1.0
+        )
+        pull = p.frequency * p.frequency * (commands[n:] - pods)
+        return xp.hstack(
+            [
+                velocity,
+                acceleration,
+                0.5 * quaternion_product(turn, xp.hstack([0.0, omega])),
+                spin,
+                (commands[:n] - lagging) / p.lag,
+                pod_rates,
+                pull - 2.0 * p.damping * p.frequency * pod_rates,
+            ]
+        )
+
+    def errors(self, state: Any, measured: Any, p: Numbers) -> Any:
+        """Measured minus predicted position, velocity, small turn and body rates, shape (12,).
+
+        Args:
+            state: See the class.
+            measured: Position, velocity, quaternion and body rates, shape (13,).
+            p: The model's numbers.
+        """
+        rotation, omega = rotation_of_quaternion(state[6:10]), state[10:13]
+        error = quaternion_product(state[6:10] * CONJUGATE, measured[6:10])
+        return xp.hstack(
+            [
+                measured[:3] - (state[:3] - rotation @ p.center),
+                measured[3:6] - (state[3:6] - rotation @ cross(omega, p.center)),
+                xp.where(error[0] < 0.0, -2.0, 2.0) * error[1:],
+                measured[10:] - (omega + p.bias),
+            ]
+        )
 
 
 def residuals_of(layout: TiltOfRotor, free: tuple[tuple[str, str], ...]) -> Callable[..., Any]:
-    """The residuals of one window: ``(theta, initial, guess, window, noise, numbers)``.
+    """The residuals of one window in JAX: ``(theta, initial, guess, window, noise, numbers)``.
 
     ``initial`` are changes of the initial state ``guess``; the result has a row per sample and a
     column per channel, (measured - predicted) over its noise, 0 where nothing is measured.
@@ -196,34 +311,39 @@ def residuals_of(layout: TiltOfRotor, free: tuple[tuple[str, str], ...]) -> Call
     import jax
     import jax.numpy as jnp
 
-    fields = {field for _, field in free}
+    fields = frozenset(field for _, field in free)
+    motion, in_jax = Motion(layout, fields), InJax("float64")
+    start, rate, errors = (
+        _stacked(in_jax(function)) for function in (motion.start, motion.rate, motion.errors)
+    )
+    rotors, tilts = len(layout), tilts_of(layout)
 
     def residuals(
         theta: Any, initial: Any, guess: Any, window: Windows, noise: Any, numbers: Any
     ) -> Any:
-        values = _values(free, numbers, theta)
-        body, rotors = _body_and_rotors(layout, numbers, values)
-        center = values["center"]
-        drag = Drag(values["resistance"], numbers["area"], numbers["density"])
-        path = _flown(
-            fields, values, body, rotors, drag, numbers["damping"], initial, guess, window
+        p = _numbers(numbers, _values(free, numbers, theta))
+        commands = jnp.concatenate(
+            [
+                window.speed_commands[:-1] if "lag" in fields else window.speeds[:, 0],
+                window.tilt_commands[:-1] if "frequency" in fields else window.tilts[:, 0],
+            ],
+            axis=1,
         )
-        rotation = jax.vmap(rotation_of_quaternion)(path[2])
-        spun = jax.vmap(cross, (0, None))(path[3], center)
-        error = jax.vmap(quaternion_product)(path[2] * CONJUGATE, window.attitude)
-        channels = {
-            "position": window.position - (path[0] - rotation @ center),
-            "velocity": window.velocity - (path[1] - jnp.einsum("kij,kj->ki", rotation, spun)),
-            "attitude": 2.0 * error[:, 1:] * jnp.sign(error[:, :1]),
-            "body_rates": window.body_rates - (path[3] + values["bias"]),
-        }
-        parts = [channels[name] / noise[name] for name in channels if name in noise]
+        first = start(guess, initial, window.speeds[0, 0], window.tilts[0, 0], p.center)
+        advance = _runge_kutta(lambda *given: rate(*given, p))
+        inputs = (window.step, window.speeds, window.tilts, commands)
+        _, path = jax.lax.scan(advance, first, inputs)
+        path = jnp.concatenate([first[None], path])
+        found = jax.vmap(errors, (0, 0, None))(path, window.measured, p)
+        sizes = [noise.get(name, 1.0) for name in MEASURED for _ in range(3)]
+        parts = [jnp.where(window.is_measured, found / jnp.array(sizes), 0.0)]
         if "lag" in fields:
-            parts.append((at_samples(window.speeds) - path[4]) / noise["rotor_speeds"])
+            error = at_samples(window.speeds) - path[:, 13 : 13 + rotors]
+            parts.append(error / noise["rotor_speeds"])
         if "frequency" in fields:
-            parts.append((at_samples(window.tilts) - path[5][:, 0]) / noise["tilt_angles"])
-        found = jnp.concatenate(parts, axis=1)
-        return jnp.where(jnp.isfinite(found), found, 0.0)
+            error = at_samples(window.tilts) - path[:, 13 + rotors : 13 + rotors + tilts]
+            parts.append(error / noise["tilt_angles"])
+        return jnp.concatenate(parts, axis=1)
 
     def at_samples(stages: Any) -> Any:
         return jnp.concatenate([stages[:, 0], stages[-1:, -1]])
@@ -231,109 +351,41 @@ def residuals_of(layout: TiltOfRotor, free: tuple[tuple[str, str], ...]) -> Call
     return residuals
 
 
-def _along(state: Any, slope: Any, step: Any) -> Any:
-    """A state after a step along a slope."""
-    import jax
+def _stacked(function: Callable[..., Any]) -> Callable[..., Any]:
+    """A function whose result, a tuple of numbers, is an array."""
 
-    return jax.tree.map(lambda a, b: a + step * b, state, slope)
+    def call(*args: Any) -> Any:
+        import jax.numpy as jnp
+
+        return jnp.stack(function(*args))
+
+    return call
 
 
 def _runge_kutta(rate: Callable[..., Any]) -> Callable[..., Any]:
     """The fourth-order method from one sample to the next: ``(state, inputs) -> (state, state)``.
 
     Args:
-        rate: ``(state, speeds, tilts, command)``: the derivative of a state.
+        rate: ``(state, speeds, tilts, commands)``: the derivative of a state.
     """
     import jax
     import jax.numpy as jnp
 
     def stage(carried: Any, given: Any) -> tuple[Any, None]:
         # One stage for all four of RK4: the program is compiled once, not four times.
-        base, slope, total, size = carried
-        speeds, tilts, command, (reach, weight, is_last) = given
-        slope = rate(_along(base, slope, reach * size), speeds, tilts, command)
-        total = _along(total, slope, weight * size)
-        base = jax.tree.map(lambda old, new: jnp.where(is_last, new, old), base, total)
-        return (base, slope, total, size), None
+        base, slope, total, size, commands = carried
+        speeds, tilts, (reach, weight, is_last) = given
+        slope = rate(base + reach * size * slope, speeds, tilts, commands)
+        total = total + weight * size * slope
+        return (jnp.where(is_last, total, base), slope, total, size, commands), None
 
     def advance(state: Any, given: Any) -> tuple[Any, Any]:
-        step, speeds, tilts, command = given
+        step, speeds, tilts, commands = given
         substeps = (len(speeds) - 1) // 2
         at = (2 * np.arange(substeps)[:, None] + STAGE_INPUTS).ravel()
-        held = jax.tree.map(lambda one: jnp.tile(one, (4 * substeps, 1)), command)
         schedule = tuple(np.tile(one, substeps) for one in RUNGE_KUTTA)
-        carried = (state, jax.tree.map(jnp.zeros_like, state), state, step / substeps)
-        carried, _ = jax.lax.scan(stage, carried, (speeds[at], tilts[at], held, schedule))
+        carried = (state, jnp.zeros_like(state), state, step / substeps, commands)
+        carried, _ = jax.lax.scan(stage, carried, (speeds[at], tilts[at], schedule))
         return carried[0], carried[0]
 
     return advance
-
-
-def _flown(
-    fields: set[str],
-    values: Any,
-    body: Body,
-    rotors: Rotors,
-    drag: Drag,
-    damping: Any,
-    initial: Any,
-    guess: Any,
-    window: Windows,
-) -> Any:
-    """The states at all samples of a window: RK4 between them.
-
-    Args:
-        fields: The free numbers; with the lag and the servo's frequency among them, rotor speeds
-            and tilts follow their commands.
-        values, body, rotors, drag, damping: The model.
-        initial, guess, window: See `residuals_of`.
-    """
-    import jax
-    import jax.numpy as jnp
-
-    center, frequency = values["center"], values["frequency"][0]
-
-    def rate(state: Any, speeds: Any, tilts: Any, command: Any) -> Any:
-        _, velocity, turn, omega, lagging, pods = state
-        if "lag" in fields:
-            speeds = lagging
-        if "frequency" in fields:
-            tilts = pods[0]
-        rotation = rotation_of_quaternion(turn)
-        wrench = wrench_map(rotors, tilts) @ (speeds * abs(speeds))
-        force, torque = wrench[:3], wrench[3:] - cross(center, wrench[:3])
-        force = force + drag_force(rotation.T @ velocity + TINY, drag)
-        wrench = jnp.concatenate([force, torque])
-        acceleration, spin = accelerations(body, rotation, omega, wrench, 0.0, 1.0)
-        pull = frequency**2 * (command[1] - pods[0]) - 2.0 * damping * frequency * pods[1]
-        return (
-            velocity,
-            acceleration,
-            0.5 * quaternion_product(turn, jnp.concatenate([jnp.zeros(1), omega])),
-            spin,
-            (command[0] - lagging) / values["lag"][0],
-            jnp.stack([pods[1], pull]),
-        )
-
-    place, velocity, turn, omega = guess
-    small = jnp.concatenate([jnp.ones(1), 0.5 * initial[6:9]])
-    turn = quaternion_product(turn, small / jnp.sqrt(small @ small))
-    omega = omega + initial[9:12]
-    arm = rotation_of_quaternion(turn) @ center
-    start = (
-        place + initial[:3] + arm,
-        velocity + initial[3:6] + rotation_of_quaternion(turn) @ cross(omega, center),
-        turn,
-        omega,
-        window.speeds[0, 0],
-        jnp.stack([window.tilts[0, 0], jnp.zeros(window.tilts.shape[-1])]),
-    )
-    commands = (window.speed_commands[:-1], window.tilt_commands[:-1])
-    if "lag" not in fields:
-        commands = (window.speeds[:, 0], commands[1])
-    if "frequency" not in fields:
-        commands = (commands[0], window.tilts[:, 0])
-    _, path = jax.lax.scan(
-        _runge_kutta(rate), start, (window.step, window.speeds, window.tilts, commands)
-    )
-    return jax.tree.map(lambda a, b: jnp.concatenate([a[None], b]), start, path)

@@ -89,10 +89,11 @@ def replay(
         raise InputError(f"window = {short_repr(window)}: must be from 0.02 to 60 s")
     vehicle = LoggedVehicle(load_scenario(scenario))
     cut = windows_of(read, window, len(vehicle.vehicle.rotors), vehicle.vehicle.tilts)
-    measured = [name for name in MEASURED if name in read]
     with jax.enable_x64(True):
-        problem = Problem(vehicle, {}, dict.fromkeys(measured, 1.0), cut)
+        problem = Problem(vehicle, {}, dict.fromkeys(MEASURED, 1.0), cut)
         mismatch, _ = problem.at(problem.start, problem.initial)
-    channels = tuple(column for name in measured for column in VECTORS[name])
+    columns = [column for name in MEASURED for column in VECTORS[name]]
+    kept = [place for place, column in enumerate(columns) if column in read.columns]
+    channels, mismatch = tuple(columns[place] for place in kept), mismatch[:, :, kept]
     steps = np.cumsum(np.pad(cut.step, ((0, 0), (1, 0))), axis=1)
     return Replay(channels, cut.start[:, None] + steps, mismatch)

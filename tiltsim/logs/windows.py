@@ -36,6 +36,9 @@ class Windows(NamedTuple):
     speed_commands: Floats  # rad/s, held between samples, shape (W, K, N); NaN if not in the log
     tilt_commands: Floats
 
+    measured: Floats  # position, velocity, quaternion, body rates, 0 if unknown, (W, K, 13)
+    is_measured: Floats  # of the twelve errors, shape (W, K, 12)
+
     @property
     def samples(self) -> int:
         """Samples of a window."""
@@ -107,7 +110,10 @@ def windows_of(log: Log, seconds: float, rotors: int, tilts: int) -> Windows:
             f"{log.name}: no {seconds:g} s without gaps in attitude, rotor speeds and tilts; "
             "shorten the window"
         )
-    return Windows(**{name: np.array(values) for name, values in parts.items()})
+    found = {name: np.array(values) for name, values in parts.items() if values}
+    known = np.concatenate([np.isfinite(found[name][..., :3]) for name in MEASURED], axis=-1)
+    measured = np.nan_to_num(np.concatenate([found[name] for name in MEASURED], axis=-1))
+    return Windows(**found, measured=measured, is_measured=known)
 
 
 def _inputs(log: Log, name: str, count: int) -> Floats:
