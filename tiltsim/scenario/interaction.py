@@ -212,7 +212,8 @@ def check_objects(scenario: Any) -> None:
         scenario.reference.after_gait((), scenario)
         controller = scenario.controller
         if controller.position_stiffness is None and not controller.is_external:
-            reason = f"the {controller.law} law cannot push; choose full_pose or python"
+            able = "choose full_pose, vectoring with position_bandwidth, or python"
+            reason = f"the {controller.law} law cannot push; {able}"
             raise scenario.mistake("reference.type", reason)
     if not scenario.has_objects:
         return

@@ -26,6 +26,10 @@ class VectoringController(Vectoring, FailureAwareController, TiltingTable, LawCo
     models_latency = True
     control: ClassVar = staticmethod(vectoring)
 
+    @property
+    def position_stiffness(self) -> float | None:
+        return None if self.position_bandwidth is None else self.position_bandwidth**2
+
     def check_scenario(self, scenario: Any) -> None:
         super().check_scenario(scenario)
         self.check_failed_rotor(scenario.vehicle.rotor_count)

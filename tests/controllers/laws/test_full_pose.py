@@ -17,6 +17,7 @@ from tiltsim_controllers.analysis.stability import is_hurwitz
 from tiltsim_controllers.code.traceable import traceable
 from tiltsim_controllers.gaits.parameters import FIXED, GaitParameters
 from tiltsim_controllers.laws import attitude_altitude
+from tiltsim_controllers.laws.allocation import RotorRange
 from tiltsim_controllers.laws.failures import UNHARMED, Failure
 from tiltsim_controllers.laws.full_pose import (
     GAIN_SETS,
@@ -290,6 +291,7 @@ def planned(gait, duration, step):
         GaitParameters(FIXED),
         ReferenceParameters(REFERENCE_TYPES["attitude_altitude"]),
         Supervisor(),
+        RotorRange(),
         decoupling=0.0,
         decoupler=0.0,
     )

@@ -29,6 +29,7 @@ from tiltsim_controllers.analysis.torque_free import (
 )
 from tiltsim_controllers.gaits import plans
 from tiltsim_controllers.laws import attitude_altitude
+from tiltsim_controllers.laws.allocation import RotorRange
 from tiltsim_controllers.laws.decouplers import DECOUPLERS
 from tiltsim_controllers.laws.failures import Failure
 from tiltsim_controllers.laws.gains import GAIN_SETS, Poles, gains_from_poles
@@ -83,6 +84,7 @@ def test_the_law_of_chapters_3_and_4_is_a_case(decoupler, decoupling):
         gait.parameters,
         ON_CIRCLE,
         Supervisor(),
+        RotorRange(),
         decoupler=codes[0],
         decoupling=codes[1],
     )
