@@ -202,7 +202,7 @@ class LoopPrograms:
             ends = ends | has_ended
         return xp.hstack([time, values, ends]), checked
 
-    def _checks(self, time: Any, values: Any, user: InputVector, head: Any) -> tuple[Any, Any]:
+    def _checks(self, time: Any, values: Any, user: Any, head: Any) -> tuple[Any, Any]:
         """The code of the limit that a sample exceeds, and the numbers whose signs are checked.
 
         Args:
@@ -220,7 +220,7 @@ class LoopPrograms:
     def checks(self) -> Program:
         """The program of `_checks`, of the vectors time, values, head and user."""
 
-        def run(time: Any, values: Any, head: Any, user: InputVector) -> Any:
+        def run(time: Any, values: Any, head: Any, user: Any) -> Any:
             limit, checked = self._checks(time[0], values, user, head)
             return xp.hstack([limit, checked])
 
