@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import pytest
 
 from tiltsim.cli import main
@@ -27,6 +29,17 @@ def test_a_name_with_quotes_is_found(folder):
     assert main(["new", "quadrotor", 'my "own".xml']) == 0
     assert main(["run", 'my "own".toml', "--quiet", "--set", "simulation.duration=0.04"]) == 1
     assert {file.name for file in folder.iterdir()} == {'my "own".xml', 'my "own".toml'}
+
+
+@pytest.mark.parametrize("kind", ["bicopter", "tricopter"])
+def test_few_rotors_have_abilities_but_no_margin(kind, folder, capsys):
+    """The margin is at given tilt angles, at which they cannot hover."""
+    assert main(["new", kind]) == 0
+    assert main(["gait", "--mjcf", f"{kind}.xml", "--faults"]) == 0
+    assert "without rotor 2       no hover" in capsys.readouterr().out
+    main(["run", f"{kind}.toml", "--set", "simulation.duration=0.04", "--out", "flight"])
+    assert "min_singularity_margin" not in json.loads((folder / "flight/metrics.json").read_text())
+    assert main(["plot", "flight"]) == 0
 
 
 def test_a_wall_without_contacts_is_pointed_out(folder, capsys):

@@ -6,7 +6,7 @@ from math import cos, isfinite, pi, sin
 
 import numpy as np
 
-from tiltsim_controllers.mathematics.rotation import rotation_from_euler
+from tiltsim_controllers.mathematics.attitude import rotation_matrix
 from tiltsim_controllers.vehicle.decoupling_matrix import (
     body_force,
     sines_and_cosines,
@@ -41,7 +41,7 @@ def tiltrotor_rates(state, inputs, vehicle):
     _, _, _, vx, vy, vz, roll, pitch, yaw, p, q, r = state[:12]
     trig = sines_and_cosines(*state[12:16])
     w = [speed * abs(speed) for speed in state[16:20]]
-    r11, r12, r13, r21, r22, r23, r31, r32, r33 = rotation_from_euler(roll, pitch, yaw)
+    r11, r12, r13, r21, r22, r23, r31, r32, r33 = rotation_matrix((roll, pitch, yaw)).ravel()
     fx, fy, fz = (
         vehicle.thrust_coefficient / vehicle.mass * force for force in body_force(trig, *w)
     )

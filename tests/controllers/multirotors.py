@@ -26,7 +26,7 @@ from tiltsim_controllers.laws.multirotor_steps import (
 )
 from tiltsim_controllers.laws.multirotor_supervisor import Watched
 from tiltsim_controllers.laws.supervisor import Supervisor
-from tiltsim_controllers.mathematics.rotation import euler_from_quaternion, quaternion_from_rotation
+from tiltsim_controllers.mathematics.attitude import euler_of_rotation
 from tiltsim_controllers.references.trajectories import SETPOINT, ReferenceParameters
 from tiltsim_controllers.vehicle.body import body_of
 from tiltsim_controllers.vehicle.effectiveness import (
@@ -174,7 +174,7 @@ def fly(vehicle, law, knots, duration, *, gait=None, step=0.005, start=(), wind=
     def rates(time, state):
         angles, turning = planned.angles(time), planned.rates(time)
         angles, turning = tuple(angles.tolist()), tuple(turning.tolist())
-        attitude = euler_from_quaternion(*quaternion_from_rotation(tuple(state[6:15])))
+        attitude = euler_of_rotation(np.reshape(state[6:15], (3, 3)))
         speeds, integrals = state[18 : 18 + rotors], tuple(state[18 + rotors :])
         law_state = (*state[:6], *attitude, *state[15:18], *angles, *speeds)
         u = inputs(time, law_state, turning, integrals, law, knots)

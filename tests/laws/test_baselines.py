@@ -12,7 +12,6 @@ from tests.laws.test_multirotor import TILTS, mjcf
 from tiltsim.laws.assembling import assemble
 from tiltsim_controllers.laws.periodic_lqr import PeriodicVehicle, linear_orbit
 from tiltsim_controllers.mathematics.attitude import attitude_error, rotation_matrix
-from tiltsim_controllers.mathematics.rotation import rotation_from_euler
 from tiltsim_controllers.vehicle.effectiveness import force_and_torque, table_per_newton
 
 CIRCLE = {"type": "circle", "radius": 1.0, "angular_frequency": 0.5}
@@ -111,7 +110,7 @@ def turned_over():
 def test_geometric_attitude_converges_exponentially_from_179_degrees(turned_over):
     """Lee et al. 2010, Proposition 1 and its proof: V(t) <= V(0) exp(-beta t)."""
     omega = turned_over["body_rates"]
-    rotations = [np.reshape(rotation_from_euler(*a), (3, 3)) for a in turned_over["attitude"]]
+    rotations = [rotation_matrix(a) for a in turned_over["attitude"]]
     error = np.array([(r - r.T)[[2, 0, 1], [1, 2, 0]] for r in rotations]) / 2.0
     psi = np.array([1.5 - 0.5 * np.trace(r) for r in rotations])
     stiffness, damping = INERTIA.mean() * 100.0, 2.0 * INERTIA.mean() * 10.0
@@ -214,7 +213,7 @@ def test_lqr_closes_the_loop_with_the_poles_of_the_riccati_solution(regulated):
 
     equations, setup = assembly.loop.equations, assembly.setup
     speeds = np.sqrt(thrusts / airframe.vehicle.thrust_coefficients) * airframe.vehicle.spins
-    rest = np.r_[np.zeros(6), rotation_from_euler(*hover[6:9]), np.zeros(3), speeds]
+    rest = np.r_[np.zeros(6), rotation_matrix(hover[6:9]).ravel(), np.zeros(3), speeds]
 
     def rates(state):
         state = state.tolist()

@@ -25,7 +25,7 @@ from tiltsim_controllers.analysis.quadrotor_singularity import (
 )
 from tiltsim_controllers.analysis.singularity import force_matrix, torque_matrix, world_up
 from tiltsim_controllers.analysis.torque_free import singularity_margin, torque_free_forces
-from tiltsim_controllers.mathematics.rotation import rotation_from_euler
+from tiltsim_controllers.mathematics.attitude import rotation_matrix
 from tiltsim_controllers.vehicle.parameters import PRESETS
 
 GUST = [{"type": "acceleration", "value": [0.7, -0.4, 0.2]}]
@@ -185,7 +185,7 @@ def test_determinants_of_the_quadrotor():
     np.testing.assert_array_equal(flight["determinant"], exact)
     published = published_determinant(*attitude)
     np.testing.assert_array_equal(flight["published_determinant"], published)
-    upright = [rotation_from_euler(roll, pitch, 0.0)[8] for roll, pitch in zip(*attitude)]
+    upright = [rotation_matrix((roll, pitch, 0.0))[2, 2] for roll, pitch in zip(*attitude)]
     np.testing.assert_allclose(np.sin(flight["singularity_margin"]), upright, rtol=1e-12)
 
 

@@ -442,7 +442,7 @@ HEXAROTOR = {"model": "multirotor", "mjcf": mjcf("hexarotor")}
         ),
         "a pose without side force": (
             {"reference": {"type": "setpoint", "roll": 0.2}},
-            "reference.roll = 0.2: is no output with 1 components of force",
+            "reference.roll = 0.2: roll and pitch are no outputs: a vehicle that controls 1 of 3",
         ),
         "rotors heavier than the vehicle": (
             {"vehicle": {**HEXAROTOR, "rotor_inertia": 0.02}},

@@ -17,7 +17,7 @@ from tiltsim.linear.coordinates import (
     equation_inputs,
 )
 from tiltsim.resources import shipped_folder
-from tiltsim_controllers.mathematics.rotation import rotation_from_quaternion
+from tiltsim_controllers.mathematics.attitude import rotation_of_quaternion
 
 NAMES = ("x", *ROTATION_NAMES, "speed")
 
@@ -31,7 +31,7 @@ def random_states(entries, count):
         quaternion /= np.linalg.norm(quaternion)
         rotation = quaternion
         if entries == MATRIX:
-            rotation = rotation_from_quaternion(*quaternion.tolist())
+            rotation = rotation_of_quaternion(quaternion).ravel()
         state = np.array((generator.normal(), *rotation, generator.normal()))
         yield coordinates, state, generator.uniform(-1.7, 1.7, size=5)
 
@@ -49,7 +49,7 @@ def test_both_forms_of_a_rotation_turn_alike():
         random_states(MATRIX, 5), random_states(QUATERNION, 5), strict=True
     ):
         turned = quaternion.moved(other, by)[1:5]
-        expected = rotation_from_quaternion(*turned.tolist())
+        expected = rotation_of_quaternion(turned).ravel()
         assert matrix.moved(state, by)[1:10] == pytest.approx(expected, abs=1e-12)
 
 

@@ -411,7 +411,7 @@ def test_every_way_to_give_attitudes_gives_the_same_rows(tmp_path):
 @pytest.mark.parametrize(
     ("scenario", "changes", "words"),
     [
-        ("fleet/hexarotor#hover", {}, "is no output with 1 components of force"),
+        ("fleet/hexarotor#hover", {}, "roll and pitch are no outputs: a vehicle that"),
         ("fleet/bicopter#hover", {}, "the geometric law cannot follow roll, pitch and yaw that"),
         ("fleet/omni_octorotor#hover", {"controller.turn_time": 1.0}, "controller.turn_time = 1.0"),
         ("fleet/omni_octorotor#hover", {"reference.yaw": 0.1}, "reference.yaw = 0.1: is a column"),

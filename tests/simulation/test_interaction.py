@@ -234,3 +234,16 @@ def test_linear_analysis_refuses_objects():
     hovering = tiltsim.load_scenario(PUSH, FREE)
     for analysis in (tiltsim.linearize, tiltsim.stability):
         assert "takes a vehicle alone" in refusal(analysis, hovering)
+
+
+def test_a_push_of_a_custom_controller_has_its_columns_and_metric():
+    def resting(_observation):
+        return tiltsim.Command(thrusts=[4.0] * 6)
+
+    scenario = push(simulation__duration=0.8, reference__position=[0.0, 0.5, 0.0])
+    scenario = scenario.replace({"reference.start": 0.0, "initial.position": [0.0, 0.54, 0.0]})
+    scenario = scenario.replace({"initial.velocity": [0.0, 0.2, 0.0]})
+    flight = tiltsim.simulate(scenario, controller=resting)
+    assert flight["push_force_ref"][-1] > 0.0
+    assert flight.metrics()["peak_force"] > 1.0
+    np.testing.assert_array_equal(flight["push_force"], flight["contact_force_y"])

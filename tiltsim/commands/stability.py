@@ -62,7 +62,8 @@ def run(
     """Print the poles of a scenario's rest point, or the Floquet multipliers of its periodic orbit.
 
     Each mode is listed with the states that take part in it: controller, gait, servos, rotors,
-    sampling and latency included, on the plant of the scenario.
+    sampling and latency included, on the plant of the scenario. From Python, tiltsim.linearize
+    gives the matrices of the linear system.
 
     Args:
         scenario (SCENARIO): a TOML file or a library name

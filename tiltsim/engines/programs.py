@@ -158,19 +158,38 @@ class LoopPrograms:
 
         A sign that is zero in the recorder is not known yet.
         """
-        loop, (parameters, knots) = self._loop, self.setup(user)
-        reference = record_with_choices(
-            ReferenceParameters, recorder[REFERENCE:], self._key.reference
-        )
-        checked = xp.array(loop.monitoring.sign_check_values(time, values, parameters, knots))
-        follows = recorder[REFERENCE - 1] != 0.0
-        limit = loop.kind.limit_exceeded(time, values, reference, knots, follows)
+        limit, checked = self._checks(time, values, user, recorder[REFERENCE - 1 : HEAD_SIZE])
         before = recorder[HEAD_SIZE : HEAD_SIZE + len(checked)]
         crossed = (before != 0.0) & (xp.copysign(1.0, checked) != before)
         ends = limit != float(WITHIN_LIMITS)
         for has_ended in (*~xp.isfinite(values), *((abs(checked) < SINGULAR) | crossed)):
             ends = ends | has_ended
         return xp.hstack([time, values, ends]), checked
+
+    def _checks(self, time: Any, values: Any, user: InputVector, head: Any) -> tuple[Any, Any]:
+        """The code of the limit that a sample exceeds, and the numbers whose signs are checked.
+
+        Args:
+            time: s
+            values: Fields after the time.
+            user: Parameters and knots.
+            head: Whether the horizontal position has a limit, and the reference.
+        """
+        loop, (parameters, knots) = self._loop, self.setup(user)
+        reference = record_with_choices(ReferenceParameters, head[1:], self._key.reference)
+        limit = loop.kind.limit_exceeded(time, values, reference, knots, head[0] != 0.0)
+        checked = loop.monitoring.sign_check_values(time, values, parameters, knots)
+        return limit, xp.array(checked)
+
+    def checks(self) -> Program:
+        """The program of `_checks`, of the vectors time, values, head and user."""
+
+        def run(time: Any, values: Any, head: Any, user: InputVector) -> Any:
+            limit, checked = self._checks(time[0], values, user, head)
+            return xp.hstack([limit, checked])
+
+        sizes = {"values": len(self._loop.sample_fields) - 1, "head": HEAD_SIZE - REFERENCE + 1}
+        return program_of(run, time=1, **sizes, user=self.user_size)
 
 
 def record_with_choices(record: type[tuple[Any, ...]], numbers: Any, choices: Choices) -> Any:

@@ -9,11 +9,12 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from tiltsim.closed_loop.choices import Choices, choices_of
+from tiltsim.closed_loop.assembly import Assembly
+from tiltsim.closed_loop.choices import Choices, ProgramKey, choices_of, program_key
 from tiltsim.closed_loop.loop import ControlSetup
 from tiltsim.engines.glue import ROWS, filled
 from tiltsim.engines.machine_code import MachineCode
-from tiltsim.engines.programs import KEPT, record_with_choices
+from tiltsim.engines.programs import KEPT, LoopPrograms, record_with_choices
 from tiltsim.system.files import one_thread_at_a_time
 from tiltsim_controllers.code.llvm_text import llvm_functions
 from tiltsim_controllers.code.program import InputVector, Program
@@ -58,6 +59,24 @@ def evaluate_over_samples(
         row = Row(function, record, choices_of(own.parameters), *sizes)
         rows[part] = evaluate(row, width, time[part], states[part], own.userdata)
     return rows
+
+
+def termination_checks(assembly: Assembly) -> Callable[[float, Values], Values]:
+    """A function of a time (s) and the other fields of a sample, traced once for equal loops.
+
+    Returns:
+        The code of the limit that the sample exceeds, and the numbers whose signs are checked.
+    """
+    head = (float(assembly.follows_position), *leaves(assembly.reference))
+    fixed = {"head": head, "user": assembly.setup.userdata.tolist()}
+    checks = python_function(_checks_program(program_key(assembly)), "checks", fixed=fixed)
+    return lambda time, values: checks((time,), values)
+
+
+@one_thread_at_a_time
+@lru_cache(maxsize=KEPT)
+def _checks_program(key: ProgramKey) -> Program:
+    return LoopPrograms(key).checks()
 
 
 class Row(NamedTuple):

@@ -30,7 +30,7 @@ from tiltsim.scenario.vehicle import PodTable, VehicleTable
 from tiltsim.simulation.array_plan import ArrayPlan, PlannedFlight
 from tiltsim.system.text import short_repr
 from tiltsim.vehicles.rotorcraft.layout import QW, TILT_1, TILT_RATE_1
-from tiltsim_controllers.mathematics.rotation import euler_from_quaternion, rotation_from_quaternion
+from tiltsim_controllers.mathematics.attitude import euler_angles, rotation_of_quaternion
 from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.references.trajectories import attitude_reference, reference_derivatives
 
@@ -118,7 +118,7 @@ class EnvFunctions:
         self._inputs, self._sample = run(equations.inputs), run(equations.observe)
         self._limit = run(loop.kind.limit_exceeded)
         self._reference_at, self._attitude_at = run(reference_derivatives), run(attitude_reference)
-        self._euler, self._rotation = map(run, (euler_from_quaternion, rotation_from_quaternion))
+        self._euler, self._rotation = map(run, (euler_angles, rotation_of_quaternion))
         first = {} if task.domain is None else task.domain.values(np.random.default_rng(0))
         self.keys = tuple(first)
         self._widths = [None if np.ndim(value) == 0 else len(value) for value in first.values()]
@@ -227,7 +227,7 @@ class EnvFunctions:
         jnp, state, time = self._numpy, episode.state, self._time(episode.index)
         qvel, act, names = self._qvel, self._act, self._task.observed.bounds
         quaternion = state[QW : QW + 4]
-        rotation = self._rotation(*quaternion)
+        rotation = self._rotation(quaternion)
         reference, spins = planned.reference, jnp.asarray(self._spins, self._dtype)
         none, tilts = jnp.zeros(0, self._dtype), self._tilts  # a stack of none is an error
         motion = jnp.asarray(self._reference_at(time, reference, planned.knots)[:9])
@@ -236,7 +236,7 @@ class EnvFunctions:
             time=time,
             position=jnp.stack(state[:3]),
             velocity=jnp.stack(state[qvel : qvel + 3]),
-            attitude=jnp.stack(self._euler(*quaternion)) if "attitude" in names else unseen,
+            attitude=jnp.stack(self._euler(quaternion)) if "attitude" in names else unseen,
             quaternion=jnp.stack(quaternion),
             body_rates=jnp.stack(state[qvel + 3 : qvel + 6]),
             tilt_angles=jnp.stack(state[TILT_1:qvel]) if tilts else none,
@@ -252,7 +252,7 @@ class EnvFunctions:
             ),
             vehicle=commanded_parameters(planned.parameters.inner).vehicle,
         )
-        return self._task.observed.arrays(seen, jnp.stack(rotation).reshape(3, 3), jnp)
+        return self._task.observed.arrays(seen, jnp.array(rotation), jnp)
 
     def _limits(self, episode: Episode, planned: PlannedFlight) -> tuple[Any, Any]:
         """The code of the limit of all flights that a state exceeds, and its `Outcome.distance`."""

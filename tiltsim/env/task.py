@@ -20,7 +20,7 @@ from tiltsim.scenario.controller import PythonController
 from tiltsim.scenario.loading import as_scenario
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.system.text import short_repr
-from tiltsim_controllers.mathematics.rotation import rotation_from_quaternion
+from tiltsim_controllers.mathematics.attitude import rotation_of_quaternion
 from tiltsim_controllers.mathematics.scalar import Floats
 
 Reward = Callable[[Mapping[str, Floats], Floats], float]
@@ -128,8 +128,8 @@ class Task:
         """The observation of the plant's state, through the scenario's sensors."""
         observation = plant.observation()
         self._target = observation.reference.position
-        entries = rotation_from_quaternion(*observation.quaternion.tolist())
-        return self.observed.arrays(observation, np.array(entries).reshape(3, 3))
+        rotation = rotation_of_quaternion(observation.quaternion)
+        return self.observed.arrays(observation, rotation)
 
     def get_reward(self, observation: Mapping[str, Floats], action: Floats) -> float:
         """The reward of a step that took ``action`` to ``observation``.

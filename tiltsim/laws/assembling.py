@@ -12,7 +12,6 @@ from tiltsim.laws.flown_law import loop_of_law
 from tiltsim.laws.full_pose import full_pose_loop, full_pose_loop_of
 from tiltsim.laws.layers.actuation import with_actuation
 from tiltsim.laws.layers.air import with_air
-from tiltsim.laws.layers.allocation import ALLOCATED, with_allocation
 from tiltsim.laws.layers.contact import with_force_loop, with_objects
 from tiltsim.laws.layers.loads import with_loads
 from tiltsim.laws.layers.measured_acceleration import with_measured_acceleration
@@ -30,9 +29,9 @@ from tiltsim.system.files import one_thread_at_a_time
 from tiltsim.vehicles.rotorcraft.others import others_of
 
 LOOPS: Final[dict[str, ClosedLoop]] = {
-    "attitude_altitude": tiltrotor_loop("attitude_altitude", False, ""),
+    "attitude_altitude": tiltrotor_loop("attitude_altitude", False, "", False),
     # the same law with gait_rate_feedforward = true
-    "gait_feedforward": tiltrotor_loop("gait_feedforward", False, ""),
+    "gait_feedforward": tiltrotor_loop("gait_feedforward", False, "", False),
     "full_pose": full_pose_loop(TILTROTOR),
     "yaw_position": YAW_POSITION,
     "switching": SWITCHING,
@@ -77,13 +76,12 @@ def loop_of(
         loop = loop_of_law(scenario, recorded=recorded)
     elif scenario.vehicle.model == "multirotor":
         loop = MULTIROTOR_LOOPS[controller.loop_name](scenario, measured, strategy)
-    elif measured or strategy:
-        loop = tiltrotor_loop(controller.loop_name, measured, strategy)
+    elif measured or strategy or controller.prioritizes_attitude:
+        limited = controller.prioritizes_attitude
+        loop = tiltrotor_loop(controller.loop_name, measured, strategy, limited)
     else:
         loop = LOOPS[controller.loop_name]
     loop = adapted(loop)
-    if controller.prioritizes_attitude and loop.dynamics.model in ALLOCATED:
-        loop = with_allocation(loop)
     if scenario.reference.type == "push" and not external:
         loop = with_force_loop(loop)
     if scenario.needs_actuation_layer:

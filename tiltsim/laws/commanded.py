@@ -22,7 +22,7 @@ from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.scenario import FlightPlan, Scenario
 from tiltsim.vehicles.rotorcraft import OTHER_LAYOUT, ROTORCRAFT, rotorcraft_kind
 from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.gaits.motion import tilt_motion_of
+from tiltsim_controllers.gaits.motion import planned_tilts
 from tiltsim_controllers.gaits.parameters import GaitParameters
 from tiltsim_controllers.laws.observed import Step
 from tiltsim_controllers.mathematics.records import make_record_type, vector_of
@@ -65,8 +65,8 @@ def planned_servo_commands(
         gait, knots: The gait and its table data.
         lead: Lag of the servos, s.
     """
-    angles, rates = tilt_motion_of(tilts).moving(time, gait, knots)
-    return tuple(angle + lead * rate for angle, rate in zip(angles, rates, strict=True))
+    planned = planned_tilts(time, gait, tuple(knots), tilts)
+    return tuple(angle + lead * rate for angle, rate, _ in planned)
 
 
 def _commanded_loop(

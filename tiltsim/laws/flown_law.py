@@ -23,8 +23,8 @@ from tiltsim.system.text import error_text
 from tiltsim.vehicles.rotorcraft import initial_tilts
 from tiltsim_controllers.code.messages import TraceError
 from tiltsim_controllers.laws.observed import Command, Observed
+from tiltsim_controllers.mathematics.attitude import quaternion_of_euler
 from tiltsim_controllers.mathematics.records import make_record_type
-from tiltsim_controllers.mathematics.rotation import quaternion_from_euler
 
 NO_PARAMETERS = make_record_type("NoParameters", none=float)(0.0)
 """For laws without parameters."""
@@ -177,7 +177,7 @@ def _try_once(loop: ClosedLoop, plan: FlightPlan, setup: ControlSetup) -> None:
     """
     scenario, initial = plan.scenario, plan.scenario.initial
     tilts, rates = initial_tilts(plan) if scenario.vehicle.has_tilting_rotors else ((), ())
-    qpos = (*initial.position, *quaternion_from_euler(*initial.attitude), *tilts)
+    qpos = (*initial.position, *quaternion_of_euler(initial.attitude), *tilts)
     qvel = (*initial.velocity, *initial.angular_velocity, *rates)
     act = tuple(map(float, loop.dynamics.initial_activations(plan, setup)))
     start = f'{scenario.address or "scenario"}: controller.law = "{scenario.controller.law}"'

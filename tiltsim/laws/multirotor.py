@@ -27,7 +27,7 @@ from tiltsim.scenario.scenario import FlightPlan, Scenario
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.laws.allocation import RotorRange
 from tiltsim_controllers.laws.attitude_altitude import PUBLISHED_DECOUPLING
-from tiltsim_controllers.laws.gait_feedforward import multirotor_law_of
+from tiltsim_controllers.laws.gait_feedforward import multirotor_law_of, prioritized
 from tiltsim_controllers.laws.multirotor import NULL_PART, SIGNALS, independence, present_wrench
 from tiltsim_controllers.laws.multirotor_steps import Direction, Form, Parameters
 from tiltsim_controllers.laws.multirotor_supervisor import (
@@ -81,13 +81,15 @@ def _setup(plan: FlightPlan) -> tuple[Any, Values]:
 
 
 @cache
-def multirotor_loop(layout: RotorLayout, form: Form, measured: bool, strategy: str) -> ClosedLoop:
+def multirotor_loop(
+    layout: RotorLayout, form: Form, measured: bool, strategy: str, limited: bool
+) -> ClosedLoop:
     """The closed loop of all multirotors of a layout.
 
     Args:
         layout: Layout of the vehicles.
         form: Options of the law.
-        measured, strategy: See `tiltsim.laws.tiltrotor.tiltrotor_loop`.
+        measured, strategy, limited: See `tiltsim.laws.tiltrotor.tiltrotor_loop`.
     """
     rotors, places = layout.tilt_of_rotor, layout.places
     turning = places.rotors if form.norm == "speed" else 0  # else they may stop
@@ -114,8 +116,9 @@ def multirotor_loop(layout: RotorLayout, form: Form, measured: bool, strategy: s
             attitude += f", without rotor {failure.rotor:g}"
         return (attitude, *stops)
 
+    step = multirotor_law_of(rotors, form)
     law = Law(
-        multirotor_law_of(rotors, form),
+        prioritized(step, rotors) if limited else step,
         Parameters,
         _setup,
         states=INTEGRALS,
@@ -138,4 +141,5 @@ def loop_of_multirotor(scenario: Scenario, measured: bool, strategy: str) -> Clo
     assert isinstance(controller, AttitudeForceController)
     assert isinstance(vehicle, Multirotor)
     form = controller.resolve_force(vehicle, scenario.gait.plan(vehicle))
-    return multirotor_loop(layout_of_vehicle(vehicle), form, measured, strategy)
+    limited = controller.prioritizes_attitude
+    return multirotor_loop(layout_of_vehicle(vehicle), form, measured, strategy, limited)

@@ -12,7 +12,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Dynamics
-from tiltsim.equations.tiltrotor import body_fields, initial_state
+from tiltsim.equations.tiltrotor import airframe_of, body_fields, initial_state
 from tiltsim.laws.law import Law, Margins, Tilts, tilts_of_gait
 from tiltsim.laws.rotorcraft import REFERENCE_COLUMNS, torque_free_columns
 from tiltsim.laws.vehicle_loop import VehicleFunctions, parts, servo_lead
@@ -31,7 +31,6 @@ from tiltsim_controllers.references.trajectories import reference_attitude, refe
 from tiltsim_controllers.vehicle.body import Body, body_of
 from tiltsim_controllers.vehicle.effectiveness import ROTOR_FLOATS
 from tiltsim_controllers.vehicle.motion import BODY_STATES, equations_of_motion
-from tiltsim_controllers.vehicle.rotors import airframe
 from tiltsim_controllers.vehicle.states import BODY_FIELDS
 
 
@@ -233,7 +232,7 @@ class RotorFunctions(VehicleFunctions):
         The thesis's equations have no gyroscopic torque but the quadrotor's.
         """
         N, _, S = self.sizes
-        body, rotors = airframe(parameters.law, knots, self.layout.tilt_of_rotor)
+        body, rotors = airframe_of(parameters.law, knots, self.layout.tilt_of_rotor)
         gyroscopic = float(self.layout.model == "quadrotor")
         tilts = self.equation_tilts(time, state, parameters, knots)
         moved = equations_of_motion(state, tilts, inputs, body, rotors, disturbance, gyroscopic)

@@ -1,8 +1,9 @@
 """Attitude-altitude control of the tiltrotor in closed loops (ch. 3 and 4)."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cache
+from math import inf
 from typing import Any, Final
 
 import numpy as np
@@ -26,10 +27,11 @@ from tiltsim.vehicles.rotorcraft import ROTORCRAFT
 from tiltsim_controllers.analysis.singularity import determinant, margin_over_gait
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.laws import attitude_altitude, gait_feedforward
+from tiltsim_controllers.laws.allocation import RotorRange
 from tiltsim_controllers.laws.attitude_altitude import PUBLISHED_DECOUPLING
 from tiltsim_controllers.laws.multirotor import SIGNALS
 from tiltsim_controllers.laws.multirotor_steps import EULER_ANGLES
-from tiltsim_controllers.laws.observed import Seen
+from tiltsim_controllers.laws.observed import Seen, Step
 from tiltsim_controllers.laws.tiltrotor_supervisor import SUPERVISION
 from tiltsim_controllers.mathematics.attitude import rotation_matrix
 from tiltsim_controllers.mathematics.linear import kernel
@@ -78,11 +80,21 @@ def _causes(sample: Mapping[str, float], _setup: ControlSetup) -> tuple[str, ...
     return (singular_attitude(sample, TILT_FIELDS), *rotor_stops(4))
 
 
+def _limits(plan: FlightPlan) -> RotorRange:
+    controller, vehicle = plan.scenario.controller, plan.scenario.rotorcraft
+    assert isinstance(controller, AttitudeAltitudeController)
+    low, high = vehicle.min_rotor_speed, vehicle.max_rotor_speed
+    return RotorRange(
+        0.0 if low is None else low, inf if high is None else high, controller.allocation_horizon
+    )
+
+
 def _setup(plan: FlightPlan) -> tuple[Any, Values]:
     controller, vehicle = plan.scenario.controller, plan.scenario.rotorcraft.resolve()
     assert isinstance(controller, AttitudeAltitudeController)
     gains, supervisor = controller.resolve_gains(), controller.resolve_supervisor(vehicle)
-    known = {"vehicle": vehicle, "gains": gains, "supervisor": supervisor}
+    limits = _limits(plan)
+    known = {"vehicle": vehicle, "gains": gains, "supervisor": supervisor, "limits": limits}
     return parameters_of(plan, attitude_altitude.Parameters, **known), ()
 
 
@@ -95,6 +107,7 @@ def _feedforward_setup(plan: FlightPlan) -> tuple[Any, Values]:
         gait_feedforward.Parameters,
         vehicle=vehicle,
         supervisor=controller.resolve_supervisor(vehicle),
+        limits=_limits(plan),
         rotor_inertia=rotorcraft.rotor_inertia if is_fed_forward else 0.0,
         attitude_error=EULER_ANGLES,
         slowest_rotor=0.0,
@@ -104,7 +117,7 @@ def _feedforward_setup(plan: FlightPlan) -> tuple[Any, Values]:
 
 
 @cache
-def tiltrotor_loop(name: str, measured: bool, strategy: str) -> ClosedLoop:
+def tiltrotor_loop(name: str, measured: bool, strategy: str, limited: bool) -> ClosedLoop:
     """The closed loop of the attitude-altitude controller of the tiltrotor.
 
     Args:
@@ -112,6 +125,7 @@ def tiltrotor_loop(name: str, measured: bool, strategy: str) -> ClosedLoop:
         measured: Whether it feeds back the angular acceleration of the plant, which
             `tiltsim.laws.layers.measured_acceleration` measures, in place of the model's.
         strategy: The supervisor's, or empty; see `supervised`.
+        limited: Whether it keeps the rotors within limits, see `gait_feedforward.prioritized`.
     """
     common: dict[str, Any] = {
         "margins": _margins,
@@ -120,10 +134,14 @@ def tiltrotor_loop(name: str, measured: bool, strategy: str) -> ClosedLoop:
         "measured": measured,
         "follows_position": decouples_position,
     }
+
+    def flown(step: Callable[..., Step]) -> Callable[..., Step]:
+        return gait_feedforward.prioritized(step, LAYOUT.tilt_of_rotor) if limited else step
+
     if name == "gait_feedforward":
         form = gait_feedforward.FORM._replace(supervised=bool(strategy))
         law = Law(
-            gait_feedforward.tiltrotor_law_of(form),
+            flown(gait_feedforward.tiltrotor_law_of(form)),
             gait_feedforward.Parameters,
             _feedforward_setup,
             states=INTEGRALS,
@@ -133,7 +151,7 @@ def tiltrotor_loop(name: str, measured: bool, strategy: str) -> ClosedLoop:
         )
     else:
         law = Law(
-            attitude_altitude.attitude_altitude,
+            flown(attitude_altitude.attitude_altitude),
             attitude_altitude.Parameters,
             _setup,
             signals=SIGNALS[:3],

@@ -8,10 +8,7 @@ from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.closed_loop.loop import ClosedLoop
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.vehicles.rotorcraft.layout import layout_of
-from tiltsim_controllers.mathematics.rotation import (
-    quaternion_from_rotation,
-    rotation_from_quaternion,
-)
+from tiltsim_controllers.mathematics.attitude import quaternion_of_rotation, rotation_of_quaternion
 from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.vehicle.states import BODY_FIELDS
 
@@ -108,7 +105,7 @@ def _turn_rates(rotation: Floats, derivative: Floats) -> Floats:
 def _quaternion(rotation: Floats) -> Floats:
     """The unit quaternion of a rotation, which may be a matrix."""
     if len(rotation) == MATRIX:
-        rotation = np.array(quaternion_from_rotation(tuple(rotation.tolist())))
+        rotation = quaternion_of_rotation(rotation.reshape(3, 3))
     return rotation / np.linalg.norm(rotation)
 
 
@@ -118,7 +115,8 @@ def _turned(rotation: Floats, vector: Floats) -> Floats:
     turn = np.array((np.cos(half), *(0.5 * np.sinc(half / np.pi) * vector)))
     turned = _product(_quaternion(rotation), turn)
     if len(rotation) == MATRIX:
-        return np.array(rotation_from_quaternion(*turned.tolist()))
+        matrix: Floats = rotation_of_quaternion(turned).ravel()
+        return matrix
     return turned
 
 

@@ -60,9 +60,10 @@ def hover_speeds(
         rotors = TiltedRotors(force, torque, lower, upper, weight)
         found = evenest_inputs(rotors, weight * direction)
         if found is None:
+            needed = f", which takes {max(map(abs, _speeds(inputs))):.4g} rad/s" if nearly else ""
             raise InputError(
                 "initial.rotor_speed: no rotor speeds within the limits hold the vehicle at its "
-                "initial tilts; give the speeds, or change vehicle.min_rotor_speed, "
+                f"initial tilts{needed}; give the speeds, or change vehicle.min_rotor_speed, "
                 "vehicle.max_rotor_speed or the gait"
             )
         inputs = found

@@ -42,7 +42,7 @@ def built_in_command(assembly: Assembly, plant: MujocoPlant) -> Command:
             qvel = (*qvel, *turning(qpos, qvel, ctrl, loads, layer))
         elif hasattr(layer, "sensors"):  # of actuation: a record for the number of rotors
             qpos, qvel = measured(time, qpos, qvel, layer.sensors)
-        elif hasattr(layer, "direction"):  # of objects
+        elif hasattr(layer, "timestep"):  # of objects
             act = seen_within(within, others_of(assembly.scenario), act)
         loop, parameters = within, inner
     ctrl = loop.sampling.controls(time, qpos, qvel, act, parameters, knots)

@@ -11,7 +11,7 @@ from tiltsim.plants.mujoco_plant import MujocoPlant
 from tiltsim.scenario.gait import tilts_of
 from tiltsim.vehicles.rotorcraft.others import others_of
 from tiltsim_controllers.code.traceable import as_arrays
-from tiltsim_controllers.mathematics.rotation import euler_from_quaternion
+from tiltsim_controllers.mathematics.attitude import euler_angles
 from tiltsim_controllers.mathematics.scalar import Values
 from tiltsim_controllers.references.trajectories import attitude_reference, reference_derivatives
 
@@ -43,7 +43,7 @@ class Observer:
             time=plant.time,
             position=qpos[:3].copy(),
             velocity=qvel[:3].copy(),
-            attitude=np.array(euler_from_quaternion(*qpos[3:7].tolist())),
+            attitude=euler_angles(qpos[3:7]),
             quaternion=qpos[3:7].copy(),
             body_rates=qvel[3:6].copy(),
             tilt_angles=tilts.copy() if self._tilting else np.zeros(self._tilts),

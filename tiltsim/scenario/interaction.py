@@ -10,7 +10,7 @@ from tiltsim.models.mjcf_editing import MAX_BYTES
 from tiltsim.models.objects import Body, Load, Objects, Tool
 from tiltsim.scenario.table import Angles3, NonNegative, Positive, Table, Vector3
 from tiltsim.system.files import is_file
-from tiltsim_controllers.mathematics.rotation import quaternion_from_euler
+from tiltsim_controllers.mathematics.attitude import quaternion_of_euler
 
 SIZES: Final = {"wall": 2, "box": 3, "sphere": 1, "mesh": 1}
 """Numbers of the size of each type of object."""
@@ -122,7 +122,7 @@ class ObjectTable(Table):
             self.name,
             self.type,
             self.position,
-            tuple(quaternion_from_euler(*self.attitude)),
+            tuple(quaternion_of_euler(self.attitude).tolist()),
             self.size,
             self.joint,
             self.mass or 0.0,
@@ -212,7 +212,8 @@ def check_objects(scenario: Any) -> None:
         scenario.reference.after_gait((), scenario)
         controller = scenario.controller
         if controller.position_stiffness is None and not controller.is_external:
-            reason = f"the {controller.law} law cannot push; choose full_pose or python"
+            able = "choose full_pose, vectoring with position_bandwidth, or python"
+            reason = f"the {controller.law} law cannot push; {able}"
             raise scenario.mistake("reference.type", reason)
     if not scenario.has_objects:
         return

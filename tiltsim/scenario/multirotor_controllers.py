@@ -57,7 +57,6 @@ class AttitudeForceController(AttitudeForce, GaitFollowingController, FailureAwa
             self.norm,
             forward,
             lost is not None,
-            self.prioritizes_attitude,
             self.supervisor is not None,
         )
 

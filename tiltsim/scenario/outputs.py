@@ -64,7 +64,10 @@ def check_dimension(
         )
     if reference.kind == "pose" and dimension < 3:
         key = "type" if reference.turns else "roll" if reference.roll else "pitch"
-        reason = f"is no output with {dimension} components of force; needs a vehicle with 3"
+        reason = (
+            f"roll and pitch are no outputs: a vehicle that controls {dimension} of 3 components "
+            "of force leans to move; leave them out, or take a vehicle with 3"
+        )
         raise scenario.mistake(f"reference.{key}", reason)
     for key in ("decoupling", "decoupler"):
         value = getattr(controller, key)

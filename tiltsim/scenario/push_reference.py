@@ -12,7 +12,7 @@ from tiltsim.models.objects import distance_ahead
 from tiltsim.scenario.messages import choose
 from tiltsim.scenario.reference_table import PositionReference
 from tiltsim.scenario.table import NonNegative, Positive, Table, Vector3
-from tiltsim_controllers.mathematics.rotation import rotation_from_euler
+from tiltsim_controllers.mathematics.attitude import rotation_matrix
 from tiltsim_controllers.references.trajectories import REFERENCE_TYPES, ReferenceParameters
 from tiltsim_controllers.references.waypoints import COEFFICIENTS, minimum_snap_knots
 
@@ -92,7 +92,7 @@ class PushReference(PositionReference):
             raise self.mistake("object", "is a mesh; a push needs a wall, box or sphere")
         if scenario.tool is None:
             raise self.mistake("object", "needs a [tool] to push with")
-        turn = np.reshape(rotation_from_euler(self.roll, self.pitch, self.yaw), (3, 3))
+        turn = rotation_matrix((self.roll, self.pitch, self.yaw))
         tool = scenario.tool.tool
         unit, tip = turn @ tool.unit, np.array(self.position) + turn @ tool.tip
         distance = distance_ahead(bodies[self.object], tip, unit)

@@ -16,7 +16,7 @@ from tiltsim.system.files import exists, is_file
 from tiltsim.system.numbers import real_array
 from tiltsim.system.parquet import open_parquet
 from tiltsim.system.text import short_repr
-from tiltsim_controllers.mathematics.rotation import euler_from_quaternion
+from tiltsim_controllers.mathematics.attitude import euler_angles
 from tiltsim_controllers.mathematics.scalar import Values
 
 Rows = tuple[Values, ...]
@@ -50,7 +50,7 @@ def rows_with_angles(rows: Rows) -> Rows:
             f"row {number}: norm of qw, qx, qy, qz = {norms[number - 1]:.3g}; must be 1"
         )
     quaternions /= norms[:, np.newaxis]
-    angles = np.unwrap([euler_from_quaternion(*row) for row in quaternions.tolist()], axis=0)
+    angles = np.unwrap(euler_angles(quaternions.T).T, axis=0)
     overlap = np.abs(np.sum(quaternions[1:] * quaternions[:-1], axis=1))
     turns, steps = 2.0 * np.arccos(np.minimum(overlap, 1.0)), np.abs(np.diff(angles, axis=0))
     fast = steps.max(axis=1, initial=0.0) > np.maximum(LARGEST_STEP, FASTER * turns)

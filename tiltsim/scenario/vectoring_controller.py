@@ -14,7 +14,7 @@ from tiltsim_controllers.analysis.stability import ErrorLoop
 from tiltsim_controllers.analysis.vectoring_design import REACH, Craft, Timing, design
 from tiltsim_controllers.laws.vectoring import Vectoring, vectoring
 from tiltsim_controllers.laws.vectoring_state import Parameters, state_units
-from tiltsim_controllers.mathematics.rotation import quaternion_from_euler
+from tiltsim_controllers.mathematics.attitude import quaternion_of_euler
 from tiltsim_controllers.mathematics.scalar import Floats, Values
 from tiltsim_controllers.vehicle.actuators import held_gain
 from tiltsim_controllers.vehicle.effectiveness import table_per_newton
@@ -25,6 +25,10 @@ class VectoringController(Vectoring, FailureAwareController, TiltingTable, LawCo
 
     models_latency = True
     control: ClassVar = staticmethod(vectoring)
+
+    @property
+    def position_stiffness(self) -> float | None:
+        return None if self.position_bandwidth is None else self.position_bandwidth**2
 
     def check_scenario(self, scenario: Any) -> None:
         super().check_scenario(scenario)
@@ -42,7 +46,7 @@ class VectoringController(Vectoring, FailureAwareController, TiltingTable, LawCo
         return (
             *airframe.initial_position,
             *airframe.initial_velocity,
-            *quaternion_from_euler(*airframe.initial_attitude),
+            *quaternion_of_euler(airframe.initial_attitude),
             *airframe.initial_body_rates,
             *(0.0,) * 6,
             *airframe.initial_speeds * (airframe.latency + 1),
@@ -57,7 +61,7 @@ class VectoringController(Vectoring, FailureAwareController, TiltingTable, LawCo
         return self._design(airframe)[1]
 
     def _design(self, airframe: Airframe) -> tuple[Parameters, Values]:
-        vehicle = airframe.vehicle
+        vehicle, servo = airframe.vehicle, airframe.tilt_servo
         thrust = np.array(vehicle.thrust_coefficients)
         slowest, fastest = _speeds(airframe, thrust)
         craft = Craft(
@@ -79,7 +83,8 @@ class VectoringController(Vectoring, FailureAwareController, TiltingTable, LawCo
             sampled,
             airframe.latency,
             airframe.rotor_time_constant or 0.0,
-            (airframe.servo_frequency, airframe.servo_damping),
+            (servo.natural_frequency, servo.damping_ratio),
+            (servo.max_rate or inf, servo.max_angle or inf),
             held_gain(self.tilt_rate_gain, airframe.control_timestep),
         )
         return design(self, craft, timing, self.resolve_failure())

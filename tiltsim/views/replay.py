@@ -18,7 +18,7 @@ from tiltsim.plants.flight_model import build_model
 from tiltsim.scenario.interaction import objects_of
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.views.dressing import dressed
-from tiltsim_controllers.mathematics.rotation import quaternion_from_euler
+from tiltsim_controllers.mathematics.attitude import quaternion_of_euler
 from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.references.trajectories import position_reference
 
@@ -74,8 +74,8 @@ def joint_positions(model: mujoco.MjModel, columns: Columns) -> Floats:
             qpos[:, address : address + 3] = _stack(columns, (f"{of}x", f"{of}y", f"{of}z"))
             if f"{of}roll" not in columns:  # a load, of which the attitude does not count
                 continue
-            angles = _stack(columns, (f"{of}roll", f"{of}pitch", f"{of}yaw")).tolist()
-            qpos[:, address + 3 : address + 7] = [quaternion_from_euler(*row) for row in angles]
+            angles = _stack(columns, (f"{of}roll", f"{of}pitch", f"{of}yaw"))
+            qpos[:, address + 3 : address + 7] = quaternion_of_euler(angles.T).T
         elif kind in (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE):
             column = COLUMN_OF_JOINT.get(name, name)
             if column in columns:

@@ -51,7 +51,7 @@ def reaction_gains(
         rotor_inertia: Inertia of one rotor about its axis, kg m^2.
         decoupling: The form of the decoupling matrix.
         dimension: How many components of force are controlled.
-        norm: In which the controller's inputs are the least, of `multirotor_steps.NORMS`.
+        norm: In which the controller's inputs are the least, "speed" or "thrust".
     """
     turning = [(tilts, speeds) for tilts, speeds in hovers if np.all(speeds)]
     if not turning:

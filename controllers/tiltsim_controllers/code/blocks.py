@@ -1,4 +1,4 @@
-"""Control flow, look-ups and names for traced functions."""
+"""Control flow and look-ups for traced functions."""
 
 from __future__ import annotations
 
@@ -19,14 +19,6 @@ from tiltsim_controllers.code.tracing import (
     graph_in_use,
     make,
 )
-
-
-def signal(name: str, value: Any) -> Any:
-    """Name a value of a law for recordings and messages; returns the value."""
-    graph = current_graph()
-    if graph is not None:
-        graph.signals[name] = value
-    return value
 
 
 def take(values: Sequence[Number], index: Number) -> Number:

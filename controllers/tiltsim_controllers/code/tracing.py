@@ -166,13 +166,11 @@ class Graph:
 
     Attributes:
         scopes: Open blocks, outermost first.
-        signals: Named values, see `tiltsim_controllers.code.blocks.signal`.
         locate: Returns file and line of the user's code.
     """
 
     def __init__(self, locate: Callable[[], tuple[str, int]] | None = None) -> None:
         self.scopes = [Block()]
-        self.signals: dict[str, Any] = {}
         self.locate = locate or user_line
         self._count = 0
 

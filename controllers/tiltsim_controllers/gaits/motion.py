@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import cache
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -17,6 +15,7 @@ Jets = Any
 """Angles with rates and accelerations, shape (M, 3), rad and s."""
 
 
+@traceable
 def planned_tilts(time: Any, gait: GaitParameters, knots: Any, tilts: int) -> Any:
     """The tilt angles (rad) of a gait with their rates and accelerations.
 
@@ -57,6 +56,7 @@ def planned_tilts(time: Any, gait: GaitParameters, knots: Any, tilts: int) -> An
     return xp.array([(gait.scale if i < 2 else back) * motion[i] for i in range(tilts)])
 
 
+@traceable
 def anticipated_tilts(time: Any, gait: GaitParameters, knots: Any, tilts: int, half: float) -> Any:
     """The planned tilt angles with rounded corners, for the attitude.
 
@@ -104,31 +104,3 @@ def rounded_corner(start: Any, start_rate: Any, stop: Any, stop_rate: Any, half:
     rate = 0.5 + u * (15.0 - 10.0 * second + 3.0 * fourth) / 16.0
     acceleration = 0.9375 * (left * left) / xp.where(half > 0.0, half, 1.0)
     return xp.stack([middle + bend * value, start_rate + bend * rate, bend * acceleration], 1)
-
-
-class TiltMotion(NamedTuple):
-    """The functions of this module for a number of tilts, for scalar code and for arrays."""
-
-    planned: Callable[..., Any]  # (time, gait, knots)
-    anticipated: Callable[..., Any]  # (time, gait, knots, half)
-    moving: Callable[..., Any]  # (time, gait, knots): planned angles and rates
-
-
-@cache
-def tilt_motion_of(tilts: int) -> TiltMotion:
-    """The functions for a number of tilts, 0 or more."""
-
-    @traceable
-    def planned(time: Any, gait: GaitParameters, knots: Any) -> Any:
-        return planned_tilts(time, gait, knots, tilts)
-
-    @traceable
-    def anticipated(time: Any, gait: GaitParameters, knots: Any, half: float) -> Any:
-        return anticipated_tilts(time, gait, knots, tilts, half)
-
-    @traceable
-    def moving(time: Any, gait: GaitParameters, knots: Any) -> Any:
-        motion = planned_tilts(time, gait, knots, tilts)
-        return motion[:, 0], motion[:, 1]
-
-    return TiltMotion(planned, anticipated, moving)

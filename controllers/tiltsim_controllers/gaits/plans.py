@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 from tiltsim_controllers.code.arrays import as_number, is_known, xp
 from tiltsim_controllers.gaits.cat import FOOTFALLS, cat_keyframes
 from tiltsim_controllers.gaits.colors import colored_angles
-from tiltsim_controllers.gaits.motion import planned_tilts, tilt_motion_of
+from tiltsim_controllers.gaits.motion import planned_tilts
 from tiltsim_controllers.gaits.parameters import (
     CUBIC,
     FIXED,
@@ -101,7 +101,7 @@ class Gait:
 
     def jets(self, time: float) -> Any:
         """Tilt angles (rad), rates (rad/s) and accelerations (rad/s^2) at a time (s), by tilt."""
-        return tilt_motion_of(self.tilts).planned(time, self.parameters, self.knots)
+        return planned_tilts(time, self.parameters, self.knots, self.tilts)
 
     def angles(self, time: ArrayLike) -> Floats:
         """Tilt angles (rad) at times (s) of shape (...), as an array of shape (..., tilts)."""

@@ -14,6 +14,7 @@ from pydantic import Field
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.code.traceable import traceable
 from tiltsim_controllers.gaits.parameters import NO_KNOTS, GaitParameters
+from tiltsim_controllers.laws.allocation import RotorRange
 from tiltsim_controllers.laws.decouplers import (
     CONVENTIONAL,
     EXACT,
@@ -96,6 +97,7 @@ Parameters = record_of(
     gait=GaitParameters,
     reference=ReferenceParameters,
     supervisor=Supervisor,
+    limits=RotorRange,  # of prioritized allocation
 )
 
 

@@ -13,7 +13,7 @@ from typing import Any, Final
 from tiltsim_controllers.code.traceable import traceable
 from tiltsim_controllers.gaits.motion import anticipated_tilts, planned_tilts
 from tiltsim_controllers.gaits.parameters import FIXED, NO_KNOTS, GaitParameters
-from tiltsim_controllers.laws.allocation import limited_accelerations
+from tiltsim_controllers.laws.allocation import RotorRange, limited_accelerations
 from tiltsim_controllers.laws.attitude_altitude import OPTIONS, AttitudeAltitude
 from tiltsim_controllers.laws.gains import Gains, IntegralGains
 from tiltsim_controllers.laws.keys import record_of
@@ -42,6 +42,7 @@ Parameters = record_of(
     gait=GaitParameters,
     reference=ReferenceParameters,
     supervisor=Supervisor,
+    limits=RotorRange,  # of prioritized allocation
     rotor_inertia=float,  # kg m^2, of a rotor about its axis, as far as it is known
     attitude_error=float,  # `EULER_ANGLES`
     slowest_rotor=float,  # rad/s, 0: a rotor at rest has no acceleration that helps
@@ -95,22 +96,35 @@ def gait_law_of(layout: TiltOfRotor, form: Form, supervision: Supervision) -> Ca
     @traceable
     def law(seen: Seen, p: Any, knots: Any = NO_KNOTS) -> Step:
         plan = None
-        moves = p.gait.type != FIXED or form.supervised
-        if leans_with_gait and moves and p.terms.attitude_rates != 0.0:
+        moves = (p.gait.type != FIXED or form.supervised) and p.terms.attitude_rates != 0.0
+        if leans_with_gait and (moves or form.own_yaw):
             if form.supervised:
                 plan, _ = supervised_gait(seen, p, knots, supervision, p.anticipation)
             else:
                 tilts = tilts_of(layout)
                 plan = anticipated_tilts(seen.time, p.gait, knots, tilts, p.anticipation)
-        step = attitude_force(seen, plan, p, knots, layout, form)
-        if not form.prioritized:
-            return step
-        wrench, up = present_wrench(seen, p, knots, layout)
-        speeds, (_, rotors) = state_of(seen.state, layout).speeds, airframe(p, knots, layout)
-        limited = limited_accelerations(step.inputs, wrench, up, speeds, rotors.spins, p.limits)
-        return step._replace(inputs=limited)
+        return attitude_force(seen, plan, p, knots, layout, form)
 
     return law
+
+
+@cache
+def prioritized(law: Callable[..., Step], layout: TiltOfRotor) -> Callable[..., Step]:
+    """A law that keeps rotor accelerations within ``limits`` of its parameters, see `allocation`.
+
+    Args:
+        law: Plain inversion.
+        layout: Layout of the vehicles.
+    """
+
+    @traceable
+    def limited(seen: Seen, p: Any, knots: Any = NO_KNOTS) -> Step:
+        step, (wrench, up) = law(seen, p, knots), present_wrench(seen, p, knots, layout)
+        speeds, (_, rotors) = state_of(seen.state, layout).speeds, airframe(p, knots, layout)
+        inputs = limited_accelerations(step.inputs, wrench, up, speeds, rotors.spins, p.limits)
+        return step._replace(inputs=inputs)
+
+    return limited
 
 
 def multirotor_law_of(layout: TiltOfRotor, form: Form) -> Callable[..., Step]:

@@ -46,7 +46,7 @@ from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.code.traceable import traceable
 from tiltsim_controllers.laws.attitude_altitude import PUBLISHED_DECOUPLING
 from tiltsim_controllers.laws.decouplers import NONE
-from tiltsim_controllers.laws.failures import working
+from tiltsim_controllers.laws.failures import UNHARMED, working
 from tiltsim_controllers.laws.feedback import attitude_motion, swept
 from tiltsim_controllers.laws.force_directions import (
     factors,
@@ -252,7 +252,7 @@ def present_wrench(seen: Seen, parameters: Any, knots: Any, layout: TiltOfRotor)
         seen, parameters, knots, layout: See `attitude_force`.
     """
     now, (_, rotors) = state_of(seen.state, layout), airframe(parameters, knots, layout)
-    works = working(seen.time, parameters.failure, len(layout))
+    works = working(seen.time, getattr(parameters, "failure", UNHARMED), len(layout))
     wrench = moving_wrench_map(rotors.masked(works), at_rest(now.tilts)).value
     return wrench, rotation_matrix(now.attitude)[2]
 

@@ -44,9 +44,6 @@ ROTATION: Final = 0.0
 EULER_ANGLES: Final = 1.0
 """Another: of roll, pitch and yaw, as in ch. 3."""
 
-NORMS: Final = ("speed", "thrust")
-"""Norms in which the inputs are the least: of rotor accelerations, or of the rates of ``w``."""
-
 INTEGRAL_FIELDS: Final = ("integral_x", "integral_y", "integral_z")
 """The controller's own states: integrals of the position error, m s, world axes."""
 
@@ -66,20 +63,12 @@ class Form(NamedTuple):
     """Options that a program of the law is made for; all else is data."""
 
     dimension: int  # components of force that are outputs, 1 to 3
-    norm: str = "speed"  # in `NORMS`
+    norm: str = "speed"  # of the inputs, or "thrust": of the rates of ``w``
     forward: bool = False  # two components are those along x and z, of a vehicle that has three
     losses: bool = False  # whether the controller knows of failures
-    prioritized: bool = False  # whether it keeps within rotor limits (`allocation`)
     supervised: bool = False  # whether a supervisor changes its gait
-    own_yaw: bool = False  # whether its decoupler takes the present yaw even if references rest
+    own_yaw: bool = False  # whether its decoupler takes yaw and planned tilts even if all rests
     spin: bool = False  # whether it takes along the angular momentum of the rotors
-
-    @property
-    def name(self) -> str:
-        """For file names."""
-        options = "_forward" * self.forward, "_losses" * self.losses
-        further = "_prioritized" * self.prioritized, "_supervised" * self.supervised
-        return f"{self.dimension}{''.join((*options, *further))}_{self.norm}"
 
 
 class Direction(NamedTuple):

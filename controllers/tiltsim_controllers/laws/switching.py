@@ -123,7 +123,7 @@ def attitude_altitude_thrust_rate(
 
 
 def switching_inputs(time: Any, state: Any, p: Any, knots: Any = NO_KNOTS) -> Any:
-    """`INPUT_FIELDS`: thrust, torques and rates of the extension's states, shape (6,).
+    """Thrust (N), torques (N m) and rates of the extension's states, shape (6,).
 
     Args:
         time: s

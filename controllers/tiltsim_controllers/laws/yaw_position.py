@@ -25,16 +25,6 @@ from tiltsim_controllers.mathematics.linear import cross
 from tiltsim_controllers.references.trajectories import ReferenceParameters, reference_motion
 from tiltsim_controllers.vehicle.parameters import Vehicle
 
-INPUT_FIELDS: Final = (
-    "thrust",  # N
-    "roll_torque",  # N m, body axes
-    "pitch_torque",
-    "yaw_torque",
-    "thrust_derivative",  # N/s, of the controller's own two states
-    "thrust_rate_derivative",  # N/s^2
-)
-"""The result of the quadrotor's control laws: one float per name, in this order."""
-
 
 class YawPositionGainTable(Keys):
     """Explicit gains of yaw-position control."""
@@ -137,7 +127,7 @@ def decoupling_matrix(state: Any, vehicle: Vehicle) -> Any:
 
 
 def yaw_position_inputs(time: Any, state: Any, p: Any, knots: Any = NO_KNOTS) -> Any:
-    """`INPUT_FIELDS`: thrust, torques and rates of the controller's own states, shape (6,).
+    """Thrust (N), torques (N m), rates of the controller's states (N/s, N/s^2), shape (6,).
 
     The inputs of ch. 2, Eqs. (1)-(8), with ``u_2`` to ``u_4`` converted from forces at the arms to
     torques. In body axes ``Delta`` is triangular: only ``u_1`` acts along the thrust, ``u_2`` and

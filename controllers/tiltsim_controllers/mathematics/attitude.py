@@ -97,7 +97,8 @@ def quaternion_product(a: Any, b: Any) -> Any:
 
 def quaternion_of_euler(attitude: Any) -> Any:
     """The unit quaternion ``w, x, y, z`` of roll, pitch and yaw (rad)."""
-    (sr, sp, sy), (cr, cp, cy) = xp.sin(0.5 * attitude), xp.cos(0.5 * attitude)
+    half = 0.5 * xp.array(attitude)
+    (sr, sp, sy), (cr, cp, cy) = xp.sin(half), xp.cos(half)
     return xp.array(
         [
             cr * cp * cy + sr * sp * sy,

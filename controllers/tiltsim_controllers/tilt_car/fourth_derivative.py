@@ -21,17 +21,12 @@ from tiltsim_controllers.laws.keys import Gains4, GainSets, Keys, NamedGains, ch
 from tiltsim_controllers.references.trajectories import ReferenceParameters, reference_motion
 from tiltsim_controllers.tilt_car.third_derivative import minimum_norm
 from tiltsim_controllers.tilt_car.vehicle import (
-    STATE_FIELDS,
     TiltCar,
     input_matrix,
     rotation,
     thrust_map,
     turn_per_tilt,
 )
-
-DERIVATIVE_FIELDS: Final = ("alpha_rate", "rotor_acceleration_1", "rotor_acceleration_2")
-EXTENDED_STATE_FIELDS: Final = (*STATE_FIELDS, *DERIVATIVE_FIELDS)
-"""The state of the car and the controller's own first derivatives, rad/s and rad/s^2."""
 
 GAIN_SETS: Final = {
     # Ours, all four poles at -3: the thesis prints none.
@@ -76,7 +71,8 @@ def body_derivatives(state: Any, car: TiltCar) -> Any:
     of the bisector, ``(1 - I_T / I_B) alpha'``, for the products of ``J_psi`` and ``J_alpha``.
 
     Args:
-        state: `EXTENDED_STATE_FIELDS`, shape (11,).
+        state: `tiltsim_controllers.tilt_car.vehicle.STATE_FIELDS`, then the controller's own tilt
+            rate (rad/s) and rotor accelerations (rad/s^2), shape (11,).
         car: The vehicle.
     """
     speeds, tilt_rate, rates = state[6:8], state[8], state[9:11]
@@ -94,7 +90,7 @@ def fourth_derivative_inputs(time: Any, state: Any, p: Any) -> Any:
 
     Args:
         time: s
-        state: `EXTENDED_STATE_FIELDS`, shape (11,).
+        state: See `body_derivatives`.
         p: `Parameters`.
 
     Returns:

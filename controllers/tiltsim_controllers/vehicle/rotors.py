@@ -158,7 +158,8 @@ def by_tilt(rotors: Rotors, columns: Any) -> Any:
     groups = [
         [i for i, own in enumerate(layout) if own == tilt] for tilt in range(tilts_of(layout))
     ]
-    return xp.array([sum(columns[:, i] for i in group) for group in groups]).T.reshape(6, -1)
+    sums = [sum((columns[:, i] for i in group), xp.zeros(6)) for group in groups]
+    return xp.array(sums).T.reshape(6, -1)
 
 
 def rotor_accelerations(rates: Any, speeds: Any, slowest: Any = 0.0) -> Any:

@@ -19,7 +19,7 @@ from tiltsim_controllers.analysis.fault_tolerance import (
 )
 from tiltsim_controllers.analysis.singularity import force_matrix, torque_matrix
 from tiltsim_controllers.analysis.two_color_map import delta
-from tiltsim_controllers.mathematics.rotation import rotation_from_euler
+from tiltsim_controllers.mathematics.attitude import rotation_matrix
 from tiltsim_controllers.vehicle.parameters import PRESETS, SPIN, drag_ratio
 
 VEHICLE = PRESETS["ar_drone_2"]
@@ -34,7 +34,7 @@ def wrench(hover, factors=(1.0,) * 4):
     """Torque and force in units of the weight, the force in world axes."""
     w = np.array(hover.rotor_speeds) ** 2 * SPIN * factors / WEIGHT
     tilts = np.array(hover.tilts)
-    turn = np.reshape(rotation_from_euler(hover.roll, hover.pitch, 0.3), (3, 3))
+    turn = rotation_matrix((hover.roll, hover.pitch, 0.3))
     return torque_matrix(tilts, VEHICLE) @ w, turn @ force_matrix(tilts) @ w
 
 

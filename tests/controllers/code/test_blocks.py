@@ -11,7 +11,7 @@ from tests.controllers.code.test_programs import SPECIAL, same
 from tests.natively import machine_code, machine_code_in_lanes
 from tiltsim_controllers.code import jax_function
 from tiltsim_controllers.code.arrays import flatten, xp
-from tiltsim_controllers.code.blocks import branch, repeat, signal, take
+from tiltsim_controllers.code.blocks import branch, repeat, take
 from tiltsim_controllers.code.casadi_function import casadi_function
 from tiltsim_controllers.code.jax_function import results_in_jax
 from tiltsim_controllers.code.messages import TraceError
@@ -24,7 +24,7 @@ TABLE = np.array([1.0, 4.0, 9.0, 16.0])
 def everything(x):
     """A matrix product, domain errors, tables, a branch and a search."""
     A = xp.array([[x[0], 0.0], [0.5, x[1]]])
-    root = signal("root", xp.sqrt(x[0] - x[1]))
+    root = xp.sqrt(x[0] - x[1])
     looked_up = take(TABLE, x[2])
     lazy = branch(
         x[1] > 0.0,

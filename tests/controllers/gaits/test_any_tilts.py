@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tiltsim_controllers.gaits import plans
-from tiltsim_controllers.gaits.motion import tilt_motion_of
+from tiltsim_controllers.gaits.motion import anticipated_tilts, planned_tilts
 
 TIMES = np.linspace(-0.5, 4.5, 41)
 ANGLES = np.random.default_rng(2).uniform(-0.5, 0.5, (3, 6))
@@ -32,9 +32,9 @@ GAITS = {
 
 def motion(gait, half):
     """Jets of the planned and of the anticipated angles, shape (2, times, tilts, 3)."""
-    functions = tilt_motion_of(gait.tilts)
-    planned = [functions.planned(t, gait.parameters, gait.knots) for t in TIMES.tolist()]
-    rounded = [functions.anticipated(t, gait.parameters, gait.knots, half) for t in TIMES.tolist()]
+    own = gait.parameters, gait.knots, gait.tilts
+    planned = [planned_tilts(t, *own) for t in TIMES.tolist()]
+    rounded = [anticipated_tilts(t, *own, half) for t in TIMES.tolist()]
     return np.array((planned, rounded))
 
 

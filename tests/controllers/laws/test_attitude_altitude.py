@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 from tests.controllers.flat_laws import attitude_altitude_inputs
 from tests.thesis import force_matrix, torque_matrix
 from tiltsim_controllers.gaits.parameters import FIXED, GaitParameters
+from tiltsim_controllers.laws.allocation import RotorRange
 from tiltsim_controllers.laws.attitude_altitude import DECOUPLINGS, Gains, Parameters
 from tiltsim_controllers.laws.decouplers import (
     DECOUPLERS,
@@ -112,6 +113,7 @@ def random_case(seed, decoupling, decoupler):
             **dict(zip(ACCELERATIONS, spread(3, 0.2))),
         ),
         supervisor=Supervisor(),
+        limits=RotorRange(),
         decoupler=DECOUPLERS[decoupler],
         decoupling=DECOUPLINGS[decoupling],
     )
@@ -229,6 +231,7 @@ def test_hover_at_the_setpoint_needs_no_rotor_acceleration(decoupling, decoupler
         gait=GaitParameters(FIXED),
         reference=ReferenceParameters(REFERENCE_TYPES["setpoint"], 1.0, 2.0, 3.0, yaw=0.3),
         supervisor=Supervisor(),
+        limits=RotorRange(),
         decoupler=DECOUPLERS[decoupler],
         decoupling=DECOUPLINGS[decoupling],
     )

@@ -17,6 +17,7 @@ from tiltsim_controllers.analysis.stability import is_hurwitz
 from tiltsim_controllers.code.traceable import traceable
 from tiltsim_controllers.gaits.parameters import FIXED, GaitParameters
 from tiltsim_controllers.laws import attitude_altitude
+from tiltsim_controllers.laws.allocation import RotorRange
 from tiltsim_controllers.laws.failures import UNHARMED, Failure
 from tiltsim_controllers.laws.full_pose import (
     GAIN_SETS,
@@ -34,7 +35,6 @@ from tiltsim_controllers.laws.observed import Seen
 from tiltsim_controllers.laws.supervisor import Supervisor
 from tiltsim_controllers.mathematics.attitude import attitude_error, rotation_matrix
 from tiltsim_controllers.mathematics.linear import least_norm
-from tiltsim_controllers.mathematics.rotation import rotation_from_euler
 from tiltsim_controllers.references.trajectories import (
     CIRCLE,
     REFERENCE_TYPES,
@@ -291,6 +291,7 @@ def planned(gait, duration, step):
         GaitParameters(FIXED),
         ReferenceParameters(REFERENCE_TYPES["attitude_altitude"]),
         Supervisor(),
+        RotorRange(),
         decoupling=0.0,
         decoupler=0.0,
     )
@@ -420,14 +421,14 @@ def test_force_and_torque_change_as_desired_with_the_least_inputs(table, failure
 
         step = 1e-4 / max(1.0, np.abs(turned).max(initial=0.0), np.abs(accelerations).max())
         rate = (wrench(step) - wrench(-step)) / (2.0 * step)
-        rotation = np.reshape(rotation_from_euler(*body[6:9]), (3, 3))
+        rotation = rotation_matrix(body[6:9])
         force, torque = np.split(wrench(0.0), 2)
         inertia = np.diag((HEXAROTOR.inertia_xx, HEXAROTOR.inertia_yy, HEXAROTOR.inertia_zz))
         present = rotation @ force / HEXAROTOR.mass - (0.0, 0.0, HEXAROTOR.gravity)
         jerk = target[3] + np.dot(
             GAINS.position, (target[2] - present, target[1] - body[3:6], target[0] - body[:3])
         )
-        yaw = rotation_from_euler(0.0, 0.0, ON_CIRCLE.yaw)
+        yaw = rotation_matrix((0.0, 0.0, ON_CIRCLE.yaw)).ravel()
         error = attitude_error(rotation, np.reshape(yaw, (3, 3)))
         angular = -np.dot(GAINS.attitude, (np.linalg.solve(inertia, torque), body[9:12], -error))
         lift = HEXAROTOR.mass * rotation.T @ jerk - np.cross(body[9:12], force)

@@ -15,6 +15,7 @@ from tests.thesis import force_matrix, torque_matrix
 from tiltsim_controllers.analysis.stability import feedforward_loops
 from tiltsim_controllers.gaits.parameters import FIXED, GaitParameters
 from tiltsim_controllers.gaits.plans import continuous_trot, fixed
+from tiltsim_controllers.laws.allocation import RotorRange
 from tiltsim_controllers.laws.attitude_altitude import EXACT_DECOUPLING, Gains
 from tiltsim_controllers.laws.decouplers import DECOUPLERS, exact_decoupler
 from tiltsim_controllers.laws.feedback import (
@@ -177,6 +178,7 @@ def parameters(**changed):
         decoupler=DECOUPLERS["none"],
         decoupling=EXACT_DECOUPLING,
         supervisor=Supervisor(),
+        limits=RotorRange(),
         rotor_inertia=0.0,
         attitude_error=EULER_ANGLES,
         slowest_rotor=0.0,

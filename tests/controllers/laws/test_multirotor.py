@@ -29,6 +29,7 @@ from tiltsim_controllers.analysis.torque_free import (
 )
 from tiltsim_controllers.gaits import plans
 from tiltsim_controllers.laws import attitude_altitude
+from tiltsim_controllers.laws.allocation import RotorRange
 from tiltsim_controllers.laws.decouplers import DECOUPLERS
 from tiltsim_controllers.laws.failures import Failure
 from tiltsim_controllers.laws.gains import GAIN_SETS, Poles, gains_from_poles
@@ -44,9 +45,8 @@ from tiltsim_controllers.laws.multirotor_steps import (
     turned,
 )
 from tiltsim_controllers.laws.supervisor import Supervisor
-from tiltsim_controllers.mathematics.attitude import attitude_error
+from tiltsim_controllers.mathematics.attitude import attitude_error, rotation_matrix
 from tiltsim_controllers.mathematics.moving import Moving
-from tiltsim_controllers.mathematics.rotation import rotation_from_euler
 from tiltsim_controllers.references.trajectories import CIRCLE, SETPOINT, ReferenceParameters
 from tiltsim_controllers.vehicle.effectiveness import (
     CONSTANT,
@@ -84,6 +84,7 @@ def test_the_law_of_chapters_3_and_4_is_a_case(decoupler, decoupling):
         gait.parameters,
         ON_CIRCLE,
         Supervisor(),
+        RotorRange(),
         decoupler=codes[0],
         decoupling=codes[1],
     )
@@ -306,7 +307,7 @@ def test_attitude_control_feeds_the_motion_of_its_reference_forward():
 
     def desired(time):
         angles = turned(time, 0.8, 1.0), turned(time, -0.6, 1.3), turned(time, 0.9, 1.1)
-        return np.reshape(rotation_from_euler(*(angle.value for angle in angles)), (3, 3))
+        return rotation_matrix([angle.value for angle in angles])
 
     def body(time):
         return desired(time - 0.2)

@@ -10,6 +10,7 @@ import sympy as sp
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tiltsim_controllers.gaits.parameters import FIXED, GaitParameters
 from tiltsim_controllers.laws.keys import choice
 from tiltsim_controllers.references.trajectories import (
     CIRCLE,
@@ -239,7 +240,7 @@ def test_the_printed_tilt_column_lacks_the_yaws_answer():
 # --- planned direction -------------------------------------------------------------------------
 
 LINE_1 = ReferenceParameters(LINE, acceleration_x=1.0)
-LAW = planned.Parameters(THESIS_CAR, LINE_1, planned.GAIN_SETS["ch11"])
+LAW = planned.Parameters(THESIS_CAR, GaitParameters(FIXED), LINE_1, planned.GAIN_SETS["ch11"])
 
 
 @given(angles, st.floats(-1.0, 1.0), st.floats(-1.0, 1.0), st.floats(-2.0, 2.0))

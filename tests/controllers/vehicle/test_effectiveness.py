@@ -8,7 +8,7 @@ import pytest
 
 from tests.controllers.multirotors import FOUR, random_states, ring, tiltrotor
 from tests.thesis import force_matrix, torque_matrix
-from tiltsim_controllers.mathematics.rotation import rotation_from_euler
+from tiltsim_controllers.mathematics.attitude import rotation_matrix
 from tiltsim_controllers.vehicle.effectiveness import (
     force_and_torque,
     rotor_entries,
@@ -91,7 +91,7 @@ def test_equations_of_motion_agree_with_chapter_3_for_its_tiltrotor():
     inputs, gust = np.array([1.0, -2.0, 3.0, -4.0]), np.array([0.1, 0.2, -0.3])
     for _, (*body, a1, a2, a3, a4, s1, s2, s3, s4) in random_states(50):
         tilts, speeds = np.array([a1, a2, a3, a4]), np.array([s1, s2, s3, s4])
-        rotation, (p, q, r) = np.reshape(rotation_from_euler(*body[6:9]), (3, 3)), body[9:]
+        rotation, (p, q, r) = rotation_matrix(body[6:9]), body[9:]
         state = np.array([*body[:6], *rotation.ravel(), p, q, r, *speeds])
         found = equations_of_motion(state, tilts, inputs, vehicle.body, rotors, gust, 0.0)
         w = speeds * np.abs(speeds)

@@ -31,29 +31,39 @@ FILTER: Final = 60.0
 """rad/s, bandwidth in which a force loop sees the contact force."""
 
 
+PUSH_COLUMNS: Final = ("push_force", "push_force_ref")
+"""The force along the direction of a push, and its command, N."""
+
+
+class Push(NamedTuple):
+    """A force that grows once the tool touches; by default there is none."""
+
+    direction: Vector3 = (0.0, 0.0, 0.0)  # unit vector, world
+    force: float = 0.0  # N
+    begin: float = 0.0  # s, when the tool touches
+    ramp: float = 1.0  # s, from there to the full force
+
+
 class Accumulation(NamedTuple):
     """Parameters of the states that keep the peak and the time of contact."""
 
     timestep: float  # s
-    direction: Vector3  # of a push, unit vector, world; zero without one
+    push: Push
 
 
 class ForceLoop(NamedTuple):
-    """Parameters of a push."""
+    """Parameters of a loop of force."""
 
-    direction: Vector3  # unit vector, world
-    force: float  # N
-    begin: float  # s, when the tool touches
-    ramp: float  # s, from there to the full force
+    push: Push
     gain: float  # 1/s
     proportional: float
     stiffness: float  # N/m, of the law within against an error of position
 
 
 @traceable
-def commanded_force(time: Any, loop: ForceLoop) -> Any:
-    """The force (N) along the direction of the push at a time (s), shape ()."""
-    return loop.force * xp.clip((time - loop.begin) / loop.ramp, 0.0, 1.0)
+def commanded_force(time: Any, push: Push) -> Any:
+    """The force (N) along the direction of a push at a time (s), shape ()."""
+    return push.force * xp.clip((time - push.begin) / push.ramp, 0.0, 1.0)
 
 
 @cache
@@ -69,10 +79,10 @@ def with_force_loop(loop: ClosedLoop) -> ClosedLoop:
 
     def displaced(time: Any, qpos: Any, act: Any, own: ForceLoop) -> tuple[Any, Any]:
         """``qpos`` as the law sees it, and the rates of the two states."""
-        direction = xp.array(own.direction)
+        direction, commanded = xp.array(own.push.direction), commanded_force(time, own.push)
         filtered, integral = act[first], act[first + 1]
-        error = commanded_force(time, own) - filtered
-        force = commanded_force(time, own) + own.proportional * error + integral
+        error = commanded - filtered
+        force = commanded + own.proportional * error + integral
         place = qpos[:3] - force / own.stiffness * direction
         measured = act[-3:] @ direction
         rates = xp.hstack([FILTER * (measured - filtered), own.gain * error])
@@ -90,35 +100,29 @@ def with_force_loop(loop: ClosedLoop) -> ClosedLoop:
         controls=controls,
         actuators=ExtraActuators(states=2),
         initial_activations=lambda _plan, _own, _inner: (0.0, 0.0),
-        derive=_derive_push,
         fields=("filtered_push_force", "push_integral"),
-        units={"filtered_push_force": "N", "push_integral": "N", "push_force_ref": "N"},
+        units={"filtered_push_force": "N", "push_integral": "N"},
         of_controller=True,
     )
     return wrap_loop(loop, layer)
 
 
+def _push(scenario: Any) -> Push:
+    reference = scenario.reference
+    if reference.type != "push":
+        return Push()
+    touch = reference.touch(scenario)
+    return Push(touch.direction, reference.force, touch.time, reference.ramp)
+
+
 def _force_loop(plan: FlightPlan) -> ForceLoop:
     scenario = plan.scenario
     reference: Any = scenario.reference
-    touch, vehicle = reference.touch(scenario), scenario.any_rotorcraft.resolve()
     stiffness = scenario.controller.position_stiffness
     assert stiffness is not None  # else the scenario is refused
-    return ForceLoop(
-        touch.direction,
-        reference.force,
-        touch.time,
-        reference.ramp,
-        reference.gain,
-        reference.proportional_gain,
-        vehicle.mass * stiffness,
-    )
-
-
-def _derive_push(
-    inner: Callable[[], dict[str, Floats]], samples: Samples, setup: ControlSetup
-) -> dict[str, Floats]:
-    return {**inner(), "push_force_ref": commanded_force(samples["time"], setup.parameters.layer)}
+    mass = scenario.any_rotorcraft.resolve().mass
+    gains = reference.gain, reference.proportional_gain
+    return ForceLoop(_push(scenario), *gains, mass * stiffness)
 
 
 @cache
@@ -155,8 +159,8 @@ def with_objects(loop: ClosedLoop, others: Others) -> ClosedLoop:
         hold=hold,
         actuators=ExtraActuators(states=states),
         initial_activations=lambda _plan, _own, _inner: (0.0,) * states,
-        derive=_derive,
-        units=others.columns | ({"push_force": "N"} if others.pushed >= 0 else {}),
+        units=others.columns | (dict.fromkeys(PUSH_COLUMNS, "N") if others.pushed >= 0 else {}),
+        derive=_derive_push if others.pushed >= 0 else Layer.derive,
     )
     wrapped = wrap_loop(loop, layer)
     behind = {"others": others.coordinates, "history": others.readings}
@@ -170,20 +174,20 @@ def with_objects(loop: ClosedLoop, others: Others) -> ClosedLoop:
 
 
 def _accumulation(plan: FlightPlan) -> Accumulation:
-    scenario, direction = plan.scenario, (0.0, 0.0, 0.0)
-    if scenario.reference.type == "push":
-        direction = scenario.reference.touch(scenario).direction
-    return Accumulation(scenario.simulation.timestep, direction)
+    scenario = plan.scenario
+    return Accumulation(scenario.simulation.timestep, _push(scenario))
 
 
-def _derive(
+def _derive_push(
     inner: Callable[[], dict[str, Floats]], samples: Samples, setup: ControlSetup
 ) -> dict[str, Floats]:
-    columns, direction = inner(), setup.parameters.layer.direction
-    if "push_force_ref" in columns:
-        along = zip(CONTACT_FORCE, direction, strict=True)
-        columns["push_force"] = sum(samples[name] * component for name, component in along)
-    return columns
+    push = setup.parameters.layer.push
+    along = zip(CONTACT_FORCE, push.direction, strict=True)
+    return {
+        **inner(),
+        "push_force": sum(samples[name] * component for name, component in along),
+        "push_force_ref": commanded_force(samples["time"], push),
+    }
 
 
 def _pushing(readings: Any, others: Others) -> list[Any]:

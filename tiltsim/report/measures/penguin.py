@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 
 from tiltsim.report.measures.flown import Flown
+from tiltsim_controllers.gaits.parameters import FIXED, GaitParameters
 from tiltsim_controllers.mathematics.scalar import Pair
 from tiltsim_controllers.references.trajectories import LINE, ReferenceParameters
 from tiltsim_controllers.tilt_car.penguin_cycle import (
@@ -148,7 +149,8 @@ def switch_matrix_is_the_limit() -> bool:
     rng = np.random.default_rng(12)
     state = (0.0, 0.0, 0.0, 0.0, 0.0)
     for alpha, x, y in rng.uniform(-2.0, 2.0, (200, 3)).tolist():
-        law = Parameters(THESIS_CAR, ReferenceParameters(LINE, x, y), _GAINS)
+        line = ReferenceParameters(LINE, x, y)
+        law = Parameters(THESIS_CAR, GaitParameters(FIXED), line, _GAINS)
         at = (*state, alpha, 0.0, 0.0)
         squares = np.array(demanded_squared_speeds(0.0, at, law))
         switch = np.diag((squares > 0.0).astype(float))

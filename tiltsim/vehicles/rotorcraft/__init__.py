@@ -34,7 +34,7 @@ from tiltsim.vehicles.rotorcraft.layout import CROSS, Layout
 from tiltsim.vehicles.rotorcraft.metrics import rotorcraft_metrics
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.code.traceable import traceable
-from tiltsim_controllers.mathematics.rotation import quaternion_from_euler
+from tiltsim_controllers.mathematics.attitude import quaternion_of_euler
 from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector
 from tiltsim_controllers.references.trajectories import ReferenceParameters
 from tiltsim_controllers.vehicle.states import P
@@ -186,14 +186,20 @@ def initial_motion(plan: FlightPlan) -> tuple[Vector, Vector]:
     tilting = plan.scenario.vehicle.has_tilting_rotors
     angles, rates = initial_tilts(plan) if tilting else ((), ())
     return (
-        (*initial.position, *quaternion_from_euler(*initial.attitude), *angles),
+        (*initial.position, *quaternion_of_euler(initial.attitude), *angles),
         (*initial.velocity, *initial.angular_velocity, *rates),
     )
 
 
 @cache
 def rotorcraft_kind(layout: Layout, extra_columns: tuple[str, ...] = ()) -> VehicleKind:
-    """The kind of rotorcraft with a layout, and its columns among `EXTRA_COLUMNS`."""
+    """The kind of rotorcraft with a layout, and its columns among `EXTRA_COLUMNS`.
+
+    Fewer than four rotors control attitude and lift only by their tilts, and have no margin at
+    given tilts.
+    """
+    if layout.rotors < FEWEST_WITH_MARGIN:
+        extra_columns = tuple(name for name in extra_columns if name != "singularity_margin")
     return VehicleKind(
         observed_fields=layout.observed_fields,
         columns=rotorcraft_columns(layout) | {name: EXTRA_COLUMNS[name] for name in extra_columns},
@@ -204,6 +210,8 @@ def rotorcraft_kind(layout: Layout, extra_columns: tuple[str, ...] = ()) -> Vehi
         metrics=rotorcraft_metrics,
     )
 
+
+FEWEST_WITH_MARGIN: Final = 4
 
 EXTRA_COLUMNS: Final = {
     "singularity_margin": Quantity("singularity margin", "rad"),

@@ -9,8 +9,7 @@ import numpy as np
 
 from tiltsim.models.objects import CABLE_READING, CONTACT_READING, COORDINATES, FORCE
 from tiltsim.scenario.interaction import objects_of
-from tiltsim_controllers.mathematics.attitude import rotation_of_quaternion
-from tiltsim_controllers.mathematics.rotation import quaternion_from_euler
+from tiltsim_controllers.mathematics.attitude import rotation_matrix
 
 if TYPE_CHECKING:
     from tiltsim.scenario.scenario import FlightPlan, Scenario
@@ -86,7 +85,7 @@ def motion_at_start(plan: FlightPlan) -> tuple[Vector, Vector]:
             velocities += [*table.velocity, 0.0, 0.0, 0.0]
     payload, initial = scenario.payload, scenario.initial
     if payload is not None and not payload.rigid:
-        turn = rotation_of_quaternion(np.array(quaternion_from_euler(*initial.attitude)))
+        turn = rotation_matrix(initial.attitude)
         down = np.array([sin(payload.swing), 0.0, -cos(payload.swing)])
         arm = turn @ np.array(payload.attachment)
         place: Values = tuple((arm + payload.length * down + initial.position).tolist())

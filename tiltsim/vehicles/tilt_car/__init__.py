@@ -19,7 +19,6 @@ from tiltsim.scenario.scenario import FlightPlan, Scenario
 from tiltsim.system.text import Quantity
 from tiltsim.vehicles.tilt_car.metrics import tilt_car_metrics
 from tiltsim_controllers.code.traceable import traceable
-from tiltsim_controllers.gaits.motion import tilt_motion_of
 from tiltsim_controllers.mathematics.scalar import Floats, Vector
 from tiltsim_controllers.references.trajectories import ReferenceParameters
 from tiltsim_controllers.tilt_car.vehicle import counter_yaw_per_tilt
@@ -116,7 +115,7 @@ def _compile(
 
 def initial_tilt(plan: FlightPlan) -> tuple[float, float]:
     """Tilt angle (rad) and its rate (rad/s) at time zero: the gait's."""
-    (angle,), (rate,) = tilt_motion_of(1).moving(0.0, plan.gait.parameters, plan.gait.knots)
+    ((angle, rate, _),) = plan.gait.jets(0.0)
     return angle, rate
 
 

@@ -202,6 +202,10 @@ def wrap(text: Text, width: float) -> None:
     text.set_text("\n".join(lines))
 
 
+CLOSE: Final = 0.93
+"""Share of a panel's width that title and legend may fill side by side."""
+
+
 def place_legends(page: Page) -> None:
     """The legends of the panels: over those over time, at the right, and below the squares.
 
@@ -231,7 +235,8 @@ def _place_legend(axes: Axes, entries: int, *, below: bool) -> None:
         drawn = axes.legend(ncols=columns, **look).get_window_extent()
         if drawn.width <= (1.15 if below else 1.0) * box.width:
             break
-    if not below and drawn.width + axes.set_title(title).get_window_extent().width > box.width:
+    together = drawn.width + axes.set_title(title).get_window_extent().width
+    if not below and together > CLOSE * box.width:
         axes.set_title(title, pad=drawn.height * points)
 
 

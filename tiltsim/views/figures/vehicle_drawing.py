@@ -18,7 +18,7 @@ from scipy.spatial import ConvexHull
 
 from tiltsim.models.rotorcraft import RotorcraftSpec, compile_model
 from tiltsim.views.figures import style
-from tiltsim_controllers.mathematics.rotation import quaternion_from_euler
+from tiltsim_controllers.mathematics.attitude import quaternion_of_euler
 from tiltsim_controllers.mathematics.scalar import Floats, Quad
 from tiltsim_controllers.vehicle.parameters import PRESETS
 from tiltsim_controllers.vehicle.states import ROTORS
@@ -68,7 +68,7 @@ class Pose:
         """Place the model; tilt angles and roll, pitch, yaw in rad."""
         self.model = _model()
         self.data = mujoco.MjData(self.model)
-        self.data.qpos[:] = (0.0, 0.0, 0.0, *quaternion_from_euler(*attitude), *tilts)
+        self.data.qpos[:] = (0.0, 0.0, 0.0, *quaternion_of_euler(attitude), *tilts)
         mujoco.mj_kinematics(self.model, self.data)
 
     @property
