@@ -26,6 +26,7 @@ fly:
   check        fly all scenarios under some paths and check their expectations
   sweep        fly a scenario along axes: grids, random sets, stability boundaries
   list         list the scenario library
+  autopilot    write the files that a firmware needs to fly a vehicle
 
 look:
   view         show flights in the Rerun viewer

@@ -515,8 +515,8 @@ def test_schema_knows_every_table_and_the_variants(capsys):
     assert main(["schema"]) == 0
     schema = json.loads(capsys.readouterr().out)
     tables = {"vehicle", "simulation", "initial", "controller", "gait", "reference"}
-    tables |= {"air", "ground", "model_error", "sensors"}
-    lists = {"disturbance", "expect", "fault", "variant"}
+    tables |= {"air", "ground", "model_error", "payload", "sensors", "tool"}
+    lists = {"disturbance", "expect", "fault", "object", "variant"}
     assert tables | lists | {"title", "source", "without", "ours", "claim"} == set(
         schema["properties"]
     )

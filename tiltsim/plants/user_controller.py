@@ -12,6 +12,7 @@ import mujoco
 
 from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.errors import InputError
+from tiltsim.plants.autopilot import ArduPilot
 from tiltsim.plants.command import (
     CheckedCommand,
     Controller,
@@ -50,6 +51,8 @@ class UserController:
     def _call(self, function: Callable[[Any], Any], argument: object) -> Any:
         try:
             return function(argument)
+        except ControllerError:
+            raise
         except (Exception, SystemExit) as error:
             raise ControllerError(
                 f"the controller {self._name} raised {describe(error)}"
@@ -63,6 +66,8 @@ def load_controller(scenario: Scenario) -> UserController:
     """
     table, controller = scenario.controller, scenario.own_controller
     assert isinstance(table, PythonController)
+    if scenario.autopilot is not None:
+        return UserController(ArduPilot(scenario), "autopilot")
     name = table.function
     if controller is None:
         controller = load_function(scenario)

@@ -5,6 +5,7 @@ from typing import Annotated, Any, Final
 from pydantic import Field, PrivateAttr
 
 from tiltsim.models.rotor_table import Multirotor
+from tiltsim.scenario.autopilot import AutopilotTable, WithAutopilot
 from tiltsim.scenario.controller import Controller
 from tiltsim.scenario.expectation import ClaimName, ClaimTable, Expectation, Origin
 from tiltsim.scenario.gait import FixedGait, Gait
@@ -22,7 +23,6 @@ from tiltsim.scenario.surroundings import (
     SensorTable,
     Torque,
 )
-from tiltsim.scenario.table import Table
 from tiltsim.scenario.tiltrotor_controllers import AttitudeAltitudeController
 from tiltsim.scenario.time_table import TimeTable
 from tiltsim.scenario.vehicle import ModelErrorTable, TiltCarTable, VehicleTable, VehicleUnion
@@ -33,7 +33,7 @@ DESCRIPTIVE: Final = ("title", "source", "without", "ours", "claim", "expect")
 """Keys that describe and judge a flight, and change nothing in it."""
 
 
-class ScenarioTables(Table):
+class ScenarioTables(WithAutopilot):
     """One flight, fully specified; `tiltsim.scenario.scenario.Scenario` adds the checks."""
 
     title: str = Field("", description="one line about the flight", examples=["My first flight"])
@@ -58,6 +58,9 @@ class ScenarioTables(Table):
     initial: InitialTable = Field(InitialTable(), description="the state at time zero")
     controller: Controller = Field(
         AttitudeAltitudeController(), description="the control law and its gains"
+    )
+    autopilot: AutopilotTable | None = Field(
+        None, description="a firmware that flies in place of the controller; default: none"
     )
     gait: Gait = Field(
         FixedGait(),

@@ -1,0 +1,114 @@
+"""The table ``[autopilot]``: a firmware that flies the vehicle in lockstep, in place of a law."""
+
+import re
+from collections.abc import Mapping
+from itertools import pairwise
+from typing import Annotated, Any, Final, Literal
+
+from pydantic import Field, model_validator
+
+from tiltsim.scenario.messages import InvalidValueError
+from tiltsim.scenario.table import Positive, Table
+
+CONTROLLER: Final = {"law": "python", "function": "autopilot"}
+"""The controller of a scenario with an autopilot."""
+
+CHANNELS: Final = 32
+"""Most outputs of a firmware."""
+
+_OUTPUT: Final = re.compile(r"(rotor|along|across)_([1-9]\d?)")
+
+Row = Annotated[tuple[float, ...], Field(strict=False, min_length=2, max_length=17)]
+
+
+class AutopilotTable(Table):
+    """A firmware on this machine that gets sensor readings and returns outputs, in lockstep."""
+
+    table_name = "autopilot"
+
+    type: Literal["ardupilot"] = Field(
+        description="ArduPilot's software in the loop, by its JSON interface over UDP"
+    )
+    port: Annotated[int, Field(ge=1, le=65535)] = Field(
+        9002, description="UDP port of this machine, on loopback, to which the firmware sends"
+    )
+    rate: Annotated[float, Field(ge=50.0, le=4000.0)] = Field(
+        800.0,
+        description="exchanges per simulated second; must be at least 1.8 times the rate of the "
+        "firmware's main loop [Hz]",
+    )
+    outputs: Annotated[tuple[str, ...], Field(strict=False, max_length=CHANNELS)] = Field(
+        (),
+        description='what each output drives: "rotor_2" its speed, from 1000 to 2000 us, about '
+        '1500 us if the rotor reverses; "along_2" and "across_2" the parts of the thrust of a '
+        'tilting rotor along its upright axis and across; "" nothing; default: the rotors in order',
+        examples=[["rotor_3", "rotor_2", "rotor_1", "rotor_4"]],
+    )
+    wait: Positive = Field(
+        20.0, description="longest time for the firmware to answer, before the link is lost [s]"
+    )
+    hold: Positive = Field(
+        90.0,
+        description="longest simulated time that the vehicle is held at rest until its thrust "
+        "exceeds its weight, in which a firmware starts its estimator [s]",
+    )
+    rc: Annotated[tuple[Row, ...], Field(strict=False, max_length=10_000)] = Field(
+        (),
+        description="sticks and switches: rows of a time since the link began and the channels "
+        "from that time on [s, us]",
+        examples=[[[0.0, 1500, 1500, 1000, 1500], [40.0, 1500, 1500, 1700, 1500]]],
+    )
+
+    def _check_values(self) -> None:
+        used = [name for name in self.outputs if name]
+        for name in used:
+            if not _OUTPUT.fullmatch(name):
+                raise InvalidValueError(
+                    "autopilot.outputs", name, 'write "rotor_1", "along_1", "across_1" or ""'
+                )
+            if used.count(name) > 1:
+                raise InvalidValueError("autopilot.outputs", name, "twice")
+        times = [row[0] for row in self.rc]
+        if any(later <= time for time, later in pairwise(times)):
+            raise self.mistake("rc", "times must increase from row to row")
+
+    @property
+    def control_timestep(self) -> float:
+        """Simulated time between exchanges, s."""
+        return 1.0 / self.rate
+
+
+def with_controller(document: Mapping[str, Any]) -> Mapping[str, Any]:
+    """A scenario's document, with the controller and the control period of its autopilot.
+
+    Raises `InvalidValueError` if it has another controller as well.
+    """
+    table = document.get("autopilot")
+    if not isinstance(table, Mapping):
+        return document
+    controller = document.get("controller", CONTROLLER)
+    if controller != CONTROLLER:
+        raise InvalidValueError(
+            "controller", controller, "the autopilot is the controller; remove [controller]"
+        )
+    changed = {**document, "controller": CONTROLLER}
+    simulation, rate = document.get("simulation", {}), table.get("rate", 800.0)
+    if isinstance(simulation, Mapping) and isinstance(rate, int | float) and rate > 0.0:
+        step = 1.0 / rate
+        if simulation.get("control_timestep", step) != step:
+            raise InvalidValueError(
+                "simulation.control_timestep",
+                simulation["control_timestep"],
+                f"the autopilot's rate makes it {step:g}; remove it",
+            )
+        changed["simulation"] = {"timestep": step, **simulation, "control_timestep": step}
+    return changed
+
+
+class WithAutopilot(Table):
+    """A document in which an autopilot may take the controller's place."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _with_controller(cls, value: Any) -> Any:
+        return with_controller(value) if isinstance(value, Mapping) else value
