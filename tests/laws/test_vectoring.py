@@ -7,7 +7,8 @@ import pytest
 
 import tiltsim
 from tests.laws.test_multirotor import mjcf
-from tiltsim_controllers.analysis.vectoring_design import Craft, side_slope
+from tiltsim.laws.assembling import assemble
+from tiltsim_controllers.analysis.vectoring_design import TRACKING, Craft, side_slope
 from tiltsim_controllers.laws.vectoring_steps import braked, turn_by
 from tiltsim_controllers.vehicle.effectiveness import table_per_newton
 
@@ -154,6 +155,53 @@ def test_sensor_noise_costs_little():
     changes = np.diff(flight["rotor_speeds"], axis=0) / np.diff(flight["time"])[:, np.newaxis]
     assert np.sqrt(np.mean(changes**2)) < 900.0
     assert position_error(flight)[flight["time"] > 2.0].max() < 0.03
+
+
+# --- limit cases -------------------------------------------------------------------------------
+
+
+def first_accelerations(controller, timestep=0.002, rotors=4):
+    """Rotor accelerations (rad/s^2) at time zero, off every reference but roll and pitch."""
+    assembly = assemble(
+        tiltsim.load_scenario(
+            {
+                "vehicle": {"model": "multirotor", "mjcf": mjcf("quadrotor")},
+                "controller": controller,
+                "reference": {"type": "setpoint", "position": [0.0, 0.0, 0.02], "yaw": 0.02},
+                "initial": {
+                    "velocity": [0.0, 0.0, 0.1],
+                    "rotor_speed": [300.0, 310.0, 330.0, 305.0],
+                },
+                "simulation": {"timestep": timestep, "duration": 1.0},
+            }
+        )
+    )
+    loop, setup = assembly.loop, assembly.setup
+    state = (
+        *loop.kind.initial_motion(assembly),
+        loop.dynamics.initial_activations(assembly, setup),
+    )
+    controls = loop.sampling.controls(0.0, *state, setup.parameters, setup.knots)
+    return np.array(controls[rotors : 2 * rotors])
+
+
+def test_without_limits_and_observers_the_law_is_feedback_linearization():
+    """With period to zero, observers off, and errors below the braking curves: poles placed."""
+    plain = {"law": "vectoring", "observer": 0.0, "prediction": False, "restoring": 0.0}
+    keys = {**plain, "position_bandwidth": 2.0, "attitude_bandwidth": 9.0}
+    periods = (1e-6, 2e-6, 4e-6)
+    found = [first_accelerations(keys, period) for period in periods]
+    limit = (8.0 * found[0] - 6.0 * found[1] + found[2]) / 3.0  # second-order extrapolation
+    c, a = TRACKING, 9.0
+    rows = np.outer([c, c * 1.8 * a, c * a * a], np.ones(3))
+    gains = {"attitude": rows.tolist(), "altitude": [c, c * 4.0, c * 4.0]}
+    exact = {
+        "law": "attitude_force",
+        "gains": gains,
+        "attitude_error": "euler_angles",
+        "max_angular_acceleration": 1e6,
+    }
+    np.testing.assert_allclose(limit, first_accelerations(exact), rtol=1e-9)
 
 
 # --- steps -------------------------------------------------------------------------------------

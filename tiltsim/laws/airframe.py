@@ -51,6 +51,5 @@ def airframe_of(plan: FlightPlan) -> Airframe:
         simulation.latency_steps,
         table.speeds_along_spin,
         table.rotor_time_constant,
-        table.tilt_servo.natural_frequency,
-        table.tilt_servo.damping_ratio,
+        table.tilt_servo,
     )

@@ -16,6 +16,7 @@ from pydantic import Field
 
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.controller_table import ControllerTable, ReferenceKind
+from tiltsim.scenario.rotorcraft import TiltServoTable
 from tiltsim.scenario.table import Positive
 from tiltsim_controllers.analysis.stability import ErrorLoop, linear_loop
 from tiltsim_controllers.code.arrays import xp as xp
@@ -66,7 +67,7 @@ class Airframe:
         speed_limits: Lowest and highest rotor speeds that the plant enforces, rad/s along the
             spin; infinite without limits.
         rotor_time_constant: Time constant of the rotors' lag, s; None for no lag.
-        servo_frequency, servo_damping: Natural frequency (rad/s) and damping ratio of the servos.
+        tilt_servo: The servos of its tilts.
     """
 
     vehicle: Multirotor
@@ -83,8 +84,7 @@ class Airframe:
     latency: int
     speed_limits: tuple[float, float]
     rotor_time_constant: float | None
-    servo_frequency: float
-    servo_damping: float
+    tilt_servo: TiltServoTable
 
     @property
     def rotors(self) -> int:

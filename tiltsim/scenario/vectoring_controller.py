@@ -61,7 +61,7 @@ class VectoringController(Vectoring, FailureAwareController, TiltingTable, LawCo
         return self._design(airframe)[1]
 
     def _design(self, airframe: Airframe) -> tuple[Parameters, Values]:
-        vehicle = airframe.vehicle
+        vehicle, servo = airframe.vehicle, airframe.tilt_servo
         thrust = np.array(vehicle.thrust_coefficients)
         slowest, fastest = _speeds(airframe, thrust)
         craft = Craft(
@@ -83,7 +83,8 @@ class VectoringController(Vectoring, FailureAwareController, TiltingTable, LawCo
             sampled,
             airframe.latency,
             airframe.rotor_time_constant or 0.0,
-            (airframe.servo_frequency, airframe.servo_damping),
+            (servo.natural_frequency, servo.damping_ratio),
+            (servo.max_rate or inf, servo.max_angle or inf),
             held_gain(self.tilt_rate_gain, airframe.control_timestep),
         )
         return design(self, craft, timing, self.resolve_failure())

@@ -47,6 +47,8 @@ REACH: Final = 10.0
 """Greatest thrust over hover thrust where nothing else limits it."""
 SERVO_ANGLE: Final = 0.3
 """rad: the tilt by which braking counts about an axis that only tilts turn."""
+MOST_TILT: Final = 3.1
+"""rad: commanded tilts stay below half a turn."""
 DIRECTIONS: Final = 8
 """Directions of side force in the linear programs."""
 
@@ -111,6 +113,7 @@ class Timing:
         latency: Samples from a reading to its command.
         lag: s, of the rotors; 0 for none.
         servo: Natural frequency (rad/s) and damping ratio of the tilt servos.
+        servo_limits: Largest rate (rad/s) and angle (rad) of these, infinite without limits.
         tilt_gain: 1/s, of the loop that moves the commanded tilts.
     """
 
@@ -119,6 +122,7 @@ class Timing:
     latency: int
     lag: float
     servo: tuple[float, float]
+    servo_limits: tuple[float, float]
     tilt_gain: float
 
 
@@ -296,8 +300,9 @@ def design(
         failure=failure,
         side_softness=3e-4 if len(craft.thrust) >= 6 else 1.0,
         pull=min(1.0, keys.restoring * h),
-        tilt_step=keys.max_tilt_rate * h,
+        tilt_step=min(keys.max_tilt_rate, timing.servo_limits[0]) * h,
         tilt_range=keys.max_tilt,
+        tilt_stop=min(MOST_TILT, timing.servo_limits[1]),
         tilt_gain=timing.tilt_gain,
         servo_angle=servo_angle,
         servo_rate=servo_rate,

@@ -162,11 +162,11 @@ def _allocated(known: Known, ahead: Ahead, goal: Any, usable: Any) -> tuple[Any,
         tilts = served(known, tilts, ahead.tilt_rates, point, usable)[0]
     rows = unit[:, None] * p.hover * wrench_map(seen.rotors, tilts)
     made = rows @ thrusts
-    wanted = made + p.share * (unit * goal - made)
-    softness = xp.array([side, side, 1e-10, 1e-12, 1e-12, 1e-4 if free else 1e-9])
+    target = made + p.share * (unit * goal - made)
+    softness = xp.array([side, side, 1e-11, 1e-13, 1e-13, 1e-4 if free else 1e-12])
     none = 1e9 * (1.0 - p.bounded)
     found = bounded_least_squares(
-        rows, wanted, softness, xp.ones(count), start, low - none, high + none
+        rows, target, softness, xp.ones(count), start, low - none, high + none
     )
     return known.speeds(p.hover * xp.clip(found, low, high)), rates
 
@@ -183,14 +183,17 @@ def _with_tilts(
     slopes = wrench_slope(seen.rotors, command) * xp.maximum(thrusts, 0.3)
     leaning = by_tilt(seen.rotors, unit[:, None] * slopes)
     made = pushing @ thrusts
-    wanted = made + p.share * (unit / p.hover * goal - made)
+    target = made + p.share * (unit / p.hover * goal - made)
     way = known.preferred - command
     most = p.tilt_step * usable
-    lower = xp.clip(way - p.tilt_range, -most, most)
-    upper = xp.clip(way + p.tilt_range, -most, most)
+    least, largest = (
+        xp.clip(known.preferred + sign * p.tilt_range, -p.tilt_stop, p.tilt_stop) - command
+        for sign in (-1.0, 1.0)
+    )
+    lower, upper = xp.clip(least, -most, most), xp.clip(largest, -most, most)
     found = bounded_least_squares(
         xp.hstack([pushing, leaning]),
-        wanted,
+        target,
         xp.array([1e-4, 1e-4, 1e-8, 1e-10, 1e-10, 1e-6]),
         xp.ones(count + len(command)),
         xp.hstack([(1.0 - p.pull) * thrusts, p.pull * usable * way]),

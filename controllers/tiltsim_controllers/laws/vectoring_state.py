@@ -62,7 +62,8 @@ class Parameters(NamedTuple):
     side_softness: float
     pull: float  # share of the way to the preferred inputs in a period
     tilt_step: float  # rad, in a period
-    tilt_range: float  # rad
+    tilt_range: float  # rad, from the preferred tilts
+    tilt_stop: float  # rad, from level
     tilt_gain: float  # 1/s, of the loop around the law
     servo_angle: Vector3  # of a servo after a period, per angle, rate and set point
     servo_rate: Vector3  # likewise

@@ -114,12 +114,12 @@ def demanded(error: Moving, jerk_error: Any, ahead: Moving, frame: Frame, p: Any
     feedback = 2.0 * p.damping * p.position * (speed * error + slope)
     side = _within(feedback[:2], p.acceleration)
     rise = _clipped(feedback[2], -p.descent, p.acceleration)
-    wanted = ahead + stacked(side[0], side[1], rise) - frame.force
-    lift = _clipped(wanted[2] + frame.gravity, 0.2 * frame.gravity, p.greatest)
+    target = ahead + stacked(side[0], side[1], rise) - frame.force
+    lift = _clipped(target[2] + frame.gravity, 0.2 * frame.gravity, p.greatest)
     # No more side force than leaves the lift, and no lean beyond 60 degrees.
     up = lift.value
     left = xp.sqrt(xp.maximum(p.greatest * p.greatest - up * up, 0.04 * p.greatest * p.greatest))
-    side = _within(wanted[:2], xp.minimum(left, 1.7 * up))
+    side = _within(target[:2], xp.minimum(left, 1.7 * up))
     return stacked(side[0], side[1], lift)
 
 
