@@ -145,8 +145,10 @@ def test_thrusts_of_the_quadrotor_are_in_newtons(plant):
     assert system.B[states.index("p")] == pytest.approx([0.0, push, 0.0, -push], abs=1e-9)
 
 
-@pytest.mark.parametrize("law", ["pid", "indi", "geometric", "lqr"])
-@pytest.mark.parametrize("plant", ["mujoco", "rigid_body"])
+@pytest.mark.parametrize(
+    ("law", "plant"),
+    [("pid", "mujoco"), ("indi", "rigid_body"), ("geometric", "mujoco"), ("lqr", "rigid_body")],
+)
 def test_a_baseline_of_the_quadrotor_is_opened_at_its_rotors(law, plant):
     scenario = tiltsim.load_scenario(f"beyond/baselines#{law}_quadrotor")
     system = linearize(scenario.replace({"simulation.plant": plant}))
