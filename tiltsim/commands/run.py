@@ -150,7 +150,8 @@ def _warnings(scenario: Scenario) -> Iterator[str]:
     if through:
         yield (
             f"vehicle.mjcf: the vehicle passes through geom {through[0]!r}: contacts are those of "
-            "geoms whose names end in 'collision' and of 'ground', with a [ground] table"
+            "geoms whose names end in 'collision' and of 'ground', with a [ground] table; an "
+            "[[object]] has contacts, too"
         )
     deflections = [abs(angle) for angle in scenario.any_rotorcraft.hinge_deflections]
     most = max(deflections, default=0.0)

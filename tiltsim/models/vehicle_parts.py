@@ -101,7 +101,7 @@ def _check_names(compiled: mujoco.MjModel, model: str, parts: Parts) -> None:
         superfluous = [name for name in found if name not in required]
         if superfluous:
             name = repr(superfluous[0]) if superfluous[0] else "without a name"
-            more = "; the file has one vehicle, without arms and payloads" * (kind == "joint")
+            more = "; tools and loads are tables of the scenario" * (kind == "joint")
             raise ValueError(
                 f"{kind} {name} is not one of a {model}'s, which are {', '.join(required)}{more}"
             )
