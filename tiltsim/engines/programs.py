@@ -1,10 +1,13 @@
 """The functions of a closed loop as programs of a few vectors."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, Final, NamedTuple
+
+import numpy as np
 
 from tiltsim.closed_loop.choices import Choices, ProgramKey
 from tiltsim.closed_loop.limits import SINGULAR, WITHIN_LIMITS
+from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup
 from tiltsim.closed_loop.userdata import (
     EVALUATIONS,
     EVALUATIONS_PER_STEP,
@@ -14,9 +17,9 @@ from tiltsim.closed_loop.userdata import (
 )
 from tiltsim.engines.base import Vectors
 from tiltsim.equations.solvers import Integration, make_step
-from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.code.program import InputVector, Program
-from tiltsim_controllers.code.traceable import program_of
+from tiltsim_controllers.code.arrays import flatten, xp
+from tiltsim_controllers.code.program import Program
+from tiltsim_controllers.code.traceable import as_arrays, program_of
 from tiltsim_controllers.mathematics.records import record_size, unflatten
 from tiltsim_controllers.references.trajectories import ReferenceParameters
 
@@ -44,6 +47,39 @@ HEAD_SIZE: Final = record_size(RecorderHead)
 REFERENCE: Final = HEAD_SIZE - record_size(ReferenceParameters)
 
 
+class LoopFunction(NamedTuple):
+    """A function of vectors.
+
+    Attributes:
+        call: Returns numbers, arrays and tuples of them.
+        sizes: Sizes of its vectors, by name; ``user`` are parameters and knots.
+    """
+
+    call: Callable[..., Any]
+    sizes: dict[str, int]
+
+    def traced(self) -> Program:
+        """Its program."""
+        return program_of(self.call, **self.sizes)
+
+    def plain(self, setup: ControlSetup, **fixed: Sequence[float]) -> Callable[..., list[float]]:
+        """The function itself, where it cannot be traced, with some of its vectors bound.
+
+        Args:
+            setup: Parameters and knots.
+            fixed: Vectors by name.
+        """
+        bound = {"user": as_arrays(setup), **as_arrays(fixed)}
+
+        def call(*vectors: Sequence[float]) -> list[float]:
+            rest = iter(vectors)
+            given = [bound[n] if n in bound else np.array(next(rest), float) for n in self.sizes]
+            with np.errstate(all="ignore"):  # infinity and NaN, as in a program
+                return [float(value) for value in flatten(self.call(*given))[0]]
+
+        return call
+
+
 class LoopPrograms:
     """Traces the functions of a loop, whose choices are constants.
 
@@ -54,8 +90,10 @@ class LoopPrograms:
     def __init__(self, key: ProgramKey) -> None:
         self._loop, self._key = key.loop, key
 
-    def setup(self, user: InputVector) -> tuple[Any, InputVector]:
-        """Parameters and knots from their vector."""
+    def setup(self, user: Any) -> tuple[Any, Any]:
+        """Parameters and knots from their vector, or as they are."""
+        if isinstance(user, ControlSetup):
+            return user
         loop, choices = self._loop, self._key.parameters
         parameters = record_with_choices(loop.parameters, user, choices)
         return parameters, user[loop.record_size :]
@@ -66,12 +104,15 @@ class LoopPrograms:
         return self._loop.record_size + self._key.knots
 
     def in_mujoco(self, *names: str) -> dict[str, Program]:
-        """Programs of MuJoCo's vectors.
+        """Programs of `functions_in_mujoco` by name."""
+        functions = self.functions_in_mujoco()
+        return {name: functions[name].traced() for name in names}
 
-        Args:
-            names: "controls" and "hold", the control step at and between the samples of the
-                controller; "observe", the values of a sample; and "sample", a sample as the
-                recorder takes it.
+    def functions_in_mujoco(self) -> dict[str, LoopFunction]:
+        """Functions of MuJoCo's vectors.
+
+        "controls" and "hold" are the control step at and between the samples of the controller,
+        "observe" the values of a sample, "sample" a sample as the recorder takes it.
         """
         loop, sampling = self._loop, self._loop.sampling
         sizes = loop.dynamics.sizes._asdict()
@@ -97,33 +138,29 @@ class LoopPrograms:
             start = header[EVALUATIONS] / header[EVALUATIONS_PER_STEP] * header[TIMESTEP]
             return self._checked(start, observe(header, *given[:-1]), user, recorder)[0]
 
-        functions: dict[str, Callable[..., Any]] = {
-            "controls": controls,
-            "hold": hold,
-            "observe": observe,
-            "sample": sample,
-        }
-        sizes = {"sample": {**vectors, "recorder": HEAD_SIZE + SIDES}}
-        return {n: program_of(functions[n], **sizes.get(n, vectors)) for n in names}
+        functions = {"controls": controls, "hold": hold, "observe": observe}
+        recorded = {**vectors, "recorder": HEAD_SIZE + SIDES}
+        found = {name: LoopFunction(function, vectors) for name, function in functions.items()}
+        return {**found, "sample": LoopFunction(sample, recorded)}
 
-    def on_equations(self, states: int, solver: str, held: bool, *names: str) -> dict[str, Program]:
-        """Programs of the equations' state with the inputs in force.
+    def on_equations(self, states: int, solver: str, *, held: bool) -> dict[str, LoopFunction]:
+        """Functions of the equations' state with the inputs in force.
+
+        "step_sampled" and "sample_sampled" are a step and a sample of the flight at a sample of the
+        controller, "step_held" and "sample_held" between two. The results of a sample are its
+        fields, whether it ends the flight, and the signs that the next one has to keep.
 
         Args:
             states: Number of states.
             solver: See `tiltsim.equations.solvers.SOLVERS`.
             held: Whether the controller is sampled and held.
-            names: "step_sampled" and "sample_sampled", a step and a sample of the flight at a
-                sample of the controller; "step_held" and "sample_held", between two. The results
-                of a sample are its fields, whether it ends the flight, and the signs that the
-                next one has to keep.
         """
         equations = self._loop.equations
         assert equations is not None  # other loops do not fly on equations
         step, size = make_step(equations, solver), states + equations.inputs_size
 
         def stepped(samples: bool) -> Callable[..., Any]:
-            def run(index: Any, now: Any, settings: Any, user: InputVector) -> Any:
+            def run(index: Any, now: Any, settings: Any, user: Any) -> Any:
                 timestep, setup = settings[0], self.setup(user)
                 integration = Integration(timestep, int(held), *setup, settings[1:])
                 return step(index[0] * timestep, now[:states], now[states:], samples, integration)
@@ -131,7 +168,7 @@ class LoopPrograms:
             return run
 
         def sampled(samples: bool) -> Callable[..., Any]:
-            def run(index: Any, now: Any, settings: Any, user: InputVector, recorder: Any) -> Any:
+            def run(index: Any, now: Any, settings: Any, user: Any, recorder: Any) -> Any:
                 time, setup = index[0] * settings[0], self.setup(user)
                 state, force = now[:states], now[states:]
                 if samples:
@@ -146,14 +183,13 @@ class LoopPrograms:
         recorded = {**sizes, "recorder": HEAD_SIZE + SIDES}
         kinds = {"step": (stepped, sizes), "sample": (sampled, recorded)}
 
-        def traced(name: str) -> Program:
-            what, _, when = name.partition("_")
-            function, vectors = kinds[what]
-            return program_of(function(when == "sampled"), **vectors)
+        return {
+            f"{what}_{when}": LoopFunction(make(when == "sampled"), vectors)
+            for what, (make, vectors) in kinds.items()
+            for when in ("sampled", "held")
+        }
 
-        return {name: traced(name) for name in names}
-
-    def _checked(self, time: Any, values: Any, user: InputVector, recorder: Any) -> tuple[Any, Any]:
+    def _checked(self, time: Any, values: Any, user: Any, recorder: Any) -> tuple[Any, Any]:
         """A sample and whether it ends the flight as the monitor would; numbers with sign checks.
 
         A sign that is zero in the recorder is not known yet.
@@ -166,7 +202,7 @@ class LoopPrograms:
             ends = ends | has_ended
         return xp.hstack([time, values, ends]), checked
 
-    def _checks(self, time: Any, values: Any, user: InputVector, head: Any) -> tuple[Any, Any]:
+    def _checks(self, time: Any, values: Any, user: Any, head: Any) -> tuple[Any, Any]:
         """The code of the limit that a sample exceeds, and the numbers whose signs are checked.
 
         Args:
@@ -184,12 +220,17 @@ class LoopPrograms:
     def checks(self) -> Program:
         """The program of `_checks`, of the vectors time, values, head and user."""
 
-        def run(time: Any, values: Any, head: Any, user: InputVector) -> Any:
+        def run(time: Any, values: Any, head: Any, user: Any) -> Any:
             limit, checked = self._checks(time[0], values, user, head)
             return xp.hstack([limit, checked])
 
         sizes = {"values": len(self._loop.sample_fields) - 1, "head": HEAD_SIZE - REFERENCE + 1}
         return program_of(run, time=1, **sizes, user=self.user_size)
+
+
+def setup_of(loop: ClosedLoop, user: Sequence[float]) -> ControlSetup:
+    """Parameters and knots of a loop from their vector."""
+    return ControlSetup(unflatten(loop.parameters, user), tuple(user[loop.record_size :]))
 
 
 def record_with_choices(record: type[tuple[Any, ...]], numbers: Any, choices: Choices) -> Any:

@@ -9,21 +9,12 @@ import mujoco
 
 from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.closed_loop.choices import ProgramKey, program_key
-from tiltsim.closed_loop.userdata import (
-    CONTROL_PERIOD,
-    EVALUATIONS,
-    EVALUATIONS_PER_STEP,
-    HEADER_SIZE,
-    TIMESTEP,
-    evaluation_time,
-)
+from tiltsim.closed_loop.userdata import CONTROL_PERIOD, EVALUATIONS, HEADER_SIZE
 from tiltsim.engines.base import Callback, Engine, EngineName, check_model, vectors_of
-from tiltsim.engines.programs import KEPT, LoopPrograms
+from tiltsim.engines.programs import KEPT, LoopPrograms, setup_of
 from tiltsim.system.files import one_thread_at_a_time
 from tiltsim_controllers.code.program import Program
 from tiltsim_controllers.code.python_source import python_function
-from tiltsim_controllers.mathematics.records import unflatten
-from tiltsim_controllers.mathematics.scalar import Values, Vector
 
 
 @one_thread_at_a_time
@@ -33,7 +24,7 @@ def control_program(key: ProgramKey, name: str) -> Program:
     return LoopPrograms(key).in_mujoco(name)[name]
 
 
-def control_step(assembly: Assembly, user: list[float], name: str) -> Callable[..., Values]:
+def control_step(assembly: Assembly, user: list[float], name: str) -> Callable[..., Any]:
     """A function ``(header, *vectors, ctrl)`` of a loop, with parameters and knots bound.
 
     The vectors are `tiltsim.engines.base.Vectors`.
@@ -45,30 +36,10 @@ def control_step(assembly: Assembly, user: list[float], name: str) -> Callable[.
         user: Parameters and knots.
         name: See `LoopPrograms.in_mujoco`.
     """
-    loop = assembly.loop
+    key = program_key(assembly)
     if assembly.traced:
-        program = control_program(program_key(assembly), name)
-        return python_function(program, name, fixed={"user": user})
-    parameters = unflatten(loop.parameters, user)
-    knots = tuple(user[loop.record_size :])
-
-    def time_of(header: list[float]) -> float:
-        numbers = header[EVALUATIONS], header[EVALUATIONS_PER_STEP], header[TIMESTEP]
-        return evaluation_time(*numbers)
-
-    def controls(header: list[float], qpos: Vector, qvel: Vector, *act: Vector) -> Values:
-        seen = [number for part in act[:-1] for number in part]
-        return loop.sampling.controls(time_of(header), qpos, qvel, seen, parameters, knots)
-
-    def hold(header: list[float], qpos: Vector, qvel: Vector, *act: Vector) -> Values:
-        seen, ctrl = [number for part in act[:-1] for number in part], act[-1]
-        return loop.sampling.hold(time_of(header), qpos, qvel, seen, ctrl, parameters)
-
-    def observe(_header: list[float], qpos: Vector, qvel: Vector, *act: Vector) -> Values:
-        seen = [number for part in act[:-1] for number in part]
-        return loop.columns.observe(qpos, qvel, seen, act[-1])
-
-    return {"controls": controls, "hold": hold, "observe": observe}[name]
+        return python_function(control_program(key, name), name, fixed={"user": user})
+    return LoopPrograms(key).functions_in_mujoco()[name].plain(setup_of(assembly.loop, user))
 
 
 class PythonEngine(Engine):

@@ -2,7 +2,7 @@
 
 import ctypes
 from collections.abc import Callable, Sequence
-from functools import cache, lru_cache
+from functools import cache, lru_cache, partial
 from typing import Any, Literal, NamedTuple, Protocol
 
 import numpy as np
@@ -11,15 +11,13 @@ from tiltsim.closed_loop.choices import ProgramKey
 from tiltsim.closed_loop.loop import Equations
 from tiltsim.engines.glue import stepper_text
 from tiltsim.engines.machine_code import MachineCode, lane_math
-from tiltsim.engines.programs import HEAD_SIZE, KEPT, SIDES, LoopPrograms
+from tiltsim.engines.programs import HEAD_SIZE, KEPT, SIDES, LoopFunction, LoopPrograms, setup_of
 from tiltsim.engines.recorder import UNLIMITED, Recorder
-from tiltsim.equations.solvers import Integration, make_step
 from tiltsim.system.files import one_thread_at_a_time
 from tiltsim_controllers.code.llvm_text import llvm_functions
 from tiltsim_controllers.code.program import Program
 from tiltsim_controllers.code.python_source import python_function
-from tiltsim_controllers.mathematics.records import record_size, unflatten
-from tiltsim_controllers.mathematics.scalar import Floats, Triple, Values, Vector
+from tiltsim_controllers.mathematics.scalar import Floats, Triple, Values
 
 
 class Layout(NamedTuple):
@@ -93,8 +91,20 @@ class Stepper(Protocol):
 @one_thread_at_a_time
 @lru_cache(maxsize=KEPT)
 def _program(layout: Layout, name: str) -> Program:
-    key, states, solver, held, _ = layout
-    return LoopPrograms(key).on_equations(states, solver, held, name)[name]
+    return _functions(layout)[name].traced()
+
+
+def _functions(layout: Layout) -> dict[str, LoopFunction]:
+    programs = LoopPrograms(layout.key)
+    return programs.on_equations(layout.states, layout.solver, held=layout.held)
+
+
+def _in_python(flight: Integrated, name: str, **fixed: Sequence[float]) -> Callable[..., Any]:
+    """A function ``((index,), now) -> numbers`` of `LoopPrograms.on_equations`."""
+    user, fixed = flight.user.tolist(), {"settings": flight.settings, **fixed}
+    if flight.traced:
+        return python_function(_program(flight.layout, name), name, fixed={"user": user, **fixed})
+    return _functions(flight.layout)[name].plain(setup_of(flight.layout.key.loop, user), **fixed)
 
 
 class PythonStepper(Stepper):
@@ -102,9 +112,9 @@ class PythonStepper(Stepper):
 
     def __init__(self, flight: Integrated) -> None:
         self._every = flight.control_steps or 1
-        step = _traced_step if flight.traced else _plain_step
-        self._sampled = step(flight, True)
-        self._held = step(flight, False) if flight.control_steps else self._sampled
+        self._sampled = self._held = _in_python(flight, "step_sampled")
+        if flight.control_steps:
+            self._held = _in_python(flight, "step_held")
 
     def advance(self, step_index: int, now: Floats, steps: int) -> Floats:
         values: Any = now.tolist()
@@ -114,67 +124,20 @@ class PythonStepper(Stepper):
         return np.array(values)
 
 
-Step = Callable[[tuple[float], list[float]], Sequence[float]]
-"""``((index,), now) -> now``: one step."""
-
-
-def _traced_step(flight: Integrated, samples: bool) -> Step:
-    name = "step_sampled" if samples else "step_held"
-    fixed = {"settings": flight.settings, "user": flight.user.tolist()}
-    return python_function(_program(flight.layout, name), name, fixed=fixed)
-
-
-def _plain_step(flight: Integrated, samples: bool) -> Step:
-    loop, states = flight.layout.key.loop, flight.layout.states
-    one_step = make_step(flight.layout.equations, flight.layout.solver)
-    record, size = loop.parameters, loop.record_size
-    numbers = flight.user.tolist()
-    setup = unflatten(record, numbers), tuple(numbers[size:])
-    timing = flight.timestep, flight.control_steps
-    integration = Integration(*timing, *setup, flight.disturbance)
-
-    def step(index: tuple[float], now: list[float]) -> list[float]:
-        state: Vector
-        time, state, held = index[0] * flight.timestep, now[:states], now[states:]
-        state, force = one_step(time, state, tuple(held), samples, integration)
-        return [*state, *force]
-
-    return step
-
-
 def observation(flight: Integrated) -> Callable[[int, Floats], Values]:
     """Samples without their time: ``(step_index, now) -> values``, as machine code takes them.
 
     Args:
         flight: Its state and the inputs in force are ``now``, shape (states + inputs,).
     """
-    every, observe = flight.control_steps or 1, cache(_observe_of(flight))
-    return lambda index, now: observe(index % every == 0)(index, now.tolist())
+    every, fields = flight.control_steps or 1, len(flight.layout.key.loop.sample_fields)
+    sample = cache(partial(_in_python, flight, recorder=[0.0] * (HEAD_SIZE + SIDES)))
 
+    def observe(index: int, now: Floats) -> Values:
+        name = "sample_held" if index % every else "sample_sampled"
+        return tuple(sample(name)((float(index),), now.tolist()))[1:fields]
 
-def _observe_of(flight: Integrated) -> Callable[[bool], Callable[[int, list[float]], Values]]:
-    loop = flight.layout.key.loop
-
-    def traced(samples: bool) -> Callable[[int, list[float]], Values]:
-        name, fields = ("sample_sampled" if samples else "sample_held"), len(loop.sample_fields)
-        fixed = {"settings": flight.settings, "user": flight.user.tolist()}
-        fixed["recorder"] = [0.0] * (HEAD_SIZE + SIDES)
-        sample = python_function(_program(flight.layout, name), name, fixed=fixed)
-        return lambda index, now: tuple(sample((float(index),), now))[1:fields]
-
-    def plain(samples: bool) -> Callable[[int, list[float]], Values]:
-        equations, numbers = flight.layout.equations, flight.user.tolist()
-        record, states = loop.parameters, flight.layout.states
-        setup = unflatten(record, numbers), tuple(numbers[record_size(record) :])
-
-        def observe(index: int, now: list[float]) -> Values:
-            time, state, held = index * flight.timestep, now[:states], now[states:]
-            force = equations.inputs(time, state, *setup) if samples else tuple(held)
-            return equations.observe(time, state, force, *setup)
-
-        return observe
-
-    return traced if flight.traced else plain
+    return observe
 
 
 @one_thread_at_a_time

@@ -115,7 +115,7 @@ def _compile(
 
 def initial_tilt(plan: FlightPlan) -> tuple[float, float]:
     """Tilt angle (rad) and its rate (rad/s) at time zero: the gait's."""
-    angle, rate, _ = plan.gait.jets(0.0)[0]  # a gait of another vehicle has more
+    angle, rate, _ = plan.gait.jets(0.0)[0]
     return angle, rate
 
 
