@@ -320,8 +320,8 @@ def test_every_scenario_can_be_used_or_is_refused_in_a_line(law, vehicle):
         scenario = fitting(law, vehicle)
         lines = {name: attempt(use, scenario)[1] for name, use in USES_OF_SCENARIOS.items()}
         assert not any(lines[name] for name in ("load_scenario", "parse_scenario", "fly"))
-        for plant in PLANTS:
-            attempt(on(plant, USES_OF_SCENARIOS["simulate"]), scenario)
+        plant = PLANTS[claimed(VEHICLES).index((law, vehicle)) % len(PLANTS)]
+        attempt(on(plant, USES_OF_SCENARIOS["simulate"]), scenario)
         attempt(on("thesis", tiltsim.symbolic), scenario)
 
 

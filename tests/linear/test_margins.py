@@ -120,7 +120,8 @@ def test_the_position_of_an_integral_law_bears_any_smaller_gain():
     assert growth(0.999 * high) < 1e-6 < growth(1.001 * high)
     control = pytest.importorskip("control")
     space = control.ss(loop.A, loop.B, -loop.C, 0.0)
-    gain, phase, *_ = control.margin(space)
+    with np.errstate(over="ignore"):  # at roots of python-control's polynomials near infinity
+        gain, phase, *_ = control.margin(space)
     assert (gain, np.radians(phase)) == (pytest.approx(high, rel=1e-3), pytest.approx(margin.phase))
 
 
@@ -144,8 +145,10 @@ def test_thrusts_of_the_quadrotor_are_in_newtons(plant):
     assert system.B[states.index("p")] == pytest.approx([0.0, push, 0.0, -push], abs=1e-9)
 
 
-@pytest.mark.parametrize("law", ["pid", "indi", "geometric", "lqr"])
-@pytest.mark.parametrize("plant", ["mujoco", "rigid_body"])
+@pytest.mark.parametrize(
+    ("law", "plant"),
+    [("pid", "mujoco"), ("indi", "rigid_body"), ("geometric", "mujoco"), ("lqr", "rigid_body")],
+)
 def test_a_baseline_of_the_quadrotor_is_opened_at_its_rotors(law, plant):
     scenario = tiltsim.load_scenario(f"beyond/baselines#{law}_quadrotor")
     system = linearize(scenario.replace({"simulation.plant": plant}))

@@ -70,8 +70,7 @@ def budgets(flight, inertia):
 
 
 @pytest.mark.parametrize("plant", ["mujoco", "rigid_body", "thesis"])
-@pytest.mark.parametrize("inertia", [0.0, INERTIA])
-@pytest.mark.parametrize("kind", ["tiltrotor", "loaded hinges"])
+@pytest.mark.parametrize(("kind", "inertia"), [("tiltrotor", 0.0), ("loaded hinges", INERTIA)])
 def test_rotors_make_all_changes_of_momentum_and_energy(kind, inertia, plant, tmp_path):
     if kind == "tiltrotor":
         desired = tiltrotor(plant, {**LAG, "rotor_inertia": inertia})

@@ -187,8 +187,6 @@ WEAK = [{"type": "partial_thrust", "rotor": 1, "time": 0.02, "factor": 0.95}]
         ("thesis", HOLD | MEASURED),
         ("rigid_body", SCALE),
         ("mujoco", MEASURED),
-        ("rigid_body", MEASURED),
-        ("mujoco", PRIORITIZED),
         ("rigid_body", PRIORITIZED | SCALE),
     ],
 )
