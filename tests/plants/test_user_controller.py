@@ -383,6 +383,27 @@ def test_the_observation_is_the_state_the_reference_and_the_gait():
     assert second.vehicle == flown.scenario.vehicle.resolve()
 
 
+def test_a_preview_shows_the_later_references():
+    seen, shown = [], []
+
+    def look(observation):
+        seen.append(observation.reference)
+        shown.append(observation.preview([0.005, 0.01]))
+        return STILL
+
+    circle = {"type": "circle", "radius": 2.0, "angular_frequency": 0.5, "yaw": 0.2}
+    trot = {"type": "trot_continuous", "amplitude": 0.3, "period": 1.0}
+    times = {"duration": 0.015, "control_timestep": 0.005}
+    tiltsim.simulate(scenario(times, gait=trot, reference=circle), controller=look)
+    assert shown[0].position.shape == (2, 3)
+    assert shown[0].tilt_rates.shape == (2, 4)
+    for name in ("position", "velocity", "acceleration", "attitude", "tilt_angles", "tilt_rates"):
+        later = [getattr(reference, name) for reference in seen[1:]]
+        # The reference of an observation is that just after its time.
+        np.testing.assert_allclose(getattr(shown[0], name), later, atol=1e-6)
+        np.testing.assert_array_equal(getattr(shown[0], name), getattr(shown[1], name))
+
+
 def test_changing_an_observation_changes_nothing_else():
     def meddle(observation):
         observation.position[:] = 1e6

@@ -81,7 +81,7 @@ def test_arrows_of_spin_and_tilt_turn_as_the_rotors_do(monkeypatch):
         if len(points) > 2:
             curved.append(points)
 
-    monkeypatch.setattr(concepts, "arrow", record)
+    monkeypatch.setattr(vehicle_drawing, "arrow", record)
     figure = concepts.vehicle_figure()
     rotors = Pose((concepts.POSITIVE_TILT,) * 4).rotors
     for rotor, tilt, spin in zip(rotors, curved[::2], curved[1::2], strict=True):

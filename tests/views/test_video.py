@@ -269,7 +269,9 @@ def test_an_invalid_mujoco_gl_is_an_error_of_one_line(way, tmp_path):
     if way == "osmesa" and (sys.platform != "linux" or find_library("OSMesa")):
         pytest.skip("OSMesa is installed")
     command = [sys.executable, "-m", "tiltsim", "run", "ch01_gust/hover#quadrotor", "--quiet"]
-    environment = os.environ | {"MUJOCO_GL": way}
+    # Rendering in this process has set the second one.
+    unset = {name: value for name, value in os.environ.items() if name != "PYOPENGL_PLATFORM"}
+    environment = unset | {"MUJOCO_GL": way}
     done = subprocess.run(command, capture_output=True, text=True, env=environment, timeout=300)
     (line,) = done.stderr.splitlines()
     assert (done.returncode, done.stdout) == (2, "")

@@ -123,13 +123,12 @@ def _thrust_axis_and_thrust(seen: Seen, p: Any, knots: Any) -> Any:
     return xp.hstack([_thrust_axis(seen, p, knots), seen.states[:1]])
 
 
-def _causes(sample: Mapping[str, float], _setup: ControlSetup) -> tuple[str, ...]:
-    """A roll or pitch of 90 degrees, or no thrust."""
+def _thrust_axis_cause(sample: Mapping[str, float], _setup: ControlSetup) -> tuple[str, ...]:
+    """Cause for `_thrust_axis`: a roll or pitch of 90 degrees."""
     roll, pitch = sample["roll"], sample["pitch"]
     return (
         "the decoupling matrix became singular: the thrust axis came level, "
         f"at roll = {roll:.3g} rad, pitch = {pitch:.3g} rad",
-        "the decoupling matrix became singular: the thrust came to zero",
     )
 
 
@@ -174,7 +173,9 @@ def _loop(step: Callable[[Seen, Any, Any], Step], record: Any, **options: Any) -
     def setup(plan: FlightPlan) -> tuple[Any, tuple[float, ...]]:
         return parameters_of(plan, record, vehicle=plan.scenario.rotorcraft.resolve()), ()
 
-    law = Law(step, record, setup, causes=_causes, **options)
+    law = Law(
+        step, record, setup, **{"signs": _thrust_axis, "causes": _thrust_axis_cause, **options}
+    )
     return replace(rotor_loop(LAYOUT, law, _Thrusting), kind=ROTORCRAFT)
 
 
@@ -187,6 +188,10 @@ YAW_POSITION: Final = _loop(
     units={"published_determinant": "1"},
     margins=_extended_singularity,
     signs=_thrust_axis_and_thrust,
+    causes=lambda sample, setup: (
+        *_thrust_axis_cause(sample, setup),
+        "the decoupling matrix became singular: the thrust came to zero",
+    ),
 )
 """The yaw-position controller of the quadrotor."""
 
@@ -194,7 +199,6 @@ QUADROTOR_ATTITUDE_ALTITUDE: Final = _loop(
     _attitude_altitude,
     quadrotor_attitude_altitude.Parameters,
     margins=upright_columns,
-    signs=_thrust_axis,
     follows_position=lambda _scenario: False,
 )
 """The attitude-altitude controller of the quadrotor (ch. 2, Appendix B)."""
@@ -207,8 +211,7 @@ SWITCHING: Final = _loop(
     signals=(*REFERENCE_COLUMNS[3:], "attitude_zone"),
     units={"published_determinant": "1", "attitude_zone": "1"},
     margins=_extended_singularity,
-    signs=_thrust_axis,  # the thrust may be anything while the other law is active
-    # In the zone, where the vehicle is meant to end up, the position is free.
+    # In the zone, where the vehicle is meant to end up, position and thrust are free.
     follows_position=lambda _scenario: False,
 )
 """Switching between yaw-position and attitude-altitude control of the quadrotor (ch. 2, Sec. 5)."""

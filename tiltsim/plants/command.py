@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from math import isfinite, pi
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from tiltsim.errors import TiltsimError
 from tiltsim.models.rotor_table import Multirotor
@@ -53,6 +54,28 @@ class Observation:
     vehicle: Vehicle | Multirotor  # mass, inertia, gravity, and the rotors' coefficients
     contact_force: Floats = field(default_factory=lambda: np.zeros(3))
     """(3,), N, world: of the vehicle on all objects, over the last physics step."""
+    reference_at: Callable[[float], Reference] | None = field(
+        default=None, repr=False, compare=False
+    )
+    """The reference at a time, s; None in environments. `preview` uses it."""
+
+    def preview(self, times: ArrayLike) -> Reference:
+        """The reference and the planned gait at other times of the flight, such as future ones.
+
+        Args:
+            times: s, from the beginning of the flight, shape (K,).
+
+        Returns:
+            Entries of shape (K, 3), and (K, M) for the tilts.
+
+        Raises:
+            ControllerError: For an observation of an environment, which has no preview.
+        """
+        if self.reference_at is None:
+            raise ControllerError("asked for a preview, which environments do not have")
+        each = [self.reference_at(float(time)) for time in np.atleast_1d(times)]
+        names = (entry.name for entry in fields(Reference))
+        return Reference(*(np.array([getattr(one, name) for one in each]) for name in names))
 
 
 Controller = Callable[[Observation], Command]

@@ -51,6 +51,7 @@ class Observer:
             rotor_speeds=self._spins * rotor_speeds,
             reference=self._reference(time),
             vehicle=self._vehicle,
+            reference_at=self._reference,
             contact_force=sum((data.history[p] for p in self._forces), np.zeros(3)),
         )
 
