@@ -63,10 +63,10 @@ class Firmware(threading.Thread):
         rates = FLIP * state["imu"]["gyro"]
         w, x, y, z = state["quaternion"]
         error = 2.0 * np.sign(w) * np.array([x, -y, -z])
-        wanted = 2.0 * (np.array([0.0, 0.0, HEIGHT]) - position) - 2.5 * velocity
-        lean = np.clip([-wanted[1] / 9.8, wanted[0] / 9.8, 0.0], -0.2, 0.2)
+        demanded = 2.0 * (np.array([0.0, 0.0, HEIGHT]) - position) - 2.5 * velocity
+        lean = np.clip([-demanded[1] / 9.8, demanded[0] / 9.8, 0.0], -0.2, 0.2)
         torque = self.inertia * (60.0 * (lean - error) - 14.0 * rates)
-        lift = self.weight * min(1.0 + wanted[2] / 9.8, 1.3 * state["timestamp"])
+        lift = self.weight * min(1.0 + demanded[2] / 9.8, 1.3 * state["timestamp"])
         shares = self.inverse @ np.array([0.0, 0.0, lift, *torque])
         if self.linear:
             return 1500.0 + 500.0 * np.clip(shares, -1.0, 1.0)

@@ -44,6 +44,7 @@ def test_the_flight_agrees_with_the_engine_and_consists_of_steps():
     for _ in range(10):
         state = step(state, changes)
     assert flown.observe(state, changes)["x"] == pytest.approx(flight["x"][1], abs=1e-12)
+    assert {"position", "velocity", "attitude"} <= set(flown.parameters["initial"])
 
 
 def test_parameters_are_the_numbers_that_a_flight_depends_on():

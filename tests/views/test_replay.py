@@ -6,8 +6,10 @@ import mujoco
 import numpy as np
 import pytest
 
+import tiltsim
 from tests.flights import flight
 from tiltsim.views.replay import (
+    cable,
     joint_positions,
     poses_in_parents,
     rotate,
@@ -82,3 +84,14 @@ def test_arrows_are_about_as_long_as_the_arms_at_hover():
     assert set(thrust_sites(model).values()) == {f"thrust_{i}" for i in (1, 2, 3, 4)}
     assert vehicle_radius(model) == pytest.approx(0.1785)
     assert thrust_scale(model) == pytest.approx(0.2)
+
+
+def test_a_cable_ends_at_its_vehicle_and_at_its_load():
+    changes = {"simulation.duration": 0.2, "payload.swing": 0.3, "expect": []}
+    carried = tiltsim.simulate(tiltsim.load_scenario("interaction/carry#cable", changes))
+    model = visible_model(carried.assembly)
+    world = world_poses(model, joint_positions(model, carried.columns))
+    ends = cable(model, world)
+    np.testing.assert_allclose(np.linalg.norm(np.diff(ends, axis=1), axis=-1), 1.0, atol=2e-3)
+    load = np.stack([carried[f"payload_{axis}"] for axis in "xyz"], axis=1)
+    np.testing.assert_allclose(ends[:, 1], load, atol=1e-9)

@@ -94,7 +94,7 @@ class CarFunctions(VehicleFunctions):
             Dynamics("tilt_car", sizes, activations, states, commands_thrusts=commands_thrusts),
             {
                 "servo_lead": lambda plan: servo_lead(plan.scenario.tilt_car.tilt_servo),
-                "heading": lambda plan: float(plan.scenario.initial.attitude[2]),
+                "heading": lambda plan: plan.scenario.initial.attitude[2],
             },
             inputs_size,
             tuple(f"law_speed_{rotor}" for rotor in ROTORS if states > 1),

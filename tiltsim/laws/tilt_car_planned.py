@@ -23,7 +23,7 @@ from tiltsim_controllers.mathematics.scalar import Floats, Vector
 from tiltsim_controllers.tilt_car import planned_direction
 from tiltsim_controllers.tilt_car.vehicle import counter_yaw_per_tilt
 
-WANTED: Final = tuple(f"wanted_square_{rotor}" for rotor in ROTORS)
+SQUARES: Final = tuple(f"wanted_square_{rotor}" for rotor in ROTORS)
 
 
 def _tilt(time: Any, p: Any, knots: Any) -> Any:
@@ -101,7 +101,7 @@ def _columns(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Fl
     lyapunov: Any = planned_direction.lyapunov_candidate(error, error_rate, gains)
     switches = {
         f"switch_{rotor}": (samples[name] > 0.0).astype(float)
-        for rotor, name in zip(ROTORS, WANTED, strict=True)
+        for rotor, name in zip(ROTORS, SQUARES, strict=True)
     }
     return {**direction_columns(samples, setup), **switches, "lyapunov": lyapunov}
 
@@ -111,9 +111,9 @@ PLANNED_DIRECTION: Final = _Planned(
         _step,
         planned_direction.Parameters,
         car_setup_of(planned_direction.Parameters),
-        signals=(*DEMANDED, *WANTED, "alpha_ref"),
+        signals=(*DEMANDED, *SQUARES, "alpha_ref"),
         units={
-            **dict.fromkeys(WANTED, "rad^2/s^2"),
+            **dict.fromkeys(SQUARES, "rad^2/s^2"),
             **{f"switch_{rotor}": "1" for rotor in ROTORS},
             "lyapunov": "m^2/s^2",
         },

@@ -100,6 +100,8 @@ def conditions(piece: Flight) -> Iterator[Condition]:
         inside = piece["attitude_zone"] > 0.5
         yield "switched to attitude-altitude control", time, inside
         yield "switched to yaw-position control", time, ~inside
+    if "contact_time" in piece.columns:
+        yield "touches an object", time, np.diff(piece["contact_time"], prepend=np.inf) > 0.0
     if scenario.vehicle.is_planar:
         for rotor in piece.assembly.loop.kind.rotors:
             stopped = at_lower_limit(piece[f"rotor_speed_{rotor}"], 0.0)

@@ -102,6 +102,14 @@ def poses_in_parents(model: mujoco.MjModel, poses: Poses) -> Poses:
     return Poses(rotate(inverse, offset), _product(inverse, poses.quaternion))
 
 
+def cable(model: mujoco.MjModel, world: Poses) -> Floats:
+    """Both ends of the cable of a load in the world (m), shape (N, 2, 3)."""
+    vehicle, load = first_free_body(model), model.body("payload").id
+    place = model.site_pos[model.site("payload_attachment").id]
+    begin = world.position[:, vehicle] + rotate(world.quaternion[:, vehicle], place)
+    return np.stack([begin, world.position[:, load]], axis=1)
+
+
 def thrust_sites(model: mujoco.MjModel) -> dict[int, str]:
     """Sites with a rotor's thrust along their z axis, and the column of that thrust (N)."""
     names = {site: model.site(site).name for site in range(model.nsite)}

@@ -15,6 +15,7 @@ from tiltsim_controllers.gaits.motion import anticipated_tilts, planned_tilts
 from tiltsim_controllers.gaits.parameters import FIXED, NO_KNOTS, GaitParameters
 from tiltsim_controllers.laws.allocation import RotorRange, limited_accelerations
 from tiltsim_controllers.laws.attitude_altitude import OPTIONS, AttitudeAltitude
+from tiltsim_controllers.laws.decouplers import NONE
 from tiltsim_controllers.laws.gains import Gains, IntegralGains
 from tiltsim_controllers.laws.keys import record_of
 from tiltsim_controllers.laws.multirotor import attitude_force, present_wrench
@@ -97,7 +98,7 @@ def gait_law_of(layout: TiltOfRotor, form: Form, supervision: Supervision) -> Ca
     def law(seen: Seen, p: Any, knots: Any = NO_KNOTS) -> Step:
         plan = None
         moves = (p.gait.type != FIXED or form.supervised) and p.terms.attitude_rates != 0.0
-        if leans_with_gait and (moves or form.own_yaw):
+        if leans_with_gait and (moves or form.own_yaw) and p.decoupler != NONE:
             if form.supervised:
                 plan, _ = supervised_gait(seen, p, knots, supervision, p.anticipation)
             else:
