@@ -209,7 +209,7 @@ def _numbers(known: Any, values: dict[str, Any]) -> Numbers:
     )
 
 
-class Motion:
+class LoggedMotion:
     """The equations of a vehicle's model for one layout, as functions of small arrays.
 
     A state is position, velocity, quaternion, body rates, speeds that follow commands, tilts that
@@ -312,7 +312,7 @@ def residuals_of(layout: TiltOfRotor, free: tuple[tuple[str, str], ...]) -> Call
     import jax.numpy as jnp
 
     fields = frozenset(field for _, field in free)
-    motion, in_jax = Motion(layout, fields), InJax("float64")
+    motion, in_jax = LoggedMotion(layout, fields), InJax("float64")
     start, rate, errors = (
         _stacked(in_jax(function)) for function in (motion.start, motion.rate, motion.errors)
     )
