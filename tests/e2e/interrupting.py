@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import argparse
+import faulthandler
 import multiprocessing
 import os
 import shutil
@@ -68,6 +69,7 @@ def _as_console_script(arguments, output):
     with output.open("wb") as file:
         os.dup2(file.fileno(), 1)
         os.dup2(file.fileno(), 2)
+    faulthandler.enable(2)
     sys.argv = ["tiltsim", *arguments]
     sys.exit(main())
 
@@ -77,7 +79,7 @@ class _Fresh:
 
     def __init__(self, arguments, output):
         with output.open("wb") as file:
-            command = [sys.executable, "-m", "tiltsim", *arguments]
+            command = [sys.executable, "-X", "faulthandler", "-m", "tiltsim", *arguments]
             self._process = subprocess.Popen(command, stdout=file, stderr=file)
         self.pid = self._process.pid
 
@@ -152,9 +154,11 @@ class Interrupting:
         process.join(PATIENCE)
         self.slowest = max(self.slowest, monotonic() - sent)
         if process.exitcode is None:
+            os.kill(process.pid, signal.SIGABRT)  # the fault handler prints where it is
+            process.join(PATIENCE)
             process.kill()
-            process.join()
-            return f"{number.name}: runs on for {PATIENCE} s"
+            where = self._output.read_text(errors="replace")
+            return f"{number.name}: runs on for {PATIENCE} s\n{where}"
         return self._mistake(number, process.exitcode)
 
     def _mistake(self, number, code):

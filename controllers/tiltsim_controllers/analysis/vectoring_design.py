@@ -37,8 +37,8 @@ POSITION_SHARE: Final = 0.3
 """Position bandwidth over attitude bandwidth."""
 FASTEST: Final = (40.0, 23.0, 8.0)
 """rad/s: attitude, yaw and position without lag and latency."""
-YAW_ERROR: Final = 0.1
-"""rad: the error of yaw that demands all of the yaw torque, or more."""
+ERROR: Final = 0.1
+"""rad: the error of attitude or yaw that demands all torque about its axis, or more."""
 TORQUE_OBSERVER: Final = 40.0
 """1/s: the fastest observer of torque."""
 TRACKING: Final = 250.0
@@ -267,10 +267,12 @@ def design(
     sample = h * timing.sampled
     # The prediction removes most of the delay; its error grows with the delay.
     left = 1.0 / tracking + (0.6 * sample + 0.25 * latency if keys.prediction else sample + latency)
-    attitude = keys.attitude_bandwidth or min(FASTEST[0], DELAY_MARGIN / left)
+    attitude = keys.attitude_bandwidth or min(
+        FASTEST[0], DELAY_MARGIN / left, (angular / ERROR) ** 0.5
+    )
     position = keys.position_bandwidth or min(FASTEST[2], POSITION_SHARE * attitude)
     delay = 1.5 * sample + 1.0 / tracking + latency
-    yaw = min(FASTEST[1], attitude, (yaw_angular / YAW_ERROR) ** 0.5)
+    yaw = min(FASTEST[1], attitude, (yaw_angular / ERROR) ** 0.5)
     servo_angle, servo_rate = _servo_step(timing.servo, h)
     parameters = Parameters(
         period=h,
