@@ -50,7 +50,7 @@ def nested(x):
 
     def body(i, a, b):
         step = branch(
-            (a > b) & ~(i < 1.0) | xp.isnan(a),
+            (a > b) & (i >= 1.0) | xp.isnan(a),
             lambda: repeat(5, newton, a + i)[0],
             lambda: xp.sin(a) * 2.0,
         )
