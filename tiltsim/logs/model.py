@@ -232,7 +232,7 @@ class LoggedMotion:
             guess: Measured position, velocity, quaternion and body rates, shape (13,).
             initial: Their changes, the rotation's as a small turn, shape (12,).
             speeds, tilts: Measured, rad/s and rad.
-            center: Of mass, from where the scenario has it, m, shape (3,).
+            center: The center of mass, from its place in the scenario, m, shape (3,).
         """
         small = xp.hstack([1.0, 0.5 * initial[6:9]])
         turn = quaternion_product(guess[6:10], small / norm(small))
