@@ -15,6 +15,8 @@ from tests.views.recordings import entities
 from tiltsim.cli import main
 from tiltsim.errors import InputError
 from tiltsim.laws.assembling import assemble
+from tiltsim.models.parts import TiltServo
+from tiltsim.models.rotorcraft import RotorcraftSpec, compile_model
 from tiltsim.models.user_vehicle import read_user_vehicle
 from tiltsim.plants.command import Command
 from tiltsim.plants.flight_model import build_model
@@ -498,3 +500,18 @@ def test_a_ground_needs_geoms_to_touch_it(write):
     model = build_model(assemble(scenario(path, ground={"height": -1.0})))
     assert model.geom("hull_collision").contype[0] == 1
     assert model.geom("ground").pos[2] == -1.0
+
+
+def test_stops_hold_for_servos_that_inherit_the_range_of_their_joints(write):
+    joint = (' armature="2e-5"', ' armature="2e-5" range="-1 1"')
+    servo = ('kv="0.01"', 'dampratio="1" inheritrange="1"')
+    own = read_user_vehicle(str(write(edited(joint, servo))), "tiltrotor")
+    for limit in (0.5, None):
+        tilt = TiltServo(damping_ratio=0.0, max_angle=limit)
+        spec = RotorcraftSpec("tiltrotor", own.vehicle, user_vehicle=own, tilt_servo=tilt)
+        model = compile_model(spec)
+        for i in range(1, 5):
+            hinge, command = model.joint(f"tilt_{i}"), model.actuator(f"tilt_{i}")
+            assert (hinge.limited[0], command.ctrllimited[0]) == (limit is not None,) * 2
+            if limit:
+                assert hinge.range.tolist() == command.ctrlrange.tolist() == [-limit, limit]
