@@ -347,7 +347,7 @@ def test_every_engine_flies_every_law_or_refuses_it_in_a_line(law, vehicle, engi
 # --- tables and their keys ---------------------------------------------------------------------
 
 NOT_FLOWN = {*DESCRIPTIVE, "variant", "autopilot"}
-"""Tables that change nothing in a flight, or need a firmware; see tests/plants/test_autopilot.py."""
+"""Tables that change nothing in a flight, or need a firmware: tests/plants/test_autopilot.py."""
 
 
 def companions(document):
