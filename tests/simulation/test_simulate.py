@@ -202,7 +202,7 @@ def test_saved_state_restarts_bit_identically(plant, engine, control_timestep):
     restarted.advance(13)  # somewhere else, so that the state has to do all the work
     restarted.state = saved
     restarted.advance(60)
-    assert np.isfinite(straight.state).all()
+    assert not np.isnan(straight.state).any()  # a limit may be infinite
     assert restarted.time == straight.time
     np.testing.assert_array_equal(restarted.state, straight.state)
     assert restarted.observe() == straight.observe()
