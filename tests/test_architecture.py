@@ -48,7 +48,7 @@ ORDER = {
 
 FLYING_PREFIXES = tuple(f"tiltsim.{folder}." for folder in FLYING)
 HEAVY = {
-    *("av", "casadi", "gymnasium", "jax", "matplotlib", "mujoco"),
+    *("av", "casadi", "dm_control", "gymnasium", "jax", "matplotlib", "mujoco"),
     *("llvmlite", "pandas", "pyarrow", "pydantic", "rerun"),
 }
 
@@ -185,7 +185,7 @@ def test_few_modules_lie_directly_in_the_package():
 
 def test_controllers_know_neither_mujoco_nor_the_testbed():
     modules = [module for module in FILES if module.startswith("tiltsim_controllers")]
-    assert not set().union(*map(roots, modules)) & {"mujoco", "tiltsim", "llvmlite"}
+    assert not set().union(*map(roots, modules)) & {"mujoco", "dm_control", "tiltsim", "llvmlite"}
 
 
 def test_flying_needs_no_library_for_screens():
@@ -206,7 +206,7 @@ def test_every_step_loads_only_what_it_needs(tmp_path):
     assert not parser & (HEAVY | SLOW)
     assert not scenario & (HEAVY - {"pydantic"})
     assert "mujoco" in saved
-    assert not saved & (HEAVY - {"mujoco", "pydantic", "pyarrow"})
+    assert not saved & (HEAVY - {"mujoco", "dm_control", "pydantic", "pyarrow"})
 
 
 def test_every_public_name_of_the_package_resolves():

@@ -124,7 +124,7 @@ def build_parser(only: str | None = None) -> argparse.ArgumentParser:
     return parser
 
 
-OPENGL_USERS: Final = ("mujoco",)
+OPENGL_USERS: Final = ("mujoco", "dm_control._render")
 """Packages that fail to load if the OpenGL library that MUJOCO_GL names is missing."""
 
 GARBAGE_THRESHOLD: Final = 50_000

@@ -149,7 +149,7 @@ def run_one(number, seed, folder):
 def _native_output(found):
     """Append what compiled code, such as MuJoCo's, prints past Python in the block."""
     flush = ctypes.CDLL(None).fflush
-    mujoco.set_mju_user_warning(None)
+    mujoco.set_mju_user_warning(None)  # dm_control's handler would pass warnings to Python's log
     with TemporaryFile() as file:
         sys.stdout.flush()
         sys.stderr.flush()

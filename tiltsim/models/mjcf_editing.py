@@ -1,25 +1,24 @@
-"""Edits of MJCF as a tree; limits and versions of the files of a user's MJCF."""
+"""Reading MJCF as a tree, and its edits; limits and versions of the files of a user's MJCF."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from math import degrees
+import os
+import re
+import warnings
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
+from importlib.util import find_spec
+from math import degrees, isfinite, prod
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 from xml.etree import ElementTree
 
 from tiltsim.models.objects import Objects, add_objects
 from tiltsim.models.parts import TiltServo
+from tiltsim.system.files import is_file, is_folder
 
 if TYPE_CHECKING:
     import mujoco
-
-    from tiltsim.models.mjspec_tree import MjSpecTree
-import os
-from collections.abc import Iterable
-from math import isfinite, prod
-
-from tiltsim.system.files import is_file, is_folder
 
 _PLAIN: Final = {
     "gear": [1.0, 0.0, 0.0, 0.0, 0.0, 0.0],
@@ -36,7 +35,8 @@ MAX_BYTES: Final = 4 * 2**20  # size of the file and all files that it includes,
 MAX_ELEMENTS: Final = 2_000
 """XML elements, with included files and each replica counted.
 
-Eight rotors on tilting arms take a tenth of it.
+Ten times the elements of eight rotors on tilting arms. The time to edit a file grows with their
+square: with 2,000 some 3 s, with 5,000 above 15 s.
 """
 MAX_SAMPLES: Final = 4096**2  # pixels of a texture, or points of a height field
 MAX_SIZE: Final = 100_000  # an attribute of ``<size>``
@@ -49,17 +49,66 @@ _TEXTS: Final = frozenset(("name", "class", "childclass", "file", "model"))
 """Attributes that are names, of any spelling."""
 
 
+def parse_mjcf(path: Path) -> Any:
+    """An MJCF file as dm_control's tree, or as one of the same interface on `mujoco.MjSpec`.
+
+    The latter where dm_control is not installed, for which Python 3.13 is too new, and for files
+    that MuJoCo reads and dm_control does not. Both trees compile to equal models.
+    """
+    if find_spec("dm_control") is not None:
+        with warnings.catch_warnings():
+            # dm_control tries its window systems on import; without a screen GLFW complains.
+            warnings.filterwarnings("ignore", module="glfw")
+            from dm_control import mjcf
+        try:
+            return mjcf.from_xml_string(_with_inclusions(path), model_dir=str(path.parent))
+        except Exception:  # of many kinds
+            pass
+    from tiltsim.models.mjspec_tree import MjSpecTree
+
+    return MjSpecTree(path)
+
+
+def _with_inclusions(path: Path) -> bytes:
+    """The MJCF of a file with included files in place; dm_control would put them at the end."""
+    tree = ElementTree.fromstring(path.read_bytes())
+    tree.attrib.setdefault("model", "MuJoCo Model")  # as MuJoCo calls it
+    pending = [tree]
+    while pending:
+        element = pending.pop()
+        for include in element.findall("include"):
+            inside = ElementTree.fromstring((path.parent / include.get("file", "")).read_bytes())
+            place = list(element).index(include)
+            element[place : place + 1] = list(inside)
+            pending.append(element)  # for the files that it includes
+            break
+        else:
+            pending += element
+    return ElementTree.tostring(tree)
+
+
 Compile = Callable[[], "mujoco.MjModel"]
 
 
-def compiler_of(root: MjSpecTree, objects: Objects | None = None) -> Compile:
+def compiler_of(root: Any, objects: Objects | None = None) -> Compile:
     """A function that compiles a tree as it is now, whatever is edited afterwards.
 
     Args:
         root: The tree.
         objects: Added to it.
     """
-    spec = root.spec.copy()
+    import mujoco
+
+    from tiltsim.models.mjspec_tree import MjSpecTree
+
+    if isinstance(root, MjSpecTree):
+        spec = root.spec.copy()
+    else:
+        unnamed = r' name="//unnamed_[^"]*"'  # dm_control's names of unnamed elements
+        text = re.sub(unnamed, "", root.to_xml_string())
+        if objects is None:
+            return partial(mujoco.MjModel.from_xml_string, text, root.get_assets())
+        spec = mujoco.MjSpec.from_string(text, assets=root.get_assets())
     if objects is not None:
         add_objects(spec, objects)
     compile_copy: Compile = spec.compile
@@ -79,7 +128,8 @@ def remove_visuals(root: Any, *, contacts: bool) -> None:
     for kind in ("camera", "light", "sensor"):
         for element in root.find_all(kind):
             element.remove()
-    acted_on = {actuator.site for actuator in root.find_all("actuator")}
+    sites = [actuator.site for actuator in root.find_all("actuator")]
+    acted_on = {getattr(site, "name", site) for site in sites}
     for site in root.find_all("site"):
         if site.name not in acted_on:
             site.remove()
@@ -100,8 +150,12 @@ def set_servos(
         joint, actuator = root.find("joint", name), root.find("actuator", name)
         kp = inertia * servo.natural_frequency**2
         kv = 2.0 * inertia * servo.damping_ratio * servo.natural_frequency
-        actuator.gaintype = "fixed"
-        actuator.gainprm, actuator.biasprm = [kp, 0.0, 0.0], [0.0, -kp, -kv]
+        if actuator.tag == "position":
+            actuator.kp, actuator.kv = kp, kv
+            actuator.dampratio = actuator.inheritrange = None
+        else:
+            actuator.gaintype = "fixed"
+            actuator.gainprm, actuator.biasprm = [kp, 0.0, 0.0], [0.0, -kp, -kv]
         joint.range = actuator.ctrlrange = (0.0, 0.0)
         joint.limited = actuator.ctrllimited = "false"
         if servo.max_angle is not None:
@@ -172,8 +226,8 @@ def check_mjcf(path: Path) -> set[Path]:
     """Raise ValueError, in one line, for MJCF that is no XML, too large, or has a NaN in it.
 
     Returns:
-        The file and all that its includes, meshes and textures can be: MuJoCo searches several
-        places. Most of these do not exist.
+        The file and all that its includes, meshes and textures can be: MuJoCo and dm_control search
+        for them in different places. Most of these do not exist.
     """
     waiting, bytes_read, elements = [path], 0, 0
     names, folders = {path.name}, {"."}
@@ -187,7 +241,7 @@ def check_mjcf(path: Path) -> set[Path]:
         inside = file.parent.is_relative_to(path.parent)
         folders.add(str(file.parent.relative_to(path.parent) if inside else file.parent))
         try:
-            # MuJoCo also reads some text that is no XML, whose sizes are not known here.
+            # MuJoCo reads some text that is no XML; dm_control, which edits the file, does not.
             root = ElementTree.fromstring(file.read_bytes())
         except (ElementTree.ParseError, ValueError, OSError) as error:
             raise ValueError(f"not XML: {' '.join(str(error).split())}") from None

@@ -1,7 +1,8 @@
-"""MJCF as a tree on `mujoco.MjSpec`.
+"""MJCF as a tree on `mujoco.MjSpec`, with the interface of dm_control's tree.
 
-Attributes have MJCF's names and values. MuJoCo copies defaults into the elements when it reads a
-file: edits must therefore address elements, never default classes.
+It has the part of that interface that the models here use, so the same functions edit either tree;
+attributes have MJCF's names and values. One difference remains: MuJoCo copies defaults into the
+elements when it reads a file. Edits must therefore address elements, never default classes.
 """
 
 from __future__ import annotations
@@ -33,6 +34,8 @@ _ENUMERATIONS: Final[dict[str, tuple[Any, str]]] = {
 
 class _Element:
     """An element, whose attributes read and write MuJoCo's own."""
+
+    tag = ""
 
     def __init__(self, spec: mujoco.MjSpec, own: Any) -> None:
         self.__dict__.update(spec=spec, own=own)
@@ -127,7 +130,7 @@ class _Body(_Element):
 
 
 class _Actuator(_Element):
-    """An actuator of any kind, which MuJoCo turns into a general one."""
+    tag = "general"  # MuJoCo turns all kinds into it
 
     def __setattr__(self, name: str, value: Any) -> None:
         super().__setattr__(name, value)
@@ -198,8 +201,8 @@ class MjSpecTree:
         self.actuator = _Actuators(spec)
 
     def find(self, kind: str, name: str) -> Any:
-        """The element of a kind and name; None where there is none."""
-        own = getattr(self.spec, kind)(name)
+        """The element of a kind and name; None where there is none, and for defaults."""
+        own = None if kind == "default" else getattr(self.spec, kind)(name)
         return None if own is None else _wrapped(self.spec, kind, own)
 
     def find_all(self, kind: str) -> list[Any]:

@@ -154,17 +154,15 @@ def _with_parameters(
     return model
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=64)  # dm_control takes several times longer than MuJoCo's compiler
 def _compose(spec: RotorcraftSpec) -> tuple[mjcf_editing.Compile, mjcf_editing.Compile]:
     """Functions that compile the complete vehicle, and the vehicle without visuals.
 
     A flight is simulated with the one and shown with the other, so both are made at once.
     """
-    from tiltsim.models.mjspec_tree import MjSpecTree  # which loads MuJoCo
-
     vehicle, servo, user_vehicle = spec.vehicle, spec.tilt_servo, spec.user_vehicle
     shipped = shipped_folder("mjcf") / f"{spec.model}.xml"
-    root = MjSpecTree(shipped if user_vehicle is None else Path(user_vehicle.path))
+    root = mjcf_editing.parse_mjcf(shipped if user_vehicle is None else Path(user_vehicle.path))
     contacts = spec.ground is not None or spec.objects is not None
 
     root.option.timestep = spec.timestep
@@ -246,7 +244,8 @@ def _moves_alike(complete: mjcf_editing.Compile, bare: mjcf_editing.Compile) -> 
 def _scale_lengths(root: Any, arm_length: float) -> None:
     """Scale the vehicle's positions and shapes so that its arms have this length (m)."""
     ratio = arm_length / root.find("body", "pod_1").pos[0]
-    pending = [root.find("body", "vehicle")]
+    defaults = root.find("default", "vehicle")  # None where the elements have taken them
+    pending = [root.find("body", "vehicle"), *([] if defaults is None else [defaults])]
     while pending:
         element = pending.pop()
         pending.extend(element.all_children())

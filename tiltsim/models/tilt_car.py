@@ -45,9 +45,7 @@ def compile_tilt_car(spec: TiltCarSpec, *, visuals: bool = True) -> mujoco.MjMod
 @lru_cache(maxsize=16)
 def _compose(spec: TiltCarSpec) -> tuple[mjcf_editing.Compile, mjcf_editing.Compile]:
     """Functions that compile the complete car, and the car without visuals."""
-    from tiltsim.models.mjspec_tree import MjSpecTree  # which loads MuJoCo
-
-    root, car = MjSpecTree(shipped_folder("mjcf") / "tilt_car.xml"), spec.car
+    root, car = mjcf_editing.parse_mjcf(shipped_folder("mjcf") / "tilt_car.xml"), spec.car
     root.option.timestep = spec.timestep
     root.option.integrator = spec.integrator
     root.option.flag.contact = "disable"
