@@ -58,6 +58,8 @@ NOT_RUN = {
     "report": "takes minutes; tests/report makes one",
     "bench": "a step of .ci/run",
     "arena": "takes minutes; tests/studies/test_arena.py scores given flights",
+    "autopilot": "needs the reader's scenario; tests/plants/test_autopilot.py writes the files",
+    **dict.fromkeys(("import", "replay", "identify"), "need a log; tests/logs makes some"),
     "compare": "takes minutes; tests/studies/test_comparison.py makes short ones",
 }
 """Commands that are parsed but not run, and why."""

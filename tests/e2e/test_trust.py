@@ -27,6 +27,7 @@ EXECUTES = ["run"]  # the code of the scenario that it names
 NEEDED = {"compare": ["--controllers", "given"]}
 OUTPUTS = {"--out": "out", "--rerun": "out.rrd", "--junit": "out.xml", "--json": "out.json"}
 OUTPUTS |= {"--plot": "out.png", "--markdown": "out.md", "--pictures": "out"}
+OUTPUTS |= {"--free": "vehicle.mass"}
 
 
 def arguments_of(name, parser, planted):
@@ -36,7 +37,7 @@ def arguments_of(name, parser, planted):
     options = {a.option_strings[-1]: a for a in actions if a.option_strings}
     needed = [planted for a in places if a.nargs != "*" or len(places) == 1]
     for option, action in options.items():
-        needed += [option, OUTPUTS[option]] if action.required else []
+        needed += [option, OUTPUTS.get(option, planted)] if action.required else []
     needed += NEEDED.get(name, [])
     yield needed
     for option in options:

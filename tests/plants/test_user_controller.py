@@ -194,7 +194,7 @@ def test_a_shipped_law_flown_as_a_users_own_flies_the_same_flight(layers):
         state = np.hstack([*body, seen.tilt_angles, SPIN * seen.rotor_speeds])
         # A shipped law sees the instant just after the one that it is given.
         time = evaluation_time(round(observation.time / timestep), 1.0, timestep)
-        step = attitude_altitude(Seen(time, state), parameters)
+        step = attitude_altitude(Seen(time, state), parameters, np.zeros(5))
         return Command(rotor_accelerations=np.array(SPIN) * step.inputs)
 
     ours, theirs = tiltsim.simulate(shipped), tiltsim.simulate(shipped, controller=own)

@@ -77,6 +77,12 @@ class Motion(ABC):
         """The flight without offsets."""
         return assemble(self.scenario, self._as_flown)
 
+    @property
+    def _is_traced(self) -> bool:
+        """Whether commands are traced: offsets stand between the controller and its layers."""
+        flown = self._flown_assembly
+        return flown.traced and flown.loop.within is None
+
     def _adapted(self, loop: ClosedLoop) -> ClosedLoop:
         """A controller without layers, to whose inputs of the vehicle the offsets are added.
 
@@ -181,7 +187,7 @@ class EquationMotion(Motion):
         disturbance = disturbance_acceleration(self.scenario)
         flown, varied = self._flown_assembly, self._equations
         equations = flown.loop.equations
-        if not flown.traced or equations is None:
+        if not self._is_traced or equations is None:
             setup = self.assembly.setup
 
             def called(time: tuple[float], state: Values, _offsets: Values) -> Values:
@@ -270,9 +276,9 @@ class MujocoMotion(Motion):
     @cached_property
     def _traced_controls(self) -> Callable[..., Values] | None:
         """The commands at a time and state, if the loop can be traced."""
-        flown = self._flown_assembly
-        if not flown.traced:
+        if not self._is_traced:
             return None
+        flown = self._flown_assembly
         controls, sizes = flown.loop.sampling.controls, flown.loop.dynamics.sizes
 
         def commanded(setup: Any, time: Any, *parts: Any) -> Any:

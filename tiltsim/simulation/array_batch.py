@@ -38,6 +38,8 @@ Result = TypeVar("Result")
 class _Sound:
     """A plant that reports no fault, for the `TerminationMonitor`."""
 
+    engine = "jax"
+
     def fault(self) -> str:
         return ""
 
