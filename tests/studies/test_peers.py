@@ -22,13 +22,18 @@ def test_a_failing_peer_is_reported(monkeypatch):
         pass
 
 
-def test_a_peer_of_an_interrupted_benchmark_is_silent(monkeypatch, capfd):
+def test_a_peer_of_an_interrupted_benchmark_is_silent(monkeypatch, capfd, tmp_path):
+    waiting = tmp_path / "python"
+    waiting.write_text("#!/bin/sh\nexec sleep 60\n")
+    waiting.chmod(0o755)
+
     def interrupted(_peer):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(peers, "find_spec", lambda name: name)
     monkeypatch.setitem(peers.PEERS, "json", peers.PeerCase(None, 1, 1))
     monkeypatch.setattr(peers.Peer, "_answer", interrupted)
+    monkeypatch.setattr(peers.sys, "executable", str(waiting))
     with pytest.raises(KeyboardInterrupt), peers.running("json"):
         pass
     assert capfd.readouterr().err == ""
