@@ -49,10 +49,10 @@ ORDER = {
 FLYING_PREFIXES = tuple(f"tiltsim.{folder}." for folder in FLYING)
 HEAVY = {
     *("av", "casadi", "dm_control", "gymnasium", "jax", "matplotlib", "mujoco"),
-    *("llvmlite", "pandas", "pyarrow", "pydantic", "rerun"),
+    *("llvmlite", "pandas", "pyarrow", "pydantic", "rerun", "scipy"),
 }
 
-SLOW = {"email", "hashlib", "html", "numpy", "platform", "scipy"}
+SLOW = {"email", "hashlib", "html", "numpy", "platform"}
 """Not loaded by ``tiltsim --help``: each would add 5 to 150 % to its time."""
 
 

@@ -11,8 +11,6 @@ from math import exp, inf
 from typing import Any, Final
 
 import numpy as np
-from scipy.linalg import expm
-from scipy.optimize import linprog
 
 from tiltsim_controllers.laws.failures import Failure
 from tiltsim_controllers.laws.full_pose import pose_rank
@@ -147,6 +145,8 @@ def side_slope(craft: Craft, rows: Floats) -> float:
         craft: The vehicle.
         rows: Force and torque per newton, shape (6, N).
     """
+    from scipy.optimize import linprog  # a third of a second to import
+
     if craft.moving:
         return 0.0
     if craft.commanded:
@@ -179,6 +179,8 @@ def free_axis(rows: Floats) -> Floats:
 
 def _servo_step(servo: tuple[float, float], period: float) -> tuple[Values, Values]:
     """Angle and rate of a servo after a period, per angle, rate and set point."""
+    from scipy.linalg import expm  # a quarter of a second to import
+
     w, z = servo
     system = np.array([[0.0, 1.0, 0.0], [-w * w, -2.0 * z * w, w * w], [0.0, 0.0, 0.0]])
     angle, rate, _ = map(tuple, expm(system * period).tolist())
