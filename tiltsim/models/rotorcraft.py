@@ -16,7 +16,15 @@ import numpy as np
 
 from tiltsim.models import mjcf_editing
 from tiltsim.models.objects import Objects, touchable
-from tiltsim.models.parts import SERVO_ARMATURE, ExtraActuators, Ground, ModelSpec, Pod, RotorLimits
+from tiltsim.models.parts import (
+    SERVO_ARMATURE,
+    ExtraActuators,
+    Ground,
+    ModelSpec,
+    Pod,
+    RotorLimits,
+    Visuals,
+)
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.models.user_vehicle import UserVehicle
 from tiltsim.resources import shipped_folder
@@ -27,6 +35,8 @@ from tiltsim_controllers.vehicle.parameters import PRESETS, SPIN, Vehicle
 from tiltsim_controllers.vehicle.states import ROTORS
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     import mujoco
 
 START_SPEED: Final = 300.0  # rotor speed (rad/s) of the keyframe ``start``
@@ -45,6 +55,8 @@ class RotorcraftSpec(ModelSpec):
         extra_actuators: Actuators that layers append after the law's states.
         ground: Ground to take off from and land on; None disables contacts.
         objects: Objects, tool and load; None for a vehicle alone.
+        companions: Further vehicles in the same world by name.
+        number: Its number, from 0, among vehicles that touch each other; -1 for one alone.
         user_vehicle: A user's file in place of the shipped one, with its own arms and pods; its
             geoms may have mass and are always kept.
     """
@@ -57,6 +69,8 @@ class RotorcraftSpec(ModelSpec):
     extra_actuators: tuple[ExtraActuators, ...] = ()
     ground: Ground | None = None
     objects: Objects | None = None
+    companions: tuple[tuple[str, RotorcraftSpec], ...] = ()
+    number: int = -1
     user_vehicle: UserVehicle | None = None
 
     @property
@@ -78,7 +92,7 @@ class RotorcraftSpec(ModelSpec):
 
 
 @one_thread_at_a_time
-def compile_model(spec: RotorcraftSpec, *, visuals: bool = True) -> mujoco.MjModel:
+def compile_model(spec: RotorcraftSpec, *, visuals: Visuals = True) -> mujoco.MjModel:
     """Compile the MuJoCo model of a rotorcraft.
 
     Mass and inertia of the compiled model are the vehicle's at any tilt: the pods' are
@@ -87,7 +101,8 @@ def compile_model(spec: RotorcraftSpec, *, visuals: bool = True) -> mujoco.MjMod
     Args:
         spec: The specification of the model.
         visuals: Whether to keep parts that are only drawn or measured: geoms, cameras and others.
-            They do not affect the physics, but updating them takes a third of a step.
+            They do not affect the physics, but updating them takes a third of a step. Or a
+            function that adds further ones to the model before it is compiled.
 
     Returns:
         With the keyframes ``hover`` (in equilibrium) and ``start`` (rotors at 300 rad/s).
@@ -97,7 +112,12 @@ def compile_model(spec: RotorcraftSpec, *, visuals: bool = True) -> mujoco.MjMod
     """
     import mujoco
 
-    if spec.objects is not None:
+    if callable(visuals):
+        world, _ = _with_others(spec, mjcf_editing.world_of)
+        visuals(world)
+        with mujoco_hooks():
+            return world.compile()
+    if spec.objects is not None or spec.companions:
         complete, bare = _compose(spec)
         with mujoco_hooks():
             return complete() if visuals else bare()
@@ -160,10 +180,27 @@ def _compose(spec: RotorcraftSpec) -> tuple[mjcf_editing.Compile, mjcf_editing.C
 
     A flight is simulated with the one and shown with the other, so both are made at once.
     """
+    return _with_others(spec, mjcf_editing.compiler_of)
+
+
+def _with_others(spec: RotorcraftSpec, made: Callable[..., Any]) -> tuple[Any, Any]:
+    """The results of ``made``, see `world_of`, for the complete world and for the bare one."""
+    others = {name: _edited(one, mjcf_editing.spec_of) for name, one in spec.companions}
+    worlds = iter([{name: both[place] for name, both in others.items()} for place in (0, 1)])
+    complete, bare = _edited(spec, lambda root: made(root, spec.objects, next(worlds)))
+    # Springs and dampers of a companion that is kept complete are not in the bare world.
+    return complete, complete if any(one is other for one, other in others.values()) else bare
+
+
+def _edited(spec: RotorcraftSpec, made: Callable[[Any], Any]) -> tuple[Any, Any]:
+    """The results of ``made`` for a tree of the complete vehicle, and for one without visuals.
+
+    They are equal where drawn and measured parts would be missed.
+    """
     vehicle, servo, user_vehicle = spec.vehicle, spec.tilt_servo, spec.user_vehicle
     shipped = shipped_folder("mjcf") / f"{spec.model}.xml"
     root = mjcf_editing.parse_mjcf(shipped if user_vehicle is None else Path(user_vehicle.path))
-    contacts = spec.ground is not None or spec.objects is not None
+    contacts = spec.ground is not None or spec.objects is not None or spec.number >= 0
 
     root.option.timestep = spec.timestep
     root.option.integrator = spec.integrator
@@ -204,14 +241,14 @@ def _compose(spec: RotorcraftSpec) -> tuple[mjcf_editing.Compile, mjcf_editing.C
             mjcf_editing.add_wrench(root, f"layer_{index}", center)
         mjcf_editing.add_hinge_torques(root, f"layer_{index}", extra.hinge_torques)
     if contacts:
-        touchable(root, ground=spec.ground is not None)
+        touchable(root, ground=spec.ground is not None, number=spec.number)
     if spec.ground is not None:
         _set_ground(root, spec.ground)
-    complete = mjcf_editing.compiler_of(root, spec.objects)
+    complete = made(root)
     if user_vehicle is not None and spec.model != "multirotor":
         return complete, complete
     mjcf_editing.remove_visuals(root, contacts=contacts)
-    bare = mjcf_editing.compiler_of(root, spec.objects)
+    bare = made(root)
     return complete, bare if user_vehicle is None or _moves_alike(complete, bare) else complete
 
 
@@ -225,11 +262,11 @@ def _center_site(root: Any, spec: RotorcraftSpec) -> str:
     return name
 
 
-def _moves_alike(complete: mjcf_editing.Compile, bare: mjcf_editing.Compile) -> bool:
+def _moves_alike(complete: Any, bare: Any) -> bool:
     """Whether drawn and measured parts give a user's vehicle no mass, spring or damper."""
     try:
         with mujoco_hooks():
-            models = complete(), bare()
+            models = [getattr(each, "compile", each)() for each in (complete, bare)]
     except ValueError:  # a body is left without mass
         return False
     with_visuals, without = models
