@@ -2,6 +2,7 @@
 
 import json
 import re
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
@@ -33,6 +34,7 @@ and coordinates beyond a million meters, are refused. Chapters (ch.) are chapter
 change a key without editing the file; entries of lists are counted from 0:
 `--set 'gait.angles[0]=0.2'`.
 """
+WORD: Final = re.compile(r"[\w-]+")
 NOT_IN_ANCHOR: Final = re.compile(r"[^\w-]")  # characters that the anchor of a heading leaves out
 FEW: Final = 2  # most tables of one address that are printed in full; more are listed
 
@@ -244,10 +246,19 @@ def page(tables: Sequence[KeyTable]) -> str:
     parts += _key_grid(key for key in document.keys if key.name not in chapters)
     for name, place in chapters.items():
         parts += ["", f"## `{head_of(place)}`", *(["", meanings[name]] if place[0].tags else [])]
-        parts += [
-            line for table in others if table.places[0][0].name == name for line in _section(table)
-        ]
+        own = [table for table in others if table.places[0][0].name == name]
+        shared = shared_keys(own)
+        if shared:
+            parts += ["", "Keys that several of the following tables have:", "", *_key_grid(shared)]
+        parts += [line for table in own for line in _section(table, shared)]
     return "\n".join(parts) + "\n"
+
+
+def shared_keys(tables: Sequence[KeyTable]) -> list[Key]:
+    """The keys that at least two of the tables have, unless another key has the same name."""
+    counts = Counter(key for table in tables for key in table.keys)
+    names = Counter(key.name for key in counts)
+    return [key for key, count in counts.items() if count > 1 and names[key.name] == 1]
 
 
 def description(tables: Sequence[KeyTable], address: str) -> str:
@@ -277,12 +288,41 @@ def description(tables: Sequence[KeyTable], address: str) -> str:
     return "\n".join(keys)
 
 
-def _section(table: KeyTable) -> list[str]:
-    """Lines of the page about one table."""
+def _section(table: KeyTable, shared: Sequence[Key]) -> list[str]:
+    """Lines of the page about one table, with only the names of shared keys."""
     place = table.places[0]
     title = ["", f"### {_title(table)}"] if len(place) > 1 or place[0].tags else []
     toml = ["```toml", *table.toml.splitlines(), "```"]
-    return [*title, "", _plain(table.meaning), "", *toml, "", *_key_grid(table.keys)]
+    own = [key for key in table.keys if key not in shared and not _is_only_kind(key)]
+    others = ", ".join(f"`{key.name}`" for key in table.keys if key in shared)
+    grid = ["", *_key_grid(own)] if own else []
+    return [
+        *title,
+        "",
+        _meaning(table),
+        "",
+        *toml,
+        *grid,
+        *(["", f"Also {others}."] if others else []),
+    ]
+
+
+def _is_only_kind(key: Key) -> bool:
+    """Whether a key says which kind the table is, and leaves no choice."""
+    return key.name in TAG_KEYS and "," not in key.values
+
+
+def _meaning(table: KeyTable) -> str:
+    """The description of a table and of its kind, without the one whose words the other has."""
+    texts = [_plain(table.meaning).rstrip(".")]
+    texts += [key.meaning for key in table.keys if _is_only_kind(key)]
+    words = [set(WORD.findall(text.lower())) for text in texts]
+    kept = [
+        text
+        for number, text in enumerate(texts)
+        if not any(words[number] < other for other in words) and words[number] not in words[:number]
+    ]
+    return _sentence("; ".join(kept))
 
 
 def _title(table: KeyTable) -> str:
@@ -307,7 +347,8 @@ def _row(key: Key) -> tuple[str, str, str]:
     unit = f" [{key.unit}]" if key.unit else ""
     required = key.default == "required"
     default = "<br>required" if required else f"<br>default `{key.default}`" if key.default else ""
-    example = f"<br>`{key.name} = {key.example}`" if key.example else ""
+    plain = key.example and key.example != key.default and not key.values.startswith(('"', "true"))
+    example = f"<br>`{key.example}`" if plain else ""
     return f"`{key.name}`", key.values + unit + default, key.meaning + example
 
 

@@ -151,12 +151,12 @@ class Group:
 
     @property
     def described(self) -> str:
-        """Statement, criterion and notes in one cell of Markdown."""
+        """Statement, notes and shared reason in one cell of Markdown."""
         statement = self.statement
         place = "; ".join(filter(None, (self.sources, f"`{statement.id}`")))
-        text = f"**{statement.text}** ({place})"
-        criterion = f"Criterion: {statement.criterion.rstrip('.')}." if statement.criterion else ""
-        return "\n".join(filter(None, (text, criterion, statement.note, self.shared_why)))
+        listed = any(row.claim.error for row in self.rows)
+        notes = (statement.note, "" if listed else self.shared_why)
+        return "\n".join(filter(None, (f"**{statement.text}** ({place})", *notes)))
 
     @property
     def many_fits(self) -> int:
