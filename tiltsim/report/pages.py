@@ -187,7 +187,7 @@ def _measured(row: Row) -> list[str]:
 
 
 def _case_rows(group: Group, errors: list[str]) -> list[list[str]]:
-    """Rows of Markdown: one with the statement and its only case, or one above those of the cases.
+    """Rows of Markdown: one with the statement and its only case, or one above all cases.
 
     Args:
         group: The rows of a statement.
