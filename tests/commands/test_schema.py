@@ -69,11 +69,11 @@ def test_page_has_every_key_with_its_unit():
                 words = re.findall(r"[\w-]+", key.meaning.lower())
                 assert {*words} <= {*re.findall(r"[\w-]+", before.rpartition("\n#")[2].lower())}
                 continue
-            known = re.search(rf"\nAlso .*`{key.name}`", section)
-            row = (shared if known else section).partition(f"\n| `{key.name}` |")[2]
-            row = row.partition("\n")[0]
-            assert f" {key.meaning}".replace("|", "\\|") in row
-            assert not key.unit or f" [{key.unit}]" in row
+            known = re.search(rf"\n- Also .*`{key.name}`", section)
+            item = (shared if known else section).partition(f"\n- `{key.name}` (")[2]
+            item = item.partition("\n")[0]
+            assert f": {key.meaning}" in item
+            assert not key.unit or f" [{key.unit}]" in item
 
 
 def classes(table):

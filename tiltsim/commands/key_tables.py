@@ -3,7 +3,7 @@
 import json
 import re
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from math import pi
@@ -243,13 +243,14 @@ def page(tables: Sequence[KeyTable]) -> str:
     ]
     parts = [INTRODUCTION, *markdown_table(("table", "meaning"), overview)]
     parts += ["", "## Keys before all tables", ""]
-    parts += _key_grid(key for key in document.keys if key.name not in chapters)
+    parts += [_item(key) for key in document.keys if key.name not in chapters]
     for name, place in chapters.items():
         parts += ["", f"## `{head_of(place)}`", *(["", meanings[name]] if place[0].tags else [])]
         own = [table for table in others if table.places[0][0].name == name]
         shared = shared_keys(own)
         if shared:
-            parts += ["", "Keys that several of the following tables have:", "", *_key_grid(shared)]
+            parts += ["", "Keys that several of the following tables have:", ""]
+            parts += map(_item, shared)
         parts += [line for table in own for line in _section(table, shared)]
     return "\n".join(parts) + "\n"
 
@@ -295,16 +296,8 @@ def _section(table: KeyTable, shared: Sequence[Key]) -> list[str]:
     toml = ["```toml", *table.toml.splitlines(), "```"]
     own = [key for key in table.keys if key not in shared and not _is_only_kind(key)]
     others = ", ".join(f"`{key.name}`" for key in table.keys if key in shared)
-    grid = ["", *_key_grid(own)] if own else []
-    return [
-        *title,
-        "",
-        _meaning(table),
-        "",
-        *toml,
-        *grid,
-        *(["", f"Also {others}."] if others else []),
-    ]
+    items = [*map(_item, own), *([f"- Also {others}."] if others else [])]
+    return [*title, "", _meaning(table), "", *toml, "", *items]
 
 
 def _is_only_kind(key: Key) -> bool:
@@ -339,17 +332,14 @@ def _narrow(table: KeyTable) -> str:
     return ", ".join(name for name in table.addresses() if name.count(".") == table.depth)
 
 
-def _key_grid(keys: Iterable[Key]) -> list[str]:
-    return markdown_table(("key", "value and default", "meaning and example"), map(_row, keys))
-
-
-def _row(key: Key) -> tuple[str, str, str]:
+def _item(key: Key) -> str:
+    """A key as an item of a list, with an example where neither default nor choices are one."""
     unit = f" [{key.unit}]" if key.unit else ""
     required = key.default == "required"
-    default = "<br>required" if required else f"<br>default `{key.default}`" if key.default else ""
+    default = ", required" if required else f", default `{key.default}`" if key.default else ""
     plain = key.example and key.example != key.default and not key.values.startswith(('"', "true"))
-    example = f"<br>`{key.example}`" if plain else ""
-    return f"`{key.name}`", key.values + unit + default, key.meaning + example
+    example = f"; example `{key.example}`" if plain else ""
+    return f"- `{key.name}` ({key.values}{unit}{default}): {key.meaning}{example}"
 
 
 def _text(table: KeyTable) -> str:
