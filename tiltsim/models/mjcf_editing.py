@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 from xml.etree import ElementTree
 
-from tiltsim.models.objects import Objects, add_objects
 from tiltsim.models.parts import TiltServo
 from tiltsim.system.files import is_file, is_folder
 
@@ -88,26 +87,17 @@ def _with_inclusions(path: Path) -> bytes:
     return ElementTree.tostring(tree)
 
 
-def spec_of(root: Any, objects: Objects | None = None) -> mujoco.MjSpec:
-    """A tree as it is now, whatever is edited afterwards.
-
-    Args:
-        root: The tree.
-        objects: Added to it.
-    """
+def spec_of(root: Any) -> mujoco.MjSpec:
+    """MuJoCo's own form of a tree as it is now, whatever is edited afterwards."""
     import mujoco
 
     from tiltsim.models.mjspec_tree import MjSpecTree
 
     if isinstance(root, MjSpecTree):
-        spec = root.spec.copy()
-    else:
-        unnamed = r' name="//unnamed_[^"]*"'  # dm_control's names of unnamed elements
-        text = re.sub(unnamed, "", root.to_xml_string())
-        spec = mujoco.MjSpec.from_string(text, assets=root.get_assets())
-    if objects is not None:
-        add_objects(spec, objects)
-    return spec
+        return root.spec.copy()
+    unnamed = r' name="//unnamed_[^"]*"'  # dm_control's names of unnamed elements
+    text = re.sub(unnamed, "", root.to_xml_string())
+    return mujoco.MjSpec.from_string(text, assets=root.get_assets())
 
 
 def remove_visuals(root: Any, *, contacts: bool) -> None:

@@ -15,8 +15,16 @@ import numpy as np
 
 from tiltsim.models import mjcf_editing
 from tiltsim.models.mjspec_tree import MjSpecTree
-from tiltsim.models.objects import Objects, touchable
-from tiltsim.models.parts import SERVO_ARMATURE, ExtraActuators, Ground, ModelSpec, Pod, RotorLimits
+from tiltsim.models.objects import Objects, add_companion, add_objects, touchable
+from tiltsim.models.parts import (
+    SERVO_ARMATURE,
+    ExtraActuators,
+    Ground,
+    ModelSpec,
+    Pod,
+    RotorLimits,
+    Visuals,
+)
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.models.user_vehicle import UserVehicle
 from tiltsim.resources import shipped_folder
@@ -45,6 +53,8 @@ class RotorcraftSpec(ModelSpec):
         extra_actuators: Actuators that layers append after the law's states.
         ground: Ground to take off from and land on; None disables contacts.
         objects: Objects, tool and load; None for a vehicle alone.
+        companions: Further vehicles in the same world by name.
+        number: Its number, from 0, among vehicles that touch each other; -1 for one alone.
         user_vehicle: A user's file in place of the shipped one, with its own arms and pods; its
             geoms may have mass and are always kept.
     """
@@ -57,6 +67,8 @@ class RotorcraftSpec(ModelSpec):
     extra_actuators: tuple[ExtraActuators, ...] = ()
     ground: Ground | None = None
     objects: Objects | None = None
+    companions: tuple[tuple[str, RotorcraftSpec], ...] = ()
+    number: int = -1
     user_vehicle: UserVehicle | None = None
 
     @property
@@ -78,7 +90,7 @@ class RotorcraftSpec(ModelSpec):
 
 
 @one_thread_at_a_time
-def compile_model(spec: RotorcraftSpec, *, visuals: bool = True) -> mujoco.MjModel:
+def compile_model(spec: RotorcraftSpec, *, visuals: Visuals = True) -> mujoco.MjModel:
     """Compile the MuJoCo model of a rotorcraft.
 
     Mass and inertia of the compiled model are the vehicle's at any tilt: the pods' are
@@ -87,7 +99,8 @@ def compile_model(spec: RotorcraftSpec, *, visuals: bool = True) -> mujoco.MjMod
     Args:
         spec: The specification of the model.
         visuals: Whether to keep parts that are only drawn or measured: geoms, cameras and others.
-            They do not affect the physics, but updating them takes a third of a step.
+            They do not affect the physics, but updating them takes a third of a step. Or a
+            function that adds further ones to the model before it is compiled.
 
     Returns:
         With the keyframes ``hover`` (in equilibrium) and ``start`` (rotors at 300 rad/s).
@@ -95,18 +108,32 @@ def compile_model(spec: RotorcraftSpec, *, visuals: bool = True) -> mujoco.MjMod
     Raises:
         ValueError: If the pods are too heavy for the vehicle.
     """
-    user = spec.user_vehicle
-    if user is not None:
-        vehicle: Vehicle | Multirotor = user.vehicle
+    vehicles = [spec, *(companion for _, companion in spec.companions)]
+    composed = [_compose(_structure(one)) for one in vehicles]
+    # One that is kept complete may have springs and dampers, which no bare model has.
+    whole = visuals or any(complete is bare for complete, bare in composed)
+    trees = [MjSpecTree(each[0 if whole else 1].copy()) for each in composed]
+    for tree, one in zip(trees, vehicles, strict=True):
+        _set_parameters(tree, one)
+    world = trees[0].spec
+    for (name, _), companion in zip(spec.companions, trees[1:], strict=True):
+        add_companion(world, name, companion.spec)
+    if spec.objects is not None:
+        add_objects(world, spec.objects, [name for name, _ in spec.companions])
+    if callable(visuals):
+        visuals(world)
+    with mujoco_hooks():
+        return world.compile()
+
+
+def _structure(spec: RotorcraftSpec) -> RotorcraftSpec:
+    """Equal for vehicles whose compositions differ in numbers only; see `_set_parameters`."""
+    if spec.user_vehicle is not None:
+        vehicle: Vehicle | Multirotor = spec.user_vehicle.vehicle
     else:
         arm_length = cast(Vehicle, spec.vehicle).arm_length
         vehicle = PRESETS["ar_drone_2"]._replace(arm_length=arm_length)
-    # Vehicles that differ in numbers only share their composition.
-    complete, bare = _compose(replace(spec, vehicle=vehicle, userdata_size=0))
-    tree = MjSpecTree((complete if visuals else bare).copy())
-    _set_parameters(tree, spec)
-    with mujoco_hooks():
-        return tree.spec.compile()
+    return replace(spec, vehicle=vehicle, userdata_size=0, companions=())
 
 
 def _set_parameters(tree: MjSpecTree, spec: RotorcraftSpec) -> None:
@@ -131,16 +158,16 @@ def _set_parameters(tree: MjSpecTree, spec: RotorcraftSpec) -> None:
         tree.find("actuator", f"thrust_{i}").gear = gear
 
 
-@lru_cache(maxsize=64)  # dm_control takes several times longer than MuJoCo's compiler
+@lru_cache(maxsize=64)  # dm_control takes a hundred times longer than MuJoCo's compiler
 def _compose(spec: RotorcraftSpec) -> tuple[mujoco.MjSpec, mujoco.MjSpec]:
-    """The complete vehicle, and the vehicle without visuals.
+    """The complete vehicle, and the one without visuals.
 
-    A flight is simulated with the one and shown with the other, so both are made at once.
+    They are the same where drawn and measured parts would be missed.
     """
     vehicle, servo, user_vehicle = spec.vehicle, spec.tilt_servo, spec.user_vehicle
     shipped = shipped_folder("mjcf") / f"{spec.model}.xml"
     root = mjcf_editing.parse_mjcf(shipped if user_vehicle is None else Path(user_vehicle.path))
-    contacts = spec.ground is not None or spec.objects is not None
+    contacts = spec.ground is not None or spec.objects is not None or spec.number >= 0
 
     root.option.timestep = spec.timestep
     root.option.integrator = spec.integrator
@@ -173,14 +200,14 @@ def _compose(spec: RotorcraftSpec) -> tuple[mujoco.MjSpec, mujoco.MjSpec]:
             mjcf_editing.add_wrench(root, f"layer_{index}", center)
         mjcf_editing.add_hinge_torques(root, f"layer_{index}", extra.hinge_torques)
     if contacts:
-        touchable(root, ground=spec.ground is not None)
+        touchable(root, ground=spec.ground is not None, number=spec.number)
     if spec.ground is not None:
         _set_ground(root, spec.ground)
-    complete = mjcf_editing.spec_of(root, spec.objects)
+    complete = mjcf_editing.spec_of(root)
     if user_vehicle is not None and spec.model != "multirotor":
         return complete, complete
     mjcf_editing.remove_visuals(root, contacts=contacts)
-    bare = mjcf_editing.spec_of(root, spec.objects)
+    bare = mjcf_editing.spec_of(root)
     return complete, bare if user_vehicle is None or _moves_alike(complete, bare) else complete
 
 
