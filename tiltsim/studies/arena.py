@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from statistics import mean
 from types import MappingProxyType
 from typing import Any, Final
@@ -12,7 +13,7 @@ from tiltsim.scenario.controller import CONTROLLERS
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.messages import choose
 from tiltsim.studies.checking import collect
-from tiltsim.studies.comparison import GIVEN, Entry, fly_entries
+from tiltsim.studies.comparison import GIVEN, Entry, controller_tables, fly_entries
 from tiltsim.studies.multirotor_analysis import FEW_ROTORS, FLEET, fleet_file
 
 FOLDER: Final = "arena"
@@ -20,6 +21,9 @@ FOLDER: Final = "arena"
 
 BASELINES: Final = ("geometric", "pid", "indi", "lqr")
 """Laws of the literature, with which the other laws are compared."""
+
+OURS: Final = "vectoring"
+"""The law that flies the limited league with its default setting."""
 
 HALF: Final = (0.1, 0.1)
 """Root mean square errors of position (m) and yaw (rad), each of which alone halves the score."""
@@ -31,12 +35,48 @@ HALF_OF: Final = {
     "step": (STEP, 0.1),
     "yaw_step": (0.1, 1.571 * STEP),
     "latency": (0.3 * STEP, 0.1),
+    "late_step": (0.3 * STEP, 0.1),
 }
 """Tasks with other errors than `HALF`: steps, whose error begins with the step itself."""
 
 
 MULTIROTOR: Final = "multirotor"
 """The file whose tasks the fleet flies, each vehicle in place of the file's own."""
+
+LEAGUES: Final = ("limited", "unlimited")
+"""The arena that counts, with limits, lag, latency and noise, and the one without."""
+
+LIMITED: Final = {
+    "quadrotor": 525.0,
+    "tiltrotor": 525.0,
+    "hexarotor": 838.0,
+    "cant_hexarotor": 838.0,
+    "tilt_hexarotor": 838.0,
+    "tilt_octorotor": 838.0,
+    "omni_octorotor": 700.0,
+}
+"""Vehicles of the limited league, with their highest rotor speeds (rad/s)."""
+
+REVERSING: Final = ("omni_octorotor",)
+"""Vehicles whose rotors are built to reverse."""
+
+SERVO: Final = {"natural_frequency": 60.0, "damping_ratio": 0.8, "max_rate": 8.0}
+"""Tilt servos of the limited league: 60 degrees in about 0.15 s."""
+
+AS_FLOWN: Final = {"rotor_bandwidth": 400.0, "observer": 8.0, "mixer": "prioritized"}
+"""Keys of baselines in the limited league: commands at once, observers and a mixer."""
+
+WORLDS: Final[Mapping[str, Mapping[str, Mapping[str, Any]]]] = {
+    "limited": {
+        "model error": {},
+        "exact model": {"model_error.mass": 1.0, "model_error.thrust_coefficient": 1.0},
+    },
+    "unlimited": {"": {}},
+}
+"""By league, what the law's model lacks: values by dotted key for each table."""
+
+SEEDS: Final = {"limited": (1, 2, 3), "unlimited": (1,)}
+"""Seeds of sensor noise and turbulence, by league."""
 
 OWN_KEYS: Final = {"omni_octorotor": {"controller.norm": "thrust"}}
 """Keys that a vehicle of the fleet needs beside its file and tilt angles: its rotors reverse."""
@@ -80,12 +120,17 @@ class Standing:
         return mean(score or 0.0 for score in self.tuned.values())
 
 
-def vehicles() -> dict[str, Vehicle]:
-    """The vehicles by name: vehicles with their own file, then the fleet's others on a gait."""
+def vehicles(league: str) -> dict[str, Vehicle]:
+    """The vehicles of a league by name.
+
+    Unlimited are vehicles with their own file, then the fleet's others on a gait.
+    """
     found: dict[str, list[str]] = {}
     for address in collect([str(shipped_folder("scenarios") / FOLDER)]):
         found.setdefault(address.partition("#")[0].rpartition("/")[2], []).append(address)
-    shared = tuple(found.pop(MULTIROTOR))
+    limited, shared = tuple(found.pop("limited")), tuple(found.pop(MULTIROTOR))
+    if league == "limited":
+        return {name: Vehicle(limited, _limited(name)) for name in LIMITED}
     every = {name: Vehicle(tuple(tasks), {}) for name, tasks in found.items()}
     for name, angles in FLEET.items():
         if name not in (*every, *FEW_ROTORS):
@@ -95,9 +140,36 @@ def vehicles() -> dict[str, Vehicle]:
     return every
 
 
-def chosen_vehicles(names: Sequence[str]) -> dict[str, Vehicle]:
-    """The named vehicles, or all. Raises InputError if one does not exist."""
-    known = vehicles()
+def _limited(name: str) -> dict[str, Any]:
+    """The values that put a vehicle into the tasks with limits."""
+    angles = (0.0,) * 4 if name == "tiltrotor" else FLEET[name]
+    limits = {"vehicle.mjcf": str(fleet_file(name)), "vehicle.max_rotor_speed": LIMITED[name]}
+    if name in REVERSING:
+        limits["vehicle.min_rotor_speed"] = None
+    if not angles:
+        return limits
+    gait = {"type": "fixed", "angles": [*angles]}
+    return limits | {"gait": gait, "vehicle.tilt_servo": SERVO}
+
+
+def tables_of(vehicle: Vehicle, league: str) -> dict[str, Mapping[str, Any]]:
+    """The tables of the controllers of a vehicle, by name.
+
+    In the limited league they are `vectoring`, and baselines as their authors fly them.
+    """
+    if league == "unlimited":
+        return controller_tables(fitting(vehicle))
+    flown = {law: {"law": law, **AS_FLOWN} for law in BASELINES}
+    if "gait" not in vehicle.overrides:
+        return {"vectoring": {"law": "vectoring"}, **flown}
+    free = {"tilts": "free"}
+    own = {"vectoring": {"law": "vectoring", **free}}
+    return own | flown | {"geometric_free": flown["geometric"] | free}
+
+
+def chosen_vehicles(names: Sequence[str], league: str) -> dict[str, Vehicle]:
+    """The named vehicles of a league, or all. Raises InputError if one does not exist."""
+    known = vehicles(league)
     for name in names:
         if name not in known:
             raise InputError(f"--vehicles {name}: {choose(name, sorted(known))}")
@@ -125,15 +197,19 @@ def fly_tasks(
     tuned: Mapping[str, Mapping[str, Mapping[str, Any]]],
     jobs: int,
     *,
+    league: str,
     trusted: bool = False,
 ) -> Iterator[tuple[str, dict[str, Any]]]:
     """Fly the tasks of every vehicle; yields the vehicle's name and a row with its score.
+
+    In the limited league, a controller with tuned gains flies with these only.
 
     Args:
         chosen: The vehicles.
         controllers: Their tables by vehicle and name.
         tuned: Tables with tuned gains of some of them, which are also flown.
         jobs: Processes.
+        league: One of `LEAGUES`.
         trusted: Whether to execute Python code that only tuned tables name.
 
     Raises:
@@ -145,14 +221,17 @@ def fly_tasks(
             for controller, table in controllers[name].items():
                 gains = tuned.get(name, {}).get(controller)
                 for kind, keys in (("default", table), ("tuned", gains)):
-                    if keys is not None:
-                        named = "function" in table and keys.get("function") == table["function"]
-                        entry = entry_of(vehicle, address, controller, keys)
-                        places.append((name, kind))
+                    if keys is None or (league == "limited" and gains and kind == "default"):
+                        continue
+                    named = "function" in table and keys.get("function") == table["function"]
+                    for world, seed in product(WORLDS[league], SEEDS[league]):
+                        changes = {**WORLDS[league][world], "simulation.seed": seed}
+                        entry = entry_of(vehicle, address, controller, keys, changes)
+                        places.append((name, {"gains": kind, "world": world, "seed": seed}))
                         entries.append(replace(entry, trusted=trusted or named))
     flown = fly_entries(entries, searches=False, timed=False, jobs=jobs)
-    for (name, kind), one in zip(places, flown, strict=True):
-        yield name, one.row | {"gains": kind, "score": score(one.row)}
+    for (name, place), one in zip(places, flown, strict=True):
+        yield name, one.row | place | {"score": score(one.row)}
 
 
 def entry_of(
@@ -180,7 +259,12 @@ def entry_of(
 
 
 def score(row: Mapping[str, Any]) -> float | None:
-    """The score of a row of `compare`: ``100 / (1 + e_position / half + e_yaw / half)``.
+    """The score of a row of `compare`, 0 to 100.
+
+    It is ``s = 100 / (1 + e_position / half + e_yaw / half)``, of which a vehicle that stays where
+    it began has none: ``100 (s - idle) / (100 - idle)``, at least 0. The position's error is the
+    greater of the root mean square of the flight and the mean of its last second, so that a vehicle
+    that falls at the end does not gain from the time before.
 
     None if the task refuses the controller, 0 if the flight ends early.
     """
@@ -188,8 +272,18 @@ def score(row: Mapping[str, Any]) -> float | None:
         return None
     if row["end"] != "completed":
         return 0.0
-    position, yaw = HALF_OF.get(task_of(row), HALF)
-    return float(100.0 / (1.0 + row["rms_position_error"] / position + row["rms_yaw_error"] / yaw))
+    half = HALF_OF.get(task_of(row), HALF)
+    position = max(row["rms_position_error"], row["final_position_error"])
+    reached = _share(position, row["rms_yaw_error"], half)
+    idle = _share(row["idle_position_error"], row["idle_yaw_error"], half)
+    if idle < 1.0 - 1e-6:
+        reached = max(0.0, reached - idle) / (1.0 - idle)
+    return float(100.0 * reached)
+
+
+def _share(position: float, yaw: float, half: tuple[float, float]) -> float:
+    """The score of errors, 0 to 1, each of which alone halves it where it is ``half``."""
+    return 1.0 / (1.0 + position / half[0] + yaw / half[1])
 
 
 def task_of(row: Mapping[str, Any]) -> str:

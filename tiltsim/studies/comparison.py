@@ -252,25 +252,34 @@ def _distance(flight: Flight) -> Floats:
 def _tracking(flight: Flight) -> dict[str, float]:
     error = _distance(flight)
     last = in_last_second(flight["time"], flight.scenario.simulation.timestep)
-    return {"final_position_error": float(error[last].mean()), "rms_yaw_error": _yaw_error(flight)}
+    idle = np.linalg.norm(flight["reference_position"] - flight["position"][0], axis=1)
+    return {
+        "final_position_error": float(error[last].mean()),
+        "rms_yaw_error": _yaw_error(flight, flight["yaw"]),
+        "idle_position_error": float(np.sqrt(np.mean(idle**2))),
+        "idle_yaw_error": _yaw_error(flight, flight["yaw"][0]),
+    }
 
 
-def _yaw_error(flight: Flight) -> float:
-    """Root mean square over the flight, rad, each the shorter way around."""
+def _yaw_error(flight: Flight, yaw: Any) -> float:
+    """Root mean square of a yaw's error over the flight, rad, each the shorter way around."""
     if "yaw_ref" not in flight.units:
         return nan
-    error = flight["yaw_ref"] - flight["yaw"]
+    error = flight["yaw_ref"] - yaw
     return float(np.sqrt(np.mean(np.arctan2(np.sin(error), np.cos(error)) ** 2)))
 
 
 def _effort(flight: Flight) -> dict[str, float]:
-    """Root mean square of the rotors' accelerations, rad/s^2, and the way of all tilts, rad."""
+    """Rms of the rotors' accelerations, rad/s^2, way of all tilts, rad, and fastest rotor, rad/s."""
+    speeds = flight["rotor_speeds"]
+    peak = {"peak_rotor_speed": float(np.abs(speeds).max())}
     if len(flight) < 2:
-        return {"rms_rotor_acceleration": nan, "tilt_travel": nan}
-    change = np.diff(flight["rotor_speeds"], axis=0) / np.diff(flight["time"])[:, np.newaxis]
+        return {"rms_rotor_acceleration": nan, "tilt_travel": nan, **peak}
+    change = np.diff(speeds, axis=0) / np.diff(flight["time"])[:, np.newaxis]
     columns = [name for name in flight.units if name.startswith("alpha_") and name[6:].isdecimal()]
     travel = sum(float(np.abs(np.diff(flight[name])).sum()) for name in columns)
-    return {"rms_rotor_acceleration": float(np.sqrt(np.mean(change**2))), "tilt_travel": travel}
+    effort = {"rms_rotor_acceleration": float(np.sqrt(np.mean(change**2))), "tilt_travel": travel}
+    return effort | peak
 
 
 def _control_period(scenario: Scenario) -> float:
