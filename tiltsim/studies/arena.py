@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from itertools import product
 from statistics import mean
 from types import MappingProxyType
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from tiltsim.errors import InputError
 from tiltsim.resources import shipped_folder
@@ -191,47 +191,67 @@ def fitting(vehicle: Vehicle) -> list[str]:
     return laws if own == default else [GIVEN, *laws]
 
 
-def fly_tasks(
+class Match(NamedTuple):
+    """A flight of the arena.
+
+    Attributes:
+        vehicle: Name.
+        place: Columns of its row: kind of gains, world and seed.
+        entry: Controller and task.
+    """
+
+    vehicle: str
+    place: Mapping[str, Any]
+    entry: Entry
+
+
+def matches(
+    league: str,
     chosen: Mapping[str, Vehicle],
     controllers: Mapping[str, Mapping[str, Mapping[str, Any]]],
     tuned: Mapping[str, Mapping[str, Mapping[str, Any]]],
-    jobs: int,
     *,
-    league: str,
     trusted: bool = False,
-) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Fly the tasks of every vehicle; yields the vehicle's name and a row with its score.
-
-    In the limited league, a controller with tuned gains flies with these only.
+) -> list[Match]:
+    """The flights of a league; in the limited one tuned gains take the place of default ones.
 
     Args:
+        league: One of `LEAGUES`.
         chosen: The vehicles.
         controllers: Their tables by vehicle and name.
-        tuned: Tables with tuned gains of some of them, which are also flown.
-        jobs: Processes.
-        league: One of `LEAGUES`.
+        tuned: Tables with tuned gains of some of them.
         trusted: Whether to execute Python code that only tuned tables name.
+    """
+    found = []
+    for name, vehicle in chosen.items():
+        for address, (controller, table) in product(vehicle.tasks, controllers[name].items()):
+            gains = tuned.get(name, {}).get(controller)
+            for kind, keys in (("default", table), ("tuned", gains)):
+                if keys is None or (league == "limited" and gains and kind == "default"):
+                    continue
+                named = "function" in table and keys.get("function") == table["function"]
+                for world, seed in product(WORLDS[league], SEEDS[league]):
+                    changes = {**WORLDS[league][world], "simulation.seed": seed}
+                    entry = entry_of(vehicle, address, controller, keys, changes)
+                    place = {"gains": kind, "world": world, "seed": seed}
+                    found.append(Match(name, place, replace(entry, trusted=trusted or named)))
+    return found
+
+
+def fly_matches(flights: Sequence[Match], jobs: int) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Fly them; yields each vehicle's name and a row with its score.
+
+    Args:
+        flights: See `matches`.
+        jobs: Processes.
 
     Raises:
-        InputError: If they name some and are not trusted.
+        InputError: If they name Python code that is not trusted.
     """
-    places, entries = [], []
-    for name, vehicle in chosen.items():
-        for address in vehicle.tasks:
-            for controller, table in controllers[name].items():
-                gains = tuned.get(name, {}).get(controller)
-                for kind, keys in (("default", table), ("tuned", gains)):
-                    if keys is None or (league == "limited" and gains and kind == "default"):
-                        continue
-                    named = "function" in table and keys.get("function") == table["function"]
-                    for world, seed in product(WORLDS[league], SEEDS[league]):
-                        changes = {**WORLDS[league][world], "simulation.seed": seed}
-                        entry = entry_of(vehicle, address, controller, keys, changes)
-                        places.append((name, {"gains": kind, "world": world, "seed": seed}))
-                        entries.append(replace(entry, trusted=trusted or named))
+    entries = [one.entry for one in flights]
     flown = fly_entries(entries, searches=False, timed=False, jobs=jobs)
-    for (name, place), one in zip(places, flown, strict=True):
-        yield name, one.row | place | {"score": score(one.row)}
+    for one, compared in zip(flights, flown, strict=True):
+        yield one.vehicle, {**compared.row, **one.place, "score": score(compared.row)}
 
 
 def entry_of(
@@ -292,15 +312,25 @@ def task_of(row: Mapping[str, Any]) -> str:
 
 
 def standings(rows: Sequence[Mapping[str, Any]]) -> list[Standing]:
-    """Standings from the rows of one vehicle, the best first, by tuned gains if there are any."""
-    scores: dict[str, dict[str, dict[str, float | None]]] = {}
+    """Standings from the rows of one vehicle, the best first, by tuned gains if there are any.
+
+    Scores are means over seeds.
+    """
+    found: dict[str, dict[str, dict[str, list[float | None]]]] = {}
     for row in rows:
-        by_gains = scores.setdefault(row["controller"], {"default": {}, "tuned": {}})
-        by_gains[row["gains"]][task_of(row)] = row["score"]
-    every = [
-        Standing(name, by["default"], by["tuned"] or by["default"]) for name, by in scores.items()
-    ]
+        by_gains = found.setdefault(row["controller"], {"default": {}, "tuned": {}})
+        by_gains[row["gains"]].setdefault(task_of(row), []).append(row["score"])
+    every = []
+    for name, by in found.items():
+        default, tuned = ({t: _mean(s) for t, s in by[kind].items()} for kind in by)
+        every.append(Standing(name, default or tuned, tuned or default))
     return sorted(every, key=lambda standing: -standing.tuned_total)
+
+
+def _mean(scores: Sequence[float | None]) -> float | None:
+    """The mean of scores of several seeds; None if one is refused."""
+    known = [score for score in scores if score is not None]
+    return mean(known) if len(known) == len(scores) else None
 
 
 def best(every: Sequence[Standing], task: str, gains: str) -> tuple[str, float]:
@@ -325,30 +355,16 @@ def are_rivals(every: Sequence[Standing]) -> bool:
     return len({one.controller in BASELINES for one in every}) > 1
 
 
-def beaten(every: Sequence[Standing], gains: str) -> list[str]:
-    """The winner of each task in which a baseline beats all other controllers.
+def beaten(every: Sequence[Standing], gains: str) -> int:
+    """In how many tasks a baseline beats all other controllers of a vehicle.
 
     Args:
-        every: The controllers of a vehicle.
+        every: The controllers.
         gains: default or tuned.
     """
     if not are_rivals(every):
-        return []
+        return 0
     known = [one for one in every if one.controller in BASELINES]
     others = [one for one in every if one.controller not in BASELINES]
-    lines = []
-    for task in every[0].scores:
-        (winner, high), (loser, low) = best(known, task, gains), best(others, task, gains)
-        if high > low:
-            lines.append(f"`{task}` (`{winner}` {high:.0f}, `{loser}` {low:.0f})")
-    return lines
-
-
-def changed(every: Sequence[Standing]) -> list[str]:
-    """Both winners of each task in which tuned gains change the winner."""
-    lines = []
-    for task in every[0].scores if every else ():
-        (before, low), (after, high) = (best(every, task, kind) for kind in ("default", "tuned"))
-        if before != after:
-            lines.append(f"`{task}` (`{before}` {low:.0f}, then `{after}` {high:.0f})")
-    return lines
+    tasks = every[0].scores
+    return sum(best(known, task, gains)[1] > best(others, task, gains)[1] for task in tasks)

@@ -270,7 +270,7 @@ def _yaw_error(flight: Flight, yaw: Any) -> float:
 
 
 def _effort(flight: Flight) -> dict[str, float]:
-    """Rms of the rotors' accelerations, rad/s^2, way of all tilts, rad, and fastest rotor, rad/s."""
+    """Rms rotor acceleration, rad/s^2, way of all tilts, rad, and greatest speed, rad/s."""
     speeds = flight["rotor_speeds"]
     peak = {"peak_rotor_speed": float(np.abs(speeds).max())}
     if len(flight) < 2:
