@@ -8,7 +8,8 @@ import pytest
 import tiltsim
 from tests.laws.test_multirotor import mjcf
 from tiltsim.laws.assembling import assemble
-from tiltsim_controllers.analysis.vectoring_design import TRACKING, Craft, side_slope
+from tiltsim_controllers.analysis.vectoring_design import TRACKING
+from tiltsim_controllers.analysis.vectoring_limits import Craft, side_slope
 from tiltsim_controllers.laws.vectoring_steps import braked, turn_by
 from tiltsim_controllers.vehicle.effectiveness import table_per_newton
 
@@ -294,6 +295,7 @@ def craft(vehicle, **changes):
         "commanded": False,
         "moving": False,
         "levers": np.ones(len(speeds)),
+        "works": np.ones(len(speeds)),
     }
     return Craft(**{**numbers, **changes})
 
