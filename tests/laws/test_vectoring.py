@@ -64,9 +64,11 @@ def test_a_circle_is_followed_with_rotors_that_lag(vehicle):
 @pytest.mark.slow
 @pytest.mark.parametrize("vehicle", ["quadrotor", "tilt_octorotor"])
 def test_native_flights_are_those_in_python(vehicle):
+    turning = {"reference": {"type": "table", "rows": [*turning_rows(0.3)]}}
+    moves = turning if vehicle.startswith("tilt") else CIRCLE
     for late in (LATE, {"timestep": 0.002}):
         python, native = (
-            tiltsim.simulate(tables(vehicle, 0.2, late={**late, "engine": engine}, **CIRCLE))
+            tiltsim.simulate(tables(vehicle, 0.2, late={**late, "engine": engine}, **moves))
             for engine in ("python", "native")
         )
         np.testing.assert_array_equal(python.samples, native.samples)
@@ -155,6 +157,59 @@ def test_sensor_noise_costs_little():
     changes = np.diff(flight["rotor_speeds"], axis=0) / np.diff(flight["time"])[:, np.newaxis]
     assert np.sqrt(np.mean(changes**2)) < 900.0
     assert position_error(flight)[flight["time"] > 2.0].max() < 0.03
+
+
+# --- poses -------------------------------------------------------------------------------------
+
+
+def pose(**angles):
+    return {"type": "setpoint", "position": [0.4, -0.3, 0.2], **angles}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("vehicle", "roll", "pitch"),
+    [("omni_octorotor", 1.2, -0.5), ("tilt_hexarotor", 0.3, 0.2), ("cant_hexarotor", 0.05, 0.0)],
+)
+def test_a_vehicle_with_side_force_takes_a_pose(vehicle, roll, pitch):
+    changed = tables(vehicle, 4.0, reference=pose(roll=roll, pitch=pitch, yaw=0.4))
+    if vehicle.startswith("omni"):
+        del changed["vehicle"]["min_rotor_speed"]  # reversing, within the limits of its file
+    flight = tiltsim.simulate(changed)
+    np.testing.assert_allclose(flight["attitude"][-1], [roll, pitch, 0.4], atol=1e-3)
+    assert position_error(flight)[-1] < 2e-3
+
+
+def turning_rows(lean):
+    """A motion from rest whose yaw turns by a revolution, and whose roll and pitch sway."""
+    for time in np.linspace(0.0, 4.0, 41):
+        sway, turn = lean * np.sin(np.pi * time / 2.0) ** 3, time - np.sin(np.pi * time) / np.pi
+        yield [time, *(0.3 * turn * np.ones(3)), sway, -sway, np.pi / 2.0 * turn]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("vehicle", "lean"), [("tilt_hexarotor", 0.3), ("cant_hexarotor", 0.0)])
+def test_a_moving_attitude_is_led(vehicle, lean):
+    """With its rates and their rates ahead, the error is far below the one of a lag."""
+    moving = {"type": "table", "rows": [*turning_rows(lean)]}
+    flight = fly(vehicle, 4.0, reference=moving)
+    off = flight["attitude"] - flight["reference_attitude"]
+    led = slice(0, 3) if lean else slice(2, 3)  # else roll and pitch lean to move
+    assert np.abs(np.angle(np.exp(1j * off[:, led]))).max() < 0.005
+    assert position_error(flight).max() < 0.04
+
+
+@pytest.mark.parametrize(
+    ("vehicle", "angles", "words"),
+    [
+        ("hexarotor", {"pitch": 0.1}, "reference.pitch = 0.1: .* no outputs of a vehicle that"),
+        ("cant_hexarotor", {"roll": 0.2}, "reference.roll = 0.2: .* hovers at up to 0.07"),
+        ("tilt_octorotor", {"roll": 0.6}, "hovers at up to 0.46"),
+    ],
+)
+def test_a_pose_beyond_the_side_force_is_refused(vehicle, angles, words):
+    with pytest.raises(tiltsim.InputError, match=words):
+        tiltsim.simulate(tables(vehicle, 1.0, reference=pose(**angles)))
 
 
 # --- limit cases -------------------------------------------------------------------------------

@@ -52,4 +52,5 @@ def airframe_of(plan: FlightPlan) -> Airframe:
         table.speeds_along_spin,
         table.rotor_time_constant,
         table.tilt_servo,
+        scenario.reference,
     )

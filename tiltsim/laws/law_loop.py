@@ -136,6 +136,7 @@ def _step_of(key: Key) -> Callable[..., Step]:
         spins, time, states = xp.array(key.layout.spins), seen.time, seen.states
         at, now = int(known.rotors), state_of(seen.state, layout)
         motion = reference_motion(time, known.reference, knots)
+        attitude = reference_attitude(time, known.reference, knots)
         planned = planned_tilts(time, known.gait, knots, tilts)
         turning = spins * now.speeds
         k = xp.array(knots[at + coefficients : at + coefficients + rotors])
@@ -156,8 +157,9 @@ def _step_of(key: Key) -> Callable[..., Step]:
             discrete=states[own : own + discrete],
             reference=Desired(
                 *motion[:4],  # type: ignore[call-arg]
-                reference_attitude(time, known.reference, knots)[0],
+                attitude[0],
                 *planned[:, :2].T,
+                *attitude[1:3],
             ),
             vehicle=known.cross if is_cross else known.vehicle,
             inertia=inertia_matrix(known.vehicle),

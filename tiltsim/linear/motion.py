@@ -53,11 +53,11 @@ class Motion(ABC):
     """
 
     def __init__(self, scenario: Scenario, engine: EngineName | None, late: bool = False) -> None:
-        if scenario.has_objects:
+        if scenario.has_objects or scenario.companion:
             where = scenario.address or "scenario"
             raise InputError(
-                f"{where}: linear analysis takes a vehicle alone; remove [[object]], [tool] and "
-                "[payload]"
+                f"{where}: linear analysis takes a vehicle alone; remove [[object]], [tool], "
+                "[payload] and [[companion]]"
             )
         self.scenario, self.engine, self._late = scenario, engine, late
         self._commanded: Values = ()

@@ -16,6 +16,7 @@ from pydantic import Field
 
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.controller_table import ControllerTable, ReferenceKind
+from tiltsim.scenario.reference import Reference
 from tiltsim.scenario.rotorcraft import TiltServoTable
 from tiltsim.scenario.table import Positive
 from tiltsim_controllers.analysis.stability import ErrorLoop, linear_loop
@@ -68,6 +69,7 @@ class Airframe:
             spin; infinite without limits.
         rotor_time_constant: Time constant of the rotors' lag, s; None for no lag.
         tilt_servo: The servos of its tilts.
+        reference: The flight's ``[reference]`` table.
     """
 
     vehicle: Multirotor
@@ -85,6 +87,7 @@ class Airframe:
     speed_limits: tuple[float, float]
     rotor_time_constant: float | None
     tilt_servo: TiltServoTable
+    reference: Reference
 
     @property
     def rotors(self) -> int:

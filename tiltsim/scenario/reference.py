@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from functools import lru_cache
 from itertools import pairwise
-from math import pi
+from math import acos, cos, pi
 from typing import Annotated, Literal
 
 from pydantic import Field
@@ -42,7 +42,7 @@ class SetpointReference(PositionReference):
 
 
 class LineReference(PositionReference):
-    """Motion along a line, uniform or at a constant acceleration."""
+    """Motion along a straight line, uniform or at a constant acceleration."""
 
     type: Literal["line"] = Field(description="a straight line")
     position: Vector3 = Field(
@@ -183,6 +183,12 @@ class TableReference(PositionReference, TimeTable):
     @property
     def turns(self) -> bool:
         return len(self.table[0]) == len(POSE_COLUMNS)
+
+    @property
+    def lean(self) -> float:
+        if not self.turns:
+            return super().lean
+        return max(acos(cos(row[4]) * cos(row[5])) for row in self.table)
 
     @property
     def kind(self) -> ReferenceKind:

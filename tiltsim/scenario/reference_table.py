@@ -1,7 +1,7 @@
 """The common part of the ``[reference]`` tables."""
 
 from abc import ABC, abstractmethod
-from math import pi
+from math import acos, cos, pi
 from typing import Annotated, Any, Final
 
 from pydantic import Field
@@ -64,6 +64,11 @@ class ReferenceTable(Table, ABC):
         """Whether roll, pitch and yaw vary with time."""
         return False
 
+    @property
+    def lean(self) -> float:
+        """The largest angle between the body's z axis and up, rad."""
+        return 0.0
+
     def after_gait(self, gait: Values, scenario: Any) -> tuple[ReferenceParameters, Values]:
         """The record, and the table data of a flight: the gait's, then the reference's.
 
@@ -82,7 +87,7 @@ class PositionReference(ReferenceTable):
     roll: Roll = Field(
         0.0,
         description="angle to hold; for controller.law attitude_force, which alone takes pi/2 and "
-        "more, full_pose, switching or python [rad]",
+        "more, full_pose, switching, vectoring or python [rad]",
         examples=[0.2],
     )
     pitch: Tilt = Field(0.0, description="as roll [rad]", examples=[0.2])
@@ -97,6 +102,10 @@ class PositionReference(ReferenceTable):
     @property
     def adds_acceleration(self) -> bool:
         return self.acceleration_feedforward
+
+    @property
+    def lean(self) -> float:
+        return acos(cos(self.roll) * cos(self.pitch))
 
     @property
     def kind(self) -> ReferenceKind:

@@ -19,11 +19,16 @@ from tiltsim_controllers.mathematics.scalar import Floats, Values
 from tiltsim_controllers.vehicle.actuators import held_gain
 from tiltsim_controllers.vehicle.effectiveness import table_per_newton
 
+LARGEST_LEAN = 1.57
+"""rad: the axis of a pose points up."""
+
 
 class VectoringController(Vectoring, FailureAwareController, TiltingTable, LawController):
     """Observers, prediction and allocation within limits, for any rotorcraft."""
 
     models_latency = True
+    reference_kinds = ("position", "pose")
+    follows_turns = True
     control: ClassVar = staticmethod(vectoring)
 
     @property
@@ -87,7 +92,15 @@ class VectoringController(Vectoring, FailureAwareController, TiltingTable, LawCo
             (servo.max_rate or inf, servo.max_angle or inf),
             held_gain(self.tilt_rate_gain, airframe.control_timestep),
         )
-        return design(self, craft, timing, self.resolve_failure())
+        found = design(self, craft, timing, self.resolve_failure())
+        reference, cone = airframe.reference, min(found[0].cone, LARGEST_LEAN)
+        if reference.lean > cone:
+            key = "type" if reference.turns else "roll" if reference.roll else "pitch"
+            able = f"within its limits the vehicle hovers at up to {cone:.3g} rad"
+            leans = "roll and pitch are no outputs of a vehicle that leans to move"
+            reason = f"leans by {reference.lean:.3g} rad; {able if cone else leans}"
+            raise reference.mistake(key, reason)
+        return found
 
 
 def _speeds(airframe: Airframe, thrust: Floats) -> tuple[Floats, Floats]:

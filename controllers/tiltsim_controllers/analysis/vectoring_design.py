@@ -6,8 +6,10 @@ limits leave, and the side force that needs no lean from a linear program.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from math import exp, inf
+from itertools import product
+from math import atan, exp, pi
 from typing import Any, Final
 
 import numpy as np
@@ -145,27 +147,61 @@ def side_slope(craft: Craft, rows: Floats) -> float:
         craft: The vehicle.
         rows: Force and torque per newton, shape (6, N).
     """
-    from scipy.optimize import linprog  # a third of a second to import
-
     if craft.moving:
         return 0.0
     if craft.commanded:
         return 0.5 if craft.outputs(craft.tilts) == 6 else 0.0
+    weight = craft.mass * craft.gravity
+    angles = 2.0 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
+    sides = [np.array([np.cos(angle), np.sin(angle), 0.0]) for angle in angles]
+    most = np.minimum(SIDE_SHARE * craft.limits[1], 2.4 * craft.hover)
+    return 0.8 * least_force(craft, rows, sides, weight, most) / weight
+
+
+def pose_cone(craft: Craft, rows: Floats, slope: float) -> float:
+    """Angle (rad) from level of the poses that side force holds; pi where all are held.
+
+    Args:
+        craft: The vehicle.
+        rows: Force and torque per newton, shape (6, N).
+        slope: Result of `side_slope`.
+    """
+    weight, most = craft.mass * craft.gravity, SIDE_SHARE * craft.limits[1]
+    ways = [np.array(way) for way in product((-1.0, 0.0, 1.0), repeat=3) if any(way)]
+    units = [way / np.linalg.norm(way) for way in ways]
+    holds_all = slope > 0.0 and not craft.commanded
+    if holds_all and least_force(craft, rows, units, 0.0, most) > weight:
+        return pi
+    return atan(slope)
+
+
+def least_force(
+    craft: Craft, rows: Floats, ways: Sequence[Floats], lift: float, most: Floats
+) -> float:
+    """The least over some directions of the greatest force (N) without torque; 0 for none.
+
+    Args:
+        craft: The vehicle.
+        rows: Force and torque per newton, shape (6, N).
+        ways: Unit vectors of the directions, body axes.
+        lift: N, that the rotors make as well, along z.
+        most: Greatest thrusts, N, shape (N,).
+    """
+    from scipy.optimize import linprog  # a third of a second to import
+
     if np.linalg.matrix_rank(rows, tol=1e-6) < 6:
         return 0.0
-    low, high = craft.limits
-    bounds = [*zip(low, np.minimum(SIDE_SHARE * high, 2.4 * craft.hover), strict=True), (0, None)]
-    weight, least = craft.mass * craft.gravity, inf
-    for angle in 2.0 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS:
-        aside = np.array([-np.cos(angle), -np.sin(angle), 0.0, 0.0, 0.0, 0.0])
+    bounds = [*zip(craft.limits[0], most, strict=True), (0, None)]
+    forces = []
+    for way in ways:
         found = linprog(
-            np.array([*np.zeros(len(low)), -1.0]),
-            A_eq=np.column_stack([rows, aside]),
-            b_eq=weight * np.eye(6)[2],
+            np.array([*np.zeros(len(most)), -1.0]),
+            A_eq=np.column_stack([rows, [*-way, 0.0, 0.0, 0.0]]),
+            b_eq=lift * np.eye(6)[2],
             bounds=bounds,
         )
-        least = min(least, -float(found.fun) if found.status == 0 else 0.0)
-    return 0.8 * least / weight
+        forces.append(-float(found.fun) if found.status == 0 else 0.0)
+    return min(forces)
 
 
 def free_axis(rows: Floats) -> Floats:
@@ -297,6 +333,7 @@ def design(
         share=1.0 - exp(-tracking * h),
         **_observers(keys.observer, (2.5 * position, min(TORQUE_OBSERVER, 0.5 / delay), yaw), h),
         slope=slope,
+        cone=pose_cone(craft, rows, slope),
         hover=craft.hover,
         lever=max(0.02, float(craft.levers.mean())),
         axis=tuple(free_axis(rows).tolist()),

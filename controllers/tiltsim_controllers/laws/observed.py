@@ -49,6 +49,8 @@ class Desired(NamedTuple):
     attitude: Any  # (3,), roll, pitch, yaw, rad
     tilt_angles: Any  # (M,), rad
     tilt_rates: Any  # (M,), rad/s
+    attitude_rates: Any = np.zeros(3)  # (3,), of roll, pitch and yaw, rad/s
+    attitude_accelerations: Any = np.zeros(3)  # (3,), likewise, rad/s^2
 
 
 class Observed(NamedTuple):

@@ -27,9 +27,9 @@ from tiltsim_controllers.laws.vectoring_state import (
     served,
     servo_doubts,
 )
-from tiltsim_controllers.laws.vectoring_steps import demanded, pointing, turning
+from tiltsim_controllers.laws.vectoring_steps import TINY, demanded, pointing, turning, upward
 from tiltsim_controllers.mathematics.linear import cross
-from tiltsim_controllers.mathematics.moving import Moving
+from tiltsim_controllers.mathematics.moving import Moving, value_of, where
 from tiltsim_controllers.vehicle.rotors import by_tilt, moving_wrench_map, wrench_map, wrench_slope
 
 UP = (0.0, 0.0, 1.0)
@@ -112,13 +112,25 @@ def _demand(known: Known, ahead: Ahead) -> Any:
     """Force (N) and torque (N m) that the rotors shall make, body axes, shape (6,)."""
     seen, p, frame, now = known.seen, known.p, known.frame, ahead.now
     reference, t = seen.reference, ahead.time
-    axis: Any = p.axis
+    own: Any = p.axis
     if len(ahead.tilts) and len(seen.tilt_commands) == 0:
         rates = reference.tilt_rates
         tilts = Moving(ahead.tilts, rates, 0.0 * rates)
         free = torque_free_force(xp.array(UP), moving_wrench_map(seen.rotors, tilts))
-        axis = free * (1.0 / xp.sqrt(free.value @ free.value))
-    unit = axis.value if isinstance(axis, Moving) else axis
+        own = free * (1.0 / xp.sqrt(free.value @ free.value))
+    # A vehicle with side force takes the pose; another one leans by its own axis.
+    turn, turning_turn = reference.attitude_rates, reference.attitude_accelerations
+    pose = Moving(
+        reference.attitude + t * (turn + 0.5 * t * turning_turn),
+        turn + t * turning_turn,
+        turning_turn,
+    )
+    up = upward(pose)
+    axis = where(p.slope > 0.0, up, own)
+    x, y, z = up.value
+    left = p.cone - xp.arctan2(xp.sqrt(x * x + y * y + TINY), z)
+    slope = xp.clip(xp.tan(xp.clip(left, 0.0, 1.5)), 0.0, p.slope)
+    unit = xp.where(p.cone > 2.0, axis.value, value_of(own))
     made = known.wrench(ahead.speeds, ahead.tilts)[:3]
     # A torque that pushes sideways is no motion to be led along where the vehicle only leans: fed
     # forward it would close an algebraic loop from torque to attitude.
@@ -132,7 +144,7 @@ def _demand(known: Known, ahead: Ahead) -> Any:
     ) - Moving(now.position, now.velocity, push)
     turned = jerk - now.rotation @ cross(now.omega, made) / frame.mass
     force = demanded(error, turned, Moving(a + t * jerk, jerk, xp.zeros(3)), frame, p)
-    desired, rates, second = pointing(force, axis, reference.attitude[2], p.slope)
+    desired, rates, second = pointing(force, axis, pose[2], slope)
     angular = turning(now, desired, rates, second, p)
     momentum = frame.inertia @ now.omega
     torque = frame.inertia @ (angular - frame.torque)

@@ -54,6 +54,7 @@ class Parameters(NamedTuple):
     force_gain: float  # 1/s, of the estimated disturbance, per call
     torque_gain: Vector3
     slope: float  # side force per lift without lean
+    cone: float  # rad, from level: of the poses that the side force holds; pi: of all
     hover: float  # N, thrust of a rotor
     lever: float  # m
     axis: Vector3  # along which it pushes with fixed rotors or preferred tilts, ...

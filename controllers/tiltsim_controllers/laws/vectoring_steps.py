@@ -9,7 +9,15 @@ from tiltsim_controllers.laws.decouplers import exact_decoupler
 from tiltsim_controllers.laws.feedback import body_rate_matrix
 from tiltsim_controllers.mathematics.attitude import rotation_matrix
 from tiltsim_controllers.mathematics.linear import cross, norm, solved_symmetric
-from tiltsim_controllers.mathematics.moving import Moving, square_root, stacked, value_of, where
+from tiltsim_controllers.mathematics.moving import (
+    Moving,
+    cosine,
+    sine,
+    square_root,
+    stacked,
+    value_of,
+    where,
+)
 
 TINY = 1e-24
 
@@ -136,12 +144,18 @@ def _clipped(x: Moving, low: Any, high: Any) -> Moving:
     return where(x.value < low, low, where(x.value > high, high, x))
 
 
-def pointing(force: Moving, axis: Any, yaw: Any, slope: Any) -> tuple[Any, Any, Any]:
+def upward(pose: Moving) -> Moving:
+    """World up in body axes, shape (3,), at a pose of roll, pitch and yaw (rad), shape (3,)."""
+    roll, pitch = pose[0], pose[1]
+    return stacked(-sine(pitch), cosine(pitch) * sine(roll), cosine(pitch) * cosine(roll))
+
+
+def pointing(force: Moving, axis: Any, yaw: Moving, slope: Any) -> tuple[Any, Any, Any]:
     """The attitude that points an axis along a force, less what the force may leave the axis.
 
     Args:
         force: Per mass, gravity included, m/s^2, world axes, shape (3,), upward.
-        axis: Body axes, moving or not, shape (3,).
+        axis: Body axes, moving or not, shape (3,); without side force it points up.
         yaw: rad.
         slope: Side force per lift that needs no lean.
 
@@ -156,10 +170,10 @@ def pointing(force: Moving, axis: Any, yaw: Any, slope: Any) -> tuple[Any, Any, 
     share = where(leans, 1.0 - own / safe, 0.0)
     x, y = share * side[0], share * side[1]
     roll, pitch = exact_decoupler(x, y, lift, yaw, 0.0, axis)
-    first = xp.array([roll.rate, pitch.rate, 0.0])
-    second = xp.array([roll.acceleration, pitch.acceleration, 0.0])
-    omega = body_rate_matrix(roll, pitch) @ Moving(first, second, xp.zeros(3))
-    return rotation_matrix(xp.array([roll.value, pitch.value, yaw])), omega.value, omega.rate
+    angles = stacked(roll, pitch, yaw)
+    rates = Moving(angles.rate, angles.acceleration, xp.zeros(3))
+    omega = body_rate_matrix(roll, pitch) @ rates
+    return rotation_matrix(angles.value), omega.value, omega.rate
 
 
 def turning(now: Motion, desired: Any, rates: Any, second: Any, p: Any) -> Any:
