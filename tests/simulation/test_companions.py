@@ -142,3 +142,40 @@ def test_companions_are_refused_where_they_cannot_fly(changes, line):
 def test_vehicles_that_overlap_at_the_start_are_refused():
     with pytest.raises(tiltsim.InputError, match=r"overlap by .* at the start"):
         tiltsim.simulate(together(WING | {"offset": [0.05, 0.0, 0.0]}))
+
+
+DOWNWASH = {"rotor_radius": 0.1, "drag_area": 0.02}
+
+
+@pytest.mark.parametrize("held", [0.0, 0.004])
+def test_a_vehicle_in_the_wake_of_another_sinks_by_its_column_in_both_engines(held):
+    changes = {"downwash": DOWNWASH, "simulation.control_timestep": held}
+    flights = [
+        tiltsim.simulate(
+            together(
+                WING | {"offset": [0.0, 0.0, -1.0]}, **{**changes, "simulation.engine": engine}
+            )
+        )
+        for engine in ("python", "native")
+    ]
+    for name in flights[0]:
+        np.testing.assert_array_equal(flights[0][name], flights[1][name], err_msg=name)
+    flight = flights[0]
+    assert not flight["downwash"].any()
+    assert flight["wing_downwash"].max() < -0.5
+    still = tiltsim.simulate(flight.scenario.replace({"downwash.drag_area": 1e-12}))
+    np.testing.assert_array_equal(flight["z"], still["z"])
+    mass = flight.scenario.any_rotorcraft.resolve().mass
+    begin = slice(2, 6)  # before its controller reacts
+    fall = np.gradient(flight["wing_vz"] - still["wing_vz"], flight["time"])[begin]
+    np.testing.assert_allclose(fall, flight["wing_downwash"][begin] / mass, rtol=0.1)
+
+
+def test_downwash_needs_a_companion():
+    assert "needs a [[companion]]" in refusal(lambda: together(downwash=DOWNWASH))
+
+
+def test_vectors_of_a_companion_have_its_name():
+    flight = tiltsim.simulate(together(WING))
+    np.testing.assert_array_equal(flight["wing_position"][:, 1], flight["wing_y"])
+    assert "wing_position" in flight

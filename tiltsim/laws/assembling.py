@@ -102,7 +102,8 @@ def loop_of(
         loops = loop, *(loop_of(each, recorded=recorded) for each in vehicles[1:])
         found = zip(("", *names), loops, map(plan_flight, vehicles), strict=True)
         return with_companions(
-            tuple(Member(n, own, len(own.setup(plan, 0.0).knots)) for n, own, plan in found)
+            tuple(Member(n, own, len(own.setup(plan, 0.0).knots)) for n, own, plan in found),
+            scenario.downwash is not None,
         )
     if plant == "mujoco" or as_printed:
         return loop

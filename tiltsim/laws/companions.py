@@ -10,23 +10,31 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from itertools import combinations
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
 from tiltsim.closed_loop.limits import VEHICLE, WITHIN_LIMITS
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Monitoring, Sampling, Sizes
-from tiltsim.models.parts import Visuals
+from tiltsim.engines.sample_evaluation import evaluate_over_samples
+from tiltsim.models.parts import ExtraActuators, Visuals
 from tiltsim.scenario.scenario import FlightPlan, Scenario, plan_flight
 from tiltsim.vehicles.rotorcraft import model_spec
+from tiltsim.vehicles.rotorcraft.layout import QW, TILT_1
 from tiltsim.vehicles.spans import position_error
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.code.traceable import traceable
+from tiltsim_controllers.mathematics.attitude import rotation_of_quaternion
 from tiltsim_controllers.mathematics.records import make_record_type
 from tiltsim_controllers.mathematics.scalar import Floats, Vector
+from tiltsim_controllers.vehicle.downwash import Downwash, Wake, downwash_force
 
 if TYPE_CHECKING:
     import mujoco
+
+
+DOWNWASH: Final = "downwash"
+"""Column of the force (N) of the wakes of other vehicles along the world's z."""
 
 
 class Member(NamedTuple):
@@ -79,6 +87,19 @@ def _parts(sizes: Sequence[int], vector: Any) -> Iterator[Any]:
         first += size
 
 
+def _wakes(scenario: Scenario) -> tuple[Downwash, tuple[Wake, ...]]:
+    """The wakes of all vehicles, and their effect."""
+    table, flown = scenario.downwash, (scenario, *scenario.companions)
+    if table is None:
+        return Downwash(), (Wake(0.0, 0.0),) * len(flown)
+    disc = np.pi * table.rotor_radius**2
+    vehicles = [one.true_vehicle for one in flown]
+    return Downwash(scenario.air.density, table.drag_area), tuple(
+        Wake(vehicle.mass * vehicle.gravity, disc * one.vehicle.rotor_count)
+        for vehicle, one in zip(vehicles, flown, strict=True)
+    )
+
+
 def _metrics_among(
     columns: Mapping[str, Floats], members: Sequence[Member], scenario: Scenario
 ) -> dict[str, Any]:
@@ -100,30 +121,37 @@ def _metrics_among(
 
 
 @cache
-def with_companions(members: tuple[Member, ...]) -> ClosedLoop:
+def with_companions(members: tuple[Member, ...], downwash: bool) -> ClosedLoop:
     """The loop of several vehicles; objects belong to the first one's scenario.
 
     Args:
         members: The vehicles, of which the first keeps its names.
+        downwash: Whether their wakes act on vehicles below.
     """
-    return Several(members).closed_loop()
+    return Several(members, downwash).closed_loop()
 
 
 class Several:
     """The functions of the loop of several vehicles; see `ClosedLoop`.
 
     Args:
-        members: See `with_companions`.
+        members, downwash: See `with_companions`.
     """
 
-    def __init__(self, members: tuple[Member, ...]) -> None:
-        self._members = members
+    def __init__(self, members: tuple[Member, ...], downwash: bool) -> None:
+        self._members, self._downwash = members, downwash
         self._loops = [member.loop for member in members]
-        self._sizes = [loop.dynamics.sizes for loop in self._loops]
+        self._wrench = ExtraActuators(wrench=downwash)
+        own = [loop.dynamics.sizes for loop in self._loops]
+        self._sizes = [size._replace(ctrl=size.ctrl + self._wrench.controls) for size in own]
         self._total = Sizes(*(sum(numbers) for numbers in zip(*self._sizes, strict=True)))
         self._names = [f"vehicle_{number}" for number in range(len(members))]
         parameters = {n: loop.parameters for n, loop in zip(self._names, self._loops, strict=True)}
-        self._record = make_record_type("Companions", signature=float, **parameters)
+        self._wakes = make_record_type("Wakes", **dict.fromkeys(self._names, Wake))
+        self._forces = traceable(self._forces_at)
+        self._record = make_record_type(
+            "Companions", signature=float, downwash=Downwash, wakes=self._wakes, **parameters
+        )
 
     def _states(self, qpos: Any, qvel: Any, act: Any) -> Iterator[tuple[Any, Any, Any]]:
         """The state of each vehicle; the first one also sees objects and readings."""
@@ -134,7 +162,8 @@ class Several:
         return zip(places, _parts([size.qvel for size in self._sizes], qvel), seen, strict=True)
 
     def _controls_of(self, ctrl: Any) -> Iterator[Any]:
-        return _parts([size.ctrl for size in self._sizes], ctrl)
+        vehicles = zip(_parts([size.ctrl for size in self._sizes], ctrl), self._loops, strict=True)
+        return (own[: loop.dynamics.sizes.ctrl] for own, loop in vehicles)
 
     def _values_of(self, values: Any) -> Iterator[Any]:
         return _parts([len(member.fields) for member in self._members], values)
@@ -151,13 +180,25 @@ class Several:
     ) -> Any:
         """See `Sampling`."""
         found = zip(self._loops, self._states(qpos, qvel, act), self._setups(parameters, knots))
-        return xp.hstack([loop.sampling.controls(time, *s, *p) for loop, s, p in found])
+        own = [loop.sampling.controls(time, *s, *p) for loop, s, p in found]
+        return self._with_wakes(own, qpos, parameters)
 
     def hold(self, time: Any, qpos: Any, qvel: Any, act: Any, ctrl: Any, parameters: Any) -> Any:
         """See `Sampling`."""
         states, held = self._states(qpos, qvel, act), self._controls_of(ctrl)
         found = zip(self._loops, states, held, self._parameters(parameters), strict=True)
-        return xp.hstack([loop.sampling.hold(time, *s, c, p) for loop, s, c, p in found])
+        own = [loop.sampling.hold(time, *s, c, p) for loop, s, c, p in found]
+        return self._with_wakes(own, qpos, parameters)
+
+    def _with_wakes(self, controls: list[Any], qpos: Any, parameters: Any) -> Any:
+        """The controls of all vehicles, each with the wrench of the other vehicles' wakes."""
+        if not self._downwash:
+            return xp.hstack(controls)
+        poses = [*_parts([size.qpos for size in self._sizes], qpos)]
+        forces = self._forces_at(0.0, xp.hstack([pose[:3] for pose in poses]), parameters, ())
+        up = [rotation_of_quaternion(pose[QW:TILT_1])[2] for pose in poses]
+        wrenches = [xp.hstack([z * force, xp.zeros(3)]) for z, force in zip(up, forces)]
+        return xp.hstack([part for both in zip(controls, wrenches) for part in both])
 
     def observe(self, qpos: Any, qvel: Any, act: Any, ctrl: Any) -> Any:
         """See `Columns`."""
@@ -187,7 +228,9 @@ class Several:
         """See `ClosedLoop`."""
         each = [loop.setup(own, loop.signature) for loop, own in zip(self._loops, _plans(plan))]
         knots = tuple(knot for one in each for knot in one.knots)
-        return ControlSetup(self._record(signature, *(one.parameters for one in each)), knots)
+        downwash, wakes = _wakes(plan.scenario)
+        own = (one.parameters for one in each)
+        return ControlSetup(self._record(signature, downwash, self._wakes(*wakes), *own), knots)
 
     def initial_activations(self, plan: FlightPlan, setup: ControlSetup) -> Vector:
         """See `Dynamics`."""
@@ -204,7 +247,21 @@ class Several:
         found: dict[str, Floats] = {}
         for member, own in zip(self._members, self._setups(*setup), strict=True):
             found |= member.shared(member.loop.columns.derive(member.own(samples), own))
+        if self._downwash:
+            names = [member.prefix + axis for member in self._members for axis in "xyz"]
+            states = np.stack([samples[name] for name in names], axis=-1)
+            own = setup._replace(knots=())
+            forces = evaluate_over_samples(
+                self._forces, len(self._members), samples["time"], states, own
+            )
+            found |= {f"{m.prefix}{DOWNWASH}": f for m, f in zip(self._members, forces.T)}
         return found
+
+    def _forces_at(self, _time: Any, state: Any, parameters: Any, _knots: Any) -> Any:
+        """The forces of the wakes (N, along z) at the positions of all vehicles."""
+        places = state.reshape(len(self._members), 3)
+        wakes, numbers = (parameters.wakes, parameters.downwash), range(len(self._members))
+        return xp.array([downwash_force(places, number, *wakes) for number in numbers])
 
     def causes(self, sample: Mapping[str, float], setup: ControlSetup) -> tuple[str, ...]:
         """See `Monitoring`."""
@@ -242,9 +299,12 @@ class Several:
         from tiltsim.models.rotorcraft import compile_model
 
         dynamics = [loop.dynamics for loop in self._loops]
+        added = [self._wrench] if self._downwash else []
         flown = zip((scenario, *scenario.companions), dynamics, strict=True)
         first, *others = (
-            replace(model_spec(own, d.controller_states, d.extra_actuators), number=number)
+            replace(
+                model_spec(own, d.controller_states, (*d.extra_actuators, *added)), number=number
+            )
             for number, (own, d) in enumerate(flown)
         )
         names = (member.name for member in self._members[1:])
@@ -255,7 +315,8 @@ class Several:
         """The closed loop, whose columns are the first vehicle's, then all others with a prefix."""
         first, others = self._loops[0], self._members[1:]
         fields = [name for member in others for name in member.fields]
-        units = [member.shared(member.loop.units) for member in others]
+        units = [first.columns.units, *(member.shared(member.loop.units) for member in others)]
+        units += [{f"{m.prefix}{DOWNWASH}": "N" for m in self._members if self._downwash}]
         return replace(
             first,
             kind=replace(
@@ -280,7 +341,7 @@ class Several:
                 observe=traceable(self.observe),
                 derive=self.derive,
                 fields=(*first.columns.fields, *fields),
-                units={k: u for each in (first.columns.units, *units) for k, u in each.items()},
+                units={k: u for each in units for k, u in each.items()},
                 observe_reads_controls=any(
                     loop.columns.observe_reads_controls for loop in self._loops
                 ),

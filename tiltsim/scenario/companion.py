@@ -16,7 +16,7 @@ from tiltsim.scenario.controller import OwnFunctionController
 from tiltsim.scenario.interaction import RESERVED
 from tiltsim.scenario.messages import InvalidValueError
 from tiltsim.scenario.override_keys import merge
-from tiltsim.scenario.table import Table, Vector3, example
+from tiltsim.scenario.table import Positive, Table, Vector3, example
 from tiltsim.system.public import public
 
 TAKEN: Final = (
@@ -119,6 +119,18 @@ class CompanionTable(Table):
         document |= {"initial": initial, "reference": reference}
 
 
+class DownwashTable(Table):
+    """The wake of each vehicle on the vehicles below: a jet with the momentum of its weight."""
+
+    table_name = "downwash"
+
+    rotor_radius: Positive = Field(description="of the rotors of all vehicles [m]", examples=[0.1])
+    drag_area: Positive = Field(
+        description="drag coefficient times area of a vehicle in the wake from above [m^2]",
+        examples=[0.02],
+    )
+
+
 def companions_of(scenario: Any) -> tuple[Any, ...]:
     """The scenarios of the companions of a scenario, each in its world.
 
@@ -150,6 +162,8 @@ def check_companions(scenario: Any) -> None:
     if len(scenario.companion) > MAX_COMPANIONS:
         count = len(scenario.companion)
         raise InvalidValueError("companion", count, f"at most {MAX_COMPANIONS} of them")
+    if scenario.downwash is not None and not scenario.companion:
+        raise scenario.mistake("downwash", "needs a [[companion]]; remove it")
     names = [table.name for table in (*scenario.companion, *scenario.object)]
     for table in scenario.companion:
         if names.count(table.name) > 1 or table.name in RESERVED:
