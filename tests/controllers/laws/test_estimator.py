@@ -69,7 +69,7 @@ def now() -> e.Estimate:
 def _through(now: e.Estimate, steps: int) -> tuple[e.Estimate, e.Transition]:
     through, draws = e.no_transition(), np.random.default_rng(7)
     for _ in range(steps):
-        rates, force = draws.normal(size=3), draws.normal(size=3) + [0.0, 0.0, GRAVITY]
+        rates, force = draws.normal(size=3), [*draws.normal(size=3), 0.0, 0.0, GRAVITY]
         now, through = e.integrated(now, through, rates, force, STEP, GRAVITY)
     return now, through
 
@@ -141,7 +141,8 @@ def test_corrections_are_joseph_form_with_the_reset(now: e.Estimate, name: str) 
 def test_an_outlier_leaves_the_state(now: e.Estimate) -> None:
     reading = _readings(now, _moved(now, np.full(e.ERRORS, 0.5)))["position"][0]
     found, seen = e.corrected(now, reading, 3.0)
-    assert seen.nis > 3.0 and seen.accepted == 0.0
+    assert seen.nis > 3.0
+    assert seen.accepted == 0.0
     for kept, before in zip(found, now, strict=True):
         assert_allclose(kept, before, atol=1e-15)
 
