@@ -274,7 +274,7 @@ def position_reading(now: Estimate, measured: Any, arm: Any, variance: Any) -> R
 
     Args:
         now: The state.
-        measured: Shape (3,).
+        measured: m, shape (3,).
         arm: The point from the inertial measurement unit, body axes, m, shape (3,).
         variance: m^2, shape (3,).
     """
@@ -285,7 +285,12 @@ def position_reading(now: Estimate, measured: Any, arm: Any, variance: Any) -> R
 
 
 def altitude_reading(now: Estimate, measured: Any, arm: Any, variance: Any) -> Reading:
-    """The height (m) of a point of the vehicle; arguments as for `position_reading`, (1,)."""
+    """The height (m) of a point of the vehicle.
+
+    Args:
+        now, arm: As for `position_reading`.
+        measured, variance: m and m^2, shape (1,).
+    """
     whole = position_reading(now, xp.hstack([xp.zeros(2), measured]), arm, variance)
     return Reading(whole.innovation[2:], whole.jacobian[2:], variance)
 
@@ -294,7 +299,8 @@ def velocity_reading(now: Estimate, measured: Any, arm: Any, variance: Any, rate
     """The velocity (m/s, world) of a point of the vehicle.
 
     Args:
-        now, measured, arm, variance: As for `position_reading`, in (m/s)^2.
+        now, arm: As for `position_reading`.
+        measured, variance: m/s and (m/s)^2, shape (3,).
         rates: Body rates as the gyro measures them, rad/s, shape (3,).
     """
     rotation = rotation_of_quaternion(now.quaternion)
