@@ -36,6 +36,7 @@ change a key without editing the file; entries of lists are counted from 0:
 """
 WORD: Final = re.compile(r"[\w-]+")
 NOT_IN_ANCHOR: Final = re.compile(r"[^\w-]")  # characters that the anchor of a heading leaves out
+EVIDENT: Final = ('"', "true", "number", "whole")  # starts of values that need no example
 FEW: Final = 2  # most tables of one address that are printed in full; more are listed
 
 
@@ -333,11 +334,11 @@ def _narrow(table: KeyTable) -> str:
 
 
 def _item(key: Key) -> str:
-    """A key as an item of a list, with an example where neither default nor choices are one."""
+    """A key as an item of a list, with an example where it says more than the values."""
     unit = f" [{key.unit}]" if key.unit else ""
     required = key.default == "required"
     default = ", required" if required else f", default `{key.default}`" if key.default else ""
-    plain = key.example and key.example != key.default and not key.values.startswith(('"', "true"))
+    plain = key.example and key.example != key.default and not key.values.startswith(EVIDENT)
     example = f"; example `{key.example}`" if plain else ""
     return f"- `{key.name}` ({key.values}{unit}{default}): {key.meaning}{example}"
 

@@ -8,6 +8,7 @@ from tiltsim.closed_loop.loop import ClosedLoop
 from tiltsim.equations.actuator_level import ActuatorPlant, actuator_plant
 from tiltsim.equations.rigid_body import rigid_body
 from tiltsim.laws.commanded import commanded_loop
+from tiltsim.laws.companions import Member, with_companions
 from tiltsim.laws.flown_law import loop_of_law
 from tiltsim.laws.full_pose import full_pose_loop, full_pose_loop_of
 from tiltsim.laws.layers.actuation import with_actuation
@@ -99,6 +100,14 @@ def loop_of(
         loop = with_measured_acceleration(loop)
     if scenario.has_objects:
         loop = with_objects(loop, others_of(scenario))
+    if scenario.companion:
+        vehicles, names = (scenario, *scenario.companions), (t.name for t in scenario.companion)
+        loops = loop, *(loop_of(each, recorded=recorded) for each in vehicles[1:])
+        found = zip(("", *names), loops, map(plan_flight, vehicles), strict=True)
+        return with_companions(
+            tuple(Member(n, own, len(own.setup(plan, 0.0).knots)) for n, own, plan in found),
+            scenario.downwash is not None,
+        )
     if plant == "mujoco" or as_printed:
         return loop
     return on_equations(loop, _plant_of(scenario, loop))

@@ -88,6 +88,7 @@ def _rendered(template: str, report: Report, **more: Any) -> str:
         "alone": lambda rows: sum(row.on_the_thesis_alone for row in rows),
         "case_rows": _case_rows,
         "cell": markdown_cell,
+        "code": "`{}`".format,
         "count_rows": count,
         "files": lambda flights: dict.fromkeys(one.partition("#")[0] for one in flights),
         "groupby_in_order": lambda items, name: [

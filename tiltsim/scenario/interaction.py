@@ -239,9 +239,10 @@ def check_objects(scenario: Any) -> None:
             raise scenario.mistake("reference.type", reason)
     if scenario.payload is not None and scenario.payload.swing_damping:
         _check_swing_damping(scenario)
-    if not scenario.has_objects:
+    keys = ("object", "tool", "payload", "companion")
+    key = next((name for name in keys if getattr(scenario, name)), None)
+    if key is None:
         return
-    key = next(name for name in ("object", "tool", "payload") if getattr(scenario, name))
     if scenario.vehicle.is_planar:
         raise scenario.mistake("vehicle.model", f"[{key}] is for rotorcraft only; remove it")
     plant = f"its equations have no contacts and no [{key}]; use mujoco"

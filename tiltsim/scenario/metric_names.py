@@ -143,6 +143,12 @@ METRICS: Final = {
     "final_swing": Metric(
         "residual swing of the load", "rad", "largest such angle over the last second"
     ),
+    "minimum_separation": Metric(
+        "smallest distance between vehicles", "m", "between centers of mass of any two vehicles"
+    ),
+    "companion_rms_position_error": Metric(
+        "rms position error of a companion", "m", "the largest of all companions"
+    ),
     "rms_force_error": Metric(
         "rms error of the force",
         "N",
