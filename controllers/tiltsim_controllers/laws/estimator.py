@@ -288,7 +288,7 @@ def altitude_reading(now: Estimate, measured: Any, arm: Any, variance: Any) -> R
     """The height (m) of a point of the vehicle.
 
     Args:
-        now, arm: As for `position_reading`.
+        now, arm: See `position_reading`.
         measured, variance: m and m^2, shape (1,).
     """
     whole = position_reading(now, xp.hstack([xp.zeros(2), measured]), arm, variance)
@@ -299,7 +299,7 @@ def velocity_reading(now: Estimate, measured: Any, arm: Any, variance: Any, rate
     """The velocity (m/s, world) of a point of the vehicle.
 
     Args:
-        now, arm: As for `position_reading`.
+        now, arm: See `position_reading`.
         measured, variance: m/s and (m/s)^2, shape (3,).
         rates: Body rates as the gyro measures them, rad/s, shape (3,).
     """
