@@ -353,11 +353,13 @@ NOT_FLOWN = {*DESCRIPTIVE, "variant", "autopilot"}
 def companions(document):
     """Values without which these tables are refused: a wall to push, an integrator."""
     pushes = document.get("reference", {}).get("type") == "push"
-    if not pushes and not {"object", "tool", "payload"} & document.keys():
+    if not pushes and not {"object", "tool", "payload", "companion", "downwash"} & document.keys():
         return {}
     wall = {"name": "wall", "type": "wall", "position": [0.8, 0.0, 1.0], "size": [4.0, 4.0]}
     below = {"position": [0.0, 0.0, -0.3], "length": 0.4}
     touched = {"object": [wall], "tool": below} if pushes else {}
+    if "downwash" in document:
+        touched["companion"] = [{"name": "wing", "offset": [0.0, 0.0, -2.0]}]
     return {"simulation.integrator": "implicitfast", **touched}
 
 

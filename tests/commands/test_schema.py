@@ -12,7 +12,7 @@ from tiltsim.cli import main
 from tiltsim.commands.key_tables import key_tables
 from tiltsim.commands.schema import scenario_schema, sweep_schema
 from tiltsim.scenario.scenario_tables import ScenarioTables
-from tiltsim.scenario.schema import Node
+from tiltsim.scenario.schema import TAG_KEYS, Node
 from tiltsim.scenario.table import Table
 
 SCHEMA = scenario_schema()
@@ -61,11 +61,19 @@ def test_page_has_every_key_with_its_unit():
     assert {table.name for table in TABLES} == {*DEFINITIONS}
     for table in TABLES:
         assert {key.name for key in table.keys} == {*DEFINITIONS[table.name]["properties"]}
-        section = text.partition(f"```toml\n{table.toml}```")[2].partition("```toml")[0]
+        before, _, after = text.partition(f"```toml\n{table.toml}```")
+        section = after.partition("```toml")[0].partition("\n#")[0]
+        shared = before.rpartition("\n## ")[2].partition("\n#")[0]
         for key in table.keys if table.toml else ():
-            row = section.partition(f"\n| `{key.name}` |")[2].partition("\n")[0]
-            assert f" {key.meaning}".replace("|", "\\|") in row
-            assert not key.unit or f" [{key.unit}]" in row
+            if key.name in TAG_KEYS and key.values == key.example:
+                words = re.findall(r"[\w-]+", key.meaning.lower())
+                assert {*words} <= {*re.findall(r"[\w-]+", before.rpartition("\n#")[2].lower())}
+                continue
+            known = re.search(rf"\n- Also .*`{key.name}`", section)
+            item = (shared if known else section).partition(f"\n- `{key.name}` (")[2]
+            item = item.partition("\n")[0]
+            assert f": {key.meaning}" in item
+            assert not key.unit or f" [{key.unit}]" in item
 
 
 def classes(table):

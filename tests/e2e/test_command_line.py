@@ -515,8 +515,17 @@ def test_schema_knows_every_table_and_the_variants(capsys):
     assert main(["schema"]) == 0
     schema = json.loads(capsys.readouterr().out)
     tables = {"vehicle", "simulation", "initial", "controller", "gait", "reference"}
-    tables |= {"air", "autopilot", "ground", "model_error", "payload", "sensors", "tool"}
-    lists = {"disturbance", "expect", "fault", "object", "variant"}
+    tables |= {
+        "air",
+        "autopilot",
+        "downwash",
+        "ground",
+        "model_error",
+        "payload",
+        "sensors",
+        "tool",
+    }
+    lists = {"companion", "disturbance", "expect", "fault", "object", "variant"}
     assert tables | lists | {"title", "source", "without", "ours", "claim"} == set(
         schema["properties"]
     )

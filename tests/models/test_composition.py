@@ -86,14 +86,12 @@ def both_ways(monkeypatch):
         for installed in (find_spec, lambda _: None):
             monkeypatch.setattr(mjcf_editing, "find_spec", installed)
             rotorcraft._compose.cache_clear()
-            rotorcraft._compiled.clear()
             tilt_car._compose.cache_clear()
             models.append([compile_it(spec, visuals=visuals) for visuals in (True, False)])
         return models
 
     yield compose
     rotorcraft._compose.cache_clear()
-    rotorcraft._compiled.clear()
     tilt_car._compose.cache_clear()
 
 

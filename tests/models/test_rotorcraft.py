@@ -15,7 +15,7 @@ from scipy.integrate import solve_ivp
 from tests.thesis import force_matrix, torque_matrix
 from tiltsim.errors import InputError
 from tiltsim.models.parts import Pod, RotorLimits, TiltServo
-from tiltsim.models.rotorcraft import RotorcraftSpec, compile_model
+from tiltsim.models.rotorcraft import RotorcraftSpec, _compose, compile_model
 from tiltsim.resources import shipped_folder
 from tiltsim.scenario.loading import parse_scenario
 from tiltsim_controllers.vehicle.parameters import PRESETS, SPIN, Vehicle
@@ -490,9 +490,7 @@ def numbers(model):
 
 @pytest.mark.parametrize("kind", ["tiltrotor", "quadrotor"])
 @pytest.mark.parametrize("law_states", [0, 2])
-def test_a_model_made_of_another_is_what_compiling_gives(kind, law_states):
-    import tiltsim.models.rotorcraft
-
+def test_vehicles_that_differ_in_numbers_share_their_composition(kind, law_states):
     vehicle = PRESETS["ar_drone_2"]
     other = vehicle._replace(
         mass=0.47123,
@@ -503,19 +501,15 @@ def test_a_model_made_of_another_is_what_compiling_gives(kind, law_states):
         drag_coefficient=2.5e-7,
         gravity=9.81,
     )
-    heavy = tiltsim.models.parts.Pod(mass=0.01, inertia=1e-6)
+    heavy = Pod(mass=0.01, inertia=1e-6)
     compile_this = partial(compile_of, kind, law_states=law_states, userdata_size=3, pod=heavy)
-    tiltsim.models.rotorcraft._compiled.clear()
-    compiled = dict(numbers(compile_this(other)))
-    tiltsim.models.rotorcraft._compiled.clear()
-    compile_this(vehicle)
-    assert len(tiltsim.models.rotorcraft._compiled) == 1
-    made = dict(numbers(compile_this(other)))
-    assert made.keys() == compiled.keys()
-    assert len(made) > 200
-    different = [name for name in made if not np.array_equal(made[name], compiled[name])]
-    assert different == []
-    # The model that others are made of is not for anybody to change.
-    again = compile_this(vehicle)
-    again.body_mass[:] = 1.0
-    np.testing.assert_array_equal(compile_this(other).body_mass, compiled["body_mass"])
+    _compose.cache_clear()
+    alone = dict(numbers(compile_this(other)))
+    _compose.cache_clear()
+    compile_this(vehicle).body_mass[:] = 1.0  # which changes no later one
+    after_another = dict(numbers(compile_this(other)))
+    assert _compose.cache_info().misses == 1
+    assert after_another.keys() == alone.keys()
+    assert len(alone) > 200
+    assert not [name for name in alone if not np.array_equal(after_another[name], alone[name])]
+    assert alone["body_mass"][1] == other.mass - 4.0 * heavy.mass * (kind == "tiltrotor")

@@ -70,7 +70,7 @@ def test_rounding_does_not_fill_a_plot():
         samples[:, SAMPLE_FIELDS.index(name)] = 1e-16 * np.sin(9.0 * this["time"])
     level = replace(this, samples=samples)
     low, high = range_of(views_of(this.scenario, flights=[level])["Body rates (rad/s)"])
-    assert high - low == pytest.approx(0.02)
+    assert 0.02 < high - low < 0.025
 
 
 def test_every_column_is_plotted():
@@ -83,7 +83,10 @@ def test_every_column_is_plotted():
         drawn |= {bound for each in signals for bound in each.bounds}
         speeds = {f"rotor_speed_{rotor}" for rotor in (1, 2, 3, 4)}  # along the spins
         assert drawn >= flight(name).units.keys() - {"time"} - speeds
-        assert {each.text for each in signals} <= views_of(scenario).keys()
+        titles = views_of(scenario).keys()
+        for each in signals:  # a plot beside another one is named by its line
+            label = each.lines[0].label.capitalize()
+            assert any(title.startswith((each.text, f"{label} (")) for title in titles)
 
 
 def test_compared_flights_have_one_legend():
@@ -92,7 +95,7 @@ def test_compared_flights_have_one_legend():
         plots = [view.properties["PlotLegend"] for view in views if "PlotLegend" in view.properties]
         return [legend.visible.as_arrow_array().to_pylist() == [True] for legend in plots]
 
-    assert legends("fixed")[:5] == [True] * 5
+    assert sorted(legends("fixed")) == [False, False] + [True] * 10
     assert sorted(legends("fixed", "trot")) == [False] * 4 + [True]
 
 
@@ -100,12 +103,12 @@ def test_legends_lie_before_the_flight():
     view = views_of(flight("fixed").scenario)["Attitude (rad)"]
     (shown,) = view.properties["TimeAxis"].view_range.as_arrow_array().to_pylist()
     assert shown["start"] < -0.25e9 * flight("fixed").end.time
-    assert shown["end"] == pytest.approx(1e9 * flight("fixed").end.time)
+    assert 1.0 < shown["end"] / (1e9 * flight("fixed").end.time) < 1.1
 
 
 @pytest.mark.parametrize(("name", "whole"), [("fixed", True), ("trot", False)])
 def test_the_attitudes_trail_is_short_if_the_curve_moves(name, whole):
-    view = views_of(flight(name).scenario)["Attitude (shaded: unreachable attitudes)"]
+    view = views_of(flight(name).scenario)["Attitude (shaded: unreachable)"]
     (shown,) = view.visualizer_overrides["plane/trail"].ranges.as_arrow_array().to_pylist()
     assert shown["range"]["start"] == (None if whole else -1e9 * MOVING_TRAIL_TIME)
 

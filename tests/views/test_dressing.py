@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tiltsim.resources import shipped_folder
-from tiltsim.views.dressing import COUNTERCLOCKWISE, dressed
+from tiltsim.views.dressing import COUNTERCLOCKWISE, dress
 
 DOCS = Path(__file__).parents[2] / "docs"
 SKY = mujoco.mjtTexture.mjTEXTURE_SKYBOX
@@ -26,7 +26,9 @@ def file_of(page, folder):
 def added(path):
     """The model of a file, the dressed one, and the types of the geoms added to its vehicle."""
     plain = mujoco.MjModel.from_xml_path(str(path))
-    model = dressed(plain, path)
+    spec = mujoco.MjSpec.from_file(str(path))
+    dress(spec)
+    model = spec.compile()
     of_vehicle = [model.geom_type[g] for g in range(model.ngeom) if model.geom_bodyid[g]]
     own = [plain.geom_type[g] for g in range(plain.ngeom) if plain.geom_bodyid[g]]
     for kind in own:

@@ -20,6 +20,8 @@ BODY_RATE: Final = 3
 """The code of p; q and r have the next ones."""
 ROTOR_SPEED: Final = 6
 """The code of the first rotor; the other rotors have the next ones."""
+VEHICLE: Final = 100
+"""The step from the codes of one vehicle to the codes of the next, where there are several."""
 
 
 def horizontal_error(time: Any, values: Any, reference: ReferenceParameters, knots: Any) -> Any:

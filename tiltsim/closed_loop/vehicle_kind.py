@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from tiltsim.models.parts import ExtraActuators
+from tiltsim.models.parts import ExtraActuators, Visuals
 from tiltsim.models.vehicle_parts import MAX_ROTORS
 from tiltsim.scenario.scenario import FlightPlan, Scenario
 from tiltsim.system.text import Quantity
@@ -38,7 +38,7 @@ class VehicleKind:
     observed_fields: tuple[str, ...]
     columns: Mapping[str, Quantity]
     thrusts: Callable[[Mapping[str, Floats], Scenario], dict[str, Floats]]
-    compile: Callable[[Scenario, int, tuple[ExtraActuators, ...], int, bool], mujoco.MjModel]
+    compile: Callable[[Scenario, int, tuple[ExtraActuators, ...], int, Visuals], mujoco.MjModel]
     initial_motion: Callable[[FlightPlan], tuple[Vector, Vector]]
     limit_exceeded: Callable[..., Any]
     metrics: Callable[[Mapping[str, Floats], Scenario, bool], dict[str, Any]]

@@ -2,7 +2,8 @@
 
 import json
 import re
-from collections.abc import Iterable, Sequence
+from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from math import pi
@@ -33,7 +34,9 @@ and coordinates beyond a million meters, are refused. Chapters (ch.) are chapter
 change a key without editing the file; entries of lists are counted from 0:
 `--set 'gait.angles[0]=0.2'`.
 """
+WORD: Final = re.compile(r"[\w-]+")
 NOT_IN_ANCHOR: Final = re.compile(r"[^\w-]")  # characters that the anchor of a heading leaves out
+EVIDENT: Final = ('"', "true", "number", "whole")  # starts of values that need no example
 FEW: Final = 2  # most tables of one address that are printed in full; more are listed
 
 
@@ -241,13 +244,23 @@ def page(tables: Sequence[KeyTable]) -> str:
     ]
     parts = [INTRODUCTION, *markdown_table(("table", "meaning"), overview)]
     parts += ["", "## Keys before all tables", ""]
-    parts += _key_grid(key for key in document.keys if key.name not in chapters)
+    parts += [_item(key) for key in document.keys if key.name not in chapters]
     for name, place in chapters.items():
         parts += ["", f"## `{head_of(place)}`", *(["", meanings[name]] if place[0].tags else [])]
-        parts += [
-            line for table in others if table.places[0][0].name == name for line in _section(table)
-        ]
+        own = [table for table in others if table.places[0][0].name == name]
+        shared = shared_keys(own)
+        if shared:
+            parts += ["", "Keys that several of the following tables have:", ""]
+            parts += map(_item, shared)
+        parts += [line for table in own for line in _section(table, shared)]
     return "\n".join(parts) + "\n"
+
+
+def shared_keys(tables: Sequence[KeyTable]) -> list[Key]:
+    """The keys that at least two of the tables have, unless another key has the same name."""
+    counts = Counter(key for table in tables for key in table.keys)
+    names = Counter(key.name for key in counts)
+    return [key for key, count in counts.items() if count > 1 and names[key.name] == 1]
 
 
 def description(tables: Sequence[KeyTable], address: str) -> str:
@@ -277,12 +290,33 @@ def description(tables: Sequence[KeyTable], address: str) -> str:
     return "\n".join(keys)
 
 
-def _section(table: KeyTable) -> list[str]:
-    """Lines of the page about one table."""
+def _section(table: KeyTable, shared: Sequence[Key]) -> list[str]:
+    """Lines of the page about one table, with only the names of shared keys."""
     place = table.places[0]
     title = ["", f"### {_title(table)}"] if len(place) > 1 or place[0].tags else []
     toml = ["```toml", *table.toml.splitlines(), "```"]
-    return [*title, "", _plain(table.meaning), "", *toml, "", *_key_grid(table.keys)]
+    own = [key for key in table.keys if key not in shared and not _is_only_kind(key)]
+    others = ", ".join(f"`{key.name}`" for key in table.keys if key in shared)
+    items = [*map(_item, own), *([f"- Also {others}."] if others else [])]
+    return [*title, "", _meaning(table), "", *toml, "", *items]
+
+
+def _is_only_kind(key: Key) -> bool:
+    """Whether a key says which kind the table is, and leaves no choice."""
+    return key.name in TAG_KEYS and "," not in key.values
+
+
+def _meaning(table: KeyTable) -> str:
+    """The description of a table and of its kind, without the one whose words the other has."""
+    texts = [_plain(table.meaning).rstrip(".")]
+    texts += [key.meaning for key in table.keys if _is_only_kind(key)]
+    words = [set(WORD.findall(text.lower())) for text in texts]
+    kept = [
+        text
+        for number, text in enumerate(texts)
+        if not any(words[number] < other for other in words) and words[number] not in words[:number]
+    ]
+    return _sentence("; ".join(kept))
 
 
 def _title(table: KeyTable) -> str:
@@ -299,16 +333,14 @@ def _narrow(table: KeyTable) -> str:
     return ", ".join(name for name in table.addresses() if name.count(".") == table.depth)
 
 
-def _key_grid(keys: Iterable[Key]) -> list[str]:
-    return markdown_table(("key", "value and default", "meaning and example"), map(_row, keys))
-
-
-def _row(key: Key) -> tuple[str, str, str]:
+def _item(key: Key) -> str:
+    """A key as an item of a list, with an example where it says more than the values."""
     unit = f" [{key.unit}]" if key.unit else ""
     required = key.default == "required"
-    default = "<br>required" if required else f"<br>default `{key.default}`" if key.default else ""
-    example = f"<br>`{key.name} = {key.example}`" if key.example else ""
-    return f"`{key.name}`", key.values + unit + default, key.meaning + example
+    default = ", required" if required else f", default `{key.default}`" if key.default else ""
+    plain = key.example and key.example != key.default and not key.values.startswith(EVIDENT)
+    example = f"; example `{key.example}`" if plain else ""
+    return f"- `{key.name}` ({key.values}{unit}{default}): {key.meaning}{example}"
 
 
 def _text(table: KeyTable) -> str:

@@ -17,6 +17,7 @@ from tiltsim.closed_loop.userdata import (
 )
 from tiltsim.engines.base import Vectors
 from tiltsim.equations.solvers import Integration, make_step
+from tiltsim.scenario.companion import MAX_COMPANIONS
 from tiltsim_controllers.code.arrays import flatten, xp
 from tiltsim_controllers.code.program import Program
 from tiltsim_controllers.code.traceable import as_arrays, program_of
@@ -26,7 +27,7 @@ from tiltsim_controllers.references.trajectories import ReferenceParameters
 KEPT: Final = 64
 """Programs of each kind that are kept; each closed loop, gait type and decoupler has its own."""
 
-SIDES: Final = 17
+SIDES: Final = 17 * (1 + MAX_COMPANIONS)
 """Largest number of sign checks of a loop."""
 
 

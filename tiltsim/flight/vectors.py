@@ -27,6 +27,13 @@ VECTORS: Final = {
 
 
 def components(name: str, columns: Iterable[str]) -> list[str]:
-    """The columns of a flight that make a vector, in its order; empty if there are none."""
-    present = {*columns}
-    return [column for column in VECTORS.get(name, ()) if column in present]
+    """The columns of a flight that make a vector, in its order; empty if there are none.
+
+    Args:
+        name: The vector, for a companion after its name, such as ``wing_position``.
+        columns: All columns of the flight.
+    """
+    present, own = {*columns}, name if name in VECTORS else ""
+    own = own or next((vector for vector in VECTORS if name.endswith(f"_{vector}")), "")
+    prefix = name.removesuffix(own)
+    return [prefix + part for part in VECTORS.get(own, ()) if prefix + part in present]

@@ -8,6 +8,7 @@ from tiltsim.closed_loop.loop import ClosedLoop
 from tiltsim.equations.actuator_level import ActuatorPlant, actuator_plant
 from tiltsim.equations.rigid_body import rigid_body
 from tiltsim.laws.commanded import commanded_loop
+from tiltsim.laws.companions import Member, with_companions
 from tiltsim.laws.flown_law import loop_of_law
 from tiltsim.laws.full_pose import full_pose_loop, full_pose_loop_of
 from tiltsim.laws.layers.actuation import with_actuation
@@ -17,6 +18,7 @@ from tiltsim.laws.layers.loads import with_loads
 from tiltsim.laws.layers.measured_acceleration import with_measured_acceleration
 from tiltsim.laws.layers.on_equations import on_equations
 from tiltsim.laws.layers.rotor_inertia import with_rotor_inertia
+from tiltsim.laws.layers.swing import with_swing_damping
 from tiltsim.laws.multirotor import loop_of_multirotor
 from tiltsim.laws.quadrotor import QUADROTOR_ATTITUDE_ALTITUDE, SWITCHING, YAW_POSITION
 from tiltsim.laws.tilt_car import FOURTH_DERIVATIVE, THIRD_DERIVATIVE
@@ -84,6 +86,8 @@ def loop_of(
     loop = adapted(loop)
     if scenario.reference.type == "push" and not external:
         loop = with_force_loop(loop)
+    if scenario.payload is not None and scenario.payload.swing_damping:
+        loop = with_swing_damping(loop)
     if scenario.needs_actuation_layer:
         loop = with_actuation(loop, scenario.simulation.latency_steps, external)
     if scenario.has_air:
@@ -96,6 +100,14 @@ def loop_of(
         loop = with_measured_acceleration(loop)
     if scenario.has_objects:
         loop = with_objects(loop, others_of(scenario))
+    if scenario.companion:
+        vehicles, names = (scenario, *scenario.companions), (t.name for t in scenario.companion)
+        loops = loop, *(loop_of(each, recorded=recorded) for each in vehicles[1:])
+        found = zip(("", *names), loops, map(plan_flight, vehicles), strict=True)
+        return with_companions(
+            tuple(Member(n, own, len(own.setup(plan, 0.0).knots)) for n, own, plan in found),
+            scenario.downwash is not None,
+        )
     if plant == "mujoco" or as_printed:
         return loop
     return on_equations(loop, _plant_of(scenario, loop))

@@ -5,15 +5,13 @@ from __future__ import annotations
 import os
 import re
 import warnings
-from collections.abc import Callable, Iterable, Sequence
-from functools import partial
+from collections.abc import Iterable, Sequence
 from importlib.util import find_spec
 from math import degrees, isfinite, prod
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 from xml.etree import ElementTree
 
-from tiltsim.models.objects import Objects, add_objects
 from tiltsim.models.parts import TiltServo
 from tiltsim.system.files import is_file, is_folder
 
@@ -64,9 +62,11 @@ def parse_mjcf(path: Path) -> Any:
             return mjcf.from_xml_string(_with_inclusions(path), model_dir=str(path.parent))
         except Exception:  # of many kinds
             pass
+    import mujoco
+
     from tiltsim.models.mjspec_tree import MjSpecTree
 
-    return MjSpecTree(path)
+    return MjSpecTree(mujoco.MjSpec.from_file(str(path)))
 
 
 def _with_inclusions(path: Path) -> bytes:
@@ -87,32 +87,17 @@ def _with_inclusions(path: Path) -> bytes:
     return ElementTree.tostring(tree)
 
 
-Compile = Callable[[], "mujoco.MjModel"]
-
-
-def compiler_of(root: Any, objects: Objects | None = None) -> Compile:
-    """A function that compiles a tree as it is now, whatever is edited afterwards.
-
-    Args:
-        root: The tree.
-        objects: Added to it.
-    """
+def spec_of(root: Any) -> mujoco.MjSpec:
+    """MuJoCo's own form of a tree as it is now, whatever is edited afterwards."""
     import mujoco
 
     from tiltsim.models.mjspec_tree import MjSpecTree
 
     if isinstance(root, MjSpecTree):
-        spec = root.spec.copy()
-    else:
-        unnamed = r' name="//unnamed_[^"]*"'  # dm_control's names of unnamed elements
-        text = re.sub(unnamed, "", root.to_xml_string())
-        if objects is None:
-            return partial(mujoco.MjModel.from_xml_string, text, root.get_assets())
-        spec = mujoco.MjSpec.from_string(text, assets=root.get_assets())
-    if objects is not None:
-        add_objects(spec, objects)
-    compile_copy: Compile = spec.compile
-    return compile_copy
+        return root.spec.copy()
+    unnamed = r' name="//unnamed_[^"]*"'  # dm_control's names of unnamed elements
+    text = re.sub(unnamed, "", root.to_xml_string())
+    return mujoco.MjSpec.from_string(text, assets=root.get_assets())
 
 
 def remove_visuals(root: Any, *, contacts: bool) -> None:

@@ -8,7 +8,6 @@ elements when it reads a file. Edits must therefore address elements, never defa
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any, Final
 
 import mujoco
@@ -192,10 +191,10 @@ _KINDS: Final = {"actuator": _Actuator, "body": _Body, "geom": _Shape, "key": _K
 
 
 class MjSpecTree:
-    """The root of the tree of an MJCF file."""
+    """The root of a tree, whose edits change a specification of MuJoCo's in place."""
 
-    def __init__(self, path: Path) -> None:
-        spec = self.spec = mujoco.MjSpec.from_file(str(path))
+    def __init__(self, spec: mujoco.MjSpec) -> None:
+        self.spec = spec
         self.size = _Element(spec, spec)
         self.option, self.compiler = _Option(spec, spec.option), _Compiler(spec, spec.compiler)
         self.actuator = _Actuators(spec)

@@ -17,6 +17,8 @@ from tiltsim_controllers.mathematics.attitude import rotation_of_quaternion
 from tiltsim_controllers.mathematics.scalar import Floats, Triple, Values
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     import mujoco
 
 WALL_THICKNESS: Final = 0.1  # m
@@ -168,12 +170,13 @@ class Objects:
         return CONTACT_READING * len(self.bodies) + CABLE_READING * self.hangs
 
 
-def touchable(root: Any, *, ground: bool) -> None:
+def touchable(root: Any, *, ground: bool, number: int = -1) -> None:
     """Let the vehicle's collision shapes touch other things, but not each other.
 
     Args:
         root: The vehicle as a tree.
         ground: Whether its ground can be touched.
+        number: Its number among vehicles that touch each other; -1 for one alone.
     """
     root.option.cone = "elliptic"  # a pyramid holds 29 % less along its diagonals
     root.option.impratio = 10.0  # friction ten times as stiff as the contact: it creeps less
@@ -182,13 +185,42 @@ def touchable(root: Any, *, ground: bool) -> None:
         plane.contype = plane.conaffinity = 0
     for geom in root.find("body", "vehicle").find_all("geom"):
         if (geom.name or "").endswith("collision"):
-            geom.contype = 1
+            geom.contype = 1 if number < 0 else 1 | 2 << number  # a bit for all after it
+            if number > 0:
+                geom.conaffinity = (2 << number) - 2  # the bits of all before it
 
 
-def add_objects(spec: mujoco.MjSpec, objects: Objects) -> None:
-    """Add objects, tool and load to a vehicle. Its keyframes, which lack them, are removed."""
+def add_companion(spec: mujoco.MjSpec, name: str, companion: mujoco.MjSpec) -> None:
+    """Add a further vehicle. Keyframes, which have only one of them, are removed.
+
+    Args:
+        spec: The first vehicle.
+        name: The other's name, which begins the names of its parts.
+        companion: The other, of which ground, lights and cameras stay behind.
+    """
+    remove_keys(spec)
+    remove_keys(companion)
+    world = companion.worldbody
+    for element in (*world.geoms, *world.lights, *world.cameras):
+        companion.delete(element)
+    spec.attach(companion, prefix=f"{name}_", frame=spec.worldbody.add_frame())
+
+
+def remove_keys(spec: mujoco.MjSpec) -> None:
+    """Remove all keyframes."""
     for key in list(spec.keys):
         spec.delete(key)
+
+
+def add_objects(spec: mujoco.MjSpec, objects: Objects, companions: Sequence[str] = ()) -> None:
+    """Add objects, tool and load to a vehicle. Its keyframes, which lack them, are removed.
+
+    Args:
+        spec: The vehicle.
+        objects: All that is added.
+        companions: Names of further vehicles, which touch the objects as well.
+    """
+    remove_keys(spec)
     spec.option.impratio, spec.option.tolerance = FIRMER, 1e-12  # forces without noise
     for body in objects.bodies:
         _add_body(spec, body)
@@ -197,7 +229,8 @@ def add_objects(spec: mujoco.MjSpec, objects: Objects) -> None:
     if objects.load is not None:
         _add_load(spec, objects.load)
     for body in objects.bodies:
-        _add_pairs(spec, body)
+        for vehicle in ("vehicle", *(f"{name}_vehicle" for name in companions)):
+            _add_pairs(spec, vehicle, body)
         _add_force_sensor(spec, body.name)
     if objects.hangs:
         import mujoco
@@ -302,13 +335,13 @@ def _add_load(spec: mujoco.MjSpec, load: Load) -> None:
     cable.solimp_limit = IMPEDANCE
 
 
-def _add_pairs(spec: mujoco.MjSpec, body: Body) -> None:
-    """Let every shape of the vehicle that can touch touch an object, with a slow friction.
+def _add_pairs(spec: mujoco.MjSpec, vehicle: str, body: Body) -> None:
+    """Let every shape of a vehicle that can touch touch an object, with a slow friction.
 
     MuJoCo's cone of friction is convex: bodies that slide at a speed are pushed apart at friction
     times that speed, and chatter. A longer time constant of friction alone divides that.
     """
-    for geom in spec.body("vehicle").find_all("geom"):
+    for geom in spec.body(vehicle).find_all("geom"):
         if geom.name.endswith("collision"):
             spec.add_pair(
                 geomname1=geom.name,

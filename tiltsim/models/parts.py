@@ -1,10 +1,19 @@
 """Parts and options that models of vehicles are compiled from; a scenario's tables fill them in."""
 
+from __future__ import annotations
+
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from math import inf
-from typing import Final, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+if TYPE_CHECKING:
+    import mujoco
 
 WRENCH_SIZE: Final = 6
+
+Visuals = bool | Callable[["mujoco.MjSpec"], None]
+"""Whether a model has parts that are only drawn or measured; or a function that adds such parts."""
 
 
 class ExtraActuators(NamedTuple):

@@ -6,17 +6,25 @@ scales the geometry with the arms, and compiles.
 
 from __future__ import annotations
 
-from copy import copy
 from dataclasses import KW_ONLY, dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, cast
 
 import numpy as np
 
 from tiltsim.models import mjcf_editing
-from tiltsim.models.objects import Objects, touchable
-from tiltsim.models.parts import SERVO_ARMATURE, ExtraActuators, Ground, ModelSpec, Pod, RotorLimits
+from tiltsim.models.mjspec_tree import MjSpecTree
+from tiltsim.models.objects import Objects, add_companion, add_objects, touchable
+from tiltsim.models.parts import (
+    SERVO_ARMATURE,
+    ExtraActuators,
+    Ground,
+    ModelSpec,
+    Pod,
+    RotorLimits,
+    Visuals,
+)
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.models.user_vehicle import UserVehicle
 from tiltsim.resources import shipped_folder
@@ -45,6 +53,8 @@ class RotorcraftSpec(ModelSpec):
         extra_actuators: Actuators that layers append after the law's states.
         ground: Ground to take off from and land on; None disables contacts.
         objects: Objects, tool and load; None for a vehicle alone.
+        companions: Further vehicles in the same world by name.
+        number: Its number, from 0, among vehicles that touch each other; -1 for one alone.
         user_vehicle: A user's file in place of the shipped one, with its own arms and pods; its
             geoms may have mass and are always kept.
     """
@@ -57,6 +67,8 @@ class RotorcraftSpec(ModelSpec):
     extra_actuators: tuple[ExtraActuators, ...] = ()
     ground: Ground | None = None
     objects: Objects | None = None
+    companions: tuple[tuple[str, RotorcraftSpec], ...] = ()
+    number: int = -1
     user_vehicle: UserVehicle | None = None
 
     @property
@@ -78,7 +90,7 @@ class RotorcraftSpec(ModelSpec):
 
 
 @one_thread_at_a_time
-def compile_model(spec: RotorcraftSpec, *, visuals: bool = True) -> mujoco.MjModel:
+def compile_model(spec: RotorcraftSpec, *, visuals: Visuals = True) -> mujoco.MjModel:
     """Compile the MuJoCo model of a rotorcraft.
 
     Mass and inertia of the compiled model are the vehicle's at any tilt: the pods' are
@@ -87,7 +99,8 @@ def compile_model(spec: RotorcraftSpec, *, visuals: bool = True) -> mujoco.MjMod
     Args:
         spec: The specification of the model.
         visuals: Whether to keep parts that are only drawn or measured: geoms, cameras and others.
-            They do not affect the physics, but updating them takes a third of a step.
+            They do not affect the physics, but updating them takes a third of a step. Or a
+            function that adds further ones to the model before it is compiled.
 
     Returns:
         With the keyframes ``hover`` (in equilibrium) and ``start`` (rotors at 300 rad/s).
@@ -95,95 +108,78 @@ def compile_model(spec: RotorcraftSpec, *, visuals: bool = True) -> mujoco.MjMod
     Raises:
         ValueError: If the pods are too heavy for the vehicle.
     """
-    import mujoco
-
+    vehicles = [spec, *(companion for _, companion in spec.companions)]
+    composed = [_compose(_structure(one)) for one in vehicles]
+    # One that is kept complete may have springs and dampers, which no bare model has.
+    whole = visuals or any(complete is bare for complete, bare in composed)
+    trees = [MjSpecTree(each[0 if whole else 1].copy()) for each in composed]
+    for tree, one in zip(trees, vehicles, strict=True):
+        _set_parameters(tree, one)
+    world = trees[0].spec
+    for (name, _), companion in zip(spec.companions, trees[1:], strict=True):
+        add_companion(world, name, companion.spec)
     if spec.objects is not None:
-        complete, bare = _compose(spec)
-        with mujoco_hooks():
-            return complete() if visuals else bare()
-    # A preset's parameters in place of all that `_with_parameters` sets.
-    key = spec, visuals
-    if isinstance(spec.vehicle, Vehicle):
-        preset = PRESETS["ar_drone_2"]._replace(arm_length=spec.vehicle.arm_length)
-        key = replace(spec, vehicle=preset), visuals
-        if key in _compiled:
-            return _with_parameters(*_compiled[key], spec, spec.vehicle)
-    complete, bare = _compose(spec)
+        add_objects(world, spec.objects, [name for name, _ in spec.companions])
+    if callable(visuals):
+        visuals(world)
     with mujoco_hooks():
-        compiled = complete() if visuals else bare()
-    if spec.user_vehicle is None and not spec.has_stops:
-        if len(_compiled) >= MODEL_CACHE_SIZE:
-            _compiled.clear()
-        _compiled[key] = copy(compiled), mujoco.MjData(compiled)
-    return compiled
+        return world.compile()
 
 
-MODEL_CACHE_SIZE: Final = 32  # number of models that are kept to derive others from
-_compiled: dict[tuple[RotorcraftSpec, bool], tuple[mujoco.MjModel, mujoco.MjData]] = {}
-"""Compiled models, with data to work in, by structure and visuals.
-
-Models with stops are not among them: MuJoCo's solver scales with a mean inertia that only its
-compiler computes.
-"""
-
-
-def _with_parameters(
-    compiled: mujoco.MjModel, data: mujoco.MjData, spec: RotorcraftSpec, vehicle: Vehicle
-) -> mujoco.MjModel:
-    """A copy of a model with another vehicle's mass, inertia, coefficients and gravity.
-
-    Bit for bit the compiler's result, a hundred times faster, except for the mean mass and inertia
-    in ``stat``, which nothing here reads.
-    """
-    import mujoco
-
-    model = copy(compiled)
-    body = model.body("vehicle").id
-    model.body_mass[body], model.body_inertia[body] = _body_inertia(spec, vehicle)
-    for i, spin in zip(ROTORS, SPIN, strict=True):
-        model.actuator(f"thrust_{i}").gear[:] = _thrust_gear(
-            vehicle.thrust_coefficient, vehicle.drag_coefficient, spin
-        )
-    model.opt.gravity[:] = (0.0, 0.0, -vehicle.gravity)
-    hover, speed = model.key("hover").id, vehicle.hover_rotor_speed
-    model.key_act[hover, :4] = [spin * speed for spin in SPIN]
-    thrusts = model.actuator("thrust_1").id
-    model.key_ctrl[hover, thrusts : thrusts + 4] = speed**2
-    with mujoco_hooks():
-        mujoco.mj_setConst(model, data)
-    return model
+def _structure(spec: RotorcraftSpec) -> RotorcraftSpec:
+    """Equal for vehicles whose compositions differ in numbers only; see `_set_parameters`."""
+    if spec.user_vehicle is not None:
+        vehicle: Vehicle | Multirotor = spec.user_vehicle.vehicle
+    else:
+        arm_length = cast(Vehicle, spec.vehicle).arm_length
+        vehicle = PRESETS["ar_drone_2"]._replace(arm_length=arm_length)
+    return replace(spec, vehicle=vehicle, userdata_size=0, companions=())
 
 
-@lru_cache(maxsize=64)  # dm_control takes several times longer than MuJoCo's compiler
-def _compose(spec: RotorcraftSpec) -> tuple[mjcf_editing.Compile, mjcf_editing.Compile]:
-    """Functions that compile the complete vehicle, and the vehicle without visuals.
+def _set_parameters(tree: MjSpecTree, spec: RotorcraftSpec) -> None:
+    """Give a composed vehicle its mass, inertia, coefficients, gravity and room for user data."""
+    vehicle, user = spec.vehicle, spec.user_vehicle
+    tree.option.gravity = (0.0, 0.0, -vehicle.gravity)
+    tree.size.nuserdata = spec.userdata_size
+    if user is not None:
+        user.set_inertia(tree, vehicle)
+    elif isinstance(vehicle, Vehicle):
+        inertial = tree.find("body", "vehicle").inertial
+        inertial.mass, inertial.diaginertia = _body_inertia(spec, vehicle)
+    if isinstance(vehicle, Vehicle):
+        gears = [(vehicle.thrust_coefficient, vehicle.drag_coefficient, spin) for spin in SPIN]
+        _set_keyframes(tree, vehicle, spec.tilts)
+    elif user is not None and vehicle != user.vehicle:
+        gears = [(rotor.thrust, rotor.drag, rotor.spin) for rotor in vehicle.rotors]
+    else:
+        gears = []
+    for i, (thrust, drag, spin) in enumerate(gears, start=1):
+        gear = (0.0, 0.0, thrust, 0.0, 0.0, -spin * drag)
+        tree.find("actuator", f"thrust_{i}").gear = gear
 
-    A flight is simulated with the one and shown with the other, so both are made at once.
+
+@lru_cache(maxsize=64)  # dm_control takes a hundred times longer than MuJoCo's compiler
+def _compose(spec: RotorcraftSpec) -> tuple[mujoco.MjSpec, mujoco.MjSpec]:
+    """The complete vehicle, and the one without visuals.
+
+    They are the same where drawn and measured parts would be missed.
     """
     vehicle, servo, user_vehicle = spec.vehicle, spec.tilt_servo, spec.user_vehicle
     shipped = shipped_folder("mjcf") / f"{spec.model}.xml"
     root = mjcf_editing.parse_mjcf(shipped if user_vehicle is None else Path(user_vehicle.path))
-    contacts = spec.ground is not None or spec.objects is not None
+    contacts = spec.ground is not None or spec.objects is not None or spec.number >= 0
 
     root.option.timestep = spec.timestep
     root.option.integrator = spec.integrator
-    root.option.gravity = (0.0, 0.0, -vehicle.gravity)
     root.option.flag.contact = "enable" if contacts else "disable"
     root.option.flag.constraint = "enable" if contacts or spec.has_stops else "disable"
-    root.size.nuserdata = spec.userdata_size
 
-    if user_vehicle is not None:
-        user_vehicle.set_inertia(root, vehicle)
-    elif isinstance(vehicle, Vehicle):
+    if user_vehicle is None and isinstance(vehicle, Vehicle):
         _scale_lengths(root, vehicle.arm_length)
-        _set_inertia(root, spec, vehicle)
+        _set_pods(root, spec)
     hinges = [f"tilt_{i}" for i in range(1, spec.tilts + 1)]
     if isinstance(vehicle, Vehicle):
-        _set_rotors(root, vehicle, len(hinges))
-    elif user_vehicle is not None and vehicle != user_vehicle.vehicle:
-        for i, rotor in enumerate(vehicle.rotors, start=1):
-            gear = _thrust_gear(rotor.thrust, rotor.drag, rotor.spin)
-            root.find("actuator", f"thrust_{i}").gear = gear
+        _set_keyframes(root, vehicle, len(hinges))
     _limit_rotors(root, spec)
     if hinges:
         if user_vehicle is None:
@@ -204,14 +200,14 @@ def _compose(spec: RotorcraftSpec) -> tuple[mjcf_editing.Compile, mjcf_editing.C
             mjcf_editing.add_wrench(root, f"layer_{index}", center)
         mjcf_editing.add_hinge_torques(root, f"layer_{index}", extra.hinge_torques)
     if contacts:
-        touchable(root, ground=spec.ground is not None)
+        touchable(root, ground=spec.ground is not None, number=spec.number)
     if spec.ground is not None:
         _set_ground(root, spec.ground)
-    complete = mjcf_editing.compiler_of(root, spec.objects)
+    complete = mjcf_editing.spec_of(root)
     if user_vehicle is not None and spec.model != "multirotor":
         return complete, complete
     mjcf_editing.remove_visuals(root, contacts=contacts)
-    bare = mjcf_editing.compiler_of(root, spec.objects)
+    bare = mjcf_editing.spec_of(root)
     return complete, bare if user_vehicle is None or _moves_alike(complete, bare) else complete
 
 
@@ -225,11 +221,11 @@ def _center_site(root: Any, spec: RotorcraftSpec) -> str:
     return name
 
 
-def _moves_alike(complete: mjcf_editing.Compile, bare: mjcf_editing.Compile) -> bool:
+def _moves_alike(complete: mujoco.MjSpec, bare: mujoco.MjSpec) -> bool:
     """Whether drawn and measured parts give a user's vehicle no mass, spring or damper."""
     try:
         with mujoco_hooks():
-            models = complete(), bare()
+            models = complete.copy().compile(), bare.copy().compile()
     except ValueError:  # a body is left without mass
         return False
     with_visuals, without = models
@@ -255,18 +251,6 @@ def _scale_lengths(root: Any, arm_length: float) -> None:
                 setattr(element, name, length * ratio)
 
 
-def _set_rotors(root: Any, vehicle: Vehicle, hinges: int) -> None:
-    """Give four rotors on a cross their coefficients, and the keyframes their speeds."""
-    for i, spin in zip(ROTORS, SPIN, strict=True):
-        root.find("actuator", f"thrust_{i}").gear = _thrust_gear(
-            vehicle.thrust_coefficient, vehicle.drag_coefficient, spin
-        )
-    for name, speed in (("hover", vehicle.hover_rotor_speed), ("start", START_SPEED)):
-        key = root.find("key", name)
-        if key is not None:
-            _set_keyframe(key, speed, hinges)
-
-
 def _limit_rotors(root: Any, spec: RotorcraftSpec) -> None:
     thrust_range = spec.rotor_limits.thrust_range
     if thrust_range is not None:
@@ -285,15 +269,7 @@ def _limit_speeds(root: Any, name: str, spec: RotorcraftSpec) -> None:
             rotor.actrange, rotor.actlimited = speed_range, "true"
 
 
-def _thrust_gear(thrust: float, drag: float, spin: float) -> tuple[float, ...]:
-    """Thrust and drag torque per unit of control, by a rotor's coefficients."""
-    return 0.0, 0.0, thrust, 0.0, 0.0, -spin * drag
-
-
-def _set_inertia(root: Any, spec: RotorcraftSpec, vehicle: Vehicle) -> None:
-    """Give the pods their mass and inertia and the body the rest of the vehicle's."""
-    inertial = root.find("body", "vehicle").inertial
-    inertial.mass, inertial.diaginertia = _body_inertia(spec, vehicle)
+def _set_pods(root: Any, spec: RotorcraftSpec) -> None:
     if spec.tilts:
         for i in ROTORS:
             inertial = root.find("body", f"pod_{i}").inertial
@@ -330,8 +306,13 @@ def _set_ground(root: Any, ground: Ground) -> None:
     plane.conaffinity = 1
 
 
-def _set_keyframe(key: Any, rotor_speed: float, hinges: int) -> None:
-    """Let all rotors of an upright, untilted vehicle turn at this speed (rad/s)."""
-    key.act = [spin * rotor_speed for spin in SPIN]
-    servos = [0.0] * hinges if key.ctrl is None else key.ctrl[:hinges]
-    key.ctrl = [*servos, *[rotor_speed**2] * 4, *[0.0] * 4]  # thrusts, rates of the rotor speeds
+def _set_keyframes(root: Any, vehicle: Vehicle, hinges: int) -> None:
+    """Let the rotors of an upright, untilted vehicle turn at the speeds of the keyframes."""
+    for name, speed in (("hover", vehicle.hover_rotor_speed), ("start", START_SPEED)):
+        key = root.find("key", name)
+        if key is not None:
+            act = [] if key.act is None else key.act
+            ctrl = [0.0] * hinges if key.ctrl is None else key.ctrl
+            key.act = [*(spin * speed for spin in SPIN), *act[4:]]
+            # thrusts, then rates of the rotor speeds
+            key.ctrl = [*ctrl[:hinges], *[speed**2] * 4, *[0.0] * 4, *ctrl[hinges + 8 :]]

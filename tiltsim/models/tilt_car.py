@@ -39,12 +39,12 @@ def compile_tilt_car(spec: TiltCarSpec, *, visuals: bool = True) -> mujoco.MjMod
     """
     complete, bare = _compose(spec)
     with mujoco_hooks():
-        return complete() if visuals else bare()
+        return (complete if visuals else bare).copy().compile()
 
 
 @lru_cache(maxsize=16)
-def _compose(spec: TiltCarSpec) -> tuple[mjcf_editing.Compile, mjcf_editing.Compile]:
-    """Functions that compile the complete car, and the car without visuals."""
+def _compose(spec: TiltCarSpec) -> tuple[mujoco.MjSpec, mujoco.MjSpec]:
+    """The complete car, and the car without visuals."""
     root, car = mjcf_editing.parse_mjcf(shipped_folder("mjcf") / "tilt_car.xml"), spec.car
     root.option.timestep = spec.timestep
     root.option.integrator = spec.integrator
@@ -64,9 +64,9 @@ def _compose(spec: TiltCarSpec) -> tuple[mjcf_editing.Compile, mjcf_editing.Comp
     start.act = [START_SPEED] * 2
     start.ctrl = [0.0, START_SPEED**2, START_SPEED**2, 0.0, 0.0]
     mjcf_editing.add_states(root, "law", spec.law_states)
-    complete = mjcf_editing.compiler_of(root)
+    complete = mjcf_editing.spec_of(root)
     mjcf_editing.remove_visuals(root, contacts=False)
-    return complete, mjcf_editing.compiler_of(root)
+    return complete, mjcf_editing.spec_of(root)
 
 
 def _set_inertia(root: Any, car: TiltCar) -> None:

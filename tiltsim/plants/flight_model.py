@@ -7,6 +7,7 @@ import mujoco
 from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.closed_loop.userdata import HEADER_SIZE
 from tiltsim.errors import InputError
+from tiltsim.models.parts import Visuals
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.scenario.scenario_tables import DESCRIPTIVE
 from tiltsim_controllers.mathematics.scalar import Triple
@@ -54,7 +55,7 @@ def disturbance_acceleration(scenario: Scenario) -> Triple:
 
 
 def build_model(
-    assembly: Assembly, *, knots: int | None = None, visuals: bool = False
+    assembly: Assembly, *, knots: int | None = None, visuals: Visuals = False
 ) -> mujoco.MjModel:
     """Compile the vehicle of a flight. Raises `InputError` if MuJoCo cannot.
 
@@ -62,7 +63,7 @@ def build_model(
         assembly: The flight.
         knots: Room for knots in ``userdata``, where several flights share the model; default: its
             own.
-        visuals: Whether the model has the parts that are only drawn.
+        visuals: Whether the model has the parts that are only drawn; see `Visuals`.
     """
     loop, scenario = assembly.loop, assembly.scenario
     size = HEADER_SIZE + loop.record_size + (len(assembly.setup.knots) if knots is None else knots)

@@ -75,7 +75,7 @@ class MujocoPlant(Plant):
         data.act[:] = self._loop.dynamics.initial_activations(assembly, self._setup)
         with control_callback(None):
             mujoco.mj_forward(self.model, data)
-        if assembly.scenario.has_objects:
+        if assembly.scenario.has_objects or assembly.scenario.companion:
             check_start(assembly.scenario, self.model, data)
 
     @property

@@ -115,6 +115,11 @@ class Report:
         """The pictures that show a finding."""
         return [drawing for drawing in self.drawings if drawing.picture.name in finding.pictures]
 
+    def errors_of(self, finding: Finding) -> list[int]:
+        """Numbers, in the list of errors, of the entries that rows settled by a finding name."""
+        named = {row.claim.error for row in self.rows if row.claim.settled_by == finding.key}
+        return [n for n, (entry, _) in enumerate(self.errors, start=1) if entry.key in named]
+
     def settled_by(self, finding: Finding) -> list[str]:
         """Ids of the statements of which a finding settles a row."""
         rows = (row for row in self.rows if row.claim.settled_by == finding.key)
@@ -151,12 +156,12 @@ class Group:
 
     @property
     def described(self) -> str:
-        """Statement, criterion and notes in one cell of Markdown."""
+        """Statement, notes and shared reason in one cell of Markdown."""
         statement = self.statement
         place = "; ".join(filter(None, (self.sources, f"`{statement.id}`")))
-        text = f"**{statement.text}** ({place})"
-        criterion = f"Criterion: {statement.criterion.rstrip('.')}." if statement.criterion else ""
-        return "\n".join(filter(None, (text, criterion, statement.note, self.shared_why)))
+        listed = any(row.claim.error for row in self.rows)
+        notes = (statement.note, "" if listed else self.shared_why)
+        return "\n".join(filter(None, (f"**{statement.text}** ({place})", *notes)))
 
     @property
     def many_fits(self) -> int:

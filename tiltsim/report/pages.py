@@ -86,14 +86,14 @@ def _rendered(template: str, report: Report, **more: Any) -> str:
     )
     environment.filters |= {
         "alone": lambda rows: sum(row.on_the_thesis_alone for row in rows),
+        "case_rows": _case_rows,
         "cell": markdown_cell,
+        "code": "`{}`".format,
         "count_rows": count,
-        "described": _described,
         "files": lambda flights: dict.fromkeys(one.partition("#")[0] for one in flights),
         "groupby_in_order": lambda items, name: [
             (key, list(group)) for key, group in groupby(items, attrgetter(name))
         ],
-        "measured": _measured,
         "number": _number,
         "png_data": _png_data,
         "prose": _prose,
@@ -187,9 +187,32 @@ def _measured(row: Row) -> list[str]:
     return ["" if cell is None else content.measured_text(row.claim, cell) for cell in cells]
 
 
-def _described(row: Row, group: Group) -> str:
-    """The verdict of a row, our choices in it, and the reason."""
+def _case_rows(group: Group, errors: list[str]) -> list[list[str]]:
+    """Rows of Markdown: one with the statement and its only case, or one above all cases.
+
+    Args:
+        group: The rows of a statement.
+        errors: Keys of the list of errors, in its order.
+    """
+    fits = group.many_fits
+    rows = [
+        [row.claim.case, published_text(row), *_measured(row), _described(row, group, errors)]
+        for row in group.rows
+        if not (fits and row.verdict is ClaimVerdict.FITTED)
+    ]
+    if fits:
+        rows.append([f"{fits} cases", "", "", "", ClaimVerdict.FITTED.value])
+    if len(rows) > 1:
+        return [[group.described, "", "", "", ""], *rows]
+    [[case, *cells]] = rows
+    return [["\n".join(filter(None, (group.described, case))), *cells]]
+
+
+def _described(row: Row, group: Group, errors: list[str]) -> str:
+    """The verdict of a row, our choices in it, and the reason or the error that explains it."""
     tags = f" (*{', '.join(origin.value for origin in row.origins)}*)" if row.origins else ""
+    if row.claim.error:
+        return f"{row.verdict.value}{tags}: [error {errors.index(row.claim.error) + 1}](errors.md)"
     why = content.why_of(row) if not group.shared_why else ""
     return f"{row.verdict.value}{tags}{f': {why}' if why else ''}"
 

@@ -4,6 +4,7 @@ import re
 from math import pi
 from typing import Final
 
+from tiltsim.scenario.companion import check_companions
 from tiltsim.scenario.controller import CONTROLLERS, laws_for
 from tiltsim.scenario.expectation import NAME
 from tiltsim.scenario.gait import FixedGait, TableGait
@@ -41,6 +42,7 @@ def check_consistency(scenario: ScenarioTables) -> None:
     _check_rotor_limits(scenario)
     _check_ground(scenario)
     check_objects(scenario)
+    check_companions(scenario)
     _check_claims(scenario)
     _check_engine(scenario)
     scenario.controller.check_scenario(scenario)

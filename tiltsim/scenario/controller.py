@@ -80,7 +80,7 @@ class PythonController(OwnFunctionController):
     rotors_have_speeds = True
     leans_unrecorded = True
 
-    law: Literal["python"] = Field(description="your own controller")
+    law: Literal["python"] = Field(description="a user's own controller")
 
 
 class NumpyController(OwnFunctionController, TiltingTable):

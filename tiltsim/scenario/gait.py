@@ -104,7 +104,7 @@ class FixedGait(GaitTable):
     model_config = example(type="fixed", angles=[-0.65, -0.65, 0.65, 0.65])
     size_key = "angles"
 
-    type: Literal["fixed"] = Field("fixed", description="angles that never change")
+    type: Literal["fixed"] = Field("fixed", description="constant angles")
     angles: AnglesEach = Field(
         (0.0, 0.0, 0.0, 0.0),
         description=f"alpha_1..4; {SIGN}; a multirotor has one for each of its tilts [rad]",

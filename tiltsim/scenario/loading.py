@@ -14,11 +14,17 @@ from pydantic import ValidationError
 from tiltsim.errors import InputError
 from tiltsim.models.mjcf_editing import check_mjcf
 from tiltsim.scenario.arguments import check_keys, check_no_other, own_title, plain
-from tiltsim.scenario.controller import DEFAULT_LAW
 from tiltsim.scenario.library import find_scenario_file, library_name, read_toml
 from tiltsim.scenario.limits import check_limits
 from tiltsim.scenario.messages import choose, did_you_mean, one_line_message, show
-from tiltsim.scenario.override_keys import refuse_replaced, split_key, value_at
+from tiltsim.scenario.override_keys import (
+    KIND_KEYS,
+    has_other_keys,
+    merge,
+    refuse_replaced,
+    split_key,
+    value_at,
+)
 from tiltsim.scenario.own_parts import (
     controller_table,
     drop_what_own_controllers_ignore,
@@ -29,13 +35,8 @@ from tiltsim.scenario.own_parts import (
 )
 from tiltsim.scenario.scenario import Scenario, Variant
 from tiltsim.scenario.scenario_tables import DESCRIPTIVE
-from tiltsim.scenario.schema import share_keys
-from tiltsim.scenario.table import Table
 from tiltsim.scenario.trust import is_trusted, with_trust
 from tiltsim.system.text import short_repr, shortened, valid_unicode
-
-KIND_KEYS: Final = {"type": None, "law": DEFAULT_LAW}
-"""Keys that decide which other keys a table may have, with their defaults."""
 
 FILE_KEYS: Final = (
     ("controller", "function", ".py:"),
@@ -43,6 +44,7 @@ FILE_KEYS: Final = (
     ("reference", "file", ""),
     ("gait", "file", ""),
     ("object", "file", ""),
+    ("companion", "scenario", ".toml"),
 )
 """Keys that name files: table, key, and a string that marks the value as a file name."""
 
@@ -229,7 +231,7 @@ def _file_keys(document: Mapping[str, Any]) -> Iterator[tuple[dict[str, Any], st
                 continue
             name = keys.get(key)
             if isinstance(name, str) and mark in name:
-                yield keys, f"{table}.{key}", bool(mark)
+                yield keys, f"{table}.{key}", mark == ".py:"
 
 
 def _lies_in(folder: Path, name: str) -> bool:
@@ -317,27 +319,6 @@ def _select_variant(file: Path, document: dict[str, Any], name: str) -> dict[str
     return merged
 
 
-def merge(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
-    """A document with changes, table by table; a table with other keys replaces the old one."""
-    merged = dict(base)
-    for key, value in changes.items():
-        old = merged.get(key)
-        if isinstance(old, dict) and isinstance(value, dict):
-            other_kind = any(
-                tag in value and _has_other_keys(old.get(tag, default), value[tag])
-                for tag, default in KIND_KEYS.items()
-            )
-            merged[key] = value if other_kind else merge(old, value)
-        else:
-            merged[key] = value
-    return merged
-
-
-def _has_other_keys(old: object, new: object) -> bool:
-    """Whether a table has other keys for another of its kinds, as a walk has for a trot."""
-    return old != new and not share_keys(Table, old, new)
-
-
 def _kinds_first(overrides: Mapping[str, Any]) -> list[tuple[str, Any]]:
     """Overrides, kind keys first, since a new kind empties its table."""
     return sorted(overrides.items(), key=lambda item: item[0].rpartition(".")[2] not in KIND_KEYS)
@@ -360,7 +341,7 @@ def _override(address: str, document: dict[str, Any], key: str, value: object) -
         is_list = isinstance(target, list)
         reason = f"is a list; write {name}[{last}]" if is_list else "is not a table"
         raise InputError(f"{address}: {key} = {show(value)}: {name} {reason}")
-    empties = last in KIND_KEYS and _has_other_keys(target.get(last, KIND_KEYS[last]), value)
+    empties = last in KIND_KEYS and has_other_keys(target.get(last, KIND_KEYS[last]), value)
     if empties:
         target.clear()
     target[last] = value

@@ -1,13 +1,19 @@
-"""Values by dotted key, as in ``--set`` and in the overrides of `load_scenario`."""
+"""Changes of a document: values by dotted key, as in ``--set``, and tables merged into others."""
 
 import re
 import tomllib
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import Any, Final
 
 from tiltsim.errors import InputError
+from tiltsim.scenario.controller import DEFAULT_LAW
 from tiltsim.scenario.limits import MAX_DEPTH, check_limits
 from tiltsim.scenario.messages import show
+from tiltsim.scenario.schema import share_keys
+from tiltsim.scenario.table import Table
+
+KIND_KEYS: Final = {"type": None, "law": DEFAULT_LAW}
+"""Keys that decide which other keys a table may have, with their defaults."""
 
 
 def split_key(key: str) -> list[str | int]:
@@ -79,3 +85,24 @@ def parse_override(text: str) -> tuple[str, Any]:
         raise InputError(f"--set {key}: lists and tables nest too deep") from None
     check_limits(parsed, f"--set {key}")
     return key, parsed
+
+
+def merge(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """A document with changes, table by table; a table with other keys replaces the old one."""
+    merged = dict(base)
+    for key, value in changes.items():
+        old = merged.get(key)
+        if isinstance(old, dict) and isinstance(value, dict):
+            other_kind = any(
+                tag in value and has_other_keys(old.get(tag, default), value[tag])
+                for tag, default in KIND_KEYS.items()
+            )
+            merged[key] = value if other_kind else merge(old, value)
+        else:
+            merged[key] = value
+    return merged
+
+
+def has_other_keys(old: object, new: object) -> bool:
+    """Whether a table has other keys for another of its kinds, as a walk has for a trot."""
+    return old != new and not share_keys(Table, old, new)

@@ -42,7 +42,7 @@ class SetpointReference(PositionReference):
 
 
 class LineReference(PositionReference):
-    """Motion along a line, uniform or at a constant acceleration."""
+    """Motion along a straight line, uniform or at a constant acceleration."""
 
     type: Literal["line"] = Field(description="a straight line")
     position: Vector3 = Field(

@@ -15,6 +15,7 @@ from pydantic import ConfigDict, Field, ValidationError
 
 from tiltsim.errors import InputError
 from tiltsim.scenario.arguments import check_keys, leaves
+from tiltsim.scenario.companion import companions_of
 from tiltsim.scenario.consistency import check_consistency
 from tiltsim.scenario.messages import missing_keys, one_line_message, show
 from tiltsim.scenario.scenario_tables import DESCRIPTIVE, ScenarioTables
@@ -71,6 +72,11 @@ class Scenario(ScenarioTables):
         """Raise `InvalidValueError`, worded by validation, if tables contradict each other."""
         check_consistency(self)
         check_time_steps(self)
+
+    @property
+    def companions(self) -> tuple[Scenario, ...]:
+        """The scenarios of the further vehicles in its world."""
+        return companions_of(self)
 
     def replace(self, changes: Mapping[str, Any]) -> Scenario:
         """This scenario with other values.

@@ -6,6 +6,7 @@ from pydantic import Field, PrivateAttr
 
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.autopilot import AutopilotTable, WithAutopilot
+from tiltsim.scenario.companion import CompanionTable, DownwashTable
 from tiltsim.scenario.controller import Controller
 from tiltsim.scenario.expectation import ClaimName, ClaimTable, Expectation, Origin
 from tiltsim.scenario.gait import FixedGait, Gait
@@ -77,6 +78,12 @@ class ScenarioTables(WithAutopilot):
         None, description="a tool that the vehicle carries; default: none"
     )
     payload: PayloadTable | None = Field(None, description="a load to carry; default: none")
+    companion: Annotated[tuple[CompanionTable, ...], Field(strict=False)] = Field(
+        (), description="further vehicles in the same world"
+    )
+    downwash: DownwashTable | None = Field(
+        None, description="the force of vehicles' wakes on vehicles below; default: none"
+    )
     disturbance: Annotated[tuple[Disturbance, ...], Field(strict=False)] = Field(
         (), description="accelerations, forces and torques that the controller does not know of"
     )
@@ -118,7 +125,7 @@ class ScenarioTables(WithAutopilot):
     @property
     def has_contacts(self) -> bool:
         """Whether the vehicle can touch anything."""
-        return self.ground is not None or self.has_objects
+        return self.ground is not None or self.has_objects or bool(self.companion)
 
     @property
     def has_objects(self) -> bool:

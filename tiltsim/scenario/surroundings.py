@@ -128,7 +128,7 @@ FaultTime = Annotated[NonNegative, Field(description="when it fails [s]", exampl
 class RotorLoss(Table):
     """A rotor that stops producing thrust and torque while its motor keeps turning."""
 
-    type: Literal["rotor_loss"] = Field(description="what fails")
+    type: Literal["rotor_loss"] = Field(description="a rotor stops")
     rotor: Rotor
     time: FaultTime
 
@@ -136,7 +136,7 @@ class RotorLoss(Table):
 class PartialThrust(Table):
     """A rotor that produces only a fraction of its thrust and drag torque."""
 
-    type: Literal["partial_thrust"] = Field(description="what fails")
+    type: Literal["partial_thrust"] = Field(description="a rotor produces a fraction of its thrust")
     rotor: Rotor
     time: FaultTime
     factor: Annotated[float, Field(ge=0.0, le=2.0)] = Field(
@@ -147,7 +147,7 @@ class PartialThrust(Table):
 class StuckServo(Table):
     """A tilt servo that holds one angle regardless of its command."""
 
-    type: Literal["stuck_servo"] = Field(description="what fails")
+    type: Literal["stuck_servo"] = Field(description="a servo holds one angle")
     rotor: Rotor
     time: FaultTime
     angle: Angle | None = Field(

@@ -11,6 +11,7 @@ from tiltsim.closed_loop.limits import (
     HORIZONTAL_ERROR,
     ROTOR_SPEED,
     SINGULAR,
+    VEHICLE,
     WITHIN_LIMITS,
     altitude_error,
     horizontal_error,
@@ -75,7 +76,11 @@ class TerminationMonitor:
     def _check_limits(self, time: float, state: dict[str, float], code: int) -> End | None:
         if code == WITHIN_LIMITS:
             return None
-        values = list(state.values())[1:]
+        number, code = divmod(code, VEHICLE)
+        name = self._assembly.scenario.companion[number - 1].name if number else ""
+        of = f"{name}_" if number else ""
+        values = [value for field, value in state.items() if field != "time"]
+        values = values if not number else [state[f"{of}{axis}"] for axis in "xyz"]
         if code == HORIZONTAL_ERROR:
             error = horizontal_error(time, values, self._reference, self._knots)
             cause = f"{error:.3g} m away from the reference"
@@ -83,12 +88,12 @@ class TerminationMonitor:
             error = altitude_error(time, values, self._reference, self._knots)
             cause = f"{error:.3g} m away from the reference altitude"
         elif code < ROTOR_SPEED:
-            name = "pqr"[code - BODY_RATE]
-            cause = f"body rate {name} = {state[name]:.3g} rad/s"
+            rate = "pqr"[code - BODY_RATE]
+            cause = f"body rate {rate} = {state[f'{of}{rate}']:.3g} rad/s"
         else:
             rotor = code - ROTOR_SPEED + 1
-            cause = f"rotor {rotor} at {state[f'rotor_speed_{rotor}']:.3g} rad/s"
-        return End("diverged", time, cause)
+            cause = f"rotor {rotor} at {state[f'{of}rotor_speed_{rotor}']:.3g} rad/s"
+        return End("diverged", time, f"{name}: {cause}" if number else cause)
 
     def _check_signs(self, time: float, state: dict[str, float], checks: Values) -> End | None:
         for index, value in enumerate(checks[1:]):

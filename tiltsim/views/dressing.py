@@ -4,13 +4,11 @@ Only pictures have it; the file flies as it is.
 """
 
 from collections.abc import Iterable, Iterator
-from pathlib import Path
 from typing import Any, Final
 
 import mujoco
 import numpy as np
 
-from tiltsim.models.objects import Objects, add_objects
 from tiltsim.resources import shipped_folder
 from tiltsim_controllers.mathematics.scalar import Floats
 
@@ -25,9 +23,9 @@ PLANE: Final = mujoco.mjtGeom.mjGEOM_PLANE
 SKYBOX: Final = mujoco.mjtTexture.mjTEXTURE_SKYBOX
 
 
-def dressed(model: mujoco.MjModel, path: Path, objects: Objects | None = None) -> mujoco.MjModel:
-    """The compiled model of a user's file among objects, with the visuals that the file lacks."""
-    spec = mujoco.MjSpec.from_file(str(path))
+def dress(spec: mujoco.MjSpec) -> None:
+    """Add the visuals that the files of the vehicles in a model lack."""
+    model = spec.copy().compile()
     scene = mujoco.MjSpec.from_file(str(shipped_folder("mjcf") / "scene.xml"))
     if SKYBOX not in [texture.type for texture in spec.textures]:
         _copy_texture(spec, scene.texture("sky"))
@@ -51,9 +49,6 @@ def dressed(model: mujoco.MjModel, path: Path, objects: Objects | None = None) -
     for body, shape in _missing_parts(model):
         mass = {"mass": 0.0, "contype": 0, "conaffinity": 0, "group": 2}
         spec.body(model.body(body).name).add_geom(**shape, **mass)
-    if objects is not None:
-        add_objects(spec, objects)
-    return spec.compile()
 
 
 def _copy_texture(spec: mujoco.MjSpec, texture: Any) -> None:
@@ -66,9 +61,19 @@ def _missing_parts(model: mujoco.MjModel) -> Iterator[tuple[int, dict[str, Any]]
     """Bodies with the shapes of the arms and rotor discs that nothing in the model stands for."""
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    sites = [s for s in range(model.nsite) if model.site(s).name.startswith("rotor_")]
+    for body in range(model.nbody):
+        name = model.body(body).name
+        if name == "vehicle" or name.endswith("_vehicle"):
+            yield from _missing_on(model, data, body, name.removesuffix("vehicle"))
+
+
+def _missing_on(
+    model: mujoco.MjModel, data: mujoco.MjData, vehicle: int, prefix: str
+) -> Iterator[tuple[int, dict[str, Any]]]:
+    """See `_missing_parts`: on one vehicle, the names of whose parts begin with a prefix."""
+    name = f"{prefix}rotor_"
+    sites = [s for s in range(model.nsite) if model.site(s).name.startswith(name)]
     places = data.site_xpos[sites]
-    vehicle = model.body("vehicle").id
     turned = data.xmat[vehicle].reshape(3, 3)
     hubs = (places - data.xpos[vehicle]) @ turned  # along the body's axes
     lengths = np.linalg.norm(hubs, axis=1)
@@ -80,8 +85,8 @@ def _missing_parts(model: mujoco.MjModel) -> Iterator[tuple[int, dict[str, Any]]
         away = np.linalg.norm(centers - place, axis=1)
         radius = min(DISC_SHARE * least, MAX_DISC * float(length) or np.inf)
         if not ((radii >= 0.5 * radius) & (away < 0.5 * radius)).any():
-            number = model.site(site).name.removeprefix("rotor_")
-            drag = float(model.actuator(f"thrust_{number}").gear[5])
+            number = model.site(site).name.removeprefix(name)
+            drag = float(model.actuator(f"{prefix}thrust_{number}").gear[5])
             color = COUNTERCLOCKWISE if drag < 0.0 else CLOCKWISE
             yield (
                 int(model.site_bodyid[site]),

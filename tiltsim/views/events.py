@@ -48,13 +48,13 @@ class EventDetector:
         self._last_true: dict[str, float] = {}
         self._minimum_margin = (float("inf"), 0.0)  # rad, and its time in s
 
-    def opening(self) -> Event:
-        """The scenario, controller and plant of the flight."""
+    def opening(self) -> list[Event]:
+        """The scenario; its gait, controller and plant."""
         scenario = self._assembly.scenario
-        parts = [*describe_gait(self._assembly), *describe_controller(scenario)]
-        parts.append(f"{scenario.simulation.plant} plant")
         title = scenario.title or scenario.address or "flight"
-        return Event(0.0, "INFO", f"{title}: {', '.join(parts)}")
+        about = [describe_gait(self._assembly), describe_controller(scenario)]
+        texts = [title, *map(", ".join, about), f"{scenario.simulation.plant} plant"]
+        return [Event(0.0, "INFO", text) for text in texts if text]
 
     def observe(self, piece: Flight) -> list[Event]:
         """The events within the next piece of the flight, in order of time."""

@@ -1,31 +1,27 @@
 """Replaying a flight on a MuJoCo model: the pose of every body at every sample.
 
 Independent of the vehicle. Free joints take the recorded position and attitude, every other joint
-the column of its name (`COLUMN_OF_JOINT` lists the exceptions); a joint without a column keeps the
-model's default.
+the column of its name, where ``tilt`` is ``alpha``; a joint without a column keeps the model's
+default.
 """
 
+import re
 from collections.abc import Mapping
 from math import cos, floor, log10, radians, sin
-from pathlib import Path
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
 from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.plants.flight_model import build_model
-from tiltsim.scenario.interaction import objects_of
 from tiltsim.scenario.scenario import Scenario
-from tiltsim.views.dressing import dressed
+from tiltsim.views.dressing import dress
 from tiltsim_controllers.mathematics.attitude import quaternion_of_euler
 from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.references.trajectories import position_reference
 
 Columns = Mapping[str, Floats]
-
-COLUMN_OF_JOINT: Final = {f"tilt_{i}": f"alpha_{i}" for i in (1, 2, 3, 4)} | {"tilt": "alpha"}
-"""Columns of the joints whose names differ from the column's."""
 
 
 class CameraPose(NamedTuple):
@@ -57,10 +53,11 @@ class Poses(NamedTuple):
 
 
 def visible_model(assembly: Assembly) -> mujoco.MjModel:
-    """The compiled model of a flight's vehicle; a user's file is dressed for the picture."""
-    scenario, model = assembly.scenario, build_model(assembly, visuals=True)
-    own = None if scenario.vehicle.is_planar else scenario.any_rotorcraft.user_vehicle
-    return model if own is None else dressed(model, Path(own.path), objects_of(scenario))
+    """The compiled model of a flight's vehicles; users' files are dressed for the picture."""
+    flown = (assembly.scenario, *assembly.scenario.companions)
+    planar = assembly.scenario.vehicle.is_planar
+    own = not planar and any(each.any_rotorcraft.user_vehicle is not None for each in flown)
+    return build_model(assembly, visuals=dress if own else True)
 
 
 def joint_positions(model: mujoco.MjModel, columns: Columns) -> Floats:
@@ -70,14 +67,14 @@ def joint_positions(model: mujoco.MjModel, columns: Columns) -> Floats:
         address = model.jnt_qposadr[joint]
         kind, name = mujoco.mjtJoint(model.jnt_type[joint]), model.joint(joint).name
         if kind == mujoco.mjtJoint.mjJNT_FREE:
-            of = "" if joint == 0 else f"{name}_"  # the vehicle's is the first
+            of = "" if joint == 0 else f"{name.removesuffix('_vehicle')}_"
             qpos[:, address : address + 3] = _stack(columns, (f"{of}x", f"{of}y", f"{of}z"))
             if f"{of}roll" not in columns:  # a load, of which the attitude does not count
                 continue
             angles = _stack(columns, (f"{of}roll", f"{of}pitch", f"{of}yaw"))
             qpos[:, address + 3 : address + 7] = quaternion_of_euler(angles.T).T
         elif kind in (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE):
-            column = COLUMN_OF_JOINT.get(name, name)
+            column = re.sub(r"tilt(?=_\d+$|$)", "alpha", name)
             if column in columns:
                 qpos[:, address] = columns[column]
     return qpos
@@ -114,10 +111,16 @@ def thrust_sites(model: mujoco.MjModel) -> dict[int, str]:
     """Sites with a rotor's thrust along their z axis, and the column of that thrust (N)."""
     names = {site: model.site(site).name for site in range(model.nsite)}
     return {
-        site: name.replace("rotor_", "thrust_")
+        site: re.sub(r"rotor_(?=\d+$)", "thrust_", name)
         for site, name in names.items()
-        if name.startswith("rotor_")
+        if re.search(r"(^|_)rotor_\d+$", name)
     }
+
+
+def _first_rotors(model: mujoco.MjModel) -> list[int]:
+    """The sites of the first vehicle's rotors."""
+    sites, free = thrust_sites(model), first_free_body(model)
+    return [site for site in sites if model.body_rootid[model.site_bodyid[site]] == free]
 
 
 def vehicle_radius(model: mujoco.MjModel) -> float:
@@ -125,7 +128,7 @@ def vehicle_radius(model: mujoco.MjModel) -> float:
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     free = first_free_body(model)
-    points = [data.site_xpos[site] for site in thrust_sites(model)] or data.xpos[free:]
+    points = [data.site_xpos[site] for site in _first_rotors(model)] or data.xpos[free:]
     return max(0.01, float(np.max(np.linalg.norm(points - data.xpos[free], axis=1))))
 
 
@@ -136,7 +139,7 @@ def thrust_scale(model: mujoco.MjModel) -> float:
     """
     free = first_free_body(model)
     weight = float(model.body_subtreemass[free] * np.linalg.norm(model.opt.gravity))
-    rotors = max(1, len(thrust_sites(model)))
+    rotors = max(1, len(_first_rotors(model)))
     exact = vehicle_radius(model) * rotors / max(weight, 1e-9)
     decade = 10.0 ** floor(log10(exact))
     return min((digit * decade for digit in (1.0, 2.0, 5.0, 10.0)), key=lambda x: abs(x - exact))

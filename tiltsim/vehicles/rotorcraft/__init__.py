@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import cache
 from math import inf
 from typing import TYPE_CHECKING, Any, Final
@@ -23,7 +24,7 @@ from tiltsim.closed_loop.limits import (
 )
 from tiltsim.closed_loop.vehicle_kind import VehicleKind
 from tiltsim.models.hover import hover_speeds
-from tiltsim.models.parts import ExtraActuators, Ground, Pod, RotorLimits, TiltServo
+from tiltsim.models.parts import ExtraActuators, Ground, Pod, RotorLimits, TiltServo, Visuals
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.interaction import objects_of
 from tiltsim.scenario.multirotor_controllers import AttitudeForceController
@@ -41,6 +42,8 @@ from tiltsim_controllers.vehicle.states import P
 
 if TYPE_CHECKING:
     import mujoco
+
+    from tiltsim.models.rotorcraft import RotorcraftSpec
 
 
 def rotorcraft_columns(layout: Layout) -> dict[str, Quantity]:
@@ -131,18 +134,27 @@ def _compile(
     law_states: int,
     extra_actuators: tuple[ExtraActuators, ...],
     userdata_size: int,
-    visuals: bool,
+    visuals: Visuals,
 ) -> mujoco.MjModel:
-    from tiltsim.models.rotorcraft import RotorcraftSpec, compile_model
+    from tiltsim.models.rotorcraft import compile_model
+
+    spec = model_spec(scenario, law_states, extra_actuators)
+    return compile_model(replace(spec, userdata_size=userdata_size), visuals=visuals)
+
+
+def model_spec(
+    scenario: Scenario, law_states: int, extra_actuators: tuple[ExtraActuators, ...]
+) -> RotorcraftSpec:
+    """The specification of the model of a rotorcraft alone; see `VehicleKind.compile`."""
+    from tiltsim.models.rotorcraft import RotorcraftSpec
 
     vehicle = scenario.any_rotorcraft
     simulation, ground = scenario.simulation, scenario.ground
-    spec = RotorcraftSpec(
+    return RotorcraftSpec(
         vehicle.model,
         scenario.true_vehicle,
         timestep=simulation.timestep,
         integrator=simulation.integrator,
-        userdata_size=userdata_size,
         tilt_servo=TiltServo(**vehicle.tilt_servo.model_dump(exclude={"max_rate"})),
         pod=Pod(**vehicle.pod.model_dump()) if isinstance(vehicle, VehicleTable) else Pod(),
         rotor_limits=rotor_limits(scenario),
@@ -152,7 +164,6 @@ def _compile(
         objects=objects_of(scenario),
         user_vehicle=vehicle.user_vehicle,
     )
-    return compile_model(spec, visuals=visuals)
 
 
 def initial_tilts(plan: FlightPlan) -> tuple[Values, Values]:

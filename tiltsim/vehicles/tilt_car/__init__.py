@@ -14,7 +14,7 @@ from tiltsim.closed_loop.limits import (
     horizontal_error,
 )
 from tiltsim.closed_loop.vehicle_kind import VehicleKind
-from tiltsim.models.parts import ExtraActuators, TiltServo
+from tiltsim.models.parts import ExtraActuators, TiltServo, Visuals
 from tiltsim.scenario.scenario import FlightPlan, Scenario
 from tiltsim.system.text import Quantity
 from tiltsim.vehicles.tilt_car.metrics import tilt_car_metrics
@@ -94,7 +94,7 @@ def _compile(
     law_states: int,
     extra_actuators: tuple[ExtraActuators, ...],
     userdata_size: int,
-    visuals: bool,
+    visuals: Visuals,
 ) -> mujoco.MjModel:
     from tiltsim.models.tilt_car import TiltCarSpec, compile_tilt_car
 
@@ -110,7 +110,7 @@ def _compile(
         law_states=law_states,
         rotor_floor=scenario.controller.rotors_stop_at_zero,
     )
-    return compile_tilt_car(spec, visuals=visuals)
+    return compile_tilt_car(spec, visuals=bool(visuals))
 
 
 def initial_tilt(plan: FlightPlan) -> tuple[float, float]:

@@ -133,8 +133,13 @@ def _legend_below(figure: Figure, axes: Axes, results: SweepResults, key: str | 
     """A legend of the lines below the panels, so that it covers none of them."""
     handles, labels = axes.get_legend_handles_labels()
     if any(labels):
-        title = None if key is None else label_of(results, key)
-        add_legend(figure, handles, title=title)
+        add_legend(figure, handles, title=_legend_title(results, key))
+
+
+def _legend_title(results: SweepResults, key: str | None) -> str | None:
+    """The quantity that the lines differ in; cases speak for themselves unless they are labeled."""
+    named = key is not None and ("." in key or key in results.points.sweep.plot.labels)
+    return label_of(results, key) if key is not None and named else None
 
 
 def _lines_figure(results: SweepResults, metrics: tuple[str, ...]) -> Figure:
@@ -278,8 +283,8 @@ def _plane_figure(results: SweepResults, _metrics: tuple[str, ...]) -> Figure:
         axes.set(title=title, xlabel=label_of(results, plot.x), ylabel=label_of(results, plot.y))
         handles, labels = axes.get_legend_handles_labels()
         if any(labels):
-            key = None if plot.lines is None else label_of(results, plot.lines)
-            axes.legend(handles, labels, title=key, alignment="left")
+            title = _legend_title(results, plot.lines)
+            axes.legend(handles, labels, title=title, alignment="left")
         if np.isnan(holds[mask]).all():  # an empty panel: as wide as the others
             axes.plot([seen.min(), seen.max()], [seen.min(), seen.max()], alpha=0.0)
     for axes in grid.flat[len(columns) :]:

@@ -9,19 +9,25 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from tiltsim.flight.flight import Flight
+from tiltsim.system.text import Quantity
 from tiltsim.views.attitude_plane import MOVING_TRAIL_TIME, curve_is_constant
 from tiltsim.views.replay import camera_of, positions, reference_path, thrust_scale, vehicle_radius
 from tiltsim.views.rerun.flight_recorder import FlightRecorder, plotted_lines
 from tiltsim.views.rerun.plane import BOUND
 from tiltsim.views.rerun.scene import REFERENCE_POINTS, ground_height
 from tiltsim.views.rerun.timeline import TIMELINE
+from tiltsim.views.signals import Signals
 from tiltsim_controllers.mathematics.scalar import Floats
 
-ALONE: Final = "Attitude (shaded: unreachable attitudes)"
+ALONE: Final = "Attitude (shaded: unreachable)"
 NEARER: Final = 0.75  # than in videos, whose frames are larger
 OVERVIEW: Final = 1.35  # distance of the overview camera, in lengths of the scene that it shows
 LETTER: Final = 0.0155  # width of a letter of a legend, as a share of a plot
 MAX_LEGEND: Final = 0.34  # share of a plot before the flight, where legends cover no curve
+MAIN: Final = "Main signals"
+AFTER: Final = 0.06  # time after the flight, as a share of it, for the label of its end
+EDGE: Final = 0.06  # of a range, beyond either end, for the labels there
+AROUND: Final = 2.2  # height of a plot beside its legend, in lines of the legend
 BACKGROUND: Final = (38, 48, 60)
 
 
@@ -155,21 +161,34 @@ def _plots(recorders: Sequence[FlightRecorder], flights: Sequence[Flight]) -> rr
     labels = [one.name for one in recorders] if len(recorders) > 1 else labels
     share = min(MAX_LEGEND, 0.08 + LETTER * max(map(len, labels)))
     end = _end_of(recorders, flights)
-    times = -share / (1.0 - share) * end, end
+    times = -share / (1.0 - share) * end, (1.0 + AFTER) * end
     if len(recorders) > 1:
         return rrb.Vertical(*_compared(recorders, flights, times))
-    plots: dict[bool, list[rrb.View]] = {True: [], False: []}
-    heights = []
+
+    def plot(panel: Signals, title: str, *, legend: bool = False) -> rrb.View:
+        limits = panel.range_of(flights) if flights else None
+        return _plot(title, [f"{panel.path}/**"], limits, times, legend=legend)
+
+    rows: list[rrb.View | rrb.Container] = []
+    heights, bare, others = [], [], []
     for each in signals:
-        limits = each.range_of(flights) if flights else None
         entries = {text for line in plotted_lines(each) for text in line.labels}
-        number = len(entries) + len(each.levels)
-        view = _plot(each.text, [f"{each.path}/**"], limits, times, legend=number > 1)
-        plots[each.plotted].append(view)
-        heights += [2.5 + number] if each.plotted else []  # every line of a legend has its height
+        if not each.plotted:
+            others.append(plot(each, each.text, legend=len(entries) > 1))
+        elif len(entries) < 2:
+            bare.append(each)
+        else:
+            # The next legend needs the height: plots without one stand beside it, named by lines.
+            names = [Quantity(one.lines[0].label.capitalize(), one.unit).text for one in bare]
+            narrow = map(plot, bare, names)
+            view = plot(each, each.text, legend=True)
+            rows.append(rrb.Horizontal(*narrow, view) if bare else view)
+            heights.append(AROUND + len(entries) + len(each.levels))
+            bare = []
+    rows += [plot(each, each.text) for each in bare]
     return rrb.Tabs(
-        rrb.Vertical(*plots[True], row_shares=heights, name="Main signals"),
-        rrb.Grid(*plots[False], grid_columns=2, name="All other signals"),
+        rrb.Vertical(*rows, row_shares=[*heights, *[4.0] * len(bare)], name=MAIN),
+        rrb.Grid(*others, grid_columns=2, name="All other signals"),
     )
 
 
@@ -200,12 +219,13 @@ def _plot(
     legend: bool = True,
 ) -> rrb.View:
     shown = (rr.TimeRangeBoundary.absolute(seconds=time) for time in times)
+    edge = 0.0 if limits is None else EDGE * (limits[1] - limits[0])
     return rrb.TimeSeriesView(
         origin="/",
         contents=contents,
         name=title,
         axis_x=rrb.TimeAxis(view_range=rr.encodings.TimeRange(*shown)),
-        axis_y=None if limits is None else rrb.ScalarAxis(range=limits),
+        axis_y=limits and rrb.ScalarAxis(range=(limits[0] - edge, limits[1] + edge)),
         plot_legend=rrb.PlotLegend("LeftTop", visible=legend),
     )
 

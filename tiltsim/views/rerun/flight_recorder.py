@@ -126,7 +126,7 @@ class FlightRecorder:
         self._event_path = f"events{suffix}"
         for path, labels, colors, _, width in self._lines:
             self._log_style(path, labels, colors, width)
-        self._log_events([self._events.opening()])
+        self._log_events(self._events.opening())
         if self.scene.not_drawn:
             text = f"not drawn, because Rerun has no such shape: {', '.join(self.scene.not_drawn)}"
             self._log_events([Event(0.0, "WARN", text)])

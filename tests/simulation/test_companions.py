@@ -1,0 +1,181 @@
+"""Several vehicles in one world: each as alone, until they touch."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+import pytest
+
+import tiltsim
+from tests.refusals import refusal
+from tiltsim.laws.assembling import assemble
+from tiltsim.plants.flight_model import flight_model
+
+HOVER = "fleet/hexarotor#hover"
+SIMULATION = {"duration": 0.3, "integrator": "implicitfast", "engine": "python"}
+TOWARDS = {
+    "name": "wing",
+    "offset": [0.8, 0.1, 0.05],
+    "changes": {"initial": {"velocity": [-1.5, 0.0, 0.0]}},
+}
+WING = {"name": "wing", "offset": [2.0, 0.3, 0.0]}
+QUAD = {
+    "name": "quad",
+    "scenario": "arena/quadrotor#step",
+    "offset": [0.0, 3.0, 0.0],
+    "changes": {"vehicle": {"gravity": 9.81}},
+}
+
+
+def together(*companions, **changes):
+    """A hexarotor among companions."""
+    tables = {f"simulation.{key}": value for key, value in SIMULATION.items()}
+    tables |= {"initial.velocity": [0.1, 0.2, 0.3], "companion": [*companions], "expect": []}
+    return tiltsim.load_scenario(HOVER, tables | changes)
+
+
+def assert_equal(flight, alone, prefix):
+    for name in alone:
+        if name != "time":
+            np.testing.assert_array_equal(flight[prefix + name], alone[name], err_msg=name)
+
+
+@pytest.mark.parametrize("engine", ["python", "native"])
+def test_far_apart_each_vehicle_flies_as_alone_with_the_same_bits(engine):
+    scenario = together(WING, QUAD, **{"simulation.engine": engine})
+    flight = tiltsim.simulate(scenario)
+    assert flight.engine == engine
+    assert_equal(flight, tiltsim.simulate(scenario.replace({"companion": []})), "")
+    for name, own in zip(("wing_", "quad_"), scenario.companions, strict=True):
+        assert_equal(flight, tiltsim.simulate(own), name)
+    assert np.ptp(flight["quad_x"]) > 0.0
+
+
+def test_both_engines_fly_a_collision_with_the_same_bits_and_push_apart():
+    flights = [
+        tiltsim.simulate(together(TOWARDS, **{"simulation.engine": engine}))
+        for engine in ("python", "native")
+    ]
+    for name in flights[0]:
+        np.testing.assert_array_equal(flights[0][name], flights[1][name], err_msg=name)
+    nearest = flights[0].metrics()["minimum_separation"]
+    alone = tiltsim.simulate(together(TOWARDS | {"offset": [0.8, 3.1, 0.05]}))
+    assert nearest < 0.8
+    assert np.abs(flights[0]["x"] - alone["x"]).max() > 1e-3, "it is pushed away"
+
+
+def test_vehicles_keep_their_momentum_through_an_impact():
+    """Without gravity and thrust."""
+    assembly = assemble(together(TOWARDS))
+    model = flight_model(assembly)
+    model.opt.gravity[:] = 0.0
+    data = mujoco.MjData(model)
+    data.qpos[:], data.qvel[:] = assembly.loop.kind.initial_motion(assembly)
+    momenta, contacts = [], 0
+    for _ in range(1000):
+        mujoco.mj_step(model, data)
+        contacts += data.ncon > 0
+        mujoco.mj_subtreeVel(model, data)
+        momenta.append(data.subtree_linvel[0] * model.body_subtreemass[0])
+    assert contacts > 5
+    assert np.ptp(momenta, axis=0).max() < 1e-6 * np.abs(momenta).max()
+
+
+def test_a_saved_flight_is_read_back_whatever_becomes_of_the_files_that_it_names(tmp_path):
+    named = tmp_path / "wing.toml"
+    named.write_text('[vehicle]\npreset = "ar_drone_2"\ngravity = 9.81\n')
+    text = f'[[companion]]\nname = "wing"\nscenario = "{named.name}"\noffset = [2.0, 0.0, 0.0]\n'
+    text += '[simulation]\nduration = 0.05\nintegrator = "implicitfast"\n'
+    text += "[vehicle]\ngravity = 9.81\n"
+    (tmp_path / "first.toml").write_text(text)
+    flight = tiltsim.simulate(tmp_path / "first.toml")
+    flight.save(tmp_path / "flight")
+    named.unlink()
+    again = tiltsim.load_flight(tmp_path / "flight")
+    assert_equal(again, flight, "")
+    assert again["wing_z"][-1] != 0.0
+    assert tiltsim.load_scenario(tmp_path / "flight" / "scenario.toml").companion
+
+
+def test_a_companion_that_is_lost_ends_the_flight_by_its_name():
+    spinning = WING | {"changes": {"initial": {"angular_velocity": [2000.0, 0.0, 0.0]}}}
+    flight = tiltsim.simulate(together(spinning))
+    assert flight.end.kind == "diverged"
+    assert flight.end.cause.startswith("wing: body rate p")
+
+
+@pytest.mark.parametrize(
+    ("companions", "line"),
+    [
+        ([WING, WING], 'companion.name = "wing": is taken'),
+        ([WING | {"name": "tilt"}], 'companion.name = "tilt": is taken'),
+        ([WING | {"name": "Wing 1"}], "companion[0].name"),
+        ([WING | {"scenario": "fleet/no_such"}], 'companion.scenario = "fleet/no_such"'),
+        ([WING | {"scenario": "missing.toml"}], 'missing.toml": no such file'),
+        ([WING | {"scenario": "ch10_state_drift/circle"}], "companion"),
+        ([WING | {"scenario": "interaction/carry#cable"}], "a companion carries no load"),
+        ([WING | {"changes": {"vehicle": {"gravity": 3.7}}}], "vehicle.gravity = 3.7"),
+        ([WING | {"changes": {"vehicle": {"mass": -1.0}}}], '"wing": vehicle.mass'),
+        ([WING | {"changes": {"nonsense": {}}}], "nonsense"),
+        ([WING | {"spacing": -1.0}], "companion[0].spacing = -1.0: unknown key"),
+        ([{"name": f"wing_{i}"} for i in range(8)], "at most 7"),
+    ],
+)
+def test_a_bad_companion_is_refused_in_one_line(companions, line):
+    assert line in refusal(together, *companions)
+
+
+@pytest.mark.parametrize(
+    ("changes", "line"),
+    [
+        (
+            {"simulation.plant": "rigid_body", "simulation.integrator": "RK4"},
+            'simulation.plant = "rigid_body"',
+        ),
+        ({"simulation.integrator": "RK4"}, 'simulation.integrator = "RK4"'),
+    ],
+)
+def test_companions_are_refused_where_they_cannot_fly(changes, line):
+    assert line in refusal(lambda: together(WING, **changes))
+
+
+def test_vehicles_that_overlap_at_the_start_are_refused():
+    with pytest.raises(tiltsim.InputError, match=r"overlap by .* at the start"):
+        tiltsim.simulate(together(WING | {"offset": [0.05, 0.0, 0.0]}))
+
+
+DOWNWASH = {"rotor_radius": 0.1, "drag_area": 0.02}
+
+
+@pytest.mark.parametrize("held", [0.0, 0.004])
+def test_a_vehicle_in_the_wake_of_another_sinks_by_its_column_in_both_engines(held):
+    changes = {"downwash": DOWNWASH, "simulation.control_timestep": held}
+    flights = [
+        tiltsim.simulate(
+            together(
+                WING | {"offset": [0.0, 0.0, -1.0]}, **{**changes, "simulation.engine": engine}
+            )
+        )
+        for engine in ("python", "native")
+    ]
+    for name in flights[0]:
+        np.testing.assert_array_equal(flights[0][name], flights[1][name], err_msg=name)
+    flight = flights[0]
+    assert not flight["downwash"].any()
+    assert flight["wing_downwash"].max() < -0.5
+    still = tiltsim.simulate(flight.scenario.replace({"downwash.drag_area": 1e-12}))
+    np.testing.assert_array_equal(flight["z"], still["z"])
+    mass = flight.scenario.any_rotorcraft.resolve().mass
+    begin = slice(2, 6)  # before its controller reacts
+    fall = np.gradient(flight["wing_vz"] - still["wing_vz"], flight["time"])[begin]
+    np.testing.assert_allclose(fall, flight["wing_downwash"][begin] / mass, rtol=0.1)
+
+
+def test_downwash_needs_a_companion():
+    assert "needs a [[companion]]" in refusal(lambda: together(downwash=DOWNWASH))
+
+
+def test_vectors_of_a_companion_have_its_name():
+    flight = tiltsim.simulate(together(WING))
+    np.testing.assert_array_equal(flight["wing_position"][:, 1], flight["wing_y"])
+    assert "wing_position" in flight
