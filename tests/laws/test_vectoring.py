@@ -130,6 +130,20 @@ def test_a_lost_rotor_is_survived(vehicle, known):
     assert position_error(flight).max() < 0.2
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("rotor", [1, 2])
+def test_five_canted_rotors_fly_a_circle(rotor):
+    """Their torques push sideways, which bounds the bandwidth, and saturate: yaw gives way."""
+    changed = tables("cant_hexarotor", 6.0, late={"timestep": 0.002}, **CIRCLE)
+    del changed["model_error"], changed["vehicle"]["rotor_time_constant"]
+    changed["controller"].update(failed_rotor=rotor, failure_known_from=2.02)
+    changed["fault"] = [{"type": "rotor_loss", "rotor": rotor, "time": 2.0}]
+    flight = tiltsim.simulate(changed)
+    error = position_error(flight)
+    assert error.max() < 0.15
+    assert error[-1] < 2e-3
+
+
 WORLDS = {
     "quick rotors": {"vehicle.rotor_time_constant": 0.02},
     "slow rotors": {"vehicle.rotor_time_constant": 0.05},

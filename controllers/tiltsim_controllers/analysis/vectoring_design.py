@@ -126,7 +126,7 @@ def _observers(factor: float, bandwidths: Values, period: float) -> dict[str, An
 
 
 def ability(keys: Vectoring, craft: Craft, left: float, *, harmed: bool = False) -> Ability:
-    """What a vehicle can do, with all its rotors or without one.
+    """Abilities of a vehicle, with all its rotors or without one.
 
     Args:
         keys: Keys of the law.
