@@ -106,7 +106,7 @@ def test_the_opened_viewer_listens_to_this_machine_only(monkeypatch):
 
 
 def test_a_viewer_that_ends_at_once_is_an_error_of_one_line(tmp_path, monkeypatch):
-    """As without a usable screen, which it finds out once it listens."""
+    """A usable screen is missing, which it finds out once it listens."""
     program = tmp_path / "rerun"
     program.write_text("#!/bin/sh\necho begins >&2\necho Error: no screen >&2\nexit 1\n")
     program.chmod(0o755)
