@@ -9,7 +9,7 @@ import pytest
 import tiltsim
 from tests.flights import flight
 from tiltsim.views.replay import (
-    cable,
+    cables,
     joint_positions,
     poses_in_parents,
     rotate,
@@ -91,7 +91,7 @@ def test_a_cable_ends_at_its_vehicle_and_at_its_load():
     carried = tiltsim.simulate(tiltsim.load_scenario("interaction/carry#cable", changes))
     model = visible_model(carried.assembly)
     world = world_poses(model, joint_positions(model, carried.columns))
-    ends = cable(model, world)
+    ends = cables(carried.scenario, model, world, carried["time"])["cable"]
     np.testing.assert_allclose(np.linalg.norm(np.diff(ends, axis=1), axis=-1), 1.0, atol=2e-3)
     load = np.stack([carried[f"payload_{axis}"] for axis in "xyz"], axis=1)
     np.testing.assert_allclose(ends[:, 1], load, atol=1e-9)

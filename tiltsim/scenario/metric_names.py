@@ -136,7 +136,7 @@ METRICS: Final = {
     "time_in_contact": Metric(
         "time in contact", "s", "time for which the vehicle touched an object"
     ),
-    "max_cable_tension": Metric("largest tension of the cable", "N", "of the recorded samples"),
+    "max_cable_tension": Metric("largest tension of a cable", "N", "of the recorded samples"),
     "minimum_separation": Metric(
         "smallest distance between vehicles", "m", "between centers of mass of any two vehicles"
     ),

@@ -99,12 +99,27 @@ def poses_in_parents(model: mujoco.MjModel, poses: Poses) -> Poses:
     return Poses(rotate(inverse, offset), _product(inverse, poses.quaternion))
 
 
-def cable(model: mujoco.MjModel, world: Poses) -> Floats:
-    """Both ends of the cable of a load in the world (m), shape (N, 2, 3)."""
-    vehicle, load = first_free_body(model), model.body("payload").id
-    place = model.site_pos[model.site("payload_attachment").id]
-    begin = world.position[:, vehicle] + rotate(world.quaternion[:, vehicle], place)
-    return np.stack([begin, world.position[:, load]], axis=1)
+def cables(
+    scenario: Scenario, model: mujoco.MjModel, world: Poses, time: Floats
+) -> dict[str, Floats]:
+    """Both ends of each cable in the world (m), shape (N, 2, 3), by its name.
+
+    Args:
+        scenario: Its cables have times between which they hold, else both ends are equal.
+        model, world: The model and the poses of its bodies.
+        time: Times of the poses, s.
+    """
+    found = {}
+    for tendon in range(model.ntendon):
+        first = model.tendon_adr[tendon]
+        sites = model.wrap_objid[first : first + 2]
+        body = model.site_bodyid[sites]
+        places = rotate(world.quaternion[:, body], model.site_pos[sites])
+        found[model.tendon(tendon).name] = world.position[:, body] + places
+    for table in scenario.cable:
+        loose = [not table.cable.holds(at) for at in time.tolist()]
+        found[table.name][loose, 1] = found[table.name][loose, 0]
+    return found
 
 
 def thrust_sites(model: mujoco.MjModel) -> dict[int, str]:
@@ -115,6 +130,15 @@ def thrust_sites(model: mujoco.MjModel) -> dict[int, str]:
         for site, name in names.items()
         if re.search(r"(^|_)rotor_\d+$", name)
     }
+
+
+def reach(scenario: Scenario, columns: Columns) -> float:
+    """Distance (m) of the farthest companion from the first vehicle, most of the time; 0 alone."""
+    apart = [
+        np.linalg.norm([columns[f"{each.name}_{axis}"] - columns[axis] for axis in "xyz"], axis=0)
+        for each in scenario.companion
+    ]
+    return float(np.quantile(apart, 0.9)) if apart else 0.0
 
 
 def _first_rotors(model: mujoco.MjModel) -> list[int]:

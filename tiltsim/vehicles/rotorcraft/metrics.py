@@ -142,8 +142,9 @@ def _contact_metrics(columns: Mapping[str, Floats]) -> dict[str, Any]:
     if "peak_contact_force" in columns:
         metrics["peak_force"] = columns["peak_contact_force"][..., -1]
         metrics["time_in_contact"] = columns["contact_time"][..., -1]
-    if "cable_tension" in columns:
-        metrics["max_cable_tension"] = columns["cable_tension"].max(axis=-1)
+    tensions = [column for name, column in columns.items() if name.endswith("_tension")]
+    if tensions:
+        metrics["max_cable_tension"] = np.max(tensions, axis=(0, -1))
     if "push_force_ref" in columns:
         time, commanded = columns["time"], columns["push_force_ref"]
         full = commanded == commanded.max(axis=-1, keepdims=True)

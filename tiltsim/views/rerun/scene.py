@@ -79,8 +79,8 @@ class Scene:
                 pose = rr.Transform3D(translation=translation, quaternion=quaternion)
                 self._log(self._paths[body], pose)
         cable = rr.LineStrips3D.from_fields(colors=[timeline.GREY], radii=[TRAIL_WIDTH])
-        if "cable_tension" in self._assembly.loop.units:
-            self._log(f"{self.root}/cable", cable)
+        for tendon in range(model.ntendon):
+            self._log(f"{self.root}/{model.tendon(tendon).name}", cable)
         trail = rr.LineStrips3D.from_fields(colors=[self._color], radii=[TRAIL_WIDTH])
         self._log(f"{self.root}/trail", trail)
         look: dict[str, Any] = {"colors": [timeline.YELLOW]}
@@ -114,9 +114,9 @@ class Scene:
             vectors = np.outer(columns[column] * self._thrust_scale, axis).astype(np.float32)
             arrow = rr.Arrows3D.columns(vectors=vectors)
             send_rows(self._recording, self._thrust_path(site), time, arrow)
-        if "cable_tension" in columns:
-            cable = rr.LineStrips3D.columns(strips=replay.cable(model, world).astype(np.float32))
-            send_rows(self._recording, f"{self.root}/cable", time, cable)
+        for name, ends in replay.cables(piece.scenario, model, world, time).items():
+            strips = rr.LineStrips3D.columns(strips=ends.astype(np.float32))
+            send_rows(self._recording, f"{self.root}/{name}", time, strips)
         position = world.position[:, replay.first_free_body(model)]
         follow = rr.Transform3D.columns(translation=position.astype(np.float32))
         send_rows(self._recording, self.camera, time, follow)
