@@ -10,7 +10,8 @@ from contextlib import suppress
 
 import numpy as np
 
-FLIP = np.array([1.0, -1.0, -1.0])
+from tiltsim_controllers.mathematics.attitude import FLIP
+
 HEIGHT = 1.0  # m
 
 

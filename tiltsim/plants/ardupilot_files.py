@@ -5,6 +5,7 @@ import numpy as np
 from tiltsim.errors import InputError
 from tiltsim.plants.autopilot import Mixer
 from tiltsim.scenario.scenario import Scenario
+from tiltsim_controllers.mathematics.attitude import FLIP
 
 PARAMETERS = {
     "FRAME_CLASS": 16,  # motors with six degrees of freedom, from a script
@@ -44,9 +45,9 @@ def ardupilot_files(scenario: Scenario) -> dict[str, str]:
             "one of the firmware's own frames"
         )
     least = np.linalg.pinv(factors)  # (outputs, 6): x forward, y left, z up
-    up, forward, right = least[:, 2], least[:, 0], -least[:, 1]
+    up, forward, right = least[:, 2], *(least[:, :2] * FLIP[:2]).T
     forces = np.stack([up, forward, right], axis=1) / np.abs(least[:, :3]).max()
-    turns = least[:, 3:] * [1.0, -1.0, -1.0] / np.abs(least[:, 3:]).max()
+    turns = least[:, 3:] * FLIP / np.abs(least[:, 3:]).max()
     lines = [
         "Motors_6DoF:add_motor({}, {}, true, {})".format(
             channel, ", ".join(f"{value:.5f}" for value in (*turn, *force)), channel + 1

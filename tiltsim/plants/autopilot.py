@@ -19,7 +19,7 @@ from tiltsim.models.cross import as_multirotor
 from tiltsim.plants.command import Command, ControllerError, Observation
 from tiltsim.scenario.autopilot import AutopilotTable
 from tiltsim.scenario.scenario import Scenario
-from tiltsim_controllers.mathematics.attitude import rotation_of_quaternion
+from tiltsim_controllers.mathematics.attitude import FLIP, rotation_of_quaternion
 from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.vehicle.effectiveness import force_and_torque
 
@@ -27,9 +27,6 @@ PACKETS: Final = {18458: Struct("<HHI16H"), 29569: Struct("<HHI32H")}
 """Outputs of the firmware, by their first number: magic, rate (Hz), count, pulse widths (us)."""
 
 LOOPBACK: Final = "127.0.0.1"
-
-FLIP: Final = np.array([1.0, -1.0, -1.0])
-"""From z up to north, east, down, and from forward, left, up to forward, right, down."""
 
 LOW, MIDDLE, HIGH = 1000.0, 1500.0, 2000.0  # us
 
