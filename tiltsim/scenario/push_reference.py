@@ -105,7 +105,7 @@ class PushReference(PositionReference):
             self.require_defaults(("gain", "proportional_gain"), needs)
 
     def softness(self, scenario: Any) -> float:
-        """How far the vehicle is pushed from its place by a force that its law does not know, m/N."""
+        """How far a force that the law does not know pushes the vehicle from its place, m/N."""
         controller = scenario.controller
         if controller.observes_forces or controller.position_stiffness is None:
             return 0.0
