@@ -184,9 +184,17 @@ class PayloadTable(Table):
         0.0, description="angle of the cable at time zero, from straight down toward +x [rad]"
     )
 
+    swing_damping: Annotated[float, Field(ge=0.0, le=1.0)] = Field(
+        0.0,
+        description="damping ratio that the controller gives the swing: its vehicle goes after the "
+        "load, by the measured angle of the cable; 0 does not [-]",
+        examples=[0.5],
+    )
+
     def _check_values(self) -> None:
         if self.rigid:
-            self.require_defaults(("swing",), "a rigid load does not swing; remove it")
+            keys = ("swing", "swing_damping")
+            self.require_defaults(keys, "a rigid load does not swing; remove it")
 
     @property
     def load(self) -> Load:
@@ -206,6 +214,20 @@ def objects_of(scenario: Any) -> Objects | None:
     )
 
 
+def _check_swing_damping(scenario: Any) -> None:
+    """Refuse to damp the swing where the law does not follow a reference that accelerates."""
+    controller, reason = scenario.controller, ""
+    if controller.is_external:
+        reason = "damps by a built-in law; a controller of yours has observation.swing"
+    elif not controller.damps_swing:
+        able = "choose full_pose, vectoring, geometric, pid, indi or numpy"
+        reason = f"the {controller.law} law does not follow a reference's acceleration; {able}"
+    elif scenario.reference.kind == "attitude_altitude":
+        reason = "needs a reference of position"
+    if reason:
+        raise scenario.payload.mistake("swing_damping", reason)
+
+
 def check_objects(scenario: Any) -> None:
     """Refuse objects, tools and loads where nothing could fly with them, or push them."""
     if scenario.reference.type == "push":
@@ -215,6 +237,8 @@ def check_objects(scenario: Any) -> None:
             able = "choose full_pose, vectoring with position_bandwidth, or python"
             reason = f"the {controller.law} law cannot push; {able}"
             raise scenario.mistake("reference.type", reason)
+    if scenario.payload is not None and scenario.payload.swing_damping:
+        _check_swing_damping(scenario)
     keys = ("object", "tool", "payload", "companion")
     key = next((name for name in keys if getattr(scenario, name)), None)
     if key is None:

@@ -137,6 +137,12 @@ METRICS: Final = {
         "time in contact", "s", "time for which the vehicle touched an object"
     ),
     "max_cable_tension": Metric("largest tension of the cable", "N", "of the recorded samples"),
+    "max_swing": Metric(
+        "largest swing of the load", "rad", "largest angle of the cable from straight down"
+    ),
+    "final_swing": Metric(
+        "residual swing of the load", "rad", "largest such angle over the last second"
+    ),
     "minimum_separation": Metric(
         "smallest distance between vehicles", "m", "between centers of mass of any two vehicles"
     ),

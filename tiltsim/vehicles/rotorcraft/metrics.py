@@ -7,6 +7,7 @@ import numpy as np
 
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.scenario import Scenario
+from tiltsim.vehicles.rotorcraft.others import SWING
 from tiltsim.vehicles.spans import (
     at_lower_limit,
     at_upper_limit,
@@ -53,7 +54,7 @@ def rotorcraft_metrics(
         "max_tilt_rate": largest(rates) if rates else np.zeros(spins.shape[1:-1]),
         **_singularity_metrics(columns, limits.resolve()),
         **_controller_metrics(columns),
-        **_contact_metrics(columns),
+        **_contact_metrics(columns, in_last_second(time, scenario.simulation.timestep)),
         **saturation_metrics(time, saturated),
     }
 
@@ -136,7 +137,7 @@ def _controller_metrics(columns: Mapping[str, Floats]) -> dict[str, Any]:
     return {f"max_{name}": columns[name].max(axis=-1) for name in names}
 
 
-def _contact_metrics(columns: Mapping[str, Floats]) -> dict[str, Any]:
+def _contact_metrics(columns: Mapping[str, Floats], last_second: Any) -> dict[str, Any]:
     """Forces on objects, where a flight has any; peak and time are kept at every step."""
     metrics = {}
     if "peak_contact_force" in columns:
@@ -144,6 +145,9 @@ def _contact_metrics(columns: Mapping[str, Floats]) -> dict[str, Any]:
         metrics["time_in_contact"] = columns["contact_time"][..., -1]
     if "cable_tension" in columns:
         metrics["max_cable_tension"] = columns["cable_tension"].max(axis=-1)
+        swing = np.hypot(*(columns[name] for name in SWING))
+        metrics["max_swing"] = swing.max(axis=-1)
+        metrics["final_swing"] = np.compress(last_second, swing, axis=-1).max(axis=-1)
     if "push_force_ref" in columns:
         time, commanded = columns["time"], columns["push_force_ref"]
         full = commanded == commanded.max(axis=-1, keepdims=True)

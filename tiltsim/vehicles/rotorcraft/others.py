@@ -24,6 +24,22 @@ CONTACT_COLUMNS: Final = dict.fromkeys((*CONTACT_FORCE, "peak_contact_force"), "
 
 LOAD_COLUMNS: Final = {**{f"payload_{axis}": "m" for axis in "xyz"}, "cable_tension": "N"}
 
+SWING: Final = ("swing_x", "swing_y")
+"""Angles of a cable from straight down toward +x and +y, rad; columns that follow from others."""
+
+
+class Felt(NamedTuple):
+    """Where numbers of objects and load are behind ``act``, for the functions of a controller."""
+
+    contact_force: slice = slice(-14, -11)  # (3,), N, world: of the vehicle on all objects
+    push_force: slice = slice(-11, -8)  # (3,), N, world: on the object that it pushes
+    swing: slice = slice(-8, -6)  # (2,), rad, see `SWING`
+    shift: slice = slice(-6, None)  # of the reference along x and y, m, with its two derivatives
+
+
+FELT: Final = Felt()
+FELT_SIZE: Final = 14
+
 
 class Others(NamedTuple):
     """Which objects and loads a flight has; flights with equal ones share their programs."""

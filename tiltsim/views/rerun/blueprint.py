@@ -16,6 +16,7 @@ from tiltsim.views.rerun.flight_recorder import FlightRecorder, plotted_lines
 from tiltsim.views.rerun.plane import BOUND
 from tiltsim.views.rerun.scene import REFERENCE_POINTS, ground_height
 from tiltsim.views.rerun.timeline import TIMELINE
+from tiltsim.views.signals import Signals
 from tiltsim_controllers.mathematics.scalar import Floats
 
 ALONE: Final = "Attitude (shaded: unreachable)"
@@ -163,25 +164,30 @@ def _plots(recorders: Sequence[FlightRecorder], flights: Sequence[Flight]) -> rr
     times = -share / (1.0 - share) * end, (1.0 + AFTER) * end
     if len(recorders) > 1:
         return rrb.Vertical(*_compared(recorders, flights, times))
+
+    def plot(panel: Signals, title: str, *, legend: bool = False) -> rrb.View:
+        limits = panel.range_of(flights) if flights else None
+        return _plot(title, [f"{panel.path}/**"], limits, times, legend=legend)
+
     rows: list[rrb.View | rrb.Container] = []
-    heights, beside, others = [], [], []
+    heights, bare, others = [], [], []
     for each in signals:
-        limits = each.range_of(flights) if flights else None
         entries = {text for line in plotted_lines(each) for text in line.labels}
-        legend = len(entries) > 1
-        alone = each.plotted and not legend  # narrow, so named by its line
-        title = Quantity(each.lines[0].label.capitalize(), each.unit).text if alone else each.text
-        view = _plot(title, [f"{each.path}/**"], limits, times, legend=legend)
         if not each.plotted:
-            others.append(view)
-        elif alone:
-            beside.append(view)  # of the next plot, whose legend needs the height
+            others.append(plot(each, each.text, legend=len(entries) > 1))
+        elif len(entries) < 2:
+            bare.append(each)
         else:
-            rows.append(rrb.Horizontal(*beside, view) if beside else view)
+            # The next legend needs the height: plots without one stand beside it, named by lines.
+            names = [Quantity(one.lines[0].label.capitalize(), one.unit).text for one in bare]
+            narrow = map(plot, bare, names)
+            view = plot(each, each.text, legend=True)
+            rows.append(rrb.Horizontal(*narrow, view) if bare else view)
             heights.append(AROUND + len(entries) + len(each.levels))
-            beside = []
+            bare = []
+    rows += [plot(each, each.text) for each in bare]
     return rrb.Tabs(
-        rrb.Vertical(*rows, *beside, row_shares=[*heights, *[4.0] * len(beside)], name=MAIN),
+        rrb.Vertical(*rows, row_shares=[*heights, *[4.0] * len(bare)], name=MAIN),
         rrb.Grid(*others, grid_columns=2, name="All other signals"),
     )
 
