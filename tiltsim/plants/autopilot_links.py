@@ -158,7 +158,7 @@ class Px4Link(Link):
     RADIUS: Final = 6_371_000.0  # m, of the Earth
     FIELDS: Final = 0x1BFF  # all readings of HIL_SENSOR but of an airspeed
     NOISE: Final = np.repeat([2e-2, 1e-3, 5e-4, 1e-2], [3, 3, 3, 1])
-    """Of forces (m/s^2), rates (rad/s), field (gauss), pressure (hPa): constants seem defects."""
+    """For forces (m/s^2), rates (rad/s), field (gauss), pressure (hPa): constants seem defects."""
 
     def __init__(self, table: AutopilotTable, signed: Any, address: str) -> None:
         self._dialect = optional_package(
