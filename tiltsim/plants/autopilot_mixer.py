@@ -74,7 +74,7 @@ class Mixer:
         """Rotor speeds (rad/s, along the spin) and tilt angles (rad) of outputs.
 
         Args:
-            shares: Of each output, shape (outputs,), linear in rotor speed: from -1 to 1 of a
+            shares: Outputs, shape (outputs,), linear in rotor speed: from -1 to 1 of a
                 signed one, else from 0 to 1.
         """
         speeds = np.zeros(len(self._top))
