@@ -16,7 +16,7 @@ from tiltsim_controllers.vehicle.effectiveness import force_and_torque
 class Mixer:
     """The vehicle's rotors and tilts as outputs of a firmware.
 
-    `signed` tells which outputs take both signs: reversible rotors and pairs of a tilting one.
+    `signed`: whether an output takes both signs: of reversible rotors, and pairs of tilting ones.
 
     Args:
         scenario: The scenario with its autopilot.
