@@ -247,7 +247,7 @@ def page(tables: Sequence[KeyTable]) -> str:
     parts += ["", "## Keys before all tables", ""]
     parts += [_item(key) for key in document.keys if key.name not in chapters]
     for name, place in chapters.items():
-        parts += ["", f"## `{head_of(place)}`", *(["", meanings[name]] if place[0].tags else [])]
+        parts += ["", f"## `{head_of(place)}`"]
         own = [table for table in others if table.places[0][0].name == name]
         shared = shared_keys(own)
         if shared:

@@ -293,6 +293,7 @@ def check_objects(scenario: Any) -> None:
             able = "choose full_pose, vectoring with position_bandwidth, or python"
             reason = f"the {controller.law} law cannot push; {able}"
             raise scenario.mistake("reference.type", reason)
+        scenario.reference.check_impedance(scenario)
     if scenario.payload is not None and scenario.payload.swing_damping:
         _check_swing_damping(scenario)
     keys = ("object", "tool", "payload", "companion")
