@@ -132,13 +132,11 @@ def thrust_sites(model: mujoco.MjModel) -> dict[int, str]:
     }
 
 
-def reach(scenario: Scenario, columns: Columns) -> float:
-    """Distance (m) of the farthest companion from the first vehicle, most of the time; 0 alone."""
-    apart = [
-        np.linalg.norm([columns[f"{each.name}_{axis}"] - columns[axis] for axis in "xyz"], axis=0)
-        for each in scenario.companion
-    ]
-    return float(np.quantile(apart, 0.9)) if apart else 0.0
+def seen_radius(scenario: Scenario, model: mujoco.MjModel) -> float:
+    """The vehicle's radius (m), or a larger one that lets a camera also see companions nearby."""
+    begin = np.array(scenario.initial.position)
+    apart = [np.linalg.norm(each.initial.position - begin) for each in scenario.companions]
+    return vehicle_radius(model) + 0.25 * float(max(apart, default=0.0))
 
 
 def _first_rotors(model: mujoco.MjModel) -> list[int]:
@@ -190,10 +188,20 @@ def _product(left: Floats, right: Floats) -> Floats:
     return np.concatenate([scalar, vector + np.cross(left[..., 1:], right[..., 1:])], axis=-1)
 
 
-def positions(columns: Columns) -> Floats:
-    """The vehicle's position at every sample (m), shape (N, 3); 0 for axes without a column."""
+def positions(columns: Columns, prefix: str = "") -> Floats:
+    """A vehicle's position at every sample (m), shape (N, 3); 0 for axes without a column.
+
+    Args:
+        columns: Columns of the flight.
+        prefix: Beginning of the names of a companion's columns.
+    """
     zero = np.zeros_like(columns["time"])
-    return np.stack([columns.get(axis, zero) for axis in "xyz"], axis=1)
+    return np.stack([columns.get(f"{prefix}{axis}", zero) for axis in "xyz"], axis=1)
+
+
+def prefixes(scenario: Scenario) -> list[str]:
+    """The beginnings of the names of the columns of each vehicle, the first one's empty."""
+    return ["", *(f"{each.name}_" for each in scenario.companion)]
 
 
 def reference_positions(columns: Columns) -> Floats:

@@ -119,7 +119,7 @@ class FlightRenderer:
         self._camera.type = mujoco.mjtCamera.mjCAMERA_TRACKING
         self._camera.trackbodyid = replay.first_free_body(self._model)
         pose = self._video.camera or replay.camera_of(flight.scenario)
-        near = self._radius + 0.25 * replay.reach(flight.scenario, flight.columns)
+        near = replay.seen_radius(flight.scenario, self._model)
         self._camera.distance = pose.distance * (self._radius if self._video.camera else near)
         self._model.tendon_width[:] = 0.002 * self._camera.distance  # some two pixels
         self._camera.azimuth, self._camera.elevation = pose.azimuth, pose.elevation
