@@ -128,6 +128,7 @@ def loop_of_law(scenario: Scenario, *, recorded: bool = False) -> ClosedLoop:
         controller.commands_tilts,
         scenario.simulation.latency_steps > 0 and not controller.models_latency,
         controller.models_latency,
+        scenario.has_objects,
     )
     loop, module = law_loop(key, find), law.function.__module__
     if recorded or (module.startswith("tiltsim_controllers.")):
@@ -179,7 +180,8 @@ def _try_once(loop: ClosedLoop, plan: FlightPlan, setup: ControlSetup) -> None:
     tilts, rates = initial_tilts(plan) if scenario.vehicle.has_tilting_rotors else ((), ())
     qpos = (*initial.position, *quaternion_of_euler(initial.attitude), *tilts)
     qvel = (*initial.velocity, *initial.angular_velocity, *rates)
-    act = tuple(map(float, loop.dynamics.initial_activations(plan, setup)))
+    activations = loop.dynamics.initial_activations(plan, setup)
+    act = (*map(float, activations), *(0.0,) * loop.dynamics.sizes.after_act)
     start = f'{scenario.address or "scenario"}: controller.law = "{scenario.controller.law}"'
     try:
         loop.sampling.controls(0.0, qpos, qvel, act, setup.parameters, setup.knots)

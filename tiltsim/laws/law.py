@@ -56,6 +56,7 @@ class Law:
         causes: ``(sample by field, setup) -> texts``: why a flight ends where each reaches zero.
         measured: Whether it sees the plant's angular acceleration, of
             `tiltsim.laws.layers.measured_acceleration`.
+        feels: Whether it sees the contact force and the swing of a load, behind ``act``.
         follows_position: See `tiltsim.closed_loop.loop.ClosedLoop`.
     """
 
@@ -73,4 +74,5 @@ class Law:
     signs: Callable[[Seen, Any, Any], Any] | None = None
     causes: Callable[[Mapping[str, float], ControlSetup], tuple[str, ...]] = lambda *_: ("",)
     measured: bool = False
+    feels: bool = False
     follows_position: Callable[[Scenario], bool] = lambda _scenario: True

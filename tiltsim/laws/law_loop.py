@@ -79,6 +79,7 @@ class Key(NamedTuple):
     tilts: bool  # whether the law commands the tilts
     models_rotors: bool  # whether the rotors follow a model of theirs, as they do with latency
     models_latency: bool = False  # whether the law knows its commands on their way
+    feels: bool = False  # whether there are objects or a load
     traced: bool = True  # see `ClosedLoop.traced`
 
 
@@ -136,6 +137,7 @@ def _step_of(key: Key) -> Callable[..., Step]:
         spins, time, states = xp.array(key.layout.spins), seen.time, seen.states
         at, now = int(known.rotors), state_of(seen.state, layout)
         motion = reference_motion(time, known.reference, knots)
+        moved = motion[:3] + seen.shift if key.feels else motion[:3]
         attitude = reference_attitude(time, known.reference, knots)
         planned = planned_tilts(time, known.gait, knots, tilts)
         turning = spins * now.speeds
@@ -156,7 +158,8 @@ def _step_of(key: Key) -> Callable[..., Step]:
             states=states[:own],
             discrete=states[own : own + discrete],
             reference=Desired(
-                *motion[:4],  # type: ignore[call-arg]
+                *moved,  # type: ignore[call-arg]
+                motion[3],
                 attitude[0],
                 *planned[:, :2].T,
                 *attitude[1:3],
@@ -169,6 +172,8 @@ def _step_of(key: Key) -> Callable[..., Step]:
             rotors=pushing,
             table=knots[at + coefficients + rotors :],
             tilt_commands=states[own + discrete : own + discrete + tilts * key.tilts],
+            contact_force=xp.array(seen.contact_force),
+            swing=xp.array(seen.swing),
         )
         command = key.law(observed, known.own)
         reached = states[len(states) - rotors :] if key.models_rotors else turning
@@ -292,6 +297,7 @@ def law_loop(key: Key, law_of: Callable[[FlightPlan], FlownLaw]) -> ClosedLoop:
         if key.tilts
         else None,
         uses_gait=not key.tilts,
+        feels=key.feels,
         follows_position=lambda scenario: scenario.reference.kind != "attitude_altitude",
     )
     late = key._replace(models_rotors=True)

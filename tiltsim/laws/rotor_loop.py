@@ -21,6 +21,7 @@ from tiltsim.scenario.scenario import FlightPlan
 from tiltsim.vehicles.rotorcraft import initial_rotor_speeds, rotorcraft_kind
 from tiltsim.vehicles.rotorcraft.layout import CROSS
 from tiltsim.vehicles.rotorcraft.layout import Layout as Places
+from tiltsim.vehicles.rotorcraft.others import FELT, FELT_SIZE
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.code.traceable import traceable
 from tiltsim_controllers.laws.failures import UNHARMED
@@ -120,7 +121,8 @@ class RotorFunctions(VehicleFunctions):
         a = parts(act, speeds=N, states=S)
         body = q.position, v.velocity, euler_angles(q.quaternion), v.omega
         measured = v.measured if self.law.measured else None
-        return Seen(time, xp.hstack([*body, q.tilts, a.speeds]), v.tilt_rates, a.states, measured)
+        state = xp.hstack([*body, q.tilts, a.speeds])
+        return Seen(time, state, v.tilt_rates, a.states, measured)
 
     def in_sample(self, time: Any, values: Any) -> Seen:
         """From a sample."""
@@ -169,6 +171,10 @@ class RotorFunctions(VehicleFunctions):
     ) -> Any:
         """Tilt servos, ahead by their lag; thrusts; rotor accelerations; rates of the states."""
         seen, p = self.in_mujoco(time, qpos, qvel, act), parameters.law
+        if self.law.feels:
+            shift = xp.hstack([act[FELT.shift].reshape(3, 2), xp.zeros((3, 1))])
+            force, swing = act[FELT.contact_force], act[FELT.swing]
+            seen = seen._replace(contact_force=force, swing=swing, shift=shift)
         step = self.law.step(seen, p, knots)
         moving = self.tilts(seen, step.rates, p, knots)
         servos = moving[:, 0] + parameters.servo_lead * moving[:, 1]
@@ -260,7 +266,7 @@ def rotor_loop(
     flown = functions(law, layout, law.tilts or tilts_of_gait(places.tilts))
     dynamics = Dynamics(
         layout.name,
-        places.sizes(len(law.states)),
+        places.sizes(len(law.states))._replace(history=FELT_SIZE if law.feels else 0),
         lambda plan, _setup: (*flown.initial_speeds(plan), *law.initial(plan)),
         len(law.states),
         layout.spins,

@@ -15,19 +15,22 @@ from typing import Any, Final
 import numpy as np
 
 from tiltsim.closed_loop.assembly import Assembly
+from tiltsim.closed_loop.choices import program_key
 from tiltsim.closed_loop.loop import ClosedLoop, Equations
 from tiltsim.closed_loop.userdata import EVALUATIONS, EVALUATIONS_PER_STEP, HEADER_SIZE
 from tiltsim.engines.base import EngineName
 from tiltsim.engines.callback import control_callback
+from tiltsim.engines.programs import LoopPrograms
 from tiltsim.errors import InputError
 from tiltsim.laws.assembling import assemble
 from tiltsim.linear import coordinates
-from tiltsim.linear.traced_loop import offset, traced_function
 from tiltsim.plants.equations_plant import EquationsPlant
 from tiltsim.plants.flight_model import disturbance_acceleration
 from tiltsim.plants.mujoco_plant import MujocoPlant
 from tiltsim.scenario.scenario import Scenario
 from tiltsim_controllers.code.arrays import xp
+from tiltsim_controllers.code.python_source import python_function
+from tiltsim_controllers.code.traceable import program_of
 from tiltsim_controllers.mathematics.scalar import Floats, Values
 
 LONG: Final = 1000
@@ -77,12 +80,6 @@ class Motion(ABC):
         """The flight without offsets."""
         return assemble(self.scenario, self._as_flown)
 
-    @property
-    def _is_traced(self) -> bool:
-        """Whether commands are traced: offsets stand between the controller and its layers."""
-        flown = self._flown_assembly
-        return flown.traced and flown.loop.within is None
-
     def _adapted(self, loop: ClosedLoop) -> ClosedLoop:
         """A controller without layers, to whose inputs of the vehicle the offsets are added.
 
@@ -96,12 +93,39 @@ class Motion(ABC):
         sampling = replace(sampling, controls=controls)
         return replace(loop, sampling=sampling, equations=equations, traced=False)
 
+    def _evaluated(self, function: Callable[..., Any], **sizes: int) -> Callable[..., Values]:
+        """A function of the loop on Python's floats, at the offsets of the moment.
+
+        Args:
+            function: ``(setup, *arrays) -> numbers``, by functions of the varied loop.
+            sizes: The size of every array, by name.
+        """
+        flown = self._flown_assembly
+        if not flown.traced:
+            return lambda *given: function(self.assembly.setup, *given)
+        programs = LoopPrograms(program_key(flown))
+
+        def once(*given: Any) -> Any:
+            *vectors, offsets, user = given
+            present, self.offsets = self.offsets, offsets  # traced
+            try:
+                return function(programs.setup(user), *vectors)
+            finally:
+                self.offsets = present
+
+        program = program_of(once, **sizes, offsets=len(self.offsets), user=programs.user_size)
+        run = python_function(program, fixed={"user": flown.setup.userdata.tolist()})
+        return lambda *given: run(*given, self.offsets.tolist())
+
     def _with_offsets(self, function: Callable[..., Values]) -> Callable[..., Values]:
         """A control step that adds the offsets and remembers the commands without them."""
 
         def step(*args: Any) -> Values:
             self._commanded = function(*args)
-            return tuple(offset(self._commanded, self._inputs, self.offsets.tolist()))
+            values = list(self._commanded)
+            for each, added in zip(self._inputs, self.offsets.tolist(), strict=True):
+                values[each.place] = values[each.place] + added * each.per_unit
+            return tuple(values)
 
         return step
 
@@ -183,29 +207,17 @@ class EquationMotion(Motion):
 
     @cached_property
     def _moved(self) -> Callable[..., Values]:
-        """Rates of the state at a time, of a state and offsets; traced if the loop can be."""
+        """Rates of the state at a time."""
         disturbance = disturbance_acceleration(self.scenario)
-        flown, varied = self._flown_assembly, self._equations
-        equations = flown.loop.equations
-        if not self._is_traced or equations is None:
-            setup = self.assembly.setup
 
-            def called(time: tuple[float], state: Values, _offsets: Values) -> Values:
-                inputs = varied.inputs(*time, state, *setup)
-                return varied.rates(*time, state, inputs, *setup, disturbance)
+        def rates(setup: Any, time: Any, state: Any) -> Any:
+            inputs = xp.array(self._equations.inputs(time[0], state, *setup))
+            return self._equations.rates(time[0], state, inputs, *setup, disturbance)
 
-            return called
-
-        def rates(setup: Any, time: Any, state: Any, offsets: Any) -> Any:
-            commanded = equations.inputs(time[0], state, *setup)
-            inputs = xp.array(offset(commanded, self._inputs, offsets))
-            return equations.rates(time[0], state, inputs, *setup, disturbance)
-
-        sizes = {"time": 1, "state": len(self.initial), "offsets": len(self.offsets)}
-        return traced_function(flown, rates, **sizes)
+        return self._evaluated(rates, time=1, state=len(self.initial))
 
     def rates(self, time: float, state: Floats) -> Floats:
-        moved = self._moved((time,), state.tolist(), self.offsets.tolist())
+        moved = self._moved((time,), state.tolist())
         return self.coordinates.rates(state, np.array(moved))
 
     def limited(self, state: Floats) -> Floats:
@@ -274,25 +286,22 @@ class MujocoMotion(Motion):
         return np.split(state, (sizes.qpos, sizes.qpos + sizes.qvel))
 
     @cached_property
-    def _traced_controls(self) -> Callable[..., Values] | None:
-        """The commands at a time and state, if the loop can be traced."""
-        if not self._is_traced:
-            return None
-        flown = self._flown_assembly
-        controls, sizes = flown.loop.sampling.controls, flown.loop.dynamics.sizes
+    def _all_controls(self) -> Callable[..., Values]:
+        """The controls at a time and state, and the controller's commands without offsets."""
+        loop = self.assembly.loop
 
-        def commanded(setup: Any, time: Any, *parts: Any) -> Any:
-            return controls(time[0], *parts, *setup)
+        def controls(setup: Any, time: Any, *parts: Any) -> Any:
+            values = loop.sampling.controls(time[0], *parts, *setup)
+            return (*values, *self._commanded)
 
-        parts = {"qpos": sizes.qpos, "qvel": sizes.qvel, "act": sizes.act}
-        return traced_function(flown, commanded, time=1, **parts)
+        sizes = loop.dynamics.sizes
+        return self._evaluated(controls, time=1, qpos=sizes.qpos, qvel=sizes.qvel, act=sizes.act)
 
     def _controls(self, time: float, state: Floats) -> Values:
-        parts, traced = (part.tolist() for part in self._split(state)), self._traced_controls
-        if traced is None:
-            return self.assembly.loop.sampling.controls(time, *parts, *self.assembly.setup)
-        self._commanded = traced((time,), *parts)
-        return tuple(offset(self._commanded, self._inputs, self.offsets.tolist()))
+        parts = (part.tolist() for part in self._split(state))
+        values, count = self._all_controls((time,), *parts), self._varied.model.nu
+        self._commanded = values[count:]
+        return values[:count]
 
     def rates(self, time: float, state: Floats) -> Floats:
         import mujoco

@@ -21,12 +21,10 @@ from tiltsim.scenario.messages import did_you_mean
 from tiltsim.system.files import is_file, is_folder
 from tiltsim.system.parquet import open_parquet
 from tiltsim.system.text import printable, short_repr
+from tiltsim_controllers.mathematics.attitude import FLIP
 from tiltsim_controllers.mathematics.scalar import Floats
 
 SUFFIXES: Final = (*LOG_SUFFIXES, ".parquet")
-
-FLIP: Final = np.diag([1.0, -1.0, -1.0])
-"""From NED to z up, and from FRD to FLU: half a turn about x."""
 
 VECTORS: Final = {
     "world": (("x", "y", "z"), ("vx", "vy", "vz")),
@@ -130,11 +128,11 @@ def _mapped(file: Path, signals: Signals, chart: LogMap) -> Log:
         held = "command" in name
         column = _at(time, signals[one.signal], chart.max_gap, held=held)
         columns[name] = one.scale * column + one.offset
-    flips = {"world": FLIP if chart.world == "ned" else np.eye(3)}
-    flips["body"] = FLIP if chart.body == "frd" else np.eye(3)
+    flips = {"world": FLIP if chart.world == "ned" else np.ones(3)}
+    flips["body"] = FLIP if chart.body == "frd" else np.ones(3)
     for frame, vectors in VECTORS.items():
         for vector in vectors:
-            for name, sign in zip(vector, np.diag(flips[frame]), strict=True):
+            for name, sign in zip(vector, flips[frame], strict=True):
                 if name in columns:
                     columns[name] = columns[name] * sign + 0.0
     if chart.attitude:
@@ -174,8 +172,8 @@ def _attitude(file: Path, turned: Floats, world: Floats, body: Floats) -> dict[s
         else Rotation.from_euler("ZYX", given[:, ::-1])
     )
     angles = np.full((len(turned), 3), np.nan)
-    found = Rotation.from_matrix(world @ rotation.as_matrix() @ body).as_euler("ZYX")[:, ::-1]
-    angles[finite] = np.unwrap(found, axis=0)
+    own = Rotation.from_matrix(world[:, None] * rotation.as_matrix() * body)
+    angles[finite] = np.unwrap(own.as_euler("ZYX")[:, ::-1], axis=0)
     return dict(zip(("roll", "pitch", "yaw"), angles.T, strict=True))
 
 

@@ -16,13 +16,11 @@ from tiltsim.errors import InputError
 from tiltsim.logs.log import Log
 from tiltsim.logs.signals import Signals
 from tiltsim.system.public import optional_package
+from tiltsim_controllers.mathematics.attitude import FLIP
 
 SAMPLE: Final = "tiltsim_sample"
 ORIGIN: Final = "tiltsim_"
 """Begins the names of information messages that hold the origin of a flight and its units."""
-
-FLIP: Final = np.array([1.0, -1.0, -1.0])
-"""From z-up to NED, and from FLU to FRD: half a turn about x."""
 
 LONGEST: Final = 60_000  # bytes of one information message, whose length has 16 bits
 

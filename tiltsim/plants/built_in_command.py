@@ -9,7 +9,7 @@ from tiltsim.closed_loop.loop import Dynamics
 from tiltsim.engines.base import vectors_of
 from tiltsim.errors import InputError
 from tiltsim.laws.assembling import assemble
-from tiltsim.laws.layers.contact import seen_within
+from tiltsim.laws.layers.contact import felt_among
 from tiltsim.laws.layers.measured_acceleration import plant_angular_acceleration_of
 from tiltsim.laws.layers.on_equations import read_actuators
 from tiltsim.laws.layers.sensing import measured
@@ -43,7 +43,8 @@ def built_in_command(assembly: Assembly, plant: MujocoPlant) -> Command:
         elif hasattr(layer, "sensors"):  # of actuation: a record for the number of rotors
             qpos, qvel = measured(time, qpos, qvel, layer.sensors)
         elif hasattr(layer, "timestep"):  # of objects
-            act = seen_within(within, others_of(assembly.scenario), act)
+            felt = felt_among(others_of(assembly.scenario))(qpos, act, layer.attachment)
+            act = [*act[: within.dynamics.sizes.act], *felt]
         loop, parameters = within, inner
     ctrl = loop.sampling.controls(time, qpos, qvel, act, parameters, knots)
     return _command(assembly, loop.dynamics, ctrl)

@@ -54,6 +54,8 @@ class Observation:
     vehicle: Vehicle | Multirotor  # mass, inertia, gravity, and the rotors' coefficients
     contact_force: Floats = field(default_factory=lambda: np.zeros(3))
     """(3,), N, world: of the vehicle on all objects, over the last physics step."""
+    swing: Floats = field(default_factory=lambda: np.zeros(2))
+    """(2,), rad: of the cable of a load from straight down toward +x and +y, world."""
     reference_at: Callable[[float], Reference] | None = field(
         default=None, repr=False, compare=False
     )

@@ -5,14 +5,16 @@ from collections.abc import Sequence
 import numpy as np
 
 from tiltsim.closed_loop.assembly import Assembly
+from tiltsim.engines.base import vectors_of
+from tiltsim.laws.layers.contact import felt_among
 from tiltsim.laws.layers.sensing import measured, sensor_parameters
 from tiltsim.plants.command import Observation, Reference
 from tiltsim.plants.mujoco_plant import MujocoPlant
 from tiltsim.scenario.gait import tilts_of
-from tiltsim.vehicles.rotorcraft.others import others_of
+from tiltsim.vehicles.rotorcraft.others import FELT, others_of
 from tiltsim_controllers.code.traceable import as_arrays
 from tiltsim_controllers.mathematics.attitude import euler_angles
-from tiltsim_controllers.mathematics.scalar import Values
+from tiltsim_controllers.mathematics.scalar import Floats, Values
 from tiltsim_controllers.references.trajectories import attitude_reference, reference_derivatives
 
 
@@ -27,8 +29,9 @@ class Observer:
         vehicle = assembly.scenario.any_rotorcraft
         self._vehicle, self._tilting = vehicle.resolve(), vehicle.has_tilting_rotors
         self._tilts, self._spins = tilts_of(self._vehicle), np.array(vehicle.spins)
-        others = others_of(assembly.scenario)
-        self._forces = [others.force_places(index) for index in range(len(others.names))]
+        scenario = assembly.scenario
+        self._felt = felt_among(others_of(scenario)) if scenario.has_objects else None
+        self._attachment = scenario.payload.attachment if scenario.payload else (0.0, 0.0, 0.0)
         self._assembly, self._sensors = assembly, as_arrays(sensor_parameters(assembly.scenario))
 
     def observe(self, plant: MujocoPlant, rotor_speeds: Sequence[float]) -> Observation:
@@ -52,8 +55,16 @@ class Observer:
             reference=self._reference(time),
             vehicle=self._vehicle,
             reference_at=self._reference,
-            contact_force=sum((data.history[p] for p in self._forces), np.zeros(3)),
+            **self._felt_by(plant),
         )
+
+    def _felt_by(self, plant: MujocoPlant) -> dict[str, Floats]:
+        """Force of contacts and swing of a load."""
+        if self._felt is None:
+            return {}
+        qpos, _, act = vectors_of(self._assembly.loop, plant.data).joined()
+        felt = np.array(self._felt(qpos, act, self._attachment))
+        return {"contact_force": felt[FELT.contact_force], "swing": felt[FELT.swing]}
 
     def _reference(self, time: float) -> Reference:
         knots, reference = self._assembly.knots, self._assembly.reference

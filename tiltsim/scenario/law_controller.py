@@ -102,6 +102,7 @@ class LawTable(ControllerTable):
     vehicle_models = ("tiltrotor", "quadrotor", "multirotor")
     reference_kinds: ClassVar[tuple[ReferenceKind, ...]] = ("position",)
     rotors_have_speeds = True
+    damps_swing = True
     leans_unrecorded = True
 
     rotor_bandwidth: Positive = Field(

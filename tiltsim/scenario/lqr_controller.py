@@ -38,6 +38,7 @@ class Weights(NamedTuple):
 class LqrController(Lqr, CompensatingController):
     """The linear-quadratic regulator about hover, or about the orbit of a moving gait."""
 
+    damps_swing = False
     control: ClassVar = staticmethod(lqr)
 
     def check_scenario(self, scenario: Any) -> None:

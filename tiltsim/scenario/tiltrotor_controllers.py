@@ -65,6 +65,7 @@ class FullPoseController(FullPose, FailureAwareController):
     vehicle_models = ("tiltrotor", "multirotor")
     reference_kinds = ("position", "pose", "attitude_altitude")
     loop_gains = ("gains",)
+    damps_swing = True
     commands_tilts = True
     follows_turns = True
 

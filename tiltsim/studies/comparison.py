@@ -213,7 +213,9 @@ def compare_one(entry: Entry, *, searches: bool, timed: bool = True) -> Compared
     except InputError as error:
         refused = {"end": "refused", "refused": str(error), **dict.fromkeys(MEASURES)}
         return Compared(row | refused | {"latency_refused": None}, np.zeros(0), np.zeros(0))
-    row |= {"end": flight.end.kind, "refused": None, **_tracking(flight), **_effort(flight)}
+    row |= {"end": flight.end.kind, "refused": None, **_tracking(flight)}
+    row["tilt_travel"] = _tilt_travel(flight)
+    row["peak_rotor_speed"] = float(np.abs(flight["rotor_speeds"]).max())
     metrics = flight.metrics()
     for measure in MEASURES:
         row[measure] = row.get(measure, metrics.get(measure))
@@ -269,17 +271,12 @@ def _yaw_error(flight: Flight, yaw: Any) -> float:
     return float(np.sqrt(np.mean(np.arctan2(np.sin(error), np.cos(error)) ** 2)))
 
 
-def _effort(flight: Flight) -> dict[str, float]:
-    """Rms rotor acceleration, rad/s^2, way of all tilts, rad, and greatest speed, rad/s."""
-    speeds = flight["rotor_speeds"]
-    peak = {"peak_rotor_speed": float(np.abs(speeds).max())}
+def _tilt_travel(flight: Flight) -> float:
+    """The way of all tilts, rad."""
     if len(flight) < 2:
-        return {"rms_rotor_acceleration": nan, "tilt_travel": nan, **peak}
-    change = np.diff(speeds, axis=0) / np.diff(flight["time"])[:, np.newaxis]
+        return nan
     columns = [name for name in flight.units if name.startswith("alpha_") and name[6:].isdecimal()]
-    travel = sum(float(np.abs(np.diff(flight[name])).sum()) for name in columns)
-    effort = {"rms_rotor_acceleration": float(np.sqrt(np.mean(change**2))), "tilt_travel": travel}
-    return effort | peak
+    return sum(float(np.abs(np.diff(flight[name])).sum()) for name in columns)
 
 
 def _control_period(scenario: Scenario) -> float:

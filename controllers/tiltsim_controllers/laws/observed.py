@@ -28,6 +28,9 @@ class Seen(NamedTuple):
     states: Any = np.zeros(0)  # (S,), of the controller
     measured: Any = None  # (3,), angular acceleration, rad/s^2, body axes; None: by the law's model
     supervisor: Any = np.zeros(3)  # (3,), its state with rate and acceleration; zero at rest
+    contact_force: Any = np.zeros(3)  # (3,), N, of the vehicle on all objects, world axes
+    swing: Any = np.zeros(2)  # (2,), rad, of the cable of a load toward +x and +y
+    shift: Any = np.zeros((3, 3))  # of the reference: position, velocity, acceleration, m and s
     recorded: bool = False  # whether it is a sample of a flight, of which signals alone are needed
 
 
@@ -77,6 +80,8 @@ class Observed(NamedTuple):
     rotors: Rotors  # force and torque per newton at any tilts
     table: Any  # further numbers of the law, such as gains over time
     tilt_commands: Any  # (M,), rad, of a law that commands the tilts; otherwise none
+    contact_force: Any = np.zeros(3)  # (3,), N, of the vehicle on all objects, world axes
+    swing: Any = np.zeros(2)  # (2,), rad, of a load's cable from straight down toward +x and +y
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Final
+
+import numpy as np
 
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.mathematics.linear import cross
+
+FLIP: Final = np.array([1.0, -1.0, -1.0])
+"""Half a turn about x: between z up and north, east, down; and between forward, left, up and
+forward, right, down."""
 
 
 def rotation_matrix(attitude: Any) -> Any:

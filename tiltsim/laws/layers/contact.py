@@ -1,28 +1,35 @@
 """Objects around the loop: their columns, the peak of the contact force, and a law that pushes.
 
 The force of a step is a reading of a sensor that MuJoCo keeps in its state. Functions of the loop
-see objects' coordinates and readings behind ``act``, and the laws within see none of it.
+see objects' coordinates and readings behind ``act``, and the laws within see `Felt` in their place.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+import numpy as np
 
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup
 from tiltsim.laws.layers.layer import Layer, Samples, wrap_loop
-from tiltsim.models.objects import CABLE_READING, COORDINATES, FORCE
+from tiltsim.models.cables import CABLE_READING
+from tiltsim.models.objects import CONTACT_READING, COORDINATES, FORCE
 from tiltsim.models.parts import ExtraActuators
-from tiltsim.vehicles.rotorcraft.others import CONTACT_FORCE, Others
+from tiltsim.vehicles.rotorcraft.others import CONTACT_FORCE, FELT, SWING, Others
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.code.traceable import traceable
-from tiltsim_controllers.mathematics.attitude import euler_angles
+from tiltsim_controllers.mathematics.attitude import (
+    euler_angles,
+    rotation_matrix,
+    rotation_of_quaternion,
+)
 from tiltsim_controllers.mathematics.records import Vector3
 from tiltsim_controllers.mathematics.scalar import Values
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable
 
     from tiltsim.scenario.scenario import FlightPlan
     from tiltsim_controllers.mathematics.scalar import Floats
@@ -44,11 +51,12 @@ class Push(NamedTuple):
     ramp: float = 1.0  # s, from there to the full force
 
 
-class Accumulation(NamedTuple):
-    """Parameters of the states that keep the peak and the time of contact."""
+class Among(NamedTuple):
+    """Parameters of a loop among objects."""
 
     timestep: float  # s
     push: Push
+    attachment: Vector3  # m, body axes, of a cable
 
 
 class ForceLoop(NamedTuple):
@@ -58,6 +66,16 @@ class ForceLoop(NamedTuple):
     gain: float  # 1/s
     proportional: float
     stiffness: float  # N/m, of the law within against an error of position
+
+
+class Impedance(NamedTuple):
+    """Parameters of a loop that gives the contact an impedance."""
+
+    push: Push
+    mass: float  # kg
+    damping: float  # N s/m
+    stiffness: float  # N/m
+    ahead: float  # m/N, of the reference for the commanded force
 
 
 @traceable
@@ -73,7 +91,7 @@ def with_force_loop(loop: ClosedLoop) -> ClosedLoop:
     Where an object stops the vehicle, a law that feeds back position pushes with its stiffness
     times the error. So an error that follows the force makes any force: the commanded one, plus the
     filtered error of the force times a gain, plus its integral. Before the touch there is neither
-    force nor error, and the law flies as it is. Further numbers in ``act`` are the contact force.
+    force nor error, and the law flies as it is.
     """
     inner_controls, first = loop.sampling.controls, loop.dynamics.sizes.act
 
@@ -84,7 +102,7 @@ def with_force_loop(loop: ClosedLoop) -> ClosedLoop:
         error = commanded - filtered
         force = commanded + own.proportional * error + integral
         place = qpos[:3] - force / own.stiffness * direction
-        measured = act[-3:] @ direction
+        measured = act[FELT.push_force] @ direction
         rates = xp.hstack([FILTER * (measured - filtered), own.gain * error])
         return xp.hstack([place, qpos[3:]]), rates
 
@@ -105,6 +123,50 @@ def with_force_loop(loop: ClosedLoop) -> ClosedLoop:
         of_controller=True,
     )
     return wrap_loop(loop, layer)
+
+
+@cache
+def with_impedance(loop: ClosedLoop) -> ClosedLoop:
+    """A law of position whose reference gives way to the error of the force along a push.
+
+    The reference is ahead by a shift s with ``mass s'' + damping s' + stiffness s = error``, and by
+    the way that a soft law needs for the commanded force.
+    """
+    inner_controls, first = loop.sampling.controls, loop.dynamics.sizes.act
+
+    @traceable
+    def controls(time: Any, qpos: Any, qvel: Any, act: Any, parameters: Any, knots: Any) -> Any:
+        own = parameters.layer
+        direction, commanded = xp.array(own.push.direction), commanded_force(time, own.push)
+        filtered, shift, speed = act[first], act[first + 1], act[first + 2]
+        along = shift + own.ahead * commanded
+        place = xp.hstack([qpos[:3] - along * direction, qpos[3:]])
+        moving = xp.hstack([qvel[:3] - speed * direction, qvel[3:]])
+        force = commanded - filtered - own.damping * speed - own.stiffness * shift
+        following = FILTER * (act[FELT.push_force] @ direction - filtered)
+        ctrl = inner_controls(time, place, moving, act, parameters.inner, knots)
+        return xp.hstack([ctrl, following, speed, force / own.mass])
+
+    layer = Layer(
+        "with_impedance",
+        Impedance,
+        _impedance,
+        controls=controls,
+        actuators=ExtraActuators(states=3),
+        initial_activations=lambda _plan, _own, _inner: (0.0,) * 3,
+        fields=("filtered_push_force", "push_shift", "push_shift_rate"),
+        units={"filtered_push_force": "N", "push_shift": "m", "push_shift_rate": "m/s"},
+        of_controller=True,
+    )
+    return wrap_loop(loop, layer)
+
+
+def _impedance(plan: FlightPlan) -> Impedance:
+    """A law that is soft itself is in series with the shift, which has to be stiffer for it."""
+    table: Any = plan.scenario.reference
+    own, softness = table.impedance, table.softness(plan.scenario)
+    stiffness = own.stiffness / (1.0 - own.stiffness * softness)
+    return Impedance(_push(plan.scenario), own.mass, own.damping, stiffness, softness)
 
 
 def _push(scenario: Any) -> Push:
@@ -133,18 +195,21 @@ def with_objects(loop: ClosedLoop, others: Others) -> ClosedLoop:
     size, ctrl_size, states = sizes.act, sizes.ctrl, 2 * bool(others.names)
     readings = size + states + others.coordinates
     accumulated, observed = _accumulated(others, size, readings), _observed(others, size, readings)
+    felt = felt_among(others)
 
-    def within(act: Any) -> Any:
-        return xp.hstack([act[:size], *_pushing(act[readings:], others)])
+    def within(qpos: Any, act: Any, own: Among) -> Any:
+        return xp.hstack([act[:size], felt(qpos, act, own.attachment)])
 
     @traceable
     def controls(time: Any, qpos: Any, qvel: Any, act: Any, parameters: Any, knots: Any) -> Any:
-        ctrl = inner_controls(time, qpos, qvel, within(act), parameters.inner, knots)
+        seen = within(qpos, act, parameters.layer)
+        ctrl = inner_controls(time, qpos, qvel, seen, parameters.inner, knots)
         return xp.hstack([ctrl, accumulated(act, parameters.layer)])
 
     @traceable
     def hold(time: Any, qpos: Any, qvel: Any, act: Any, ctrl: Any, parameters: Any) -> Any:
-        held = inner_hold(time, qpos, qvel, within(act), ctrl[:ctrl_size], parameters.inner)
+        seen = within(qpos, act, parameters.layer)
+        held = inner_hold(time, qpos, qvel, seen, ctrl[:ctrl_size], parameters.inner)
         return xp.hstack([held, accumulated(act, parameters.layer)])
 
     @traceable
@@ -153,14 +218,18 @@ def with_objects(loop: ClosedLoop, others: Others) -> ClosedLoop:
 
     layer = Layer(
         "with_objects",
-        Accumulation,
-        _accumulation,
+        Among,
+        _among,
         controls=controls,
         hold=hold,
         actuators=ExtraActuators(states=states),
         initial_activations=lambda _plan, _own, _inner: (0.0,) * states,
-        units=others.columns | (dict.fromkeys(PUSH_COLUMNS, "N") if others.pushed >= 0 else {}),
-        derive=_derive_push if others.pushed >= 0 else Layer.derive,
+        units={
+            **others.columns,
+            **(dict.fromkeys(PUSH_COLUMNS, "N") if others.pushed >= 0 else {}),
+            **(dict.fromkeys(SWING, "rad") if others.hangs else {}),
+        },
+        derive=partial(_derive, others),
     )
     wrapped = wrap_loop(loop, layer)
     behind = {"others": others.coordinates, "history": others.readings}
@@ -173,39 +242,63 @@ def with_objects(loop: ClosedLoop, others: Others) -> ClosedLoop:
     )
 
 
-def _accumulation(plan: FlightPlan) -> Accumulation:
-    scenario = plan.scenario
-    return Accumulation(scenario.simulation.timestep, _push(scenario))
+def _among(plan: FlightPlan) -> Among:
+    scenario, load = plan.scenario, plan.scenario.payload
+    attachment = (0.0, 0.0, 0.0) if load is None else load.attachment
+    return Among(scenario.simulation.timestep, _push(scenario), attachment)
 
 
-def _derive_push(
-    inner: Callable[[], dict[str, Floats]], samples: Samples, setup: ControlSetup
+def _derive(
+    others: Others, inner: Callable[[], dict[str, Floats]], samples: Samples, setup: ControlSetup
 ) -> dict[str, Floats]:
-    push = setup.parameters.layer.push
-    along = zip(CONTACT_FORCE, push.direction, strict=True)
-    return {
-        **inner(),
-        "push_force": sum(samples[name] * component for name, component in along),
-        "push_force_ref": commanded_force(samples["time"], push),
-    }
+    columns, own = inner(), setup.parameters.layer
+    if others.pushed >= 0:
+        along = zip(CONTACT_FORCE, own.push.direction, strict=True)
+        columns |= {
+            "push_force": sum(samples[name] * component for name, component in along),
+            "push_force_ref": commanded_force(samples["time"], own.push),
+        }
+    if others.hangs:
+        turn, place, load = (
+            np.array([samples[f"{before}{name}"] for name in names])
+            for before, names in (("", ("roll", "pitch", "yaw")), ("", "xyz"), ("payload_", "xyz"))
+        )
+        arm = np.einsum("ij...,j->i...", rotation_matrix(turn), own.attachment)
+        columns |= zip(SWING, swing(load - place - arm), strict=True)
+    return columns
 
 
-def _pushing(readings: Any, others: Others) -> list[Any]:
-    """The force (N, world), shape (3,), on the object that is pushed, if there is one."""
-    return [readings[others.force_places(others.pushed)]] if others.pushed >= 0 else []
-
-
-def seen_within(inner: ClosedLoop, others: Others, act: Sequence[float]) -> list[float]:
-    """``act`` as the loop within `with_objects` sees it.
+def swing(hanging: Any) -> Any:
+    """Angles (rad), shape (2, ...), of a cable from straight down toward +x and +y.
 
     Args:
-        inner: The loop within.
-        others: The objects.
-        act: As the loop around it sees it.
+        hanging: From its attachment to the load, m, world axes, shape (3, ...).
     """
-    readings = act[len(act) - others.readings :]
-    forces = _pushing(readings, others)
-    return [*act[: inner.dynamics.sizes.act], *(number for force in forces for number in force)]
+    return xp.array([xp.arctan2(hanging[0], -hanging[2]), xp.arctan2(hanging[1], -hanging[2])])
+
+
+@cache
+def felt_among(others: Others) -> Callable[..., Values]:
+    """A function ``(qpos, act, attachment)`` of `Felt`, in this order; zeros of absent things.
+
+    Its ``act`` is as `with_objects` has it, ``attachment`` the beginning of the cable, body axes.
+    """
+
+    @traceable
+    def felt(qpos: Any, act: Any, attachment: Any) -> Any:
+        first = len(act) - others.readings
+        readings, total, pushed, angles = act[first:], xp.zeros(3), xp.zeros(3), xp.zeros(2)
+        if others.names:
+            total = _total(readings, others)
+        if others.pushed >= 0:
+            pushed = readings[others.force_places(others.pushed)]
+        if others.hangs:
+            load = act[first - COORDINATES["free"] : first][:3]
+            arm = rotation_of_quaternion(qpos[3:7]) @ xp.array(attachment)
+            angles = swing(load - qpos[:3] - arm)
+        return xp.hstack([total, pushed, angles, xp.zeros(6)])
+
+    return felt
 
 
 def _total(readings: Any, others: Others) -> Any:
@@ -217,7 +310,7 @@ def _accumulated(others: Others, size: int, readings: int) -> Callable[..., Valu
     """A function ``(act, own)`` of the rates of the largest force and of the time in contact."""
 
     @traceable
-    def accumulated(act: Any, own: Accumulation) -> Any:
+    def accumulated(act: Any, own: Among) -> Any:
         if not others.names:
             return act[:0]
         force, peak = _total(act[readings:], others), act[size]
@@ -241,9 +334,10 @@ def _observed(others: Others, size: int, readings: int) -> Callable[..., Values]
             if joint == "free":
                 pose = xp.hstack([pose[:3], euler_angles(pose[3:])])
             parts, at = [*parts, pose], at + COORDINATES[joint]
-        if others.hangs:
-            tension = readings + others.readings - CABLE_READING + FORCE
-            parts += [act[at : at + 3], act[tension : tension + 1]]
+        tension = readings + CONTACT_READING * len(others.names) + FORCE
+        tensions = act[tension::CABLE_READING]  # of the load's cable first
+        parts += [act[at : at + 3]] if others.hangs else []
+        parts += [tensions] if others.hangs or others.cables else []
         return xp.hstack(parts) if parts else act[:0]
 
     return observed

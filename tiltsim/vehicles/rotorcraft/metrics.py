@@ -7,6 +7,7 @@ import numpy as np
 
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.scenario import Scenario
+from tiltsim.vehicles.rotorcraft.others import SWING
 from tiltsim.vehicles.spans import (
     at_lower_limit,
     at_upper_limit,
@@ -48,14 +49,24 @@ def rotorcraft_metrics(
         **_attitude_metrics(columns, scenario),
         "min_rotor_speed": spins.min(axis=(0, -1)),
         "max_rotor_speed": spins.max(axis=(0, -1)),
+        "rms_rotor_acceleration": _rms_change(time, spins),
         **_altitude_metrics(time, columns["z_ref"] - columns["z"]),
         **_singular_zone_metrics(columns),
         "max_tilt_rate": largest(rates) if rates else np.zeros(spins.shape[1:-1]),
         **_singularity_metrics(columns, limits.resolve()),
         **_controller_metrics(columns),
-        **_contact_metrics(columns),
+        **_contact_metrics(columns, in_last_second(time, scenario.simulation.timestep)),
         **saturation_metrics(time, saturated),
     }
+
+
+def _rms_change(time: Floats, speeds: Floats) -> Any:
+    """Root mean square of the rates (rad/s^2) of speeds (rotors, ..., N); NaN of one sample."""
+    if len(time) < 2:
+        return np.full(speeds.shape[1:-1], np.nan)
+    rates = np.diff(speeds, axis=-1) / np.diff(time)
+    # By rotor, so that the order of the sum does not depend on the number of flights.
+    return np.sqrt(sum(np.mean(rate * rate, axis=-1) for rate in rates) / len(rates))
 
 
 def _position_metrics(
@@ -136,14 +147,19 @@ def _controller_metrics(columns: Mapping[str, Floats]) -> dict[str, Any]:
     return {f"max_{name}": columns[name].max(axis=-1) for name in names}
 
 
-def _contact_metrics(columns: Mapping[str, Floats]) -> dict[str, Any]:
+def _contact_metrics(columns: Mapping[str, Floats], last_second: Any) -> dict[str, Any]:
     """Forces on objects, where a flight has any; peak and time are kept at every step."""
     metrics = {}
     if "peak_contact_force" in columns:
         metrics["peak_force"] = columns["peak_contact_force"][..., -1]
         metrics["time_in_contact"] = columns["contact_time"][..., -1]
+    tensions = [column for name, column in columns.items() if name.endswith("_tension")]
+    if tensions:
+        metrics["max_cable_tension"] = np.max(tensions, axis=(0, -1))
     if "cable_tension" in columns:
-        metrics["max_cable_tension"] = columns["cable_tension"].max(axis=-1)
+        swing = np.hypot(*(columns[name] for name in SWING))
+        metrics["max_swing"] = swing.max(axis=-1)
+        metrics["final_swing"] = np.compress(last_second, swing, axis=-1).max(axis=-1)
     if "push_force_ref" in columns:
         time, commanded = columns["time"], columns["push_force_ref"]
         full = commanded == commanded.max(axis=-1, keepdims=True)

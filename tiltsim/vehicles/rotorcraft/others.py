@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from tiltsim.models.objects import CABLE_READING, CONTACT_READING, COORDINATES, FORCE
+from tiltsim.models.cables import CABLE_READING
+from tiltsim.models.objects import CONTACT_READING, COORDINATES, FORCE
 from tiltsim.scenario.interaction import objects_of
 from tiltsim_controllers.mathematics.attitude import rotation_matrix
 
@@ -24,6 +25,22 @@ CONTACT_COLUMNS: Final = dict.fromkeys((*CONTACT_FORCE, "peak_contact_force"), "
 
 LOAD_COLUMNS: Final = {**{f"payload_{axis}": "m" for axis in "xyz"}, "cable_tension": "N"}
 
+SWING: Final = ("swing_x", "swing_y")
+"""Angles of a cable from straight down toward +x and +y, rad; columns that follow from others."""
+
+
+class Felt(NamedTuple):
+    """Where numbers of objects and load are behind ``act``, for the functions of a controller."""
+
+    contact_force: slice = slice(-14, -11)  # (3,), N, world: of the vehicle on all objects
+    push_force: slice = slice(-11, -8)  # (3,), N, world: on the object that it pushes
+    swing: slice = slice(-8, -6)  # (2,), rad, see `SWING`
+    shift: slice = slice(-6, None)  # of the reference along x and y, m, with its two derivatives
+
+
+FELT: Final = Felt()
+FELT_SIZE: Final = 14
+
 
 class Others(NamedTuple):
     """Which objects and loads a flight has; flights with equal ones share their programs."""
@@ -31,6 +48,7 @@ class Others(NamedTuple):
     names: tuple[str, ...] = ()
     joints: tuple[str, ...] = ()
     hangs: bool = False  # a load on a cable
+    cables: tuple[str, ...] = ()
     pushed: int = -1  # the object that the reference pushes, -1 for none
 
     @property
@@ -41,7 +59,7 @@ class Others(NamedTuple):
     @property
     def readings(self) -> int:
         """Numbers in the memories of the sensors."""
-        return CONTACT_READING * len(self.names) + CABLE_READING * self.hangs
+        return CONTACT_READING * len(self.names) + CABLE_READING * (self.hangs + len(self.cables))
 
     @property
     def columns(self) -> dict[str, str]:
@@ -53,7 +71,8 @@ class Others(NamedTuple):
             elif joint == "free":
                 columns |= {f"{name}_{axis}": "m" for axis in "xyz"}
                 columns |= {f"{name}_{angle}": "rad" for angle in ("roll", "pitch", "yaw")}
-        return columns | (LOAD_COLUMNS if self.hangs else {})
+        columns |= LOAD_COLUMNS if self.hangs else {}
+        return columns | {f"{name}_tension": "N" for name in self.cables}
 
     def force_places(self, index: int) -> slice:
         """Where the force of an object is among the sensors' readings."""
@@ -69,7 +88,9 @@ def others_of(scenario: Scenario) -> Others:
     names = tuple(body.name for body in objects.bodies)
     reference = scenario.reference
     pushed = names.index(reference.object) if reference.type == "push" else -1
-    return Others(names, tuple(body.joint for body in objects.bodies), objects.hangs, pushed)
+    joints = tuple(body.joint for body in objects.bodies)
+    cables = tuple(cable.name for cable in objects.cables)
+    return Others(names, joints, objects.hangs, cables, pushed)
 
 
 def motion_at_start(plan: FlightPlan) -> tuple[Vector, Vector]:
