@@ -180,11 +180,12 @@ def _tables_of(tuning: Mapping[str, Any], tables: Tables) -> Tables:
 
 
 def _sentence(tuning: Mapping[str, Any], league: str) -> str:
-    from tiltsim.studies.arena import SEEDS
+    from tiltsim.studies.arena import SEEDS, WORLDS
 
+    seeds = max((SEEDS[world] for world in WORLDS[league]), key=len)
     made = tuning["made"]
     at = f" at commit {made['commit']}" if made["commit"] else ""
     return (
-        f"Seeds of the tasks: {', '.join(map(str, SEEDS[league]))}. Tuned gains: a search of "
+        f"Seeds of the tasks: {', '.join(map(str, seeds))}. Tuned gains: a search of "
         f"{tuning['flights']} flights each with seed {tuning['seed']}, of {made['date']}{at}."
     )

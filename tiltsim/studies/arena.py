@@ -75,8 +75,8 @@ WORLDS: Final[Mapping[str, Mapping[str, Mapping[str, Any]]]] = {
 }
 """By league, what the law's model lacks: values by dotted key for each table."""
 
-SEEDS: Final = {"limited": (1, 2, 3), "unlimited": (1,)}
-"""Seeds of sensor noise and turbulence, by league."""
+SEEDS: Final = {"model error": (1, 2, 3), "exact model": (1,), "": (1,)}
+"""Seeds of sensor noise and turbulence, by world."""
 
 OWN_KEYS: Final = {"omni_octorotor": {"controller.norm": "thrust"}}
 """Keys that a vehicle of the fleet needs beside its file and tilt angles: its rotors reverse."""
@@ -230,7 +230,8 @@ def matches(
                 if keys is None or (league == "limited" and gains and kind == "default"):
                     continue
                 named = "function" in table and keys.get("function") == table["function"]
-                for world, seed in product(WORLDS[league], SEEDS[league]):
+                flown = ((world, seed) for world in WORLDS[league] for seed in SEEDS[world])
+                for world, seed in flown:
                     changes = {**WORLDS[league][world], "simulation.seed": seed}
                     entry = entry_of(vehicle, address, controller, keys, changes)
                     place = {"gains": kind, "world": world, "seed": seed}

@@ -19,7 +19,7 @@ from typing import Any, Final, Literal
 from pydantic import Field
 
 from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.laws.bounded_allocation import bounded_least_squares
+from tiltsim_controllers.laws.bounded_allocation import bounded_least_squares, largest
 from tiltsim_controllers.laws.keys import Keys, NonNegative
 from tiltsim_controllers.laws.observed import Command, Observed
 from tiltsim_controllers.mathematics.linear import cross, nearest_solution, norm, solved_symmetric
@@ -117,12 +117,26 @@ def mixed(observed: Observed, thrusts: Any, low: Any, high: Any) -> Any:
         low, high: Limits, N, shape (N,).
     """
     lift, scale = norm(observed.force[2]), observed.vehicle.mass * observed.vehicle.gravity
+    yaw = nearest_solution(
+        observed.torque,
+        (observed.torque @ thrusts) * xp.array([0.0, 0.0, 1.0]),
+        xp.zeros(len(thrusts)),
+    )
+    rest = thrusts - yaw
+    # Where all of the yaw would put every rotor to a limit, none would be left for roll and pitch.
+    size = xp.where(abs(yaw) > 1e-9 * scale, yaw, 1e-9 * scale)
+    share = xp.clip(xp.maximum((low - rest) / size, (high - rest) / size), 0.0, 1.0)
+    part = -largest(-share)
+    wanted = xp.where(part < 1.0, rest + part * yaw, thrusts) / scale
     rows = xp.vstack([observed.force / lift, *(row[None] / norm(row) for row in observed.torque)])
-    one = xp.ones(len(thrusts))
-    limits = low / scale, high / scale
-    share = thrusts / scale
     return scale * bounded_least_squares(
-        rows, rows @ share, xp.array(SOFTNESS), one, share, *limits
+        rows,
+        rows @ wanted,
+        xp.array(SOFTNESS),
+        xp.ones(len(thrusts)),
+        wanted,
+        low / scale,
+        high / scale,
     )
 
 
