@@ -8,7 +8,8 @@ import pytest
 import tiltsim
 from tests.laws.test_multirotor import mjcf
 from tiltsim.laws.assembling import assemble
-from tiltsim_controllers.analysis.vectoring_design import TRACKING, Craft, side_slope
+from tiltsim_controllers.analysis.vectoring_design import TRACKING
+from tiltsim_controllers.analysis.vectoring_limits import Craft, side_slope
 from tiltsim_controllers.laws.vectoring_steps import braked, turn_by
 from tiltsim_controllers.vehicle.effectiveness import table_per_newton
 
@@ -127,6 +128,20 @@ def test_a_lost_rotor_is_survived(vehicle, known):
     flight = tiltsim.simulate(changed)
     assert flight.end.kind == "completed", flight.end
     assert position_error(flight).max() < 0.2
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("rotor", [1, 2])
+def test_five_canted_rotors_fly_a_circle(rotor):
+    """Their torques push sideways, which bounds the bandwidth, and saturate: yaw gives way."""
+    changed = tables("cant_hexarotor", 6.0, late={"timestep": 0.002}, **CIRCLE)
+    del changed["model_error"], changed["vehicle"]["rotor_time_constant"]
+    changed["controller"].update(failed_rotor=rotor, failure_known_from=2.02)
+    changed["fault"] = [{"type": "rotor_loss", "rotor": rotor, "time": 2.0}]
+    flight = tiltsim.simulate(changed)
+    error = position_error(flight)
+    assert error.max() < 0.15
+    assert error[-1] < 2e-3
 
 
 WORLDS = {
@@ -294,6 +309,7 @@ def craft(vehicle, **changes):
         "commanded": False,
         "moving": False,
         "levers": np.ones(len(speeds)),
+        "works": np.ones(len(speeds)),
     }
     return Craft(**{**numbers, **changes})
 

@@ -36,6 +36,7 @@ change a key without editing the file; entries of lists are counted from 0:
 """
 WORD: Final = re.compile(r"[\w-]+")
 NOT_IN_ANCHOR: Final = re.compile(r"[^\w-]")  # characters that the anchor of a heading leaves out
+BOUNDED: Final = re.compile(r"^number(, | (?=[<>]))")  # a number, as its bounds tell
 EVIDENT: Final = ('"', "true", "number", "whole")  # starts of values that need no example
 FEW: Final = 2  # most tables of one address that are printed in full; more are listed
 
@@ -246,7 +247,7 @@ def page(tables: Sequence[KeyTable]) -> str:
     parts += ["", "## Keys before all tables", ""]
     parts += [_item(key) for key in document.keys if key.name not in chapters]
     for name, place in chapters.items():
-        parts += ["", f"## `{head_of(place)}`", *(["", meanings[name]] if place[0].tags else [])]
+        parts += ["", f"## `{head_of(place)}`"]
         own = [table for table in others if table.places[0][0].name == name]
         shared = shared_keys(own)
         if shared:
@@ -340,7 +341,8 @@ def _item(key: Key) -> str:
     default = ", required" if required else f", default `{key.default}`" if key.default else ""
     plain = key.example and key.example != key.default and not key.values.startswith(EVIDENT)
     example = f"; example `{key.example}`" if plain else ""
-    return f"- `{key.name}` ({key.values}{unit}{default}): {key.meaning}{example}"
+    values = BOUNDED.sub("", key.values)
+    return f"- `{key.name}` ({values}{unit}{default}): {key.meaning}{example}"
 
 
 def _text(table: KeyTable) -> str:

@@ -3,7 +3,7 @@
 import numpy as np
 
 from tiltsim.errors import InputError
-from tiltsim.plants.autopilot import Mixer
+from tiltsim.plants.autopilot_mixer import Mixer
 from tiltsim.scenario.scenario import Scenario
 from tiltsim_controllers.mathematics.attitude import FLIP
 
@@ -12,6 +12,9 @@ PARAMETERS = {
     "SCR_ENABLE": 1,
     "MOT_THST_EXPO": 1,  # pulses are linear in rotor speed
     "MOT_SPIN_MIN": 0,
+    "MOT_SPIN_MAX": 1,
+    "MOT_PWM_MIN": 1000,
+    "MOT_PWM_MAX": 2000,
     "MOT_SPIN_ARM": 0,
     "LOG_BACKEND_TYPE": 0,  # repeated flights differ while its logger runs
 }
@@ -37,7 +40,8 @@ def ardupilot_files(scenario: Scenario) -> dict[str, str]:
     """
     if scenario.autopilot is None:
         raise InputError(f"{scenario.address}: autopilot: this scenario has no [autopilot] table")
-    factors = Mixer(scenario).factors()
+    mixer = Mixer(scenario)
+    factors = mixer.factors()
     sizes = np.maximum(np.abs(factors).max(axis=1, keepdims=True), 1e-300)
     if np.linalg.matrix_rank(factors / sizes) < 6:
         raise InputError(
@@ -45,12 +49,15 @@ def ardupilot_files(scenario: Scenario) -> dict[str, str]:
             "one of the firmware's own frames"
         )
     least = np.linalg.pinv(factors)  # (outputs, 6): x forward, y left, z up
-    up, forward, right = least[:, 2], *(least[:, :2] * FLIP[:2]).T
-    forces = np.stack([up, forward, right], axis=1) / np.abs(least[:, :3]).max()
+    pushes = least[:, :3] * [1.0, -1.0, 1.0] / np.abs(least[:, :3]).max()  # forward, right, up
+    forces = pushes[:, [2, 0, 1]]
     turns = least[:, 3:] * FLIP / np.abs(least[:, 3:]).max()
     lines = [
-        "Motors_6DoF:add_motor({}, {}, true, {})".format(
-            channel, ", ".join(f"{value:.5f}" for value in (*turn, *force)), channel + 1
+        "Motors_6DoF:add_motor({}, {}, {}, {})".format(
+            channel,
+            ", ".join(f"{value:.5f}" for value in (*turn, *force)),
+            str(bool(mixer.signed[channel])).lower(),
+            channel + 1,
         )
         for channel, (turn, force) in enumerate(zip(turns, forces, strict=True))
     ]

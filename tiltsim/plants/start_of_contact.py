@@ -30,6 +30,14 @@ def check_start(scenario: Scenario, model: mujoco.MjModel, data: mujoco.MjData) 
                 f"{where}: {names[0]} and {names[1]} overlap by {-contact.dist:.3g} m at the "
                 "start; move one of them"
             )
+    for table in scenario.cable:
+        tendon = model.tendon(table.name)
+        apart = float(data.ten_length[tendon.id])
+        if table.start == 0.0 and apart > table.length + OVERLAP:
+            raise InputError(
+                f"{where}: cable {table.name}: its ends are {apart:.4g} m apart at the start, and "
+                f"cable.length = {table.length:g}"
+            )
     if scenario.tool is not None:
         tool = model.geom("tool_collision").id
         for geom in range(model.ngeom):

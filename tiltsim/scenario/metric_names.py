@@ -136,7 +136,7 @@ METRICS: Final = {
     "time_in_contact": Metric(
         "time in contact", "s", "time for which the vehicle touched an object"
     ),
-    "max_cable_tension": Metric("largest tension of the cable", "N", "of the recorded samples"),
+    "max_cable_tension": Metric("largest tension of a cable", "N", "of the recorded samples"),
     "max_swing": Metric(
         "largest swing of the load", "rad", "largest angle of the cable from straight down"
     ),

@@ -175,7 +175,7 @@ def _allocated(known: Known, ahead: Ahead, goal: Any, usable: Any) -> tuple[Any,
     rows = unit[:, None] * p.hover * wrench_map(seen.rotors, tilts)
     made = rows @ thrusts
     target = made + p.share * (unit * goal - made)
-    softness = xp.array([side, side, 1e-11, 1e-13, 1e-13, 1e-4 if free else 1e-12])
+    softness = xp.array([side, side, 1e-11, 1e-13, 1e-13, p.yaw_softness])
     none = 1e9 * (1.0 - p.bounded)
     found = bounded_least_squares(
         rows, target, softness, xp.ones(count), start, low - none, high + none

@@ -30,6 +30,7 @@ from tiltsim_controllers.code.traceable import traceable
 from tiltsim_controllers.mathematics.attitude import rotation_matrix, rotation_of_quaternion
 from tiltsim_controllers.mathematics.records import Vector3, make_record_type, vector_of
 from tiltsim_controllers.vehicle import instruments
+from tiltsim_controllers.vehicle.sensors import reading_index
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -174,7 +175,7 @@ def _read(each: Instrument, time: Any, truth: Any, memory: Any, own: Any) -> tup
     walks = each.errors if each.walks else 0
     walked, line = memory[:walks], memory[walks:-size].reshape(each.under_way + 1, size)
     new = instruments.is_new(p, time, own.control_period)
-    newest = instruments.reading_index(time, p.period)
+    newest = reading_index(time, p.period)
     if walks:
         step = p.walk * instruments.draws(p, newest, WALK, each.errors)
         walked = walked + new * step

@@ -143,8 +143,10 @@ def _contact_metrics(columns: Mapping[str, Floats], last_second: Any) -> dict[st
     if "peak_contact_force" in columns:
         metrics["peak_force"] = columns["peak_contact_force"][..., -1]
         metrics["time_in_contact"] = columns["contact_time"][..., -1]
+    tensions = [column for name, column in columns.items() if name.endswith("_tension")]
+    if tensions:
+        metrics["max_cable_tension"] = np.max(tensions, axis=(0, -1))
     if "cable_tension" in columns:
-        metrics["max_cable_tension"] = columns["cable_tension"].max(axis=-1)
         swing = np.hypot(*(columns[name] for name in SWING))
         metrics["max_swing"] = swing.max(axis=-1)
         metrics["final_swing"] = np.compress(last_second, swing, axis=-1).max(axis=-1)
