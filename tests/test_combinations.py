@@ -378,6 +378,8 @@ def changes(table, key=None):
     if key is not None:
         at[key.name] = tomllib.loads(f"value = {key.example}")["value"]
     needed = dict(leaves(document)) | companions(document)
+    if [step.name for step in table.places[0]][:1] == ["sensors"] and len(table.places[0]) > 1:
+        needed["simulation.control_timestep"] = 0.01  # instruments are read at control steps
     return {key: needed[key] for key in needed.keys() - {"controller.function", "vehicle.mjcf"}}
 
 

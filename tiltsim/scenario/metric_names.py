@@ -71,6 +71,9 @@ METRICS: Final = {
         "smallest rotor speed along its spin, negative where one reversed",
     ),
     "max_rotor_speed": Metric("highest rotor speed", "rad/s", "largest rotor speed along its spin"),
+    "rms_rotor_acceleration": Metric(
+        "rotor acceleration", "rad/s^2", "root mean square over all rotors, from sample to sample"
+    ),
     "altitude_overshoot": Metric(
         "overshoot of the altitude", "m", "largest height above the reference"
     ),
