@@ -10,7 +10,7 @@ from tiltsim.engines.base import vectors_of
 from tiltsim.errors import InputError
 from tiltsim.laws.assembling import assemble
 from tiltsim.laws.layers.contact import felt_among
-from tiltsim.laws.layers.measured_acceleration import plant_angular_acceleration_of
+from tiltsim.laws.layers.measured_acceleration import plant_acceleration_of
 from tiltsim.laws.layers.on_equations import read_actuators
 from tiltsim.laws.layers.sensing import measured
 from tiltsim.plants.command import Command, Observation
@@ -38,8 +38,8 @@ def built_in_command(assembly: Assembly, plant: MujocoPlant) -> Command:
         if hasattr(layer, "pod_inertias"):  # of measured acceleration: a record for the model
             ctrl = within.sampling.controls(time, qpos, (*qvel, 0.0, 0.0, 0.0), act, inner, knots)
             loads = read_actuators(within.dynamics)[1](ctrl)
-            turning = plant_angular_acceleration_of(within.dynamics)
-            qvel = (*qvel, *turning(qpos, qvel, ctrl, loads, layer))
+            turning = plant_acceleration_of(within.dynamics)
+            qvel = (*qvel, *turning(qpos, qvel, ctrl, loads, layer)[3:])
         elif hasattr(layer, "sensors"):  # of actuation: a record for the number of rotors
             qpos, qvel = measured(time, qpos, qvel, layer.sensors)
         elif hasattr(layer, "timestep"):  # of objects

@@ -14,7 +14,8 @@ import numpy as np
 
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup
 from tiltsim.laws.layers.layer import Layer, Samples, wrap_loop
-from tiltsim.models.objects import CABLE_READING, COORDINATES, FORCE
+from tiltsim.models.cables import CABLE_READING
+from tiltsim.models.objects import CONTACT_READING, COORDINATES, FORCE
 from tiltsim.models.parts import ExtraActuators
 from tiltsim.vehicles.rotorcraft.others import CONTACT_FORCE, FELT, SWING, Others
 from tiltsim_controllers.code.arrays import xp
@@ -334,9 +335,10 @@ def _observed(others: Others, size: int, readings: int) -> Callable[..., Values]
             if joint == "free":
                 pose = xp.hstack([pose[:3], euler_angles(pose[3:])])
             parts, at = [*parts, pose], at + COORDINATES[joint]
-        if others.hangs:
-            tension = readings + others.readings - CABLE_READING + FORCE
-            parts += [act[at : at + 3], act[tension : tension + 1]]
+        tension = readings + CONTACT_READING * len(others.names) + FORCE
+        tensions = act[tension::CABLE_READING]  # of the load's cable first
+        parts += [act[at : at + 3]] if others.hangs else []
+        parts += [tensions] if others.hangs or others.cables else []
         return xp.hstack(parts) if parts else act[:0]
 
     return observed
