@@ -28,6 +28,7 @@ class VectoringController(Vectoring, FailureAwareController, TiltingTable, LawCo
     """Observers, prediction and allocation within limits, for any rotorcraft."""
 
     models_latency = True
+    observes_forces = True
     reference_kinds = ("position", "pose")
     follows_turns = True
     control: ClassVar = staticmethod(vectoring)
