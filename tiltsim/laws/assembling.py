@@ -87,7 +87,7 @@ def loop_of(
     loop = adapted(loop)
     if scenario.reference.type == "push" and not external:
         loop = (with_impedance if scenario.reference.impedance else with_force_loop)(loop)
-    if scenario.payload is not None and scenario.payload.swing_damping:
+    if scenario.payload is not None and scenario.payload.swing_damping and not external:
         loop = with_swing_damping(loop)
     if scenario.needs_actuation_layer:
         loop = with_actuation(loop, scenario.simulation.latency_steps, external)

@@ -56,7 +56,8 @@ def built_in_command(assembly: Assembly, plant: MujocoPlant) -> Command:
 class BuiltInController:
     """The built-in controller of a rotorcraft's scenario, as a function of an observation.
 
-    It integrates its own states, and its supervisor's, over ``simulation.control_timestep``.
+    It integrates its own states, and its supervisor's, over ``simulation.control_timestep``. The
+    force on the object that it pushes is the contact force: there must be no other object.
 
     Args:
         scenario: With a built-in controller.
@@ -69,7 +70,8 @@ class BuiltInController:
     def __init__(self, scenario: Scenario) -> None:
         controller, simulation = scenario.controller, scenario.simulation
         observed = scenario.vehicle.model in PythonController.vehicle_models
-        feeds_back = controller.measures_angular_acceleration or scenario.reference.type == "push"
+        felt = scenario.reference.type != "push" or len(scenario.object) == 1
+        feeds_back = controller.measures_angular_acceleration or not felt
         if not observed or controller.is_external or feeds_back:
             raise InputError("controller: must be a built-in one that needs observations only")
         self._assembly = assembly = assemble(scenario)
@@ -89,7 +91,8 @@ class BuiltInController:
         if layout_of(loop.dynamics).tilts:
             qpos, qvel = [*qpos, *seen.tilt_angles], [*qvel, *seen.tilt_rates]
         speeds = flip_by_spin(seen.rotor_speeds.tolist(), loop.dynamics.spins)
-        act = [*speeds, *self._states]
+        felt = np.concatenate([seen.contact_force, seen.contact_force, seen.swing, np.zeros(6)])
+        act = [*speeds, *self._states, *felt]
         vectors = list(map(float, qpos)), list(map(float, qvel)), act
         ctrl = loop.sampling.controls(seen.time, *vectors, self._parameters, knots)
         rates = ctrl[len(ctrl) - len(self._states) :]
