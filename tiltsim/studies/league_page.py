@@ -89,11 +89,10 @@ def _verdict(every: Mapping[str, Sequence[Standing]], flown: Rows) -> Iterator[s
     if not pairs:
         return
     won = sum(ours > theirs + TIE for ours, _, theirs in pairs.values())
-    lost = [
-        f"{task} of {vehicle} (`{name}` {theirs:.1f}, {ours:.1f})"
-        for (vehicle, task), (ours, name, theirs) in pairs.items()
-        if theirs > ours + TIE
-    ]
+    lost: dict[str, list[float]] = {}
+    for (_, task), (ours, _, theirs) in pairs.items():
+        if theirs > ours + TIE:
+            lost.setdefault(task, []).append(theirs - ours)
     errors = [
         [_rms(flown[vehicle], task, one) for one in (name, OURS)]
         for (vehicle, task), (_, name, _) in pairs.items()
@@ -101,10 +100,10 @@ def _verdict(every: Mapping[str, Sequence[Standing]], flown: Rows) -> Iterator[s
     ]
     ratios = [mean(theirs) / mean(ours) for theirs, ours in errors if theirs and ours]
     ours, theirs = (mean(pair[place] for pair in pairs.values()) for place in (0, 2))
-    tied = len(pairs) - won - len(lost)
+    tied = len(pairs) - won - (losses := sum(map(len, lost.values())))
     yield (
         f"`{OURS}`, at one default setting, wins {won} of {len(pairs)} tasks against the best "
-        f"baseline of each task, ties in {tied} (within {TIE} points) and loses {len(lost)}. "
+        f"baseline of each task, ties in {tied} (within {TIE} points) and loses {losses}. "
         f"Mean score {ours:.1f}, against {theirs:.1f} of the best baseline of each task."
     )
     if ratios:
@@ -112,7 +111,8 @@ def _verdict(every: Mapping[str, Sequence[Standing]], flown: Rows) -> Iterator[s
             f"On curves, in wind and with a weak rotor the best baseline's error is "
             f"{median(ratios):.1f} times as large (median; {min(ratios):.1f} to {max(ratios):.1f})."
         )
-    yield f"It loses: {'; '.join(lost)}." if lost else "It loses nowhere."
+    where = (f"`{task}` on {len(by)}, by up to {max(by):.1f}" for task, by in lost.items())
+    yield f"It loses, by vehicles and points: {'; '.join(where)}." if lost else "It loses nowhere."
     yield ""
 
 
@@ -156,7 +156,7 @@ def _errors(flown: Rows) -> Iterator[str]:
 
 def _effort(flown: Rows) -> Iterator[str]:
     """Controllers as rows: rotor accelerations, peak speeds, saturation and losses."""
-    yield "| controller | rms rotor acceleration, rad/s^2 | peak speed / limit | limited | lost |"
+    yield "| controller | rotor acceleration, rad/s^2 | peak speed | at a limit | ended early |"
     yield "| --- | --: | --: | --: | --: |"
     for name in dict.fromkeys(row["controller"] for rows in flown.values() for row in rows):
         of = [(v, row) for v, rows in flown.items() for row in rows if row["controller"] == name]
