@@ -146,6 +146,19 @@ def test_vehicles_that_overlap_at_the_start_are_refused():
         tiltsim.simulate(together(WING | {"offset": [0.05, 0.0, 0.0]}))
 
 
+def test_rows_of_a_batch_fly_among_companions_as_alone():
+    scenarios = [
+        together(WING | {"offset": [2.0, y, 0.0]}, **{"simulation.engine": "native"})
+        for y in (0.3, 1.0)
+    ]
+    rows = tiltsim.fly(scenarios, keep_samples=True)
+    for scenario, row in zip(scenarios, rows, strict=True):
+        alone = tiltsim.simulate(scenario)
+        assert_equal(row.flight, alone, "")
+        for name in ("minimum_separation", "companion_rms_position_error"):
+            assert row.metrics[name] == alone.metrics()[name]
+
+
 DOWNWASH = {"rotor_radius": 0.1, "drag_area": 0.02}
 
 
