@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import mujoco
 import numpy as np
 import pytest
 
 import tiltsim
 from tests.refusals import refusal
+from tiltsim.laws.assembling import assemble
+from tiltsim.models.cables import switch
+from tiltsim.plants.flight_model import flight_model
+from tiltsim.vehicles.rotorcraft.others import motion_at_start
 
 HANDOVER = "interaction/handover"
 TAKER = {"name": "taker", "changes": {"initial": {"position": [0.3, 0.0, 0.1]}}}
@@ -103,3 +108,23 @@ def test_a_bad_cable_is_refused_in_one_line(cables, line):
 def test_a_cable_that_is_too_short_at_the_start_is_refused():
     short = handed(FIRST | {"length": 0.5})
     assert "cable one: its ends are 0.6 m apart at the start" in refusal(tiltsim.simulate, short)
+
+
+def test_vehicles_and_load_keep_their_momentum_while_the_load_changes_hands():
+    """Without gravity and thrust."""
+    assembly = assemble(handed(FIRST, SECOND))
+    model = flight_model(assembly)
+    model.opt.gravity[:] = 0.0
+    data, sizes = mujoco.MjData(model), assembly.loop.dynamics.sizes
+    data.qpos[: sizes.qpos], _ = assembly.loop.kind.initial_motion(assembly)
+    data.qpos[sizes.qpos :], _ = motion_at_start(assembly)
+    data.qvel[-6:-3] = -2.0, 0.5, -1.0
+    momenta, taut = [], []
+    for step in range(600):
+        switch(model, [table.cable for table in assembly.scenario.cable], 0.001 * step)
+        mujoco.mj_step(model, data)
+        taut.append(data.history[data.history.size - 8 :][3::4] > 0.0)
+        mujoco.mj_subtreeVel(model, data)
+        momenta.append(data.subtree_linvel[0] * model.body_subtreemass[0])
+    assert np.any(taut, axis=0).all(), "both cables pull"
+    assert np.ptp(momenta, axis=0).max() < 1e-6 * np.abs(momenta).max()

@@ -201,6 +201,8 @@ def add_companion(spec: mujoco.MjSpec, name: str, companion: mujoco.MjSpec) -> N
     world = companion.worldbody
     for element in (*world.geoms, *world.lights, *world.cameras):
         companion.delete(element)
+    for option in ("impratio", "tolerance"):  # else MuJoCo warns of the difference
+        setattr(companion.option, option, getattr(spec.option, option))
     spec.attach(companion, prefix=f"{name}_", frame=spec.worldbody.add_frame())
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any, Final
 
-from pydantic import Field, field_validator
+from pydantic import BeforeValidator, Field
 
 from tiltsim.errors import InputError
 from tiltsim.scenario.controller import OwnFunctionController
@@ -37,6 +37,21 @@ TAKEN: Final = (
 MAX_COMPANIONS: Final = 7
 
 
+def _tables_at(value: Any) -> Any:
+    """The tables of a scenario in place of its address."""
+    if not isinstance(value, str) or not value:
+        return {} if value == "" else value
+    try:
+        named = public("load_scenario")(value, {"companion": []})
+    except InputError as error:
+        reason = str(error).removeprefix(f"{value}: ")
+        raise InvalidValueError("companion.scenario", value, reason) from None
+    if named.payload is not None:
+        raise InvalidValueError("companion.scenario", value, "a companion carries no load")
+    tables = named.model_dump(mode="json", exclude_unset=True)
+    return {key: tables[key] for key in TAKEN if key in tables}
+
+
 class CompanionTable(Table):
     """A further vehicle in the same world, under its own controller."""
 
@@ -46,7 +61,7 @@ class CompanionTable(Table):
     name: Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,30}$")] = Field(
         description="its name, which begins the names of its columns", examples=["wing"]
     )
-    scenario: dict[str, Any] = Field(
+    scenario: Annotated[dict[str, Any], BeforeValidator(_tables_at)] = Field(
         {},
         description="address of the scenario whose vehicle, controller, gait, reference and the "
         "like it takes: a name of the library, or a .toml file relative to the scenario's folder; "
@@ -64,22 +79,6 @@ class CompanionTable(Table):
         description="tables and keys in place of its scenario's",
         examples=[{"reference": {"type": "setpoint", "yaw": 0.5}}],
     )
-
-    @field_validator("scenario", mode="before")
-    @classmethod
-    def _read(cls, value: Any) -> Any:
-        """The tables of a scenario in place of its address."""
-        if not isinstance(value, str) or not value:
-            return {} if value == "" else value
-        try:
-            named = public("load_scenario")(value, {"companion": []})
-        except InputError as error:
-            reason = str(error).removeprefix(f"{value}: ")
-            raise InvalidValueError("companion.scenario", value, reason) from None
-        if named.payload is not None:
-            raise InvalidValueError("companion.scenario", value, "a companion carries no load")
-        tables = named.model_dump(mode="json", exclude_unset=True)
-        return {key: tables[key] for key in TAKEN if key in tables}
 
     def tables(self, own: Mapping[str, Any], world: Mapping[str, Any]) -> dict[str, Any]:
         """The document of its scenario.

@@ -188,8 +188,8 @@ class PayloadTable(Table):
 
     swing_damping: Annotated[float, Field(ge=0.0, le=1.0)] = Field(
         0.0,
-        description="damping ratio that the controller gives the swing: its vehicle goes after the "
-        "load, by the measured angle of the cable; 0 does not [-]",
+        description="damping ratio that a law gives the swing: its vehicle goes after the load, by "
+        "the measured angle of the cable; not with python; 0 does not [-]",
         examples=[0.5],
     )
 
@@ -272,9 +272,7 @@ def _check_cables(scenario: Any) -> None:
 def _check_swing_damping(scenario: Any) -> None:
     """Refuse to damp the swing where the law does not follow a reference that accelerates."""
     controller, reason = scenario.controller, ""
-    if controller.is_external:
-        reason = "damps by a built-in law; a controller of yours has observation.swing"
-    elif not controller.damps_swing:
+    if not controller.damps_swing:
         able = "choose full_pose, vectoring, geometric, pid, indi or numpy"
         reason = f"the {controller.law} law does not follow a reference's acceleration; {able}"
     elif scenario.reference.kind == "attitude_altitude":
@@ -294,7 +292,8 @@ def check_objects(scenario: Any) -> None:
             reason = f"the {controller.law} law cannot push; {able}"
             raise scenario.mistake("reference.type", reason)
         scenario.reference.check_impedance(scenario)
-    if scenario.payload is not None and scenario.payload.swing_damping:
+    damps = scenario.payload is not None and scenario.payload.swing_damping
+    if damps and not scenario.controller.is_external:
         _check_swing_damping(scenario)
     keys = ("object", "tool", "payload", "companion")
     key = next((name for name in keys if getattr(scenario, name)), None)

@@ -196,6 +196,7 @@ class ScenarioTables(WithAutopilot):
             or self.needs_actuation_layer
             or self.has_air
             or self.loads
+            or self.sensors.instruments
         )
 
     @property

@@ -31,7 +31,7 @@ from tiltsim_controllers.mathematics.scalar import Values
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from tiltsim.scenario.scenario import FlightPlan
+    from tiltsim.scenario.scenario import FlightPlan, Scenario
     from tiltsim_controllers.mathematics.scalar import Floats
 
 FILTER: Final = 60.0
@@ -166,11 +166,12 @@ def _impedance(plan: FlightPlan) -> Impedance:
     table: Any = plan.scenario.reference
     own, softness = table.impedance, table.softness(plan.scenario)
     stiffness = own.stiffness / (1.0 - own.stiffness * softness)
-    return Impedance(_push(plan.scenario), own.mass, own.damping, stiffness, softness)
+    return Impedance(push_of(plan.scenario), own.mass, own.damping, stiffness, softness)
 
 
-def _push(scenario: Any) -> Push:
-    reference = scenario.reference
+def push_of(scenario: Scenario) -> Push:
+    """The push of a scenario's reference."""
+    reference: Any = scenario.reference
     if reference.type != "push":
         return Push()
     touch = reference.touch(scenario)
@@ -184,7 +185,7 @@ def _force_loop(plan: FlightPlan) -> ForceLoop:
     assert stiffness is not None  # else the scenario is refused
     mass = scenario.any_rotorcraft.resolve().mass
     gains = reference.gain, reference.proportional_gain
-    return ForceLoop(_push(scenario), *gains, mass * stiffness)
+    return ForceLoop(push_of(scenario), *gains, mass * stiffness)
 
 
 @cache
@@ -245,7 +246,7 @@ def with_objects(loop: ClosedLoop, others: Others) -> ClosedLoop:
 def _among(plan: FlightPlan) -> Among:
     scenario, load = plan.scenario, plan.scenario.payload
     attachment = (0.0, 0.0, 0.0) if load is None else load.attachment
-    return Among(scenario.simulation.timestep, _push(scenario), attachment)
+    return Among(scenario.simulation.timestep, push_of(scenario), attachment)
 
 
 def _derive(
