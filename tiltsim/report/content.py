@@ -169,6 +169,11 @@ class Group:
         fits = sum(row.verdict is ClaimVerdict.FITTED for row in self.rows)
         return fits if fits >= 3 else 0
 
+    @property
+    def only_fits(self) -> bool:
+        """Whether all rows, from three on, are consistent with a fit."""
+        return self.many_fits == len(self.rows)
+
     def without(self, verdict: ClaimVerdict) -> Group:
         """The group without the rows of this verdict."""
         return Group([row for row in self.rows if row.verdict is not verdict])
