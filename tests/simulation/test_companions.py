@@ -19,6 +19,7 @@ TOWARDS = {
     "changes": {"initial": {"velocity": [-1.5, 0.0, 0.0]}},
 }
 WING = {"name": "wing", "offset": [2.0, 0.3, 0.0]}
+PULL = {"type": "acceleration", "value": [1.0, 0.0, 0.0]}
 STICK = {"position": [0.0, 0.05, 0.0], "direction": [0.0, 1.0, 0.0], "length": 0.4, "mass": 0.01}
 QUAD = {
     "name": "quad",
@@ -119,6 +120,8 @@ def test_a_companion_that_is_lost_ends_the_flight_by_its_name():
         ([WING | {"changes": {"vehicle": {"gravity": 3.7}}}], "vehicle.gravity = 3.7"),
         ([WING | {"changes": {"vehicle": {"mass": -1.0}}}], '"wing": vehicle.mass'),
         ([WING | {"changes": {"nonsense": {}}}], "nonsense"),
+        ([WING | {"changes": {"sensors": {"imu": {}}}}], "sensors.imu"),
+        ([WING | {"changes": {"disturbance": [PULL]}}], "a disturbance by an acceleration"),
         ([WING | {"spacing": -1.0}], "companion[0].spacing = -1.0: unknown key"),
         ([{"name": f"wing_{i}"} for i in range(8)], "at most 7"),
     ],
@@ -135,6 +138,7 @@ def test_a_bad_companion_is_refused_in_one_line(companions, line):
             'simulation.plant = "rigid_body"',
         ),
         ({"simulation.integrator": "RK4"}, 'simulation.integrator = "RK4"'),
+        ({"simulation.plant": "thesis", "simulation.engine": "jax"}, "no [companion]"),
     ],
 )
 def test_companions_are_refused_where_they_cannot_fly(changes, line):
