@@ -110,7 +110,10 @@ def flights(monkeypatch):
             "scenario": entry.address,
             "end": "refused" if gain > 3.0 else "completed",
             "rms_position_error": abs(gain - 2.0),
+            "final_position_error": 0.0,
             "rms_yaw_error": 0.0,
+            "idle_position_error": 0.0,
+            "idle_yaw_error": 0.0,
         }
         return Compared(row, np.zeros(0), np.zeros(0))
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
@@ -49,7 +49,7 @@ def run(
     """Fly the tasks of scenarios/arena under every controller that fits, and score them.
 
     The limited league has rotor limits, lag, latency, noise and model errors, and baselines with
-    observers and mixers; in the unlimited one all controllers that fit, of packages, too, fly
+    observers and mixers; in the unlimited one all controllers that fit, also of packages, fly
     without. Scores: 100 for no error, 50 for a root mean square error of 0.1 m or 0.1 rad of yaw
     (steps: a quarter of the step), 0 for a vehicle that stays where it began and if the flight ends
     early, - if the task refuses the controller.
@@ -69,7 +69,7 @@ def run(
     from tiltsim.commands.controllers import chosen_controllers
     from tiltsim.report.made import Made
     from tiltsim.resources import shipped_folder
-    from tiltsim.studies.arena import FOLDER, OURS, chosen_vehicles, fly_matches, matches, tables_of
+    from tiltsim.studies.arena import FOLDER, OURS, chosen_vehicles, fly_matches, matches
     from tiltsim.studies.comparison import refusal
     from tiltsim.studies.tuning import read_tuning
     from tiltsim.system.files import prepare_folder
@@ -80,28 +80,21 @@ def run(
         raise InputError("--seed: only with --tune")
     given = chosen_controllers(controllers, own)
     chosen = chosen_vehicles(vehicles, league)
-    tables: Tables = {}
-    for name, vehicle in chosen.items():
-        known = tables_of(vehicle, league)
-        named = {one: known.get(one, table) for one, table in given.items()}
-        tables[name] = named or known
+    tables = _tables(chosen, given, league)
     prepare_folder(out)
     rows: dict[str, list[dict[str, Any]]] = {name: [] for name in chosen}
     with show_progress(shown=not quiet) as progress:
         if tune is not None:
             budget = {"flights": tune, "seed": seed or 1}
-            searched = {
-                name: {one: table for one, table in of.items() if one != OURS}
-                for name, of in tables.items()
-            }
+            searched = _tables(chosen, given, league, without=(OURS,) * (league == "limited"))
             tuning = _tuned(out / GAINS_FILE[league], chosen, searched, budget, jobs, progress)
         else:
             tuning = read_tuning(gains or shipped_folder("scenarios") / FOLDER / GAINS_FILE[league])
         tuned = _tables_of(tuning, tables)
         flights = matches(league, chosen, tables, tuned, trusted=trust)
         progress.begin("flights", len(flights))
-        for vehicle, row in fly_matches(flights, jobs):
-            rows[vehicle].append(row)
+        for name, row in fly_matches(flights, jobs):
+            rows[name].append(row)
             progress.tell("flights", sum(map(len, rows.values())), len(flights))
     made = Made.now()
     document = json_text({"made": asdict(made), "vehicles": rows})
@@ -112,6 +105,23 @@ def run(
         print_line(f"arena written to {out}")
     require_flown([refusal(row) for flown in rows.values() for row in flown])
     return 0
+
+
+def _tables(
+    chosen: Mapping[str, Vehicle],
+    given: Mapping[str, Mapping[str, Any]],
+    league: str,
+    without: Sequence[str] = (),
+) -> Tables:
+    """Tables of the named controllers, or of all in a league, by vehicle and name."""
+    from tiltsim.studies.arena import tables_of
+
+    found: Tables = {}
+    for name, vehicle in chosen.items():
+        known = tables_of(vehicle, league)
+        named = {one: known.get(one, table) for one, table in given.items()} or known
+        found[name] = {one: table for one, table in named.items() if one not in without}
+    return found
 
 
 def _written(

@@ -73,7 +73,7 @@ WORLDS: Final[Mapping[str, Mapping[str, Mapping[str, Any]]]] = {
     },
     "unlimited": {"": {}},
 }
-"""By league, what the law's model lacks: values by dotted key for each table."""
+"""By league, the errors of the law's model: values by dotted key for each table."""
 
 SEEDS: Final = {"model error": (1, 2, 3), "exact model": (1,), "": (1,)}
 """Seeds of sensor noise and turbulence, by world."""
@@ -159,12 +159,12 @@ def tables_of(vehicle: Vehicle, league: str) -> dict[str, Mapping[str, Any]]:
     """
     if league == "unlimited":
         return controller_tables(fitting(vehicle))
-    flown = {law: {"law": law, **AS_FLOWN} for law in BASELINES}
+    flown: dict[str, Mapping[str, Any]] = {law: {"law": law, **AS_FLOWN} for law in BASELINES}
     if "gait" not in vehicle.overrides:
         return {"vectoring": {"law": "vectoring"}, **flown}
     free = {"tilts": "free"}
     own = {"vectoring": {"law": "vectoring", **free}}
-    return own | flown | {"geometric_free": flown["geometric"] | free}
+    return {**own, **flown, "geometric_free": {**flown["geometric"], **free}}
 
 
 def chosen_vehicles(names: Sequence[str], league: str) -> dict[str, Vehicle]:

@@ -71,6 +71,9 @@ MEASURES: Final = (
 )
 """Numbers of a row; null where a flight has none, or a search did not survive its start."""
 
+SCALES: Final = ("idle_position_error", "idle_yaw_error", "peak_rotor_speed")
+"""Further ones: errors of a vehicle that stays where it began, and the greatest rotor speed."""
+
 
 @dataclass(frozen=True)
 class Compared:
@@ -211,7 +214,7 @@ def compare_one(entry: Entry, *, searches: bool, timed: bool = True) -> Compared
         assembly = assemble(scenario)
         flight = simulate_to_end(_engine(scenario, searches))
     except InputError as error:
-        refused = {"end": "refused", "refused": str(error), **dict.fromkeys(MEASURES)}
+        refused = {"end": "refused", "refused": str(error), **dict.fromkeys((*MEASURES, *SCALES))}
         return Compared(row | refused | {"latency_refused": None}, np.zeros(0), np.zeros(0))
     row |= {"end": flight.end.kind, "refused": None, **_tracking(flight)}
     row["tilt_travel"] = _tilt_travel(flight)

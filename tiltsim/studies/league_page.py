@@ -99,12 +99,13 @@ def _verdict(every: Mapping[str, Sequence[Standing]], flown: Rows) -> Iterator[s
         if task in DISTURBED
     ]
     ratios = [mean(theirs) / mean(ours) for theirs, ours in errors if theirs and ours]
-    ours, theirs = (mean(pair[place] for pair in pairs.values()) for place in (0, 2))
+    reached = mean(ours for ours, _, _ in pairs.values())
+    rival = mean(theirs for _, _, theirs in pairs.values())
     tied = len(pairs) - won - (losses := sum(map(len, lost.values())))
     yield (
         f"`{OURS}`, at one default setting, wins {won} of {len(pairs)} tasks against the best "
         f"baseline of each task, ties in {tied} (within {TIE} points) and loses {losses}. "
-        f"Mean score {ours:.1f}, against {theirs:.1f} of the best baseline of each task."
+        f"Mean score {reached:.1f}, against {rival:.1f} of the best baseline of each task."
     )
     if ratios:
         yield (

@@ -34,7 +34,7 @@ STATES: Final = {
 """States of the observers, after the law's."""
 
 SOFTNESS: Final = (1.0, 1.0, 1e-6, 1e-9, 1e-9, 1e-3)
-"""Of side force, lift, torque about x and y, and yaw: the smaller, the earlier it is met."""
+"""Softness of side force, lift, torque about x and y, and yaw: the smallest is met first."""
 
 
 class Compensating(Keys):
@@ -72,7 +72,7 @@ def compensated(
 
     Args:
         law: It demands thrusts.
-        turning: Whether the torque, too, is countered, since the law does not do so itself.
+        turning: Whether the torque is also countered, since the law does not do so itself.
         integrators: How many of its states, the first ones, are integrators.
         observes: Whether there are observers.
         mixes: Whether there is a mixer.
