@@ -204,6 +204,15 @@ def test_the_frame_of_a_tilting_vehicle_gives_each_motion_alone():
     scale = np.diag(wrench)
     assert (scale > 0.0).all()
     np.testing.assert_allclose(wrench, np.diag(scale), atol=1e-3 * scale.max())
-    assert "FRAME_CLASS 16" in files["parameters.parm"]
+    parameters = dict(line.split() for line in files["parameters.parm"].splitlines())
+    assert parameters["FRAME_CLASS"] == "16"
+    assert parameters["MOT_YAW_HEADROOM"] == "0"  # else pairs near zero keep their sign
+    mixer = Mixer(scenario(9002, tilting=True))
+    turning = scale[:3] / np.diag(np.reshape(mixer.vehicle.inertia, (3, 3)))  # rad/s^2 per unit
+    for axis, acceleration, rate in zip(("RLL", "PIT", "YAW"), turning, (20, 20, 10), strict=True):
+        gain = float(parameters[f"ATC_RAT_{axis}_P"])
+        assert gain * acceleration == pytest.approx(rate, rel=1e-3)
+    # At full throttle the first rotor has its full thrust.
+    assert max(row[3] for row in rows) == 1.0
     with pytest.raises(tiltsim.InputError, match="do not give every force and torque"):
         ardupilot_files(scenario(9002))

@@ -184,6 +184,17 @@ def test_vectors_of_a_companion_have_its_name():
 
 
 def test_a_companions_tool_that_touches_its_rotor_is_refused():
-    tool = {"tool": {"position": [0.0, 0.0, 0.0], "direction": [0.866, 0.5, 0.0], "length": 0.5}}
+    tool = {"tool": {"position": [0.0, 0.0, 0.02], "direction": [0.866, 0.5, 0.0], "length": 0.3}}
     scenario = together(WING | {"changes": tool})
     assert "tool: touches wing_pod_1 of its own vehicle" in refusal(tiltsim.simulate, scenario)
+
+
+@pytest.mark.parametrize("objects", [{}, {"tool": STICK, "payload": {"mass": 0.1, "length": 0.3}}])
+def test_the_first_vehicle_gives_the_command_that_it_gives_alone(objects):
+    among = tiltsim.Simulation(together(WING, QUAD, **objects))
+    alone = tiltsim.Simulation(among.scenario.replace({"companion": []}))
+    for simulation in (among, alone):
+        simulation.step(5)
+    commanded, expected = among.command().rotor_accelerations, alone.command().rotor_accelerations
+    np.testing.assert_array_equal(commanded, expected)
+    assert commanded.any()

@@ -45,6 +45,9 @@ def built_in_command(assembly: Assembly, plant: MujocoPlant) -> Command:
         elif hasattr(layer, "timestep"):  # of objects
             felt = felt_among(others_of(assembly.scenario))(qpos, act, layer.attachment)
             act = [*act[: within.dynamics.sizes.act], *felt]
+        elif hasattr(layer, "downwash"):  # of companions, whose state follows this vehicle's
+            own, behind = within.dynamics.sizes, act[loop.dynamics.sizes.act :]
+            qpos, qvel, act = qpos[: own.qpos], qvel[: own.qvel], [*act[: own.act], *behind]
         loop, parameters = within, inner
     ctrl = loop.sampling.controls(time, qpos, qvel, act, parameters, knots)
     return _command(assembly, loop.dynamics, ctrl)
