@@ -29,16 +29,16 @@ class Firmware(threading.Thread):
         signed: Whether outputs are speeds about 1500 us; else from 1000 us.
         weight: N; inertia: kg m^2, shape (3,).
         exchanges: Their number, after which it is silent; then ``last``, if it is not empty.
+        late: Time after which that comes, or the link closes, s.
         repeat: Whether it sends each output twice, as when an answer comes late.
     """
 
-    def __init__(
-        self, port, wrench_map, weight, inertia, *, signed, exchanges, last=b"", repeat=False
-    ):
+    def __init__(self, port, wrench_map, weight, inertia, *, signed, exchanges, **options):
         super().__init__(daemon=True)
-        self.port, self.signed, self.exchanges, self.last = port, signed, exchanges, last
+        self.port, self.signed, self.exchanges = port, signed, exchanges
+        self.last, self.late = options.get("last", b""), options.get("late", 0.0)
         self.inverse, self.weight, self.inertia = np.linalg.pinv(wrench_map), weight, inertia
-        self.width, self.repeat = wrench_map.shape[1], repeat
+        self.width, self.repeat = wrench_map.shape[1], options.get("repeat", False)
         self.readings = []
 
     def run(self):
@@ -63,6 +63,7 @@ class Firmware(threading.Thread):
             pulses[: self.width] = (
                 (1500.0 + 500.0 * shares) if self.signed else 1000.0 * (1 + shares)
             )
+        time.sleep(self.late)
         if self.last:
             link.sendto(self.last, ("127.0.0.1", self.port))
         link.close()
@@ -139,6 +140,7 @@ class Px4Firmware(Firmware):
                 link.sendall(
                     mavlink.hil_actuator_controls_encode(stamp, controls, 129, 1).pack(mavlink)
                 )
+        time.sleep(self.late)
         if self.last:
             link.sendall(self.last)
         time.sleep(0.01)

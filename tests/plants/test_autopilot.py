@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import socket
+import struct
 
 import numpy as np
 import pytest
@@ -87,15 +88,17 @@ def test_two_flights_of_px4_are_equal_in_every_bit_and_reach_their_height():
 
 
 @pytest.mark.parametrize(
-    ("options", "cause"),
+    ("options", "keys", "cause"),
     [
-        ({"exchanges": 300}, "the firmware's link broke: "),
-        ({"exchanges": 300, "last": b"hello"}, "invalid MAVLink prefix"),
-        ({"shift": 4000}, "outputs of 28000 us, after 24000 us"),
+        ({"exchanges": 300}, {}, "the firmware's link broke: "),
+        ({"exchanges": 300, "late": 0.6}, {"wait": 0.3}, "the link to the firmware is lost"),
+        ({"exchanges": 300, "last": b"hello"}, {}, "invalid MAVLink prefix"),
+        ({"shift": 4000}, {}, "outputs of 28000 us, after 24000 us"),
+        ({"shift": -4000}, {"hold": 0.1}, "without lift-off"),  # each answers earlier readings
     ],
 )
-def test_a_wrong_answer_of_px4_ends_the_flight_with_its_cause(options, cause):
-    flown = px4()
+def test_a_wrong_answer_of_px4_ends_the_flight_with_its_cause(options, keys, cause):
+    flown = px4(**keys)
     firmware(flown, **options)
     flight = tiltsim.simulate(flown)
     assert flight.end.kind == "failed"
@@ -143,6 +146,15 @@ def test_sticks_follow_simulated_time():
     ("options", "keys", "cause"),
     [
         ({"exchanges": 300}, {"wait": 0.3}, "the link to the firmware is lost"),
+        (
+            {
+                "exchanges": 300,
+                "last": struct.pack("<HHI16H", 18458, 400, 300, *16 * [1500]),
+                "late": 0.6,
+            },
+            {"wait": 0.3},
+            "the link to the firmware is lost",
+        ),
         ({"exchanges": 300, "last": b"hello"}, {}, "not ArduPilot's, on port"),
         ({"exchanges": 0}, {"wait": 0.3}, "the link to the firmware is lost"),
     ],

@@ -167,20 +167,24 @@ def check_companions(scenario: Any) -> None:
     for table in scenario.companion:
         if names.count(table.name) > 1 or table.name in RESERVED:
             raise table.mistake("name", "is taken; choose another")
+    if scenario.companion and (reason := _conflict(scenario, scenario)):
+        raise InvalidValueError("companion", names[0], f"with companions {reason}")
     for table, each in zip(scenario.companion, companions_of(scenario), strict=True):
-        if reason := _conflict(each, scenario) or _conflict(scenario, scenario):
+        if reason := _conflict(each, scenario):
             raise table.mistake("name", reason)
 
 
 def _conflict(scenario: Any, first: Any) -> str:
     """The reason for which a scenario cannot fly in the world of the first; empty for none."""
     if scenario.vehicle.is_planar:
-        return "several vehicles have to be rotorcraft"
+        return "every vehicle has to be a rotorcraft"
     if isinstance(scenario.controller, OwnFunctionController):
         law = scenario.controller.law
-        return f"controller.law = {law!r} flies alone; choose a built-in law or a package's"
+        return f"controller.law = {law!r} cannot fly; choose a built-in law or a package's"
     if scenario.controller.measures_angular_acceleration:
-        return "controller.angular_acceleration: does not know contacts; choose model"
+        return "controller.angular_acceleration must be model: measured knows no contacts"
+    if scenario.sensors.instruments:
+        return "instruments in [sensors] know no contacts; remove them"
     gravity, world = (one.vehicle.resolve().gravity for one in (scenario, first))
     if gravity != world:
         return f"vehicle.gravity = {gravity:g}, and the first vehicle's is {world:g}; change one"

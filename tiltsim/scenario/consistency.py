@@ -44,11 +44,11 @@ def check_consistency(scenario: ScenarioTables) -> None:
     _check_ground(scenario)
     check_instruments(scenario)
     check_objects(scenario)
-    check_companions(scenario)
     _check_claims(scenario)
     _check_engine(scenario)
     scenario.controller.check_scenario(scenario)
     _check_rigid_body(scenario)
+    check_companions(scenario)
 
 
 def _check_engine(scenario: ScenarioTables) -> None:
