@@ -260,10 +260,13 @@ def errors_of(now: Estimate, truth: Estimate) -> Any:
     )
 
 
-def nees_of(now: Estimate, truth: Estimate) -> Any:
-    """The square of the errors, normalized by their covariance; 15 on average where it is true."""
-    error = errors_of(now, truth)
-    return error @ solved_symmetric(now.covariance[_PLACE], error)
+def nees_of(now: Estimate, truth: Estimate, count: int = ERRORS) -> Any:
+    """The square of the first errors, normalized by their covariance.
+
+    It is ``count`` on average where the covariance is true.
+    """
+    error = errors_of(now, truth)[:count]
+    return error @ solved_symmetric(now.covariance[_PLACE][:count, :count], error)
 
 
 # --- measurements of the sensors
