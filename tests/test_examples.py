@@ -27,12 +27,18 @@ PRINTED = {
     "stability": r"stable: True\n.*altitude: 1\.021 rad/s",
     "linear_system": r"real parts from -31\.\d+ to -0\.0\d",
     "identify": r"assumed: rms position error 0\.268\d m\nidentified: .* 0\.048\d m",
+    "optimal_control": r"after 0\.8 s at 0\.95\d m, accelerations up to 12\d\d\d rad/s\^2",
+    "predictive_control": r"predictive: .* error 0\.37\d m.*\nvectoring: .* error 0\.38\d m",
     "learning": r"actions \(6,\), best score [1-9]\d*\.\d",
 }
 """Text that each prints."""
 
 SLOW = {"identify", "first_flight", "stability", "csv_reference", "controllers", "learning", "wind"}
+SLOW.add("predictive_control")
 """Examples that take more than 3 s."""
+
+NEEDS = {"learning": "gymnasium", "optimal_control": "casadi", "predictive_control": "casadi"}
+"""Packages that not every installation has."""
 
 SHORT = sorted(
     file.stem for file in EXAMPLES.glob("*.py") if len(file.read_text().splitlines()) < 60
@@ -56,12 +62,12 @@ def test_every_short_example_begins_with_its_purpose(name):
     "name", [pytest.param(n, marks=[pytest.mark.slow] if n in SLOW else []) for n in PRINTED]
 )
 def test_every_short_example_runs(name, tmp_path, monkeypatch, capsys):
-    if name == "learning":
-        pytest.importorskip("gymnasium")
+    if name in NEEDS:
+        pytest.importorskip(NEEDS[name])
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("MPLBACKEND", "agg")
     source = (EXAMPLES / f"{name}.py").read_text()
-    runpy.run_path(str(EXAMPLES / f"{name}.py"))
+    runpy.run_path(str(EXAMPLES / f"{name}.py"), run_name="__main__")
     assert re.search(PRINTED[name], capsys.readouterr().out)
     for drawn in re.findall(r'savefig\("(\S+)"\)', source):
         assert (tmp_path / drawn).stat().st_size > 10_000

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from tiltsim.linear.linearization import linearize
     from tiltsim.linear.margins import margins
     from tiltsim.linear.stability import stability
+    from tiltsim.linear.symbolic import symbolic
     from tiltsim.logs.export import export
     from tiltsim.logs.identify import Estimate, identify
     from tiltsim.logs.log import Log
@@ -35,7 +36,6 @@ if TYPE_CHECKING:
     from tiltsim.simulation.batch import fly
     from tiltsim.simulation.simulate import simulate
     from tiltsim.simulation.stepwise import Simulation
-    from tiltsim.simulation.symbolic import symbolic
     from tiltsim.simulation.vectorized import vectorized
     from tiltsim.sweeps.running import sweep
     from tiltsim.views.figures.plot import plot
@@ -75,7 +75,7 @@ _HOMES = {
     "show_progress": "commands.progress",  # for progress=True
     "stability": "linear.stability",
     "sweep": "sweeps.running",
-    "symbolic": "simulation.symbolic",
+    "symbolic": "linear.symbolic",
     "vectorized": "simulation.vectorized",
     "video": "views.video.making",
     "view": "views.rerun.viewer",

@@ -78,7 +78,13 @@ class Parser(argparse.ArgumentParser):
         self._negative_number_matcher = re.compile(r"-\.?\d")
 
     def error(self, message: str) -> NoReturn:
-        """Print the line and exit."""
+        """Print the line, with the closest name of a command or choice, and exit."""
+        wrong = re.search(r"invalid choice: '(.*)' \(choose from (.*)\)$", message)
+        if wrong:
+            from tiltsim.scenario.messages import did_you_mean
+
+            hint = did_you_mean(wrong[1], re.findall(r"[\w-]+", wrong[2]))
+            message = message.replace("(choose", f"({hint}choose")
         self.exit(INVALID_INPUT, f"tiltsim: {_one_line(message)} (see {self.prog} --help)\n")
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:

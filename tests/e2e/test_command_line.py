@@ -525,7 +525,7 @@ def test_schema_knows_every_table_and_the_variants(capsys):
         "sensors",
         "tool",
     }
-    lists = {"companion", "disturbance", "expect", "fault", "object", "variant"}
+    lists = {"cable", "companion", "disturbance", "expect", "fault", "object", "variant"}
     assert tables | lists | {"title", "source", "without", "ours", "claim"} == set(
         schema["properties"]
     )

@@ -155,5 +155,6 @@ def test_processes_of_a_script_import_nothing_from_the_working_folder(folders, t
     done = run(here, program / "script.py")
     assert (done.returncode, done.stdout) == (0, "[1, 2] None\n"), done.stderr
     assert [file.name for file in tmp_path.glob("ran_*")] == []
-    assert run(here, "-c", "import smtplib").returncode == 0
+    (here / "plain.py").write_text("import smtplib\n")
+    assert run(here, "plain.py").returncode == 0
     assert (tmp_path / "ran_smtplib").exists()  # where nothing keeps Python from it

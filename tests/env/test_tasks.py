@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation
 
 import tiltsim
 from tiltsim.env.environment import TiltrotorEnv
+from tiltsim.env.task import hover_reward
 from tiltsim.env.tasks import EPISODE_STEPS, TASKS
 from tiltsim.errors import InputError
 from tiltsim.plants.built_in_command import BuiltInController
@@ -52,7 +53,7 @@ def flown(request):
     return request.param, env, score(env, BuiltInPolicy(env), seed=0)
 
 
-@pytest.mark.parametrize("task", ["SetPoint", "Circle"])
+@pytest.mark.parametrize("task", ["SetPoint", "Circle", "Push", "Carry"])
 def test_gymnasiums_checker_passes_without_a_warning(task):
     check_env(make(task).unwrapped, skip_render_check=True)
 
@@ -67,6 +68,40 @@ def test_the_built_in_controller_flies_to_the_end_with_the_stated_score(flown):
     assert abs(total - mean) < 4.0 * deviation  # of one episode
     assert env.env.end.kind == "completed"
     assert len(env.env.flight()) == EPISODE_STEPS + 1
+
+
+def test_an_episode_of_a_push_is_repeated_bit_for_bit_and_holds_its_force():
+    env = make("Push").unwrapped
+    scores = [score(env, BuiltInPolicy(env), seed=0) for _ in range(2)]
+    assert scores[0] == scores[1]
+    flight = env.env.flight()
+    late = flight["time"] > 4.5
+    np.testing.assert_allclose(flight["push_force"][late], flight["push_force_ref"][late], rtol=0.1)
+    seen = env.env.observe()
+    turn = Rotation.from_quat(seen.quaternion, scalar_first=True).inv()
+    missing = seen.reference.force - seen.contact_force
+    np.testing.assert_allclose(
+        env.env.task.get_observation(env.env._plant)["force_error_body"], turn.apply(missing)
+    )
+    assert seen.reference.force[1] == env.env.scenario.reference.force
+
+
+def test_rewards_fall_with_errors_of_a_force_and_with_the_swing():
+    still = {f"{name}_error_body": np.zeros(3) for name in ("position", "velocity", "force")}
+    still |= {"body_rates": np.zeros(3), "swing_body": np.zeros(3)}
+    assert hover_reward(still, None) == 1.0
+    off = still | {"force_error_body": np.array([0.0, 2.0, 0.0])}
+    assert hover_reward(off, None) == 0.5
+    swinging = still | {"swing_body": np.array([0.3, 0.1, 0.0])}
+    assert hover_reward(swinging, None) == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize("task", ["Push", "Carry"])
+def test_tasks_with_contact_fly_in_vectors_of_single_environments(task):
+    several = gymnasium.make_vec(f"tiltsim/{task}-v0", num_envs=2)
+    observations, _ = several.reset(seed=3)
+    for seed, observation in zip((3, 4), observations, strict=True):
+        np.testing.assert_array_equal(observation, make(task).reset(seed=seed)[0])
 
 
 @each_task
@@ -228,6 +263,8 @@ def test_starts_on_one_model_equal_the_starts_of_a_new_environment():
         "beyond/gait_feedforward#t1",
         "beyond/allocation#prioritized_from_a_lean",
         "fleet/arms_to_horizontal#hold",
+        "interaction/push#held",
+        "interaction/carry#held",
     ],
 )
 def test_a_built_in_controller_commands_on_an_observation_what_it_does_in_its_plant(scenario):

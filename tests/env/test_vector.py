@@ -136,6 +136,8 @@ def make(*args, **arguments):
             {},
             "vehicle.rotor_inertia = 1e-05: does not fly on arrays; use GymnasiumEnv",
         ),
+        ("tiltsim/Push-v0", {}, "object = .*: does not fly on arrays; use GymnasiumEnv"),
+        ("tiltsim/Carry-v0", {}, "payload = .*: does not fly on arrays; use GymnasiumEnv"),
         (
             "tiltsim/Hover-v0",
             {"domain": [{"key": "simulation.seed", "type": "seed"}]},

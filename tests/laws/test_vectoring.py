@@ -8,7 +8,8 @@ import pytest
 import tiltsim
 from tests.laws.test_multirotor import mjcf
 from tiltsim.laws.assembling import assemble
-from tiltsim_controllers.analysis.vectoring_design import TRACKING, Craft, side_slope
+from tiltsim_controllers.analysis.vectoring_design import TRACKING
+from tiltsim_controllers.analysis.vectoring_limits import Craft, side_slope
 from tiltsim_controllers.laws.vectoring_steps import braked, turn_by
 from tiltsim_controllers.vehicle.effectiveness import table_per_newton
 
@@ -129,6 +130,20 @@ def test_a_lost_rotor_is_survived(vehicle, known):
     assert position_error(flight).max() < 0.2
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("rotor", [1, 2])
+def test_five_canted_rotors_fly_a_circle(rotor):
+    """Their torques push sideways, which bounds the bandwidth, and saturate: yaw gives way."""
+    changed = tables("cant_hexarotor", 6.0, late={"timestep": 0.002}, **CIRCLE)
+    del changed["model_error"], changed["vehicle"]["rotor_time_constant"]
+    changed["controller"].update(failed_rotor=rotor, failure_known_from=2.02)
+    changed["fault"] = [{"type": "rotor_loss", "rotor": rotor, "time": 2.0}]
+    flight = tiltsim.simulate(changed)
+    error = position_error(flight)
+    assert error.max() < 0.15
+    assert error[-1] < 2e-3
+
+
 WORLDS = {
     "quick rotors": {"vehicle.rotor_time_constant": 0.02},
     "slow rotors": {"vehicle.rotor_time_constant": 0.05},
@@ -215,48 +230,96 @@ def test_a_pose_beyond_the_side_force_is_refused(vehicle, angles, words):
 # --- limit cases -------------------------------------------------------------------------------
 
 
-def first_accelerations(controller, timestep=0.002, rotors=4):
-    """Rotor accelerations (rad/s^2) at time zero, off every reference but roll and pitch."""
-    assembly = assemble(
+TURNING_PODS = {"type": "table", "rows": [[time, *[0.2 * time] * 6] for time in (0.0, 0.5, 1.0)]}
+"""All pods turn alike, at a constant rate, so that the axis of the vehicle stays."""
+
+
+def assembly_of(vehicle, controller, timestep=0.002, **gait):
+    """A flight that begins off every reference but roll and pitch."""
+    return assemble(
         tiltsim.load_scenario(
             {
-                "vehicle": {"model": "multirotor", "mjcf": mjcf("quadrotor")},
+                "vehicle": {"model": "multirotor", "mjcf": mjcf(vehicle)},
                 "controller": controller,
                 "reference": {"type": "setpoint", "position": [0.0, 0.0, 0.02], "yaw": 0.02},
-                "initial": {
-                    "velocity": [0.0, 0.0, 0.1],
-                    "rotor_speed": [300.0, 310.0, 330.0, 305.0],
-                },
+                "initial": {"velocity": [0.0, 0.0, 0.1], "rotor_speed": SPEEDS[vehicle]},
                 "simulation": {"timestep": timestep, "duration": 1.0},
+                **gait,
             }
         )
     )
+
+
+def design_of(vehicle, controller, **gait):
+    """Parameters of the law."""
+    return assembly_of(vehicle, controller, **gait).setup.parameters.law.own
+
+
+def first_accelerations(vehicle, controller, timestep=0.002, **gait):
+    """Rotor accelerations (rad/s^2) at time zero."""
+    assembly = assembly_of(vehicle, controller, timestep, **gait)
     loop, setup = assembly.loop, assembly.setup
     state = (
         *loop.kind.initial_motion(assembly),
         loop.dynamics.initial_activations(assembly, setup),
     )
     controls = loop.sampling.controls(0.0, *state, setup.parameters, setup.knots)
-    return np.array(controls[rotors : 2 * rotors])
+    rotors = len(SPEEDS[vehicle])
+    first = rotors + (rotors if gait else 0)  # tilts, one for each rotor, come before
+    return np.array(controls[first : first + rotors])
 
 
-def test_without_limits_and_observers_the_law_is_feedback_linearization():
-    """With period to zero, observers off, and errors below the braking curves: poles placed."""
-    plain = {"law": "vectoring", "observer": 0.0, "prediction": False, "restoring": 0.0}
-    keys = {**plain, "position_bandwidth": 2.0, "attitude_bandwidth": 9.0}
-    periods = (1e-6, 2e-6, 4e-6)
-    found = [first_accelerations(keys, period) for period in periods]
-    limit = (8.0 * found[0] - 6.0 * found[1] + found[2]) / 3.0  # second-order extrapolation
-    c, a = TRACKING, 9.0
-    rows = np.outer([c, c * 1.8 * a, c * a * a], np.ones(3))
-    gains = {"attitude": rows.tolist(), "altitude": [c, c * 4.0, c * 4.0]}
+SPEEDS = {
+    "quadrotor": [300.0, 310.0, 330.0, 305.0],
+    "tilt_hexarotor": [540.0, 550.0, 530.0, 545.0, 535.0, 552.0],
+}
+PLAIN = {
+    **{"law": "vectoring", "observer": 0.0, "prediction": False, "restoring": 0.0},
+    **{"position_bandwidth": 2.0, "attitude_bandwidth": 9.0},
+}
+C, A = TRACKING, 9.0
+
+
+@pytest.mark.parametrize(
+    ("vehicle", "gait"), [("quadrotor", {}), ("tilt_hexarotor", {"gait": TURNING_PODS})]
+)
+def test_without_limits_and_observers_the_law_is_feedback_linearization(vehicle, gait):
+    """With period to zero, observers off, and errors below the braking curves: poles placed.
+
+    The pods of the hexarotor move, whose rates the thrusts make good.
+    """
+    periods = np.array([1.0, 2.0, 4.0, 8.0])
+    found = [first_accelerations(vehicle, PLAIN, 1e-6 * period, **gait) for period in periods]
+    limit = np.linalg.solve(np.vander(periods, increasing=True), found)[0]
+    yaw = design_of(vehicle, PLAIN, **gait).yaw
+    rows = np.array([[C, C, C], [C * 1.8 * A, C * 1.8 * A, C * 1.8 * yaw], [C * A * A] * 3])
+    rows[2, 2] = C * yaw * yaw
     exact = {
         "law": "attitude_force",
-        "gains": gains,
+        "gains": {"attitude": rows.tolist(), "altitude": [C, C * 4.0, C * 4.0]},
         "attitude_error": "euler_angles",
         "max_angular_acceleration": 1e6,
+        **{"dimension": 1, "norm": "thrust", "restoring": 0.0},
     }
-    np.testing.assert_allclose(limit, first_accelerations(exact), rtol=1e-9)
+    expected = first_accelerations(vehicle, exact, **gait)
+    np.testing.assert_allclose(limit, expected, rtol=0.0, atol=1e-9 * np.abs(expected).max())
+
+
+def test_hover_has_the_poles_that_are_placed():
+    """Held over a period, the wrench follows at ``(1 - exp(-rate period)) / period``."""
+    step = 1e-4
+    hover = {
+        "vehicle": {"model": "multirotor", "mjcf": mjcf("quadrotor")},
+        "controller": PLAIN,
+        "simulation": {"timestep": step},
+    }
+    found = tiltsim.stability(hover)
+    assert found.stable
+    rate = (1.0 - np.exp(-C * step)) / step
+    for damping, frequency in ((1.0, 2.0), (0.9, 9.0)):  # of altitude and yaw
+        cubic = np.array([1.0, 1.0, 2.0 * damping * frequency, frequency**2])
+        for pole in np.roots(cubic * [1.0, rate, rate, rate]):
+            assert np.abs(found.poles - pole).min() < 1e-6 * abs(pole)
 
 
 # --- steps -------------------------------------------------------------------------------------
@@ -294,6 +357,7 @@ def craft(vehicle, **changes):
         "commanded": False,
         "moving": False,
         "levers": np.ones(len(speeds)),
+        "works": np.ones(len(speeds)),
     }
     return Craft(**{**numbers, **changes})
 

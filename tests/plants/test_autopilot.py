@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import socket
+import struct
 
 import numpy as np
 import pytest
 
 import tiltsim
-from tests.plants.firmware_double import HEIGHT, Firmware
+from tests.plants.firmware_double import HEIGHT, Firmware, Px4Firmware
 from tiltsim.models.cross import as_multirotor
 from tiltsim.plants.ardupilot_files import ardupilot_files
-from tiltsim.plants.autopilot import Mixer
+from tiltsim.plants.autopilot_mixer import Mixer
 from tiltsim_controllers.vehicle.effectiveness import force_and_torque
 
 TILTING = [*(f"along_{i}" for i in range(1, 7)), *(f"across_{i}" for i in range(1, 7))]
@@ -55,17 +56,53 @@ def firmware(flown, exchanges=100_000, **options):
     for angle in (0.0, np.pi / 2)[: 1 + (vehicle.tilts > 0)]:
         force, torque = force_and_torque(vehicle.table, [angle] * vehicle.tilts)
         columns.append(np.vstack([force, torque]) * scale)
-    made = Firmware(
+    kind = Px4Firmware if flown.autopilot.type == "px4" else Firmware
+    made = kind(
         flown.autopilot.port,
         np.hstack(columns),
         vehicle.mass * vehicle.gravity,
         np.diag(np.reshape(vehicle.inertia, (3, 3))),
-        linear=vehicle.tilts > 0,
+        signed=vehicle.tilts > 0,
         exchanges=exchanges,
         **options,
     )
     made.start()
     return made
+
+
+def px4(**keys):
+    return scenario(free_port(), 4.0, type="px4", **keys)
+
+
+def test_two_flights_of_px4_are_equal_in_every_bit_and_reach_their_height():
+    flights = []
+    for _ in range(2):
+        flown = px4()
+        double = firmware(flown)
+        flights.append(tiltsim.simulate(flown))
+        assert flights[-1].end.kind == "completed", flights[-1].end
+    assert flights[0].samples.tobytes() == flights[1].samples.tobytes()
+    # Inertial navigation finds its height, so that forces and rates are in its frames.
+    assert flights[0]["z"][-1] == pytest.approx(HEIGHT, abs=0.05)
+    assert double.readings[-1].abs_pressure < double.readings[0].abs_pressure
+
+
+@pytest.mark.parametrize(
+    ("options", "keys", "cause"),
+    [
+        ({"exchanges": 300}, {}, "the firmware's link broke: "),
+        ({"exchanges": 300, "late": 0.6}, {"wait": 0.3}, "the link to the firmware is lost"),
+        ({"exchanges": 300, "last": b"hello"}, {}, "invalid MAVLink prefix"),
+        ({"shift": 4000}, {}, "outputs of 28000 us, after 24000 us"),
+        ({"shift": -4000}, {"hold": 0.1}, "without lift-off"),  # each answers earlier readings
+    ],
+)
+def test_a_wrong_answer_of_px4_ends_the_flight_with_its_cause(options, keys, cause):
+    flown = px4(**keys)
+    firmware(flown, **options)
+    flight = tiltsim.simulate(flown)
+    assert flight.end.kind == "failed"
+    assert cause in flight.end.cause
 
 
 @pytest.mark.parametrize("tilting", [False, True])
@@ -109,7 +146,16 @@ def test_sticks_follow_simulated_time():
     ("options", "keys", "cause"),
     [
         ({"exchanges": 300}, {"wait": 0.3}, "the link to the firmware is lost"),
-        ({"exchanges": 300, "last": b"hello"}, {}, "these are not ArduPilot's outputs"),
+        (
+            {
+                "exchanges": 300,
+                "last": struct.pack("<HHI16H", 18458, 400, 300, *16 * [1500]),
+                "late": 0.6,
+            },
+            {"wait": 0.3},
+            "the link to the firmware is lost",
+        ),
+        ({"exchanges": 300, "last": b"hello"}, {}, "not ArduPilot's, on port"),
         ({"exchanges": 0}, {"wait": 0.3}, "the link to the firmware is lost"),
     ],
 )
@@ -130,7 +176,7 @@ def test_a_firmware_that_never_lifts_off_ends_the_flight():
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"autopilot": {"type": "px4", "rate": 250.0}}, "autopilot.type"),
+        ({"autopilot": {"type": "px5", "rate": 250.0}}, "autopilot.type"),
         ({"autopilot.outputs": ["rotor_9"]}, "the vehicle has 4 rotors"),
         ({"autopilot.outputs": ["rotor_1", "rotor_1"]}, "twice"),
         ({"autopilot.outputs": ["motor_1"]}, 'write "rotor_1"'),
@@ -170,6 +216,15 @@ def test_the_frame_of_a_tilting_vehicle_gives_each_motion_alone():
     scale = np.diag(wrench)
     assert (scale > 0.0).all()
     np.testing.assert_allclose(wrench, np.diag(scale), atol=1e-3 * scale.max())
-    assert "FRAME_CLASS 16" in files["parameters.parm"]
+    parameters = dict(line.split() for line in files["parameters.parm"].splitlines())
+    assert parameters["FRAME_CLASS"] == "16"
+    assert parameters["MOT_YAW_HEADROOM"] == "0"  # else pairs near zero keep their sign
+    mixer = Mixer(scenario(9002, tilting=True))
+    turning = scale[:3] / np.diag(np.reshape(mixer.vehicle.inertia, (3, 3)))  # rad/s^2 per unit
+    for axis, acceleration, rate in zip(("RLL", "PIT", "YAW"), turning, (20, 20, 10), strict=True):
+        gain = float(parameters[f"ATC_RAT_{axis}_P"])
+        assert gain * acceleration == pytest.approx(rate, rel=1e-3)
+    # At full throttle the first rotor has its full thrust.
+    assert max(row[3] for row in rows) == 1.0
     with pytest.raises(tiltsim.InputError, match="do not give every force and torque"):
         ardupilot_files(scenario(9002))

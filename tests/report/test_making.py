@@ -338,7 +338,6 @@ def test_a_criterion_and_an_error_stand_on_the_page(full):
     assert 'id="error-routh"' in text
     assert f'<a href="#{row.claim.id}">{row.claim.id}</a>' in text
     assert "<td>0.05 m</td>" in text
-    assert "| short | 0.05 m | 4 | 1 | 2 | As thick as a line. |" in markdown(changed)
     assert ERRORS["routh"].title in errors_page(changed)
     assert "1 rows are refuted or misprints; they trace back to 1 errors" in text
 

@@ -19,6 +19,8 @@ TOWARDS = {
     "changes": {"initial": {"velocity": [-1.5, 0.0, 0.0]}},
 }
 WING = {"name": "wing", "offset": [2.0, 0.3, 0.0]}
+PULL = {"type": "acceleration", "value": [1.0, 0.0, 0.0]}
+STICK = {"position": [0.0, 0.05, 0.0], "direction": [0.0, 1.0, 0.0], "length": 0.4, "mass": 0.01}
 QUAD = {
     "name": "quad",
     "scenario": "arena/quadrotor#step",
@@ -42,7 +44,8 @@ def assert_equal(flight, alone, prefix):
 
 @pytest.mark.parametrize("engine", ["python", "native"])
 def test_far_apart_each_vehicle_flies_as_alone_with_the_same_bits(engine):
-    scenario = together(WING, QUAD, **{"simulation.engine": engine})
+    armed = WING | {"changes": {"tool": STICK}}
+    scenario = together(armed, QUAD, **{"simulation.engine": engine})
     flight = tiltsim.simulate(scenario)
     assert flight.engine == engine
     assert_equal(flight, tiltsim.simulate(scenario.replace({"companion": []})), "")
@@ -117,6 +120,8 @@ def test_a_companion_that_is_lost_ends_the_flight_by_its_name():
         ([WING | {"changes": {"vehicle": {"gravity": 3.7}}}], "vehicle.gravity = 3.7"),
         ([WING | {"changes": {"vehicle": {"mass": -1.0}}}], '"wing": vehicle.mass'),
         ([WING | {"changes": {"nonsense": {}}}], "nonsense"),
+        ([WING | {"changes": {"sensors": {"imu": {}}}}], "sensors.imu"),
+        ([WING | {"changes": {"disturbance": [PULL]}}], "a disturbance by an acceleration"),
         ([WING | {"spacing": -1.0}], "companion[0].spacing = -1.0: unknown key"),
         ([{"name": f"wing_{i}"} for i in range(8)], "at most 7"),
     ],
@@ -133,6 +138,7 @@ def test_a_bad_companion_is_refused_in_one_line(companions, line):
             'simulation.plant = "rigid_body"',
         ),
         ({"simulation.integrator": "RK4"}, 'simulation.integrator = "RK4"'),
+        ({"simulation.plant": "thesis", "simulation.engine": "jax"}, "no [companion]"),
     ],
 )
 def test_companions_are_refused_where_they_cannot_fly(changes, line):
@@ -142,6 +148,19 @@ def test_companions_are_refused_where_they_cannot_fly(changes, line):
 def test_vehicles_that_overlap_at_the_start_are_refused():
     with pytest.raises(tiltsim.InputError, match=r"overlap by .* at the start"):
         tiltsim.simulate(together(WING | {"offset": [0.05, 0.0, 0.0]}))
+
+
+def test_rows_of_a_batch_fly_among_companions_as_alone():
+    scenarios = [
+        together(WING | {"offset": [2.0, y, 0.0]}, **{"simulation.engine": "native"})
+        for y in (0.3, 1.0)
+    ]
+    rows = tiltsim.fly(scenarios, keep_samples=True)
+    for scenario, row in zip(scenarios, rows, strict=True):
+        alone = tiltsim.simulate(scenario)
+        assert_equal(row.flight, alone, "")
+        for name in ("minimum_separation", "companion_rms_position_error"):
+            assert row.metrics[name] == alone.metrics()[name]
 
 
 DOWNWASH = {"rotor_radius": 0.1, "drag_area": 0.02}
@@ -179,3 +198,20 @@ def test_vectors_of_a_companion_have_its_name():
     flight = tiltsim.simulate(together(WING))
     np.testing.assert_array_equal(flight["wing_position"][:, 1], flight["wing_y"])
     assert "wing_position" in flight
+
+
+def test_a_companions_tool_that_touches_its_rotor_is_refused():
+    tool = {"tool": {"position": [0.0, 0.0, 0.02], "direction": [0.866, 0.5, 0.0], "length": 0.3}}
+    scenario = together(WING | {"changes": tool})
+    assert "tool: touches wing_pod_1 of its own vehicle" in refusal(tiltsim.simulate, scenario)
+
+
+@pytest.mark.parametrize("objects", [{}, {"tool": STICK, "payload": {"mass": 0.1, "length": 0.3}}])
+def test_the_first_vehicle_gives_the_command_that_it_gives_alone(objects):
+    among = tiltsim.Simulation(together(WING, QUAD, **objects))
+    alone = tiltsim.Simulation(among.scenario.replace({"companion": []}))
+    for simulation in (among, alone):
+        simulation.step(5)
+    commanded, expected = among.command().rotor_accelerations, alone.command().rotor_accelerations
+    np.testing.assert_array_equal(commanded, expected)
+    assert commanded.any()

@@ -118,6 +118,28 @@ def test_a_flight_that_is_saved_in_contact_goes_on_with_the_same_bits():
     assert touched > 1
 
 
+@pytest.mark.parametrize("stiffness", [0.0, 20.0])
+def test_an_impedance_gives_way_by_its_stiffness(stiffness):
+    """The path goes on into the wall: the force grows by the stiffness times that way."""
+    into = {"positions": [[0.0, 0.0, 0.0], [0.0, 0.04, 0.0]], "times": [0.5, 1.5]}
+    impedance = {"mass": 1.0, "damping": 20.0, "stiffness": stiffness}
+    changes = NEAR | {"simulation.duration": 7.0, "reference.slide": into}
+    flight = tiltsim.simulate(
+        tiltsim.load_scenario(PUSH, changes | {"reference.impedance": impedance})
+    )
+    assert flight["push_force"][-1] == pytest.approx(5.0 + 0.04 * stiffness, abs=0.01)
+    own = {name: flight[name] for name in ("push_shift", "push_shift_rate")}
+    error = flight["push_force_ref"] - flight["filtered_push_force"]
+    law = flight.scenario.reference
+    softness = law.softness(flight.scenario)
+    spring = stiffness / (1.0 - stiffness * softness) * own["push_shift"]
+    pushed = error - 20.0 * own["push_shift_rate"] - spring
+    step, time = np.diff(own["push_shift_rate"]), flight["time"]
+    between = 0.5 * (pushed[1:] + pushed[:-1]) * np.diff(time)
+    late = time[1:] > 1.0
+    np.testing.assert_allclose(step[late], between[late], atol=2e-4)
+
+
 @pytest.mark.slow
 def test_the_peak_of_an_impact_hardly_depends_on_the_time_step():
     peaks = [
@@ -139,6 +161,7 @@ def test_rows_of_a_batch_fly_among_objects_as_alone():
         np.testing.assert_array_equal(alone["contact_force_y"], result.flight["contact_force_y"])
 
 
+STIFF = {"mass": 1.0, "damping": 20.0, "stiffness": 60.0}
 WALL = {
     "name": "wall",
     "type": "wall",
@@ -170,6 +193,8 @@ WALL = {
         ({"tool": {"length": 0.01}}, "must exceed twice the radius"),
         ({"tool": {"length": 0.3, "direction": [0.0, 0.0, 0.0]}}, "must not be zero"),
         ({"tool": None}, "needs a [tool]"),
+        ({"reference.impedance": STIFF}, "0.9 of the law's own stiffness"),
+        ({"reference.impedance": STIFF, "reference.gain": 1.0}, "is of the loop of force"),
         ({"simulation.integrator": "RK4"}, 'must be "implicitfast"'),
         ({"simulation.plant": "rigid_body", "simulation.integrator": "RK4"}, "use mujoco"),
         ({"controller": {"law": "attitude_force"}}, "cannot push; choose full_pose"),
@@ -276,9 +301,10 @@ def test_a_push_of_a_custom_controller_has_its_columns_and_metric():
     ],
     ids=["sampled", "loaded"],
 )
-def test_both_engines_push_with_the_same_bits_through_all_layers(layers):
+@pytest.mark.parametrize("pushing", [{}, {"reference.impedance": STIFF}], ids=["force", "soft"])
+def test_both_engines_push_with_the_same_bits_through_all_layers(layers, pushing):
     def fly(engine):
-        changes = NEAR | layers | {"simulation.engine": engine}
+        changes = NEAR | pushing | layers | {"simulation.engine": engine}
         return tiltsim.simulate(tiltsim.load_scenario("interaction/push#slide_level", changes))
 
     plain, native = (fly(engine) for engine in ("python", "native"))

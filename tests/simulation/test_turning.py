@@ -159,4 +159,4 @@ def test_a_law_that_cannot_turn_says_which_can():
         {"controller": {"law": "geometric"}, "simulation.duration": 4.0, "expect": []},
         reference=pose,
     )
-    assert line.endswith("choose full_pose, attitude_force, python, numpy")
+    assert line.endswith("choose full_pose, attitude_force, vectoring, python, numpy")

@@ -9,10 +9,11 @@ import pytest
 import tiltsim
 from tests.flights import flight
 from tiltsim.views.replay import (
-    cable,
+    cables,
     joint_positions,
     poses_in_parents,
     rotate,
+    seen_radius,
     thrust_scale,
     thrust_sites,
     vehicle_radius,
@@ -91,7 +92,26 @@ def test_a_cable_ends_at_its_vehicle_and_at_its_load():
     carried = tiltsim.simulate(tiltsim.load_scenario("interaction/carry#cable", changes))
     model = visible_model(carried.assembly)
     world = world_poses(model, joint_positions(model, carried.columns))
-    ends = cable(model, world)
+    ends = cables(carried.scenario, model, world, carried["time"])["cable"]
     np.testing.assert_allclose(np.linalg.norm(np.diff(ends, axis=1), axis=-1), 1.0, atol=2e-3)
     load = np.stack([carried[f"payload_{axis}"] for axis in "xyz"], axis=1)
     np.testing.assert_allclose(ends[:, 1], load, atol=1e-9)
+
+
+def test_companions_are_drawn_where_they_flew_and_cables_while_they_hold():
+    changes = {"simulation.duration": 0.1, "simulation.engine": "python", "expect": []}
+    changes |= {"cable[0].end": 0.05, "controller": {"law": "full_pose"}}
+    flight = tiltsim.simulate(tiltsim.load_scenario("interaction/handover", changes))
+    model = visible_model(flight.assembly)
+    world = world_poses(model, joint_positions(model, flight.columns))
+    for name, prefix in (("vehicle", ""), ("taker_vehicle", "taker_")):
+        drawn = world.position[:, model.body(name).id]
+        np.testing.assert_allclose(drawn, flight[f"{prefix}position"], atol=1e-12)
+    hinge = model.joint("taker_tilt_5").qposadr[0]
+    tilts = joint_positions(model, flight.columns)[:, hinge]
+    np.testing.assert_array_equal(tilts, flight["taker_alpha_5"])
+    assert thrust_sites(model)[model.site("taker_rotor_6").id] == "taker_thrust_6"
+    assert vehicle_radius(model) < 0.5 < seen_radius(flight.scenario, model)
+    ends = cables(flight.scenario, model, world, flight["time"])["first_cable"]
+    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    np.testing.assert_allclose(length, np.where(flight["time"] < 0.0499, 1.3, 0.0), atol=5e-3)

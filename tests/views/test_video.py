@@ -221,7 +221,9 @@ def test_the_command_works_without_a_display(tmp_path):
         capture_output=True,
         text=True,
     )
-    assert (done.returncode, done.stderr) == (0, "")
+    assert done.returncode == 0
+    progress = "tiltsim: frames: "  # on a busy machine
+    assert all(line.startswith(progress) for line in done.stderr.splitlines())
     assert done.stdout == f"video written to {folder / 'flight.mp4'}\n"
     assert b"ftyp" in (folder / "flight.mp4").read_bytes()[:12]
 

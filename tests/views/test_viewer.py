@@ -6,6 +6,7 @@ import signal
 import socket
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import pytest
 
@@ -20,6 +21,7 @@ from tests.views.viewer_shot import (
     viewer_process,
     wait_for,
 )
+from tiltsim.errors import InputError
 from tiltsim.flight.reading import load_flight
 from tiltsim.simulation.simulate import simulate
 from tiltsim.views.rerun.live import LiveStream
@@ -87,6 +89,7 @@ def test_the_opened_viewer_listens_to_this_machine_only(monkeypatch):
         started.append(command[1:])
         listener.bind(("127.0.0.1", port))
         listener.listen()
+        return SimpleNamespace(poll=lambda: None)
 
     class Recording:
         def connect_grpc(self, url, default_blueprint):
@@ -100,3 +103,20 @@ def test_the_opened_viewer_listens_to_this_machine_only(monkeypatch):
     assert len(started) == 1
     assert started[0][:2] == ["--bind", "127.0.0.1"]
     assert received == [(url, "first"), (url, "second")]
+
+
+def test_a_viewer_that_ends_at_once_is_an_error_of_one_line(tmp_path, monkeypatch):
+    """A usable screen is missing, which it finds out once it listens."""
+    program = tmp_path / "rerun"
+    program.write_text("#!/bin/sh\necho begins >&2\necho Error: no screen >&2\nexit 1\n")
+    program.chmod(0o755)
+    monkeypatch.setattr("rerun_cli.__file__", str(tmp_path / "__init__.py"))
+    monkeypatch.setattr(viewer_module, "require_viewer", lambda _: None)
+    monkeypatch.setattr(viewer_module, "viewer_listens", lambda _: False)
+    recording = tmp_path / "flight.rrd"
+    recording.write_bytes(b"RRF2")
+    line = "^the Rerun viewer ended at once: Error: no screen$"
+    with pytest.raises(InputError, match=line):
+        viewer_module.attach_viewer(None, None, None)
+    with pytest.raises(InputError, match=line):
+        viewer_module.view_recordings([recording])

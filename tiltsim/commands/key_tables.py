@@ -3,7 +3,7 @@
 import json
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from math import pi
@@ -36,6 +36,7 @@ change a key without editing the file; entries of lists are counted from 0:
 """
 WORD: Final = re.compile(r"[\w-]+")
 NOT_IN_ANCHOR: Final = re.compile(r"[^\w-]")  # characters that the anchor of a heading leaves out
+BOUNDED: Final = re.compile(r"^number(, | (?=[<>]))")  # a number, as its bounds tell
 EVIDENT: Final = ('"', "true", "number", "whole")  # starts of values that need no example
 FEW: Final = 2  # most tables of one address that are printed in full; more are listed
 
@@ -246,21 +247,22 @@ def page(tables: Sequence[KeyTable]) -> str:
     parts += ["", "## Keys before all tables", ""]
     parts += [_item(key) for key in document.keys if key.name not in chapters]
     for name, place in chapters.items():
-        parts += ["", f"## `{head_of(place)}`", *(["", meanings[name]] if place[0].tags else [])]
+        parts += ["", f"## `{head_of(place)}`"]
         own = [table for table in others if table.places[0][0].name == name]
         shared = shared_keys(own)
         if shared:
             parts += ["", "Keys that several of the following tables have:", ""]
             parts += map(_item, shared)
-        parts += [line for table in own for line in _section(table, shared)]
+        above = {replace(key, example="") for key in (*document.keys, *shared)}
+        parts += [line for table in own for line in _section(table, above)]
     return "\n".join(parts) + "\n"
 
 
 def shared_keys(tables: Sequence[KeyTable]) -> list[Key]:
-    """The keys that at least two of the tables have, unless another key has the same name."""
-    counts = Counter(key for table in tables for key in table.keys)
-    names = Counter(key.name for key in counts)
-    return [key for key, count in counts.items() if count > 1 and names[key.name] == 1]
+    """The keys that at least two of the tables have, whatever their examples."""
+    first = {replace(key, example=""): key for table in tables[::-1] for key in table.keys}
+    counts = Counter(replace(key, example="") for table in tables for key in table.keys)
+    return [first[key] for key, count in counts.items() if count > 1]
 
 
 def description(tables: Sequence[KeyTable], address: str) -> str:
@@ -290,13 +292,14 @@ def description(tables: Sequence[KeyTable], address: str) -> str:
     return "\n".join(keys)
 
 
-def _section(table: KeyTable, shared: Sequence[Key]) -> list[str]:
-    """Lines of the page about one table, with only the names of shared keys."""
+def _section(table: KeyTable, above: Collection[Key]) -> list[str]:
+    """Lines of the page about one table, with only the names of keys that stand above."""
     place = table.places[0]
     title = ["", f"### {_title(table)}"] if len(place) > 1 or place[0].tags else []
     toml = ["```toml", *table.toml.splitlines(), "```"]
-    own = [key for key in table.keys if key not in shared and not _is_only_kind(key)]
-    others = ", ".join(f"`{key.name}`" for key in table.keys if key in shared)
+    known = [key for key in table.keys if replace(key, example="") in above]
+    own = [key for key in table.keys if key not in known and not _is_only_kind(key)]
+    others = ", ".join(f"`{key.name}`" for key in known)
     items = [*map(_item, own), *([f"- Also {others}."] if others else [])]
     return [*title, "", _meaning(table), "", *toml, "", *items]
 
@@ -340,7 +343,8 @@ def _item(key: Key) -> str:
     default = ", required" if required else f", default `{key.default}`" if key.default else ""
     plain = key.example and key.example != key.default and not key.values.startswith(EVIDENT)
     example = f"; example `{key.example}`" if plain else ""
-    return f"- `{key.name}` ({key.values}{unit}{default}): {key.meaning}{example}"
+    values = BOUNDED.sub("", key.values).replace("list of 3 ", "3 ")
+    return f"- `{key.name}` ({values}{unit}{default}): {key.meaning}{example}"
 
 
 def _text(table: KeyTable) -> str:

@@ -63,6 +63,11 @@ OBSERVATIONS: Final[dict[str, Reader]] = {
         (seen.reference.velocity - seen.velocity) @ rotation
     ),
     "reference_acceleration_body": lambda seen, rotation: seen.reference.acceleration @ rotation,
+    "contact_force_body": lambda seen, rotation: seen.contact_force @ rotation,
+    "force_error_body": lambda seen, rotation: (
+        (seen.reference.force - seen.contact_force) @ rotation
+    ),
+    "swing_body": lambda seen, rotation: np.append(seen.swing, 0.0) @ rotation,
     "up_body": lambda _, rotation: rotation[2],
 }
 """All observations. Errors are reference minus actual; ``_body`` is along the body's axes."""

@@ -34,13 +34,16 @@ def hover_reward(observation: Mapping[str, Any], action: Any) -> Any:
 
     ``1 / (1 + e^2 + 0.1 v^2 + 0.01 w^2)`` of the position error e (m), the velocity error v (m/s)
     and the body rates w (rad/s), from observations in world or in body axes; they may be arrays of
-    JAX.
+    JAX. To the sum come ``0.25 f^2`` of an observed error f (N) of the force of a push and
+    ``10 s^2`` of an observed swing s (rad) of a load.
     """
     error, velocity_error = _error(observation, "position"), _error(observation, "velocity")
     rates = observation["body_rates"]
-    return 1.0 / (
-        1.0 + error @ error + 0.1 * (velocity_error @ velocity_error) + 0.01 * (rates @ rates)
-    )
+    total = 1.0 + error @ error + 0.1 * (velocity_error @ velocity_error) + 0.01 * (rates @ rates)
+    for name, weight in (("force_error_body", 0.25), ("swing_body", 10.0)):
+        if name in observation:
+            total = total + weight * (observation[name] @ observation[name])
+    return 1.0 / total
 
 
 def _error(observation: Mapping[str, Any], name: str) -> Any:

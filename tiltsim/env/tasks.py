@@ -102,7 +102,32 @@ TASKS: Final[dict[str, dict[str, Any]]] = {
             "angular_frequency": 1.0,
         },
     ),
+    "Push": {
+        "scenario": "interaction/push#held",
+        "domain": [
+            *_uniform("initial.position", 0.1),
+            {"key": "initial.position[1]", "type": "uniform", "low": 0.3, "high": 0.45},
+            {"key": "initial.position[2]", "type": "uniform", "low": -0.1, "high": 0.1},
+            {"key": "reference.force", "type": "uniform", "low": 2.0, "high": 8.0},
+        ],
+        "observations": {**OBSERVATIONS, "contact_force_body": 20.0, "force_error_body": 20.0},
+        "max_position_error": 2.0,
+        "max_tilt_angle": 1.0,
+    },
+    "Carry": {
+        "scenario": "interaction/carry#held",
+        "domain": [
+            *_uniform("reference.position", 1.0, 1.0, 1.0),
+            {"key": "payload.swing", "type": "uniform", "low": -0.3, "high": 0.3},
+        ],
+        "observations": {**OBSERVATIONS, "swing_body": 1.0},
+        "max_position_error": 4.0,
+        "max_tilt_angle": 1.0,
+    },
 }
+
+IN_MUJOCO: Final = frozenset({"Push", "Carry"})
+"""Tasks with objects or loads, which the equations of `tiltsim.env.VectorEnv` do not have."""
 
 ID: Final = "tiltsim/Tiltrotor-v0"
 """Name of `tiltsim.env.TiltrotorEnv` with its defaults; the tasks are ``tiltsim/NAME-v0``."""
@@ -120,11 +145,12 @@ def register() -> None:
     if ID in gymnasium.registry:
         return
     gymnasium.register(ID, entry_point=ENTRY_POINT)
+    with_jax = find_spec("jax") is not None
     for name, arguments in TASKS.items():
         gymnasium.register(
             f"tiltsim/{name}-v0",
             entry_point=ENTRY_POINT,
-            vector_entry_point=VECTOR_ENTRY_POINT if find_spec("jax") else None,
+            vector_entry_point=VECTOR_ENTRY_POINT if with_jax and name not in IN_MUJOCO else None,
             kwargs={**arguments, "flat": True},
             max_episode_steps=EPISODE_STEPS,
         )

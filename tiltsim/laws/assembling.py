@@ -15,6 +15,8 @@ from tiltsim.laws.layers.actuation import with_actuation
 from tiltsim.laws.layers.air import with_air
 from tiltsim.laws.layers.contact import with_force_loop, with_objects
 from tiltsim.laws.layers.estimation import fusion_of, with_estimator
+from tiltsim.laws.layers.contact import with_force_loop, with_impedance, with_objects
+from tiltsim.laws.layers.instruments import instruments_of, with_instruments
 from tiltsim.laws.layers.loads import with_loads
 from tiltsim.laws.layers.measured_acceleration import with_measured_acceleration
 from tiltsim.laws.layers.on_equations import on_equations
@@ -85,11 +87,11 @@ def loop_of(
     else:
         loop = LOOPS[controller.loop_name]
     loop = adapted(loop)
-    if controller.estimator:
+    if controller.estimator is not None:
         loop = with_estimator(loop, fusion_of(scenario))
     if scenario.reference.type == "push" and not external:
-        loop = with_force_loop(loop)
-    if scenario.payload is not None and scenario.payload.swing_damping:
+        loop = (with_impedance if scenario.reference.impedance else with_force_loop)(loop)
+    if scenario.payload is not None and scenario.payload.swing_damping and not external:
         loop = with_swing_damping(loop)
     if scenario.needs_actuation_layer:
         loop = with_actuation(loop, scenario.simulation.latency_steps, external)
@@ -99,6 +101,8 @@ def loop_of(
         loop = with_loads(loop, len(scenario.loads))
     if scenario.has_rotor_inertia:
         loop = with_rotor_inertia(loop)
+    if scenario.sensors.instruments:
+        loop = with_instruments(loop, instruments_of(scenario))
     if measured:
         loop = with_measured_acceleration(loop)
     if scenario.has_objects:

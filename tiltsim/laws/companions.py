@@ -87,17 +87,18 @@ def _parts(sizes: Sequence[int], vector: Any) -> Iterator[Any]:
         first += size
 
 
-def _wakes(scenario: Scenario) -> tuple[Downwash, tuple[Wake, ...]]:
-    """The wakes of all vehicles, and their effect."""
+def _wakes(scenario: Scenario) -> tuple[Any, ...]:
+    """The effect of wakes, and the wakes of all vehicles."""
     table, flown = scenario.downwash, (scenario, *scenario.companions)
     if table is None:
-        return Downwash(), (Wake(0.0, 0.0),) * len(flown)
+        return (Downwash(), *[Wake(0.0, 0.0)] * len(flown))
     disc = np.pi * table.rotor_radius**2
     vehicles = [one.true_vehicle for one in flown]
-    return Downwash(scenario.air.density, table.drag_area), tuple(
+    wakes = (
         Wake(vehicle.mass * vehicle.gravity, disc * one.vehicle.rotor_count)
         for vehicle, one in zip(vehicles, flown, strict=True)
     )
+    return (Downwash(scenario.air.density, table.drag_area), *wakes)
 
 
 def _metrics_among(
@@ -145,12 +146,13 @@ class Several:
         own = [loop.dynamics.sizes for loop in self._loops]
         self._sizes = [size._replace(ctrl=size.ctrl + self._wrench.controls) for size in own]
         self._total = Sizes(*(sum(numbers) for numbers in zip(*self._sizes, strict=True)))
-        self._names = [f"vehicle_{number}" for number in range(len(members))]
+        self._names = ["inner", *(f"vehicle_{number}" for number in range(1, len(members)))]
         parameters = {n: loop.parameters for n, loop in zip(self._names, self._loops, strict=True)}
-        self._wakes = make_record_type("Wakes", **dict.fromkeys(self._names, Wake))
+        wakes = dict.fromkeys(self._names, Wake)
+        self._layer = make_record_type("Wakes", downwash=Downwash, **wakes)
         self._forces = traceable(self._forces_at)
         self._record = make_record_type(
-            "Companions", signature=float, downwash=Downwash, wakes=self._wakes, **parameters
+            "Companions", signature=float, layer=self._layer, **parameters
         )
 
     def _states(self, qpos: Any, qvel: Any, act: Any) -> Iterator[tuple[Any, Any, Any]]:
@@ -228,9 +230,9 @@ class Several:
         """See `ClosedLoop`."""
         each = [loop.setup(own, loop.signature) for loop, own in zip(self._loops, _plans(plan))]
         knots = tuple(knot for one in each for knot in one.knots)
-        downwash, wakes = _wakes(plan.scenario)
+        layer = self._layer(*_wakes(plan.scenario))
         own = (one.parameters for one in each)
-        return ControlSetup(self._record(signature, downwash, self._wakes(*wakes), *own), knots)
+        return ControlSetup(self._record(signature, layer, *own), knots)
 
     def initial_activations(self, plan: FlightPlan, setup: ControlSetup) -> Vector:
         """See `Dynamics`."""
@@ -260,8 +262,9 @@ class Several:
     def _forces_at(self, _time: Any, state: Any, parameters: Any, _knots: Any) -> Any:
         """The forces of the wakes (N, along z) at the positions of all vehicles."""
         places = state.reshape(len(self._members), 3)
-        wakes, numbers = (parameters.wakes, parameters.downwash), range(len(self._members))
-        return xp.array([downwash_force(places, number, *wakes) for number in numbers])
+        downwash, *wakes = parameters.layer
+        numbers = range(len(self._members))
+        return xp.array([downwash_force(places, number, wakes, downwash) for number in numbers])
 
     def causes(self, sample: Mapping[str, float], setup: ControlSetup) -> tuple[str, ...]:
         """See `Monitoring`."""
@@ -348,6 +351,6 @@ class Several:
             ),
             monitoring=Monitoring(traceable(self.signs), self.causes),
             equations=None,
-            within=None,
+            within=first,  # for its controller
             traced=all(loop.is_traceable for loop in self._loops),
         )

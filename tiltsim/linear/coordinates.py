@@ -215,6 +215,16 @@ def _coordinates(names: tuple[str, ...], loop: ClosedLoop, rotation: int) -> Coo
     return Coordinates(names, tuple(unit_of(name, loop) for name in names), rotation, first)
 
 
+def entry_names(found: Coordinates) -> tuple[str, ...]:
+    """Names of the entries of a state: the coordinates', and a name for each of its rotation."""
+    names, first = found.names, found.first
+    if not found.rotation:
+        return names
+    parts = "wxyz" if found.rotation == QUATERNION else [f"{i}{j}" for i in "123" for j in "123"]
+    kind = "quaternion" if found.rotation == QUATERNION else "rotation"
+    return (*names[:first], *(f"{kind}_{part}" for part in parts), *names[first + 3 :])
+
+
 class Input(NamedTuple):
     """An input of the vehicle, as a controller commands it."""
 

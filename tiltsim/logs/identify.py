@@ -15,6 +15,7 @@ from typing import Any, Final
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from tiltsim.arrays.jax_programs import require_jax
 from tiltsim.errors import InputError
 from tiltsim.logs.log import Log
 from tiltsim.logs.model import FACTORS, INITIAL, LoggedVehicle, Parameter, residuals_of
@@ -23,7 +24,6 @@ from tiltsim.logs.windows import MEASURED, Windows, noise_of, windows_of
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.system.numbers import is_finite
-from tiltsim.system.public import optional_package
 from tiltsim.system.text import html_table, short_repr
 from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.vehicle.effectiveness import TiltOfRotor
@@ -125,10 +125,8 @@ def identify(
         InputError: If the log is not of this vehicle, has no whole window, or cannot tell the
             parameters, with the combination that it cannot tell.
     """
-    jax = optional_package("jax", "tiltsim.identify", "tiltsim[jax]")
+    jax = require_jax("tiltsim.identify")
     read = log if isinstance(log, Log) else read_log(log, map)
-    if not is_finite(window) or not 0.02 <= window <= 60.0:
-        raise InputError(f"window = {short_repr(window)}: must be from 0.02 to 60 s")
     loaded = load_scenario(scenario)
     vehicle = LoggedVehicle(loaded)
     chosen = vehicle.chosen(free)

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from tiltsim.errors import InputError
+from tiltsim.arrays.jax_programs import require_jax
 from tiltsim.flight.vectors import VECTORS
 from tiltsim.logs.identify import Problem
 from tiltsim.logs.log import UNITS, Log
@@ -18,9 +18,6 @@ from tiltsim.logs.reading import read_log
 from tiltsim.logs.windows import MEASURED, windows_of
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.scenario import Scenario
-from tiltsim.system.numbers import is_finite
-from tiltsim.system.public import optional_package
-from tiltsim.system.text import short_repr
 from tiltsim_controllers.mathematics.scalar import Floats
 
 
@@ -83,10 +80,8 @@ def replay(
     Raises:
         InputError: If the log is not of this vehicle, or has no whole window.
     """
-    jax = optional_package("jax", "tiltsim.replay", "tiltsim[jax]")
+    jax = require_jax("tiltsim.replay")
     read = log if isinstance(log, Log) else read_log(log, map)
-    if not is_finite(window) or not 0.02 <= window <= 60.0:
-        raise InputError(f"window = {short_repr(window)}: must be from 0.02 to 60 s")
     vehicle = LoggedVehicle(load_scenario(scenario))
     cut = windows_of(read, window, len(vehicle.vehicle.rotors), vehicle.vehicle.tilts)
     with jax.enable_x64(True):

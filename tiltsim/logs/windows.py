@@ -10,6 +10,8 @@ from scipy.interpolate import CubicSpline
 
 from tiltsim.errors import InputError
 from tiltsim.logs.log import Log
+from tiltsim.system.numbers import is_finite
+from tiltsim.system.text import short_repr
 from tiltsim_controllers.mathematics.scalar import Floats
 
 LONGEST_STEP: Final = 0.005
@@ -56,6 +58,8 @@ def windows_of(log: Log, seconds: float, rotors: int, tilts: int) -> Windows:
     Raises:
         InputError: If the log lacks inputs, has the inputs of another vehicle or no whole window.
     """
+    if not is_finite(seconds) or not 0.02 <= seconds <= 60.0:
+        raise InputError(f"window = {short_repr(seconds)}: must be from 0.02 to 60 s")
     for name, count, part in (("rotor_speed", rotors, "rotors"), ("alpha", tilts, "tilting pods")):
         for number in range(1, count + 1):
             if f"{name}_{number}" not in log.columns:

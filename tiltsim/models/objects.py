@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
 
+from tiltsim.models.cables import CABLE_READING, IMPEDANCE, Cable, add_cable, stretch
 from tiltsim_controllers.mathematics.attitude import rotation_of_quaternion
 from tiltsim_controllers.mathematics.scalar import Floats, Triple, Values
 
@@ -23,9 +24,6 @@ if TYPE_CHECKING:
 
 WALL_THICKNESS: Final = 0.1  # m
 PLATE_THICKNESS: Final = 0.004  # m
-IMPEDANCE: Final = (0.95, 0.99, 0.001, 0.5, 2.0)
-"""MuJoCo's ``solimp``: how firmly contacts and the cable hold."""
-
 COORDINATES: Final = {"fixed": 0, "hinged": 1, "free": 7}
 """Numbers in ``qpos`` of an object, by its joint."""
 
@@ -38,7 +36,6 @@ FIRMER: Final = 500.0
 CONTACT_READING: Final = 6
 """Numbers in the memory of a contact sensor: two of MuJoCo, the time and a force."""
 
-CABLE_READING: Final = 4
 FORCE: Final = 3  # where the reading begins in a memory
 
 FIXED_COLOR: Final = (0.55, 0.60, 0.66, 1.0)
@@ -152,6 +149,7 @@ class Objects:
     bodies: tuple[Body, ...] = ()
     tool: Tool | None = None
     load: Load | None = None
+    cables: tuple[Cable, ...] = ()
 
     @cached_property
     def hangs(self) -> bool:
@@ -167,7 +165,7 @@ class Objects:
     @property
     def readings(self) -> int:
         """Numbers in the sensors' memories."""
-        return CONTACT_READING * len(self.bodies) + CABLE_READING * self.hangs
+        return CONTACT_READING * len(self.bodies) + CABLE_READING * (self.hangs + len(self.cables))
 
 
 def touchable(root: Any, *, ground: bool, number: int = -1) -> None:
@@ -203,6 +201,8 @@ def add_companion(spec: mujoco.MjSpec, name: str, companion: mujoco.MjSpec) -> N
     world = companion.worldbody
     for element in (*world.geoms, *world.lights, *world.cameras):
         companion.delete(element)
+    for option in ("impratio", "tolerance"):  # else MuJoCo warns of the difference
+        setattr(companion.option, option, getattr(spec.option, option))
     spec.attach(companion, prefix=f"{name}_", frame=spec.worldbody.add_frame())
 
 
@@ -232,11 +232,10 @@ def add_objects(spec: mujoco.MjSpec, objects: Objects, companions: Sequence[str]
         for vehicle in ("vehicle", *(f"{name}_vehicle" for name in companions)):
             _add_pairs(spec, vehicle, body)
         _add_force_sensor(spec, body.name)
-    if objects.hangs:
-        import mujoco
-
-        cable, force = mujoco.mjtObj.mjOBJ_TENDON, mujoco.mjtSensor.mjSENS_TENDONLIMITFRC
-        spec.add_sensor(name="cable", type=force, objtype=cable, objname="cable", nsample=1)
+    if objects.load is not None and objects.hangs:
+        stretch(spec, "cable", ("payload_attachment", "payload"), objects.load.length)
+    for cable in objects.cables:
+        add_cable(spec, cable)
 
 
 def _add_body(spec: mujoco.MjSpec, body: Body) -> None:
@@ -328,11 +327,6 @@ def _add_load(spec: mujoco.MjSpec, load: Load) -> None:
     own.add_freejoint(name="payload")
     own.add_site(name="payload")
     vehicle.add_site(name="payload_attachment", pos=attachment)
-    cable = spec.add_tendon(name="cable", limited=1, range=(0.0, load.length), width=0.003)
-    cable.wrap_site("payload_attachment")
-    cable.wrap_site("payload")
-    cable.solref_limit = (2.0 * spec.option.timestep, 1.0)  # as stiff as MuJoCo allows
-    cable.solimp_limit = IMPEDANCE
 
 
 def _add_pairs(spec: mujoco.MjSpec, vehicle: str, body: Body) -> None:

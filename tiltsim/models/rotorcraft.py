@@ -116,7 +116,9 @@ def compile_model(spec: RotorcraftSpec, *, visuals: Visuals = True) -> mujoco.Mj
     for tree, one in zip(trees, vehicles, strict=True):
         _set_parameters(tree, one)
     world = trees[0].spec
-    for (name, _), companion in zip(spec.companions, trees[1:], strict=True):
+    for (name, one), companion in zip(spec.companions, trees[1:], strict=True):
+        if one.objects is not None:
+            add_objects(companion.spec, one.objects)
         add_companion(world, name, companion.spec)
     if spec.objects is not None:
         add_objects(world, spec.objects, [name for name, _ in spec.companions])

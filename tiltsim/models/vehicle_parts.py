@@ -101,7 +101,8 @@ def _check_names(compiled: mujoco.MjModel, model: str, parts: Parts) -> None:
         superfluous = [name for name in found if name not in required]
         if superfluous:
             name = repr(superfluous[0]) if superfluous[0] else "without a name"
-            more = "; tools and loads are tables of the scenario" * (kind == "joint")
+            hint = "; tools, loads and further vehicles are tables of the scenario"
+            more = hint if kind == "joint" else ""
             raise ValueError(
                 f"{kind} {name} is not one of a {model}'s, which are {', '.join(required)}{more}"
             )

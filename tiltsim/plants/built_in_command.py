@@ -10,7 +10,7 @@ from tiltsim.engines.base import vectors_of
 from tiltsim.errors import InputError
 from tiltsim.laws.assembling import assemble
 from tiltsim.laws.layers.contact import felt_among
-from tiltsim.laws.layers.measured_acceleration import plant_angular_acceleration_of
+from tiltsim.laws.layers.measured_acceleration import plant_acceleration_of
 from tiltsim.laws.layers.on_equations import read_actuators
 from tiltsim.laws.layers.sensing import measured
 from tiltsim.plants.command import Command, Observation
@@ -38,13 +38,16 @@ def built_in_command(assembly: Assembly, plant: MujocoPlant) -> Command:
         if hasattr(layer, "pod_inertias"):  # of measured acceleration: a record for the model
             ctrl = within.sampling.controls(time, qpos, (*qvel, 0.0, 0.0, 0.0), act, inner, knots)
             loads = read_actuators(within.dynamics)[1](ctrl)
-            turning = plant_angular_acceleration_of(within.dynamics)
-            qvel = (*qvel, *turning(qpos, qvel, ctrl, loads, layer))
+            turning = plant_acceleration_of(within.dynamics)
+            qvel = (*qvel, *turning(qpos, qvel, ctrl, loads, layer)[3:])
         elif hasattr(layer, "sensors"):  # of actuation: a record for the number of rotors
             qpos, qvel = measured(time, qpos, qvel, layer.sensors)
         elif hasattr(layer, "timestep"):  # of objects
             felt = felt_among(others_of(assembly.scenario))(qpos, act, layer.attachment)
             act = [*act[: within.dynamics.sizes.act], *felt]
+        elif hasattr(layer, "downwash"):  # of companions, whose state follows this vehicle's
+            own, behind = within.dynamics.sizes, act[loop.dynamics.sizes.act :]
+            qpos, qvel, act = qpos[: own.qpos], qvel[: own.qvel], [*act[: own.act], *behind]
         loop, parameters = within, inner
     ctrl = loop.sampling.controls(time, qpos, qvel, act, parameters, knots)
     return _command(assembly, loop.dynamics, ctrl)
@@ -53,7 +56,8 @@ def built_in_command(assembly: Assembly, plant: MujocoPlant) -> Command:
 class BuiltInController:
     """The built-in controller of a rotorcraft's scenario, as a function of an observation.
 
-    It integrates its own states, and its supervisor's, over ``simulation.control_timestep``.
+    It integrates its own states, and its supervisor's, over ``simulation.control_timestep``. The
+    force on the object that it pushes is the contact force: there must be no other object.
 
     Args:
         scenario: With a built-in controller.
@@ -66,7 +70,8 @@ class BuiltInController:
     def __init__(self, scenario: Scenario) -> None:
         controller, simulation = scenario.controller, scenario.simulation
         observed = scenario.vehicle.model in PythonController.vehicle_models
-        feeds_back = controller.measures_angular_acceleration or scenario.reference.type == "push"
+        felt = scenario.reference.type != "push" or len(scenario.object) == 1
+        feeds_back = controller.measures_angular_acceleration or not felt
         if not observed or controller.is_external or feeds_back:
             raise InputError("controller: must be a built-in one that needs observations only")
         self._assembly = assembly = assemble(scenario)
@@ -86,7 +91,8 @@ class BuiltInController:
         if layout_of(loop.dynamics).tilts:
             qpos, qvel = [*qpos, *seen.tilt_angles], [*qvel, *seen.tilt_rates]
         speeds = flip_by_spin(seen.rotor_speeds.tolist(), loop.dynamics.spins)
-        act = [*speeds, *self._states]
+        felt = np.concatenate([seen.contact_force, seen.contact_force, seen.swing, np.zeros(6)])
+        act = [*speeds, *self._states, *felt]
         vectors = list(map(float, qpos)), list(map(float, qvel)), act
         ctrl = loop.sampling.controls(seen.time, *vectors, self._parameters, knots)
         rates = ctrl[len(ctrl) - len(self._states) :]

@@ -30,6 +30,7 @@ class Reference:
     attitude: Floats  # (3,), roll, pitch, yaw, rad
     tilt_angles: Floats  # (M,), rad, of the planned gait; four zeros for the quadrotor
     tilt_rates: Floats  # (M,), rad/s
+    force: Floats = field(default_factory=lambda: np.zeros(3))  # (3,), N, of a push on its object
 
 
 @dataclass(frozen=True, slots=True)

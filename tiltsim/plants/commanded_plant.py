@@ -159,7 +159,7 @@ class CommandedPlant(MujocoPlant):
         moving = self._layered or self.data.ctrl[self._rates].any()
         end = (self.steps_taken + steps) * self._evaluations_per_step
         with control_callback(self._hold if moving else None):
-            mujoco.mj_step(self.model, self.data, nstep=steps)
+            self._step(steps)
         self.data.userdata[EVALUATIONS] = end
 
     def _hold(self, _model: mujoco.MjModel, called: mujoco.MjData) -> None:

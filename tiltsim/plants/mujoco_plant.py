@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from functools import cache, partial
+from itertools import pairwise
 from math import nan
 from typing import Any, Final
 
@@ -24,10 +25,12 @@ from tiltsim.engines.callback import control_callback
 from tiltsim.engines.factory import make_engine
 from tiltsim.engines.python_engine import control_step
 from tiltsim.engines.recorder import Recorder
+from tiltsim.models.cables import switch
 from tiltsim.plants.engine_choice import choose_engine
 from tiltsim.plants.flight_model import evaluations_per_step, flight_model
 from tiltsim.plants.plant import Plant
 from tiltsim.plants.start_of_contact import check_start
+from tiltsim.scenario.interaction import objects_of
 from tiltsim.vehicles.rotorcraft.others import motion_at_start
 from tiltsim_controllers.mathematics.scalar import Floats
 
@@ -73,6 +76,10 @@ class MujocoPlant(Plant):
             others = motion_at_start(assembly)
             data.qpos[sizes.qpos :], data.qvel[sizes.qvel :] = others
         data.act[:] = self._loop.dynamics.initial_activations(assembly, self._setup)
+        objects = objects_of(assembly.scenario)
+        self._cables = () if objects is None else objects.cables
+        self._switches = {s for c in self._cables for s in c.switches(simulation.timestep)}
+        switch(self.model, self._cables, 0.0)
         with control_callback(None):
             mujoco.mj_forward(self.model, data)
         if assembly.scenario.has_objects or assembly.scenario.companion:
@@ -98,6 +105,7 @@ class MujocoPlant(Plant):
     def state(self, value: Floats) -> None:
         mujoco.mj_resetData(self.model, self.data)  # clears the warnings
         mujoco.mj_setState(self.model, self.data, value, _INTEGRATION)
+        switch(self.model, self._cables, self.time)
         with control_callback(None):
             mujoco.mj_forward(self.model, self.data)
         self._read_parameters()
@@ -114,7 +122,15 @@ class MujocoPlant(Plant):
 
     def advance(self, steps: int) -> None:
         with control_callback(self._engine.callback()):
-            mujoco.mj_step(self.model, self.data, nstep=steps)
+            self._step(steps)
+
+    def _step(self, steps: int) -> None:
+        """Take physics steps, between which cables begin to hold and release."""
+        first = self.steps_taken
+        inside = sorted(step for step in self._switches if first < step < first + steps)
+        for begin, end in pairwise((first, *inside, first + steps)):
+            switch(self.model, self._cables, begin * self._assembly.scenario.simulation.timestep)
+            mujoco.mj_step(self.model, self.data, nstep=end - begin)
 
     def record(self, samples: int, steps: int) -> Floats | None:
         """Natively, all but the last sample come from the callback."""

@@ -6,7 +6,7 @@ import numpy as np
 
 from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.engines.base import vectors_of
-from tiltsim.laws.layers.contact import felt_among
+from tiltsim.laws.layers.contact import commanded_force, felt_among, push_of
 from tiltsim.laws.layers.sensing import measured, sensor_parameters
 from tiltsim.plants.command import Observation, Reference
 from tiltsim.plants.mujoco_plant import MujocoPlant
@@ -31,6 +31,7 @@ class Observer:
         self._tilts, self._spins = tilts_of(self._vehicle), np.array(vehicle.spins)
         scenario = assembly.scenario
         self._felt = felt_among(others_of(scenario)) if scenario.has_objects else None
+        self._push = push_of(scenario)
         self._attachment = scenario.payload.attachment if scenario.payload else (0.0, 0.0, 0.0)
         self._assembly, self._sensors = assembly, as_arrays(sensor_parameters(assembly.scenario))
 
@@ -79,6 +80,7 @@ class Observer:
             attitude=np.array(attitude_reference(time, reference, knots)),
             tilt_angles=angles.copy(),
             tilt_rates=rates.copy(),
+            force=commanded_force(time, self._push) * np.array(self._push.direction),
         )
 
 

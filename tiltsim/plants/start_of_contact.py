@@ -30,18 +30,33 @@ def check_start(scenario: Scenario, model: mujoco.MjModel, data: mujoco.MjData) 
                 f"{where}: {names[0]} and {names[1]} overlap by {-contact.dist:.3g} m at the "
                 "start; move one of them"
             )
-    if scenario.tool is not None:
-        tool = model.geom("tool_collision").id
-        for geom in range(model.ngeom):
-            name = model.geom(geom).name
-            if name.startswith(("pod_", "rotor_")) and name.endswith("collision"):
-                ends = np.zeros(6)
-                if mujoco.mj_geomDistance(model, data, tool, geom, 1.0, ends) < 0.0:
-                    rotor = name.removesuffix("_collision")
-                    raise InputError(
-                        f"{where}: tool: touches {rotor} of its own vehicle; change tool.position, "
-                        "tool.direction or tool.length"
-                    )
+    for table in scenario.cable:
+        tendon = model.tendon(table.name)
+        apart = float(data.ten_length[tendon.id])
+        if table.start == 0.0 and apart > table.length + OVERLAP:
+            raise InputError(
+                f"{where}: cable {table.name}: its ends are {apart:.4g} m apart at the start, and "
+                f"cable.length = {table.length:g}"
+            )
+    prefixes = ("", *(f"{table.name}_" for table in scenario.companion))
+    for prefix, each in zip(prefixes, (scenario, *scenario.companions), strict=True):
+        rotor = None if each.tool is None else _touched_rotor(model, data, prefix)
+        if rotor is not None:
+            raise InputError(
+                f"{where}: tool: touches {rotor} of its own vehicle; change tool.position, "
+                "tool.direction or tool.length"
+            )
+
+
+def _touched_rotor(model: mujoco.MjModel, data: mujoco.MjData, prefix: str) -> str | None:
+    """A rotor that the tool of a vehicle touches, the names of whose parts have a prefix."""
+    tool = model.geom(f"{prefix}tool_collision").id
+    for geom in range(model.ngeom):
+        name = model.geom(geom).name
+        turns = name.startswith((f"{prefix}pod_", f"{prefix}rotor_")) and name.endswith("collision")
+        if turns and mujoco.mj_geomDistance(model, data, tool, geom, 1.0, np.zeros(6)) < 0.0:
+            return str(name.removesuffix("_collision"))
+    return None
 
 
 def _name(model: mujoco.MjModel, geom: int) -> str:

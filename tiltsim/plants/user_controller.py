@@ -12,7 +12,7 @@ import mujoco
 
 from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.errors import InputError
-from tiltsim.plants.autopilot import ArduPilot
+from tiltsim.plants.autopilot import FirmwareController
 from tiltsim.plants.command import (
     CheckedCommand,
     Controller,
@@ -67,7 +67,7 @@ def load_controller(scenario: Scenario) -> UserController:
     table, controller = scenario.controller, scenario.own_controller
     assert isinstance(table, PythonController)
     if scenario.autopilot is not None:
-        return UserController(ArduPilot(scenario), "autopilot")
+        return UserController(FirmwareController(scenario), "autopilot")
     name = table.function
     if controller is None:
         controller = load_function(scenario)

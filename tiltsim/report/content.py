@@ -169,6 +169,11 @@ class Group:
         fits = sum(row.verdict is ClaimVerdict.FITTED for row in self.rows)
         return fits if fits >= 3 else 0
 
+    @property
+    def only_fits(self) -> bool:
+        """Whether all rows, from three on, are consistent with a fit."""
+        return self.many_fits == len(self.rows)
+
     def without(self, verdict: ClaimVerdict) -> Group:
         """The group without the rows of this verdict."""
         return Group([row for row in self.rows if row.verdict is not verdict])
@@ -340,22 +345,25 @@ def failure_text(failure: Failure) -> str:
 
 
 def lead_text(rows: list[Row]) -> str:
-    """The first sentences of the summary."""
+    """The first sentences of the summary, without verdicts that no row has."""
     counts, statements = count(rows), count_statements(rows)
     alone = sum(row.on_the_thesis_alone for row in rows)
     flown = sum(row.analysis is None for row in rows)
+    share = f", {alone} of them with no number of ours in setting or criterion" if alone else ""
     wrong = counts[ClaimVerdict.REFUTED] + counts[ClaimVerdict.MISPRINT]
-    return (
-        f"{statements.total()} statements in {len(rows)} rows, {flown} of them flown, the others "
-        f"computed. {counts[ClaimVerdict.REPRODUCED]} rows are reproduced, {alone} of them with no "
-        f"number of ours in setting or criterion; {counts[ClaimVerdict.QUALITATIVE]} are "
-        f"reproduced qualitatively, and {counts[ClaimVerdict.FITTED]} are consistent with a fit, "
-        f"which is no evidence. {counts[ClaimVerdict.NOT_REPRODUCED]} are not reproduced, and "
-        f"{counts[ClaimVerdict.NOT_TESTABLE]} are not testable, as the text leaves something "
-        f"open. {counts[ClaimVerdict.ROUNDING]} are one rounding artifact: true of the printed "
-        "digits of the blue angles and of P, not of the exact ones. "
-        f"{wrong} rows are refuted or misprints; they trace back to {len(errors(rows))} errors."
-    )
+    found = {
+        f"rows are reproduced{share}.": counts[ClaimVerdict.REPRODUCED],
+        "are reproduced qualitatively.": counts[ClaimVerdict.QUALITATIVE],
+        "are consistent with a fit, which is no evidence.": counts[ClaimVerdict.FITTED],
+        "are not reproduced.": counts[ClaimVerdict.NOT_REPRODUCED],
+        "are not testable, as the text leaves something open.": counts[ClaimVerdict.NOT_TESTABLE],
+        "are one rounding artifact: true of the printed digits of the blue angles and of P, not of "
+        "the exact ones.": counts[ClaimVerdict.ROUNDING],
+        f"rows are refuted or misprints; they trace back to {len(errors(rows))} errors.": wrong,
+    }
+    how = f"{flown} of them flown, the others computed" if flown < len(rows) else "all flown"
+    lead = f"{statements.total()} statements in {len(rows)} rows, {how}."
+    return " ".join([lead, *(f"{number} {text}" for text, number in found.items() if number)])
 
 
 def flown_text(report: Report) -> str:

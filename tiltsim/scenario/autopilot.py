@@ -26,16 +26,18 @@ class AutopilotTable(Table):
 
     table_name = "autopilot"
 
-    type: Literal["ardupilot"] = Field(
-        description="ArduPilot's software in the loop, by its JSON interface over UDP"
+    type: Literal["ardupilot", "px4"] = Field(
+        description="ArduPilot's software in the loop, by its JSON interface over UDP; PX4's, by "
+        "MAVLink over TCP"
     )
     port: Annotated[int, Field(ge=1, le=65535)] = Field(
-        9002, description="UDP port of this machine, on loopback, to which the firmware sends"
+        9002,
+        description="port of this machine, on loopback, to which the firmware sends; of PX4: 4560",
     )
     rate: Annotated[float, Field(ge=50.0, le=4000.0)] = Field(
         800.0,
         description="exchanges per simulated second; must be at least 1.8 times the rate of the "
-        "firmware's main loop [Hz]",
+        "firmware's main loop; of PX4: 250 [Hz]",
     )
     outputs: Annotated[tuple[str, ...], Field(strict=False, max_length=CHANNELS)] = Field(
         (),
@@ -91,7 +93,9 @@ def with_controller(document: Mapping[str, Any]) -> Mapping[str, Any]:
         raise InvalidValueError(
             "controller", controller, "the autopilot is the controller; remove [controller]"
         )
-    changed = {**document, "controller": CONTROLLER}
+    if table.get("type") == "px4":
+        table = {"port": 4560, "rate": 250.0, **table}
+    changed = {**document, "controller": CONTROLLER, "autopilot": table}
     simulation, rate = document.get("simulation", {}), table.get("rate", 800.0)
     if isinstance(simulation, Mapping) and isinstance(rate, int | float) and rate > 0.0:
         step = 1.0 / rate

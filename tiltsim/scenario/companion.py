@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any, Final
 
-from pydantic import Field, field_validator
+from pydantic import BeforeValidator, Field
 
 from tiltsim.errors import InputError
 from tiltsim.scenario.controller import OwnFunctionController
@@ -37,6 +37,21 @@ TAKEN: Final = (
 MAX_COMPANIONS: Final = 7
 
 
+def _tables_at(value: Any) -> Any:
+    """The tables of a scenario in place of its address."""
+    if not isinstance(value, str) or not value:
+        return {} if value == "" else value
+    try:
+        named = public("load_scenario")(value, {"companion": []})
+    except InputError as error:
+        reason = str(error).removeprefix(f"{value}: ")
+        raise InvalidValueError("companion.scenario", value, reason) from None
+    if named.payload is not None:
+        raise InvalidValueError("companion.scenario", value, "a companion carries no load")
+    tables = named.model_dump(mode="json", exclude_unset=True)
+    return {key: tables[key] for key in TAKEN if key in tables}
+
+
 class CompanionTable(Table):
     """A further vehicle in the same world, under its own controller."""
 
@@ -46,7 +61,7 @@ class CompanionTable(Table):
     name: Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,30}$")] = Field(
         description="its name, which begins the names of its columns", examples=["wing"]
     )
-    scenario: dict[str, Any] = Field(
+    scenario: Annotated[dict[str, Any], BeforeValidator(_tables_at)] = Field(
         {},
         description="address of the scenario whose vehicle, controller, gait, reference and the "
         "like it takes: a name of the library, or a .toml file relative to the scenario's folder; "
@@ -64,22 +79,6 @@ class CompanionTable(Table):
         description="tables and keys in place of its scenario's",
         examples=[{"reference": {"type": "setpoint", "yaw": 0.5}}],
     )
-
-    @field_validator("scenario", mode="before")
-    @classmethod
-    def _read(cls, value: Any) -> Any:
-        """The tables of a scenario in place of its address."""
-        if not isinstance(value, str) or not value:
-            return {} if value == "" else value
-        try:
-            named = public("load_scenario")(value, {"companion": []})
-        except InputError as error:
-            reason = str(error).removeprefix(f"{value}: ")
-            raise InvalidValueError("companion.scenario", value, reason) from None
-        if named.payload is not None:
-            raise InvalidValueError("companion.scenario", value, "a companion carries no load")
-        tables = named.model_dump(mode="json", exclude_unset=True)
-        return {key: tables[key] for key in TAKEN if key in tables}
 
     def tables(self, own: Mapping[str, Any], world: Mapping[str, Any]) -> dict[str, Any]:
         """The document of its scenario.
@@ -168,20 +167,24 @@ def check_companions(scenario: Any) -> None:
     for table in scenario.companion:
         if names.count(table.name) > 1 or table.name in RESERVED:
             raise table.mistake("name", "is taken; choose another")
+    if scenario.companion and (reason := _conflict(scenario, scenario)):
+        raise InvalidValueError("companion", names[0], f"with companions {reason}")
     for table, each in zip(scenario.companion, companions_of(scenario), strict=True):
-        if reason := _conflict(each, scenario) or _conflict(scenario, scenario):
+        if reason := _conflict(each, scenario):
             raise table.mistake("name", reason)
 
 
 def _conflict(scenario: Any, first: Any) -> str:
     """The reason for which a scenario cannot fly in the world of the first; empty for none."""
     if scenario.vehicle.is_planar:
-        return "several vehicles have to be rotorcraft"
+        return "every vehicle has to be a rotorcraft"
     if isinstance(scenario.controller, OwnFunctionController):
         law = scenario.controller.law
-        return f"controller.law = {law!r} flies alone; choose a built-in law or a package's"
+        return f"controller.law = {law!r} cannot fly; choose a built-in law or a package's"
     if scenario.controller.measures_angular_acceleration:
-        return "controller.angular_acceleration: does not know contacts; choose model"
+        return "controller.angular_acceleration must be model: measured knows no contacts"
+    if scenario.sensors.instruments:
+        return "instruments in [sensors] know no contacts; remove them"
     gravity, world = (one.vehicle.resolve().gravity for one in (scenario, first))
     if gravity != world:
         return f"vehicle.gravity = {gravity:g}, and the first vehicle's is {world:g}; change one"

@@ -8,6 +8,7 @@ from tiltsim.scenario.companion import check_companions
 from tiltsim.scenario.controller import CONTROLLERS, laws_for
 from tiltsim.scenario.expectation import NAME
 from tiltsim.scenario.gait import FixedGait, TableGait
+from tiltsim.scenario.instruments import check_instruments
 from tiltsim.scenario.interaction import check_objects
 from tiltsim.scenario.messages import InvalidValueError, choose
 from tiltsim.scenario.multirotor_controllers import AttitudeForceController
@@ -41,12 +42,13 @@ def check_consistency(scenario: ScenarioTables) -> None:
     _check_time_tables(scenario)
     _check_rotor_limits(scenario)
     _check_ground(scenario)
+    check_instruments(scenario)
     check_objects(scenario)
-    check_companions(scenario)
     _check_claims(scenario)
     _check_engine(scenario)
     scenario.controller.check_scenario(scenario)
     _check_rigid_body(scenario)
+    check_companions(scenario)
 
 
 def _check_engine(scenario: ScenarioTables) -> None:

@@ -154,6 +154,7 @@ class ControllerTable(Table):
     follows_turns: ClassVar[bool] = False  # roll, pitch and yaw that vary with time
     needs_four_rotors: ClassVar[bool] = True  # or tilts that the law commands
     models_latency: ClassVar[bool] = False  # the law knows its commands on their way
+    observes_forces: ClassVar[bool] = False  # and holds its place against them
     damps_swing: ClassVar[bool] = (
         False  # of a load, by a moving reference; see laws/layers/swing.py
     )

@@ -1,13 +1,15 @@
 """The tables of objects, of a tool and of a load: ``[[object]]``, ``[tool]``, ``[payload]``."""
 
-from math import pi
+from math import inf, pi
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
 from pydantic import Field
 
+from tiltsim.models.cables import Cable
 from tiltsim.models.mjcf_editing import MAX_BYTES
 from tiltsim.models.objects import Body, Load, Objects, Tool
+from tiltsim.scenario.messages import choose
 from tiltsim.scenario.table import Angles3, NonNegative, Positive, Table, Vector3
 from tiltsim.system.files import is_file
 from tiltsim_controllers.mathematics.attitude import quaternion_of_euler
@@ -186,8 +188,8 @@ class PayloadTable(Table):
 
     swing_damping: Annotated[float, Field(ge=0.0, le=1.0)] = Field(
         0.0,
-        description="damping ratio that the controller gives the swing: its vehicle goes after the "
-        "load, by the measured angle of the cable; 0 does not [-]",
+        description="damping ratio that a law gives the swing: its vehicle goes after the load, by "
+        "the measured angle of the cable; not with python; 0 does not [-]",
         examples=[0.5],
     )
 
@@ -202,6 +204,41 @@ class PayloadTable(Table):
         return Load(self.mass, self.length, self.attachment, self.radius, self.rigid)
 
 
+class CableTable(Table):
+    """A cable from a vehicle to a free object, taut or slack, from one time to another."""
+
+    table_name = "cable"
+
+    name: Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,30}$")] = Field(
+        description="its name, which begins the name of its column", examples=["sling"]
+    )
+    object: str = Field(description="the name of a free object", examples=["parcel"])
+    vehicle: str = Field(
+        "",
+        description="the name of the companion that it hangs on; default: the first vehicle",
+        examples=["wing"],
+    )
+    attachment: Vector3 = Field(
+        (0.0, 0.0, 0.0), description="in body axes [m]", examples=[[0.0, 0.0, -0.05]]
+    )
+    length: Positive = Field(description="to the center of the object [m]", examples=[1.0])
+    start: NonNegative = Field(0.0, description="from when it holds [s]", examples=[5.0])
+    end: Positive | None = Field(
+        None, description="when it releases; default: never [s]", examples=[8.0]
+    )
+
+    def _check_values(self) -> None:
+        if self.end is not None and self.end <= self.start:
+            raise self.mistake("end", f"must be after start = {self.start}")
+
+    @property
+    def cable(self) -> Cable:
+        """The cable for MuJoCo's model."""
+        end = inf if self.end is None else self.end
+        joined = self.name, self.vehicle, self.object
+        return Cable(*joined, self.attachment, self.length, self.start, end)
+
+
 def objects_of(scenario: Any) -> Objects | None:
     """All that a scenario adds to its vehicle's model; None for a vehicle alone."""
     if not scenario.has_objects:
@@ -211,15 +248,31 @@ def objects_of(scenario: Any) -> Objects | None:
         tuple(table.body for table in scenario.object),
         None if tool is None else tool.tool,
         None if payload is None else payload.load,
+        tuple(table.cable for table in scenario.cable),
     )
+
+
+def _check_cables(scenario: Any) -> None:
+    objects = {table.name: table.joint for table in scenario.object}
+    vehicles = ["", *(table.name for table in scenario.companion)]
+    names = [table.name for table in scenario.cable] + ["cable"] * (scenario.payload is not None)
+    for table in scenario.cable:
+        if names.count(table.name) > 1 or table.name in (*RESERVED, *objects, *vehicles):
+            raise table.mistake("name", "is taken; choose another")
+        if objects.get(table.object) != "free":
+            free = [name for name, joint in objects.items() if joint == "free"]
+            reason = choose(table.object, free) if free else "there is no free [[object]]"
+            raise table.mistake("object", reason)
+        if table.vehicle not in vehicles:
+            others = vehicles[1:]
+            reason = choose(table.vehicle, others) if others else "there is no [[companion]]"
+            raise table.mistake("vehicle", reason)
 
 
 def _check_swing_damping(scenario: Any) -> None:
     """Refuse to damp the swing where the law does not follow a reference that accelerates."""
     controller, reason = scenario.controller, ""
-    if controller.is_external:
-        reason = "damps by a built-in law; a controller of yours has observation.swing"
-    elif not controller.damps_swing:
+    if not controller.damps_swing:
         able = "choose full_pose, vectoring, geometric, pid, indi or numpy"
         reason = f"the {controller.law} law does not follow a reference's acceleration; {able}"
     elif scenario.reference.kind == "attitude_altitude":
@@ -230,6 +283,7 @@ def _check_swing_damping(scenario: Any) -> None:
 
 def check_objects(scenario: Any) -> None:
     """Refuse objects, tools and loads where nothing could fly with them, or push them."""
+    _check_cables(scenario)
     if scenario.reference.type == "push":
         scenario.reference.after_gait((), scenario)
         controller = scenario.controller
@@ -237,7 +291,9 @@ def check_objects(scenario: Any) -> None:
             able = "choose full_pose, vectoring with position_bandwidth, or python"
             reason = f"the {controller.law} law cannot push; {able}"
             raise scenario.mistake("reference.type", reason)
-    if scenario.payload is not None and scenario.payload.swing_damping:
+        scenario.reference.check_impedance(scenario)
+    damps = scenario.payload is not None and scenario.payload.swing_damping
+    if damps and not scenario.controller.is_external:
         _check_swing_damping(scenario)
     keys = ("object", "tool", "payload", "companion")
     key = next((name for name in keys if getattr(scenario, name)), None)

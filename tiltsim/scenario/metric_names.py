@@ -71,6 +71,9 @@ METRICS: Final = {
         "smallest rotor speed along its spin, negative where one reversed",
     ),
     "max_rotor_speed": Metric("highest rotor speed", "rad/s", "largest rotor speed along its spin"),
+    "rms_rotor_acceleration": Metric(
+        "rotor acceleration", "rad/s^2", "root mean square over all rotors, from sample to sample"
+    ),
     "altitude_overshoot": Metric(
         "overshoot of the altitude", "m", "largest height above the reference"
     ),
@@ -136,7 +139,7 @@ METRICS: Final = {
     "time_in_contact": Metric(
         "time in contact", "s", "time for which the vehicle touched an object"
     ),
-    "max_cable_tension": Metric("largest tension of the cable", "N", "of the recorded samples"),
+    "max_cable_tension": Metric("largest tension of a cable", "N", "of the recorded samples"),
     "max_swing": Metric(
         "largest swing of the load", "rad", "largest angle of the cable from straight down"
     ),

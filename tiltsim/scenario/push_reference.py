@@ -51,6 +51,19 @@ class Slide(Table):
             raise self.mistake("times", "must increase")
 
 
+class ImpedanceTable(Table):
+    """How the contact gives way to errors of the force: ``m x'' + d x' + k x = error``."""
+
+    table_name = "reference.impedance"
+
+    mass: Positive = Field(description="virtual [kg]", examples=[2.0])
+    damping: NonNegative = Field(description="virtual [N s/m]", examples=[40.0])
+    stiffness: NonNegative = Field(
+        description="of the vehicle's place against the object; 0 holds the force [N/m]",
+        examples=[20.0],
+    )
+
+
 class Touch(NamedTuple):
     """Where and when a push touches its object."""
 
@@ -81,6 +94,30 @@ class PushReference(PositionReference):
         0.5, description="gain from the error of the force to the commanded force [-]"
     )
     slide: Slide | None = Field(None, description="a path along the object; default: none")
+    impedance: ImpedanceTable | None = Field(
+        None, description="an impedance in place of the loop of force; default: none"
+    )
+
+    def _check_values(self) -> None:
+        super()._check_values()
+        if self.impedance is not None:
+            needs = "is of the loop of force; remove it, or reference.impedance"
+            self.require_defaults(("gain", "proportional_gain"), needs)
+
+    def softness(self, scenario: Any) -> float:
+        """How far a force that the law does not know pushes the vehicle from its place, m/N."""
+        controller = scenario.controller
+        if controller.observes_forces or controller.position_stiffness is None:
+            return 0.0
+        mass: float = scenario.any_rotorcraft.resolve().mass
+        return 1.0 / (mass * controller.position_stiffness)
+
+    def check_impedance(self, scenario: Any) -> None:
+        """Refuse an impedance that the law cannot have. Raises `mistake`."""
+        own, softness = self.impedance, self.softness(scenario)
+        if own is not None and softness * own.stiffness >= 0.9:
+            most = f"must be below {0.9 / softness:.4g}, 0.9 of the law's own stiffness"
+            raise own.mistake("stiffness", most)
 
     def touch(self, scenario: Any) -> Touch:
         """Where and when it touches. Raises `mistake` for an object that it cannot touch."""

@@ -10,7 +10,7 @@ from tiltsim.scenario.companion import CompanionTable, DownwashTable
 from tiltsim.scenario.controller import Controller
 from tiltsim.scenario.expectation import ClaimName, ClaimTable, Expectation, Origin
 from tiltsim.scenario.gait import FixedGait, Gait
-from tiltsim.scenario.interaction import ObjectTable, PayloadTable, ToolTable
+from tiltsim.scenario.interaction import CableTable, ObjectTable, PayloadTable, ToolTable
 from tiltsim.scenario.reference import Reference, SetpointReference
 from tiltsim.scenario.rotorcraft import MultirotorTable, RotorcraftTable, TiltServoTable
 from tiltsim.scenario.simulation_table import InitialTable, SimulationTable
@@ -78,6 +78,9 @@ class ScenarioTables(WithAutopilot):
         None, description="a tool that the vehicle carries; default: none"
     )
     payload: PayloadTable | None = Field(None, description="a load to carry; default: none")
+    cable: Annotated[tuple[CableTable, ...], Field(strict=False)] = Field(
+        (), description="cables between vehicles and free objects, which hold for a time"
+    )
     companion: Annotated[tuple[CompanionTable, ...], Field(strict=False)] = Field(
         (), description="further vehicles in the same world"
     )
@@ -193,6 +196,7 @@ class ScenarioTables(WithAutopilot):
             or self.needs_actuation_layer
             or self.has_air
             or self.loads
+            or self.sensors.instruments
         )
 
     @property

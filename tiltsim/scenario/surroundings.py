@@ -6,6 +6,16 @@ from pydantic import Field
 
 from tiltsim.models.parts import Ground
 from tiltsim.models.vehicle_parts import MAX_ROTORS
+from tiltsim.scenario.instruments import (
+    INSTRUMENTS,
+    BarometerTable,
+    GpsTable,
+    ImuTable,
+    InstrumentTable,
+    MagnetometerTable,
+    MocapTable,
+    RotorSpeedTable,
+)
 from tiltsim.scenario.messages import InvalidValueError
 from tiltsim.scenario.table import Angle, Coordinate, NonNegative, Positive, Table, Vector3, example
 
@@ -106,11 +116,24 @@ class SensorTable(Table):
         description="time between measurements; default: control_timestep, 0.01 if continuous [s]",
         examples=[0.02],
     )
+    imu: ImuTable | None = Field(None, description="accelerometer and gyro")
+    mocap: MocapTable | None = Field(None, description="motion capture")
+    gps: GpsTable | None = Field(None, description="position and velocity from satellites")
+    barometer: BarometerTable | None = Field(None, description="altitude from air pressure")
+    magnetometer: MagnetometerTable | None = Field(None, description="direction of the field")
+    rotor_speed: RotorSpeedTable | None = Field(None, description="speeds of the rotors")
 
     @property
     def have_errors(self) -> bool:
         """Whether any measurement has an error."""
-        return self.model_copy(update={"sample_time": None}) != SensorTable()
+        ideal = dict.fromkeys(("sample_time", *INSTRUMENTS))
+        return self.model_copy(update=ideal) != SensorTable()
+
+    @property
+    def instruments(self) -> dict[str, InstrumentTable]:
+        """The instruments on the vehicle, by name."""
+        found = {name: getattr(self, name) for name in INSTRUMENTS}
+        return {name: table for name, table in found.items() if table is not None}
 
 
 Rotor = Annotated[

@@ -11,7 +11,8 @@ import numpy as np
 from tiltsim.scenario.gait_following import FailureAwareController
 from tiltsim.scenario.law_controller import Airframe, LawController, TiltingTable
 from tiltsim_controllers.analysis.stability import ErrorLoop
-from tiltsim_controllers.analysis.vectoring_design import REACH, Craft, Timing, design
+from tiltsim_controllers.analysis.vectoring_design import REACH, Timing, design
+from tiltsim_controllers.analysis.vectoring_limits import Craft
 from tiltsim_controllers.laws.vectoring import Vectoring, vectoring
 from tiltsim_controllers.laws.vectoring_state import Parameters, state_units
 from tiltsim_controllers.mathematics.attitude import quaternion_of_euler
@@ -27,6 +28,7 @@ class VectoringController(Vectoring, FailureAwareController, TiltingTable, LawCo
     """Observers, prediction and allocation within limits, for any rotorcraft."""
 
     models_latency = True
+    observes_forces = True
     reference_kinds = ("position", "pose")
     follows_turns = True
     control: ClassVar = staticmethod(vectoring)
@@ -81,6 +83,7 @@ class VectoringController(Vectoring, FailureAwareController, TiltingTable, LawCo
             self.commands_tilts and len(airframe.initial_tilts) > 0,
             len(airframe.initial_tilts) > 0 and not airframe.gait.is_constant,
             np.array([hypot(*rotor.place) for rotor in vehicle.rotors]),
+            np.ones(len(thrust)),
         )
         sampled = airframe.control_timestep > 0.0
         timing = Timing(

@@ -10,6 +10,7 @@ from pydantic import BaseModel
 from tiltsim.arrays.jax_programs import InJax
 from tiltsim.closed_loop.loop import ClosedLoop
 from tiltsim.plants.flight_model import disturbance_acceleration
+from tiltsim.scenario.instruments import INSTRUMENTS
 from tiltsim.scenario.scenario import Scenario, plan_flight
 from tiltsim.scenario.vehicle import VehicleTable
 from tiltsim_controllers.code.messages import TraceError
@@ -31,7 +32,7 @@ TABLES: Final = (
 )
 """Tables of a scenario whose numbers may be parameters."""
 
-FIXED: Final = frozenset({"sample_time", "tilt_servo", "pod"})
+FIXED: Final = frozenset({"sample_time", "tilt_servo", "pod", *INSTRUMENTS})
 """Keys that are no parameters."""
 
 

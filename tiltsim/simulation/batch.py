@@ -270,6 +270,7 @@ def _way_to_fly(assembly: Assembly, native: bool) -> object:
     if (
         not (natively and assembly.traced and assembly.loop.is_traceable)
         or scenario.controller.is_external
+        or any(table.start or table.end for table in scenario.cable)  # each has its own model
     ):
         return "alone"
     key = program_key(assembly)
@@ -278,7 +279,7 @@ def _way_to_fly(assembly: Assembly, native: bool) -> object:
         return key, simulation.solver, held, simulation.batch_functions
     # Stops of the tilt servos are constraints, which lengthen a state; ground and objects add
     # geoms; a layer has its own states and controls; a user's file may have other bodies.
-    vehicle = scenario.vehicle
-    file = vehicle.mjcf if isinstance(vehicle, VehicleTable) else None
-    stops, ground = vehicle.tilt_servo.angle_limit is not None, scenario.ground is not None
-    return key, stops, ground, objects_of(scenario), file
+    vehicles = [each.vehicle for each in (scenario, *scenario.companions)]
+    files = tuple(v.mjcf if isinstance(v, VehicleTable) else None for v in vehicles)
+    stops = tuple(vehicle.tilt_servo.angle_limit is not None for vehicle in vehicles)
+    return key, stops, scenario.ground is not None, objects_of(scenario), files

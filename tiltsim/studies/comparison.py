@@ -213,7 +213,8 @@ def compare_one(entry: Entry, *, searches: bool, timed: bool = True) -> Compared
     except InputError as error:
         refused = {"end": "refused", "refused": str(error), **dict.fromkeys(MEASURES)}
         return Compared(row | refused | {"latency_refused": None}, np.zeros(0), np.zeros(0))
-    row |= {"end": flight.end.kind, "refused": None, **_tracking(flight), **_effort(flight)}
+    row |= {"end": flight.end.kind, "refused": None, **_tracking(flight)}
+    row["tilt_travel"] = _tilt_travel(flight)
     metrics = flight.metrics()
     for measure in MEASURES:
         row[measure] = row.get(measure, metrics.get(measure))
@@ -263,14 +264,12 @@ def _yaw_error(flight: Flight) -> float:
     return float(np.sqrt(np.mean(np.arctan2(np.sin(error), np.cos(error)) ** 2)))
 
 
-def _effort(flight: Flight) -> dict[str, float]:
-    """Root mean square of the rotors' accelerations, rad/s^2, and the way of all tilts, rad."""
+def _tilt_travel(flight: Flight) -> float:
+    """The way of all tilts, rad."""
     if len(flight) < 2:
-        return {"rms_rotor_acceleration": nan, "tilt_travel": nan}
-    change = np.diff(flight["rotor_speeds"], axis=0) / np.diff(flight["time"])[:, np.newaxis]
+        return nan
     columns = [name for name in flight.units if name.startswith("alpha_") and name[6:].isdecimal()]
-    travel = sum(float(np.abs(np.diff(flight[name])).sum()) for name in columns)
-    return {"rms_rotor_acceleration": float(np.sqrt(np.mean(change**2))), "tilt_travel": travel}
+    return sum(float(np.abs(np.diff(flight[name])).sum()) for name in columns)
 
 
 def _control_period(scenario: Scenario) -> float:

@@ -121,6 +121,10 @@ def subscript(number: int) -> str:
     return "".join(SUBSCRIPTS[int(digit)] for digit in str(number))
 
 
+_ACRONYMS: Final = frozenset(("imu", "gps"))
+
+
 def in_words(name: str) -> str:
     """A name of code, such as ``gait.bias_angle``, in words."""
-    return name.replace("_", " ").replace(".", " ").strip()
+    words = name.replace("_", " ").replace(".", " ").split()
+    return " ".join(word.upper() if word in _ACRONYMS else word for word in words)

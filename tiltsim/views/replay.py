@@ -99,12 +99,27 @@ def poses_in_parents(model: mujoco.MjModel, poses: Poses) -> Poses:
     return Poses(rotate(inverse, offset), _product(inverse, poses.quaternion))
 
 
-def cable(model: mujoco.MjModel, world: Poses) -> Floats:
-    """Both ends of the cable of a load in the world (m), shape (N, 2, 3)."""
-    vehicle, load = first_free_body(model), model.body("payload").id
-    place = model.site_pos[model.site("payload_attachment").id]
-    begin = world.position[:, vehicle] + rotate(world.quaternion[:, vehicle], place)
-    return np.stack([begin, world.position[:, load]], axis=1)
+def cables(
+    scenario: Scenario, model: mujoco.MjModel, world: Poses, time: Floats
+) -> dict[str, Floats]:
+    """Both ends of each cable in the world (m), shape (N, 2, 3), by its name.
+
+    Args:
+        scenario: Its cables have times between which they hold, else both ends are equal.
+        model, world: The model and the poses of its bodies.
+        time: Times of the poses, s.
+    """
+    found = {}
+    for tendon in range(model.ntendon):
+        first = model.tendon_adr[tendon]
+        sites = model.wrap_objid[first : first + 2]
+        body = model.site_bodyid[sites]
+        places = rotate(world.quaternion[:, body], model.site_pos[sites])
+        found[model.tendon(tendon).name] = world.position[:, body] + places
+    for table in scenario.cable:
+        loose = [not table.cable.holds(at) for at in time.tolist()]
+        found[table.name][loose, 1] = found[table.name][loose, 0]
+    return found
 
 
 def thrust_sites(model: mujoco.MjModel) -> dict[int, str]:
@@ -115,6 +130,13 @@ def thrust_sites(model: mujoco.MjModel) -> dict[int, str]:
         for site, name in names.items()
         if re.search(r"(^|_)rotor_\d+$", name)
     }
+
+
+def seen_radius(scenario: Scenario, model: mujoco.MjModel) -> float:
+    """The vehicle's radius (m), or a larger one that lets a camera also see companions nearby."""
+    begin = np.array(scenario.initial.position)
+    apart = [np.linalg.norm(each.initial.position - begin) for each in scenario.companions]
+    return vehicle_radius(model) + 0.25 * float(max(apart, default=0.0))
 
 
 def _first_rotors(model: mujoco.MjModel) -> list[int]:
@@ -166,10 +188,20 @@ def _product(left: Floats, right: Floats) -> Floats:
     return np.concatenate([scalar, vector + np.cross(left[..., 1:], right[..., 1:])], axis=-1)
 
 
-def positions(columns: Columns) -> Floats:
-    """The vehicle's position at every sample (m), shape (N, 3); 0 for axes without a column."""
+def positions(columns: Columns, prefix: str = "") -> Floats:
+    """A vehicle's position at every sample (m), shape (N, 3); 0 for axes without a column.
+
+    Args:
+        columns: Columns of the flight.
+        prefix: Beginning of the names of a companion's columns.
+    """
     zero = np.zeros_like(columns["time"])
-    return np.stack([columns.get(axis, zero) for axis in "xyz"], axis=1)
+    return np.stack([columns.get(f"{prefix}{axis}", zero) for axis in "xyz"], axis=1)
+
+
+def prefixes(scenario: Scenario) -> list[str]:
+    """The beginnings of the names of the columns of each vehicle, the first one's empty."""
+    return ["", *(f"{each.name}_" for each in scenario.companion)]
 
 
 def reference_positions(columns: Columns) -> Floats:

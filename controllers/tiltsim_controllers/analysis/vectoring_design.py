@@ -6,35 +6,36 @@ limits leave, and the side force that needs no lean from a linear program.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from itertools import product
-from math import atan, exp, pi
+from dataclasses import dataclass, replace
+from math import exp
 from typing import Any, Final
 
 import numpy as np
 
-from tiltsim_controllers.laws.failures import Failure
-from tiltsim_controllers.laws.full_pose import pose_rank
-from tiltsim_controllers.laws.vectoring import Vectoring
-from tiltsim_controllers.laws.vectoring_state import Parameters
-from tiltsim_controllers.mathematics.scalar import Floats, Values
-from tiltsim_controllers.vehicle.effectiveness import (
-    ROTOR_FLOATS,
-    SPIN_SIGN,
-    force_and_torque,
-    tilt_of_rotor,
+from tiltsim_controllers.analysis.vectoring_limits import (
+    Craft,
+    authority,
+    free_axis,
+    pose_cone,
+    preferred_tilts,
+    side_slope,
+    sideways_limit,
 )
-from tiltsim_controllers.vehicle.rotors import by_tilt, rotors_in, wrench_slope
+from tiltsim_controllers.laws.failures import Failure
+from tiltsim_controllers.laws.vectoring import Vectoring
+from tiltsim_controllers.laws.vectoring_state import Ability, Parameters
+from tiltsim_controllers.mathematics.scalar import Values
 
-SIDE_SHARE: Final = 0.65
-"""Share of the greatest thrusts that side force may take."""
 TOTAL_SHARE: Final = 0.9
 """Share of the greatest thrusts that is demanded in all."""
 DELAY_MARGIN: Final = 0.22
 """Attitude bandwidth times the delay that is left."""
 POSITION_SHARE: Final = 0.3
-"""Position bandwidth over attitude bandwidth."""
+"""Position bandwidth over attitude bandwidth, ..."""
+SIDEWAYS_POSITION: Final = 0.5
+"""... and where the push of torques limits attitude."""
+SIDEWAYS_SHARE: Final = 0.9
+"""Attitude bandwidth over `sideways_limit`."""
 FASTEST: Final = (40.0, 23.0, 8.0)
 """rad/s: attitude, yaw and position without lag and latency."""
 ERROR: Final = 0.1
@@ -45,62 +46,8 @@ TRACKING: Final = 250.0
 """1/s: how fast the wrench follows its demand where rotors have no lag."""
 REACH: Final = 10.0
 """Greatest thrust over hover thrust where nothing else limits it."""
-SERVO_ANGLE: Final = 0.3
-"""rad: the tilt by which braking counts about an axis that only tilts turn."""
 MOST_TILT: Final = 3.1
 """rad: commanded tilts stay below half a turn."""
-DIRECTIONS: Final = 8
-"""Directions of side force in the linear programs."""
-
-
-@dataclass(frozen=True)
-class Craft:
-    """A vehicle as the design sees it, N rotors with M tilts.
-
-    Attributes:
-        table: Table of the rotors, per newton.
-        mass, gravity: kg, m/s^2.
-        inertia: kg m^2, shape (3, 3).
-        thrust: N s^2/rad^2, shape (N,).
-        slowest, fastest: rad/s, along the spin, shape (N,).
-        tilts: At the start, rad, shape (M,).
-        commanded: Whether the law commands the tilts.
-        moving: Whether a gait moves them.
-        levers: m, of the rotors from the center of mass, shape (N,).
-    """
-
-    table: Values
-    mass: float
-    gravity: float
-    inertia: Floats
-    thrust: Floats
-    slowest: Floats
-    fastest: Floats
-    tilts: Floats
-    commanded: bool
-    moving: bool
-    levers: Floats
-
-    @property
-    def hover(self) -> float:
-        """Thrust (N) of a rotor in hover, were all upward."""
-        return self.mass * self.gravity / len(self.thrust)
-
-    @property
-    def limits(self) -> tuple[Floats, Floats]:
-        """Least and greatest thrusts, N, shape (N,) each."""
-        low, high = (self.thrust * s * np.abs(s) for s in (self.slowest, self.fastest))
-        return low, high
-
-    def outputs(self, tilts: Floats) -> int:
-        """How many of the six outputs rotors and tilts move."""
-        spins = np.reshape(self.table, (len(self.thrust), ROTOR_FLOATS))[:, SPIN_SIGN]
-        return pose_rank(self.table, tilts, spins)
-
-    def wrench(self, tilts: Floats) -> Floats:
-        """Force and torque per newton, shape (6, N)."""
-        force, torque = force_and_torque(self.table, tilts[np.newaxis])
-        return np.vstack([force[0], torque[0]])
 
 
 @dataclass(frozen=True)
@@ -124,93 +71,6 @@ class Timing:
     servo: tuple[float, float]
     servo_limits: tuple[float, float]
     tilt_gain: float
-
-
-def preferred_tilts(craft: Craft) -> Floats:
-    """The gait's angles or level ones, whichever are farther from singular, rad, shape (M,)."""
-    if not craft.commanded:
-        return craft.tilts
-
-    def margin(tilts: Floats) -> float:
-        scale = np.repeat([1.0, 1.0 / float(craft.levers.mean())], 3)[:, np.newaxis]
-        rows = scale * craft.wrench(tilts)
-        sizes = [np.linalg.svd(part, compute_uv=False)[-1] for part in (rows, rows[2:])]
-        return float((sizes[0] if len(craft.thrust) >= 6 else 0.0) + 1e-3 * sizes[1])
-
-    return max((craft.tilts, np.zeros(len(craft.tilts))), key=margin)
-
-
-def side_slope(craft: Craft, rows: Floats) -> float:
-    """Side force per lift that level hover has in every direction within the limits.
-
-    Args:
-        craft: The vehicle.
-        rows: Force and torque per newton, shape (6, N).
-    """
-    if craft.moving:
-        return 0.0
-    if craft.commanded:
-        return 0.5 if craft.outputs(craft.tilts) == 6 else 0.0
-    weight = craft.mass * craft.gravity
-    angles = 2.0 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
-    sides = [np.array([np.cos(angle), np.sin(angle), 0.0]) for angle in angles]
-    most = np.minimum(SIDE_SHARE * craft.limits[1], 2.4 * craft.hover)
-    return 0.8 * least_force(craft, rows, sides, weight, most) / weight
-
-
-def pose_cone(craft: Craft, rows: Floats, slope: float) -> float:
-    """Angle (rad) from level of the poses that side force holds; pi where all are held.
-
-    Args:
-        craft: The vehicle.
-        rows: Force and torque per newton, shape (6, N).
-        slope: Result of `side_slope`.
-    """
-    weight, most = craft.mass * craft.gravity, SIDE_SHARE * craft.limits[1]
-    ways = [np.array(way) for way in product((-1.0, 0.0, 1.0), repeat=3) if any(way)]
-    units = [way / np.linalg.norm(way) for way in ways]
-    holds_all = slope > 0.0 and not craft.commanded
-    if holds_all and least_force(craft, rows, units, 0.0, most) > weight:
-        return pi
-    return atan(slope)
-
-
-def least_force(
-    craft: Craft, rows: Floats, ways: Sequence[Floats], lift: float, most: Floats
-) -> float:
-    """The least over some directions of the greatest force (N) without torque; 0 for none.
-
-    Args:
-        craft: The vehicle.
-        rows: Force and torque per newton, shape (6, N).
-        ways: Unit vectors of the directions, body axes.
-        lift: N, that the rotors make as well, along z.
-        most: Greatest thrusts, N, shape (N,).
-    """
-    from scipy.optimize import linprog  # a third of a second to import
-
-    if np.linalg.matrix_rank(rows, tol=1e-6) < 6:
-        return 0.0
-    bounds = [*zip(craft.limits[0], most, strict=True), (0, None)]
-    forces = []
-    for way in ways:
-        found = linprog(
-            np.array([*np.zeros(len(most)), -1.0]),
-            A_eq=np.column_stack([rows, [*-way, 0.0, 0.0, 0.0]]),
-            b_eq=lift * np.eye(6)[2],
-            bounds=bounds,
-        )
-        forces.append(-float(found.fun) if found.status == 0 else 0.0)
-    return min(forces)
-
-
-def free_axis(rows: Floats) -> Floats:
-    """Unit axis of the force of the least thrusts that lift without torque, shape (3,)."""
-    up, torque = rows[2], rows[3:]
-    free = up - np.linalg.pinv(torque, rcond=1e-9) @ (torque @ up)
-    force = rows[:3] @ free
-    size = float(np.linalg.norm(force))
-    return force / size if size > 1e-9 else np.array([0.0, 0.0, 1.0])
 
 
 def _servo_step(servo: tuple[float, float], period: float) -> tuple[Values, Values]:
@@ -242,22 +102,6 @@ def _rotor_step(timing: Timing, lag: float) -> dict[str, float]:
     }
 
 
-def _authority(craft: Craft, rows: Floats, tilts: Floats) -> tuple[float, float]:
-    """Angular accelerations (rad/s^2) about x and y, and about z, that hover leaves.
-
-    By the thrusts; about an axis that only tilts turn, by these.
-    """
-    low, high = craft.limits
-    room = np.maximum(np.minimum(high - craft.hover, craft.hover - low), 0.05 * craft.hover)
-    turn = np.abs(rows[3:]) @ room / np.diag(craft.inertia)
-    if craft.commanded:
-        rotors = rotors_in(craft.table, 0, tilt_of_rotor(craft.table))
-        slopes = np.abs(by_tilt(rotors, wrench_slope(rotors, tilts)))[3:]
-        turning = SERVO_ANGLE * craft.hover * slopes.sum(axis=1) / np.diag(craft.inertia)
-        turn = np.where(turn < 0.1 * turn.max(), np.maximum(turn, turning), turn)
-    return min(500.0, float(turn[:2].min())), min(350.0, float(turn[2]))
-
-
 def _observers(factor: float, bandwidths: Values, period: float) -> dict[str, Any]:
     """Gains of the observers, which have double poles; without them all measurements are taken.
 
@@ -281,6 +125,40 @@ def _observers(factor: float, bandwidths: Values, period: float) -> dict[str, An
     }
 
 
+def ability(keys: Vectoring, craft: Craft, left: float, *, harmed: bool = False) -> Ability:
+    """Abilities of a vehicle, with all its rotors or without one.
+
+    Args:
+        keys: Keys of the law.
+        craft: The vehicle.
+        left: s, the delay that no prediction removes.
+        harmed: Whether it has lost a rotor.
+    """
+    preferred = preferred_tilts(craft)
+    rows = craft.wrench(preferred)
+    slope, (angular, yaw_angular) = side_slope(craft, rows), authority(craft, rows, preferred)
+    fastest, share = min(FASTEST[0], DELAY_MARGIN / left, (angular / ERROR) ** 0.5), POSITION_SHARE
+    if harmed and slope == 0.0:
+        sideways = SIDEWAYS_SHARE * sideways_limit(craft, rows)
+        if sideways < fastest:
+            fastest, share = sideways, SIDEWAYS_POSITION
+    attitude = keys.attitude_bandwidth or fastest
+    return Ability(
+        axis=tuple(free_axis(rows).tolist()),
+        slope=slope,
+        cone=pose_cone(craft, rows, slope),
+        position=keys.position_bandwidth or min(FASTEST[2], share * attitude),
+        lean_time=1.5 / attitude if slope < 1.0 else 0.0,
+        attitude=attitude,
+        yaw=min(FASTEST[1], attitude, (yaw_angular / ERROR) ** 0.5),
+        angular=angular,
+        yaw_angular=yaw_angular,
+        side_softness=3e-4 if craft.works.sum() >= 6 else 1.0,
+        # The tilts have made the torque that they can; a harmed vehicle has little of it to give.
+        yaw_softness=1e-4 if craft.commanded or harmed else 1e-12,
+    )
+
+
 def design(
     keys: Vectoring, craft: Craft, timing: Timing, failure: Failure
 ) -> tuple[Parameters, Values]:
@@ -291,13 +169,9 @@ def design(
         craft, timing: The vehicle and the loop.
         failure: A rotor that is known to have failed, and since when.
     """
-    h, preferred = timing.period, preferred_tilts(craft)
-    rows = craft.wrench(preferred)
-    works = np.arange(1, len(craft.thrust) + 1) != failure.rotor
+    h = timing.period
     high = craft.limits[1]
     lag = timing.lag if keys.lag_model else 0.0
-    slope = side_slope(craft, rows)
-    angular, yaw_angular = _authority(craft, rows, preferred)
     greatest = float(high.sum()) / craft.mass
     lift = max(0.0, (greatest / craft.gravity) ** 2 - 1.0) ** 0.5
     tracking = min(TRACKING, keys.lead / lag) if lag else TRACKING
@@ -305,12 +179,11 @@ def design(
     sample = h * timing.sampled
     # The prediction removes most of the delay; its error grows with the delay.
     left = 1.0 / tracking + (0.6 * sample + 0.25 * latency if keys.prediction else sample + latency)
-    attitude = keys.attitude_bandwidth or min(
-        FASTEST[0], DELAY_MARGIN / left, (angular / ERROR) ** 0.5
-    )
-    position = keys.position_bandwidth or min(FASTEST[2], POSITION_SHARE * attitude)
     delay = 1.5 * sample + 1.0 / tracking + latency
-    yaw = min(FASTEST[1], attitude, (yaw_angular / ERROR) ** 0.5)
+    works = 1.0 * (np.arange(1, len(craft.thrust) + 1) != failure.rotor)
+    able = ability(keys, craft, left)
+    after = ability(keys, replace(craft, works=works), left, harmed=True) if failure.rotor else able
+    following = (2.5 * able.position, min(TORQUE_OBSERVER, 0.5 / delay), able.yaw)
     servo_angle, servo_rate = _servo_step(timing.servo, h)
     parameters = Parameters(
         period=h,
@@ -318,28 +191,19 @@ def design(
         **_rotor_step(timing, lag),
         predicts=float(keys.prediction),
         bounded=float(keys.bounded),
-        position=position,
+        **able._asdict(),
         damping=1.0,
         acceleration=min(20.0, 0.45 * craft.gravity * lift),
         descent=6.0,
         greatest=TOTAL_SHARE * greatest,
-        lean_time=1.5 / attitude if slope < 1.0 else 0.0,
-        attitude=attitude,
         attitude_damping=0.9,
-        yaw=yaw,
-        angular=angular,
-        yaw_angular=yaw_angular,
         reversal=lag + h if lag else 0.0,
         share=1.0 - exp(-tracking * h),
-        **_observers(keys.observer, (2.5 * position, min(TORQUE_OBSERVER, 0.5 / delay), yaw), h),
-        slope=slope,
-        cone=pose_cone(craft, rows, slope),
+        **_observers(keys.observer, following, h),
         hover=craft.hover,
         lever=max(0.02, float(craft.levers.mean())),
-        axis=tuple(free_axis(rows).tolist()),
-        axis_after=tuple(free_axis(rows * works).tolist()),
         failure=failure,
-        side_softness=3e-4 if len(craft.thrust) >= 6 else 1.0,
+        after=after,
         pull=min(1.0, keys.restoring * h),
         tilt_step=min(keys.max_tilt_rate, timing.servo_limits[0]) * h,
         tilt_range=keys.max_tilt,
@@ -352,5 +216,5 @@ def design(
     )
     numbers: list[Any] = [craft.thrust, craft.slowest, craft.fastest]
     if craft.commanded:
-        numbers.append(preferred)
+        numbers.append(preferred_tilts(craft))
     return parameters, tuple(float(value) for part in numbers for value in part)

@@ -172,10 +172,13 @@ def _allocated(known: Known, ahead: Ahead, goal: Any, usable: Any) -> tuple[Any,
         start, rates = _with_tilts(known, goal, (thrusts, low, high), usable)
         point = seen.tilt_commands + p.servo_lead * rates
         tilts = served(known, tilts, ahead.tilt_rates, point, usable)[0]
+    elif len(tilts):
+        tilts = tilts + p.period * seen.reference.tilt_rates
     rows = unit[:, None] * p.hover * wrench_map(seen.rotors, tilts)
-    made = rows @ thrusts
+    # A gait's tilts change the wrench by themselves, which the thrusts make good.
+    made = rows @ thrusts if free else unit * known.wrench(ahead.speeds, ahead.tilts)
     target = made + p.share * (unit * goal - made)
-    softness = xp.array([side, side, 1e-11, 1e-13, 1e-13, 1e-4 if free else 1e-12])
+    softness = xp.array([side, side, 1e-11, 1e-13, 1e-13, p.yaw_softness])
     none = 1e9 * (1.0 - p.bounded)
     found = bounded_least_squares(
         rows, target, softness, xp.ones(count), start, low - none, high + none

@@ -21,6 +21,22 @@ MOTION = 19
 """States of the modeled motion and its disturbance."""
 
 
+class Ability(NamedTuple):
+    """The part of `Parameters` that changes with the failure of a rotor."""
+
+    axis: Vector3
+    slope: float
+    cone: float
+    position: float
+    lean_time: float
+    attitude: float
+    yaw: float
+    angular: float
+    yaw_angular: float
+    side_softness: float
+    yaw_softness: float
+
+
 class Parameters(NamedTuple):
     """Numbers of the law, see `tiltsim_controllers.analysis.vectoring_design`."""
 
@@ -57,10 +73,11 @@ class Parameters(NamedTuple):
     cone: float  # rad, from level: of the poses that the side force holds; pi: of all
     hover: float  # N, thrust of a rotor
     lever: float  # m
-    axis: Vector3  # along which it pushes with fixed rotors or preferred tilts, ...
-    axis_after: Vector3  # ... and without the failed rotor
+    axis: Vector3  # along which it pushes with fixed rotors or preferred tilts
     failure: Failure
+    after: Ability  # without the failed rotor
     side_softness: float
+    yaw_softness: float  # at the tilts that the servos will have
     pull: float  # share of the way to the preferred inputs in a period
     tilt_step: float  # rad, in a period
     tilt_range: float  # rad, from the preferred tilts
@@ -167,8 +184,11 @@ def known_of(observed: Observed, p: Parameters) -> Known:
     rotors, table = len(observed.thrusts), xp.array(observed.table)
     works = working(observed.time, p.failure, rotors)
     harmed = observed.time >= p.failure.known_from
-    axis = xp.where(harmed, xp.array(p.axis_after), xp.array(p.axis))
-    p = p._replace(axis=axis, slope=xp.where(harmed, 0.0, p.slope))
+    able = {
+        name: xp.where(harmed, getattr(p.after, name), getattr(p, name))
+        for name in Ability._fields[1:]
+    }
+    p = p._replace(axis=xp.where(harmed, xp.array(p.after.axis), xp.array(p.axis)), **able)
     thrust, slowest, fastest = table[: 3 * rotors].reshape(3, rotors)
     return Known(
         observed._replace(rotors=observed.rotors.masked(works)),

@@ -26,7 +26,7 @@ from tiltsim.engines.callback import control_callback
 from tiltsim.equations.actuator_level import actuator_plant
 from tiltsim.errors import InputError
 from tiltsim.laws.assembling import LOOPS, assemble, loop_of
-from tiltsim.laws.layers.measured_acceleration import plant_angular_acceleration_of
+from tiltsim.laws.layers.measured_acceleration import plant_acceleration_of
 from tiltsim.laws.layers.on_equations import read_actuators
 from tiltsim.models.hover import hover_speeds
 from tiltsim.plants.factory import make_plant
@@ -84,14 +84,14 @@ def test_the_measurement_is_the_acceleration_that_mujoco_integrates(changes, tmp
     plant = make_plant(assemble(scenario(*tables, MEASURED)))
     loop, parameters = plant._loop, plant._setup.parameters
     _, wrench = read_actuators(loop.dynamics)
-    acceleration_of = plant_angular_acceleration_of(loop.dynamics)
+    acceleration_of = plant_acceleration_of(loop.dynamics)
     data, largest = plant.data, 0.0
     for _ in range(20):
         plant.advance(3)
         with control_callback(plant.callback):
             mujoco.mj_forward(plant.model, data)
         state, ctrl = (data.qpos.tolist(), data.qvel.tolist()), data.ctrl.tolist()
-        measured = acceleration_of(*state, ctrl, wrench(ctrl), parameters.layer)
+        measured = acceleration_of(*state, ctrl, wrench(ctrl), parameters.layer)[3:]
         np.testing.assert_allclose(measured, data.qacc[3:6], rtol=1e-9, atol=1e-9)
         largest = max(largest, *np.abs(measured))
     assert largest > 5.0
@@ -115,7 +115,7 @@ def test_the_measurement_is_the_acceleration_that_the_equations_integrate():
         plant.time, qpos, np.hstack([qvel, np.zeros(3)]), act, inner, setup.knots
     )
     loads = read_actuators(unmeasured.dynamics)[1](ctrl)
-    seen = plant_angular_acceleration_of(loop.dynamics)(qpos, qvel, ctrl, loads, layer)
+    seen = plant_acceleration_of(loop.dynamics)(qpos, qvel, ctrl, loads, layer)[3:]
     np.testing.assert_allclose(seen, rates[15:18], rtol=1e-12)
 
 

@@ -140,8 +140,15 @@ def test_a_swing_that_cannot_be_damped_is_refused(changes, words):
 
 
 def test_a_python_controller_damps_by_itself():
-    scenario = hanging(payload__swing_damping=0.5)
-    assert "observation.swing" in refusal(tiltsim.simulate, scenario, controller=lambda _: None)
+    seen = []
+
+    def resting(observation):
+        seen.append(observation.swing)
+        return tiltsim.Command(thrusts=[2.6] * 6)
+
+    scenario = hanging(payload__swing_damping=0.5, simulation__duration=0.01)
+    assert "swing_shift_x" not in tiltsim.simulate(scenario, controller=resting)
+    np.testing.assert_allclose(seen[0], [0.1, 0.0], atol=1e-12)
 
 
 @pytest.mark.slow

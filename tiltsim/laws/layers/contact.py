@@ -14,7 +14,8 @@ import numpy as np
 
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup
 from tiltsim.laws.layers.layer import Layer, Samples, wrap_loop
-from tiltsim.models.objects import CABLE_READING, COORDINATES, FORCE
+from tiltsim.models.cables import CABLE_READING
+from tiltsim.models.objects import CONTACT_READING, COORDINATES, FORCE
 from tiltsim.models.parts import ExtraActuators
 from tiltsim.vehicles.rotorcraft.others import CONTACT_FORCE, FELT, SWING, Others
 from tiltsim_controllers.code.arrays import xp
@@ -30,7 +31,7 @@ from tiltsim_controllers.mathematics.scalar import Values
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from tiltsim.scenario.scenario import FlightPlan
+    from tiltsim.scenario.scenario import FlightPlan, Scenario
     from tiltsim_controllers.mathematics.scalar import Floats
 
 FILTER: Final = 60.0
@@ -65,6 +66,16 @@ class ForceLoop(NamedTuple):
     gain: float  # 1/s
     proportional: float
     stiffness: float  # N/m, of the law within against an error of position
+
+
+class Impedance(NamedTuple):
+    """Parameters of a loop that gives the contact an impedance."""
+
+    push: Push
+    mass: float  # kg
+    damping: float  # N s/m
+    stiffness: float  # N/m
+    ahead: float  # m/N, of the reference for the commanded force
 
 
 @traceable
@@ -114,8 +125,53 @@ def with_force_loop(loop: ClosedLoop) -> ClosedLoop:
     return wrap_loop(loop, layer)
 
 
-def _push(scenario: Any) -> Push:
-    reference = scenario.reference
+@cache
+def with_impedance(loop: ClosedLoop) -> ClosedLoop:
+    """A law of position whose reference gives way to the error of the force along a push.
+
+    The reference is ahead by a shift s with ``mass s'' + damping s' + stiffness s = error``, and by
+    the way that a soft law needs for the commanded force.
+    """
+    inner_controls, first = loop.sampling.controls, loop.dynamics.sizes.act
+
+    @traceable
+    def controls(time: Any, qpos: Any, qvel: Any, act: Any, parameters: Any, knots: Any) -> Any:
+        own = parameters.layer
+        direction, commanded = xp.array(own.push.direction), commanded_force(time, own.push)
+        filtered, shift, speed = act[first], act[first + 1], act[first + 2]
+        along = shift + own.ahead * commanded
+        place = xp.hstack([qpos[:3] - along * direction, qpos[3:]])
+        moving = xp.hstack([qvel[:3] - speed * direction, qvel[3:]])
+        force = commanded - filtered - own.damping * speed - own.stiffness * shift
+        following = FILTER * (act[FELT.push_force] @ direction - filtered)
+        ctrl = inner_controls(time, place, moving, act, parameters.inner, knots)
+        return xp.hstack([ctrl, following, speed, force / own.mass])
+
+    layer = Layer(
+        "with_impedance",
+        Impedance,
+        _impedance,
+        controls=controls,
+        actuators=ExtraActuators(states=3),
+        initial_activations=lambda _plan, _own, _inner: (0.0,) * 3,
+        fields=("filtered_push_force", "push_shift", "push_shift_rate"),
+        units={"filtered_push_force": "N", "push_shift": "m", "push_shift_rate": "m/s"},
+        of_controller=True,
+    )
+    return wrap_loop(loop, layer)
+
+
+def _impedance(plan: FlightPlan) -> Impedance:
+    """A law that is soft itself is in series with the shift, which has to be stiffer for it."""
+    table: Any = plan.scenario.reference
+    own, softness = table.impedance, table.softness(plan.scenario)
+    stiffness = own.stiffness / (1.0 - own.stiffness * softness)
+    return Impedance(push_of(plan.scenario), own.mass, own.damping, stiffness, softness)
+
+
+def push_of(scenario: Scenario) -> Push:
+    """The push of a scenario's reference."""
+    reference: Any = scenario.reference
     if reference.type != "push":
         return Push()
     touch = reference.touch(scenario)
@@ -129,7 +185,7 @@ def _force_loop(plan: FlightPlan) -> ForceLoop:
     assert stiffness is not None  # else the scenario is refused
     mass = scenario.any_rotorcraft.resolve().mass
     gains = reference.gain, reference.proportional_gain
-    return ForceLoop(_push(scenario), *gains, mass * stiffness)
+    return ForceLoop(push_of(scenario), *gains, mass * stiffness)
 
 
 @cache
@@ -190,7 +246,7 @@ def with_objects(loop: ClosedLoop, others: Others) -> ClosedLoop:
 def _among(plan: FlightPlan) -> Among:
     scenario, load = plan.scenario, plan.scenario.payload
     attachment = (0.0, 0.0, 0.0) if load is None else load.attachment
-    return Among(scenario.simulation.timestep, _push(scenario), attachment)
+    return Among(scenario.simulation.timestep, push_of(scenario), attachment)
 
 
 def _derive(
@@ -279,9 +335,10 @@ def _observed(others: Others, size: int, readings: int) -> Callable[..., Values]
             if joint == "free":
                 pose = xp.hstack([pose[:3], euler_angles(pose[3:])])
             parts, at = [*parts, pose], at + COORDINATES[joint]
-        if others.hangs:
-            tension = readings + others.readings - CABLE_READING + FORCE
-            parts += [act[at : at + 3], act[tension : tension + 1]]
+        tension = readings + CONTACT_READING * len(others.names) + FORCE
+        tensions = act[tension::CABLE_READING]  # of the load's cable first
+        parts += [act[at : at + 3]] if others.hangs else []
+        parts += [tensions] if others.hangs or others.cables else []
         return xp.hstack(parts) if parts else act[:0]
 
     return observed

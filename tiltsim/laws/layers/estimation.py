@@ -14,10 +14,10 @@ import numpy as np
 
 from tiltsim.closed_loop.loop import ClosedLoop
 from tiltsim.laws.layers.actuation import along_line
+from tiltsim.laws.layers.instruments import instruments_of
 from tiltsim.laws.layers.layer import Layer, wrap_loop
 from tiltsim.laws.vehicle_loop import parts
 from tiltsim.models.parts import ExtraActuators
-from tiltsim.scenario.instruments import INSTRUMENTS
 from tiltsim.scenario.scenario import FlightPlan, Scenario
 from tiltsim.vehicles.rotorcraft.layout import QW, TILT_1, TILT_RATE_1
 from tiltsim_controllers.code.arrays import xp
@@ -128,21 +128,20 @@ class Fusion(NamedTuple):
 
 def fusion_of(scenario: Scenario) -> Fusion:
     """The instruments of a scenario with an estimator."""
-    sensors, timestep = scenario.sensors, scenario.simulation.control_timestep
-    rotors, first, found = scenario.any_rotorcraft.rotor_count, 0, {}
-    for name in INSTRUMENTS:
-        table = getattr(sensors, name)
-        if table is not None:
-            size = rotors if name == "rotor_speed" else len(table.columns)
-            found[name] = first, size, ceil(table.delay / timestep - 1e-6)
-            first += size + 1
-    late, used = found["imu"][2], {name: found[name] for name in CORRECTIONS if name in found}
-    horizon = max(late, *(delay for _, _, delay in used.values()))
+    sensors, timestep = scenario.sensors.instruments, scenario.simulation.control_timestep
+    delays = {name: ceil(table.delay / timestep - 1e-6) for name, table in sensors.items()}
+    places, size = {}, 0
+    for each in instruments_of(scenario):
+        places[each.name] = size, len(each.units)
+        size += len(each.columns)
+    used = [name for name in CORRECTIONS if name in sensors]
+    horizon, late = max(delays[name] for name in ("imu", *used)), delays["imu"]
     correctors = tuple(
-        Corrector(name, size, place, horizon - delay)
-        for name, (place, size, delay) in used.items()
+        Corrector(name, count, place, horizon - delays[name])
+        for name in used
+        for place, count in [places[name]]
     )
-    return Fusion(first, found["imu"][0], horizon - late, late, correctors)
+    return Fusion(size, places["imu"][0], horizon - late, late, correctors)
 
 
 @cache

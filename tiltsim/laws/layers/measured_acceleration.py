@@ -36,39 +36,62 @@ def motion_record(dynamics: Dynamics) -> Any:
         mechanics=mechanics_record(rotors_record(dynamics), tilts),
         least_thrust=float,  # (rad/s)^2, limits of the thrusts' controls
         greatest_thrust=float,
-        gyroscopic=float,  # factor of the gyroscopic torque, 0 on the thesis plant
+        gyroscopic=float,  # factor of this torque, 0 of tilting vehicles on the thesis plant
         pod_inertias=vector_of(tilts),  # kg m^2, about the hinges; 0 of massless pods
         turning=Body,  # the body that turns where pods and the servos' armatures give way
     )
 
 
 @cache
-def plant_angular_acceleration_of(dynamics: Dynamics) -> Callable[..., Any]:
-    """The angular acceleration (rad/s^2, body axes), shape (3,), of a simulated vehicle.
+def plant_acceleration_of(dynamics: Dynamics) -> Callable[..., Any]:
+    """The accelerations of a simulated vehicle by all forces but gravity, shape (6,).
 
     It is ``(qpos, qvel, ctrl, loads, motion) -> acceleration``: MuJoCo's vectors, the loads of air
-    and spinning rotors, and a `motion_record`. Euler's equation with the momentum of the pods, ``I
-    omega' + sum J alpha_i'' a_i + omega x (I omega + sum J alpha_i' a_i) = torque``, and for each
-    hinge with the servo's armature ``A`` ``(J + A) alpha_i'' + J a_i . omega' = servo torque``.
-    Impacts on stops or ground are left out.
+    and spinning rotors, and a `motion_record`. In body axes, first the acceleration of the center
+    of mass (m/s^2), then the angular one (rad/s^2) by Euler's equation with the momentum of the
+    pods, ``I omega' + sum J alpha_i'' a_i + omega x (I omega + sum J alpha_i' a_i) = torque``, and
+    for each hinge with the servo's armature ``A`` ``(J + A) alpha_i'' + J a_i . omega' = servo
+    torque``. Impacts on stops or ground are left out.
     """
     layout, tilted = layout_of(dynamics), tilt_of_rotor(dynamics)
 
     @traceable
-    def plant_angular_acceleration(qpos: Any, qvel: Any, ctrl: Any, loads: Any, motion: Any) -> Any:
+    def plant_acceleration(qpos: Any, qvel: Any, ctrl: Any, loads: Any, motion: Any) -> Any:
         own, pods = motion.mechanics, motion.pod_inertias
         craft, omega, tilts = craft_of(own.vehicle, tilted), qvel[3:6], qpos[TILT_1:]
         tilt_rates = qvel[TILT_RATE_1 : TILT_RATE_1 + layout.tilts]
         thrusts = xp.clip(ctrl[layout.thrusts], motion.least_thrust, motion.greatest_thrust)
         # The controls are s varpi |varpi| with the spins s, the map's factors are without s.
-        turned = wrench_map(craft.rotors, tilts)[3:] @ (xp.array(dynamics.spins) * thrusts)
-        torque = turned + loads[3:6]
+        turned = wrench_map(craft.rotors, tilts) @ (xp.array(dynamics.spins) * thrusts)
+        wrench = turned + loads[:6]
         momentum = inertia_matrix(craft.body) @ omega + (pods * tilt_rates) @ craft.hinges
         servos = servo_accelerations(craft, ctrl, thrusts, tilts, tilt_rates, loads, own)
-        remaining = torque - motion.gyroscopic * cross(omega, momentum)
-        return inverse_inertia_matrix(motion.turning) @ (remaining - (pods * servos) @ craft.hinges)
+        remaining = wrench[3:] - motion.gyroscopic * cross(omega, momentum)
+        turning = inverse_inertia_matrix(motion.turning)
+        angular = turning @ (remaining - (pods * servos) @ craft.hinges)
+        return xp.hstack([wrench[:3] / craft.body.mass, angular])
 
-    return plant_angular_acceleration
+    return plant_acceleration
+
+
+def read_motion(plan: FlightPlan, dynamics: Dynamics) -> Any:
+    """The `motion_record` of a planned flight."""
+    scenario = plan.scenario
+    plant, vehicle = scenario.simulation.plant, scenario.any_rotorcraft
+    least, greatest = rotor_limits(scenario).thrust_range or (-inf, inf)
+    tilts = layout_of(dynamics).tilts
+    hinges = vehicle.hinge_inertias[:tilts]
+    pods = vehicle.pod_inertias[:tilts] if plant == "mujoco" else (0.0,) * tilts
+    # The share of a pod that its reaction turns; the rest of the hinge is the servo's armature.
+    carried = tuple(pod * (pod / hinge) for pod, hinge in zip(pods, hinges, strict=True))
+    return motion_record(dynamics)(
+        mechanics=mechanics(plan),
+        least_thrust=least,
+        greatest_thrust=greatest,
+        gyroscopic=float(plant != "thesis" or scenario.vehicle.model == "quadrotor"),
+        pod_inertias=pods,
+        turning=body_less(scenario, carried),
+    )
 
 
 @cache
@@ -77,33 +100,23 @@ def with_measured_acceleration(loop: ClosedLoop) -> ClosedLoop:
 
     It goes around all other layers, whose controls move the plant.
     """
-    inner_controls = loop.sampling.controls
-    dynamics, record = loop.dynamics, motion_record(loop.dynamics)
+    inner_controls, dynamics = loop.sampling.controls, loop.dynamics
     _, loads = read_actuators(dynamics)
-    plant_angular_acceleration = plant_angular_acceleration_of(dynamics)
-
-    def read(plan: FlightPlan) -> Any:
-        scenario = plan.scenario
-        plant, vehicle = scenario.simulation.plant, scenario.any_rotorcraft
-        least, greatest = rotor_limits(scenario).thrust_range or (-inf, inf)
-        hinges = vehicle.hinge_inertias[: layout_of(dynamics).tilts]
-        pods = vehicle.pod_inertias if plant == "mujoco" else (0.0,) * len(hinges)
-        # The share of a pod that its reaction turns; the rest of the hinge is the servo's armature.
-        carried = tuple(pod * (pod / hinge) for pod, hinge in zip(pods, hinges, strict=True))
-        return record(
-            mechanics=mechanics(plan),
-            least_thrust=least,
-            greatest_thrust=greatest,
-            gyroscopic=float(plant != "thesis"),
-            pod_inertias=pods,
-            turning=body_less(scenario, carried),
-        )
+    plant_acceleration = plant_acceleration_of(dynamics)
 
     @traceable
     def controls(time: Any, qpos: Any, qvel: Any, act: Any, parameters: Any, knots: Any) -> Any:
         inner = parameters.inner
         ctrl = inner_controls(time, qpos, xp.hstack([qvel, xp.zeros(3)]), act, inner, knots)
-        measured = plant_angular_acceleration(qpos, qvel, ctrl, loads(ctrl), parameters.layer)
+        measured = plant_acceleration(qpos, qvel, ctrl, loads(ctrl), parameters.layer)[3:]
         return inner_controls(time, qpos, xp.hstack([qvel, measured]), act, inner, knots)
 
-    return wrap_loop(loop, Layer("with_measured_acceleration", record, read, controls=controls))
+    return wrap_loop(
+        loop,
+        Layer(
+            "with_measured_acceleration",
+            motion_record(dynamics),
+            lambda plan: read_motion(plan, dynamics),
+            controls=controls,
+        ),
+    )

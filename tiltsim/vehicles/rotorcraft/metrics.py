@@ -49,6 +49,7 @@ def rotorcraft_metrics(
         **_attitude_metrics(columns, scenario),
         "min_rotor_speed": spins.min(axis=(0, -1)),
         "max_rotor_speed": spins.max(axis=(0, -1)),
+        "rms_rotor_acceleration": _rms_change(time, spins),
         **_altitude_metrics(time, columns["z_ref"] - columns["z"]),
         **_singular_zone_metrics(columns),
         "max_tilt_rate": largest(rates) if rates else np.zeros(spins.shape[1:-1]),
@@ -57,6 +58,15 @@ def rotorcraft_metrics(
         **_contact_metrics(columns, in_last_second(time, scenario.simulation.timestep)),
         **saturation_metrics(time, saturated),
     }
+
+
+def _rms_change(time: Floats, speeds: Floats) -> Any:
+    """Root mean square of the rates (rad/s^2) of speeds (rotors, ..., N); NaN of one sample."""
+    if len(time) < 2:
+        return np.full(speeds.shape[1:-1], np.nan)
+    rates = np.diff(speeds, axis=-1) / np.diff(time)
+    # By rotor, so that the order of the sum does not depend on the number of flights.
+    return np.sqrt(sum(np.mean(rate * rate, axis=-1) for rate in rates) / len(rates))
 
 
 def _position_metrics(
@@ -143,8 +153,10 @@ def _contact_metrics(columns: Mapping[str, Floats], last_second: Any) -> dict[st
     if "peak_contact_force" in columns:
         metrics["peak_force"] = columns["peak_contact_force"][..., -1]
         metrics["time_in_contact"] = columns["contact_time"][..., -1]
+    tensions = [column for name, column in columns.items() if name.endswith("_tension")]
+    if tensions:
+        metrics["max_cable_tension"] = np.max(tensions, axis=(0, -1))
     if "cable_tension" in columns:
-        metrics["max_cable_tension"] = columns["cable_tension"].max(axis=-1)
         swing = np.hypot(*(columns[name] for name in SWING))
         metrics["max_swing"] = swing.max(axis=-1)
         metrics["final_swing"] = np.compress(last_second, swing, axis=-1).max(axis=-1)

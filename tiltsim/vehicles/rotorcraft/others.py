@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from tiltsim.models.objects import CABLE_READING, CONTACT_READING, COORDINATES, FORCE
+from tiltsim.models.cables import CABLE_READING
+from tiltsim.models.objects import CONTACT_READING, COORDINATES, FORCE
 from tiltsim.scenario.interaction import objects_of
 from tiltsim_controllers.mathematics.attitude import rotation_matrix
 
@@ -47,6 +48,7 @@ class Others(NamedTuple):
     names: tuple[str, ...] = ()
     joints: tuple[str, ...] = ()
     hangs: bool = False  # a load on a cable
+    cables: tuple[str, ...] = ()
     pushed: int = -1  # the object that the reference pushes, -1 for none
 
     @property
@@ -57,7 +59,7 @@ class Others(NamedTuple):
     @property
     def readings(self) -> int:
         """Numbers in the memories of the sensors."""
-        return CONTACT_READING * len(self.names) + CABLE_READING * self.hangs
+        return CONTACT_READING * len(self.names) + CABLE_READING * (self.hangs + len(self.cables))
 
     @property
     def columns(self) -> dict[str, str]:
@@ -69,7 +71,8 @@ class Others(NamedTuple):
             elif joint == "free":
                 columns |= {f"{name}_{axis}": "m" for axis in "xyz"}
                 columns |= {f"{name}_{angle}": "rad" for angle in ("roll", "pitch", "yaw")}
-        return columns | (LOAD_COLUMNS if self.hangs else {})
+        columns |= LOAD_COLUMNS if self.hangs else {}
+        return columns | {f"{name}_tension": "N" for name in self.cables}
 
     def force_places(self, index: int) -> slice:
         """Where the force of an object is among the sensors' readings."""
@@ -85,7 +88,9 @@ def others_of(scenario: Scenario) -> Others:
     names = tuple(body.name for body in objects.bodies)
     reference = scenario.reference
     pushed = names.index(reference.object) if reference.type == "push" else -1
-    return Others(names, tuple(body.joint for body in objects.bodies), objects.hangs, pushed)
+    joints = tuple(body.joint for body in objects.bodies)
+    cables = tuple(cable.name for cable in objects.cables)
+    return Others(names, joints, objects.hangs, cables, pushed)
 
 
 def motion_at_start(plan: FlightPlan) -> tuple[Vector, Vector]:

@@ -40,7 +40,8 @@ def body_less(scenario: Scenario, inertias: Values) -> Body:
             axis = next(rotor.hinge_axis for rotor in vehicle.rotors if rotor.tilt == tilt)
             inertia -= own * np.outer(axis, axis)
         return body_of(vehicle.mass, inertia, vehicle.gravity)
-    about_x, about_y = (2.0 * own for own in inertias[:2])  # two hinges lie along each
+    # two hinges lie along each axis; a quadrotor has none
+    about_x, about_y = (2.0 * own for own in inertias[:2] or (0.0, 0.0))
     return principal_body(
         vehicle._replace(
             inertia_xx=vehicle.inertia_xx - about_x, inertia_yy=vehicle.inertia_yy - about_y

@@ -283,8 +283,8 @@ def _plane_figure(results: SweepResults, _metrics: tuple[str, ...]) -> Figure:
         axes.set(title=title, xlabel=label_of(results, plot.x), ylabel=label_of(results, plot.y))
         handles, labels = axes.get_legend_handles_labels()
         if any(labels):
-            title = _legend_title(results, plot.lines)
-            axes.legend(handles, labels, title=title, alignment="left")
+            lines = _legend_title(results, plot.lines)
+            axes.legend(handles, labels, title=lines, alignment="left")
         if np.isnan(holds[mask]).all():  # an empty panel: as wide as the others
             axes.plot([seen.min(), seen.max()], [seen.min(), seen.max()], alpha=0.0)
     for axes in grid.flat[len(columns) :]:

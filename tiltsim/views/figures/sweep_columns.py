@@ -47,7 +47,10 @@ def text_of(value: Any) -> str:
     """A value as text for figures."""
     if isinstance(value, list):
         return "(" + ", ".join(map(text_of, value)) + ")"
-    return f"{value:g}" if isinstance(value, float | int) else verbatim(str(value))
+    if isinstance(value, float | int):
+        return f"{value:g}"
+    text = str(value)
+    return verbatim(text.replace("_", " ") if text.isidentifier() else text)
 
 
 def label_of(results: SweepResults, name: str) -> str:

@@ -11,7 +11,15 @@ import rerun.blueprint as rrb
 from tiltsim.flight.flight import Flight
 from tiltsim.system.text import Quantity
 from tiltsim.views.attitude_plane import MOVING_TRAIL_TIME, curve_is_constant
-from tiltsim.views.replay import camera_of, positions, reference_path, thrust_scale, vehicle_radius
+from tiltsim.views.replay import (
+    camera_of,
+    positions,
+    prefixes,
+    reference_path,
+    seen_radius,
+    thrust_scale,
+    vehicle_radius,
+)
 from tiltsim.views.rerun.flight_recorder import FlightRecorder, plotted_lines
 from tiltsim.views.rerun.plane import BOUND
 from tiltsim.views.rerun.scene import REFERENCE_POINTS, ground_height
@@ -74,7 +82,7 @@ def _end_of(recorders: Sequence[FlightRecorder], flights: Sequence[Flight]) -> f
 
 def _vehicle_view(one: FlightRecorder) -> rrb.View:
     """The vehicle at close range; the camera moves with it but does not rotate."""
-    radius = vehicle_radius(one.model)
+    radius = seen_radius(one.scenario, one.model)
     arrows = f"thrust arrows: {100.0 * thrust_scale(one.model):g} cm per newton"
     pose = camera_of(one.scenario)
     eye = NEARER * radius * pose.distance * pose.away
@@ -93,11 +101,13 @@ def _trajectory_view(recorders: Sequence[FlightRecorder], flights: Sequence[Flig
     """The complete paths of all vehicles and references."""
     contents = []
     for one in recorders:
-        contents += [f"{one.scene.root}/trail", f"{one.scene.root}/reference/**"]
+        contents += [*one.scene.trails, f"{one.scene.root}/reference/**"]
+        contents += [f"{one.scene.root}/{each.name}_vehicle/**" for each in one.scenario.companion]
         contents += [f"{one.scene.vehicle}/**", f"{one.scene.camera}/**"]
     first = recorders[0]
     paths = [reference_path(first.assembly, _end_of(recorders, flights), REFERENCE_POINTS)]
-    known = np.concatenate([*paths, *(positions(flight.columns) for flight in flights)])
+    tracks = [positions(f.columns, p) for f in flights for p in prefixes(f.scenario)]
+    known = np.concatenate([*paths, *tracks])
     low, high = np.quantile(known, 0.02, axis=0), np.quantile(known, 0.98, axis=0)
     size = max(float((high - low).max()), 6.0 * vehicle_radius(first.model))
     middle, above = 0.5 * (low + high), np.array([0.0, 0.0, 1.0])
@@ -231,7 +241,7 @@ def _plot(
 
 
 def _trails(recorders: Sequence[FlightRecorder]) -> dict[str, rrb.VisibleTimeRanges]:
-    return {f"{one.scene.root}/trail": _from_the_start() for one in recorders}
+    return {trail: _from_the_start() for one in recorders for trail in one.scene.trails}
 
 
 def _from_the_start() -> rrb.VisibleTimeRanges:

@@ -62,12 +62,17 @@ class Scene:
         self._floor = f"{root}/floor"  # moves with the vehicle in whole cells
         self._paths = body_paths(model, root)
         self.vehicle = self._paths[replay.first_free_body(model)]
-        self._trail = Trail(TRAIL_INTERVAL)
+        self._trails = {p: Trail(TRAIL_INTERVAL) for p in replay.prefixes(assembly.scenario)}
         self._thrust = replay.thrust_sites(model)
         self._thrust_scale = replay.thrust_scale(model)
         self._floor_cell: Floats | None = None
         self.not_drawn = log_geometry(recording, model, root)  # geoms that Rerun cannot draw
         self._log_styles(name)
+
+    @property
+    def trails(self) -> list[str]:
+        """The entities of the trails of all vehicles, the first one's first."""
+        return [f"{self.root}/{prefix}trail" for prefix in self._trails]
 
     def _log_styles(self, name: str) -> None:
         """Log static parts, and the looks of moving ones; ``name`` is the vehicle's label."""
@@ -79,10 +84,11 @@ class Scene:
                 pose = rr.Transform3D(translation=translation, quaternion=quaternion)
                 self._log(self._paths[body], pose)
         cable = rr.LineStrips3D.from_fields(colors=[timeline.GREY], radii=[TRAIL_WIDTH])
-        if "cable_tension" in self._assembly.loop.units:
-            self._log(f"{self.root}/cable", cable)
+        for tendon in range(model.ntendon):
+            self._log(f"{self.root}/{model.tendon(tendon).name}", cable)
         trail = rr.LineStrips3D.from_fields(colors=[self._color], radii=[TRAIL_WIDTH])
-        self._log(f"{self.root}/trail", trail)
+        for path in self.trails:
+            self._log(path, trail)
         look: dict[str, Any] = {"colors": [timeline.YELLOW]}
         look["radii"] = [0.02 * replay.vehicle_radius(model)]
         for site in self._thrust:
@@ -114,16 +120,17 @@ class Scene:
             vectors = np.outer(columns[column] * self._thrust_scale, axis).astype(np.float32)
             arrow = rr.Arrows3D.columns(vectors=vectors)
             send_rows(self._recording, self._thrust_path(site), time, arrow)
-        if "cable_tension" in columns:
-            cable = rr.LineStrips3D.columns(strips=replay.cable(model, world).astype(np.float32))
-            send_rows(self._recording, f"{self.root}/cable", time, cable)
+        for name, ends in replay.cables(piece.scenario, model, world, time).items():
+            strips = rr.LineStrips3D.columns(strips=ends.astype(np.float32))
+            send_rows(self._recording, f"{self.root}/{name}", time, strips)
         position = world.position[:, replay.first_free_body(model)]
         follow = rr.Transform3D.columns(translation=position.astype(np.float32))
         send_rows(self._recording, self.camera, time, follow)
-        ends, segments = self._trail.extend(time, position)
-        if len(ends):
-            strips = rr.LineStrips3D.columns(strips=segments.astype(np.float32))
-            send_rows(self._recording, f"{self.root}/trail", ends, strips)
+        for path, (prefix, trail) in zip(self.trails, self._trails.items(), strict=True):
+            ends, segments = trail.extend(time, replay.positions(columns, prefix))
+            if len(ends):
+                strips = rr.LineStrips3D.columns(strips=segments.astype(np.float32))
+                send_rows(self._recording, path, ends, strips)
         # The grid moves by whole cells, so that it appears fixed and infinite.
         cells = FLOOR_CELL * np.round(position * (1.0, 1.0, 0.0) / FLOOR_CELL)
         before = cells[:1] + 1.0 if self._floor_cell is None else self._floor_cell[np.newaxis]

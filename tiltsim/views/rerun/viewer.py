@@ -5,10 +5,12 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import redirect_stdout
+from functools import partial
 from io import StringIO
 from pathlib import Path
+from tempfile import TemporaryFile
 from time import monotonic, sleep
 from typing import TYPE_CHECKING, Any, Final
 
@@ -24,6 +26,7 @@ if TYPE_CHECKING:
 
 RECORDING_START: Final = b"RRF"  # first bytes of every recording; the version follows
 START_TIME: Final = 20.0  # time (s) that the viewer may take to start
+SETTLING: Final = 1.0  # time (s) within which a viewer without a usable screen ends
 
 
 def view(flights: Flight | Sequence[Flight], *, url: str | None = None) -> Any:
@@ -108,24 +111,41 @@ def view_recordings(paths: Sequence[Path]) -> None:
         if start != RECORDING_START:
             raise InputError(f"{path}: not a Rerun recording")
     require_viewer(None)
-    _open_viewer(*(str(path.absolute()) for path in paths))
+    _open_viewer(*(str(path.absolute()) for path in paths), until=lambda: True)
 
 
-def _open_viewer(*arguments: str) -> None:
-    """Start the viewer in a separate process; it listens to programs of this machine only."""
+def _open_viewer(*arguments: str, until: Callable[[], bool]) -> None:
+    """Start the viewer, which listens to programs of this machine only, and wait for it.
+
+    Raises:
+        InputError: If it does not start or ends at once, with the last line that it wrote.
+    """
     import rerun_cli
 
     program = Path(rerun_cli.__file__).with_name("rerun")
     program = program.with_suffix(".exe") if sys.platform == "win32" else program
-    try:
-        subprocess.Popen(
-            [str(program), "--bind", "127.0.0.1", *arguments],
-            env={**os.environ, "RERUN_APP_ONLY": "true"},
-            stdout=subprocess.DEVNULL,
-            start_new_session=True,
-        )
-    except OSError as error:
-        raise InputError(f"the Rerun viewer did not start: {error.strerror}") from error
+    with TemporaryFile() as said:
+        try:
+            process = subprocess.Popen(
+                [str(program), "--bind", "127.0.0.1", *arguments],
+                env={**os.environ, "RERUN_APP_ONLY": "true"},
+                stdout=subprocess.DEVNULL,
+                stderr=said,
+                start_new_session=True,
+            )
+        except OSError as error:
+            raise InputError(f"the Rerun viewer did not start: {error.strerror}") from error
+        began, ready = monotonic(), float("inf")
+        while monotonic() < ready + SETTLING:
+            if process.poll():
+                said.seek(0)
+                reason = said.read().decode(errors="replace").strip().rpartition("\n")[2]
+                raise InputError(f"the Rerun viewer ended at once: {reason or process.returncode}")
+            if ready == float("inf") and until():
+                ready = monotonic()
+            elif ready == float("inf") and monotonic() > began + START_TIME:
+                raise InputError(f"the Rerun viewer did not start within {START_TIME:g} s")
+            sleep(0.05)
 
 
 def attach_viewer(recording: rr.RecordingStream, url: str | None, blueprint: rrb.Blueprint) -> None:
@@ -133,10 +153,6 @@ def attach_viewer(recording: rr.RecordingStream, url: str | None, blueprint: rrb
     if url is None:
         url = DEFAULT_URL
         if not viewer_listens(url):
-            _open_viewer("--hide-welcome-screen", "--expect-data-soon")
-            deadline = monotonic() + START_TIME
-            while not viewer_listens(url):
-                if monotonic() > deadline:
-                    raise InputError(f"the Rerun viewer did not start within {START_TIME:g} s")
-                sleep(0.05)
+            options = "--hide-welcome-screen", "--expect-data-soon"
+            _open_viewer(*options, until=partial(viewer_listens, url))
     recording.connect_grpc(url, default_blueprint=blueprint)

@@ -15,6 +15,7 @@ import numpy as np
 from PIL import Image as Pillow
 
 from tiltsim.flight.flight import Flight
+from tiltsim.models.cables import switch
 from tiltsim.system.files import replacing
 from tiltsim.views import replay
 from tiltsim.views.replay import CameraPose, vehicle_radius
@@ -113,19 +114,24 @@ class FlightRenderer:
         self._targets = replay.reference_positions(flight.columns)
         self._position = replay.positions(flight.columns)
         self._overlay = Overlay(flight, self._video.height)
+        self._cables = [table.cable for table in flight.scenario.cable]
         self._camera = mujoco.MjvCamera()
         self._camera.type = mujoco.mjtCamera.mjCAMERA_TRACKING
         self._camera.trackbodyid = replay.first_free_body(self._model)
         pose = self._video.camera or replay.camera_of(flight.scenario)
-        self._camera.distance = pose.distance * self._radius
+        near = replay.seen_radius(flight.scenario, self._model)
+        self._camera.distance = pose.distance * (self._radius if self._video.camera else near)
+        self._model.tendon_width[:] = 0.002 * self._camera.distance  # some two pixels
         self._camera.azimuth, self._camera.elevation = pose.azimuth, pose.elevation
 
     def frame(self, sample: int) -> Image:
         """The frame of a sample."""
         model, data = self._model, self._data
         data.qpos = self._qpos[sample]
+        switch(model, self._cables, float(self._flight["time"][sample]))
         mujoco.mj_kinematics(model, data)
         mujoco.mj_comPos(model, data)
+        mujoco.mj_tendon(model, data)
         mujoco.mj_camlight(model, data)
         self.canvas.compose(data, self._camera)
         for site, column in replay.thrust_sites(model).items():

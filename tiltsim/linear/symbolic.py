@@ -4,8 +4,10 @@ from collections.abc import Callable, Mapping
 from os import PathLike
 from typing import Any, NamedTuple
 
+from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.errors import InputError, TiltsimError
 from tiltsim.laws.assembling import assemble
+from tiltsim.linear.coordinates import entry_names, equation_coordinates, equation_inputs
 from tiltsim.plants.flight_model import disturbance_acceleration
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.scenario import Scenario
@@ -25,6 +27,9 @@ class Symbolic(NamedTuple):
         closed_loop: ``(time, state) -> rates``.
         sample: ``(time, state) -> sample``: the fields of a recorded sample after its time.
         initial: State at time zero.
+        states: Names of the state's entries; a rotation has four of a quaternion, or nine of its
+            matrix, rows first.
+        inputs: Names of the inputs' entries; empty for one that changes nothing.
         fields: Names of the sample's entries.
     """
 
@@ -33,7 +38,18 @@ class Symbolic(NamedTuple):
     closed_loop: Any
     sample: Any
     initial: tuple[float, ...]
+    states: tuple[str, ...]
+    inputs: tuple[str, ...]
     fields: tuple[str, ...]
+
+
+def _input_names(assembly: Assembly, size: int) -> tuple[str, ...]:
+    """Names of the inputs of equations; a thrust is among them as a squared speed."""
+    names = [""] * size
+    for found in equation_inputs(assembly, size):
+        scaled = found.per_unit != 1.0
+        names[found.place] = found.name.replace("thrust", "squared_speed" if scaled else "thrust")
+    return tuple(names)
 
 
 def symbolic(scenario: Scenario | str | PathLike[str] | Mapping[str, Any]) -> Symbolic:
@@ -85,5 +101,7 @@ def symbolic(scenario: Scenario | str | PathLike[str] | Mapping[str, Any]) -> Sy
         function(closed_loop, "rates"),
         function(sample, "sample"),
         initial,
+        entry_names(equation_coordinates(assembly, len(initial))),
+        _input_names(assembly, equations.inputs_size),
         assembly.loop.sample_fields[1:],
     )

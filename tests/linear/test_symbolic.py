@@ -51,6 +51,21 @@ def test_symbolic_closed_loops_agree_with_python(name):
         model.sample(0.037, state).full().ravel(), sample, rtol=1e-12, atol=1e-12
     )
     assert len(model.fields) == len(sample)
+    assert len({*model.states}) == len(model.initial)
+    assert len(model.inputs) == len(inputs)
+
+
+def test_names_say_where_states_and_inputs_are():
+    model = tiltsim.symbolic({**THESIS, "controller": EXACT})
+    state = np.array(model.initial)
+    assert (
+        state[model.states.index("rotor_speed_2")]
+        == model.sample(0.0, state)[model.fields.index("rotor_speed_2")]
+    )
+    push = np.zeros(len(model.inputs))
+    push[model.inputs.index("rotor_acceleration_2")] = 7.0
+    rates = model.dynamics(0.0, state, push).full().ravel()
+    assert rates[model.states.index("rotor_speed_2")] == 7.0
 
 
 def test_the_symbolic_jacobian_has_the_poles_of_the_gains():

@@ -1,0 +1,201 @@
+"""Limits of a vehicle as `vectoring` sees it: forces, poses and torques that its rotors leave.
+
+Side force that needs no lean, and the poses that it holds, come from linear programs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+from math import atan, inf, pi
+from typing import Final
+
+import numpy as np
+
+from tiltsim_controllers.laws.full_pose import pose_rank
+from tiltsim_controllers.mathematics.scalar import Floats, Values
+from tiltsim_controllers.vehicle.effectiveness import (
+    ROTOR_FLOATS,
+    SPIN_SIGN,
+    force_and_torque,
+    tilt_of_rotor,
+)
+from tiltsim_controllers.vehicle.rotors import by_tilt, rotors_in, wrench_slope
+
+SIDE_SHARE: Final = 0.65
+"""Share of the greatest thrusts that side force may take."""
+SERVO_ANGLE: Final = 0.3
+"""rad: the tilt by which braking counts about an axis that only tilts turn."""
+DIRECTIONS: Final = 8
+"""Directions of side force in the linear programs."""
+
+
+@dataclass(frozen=True)
+class Craft:
+    """A vehicle as the design sees it, N rotors with M tilts.
+
+    Attributes:
+        table: Table of the rotors, per newton.
+        mass, gravity: kg, m/s^2.
+        inertia: kg m^2, shape (3, 3).
+        thrust: N s^2/rad^2, shape (N,).
+        slowest, fastest: rad/s, along the spin, shape (N,).
+        tilts: At the start, rad, shape (M,).
+        commanded: Whether the law commands the tilts.
+        moving: Whether a gait moves them.
+        levers: m, of the rotors from the center of mass, shape (N,).
+        works: 1 for a rotor that works, else 0, shape (N,).
+    """
+
+    table: Values
+    mass: float
+    gravity: float
+    inertia: Floats
+    thrust: Floats
+    slowest: Floats
+    fastest: Floats
+    tilts: Floats
+    commanded: bool
+    moving: bool
+    levers: Floats
+    works: Floats
+
+    @property
+    def hover(self) -> float:
+        """Thrust (N) of a rotor in hover, were all upward."""
+        return self.mass * self.gravity / len(self.thrust)
+
+    @property
+    def limits(self) -> tuple[Floats, Floats]:
+        """Least and greatest thrusts, N, shape (N,) each."""
+        low, high = (self.thrust * s * np.abs(s) for s in (self.slowest, self.fastest))
+        return low, high
+
+    def outputs(self, tilts: Floats) -> int:
+        """How many of the six outputs rotors and tilts move."""
+        spins = np.reshape(self.table, (len(self.thrust), ROTOR_FLOATS))[:, SPIN_SIGN]
+        return pose_rank(self.table, tilts, spins * self.works)
+
+    def wrench(self, tilts: Floats) -> Floats:
+        """Force and torque per newton, shape (6, N)."""
+        force, torque = force_and_torque(self.table, tilts[np.newaxis])
+        return np.vstack([force[0], torque[0]]) * self.works
+
+
+def preferred_tilts(craft: Craft) -> Floats:
+    """The gait's angles or level ones, whichever are farther from singular, rad, shape (M,)."""
+    if not craft.commanded:
+        return craft.tilts
+
+    def margin(tilts: Floats) -> float:
+        scale = np.repeat([1.0, 1.0 / float(craft.levers.mean())], 3)[:, np.newaxis]
+        rows = scale * craft.wrench(tilts)
+        sizes = [np.linalg.svd(part, compute_uv=False)[-1] for part in (rows, rows[2:])]
+        return float((sizes[0] if len(craft.thrust) >= 6 else 0.0) + 1e-3 * sizes[1])
+
+    return max((craft.tilts, np.zeros(len(craft.tilts))), key=margin)
+
+
+def side_slope(craft: Craft, rows: Floats) -> float:
+    """Side force per lift that level hover has in every direction within the limits.
+
+    Args:
+        craft: The vehicle.
+        rows: Force and torque per newton, shape (6, N).
+    """
+    if craft.moving:
+        return 0.0
+    if craft.commanded:
+        return 0.5 if craft.outputs(craft.tilts) == 6 else 0.0
+    weight = craft.mass * craft.gravity
+    angles = 2.0 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
+    sides = [np.array([np.cos(angle), np.sin(angle), 0.0]) for angle in angles]
+    most = np.minimum(SIDE_SHARE * craft.limits[1], 2.4 * craft.hover)
+    return 0.8 * least_force(craft, rows, sides, weight, most) / weight
+
+
+def pose_cone(craft: Craft, rows: Floats, slope: float) -> float:
+    """Angle (rad) from level of the poses that side force holds; pi where all are held.
+
+    Args:
+        craft: The vehicle.
+        rows: Force and torque per newton, shape (6, N).
+        slope: Result of `side_slope`.
+    """
+    weight, most = craft.mass * craft.gravity, SIDE_SHARE * craft.limits[1]
+    ways = [np.array(way) for way in product((-1.0, 0.0, 1.0), repeat=3) if any(way)]
+    units = [way / np.linalg.norm(way) for way in ways]
+    holds_all = slope > 0.0 and not craft.commanded
+    if holds_all and least_force(craft, rows, units, 0.0, most) > weight:
+        return pi
+    return atan(slope)
+
+
+def least_force(
+    craft: Craft, rows: Floats, ways: Sequence[Floats], lift: float, most: Floats
+) -> float:
+    """The least over some directions of the greatest force (N) without torque; 0 for none.
+
+    Args:
+        craft: The vehicle.
+        rows: Force and torque per newton, shape (6, N).
+        ways: Unit vectors of the directions, body axes.
+        lift: N, that the rotors make as well, along z.
+        most: Greatest thrusts, N, shape (N,).
+    """
+    from scipy.optimize import linprog  # a third of a second to import
+
+    if np.linalg.matrix_rank(rows, tol=1e-6) < 6:
+        return 0.0
+    bounds = [*zip(craft.limits[0], most, strict=True), (0, None)]
+    forces = []
+    for way in ways:
+        found = linprog(
+            np.array([*np.zeros(len(most)), -1.0]),
+            A_eq=np.column_stack([rows, [*-way, 0.0, 0.0, 0.0]]),
+            b_eq=lift * np.eye(6)[2],
+            bounds=bounds,
+        )
+        forces.append(-float(found.fun) if found.status == 0 else 0.0)
+    return min(forces)
+
+
+def sideways_limit(craft: Craft, rows: Floats) -> float:
+    """Bandwidth (rad/s) below which a lean pushes more than the torque that makes it.
+
+    A torque of canted rotors pushes sideways, at ``lever`` times the angular acceleration; a lean
+    of a vehicle without side force gives ``gravity / frequency^2`` times it.
+
+    Args:
+        craft: The vehicle.
+        rows: Force and torque per newton, shape (6, N).
+    """
+    made = np.linalg.pinv(rows[2:], rcond=1e-9)[:, 1:] @ craft.inertia / craft.mass
+    lever = float(np.linalg.norm(rows[:2] @ made, 2))
+    return inf if lever < 1e-9 else (craft.gravity / lever) ** 0.5
+
+
+def free_axis(rows: Floats) -> Floats:
+    """Unit axis of the force of the least thrusts that lift without torque, shape (3,)."""
+    up, torque = rows[2], rows[3:]
+    free = up - np.linalg.pinv(torque, rcond=1e-9) @ (torque @ up)
+    force = rows[:3] @ free
+    size = float(np.linalg.norm(force))
+    return force / size if size > 1e-9 else np.array([0.0, 0.0, 1.0])
+
+
+def authority(craft: Craft, rows: Floats, tilts: Floats) -> tuple[float, float]:
+    """Angular accelerations (rad/s^2) about x and y, and about z, that hover leaves.
+
+    By the thrusts; about an axis that only tilts turn, by these.
+    """
+    low, high = craft.limits
+    room = np.maximum(np.minimum(high - craft.hover, craft.hover - low), 0.05 * craft.hover)
+    turn = np.abs(rows[3:]) @ room / np.diag(craft.inertia)
+    if craft.commanded:
+        rotors = rotors_in(craft.table, 0, tilt_of_rotor(craft.table))
+        slopes = np.abs(by_tilt(rotors, wrench_slope(rotors, tilts)))[3:]
+        turning = SERVO_ANGLE * craft.hover * slopes.sum(axis=1) / np.diag(craft.inertia)
+        turn = np.where(turn < 0.1 * turn.max(), np.maximum(turn, turning), turn)
+    return min(500.0, float(turn[:2].min())), min(350.0, float(turn[2]))

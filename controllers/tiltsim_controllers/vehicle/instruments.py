@@ -1,0 +1,117 @@
+"""Instruments on a vehicle: their readings and the errors of these.
+
+A reading has a number that counts from 0 at time zero. Its noise and whether it is lost depend on
+this number and the seed alone, so that readings are the same on every engine and after a restart.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from tiltsim_controllers.code.arrays import xp
+from tiltsim_controllers.code.blocks import normal, uniform
+from tiltsim_controllers.code.traceable import traceable
+from tiltsim_controllers.mathematics.linear import cross
+from tiltsim_controllers.mathematics.records import make_record_type, vector_of
+from tiltsim_controllers.vehicle.sensors import reading_index, rotate_by_small_angle
+
+
+def instrument_record(errors: int) -> Any:
+    """The type of the parameters of an instrument with a number of independent errors."""
+    size = vector_of(errors)
+    return make_record_type(
+        "Instrument",
+        seed=float,
+        channel=float,  # first channel of its draws
+        period=float,  # s, between readings
+        delay=float,  # s, until a reading is available
+        dropout=float,  # probability that a reading is lost
+        noise=size,  # standard deviation of a reading, white
+        walk=size,  # standard deviation of the bias's step from reading to reading
+        bias=size,  # constant
+        resolution=size,  # readings are multiples of it; 0 for none
+    )
+
+
+@traceable
+def specific_force(linear: Any, angular: Any, omega: Any, place: Any) -> Any:
+    """The specific force (m/s^2, body axes) at a place of a rigid body, shape (3,).
+
+    Args:
+        linear: All forces but gravity by the mass, m/s^2, body axes.
+        angular: Angular acceleration, rad/s^2, body axes.
+        omega: Body rates, rad/s.
+        place: From the center of mass, m, body axes.
+    """
+    return linear + cross(angular, place) + cross(omega, cross(omega, place))
+
+
+@traceable
+def draws(own: Any, number: Any, first: float, count: int) -> Any:
+    """Standard normal draws, shape (count,).
+
+    Args:
+        own: Parameters, an `instrument_record`.
+        number: The number of the reading.
+        first: First channel among the instrument's.
+        count: How many.
+    """
+    base = own.channel + first
+    return xp.array([normal(own.seed, base + axis, number) for axis in range(count)])
+
+
+@traceable
+def is_new(own: Any, time: Any, timestep: Any) -> Any:
+    """1 if a reading is taken at a control step, which the one before was too early for, else 0."""
+    taken = reading_index(time, own.period) > reading_index(time - timestep, own.period)
+    return xp.where(taken, 1.0, 0.0)
+
+
+@traceable
+def arrival(own: Any, time: Any, timestep: Any) -> tuple[Any, Any]:
+    """The number of the latest reading that has its delay behind it, and 1 if it just arrived.
+
+    Args:
+        own: Parameters, an `instrument_record`.
+        time: s.
+        timestep: s, between control steps.
+    """
+    number = reading_index(time - own.delay, own.period)
+    just = number > reading_index(time - own.delay - timestep, own.period)
+    kept = uniform(own.seed, 2.0 * own.channel - 1.0, number) >= own.dropout
+    arrived = xp.where(just, xp.where(number >= 0.0, xp.where(kept, 1.0, 0.0), 0.0), 0.0)
+    return number, arrived
+
+
+@traceable
+def quantized(values: Any, resolution: Any) -> Any:
+    """Values as multiples of a resolution; unchanged where it is 0."""
+    step = xp.where(resolution == 0.0, 1.0, resolution)
+    return xp.where(resolution == 0.0, values, step * xp.floor(values / step + 0.5))
+
+
+@traceable
+def reading(own: Any, truth: Any, number: Any) -> Any:
+    """A reading of a vector of numbers.
+
+    Args:
+        own: Parameters, an `instrument_record`.
+        truth: The true values with the walk of their biases, shape (n,).
+        number: The number of the reading.
+    """
+    noise = own.noise * draws(own, number, 0.0, len(truth))
+    return quantized(truth + own.bias + noise, own.resolution)
+
+
+@traceable
+def pose_reading(own: Any, truth: Any, number: Any) -> Any:
+    """A reading of a position (m) and a quaternion, shape (7,); errors turn about body axes.
+
+    Args:
+        own: Parameters; the last three errors are angles, rad.
+        truth: Position and quaternion, shape (7,).
+        number: The number of the reading.
+    """
+    error = own.bias + own.noise * draws(own, number, 0.0, 6)
+    position = quantized(truth[:3] + error[:3], own.resolution[:3])
+    return xp.hstack([position, rotate_by_small_angle(truth[3:], error[3:])])

@@ -1,0 +1,227 @@
+"""Instruments around any rotorcraft's controller, read at its control steps.
+
+The layer takes readings of the true vehicle and keeps them for their delay. The controller within
+sees them behind MuJoCo's velocities: of every instrument its values, then 1 if a reading arrived at
+this control step, else 0. Its memory, activations of MuJoCo, are walking biases, readings under way
+and the last ones that arrived.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from math import ceil
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+import numpy as np
+
+from tiltsim.laws.layers.layer import Layer, wrap_loop
+from tiltsim.laws.layers.measured_acceleration import (
+    motion_record,
+    plant_acceleration_of,
+    read_motion,
+)
+from tiltsim.laws.layers.on_equations import read_actuators
+from tiltsim.models.parts import ExtraActuators
+from tiltsim.scenario.surroundings import Acceleration
+from tiltsim.vehicles.rotorcraft.layout import QW, TILT_1
+from tiltsim_controllers.code.arrays import xp
+from tiltsim_controllers.code.traceable import traceable
+from tiltsim_controllers.mathematics.attitude import rotation_matrix, rotation_of_quaternion
+from tiltsim_controllers.mathematics.records import Vector3, make_record_type, vector_of
+from tiltsim_controllers.vehicle import instruments
+from tiltsim_controllers.vehicle.sensors import reading_index
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from tiltsim.closed_loop.loop import ClosedLoop
+    from tiltsim.scenario.scenario import FlightPlan, Scenario
+
+CHANNELS: Final = 64  # of the draws of an instrument; other parts of a flight use those below 1000
+WALK: Final = 32.0  # channels between the noise of an instrument and the walk of its biases
+
+
+class Instrument(NamedTuple):
+    """The part of an instrument that a loop is compiled for."""
+
+    name: str
+    units: tuple[tuple[str, str], ...]  # columns and their units
+    errors: int
+    under_way: int  # readings that wait for their delay
+    walks: bool
+
+    @property
+    def columns(self) -> dict[str, str]:
+        """Its columns and units: values, then whether they are new."""
+        return {**dict(self.units), f"{self.name}_new": "1"}
+
+    @property
+    def states(self) -> int:
+        """Numbers in its memory."""
+        return self.walks * self.errors + (self.under_way + 2) * len(self.units)
+
+
+def instruments_of(scenario: Scenario) -> tuple[Instrument, ...]:
+    """The instruments of a scenario, in the order of their readings."""
+    rotors, step = scenario.any_rotorcraft.rotor_count, scenario.simulation.control_timestep
+    found = []
+    for name, table in scenario.sensors.instruments.items():
+        units = {
+            column.replace("#", str(i)): unit
+            for column, unit in table.columns.items()
+            for i in range(1, 1 + (rotors if "#" in column else 1))
+        }
+        errors, period = table.errors(1.0, rotors), table.period(step)
+        under_way = ceil(table.delay / period - 1e-6)
+        one = Instrument(name, tuple(units.items()), len(errors.noise), under_way, any(errors.walk))
+        found.append(one)
+    return tuple(found)
+
+
+@cache
+def with_instruments(loop: ClosedLoop, carried: tuple[Instrument, ...]) -> ClosedLoop:
+    """A loop whose controller sees the readings of instruments behind MuJoCo's velocities.
+
+    Args:
+        loop: The loop within.
+        carried: The instruments.
+    """
+    inner_controls, dynamics = loop.sampling.controls, loop.dynamics
+    inner_observe, first = loop.columns.observe, dynamics.sizes.act
+    _, loads = read_actuators(dynamics)
+    acceleration, measured = plant_acceleration_of(dynamics), _measured(dynamics.spins)
+    columns = {name: unit for each in carried for name, unit in each.columns.items()}
+    states = sum(each.states for each in carried)
+    record = make_record_type(
+        "Instruments",
+        motion=motion_record(dynamics),
+        control_period=float,  # s
+        disturbance=Vector3,  # m/s^2, world
+        imu_place=Vector3,  # m, body axes
+        imu_axes=vector_of(9),  # of the IMU in body axes, as columns
+        field=Vector3,  # direction of the magnetic field, world
+        **{each.name: instruments.instrument_record(each.errors) for each in carried},
+    )
+
+    @traceable
+    def controls(time: Any, qpos: Any, qvel: Any, act: Any, parameters: Any, knots: Any) -> Any:
+        own, inner, memory = parameters.layer, parameters.inner, act[first : first + states]
+        # Forces of the air and of loads are among the controls, and depend on no reading.
+        blind = xp.hstack([qvel, xp.zeros(len(columns))])
+        ctrl = inner_controls(time, qpos, blind, act, inner, knots)
+        moved = acceleration(qpos, qvel, ctrl, loads(ctrl), own.motion)
+        readings, kept = [], []
+        for each in carried:
+            truth = measured[each.name](qpos, qvel, act, moved, own)
+            remembered, memory = memory[: each.states], memory[each.states :]
+            seen, after = _read(each, time, truth, remembered, own)
+            readings.append(seen)
+            kept.append((after - remembered) / own.control_period)
+        seen = xp.hstack(readings)
+        ctrl = inner_controls(time, qpos, xp.hstack([qvel, seen]), act, inner, knots)
+        return xp.hstack([ctrl, *kept, seen])
+
+    @traceable
+    def observe(qpos: Any, qvel: Any, act: Any, ctrl: Any) -> Any:
+        place = dynamics.sizes.ctrl
+        shown = ctrl[place + states : place + states + len(columns)]
+        return xp.hstack([inner_observe(qpos, qvel, act[:first], ctrl[:place]), shown])
+
+    layer = Layer(
+        "with_instruments",
+        record,
+        lambda plan: _parameters(plan, record, loop, carried),
+        controls=controls,
+        actuators=ExtraActuators(states=states, memories=len(columns)),
+        initial_activations=lambda _plan, _own, _inner: (0.0,) * states,
+        units=columns,
+    )
+    wrapped = wrap_loop(loop, layer)
+    observed = replace(
+        wrapped.columns,
+        observe=observe,
+        fields=(*wrapped.columns.fields, *columns),
+        observe_reads_controls=True,
+    )
+    return replace(wrapped, columns=observed)
+
+
+def _measured(spins: tuple[float, ...]) -> dict[str, Callable[..., Any]]:
+    """The true values of every instrument: ``(qpos, qvel, act, accelerations, parameters)``."""
+
+    def imu(qpos: Any, qvel: Any, _act: Any, moved: Any, own: Any) -> Any:
+        pushed = rotation_of_quaternion(qpos[QW:TILT_1]).T @ own.disturbance
+        linear, omega = moved[:3] + pushed, qvel[3:6]
+        force = instruments.specific_force(linear, moved[3:], omega, own.imu_place)
+        axes = own.imu_axes.reshape(3, 3)
+        return xp.hstack([axes.T @ force, axes.T @ omega])
+
+    return {
+        "imu": imu,
+        "mocap": lambda qpos, *_: qpos[:TILT_1],
+        "gps": lambda qpos, qvel, *_: xp.hstack([qpos[:3], qvel[:3]]),
+        "barometer": lambda qpos, *_: qpos[2:3],
+        "magnetometer": lambda qpos, qvel, act, moved, own: (
+            rotation_of_quaternion(qpos[QW:TILT_1]).T @ own.field
+        ),
+        "rotor_speed": lambda _qpos, _qvel, act, *_: xp.array(spins) * act[: len(spins)],
+    }
+
+
+def _read(each: Instrument, time: Any, truth: Any, memory: Any, own: Any) -> tuple[Any, Any]:
+    """The last reading that arrived, with whether it is new, and the memory after this step."""
+    p, size = getattr(own, each.name), len(each.units)
+    walks = each.errors if each.walks else 0
+    walked, line = memory[:walks], memory[walks:-size].reshape(each.under_way + 1, size)
+    new = instruments.is_new(p, time, own.control_period)
+    newest = reading_index(time, p.period)
+    if walks:
+        step = p.walk * instruments.draws(p, newest, WALK, each.errors)
+        walked = walked + new * step
+        truth = truth + walked
+    line = xp.where(new > 0.0, xp.vstack([truth, *line[:-1]]), line)
+    number, arrived = instruments.arrival(p, time, own.control_period)
+    past, kept = newest - number, line[0]
+    for place in range(1, each.under_way + 1):
+        kept = xp.where(past == float(place), line[place], kept)
+    make = instruments.pose_reading if each.name == "mocap" else instruments.reading
+    found = make(p, kept, number)
+    if each.name == "imu":
+        axes = own.imu_axes.reshape(3, 3)
+        found = xp.hstack([axes @ found[:3], axes @ found[3:]])
+    found = xp.where(arrived > 0.0, found, memory[-size:])
+    return xp.hstack([found, arrived]), xp.hstack([walked, line.ravel(), found])
+
+
+def _parameters(
+    plan: FlightPlan, record: Any, loop: ClosedLoop, carried: tuple[Instrument, ...]
+) -> Any:
+    scenario = plan.scenario
+    simulation, tables = scenario.simulation, scenario.sensors.instruments
+    rotors, step = scenario.any_rotorcraft.rotor_count, simulation.control_timestep
+    pushes = [each.value for each in scenario.disturbance if isinstance(each, Acceleration)]
+    imu, magnetometer = scenario.sensors.imu, scenario.sensors.magnetometer
+    down = 0.0 if magnetometer is None else magnetometer.inclination
+    own = {}
+    for index, each in enumerate(carried):
+        table = tables[each.name]
+        period = table.period(step)
+        own[each.name] = instruments.instrument_record(each.errors)(
+            float(simulation.seed),
+            1000.0 + CHANNELS * index,
+            period,
+            table.delay,
+            table.dropout,
+            *table.errors(1.0 / period, rotors),
+        )
+    axes = np.eye(3) if imu is None else rotation_matrix(np.array(imu.orientation))
+    return record(
+        motion=read_motion(plan, loop.dynamics),
+        control_period=step,
+        disturbance=tuple(np.sum([(0.0, 0.0, 0.0), *pushes], axis=0).tolist()),
+        imu_place=(0.0, 0.0, 0.0) if imu is None else imu.position,
+        imu_axes=tuple(axes.ravel().tolist()),
+        field=(float(np.cos(down)), 0.0, -float(np.sin(down))),
+        **own,
+    )

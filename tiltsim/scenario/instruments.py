@@ -1,0 +1,333 @@
+"""The tables of the instruments on a vehicle, below ``[sensors]``."""
+
+from collections.abc import Mapping
+from math import radians, sqrt
+from typing import Annotated, Any, ClassVar, Final, Literal, NamedTuple
+
+from pydantic import Field, model_validator
+
+from tiltsim.scenario.table import Angles3, NonNegative, Positive, Table, Vector3, example
+
+Probability = Annotated[float, Field(ge=0.0, lt=1.0)]
+ZEROS: tuple[float, float, float] = (0.0, 0.0, 0.0)
+G: Final = 9.80665  # m/s^2
+MOST_UNDER_WAY: Final = 64  # readings that wait for their delay
+
+
+class Errors(NamedTuple):
+    """Independent errors of an instrument, one entry each: see `instrument_record`."""
+
+    noise: tuple[float, ...]
+    walk: tuple[float, ...]
+    bias: tuple[float, ...]
+    resolution: tuple[float, ...]
+
+
+class InstrumentTable(Table):
+    """An instrument that is read at control steps."""
+
+    columns: ClassVar[Mapping[str, str]] = {}
+    """Its columns in a flight and their units; with ``#`` one for each rotor."""
+
+    rate: Positive | None = Field(
+        None, description="readings per second; default: one each control step [Hz]", examples=[100]
+    )
+    delay: NonNegative = Field(0.0, description="until a reading is available [s]", examples=[0.02])
+    dropout: Probability = Field(
+        0.0, description="probability that a reading is lost [-]", examples=[0.05]
+    )
+
+    def period(self, timestep: float) -> float:
+        """Time between readings (s), with a time between control steps (s)."""
+        return timestep if self.rate is None else 1.0 / self.rate
+
+    def errors(self, rate: float, rotors: int) -> Errors:
+        """Its errors at a rate (Hz) on a vehicle with a number of rotors."""
+        raise AssertionError
+
+
+def _axes(noise: float, walk: float, bias: Any, resolution: float) -> list[Any]:
+    return [(noise,) * 3, (walk,) * 3, tuple(bias), (resolution,) * 3]
+
+
+def _joined(*parts: list[Any]) -> Errors:
+    return Errors(*(sum(each, ()) for each in zip(*parts, strict=True)))
+
+
+class ImuTable(InstrumentTable):
+    """Accelerometer and gyro; readings are in body axes."""
+
+    table_name = "sensors.imu"
+    model_config = example(preset="bmi088")
+    columns: ClassVar[Mapping[str, str]] = {
+        **{f"imu_acceleration_{axis}": "m/s^2" for axis in "xyz"},
+        **{f"imu_rate_{axis}": "rad/s" for axis in "xyz"},
+    }
+    presets: ClassVar[Mapping[str, Mapping[str, float]]] = {
+        "bmi088": {
+            "accelerometer_noise_density": 190e-6 * G,
+            "gyro_noise_density": radians(0.014),
+            "accelerometer_resolution": G / 5460.0,
+            "gyro_resolution": radians(1.0 / 32.768),
+        },
+        "icm_20948": {
+            "accelerometer_noise_density": 230e-6 * G,
+            "gyro_noise_density": radians(0.015),
+            "accelerometer_resolution": G / 8192.0,
+            "gyro_resolution": radians(1.0 / 32.8),
+        },
+        "mpu_6050": {
+            "accelerometer_noise_density": 400e-6 * G,
+            "gyro_noise_density": radians(0.005),
+            "accelerometer_resolution": G / 8192.0,
+            "gyro_resolution": radians(1.0 / 32.8),
+        },
+    }
+    """Typical values of the data sheets BST-BMI088-DS001 (+-6 g, +-1000 deg/s), DS-000189
+    (ICM-20948) and PS-MPU-6000A-00 (both +-4 g, +-1000 deg/s).
+    """
+
+    preset: Literal["bmi088", "icm_20948", "mpu_6050"] | None = Field(
+        None, description="densities and resolutions of a part, unless given", examples=["bmi088"]
+    )
+    accelerometer_noise_density: NonNegative = Field(
+        0.0, description="of white noise [m/s^2/sqrt(Hz)]", examples=[0.0017]
+    )
+    accelerometer_random_walk: NonNegative = Field(
+        0.0, description="of the bias [m/s^3/sqrt(Hz)]", examples=[0.0003]
+    )
+    accelerometer_bias: Vector3 = Field(
+        ZEROS, description="constant error [m/s^2]", examples=[[0.1, 0.0, -0.05]]
+    )
+    accelerometer_resolution: NonNegative = Field(
+        0.0, description="step of the readings; 0: none [m/s^2]", examples=[0.0012]
+    )
+    gyro_noise_density: NonNegative = Field(
+        0.0, description="of white noise [rad/s/sqrt(Hz)]", examples=[0.00024]
+    )
+    gyro_random_walk: NonNegative = Field(
+        0.0, description="of the bias [rad/s^2/sqrt(Hz)]", examples=[2e-5]
+    )
+    gyro_bias: Vector3 = Field(
+        ZEROS, description="constant error [rad/s]", examples=[[0.01, 0.0, -0.005]]
+    )
+    gyro_resolution: NonNegative = Field(
+        0.0, description="step of the readings; 0: none [rad/s]", examples=[0.0011]
+    )
+    position: Vector3 = Field(
+        ZEROS, description="from the center of mass, body axes [m]", examples=[[0.05, 0.0, 0.01]]
+    )
+    orientation: Angles3 = Field(
+        ZEROS,
+        description="roll, pitch and yaw of its own axes, in which it errs [rad]",
+        examples=[[0.0, 0.0, 1.57]],
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _of_preset(cls, given: Any) -> Any:
+        preset = cls.presets.get(str(given.get("preset"))) if isinstance(given, dict) else None
+        return {**preset, **given} if preset else given
+
+    def errors(self, rate: float, rotors: int) -> Errors:
+        size, walked = sqrt(rate), 1.0 / sqrt(rate)
+        return _joined(
+            _axes(
+                self.accelerometer_noise_density * size,
+                self.accelerometer_random_walk * walked,
+                self.accelerometer_bias,
+                self.accelerometer_resolution,
+            ),
+            _axes(
+                self.gyro_noise_density * size,
+                self.gyro_random_walk * walked,
+                self.gyro_bias,
+                self.gyro_resolution,
+            ),
+        )
+
+
+class MocapTable(InstrumentTable):
+    """Motion capture: position and attitude from cameras."""
+
+    table_name = "sensors.mocap"
+    model_config = example(rate=100.0, position_noise=0.001, delay=0.01)
+    columns: ClassVar[Mapping[str, str]] = {
+        **{f"mocap_{axis}": "m" for axis in "xyz"},
+        **{f"mocap_q{part}": "1" for part in "wxyz"},
+    }
+
+    position_noise: NonNegative = Field(
+        0.0, description="standard deviation along each axis [m]", examples=[0.001]
+    )
+    position_bias: Vector3 = Field(
+        ZEROS, description="constant error, world axes [m]", examples=[[0.002, 0.0, 0.0]]
+    )
+    position_resolution: NonNegative = Field(
+        0.0, description="step of the readings; 0: none [m]", examples=[0.0001]
+    )
+    attitude_noise: NonNegative = Field(
+        0.0, description="standard deviation about each body axis [rad]", examples=[0.005]
+    )
+    attitude_bias: Vector3 = Field(
+        ZEROS, description="constant turn about the body axes [rad]", examples=[[0.01, 0.0, 0.0]]
+    )
+
+    def errors(self, rate: float, rotors: int) -> Errors:
+        return _joined(
+            _axes(self.position_noise, 0.0, self.position_bias, self.position_resolution),
+            _axes(self.attitude_noise, 0.0, self.attitude_bias, 0.0),
+        )
+
+
+class GpsTable(InstrumentTable):
+    """Position and velocity from satellites."""
+
+    table_name = "sensors.gps"
+    model_config = example(rate=5.0, position_noise=1.0, velocity_noise=0.05, delay=0.12)
+    columns: ClassVar[Mapping[str, str]] = {
+        **{f"gps_{axis}": "m" for axis in "xyz"},
+        **{f"gps_velocity_{axis}": "m/s" for axis in "xyz"},
+    }
+
+    position_noise: NonNegative = Field(
+        0.0, description="standard deviation along each axis [m]", examples=[1.0]
+    )
+    position_random_walk: NonNegative = Field(
+        0.0, description="of the error of the position [m/sqrt(s)]", examples=[0.05]
+    )
+    position_bias: Vector3 = Field(
+        ZEROS, description="constant error, world axes [m]", examples=[[1.0, 0.5, 0.0]]
+    )
+    velocity_noise: NonNegative = Field(
+        0.0, description="standard deviation along each axis [m/s]", examples=[0.05]
+    )
+    resolution: NonNegative = Field(
+        0.0, description="step of the positions; 0: none [m]", examples=[0.01]
+    )
+
+    def errors(self, rate: float, rotors: int) -> Errors:
+        walk = self.position_random_walk / sqrt(rate)
+        return _joined(
+            _axes(self.position_noise, walk, self.position_bias, self.resolution),
+            _axes(self.velocity_noise, 0.0, ZEROS, 0.0),
+        )
+
+
+class BarometerTable(InstrumentTable):
+    """Altitude from air pressure."""
+
+    table_name = "sensors.barometer"
+    model_config = example(rate=50.0, noise=0.1)
+    columns: ClassVar[Mapping[str, str]] = {"barometer_altitude": "m"}
+
+    noise: NonNegative = Field(0.0, description="standard deviation [m]", examples=[0.1])
+    random_walk: NonNegative = Field(
+        0.0, description="of the bias, as weather drifts [m/sqrt(s)]", examples=[0.01]
+    )
+    bias: float = Field(0.0, description="constant error [m]", examples=[0.5])
+    resolution: NonNegative = Field(
+        0.0, description="step of the readings; 0: none [m]", examples=[0.01]
+    )
+
+    def errors(self, rate: float, rotors: int) -> Errors:
+        walk = self.random_walk / sqrt(rate)
+        return Errors((self.noise,), (walk,), (self.bias,), (self.resolution,))
+
+
+class MagnetometerTable(InstrumentTable):
+    """The direction of the Earth's field, in body axes; a unit vector without errors."""
+
+    table_name = "sensors.magnetometer"
+    model_config = example(rate=50.0, noise=0.01)
+    columns: ClassVar[Mapping[str, str]] = {f"magnetometer_{axis}": "1" for axis in "xyz"}
+
+    noise: NonNegative = Field(
+        0.0, description="standard deviation on each axis, of the field's size [-]", examples=[0.01]
+    )
+    bias: Vector3 = Field(
+        ZEROS, description="of magnets on board, of the field's size [-]", examples=[[0.02, 0, 0]]
+    )
+    resolution: NonNegative = Field(
+        0.0, description="step of the readings; 0: none [-]", examples=[0.003]
+    )
+    inclination: Annotated[float, Field(ge=-1.55, le=1.55)] = Field(
+        1.1, description="of the field below the horizon, along x of the world [rad]"
+    )
+
+    def errors(self, rate: float, rotors: int) -> Errors:
+        return Errors(*_axes(self.noise, 0.0, self.bias, self.resolution))
+
+
+class RotorSpeedTable(InstrumentTable):
+    """Speeds of the rotors along their spin, as speed controllers report them."""
+
+    table_name = "sensors.rotor_speed"
+    model_config = example(rate=100.0, noise=2.0)
+    columns: ClassVar[Mapping[str, str]] = {"rotor_speed_measured_#": "rad/s"}
+
+    noise: NonNegative = Field(0.0, description="standard deviation [rad/s]", examples=[2.0])
+    bias: float = Field(0.0, description="constant error [rad/s]", examples=[1.0])
+    resolution: NonNegative = Field(
+        0.0, description="step of the readings; 0: none [rad/s]", examples=[0.5]
+    )
+
+    def errors(self, rate: float, rotors: int) -> Errors:
+        return Errors(
+            (self.noise,) * rotors,
+            (0.0,) * rotors,
+            (self.bias,) * rotors,
+            (self.resolution,) * rotors,
+        )
+
+
+INSTRUMENTS: tuple[str, ...] = ("imu", "mocap", "gps", "barometer", "magnetometer", "rotor_speed")
+"""Keys of ``[sensors]`` that are instruments, in the order of their readings."""
+
+
+def check_instruments(scenario: Any) -> None:
+    """Refuse instruments that a flight cannot read, naming the key."""
+    found, simulation = scenario.sensors.instruments, scenario.simulation
+    if scenario.controller.estimator is not None:
+        _check_estimator(scenario)
+    if not found:
+        return
+    first, step = f"sensors.{next(iter(found))}", simulation.control_timestep
+    reasons = {
+        "the tilt_car": scenario.vehicle.is_planar,
+        'controller.law = "python"': scenario.controller.is_external,
+        "[ground], [[object]], [tool], [payload] and [[companion]]": scenario.has_contacts,
+    }
+    for what, present in reasons.items():
+        if present:
+            raise scenario.mistake(first, f"not supported with {what}; remove one of them")
+    if step == 0.0:
+        reason = f"[{first}] is read at control steps; must be above 0"
+        raise scenario.mistake("simulation.control_timestep", reason)
+    for name, table in found.items():
+        if table.period(step) < step * (1.0 - 1e-9):
+            reason = f"at most {1.0 / step:g}, one reading each simulation.control_timestep"
+            raise scenario.mistake(f"sensors.{name}.rate", reason)
+        if table.delay > MOST_UNDER_WAY * table.period(step):
+            reason = (
+                f"at most {MOST_UNDER_WAY} readings late, {MOST_UNDER_WAY * table.period(step):g}"
+            )
+            raise scenario.mistake(f"sensors.{name}.delay", reason)
+    imu = scenario.sensors.imu
+    if imu is not None and any(imu.position) and scenario.controller.commands_tilts:
+        reason = "must be zero for a law that commands the tilts, which turn the body themselves"
+        raise scenario.mistake("sensors.imu.position", reason)
+
+
+def _check_estimator(scenario: Any) -> None:
+    """Refuse an estimator without the instruments that it needs."""
+    found, sensors = scenario.sensors.instruments, scenario.sensors
+    if scenario.controller.is_external or scenario.vehicle.is_planar:
+        reason = "needs a law of a rotorcraft other than python; remove it"
+        raise scenario.mistake("controller.estimator", reason)
+    if "imu" not in found or not {"mocap", "gps"} & {*found}:
+        reason = "needs [sensors.imu], and [sensors.mocap] or [sensors.gps]"
+        raise scenario.mistake("controller.estimator", reason)
+    if sensors.have_errors:
+        reason = "reads instruments; remove noise and bias keys of [sensors] itself"
+        raise scenario.mistake("controller.estimator", reason)
