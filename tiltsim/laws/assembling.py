@@ -13,9 +13,8 @@ from tiltsim.laws.flown_law import loop_of_law
 from tiltsim.laws.full_pose import full_pose_loop, full_pose_loop_of
 from tiltsim.laws.layers.actuation import with_actuation
 from tiltsim.laws.layers.air import with_air
-from tiltsim.laws.layers.contact import with_force_loop, with_objects
-from tiltsim.laws.layers.estimation import fusion_of, with_estimator
 from tiltsim.laws.layers.contact import with_force_loop, with_impedance, with_objects
+from tiltsim.laws.layers.estimation import fusion_of, with_estimator
 from tiltsim.laws.layers.instruments import instruments_of, with_instruments
 from tiltsim.laws.layers.loads import with_loads
 from tiltsim.laws.layers.measured_acceleration import with_measured_acceleration

@@ -18,6 +18,8 @@ from tiltsim_controllers.mathematics.attitude import quaternion_product, rotatio
 from tiltsim_controllers.mathematics.linear import cross, solved_symmetric
 
 ERRORS: Final = 15
+NAVIGATION_ERRORS: Final = 9
+"""The first ones: rotation, velocity and position."""
 ROTATION, VELOCITY, POSITION, GYRO_BIAS, FORCE_BIAS = (slice(i, i + 3) for i in range(0, ERRORS, 3))
 ROWS, COLUMNS = np.tril_indices(ERRORS)
 """Places of the packed covariance, the lower triangle row by row."""

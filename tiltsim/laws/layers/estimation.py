@@ -1,7 +1,7 @@
 """An estimator between the instruments and the controller, which then flies on its estimate.
 
 The filter (`tiltsim_controllers.laws.estimator`) works at a horizon that lies as far back as the
-longest delay of an instrument: there each reading meets the state of its own time, exactly and once.
+longest delay of an instrument: there each reading meets the state at its time.
 From the horizon a predictor integrates the newer inertial readings to the present, and one
 transition of all of them carries the covariance along. Readings that arrive early wait in lines.
 """
@@ -74,9 +74,6 @@ DEVIATIONS: Final = {
 }
 CONSISTENCY: Final = {"nees": "1", "nis": "1", "nis_count": "1"}
 
-NAVIGATION: Final = 9
-"""Errors in the NEES: rotation, velocity and position."""
-
 LEAST_VARIANCE: Final = 1e-12
 LEAST_GYRO_BIAS: Final = 1e-3
 """rad/s: the filter's least deviation of the gyro's bias at the start."""
@@ -105,7 +102,7 @@ class Fusion(NamedTuple):
     readings: int  # numbers at the end of the velocities
     imu: int  # first number of the inertial measurement unit's
     waits: int  # control steps that an inertial reading waits for the horizon
-    late: int  # control steps of its own delay
+    late: int  # control steps, the delay of that unit
     correctors: tuple[Corrector, ...]
 
     @property
@@ -185,7 +182,7 @@ def _reading(kind: str, now: Estimate, value: Any, own: Any, rates: Any) -> Read
 def _corrections(
     now: Estimate, name: str, value: Any, own: Any, rates: Any
 ) -> tuple[Estimate, list[Any], Any, Any]:
-    """The state after a reading of an instrument; innovations by their deviation; NIS; its count."""
+    """The state after a reading; innovations by their deviation; NIS and its components."""
     shown: list[Any] = []
     nis: Any = 0.0
     count: Any = 0.0
@@ -206,13 +203,13 @@ def _filtered(
 
     Args:
         time: s.
-        readings: Of the instruments, as their layer appends them.
+        readings: As the layer of the instruments appends them.
         before: The states, shape (S,).
         fusion: The instruments.
         p: The layer's parameters.
 
     Returns:
-        The state at the horizon, the state at present, and the new states.
+        The state at the horizon, the state at present, and the rates of the states.
     """
     T, W = p.control_timestep, fusion.waits
     horizon = W + fusion.late
@@ -222,7 +219,7 @@ def _filtered(
     state = Estimate(*(getattr(at, name) for name in _FILTER))
 
     def moved(now: Estimate, through: Any, steps: range) -> Any:
-        """Through control steps, each of which ended so many steps before the latest reading."""
+        """Through control steps, numbered backwards from the latest reading."""
         lengths = [xp.where(time > (step + fusion.late + 0.5) * T, T, 0.0) for step in steps]
         means = [0.5 * (imu[step] + imu[step + 1]) for step in steps]
         length = sum(lengths)
@@ -282,7 +279,7 @@ def _nees(present: Estimate, qpos: Any, qvel: Any, place: Any) -> Any:
         velocity=qvel[:3] + rotation @ cross(qvel[3:6], place),
         quaternion=quaternion,
     )
-    return filters.nees_of(present, truth, NAVIGATION)
+    return filters.nees_of(present, truth, filters.NAVIGATION_ERRORS)
 
 
 @cache
@@ -336,7 +333,8 @@ def _parameters(plan: FlightPlan, fusion: Fusion) -> Any:
     scenario, record = plan.scenario, _record(fusion)
     sensors, timestep = scenario.sensors, scenario.simulation.control_timestep
     imu, estimator = sensors.imu, scenario.controller.estimator_table
-    assert imu is not None and estimator is not None
+    assert imu is not None
+    assert estimator is not None
     period = max(imu.period(timestep), timestep)
     known = imu.errors(1.0 / imu.period(timestep), 0)
     density = [sqrt(period) * _deviation(known, i) for i in (0, 3)]
@@ -376,10 +374,11 @@ def _start(plan: FlightPlan, p: Any, fusion: Fusion) -> Vector:
     """
     scenario, initial = plan.scenario, plan.scenario.initial
     imu, table = scenario.sensors.imu, scenario.controller.estimator_table
-    assert imu is not None and table is not None
+    assert imu is not None
+    assert table is not None
     sizes = (table.initial_attitude, table.initial_velocity, table.initial_position)
     seed = float(scenario.simulation.seed)
-    draws = [normal(seed, CHANNEL + i, 0.0) for i in range(NAVIGATION)]
+    draws = [normal(seed, CHANNEL + i, 0.0) for i in range(filters.NAVIGATION_ERRORS)]
     error = np.array(draws) * np.repeat(sizes, 3)
     quaternion = np.array(quaternion_of_euler(initial.attitude))
     rotation = rotation_of_quaternion(quaternion)
