@@ -186,6 +186,8 @@ def refused(path):
 
 def test_a_missing_flight_is_an_input_error(tmp_path):
     assert "no flight.parquet in this folder" in refused(tmp_path)
+    (tmp_path / "mine.toml").write_text("", encoding="utf-8")
+    assert "a scenario, not a flight; give a folder" in refused(tmp_path / "mine.toml")
     assert "no such file" in refused(tmp_path / "nothing.parquet")
 
 

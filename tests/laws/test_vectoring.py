@@ -8,6 +8,7 @@ import pytest
 import tiltsim
 from tests.laws.test_multirotor import mjcf
 from tiltsim.laws.assembling import assemble
+from tiltsim.studies.benchmark import compiled_time_per_call
 from tiltsim_controllers.analysis.vectoring_design import TRACKING
 from tiltsim_controllers.analysis.vectoring_limits import Craft, side_slope
 from tiltsim_controllers.laws.vectoring_steps import braked, turn_by
@@ -142,6 +143,14 @@ def test_five_canted_rotors_fly_a_circle(rotor):
     error = position_error(flight)
     assert error.max() < 0.15
     assert error[-1] < 2e-3
+
+
+@pytest.mark.slow
+def test_a_call_for_eight_rotors_with_eight_tilts_takes_microseconds():
+    changed = tables("tilt_octorotor", 1.0)
+    del changed["simulation"]["engine"]
+    scenario = tiltsim.load_scenario(changed)
+    assert min(compiled_time_per_call(scenario) for _ in range(3)) < 10e-6
 
 
 WORLDS = {

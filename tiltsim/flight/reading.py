@@ -99,9 +99,11 @@ def flight_file(given: str | PathLike[str]) -> Path:
         raise InputError(f"path = {short_repr(given)}: must be the name of a folder or file")
     path = Path(given)
     file = path / "flight.parquet" if is_folder(path) else path
-    if is_file(file):
+    is_scenario = file.suffix == ".toml"
+    if is_file(file) and not is_scenario:
         return file
     missing = "no flight.parquet in this folder" if is_folder(path) else "no such file"
+    missing = "a scenario, not a flight" if is_file(file) and is_scenario else missing
     raise InputError(
         f"{path}: {missing}; give a folder that tiltsim run --out wrote, a flight.parquet or, to "
         "tiltsim plot, the output of tiltsim sweep"

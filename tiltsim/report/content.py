@@ -115,10 +115,10 @@ class Report:
         """The pictures that show a finding."""
         return [drawing for drawing in self.drawings if drawing.picture.name in finding.pictures]
 
-    def errors_of(self, finding: Finding) -> list[int]:
-        """Numbers, in the list of errors, of the entries that rows settled by a finding name."""
-        named = {row.claim.error for row in self.rows if row.claim.settled_by == finding.key}
-        return [n for n, (entry, _) in enumerate(self.errors, start=1) if entry.key in named]
+    def errors_of(self, finding: Finding) -> set[str]:
+        """Keys of the list of errors that rows settled by a finding name."""
+        rows = (row for row in self.rows if row.claim.settled_by == finding.key)
+        return {row.claim.error for row in rows if row.claim.error}
 
     def settled_by(self, finding: Finding) -> list[str]:
         """Ids of the statements of which a finding settles a row."""
