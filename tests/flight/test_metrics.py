@@ -78,6 +78,7 @@ def test_all_metrics_are_declared_and_in_this_order():
     others = of_the_quadrotor | of_switching | of_circles | of_the_car | of_limits | of_multirotors
     of_objects = {"peak_force", "time_in_contact", "rms_force_error", "max_cable_tension"}
     of_objects |= {"max_swing", "final_swing"}
+    of_objects |= {"nees", "nees_in_band", "nis", "nis_low", "nis_high"}  # of an estimator
     of_objects |= {"minimum_separation", "companion_rms_position_error"}
     others |= of_the_supervisor | of_objects
     assert set(METRICS) - set(metrics) == others

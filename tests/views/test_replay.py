@@ -96,6 +96,7 @@ def test_a_cable_ends_at_its_vehicle_and_at_its_load():
     np.testing.assert_allclose(np.linalg.norm(np.diff(ends, axis=1), axis=-1), 1.0, atol=2e-3)
     load = np.stack([carried[f"payload_{axis}"] for axis in "xyz"], axis=1)
     np.testing.assert_allclose(ends[:, 1], load, atol=1e-9)
+    assert seen_radius(carried.scenario, model) == vehicle_radius(model) + 0.25
 
 
 def test_companions_are_drawn_where_they_flew_and_cables_while_they_hold():

@@ -14,6 +14,7 @@ from tiltsim.laws.full_pose import full_pose_loop, full_pose_loop_of
 from tiltsim.laws.layers.actuation import with_actuation
 from tiltsim.laws.layers.air import with_air
 from tiltsim.laws.layers.contact import with_force_loop, with_impedance, with_objects
+from tiltsim.laws.layers.estimation import fusion_of, with_estimator
 from tiltsim.laws.layers.instruments import instruments_of, with_instruments
 from tiltsim.laws.layers.loads import with_loads
 from tiltsim.laws.layers.measured_acceleration import with_measured_acceleration
@@ -85,6 +86,8 @@ def loop_of(
     else:
         loop = LOOPS[controller.loop_name]
     loop = adapted(loop)
+    if controller.estimator is not None:
+        loop = with_estimator(loop, fusion_of(scenario))
     if scenario.reference.type == "push" and not external:
         loop = (with_impedance if scenario.reference.impedance else with_force_loop)(loop)
     if scenario.payload is not None and scenario.payload.swing_damping and not external:

@@ -114,6 +114,32 @@ class SupervisorTable(Table):
             )
 
 
+class EstimatorTable(Table):
+    """The estimator on which the law flies; see docs/estimator.md."""
+
+    model_config = example(type="ekf", initial_position=0.2)
+    table_name = "controller.estimator"
+
+    type: Literal["ekf"] = Field("ekf", description="an error-state Kalman filter")
+    gate: Annotated[float, Field(gt=0.5, lt=1.0)] = Field(
+        0.9999,
+        description="share of good readings that it accepts: it leaves out a reading whose "
+        "innovation is beyond this quantile of the chi-square distribution [-]",
+        examples=[0.999],
+    )
+    initial_position: Positive = Field(
+        0.05, description="standard deviation of its error at time zero, which is drawn [m]"
+    )
+    initial_velocity: Positive = Field(
+        0.05, description="standard deviation of its error at time zero, which is drawn [m/s]"
+    )
+    initial_attitude: Annotated[float, Field(gt=0.0, le=0.5)] = Field(
+        0.02,
+        description="standard deviation of its error about each axis at time zero, which is drawn "
+        "[rad]",
+    )
+
+
 class ControllerTable(Table):
     """Base of every controller; properties are neutral where a controller lacks the feature."""
 
@@ -139,7 +165,18 @@ class ControllerTable(Table):
     allow_unstable: bool = Field(
         False, description="accept gains that fail the Routh-Hurwitz criterion of stability"
     )
+    estimator: Literal["ekf"] | EstimatorTable | None = Field(
+        None,
+        description="the law flies on the estimate of a filter, which is driven by sensors.imu; "
+        "default: none, on the true state",
+        examples=["ekf"],
+    )
     law: str
+
+    @property
+    def estimator_table(self) -> EstimatorTable | None:
+        """The estimator with all its keys; None without one."""
+        return EstimatorTable() if self.estimator == "ekf" else self.estimator  # type: ignore[return-value]
 
     def resolve_gains(self) -> Any:
         """The gains as the law reads them: of a named set, or as given."""

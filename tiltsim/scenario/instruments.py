@@ -288,6 +288,8 @@ INSTRUMENTS: tuple[str, ...] = ("imu", "mocap", "gps", "barometer", "magnetomete
 def check_instruments(scenario: Any) -> None:
     """Refuse instruments that a flight cannot read, naming the key."""
     found, simulation = scenario.sensors.instruments, scenario.simulation
+    if scenario.controller.estimator is not None:
+        _check_estimator(scenario)
     if not found:
         return
     first, step = f"sensors.{next(iter(found))}", simulation.control_timestep
@@ -315,3 +317,17 @@ def check_instruments(scenario: Any) -> None:
     if imu is not None and any(imu.position) and scenario.controller.commands_tilts:
         reason = "must be zero for a law that commands the tilts, which turn the body themselves"
         raise scenario.mistake("sensors.imu.position", reason)
+
+
+def _check_estimator(scenario: Any) -> None:
+    """Refuse an estimator without the instruments that it needs."""
+    found, sensors = scenario.sensors.instruments, scenario.sensors
+    if scenario.controller.is_external or scenario.vehicle.is_planar:
+        reason = "needs a law of a rotorcraft other than python; remove it"
+        raise scenario.mistake("controller.estimator", reason)
+    if "imu" not in found or not {"mocap", "gps"} & {*found}:
+        reason = "needs [sensors.imu], and [sensors.mocap] or [sensors.gps]"
+        raise scenario.mistake("controller.estimator", reason)
+    if sensors.have_errors:
+        reason = "reads instruments; remove noise and bias keys of [sensors] itself"
+        raise scenario.mistake("controller.estimator", reason)

@@ -157,6 +157,25 @@ METRICS: Final = {
         "N",
         "root mean square error of the force of a push, from 1 s after the full force is commanded",
     ),
+    "nees": Metric(
+        "NEES of the estimate",
+        "",
+        "squared errors of the estimated attitude, velocity and position, normalized by their "
+        "covariance: mean over the samples and the nine errors, 1 for a consistent filter",
+    ),
+    "nees_in_band": Metric(
+        "share of samples with consistent errors",
+        "",
+        "share of samples whose NEES is within the 95 % band of the chi-square distribution",
+    ),
+    "nis": Metric(
+        "NIS of the estimate",
+        "",
+        "squared innovations, normalized by their covariance: mean over all components of all "
+        "readings, 1 for a consistent filter",
+    ),
+    "nis_low": Metric("lower end of the NIS", "", "of the 95 % band for this number of readings"),
+    "nis_high": Metric("upper end of the NIS", "", "of the 95 % band for this number of readings"),
     "saturated_fraction": Metric(
         "share of time with a saturated rotor",
         "",

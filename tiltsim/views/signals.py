@@ -236,9 +236,9 @@ def _chosen(assembly: Assembly) -> Iterator[Signals]:
         lines = [Signal("candidate", "candidate", "lyapunov")]
         title = "Lyapunov candidate, ½ ė² + ½ K e², along y"
         yield Signals("lyapunov", title, "m^2/s^2", lines, floor=1e-6, moves=True)
-    for name in ("contact_force", "push_force", "cable_tension"):
-        columns = [name] if name in units else [f"{name}_{axis}" for axis in AXES]
-        if columns[0] in units:
+    for name in ("contact_force", "push_force", "cable_tension", "swing"):
+        columns = [each for each in (name, *(f"{name}_{axis}" for axis in AXES)) if each in units]
+        if columns:
             panel = vector_signals(assembly, name, columns)
             yield replace(panel, moves=False, on_request=False, plotted=True)
 

@@ -18,6 +18,8 @@ from tiltsim_controllers.mathematics.attitude import quaternion_product, rotatio
 from tiltsim_controllers.mathematics.linear import cross, solved_symmetric
 
 ERRORS: Final = 15
+NAVIGATION_ERRORS: Final = 9
+"""The first ones: rotation, velocity and position."""
 ROTATION, VELOCITY, POSITION, GYRO_BIAS, FORCE_BIAS = (slice(i, i + 3) for i in range(0, ERRORS, 3))
 ROWS, COLUMNS = np.tril_indices(ERRORS)
 """Places of the packed covariance, the lower triangle row by row."""
@@ -260,10 +262,13 @@ def errors_of(now: Estimate, truth: Estimate) -> Any:
     )
 
 
-def nees_of(now: Estimate, truth: Estimate) -> Any:
-    """The square of the errors, normalized by their covariance; 15 on average where it is true."""
-    error = errors_of(now, truth)
-    return error @ solved_symmetric(now.covariance[_PLACE], error)
+def nees_of(now: Estimate, truth: Estimate, count: int = ERRORS) -> Any:
+    """The square of the first errors, normalized by their covariance.
+
+    It is ``count`` on average where the covariance is true.
+    """
+    error = errors_of(now, truth)[:count]
+    return error @ solved_symmetric(now.covariance[_PLACE][:count, :count], error)
 
 
 # --- measurements of the sensors

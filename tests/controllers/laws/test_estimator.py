@@ -69,7 +69,7 @@ def now() -> e.Estimate:
 def _through(now: e.Estimate, steps: int) -> tuple[e.Estimate, e.Transition]:
     through, draws = e.no_transition(), np.random.default_rng(7)
     for _ in range(steps):
-        rates, force = draws.normal(size=3), [*draws.normal(size=3), 0.0, 0.0, GRAVITY]
+        rates, force = draws.normal(size=3), draws.normal(size=3) + np.array([0.0, 0.0, GRAVITY])
         now, through = e.integrated(now, through, rates, force, STEP, GRAVITY)
     return now, through
 

@@ -42,6 +42,8 @@ class Layer:
             actuators at time zero.
         derive: ``(inner columns, samples by field, setup) -> columns``; the first is a function.
         fields: Fields of a sample: the first activations of the layer's actuators.
+        remembered: Further fields: the first controls of the layer's actuators after the rates of
+            their activations.
         units: Columns of a flight that the layer adds, with their units.
         equations: See `ClosedLoop`; for these parameters. The equations of the loop within are not
             used: they do not know the layer.
@@ -61,6 +63,7 @@ class Layer:
     )
     derive: Derive = lambda inner, _samples, _setup: inner()
     fields: tuple[str, ...] = ()
+    remembered: tuple[str, ...] = ()
     units: Mapping[str, str] = field(default_factory=dict)
     equations: Equations | None = None
     of_controller: bool = False
@@ -106,8 +109,9 @@ def wrap_loop(inner: ClosedLoop, layer: Layer) -> ClosedLoop:
         inner.columns,
         observe=observe,
         derive=derive,
-        fields=(*inner.columns.fields, *layer.fields),
+        fields=(*inner.columns.fields, *layer.fields, *layer.remembered),
         units={**inner.columns.units, **layer.units},
+        observe_reads_controls=inner.columns.observe_reads_controls or bool(layer.remembered),
     )
     return replace(
         inner,
@@ -143,7 +147,7 @@ def _functions_within(inner: ClosedLoop, layer: Layer) -> tuple[Callable[..., Va
     inner_observe = inner.columns.observe
     inner_check = inner.monitoring.sign_check_values
     act_size, ctrl_size = inner.dynamics.sizes.act, inner.dynamics.sizes.ctrl
-    end = act_size + len(layer.fields)
+    end, first = act_size + len(layer.fields), ctrl_size + layer.actuators.states
     adds = layer.adds or _none_added
 
     @traceable
@@ -162,7 +166,8 @@ def _functions_within(inner: ClosedLoop, layer: Layer) -> tuple[Callable[..., Va
     @traceable
     def observe(qpos: Any, qvel: Any, act: Any, ctrl: Any) -> Any:
         inner = inner_observe(qpos, qvel, act[:act_size], ctrl[:ctrl_size])
-        return xp.hstack([inner, act[act_size:end]])
+        remembered = ctrl[first : first + len(layer.remembered)]
+        return xp.hstack([inner, act[act_size:end], remembered])
 
     @traceable
     def sign_check_values(time: Any, values: Any, parameters: Any, knots: Any) -> Any:

@@ -22,11 +22,16 @@ from tiltsim.vehicles.spans import (
     when_settled,
 )
 from tiltsim_controllers.analysis.singularity import force_matrix, torque_matrix, world_up
+from tiltsim_controllers.laws.estimator import NAVIGATION_ERRORS
+from tiltsim_controllers.mathematics.probability import chi_square_quantile
 from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.vehicle.parameters import Vehicle
 from tiltsim_controllers.vehicle.states import TILT_FIELDS
 
 SETTLED_ALTITUDE: Final = 0.005  # m
+
+BAND: Final = (0.025, 0.975)
+"""Ends of the 95 % band of a distribution."""
 
 SETTLED_FORCE: Final = 1.0
 """s after the full force is commanded, from where on the error of the force counts."""
@@ -56,6 +61,7 @@ def rotorcraft_metrics(
         **_singularity_metrics(columns, limits.resolve()),
         **_controller_metrics(columns),
         **_contact_metrics(columns, in_last_second(time, scenario.simulation.timestep)),
+        **_estimate_metrics(columns),
         **saturation_metrics(time, saturated),
     }
 
@@ -170,6 +176,24 @@ def _contact_metrics(columns: Mapping[str, Floats], last_second: Any) -> dict[st
         with np.errstate(invalid="ignore", divide="ignore"):  # NaN where the flight is too short
             metrics["rms_force_error"] = np.sqrt((error * error).sum(axis=-1) / count)
     return metrics
+
+
+def _estimate_metrics(columns: Mapping[str, Floats]) -> dict[str, Any]:
+    """How true the covariance of an estimate is, where a flight has one."""
+    if "nees" not in columns:
+        return {}
+    nees, count = columns["nees"], columns["nis_count"][..., -1]
+    low, high = (chi_square_quantile(share, NAVIGATION_ERRORS) for share in BAND)
+    band = [np.vectorize(chi_square_quantile)(share, np.maximum(count, 1.0)) for share in BAND]
+    with np.errstate(invalid="ignore", divide="ignore"):  # NaN where no reading arrived
+        nis, least, greatest = (x / count for x in (columns["nis"][..., -1], *band))
+    return {
+        "nees": nees.mean(axis=-1) / NAVIGATION_ERRORS,
+        "nees_in_band": ((nees >= low) & (nees <= high)).mean(axis=-1),
+        "nis": nis,
+        "nis_low": least,
+        "nis_high": greatest,
+    }
 
 
 def _singularity_metrics(

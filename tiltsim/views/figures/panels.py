@@ -22,6 +22,7 @@ from tiltsim.views.figures.flight_lines import (
     mark_end,
     plot_flights,
 )
+from tiltsim.views.figures.tubes import TUBES, draw_tube
 from tiltsim.views.signals import (
     AXES,
     FLOORS,
@@ -91,6 +92,11 @@ def panels_of(flights: Sequence[Flight]) -> dict[str, Panel]:
         found |= ({"margin": margin} if "margin" in found else {}) | common | path
         if has_attitude_plane(assembly):
             found["attitude_plane"] = Panel(_attitude_plane, over_time=False)
+        if "nees" in units:
+            tubes = {name: Panel(partial(draw_tube, name=name)) for name in TUBES}
+            found |= {
+                name: replace(tube, needs="nees", on_request=True) for name, tube in tubes.items()
+            }
         if "direction" in units:
             found["portrait"] = Panel(_portrait, over_time=False)
     return {name: panel for name, panel in found.items() if panel.needs in units}
