@@ -97,7 +97,7 @@ REFUSED = {
         ("compare", " --controllers given"),
         ("report", ""),
     )
-} | {"stability numpy.toml", "sweep sweep.toml", "arena --gains gains.json"}
+} | {"stability numpy.toml", "sweep sweep.toml", "arena --league unlimited --gains gains.json"}
 
 
 @pytest.fixture
@@ -117,7 +117,9 @@ def folders(tmp_path):
     for name, law in (("flight", "numpy"), ("flight2", "python")):
         tiltsim.simulate(here / f"{law}.toml").save(here / name)
     evil = {"law": "numpy", "function": f"{here}/law.py:numpy"}
-    (here / "gains.json").write_text(gains(vehicles(), "pid", of={"law": "pid"}, table=evil))
+    (here / "gains.json").write_text(
+        gains(vehicles("unlimited"), "pid", of={"law": "pid"}, table=evil)
+    )
     assert mark.exists()  # as those flights were flown
     mark.unlink()
     for name in {*sys.stdlib_module_names, "numpy", "mujoco", "tiltsim", "glfw"}:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 
 import numpy as np
@@ -12,8 +13,11 @@ from tiltsim.errors import InputError
 from tiltsim.studies import arena, tuning
 from tiltsim.studies.arena_page import arena_page
 from tiltsim.studies.comparison import Compared, Entry, compare_one, controller_tables
+from tiltsim.studies.league_page import league_page, league_table
 from tiltsim.studies.multirotor_analysis import FEW_ROTORS, FLEET
-from tiltsim.views.figures.arena_scores import arena_figure
+from tiltsim.views.figures.arena_scores import arena_figure, panels_of
+
+UNLIMITED = ["--league", "unlimited"]
 
 
 def row(controller, task, position=0.0, yaw=0.0, end="completed", gains="default"):
@@ -23,8 +27,12 @@ def row(controller, task, position=0.0, yaw=0.0, end="completed", gains="default
         "end": end,
         "refused": f"arena/tiltrotor#{task}: needs legs" if end == "refused" else None,
         "rms_position_error": position,
+        "final_position_error": 0.0,
         "rms_yaw_error": yaw,
+        "idle_position_error": 0.0,
+        "idle_yaw_error": 0.0,
         "gains": gains,
+        "world": "",
     }
     return made | {"score": arena.score(made)}
 
@@ -64,13 +72,7 @@ def test_a_refusal_counts_as_zero_in_the_total_alone(rows):
 def test_the_page_says_first_where_a_baseline_wins(rows):
     lines = arena_page({"tiltrotor": rows}, ["Made."]).splitlines()
     assert lines[2].endswith("in 2 of 2 tasks: tiltrotor 2.")
-    assert (
-        "- a baseline wins with default gains: "
-        "`step` (`pid` 50, `full_pose` 33), `circle` (`lqr` 50, `full_pose` 25)"
-    ) in lines
     assert "| `circle` | 25 | - | 50 |" in lines
-    assert "- `pid`: needs legs" in lines
-    assert "- `lqr` in `step`, default gains: singular" in lines
 
 
 def test_the_page_of_controllers_without_rivals_names_no_winner(rows):
@@ -80,16 +82,6 @@ def test_the_page_of_controllers_without_rivals_names_no_winner(rows):
     assert page.startswith("# Arena\n\n## All tasks")
     both = arena_page({"tiltrotor": rows, "quadrotor": baselines}, ["Made."]).splitlines()
     assert both[2].endswith("in 2 of 2 tasks: tiltrotor 2.")
-
-
-def test_refusals_that_differ_in_numbers_stand_on_the_page_once(rows):
-    refused = [row("pid", task, end="refused") for task in ("gust", "step", "circle")]
-    for one, legs in zip(refused, ("4", "2.5e-3", "4"), strict=True):
-        one["refused"] = f"{one['scenario']}: needs {legs} legs"
-    lines = arena_page({"tiltrotor": [*rows[2:], *refused]}, []).splitlines()
-    first = lines.index("Refused (-):")
-    assert lines[first + 2] == "- `pid`: needs 4 legs (elsewhere with other numbers)"
-    assert not lines[first + 3]
 
 
 @pytest.fixture
@@ -106,29 +98,28 @@ def test_tuned_scores_stand_beside_default_ones_and_decide_the_order(tuned):
     lines = arena_page({"tiltrotor": tuned}, ["Made."]).splitlines()
     assert lines[2].startswith("With tuned gains a baseline beats")
     assert lines[2].endswith("in 1 of 2 tasks: tiltrotor 1.")
-    assert "- a baseline wins with tuned gains: `circle` (`lqr` 50, `full_pose` 25)" in lines
-    assert "- tuning changes who wins: `step` (`pid` 50, then `full_pose` 67)" in lines
     assert "| `step` | 33 → 67 | 50 | 0 |" in lines
     assert "| tiltrotor | 29 → 46 | 25 | 25 |" in lines
 
 
 def test_the_figure_shows_every_score(tuned):
     ranked = arena.standings(tuned)
-    figure = arena_figure({"tiltrotor": ranked})
+    figure = arena_figure(panels_of({"tiltrotor": ranked}))
     texts = [text.get_text() for text in figure.axes[0].texts]
     assert texts == ["33 → 67", "50", "0", "25", "–", "50", "29 → 46", "25", "25"]
-    many = arena_figure({"one": ranked, "two": ranked, "three": ranked})
+    many = arena_figure(panels_of({"one": ranked, "two": ranked, "three": ranked}))
     assert [len(axes.texts) for axes in many.axes] == [9, 9, 9]
 
 
 def test_every_vehicle_of_the_fleet_has_tasks():
-    vehicles = arena.vehicles()
+    vehicles = arena.vehicles("unlimited")
     assert list(vehicles)[:2] == ["quadrotor", "tiltrotor"]
     assert set(vehicles) == set(FLEET) - set(FEW_ROTORS)
     of = {name: {task.partition("#")[2] for task in one.tasks} for name, one in vehicles.items()}
     assert of["tiltrotor"] >= of["quadrotor"]
     assert of["tiltrotor"] >= of["hexarotor"] == of["omni_octorotor"]
-    assert set(arena.HALF_OF) <= of["tiltrotor"]
+    limited = {task.partition("#")[2] for task in arena.vehicles("limited")["hexarotor"].tasks}
+    assert set(arena.HALF_OF) <= of["tiltrotor"] | limited
     for name in ("quadrotor", "tiltrotor", "tilt_octorotor", "omni_octorotor"):
         for address in vehicles[name].tasks[::4]:
             flown = arena.entry_of(vehicles[name], address, "given", {}).scenario()
@@ -137,7 +128,7 @@ def test_every_vehicle_of_the_fleet_has_tasks():
 
 
 def test_a_vehicle_has_the_controllers_that_fit():
-    vehicles = arena.vehicles()
+    vehicles = arena.vehicles("unlimited")
     own = ["given", "attitude_altitude", "full_pose", *arena.BASELINES]
     assert arena.fitting(vehicles["tiltrotor"])[:7] == own
     assert arena.fitting(vehicles["quadrotor"])[:5] == ["yaw_position", *arena.BASELINES]
@@ -147,7 +138,7 @@ def test_a_vehicle_has_the_controllers_that_fit():
 
 
 def test_only_the_tasks_own_controller_takes_what_a_vehicle_needs():
-    octorotor = arena.vehicles()["omni_octorotor"]
+    octorotor = arena.vehicles("unlimited")["omni_octorotor"]
     of = [
         arena.entry_of(octorotor, octorotor.tasks[0], name, table).scenario().controller
         for name, table in controller_tables(["given", "attitude_force", "pid"]).items()
@@ -201,7 +192,7 @@ def test_an_arena_without_a_flight_fails(tmp_path, capsys, monkeypatch):
             yield one
 
     monkeypatch.setattr(arena, "fly_entries", refused)
-    chosen = ["--controllers", "pid", "--vehicles", "quadrotor", "--quiet"]
+    chosen = ["--controllers", "pid", "--vehicles", "quadrotor", "--quiet", *UNLIMITED]
     assert main(["arena", *chosen, "--out", str(tmp_path)]) == 2
     message = "tiltsim: nothing could be flown; most frequent reason (18 of 18): needs legs\n"
     assert capsys.readouterr().err == message
@@ -217,7 +208,7 @@ def test_the_command_writes_data_page_and_figure(tmp_path, capsys, monkeypatch):
         tuning.Search("tiltrotor", "lqr"): None,
     }
     monkeypatch.setattr(tuning, "tune_all", lambda *_, **__: iter(found.items()))
-    chosen = ["--controllers", "pid,lqr", "--vehicles", "tiltrotor"]
+    chosen = ["--controllers", "pid,lqr", "--vehicles", "tiltrotor", *UNLIMITED]
     first, second = tmp_path / "first", tmp_path / "second"
     assert main(["arena", *chosen, "--tune", "40", "--out", str(first), "--json"]) == 0
     printed = json.loads(capsys.readouterr().out)
@@ -243,4 +234,68 @@ def test_the_command_writes_data_page_and_figure(tmp_path, capsys, monkeypatch):
 
 def test_an_unknown_vehicle_is_refused():
     with pytest.raises(InputError, match="--vehicles boat: choose cant_hexarotor, "):
-        arena.chosen_vehicles(["boat"])
+        arena.chosen_vehicles(["boat"], "unlimited")
+
+
+def flight(**changes):
+    return row("pid", "step") | {"idle_position_error": 1.0, "idle_yaw_error": 0.5} | changes
+
+
+def test_neither_an_idle_vehicle_nor_a_late_crash_gains():
+    assert arena.score(flight(rms_position_error=1.0, rms_yaw_error=0.5)) == 0.0
+    assert arena.score(flight(rms_position_error=1.5, rms_yaw_error=0.5)) == 0.0
+    assert arena.score(flight()) == 100.0
+    assert arena.score(flight(rms_position_error=1e-3, end="diverged")) == 0.0
+    falling = arena.score(flight(rms_position_error=0.05, final_position_error=0.4))
+    assert falling == arena.score(flight(rms_position_error=0.4)) < 40.0
+
+
+def league_rows():
+    """Two tasks, two seeds, two worlds: vectoring wins the circle, pid the step by little."""
+    for world, seed in itertools.product(("model error", "exact model"), (1, 2)):
+        for name, step, circle in (("vectoring", 0.25, 0.01 * seed), ("pid", 0.24, 0.1)):
+            for task, error in (("step", step), ("circle", circle)):
+                effort = {"rms_rotor_acceleration": 500.0, "peak_rotor_speed": 419.0}
+                made = row(name, task, error) | effort | {"saturated_fraction": 0.1}
+                yield made | {"seed": seed, "world": world}
+
+
+def test_the_page_of_the_limited_league_says_who_wins_by_how_much_and_where_not():
+    rows = {"hexarotor": list(league_rows())}
+    lines = league_page(rows, ["Made."]).splitlines()
+    assert lines[2] == "## With a model error"
+    assert "wins 1 of 2 tasks" in lines[4]
+    assert lines[5].startswith("On curves, in wind and with a weak rotor the best baseline's error")
+    assert " is 6.7 times as large" in lines[5]
+    assert lines[6] == "It loses, by vehicles and points: `step` on 1, by up to 1.0."
+    assert "| `circle` | 0.015 / 0.100 `pid` 50 |" in lines
+    assert "| `pid` | 500 | 0.50 | 10.0 % | 0 of 4 |" in lines
+    assert "## With an exact model" in lines
+    table = league_table(rows).splitlines()
+    assert len(table) == 17
+    assert table[1].startswith("hexarotor,step,vectoring,default,model error,1,completed,50.0,0.25")
+
+
+def test_the_limited_league_flies_within_limits():
+    vehicles = arena.vehicles("limited")
+    assert set(vehicles) == set(arena.LIMITED)
+    for name, vehicle in vehicles.items():
+        tables = arena.tables_of(vehicle, "limited")
+        flights = arena.matches("limited", {name: vehicle}, {name: tables}, {})
+        assert {one.place["seed"] for one in flights} == {1, 2, 3}
+        flown = flights[0].entry.scenario()
+        low, high = flown.vehicle.speeds_along_spin
+        assert (low < 0.0) == (name in arena.REVERSING)
+        assert high == arena.LIMITED[name]
+        assert flown.vehicle.rotor_time_constant == 0.03
+        assert flown.simulation.control_latency > 0.0
+        assert ("geometric_free" in tables) == flown.vehicle.has_tilting_rotors
+
+
+def test_tuned_gains_take_the_place_of_default_ones_in_the_limited_league():
+    vehicles = {"hexarotor": arena.vehicles("limited")["hexarotor"]}
+    tables = {"hexarotor": controller_tables(["pid"])}
+    tuned = {"hexarotor": {"pid": {"law": "pid", "position_gain": 1.5}}}
+    flights = arena.matches("limited", vehicles, tables, tuned)
+    assert {one.place["gains"] for one in flights} == {"tuned"}
+    assert len(flights) == 9 * (3 + 1)

@@ -21,7 +21,7 @@ TABLES = {
 
 
 def controller(vehicle, name):
-    entries = tuning.tuning_entries(vehicles()[vehicle], name, TABLES[vehicle][name])
+    entries = tuning.tuning_entries(vehicles("unlimited")[vehicle], name, TABLES[vehicle][name])
     return entries[0].scenario().controller
 
 
@@ -110,7 +110,10 @@ def flights(monkeypatch):
             "scenario": entry.address,
             "end": "refused" if gain > 3.0 else "completed",
             "rms_position_error": abs(gain - 2.0),
+            "final_position_error": 0.0,
             "rms_yaw_error": 0.0,
+            "idle_position_error": 0.0,
+            "idle_yaw_error": 0.0,
         }
         return Compared(row, np.zeros(0), np.zeros(0))
 
@@ -119,19 +122,19 @@ def flights(monkeypatch):
 
 
 def test_a_search_finds_the_gains_that_score_best(flights):
-    found = tuning.tune(tuning.Search("quadrotor", "pid"), vehicles(), TABLES, 200, 1)
+    found = tuning.tune(tuning.Search("quadrotor", "pid"), vehicles("unlimited"), TABLES, 200, 1)
     assert found.flights == len(flights) <= 200
     assert abs(found.table["position_gain"] - 2.0) < 0.1
     assert found.tuned_score > found.default_score > 0.0
     assert found.factors["position_gain"] == pytest.approx(found.table["position_gain"], rel=1e-3)
     assert found.of == {"law": "pid"}
-    again = tuning.tune(tuning.Search("quadrotor", "pid"), vehicles(), TABLES, 200, 1)
+    again = tuning.tune(tuning.Search("quadrotor", "pid"), vehicles("unlimited"), TABLES, 200, 1)
     assert again == found
 
 
 def test_a_budget_below_one_flight_on_each_task_is_refused(flights):
     with pytest.raises(InputError, match="--tune 4: must be at least 5, one flight on each"):
-        tuning.tune(tuning.Search("quadrotor", "pid"), vehicles(), TABLES, 4, 1)
+        tuning.tune(tuning.Search("quadrotor", "pid"), vehicles("unlimited"), TABLES, 4, 1)
     assert not flights
 
 
@@ -140,12 +143,14 @@ def test_scenarios_without_a_task_have_no_tuned_gains(monkeypatch):
         return Compared({"scenario": entry.address, "end": "refused"}, np.zeros(0), np.zeros(0))
 
     monkeypatch.setattr(tuning, "compare_one", refused)
-    assert tuning.tune(tuning.Search("tiltrotor", "lqr"), vehicles(), TABLES, 20, 1) is None
+    assert (
+        tuning.tune(tuning.Search("tiltrotor", "lqr"), vehicles("unlimited"), TABLES, 20, 1) is None
+    )
 
 
 def test_no_tuning_task_is_one_of_the_arena():
     for name in ("quadrotor", "tiltrotor", "hexarotor"):
-        vehicle = vehicles()[name]
+        vehicle = vehicles("unlimited")[name]
         entries = tuning.tuning_entries(vehicle, "given", {})
         assert len(entries) == (5 if name == "quadrotor" else 6 + ("tilt" in name))
         for entry in entries:

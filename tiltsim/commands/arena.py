@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 from tiltsim.commands.declaring import Option
 from tiltsim.commands.options import (
@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     from tiltsim.studies.arena import Vehicle
 
 Tables = dict[str, dict[str, Mapping[str, Any]]]  # tables of controllers, by vehicle and name
-GAINS_FILE: Final = "tuned_gains.json"
-"""Gains of the shipped tasks, and the file that ``--tune`` writes."""
+GAINS_FILE: Final = {"limited": "limited_gains.json", "unlimited": "tuned_gains.json"}
+"""Gains of the shipped tasks by league, and the file that ``--tune`` writes."""
 
 Count = Annotated[int | None, Option(read=positive_integer)]
 
@@ -36,6 +36,7 @@ def run(
     out: Path = Path("arena"),
     controllers: Names = (),
     own: OwnControllers = (),
+    league: Literal["limited", "unlimited"] = "limited",
     vehicles: Names = (),
     tune: Count = None,
     seed: Count = None,
@@ -47,16 +48,19 @@ def run(
 ) -> int:
     """Fly the tasks of scenarios/arena under every controller that fits, and score them.
 
-    Controllers of installed packages are included; gains are default and tuned. Scores: 100 for no
-    error, 50 for a root mean square error of 0.1 m or 0.1 rad of yaw (steps: a quarter of the
-    step), 0 if the flight ends early, - if the task refuses the controller.
+    The limited league has rotor limits, lag, latency, noise and model errors, and baselines with
+    observers and mixers; in the unlimited one all controllers that fit, also of packages, fly
+    without. Scores: 100 for no error, 50 for a root mean square error of 0.1 m or 0.1 rad of yaw
+    (steps: a quarter of the step), 0 for a vehicle that stays where it began and if the flight ends
+    early, - if the task refuses the controller.
 
     Args:
-        out (DIR): folder for arena.json, arena.png and arena.md (default: arena)
+        out (DIR): folder for arena.csv, arena.json, arena.png and arena.md (default: arena)
         controllers: laws, or given, the scenarios' own; default without --controller: all that fit
+        league: limited or unlimited (default: limited)
         vehicles: default: all
         tune (N): first search each controller's gains with at most N flights on other tasks, and
-            write them to tuned_gains.json
+            write them to limited_gains.json or tuned_gains.json
         seed (S): seed of that search (default: 1)
         gains (FILE): tuned gains that --tune wrote; default: the gains of scenarios/arena
     """
@@ -65,52 +69,85 @@ def run(
     from tiltsim.commands.controllers import chosen_controllers
     from tiltsim.report.made import Made
     from tiltsim.resources import shipped_folder
-    from tiltsim.studies.arena import FOLDER, chosen_vehicles, fitting, fly_tasks, standings
-    from tiltsim.studies.arena_page import arena_page
-    from tiltsim.studies.comparison import controller_tables, refusal
+    from tiltsim.studies.arena import FOLDER, OURS, chosen_vehicles, fly_matches, matches
+    from tiltsim.studies.comparison import refusal
     from tiltsim.studies.tuning import read_tuning
     from tiltsim.system.files import prepare_folder
-    from tiltsim.views.figures import style
-    from tiltsim.views.figures.arena_scores import arena_figure
 
     if tune is not None and gains is not None:
         raise InputError("--gains: not with --tune, which searches gains itself")
     if tune is None and seed is not None:
         raise InputError("--seed: only with --tune")
     given = chosen_controllers(controllers, own)
-    chosen = chosen_vehicles(vehicles)
-    tables: Tables = {
-        name: given or controller_tables(fitting(vehicle)) for name, vehicle in chosen.items()
-    }
+    chosen = chosen_vehicles(vehicles, league)
+    tables = _tables(chosen, given, league)
     prepare_folder(out)
     rows: dict[str, list[dict[str, Any]]] = {name: [] for name in chosen}
     with show_progress(shown=not quiet) as progress:
         if tune is not None:
             budget = {"flights": tune, "seed": seed or 1}
-            tuning = _tuned(out / GAINS_FILE, chosen, tables, budget, jobs, progress)
+            searched = _tables(chosen, given, league, without=(OURS,) * (league == "limited"))
+            tuning = _tuned(out / GAINS_FILE[league], chosen, searched, budget, jobs, progress)
         else:
-            tuning = read_tuning(gains or shipped_folder("scenarios") / FOLDER / GAINS_FILE)
+            tuning = read_tuning(gains or shipped_folder("scenarios") / FOLDER / GAINS_FILE[league])
         tuned = _tables_of(tuning, tables)
-        total = sum(
-            len(vehicle.tasks) * (len(tables[name]) + len(tuned[name]))
-            for name, vehicle in chosen.items()
-        )
-        progress.begin("flights", total)
-        for vehicle, row in fly_tasks(chosen, tables, tuned, jobs, trusted=trust):
-            rows[vehicle].append(row)
-            progress.tell("flights", sum(map(len, rows.values())), total)
+        flights = matches(league, chosen, tables, tuned, trusted=trust)
+        progress.begin("flights", len(flights))
+        for name, row in fly_matches(flights, jobs):
+            rows[name].append(row)
+            progress.tell("flights", sum(map(len, rows.values())), len(flights))
     made = Made.now()
     document = json_text({"made": asdict(made), "vehicles": rows})
-    page = arena_page(rows, [made.sentence, _sentence(tuning)])
+    page = _written(out, rows, [made.sentence, _sentence(tuning, league)], league)
     write_text(out / "arena.json", document)
-    write_text(out / "arena.md", page)
-    every = {vehicle: standings(flown) for vehicle, flown in rows.items()}
-    style.save(arena_figure(every), out / "arena.png")
     print(document if json else page)
     if not json:
         print_line(f"arena written to {out}")
     require_flown([refusal(row) for flown in rows.values() for row in flown])
     return 0
+
+
+def _tables(
+    chosen: Mapping[str, Vehicle],
+    given: Mapping[str, Mapping[str, Any]],
+    league: str,
+    without: Sequence[str] = (),
+) -> Tables:
+    """Tables of the named controllers, or of all in a league, by vehicle and name."""
+    from tiltsim.studies.arena import tables_of
+
+    found: Tables = {}
+    for name, vehicle in chosen.items():
+        known = tables_of(vehicle, league)
+        named = {one: known.get(one, table) for one, table in given.items()} or known
+        found[name] = {one: table for one, table in named.items() if one not in without}
+    return found
+
+
+def _written(
+    out: Path, rows: Mapping[str, list[dict[str, Any]]], made: list[str], league: str
+) -> str:
+    """Write page, table and picture of a league into a folder; returns the page."""
+    from tiltsim.studies.arena import standings
+    from tiltsim.studies.arena_page import arena_page
+    from tiltsim.studies.league_page import by_world, league_page, league_table
+    from tiltsim.views.figures import style
+    from tiltsim.views.figures.arena_scores import arena_figure, panels_of, tasks_of, vehicles_of
+
+    if league == "limited":
+        page, panels = league_page(rows, made), {}
+        for world, of in by_world(rows).items():
+            every = {vehicle: standings(flown) for vehicle, flown in of.items()}
+            together = standings([row for flown in of.values() for row in flown])
+            panels[f"{world}: tasks, mean of the vehicles"] = tasks_of(together)
+            panels[f"{world}: vehicles"] = vehicles_of(every)
+    else:
+        page = arena_page(rows, made)
+        panels = panels_of({vehicle: standings(flown) for vehicle, flown in rows.items()})
+    write_text(out / "arena.md", page)
+    write_text(out / "arena.csv", league_table(rows))
+    style.save(arena_figure(panels), out / "arena.png")
+    return page
 
 
 def _tuned(
@@ -152,10 +189,13 @@ def _tables_of(tuning: Mapping[str, Any], tables: Tables) -> Tables:
     }
 
 
-def _sentence(tuning: Mapping[str, Any]) -> str:
+def _sentence(tuning: Mapping[str, Any], league: str) -> str:
+    from tiltsim.studies.arena import SEEDS, WORLDS
+
+    seeds = max((SEEDS[world] for world in WORLDS[league]), key=len)
     made = tuning["made"]
     at = f" at commit {made['commit']}" if made["commit"] else ""
     return (
-        f"All tasks have `simulation.seed = 1`. Tuned gains: a search of {tuning['flights']} "
-        f"flights each with seed {tuning['seed']}, of {made['date']}{at}."
+        f"Seeds of the tasks: {', '.join(map(str, seeds))}. Tuned gains: a search of "
+        f"{tuning['flights']} flights each with seed {tuning['seed']}, of {made['date']}{at}."
     )

@@ -1,7 +1,7 @@
 """The ``[controller]`` tables of the baselines: known controllers to compare with."""
 
 from collections.abc import Callable, Mapping
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Final
 
 import numpy as np
 
@@ -10,6 +10,8 @@ from tiltsim.scenario.law_controller import Airframe, LawController, TiltingTabl
 from tiltsim.scenario.messages import InvalidValueError
 from tiltsim_controllers.analysis.stability import ErrorLoop, linear_loop
 from tiltsim_controllers.analysis.torque_free import RANK_TOLERANCE
+from tiltsim_controllers.laws.compensation import STATES as OBSERVER_STATES
+from tiltsim_controllers.laws.compensation import Compensating, compensated, record_of_limits
 from tiltsim_controllers.laws.geometric import (
     Geometric,
     geometric,
@@ -21,6 +23,9 @@ from tiltsim_controllers.laws.pid import STATES, Pid, pid
 from tiltsim_controllers.mathematics.scalar import Values
 from tiltsim_controllers.vehicle.effectiveness import CONSTANT, COSINE, ROTOR_FLOATS, SINE
 
+FASTEST: Final = 1e6
+"""rad/s, in place of no limit."""
+
 
 def require_no_pose(scenario: Any) -> None:
     """Refuse a reference of roll and pitch, of which the position disposes."""
@@ -31,7 +36,74 @@ def require_no_pose(scenario: Any) -> None:
             raise InvalidValueError(f"reference.{key}", getattr(reference, key), reason)
 
 
-class GeometricController(Geometric, TiltingTable, LawController):
+class CompensatingController(Compensating, LawController):
+    """A baseline, with observers and a mixer if its keys ask for them.
+
+    Attributes:
+        turning, integrators: See `compensated`.
+    """
+
+    turning: ClassVar[bool] = True
+    integrators: ClassVar[int] = 0
+
+    @property
+    def compensates(self) -> bool:
+        """Whether there is anything around the law itself."""
+        return self.observer > 0.0 or self.mixer == "prioritized"
+
+    def check_scenario(self, scenario: Any) -> None:
+        super().check_scenario(scenario)
+        vehicle = scenario.vehicle
+        if self.mixer == "prioritized" and not vehicle.has_rotor_limits:
+            raise self.mistake("mixer", "needs vehicle.min_rotor_speed or vehicle.max_rotor_speed")
+
+    def law_function(self, airframe: Airframe) -> Callable[..., Any]:
+        law = self.plain_function(airframe)
+        if not self.compensates:
+            return law
+        observes, mixes = self.observer > 0.0, self.mixer == "prioritized"
+        return compensated(law, self.turning, self.integrators, observes, mixes)
+
+    def plain_function(self, airframe: Airframe) -> Callable[..., Any]:
+        """The function of the law itself."""
+        return self.control
+
+    def law_parameters(self, airframe: Airframe) -> tuple[Any, ...]:
+        own = self.plain_parameters(airframe)
+        if not self.compensates:
+            return own
+        thrusts = (
+            tuple(k * speed * abs(speed) for k in airframe.vehicle.thrust_coefficients)
+            for speed in np.clip(airframe.speed_limits, -FASTEST, FASTEST).tolist()
+        )
+        made: tuple[Any, ...] = record_of_limits(type(own), airframe.rotors)(
+            own, self.observer, *thrusts
+        )
+        return made
+
+    def plain_parameters(self, airframe: Airframe) -> tuple[Any, ...]:
+        """The parameters of the law itself."""
+        return super().law_parameters(airframe)
+
+    def state_units(self, airframe: Airframe) -> Mapping[str, str]:
+        return {**self.plain_states(airframe), **(OBSERVER_STATES if self.observer else {})}
+
+    def plain_states(self, airframe: Airframe) -> Mapping[str, str]:
+        """The states of the law itself, with their units."""
+        return self.states
+
+    def initial_states(self, airframe: Airframe) -> Values:
+        own = self.plain_initial(airframe)
+        velocity, rates = airframe.initial_velocity, airframe.initial_body_rates
+        observed = (*velocity, *(0.0,) * 3, *rates, *(0.0,) * 3)
+        return (*own, *observed) if self.observer else own
+
+    def plain_initial(self, airframe: Airframe) -> Values:
+        """The states of the law itself at time zero."""
+        return (0.0,) * len(self.plain_states(airframe))
+
+
+class GeometricController(Geometric, TiltingTable, CompensatingController):
     """Tracking control on SE(3) (Lee et al. 2010)."""
 
     reference_kinds = ("position", "pose")
@@ -45,7 +117,7 @@ class GeometricController(Geometric, TiltingTable, LawController):
     def records_attitude(self, scenario: Any) -> bool:
         return super().records_attitude(scenario) and not self._leans(scenario.vehicle)
 
-    def law_function(self, airframe: Airframe) -> Callable[..., Any]:
+    def plain_function(self, airframe: Airframe) -> Callable[..., Any]:
         if not self.commands_tilts:
             return self.control
         outputs = self._outputs(airframe.vehicle)
@@ -82,10 +154,12 @@ class GeometricController(Geometric, TiltingTable, LawController):
         return 4
 
 
-class PidController(Pid, LawController):
+class PidController(Pid, CompensatingController):
     """The cascade of P, PI, P and PID that a practitioner tries first."""
 
     states = STATES
+    turning = False  # its integral of the rates does so
+    integrators = 6
     control: ClassVar = staticmethod(pid)
 
     def error_loops(self, vehicle: Any) -> list[ErrorLoop]:
@@ -104,15 +178,16 @@ class PidController(Pid, LawController):
         ]
 
 
-class IndiController(Indi, LawController):
+class IndiController(Indi, CompensatingController):
     """Incremental nonlinear dynamic inversion (Smeur et al. 2016)."""
 
+    turning = False  # it increments the torque that is there
     control: ClassVar = staticmethod(indi)
 
-    def state_units(self, airframe: Airframe) -> Mapping[str, str]:
+    def plain_states(self, airframe: Airframe) -> Mapping[str, str]:
         return state_units(airframe.rotors)
 
-    def initial_states(self, airframe: Airframe) -> Values:
+    def plain_initial(self, airframe: Airframe) -> Values:
         pairs = zip(airframe.vehicle.thrust_coefficients, airframe.initial_speeds, strict=True)
         thrusts = (k * speed * abs(speed) for k, speed in pairs)
         filtered = (*airframe.initial_body_rates, 0.0, 0.0, 0.0)

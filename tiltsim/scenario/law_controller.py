@@ -22,6 +22,7 @@ from tiltsim.scenario.table import Positive
 from tiltsim_controllers.analysis.stability import ErrorLoop, linear_loop
 from tiltsim_controllers.code.arrays import xp as xp
 from tiltsim_controllers.gaits.plans import Gait
+from tiltsim_controllers.laws.compensation import Compensating
 from tiltsim_controllers.laws.keys import number_of, record_of
 from tiltsim_controllers.laws.observed import Command as Command
 from tiltsim_controllers.laws.observed import Observed as Observed
@@ -200,9 +201,11 @@ class TiltingTable(LawTable):
             self.require_defaults(("tilt_bandwidth",), "needs controller.tilts = free")
         elif not scenario.vehicle.has_tilting_rotors:
             raise self.mistake("tilts", f"the rotors of the {scenario.vehicle.model} do not tilt")
+        super().check_scenario(scenario)
 
 
 @cache
 def _not_read() -> frozenset[str]:
     """Keys of the tables of laws that a law does not read."""
-    return frozenset(LawController.model_fields.keys() | TiltingTable.model_fields.keys())
+    tables = LawController, TiltingTable, Compensating
+    return frozenset(key for table in tables for key in table.model_fields)

@@ -1,5 +1,6 @@
 """The ``[controller]`` table of the linear-quadratic regulator."""
 
+from collections.abc import Callable
 from functools import lru_cache
 from math import inf
 from typing import Any, ClassVar, NamedTuple
@@ -7,12 +8,13 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from tiltsim.models.rotor_table import Multirotor
-from tiltsim.scenario.law_controller import Airframe, LawController
+from tiltsim.scenario.baseline_controllers import CompensatingController
+from tiltsim.scenario.law_controller import Airframe
 from tiltsim.scenario.messages import InvalidValueError
 from tiltsim_controllers.gaits.parameters import CUBIC
 from tiltsim_controllers.gaits.plans import Gait
 from tiltsim_controllers.laws.decouplers import exact_decoupler
-from tiltsim_controllers.laws.lqr import Lqr, Parameters, lqr
+from tiltsim_controllers.laws.lqr import Lqr, Parameters, lqr, lqr_along
 from tiltsim_controllers.laws.periodic_lqr import (
     LONGEST_PERIOD,
     SUBSTEPS,
@@ -33,13 +35,14 @@ class Weights(NamedTuple):
     thrust_change: float  # relative to the thrust in hover
 
 
-class LqrController(Lqr, LawController):
+class LqrController(Lqr, CompensatingController):
     """The linear-quadratic regulator about hover, or about the orbit of a moving gait."""
 
     damps_swing = False
     control: ClassVar = staticmethod(lqr)
 
     def check_scenario(self, scenario: Any) -> None:
+        super().check_scenario(scenario)
         if scenario.gait.type == "fixed":
             return
         gait = scenario.gait.plan(scenario.vehicle.resolve())
@@ -62,7 +65,7 @@ class LqrController(Lqr, LawController):
             airframe.gait,
             airframe.initial_tilts,
             airframe.gyroscopic,
-            self.rotor_bandwidth,
+            1.0 / (1.0 / self.rotor_bandwidth + (airframe.rotor_time_constant or 0.0)),
             self._weights(airframe.rotors),
         )
 
@@ -70,7 +73,10 @@ class LqrController(Lqr, LawController):
         errors = (self.position_error, self.velocity_error, self.attitude_error, self.rate_error)
         return Weights((*np.repeat(errors, 3).tolist(), *(inf,) * rotors), self.thrust_change)
 
-    def law_parameters(self, airframe: Airframe) -> Parameters:
+    def plain_function(self, airframe: Airframe) -> Callable[..., Any]:
+        return lqr_along if self.observer else self.control
+
+    def plain_parameters(self, airframe: Airframe) -> Parameters:
         gait = airframe.gait
         return Parameters() if gait.is_constant else Parameters(gait.parameters.period)
 

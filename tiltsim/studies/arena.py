@@ -2,9 +2,10 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from statistics import mean
 from types import MappingProxyType
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from tiltsim.errors import InputError
 from tiltsim.resources import shipped_folder
@@ -12,7 +13,7 @@ from tiltsim.scenario.controller import CONTROLLERS
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.messages import choose
 from tiltsim.studies.checking import collect
-from tiltsim.studies.comparison import GIVEN, Entry, fly_entries
+from tiltsim.studies.comparison import GIVEN, Entry, controller_tables, fly_entries
 from tiltsim.studies.multirotor_analysis import FEW_ROTORS, FLEET, fleet_file
 
 FOLDER: Final = "arena"
@@ -20,6 +21,9 @@ FOLDER: Final = "arena"
 
 BASELINES: Final = ("geometric", "pid", "indi", "lqr")
 """Laws of the literature, with which the other laws are compared."""
+
+OURS: Final = "vectoring"
+"""The law that flies the limited league with its default setting."""
 
 HALF: Final = (0.1, 0.1)
 """Root mean square errors of position (m) and yaw (rad), each of which alone halves the score."""
@@ -31,12 +35,48 @@ HALF_OF: Final = {
     "step": (STEP, 0.1),
     "yaw_step": (0.1, 1.571 * STEP),
     "latency": (0.3 * STEP, 0.1),
+    "late_step": (0.3 * STEP, 0.1),
 }
 """Tasks with other errors than `HALF`: steps, whose error begins with the step itself."""
 
 
 MULTIROTOR: Final = "multirotor"
 """The file whose tasks the fleet flies, each vehicle in place of the file's own."""
+
+LEAGUES: Final = ("limited", "unlimited")
+"""The arena that counts, with limits, lag, latency and noise, and the one without."""
+
+LIMITED: Final = {
+    "quadrotor": 525.0,
+    "tiltrotor": 525.0,
+    "hexarotor": 838.0,
+    "cant_hexarotor": 838.0,
+    "tilt_hexarotor": 838.0,
+    "tilt_octorotor": 838.0,
+    "omni_octorotor": 700.0,
+}
+"""Vehicles of the limited league, with their highest rotor speeds (rad/s)."""
+
+REVERSING: Final = ("omni_octorotor",)
+"""Vehicles whose rotors are built to reverse."""
+
+SERVO: Final = {"natural_frequency": 60.0, "damping_ratio": 0.8, "max_rate": 8.0}
+"""Tilt servos of the limited league: 60 degrees in about 0.15 s."""
+
+AS_FLOWN: Final = {"rotor_bandwidth": 400.0, "observer": 8.0, "mixer": "prioritized"}
+"""Keys of baselines in the limited league: commands at once, observers and a mixer."""
+
+WORLDS: Final[Mapping[str, Mapping[str, Mapping[str, Any]]]] = {
+    "limited": {
+        "model error": {},
+        "exact model": {"model_error.mass": 1.0, "model_error.thrust_coefficient": 1.0},
+    },
+    "unlimited": {"": {}},
+}
+"""By league, the errors of the law's model: values by dotted key for each table."""
+
+SEEDS: Final = {"model error": (1, 2, 3), "exact model": (1,), "": (1,)}
+"""Seeds of sensor noise and turbulence, by world."""
 
 OWN_KEYS: Final = {"omni_octorotor": {"controller.norm": "thrust"}}
 """Keys that a vehicle of the fleet needs beside its file and tilt angles: its rotors reverse."""
@@ -80,12 +120,17 @@ class Standing:
         return mean(score or 0.0 for score in self.tuned.values())
 
 
-def vehicles() -> dict[str, Vehicle]:
-    """The vehicles by name: vehicles with their own file, then the fleet's others on a gait."""
+def vehicles(league: str) -> dict[str, Vehicle]:
+    """The vehicles of a league by name.
+
+    Unlimited are vehicles with their own file, then the fleet's others on a gait.
+    """
     found: dict[str, list[str]] = {}
     for address in collect([str(shipped_folder("scenarios") / FOLDER)]):
         found.setdefault(address.partition("#")[0].rpartition("/")[2], []).append(address)
-    shared = tuple(found.pop(MULTIROTOR))
+    limited, shared = tuple(found.pop("limited")), tuple(found.pop(MULTIROTOR))
+    if league == "limited":
+        return {name: Vehicle(limited, _limited(name)) for name in LIMITED}
     every = {name: Vehicle(tuple(tasks), {}) for name, tasks in found.items()}
     for name, angles in FLEET.items():
         if name not in (*every, *FEW_ROTORS):
@@ -95,9 +140,36 @@ def vehicles() -> dict[str, Vehicle]:
     return every
 
 
-def chosen_vehicles(names: Sequence[str]) -> dict[str, Vehicle]:
-    """The named vehicles, or all. Raises InputError if one does not exist."""
-    known = vehicles()
+def _limited(name: str) -> dict[str, Any]:
+    """The values that put a vehicle into the tasks with limits."""
+    angles = (0.0,) * 4 if name == "tiltrotor" else FLEET[name]
+    limits = {"vehicle.mjcf": str(fleet_file(name)), "vehicle.max_rotor_speed": LIMITED[name]}
+    if name in REVERSING:
+        limits["vehicle.min_rotor_speed"] = None
+    if not angles:
+        return limits
+    gait = {"type": "fixed", "angles": [*angles]}
+    return limits | {"gait": gait, "vehicle.tilt_servo": SERVO}
+
+
+def tables_of(vehicle: Vehicle, league: str) -> dict[str, Mapping[str, Any]]:
+    """The tables of the controllers of a vehicle, by name.
+
+    In the limited league they are `vectoring`, and baselines as their authors fly them.
+    """
+    if league == "unlimited":
+        return controller_tables(fitting(vehicle))
+    flown: dict[str, Mapping[str, Any]] = {law: {"law": law, **AS_FLOWN} for law in BASELINES}
+    if "gait" not in vehicle.overrides:
+        return {"vectoring": {"law": "vectoring"}, **flown}
+    free = {"tilts": "free"}
+    own = {"vectoring": {"law": "vectoring", **free}}
+    return {**own, **flown, "geometric_free": {**flown["geometric"], **free}}
+
+
+def chosen_vehicles(names: Sequence[str], league: str) -> dict[str, Vehicle]:
+    """The named vehicles of a league, or all. Raises InputError if one does not exist."""
+    known = vehicles(league)
     for name in names:
         if name not in known:
             raise InputError(f"--vehicles {name}: {choose(name, sorted(known))}")
@@ -119,40 +191,68 @@ def fitting(vehicle: Vehicle) -> list[str]:
     return laws if own == default else [GIVEN, *laws]
 
 
-def fly_tasks(
+class Match(NamedTuple):
+    """A flight of the arena.
+
+    Attributes:
+        vehicle: Name.
+        place: Columns of its row: kind of gains, world and seed.
+        entry: Controller and task.
+    """
+
+    vehicle: str
+    place: Mapping[str, Any]
+    entry: Entry
+
+
+def matches(
+    league: str,
     chosen: Mapping[str, Vehicle],
     controllers: Mapping[str, Mapping[str, Mapping[str, Any]]],
     tuned: Mapping[str, Mapping[str, Mapping[str, Any]]],
-    jobs: int,
     *,
     trusted: bool = False,
-) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Fly the tasks of every vehicle; yields the vehicle's name and a row with its score.
+) -> list[Match]:
+    """The flights of a league; in the limited one tuned gains take the place of default ones.
 
     Args:
+        league: One of `LEAGUES`.
         chosen: The vehicles.
         controllers: Their tables by vehicle and name.
-        tuned: Tables with tuned gains of some of them, which are also flown.
-        jobs: Processes.
+        tuned: Tables with tuned gains of some of them.
         trusted: Whether to execute Python code that only tuned tables name.
+    """
+    found = []
+    for name, vehicle in chosen.items():
+        for address, (controller, table) in product(vehicle.tasks, controllers[name].items()):
+            gains = tuned.get(name, {}).get(controller)
+            for kind, keys in (("default", table), ("tuned", gains)):
+                if keys is None or (league == "limited" and gains and kind == "default"):
+                    continue
+                named = "function" in table and keys.get("function") == table["function"]
+                flown = ((world, seed) for world in WORLDS[league] for seed in SEEDS[world])
+                for world, seed in flown:
+                    changes = {**WORLDS[league][world], "simulation.seed": seed}
+                    entry = entry_of(vehicle, address, controller, keys, changes)
+                    place = {"gains": kind, "world": world, "seed": seed}
+                    found.append(Match(name, place, replace(entry, trusted=trusted or named)))
+    return found
+
+
+def fly_matches(flights: Sequence[Match], jobs: int) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Fly them; yields each vehicle's name and a row with its score.
+
+    Args:
+        flights: See `matches`.
+        jobs: Processes.
 
     Raises:
-        InputError: If they name some and are not trusted.
+        InputError: If they name Python code that is not trusted.
     """
-    places, entries = [], []
-    for name, vehicle in chosen.items():
-        for address in vehicle.tasks:
-            for controller, table in controllers[name].items():
-                gains = tuned.get(name, {}).get(controller)
-                for kind, keys in (("default", table), ("tuned", gains)):
-                    if keys is not None:
-                        named = "function" in table and keys.get("function") == table["function"]
-                        entry = entry_of(vehicle, address, controller, keys)
-                        places.append((name, kind))
-                        entries.append(replace(entry, trusted=trusted or named))
+    entries = [one.entry for one in flights]
     flown = fly_entries(entries, searches=False, timed=False, jobs=jobs)
-    for (name, kind), one in zip(places, flown, strict=True):
-        yield name, one.row | {"gains": kind, "score": score(one.row)}
+    for one, compared in zip(flights, flown, strict=True):
+        yield one.vehicle, {**compared.row, **one.place, "score": score(compared.row)}
 
 
 def entry_of(
@@ -180,7 +280,12 @@ def entry_of(
 
 
 def score(row: Mapping[str, Any]) -> float | None:
-    """The score of a row of `compare`: ``100 / (1 + e_position / half + e_yaw / half)``.
+    """The score of a row of `compare`, 0 to 100.
+
+    It is ``s = 100 / (1 + e_position / half + e_yaw / half)``, of which a vehicle that stays where
+    it began has none: ``100 (s - idle) / (100 - idle)``, at least 0. The position's error is the
+    greater of the root mean square of the flight and the mean of its last second, so that a vehicle
+    that falls at the end does not gain from the time before.
 
     None if the task refuses the controller, 0 if the flight ends early.
     """
@@ -188,8 +293,18 @@ def score(row: Mapping[str, Any]) -> float | None:
         return None
     if row["end"] != "completed":
         return 0.0
-    position, yaw = HALF_OF.get(task_of(row), HALF)
-    return float(100.0 / (1.0 + row["rms_position_error"] / position + row["rms_yaw_error"] / yaw))
+    half = HALF_OF.get(task_of(row), HALF)
+    position = max(row["rms_position_error"], row["final_position_error"])
+    reached = _share(position, row["rms_yaw_error"], half)
+    idle = _share(row["idle_position_error"], row["idle_yaw_error"], half)
+    if idle < 1.0 - 1e-6:
+        reached = max(0.0, reached - idle) / (1.0 - idle)
+    return float(100.0 * reached)
+
+
+def _share(position: float, yaw: float, half: tuple[float, float]) -> float:
+    """The score of errors, 0 to 1, each of which alone halves it where it is ``half``."""
+    return 1.0 / (1.0 + position / half[0] + yaw / half[1])
 
 
 def task_of(row: Mapping[str, Any]) -> str:
@@ -198,15 +313,25 @@ def task_of(row: Mapping[str, Any]) -> str:
 
 
 def standings(rows: Sequence[Mapping[str, Any]]) -> list[Standing]:
-    """Standings from the rows of one vehicle, the best first, by tuned gains if there are any."""
-    scores: dict[str, dict[str, dict[str, float | None]]] = {}
+    """Standings from the rows of one vehicle, the best first, by tuned gains if there are any.
+
+    Scores are means over seeds.
+    """
+    found: dict[str, dict[str, dict[str, list[float | None]]]] = {}
     for row in rows:
-        by_gains = scores.setdefault(row["controller"], {"default": {}, "tuned": {}})
-        by_gains[row["gains"]][task_of(row)] = row["score"]
-    every = [
-        Standing(name, by["default"], by["tuned"] or by["default"]) for name, by in scores.items()
-    ]
+        by_gains = found.setdefault(row["controller"], {"default": {}, "tuned": {}})
+        by_gains[row["gains"]].setdefault(task_of(row), []).append(row["score"])
+    every = []
+    for name, by in found.items():
+        default, tuned = ({t: _mean(s) for t, s in by[kind].items()} for kind in by)
+        every.append(Standing(name, default or tuned, tuned or default))
     return sorted(every, key=lambda standing: -standing.tuned_total)
+
+
+def _mean(scores: Sequence[float | None]) -> float | None:
+    """The mean of scores of several seeds; None if one is refused."""
+    known = [score for score in scores if score is not None]
+    return mean(known) if len(known) == len(scores) else None
 
 
 def best(every: Sequence[Standing], task: str, gains: str) -> tuple[str, float]:
@@ -231,30 +356,16 @@ def are_rivals(every: Sequence[Standing]) -> bool:
     return len({one.controller in BASELINES for one in every}) > 1
 
 
-def beaten(every: Sequence[Standing], gains: str) -> list[str]:
-    """The winner of each task in which a baseline beats all other controllers.
+def beaten(every: Sequence[Standing], gains: str) -> int:
+    """In how many tasks a baseline beats all other controllers of a vehicle.
 
     Args:
-        every: The controllers of a vehicle.
+        every: The controllers.
         gains: default or tuned.
     """
     if not are_rivals(every):
-        return []
+        return 0
     known = [one for one in every if one.controller in BASELINES]
     others = [one for one in every if one.controller not in BASELINES]
-    lines = []
-    for task in every[0].scores:
-        (winner, high), (loser, low) = best(known, task, gains), best(others, task, gains)
-        if high > low:
-            lines.append(f"`{task}` (`{winner}` {high:.0f}, `{loser}` {low:.0f})")
-    return lines
-
-
-def changed(every: Sequence[Standing]) -> list[str]:
-    """Both winners of each task in which tuned gains change the winner."""
-    lines = []
-    for task in every[0].scores if every else ():
-        (before, low), (after, high) = (best(every, task, kind) for kind in ("default", "tuned"))
-        if before != after:
-            lines.append(f"`{task}` (`{before}` {low:.0f}, then `{after}` {high:.0f})")
-    return lines
+    tasks = every[0].scores
+    return sum(best(known, task, gains)[1] > best(others, task, gains)[1] for task in tasks)

@@ -3,13 +3,11 @@
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from tiltsim.studies.arena import Standing, are_rivals, beaten, changed, standings, task_of
-from tiltsim.studies.comparison import refusal
-from tiltsim.system.text import alike
+from tiltsim.studies.arena import Standing, are_rivals, beaten, standings
 
 
 def arena_page(rows: Mapping[str, Sequence[Mapping[str, Any]]], made: Sequence[str]) -> str:
-    """How often baselines win, all totals, and for each vehicle who wins and a table.
+    """How often baselines win, all totals, and a table for each vehicle.
 
     Args:
         rows: Rows of each vehicle.
@@ -17,11 +15,10 @@ def arena_page(rows: Mapping[str, Sequence[Mapping[str, Any]]], made: Sequence[s
     """
     every = {vehicle: standings(chosen) for vehicle, chosen in rows.items()}
     kinds = ("tuned", "default") if is_tuned(rows) else ("default",)
-    lines = ["# Arena", "", *_baselines_win(every, kinds), "## All tasks", "", *_totals(every)]
+    lines = ["# Arena", "", *_baselines_win(every, kinds), "## All tasks", "", *totals(every)]
     for vehicle, ranked in every.items():
         title = vehicle.replace("_", " ").capitalize()
-        lines += ["", f"## {title}", "", *_table(ranked), "", *_winners(ranked, kinds)]
-        lines += _failures(rows[vehicle])
+        lines += ["", f"## {title}", "", *_table(ranked)]
     return "\n".join([*lines, "", *made, ""])
 
 
@@ -35,7 +32,7 @@ def _baselines_win(every: Mapping[str, Sequence[Standing]], kinds: Sequence[str]
     rivals = {vehicle: ranked for vehicle, ranked in every.items() if are_rivals(ranked)}
     tasks = sum(len(ranked[0].scores) for ranked in rivals.values())
     for gains in kinds if rivals else ():
-        won = {vehicle: len(beaten(ranked, gains)) for vehicle, ranked in rivals.items()}
+        won = {vehicle: beaten(ranked, gains) for vehicle, ranked in rivals.items()}
         shares = (f"{vehicle} {number}" for vehicle, number in won.items())
         yield (
             f"With {gains} gains a baseline beats all other controllers that flew in "
@@ -44,16 +41,7 @@ def _baselines_win(every: Mapping[str, Sequence[Standing]], kinds: Sequence[str]
         yield ""
 
 
-def _winners(ranked: Sequence[Standing], kinds: Sequence[str]) -> Iterator[str]:
-    """Tasks of one vehicle that baselines win, and whose winner changes by tuning."""
-    for gains in kinds if are_rivals(ranked) else ():
-        won = ", ".join(beaten(ranked, gains)) or "nowhere"
-        yield f"- a baseline wins with {gains} gains: {won}"
-    if len(kinds) > 1 and len(ranked) > 1:
-        yield f"- tuning changes who wins: {', '.join(changed(ranked)) or 'nowhere'}"
-
-
-def _totals(every: Mapping[str, Sequence[Standing]]) -> Iterator[str]:
+def totals(every: Mapping[str, Sequence[Standing]]) -> Iterator[str]:
     """Vehicles as rows, controllers as columns."""
     names = list(dict.fromkeys(one.controller for ranked in every.values() for one in ranked))
     yield "| | " + " | ".join(f"`{name}`" for name in names) + " |"
@@ -71,26 +59,6 @@ def _table(ranked: Sequence[Standing]) -> Iterator[str]:
         cells = " | ".join(cell(one.scores[task], one.tuned[task]) for one in ranked)
         yield f"| `{task}` | {cells} |"
     yield "| all tasks | " + " | ".join(cell(s.total, s.tuned_total) for s in ranked) + " |"
-
-
-def _failures(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
-    """Refusals, each once whatever its numbers, and flights that ended early."""
-    reasons: dict[str, list[str]] = {}
-    for row in rows:
-        if (reason := refusal(row)) is not None:
-            reasons.setdefault(row["controller"], []).append(reason)
-    refused = [
-        f"- `{name}`: {reason}{' (elsewhere with other numbers)' * (len({*found}) > 1)}"
-        for name, of_controller in reasons.items()
-        for reason, found in alike(of_controller).items()
-    ]
-    lost = dict.fromkeys(
-        f"- `{row['controller']}` in `{task_of(row)}`, {row['gains']} gains: {row['end']}"
-        for row in rows
-        if row["end"] not in ("completed", "refused")
-    )
-    yield from ["", "Refused (-):", "", *refused] * bool(refused)
-    yield from ["", "Ended early (0):", "", *lost] * bool(lost)
 
 
 def cell(default: float | None, tuned: float | None) -> str:

@@ -71,6 +71,9 @@ MEASURES: Final = (
 )
 """Numbers of a row; null where a flight has none, or a search did not survive its start."""
 
+SCALES: Final = ("idle_position_error", "idle_yaw_error", "peak_rotor_speed")
+"""Further ones: errors of a vehicle that stays where it began, and the greatest rotor speed."""
+
 
 @dataclass(frozen=True)
 class Compared:
@@ -211,10 +214,11 @@ def compare_one(entry: Entry, *, searches: bool, timed: bool = True) -> Compared
         assembly = assemble(scenario)
         flight = simulate_to_end(_engine(scenario, searches))
     except InputError as error:
-        refused = {"end": "refused", "refused": str(error), **dict.fromkeys(MEASURES)}
+        refused = {"end": "refused", "refused": str(error), **dict.fromkeys((*MEASURES, *SCALES))}
         return Compared(row | refused | {"latency_refused": None}, np.zeros(0), np.zeros(0))
     row |= {"end": flight.end.kind, "refused": None, **_tracking(flight)}
     row["tilt_travel"] = _tilt_travel(flight)
+    row["peak_rotor_speed"] = float(np.abs(flight["rotor_speeds"]).max())
     metrics = flight.metrics()
     for measure in MEASURES:
         row[measure] = row.get(measure, metrics.get(measure))
@@ -253,14 +257,20 @@ def _distance(flight: Flight) -> Floats:
 def _tracking(flight: Flight) -> dict[str, float]:
     error = _distance(flight)
     last = in_last_second(flight["time"], flight.scenario.simulation.timestep)
-    return {"final_position_error": float(error[last].mean()), "rms_yaw_error": _yaw_error(flight)}
+    idle = np.linalg.norm(flight["reference_position"] - flight["position"][0], axis=1)
+    return {
+        "final_position_error": float(error[last].mean()),
+        "rms_yaw_error": _yaw_error(flight, flight["yaw"]),
+        "idle_position_error": float(np.sqrt(np.mean(idle**2))),
+        "idle_yaw_error": _yaw_error(flight, flight["yaw"][0]),
+    }
 
 
-def _yaw_error(flight: Flight) -> float:
-    """Root mean square over the flight, rad, each the shorter way around."""
+def _yaw_error(flight: Flight, yaw: Any) -> float:
+    """Root mean square of a yaw's error over the flight, rad, each the shorter way around."""
     if "yaw_ref" not in flight.units:
         return nan
-    error = flight["yaw_ref"] - flight["yaw"]
+    error = flight["yaw_ref"] - yaw
     return float(np.sqrt(np.mean(np.arctan2(np.sin(error), np.cos(error)) ** 2)))
 
 

@@ -135,9 +135,10 @@ def thrust_sites(model: mujoco.MjModel) -> dict[int, str]:
 def seen_radius(scenario: Scenario, model: mujoco.MjModel) -> float:
     """The vehicle's radius (m), or a larger one so that a camera sees companions and a load."""
     begin = np.array(scenario.initial.position)
-    apart = [np.linalg.norm(each.initial.position - begin) for each in scenario.companions]
+    companions = (each.initial.position for each in scenario.companions)
+    apart = [float(np.linalg.norm(place - begin)) for place in companions]
     apart += [scenario.payload.length] if scenario.payload else []
-    return vehicle_radius(model) + 0.25 * float(max(apart, default=0.0))
+    return vehicle_radius(model) + 0.25 * max(apart, default=0.0)
 
 
 def _first_rotors(model: mujoco.MjModel) -> list[int]:

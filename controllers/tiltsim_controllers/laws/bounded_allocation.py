@@ -40,7 +40,7 @@ def bounded_least_squares(
         dual = solved_symmetric((matrix * (free / weights)) @ matrix.T + lead, rest)
         x = xp.where(free > 0.5, start + (dual @ matrix) / weights, x)
         beyond = free * root * xp.maximum(low - x, x - high)
-        worst = _largest(beyond)
+        worst = largest(beyond)
         leaves = (beyond > 0.5 * worst) & (beyond > TOLERANCE)
         return xp.where(leaves, xp.clip(x, low, high), x), xp.where(leaves, 0.0, free), worst
 
@@ -50,7 +50,7 @@ def bounded_least_squares(
     return xp.clip(x, low, high)
 
 
-def _largest(values: Any) -> Any:
+def largest(values: Any) -> Any:
     """The largest of some numbers."""
     most = values[0]
     for value in values[1:]:

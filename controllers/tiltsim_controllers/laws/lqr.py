@@ -17,8 +17,9 @@ from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.code.blocks import take_row
 from tiltsim_controllers.laws.keys import Keys, NonNegative, Positive
 from tiltsim_controllers.laws.observed import Command, Observed
-from tiltsim_controllers.laws.outer_loop import tracking_errors
+from tiltsim_controllers.laws.outer_loop import UP, pointing_attitude, tracking_errors
 from tiltsim_controllers.mathematics.attitude import attitude_error, rotation_matrix
+from tiltsim_controllers.mathematics.linear import norm
 
 BODY: Final = 12
 """States before the thrusts."""
@@ -55,12 +56,28 @@ def lqr(observed: Observed, p: Parameters) -> Command:
     are position, velocity (axes of the world but for the yaw), roll, pitch, yaw, body rates and
     thrusts.
     """
-    N, yaw = len(observed.thrusts), observed.reference.attitude[2]
-    row = _row_now(observed, p, (BODY + N) * (N + 1) + N)
-    states, thrusts, gains = row[: BODY + N], row[BODY + N : BODY + 2 * N], row[BODY + 2 * N :]
+    yaw = observed.reference.attitude[2]
+    states, thrusts, gains = _row_now(observed, p)
+    desired = rotation_matrix(states[6:9] + yaw * xp.array([0.0, 0.0, 1.0]))
+    return _regulated(observed, states, thrusts, gains, desired)
+
+
+def lqr_along(observed: Observed, p: Parameters) -> Command:
+    """The law about the attitude and the thrusts of the reference's acceleration."""
+    a = observed.reference.acceleration
+    states, thrusts, gains = _row_now(observed, p)
+    g = observed.vehicle.gravity
+    more = norm(a + g * xp.array(UP)) / g
+    desired = pointing_attitude(observed, a, observed.force @ thrusts)
+    states = xp.hstack([states[:BODY], more * states[BODY:]])
+    return _regulated(observed, states, more * thrusts, gains, desired)
+
+
+def _regulated(observed: Observed, states: Any, thrusts: Any, gains: Any, desired: Any) -> Command:
+    """Thrusts that return to states and to an attitude, given the gains in one row."""
+    N, yaw = len(thrusts), observed.reference.attitude[2]
     heading = rotation_matrix(xp.array([0.0, 0.0, yaw]))
     error, speed = tracking_errors(observed)
-    desired = rotation_matrix(states[6:9] + yaw * xp.array([0.0, 0.0, 1.0]))
     deviation = xp.hstack(
         [
             -heading.T @ error - states[0:3],
@@ -73,13 +90,17 @@ def lqr(observed: Observed, p: Parameters) -> Command:
     return Command(thrusts=thrusts - gains.reshape(N, -1) @ deviation)
 
 
-def _row_now(observed: Observed, p: Parameters, width: int) -> Any:
-    """The row of the table at the present time, shape (width,)."""
+def _row_now(observed: Observed, p: Parameters) -> tuple[Any, Any, Any]:
+    """States, thrusts (N) and gains of the table at the present time, shapes as in `lqr`."""
+    N = len(observed.thrusts)
+    width = (BODY + N) * (N + 1) + N
     nodes = len(observed.table) // width - 1
     if nodes == 0:
-        return xp.array(observed.table)
-    turns = observed.time / p.period
-    place = (turns - xp.floor(turns)) * nodes
-    node = xp.minimum(xp.floor(place), nodes - 1.0)
-    first, second = (take_row(observed.table, node + k, width) for k in (0.0, 1.0))
-    return first + (place - node) * (second - first)
+        row = xp.array(observed.table)
+    else:
+        turns = observed.time / p.period
+        place = (turns - xp.floor(turns)) * nodes
+        node = xp.minimum(xp.floor(place), nodes - 1.0)
+        first, second = (take_row(observed.table, node + k, width) for k in (0.0, 1.0))
+        row = first + (place - node) * (second - first)
+    return row[: BODY + N], row[BODY + N : BODY + 2 * N], row[BODY + 2 * N :]

@@ -22,22 +22,36 @@ Cells = dict[str, dict[str, tuple[float | None, float | None]]]
 """Scores with default and tuned gains, by row and controller."""
 
 
-@style.paper_style()
-def arena_figure(every: Mapping[str, Sequence[Standing]]) -> Figure:
-    """Every score as numbers on the shade of the one with tuned gains; the best first."""
-    panels: dict[str, Cells] = {}
-    for vehicle, ranked in islice(every.items(), DETAILED):
-        panels[vehicle] = {
-            task: {one.controller: (one.scores[task], one.tuned[task]) for one in ranked}
-            for task in ranked[0].scores
-        } | {ALL: {one.controller: (one.total, one.tuned_total) for one in ranked}}
+def panels_of(every: Mapping[str, Sequence[Standing]]) -> dict[str, Cells]:
+    """Tasks of the first vehicles, and the totals of all."""
+    panels = {vehicle: tasks_of(ranked) for vehicle, ranked in islice(every.items(), DETAILED)}
     if len(every) > DETAILED:
-        panels["all tasks of every vehicle"] = {
-            vehicle: {one.controller: (one.total, one.tuned_total) for one in ranked}
-            for vehicle, ranked in every.items()
-        }
+        panels["all tasks of every vehicle"] = vehicles_of(every)
+    return panels
+
+
+def tasks_of(ranked: Sequence[Standing]) -> Cells:
+    """Scores by task, and their mean."""
+    return {
+        task: {one.controller: (one.scores[task], one.tuned[task]) for one in ranked}
+        for task in ranked[0].scores
+    } | {ALL: {one.controller: (one.total, one.tuned_total) for one in ranked}}
+
+
+def vehicles_of(every: Mapping[str, Sequence[Standing]]) -> Cells:
+    """Means of all tasks by vehicle."""
+    return {
+        vehicle: {one.controller: (one.total, one.tuned_total) for one in ranked}
+        for vehicle, ranked in every.items()
+    }
+
+
+@style.paper_style()
+def arena_figure(panels: Mapping[str, Cells]) -> Figure:
+    """Every score as numbers on the shade of the one with tuned gains."""
     # All panels have these columns.
-    names = [*dict.fromkeys(one.controller for ranked in every.values() for one in ranked)]
+    rows = [row for cells in panels.values() for row in cells.values()]
+    names = [*dict.fromkeys(name for row in rows for name in row)]
     heights = [1 + len(cells) for cells in panels.values()]
     height = 1.1 + 0.5 * len(heights) + 0.24 * sum(heights)
     figure = style.new_figure(max(4.5, 1.4 + 0.72 * len(names)), height)

@@ -1,0 +1,173 @@
+"""The page of the arena's limited league in Markdown: who wins, by how much, at which effort."""
+
+import csv
+from collections.abc import Iterator, Mapping, Sequence
+from io import StringIO
+from statistics import mean, median
+from typing import Any, Final
+
+from tiltsim.studies.arena import LIMITED, OURS, Standing, best, standings, task_of
+from tiltsim.studies.arena_page import shown, totals
+
+Rows = Mapping[str, Sequence[Mapping[str, Any]]]
+"""Rows of flights, by vehicle."""
+
+TIE: Final = 0.5
+"""Difference of scores below which two controllers tie."""
+
+DISTURBED: Final = ("circle", "figure_eight", "gust", "wind", "weak_rotor")
+"""Tasks in which errors come from a disturbance or a moving reference alone."""
+
+COLUMNS: Final = (
+    "controller",
+    "gains",
+    "world",
+    "seed",
+    "end",
+    "score",
+    "rms_position_error",
+    "final_position_error",
+    "rms_yaw_error",
+    "rms_rotor_acceleration",
+    "peak_rotor_speed",
+    "saturated_fraction",
+)
+"""Columns of the table of flights after vehicle and task, unrounded; SI units."""
+
+
+def league_table(rows: Rows) -> str:
+    """All flights as CSV."""
+    text = StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(["vehicle", "task", *COLUMNS])
+    for vehicle, flown in rows.items():
+        writer.writerows(
+            [vehicle, task_of(row), *(row.get(column) for column in COLUMNS)] for row in flown
+        )
+    return text.getvalue()
+
+
+def by_world(rows: Rows) -> dict[str, dict[str, list[Mapping[str, Any]]]]:
+    """The rows of each world, by vehicle."""
+    worlds = dict.fromkeys(row["world"] for flown in rows.values() for row in flown)
+    return {
+        world: {
+            vehicle: [row for row in flown if row["world"] == world]
+            for vehicle, flown in rows.items()
+        }
+        for world in worlds
+    }
+
+
+def league_page(rows: Rows, made: Sequence[str]) -> str:
+    """Who wins, totals, errors, effort and losses, for each world.
+
+    Args:
+        rows: Rows of each vehicle.
+        made: Sentences on versions, seeds and gains.
+    """
+    lines = ["# Arena, limited league"]
+    for world, flown in by_world(rows).items():
+        every = {vehicle: standings(of) for vehicle, of in flown.items()}
+        lines += ["", f"## With {_named(world)}", "", *_verdict(every, flown), *totals(every)]
+        lines += ["", *_errors(flown), "", *_effort(flown)]
+    return "\n".join([*lines, "", *made, ""])
+
+
+def _named(world: str) -> str:
+    return f"an {world}" if world[0] in "aeiou" else f"a {world}"
+
+
+def _verdict(every: Mapping[str, Sequence[Standing]], flown: Rows) -> Iterator[str]:
+    """Against the best baseline of each task; nothing where not both flew."""
+    pairs = {
+        (vehicle, task): (_of(ranked, OURS).tuned[task] or 0.0, *_rival(ranked, task))
+        for vehicle, ranked in every.items()
+        if len({one.controller == OURS for one in ranked}) > 1
+        for task in ranked[0].scores
+    }
+    if not pairs:
+        return
+    won = sum(ours > theirs + TIE for ours, _, theirs in pairs.values())
+    lost: dict[str, list[float]] = {}
+    for (_, task), (ours, _, theirs) in pairs.items():
+        if theirs > ours + TIE:
+            lost.setdefault(task, []).append(theirs - ours)
+    errors = [
+        [_rms(flown[vehicle], task, one) for one in (name, OURS)]
+        for (vehicle, task), (_, name, _) in pairs.items()
+        if task in DISTURBED
+    ]
+    ratios = [mean(theirs) / mean(ours) for theirs, ours in errors if theirs and ours]
+    reached = mean(ours for ours, _, _ in pairs.values())
+    rival = mean(theirs for _, _, theirs in pairs.values())
+    tied = len(pairs) - won - (losses := sum(map(len, lost.values())))
+    yield (
+        f"`{OURS}`, at one default setting, wins {won} of {len(pairs)} tasks against the best "
+        f"baseline of each task, ties in {tied} (within {TIE} points) and loses {losses}. "
+        f"Mean score {reached:.1f}, against {rival:.1f} of the best baseline of each task."
+    )
+    if ratios:
+        yield (
+            f"On curves, in wind and with a weak rotor the best baseline's error is "
+            f"{median(ratios):.1f} times as large (median; {min(ratios):.1f} to {max(ratios):.1f})."
+        )
+    where = (f"`{task}` on {len(by)}, by up to {max(by):.1f}" for task, by in lost.items())
+    yield f"It loses, by vehicles and points: {'; '.join(where)}." if lost else "It loses nowhere."
+    yield ""
+
+
+def _of(ranked: Sequence[Standing], name: str) -> Standing:
+    return next(one for one in ranked if one.controller == name)
+
+
+def _rival(ranked: Sequence[Standing], task: str) -> tuple[str, float]:
+    return best([one for one in ranked if one.controller != OURS], task, "tuned")
+
+
+def _rms(rows: Sequence[Mapping[str, Any]], task: str, name: str) -> list[float]:
+    """Errors of a controller in a task that it completes, m."""
+    return [
+        row["rms_position_error"]
+        for row in rows
+        if (task_of(row), row["controller"], row["end"]) == (task, name, "completed")
+    ]
+
+
+def _errors(flown: Rows) -> Iterator[str]:
+    """Tasks as rows, vehicles as columns: errors of `OURS` and of the best baseline."""
+    every = {vehicle: standings(rows) for vehicle, rows in flown.items()}
+    yield (
+        f"Position error (rms, m, mean of seeds) of `{OURS}` / of the baseline with the best "
+        "score, with its score:"
+    )
+    yield ""
+    yield "| task | " + " | ".join(flown) + " |"
+    yield "| --- |" + " --: |" * len(flown)
+    for task in dict.fromkeys(task_of(row) for rows in flown.values() for row in rows):
+        cells = []
+        for vehicle, rows in flown.items():
+            rivals = [one for one in every[vehicle] if one.controller != OURS]
+            name, score = best(rivals, task, "tuned") if rivals else ("", None)
+            errors = (_rms(rows, task, one) for one in (OURS, name))
+            texts = [f"{mean(found):.3f}" if found else "-" for found in errors]
+            cells.append(" / ".join(texts) + (f" `{name}` {shown(score)}" if name else ""))
+        yield f"| `{task}` | " + " | ".join(cells) + " |"
+
+
+def _effort(flown: Rows) -> Iterator[str]:
+    """Controllers as rows: rotor accelerations, peak speeds, saturation and losses."""
+    yield "| controller | rotor acceleration, rad/s^2 | peak speed | at a limit | ended early |"
+    yield "| --- | --: | --: | --: | --: |"
+    for name in dict.fromkeys(row["controller"] for rows in flown.values() for row in rows):
+        of = [(v, row) for v, rows in flown.items() for row in rows if row["controller"] == name]
+        done = [(vehicle, row) for vehicle, row in of if row["end"] == "completed"]
+        lost = len([row for _, row in of if row["end"] != "refused"]) - len(done)
+        if not done:
+            yield f"| `{name}` | - | - | - | {lost} of {len(of)} |"
+            continue
+        effort = median(row["rms_rotor_acceleration"] for _, row in done)
+        peak = median(row["peak_rotor_speed"] / LIMITED.get(v, 1.0) for v, row in done)
+        limited = mean(row["saturated_fraction"] or 0.0 for _, row in done)
+        numbers = f"{effort:.0f} | {peak:.2f} | {100.0 * limited:.1f} %"
+        yield f"| `{name}` | {numbers} | {lost} of {len(of)} |"
