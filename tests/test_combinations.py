@@ -380,6 +380,8 @@ def changes(table, key=None):
     needed = dict(leaves(document)) | companions(document)
     if [step.name for step in table.places[0]][:1] == ["sensors"] and len(table.places[0]) > 1:
         needed["simulation.control_timestep"] = 0.01  # instruments are read at control steps
+    if "estimator" in document.get("controller", {}):
+        needed |= {"sensors.imu": {}, "sensors.mocap": {}, "simulation.control_timestep": 0.01}
     return {key: needed[key] for key in needed.keys() - {"controller.function", "vehicle.mjcf"}}
 
 

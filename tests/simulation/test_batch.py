@@ -300,6 +300,27 @@ def test_rows_with_and_without_layers_fly_the_same_three_ways():
 
 
 @pytest.mark.slow
+def test_estimators_inside_layers_fly_the_same_three_ways():
+    sensors = {
+        "imu": {"gyro_noise_density": 3e-4, "accelerometer_noise_density": 2e-3},
+        "mocap": {"position_noise": 1e-3, "attitude_noise": 3e-3, "delay": 0.008},
+    }
+    estimating = {"controller": {"estimator": "ekf"}, "sensors": sensors}
+    actuators = {key: table for key, table in ACTUATION.items() if key != "sensors"}
+    rows = three_ways(
+        [
+            layered(estimating, **HELD),
+            layered(estimating, seed=2, **HELD),
+            layered(estimating, STORMY, HINGED, HEAVY, **HELD),
+            layered(estimating, actuators, MEASURED, **LATE),
+            layered(estimating, STORMY, plant="thesis", **HELD),
+        ]
+    )
+    assert all(row.end.kind == "completed" for row in rows)
+    assert rows[0].flight["estimate_x"].tolist() != rows[1].flight["estimate_x"].tolist()
+
+
+@pytest.mark.slow
 def test_layers_around_the_law_that_knows_its_gait_fly_the_same_three_ways():
     rows = three_ways(
         [

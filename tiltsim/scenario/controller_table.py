@@ -176,7 +176,7 @@ class ControllerTable(Table):
     @property
     def estimator_table(self) -> EstimatorTable | None:
         """The estimator with all its keys; None without one."""
-        return EstimatorTable() if self.estimator == "ekf" else self.estimator  # type: ignore[return-value]
+        return EstimatorTable() if self.estimator == "ekf" else self.estimator
 
     def resolve_gains(self) -> Any:
         """The gains as the law reads them: of a named set, or as given."""

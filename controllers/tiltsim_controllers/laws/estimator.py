@@ -106,7 +106,8 @@ def vector_of_quaternion(quaternion: Any) -> Any:
 
 def no_transition() -> Transition:
     """The transition of no time at all."""
-    return Transition(0.0, *(xp.zeros((3, 3)) for _ in range(4)), xp.zeros(3), xp.zeros(3))
+    none, zeros = xp.zeros((3, 3)), xp.zeros(3)
+    return Transition(0.0, none, none, none, none, zeros, zeros)
 
 
 def integrated(

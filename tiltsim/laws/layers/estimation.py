@@ -343,7 +343,8 @@ def _parameters(plan: FlightPlan, fusion: Fusion) -> Any:
     correctors = {}
     for each in fusion.correctors:
         table = getattr(sensors, each.name)
-        errors, own, place = table.errors(1.0 / table.period(timestep), 0), {}, 0
+        errors, place = table.errors(1.0 / table.period(timestep), 0), 0
+        own: dict[str, Any] = {}
         for kind in CORRECTIONS[each.name]:
             count = len(COMPONENTS[kind])
             deviations = [_deviation(errors, place + i) for i in range(count)]
