@@ -195,6 +195,8 @@ def test_gains_name_no_code_but_the_command_lines(folder, own, capsys):
     (folder / "gains.json").write_text(tuned)
     chosen = ["--controller", f"{folder}/other.py:numpy"] if own else ["--controllers", "pid"]
     options = ["--gains", str(folder / "gains.json"), "--out", str(folder / "out"), "--jobs", "1"]
-    assert main(["arena", "--vehicles", "quadrotor", *chosen, *options]) == 2
+    assert (
+        main(["arena", "--league", "unlimited", "--vehicles", "quadrotor", *chosen, *options]) == 2
+    )
     assert ASKED in capsys.readouterr().err
     assert not ran(folder)

@@ -91,8 +91,8 @@ def compensated(
         command = law(seen, p.own)
         thrusts, rates = command.thrusts, [xp.zeros(0) if first == 0 else command.rates]
         if observes and turning:
-            wanted = -(observed.inertia @ torque)
-            thrusts = thrusts + nearest_solution(observed.torque, wanted, xp.zeros(len(thrusts)))
+            desired = -(observed.inertia @ torque)
+            thrusts = thrusts + nearest_solution(observed.torque, desired, xp.zeros(len(thrusts)))
         if mixes:
             found = mixed(observed, thrusts, xp.array(p.low), xp.array(p.high))
             if integrators:
@@ -113,7 +113,7 @@ def mixed(observed: Observed, thrusts: Any, low: Any, high: Any) -> Any:
 
     Args:
         observed: By the law.
-        thrusts: Wanted, N, shape (N,).
+        thrusts: Desired, N, shape (N,).
         low, high: Limits, N, shape (N,).
     """
     lift, scale = norm(observed.force[2]), observed.vehicle.mass * observed.vehicle.gravity
@@ -127,14 +127,14 @@ def mixed(observed: Observed, thrusts: Any, low: Any, high: Any) -> Any:
     size = xp.where(abs(yaw) > 1e-9 * scale, yaw, 1e-9 * scale)
     share = xp.clip(xp.maximum((low - rest) / size, (high - rest) / size), 0.0, 1.0)
     part = -largest(-share)
-    wanted = xp.where(part < 1.0, rest + part * yaw, thrusts) / scale
+    desired = xp.where(part < 1.0, rest + part * yaw, thrusts) / scale
     rows = xp.vstack([observed.force / lift, *(row[None] / norm(row) for row in observed.torque)])
     return scale * bounded_least_squares(
         rows,
-        rows @ wanted,
+        rows @ desired,
         xp.array(SOFTNESS),
         xp.ones(len(thrusts)),
-        wanted,
+        desired,
         low / scale,
         high / scale,
     )
