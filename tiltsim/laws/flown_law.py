@@ -13,6 +13,7 @@ from tiltsim.engines.programs import LoopPrograms
 from tiltsim.errors import InputError
 from tiltsim.laws.airframe import airframe_of
 from tiltsim.laws.law_loop import REMEDY, FlownLaw, Key, LawError, law_loop
+from tiltsim.laws.layers.instruments import instruments_of, with_instruments
 from tiltsim.laws.rotor_loop import layout_of_vehicle
 from tiltsim.scenario.controller import NumpyController
 from tiltsim.scenario.law_controller import LawController
@@ -133,10 +134,13 @@ def loop_of_law(scenario: Scenario, *, recorded: bool = False) -> ClosedLoop:
     loop, module = law_loop(key, find), law.function.__module__
     if recorded or (module.startswith("tiltsim_controllers.")):
         return loop
-    setup = loop.setup(plan, loop.signature)
-    _try_once(loop, plan, setup)
+    whole = loop
+    if scenario.sensors.instruments and controller.estimator is None:
+        whole = with_instruments(loop, instruments_of(scenario))
+    setup = whole.setup(plan, whole.signature)
+    _try_once(whole, plan, setup)
     refusal = _refusal(
-        loop, choices_of(setup.parameters), choices_of(plan.reference), len(setup.knots)
+        whole, choices_of(setup.parameters), choices_of(plan.reference), len(setup.knots)
     )
     if not refusal:
         return loop

@@ -174,6 +174,7 @@ def _step_of(key: Key) -> Callable[..., Step]:
             tilt_commands=states[own + discrete : own + discrete + tilts * key.tilts],
             contact_force=xp.array(seen.contact_force),
             swing=xp.array(seen.swing),
+            readings=seen.readings,
         )
         command = key.law(observed, known.own)
         reached = states[len(states) - rotors :] if key.models_rotors else turning

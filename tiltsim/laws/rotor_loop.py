@@ -122,7 +122,8 @@ class RotorFunctions(VehicleFunctions):
         body = q.position, v.velocity, euler_angles(q.quaternion), v.omega
         measured = v.measured if self.law.measured else None
         state = xp.hstack([*body, q.tilts, a.speeds])
-        return Seen(time, state, v.tilt_rates, a.states, measured)
+        readings = qvel[6 + M :]  # where none is measured
+        return Seen(time, state, v.tilt_rates, a.states, measured, readings=readings)
 
     def in_sample(self, time: Any, values: Any) -> Seen:
         """From a sample."""

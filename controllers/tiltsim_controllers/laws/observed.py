@@ -30,6 +30,7 @@ class Seen(NamedTuple):
     supervisor: Any = np.zeros(3)  # (3,), its state with rate and acceleration; zero at rest
     contact_force: Any = np.zeros(3)  # (3,), N, of the vehicle on all objects, world axes
     swing: Any = np.zeros(2)  # (2,), rad, of the cable of a load toward +x and +y
+    readings: Any = np.zeros(0)  # of the vehicle's instruments, see `Observed`
     shift: Any = np.zeros((3, 3))  # of the reference: position, velocity, acceleration, m and s
     recorded: bool = False  # whether it is a sample of a flight, of which signals alone are needed
 
@@ -82,6 +83,7 @@ class Observed(NamedTuple):
     tilt_commands: Any  # (M,), rad, of a law that commands the tilts; otherwise none
     contact_force: Any = np.zeros(3)  # (3,), N, of the vehicle on all objects, world axes
     swing: Any = np.zeros(2)  # (2,), rad, of a load's cable from straight down toward +x and +y
+    readings: Any = np.zeros(0)  # of each instrument its values, then 1 if they are new, else 0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -149,6 +149,52 @@ def test_refusals_name_the_key(changes, words):
         scenario(changes.pop("sensors", INSTRUMENTS["mocap"]), **changes)
 
 
+OWN = """
+import tiltsim
+from tiltsim import xp
+
+
+def fly(observed):
+    \"\"\"Altitude by an alpha-beta filter of a barometer, upright by the true attitude.\"\"\"
+    height, climb = observed.discrete
+    force = observed.readings[2]
+    reading, new = observed.readings[7], observed.readings[8]
+    step, weight = 0.01, observed.vehicle.gravity
+    ahead = height + step * climb
+    error = new * (reading - ahead)
+    height, climb = ahead + 0.2 * error, climb + step * (force - weight) + 0.5 * error
+    lift = weight + 4.0 * (observed.reference.position[2] - height) - 4.0 * climb
+    roll, pitch, _ = observed.attitude
+    torque = -xp.array([0.3 * roll, 0.3 * pitch, 0.0]) - 0.08 * observed.body_rates
+    even = observed.vehicle.mass * lift * xp.array([0.25, 0.25, 0.25, 0.25])
+    turn = observed.torque.T @ torque
+    return tiltsim.Command(thrusts=even + 5.0 * turn, discrete=xp.array([height, climb]))
+"""
+
+
+def test_a_custom_law_estimates_from_the_readings(tmp_path):
+    (tmp_path / "own.py").write_text(OWN, encoding="utf-8")
+    flown = []
+    for engine in ("python", "native"):
+        flight = tiltsim.simulate(
+            {
+                "vehicle": {"model": "quadrotor"},
+                "controller": {
+                    "law": "numpy",
+                    "function": str(tmp_path / "own.py:fly"),
+                    "discrete_states": {"state_height": "m", "state_climb": "m/s"},
+                },
+                "reference": {"type": "setpoint", "position": [0.0, 0.0, 0.4]},
+                "sensors": {"imu": IMU, "barometer": {"rate": 50.0, "noise": 0.01}},
+                "simulation": {"duration": 5.0, "control_timestep": 0.01, "engine": engine},
+            }
+        )
+        flown.append(flight)
+    assert np.abs(flown[0]["z"][-100:] - 0.4).max() < 0.1
+    assert np.abs(flown[0]["z"] - flown[0]["state_height"])[-100:].max() < 0.05
+    np.testing.assert_array_equal(flown[0].samples, flown[1].samples)
+
+
 def test_lines_are_as_long_as_the_longest_delay():
     fusion = fusion_of(scenario(INSTRUMENTS["late"]))
     assert (fusion.waits, fusion.late, fusion.correctors[0].waits) == (2, 1, 0)
