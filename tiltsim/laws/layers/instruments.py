@@ -8,7 +8,6 @@ and the last ones that arrived.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import cache
 from math import ceil
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
@@ -88,7 +87,7 @@ def with_instruments(loop: ClosedLoop, carried: tuple[Instrument, ...]) -> Close
         carried: The instruments.
     """
     inner_controls, dynamics = loop.sampling.controls, loop.dynamics
-    inner_observe, first = loop.columns.observe, dynamics.sizes.act
+    first = dynamics.sizes.act
     _, loads = read_actuators(dynamics)
     acceleration, measured = plant_acceleration_of(dynamics), _measured(dynamics.spins)
     columns = {name: unit for each in carried for name, unit in each.columns.items()}
@@ -122,12 +121,6 @@ def with_instruments(loop: ClosedLoop, carried: tuple[Instrument, ...]) -> Close
         ctrl = inner_controls(time, qpos, xp.hstack([qvel, seen]), act, inner, knots)
         return xp.hstack([ctrl, *kept, seen])
 
-    @traceable
-    def observe(qpos: Any, qvel: Any, act: Any, ctrl: Any) -> Any:
-        place = dynamics.sizes.ctrl
-        shown = ctrl[place + states : place + states + len(columns)]
-        return xp.hstack([inner_observe(qpos, qvel, act[:first], ctrl[:place]), shown])
-
     layer = Layer(
         "with_instruments",
         record,
@@ -135,16 +128,10 @@ def with_instruments(loop: ClosedLoop, carried: tuple[Instrument, ...]) -> Close
         controls=controls,
         actuators=ExtraActuators(states=states, memories=len(columns)),
         initial_activations=lambda _plan, _own, _inner: (0.0,) * states,
+        remembered=tuple(columns),
         units=columns,
     )
-    wrapped = wrap_loop(loop, layer)
-    observed = replace(
-        wrapped.columns,
-        observe=observe,
-        fields=(*wrapped.columns.fields, *columns),
-        observe_reads_controls=True,
-    )
-    return replace(wrapped, columns=observed)
+    return wrap_loop(loop, layer)
 
 
 def _measured(spins: tuple[float, ...]) -> dict[str, Callable[..., Any]]:
