@@ -8,6 +8,7 @@ import json
 import socket
 import time
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from struct import Struct
 from typing import Any, Final, NamedTuple
 
@@ -251,4 +252,4 @@ class Px4Link(Link):
                 return np.clip(self._used(shares), np.where(self._signed, -1.0, 0.0), 1.0)
 
 
-LINKS: Final = {"ardupilot": ArduPilotLink, "px4": Px4Link}
+LINKS: Final[dict[str, Callable[..., Link]]] = {"ardupilot": ArduPilotLink, "px4": Px4Link}

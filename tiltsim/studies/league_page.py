@@ -155,13 +155,18 @@ def _errors(flown: Rows) -> Iterator[str]:
         yield f"| `{task}` | " + " | ".join(cells) + " |"
 
 
+def _is_near(row: Mapping[str, Any]) -> bool:
+    """Whether a flight ends within a meter of its reference, mean of the last second."""
+    return bool(row["final_position_error"] <= 1.0)
+
+
 def _effort(flown: Rows) -> Iterator[str]:
     """Controllers as rows: rotor accelerations, peak speeds, saturation and losses."""
-    yield "| controller | rotor acceleration, rad/s^2 | peak speed | at a limit | ended early |"
+    yield "| controller | rotor acceleration, rad/s^2 | peak speed | at a limit | lost |"
     yield "| --- | --: | --: | --: | --: |"
     for name in dict.fromkeys(row["controller"] for rows in flown.values() for row in rows):
         of = [(v, row) for v, rows in flown.items() for row in rows if row["controller"] == name]
-        done = [(vehicle, row) for vehicle, row in of if row["end"] == "completed"]
+        done = [(v, row) for v, row in of if row["end"] == "completed" and _is_near(row)]
         lost = len([row for _, row in of if row["end"] != "refused"]) - len(done)
         if not done:
             yield f"| `{name}` | - | - | - | {lost} of {len(of)} |"

@@ -167,6 +167,14 @@ def test_the_field_points_north_and_down_in_body_axes():
         np.testing.assert_allclose(seen, expected, atol=1e-12)
 
 
+def test_a_bias_walks_from_reading_to_reading():
+    flight = fly({"imu": {"gyro_random_walk": 0.1}}, simulation={"duration": 8.0})
+    bias = vectors(flight, "imu_rate")[0] - np.stack([flight[n] for n in "pqr"], axis=-1)
+    steps = np.diff(bias, axis=0)
+    assert steps.std() == pytest.approx(0.1 * np.sqrt(STEP), rel=0.05)
+    assert abs(np.corrcoef(steps[1:, 0], steps[:-1, 0])[0, 1]) < 0.1
+
+
 NOISY = {
     "imu": {"preset": "mpu_6050", "gyro_random_walk": 1e-3, "position": PLACE},
     "mocap": {"rate": 50.0, "delay": 0.03, "attitude_noise": 0.01, "dropout": 0.1},
@@ -185,7 +193,8 @@ def test_readings_are_equal_on_both_engines_and_the_flight_is_the_one_without(pl
     ]
     np.testing.assert_array_equal(flights[0].samples, flights[1].samples)
     alone = fly({}, simulation={"plant": plant, "duration": 0.5})
-    np.testing.assert_array_equal(flights[0]["x"], alone["x"])
+    for name in alone.units:
+        np.testing.assert_array_equal(flights[0][name], alone[name], err_msg=name)
     other = fly(NOISY, simulation={"plant": plant, "duration": 0.5, "seed": 1})
     assert (other["barometer_altitude"] != flights[0]["barometer_altitude"]).all()
 
