@@ -17,7 +17,8 @@ from tiltsim.report.pictures import PICTURES
 from tiltsim.report.statement import ID
 from tiltsim.scenario.metric_names import METRICS
 
-RAW = re.compile("|".join([*METRICS, *(name.replace("_", " ") for name in METRICS)]), re.I)
+NAMES = "|".join([*METRICS, *(name.replace("_", " ") for name in METRICS)])
+RAW = re.compile(rf"\b(?:{NAMES})\b", re.I)
 PLAIN_WORDS = {"duration", "switches", "diverged"}
 
 

@@ -23,6 +23,16 @@ class Errors(NamedTuple):
     resolution: tuple[float, ...]
 
 
+POSITION: Any = Field(
+    ZEROS, description="from the center of mass, body axes [m]", examples=[[0.05, 0.0, 0.01]]
+)
+ORIENTATION: Any = Field(
+    ZEROS,
+    description="roll, pitch and yaw of its own axes, in which it errs [rad]",
+    examples=[[0.0, 0.0, 1.57]],
+)
+
+
 class InstrumentTable(Table):
     """An instrument that is read at control steps."""
 
@@ -114,14 +124,8 @@ class ImuTable(InstrumentTable):
     gyro_resolution: NonNegative = Field(
         0.0, description="step of the readings; 0: none [rad/s]", examples=[0.0011]
     )
-    position: Vector3 = Field(
-        ZEROS, description="from the center of mass, body axes [m]", examples=[[0.05, 0.0, 0.01]]
-    )
-    orientation: Angles3 = Field(
-        ZEROS,
-        description="roll, pitch and yaw of its own axes, in which it errs [rad]",
-        examples=[[0.0, 0.0, 1.57]],
-    )
+    position: Vector3 = POSITION
+    orientation: Angles3 = ORIENTATION
 
     @model_validator(mode="before")
     @classmethod
@@ -173,6 +177,8 @@ class MocapTable(InstrumentTable):
         ZEROS, description="constant turn about the body axes [rad]", examples=[[0.01, 0.0, 0.0]]
     )
 
+    position: Vector3 = POSITION
+
     def errors(self, rate: float, rotors: int) -> Errors:
         return _joined(
             _axes(self.position_noise, 0.0, self.position_bias, self.position_resolution),
@@ -206,6 +212,8 @@ class GpsTable(InstrumentTable):
         0.0, description="step of the positions; 0: none [m]", examples=[0.01]
     )
 
+    position: Vector3 = POSITION
+
     def errors(self, rate: float, rotors: int) -> Errors:
         walk = self.position_random_walk / sqrt(rate)
         return _joined(
@@ -229,6 +237,8 @@ class BarometerTable(InstrumentTable):
     resolution: NonNegative = Field(
         0.0, description="step of the readings; 0: none [m]", examples=[0.01]
     )
+
+    position: Vector3 = POSITION
 
     def errors(self, rate: float, rotors: int) -> Errors:
         walk = self.random_walk / sqrt(rate)
@@ -254,6 +264,8 @@ class MagnetometerTable(InstrumentTable):
     inclination: Annotated[float, Field(ge=-1.55, le=1.55)] = Field(
         1.1, description="of the field below the horizon, along x of the world [rad]"
     )
+
+    orientation: Angles3 = ORIENTATION
 
     def errors(self, rate: float, rotors: int) -> Errors:
         return Errors(*_axes(self.noise, 0.0, self.bias, self.resolution))

@@ -10,7 +10,7 @@ from pydantic import BaseModel
 from tiltsim.arrays.jax_programs import InJax
 from tiltsim.closed_loop.loop import ClosedLoop
 from tiltsim.plants.flight_model import disturbance_acceleration
-from tiltsim.scenario.instruments import INSTRUMENTS
+from tiltsim.scenario.instruments import InstrumentTable
 from tiltsim.scenario.scenario import Scenario, plan_flight
 from tiltsim.scenario.vehicle import VehicleTable
 from tiltsim_controllers.code.messages import TraceError
@@ -32,8 +32,8 @@ TABLES: Final = (
 )
 """Tables of a scenario whose numbers may be parameters."""
 
-FIXED: Final = frozenset({"sample_time", "tilt_servo", "pod", *INSTRUMENTS})
-"""Keys that are no parameters."""
+FIXED: Final = frozenset({"sample_time", "tilt_servo", "pod"})
+"""Keys that are no parameters, as the keys of instruments are not."""
 
 
 def in_full(scenario: Scenario) -> Scenario:
@@ -57,8 +57,10 @@ def _numbers(table: BaseModel) -> Tree:
     """The numbers of a table by key; each table within is a tree."""
     found: Tree = {}
     for key, value in table:
+        if key in FIXED or isinstance(value, InstrumentTable):
+            continue
         inner = _numbers(value) if isinstance(value, BaseModel) else value
-        if key not in FIXED and (inner if isinstance(value, BaseModel) else _is_number(value)):
+        if inner if isinstance(value, BaseModel) else _is_number(value):
             found[key] = inner
     return found
 

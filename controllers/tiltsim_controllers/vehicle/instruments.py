@@ -26,6 +26,8 @@ def instrument_record(errors: int) -> Any:
         period=float,  # s, between readings
         delay=float,  # s, until a reading is available
         dropout=float,  # probability that a reading is lost
+        place=vector_of(3),  # from the center of mass, m, body axes
+        axes=vector_of(9),  # its own axes in body axes, as columns
         noise=size,  # standard deviation of a reading, white
         walk=size,  # standard deviation of the bias's step from reading to reading
         bias=size,  # constant

@@ -107,6 +107,25 @@ def test_on_the_thesis_s_circle_the_imu_agrees_with_mujoco():
     assert max(reading) < 1e-9
 
 
+def test_places_away_from_the_center_of_mass_move_with_the_body():
+    place = {"position": PLACE}
+    flight = fly({"mocap": place, "gps": place, "barometer": place})
+    attitude = np.stack([flight[name] for name in ("roll", "pitch", "yaw")], axis=-1)
+    omega = np.stack([flight[name] for name in "pqr"], axis=-1)
+    turned = [rotation_matrix(row) for row in attitude]
+    arms = np.array([rotation @ PLACE for rotation in turned])
+    around = np.array(
+        [rotation @ np.cross(rate, PLACE) for rotation, rate in zip(turned, omega, strict=True)]
+    )
+    center = np.stack([flight[axis] for axis in "xyz"], axis=-1)
+    velocity = np.stack([flight[name] for name in ("vx", "vy", "vz")], axis=-1)
+    mocap, gps, moving = vectors(flight, "mocap", "gps", "gps_velocity")
+    np.testing.assert_allclose(mocap, center + arms, atol=1e-12)
+    np.testing.assert_allclose(gps, center + arms, atol=1e-12)
+    np.testing.assert_allclose(moving, velocity + around, atol=1e-12)
+    np.testing.assert_allclose(flight["barometer_altitude"], mocap[:, 2], atol=1e-14)
+
+
 def test_a_disturbance_that_accelerates_is_felt():
     push = [{"type": "acceleration", "value": [1.5, 0.0, 0.0]}]
     calm, pushed = fly({"imu": {}}), fly({"imu": {}}, disturbance=push)
@@ -156,6 +175,15 @@ def test_errors_are_in_the_axes_of_the_imu_and_readings_in_the_body_s():
     turned = fly({"imu": {"accelerometer_bias": bias, "orientation": [0.0, 0.0, np.pi / 2]}})
     difference = vectors(turned, "imu_acceleration")[0] - vectors(ideal, "imu_acceleration")[0]
     np.testing.assert_allclose(difference, np.tile([0.0, 0.5, 0.0], (len(ideal), 1)), atol=1e-12)
+
+
+def test_a_turned_magnetometer_errs_in_its_own_axes():
+    bias = {"bias": [0.1, 0.0, 0.0]}
+    ideal, turned = (
+        fly({"magnetometer": keys}) for keys in ({}, bias | {"orientation": [0.0, 0.0, np.pi / 2]})
+    )
+    difference = vectors(turned, "magnetometer")[0] - vectors(ideal, "magnetometer")[0]
+    np.testing.assert_allclose(difference, np.tile([0.0, 0.1, 0.0], (len(ideal), 1)), atol=1e-12)
 
 
 def test_the_field_points_north_and_down_in_body_axes():
@@ -259,7 +287,10 @@ def test_the_allan_deviation_of_an_hour_has_the_densities():
         ),
     )
     errors = table.errors(rate, 0)
-    own = instruments.instrument_record(6)(3.0, 1000.0, 1.0 / rate, 0.0, 0.0, *errors)
+    ideal = {"delay": 0.0, "dropout": 0.0, "place": (0.0,) * 3, "axes": (0.0,) * 9}
+    own = instruments.instrument_record(6)(
+        seed=3.0, channel=1000.0, period=1.0 / rate, **ideal, **errors._asdict()
+    )
     white = read_an_hour(own, rate, first=None)
     walked = np.cumsum(read_an_hour(own, rate, first=32.0), axis=0)
     for axes, density, walk in (

@@ -27,7 +27,8 @@ from tiltsim.vehicles.rotorcraft.layout import QW, TILT_1
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.code.traceable import traceable
 from tiltsim_controllers.mathematics.attitude import rotation_matrix, rotation_of_quaternion
-from tiltsim_controllers.mathematics.records import Vector3, make_record_type, vector_of
+from tiltsim_controllers.mathematics.linear import cross
+from tiltsim_controllers.mathematics.records import Vector3, make_record_type
 from tiltsim_controllers.vehicle import instruments
 from tiltsim_controllers.vehicle.sensors import reading_index
 
@@ -97,8 +98,6 @@ def with_instruments(loop: ClosedLoop, carried: tuple[Instrument, ...]) -> Close
         motion=motion_record(dynamics),
         control_period=float,  # s
         disturbance=Vector3,  # m/s^2, world
-        imu_place=Vector3,  # m, body axes
-        imu_axes=vector_of(9),  # of the IMU in body axes, as columns
         field=Vector3,  # direction of the magnetic field, world
         **{each.name: instruments.instrument_record(each.errors) for each in carried},
     )
@@ -137,28 +136,45 @@ def with_instruments(loop: ClosedLoop, carried: tuple[Instrument, ...]) -> Close
 def _measured(spins: tuple[float, ...]) -> dict[str, Callable[..., Any]]:
     """The true values of every instrument: ``(qpos, qvel, act, accelerations, parameters)``."""
 
+    def rotation(qpos: Any) -> Any:
+        return rotation_of_quaternion(qpos[QW:TILT_1])
+
     def imu(qpos: Any, qvel: Any, _act: Any, moved: Any, own: Any) -> Any:
-        pushed = rotation_of_quaternion(qpos[QW:TILT_1]).T @ own.disturbance
-        linear, omega = moved[:3] + pushed, qvel[3:6]
-        force = instruments.specific_force(linear, moved[3:], omega, own.imu_place)
-        axes = own.imu_axes.reshape(3, 3)
-        return xp.hstack([axes.T @ force, axes.T @ omega])
+        linear, omega = moved[:3] + rotation(qpos).T @ own.disturbance, qvel[3:6]
+        force = instruments.specific_force(linear, moved[3:], omega, own.imu.place)
+        return xp.hstack([force, omega])
+
+    def point(qpos: Any, place: Any) -> Any:
+        return qpos[:3] + rotation(qpos) @ place
+
+    def gps(qpos: Any, qvel: Any, _act: Any, _moved: Any, own: Any) -> Any:
+        around = rotation(qpos) @ cross(qvel[3:6], own.gps.place)
+        return xp.hstack([point(qpos, own.gps.place), qvel[:3] + around])
 
     return {
         "imu": imu,
-        "mocap": lambda qpos, *_: qpos[:TILT_1],
-        "gps": lambda qpos, qvel, *_: xp.hstack([qpos[:3], qvel[:3]]),
-        "barometer": lambda qpos, *_: qpos[2:3],
-        "magnetometer": lambda qpos, qvel, act, moved, own: (
-            rotation_of_quaternion(qpos[QW:TILT_1]).T @ own.field
+        "mocap": lambda qpos, qvel, act, moved, own: xp.hstack(
+            [point(qpos, own.mocap.place), qpos[QW:TILT_1]]
         ),
+        "gps": gps,
+        "barometer": lambda qpos, qvel, act, moved, own: point(qpos, own.barometer.place)[2:],
+        "magnetometer": lambda qpos, qvel, act, moved, own: rotation(qpos).T @ own.field,
         "rotor_speed": lambda _qpos, _qvel, act, *_: xp.array(spins) * act[: len(spins)],
     }
+
+
+def _turned(each: Instrument, axes: Any, values: Any) -> Any:
+    """Vectors in body axes, of an instrument that has axes of its own, multiplied by a matrix."""
+    if each.name not in ("imu", "magnetometer"):
+        return values
+    return xp.hstack([axes @ values[i : i + 3] for i in range(0, len(values), 3)])
 
 
 def _read(each: Instrument, time: Any, truth: Any, memory: Any, own: Any) -> tuple[Any, Any]:
     """The last reading that arrived, with whether it is new, and the memory after this step."""
     p, size = getattr(own, each.name), len(each.units)
+    axes = p.axes.reshape(3, 3)
+    truth = _turned(each, axes.T, truth)
     walks = each.errors if each.walks else 0
     walked, line = memory[:walks], memory[walks:-size].reshape(each.under_way + 1, size)
     new = instruments.is_new(p, time, own.control_period)
@@ -173,10 +189,7 @@ def _read(each: Instrument, time: Any, truth: Any, memory: Any, own: Any) -> tup
     for place in range(1, each.under_way + 1):
         kept = xp.where(past == float(place), line[place], kept)
     make = instruments.pose_reading if each.name == "mocap" else instruments.reading
-    found = make(p, kept, number)
-    if each.name == "imu":
-        axes = own.imu_axes.reshape(3, 3)
-        found = xp.hstack([axes @ found[:3], axes @ found[3:]])
+    found = _turned(each, axes, make(p, kept, number))
     found = xp.where(arrived > 0.0, found, memory[-size:])
     return xp.hstack([found, arrived]), xp.hstack([walked, line.ravel(), found])
 
@@ -188,27 +201,26 @@ def _parameters(
     simulation, tables = scenario.simulation, scenario.sensors.instruments
     rotors, step = scenario.any_rotorcraft.rotor_count, simulation.control_timestep
     pushes = [each.value for each in scenario.disturbance if isinstance(each, Acceleration)]
-    imu, magnetometer = scenario.sensors.imu, scenario.sensors.magnetometer
+    magnetometer = scenario.sensors.magnetometer
     down = 0.0 if magnetometer is None else magnetometer.inclination
     own = {}
     for index, each in enumerate(carried):
         table = tables[each.name]
-        period = table.period(step)
+        period, turn = table.period(step), getattr(table, "orientation", (0.0, 0.0, 0.0))
         own[each.name] = instruments.instrument_record(each.errors)(
             float(simulation.seed),
             1000.0 + CHANNELS * index,
             period,
             table.delay,
             table.dropout,
+            getattr(table, "position", (0.0, 0.0, 0.0)),
+            tuple(rotation_matrix(np.array(turn)).ravel().tolist()),
             *table.errors(1.0 / period, rotors),
         )
-    axes = np.eye(3) if imu is None else rotation_matrix(np.array(imu.orientation))
     return record(
         motion=read_motion(plan, loop.dynamics),
         control_period=step,
         disturbance=tuple(np.sum([(0.0, 0.0, 0.0), *pushes], axis=0).tolist()),
-        imu_place=(0.0, 0.0, 0.0) if imu is None else imu.position,
-        imu_axes=tuple(axes.ravel().tolist()),
         field=(float(np.cos(down)), 0.0, -float(np.sin(down))),
         **own,
     )
