@@ -27,7 +27,7 @@ def instrument_record(errors: int) -> Any:
         delay=float,  # s, until a reading is available
         dropout=float,  # probability that a reading is lost
         place=vector_of(3),  # from the center of mass, m, body axes
-        axes=vector_of(9),  # its own axes in body axes, as columns
+        axes=vector_of(9),  # of the instrument in body axes, as columns
         noise=size,  # standard deviation of a reading, white
         walk=size,  # standard deviation of the bias's step from reading to reading
         bias=size,  # constant

@@ -352,8 +352,7 @@ def _parameters(plan: FlightPlan, fusion: Fusion) -> Any:
             own[f"{kind}_gate"] = chi_square_quantile(estimator.gate, count)
             place += count
         field = _field(table.inclination) if each.name == "magnetometer" else (0.0, 0.0, 0.0)
-        apart = np.subtract(getattr(table, "position", imu.position), imu.position)
-        arm = tuple(apart.tolist())
+        arm = tuple(np.subtract(getattr(table, "position", imu.position), imu.position).tolist())
         correctors[each.name] = types[each.name](arm, field, **own)
     return record(
         timestep,

@@ -164,7 +164,7 @@ def _measured(spins: tuple[float, ...]) -> dict[str, Callable[..., Any]]:
 
 
 def _turned(each: Instrument, axes: Any, values: Any) -> Any:
-    """Vectors in body axes, of an instrument that has axes of its own, multiplied by a matrix."""
+    """Vectors of an instrument that has an orientation, multiplied by a matrix."""
     if each.name not in ("imu", "magnetometer"):
         return values
     return xp.hstack([axes @ values[i : i + 3] for i in range(0, len(values), 3)])
