@@ -26,6 +26,8 @@ class TracedBeginnings:
 
     def __init__(self, coverage):
         self._coverage = coverage
+        # An interrupt that a test raises while this lock is held would block all tests after it.
+        coverage._collector.data_lock = None
         signal.signal(signal.SIGPROF, lambda *_: coverage.stop())
         signal.siginterrupt(signal.SIGPROF, False)
 
