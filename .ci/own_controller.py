@@ -35,7 +35,16 @@ tiltsim("run", "steady.toml", "--quiet", "--out", "steady")
 assert json.loads(Path("steady/metrics.json").read_text())["diverged"] is False
 assert "1 passed" in tiltsim("check", "steady.toml")
 assert "removes steady errors" in tiltsim("schema", "controller.steady")
-arena = ("--vehicles", "quadrotor", "--controllers", "steady", "--jobs", "1")
+arena = (
+    "--league",
+    "unlimited",
+    "--vehicles",
+    "quadrotor",
+    "--controllers",
+    "steady",
+    "--jobs",
+    "1",
+)
 rows = json.loads(tiltsim("arena", *arena, "--out", "arena", "--json"))["vehicles"]["quadrotor"]
 assert len(rows) == 9
 assert all(row["controller"] == "steady" and row["score"] > 0.0 for row in rows)
