@@ -24,7 +24,7 @@ from tiltsim.cli import build_parser
 SCENARIOS = ["numpy.toml", "python.toml", "long.toml"]
 PLANTED = [*SCENARIOS, "sweep.toml", "flight", "flight2", "gains.json", "."]
 EXECUTES = ["run"]  # the code of the scenario that it names
-NEEDED = {"compare": ["--controllers", "given"]}
+NEEDED = {"compare": ["--controllers", "given"], "arena": ["--league", "unlimited"]}
 OUTPUTS = {"--out": "out", "--rerun": "out.rrd", "--junit": "out.xml", "--json": "out.json"}
 OUTPUTS |= {"--plot": "out.png", "--markdown": "out.md", "--pictures": "out"}
 OUTPUTS |= {"--free": "vehicle.mass"}

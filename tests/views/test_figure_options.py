@@ -325,6 +325,8 @@ def test_every_metric_and_column_has_a_distinct_label():
         ("vehicle.rotor_inertia", "rotor inertia (kg m²)"),
         ("initial.attitude[1]", "initial attitude pitch (rad)"),
         ("gait.angles[0]", "gait angles α₁ (rad)"),
+        ("companion[0].offset[1]", "companion[0] offset y (m)"),
+        ("fault[1].time", "fault[1] time (s)"),
         ("my_own_variable", "my own variable"),
     ],
 )

@@ -14,7 +14,7 @@ from pydantic import BeforeValidator, Field
 from tiltsim.errors import InputError
 from tiltsim.scenario.controller import OwnFunctionController
 from tiltsim.scenario.interaction import RESERVED
-from tiltsim.scenario.messages import InvalidValueError
+from tiltsim.scenario.messages import InvalidValueError, choose
 from tiltsim.scenario.override_keys import merge
 from tiltsim.scenario.table import Positive, Table, Vector3, example
 from tiltsim.system.public import public
@@ -86,7 +86,13 @@ class CompanionTable(Table):
         Args:
             own: The tables of the file that it is in.
             world: The tables of the world.
+
+        Raises:
+            InvalidValueError: If it changes a table that is not its vehicle's.
         """
+        for key, value in self.changes.items():
+            if key not in TAKEN:
+                raise InvalidValueError(f"companion.changes.{key}", value, choose(key, TAKEN))
         taken = self.scenario or {key: own[key] for key in TAKEN if key in own}
         document = merge(taken, self.changes)
         if any(self.offset):
