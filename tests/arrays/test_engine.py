@@ -15,7 +15,6 @@ from tiltsim.arrays.flying import Kernel, course_of, double_precision
 from tiltsim.equations.solvers import Integration, make_step
 from tiltsim.errors import InputError
 from tiltsim.laws.assembling import assemble
-from tiltsim.plants.flight_model import disturbance_acceleration
 from tiltsim.scenario.loading import merge
 
 needs_jax = pytest.mark.skipif(
@@ -87,7 +86,7 @@ def compare_steps(tables):
     import jax
 
     assembly = assemble(tiltsim.parse_scenario(tables))
-    equations, disturbance = assembly.loop.equations, disturbance_acceleration(assembly.scenario)
+    equations, disturbance = assembly.loop.equations, assembly.scenario.disturbance_acceleration
     simulation = assembly.scenario.simulation
     timing = simulation.timestep, simulation.control_steps
     integration = Integration(*timing, *assembly.setup, disturbance)

@@ -25,7 +25,6 @@ from tiltsim.errors import InputError
 from tiltsim.laws.assembling import assemble
 from tiltsim.linear import coordinates
 from tiltsim.plants.equations_plant import EquationsPlant
-from tiltsim.plants.flight_model import disturbance_acceleration
 from tiltsim.plants.mujoco_plant import MujocoPlant
 from tiltsim.scenario.scenario import Scenario
 from tiltsim_controllers.code.arrays import xp
@@ -208,7 +207,7 @@ class EquationMotion(Motion):
     @cached_property
     def _moved(self) -> Callable[..., Values]:
         """Rates of the state at a time."""
-        disturbance = disturbance_acceleration(self.scenario)
+        disturbance = self.scenario.disturbance_acceleration
 
         def rates(setup: Any, time: Any, state: Any) -> Any:
             inputs = xp.array(self._equations.inputs(time[0], state, *setup))

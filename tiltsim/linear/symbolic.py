@@ -8,7 +8,6 @@ from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.errors import InputError, TiltsimError
 from tiltsim.laws.assembling import assemble
 from tiltsim.linear.coordinates import entry_names, equation_coordinates, equation_inputs
-from tiltsim.plants.flight_model import disturbance_acceleration
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.system.public import optional_package
@@ -72,7 +71,7 @@ def symbolic(scenario: Scenario | str | PathLike[str] | Mapping[str, Any]) -> Sy
     equations, setup = assembly.loop.equations, assembly.setup
     assert equations is not None  # mujoco is refused
     initial = tuple(map(float, equations.initial(assembly, setup)))
-    moved = *setup, disturbance_acceleration(scenario)
+    moved = *setup, scenario.disturbance_acceleration
 
     def dynamics(time: Any, state: Any, inputs: Any) -> Any:
         return equations.rates(time[0], state, inputs, *moved)

@@ -16,7 +16,6 @@ from tiltsim.engines.steppers import (
     observation,
 )
 from tiltsim.plants.engine_choice import choose_engine
-from tiltsim.plants.flight_model import disturbance_acceleration
 from tiltsim.plants.plant import Plant
 from tiltsim_controllers.mathematics.scalar import Floats
 
@@ -44,7 +43,7 @@ def integrated(assembly: Assembly, layout: Layout) -> Integrated:
         simulation.timestep,
         simulation.control_steps,
         assembly.setup.userdata,
-        disturbance_acceleration(assembly.scenario),
+        assembly.scenario.disturbance_acceleration,
         assembly.traced,
     )
 

@@ -10,7 +10,6 @@ from tiltsim.errors import InputError
 from tiltsim.models.parts import Visuals
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.scenario.scenario_tables import DESCRIPTIVE
-from tiltsim_controllers.mathematics.scalar import Triple
 
 _TABLES_WITHOUT_EFFECT: Final = frozenset(
     (*DESCRIPTIVE, "simulation", "initial", "gait", "reference", "sensors")
@@ -47,13 +46,6 @@ def evaluations_per_step(model: mujoco.MjModel) -> int:
     return 4 if model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4 else 1
 
 
-def disturbance_acceleration(scenario: Scenario) -> Triple:
-    """The sum of the accelerations among a scenario's disturbances, m/s^2, world."""
-    values = [each.value for each in scenario.disturbance if each.type == "acceleration"]
-    x, y, z = (sum((value[axis] for value in values), 0.0) for axis in range(3))
-    return x, y, z
-
-
 def build_model(
     assembly: Assembly, *, knots: int | None = None, visuals: Visuals = False
 ) -> mujoco.MjModel:
@@ -73,5 +65,5 @@ def build_model(
         )
     except ValueError as error:
         raise InputError(f"{scenario.address or 'scenario'}: vehicle: {error}") from error
-    model.opt.gravity += disturbance_acceleration(scenario)
+    model.opt.gravity += scenario.disturbance_acceleration
     return model

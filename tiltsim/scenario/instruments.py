@@ -1,7 +1,7 @@
 """The tables of the instruments on a vehicle, below ``[sensors]``."""
 
 from collections.abc import Mapping
-from math import radians, sqrt
+from math import cos, radians, sin, sqrt
 from typing import Annotated, Any, ClassVar, Final, Literal, NamedTuple
 
 from pydantic import Field, model_validator
@@ -266,6 +266,11 @@ class MagnetometerTable(InstrumentTable):
     )
 
     orientation: Angles3 = ORIENTATION
+
+    @property
+    def field(self) -> tuple[float, float, float]:
+        """Direction of the field, a unit vector in world axes."""
+        return cos(self.inclination), 0.0, -sin(self.inclination)
 
     def errors(self, rate: float, rotors: int) -> Errors:
         return Errors(*_axes(self.noise, 0.0, self.bias, self.resolution))

@@ -170,6 +170,13 @@ class ScenarioTables(WithAutopilot):
         return self.air != AirTable()
 
     @property
+    def disturbance_acceleration(self) -> tuple[float, float, float]:
+        """The sum of the accelerations among the disturbances, m/s^2, world."""
+        values = [each.value for each in self.disturbance if isinstance(each, Acceleration)]
+        x, y, z = (sum((value[axis] for value in values), 0.0) for axis in range(3))
+        return x, y, z
+
+    @property
     def loads(self) -> tuple[Force | Torque, ...]:
         """Forces and torques among the disturbances."""
         return tuple(each for each in self.disturbance if not isinstance(each, Acceleration))

@@ -19,7 +19,6 @@ from tiltsim.closed_loop.choices import program_key
 from tiltsim.flight.end import End
 from tiltsim.flight.flight import Flight
 from tiltsim.plants.equations_plant import initial_state
-from tiltsim.plants.flight_model import disturbance_acceleration
 from tiltsim.simulation.completed_flights import METRICS_ROWS, completed_flights
 from tiltsim.simulation.monitor import TerminationMonitor
 from tiltsim.simulation.simulate import simulate_assembly
@@ -49,7 +48,7 @@ def numbers_of(assembly: Assembly) -> tuple[float, ...]:
     return (
         *flatten(assembly.setup.parameters),
         *map(float, assembly.reference),
-        *disturbance_acceleration(assembly.scenario),
+        *assembly.scenario.disturbance_acceleration,
         *initial_state(assembly),
     )
 

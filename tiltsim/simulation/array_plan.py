@@ -9,7 +9,6 @@ from pydantic import BaseModel
 
 from tiltsim.arrays.jax_programs import InJax
 from tiltsim.closed_loop.loop import ClosedLoop
-from tiltsim.plants.flight_model import disturbance_acceleration
 from tiltsim.scenario.instruments import InstrumentTable
 from tiltsim.scenario.scenario import Scenario, plan_flight
 from tiltsim.scenario.vehicle import VehicleTable
@@ -133,7 +132,7 @@ class ArrayPlan:
             plan = plan_flight(scenario)
             setup = loop.setup(plan, loop.signature)
             state = equations.initial(plan, setup)
-        disturbance = disturbance_acceleration(scenario)
+        disturbance = scenario.disturbance_acceleration
         return PlannedFlight(setup.parameters, plan.reference, setup.knots, disturbance, state)
 
     def __call__(self, tree: Mapping[str, Any]) -> PlannedFlight:

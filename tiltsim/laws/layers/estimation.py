@@ -7,7 +7,7 @@ transition of all of them carries the covariance along. Readings that arrive ear
 """
 
 from functools import cache
-from math import ceil, cos, sin, sqrt
+from math import ceil, sqrt
 from typing import Any, Final, NamedTuple, get_type_hints
 
 import numpy as np
@@ -34,7 +34,7 @@ from tiltsim_controllers.mathematics.attitude import (
 from tiltsim_controllers.mathematics.linear import cross
 from tiltsim_controllers.mathematics.probability import chi_square_quantile
 from tiltsim_controllers.mathematics.records import Vector3, make_record_type, vector_of
-from tiltsim_controllers.mathematics.scalar import Values, Vector
+from tiltsim_controllers.mathematics.scalar import Vector
 
 AXES: Final = ("x", "y", "z")
 CORRECTIONS: Final = {
@@ -351,7 +351,7 @@ def _parameters(plan: FlightPlan, fusion: Fusion) -> Any:
             own[f"{kind}_variance"] = tuple(max(d * d, LEAST_VARIANCE) for d in deviations)
             own[f"{kind}_gate"] = chi_square_quantile(estimator.gate, count)
             place += count
-        field = _field(table.inclination) if each.name == "magnetometer" else (0.0, 0.0, 0.0)
+        field = table.field if each.name == "magnetometer" else (0.0, 0.0, 0.0)
         arm = tuple(np.subtract(getattr(table, "position", imu.position), imu.position).tolist())
         correctors[each.name] = types[each.name](arm, field, **own)
     return record(
@@ -393,8 +393,3 @@ def _start(plan: FlightPlan, p: Any, fusion: Fusion) -> Vector:
     packed = covariance[filters.ROWS, filters.COLUMNS]
     rest = sum(fusion.sizes.values()) - 16 - filters.PACKED
     return tuple(np.hstack([*state, packed, np.zeros(rest)]).tolist())
-
-
-def _field(inclination: float) -> Values:
-    """The Earth's field as a unit vector, world axes."""
-    return cos(inclination), 0.0, -sin(inclination)

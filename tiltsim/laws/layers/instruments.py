@@ -22,7 +22,6 @@ from tiltsim.laws.layers.measured_acceleration import (
 )
 from tiltsim.laws.layers.on_equations import read_actuators
 from tiltsim.models.parts import ExtraActuators
-from tiltsim.scenario.surroundings import Acceleration
 from tiltsim.vehicles.rotorcraft.layout import QW, TILT_1
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.code.traceable import traceable
@@ -200,9 +199,7 @@ def _parameters(
     scenario = plan.scenario
     simulation, tables = scenario.simulation, scenario.sensors.instruments
     rotors, step = scenario.any_rotorcraft.rotor_count, simulation.control_timestep
-    pushes = [each.value for each in scenario.disturbance if isinstance(each, Acceleration)]
     magnetometer = scenario.sensors.magnetometer
-    down = 0.0 if magnetometer is None else magnetometer.inclination
     own = {}
     for index, each in enumerate(carried):
         table = tables[each.name]
@@ -220,7 +217,7 @@ def _parameters(
     return record(
         motion=read_motion(plan, loop.dynamics),
         control_period=step,
-        disturbance=tuple(np.sum([(0.0, 0.0, 0.0), *pushes], axis=0).tolist()),
-        field=(float(np.cos(down)), 0.0, -float(np.sin(down))),
+        disturbance=scenario.disturbance_acceleration,
+        field=(0.0, 0.0, 0.0) if magnetometer is None else magnetometer.field,
         **own,
     )
