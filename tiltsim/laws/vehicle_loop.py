@@ -16,8 +16,7 @@ from tiltsim.closed_loop.loop import (
     nothing_singular,
 )
 from tiltsim.engines.sample_evaluation import evaluate_over_samples
-from tiltsim.laws.law import Law
-from tiltsim.laws.parameters import head_of
+from tiltsim.laws.law import Law, head_of
 from tiltsim.scenario.rotorcraft import ServoTable
 from tiltsim.scenario.scenario import FlightPlan
 from tiltsim_controllers.code.traceable import traceable

@@ -18,7 +18,7 @@ from tiltsim.closed_loop.assembly import Assembly, program_key
 from tiltsim.closed_loop.loop import ClosedLoop, Equations
 from tiltsim.closed_loop.userdata import EVALUATIONS, EVALUATIONS_PER_STEP, HEADER_SIZE
 from tiltsim.engines.base import EngineName
-from tiltsim.engines.callback import control_callback
+from tiltsim.engines.control import control_callback
 from tiltsim.engines.programs import LoopPrograms
 from tiltsim.errors import InputError
 from tiltsim.laws.assembling import assemble
