@@ -78,7 +78,7 @@ def test_vehicle_load_and_objects_keep_their_momentum(load):
     assembly = assemble(beside_a_box(**load))
     model = flight_model(assembly)
     model.opt.gravity[:] = 0.0
-    data, sizes = mujoco.MjData(model), assembly.loop.dynamics.sizes
+    data, sizes = mujoco.MjData(model), assembly.loop.sizes
     data.qpos[: sizes.qpos], _ = assembly.loop.kind.initial_motion(assembly)
     data.qpos[sizes.qpos :], data.qvel[sizes.qvel :] = motion_at_start(assembly)
     momenta, contacts = [], 0
