@@ -12,8 +12,7 @@ from typing import Any, Final
 
 import mujoco
 
-from tiltsim.closed_loop.assembly import Assembly
-from tiltsim.closed_loop.choices import ProgramKey, program_key
+from tiltsim.closed_loop.assembly import Assembly, ProgramKey, program_key
 from tiltsim.closed_loop.userdata import CONTROL_PERIOD, EVALUATIONS, HEADER_SIZE, RECORDER
 from tiltsim.engines.base import Engine, EngineName, check_model
 from tiltsim.engines.glue import CALLBACK, EMPTY, filled
@@ -42,8 +41,8 @@ def compile_control(key: ProgramKey) -> Any:
         evaluations=EVALUATIONS,
         control_period=CONTROL_PERIOD,
         recorder=RECORDER,
-        controls=loop.dynamics.sizes.ctrl,
-        vehicle_size=loop.dynamics.sizes.qpos,
+        controls=loop.sizes.ctrl,
+        vehicle_size=loop.sizes.qpos,
         nan=nan,
         width=width,
     )

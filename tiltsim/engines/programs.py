@@ -5,7 +5,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from tiltsim.closed_loop.choices import Choices, ProgramKey
+from tiltsim.closed_loop.assembly import Choices, ProgramKey
 from tiltsim.closed_loop.limits import SINGULAR, WITHIN_LIMITS
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup
 from tiltsim.closed_loop.userdata import (
@@ -85,7 +85,7 @@ class LoopPrograms:
     """Traces the functions of a loop, whose choices are constants.
 
     Args:
-        key: See `tiltsim.closed_loop.choices`.
+        key: See `tiltsim.closed_loop.assembly`.
     """
 
     def __init__(self, key: ProgramKey) -> None:
@@ -115,24 +115,22 @@ class LoopPrograms:
         "controls" and "hold" are the control step at and between the samples of the controller,
         "observe" the values of a sample, "sample" a sample as the recorder takes it.
         """
-        loop, sampling = self._loop, self._loop.sampling
-        sizes = loop.dynamics.sizes._asdict()
+        loop = self._loop
+        sizes = loop.sizes._asdict()
         state = {name: sizes[name] for name in (*Vectors._fields, "ctrl")}
         vectors = {"header": HEADER_SIZE, **state, "user": self.user_size}
 
         def controls(header: Any, qpos: Any, qvel: Any, *given: Any) -> Any:
             *act, _, user = given
-            return sampling.controls(
-                _next_time(header), qpos, qvel, xp.hstack(act), *self.setup(user)
-            )
+            return loop.controls(_next_time(header), qpos, qvel, xp.hstack(act), *self.setup(user))
 
         def hold(header: Any, qpos: Any, qvel: Any, *given: Any) -> Any:
             (*act, ctrl, user), time = given, _next_time(header)
-            return sampling.hold(time, qpos, qvel, xp.hstack(act), ctrl, self.setup(user)[0])
+            return loop.hold(time, qpos, qvel, xp.hstack(act), ctrl, self.setup(user)[0])
 
         def observe(_header: Any, qpos: Any, qvel: Any, *given: Any) -> Any:
             *act, ctrl, _ = given
-            return loop.columns.observe(qpos, qvel, xp.hstack(act), ctrl)
+            return loop.observe(qpos, qvel, xp.hstack(act), ctrl)
 
         def sample(header: Any, *given: Any) -> Any:
             *_, user, recorder = given
@@ -215,7 +213,7 @@ class LoopPrograms:
         loop, (parameters, knots) = self._loop, self.setup(user)
         reference = record_with_choices(ReferenceParameters, head[1:], self._key.reference)
         limit = loop.kind.limit_exceeded(time, values, reference, knots, head[0] != 0.0)
-        checked = loop.monitoring.sign_check_values(time, values, parameters, knots)
+        checked = loop.sign_check_values(time, values, parameters, knots)
         return limit, xp.array(checked)
 
     def checks(self) -> Program:
@@ -240,7 +238,7 @@ def record_with_choices(record: type[tuple[Any, ...]], numbers: Any, choices: Ch
     Args:
         record: Its type.
         numbers: The numbers of the flattened record, or more.
-        choices: See `tiltsim.closed_loop.choices`.
+        choices: See `tiltsim.closed_loop.assembly`.
     """
     known = dict(choices)
     size = record_size(record)

@@ -7,8 +7,7 @@ from typing import Any
 
 import mujoco
 
-from tiltsim.closed_loop.assembly import Assembly
-from tiltsim.closed_loop.choices import ProgramKey, program_key
+from tiltsim.closed_loop.assembly import Assembly, ProgramKey, program_key
 from tiltsim.closed_loop.userdata import CONTROL_PERIOD, EVALUATIONS, HEADER_SIZE
 from tiltsim.engines.base import Callback, Engine, EngineName, check_model, vectors_of
 from tiltsim.engines.programs import KEPT, LoopPrograms, setup_of

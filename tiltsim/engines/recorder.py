@@ -55,7 +55,7 @@ class Recorder:
         samples: How many to take.
         interval, last_interval: Evaluations of the control step between samples, and between the
             last two.
-        checked: The numbers that must keep their signs, as they are now; see `Monitoring`.
+        checked: The numbers that must keep their signs, as they are now; see `ClosedLoop`.
 
     Attributes:
         head: The head and the signs to keep, shape (HEAD_SIZE + SIDES,).
@@ -79,7 +79,7 @@ class Recorder:
         left = interval if samples > 1 else last_interval
         self.head[:HEAD_SIZE] = recorder_head(assembly, left, samples, interval, last_interval)
         if len(checked) > SIDES:
-            raise ValueError(f"{loop.dynamics.model}: {len(checked)} sign checks, at most {SIDES}")
+            raise ValueError(f"{loop.model}: {len(checked)} sign checks, at most {SIDES}")
         for index, value in enumerate(checked):
             self.head[HEAD_SIZE + index] = copysign(1.0, value)
 

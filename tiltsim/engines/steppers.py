@@ -7,7 +7,7 @@ from typing import Any, Literal, NamedTuple, Protocol
 
 import numpy as np
 
-from tiltsim.closed_loop.choices import ProgramKey
+from tiltsim.closed_loop.assembly import ProgramKey
 from tiltsim.closed_loop.loop import Equations
 from tiltsim.engines.glue import stepper_text
 from tiltsim.engines.machine_code import MachineCode, lane_math

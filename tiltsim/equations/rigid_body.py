@@ -28,6 +28,5 @@ def rigid_body(scenario: Scenario) -> ActuatorPlant:
             type(true_rotors(scenario)),
             gyroscopic=1.0,
             has_limits=has_limits,
-            name="rigid_body.limited" if has_limits else "rigid_body",
         )
     )

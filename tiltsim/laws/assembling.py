@@ -123,7 +123,7 @@ def _plant_of(scenario: Scenario, loop: ClosedLoop) -> ActuatorPlant:
     """The equations on which the controls of MuJoCo's model act."""
     if scenario.simulation.plant == "rigid_body":
         return rigid_body(scenario)
-    return actuator_plant(loop.dynamics)
+    return actuator_plant(loop)
 
 
 def assemble(

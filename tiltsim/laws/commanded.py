@@ -9,8 +9,7 @@ from dataclasses import replace
 from functools import cache
 from typing import Any, Final
 
-from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup
-from tiltsim.closed_loop.vehicle_kind import VehicleKind
+from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, VehicleKind
 from tiltsim.laws.law import Law
 from tiltsim.laws.quadrotor import LAYOUT as QUADROTOR
 from tiltsim.laws.quadrotor import upright_columns

@@ -11,7 +11,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Dynamics
+from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup
 from tiltsim.equations.tiltrotor import airframe_of, body_fields, initial_state
 from tiltsim.laws.law import Law, Margins, Tilts, tilts_of_gait
 from tiltsim.laws.rotorcraft import REFERENCE_COLUMNS, torque_free_columns
@@ -265,21 +265,19 @@ def rotor_loop(
     """
     places = layout.places
     flown = functions(law, layout, law.tilts or tilts_of_gait(places.tilts))
-    dynamics = Dynamics(
-        layout.name,
-        places.sizes(len(law.states))._replace(history=FELT_SIZE if law.feels else 0),
-        lambda plan, _setup: (*flown.initial_speeds(plan), *law.initial(plan)),
-        len(law.states),
-        layout.spins,
-        layout.tilt_of_rotor if layout.model == "multirotor" else (),
-        commands_thrusts=functions.commands_thrusts,
-    )
     loop = flown.closed_loop(
         rotorcraft_kind(layout.shown, ("singularity_margin",)),
-        dynamics,
         {"servo_lead": lambda plan: servo_lead(plan.scenario.any_rotorcraft.tilt_servo)},
         places.rotors + len(law.states),
         places.names("tilt_command") if law.records_commands else (),
+        model=layout.name,
+        sizes=places.sizes(len(law.states))._replace(history=FELT_SIZE if law.feels else 0),
+        initial_activations=lambda plan, _: (*flown.initial_speeds(plan), *law.initial(plan)),
+        controller_states=len(law.states),
+        spins=layout.spins,
+        tilt_of_rotor=layout.tilt_of_rotor if layout.model == "multirotor" else (),
+        commands_thrusts=functions.commands_thrusts,
+        observe_reads_controls=functions.commands_thrusts,
     )
     if law.measured or law.records_commands:  # they need a plant with servos
         return replace(loop, equations=None)

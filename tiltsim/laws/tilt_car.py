@@ -10,7 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Dynamics, Sizes
+from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Sizes
 from tiltsim.laws.law import Law
 from tiltsim.laws.parameters import parameters_of
 from tiltsim.laws.vehicle_loop import VehicleFunctions, parts, servo_lead
@@ -83,7 +83,6 @@ class CarFunctions(VehicleFunctions):
             commands_thrusts: Whether the rotor speeds among the activations are idle.
         """
         law = self.law
-        sizes = Sizes(qpos=4, qvel=4, act=2 + states, ctrl=5 + states)
 
         def activations(plan: FlightPlan, _setup: ControlSetup) -> Vector:
             speeds = plan.scenario.initial.rotor_speeds(2)
@@ -91,13 +90,18 @@ class CarFunctions(VehicleFunctions):
 
         return self.closed_loop(
             TILT_CAR,
-            Dynamics("tilt_car", sizes, activations, states, commands_thrusts=commands_thrusts),
             {
                 "servo_lead": lambda plan: servo_lead(plan.scenario.tilt_car.tilt_servo),
                 "heading": lambda plan: plan.scenario.initial.attitude[2],
             },
             inputs_size,
             tuple(f"law_speed_{rotor}" for rotor in ROTORS if states > 1),
+            model="tilt_car",
+            sizes=Sizes(qpos=4, qvel=4, act=2 + states, ctrl=5 + states),
+            initial_activations=activations,
+            controller_states=states,
+            commands_thrusts=commands_thrusts,
+            observe_reads_controls=commands_thrusts,
         )
 
 

@@ -4,8 +4,7 @@ from math import nan
 
 import numpy as np
 
-from tiltsim.closed_loop.assembly import Assembly
-from tiltsim.closed_loop.choices import program_key
+from tiltsim.closed_loop.assembly import Assembly, program_key
 from tiltsim.engines.base import EngineName
 from tiltsim.engines.steppers import (
     Integrated,

@@ -264,7 +264,7 @@ def time_per_call(assembly: Assembly) -> float:
     if assembly.scenario.controller.is_external:
         return nan
     qpos, qvel = loop.kind.initial_motion(assembly)
-    act = tuple(map(float, loop.dynamics.initial_activations(assembly, setup)))
+    act = tuple(map(float, loop.initial_activations(assembly, setup)))
     header = [*Header(assembly.scenario.simulation.timestep)]
     none: list[float] = []
     vectors = [*map(float, qpos)], [*map(float, qvel)], [*act], none, none, none

@@ -10,7 +10,6 @@ actuators that act on nothing. So the control step remains a pure function that 
 and a scenario with ideal actuators runs without the layer.
 """
 
-from collections.abc import Callable
 from functools import cache
 from math import inf
 from typing import Any, Final
@@ -26,7 +25,6 @@ from tiltsim.scenario.scenario import FlightPlan
 from tiltsim.vehicles.rotorcraft import initial_tilts
 from tiltsim.vehicles.rotorcraft.layout import TILT_1, layout_of
 from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.code.traceable import traceable
 from tiltsim_controllers.mathematics.records import make_record_type
 from tiltsim_controllers.mathematics.scalar import Floats, Vector
 from tiltsim_controllers.vehicle.actuators import (
@@ -105,47 +103,38 @@ def with_actuation(loop: ClosedLoop, latency_steps: int, external: bool = False)
             commands are speeds (rad/s), which take effect at once: `tiltsim.plants.commanded_plant`
             moves these along the delay line, as no rate of activations makes a speed jump.
     """
-    law_controls, dynamics = loop.sampling.controls, loop.dynamics
-    layout = layout_of(dynamics)
+    layout = layout_of(loop)
     rotors, tilts = layout
     size = rotors + tilts  # commands of a controller
     under_way = (size + external) * latency_steps
     # Activations: the law's, speed commands of the motors, the line. Controls: the law's, then
     # rates of these, then the commands in force.
-    asked = slice(dynamics.sizes.act, dynamics.sizes.act + rotors)
+    asked = slice(loop.sizes.act, loop.sizes.act + rotors)
     line = slice(asked.stop, asked.stop + under_way)
-    states = slice(layout.further_rates, dynamics.sizes.ctrl)
+    states = slice(layout.further_rates, loop.sizes.ctrl)
     line_rates = slice(states.stop + rotors, states.stop + rotors + under_way)
 
     def controls_of(
         time: Any, qpos: Any, act: Any, ctrl: Any, commands: Any, rates: Any, actuation: Any
     ) -> Any:
-        spins = xp.array(dynamics.spins)
+        spins = xp.array(loop.spins)
         head = driven(time, qpos[TILT_1:], act[:rotors], act[asked], commands, spins, actuation)
         return xp.hstack([head, ctrl[states], commands[tilts:], rates, commands])
 
-    def sampled(time: Any, qpos: Any, act: Any, ctrl: Any, actuation: Any) -> Any:
+    def controls(
+        within: Any, time: Any, qpos: Any, qvel: Any, act: Any, own: Any, knots: Any
+    ) -> Any:
+        ctrl = within(*measured(time, qpos, qvel, own.sensors), act)
         commands = xp.hstack([ctrl[:tilts], ctrl[layout.accelerations]])
         rates = xp.zeros(under_way)  # the plant moves the line of external commands
         if not external:
             before = act[line].reshape(latency_steps, size)
-            commands, rates = along_line(before, commands, actuation.control_timestep)
-        return controls_of(time, qpos, act, ctrl, commands, rates.ravel(), actuation)
+            commands, rates = along_line(before, commands, own.control_timestep)
+        return controls_of(time, qpos, act, ctrl, commands, rates.ravel(), own)
 
-    def between(time: Any, qpos: Any, act: Any, ctrl: Any, actuation: Any) -> Any:
+    def hold(_within: Any, time: Any, qpos: Any, act: Any, ctrl: Any, own: Any) -> Any:
         commands = ctrl[line_rates.stop :]
-        return controls_of(time, qpos, act, ctrl, commands, ctrl[line_rates], actuation)
-
-    @traceable
-    def controls(time: Any, qpos: Any, qvel: Any, act: Any, parameters: Any, knots: Any) -> Any:
-        actuation = parameters.layer
-        seen_qpos, seen_qvel = measured(time, qpos, qvel, actuation.sensors)
-        ctrl = law_controls(time, seen_qpos, seen_qvel, act, parameters.inner, knots)
-        return sampled(time, qpos, act, ctrl, actuation)
-
-    @traceable
-    def hold(time: Any, qpos: Any, qvel: Any, act: Any, ctrl: Any, parameters: Any) -> Any:
-        return between(time, qpos, act, ctrl, parameters.layer)
+        return controls_of(time, qpos, act, ctrl, commands, ctrl[line_rates], own)
 
     def initial_activations(plan: FlightPlan, _layer: Any, inner: Vector) -> Vector:
         angles, at_rest = initial_tilts(plan)[0][:tilts], (0.0,) * rotors
@@ -153,7 +142,6 @@ def with_actuation(loop: ClosedLoop, latency_steps: int, external: bool = False)
         return (*inner[:rotors], *waiting * latency_steps)
 
     layer = Layer(
-        f"with_actuation.{latency_steps}",
         actuation_record(rotors),
         _actuation,
         controls=controls,
@@ -168,16 +156,13 @@ def with_actuation(loop: ClosedLoop, latency_steps: int, external: bool = False)
     return wrap_loop(loop, layer)
 
 
-def _derive(
-    inner: Callable[[], dict[str, Floats]], samples: Samples, setup: ControlSetup
-) -> dict[str, Floats]:
-    time, columns, faults = samples["time"], inner(), setup.parameters.layer.faults
+def _derive(samples: Samples, setup: ControlSetup) -> dict[str, Floats]:
+    time, faults = samples["time"], setup.parameters.layer.faults
     pairs = zip(faults.thrust_time, faults.thrust_factor, strict=True)
-    remaining = {
+    return {
         f"thrust_factor_{rotor}": np.where(time >= since, factor, 1.0)
         for rotor, (since, factor) in enumerate(pairs, start=1)
     }
-    return {**columns, **remaining}
 
 
 def _actuation(plan: FlightPlan) -> Any:

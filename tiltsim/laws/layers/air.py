@@ -5,7 +5,6 @@ actuators on the body instead, force and torque in body axes, which only models 
 filters of the turbulence are activations, so a flight restarts anywhere.
 """
 
-from collections.abc import Callable
 from functools import cache
 from typing import Any, Final
 
@@ -75,11 +74,9 @@ def air_wrench(
 @cache
 def with_air(loop: ClosedLoop) -> ClosedLoop:
     """A loop in air with wind, turbulence, gusts, drag and ground effect."""
-    dynamics, layout = loop.dynamics, layout_of(loop.dynamics)
-    first, rotors = dynamics.sizes.act, tilt_of_rotor(dynamics)
-    record = make_record_type("Surroundings", air=Air, vehicle=rotors_record(dynamics))
+    layout, first, rotors = layout_of(loop), loop.sizes.act, tilt_of_rotor(loop)
+    record = make_record_type("Surroundings", air=Air, vehicle=rotors_record(loop))
 
-    @traceable
     def forces(time: Any, qpos: Any, qvel: Any, act: Any, ctrl: Any, layer: Any) -> Any:
         states = act[first : first + DRYDEN_STATES]
         thrusts, craft = ctrl[layout.thrusts], craft_of(layer.vehicle, rotors)
@@ -87,7 +84,6 @@ def with_air(loop: ClosedLoop) -> ClosedLoop:
         return xp.hstack([dryden_rates(time, states, layer.air.turbulence), wrench])
 
     layer = Layer(
-        "with_air",
         record,
         lambda plan: record(_air(plan), true_rotors(plan.scenario)),
         adds=forces,
@@ -100,13 +96,11 @@ def with_air(loop: ClosedLoop) -> ClosedLoop:
     return wrap_loop(loop, layer)
 
 
-def _derive(
-    inner: Callable[[], dict[str, Floats]], samples: Samples, setup: ControlSetup
-) -> dict[str, Floats]:
+def _derive(samples: Samples, setup: ControlSetup) -> dict[str, Floats]:
     air = ControlSetup(setup.parameters.layer.air)
     states = np.stack([samples[name] for name in DRYDEN_FIELDS], axis=-1)
     velocity = evaluate_over_samples(_velocity, 3, samples["time"], states, air)
-    return {**inner(), **dict(zip(AIR_COLUMNS, velocity.T, strict=True))}
+    return dict(zip(AIR_COLUMNS, velocity.T, strict=True))
 
 
 @traceable

@@ -24,7 +24,6 @@ from tiltsim.laws.layers.on_equations import read_actuators
 from tiltsim.models.parts import ExtraActuators
 from tiltsim.vehicles.rotorcraft.layout import QW, TILT_1
 from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.code.traceable import traceable
 from tiltsim_controllers.mathematics.attitude import rotation_matrix, rotation_of_quaternion
 from tiltsim_controllers.mathematics.linear import cross
 from tiltsim_controllers.mathematics.records import Vector3, make_record_type
@@ -86,27 +85,26 @@ def with_instruments(loop: ClosedLoop, carried: tuple[Instrument, ...]) -> Close
         loop: The loop within.
         carried: The instruments.
     """
-    inner_controls, dynamics = loop.sampling.controls, loop.dynamics
-    first = dynamics.sizes.act
-    _, loads = read_actuators(dynamics)
-    acceleration, measured = plant_acceleration_of(dynamics), _measured(dynamics.spins)
+    first = loop.sizes.act
+    _, loads = read_actuators(loop)
+    acceleration, measured = plant_acceleration_of(loop), _measured(loop.spins)
     columns = {name: unit for each in carried for name, unit in each.columns.items()}
     states = sum(each.states for each in carried)
     record = make_record_type(
         "Instruments",
-        motion=motion_record(dynamics),
+        motion=motion_record(loop),
         control_period=float,  # s
         disturbance=Vector3,  # m/s^2, world
         field=Vector3,  # direction of the magnetic field, world
         **{each.name: instruments.instrument_record(each.errors) for each in carried},
     )
 
-    @traceable
-    def controls(time: Any, qpos: Any, qvel: Any, act: Any, parameters: Any, knots: Any) -> Any:
-        own, inner, memory = parameters.layer, parameters.inner, act[first : first + states]
+    def controls(
+        within: Any, time: Any, qpos: Any, qvel: Any, act: Any, own: Any, knots: Any
+    ) -> Any:
+        memory = act[first : first + states]
         # Forces of the air and of loads are among the controls, and depend on no reading.
-        blind = xp.hstack([qvel, xp.zeros(len(columns))])
-        ctrl = inner_controls(time, qpos, blind, act, inner, knots)
+        ctrl = within(qpos, xp.hstack([qvel, xp.zeros(len(columns))]), act)
         moved = acceleration(qpos, qvel, ctrl, loads(ctrl), own.motion)
         readings, kept = [], []
         for each in carried:
@@ -116,16 +114,13 @@ def with_instruments(loop: ClosedLoop, carried: tuple[Instrument, ...]) -> Close
             readings.append(seen)
             kept.append((after - remembered) / own.control_period)
         seen = xp.hstack(readings)
-        ctrl = inner_controls(time, qpos, xp.hstack([qvel, seen]), act, inner, knots)
-        return xp.hstack([ctrl, *kept, seen])
+        return xp.hstack([within(qpos, xp.hstack([qvel, seen]), act), *kept, seen])
 
     layer = Layer(
-        "with_instruments",
         record,
         lambda plan: _parameters(plan, record, loop, carried),
         controls=controls,
         actuators=ExtraActuators(states=states, memories=len(columns)),
-        initial_activations=lambda _plan, _own, _inner: (0.0,) * states,
         remembered=tuple(columns),
         units=columns,
     )
@@ -215,7 +210,7 @@ def _parameters(
             *table.errors(1.0 / period, rotors),
         )
     return record(
-        motion=read_motion(plan, loop.dynamics),
+        motion=read_motion(plan, loop),
         control_period=step,
         disturbance=scenario.disturbance_acceleration,
         field=(0.0, 0.0, 0.0) if magnetometer is None else magnetometer.field,

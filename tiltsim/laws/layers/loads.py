@@ -4,7 +4,6 @@ They act through six actuators on the body, force and torque in body axes, which
 loads have.
 """
 
-from collections.abc import Callable
 from functools import cache
 from math import inf
 from typing import Any, Final
@@ -31,12 +30,10 @@ def with_loads(loop: ClosedLoop, count: int) -> ClosedLoop:
     """A loop on whose vehicle a number of loads act."""
     record = make_record_type("Loads", **{f"load_{i + 1}": Load for i in range(count)})
 
-    @traceable
     def forces(time: Any, qpos: Any, qvel: Any, act: Any, ctrl: Any, loads: Any) -> Any:
         return wrench_of_loads(time, rotation_of_quaternion(qpos[QW:TILT_1]), loads)
 
     layer = Layer(
-        "with_loads",
         record,
         lambda plan: record(*map(_load, plan.scenario.loads)),
         adds=forces,
@@ -55,13 +52,11 @@ def _load(table: Force | Torque) -> Load:
     return load._replace(force=table.value, point=table.point)
 
 
-def _derive(
-    inner: Callable[[], dict[str, Floats]], samples: Samples, setup: ControlSetup
-) -> dict[str, Floats]:
+def _derive(samples: Samples, setup: ControlSetup) -> dict[str, Floats]:
     attitude = np.stack([samples[name] for name in ("roll", "pitch", "yaw")], axis=-1)
     loads = ControlSetup(setup.parameters.layer)
     wrenches = evaluate_over_samples(_acting, 6, samples["time"], attitude, loads)
-    return {**inner(), **dict(zip(LOAD_COLUMNS, wrenches.T, strict=True))}
+    return dict(zip(LOAD_COLUMNS, wrenches.T, strict=True))
 
 
 @traceable

@@ -10,7 +10,7 @@ from functools import cache
 from math import inf
 from typing import Any
 
-from tiltsim.closed_loop.loop import ClosedLoop, Dynamics
+from tiltsim.closed_loop.loop import ClosedLoop
 from tiltsim.equations.actuator_level import mechanics, mechanics_record, servo_accelerations
 from tiltsim.laws.layers.layer import Layer, wrap_loop
 from tiltsim.laws.layers.on_equations import read_actuators
@@ -28,12 +28,12 @@ from tiltsim_controllers.vehicle.rotors import wrench_map
 
 
 @cache
-def motion_record(dynamics: Dynamics) -> Any:
+def motion_record(loop: ClosedLoop) -> Any:
     """The type of the parameters of the angular acceleration."""
-    tilts = layout_of(dynamics).tilts
+    tilts = layout_of(loop).tilts
     return make_record_type(
         "Motion",
-        mechanics=mechanics_record(rotors_record(dynamics), tilts),
+        mechanics=mechanics_record(rotors_record(loop), tilts),
         least_thrust=float,  # (rad/s)^2, limits of the thrusts' controls
         greatest_thrust=float,
         gyroscopic=float,  # factor of this torque, 0 of tilting vehicles on the thesis plant
@@ -43,7 +43,7 @@ def motion_record(dynamics: Dynamics) -> Any:
 
 
 @cache
-def plant_acceleration_of(dynamics: Dynamics) -> Callable[..., Any]:
+def plant_acceleration_of(loop: ClosedLoop) -> Callable[..., Any]:
     """The accelerations of a simulated vehicle by all forces but gravity, shape (6,).
 
     It is ``(qpos, qvel, ctrl, loads, motion) -> acceleration``: MuJoCo's vectors, the loads of air
@@ -53,7 +53,7 @@ def plant_acceleration_of(dynamics: Dynamics) -> Callable[..., Any]:
     for each hinge with the servo's armature ``A`` ``(J + A) alpha_i'' + J a_i . omega' = servo
     torque``. Impacts on stops or ground are left out.
     """
-    layout, tilted = layout_of(dynamics), tilt_of_rotor(dynamics)
+    layout, tilted = layout_of(loop), tilt_of_rotor(loop)
 
     @traceable
     def plant_acceleration(qpos: Any, qvel: Any, ctrl: Any, loads: Any, motion: Any) -> Any:
@@ -62,7 +62,7 @@ def plant_acceleration_of(dynamics: Dynamics) -> Callable[..., Any]:
         tilt_rates = qvel[TILT_RATE_1 : TILT_RATE_1 + layout.tilts]
         thrusts = xp.clip(ctrl[layout.thrusts], motion.least_thrust, motion.greatest_thrust)
         # The controls are s varpi |varpi| with the spins s, the map's factors are without s.
-        turned = wrench_map(craft.rotors, tilts) @ (xp.array(dynamics.spins) * thrusts)
+        turned = wrench_map(craft.rotors, tilts) @ (xp.array(loop.spins) * thrusts)
         wrench = turned + loads[:6]
         momentum = inertia_matrix(craft.body) @ omega + (pods * tilt_rates) @ craft.hinges
         servos = servo_accelerations(craft, ctrl, thrusts, tilts, tilt_rates, loads, own)
@@ -74,17 +74,17 @@ def plant_acceleration_of(dynamics: Dynamics) -> Callable[..., Any]:
     return plant_acceleration
 
 
-def read_motion(plan: FlightPlan, dynamics: Dynamics) -> Any:
+def read_motion(plan: FlightPlan, loop: ClosedLoop) -> Any:
     """The `motion_record` of a planned flight."""
     scenario = plan.scenario
     plant, vehicle = scenario.simulation.plant, scenario.any_rotorcraft
     least, greatest = rotor_limits(scenario).thrust_range or (-inf, inf)
-    tilts = layout_of(dynamics).tilts
+    tilts = layout_of(loop).tilts
     hinges = vehicle.hinge_inertias[:tilts]
     pods = vehicle.pod_inertias[:tilts] if plant == "mujoco" else (0.0,) * tilts
     # The share of a pod that its reaction turns; the rest of the hinge is the servo's armature.
     carried = tuple(pod * (pod / hinge) for pod, hinge in zip(pods, hinges, strict=True))
-    return motion_record(dynamics)(
+    return motion_record(loop)(
         mechanics=mechanics(plan),
         least_thrust=least,
         greatest_thrust=greatest,
@@ -100,23 +100,15 @@ def with_measured_acceleration(loop: ClosedLoop) -> ClosedLoop:
 
     It goes around all other layers, whose controls move the plant.
     """
-    inner_controls, dynamics = loop.sampling.controls, loop.dynamics
-    _, loads = read_actuators(dynamics)
-    plant_acceleration = plant_acceleration_of(dynamics)
+    _, loads = read_actuators(loop)
+    plant_acceleration = plant_acceleration_of(loop)
 
-    @traceable
-    def controls(time: Any, qpos: Any, qvel: Any, act: Any, parameters: Any, knots: Any) -> Any:
-        inner = parameters.inner
-        ctrl = inner_controls(time, qpos, xp.hstack([qvel, xp.zeros(3)]), act, inner, knots)
-        measured = plant_acceleration(qpos, qvel, ctrl, loads(ctrl), parameters.layer)[3:]
-        return inner_controls(time, qpos, xp.hstack([qvel, measured]), act, inner, knots)
+    def controls(
+        within: Any, time: Any, qpos: Any, qvel: Any, act: Any, own: Any, knots: Any
+    ) -> Any:
+        ctrl = within(qpos, xp.hstack([qvel, xp.zeros(3)]), act)
+        measured = plant_acceleration(qpos, qvel, ctrl, loads(ctrl), own)[3:]
+        return within(qpos, xp.hstack([qvel, measured]), act)
 
-    return wrap_loop(
-        loop,
-        Layer(
-            "with_measured_acceleration",
-            motion_record(dynamics),
-            lambda plan: read_motion(plan, dynamics),
-            controls=controls,
-        ),
-    )
+    layer = Layer(motion_record(loop), lambda plan: read_motion(plan, loop), controls=controls)
+    return wrap_loop(loop, layer)

@@ -12,7 +12,7 @@ from dataclasses import replace
 from functools import cache
 from typing import Any
 
-from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Dynamics, Equations
+from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Equations
 from tiltsim.laws.layers.layer import Layer, wrap_loop
 from tiltsim.models.parts import ExtraActuators
 from tiltsim.scenario.scenario import FlightPlan
@@ -36,12 +36,12 @@ from tiltsim_controllers.vehicle.rotor_inertia import (
 @cache
 def with_rotor_inertia(loop: ClosedLoop) -> ClosedLoop:
     """A loop whose rotors have spin inertia."""
-    dynamics, layout, equations = loop.dynamics, layout_of(loop.dynamics), loop.equations
-    (rotors, tilts), tilted = layout, tilt_of_rotor(dynamics)
+    layout, equations = layout_of(loop), loop.equations
+    (rotors, tilts), tilted = layout, tilt_of_rotor(loop)
     record = make_record_type(
         "SpinningRotors",
         inertia=float,  # kg m^2, of one rotor about its axis
-        vehicle=rotors_record(dynamics),  # the true one, not the controller's
+        vehicle=rotors_record(loop),  # the true one, not the controller's
         slowest=float,  # rad/s, of a rotor along its spin
         fastest=float,
     )
@@ -51,26 +51,24 @@ def with_rotor_inertia(loop: ClosedLoop) -> ClosedLoop:
         own = vehicle.rotor_inertia, true_rotors(plan.scenario)
         return record(*own, *vehicle.speeds_along_spin)
 
-    @traceable
     def loads(time: Any, qpos: Any, qvel: Any, act: Any, ctrl: Any, layer: Any) -> Any:
         """The wrench on the body (N, N m, body axes) and torques on the hinges (N m)."""
         craft, speeds, omega = craft_of(layer.vehicle, tilted), act[:rotors], qvel[3:6]
         angles, rates = qpos[TILT_1:], qvel[TILT_RATE_1 : TILT_RATE_1 + tilts]
         demanded = ctrl[layout.accelerations]
         accelerations = accelerations_within_limits(
-            xp.array(dynamics.spins), speeds, demanded, layer.slowest, layer.fastest
+            xp.array(loop.spins), speeds, demanded, layer.slowest, layer.fastest
         )
         torque = spin_torque(craft, angles, rates, speeds, accelerations, omega)
         hinges = hinge_torques(craft, angles, speeds, accelerations, omega)
         return xp.hstack([xp.zeros(3), layer.inertia * torque, layer.inertia * hinges])
 
     layer = Layer(
-        "with_rotor_inertia",
         record,
         read,
         adds=loads,
         actuators=ExtraActuators(wrench=True, hinge_torques=tilts),
-        equations=None if equations is None else _momentum_equations(equations, dynamics),
+        equations=None if equations is None else _momentum_equations(equations, loop),
     )
     return wrap_loop(loop, layer)
 
@@ -78,13 +76,13 @@ def with_rotor_inertia(loop: ClosedLoop) -> ClosedLoop:
 # --- ideal actuators on the thesis's equations -------------------------------------------------
 
 
-def _momentum_equations(equations: Equations, dynamics: Dynamics) -> Equations:
+def _momentum_equations(equations: Equations, loop: ClosedLoop) -> Equations:
     """Equations of a vehicle whose rotors have spin inertia, and whose pods may jump.
 
     At their body rates the body alone would have the total angular momentum.
     """
     inner_inputs, inner_rates, inner_observe = equations.inputs, equations.rates, equations.observe
-    tilts, tilted, rotors = equations.tilts, tilt_of_rotor(dynamics), len(dynamics.spins)
+    tilts, tilted, rotors = equations.tilts, tilt_of_rotor(loop), len(loop.spins)
     assert tilts is not None  # other vehicles are refused
 
     @traceable

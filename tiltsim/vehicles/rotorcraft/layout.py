@@ -2,7 +2,7 @@
 
 from typing import Final, NamedTuple
 
-from tiltsim.closed_loop.loop import Dynamics, Sizes
+from tiltsim.closed_loop.loop import ClosedLoop, Sizes
 from tiltsim_controllers.vehicle.states import BODY_FIELDS
 
 # Places in ``qpos`` and ``qvel``: the quaternion, and the first tilt and tilt rate.
@@ -73,16 +73,16 @@ class Layout(NamedTuple):
         return (*BODY_FIELDS, *(name for kind in kinds for name in self.names(kind)))
 
 
-def layout_of(dynamics: Dynamics) -> Layout:
+def layout_of(loop: ClosedLoop) -> Layout:
     """The layout of a model's vectors; the quadrotor's have no tilts."""
-    return Layout(len(dynamics.spins), dynamics.sizes.qpos - TILT_1)
+    return Layout(len(loop.spins), loop.sizes.qpos - TILT_1)
 
 
-def tilt_of_rotor(dynamics: Dynamics) -> tuple[int, ...]:
+def tilt_of_rotor(loop: ClosedLoop) -> tuple[int, ...]:
     """The number, from 0, of each rotor's tilt; -1: fixed."""
-    rotors, tilts = layout_of(dynamics)
+    rotors, tilts = layout_of(loop)
     on_cross = tuple(range(rotors)) if tilts else (-1,) * rotors
-    return dynamics.tilt_of_rotor or on_cross
+    return loop.tilt_of_rotor or on_cross
 
 
 CROSS: Final = Layout(4, 4)

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from tiltsim.closed_loop.loop import Dynamics
+from tiltsim.closed_loop.loop import ClosedLoop
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.vehicles.rotorcraft.layout import layout_of
@@ -14,9 +14,9 @@ from tiltsim_controllers.vehicle.craft import craft_parameters, craft_record
 from tiltsim_controllers.vehicle.parameters import Vehicle
 
 
-def rotors_record(dynamics: Dynamics) -> Any:
+def rotors_record(loop: ClosedLoop) -> Any:
     """The type of the parameters of a model's vehicle; see `true_rotors`."""
-    return craft_record(*layout_of(dynamics)) if dynamics.tilt_of_rotor else Vehicle
+    return craft_record(*layout_of(loop)) if loop.tilt_of_rotor else Vehicle
 
 
 def true_rotors(scenario: Scenario) -> Any:

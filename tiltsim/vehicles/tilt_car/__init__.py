@@ -13,7 +13,7 @@ from tiltsim.closed_loop.limits import (
     first_limit,
     horizontal_error,
 )
-from tiltsim.closed_loop.vehicle_kind import VehicleKind
+from tiltsim.closed_loop.loop import VehicleKind
 from tiltsim.models.parts import ExtraActuators, TiltServo, Visuals
 from tiltsim.scenario.scenario import FlightPlan, Scenario
 from tiltsim.system.text import Quantity

@@ -20,7 +20,7 @@ from tiltsim_controllers.mathematics.scalar import Floats
 def tilt_car_metrics(
     columns: Mapping[str, Floats], scenario: Scenario, _follows_position: bool
 ) -> dict[str, Any]:
-    """See `tiltsim.closed_loop.vehicle_kind.VehicleKind.metrics`."""
+    """See `tiltsim.closed_loop.loop.VehicleKind.metrics`."""
     timestep = scenario.simulation.timestep
     last_second = in_last_second(columns["time"], timestep)
     errors = {axis: columns[f"{axis}_ref"] - columns[axis] for axis in ("x", "y")}
