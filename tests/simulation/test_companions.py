@@ -211,7 +211,15 @@ def test_a_companions_tool_that_touches_its_rotor_is_refused():
     assert "tool: touches wing_pod_1 of its own vehicle" in refusal(tiltsim.simulate, scenario)
 
 
-@pytest.mark.parametrize("objects", [{}, {"tool": STICK, "payload": {"mass": 0.1, "length": 0.3}}])
+@pytest.mark.parametrize(
+    "objects",
+    [
+        {},
+        pytest.param(
+            {"tool": STICK, "payload": {"mass": 0.1, "length": 0.3}}, marks=pytest.mark.slow
+        ),
+    ],
+)
 def test_the_first_vehicle_gives_the_command_that_it_gives_alone(objects):
     among = tiltsim.Simulation(together(WING, QUAD, **objects))
     alone = tiltsim.Simulation(among.scenario.replace({"companion": []}))
