@@ -7,7 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from tiltsim.closed_loop.choices import CHOICES
+from tiltsim.closed_loop.assembly import CHOICES
 from tiltsim.engines.machine_code import MachineCode
 from tiltsim_controllers.code.llvm_text import llvm_functions
 from tiltsim_controllers.code.program import trace_vectors

@@ -28,7 +28,7 @@ from tiltsim.scenario.simulation_table import SimulationTable
 from tiltsim.scenario.vehicle import VehicleUnion
 from tiltsim.studies.multirotor_analysis import FLEET, fleet_file
 from tiltsim.views.figures.style import save
-from tiltsim.views.rerun.recording_file import save_recording
+from tiltsim.views.rerun.recording import save_recording
 from tiltsim.views.video.overlay import Overlay
 
 SHORT = {"duration": 0.02, "timestep": 0.002, "engine": "python"}

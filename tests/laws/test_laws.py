@@ -140,7 +140,7 @@ def test_the_table_has_the_columns_of_every_flight_and_the_laws_own(law):
     flight = fly(law, {"duration": 0.05})
     table = flight.to_arrow()
     loop = loop_of(flight.scenario)
-    assert table.column_names == [*loop.kind.columns, *loop.columns.units]
+    assert table.column_names == [*loop.kind.columns, *loop.further_units]
     for field in table.schema:
         assert field.metadata == {b"unit": flight.units[field.name].encode()}
     assert all(np.isfinite(column).all() for column in flight.columns.values())

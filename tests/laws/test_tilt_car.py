@@ -18,7 +18,7 @@ from tiltsim.models.tilt_car import TiltCarSpec, compile_tilt_car
 from tiltsim.resources import shipped_folder
 from tiltsim.views.figures.plot import plot
 from tiltsim.views.replay import thrust_sites, visible_model
-from tiltsim.views.rerun.recording_file import save_recording
+from tiltsim.views.rerun.recording import save_recording
 from tiltsim.views.rerun.scene import ground_height
 from tiltsim_controllers.tilt_car.penguin_cycle import Swing, limit_cycle, lyapunov, lyapunov_bound
 from tiltsim_controllers.tilt_car.planned_direction import GAIN_SETS

@@ -268,11 +268,8 @@ def first_accelerations(vehicle, controller, timestep=0.002, **gait):
     """Rotor accelerations (rad/s^2) at time zero."""
     assembly = assembly_of(vehicle, controller, timestep, **gait)
     loop, setup = assembly.loop, assembly.setup
-    state = (
-        *loop.kind.initial_motion(assembly),
-        loop.dynamics.initial_activations(assembly, setup),
-    )
-    controls = loop.sampling.controls(0.0, *state, setup.parameters, setup.knots)
+    state = (*loop.kind.initial_motion(assembly), loop.initial_activations(assembly, setup))
+    controls = loop.controls(0.0, *state, setup.parameters, setup.knots)
     rotors = len(SPEEDS[vehicle])
     first = rotors + (rotors if gait else 0)  # tilts, one for each rotor, come before
     return np.array(controls[first : first + rotors])

@@ -23,7 +23,7 @@ from tiltsim.plants.flight_model import build_model
 from tiltsim.resources import shipped_folder
 from tiltsim.vehicles.rotorcraft import COLUMNS
 from tiltsim.views.figures.plot import plot
-from tiltsim.views.rerun.recording_file import save_recording
+from tiltsim.views.rerun.recording import save_recording
 from tiltsim.views.video.overlay import Overlay
 
 DOCS = Path(__file__).parents[2] / "docs"

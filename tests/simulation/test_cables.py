@@ -115,7 +115,7 @@ def test_vehicles_and_load_keep_their_momentum_while_the_load_changes_hands():
     assembly = assemble(handed(FIRST, SECOND))
     model = flight_model(assembly)
     model.opt.gravity[:] = 0.0
-    data, sizes = mujoco.MjData(model), assembly.loop.dynamics.sizes
+    data, sizes = mujoco.MjData(model), assembly.loop.sizes
     data.qpos[: sizes.qpos], _ = assembly.loop.kind.initial_motion(assembly)
     data.qpos[sizes.qpos :], _ = motion_at_start(assembly)
     data.qvel[-6:-3] = -2.0, 0.5, -1.0

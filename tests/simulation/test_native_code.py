@@ -11,7 +11,7 @@ import tiltsim
 import tiltsim.engines.sample_evaluation
 from tests.laws.test_laws import LAWS
 from tests.simulation.test_batch import ALL_LAWS, GAITS, scenario
-from tiltsim.closed_loop.choices import program_key
+from tiltsim.closed_loop.assembly import program_key
 from tiltsim.flight.end import End
 from tiltsim.laws.assembling import LOOPS, assemble
 from tiltsim.plants.engine_choice import choose_engine
@@ -27,7 +27,7 @@ def test_every_sign_check_has_a_cause(law):
     sample = dict(zip(loop.sample_fields, (plant.time, *values), strict=True))
     assembly = assemble(scenario(ALL_LAWS[law]))
     numbers = assembly.sign_check_values(plant.time, values)
-    assert len(loop.monitoring.causes(sample, assembly.setup)) == len(numbers)
+    assert len(loop.causes(sample, assembly.setup)) == len(numbers)
     assert all(np.isfinite(numbers))
 
 

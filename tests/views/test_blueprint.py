@@ -14,8 +14,7 @@ from tiltsim.flight.end import End
 from tiltsim.laws.assembling import assemble
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.views.attitude_plane import MOVING_TRAIL_TIME
-from tiltsim.views.rerun.blueprint import flight_blueprint
-from tiltsim.views.rerun.recording_file import new_recording
+from tiltsim.views.rerun.recording import flight_blueprint, new_recording
 from tiltsim.views.signals import signals_of
 
 

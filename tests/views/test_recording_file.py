@@ -17,7 +17,7 @@ from tiltsim.cli import main
 from tiltsim.errors import InputError
 from tiltsim.flight.reading import load_flight
 from tiltsim.simulation.simulate import simulate
-from tiltsim.views.rerun.recording_file import new_recording, save_recording
+from tiltsim.views.rerun.recording import new_recording, save_recording
 from tiltsim.views.rerun.timeline import TIMELINE
 from tiltsim.views.rerun.viewer import require_viewer
 from tiltsim.views.signals import signals_of

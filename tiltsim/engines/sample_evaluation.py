@@ -9,8 +9,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from tiltsim.closed_loop.assembly import Assembly
-from tiltsim.closed_loop.choices import Choices, ProgramKey, choices_of, program_key
+from tiltsim.closed_loop.assembly import Assembly, Choices, ProgramKey, choices_of, program_key
 from tiltsim.closed_loop.loop import ControlSetup
 from tiltsim.engines.glue import ROWS, filled
 from tiltsim.engines.machine_code import MachineCode

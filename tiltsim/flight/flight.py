@@ -133,7 +133,7 @@ class Flight:
         loop = self.assembly.loop
         known = dict(zip(loop.sample_fields, self.samples.T, strict=True))
         with _overflow_ignored():
-            known |= loop.columns.derive(known, self.assembly.setup)
+            known |= loop.derive(known, self.assembly.setup)
             known |= loop.kind.thrusts(known, self.scenario)
         return {name: known[name] for name in self.units}
 

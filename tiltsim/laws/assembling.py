@@ -12,19 +12,19 @@ from tiltsim.laws.companions import Member, with_companions
 from tiltsim.laws.flown_law import loop_of_law
 from tiltsim.laws.full_pose import full_pose_loop, full_pose_loop_of
 from tiltsim.laws.layers.actuation import with_actuation
-from tiltsim.laws.layers.air import with_air
 from tiltsim.laws.layers.contact import with_force_loop, with_impedance, with_objects
 from tiltsim.laws.layers.estimation import fusion_of, with_estimator
-from tiltsim.laws.layers.instruments import instruments_of, with_instruments
-from tiltsim.laws.layers.loads import with_loads
-from tiltsim.laws.layers.measured_acceleration import with_measured_acceleration
+from tiltsim.laws.layers.forces import with_air, with_loads, with_rotor_inertia
+from tiltsim.laws.layers.instruments import (
+    instruments_of,
+    with_instruments,
+    with_measured_acceleration,
+)
 from tiltsim.laws.layers.on_equations import on_equations
-from tiltsim.laws.layers.rotor_inertia import with_rotor_inertia
 from tiltsim.laws.layers.swing import with_swing_damping
 from tiltsim.laws.multirotor import loop_of_multirotor
 from tiltsim.laws.quadrotor import QUADROTOR_ATTITUDE_ALTITUDE, SWITCHING, YAW_POSITION
-from tiltsim.laws.tilt_car import FOURTH_DERIVATIVE, THIRD_DERIVATIVE
-from tiltsim.laws.tilt_car_planned import PLANNED_DIRECTION
+from tiltsim.laws.tilt_car import FOURTH_DERIVATIVE, PLANNED_DIRECTION, THIRD_DERIVATIVE
 from tiltsim.laws.tiltrotor import LAYOUT as TILTROTOR
 from tiltsim.laws.tiltrotor import tiltrotor_loop
 from tiltsim.scenario.law_controller import LawTable
@@ -123,7 +123,7 @@ def _plant_of(scenario: Scenario, loop: ClosedLoop) -> ActuatorPlant:
     """The equations on which the controls of MuJoCo's model act."""
     if scenario.simulation.plant == "rigid_body":
         return rigid_body(scenario)
-    return actuator_plant(loop.dynamics)
+    return actuator_plant(loop)
 
 
 def assemble(

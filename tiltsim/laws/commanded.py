@@ -9,13 +9,11 @@ from dataclasses import replace
 from functools import cache
 from typing import Any, Final
 
-from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup
-from tiltsim.closed_loop.vehicle_kind import VehicleKind
+from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, VehicleKind
 from tiltsim.laws.law import Law
 from tiltsim.laws.quadrotor import LAYOUT as QUADROTOR
 from tiltsim.laws.quadrotor import upright_columns
-from tiltsim.laws.rotor_loop import RotorLayout, layout_of_vehicle, rotor_loop
-from tiltsim.laws.rotorcraft import torque_free_columns
+from tiltsim.laws.rotor_loop import RotorLayout, layout_of_vehicle, rotor_loop, torque_free_columns
 from tiltsim.laws.tiltrotor import LAYOUT, singularity_columns
 from tiltsim.laws.vehicle_loop import servo_lead
 from tiltsim.models.rotor_table import Multirotor

@@ -7,12 +7,11 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from tiltsim.closed_loop.choices import ProgramKey, choices_of
+from tiltsim.closed_loop.assembly import ProgramKey, choices_of
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup
 from tiltsim.engines.programs import LoopPrograms
 from tiltsim.errors import InputError
-from tiltsim.laws.airframe import airframe_of
-from tiltsim.laws.law_loop import REMEDY, FlownLaw, Key, LawError, law_loop
+from tiltsim.laws.law_loop import REMEDY, FlownLaw, Key, LawError, airframe_of, law_loop
 from tiltsim.laws.layers.instruments import instruments_of, with_instruments
 from tiltsim.laws.rotor_loop import layout_of_vehicle
 from tiltsim.scenario.controller import NumpyController
@@ -184,11 +183,11 @@ def _try_once(loop: ClosedLoop, plan: FlightPlan, setup: ControlSetup) -> None:
     tilts, rates = initial_tilts(plan) if scenario.vehicle.has_tilting_rotors else ((), ())
     qpos = (*initial.position, *quaternion_of_euler(initial.attitude), *tilts)
     qvel = (*initial.velocity, *initial.angular_velocity, *rates)
-    activations = loop.dynamics.initial_activations(plan, setup)
-    act = (*map(float, activations), *(0.0,) * loop.dynamics.sizes.after_act)
+    activations = loop.initial_activations(plan, setup)
+    act = (*map(float, activations), *(0.0,) * loop.sizes.after_act)
     start = f'{scenario.address or "scenario"}: controller.law = "{scenario.controller.law}"'
     try:
-        loop.sampling.controls(0.0, qpos, qvel, act, setup.parameters, setup.knots)
+        loop.controls(0.0, qpos, qvel, act, setup.parameters, setup.knots)
     except LawError as error:
         raise InputError(f"{start}: the law {error}") from None
     except Exception as error:

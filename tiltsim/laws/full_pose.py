@@ -8,16 +8,15 @@ from typing import Any
 import numpy as np
 
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup
-from tiltsim.laws.law import Law, tilts_in_states
-from tiltsim.laws.parameters import parameters_of
+from tiltsim.laws.law import Law, parameters_of, tilts_in_states
 from tiltsim.laws.rotor_loop import (
     RotorLayout,
     body_of_vehicle,
     layout_of_vehicle,
     margins_of,
     rotor_loop,
+    rotor_stops,
 )
-from tiltsim.laws.rotorcraft import rotor_stops
 from tiltsim.laws.tiltrotor import singularity_columns
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.scenario import FlightPlan, Scenario

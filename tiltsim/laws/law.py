@@ -1,15 +1,24 @@
-"""The record of a control law, from which `tiltsim.laws.vehicle_loop` makes a closed loop."""
+"""The record of a control law, its parameters in a flight, and its supervisor."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass, field, replace
+from functools import cache
+from typing import Any, Final
 
 from tiltsim.closed_loop.loop import ControlSetup
+from tiltsim.scenario.multirotor_controllers import AttitudeForceController
 from tiltsim.scenario.scenario import FlightPlan, Scenario
+from tiltsim.scenario.tiltrotor_controllers import AttitudeAltitudeController
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.gaits.motion import planned_tilts
+from tiltsim_controllers.laws.gait_feedforward import supervised_gait
+from tiltsim_controllers.laws.keys import number_of
+from tiltsim_controllers.laws.multirotor_steps import INTEGRAL_FIELDS
 from tiltsim_controllers.laws.observed import Seen, Step
+from tiltsim_controllers.laws.supervisor import HOLD, Supervision
+from tiltsim_controllers.mathematics.records import make_record_type
 from tiltsim_controllers.mathematics.scalar import Floats, Values
+from tiltsim_controllers.vehicle.states import PITCH, ROLL
 
 Margins = Callable[[Mapping[str, Floats], ControlSetup], dict[str, Floats]]
 """``(samples by field, with the columns of references, setup) -> columns``."""
@@ -55,7 +64,7 @@ class Law:
             the law becomes singular. None for a law that is singular nowhere.
         causes: ``(sample by field, setup) -> texts``: why a flight ends where each reaches zero.
         measured: Whether it sees the plant's angular acceleration, of
-            `tiltsim.laws.layers.measured_acceleration`.
+            `tiltsim.laws.layers.instruments`.
         feels: Whether it sees the contact force and the swing of a load, behind ``act``.
         follows_position: See `tiltsim.closed_loop.loop.ClosedLoop`.
     """
@@ -76,3 +85,139 @@ class Law:
     measured: bool = False
     feels: bool = False
     follows_position: Callable[[Scenario], bool] = lambda _scenario: True
+
+
+INTEGRALS: Final = dict.fromkeys(INTEGRAL_FIELDS, "m s")
+"""States of a law that integrates the position error, with their units."""
+
+
+@cache
+def head_of(law: Any, **own: type) -> Any:
+    """The type of the head of `userdata`, around the parameters of a law.
+
+    Args:
+        law: Type of these parameters.
+        own: Further fields, such as ``servo_lead``: rate feed-forward of the tilt servos, s,
+            ``2 zeta / omega_n``.
+    """
+    # The signature is `tiltsim.closed_loop.loop.ClosedLoop.signature`.
+    return make_record_type("LoopParameters", signature=float, **own, law=law)
+
+
+def parameters_of(plan: FlightPlan, record: Any, **own: Any) -> Any:
+    """The parameters of a flight's law.
+
+    Args:
+        plan: Plan of the flight.
+        record: Their type, see `tiltsim_controllers.laws.keys.record_of`.
+        own: Values of fields that are neither keys nor parts of the plan.
+    """
+    known = {
+        "gait": plan.gait.parameters,
+        "reference": plan.reference,
+        "rotors": float(len(plan.knots)),  # where the law's tables follow in the knots
+        **own,
+    }
+    controller = plan.scenario.controller
+    return record(
+        *(known[key] if key in known else number_of(controller, key) for key in record._fields)
+    )
+
+
+def tracking_parameters(plan: FlightPlan, record: Any, **own: Any) -> Any:
+    """The parameters of a law with feed-forward of a gait.
+
+    Args:
+        plan, record, own: See `parameters_of`.
+    """
+    scenario, controller = plan.scenario, plan.scenario.controller
+    assert isinstance(controller, (AttitudeAltitudeController, AttitudeForceController))
+    # The thesis's equations omit the gyroscopic torque.
+    terms = controller.resolve_feedforward_terms(
+        gyroscopic_torque=scenario.simulation.plant != "thesis"
+    )
+    return parameters_of(
+        plan,
+        record,
+        gains=controller.resolve_gains(),
+        integral=controller.resolve_integral_gains(),
+        anticipation=xp.minimum(controller.anticipation, 0.5 * plan.gait.min_segment_time),
+        terms=terms,
+        **own,
+    )
+
+
+def integrals_at_rest(_plan: FlightPlan) -> tuple[float, ...]:
+    """The states `INTEGRALS` at time zero."""
+    return (0.0,) * len(INTEGRALS)
+
+
+def decouples_position(scenario: Scenario) -> bool:
+    """Whether a decoupler steers the vehicle to the reference's horizontal position."""
+    controller = scenario.controller
+    assert isinstance(controller, (AttitudeAltitudeController, AttitudeForceController))
+    return controller.decoupler != "none"
+
+
+SUPERVISION: Final = "supervision"
+"""A column: how much the supervisor intervenes, from 0 to 1.
+
+It is the share of the gait's angles or of its speed that is removed, or of the way to red.
+"""
+
+SUPERVISOR_FIELDS: Final = ("supervisor_state", "supervisor_rate")
+"""States of a supervisor that has any: see `tiltsim_controllers.laws.supervisor`."""
+
+_STATE_UNITS: Final = {"hold": ("s", "1"), "return_to_red": ("1", "1/s")}
+
+
+def supervised(law: Law, supervision: Supervision, strategy: str) -> Law:
+    """A law under a supervisor, whose states follow the law's.
+
+    Args:
+        law: Its parameters have ``gait`` and ``supervisor``.
+        supervision: The functions of the supervisor.
+        strategy: One of `tiltsim_controllers.laws.supervisor.STRATEGIES`, or empty for none.
+    """
+    if not strategy:
+        return law
+    assert law.signals is not None
+    units, own, tracked = _STATE_UNITS.get(strategy, ()), len(law.states), len(law.signals)
+
+    def watched(seen: Seen, p: Any, knots: Any) -> Seen:
+        """The vehicle as the law sees it, with the motion of the supervisor."""
+        state, rate = seen.states[own:]
+        motion = xp.array([state, rate, 0.0])
+        if not seen.recorded:
+            vehicle = supervision.watched(seen.time, p)
+            attitude = seen.state[ROLL], seen.state[PITCH]
+            motion = supervision.derivative(
+                seen.time, *attitude, state, rate, p.gait, knots, p.supervisor, vehicle
+            )
+        return seen._replace(states=seen.states[:own], supervisor=motion)
+
+    def step(seen: Seen, p: Any, knots: Any) -> Step:
+        if units:
+            seen = watched(seen, p, knots)
+            acts = seen.supervisor[1 if p.supervisor.strategy == HOLD else 0]
+        else:
+            acts = 1.0 - supervised_gait(seen, p, knots, supervision)[1]
+        step = law.step(seen, p, knots)
+        rates = xp.hstack([step.rates, seen.supervisor[1:]]) if units else step.rates
+        return Step(step.inputs, rates, xp.hstack([step.signals[:tracked], acts]))
+
+    def tilts(seen: Seen, rates: Any, p: Any, knots: Any) -> Any:
+        if units:
+            motion = xp.hstack([seen.states[own], rates[own:]])
+            seen = seen._replace(supervisor=motion)
+        return supervised_gait(seen, p, knots, supervision)[0][:, :2]
+
+    return replace(
+        law,
+        step=step,
+        states={**law.states, **dict(zip(SUPERVISOR_FIELDS, units, strict=False))},
+        initial=lambda plan: (*law.initial(plan), *(0.0,) * len(units)),
+        signals=(*law.signals, SUPERVISION),
+        units={**law.units, SUPERVISION: "1"},
+        tilts=tilts,
+    )

@@ -5,19 +5,24 @@ layout is compiled in. The rotors' speeds are states that approach the commanded
 tilts of a law that commands them.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cache, partial
+from os import PathLike
 from typing import Any, Final, NamedTuple
 
 from tiltsim.closed_loop.loop import ClosedLoop
-from tiltsim.errors import TiltsimError
-from tiltsim.laws.airframe import airframe_of
+from tiltsim.errors import InputError, TiltsimError
 from tiltsim.laws.law import Law, tilts_in_states
 from tiltsim.laws.rotor_loop import RotorLayout, body_of_vehicle, margins_of, rotor_loop
-from tiltsim.scenario.law_controller import LawTable
-from tiltsim.scenario.scenario import FlightPlan
+from tiltsim.models.cross import as_multirotor
+from tiltsim.scenario.law_controller import Airframe, LawTable
+from tiltsim.scenario.loading import load_scenario
+from tiltsim.scenario.scenario import FlightPlan, Scenario, plan_flight
 from tiltsim.system.text import short_repr
+from tiltsim.vehicles.rotorcraft import initial_rotor_speeds, initial_tilts
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.code.tracing import as_array
 from tiltsim_controllers.gaits.motion import planned_tilts
@@ -307,4 +312,46 @@ def law_loop(key: Key, law_of: Callable[[FlightPlan], FlownLaw]) -> ClosedLoop:
         rotor_loop(key.layout, law),
         with_latency=None if knows_latency else partial(law_loop, late, law_of),
         traced=key.traced,
+    )
+
+
+def airframe(scenario: Scenario | str | PathLike[str] | Mapping[str, Any]) -> Airframe:
+    """Facts that the controller of a scenario may use, as methods of a `LawController` take them.
+
+    Args:
+        scenario: Anything that `tiltsim.load_scenario` takes, of a rotorcraft.
+
+    Raises:
+        InputError: If it is not valid, or of a tilt-car.
+    """
+    loaded = load_scenario(scenario)
+    if loaded.vehicle.model == "tilt_car":
+        raise InputError(f"{loaded.address}: vehicle.model: airframe takes rotorcraft only")
+    return airframe_of(plan_flight(loaded))
+
+
+def airframe_of(plan: FlightPlan) -> Airframe:
+    """The airframe of a planned flight."""
+    scenario, simulation = plan.scenario, plan.scenario.simulation
+    table = scenario.any_rotorcraft
+    vehicle, tilting = table.resolve(), table.has_tilting_rotors
+    speeds = initial_rotor_speeds(plan)
+    return Airframe(
+        as_multirotor(vehicle, tilting=tilting),
+        plan.gait,
+        initial_tilts(plan)[0] if tilting else (),
+        tuple(spin * speed for spin, speed in zip(table.spins, speeds, strict=True)),
+        scenario.initial.position,
+        scenario.initial.velocity,
+        scenario.initial.attitude,
+        scenario.initial.angular_velocity,
+        # The thesis's equations omit the gyroscopic torque but for the quadrotor's.
+        float(simulation.plant != "thesis" or table.model == "quadrotor"),
+        simulation.timestep,
+        simulation.control_timestep,
+        simulation.latency_steps,
+        table.speeds_along_spin,
+        table.rotor_time_constant,
+        table.tilt_servo,
+        scenario.reference,
     )

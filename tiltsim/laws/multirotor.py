@@ -5,22 +5,25 @@ from functools import cache
 from typing import Any, Final
 
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup
-from tiltsim.laws.law import Law
-from tiltsim.laws.parameters import (
+from tiltsim.laws.law import (
     INTEGRALS,
+    Law,
     decouples_position,
     integrals_at_rest,
+    supervised,
     tracking_parameters,
 )
 from tiltsim.laws.rotor_loop import (
+    CONDITION,
     RotorLayout,
     body_of_vehicle,
     layout_of_vehicle,
     rotor_loop,
+    rotor_stops,
+    singular_attitude,
     table_of,
+    torque_free_columns,
 )
-from tiltsim.laws.rotorcraft import CONDITION, rotor_stops, singular_attitude, torque_free_columns
-from tiltsim.laws.supervision import supervised
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.multirotor_controllers import AttitudeForceController, upper_side
 from tiltsim.scenario.scenario import FlightPlan, Scenario
@@ -30,12 +33,8 @@ from tiltsim_controllers.laws.attitude_altitude import PUBLISHED_DECOUPLING
 from tiltsim_controllers.laws.gait_feedforward import multirotor_law_of, prioritized
 from tiltsim_controllers.laws.multirotor import NULL_PART, SIGNALS, independence, present_wrench
 from tiltsim_controllers.laws.multirotor_steps import Direction, Form, Parameters
-from tiltsim_controllers.laws.multirotor_supervisor import (
-    Watched,
-    multirotor_supervision_of,
-    watched,
-)
 from tiltsim_controllers.laws.observed import Seen
+from tiltsim_controllers.laws.supervised_vehicles import Watched, multirotor_supervision_of, watched
 from tiltsim_controllers.laws.supervisor import Supervisor
 from tiltsim_controllers.mathematics.scalar import Floats, Values
 from tiltsim_controllers.vehicle.effectiveness import without_rotor

@@ -12,10 +12,8 @@ import numpy as np
 
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup
 from tiltsim.equations.quadrotor import equations_of_motion, initial_state
-from tiltsim.laws.law import Law
-from tiltsim.laws.parameters import parameters_of
-from tiltsim.laws.rotor_loop import RotorFunctions, RotorLayout, rotor_loop
-from tiltsim.laws.rotorcraft import REFERENCE_COLUMNS
+from tiltsim.laws.law import Law, parameters_of
+from tiltsim.laws.rotor_loop import REFERENCE_COLUMNS, RotorFunctions, RotorLayout, rotor_loop
 from tiltsim.scenario.scenario import FlightPlan
 from tiltsim.vehicles.rotorcraft import ROTORCRAFT
 from tiltsim_controllers.analysis.quadrotor_singularity import (

@@ -10,17 +10,16 @@ import numpy as np
 
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup
 from tiltsim.engines.sample_evaluation import flights_in
-from tiltsim.laws.law import Law
-from tiltsim.laws.parameters import (
+from tiltsim.laws.law import (
     INTEGRALS,
+    Law,
     decouples_position,
     integrals_at_rest,
     parameters_of,
+    supervised,
     tracking_parameters,
 )
-from tiltsim.laws.rotor_loop import RotorLayout, rotor_loop
-from tiltsim.laws.rotorcraft import rotor_stops, singular_attitude
-from tiltsim.laws.supervision import supervised
+from tiltsim.laws.rotor_loop import RotorLayout, rotor_loop, rotor_stops, singular_attitude
 from tiltsim.scenario.scenario import FlightPlan
 from tiltsim.scenario.tiltrotor_controllers import AttitudeAltitudeController
 from tiltsim.vehicles.rotorcraft import ROTORCRAFT
@@ -32,7 +31,7 @@ from tiltsim_controllers.laws.attitude_altitude import PUBLISHED_DECOUPLING
 from tiltsim_controllers.laws.multirotor import SIGNALS
 from tiltsim_controllers.laws.multirotor_steps import EULER_ANGLES
 from tiltsim_controllers.laws.observed import Seen, Step
-from tiltsim_controllers.laws.tiltrotor_supervisor import SUPERVISION
+from tiltsim_controllers.laws.supervised_vehicles import SUPERVISION
 from tiltsim_controllers.mathematics.attitude import rotation_matrix
 from tiltsim_controllers.mathematics.linear import kernel
 from tiltsim_controllers.mathematics.scalar import Floats, Values
@@ -123,7 +122,7 @@ def tiltrotor_loop(name: str, measured: bool, strategy: str, limited: bool) -> C
     Args:
         name: "attitude_altitude", or "gait_feedforward" with tilt-rate feed-forward.
         measured: Whether it feeds back the angular acceleration of the plant, which
-            `tiltsim.laws.layers.measured_acceleration` measures, in place of the model's.
+            `tiltsim.laws.layers.instruments` measures, in place of the model's.
         strategy: The supervisor's, or empty; see `supervised`.
         limited: Whether it keeps the rotors within limits, see `gait_feedforward.prioritized`.
     """

@@ -10,17 +10,13 @@ import numpy as np
 
 from tiltsim.closed_loop.loop import (
     ClosedLoop,
-    Columns,
     ControlSetup,
-    Dynamics,
     Equations,
-    Monitoring,
-    Sampling,
+    VehicleKind,
+    nothing_singular,
 )
-from tiltsim.closed_loop.vehicle_kind import VehicleKind
 from tiltsim.engines.sample_evaluation import evaluate_over_samples
-from tiltsim.laws.law import Law
-from tiltsim.laws.parameters import head_of
+from tiltsim.laws.law import Law, head_of
 from tiltsim.scenario.rotorcraft import ServoTable
 from tiltsim.scenario.scenario import FlightPlan
 from tiltsim_controllers.code.traceable import traceable
@@ -56,15 +52,15 @@ class VehicleFunctions(ABC):
     def controls(
         self, time: Any, qpos: Any, qvel: Any, act: Any, parameters: Any, knots: Any
     ) -> Any:
-        """The control step, see `Sampling`."""
+        """The control step, see `ClosedLoop`."""
 
     def hold(self, time: Any, qpos: Any, qvel: Any, act: Any, ctrl: Any, parameters: Any) -> Any:
-        """The controls between samples, see `Sampling`."""
+        """The controls between samples, see `ClosedLoop`."""
         return ctrl
 
     @abstractmethod
     def observe(self, qpos: Any, qvel: Any, act: Any, ctrl: Any) -> Any:
-        """A sample, see `Columns`."""
+        """A sample, see `ClosedLoop`."""
 
     @abstractmethod
     def in_sample(self, time: Any, values: Any) -> Seen:
@@ -80,7 +76,7 @@ class VehicleFunctions(ABC):
         """References and signals of a sample."""
 
     def signs(self, time: Any, values: Any, parameters: Any, knots: Any) -> Any:
-        """See `Monitoring`."""
+        """See `ClosedLoop.sign_check_values`."""
         assert self.law.signs is not None
         return self.law.signs(self.in_sample(time, values), parameters.law, knots)
 
@@ -107,19 +103,19 @@ class VehicleFunctions(ABC):
     def closed_loop(
         self,
         kind: VehicleKind,
-        dynamics: Dynamics,
         head: Mapping[str, Callable[[FlightPlan], float]],
         inputs_size: int,
         fields: tuple[str, ...] = (),
+        **model: Any,
     ) -> ClosedLoop:
         """The closed loop.
 
         Args:
             kind: Kind of the vehicle.
-            dynamics: Its model.
             head: Parameters beside the law's, by name.
             inputs_size: Number of inputs of the equations.
             fields: Fields of a sample after the kind's and the states of the law.
+            model: Fields of `ClosedLoop` that describe the model.
         """
         law, references, names = self.law, traceable(self.references), self.names
         record = head_of(law.parameters, **dict.fromkeys(head, float))
@@ -140,16 +136,14 @@ class VehicleFunctions(ABC):
             kind=kind,
             parameters=record,
             setup=setup,
-            dynamics=dynamics,
-            sampling=Sampling(traceable(self.controls), traceable(self.hold)),
-            columns=Columns(
-                traceable(self.observe),
-                derive,
-                fields=(*law.states, *fields),
-                units={name: unit for name, unit in units.items() if name not in kind.columns},
-                observe_reads_controls=dynamics.commands_thrusts,
-            ),
-            monitoring=Monitoring(traceable(self.signs), law.causes) if law.signs else Monitoring(),
+            controls=traceable(self.controls),
+            hold=traceable(self.hold),
+            observe=traceable(self.observe),
+            derive=derive,
+            fields=(*law.states, *fields),
+            further_units={name: unit for name, unit in units.items() if name not in kind.columns},
+            sign_check_values=traceable(self.signs) if law.signs else nothing_singular,
+            causes=law.causes,
             equations=Equations(
                 inputs=traceable(self.equation_inputs),
                 inputs_size=inputs_size,
@@ -159,4 +153,5 @@ class VehicleFunctions(ABC):
             ),
             follows_position=law.follows_position,
             uses_gait=law.uses_gait,
+            **model,
         )

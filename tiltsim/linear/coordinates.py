@@ -156,13 +156,12 @@ def activation_names(loop: ClosedLoop) -> tuple[str, ...]:
     inner = loop
     while inner.within is not None:
         inner = inner.within
-    dynamics, names = loop.dynamics, inner.columns.fields
-    own = dynamics.controller_states
+    names, own = inner.fields, loop.controller_states
     if len(names) != own:
         names = numbered("law", own)
-    rotors = dynamics.sizes.act - own - sum(extra.states for extra in dynamics.extra_actuators)
+    rotors = loop.sizes.act - own - sum(extra.states for extra in loop.extra_actuators)
     layers: list[str] = []
-    for index, extra in enumerate(dynamics.extra_actuators):
+    for index, extra in enumerate(loop.extra_actuators):
         if extra.begins_with_rotor_speeds:
             layers += numbered("speed_command", rotors)
             tilts = numbered("tilt_command", extra.memories - rotors)
@@ -176,8 +175,8 @@ def activation_names(loop: ClosedLoop) -> tuple[str, ...]:
 
 def mujoco_coordinates(loop: ClosedLoop) -> Coordinates:
     """Coordinates of `qpos`, `qvel` and `act`."""
-    sizes = loop.dynamics.sizes
-    if loop.dynamics.model == "tilt_car":
+    sizes = loop.sizes
+    if loop.model == "tilt_car":
         names = ("x", "y", "yaw", "alpha", "vx", "vy", "r", "alpha_rate")
         return _coordinates((*names, *activation_names(loop)), loop, 0)
     tilts = sizes.qpos - len(POSITION) - QUATERNION
@@ -196,17 +195,17 @@ def equation_coordinates(assembly: Assembly, size: int) -> Coordinates:
     if rotation:
         body = (*POSITION, *VELOCITY, *ROTATION_NAMES, *BODY_RATES)
     if model != "tilt_car" and loop.within is not None:
-        tilts = layout_of(loop.dynamics).tilts
+        tilts = layout_of(loop).tilts
         servos = (*numbered("alpha", tilts), *numbered("alpha_rate", tilts))
         names = (*body, *servos, *activation_names(loop))
     elif model == "tilt_car":
         driven = ("alpha", "rotor_speed_1", "rotor_speed_2")
         names = (*PLANE, *(driven if size > len(PLANE) else ()))
     else:
-        rotors = numbered("rotor_speed", len(loop.dynamics.spins)) if rotation else ()
+        rotors = numbered("rotor_speed", len(loop.spins)) if rotation else ()
         names = (*body, *rotors)
     further = size - len(names) - (rotation - 3 if rotation else 0)
-    own = loop.columns.fields if len(loop.columns.fields) == further else numbered("law", further)
+    own = loop.fields if len(loop.fields) == further else numbered("law", further)
     return _coordinates((*names, *own), loop, rotation)
 
 
@@ -235,16 +234,16 @@ class Input(NamedTuple):
 
 def control_inputs(assembly: Assembly) -> tuple[Input, ...]:
     """Inputs of the vehicle among the controls of its model."""
-    dynamics = assembly.loop.dynamics
-    rotors, sizes = len(dynamics.spins), dynamics.sizes
-    if dynamics.model == "tilt_car":
+    loop = assembly.loop
+    rotors, sizes = len(loop.spins), loop.sizes
+    if loop.model == "tilt_car":
         rotors = 2
         named: tuple[str, ...] = ("tilt_command",)
     else:
         named = numbered("tilt_command", sizes.qpos - len(POSITION) - QUATERNION)
     tilts = len(named)
     kind, first, per_unit = ROTOR_INPUT, tilts + rotors, 1.0
-    if dynamics.commands_thrusts:  # as squared rotor speeds
+    if loop.commands_thrusts:  # as squared rotor speeds
         vehicle = assembly.scenario.vehicle.resolve()
         assert not isinstance(vehicle, Multirotor)  # its controllers command rates of rotor speeds
         per_unit = 1.0 / vehicle.thrust_coefficient
@@ -266,7 +265,7 @@ def equation_inputs(assembly: Assembly, size: int) -> tuple[Input, ...]:
             names = (*numbered(ROTOR_INPUT, 2), "alpha_rate")
     else:
         # Further inputs turn the arms if they integrate to commands of tilts.
-        commands = (f for f in loop.columns.fields if f.startswith("tilt_command"))
+        commands = (f for f in loop.fields if f.startswith("tilt_command"))
         rates = (command.replace("tilt_command", "alpha_rate") for command in commands)
-        names = (*numbered(ROTOR_INPUT, len(loop.dynamics.spins)), *rates)
+        names = (*numbered(ROTOR_INPUT, len(loop.spins)), *rates)
     return tuple(Input(name, index) for index, name in enumerate(names))

@@ -14,12 +14,11 @@ from typing import Any, Final
 
 import numpy as np
 
-from tiltsim.closed_loop.assembly import Assembly
-from tiltsim.closed_loop.choices import program_key
+from tiltsim.closed_loop.assembly import Assembly, program_key
 from tiltsim.closed_loop.loop import ClosedLoop, Equations
 from tiltsim.closed_loop.userdata import EVALUATIONS, EVALUATIONS_PER_STEP, HEADER_SIZE
 from tiltsim.engines.base import EngineName
-from tiltsim.engines.callback import control_callback
+from tiltsim.engines.control import control_callback
 from tiltsim.engines.programs import LoopPrograms
 from tiltsim.errors import InputError
 from tiltsim.laws.assembling import assemble
@@ -85,12 +84,11 @@ class Motion(ABC):
         It is not traced: offsets are not parameters.
         """
         loop = self._as_flown(loop)
-        sampling, equations = loop.sampling, loop.equations
+        equations = loop.equations
         if equations is not None:
             equations = replace(equations, inputs=self._with_offsets(equations.inputs))
-        controls = self._with_offsets(sampling.controls)
-        sampling = replace(sampling, controls=controls)
-        return replace(loop, sampling=sampling, equations=equations, traced=False)
+        controls = self._with_offsets(loop.controls)
+        return replace(loop, controls=controls, equations=equations, traced=False)
 
     def _evaluated(self, function: Callable[..., Any], **sizes: int) -> Callable[..., Values]:
         """A function of the loop on Python's floats, at the offsets of the moment.
@@ -277,11 +275,11 @@ class MujocoMotion(Motion):
 
     @property
     def _part(self) -> slice:
-        sizes = self.assembly.loop.dynamics.sizes
+        sizes = self.assembly.loop.sizes
         return slice(1, 1 + sizes.qpos + sizes.qvel + sizes.act)
 
     def _split(self, state: Floats) -> list[Floats]:
-        sizes = self.assembly.loop.dynamics.sizes
+        sizes = self.assembly.loop.sizes
         return np.split(state, (sizes.qpos, sizes.qpos + sizes.qvel))
 
     @cached_property
@@ -290,10 +288,10 @@ class MujocoMotion(Motion):
         loop = self.assembly.loop
 
         def controls(setup: Any, time: Any, *parts: Any) -> Any:
-            values = loop.sampling.controls(time[0], *parts, *setup)
+            values = loop.controls(time[0], *parts, *setup)
             return (*values, *self._commanded)
 
-        sizes = loop.dynamics.sizes
+        sizes = loop.sizes
         return self._evaluated(controls, time=1, qpos=sizes.qpos, qvel=sizes.qvel, act=sizes.act)
 
     def _controls(self, time: float, state: Floats) -> Values:
@@ -357,7 +355,7 @@ class MujocoMotion(Motion):
     def observed(self, time: float, state: Floats) -> Floats:
         parts = [part.tolist() for part in self._split(state)]
         controls = self._controls(time, state)
-        return np.array(self.assembly.loop.columns.observe(*parts, controls))
+        return np.array(self.assembly.loop.observe(*parts, controls))
 
 
 def make_motion(scenario: Scenario, engine: EngineName | None = None, late: bool = False) -> Motion:

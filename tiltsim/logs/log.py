@@ -16,12 +16,15 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from tiltsim.errors import InputError
-from tiltsim.flight.vectors import VECTORS, components
+from tiltsim.flight.vectors import components
 from tiltsim.flight.writing import FLIGHT
+from tiltsim.models.vehicle_parts import MAX_ROTORS
 from tiltsim.scenario.messages import did_you_mean
 from tiltsim.system.files import is_file, is_folder, prepare_folder, replacing
 from tiltsim.system.parquet import open_parquet, parquet_bytes
 from tiltsim.system.text import short_repr
+from tiltsim.vehicles.rotorcraft import rotorcraft_columns
+from tiltsim.vehicles.rotorcraft.layout import Layout
 from tiltsim_controllers.mathematics.scalar import Floats
 
 if TYPE_CHECKING:
@@ -29,21 +32,18 @@ if TYPE_CHECKING:
 
     from tiltsim.flight.flight import Flight
 
+_FLIGHT: Final = rotorcraft_columns(Layout(MAX_ROTORS, MAX_ROTORS))
+COMMANDS: Final = {"rotor_speed": "rotor_command", "alpha": "alpha_command"}
 UNITS: Final = {
-    "time": "s",
-    **dict.fromkeys(VECTORS["position"] + VECTORS["reference_position"], "m"),
-    **dict.fromkeys(VECTORS["velocity"], "m/s"),
-    **dict.fromkeys(VECTORS["attitude"] + VECTORS["reference_attitude"], "rad"),
-    **dict.fromkeys(VECTORS["body_rates"], "rad/s"),
-    **dict.fromkeys(VECTORS["tilt_angles"] + VECTORS["reference_tilt_angles"], "rad"),
-    **dict.fromkeys(VECTORS["tilt_rates"] + VECTORS["rotor_speeds"], "rad/s"),
-    **dict.fromkeys(VECTORS["thrusts"], "N"),
+    **{name: known.unit for name, known in _FLIGHT.items()},
     **{f"accelerometer_{axis}": "m/s^2" for axis in "xyz"},
-    **{name.replace("speed", "command"): "rad/s" for name in VECTORS["rotor_speeds"]},
-    **{name.replace("alpha", "alpha_command"): "rad" for name in VECTORS["tilt_angles"]},
+    **{
+        f"{command}_{number}": _FLIGHT[f"{name}_{number}"].unit
+        for name, command in COMMANDS.items()
+        for number in range(1, MAX_ROTORS + 1)
+    },
 }
 """Columns of a log of a real vehicle and their units; a flight has more."""
-
 
 LOG_SUFFIXES: Final = (".mcap", ".ulg", ".ulog", ".csv")
 """Suffixes of files in the formats of other tools."""

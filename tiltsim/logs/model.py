@@ -6,14 +6,12 @@ Forces and torques, Euler's equation and drag are the functions of the vehicles'
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from tiltsim.arrays.jax_programs import InJax
 from tiltsim.errors import InputError
-from tiltsim.logs.windows import MEASURED, Windows
 from tiltsim.models.cross import as_multirotor
 from tiltsim.scenario.messages import choose
 from tiltsim.scenario.scenario import Scenario
@@ -54,19 +52,6 @@ CONJUGATE: Final = np.array([1.0, -1.0, -1.0, -1.0])
 
 TINY: Final = 1e-12
 """Velocity (m/s) at which the drag of a vehicle at rest still has a derivative."""
-
-STAGE_INPUTS: Final = np.array([0, 1, 1, 2])
-"""Half steps after the beginning of a step at which the stages of RK4 take their inputs."""
-
-RUNGE_KUTTA: Final = (
-    np.array([0.0, 0.5, 0.5, 1.0]),
-    np.array([1.0, 2.0, 2.0, 1.0]) / 6.0,
-    np.array([False, False, False, True]),
-)
-"""By stage: how far along the last slope, the weight of its slope, and whether it ends the step."""
-
-INITIAL: Final = 12
-"""Numbers of a window's initial state: position, velocity, small turn, body rates."""
 
 
 class LoggedVehicle:
@@ -147,7 +132,7 @@ class LoggedVehicle:
         return {key: self.parameters[key] for key in free}
 
 
-def _values(free: tuple[tuple[str, str], ...], numbers: Any, theta: Any) -> dict[str, Any]:
+def values_of(free: tuple[tuple[str, str], ...], numbers: Any, theta: Any) -> dict[str, Any]:
     """Numbers of the model by field.
 
     Args:
@@ -180,7 +165,7 @@ class Numbers(NamedTuple):
     bias: Any  # rad/s, shape (3,)
 
 
-def _numbers(known: Any, values: dict[str, Any]) -> Numbers:
+def numbers_of(known: Any, values: dict[str, Any]) -> Numbers:
     """The numbers of a model, of which some are free; see `LoggedVehicle.numbers`."""
     import jax.numpy as jnp
 
@@ -296,96 +281,3 @@ class LoggedMotion:
                 measured[10:] - (omega + p.bias),
             ]
         )
-
-
-def residuals_of(layout: TiltOfRotor, free: tuple[tuple[str, str], ...]) -> Callable[..., Any]:
-    """The residuals of one window in JAX: ``(theta, initial, guess, window, noise, numbers)``.
-
-    ``initial`` are changes of the initial state ``guess``; the result has a row per sample and a
-    column per channel, (measured - predicted) over its noise, 0 where nothing is measured.
-
-    Args:
-        layout: The tilt of each rotor.
-        free: Key and field of each free parameter.
-    """
-    import jax
-    import jax.numpy as jnp
-
-    fields = frozenset(field for _, field in free)
-    motion, in_jax = LoggedMotion(layout, fields), InJax("float64")
-    start, rate, errors = (
-        _stacked(in_jax(function)) for function in (motion.start, motion.rate, motion.errors)
-    )
-    rotors, tilts = len(layout), tilts_of(layout)
-
-    def residuals(
-        theta: Any, initial: Any, guess: Any, window: Windows, noise: Any, numbers: Any
-    ) -> Any:
-        p = _numbers(numbers, _values(free, numbers, theta))
-        commands = jnp.concatenate(
-            [
-                window.speed_commands[:-1] if "lag" in fields else window.speeds[:, 0],
-                window.tilt_commands[:-1] if "frequency" in fields else window.tilts[:, 0],
-            ],
-            axis=1,
-        )
-        first = start(guess, initial, window.speeds[0, 0], window.tilts[0, 0], p.center)
-        advance = _runge_kutta(lambda *given: rate(*given, p))
-        inputs = (window.step, window.speeds, window.tilts, commands)
-        _, path = jax.lax.scan(advance, first, inputs)
-        path = jnp.concatenate([first[None], path])
-        found = jax.vmap(errors, (0, 0, None))(path, window.measured, p)
-        sizes = [noise.get(name, 1.0) for name in MEASURED for _ in range(3)]
-        parts = [jnp.where(window.is_measured, found / jnp.array(sizes), 0.0)]
-        if "lag" in fields:
-            error = at_samples(window.speeds) - path[:, 13 : 13 + rotors]
-            parts.append(error / noise["rotor_speeds"])
-        if "frequency" in fields:
-            error = at_samples(window.tilts) - path[:, 13 + rotors : 13 + rotors + tilts]
-            parts.append(error / noise["tilt_angles"])
-        return jnp.concatenate(parts, axis=1)
-
-    def at_samples(stages: Any) -> Any:
-        return jnp.concatenate([stages[:, 0], stages[-1:, -1]])
-
-    return residuals
-
-
-def _stacked(function: Callable[..., Any]) -> Callable[..., Any]:
-    """A function whose result, a tuple of numbers, is an array."""
-
-    def call(*args: Any) -> Any:
-        import jax.numpy as jnp
-
-        return jnp.stack(function(*args))
-
-    return call
-
-
-def _runge_kutta(rate: Callable[..., Any]) -> Callable[..., Any]:
-    """The fourth-order method from one sample to the next: ``(state, inputs) -> (state, state)``.
-
-    Args:
-        rate: ``(state, speeds, tilts, commands)``: the derivative of a state.
-    """
-    import jax
-    import jax.numpy as jnp
-
-    def stage(carried: Any, given: Any) -> tuple[Any, None]:
-        # One stage for all four of RK4: the program is compiled once, not four times.
-        base, slope, total, size, commands = carried
-        speeds, tilts, (reach, weight, is_last) = given
-        slope = rate(base + reach * size * slope, speeds, tilts, commands)
-        total = total + weight * size * slope
-        return (jnp.where(is_last, total, base), slope, total, size, commands), None
-
-    def advance(state: Any, given: Any) -> tuple[Any, Any]:
-        step, speeds, tilts, commands = given
-        substeps = (len(speeds) - 1) // 2
-        at = (2 * np.arange(substeps)[:, None] + STAGE_INPUTS).ravel()
-        schedule = tuple(np.tile(one, substeps) for one in RUNGE_KUTTA)
-        carried = (state, jnp.zeros_like(state), state, step / substeps, commands)
-        carried, _ = jax.lax.scan(stage, carried, (speeds[at], tilts[at], schedule))
-        return carried[0], carried[0]
-
-    return advance

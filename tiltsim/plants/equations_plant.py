@@ -4,8 +4,7 @@ from math import nan
 
 import numpy as np
 
-from tiltsim.closed_loop.assembly import Assembly
-from tiltsim.closed_loop.choices import program_key
+from tiltsim.closed_loop.assembly import Assembly, program_key
 from tiltsim.engines.base import EngineName
 from tiltsim.engines.steppers import (
     Integrated,
@@ -120,7 +119,7 @@ class EquationsPlant(Plant):
         return super().record(samples, steps)
 
     def _record_natively(self, samples: int, steps: int) -> Floats | None:
-        from tiltsim.engines.recorder import Recorder
+        from tiltsim.engines.programs import Recorder
 
         checked = self._assembly.sign_check_values(self.time, self.observe())
         recorder = Recorder(self._assembly, samples, steps, steps, checked)

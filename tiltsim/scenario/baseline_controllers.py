@@ -47,6 +47,11 @@ class CompensatingController(Compensating, LawController):
     integrators: ClassVar[int] = 0
 
     @property
+    def observes_forces(self) -> bool:  # type: ignore[override]
+        """Whether it holds its place against forces."""
+        return self.observer > 0.0
+
+    @property
     def compensates(self) -> bool:
         """Whether there is anything around the law itself."""
         return self.observer > 0.0 or self.mixer == "prioritized"
@@ -108,6 +113,10 @@ class GeometricController(Geometric, TiltingTable, CompensatingController):
 
     reference_kinds = ("position", "pose")
     control: ClassVar = staticmethod(geometric)
+
+    @property
+    def position_stiffness(self) -> float | None:
+        return self.position_bandwidth**2 if self.commands_tilts else None
 
     def check_scenario(self, scenario: Any) -> None:
         super().check_scenario(scenario)

@@ -21,7 +21,7 @@ from tiltsim.scenario.quadrotor_controllers import (
     SwitchingController,
     YawPositionController,
 )
-from tiltsim.scenario.table import example
+from tiltsim.scenario.table import Positive, example
 from tiltsim.scenario.tilt_car_controllers import (
     FourthDerivativeController,
     PlannedDirectionController,
@@ -109,6 +109,16 @@ class NumpyController(OwnFunctionController, TiltingTable):
         "names and units; needs simulation.control_timestep > 0",
         examples=[{"state_flag": "1"}],
     )
+    push_stiffness: Positive | None = Field(
+        None,
+        description="force per mass and per error of position that the law makes at rest, for a "
+        "reference that pushes; default: it does not push [1/s^2]",
+        examples=[4.0],
+    )
+
+    @property
+    def position_stiffness(self) -> float | None:
+        return self.push_stiffness
 
 
 def _law(value: Any) -> str:

@@ -288,7 +288,10 @@ def check_objects(scenario: Any) -> None:
         scenario.reference.after_gait((), scenario)
         controller = scenario.controller
         if controller.position_stiffness is None and not controller.is_external:
-            able = "choose full_pose, vectoring with position_bandwidth, or python"
+            able = (
+                "choose full_pose, vectoring with position_bandwidth, geometric with tilts = free, "
+                "numpy with push_stiffness, or python"
+            )
             reason = f"the {controller.law} law cannot push; {able}"
             raise scenario.mistake("reference.type", reason)
         scenario.reference.check_impedance(scenario)

@@ -11,8 +11,7 @@ from os import PathLike
 from typing import Any, Final, TypeVar
 from warnings import warn
 
-from tiltsim.closed_loop.assembly import Assembly
-from tiltsim.closed_loop.choices import program_key
+from tiltsim.closed_loop.assembly import Assembly, program_key
 from tiltsim.errors import InputError
 from tiltsim.flight.end import End
 from tiltsim.flight.flight import Flight

@@ -54,6 +54,9 @@ SEARCHES: Final = {
 }
 """Measures of robustness: each the last value found that is survived."""
 
+CONTACTS: Final = ("rms_force_error", "peak_force", "time_in_contact", "final_swing")
+"""Metrics of flights that push, touch or carry a load; null in the others."""
+
 MEASURES: Final = (
     "rms_position_error",
     "max_position_error",
@@ -64,6 +67,7 @@ MEASURES: Final = (
     "min_singularity_margin",
     "min_rotor_speed",
     "saturated_fraction",
+    *CONTACTS,
     *SEARCHES,
     "control_period",
     "time_per_call",

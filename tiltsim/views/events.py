@@ -10,7 +10,7 @@ import numpy.typing as npt
 from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.flight.end import End
 from tiltsim.flight.flight import Flight
-from tiltsim.laws.supervision import SUPERVISION
+from tiltsim.laws.law import SUPERVISION
 from tiltsim.vehicles.spans import at_lower_limit, at_upper_limit
 from tiltsim.views.attitude_plane import SUPERVISION_THRESHOLD, margin_threshold
 from tiltsim.views.titles import describe_controller, describe_gait

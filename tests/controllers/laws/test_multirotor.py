@@ -31,7 +31,6 @@ from tiltsim_controllers.gaits import plans
 from tiltsim_controllers.laws import attitude_altitude
 from tiltsim_controllers.laws.allocation import RotorRange
 from tiltsim_controllers.laws.decouplers import DECOUPLERS
-from tiltsim_controllers.laws.failures import Failure
 from tiltsim_controllers.laws.gains import GAIN_SETS, Poles, gains_from_poles
 from tiltsim_controllers.laws.gait_feedforward import multirotor_law_of
 from tiltsim_controllers.laws.multirotor import independence
@@ -44,6 +43,7 @@ from tiltsim_controllers.laws.multirotor_steps import (
     side_control,
     turned,
 )
+from tiltsim_controllers.laws.observed import Failure
 from tiltsim_controllers.laws.supervisor import Supervisor
 from tiltsim_controllers.mathematics.attitude import attitude_error, rotation_matrix
 from tiltsim_controllers.mathematics.moving import Moving

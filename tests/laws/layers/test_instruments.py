@@ -8,7 +8,7 @@ import pytest
 
 import tiltsim
 from tiltsim.closed_loop.loop import ControlSetup
-from tiltsim.engines.callback import control_callback
+from tiltsim.engines.control import control_callback
 from tiltsim.engines.sample_evaluation import evaluate_over_samples
 from tiltsim.errors import InputError
 from tiltsim.laws.assembling import assemble

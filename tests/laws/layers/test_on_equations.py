@@ -190,7 +190,7 @@ def test_a_state_that_has_overflowed_is_seen_as_no_number(base):
     """The last addition of a step may give infinity, of which floats have no sine."""
     assembly = assemble(scenario(base, STORM, {"simulation": {"plant": "thesis"}}))
     plant = make_plant(assembly)
-    state, motion = plant.state, actuator_plant(assembly.loop.dynamics).motion
+    state, motion = plant.state, actuator_plant(assembly.loop).motion
     first = 1 + len(plant._held)
     for index in range(motion):
         overflowed = state.copy()

@@ -22,7 +22,6 @@ from tiltsim.scenario.scenario import FlightPlan, Scenario
 from tiltsim.vehicles.rotorcraft.layout import QW, TILT_1, TILT_RATE_1
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.code.blocks import branch, normal
-from tiltsim_controllers.code.traceable import traceable
 from tiltsim_controllers.laws import estimator as filters
 from tiltsim_controllers.laws.estimator import Estimate, ImuNoise, Outcome, Reading
 from tiltsim_controllers.mathematics.attitude import (
@@ -289,13 +288,12 @@ def with_estimator(loop: ClosedLoop, fusion: Fusion) -> ClosedLoop:
     It goes between the controller and the layer of the instruments, which appends their readings
     to the velocities.
     """
-    inner_controls, first = loop.sampling.controls, loop.dynamics.sizes.act
+    first = loop.sizes.act
     states = sum(fusion.sizes.values())
     fields = {**ESTIMATED, **DEVIATIONS, **CONSISTENCY, **dict.fromkeys(fusion.innovations, "1")}
 
-    @traceable
-    def controls(time: Any, qpos: Any, qvel: Any, act: Any, parameters: Any, knots: Any) -> Any:
-        p, size = parameters.layer, len(qvel) - fusion.readings
+    def controls(within: Any, time: Any, qpos: Any, qvel: Any, act: Any, p: Any, knots: Any) -> Any:
+        size = len(qvel) - fusion.readings
         readings, before = qvel[size:], act[first : first + states]
         _, present, rates = _filtered(time, readings, before, fusion, p)
         rotation = rotation_of_quaternion(present.quaternion)
@@ -311,11 +309,9 @@ def with_estimator(loop: ClosedLoop, fusion: Fusion) -> ClosedLoop:
         variances = xp.array([present.covariance[i * (i + 3) // 2] for i in range(filters.ERRORS)])
         consistency = [_nees(present, qpos, qvel, p.place), *after.nis, *after.innovations]
         shown = [*estimated, present.gyro_bias, present.force_bias, xp.sqrt(variances)]
-        inner = inner_controls(time, *seen, act, parameters.inner, knots)
-        return xp.hstack([inner, rates, *shown, *consistency])
+        return xp.hstack([within(*seen, act), rates, *shown, *consistency])
 
     layer = Layer(
-        "with_estimator",
         _record(fusion),
         lambda plan: _parameters(plan, fusion),
         controls=controls,

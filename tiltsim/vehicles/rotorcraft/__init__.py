@@ -22,7 +22,7 @@ from tiltsim.closed_loop.limits import (
     first_limit,
     horizontal_error,
 )
-from tiltsim.closed_loop.vehicle_kind import VehicleKind
+from tiltsim.closed_loop.loop import VehicleKind
 from tiltsim.models.hover import hover_speeds
 from tiltsim.models.parts import ExtraActuators, Ground, Pod, RotorLimits, TiltServo, Visuals
 from tiltsim.models.rotor_table import Multirotor

@@ -40,7 +40,7 @@ SETTLED_FORCE: Final = 1.0
 def rotorcraft_metrics(
     columns: Mapping[str, Floats], scenario: Scenario, follows_position: bool
 ) -> dict[str, Any]:
-    """See `tiltsim.closed_loop.vehicle_kind.VehicleKind.metrics`."""
+    """See `tiltsim.closed_loop.loop.VehicleKind.metrics`."""
     time = columns["time"]
     limits = scenario.any_rotorcraft
     signs = enumerate(limits.spins, start=1)

@@ -9,9 +9,8 @@ import numpy as np
 
 from tiltsim.errors import InputError
 from tiltsim.flight.vectors import VECTORS, components
-from tiltsim.logs.identify import Estimate
+from tiltsim.logs.identify import Estimate, Replay
 from tiltsim.logs.log import UNITS, Log
-from tiltsim.logs.replay import Replay
 from tiltsim.system.text import in_words
 from tiltsim.views.figures import style
 from tiltsim.views.figures.layout import add_heading, add_legend

@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from tiltsim.flight.flight import Flight
-from tiltsim.laws.supervision import SUPERVISION
+from tiltsim.laws.law import SUPERVISION
 from tiltsim.scenario.gait import PenguinGait
 from tiltsim.system.text import Quantity
 from tiltsim.views import attitude_plane

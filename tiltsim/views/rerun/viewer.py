@@ -64,8 +64,7 @@ def _inline_viewer(flights: Sequence[Flight]) -> Any:
         optional_package("rerun_notebook", "Rerun in a notebook", "'rerun-sdk[notebook]'")
     from rerun.notebook import Viewer
 
-    from tiltsim.views.rerun.blueprint import flight_blueprint
-    from tiltsim.views.rerun.recording_file import new_recording, write_flights
+    from tiltsim.views.rerun.recording import flight_blueprint, new_recording, write_flights
 
     recording, recorders = new_recording([flight.assembly for flight in flights])
     blueprint = flight_blueprint(recorders, flights)
@@ -85,8 +84,7 @@ def view_flights(
     Raises:
         InputError: If no viewer listens at the address, or there is no screen to open one on.
     """
-    from tiltsim.views.rerun.blueprint import flight_blueprint
-    from tiltsim.views.rerun.recording_file import new_recording, write_flights
+    from tiltsim.views.rerun.recording import flight_blueprint, new_recording, write_flights
 
     require_viewer(url)
     recording, recorders = new_recording([flight.assembly for flight in flights], names)
