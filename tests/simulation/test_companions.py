@@ -119,7 +119,7 @@ def test_vectors_of_a_companion_are_panels_and_hints():
         (tiltsim.stability, "linear analysis takes a vehicle alone"),
     ],
 )
-def test_analyses_of_one_vehicle_refuse_companions(analysis, words):
+def test_an_analysis_of_one_vehicle_refuses_companions(analysis, words):
     assert words in refusal(analysis, together(WING))
 
 

@@ -107,7 +107,7 @@ def one_line_message(
         emptied: Dotted keys, such as ``gait.type``, whose change dropped other keys of the table.
     """
     details = error.errors(include_url=False)
-    # A table with a mistake of its own is also none of the names that it may be instead.
+    # A table with mistakes in it is also none of the names that may stand instead.
     wrong = {_mistake(detail, document) for detail in details}
     details = [
         detail

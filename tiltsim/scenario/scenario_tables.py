@@ -136,11 +136,11 @@ class ScenarioTables(WithAutopilot):
         """Whether the model has more in it than the vehicle and the ground."""
         return bool(self.object) or self.tool is not None or self.payload is not None
 
-    def require_alone(self, what: str) -> None:
-        """Refuse objects, loads and companions. Raises InputError, which begins with ``what``."""
+    def require_alone(self, analysis: str) -> None:
+        """Refuse objects, loads and companions. Raises InputError, which begins with ``analysis``."""
         if self.has_objects or self.companion:
             raise InputError(
-                f"{self.address or 'scenario'}: {what} takes a vehicle alone; remove [[object]], "
+                f"{self.address or 'scenario'}: {analysis} takes a vehicle alone; remove [[object]], "
                 "[tool], [payload] and [[companion]]"
             )
 
