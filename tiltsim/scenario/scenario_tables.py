@@ -137,11 +137,11 @@ class ScenarioTables(WithAutopilot):
         return bool(self.object) or self.tool is not None or self.payload is not None
 
     def require_alone(self, analysis: str) -> None:
-        """Refuse objects, loads and companions. Raises InputError, which begins with ``analysis``."""
+        """Refuse objects, loads and companions for an analysis, named in the `InputError`."""
         if self.has_objects or self.companion:
             raise InputError(
-                f"{self.address or 'scenario'}: {analysis} takes a vehicle alone; remove [[object]], "
-                "[tool], [payload] and [[companion]]"
+                f"{self.address or 'scenario'}: {analysis} takes a vehicle alone; remove "
+                "[[object]], [tool], [payload] and [[companion]]"
             )
 
     @property
