@@ -318,6 +318,7 @@ def full(gait, duration, step, **options):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("gait", GAITS)
 def test_full_pose_control_is_faster_with_less_overshoot_and_fast_tilting(gait):
     """Ch. 3, Sec. 6.3 against Secs. 6.1.1 and 6.1.2: same start, with less thrust than weight."""

@@ -231,6 +231,7 @@ def sway(tilts, periods=48):
     return plans.table(times.tolist(), angles.tolist(), repeats=True)
 
 
+@pytest.mark.slow
 def test_restoring_stops_the_drift_that_position_and_attitude_do_not_show():
     vehicle, gait = Vehicle(ring(7, hinged=True), HEXAROTOR, 3), sway(7)
     drifting, restored = (

@@ -79,6 +79,7 @@ def random_cases(random):
         yield watch_all, (vehicle, table), tuple(tilts), random.uniform(-0.9, 0.9, 2)
 
 
+@pytest.mark.slow
 def test_the_scale_is_the_largest_that_is_allowed():
     """The largest scale of a dense grid, except for a range of scales between two sixteenths."""
     dense, unseen, nearest, partial, beyond = 128, 0, 0, 0, 0
