@@ -224,7 +224,7 @@ FOUR_ROTORS = {"ROTORS", "SPIN", "TILT_FIELDS", "ROTOR_FIELDS", "TILTROTOR_FIELD
 """Names that presume the four rotors of the thesis's vehicles."""
 
 OF_FOUR_ROTORS = {
-    *("quadrotor", "tiltrotor"),
+    *("quadrotor", "linearizing"),
     *("cross", "metrics", "user_vehicle", "vehicle", "vehicle_parts"),
     *("attitude_plane", "concepts", "gait_analysis", "vehicle_drawing"),
     *("attainable", "effectiveness", "fault_tolerance", "rotorcraft", "statics"),

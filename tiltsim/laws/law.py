@@ -2,22 +2,24 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from functools import cache
 from typing import Any, Final
 
+import numpy as np
+
 from tiltsim.closed_loop.loop import ControlSetup
-from tiltsim.scenario.multirotor_controllers import AttitudeForceController
+from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.scenario import FlightPlan, Scenario
-from tiltsim.scenario.tiltrotor_controllers import AttitudeAltitudeController
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.gaits.motion import planned_tilts
+from tiltsim_controllers.laws.allocation import RotorRange
 from tiltsim_controllers.laws.gait_feedforward import supervised_gait
 from tiltsim_controllers.laws.keys import number_of
 from tiltsim_controllers.laws.multirotor_steps import INTEGRAL_FIELDS
 from tiltsim_controllers.laws.observed import Seen, Step
 from tiltsim_controllers.laws.supervisor import HOLD, Supervision
-from tiltsim_controllers.mathematics.records import make_record_type
 from tiltsim_controllers.mathematics.scalar import Floats, Values
+from tiltsim_controllers.vehicle.body import Body, body_of
+from tiltsim_controllers.vehicle.parameters import Vehicle
 from tiltsim_controllers.vehicle.states import PITCH, ROLL
 
 Margins = Callable[[Mapping[str, Floats], ControlSetup], dict[str, Floats]]
@@ -49,9 +51,11 @@ class Law:
         parameters: Type of its record. It has ``reference``; ``gait`` where the tilts follow it;
             and ``vehicle``, with ``rotors`` as the index of the rotors' table in the knots, see
             `tiltsim_controllers.vehicle.rotors.airframe`.
-        setup: ``(plan) -> parameters, knots to append``.
+        own: ``(plan) -> values by name`` of parameters other than keys, where `parameters_of` does
+            not know them.
+        tables: ``(plan) -> numbers`` that follow the knots of gait and reference.
         states: Names of the controller's states, part of a sample, and their units.
-        initial: ``(plan) -> states`` at time zero.
+        initial: ``(plan) -> states`` at time zero; None for zeros.
         signals: Names of the first signals of a step, columns of a flight: roll, pitch and yaw that
             it tracks, and any more. None for the attitude of the reference.
         units: Columns of a flight other than the states and the columns of its kind, with units;
@@ -59,6 +63,7 @@ class Law:
         tilts: See `Tilts`; None for `tilts_of_gait`.
         uses_gait: Whether the gait has a part in the flight.
         records_commands: Whether the commands of the tilt servos are part of a sample.
+        columns: Its columns among `tiltsim.vehicles.rotorcraft.EXTRA_COLUMNS`.
         margins: See `Margins`.
         signs: Function of arrays ``(seen, parameters, knots)``: numbers that keep their sign until
             the law becomes singular. None for a law that is singular nowhere.
@@ -70,15 +75,17 @@ class Law:
     """
 
     step: Callable[[Seen, Any, Any], Step]
-    parameters: type[tuple[Any, ...]]
-    setup: Callable[[FlightPlan], tuple[Any, Values]]
+    parameters: Any
+    own: Callable[[FlightPlan], dict[str, Any]] = lambda _plan: {}
+    tables: Callable[[FlightPlan], Values] = lambda _plan: ()
     states: Mapping[str, str] = field(default_factory=dict)
-    initial: Callable[[FlightPlan], Values] = lambda _plan: ()
+    initial: Callable[[FlightPlan], Values] | None = None
     signals: tuple[str, ...] | None = None
     units: Mapping[str, str] = field(default_factory=dict)
     tilts: Tilts | None = None
     uses_gait: bool = True
     records_commands: bool = False
+    columns: tuple[str, ...] = ("singularity_margin",)
     margins: Margins = lambda _samples, _setup: {}
     signs: Callable[[Seen, Any, Any], Any] | None = None
     causes: Callable[[Mapping[str, float], ControlSetup], tuple[str, ...]] = lambda *_: ("",)
@@ -86,77 +93,77 @@ class Law:
     feels: bool = False
     follows_position: Callable[[Scenario], bool] = lambda _scenario: True
 
+    def initial_states(self, plan: FlightPlan) -> Values:
+        """Its states at time zero."""
+        return self.initial(plan) if self.initial else (0.0,) * len(self.states)
+
 
 INTEGRALS: Final = dict.fromkeys(INTEGRAL_FIELDS, "m s")
 """States of a law that integrates the position error, with their units."""
 
 
-@cache
-def head_of(law: Any, **own: type) -> Any:
-    """The type of the head of `userdata`, around the parameters of a law.
-
-    Args:
-        law: Type of these parameters.
-        own: Further fields, such as ``servo_lead``: rate feed-forward of the tilt servos, s,
-            ``2 zeta / omega_n``.
-    """
-    # The signature is `tiltsim.closed_loop.loop.ClosedLoop.signature`.
-    return make_record_type("LoopParameters", signature=float, **own, law=law)
+def vehicle_of(plan: FlightPlan) -> Body | Vehicle:
+    """The vehicle that a law knows: of a multirotor the rigid body."""
+    vehicle = plan.scenario.any_rotorcraft.resolve()
+    return body_of_vehicle(vehicle) if isinstance(vehicle, Multirotor) else vehicle
 
 
-def parameters_of(plan: FlightPlan, record: Any, **own: Any) -> Any:
-    """The parameters of a flight's law.
+def body_of_vehicle(vehicle: Multirotor) -> Body:
+    """The rigid body that a law knows of a multirotor."""
+    return body_of(vehicle.mass, np.reshape(vehicle.inertia, (3, 3)), vehicle.gravity)
+
+
+def _limits(plan: FlightPlan, horizon: float) -> RotorRange:
+    vehicle = plan.scenario.any_rotorcraft
+    low, high = vehicle.speeds_along_spin
+    if vehicle.model == "tiltrotor" and vehicle.min_rotor_speed is None:
+        low = 0.0  # its rotors do not reverse
+    return RotorRange(low, high, horizon)
+
+
+_VALUES: Final[dict[str, Callable[[FlightPlan, Any], Any]]] = {
+    "gait": lambda plan, _: plan.gait.parameters,
+    "reference": lambda plan, _: plan.reference,
+    "rotors": lambda plan, _: float(len(plan.knots)),  # where tables follow in the knots
+    "vehicle": lambda plan, _: vehicle_of(plan),
+    "car": lambda plan, _: plan.scenario.tilt_car.resolve(),
+    "gains": lambda _, keys: keys.resolve_gains(),
+    "integral": lambda _, keys: keys.resolve_integral_gains(),
+    "anticipation": lambda plan, keys: xp.minimum(
+        keys.anticipation, 0.5 * plan.gait.min_segment_time
+    ),
+    # The thesis's equations omit the gyroscopic torque.
+    "terms": lambda plan, keys: keys.resolve_feedforward_terms(
+        gyroscopic_torque=plan.scenario.simulation.plant != "thesis"
+    ),
+    "supervisor": lambda plan, keys: keys.resolve_supervisor(plan.scenario.vehicle.resolve()),
+    "failure": lambda _, keys: keys.resolve_failure(),
+    "limits": lambda plan, keys: _limits(plan, keys.allocation_horizon),
+}
+"""Values of parameters that several laws have and that are no number of a key, by name."""
+
+
+def parameters_of(plan: FlightPlan, law: Law) -> Any:
+    """The parameters of a flight's law: its own, numbers of keys, and parts of the plan.
 
     Args:
         plan: Plan of the flight.
-        record: Their type, see `tiltsim_controllers.laws.keys.record_of`.
-        own: Values of fields that are neither keys nor parts of the plan.
+        law: The law.
     """
-    known = {
-        "gait": plan.gait.parameters,
-        "reference": plan.reference,
-        "rotors": float(len(plan.knots)),  # where the law's tables follow in the knots
-        **own,
-    }
-    controller = plan.scenario.controller
-    return record(
-        *(known[key] if key in known else number_of(controller, key) for key in record._fields)
-    )
+    own, controller = law.own(plan), plan.scenario.controller
 
+    def value(name: str) -> Any:
+        if name in own:
+            return own[name]
+        return _VALUES[name](plan, controller) if name in _VALUES else number_of(controller, name)
 
-def tracking_parameters(plan: FlightPlan, record: Any, **own: Any) -> Any:
-    """The parameters of a law with feed-forward of a gait.
-
-    Args:
-        plan, record, own: See `parameters_of`.
-    """
-    scenario, controller = plan.scenario, plan.scenario.controller
-    assert isinstance(controller, (AttitudeAltitudeController, AttitudeForceController))
-    # The thesis's equations omit the gyroscopic torque.
-    terms = controller.resolve_feedforward_terms(
-        gyroscopic_torque=scenario.simulation.plant != "thesis"
-    )
-    return parameters_of(
-        plan,
-        record,
-        gains=controller.resolve_gains(),
-        integral=controller.resolve_integral_gains(),
-        anticipation=xp.minimum(controller.anticipation, 0.5 * plan.gait.min_segment_time),
-        terms=terms,
-        **own,
-    )
-
-
-def integrals_at_rest(_plan: FlightPlan) -> tuple[float, ...]:
-    """The states `INTEGRALS` at time zero."""
-    return (0.0,) * len(INTEGRALS)
+    return law.parameters(*map(value, law.parameters._fields))
 
 
 def decouples_position(scenario: Scenario) -> bool:
     """Whether a decoupler steers the vehicle to the reference's horizontal position."""
-    controller = scenario.controller
-    assert isinstance(controller, (AttitudeAltitudeController, AttitudeForceController))
-    return controller.decoupler != "none"
+    controller: Any = scenario.controller
+    return bool(controller.decoupler != "none")
 
 
 SUPERVISION: Final = "supervision"
@@ -216,7 +223,7 @@ def supervised(law: Law, supervision: Supervision, strategy: str) -> Law:
         law,
         step=step,
         states={**law.states, **dict(zip(SUPERVISOR_FIELDS, units, strict=False))},
-        initial=lambda plan: (*law.initial(plan), *(0.0,) * len(units)),
+        initial=lambda plan: (*law.initial_states(plan), *(0.0,) * len(units)),
         signals=(*law.signals, SUPERVISION),
         units={**law.units, SUPERVISION: "1"},
         tilts=tilts,

@@ -34,7 +34,6 @@ from tiltsim_controllers.laws.observed import UNHARMED, Failure, Seen
 from tiltsim_controllers.mathematics.attitude import euler_angles
 from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector
 from tiltsim_controllers.references.trajectories import reference_attitude, reference_motion
-from tiltsim_controllers.vehicle.body import Body, body_of
 from tiltsim_controllers.vehicle.effectiveness import ROTOR_FLOATS, force_and_torque
 from tiltsim_controllers.vehicle.motion import BODY_STATES, equations_of_motion
 from tiltsim_controllers.vehicle.states import BODY_FIELDS
@@ -71,24 +70,20 @@ def layout_of_vehicle(vehicle: Multirotor, model: str = "multirotor") -> RotorLa
     return RotorLayout(vehicle.tilt_of_rotor, vehicle.spins, model)
 
 
-def body_of_vehicle(vehicle: Multirotor) -> Body:
-    """The rigid body that a law knows of a vehicle."""
-    return body_of(vehicle.mass, np.reshape(vehicle.inertia, (3, 3)), vehicle.gravity)
-
-
 def table_of(places: Places, setup: ControlSetup) -> Values:
     """The table of the rotors, in the knots after the data of gait and reference."""
     first = int(setup.parameters.law.rotors)
     return setup.knots[first : first + ROTOR_FLOATS * places.rotors]
 
 
-def margins_of(layout: RotorLayout) -> Margins:
-    """The angle (rad) to the nearest singular attitude, for a law that knows of failures or not."""
+def margins_of(layout: RotorLayout, dimension: int | None = None) -> Margins:
+    """`torque_free_columns` for a law that knows of failures or not."""
     places = layout.places
 
     def margins(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
         failure = getattr(setup.parameters.law, "failure", UNHARMED)
-        return torque_free_columns(places, table_of(places, setup), samples, failure=failure)
+        table = table_of(places, setup)
+        return torque_free_columns(places, table, samples, dimension, failure)
 
     return margins
 
@@ -220,7 +215,7 @@ class RotorFunctions(VehicleFunctions):
     # --- on equations of motion
 
     def initial_state(self, plan: FlightPlan) -> Vector:
-        speeds, states = initial_rotor_speeds(plan), self.law.initial(plan)
+        speeds, states = initial_rotor_speeds(plan), self.law.initial_states(plan)
         return (*initial_state(plan.scenario, speeds), *states)
 
     def equation_inputs(self, time: Any, state: Any, parameters: Any, knots: Any) -> Any:
@@ -271,13 +266,16 @@ def rotor_loop(
     places = layout.places
     flown = functions(law, layout, law.tilts or tilts_of_gait(places.tilts))
     loop = flown.closed_loop(
-        rotorcraft_kind(layout.shown, ("singularity_margin",)),
+        rotorcraft_kind(layout.shown, law.columns),
         {"servo_lead": lambda plan: servo_lead(plan.scenario.any_rotorcraft.tilt_servo)},
         places.rotors + len(law.states),
         places.names("tilt_command") if law.records_commands else (),
         model=layout.name,
         sizes=places.sizes(len(law.states))._replace(history=FELT_SIZE if law.feels else 0),
-        initial_activations=lambda plan, _: (*flown.initial_speeds(plan), *law.initial(plan)),
+        initial_activations=lambda plan, _: (
+            *flown.initial_speeds(plan),
+            *law.initial_states(plan),
+        ),
         controller_states=len(law.states),
         spins=layout.spins,
         tilt_of_rotor=layout.tilt_of_rotor if layout.model == "multirotor" else (),

@@ -11,7 +11,7 @@ from typing import Any, Final
 import numpy as np
 
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Sizes
-from tiltsim.laws.law import Law, parameters_of
+from tiltsim.laws.law import Law
 from tiltsim.laws.vehicle_loop import VehicleFunctions, parts, servo_lead
 from tiltsim.scenario.scenario import FlightPlan, Scenario
 from tiltsim.vehicles.tilt_car import ROTORS, TILT_CAR, initial_tilt
@@ -86,7 +86,7 @@ class CarFunctions(VehicleFunctions):
 
         def activations(plan: FlightPlan, _setup: ControlSetup) -> Vector:
             speeds = plan.scenario.initial.rotor_speeds(2)
-            return (*((0.0, 0.0) if commands_thrusts else speeds), *law.initial(plan))
+            return (*((0.0, 0.0) if commands_thrusts else speeds), *law.initial_states(plan))
 
         return self.closed_loop(
             TILT_CAR,
@@ -117,11 +117,6 @@ def direction_columns(samples: Mapping[str, Floats], setup: ControlSetup) -> dic
         "direction_ref": direction + np.arctan2(np.sin(away), np.cos(away)),
         "input_split": samples["rotor_speed_1"] ** 2 - samples["rotor_speed_2"] ** 2,
     }
-
-
-def car_setup_of(record: Any) -> Callable[[FlightPlan], tuple[Any, tuple[float, ...]]]:
-    """`Law.setup` of a law with a record of parameters."""
-    return lambda plan: (parameters_of(plan, record, car=plan.scenario.tilt_car.resolve()), ())
 
 
 # --- laws that integrate -----------------------------------------------------------------------
@@ -185,7 +180,7 @@ class _Integrating(CarFunctions):
         return Seen(time, seen, states=xp.hstack([s.alpha, s.further]))
 
     def initial_state(self, plan: FlightPlan) -> Vector:
-        tilt, *further = self.law.initial(plan)
+        tilt, *further = self.law.initial_states(plan)
         speeds = plan.scenario.initial.rotor_speeds(2)
         return (*initial_motion(plan.scenario), tilt, *speeds, *further)
 
@@ -241,7 +236,6 @@ def _integrating(
     law = Law(
         step,
         record,
-        car_setup_of(record),
         states={"alpha_ref": "rad", **states},
         initial=lambda plan: (initial_tilt(plan)[0], *(0.0,) * len(states)),
         signals=DEMANDED,
@@ -358,7 +352,6 @@ PLANNED_DIRECTION: Final = _Planned(
     Law(
         _step,
         planned_direction.Parameters,
-        car_setup_of(planned_direction.Parameters),
         signals=(*DEMANDED, *SQUARES, "alpha_ref"),
         units={
             **dict.fromkeys(SQUARES, "rad^2/s^2"),
