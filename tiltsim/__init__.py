@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from tiltsim.flight.end import End
     from tiltsim.flight.flight import Flight
     from tiltsim.flight.reading import load_flight
-    from tiltsim.laws.airframe import airframe
+    from tiltsim.laws.law_loop import airframe
     from tiltsim.linear.attraction import attraction
     from tiltsim.linear.linearization import linearize
     from tiltsim.linear.margins import margins
@@ -56,7 +56,7 @@ _HOMES = {
     "Scenario": "scenario.scenario",
     "Simulation": "simulation.stepwise",
     "TiltsimError": "errors",
-    "airframe": "laws.airframe",
+    "airframe": "laws.law_loop",
     "attraction": "linear.attraction",
     "export": "logs.formats",
     "fly": "simulation.batch",

@@ -14,7 +14,6 @@ from tiltsim_controllers.gaits import plans
 from tiltsim_controllers.laws.allocation import RotorRange
 from tiltsim_controllers.laws.attitude_altitude import EXACT_DECOUPLING
 from tiltsim_controllers.laws.decouplers import EXACT
-from tiltsim_controllers.laws.failures import Failure
 from tiltsim_controllers.laws.gains import GAIN_SETS, IntegralGains
 from tiltsim_controllers.laws.gait_feedforward import multirotor_law_of
 from tiltsim_controllers.laws.multirotor_steps import (
@@ -24,7 +23,8 @@ from tiltsim_controllers.laws.multirotor_steps import (
     Form,
     Parameters,
 )
-from tiltsim_controllers.laws.multirotor_supervisor import Watched
+from tiltsim_controllers.laws.observed import Failure
+from tiltsim_controllers.laws.supervised_vehicles import Watched
 from tiltsim_controllers.laws.supervisor import Supervisor
 from tiltsim_controllers.mathematics.attitude import euler_of_rotation
 from tiltsim_controllers.references.trajectories import SETPOINT, ReferenceParameters

@@ -211,6 +211,7 @@ def test_make_vec_flies_a_task_on_arrays(two):
     assert two.spec.id == "tiltsim/Hover-v0"
 
 
+@pytest.mark.slow
 def test_a_termination_says_why(two):
     two.reset(seed=0)
     fall, hover = -np.ones(8), np.zeros(8)

@@ -375,8 +375,7 @@ def test_foreign_model_is_left_alone_by_the_callbacks(userdata):
     """MuJoCo's callback is global: stepping another model under it must not crash or write."""
     import mujoco
 
-    from tiltsim.engines.callback import control_callback
-    from tiltsim.engines.factory import make_engine
+    from tiltsim.engines.control import control_callback, make_engine
 
     assembly = assemble(scenario())
     plant = MujocoPlant(assembly)

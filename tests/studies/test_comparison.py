@@ -138,6 +138,16 @@ def test_the_command_prints_rows_and_writes_a_folder(tmp_path, capsys):
     assert "yaw_position: " in table[4]
 
 
+def test_measures_of_contacts_are_shown_where_there_are_some(capsys):
+    short = ["--set", "simulation.duration=0.1", "--set", "expect=[]", "--nominal"]
+    command = ["compare", "interaction/door", "arena/quadrotor#step", "--controllers", "pid"]
+    assert main([*command, *short, "--jobs", "1"]) == 0
+    door, step = (line for line in capsys.readouterr().out.splitlines() if "rms error" in line)
+    assert "peak (N)" in door
+    assert "swing (rad)" not in door
+    assert "peak (N)" not in step
+
+
 def test_a_comparison_is_reported_as_soon_as_it_is_finished(monkeypatch):
     def in_turn(work, entries, _jobs):
         for entry in entries:

@@ -220,6 +220,7 @@ def test_vehicle_and_reference_are_visible_from_any_distance(recorded):
     assert all(radius < 0.0 for (radius,) in radii.values()), "in points of the screen"
 
 
+@pytest.mark.slow
 def test_run_and_view_write_equal_recordings(tmp_path, capsys):
     name = "ch04_tracking/setpoint#rho_065_modified"
     short = ["--set", "simulation.duration=0.3", "--quiet", "--out", str(tmp_path)]

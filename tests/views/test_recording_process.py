@@ -45,6 +45,7 @@ def test_the_process_ends_with_an_interrupted_flight():
     assert process._process.exitcode is not None
 
 
+@pytest.mark.slow
 def test_the_process_prints_nothing_if_its_answer_is_not_read(tmp_path, capfd):
     """As if another file of the flight could not be written."""
     path = tmp_path / "flight.rrd"
@@ -55,6 +56,7 @@ def test_the_process_prints_nothing_if_its_answer_is_not_read(tmp_path, capfd):
     assert capfd.readouterr().err == ""
 
 
+@pytest.mark.slow
 def test_the_process_prints_nothing_about_an_incomplete_message(capfd):
     with RecordingProcess(flight("fixed").scenario) as process:
         process._work = flight("fixed"), Path("nowhere")

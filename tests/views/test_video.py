@@ -209,6 +209,7 @@ def test_a_video_may_show_a_part_of_the_flight():
     np.testing.assert_allclose(frame_times(this, dataclasses.replace(video, end=9.0))[-1], 1.2)
 
 
+@pytest.mark.slow
 @needs_gl
 def test_the_command_works_without_a_display(tmp_path):
     folder = saved("fixed", tmp_path)
@@ -230,6 +231,7 @@ def test_the_command_works_without_a_display(tmp_path):
 # --- errors ------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @needs_gl
 def test_a_terminated_command_leaves_no_file(tmp_path):
     folder = saved("fixed", tmp_path)

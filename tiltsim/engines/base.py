@@ -1,7 +1,7 @@
 """Engines, which run the control step inside MuJoCo.
 
 One scalar source runs on Python floats (nothing to compile, best for one short flight) or as a
-native callback (`tiltsim.engines.native_engine`). MuJoCo's control callback is global to the
+native callback (`tiltsim.engines.control`). MuJoCo's control callback is global to the
 process, so an engine checks that a model is ours before it writes to it.
 """
 

@@ -1,15 +1,16 @@
 """LLVM text as machine code, which is kept on disk."""
 
 import ctypes
+import os
 import platform
 import tempfile
 from collections.abc import Mapping
+from contextlib import suppress
 from functools import cache
 from hashlib import sha256
 from pathlib import Path
 from typing import Any, Final
 
-from tiltsim.engines.code_folder import code_folder, is_usable
 from tiltsim_controllers.code.lanes import LaneMath
 
 OPTIMIZATION: Final = 1
@@ -114,3 +115,37 @@ def _save(file: Path, code: bytes) -> None:
         Path(own.name).replace(file)
     except OSError:
         Path(own.name).unlink(missing_ok=True)
+
+
+def code_folder() -> Path:
+    """The folder of compiled code, in the user's folder for caches."""
+    base = Path(os.environ.get("XDG_CACHE_HOME", ""))
+    if not base.is_absolute():  # to be ignored, as the specification of XDG_CACHE_HOME says
+        base = Path.home() / ".cache"
+    return base / "tiltsim" / "machine_code"
+
+
+def is_usable(folder: Path) -> bool:
+    """Whether compiled code may be kept and loaded: its folder is writable, and by nobody else.
+
+    Whoever can write there decides what a flight executes.
+    """
+    try:
+        return _is_private(folder.parent) and _is_private(folder) and os.access(folder, os.W_OK)
+    except OSError:
+        return False
+
+
+def _is_private(folder: Path) -> bool:
+    """Whether a folder is this user's alone; it is created so, whatever the umask."""
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    with suppress(FileExistsError):
+        folder.mkdir(mode=0o700)
+    if os.name == "nt":
+        return True
+    found = folder.stat()
+    if found.st_uid != os.getuid():
+        return False
+    if found.st_mode & 0o077:
+        folder.chmod(0o700)
+    return True

@@ -11,8 +11,16 @@ from tiltsim.closed_loop.assembly import ProgramKey
 from tiltsim.closed_loop.loop import Equations
 from tiltsim.engines.glue import stepper_text
 from tiltsim.engines.machine_code import MachineCode, lane_math
-from tiltsim.engines.programs import HEAD_SIZE, KEPT, SIDES, LoopFunction, LoopPrograms, setup_of
-from tiltsim.engines.recorder import UNLIMITED, Recorder
+from tiltsim.engines.programs import (
+    HEAD_SIZE,
+    KEPT,
+    SIDES,
+    UNLIMITED,
+    LoopFunction,
+    LoopPrograms,
+    Recorder,
+    setup_of,
+)
 from tiltsim.system.files import one_thread_at_a_time
 from tiltsim_controllers.code.llvm_text import llvm_functions
 from tiltsim_controllers.code.program import Program
@@ -197,7 +205,7 @@ class LaneStepper:
             lane: Number of the lane, from 0.
             flight: The flight.
             now: State and inputs in force.
-            head: Head of its recorder; see `tiltsim.engines.recorder.recorder_head`.
+            head: Head of its recorder; see `tiltsim.engines.programs.recorder_head`.
             rows: Memory for its samples, which has to live as long as it is in the lane.
         """
         self.index[:, lane] = 0.0

@@ -18,8 +18,7 @@ from tiltsim.closed_loop.loop import ClosedLoop
 from tiltsim.models.parts import WRENCH_SIZE
 from tiltsim.scenario.scenario import FlightPlan
 from tiltsim.vehicles.rotorcraft import initial_tilts
-from tiltsim.vehicles.rotorcraft.layout import layout_of, tilt_of_rotor
-from tiltsim.vehicles.rotorcraft.rotors import rotors_record, true_rotors
+from tiltsim.vehicles.rotorcraft.layout import layout_of, rotors_record, tilt_of_rotor, true_rotors
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.mathematics.attitude import (
     euler_rates,

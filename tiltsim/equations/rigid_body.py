@@ -12,7 +12,7 @@ from tiltsim.equations.actuator_level import (
     plant_of,
 )
 from tiltsim.scenario.scenario import Scenario
-from tiltsim.vehicles.rotorcraft.rotors import true_rotors
+from tiltsim.vehicles.rotorcraft.layout import true_rotors
 
 
 def rigid_body(scenario: Scenario) -> ActuatorPlant:

@@ -11,8 +11,7 @@ from tiltsim.closed_loop.assembly import ProgramKey, choices_of
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup
 from tiltsim.engines.programs import LoopPrograms
 from tiltsim.errors import InputError
-from tiltsim.laws.airframe import airframe_of
-from tiltsim.laws.law_loop import REMEDY, FlownLaw, Key, LawError, law_loop
+from tiltsim.laws.law_loop import REMEDY, FlownLaw, Key, LawError, airframe_of, law_loop
 from tiltsim.laws.layers.instruments import instruments_of, with_instruments
 from tiltsim.laws.rotor_loop import layout_of_vehicle
 from tiltsim.scenario.controller import NumpyController

@@ -5,19 +5,24 @@ layout is compiled in. The rotors' speeds are states that approach the commanded
 tilts of a law that commands them.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cache, partial
+from os import PathLike
 from typing import Any, Final, NamedTuple
 
 from tiltsim.closed_loop.loop import ClosedLoop
-from tiltsim.errors import TiltsimError
-from tiltsim.laws.airframe import airframe_of
-from tiltsim.laws.law import Law, tilts_in_states
-from tiltsim.laws.rotor_loop import RotorLayout, body_of_vehicle, margins_of, rotor_loop
-from tiltsim.scenario.law_controller import LawTable
-from tiltsim.scenario.scenario import FlightPlan
+from tiltsim.errors import InputError, TiltsimError
+from tiltsim.laws.law import Law, body_of_vehicle, tilts_in_states
+from tiltsim.laws.rotor_loop import RotorLayout, margins_of, rotor_loop
+from tiltsim.models.cross import as_multirotor
+from tiltsim.scenario.law_controller import Airframe, LawTable
+from tiltsim.scenario.loading import load_scenario
+from tiltsim.scenario.scenario import FlightPlan, Scenario, plan_flight
 from tiltsim.system.text import short_repr
+from tiltsim.vehicles.rotorcraft import initial_rotor_speeds, initial_tilts
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.code.tracing import as_array
 from tiltsim_controllers.gaits.motion import planned_tilts
@@ -37,6 +42,8 @@ from tiltsim_controllers.vehicle.effectiveness import ROTOR_FLOATS, table_per_ne
 from tiltsim_controllers.vehicle.parameters import Vehicle
 from tiltsim_controllers.vehicle.rotors import rotors_in, wrench_map
 from tiltsim_controllers.vehicle.states import state_of
+
+_NO_CROSS: Final = (0.0,) * len(Vehicle._fields)
 
 CORRECTION: Final = 5.0
 """1/s: the rate at which rotors approach the speeds of their model, slow beside any latency."""
@@ -228,33 +235,36 @@ def _state_rates(key: Key, command: Command, states: Any, known: Any) -> tuple[A
     return rates, moving
 
 
-def _setup_of(
-    record: Any, law_of: Callable[[FlightPlan], FlownLaw]
-) -> Callable[[FlightPlan], tuple[Any, Values]]:
-    """`Law.setup` of a law with a record of parameters."""
+def _own_of(find: Callable[[FlightPlan], FlownLaw]) -> Callable[[FlightPlan], dict[str, Any]]:
+    """`Law.own` of a law that is found for each flight."""
 
-    def setup(plan: FlightPlan) -> tuple[Any, Values]:
-        scenario, airframe, law = plan.scenario, airframe_of(plan), law_of(plan)
-        controller, vehicle = scenario.controller, airframe.vehicle
+    def own(plan: FlightPlan) -> dict[str, Any]:
+        airframe, controller = airframe_of(plan), plan.scenario.controller
         assert isinstance(controller, LawTable)
-        step, table = scenario.simulation.control_timestep, scenario.any_rotorcraft.resolve()
-        known = record(
-            plan.gait.parameters,
-            plan.reference,
-            body_of_vehicle(vehicle),
-            table if isinstance(table, Vehicle) else Vehicle(*(0.0,) * len(Vehicle._fields)),
-            airframe.gyroscopic,
-            float(len(plan.knots)),
-            held_gain(controller.rotor_bandwidth, step),
-            held_gain(controller.tilt_rate_gain, step),
-            step,
-            law.parameters,
-        )
-        per_newton = table_per_newton(vehicle.table, vehicle.thrust_coefficients)
-        tables = (*vehicle.table, *per_newton, *vehicle.thrust_coefficients)
-        return known, (*tables, *law.table)
+        step, table = airframe.control_timestep, plan.scenario.any_rotorcraft.resolve()
+        return {
+            "vehicle": body_of_vehicle(airframe.vehicle),
+            "cross": table if isinstance(table, Vehicle) else Vehicle(*_NO_CROSS),
+            "gyroscopic": airframe.gyroscopic,
+            "rotor_gain": held_gain(controller.rotor_bandwidth, step),
+            "tilt_gain": held_gain(controller.tilt_rate_gain, step),
+            "control_period": step,
+            "own": find(plan).parameters,
+        }
 
-    return setup
+    return own
+
+
+def _tables_of(find: Callable[[FlightPlan], FlownLaw]) -> Callable[[FlightPlan], Values]:
+    """`Law.tables`: of the rotors, of these per newton, their coefficients, and the law's own."""
+
+    def tables(plan: FlightPlan) -> Values:
+        vehicle = airframe_of(plan).vehicle
+        per_newton = table_per_newton(vehicle.table, vehicle.thrust_coefficients)
+        own = find(plan).table
+        return (*vehicle.table, *per_newton, *vehicle.thrust_coefficients, *own)
+
+    return tables
 
 
 def _initial_of(
@@ -285,7 +295,8 @@ def law_loop(key: Key, law_of: Callable[[FlightPlan], FlownLaw]) -> ClosedLoop:
     law = Law(
         _step_of(key),
         record,
-        _setup_of(record, law_of),
+        _own_of(law_of),
+        _tables_of(law_of),
         states={
             **dict(key.states),
             **dict(key.discrete),
@@ -307,4 +318,46 @@ def law_loop(key: Key, law_of: Callable[[FlightPlan], FlownLaw]) -> ClosedLoop:
         rotor_loop(key.layout, law),
         with_latency=None if knows_latency else partial(law_loop, late, law_of),
         traced=key.traced,
+    )
+
+
+def airframe(scenario: Scenario | str | PathLike[str] | Mapping[str, Any]) -> Airframe:
+    """Facts that the controller of a scenario may use, as methods of a `LawController` take them.
+
+    Args:
+        scenario: Anything that `tiltsim.load_scenario` takes, of a rotorcraft.
+
+    Raises:
+        InputError: If it is not valid, or of a tilt-car.
+    """
+    loaded = load_scenario(scenario)
+    if loaded.vehicle.model == "tilt_car":
+        raise InputError(f"{loaded.address}: vehicle.model: airframe takes rotorcraft only")
+    return airframe_of(plan_flight(loaded))
+
+
+def airframe_of(plan: FlightPlan) -> Airframe:
+    """The airframe of a planned flight."""
+    scenario, simulation = plan.scenario, plan.scenario.simulation
+    table = scenario.any_rotorcraft
+    vehicle, tilting = table.resolve(), table.has_tilting_rotors
+    speeds = initial_rotor_speeds(plan)
+    return Airframe(
+        as_multirotor(vehicle, tilting=tilting),
+        plan.gait,
+        initial_tilts(plan)[0] if tilting else (),
+        tuple(spin * speed for spin, speed in zip(table.spins, speeds, strict=True)),
+        scenario.initial.position,
+        scenario.initial.velocity,
+        scenario.initial.attitude,
+        scenario.initial.angular_velocity,
+        # The thesis's equations omit the gyroscopic torque but for the quadrotor's.
+        float(simulation.plant != "thesis" or table.model == "quadrotor"),
+        simulation.timestep,
+        simulation.control_timestep,
+        simulation.latency_steps,
+        table.speeds_along_spin,
+        table.rotor_time_constant,
+        table.tilt_servo,
+        scenario.reference,
     )

@@ -16,12 +16,12 @@ from tiltsim.closed_loop.loop import (
     nothing_singular,
 )
 from tiltsim.engines.sample_evaluation import evaluate_over_samples
-from tiltsim.laws.law import Law
-from tiltsim.laws.parameters import head_of
+from tiltsim.laws.law import Law, parameters_of
 from tiltsim.scenario.rotorcraft import ServoTable
 from tiltsim.scenario.scenario import FlightPlan
 from tiltsim_controllers.code.traceable import traceable
 from tiltsim_controllers.laws.observed import Seen
+from tiltsim_controllers.mathematics.records import make_record_type
 from tiltsim_controllers.mathematics.scalar import Floats, Vector
 
 
@@ -119,13 +119,14 @@ class VehicleFunctions(ABC):
             model: Fields of `ClosedLoop` that describe the model.
         """
         law, references, names = self.law, traceable(self.references), self.names
-        record = head_of(law.parameters, **dict.fromkeys(head, float))
+        numbers = dict.fromkeys(head, float)
+        record = make_record_type("LoopParameters", signature=float, **numbers, law=law.parameters)
         read, units = (*kind.observed_fields, *law.states), {**law.states, **law.units}
 
         def setup(plan: FlightPlan, signature: float) -> ControlSetup:
-            parameters, further = law.setup(plan)
             own = [value(plan) for value in head.values()]
-            return ControlSetup(record(signature, *own, parameters), (*plan.knots, *further))
+            parameters = record(signature, *own, parameters_of(plan, law))
+            return ControlSetup(parameters, (*plan.knots, *law.tables(plan)))
 
         def derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
             states = np.stack([samples[name] for name in read], axis=-1)

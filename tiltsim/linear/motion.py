@@ -18,9 +18,8 @@ from tiltsim.closed_loop.assembly import Assembly, program_key
 from tiltsim.closed_loop.loop import ClosedLoop, Equations
 from tiltsim.closed_loop.userdata import EVALUATIONS, EVALUATIONS_PER_STEP, HEADER_SIZE
 from tiltsim.engines.base import EngineName
-from tiltsim.engines.callback import control_callback
+from tiltsim.engines.control import control_callback
 from tiltsim.engines.programs import LoopPrograms
-from tiltsim.errors import InputError
 from tiltsim.laws.assembling import assemble
 from tiltsim.linear import coordinates
 from tiltsim.plants.equations_plant import EquationsPlant
@@ -54,12 +53,7 @@ class Motion(ABC):
     """
 
     def __init__(self, scenario: Scenario, engine: EngineName | None, late: bool = False) -> None:
-        if scenario.has_objects or scenario.companion:
-            where = scenario.address or "scenario"
-            raise InputError(
-                f"{where}: linear analysis takes a vehicle alone; remove [[object]], [tool], "
-                "[payload] and [[companion]]"
-            )
+        scenario.require_alone("linear analysis")
         self.scenario, self.engine, self._late = scenario, engine, late
         self._commanded: Values = ()
         self._inputs: tuple[coordinates.Input, ...] = ()

@@ -67,6 +67,7 @@ class LoggedVehicle:
     def __init__(self, scenario: Scenario) -> None:
         if scenario.vehicle.model == "tilt_car":
             raise InputError(f"{scenario.address}: vehicle.model: takes rotorcraft only")
+        scenario.require_alone("identify")
         table = scenario.any_rotorcraft
         tilting = table.has_tilting_rotors
         assumed = as_multirotor(table.resolve(), tilting=tilting)

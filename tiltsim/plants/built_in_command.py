@@ -9,10 +9,10 @@ from tiltsim.closed_loop.loop import ClosedLoop
 from tiltsim.engines.base import vectors_of
 from tiltsim.errors import InputError
 from tiltsim.laws.assembling import assemble
+from tiltsim.laws.layers.actuation import measured
 from tiltsim.laws.layers.contact import felt_among
-from tiltsim.laws.layers.measured_acceleration import plant_acceleration_of
+from tiltsim.laws.layers.instruments import plant_acceleration_of
 from tiltsim.laws.layers.on_equations import read_actuators
-from tiltsim.laws.layers.sensing import measured
 from tiltsim.plants.command import Command, Observation
 from tiltsim.plants.mujoco_plant import MujocoPlant
 from tiltsim.plants.observing import flip_by_spin

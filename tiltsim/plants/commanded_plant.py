@@ -14,15 +14,13 @@ import numpy as np
 from tiltsim.closed_loop.assembly import Assembly, program_key
 from tiltsim.closed_loop.userdata import EVALUATIONS, HEADER_SIZE
 from tiltsim.engines.base import vectors_of
-from tiltsim.engines.callback import control_callback
-from tiltsim.engines.python_engine import control_program, control_step
+from tiltsim.engines.control import control_callback, control_program, control_step
 from tiltsim.laws.commanded import commanded_parameters, planned_servo_commands, with_command
 from tiltsim.laws.vehicle_loop import servo_lead
 from tiltsim.plants.command import CheckedCommand, ControllerError, Observation
 from tiltsim.plants.mujoco_plant import MujocoPlant
 from tiltsim.plants.observing import Observer, flip_by_spin
-from tiltsim.vehicles.rotorcraft.layout import TILT_1, layout_of, tilt_of_rotor
-from tiltsim.vehicles.rotorcraft.rotors import true_rotors
+from tiltsim.vehicles.rotorcraft.layout import TILT_1, layout_of, tilt_of_rotor, true_rotors
 from tiltsim_controllers.code.python_source import python_function
 from tiltsim_controllers.code.traceable import as_arrays
 from tiltsim_controllers.mathematics.records import flatten

@@ -119,7 +119,7 @@ class EquationsPlant(Plant):
         return super().record(samples, steps)
 
     def _record_natively(self, samples: int, steps: int) -> Floats | None:
-        from tiltsim.engines.recorder import Recorder
+        from tiltsim.engines.programs import Recorder
 
         checked = self._assembly.sign_check_values(self.time, self.observe())
         recorder = Recorder(self._assembly, samples, steps, steps, checked)

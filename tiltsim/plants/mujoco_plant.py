@@ -21,10 +21,8 @@ from tiltsim.closed_loop.userdata import (
     steps_taken,
 )
 from tiltsim.engines.base import EngineName, vectors_of
-from tiltsim.engines.callback import control_callback
-from tiltsim.engines.factory import make_engine
-from tiltsim.engines.python_engine import control_step
-from tiltsim.engines.recorder import Recorder
+from tiltsim.engines.control import control_callback, control_step, make_engine
+from tiltsim.engines.programs import Recorder
 from tiltsim.models.cables import switch
 from tiltsim.plants.engine_choice import choose_engine
 from tiltsim.plants.flight_model import evaluations_per_step, flight_model
@@ -162,7 +160,7 @@ class MujocoPlant(Plant):
             samples: Number of samples.
             steps, last_steps: Physics steps between samples, and before the last one.
         """
-        from tiltsim.engines.recorder import Recorder
+        from tiltsim.engines.programs import Recorder
 
         evaluations = self._evaluations_per_step
         return Recorder(

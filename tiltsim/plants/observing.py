@@ -6,8 +6,8 @@ import numpy as np
 
 from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.engines.base import vectors_of
+from tiltsim.laws.layers.actuation import measured, sensor_parameters
 from tiltsim.laws.layers.contact import commanded_force, felt_among, push_of
-from tiltsim.laws.layers.sensing import measured, sensor_parameters
 from tiltsim.plants.command import Observation, Reference
 from tiltsim.plants.mujoco_plant import MujocoPlant
 from tiltsim.scenario.gait import tilts_of

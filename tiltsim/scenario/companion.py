@@ -14,9 +14,10 @@ from pydantic import BeforeValidator, Field
 from tiltsim.errors import InputError
 from tiltsim.scenario.controller import OwnFunctionController
 from tiltsim.scenario.interaction import RESERVED
+from tiltsim.scenario.library import find_scenario_file, read_toml
 from tiltsim.scenario.messages import InvalidValueError, choose
 from tiltsim.scenario.override_keys import merge
-from tiltsim.scenario.table import Positive, Table, Vector3, example
+from tiltsim.scenario.table import Name, Positive, Table, Vector3, example
 from tiltsim.system.public import public
 
 TAKEN: Final = (
@@ -48,6 +49,11 @@ def _tables_at(value: Any) -> Any:
         raise InvalidValueError("companion.scenario", value, reason) from None
     if named.payload is not None:
         raise InvalidValueError("companion.scenario", value, "a companion carries no load")
+    name, _, variant = value.partition("#")
+    document = read_toml(find_scenario_file(name))
+    chosen = [one for one in document.get("variant", ()) if one["name"] == variant] or [document]
+    if chosen[0].get("companion", document.get("companion")):
+        raise InvalidValueError("companion.scenario", value, "a companion has no companions")
     tables = named.model_dump(mode="json", exclude_unset=True)
     return {key: tables[key] for key in TAKEN if key in tables}
 
@@ -58,7 +64,7 @@ class CompanionTable(Table):
     model_config = example(name="wing", offset=[2.0, 0.0, 0.0])
     table_name = "companion"
 
-    name: Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,30}$")] = Field(
+    name: Name = Field(
         description="its name, which begins the names of its columns", examples=["wing"]
     )
     scenario: Annotated[dict[str, Any], BeforeValidator(_tables_at)] = Field(

@@ -7,7 +7,6 @@ from pydantic import Field
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.controller_table import ControllerTable, SupervisorTable
 from tiltsim.scenario.table import NonNegative, Positive
-from tiltsim_controllers.laws.failures import Failure
 from tiltsim_controllers.laws.gains import (
     GAIN_SETS,
     Gains,
@@ -18,6 +17,7 @@ from tiltsim_controllers.laws.gains import (
     gains_from_rows,
 )
 from tiltsim_controllers.laws.multirotor_steps import FeedforwardTerms
+from tiltsim_controllers.laws.observed import Failure
 from tiltsim_controllers.laws.supervisor import Supervisor
 from tiltsim_controllers.vehicle.parameters import Vehicle
 

@@ -14,6 +14,9 @@ G: Final = 9.80665  # m/s^2
 MOST_UNDER_WAY: Final = 64  # readings that wait for their delay
 
 
+FINEST: Final = 1e-12  # step of readings: rounding is as coarse
+
+
 class Errors(NamedTuple):
     """Independent errors of an instrument, one entry each: see `instrument_record`."""
 
@@ -46,6 +49,11 @@ class InstrumentTable(Table):
     dropout: Probability = Field(
         0.0, description="probability that a reading is lost [-]", examples=[0.05]
     )
+
+    def _check_values(self) -> None:
+        for key in type(self).model_fields:
+            if key.endswith("resolution") and 0.0 < getattr(self, key) < FINEST:
+                raise self.mistake(key, f"must be 0, for none, or at least {FINEST:g}")
 
     def period(self, timestep: float) -> float:
         """Time between readings (s), with a time between control steps (s)."""
@@ -93,8 +101,9 @@ class ImuTable(InstrumentTable):
             "gyro_resolution": radians(1.0 / 32.8),
         },
     }
-    """Typical values of the data sheets BST-BMI088-DS001 (+-6 g, +-1000 deg/s), DS-000189
-    (ICM-20948) and PS-MPU-6000A-00 (both +-4 g, +-1000 deg/s).
+    """Nominal densities of the data sheets BST-BMI088-DS001, DS-000189 (ICM-20948) and
+    PS-MPU-6000A-00, taken for all axes and ranges; resolutions of the ranges +-6 g, +-4 g and
+    +-4 g, and of +-1000 deg/s.
     """
 
     preset: Literal["bmi088", "icm_20948", "mpu_6050"] | None = Field(
@@ -311,13 +320,15 @@ def check_instruments(scenario: Any) -> None:
         return
     first, step = f"sensors.{next(iter(found))}", simulation.control_timestep
     reasons = {
-        "the tilt_car": scenario.vehicle.is_planar,
-        'controller.law = "python"': scenario.controller.is_external,
-        "[ground], [[object]], [tool], [payload] and [[companion]]": scenario.has_contacts,
+        "the tilt_car has no instruments; remove it": scenario.vehicle.is_planar,
+        "a Python controller observes the state, not readings; choose controller.law = "
+        '"numpy", or remove it': scenario.controller.is_external,
+        "does not sense contacts; remove it, or [ground], [[object]], [tool], [payload] and "
+        "[[companion]]": scenario.has_contacts,
     }
-    for what, present in reasons.items():
+    for reason, present in reasons.items():
         if present:
-            raise scenario.mistake(first, f"not supported with {what}; remove one of them")
+            raise scenario.mistake(first, reason)
     if step == 0.0:
         reason = f"[{first}] is read at control steps; must be above 0"
         raise scenario.mistake("simulation.control_timestep", reason)

@@ -10,7 +10,7 @@ from tiltsim.models.cables import Cable
 from tiltsim.models.mjcf_editing import MAX_BYTES
 from tiltsim.models.objects import Body, Load, Objects, Tool
 from tiltsim.scenario.messages import choose
-from tiltsim.scenario.table import Angles3, NonNegative, Positive, Table, Vector3
+from tiltsim.scenario.table import Angles3, Name, NonNegative, Positive, Table, Vector3
 from tiltsim.system.files import is_file
 from tiltsim_controllers.mathematics.attitude import quaternion_of_euler
 
@@ -32,7 +32,7 @@ class ObjectTable(Table):
 
     table_name = "object"
 
-    name: Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,30}$")] = Field(
+    name: Name = Field(
         description="its name, which begins the names of its columns", examples=["wall"]
     )
     type: Literal["wall", "box", "sphere", "mesh"] = Field(
@@ -209,7 +209,7 @@ class CableTable(Table):
 
     table_name = "cable"
 
-    name: Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,30}$")] = Field(
+    name: Name = Field(
         description="its name, which begins the name of its column", examples=["sling"]
     )
     object: str = Field(description="the name of a free object", examples=["parcel"])

@@ -4,6 +4,7 @@ from typing import Annotated, Any, Final
 
 from pydantic import Field, PrivateAttr
 
+from tiltsim.errors import InputError
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.autopilot import AutopilotTable, WithAutopilot
 from tiltsim.scenario.companion import CompanionTable, DownwashTable
@@ -134,6 +135,14 @@ class ScenarioTables(WithAutopilot):
     def has_objects(self) -> bool:
         """Whether the model has more in it than the vehicle and the ground."""
         return bool(self.object) or self.tool is not None or self.payload is not None
+
+    def require_alone(self, analysis: str) -> None:
+        """Refuse objects, loads and companions for an analysis, named in the `InputError`."""
+        if self.has_objects or self.companion:
+            raise InputError(
+                f"{self.address or 'scenario'}: {analysis} takes a vehicle alone; remove "
+                "[[object]], [tool], [payload] and [[companion]]"
+            )
 
     @property
     def time_tables(self) -> dict[str, TimeTable]:

@@ -25,6 +25,7 @@ Angles3 = Annotated[tuple[Angle, Angle, Angle], Field(strict=False)]
 AnglesEach = Annotated[tuple[Angle, ...], Field(strict=False, min_length=1, max_length=16)]
 Gains4 = Annotated[tuple[float, float, float, float], Field(strict=False)]
 PositiveEach = Annotated[tuple[Positive, ...], Field(strict=False, min_length=2, max_length=16)]
+Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,30}$")]
 Limit = Annotated[float, Field(allow_inf_nan=True)]
 Range = Annotated[tuple[Limit, Limit], Field(strict=False)]
 
@@ -88,7 +89,8 @@ class Table(BaseModel):
     def mistake(self, key: str, allowed: str) -> InvalidValueError:
         """The error of the value of a dotted key that is not allowed; see `InvalidValueError`."""
         value = attrgetter(key)(self)
-        shown = value.model_dump() if isinstance(value, BaseModel) else value
+        is_table = isinstance(value, BaseModel)
+        shown = value.model_dump(exclude_unset=True) if is_table else value
         return InvalidValueError(f"{self.table_name}.{key}".removeprefix("."), shown, allowed)
 
     def require(self, key: str, value: object, reason: str) -> None:

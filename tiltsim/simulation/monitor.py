@@ -67,7 +67,7 @@ class TerminationMonitor:
     def passes(self, plant: Plant, samples: Floats) -> bool:
         """Whether none of the samples that `Plant.record` returned ends the flight.
 
-        Native code has checked all but the last; see `tiltsim.engines.recorder.Recorder`.
+        Native code has checked all but the last; see `tiltsim.engines.programs.Recorder`.
         """
         if plant.engine == "native":
             samples = samples[-1:]

@@ -22,10 +22,7 @@ from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.closed_loop.userdata import CONTROL_PERIOD as PERIOD_IN_USERDATA
 from tiltsim.closed_loop.userdata import Header
 from tiltsim.engines.base import EngineName
-from tiltsim.engines.callback import control_callback
-from tiltsim.engines.factory import make_engine
-from tiltsim.engines.native_engine import compile_empty
-from tiltsim.engines.python_engine import control_step
+from tiltsim.engines.control import compile_empty, control_callback, control_step, make_engine
 from tiltsim.laws.assembling import assemble
 from tiltsim.plants.mujoco_plant import MujocoPlant
 from tiltsim.scenario.loading import parse_scenario
@@ -266,8 +263,9 @@ def time_per_call(assembly: Assembly) -> float:
     qpos, qvel = loop.kind.initial_motion(assembly)
     act = tuple(map(float, loop.initial_activations(assembly, setup)))
     header = [*Header(assembly.scenario.simulation.timestep)]
+    others = [0.0] * loop.sizes.others, [0.0] * loop.sizes.history
     none: list[float] = []
-    vectors = [*map(float, qpos)], [*map(float, qvel)], [*act], none, none, none
+    vectors = [*map(float, qpos)], [*map(float, qvel)], [*act], *others, none
     step = control_step(assembly, setup.userdata.tolist(), "controls")
 
     def calls() -> None:

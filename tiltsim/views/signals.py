@@ -17,7 +17,7 @@ import numpy as np
 from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.flight.flight import Flight
 from tiltsim.flight.vectors import VECTORS, components
-from tiltsim.laws.supervision import SUPERVISION
+from tiltsim.laws.law import SUPERVISION
 from tiltsim.scenario.vehicle import VehicleTable
 from tiltsim.system.text import Quantity, in_words, subscript
 from tiltsim.views.attitude_plane import margin_threshold

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.flight.end import End
 from tiltsim.flight.flight import Flight
-from tiltsim.laws.supervision import SUPERVISION
+from tiltsim.laws.law import SUPERVISION
 from tiltsim.scenario.arguments import leaves
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.scenario.scenario_tables import DESCRIPTIVE

@@ -19,7 +19,7 @@ from typing import Any, Final, Literal
 from pydantic import Field
 
 from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.laws.bounded_allocation import bounded_least_squares, largest
+from tiltsim_controllers.laws.allocation import bounded_least_squares, largest
 from tiltsim_controllers.laws.keys import Keys, NonNegative
 from tiltsim_controllers.laws.observed import Command, Observed
 from tiltsim_controllers.mathematics.linear import cross, nearest_solution, norm, solved_symmetric

@@ -27,10 +27,9 @@ from pydantic import Field
 
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.code.traceable import traceable
-from tiltsim_controllers.laws.failures import Failure, working
 from tiltsim_controllers.laws.feedback import body_rate_matrix
 from tiltsim_controllers.laws.keys import GainSets, Keys, NamedGains, Positive, Vector3, record_of
-from tiltsim_controllers.laws.observed import Seen, Step
+from tiltsim_controllers.laws.observed import Failure, Seen, Step, working
 from tiltsim_controllers.mathematics.attitude import attitude_error, rotation_matrix
 from tiltsim_controllers.mathematics.linear import cross, least_norm
 from tiltsim_controllers.mathematics.moving import Moving

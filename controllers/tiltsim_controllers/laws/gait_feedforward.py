@@ -20,10 +20,9 @@ from tiltsim_controllers.laws.gains import Gains, IntegralGains
 from tiltsim_controllers.laws.keys import record_of
 from tiltsim_controllers.laws.multirotor import attitude_force, present_wrench
 from tiltsim_controllers.laws.multirotor_steps import FeedforwardTerms, Form
-from tiltsim_controllers.laws.multirotor_supervisor import multirotor_supervision_of
 from tiltsim_controllers.laws.observed import Seen, Step
+from tiltsim_controllers.laws.supervised_vehicles import SUPERVISION, multirotor_supervision_of
 from tiltsim_controllers.laws.supervisor import Supervision, Supervisor, gait_time
-from tiltsim_controllers.laws.tiltrotor_supervisor import SUPERVISION
 from tiltsim_controllers.references.trajectories import ReferenceParameters
 from tiltsim_controllers.vehicle.effectiveness import TiltOfRotor, tilts_of
 from tiltsim_controllers.vehicle.parameters import Vehicle

@@ -17,17 +17,15 @@ from tiltsim_controllers.laws.keys import Keys, Positive
 from tiltsim_controllers.laws.observed import Command, Observed
 from tiltsim_controllers.laws.outer_loop import (
     UP,
-    demanded_acceleration,
-    pointing_attitude,
-    pointing_rates,
-    push_along,
-)
-from tiltsim_controllers.laws.rotor_allocation import (
     allocated_thrusts,
     allocated_with_tilts,
+    demanded_acceleration,
     in_components,
     lift_without_torque,
     of_components,
+    pointing_attitude,
+    pointing_rates,
+    push_along,
 )
 from tiltsim_controllers.mathematics.attitude import attitude_error, rotation_matrix
 from tiltsim_controllers.mathematics.linear import cross

@@ -20,8 +20,13 @@ from pydantic import Field
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.laws.keys import Keys, Positive
 from tiltsim_controllers.laws.observed import Command, Observed
-from tiltsim_controllers.laws.outer_loop import demanded_acceleration, pointing_attitude, push_along
-from tiltsim_controllers.laws.rotor_allocation import allocated_thrusts, lift_without_torque
+from tiltsim_controllers.laws.outer_loop import (
+    allocated_thrusts,
+    demanded_acceleration,
+    lift_without_torque,
+    pointing_attitude,
+    push_along,
+)
 from tiltsim_controllers.mathematics.attitude import attitude_error
 
 

@@ -46,7 +46,6 @@ from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.code.traceable import traceable
 from tiltsim_controllers.laws.attitude_altitude import PUBLISHED_DECOUPLING
 from tiltsim_controllers.laws.decouplers import NONE
-from tiltsim_controllers.laws.failures import UNHARMED, working
 from tiltsim_controllers.laws.feedback import attitude_motion, swept
 from tiltsim_controllers.laws.force_directions import (
     factors,
@@ -68,7 +67,7 @@ from tiltsim_controllers.laws.multirotor_steps import (
     tracking,
     turned,
 )
-from tiltsim_controllers.laws.observed import Seen, Step
+from tiltsim_controllers.laws.observed import UNHARMED, Seen, Step, working
 from tiltsim_controllers.mathematics.attitude import rotation_matrix
 from tiltsim_controllers.mathematics.linear import cross, nearest_solution
 from tiltsim_controllers.mathematics.moving import Moving, at_rest, stacked

@@ -17,7 +17,6 @@ from tiltsim_controllers.laws.decouplers import (
     exact_decoupler,
     modified_decoupler,
 )
-from tiltsim_controllers.laws.failures import Failure
 from tiltsim_controllers.laws.feedback import (
     angular_jerk,
     attitude_jerk,
@@ -29,7 +28,8 @@ from tiltsim_controllers.laws.feedback import (
 )
 from tiltsim_controllers.laws.gains import Gains, GivenGains, IntegralGains
 from tiltsim_controllers.laws.keys import Keys, NonNegative, Vector3, record_of
-from tiltsim_controllers.laws.multirotor_supervisor import Watched
+from tiltsim_controllers.laws.observed import Failure
+from tiltsim_controllers.laws.supervised_vehicles import Watched
 from tiltsim_controllers.laws.supervisor import Supervisor
 from tiltsim_controllers.mathematics.attitude import attitude_error, rotation_matrix, wrapped
 from tiltsim_controllers.mathematics.linear import cross

@@ -15,12 +15,13 @@ from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.laws.keys import Gains2, Keys, Positive, Vector3
 from tiltsim_controllers.laws.observed import Command, Observed
 from tiltsim_controllers.laws.outer_loop import (
+    allocated_thrusts,
+    lift_without_torque,
     pointing_attitude,
     push_along,
     shortened,
     tracking_errors,
 )
-from tiltsim_controllers.laws.rotor_allocation import allocated_thrusts, lift_without_torque
 from tiltsim_controllers.mathematics.attitude import attitude_error
 
 STATES: Final = {

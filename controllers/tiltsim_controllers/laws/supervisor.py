@@ -4,7 +4,7 @@ It keeps two numbers above their thresholds: the singularity margin (rad, the di
 attitude from a singular one) and the determinant of the matrix, scaled to `UNTILTED`, its value for
 the level untilted tiltrotor. Only the determinant shows that a gait approaches tilt angles at which
 every attitude is singular. Both numbers depend on the kind of vehicle
-(`tiltsim_controllers.laws.tiltrotor_supervisor`, ``multirotor_supervisor``). There are three
+(`tiltsim_controllers.laws.supervised_vehicles`). There are three
 strategies.
 
 * ``SCALE`` scales all tilt angles toward zero as little as satisfies both thresholds. A function

@@ -13,7 +13,7 @@ from typing import Any, Literal
 from pydantic import Field
 
 from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.laws.bounded_allocation import bounded_least_squares
+from tiltsim_controllers.laws.allocation import bounded_least_squares
 from tiltsim_controllers.laws.force_directions import torque_free_force
 from tiltsim_controllers.laws.keys import Keys, NonNegative, Positive
 from tiltsim_controllers.laws.observed import Command, Observed

@@ -99,7 +99,7 @@ def test_lanes_that_take_different_ways_keep_the_bits_of_each(function, lanes):
 
 
 @pytest.mark.parametrize("in_segments", [False, True])
-@pytest.mark.parametrize("function", [everything, nested])
+@pytest.mark.parametrize("function", [pytest.param(everything, marks=pytest.mark.slow), nested])
 def test_a_program_has_the_same_values_in_jax(function, in_segments, monkeypatch):
     jax = pytest.importorskip("jax")
     monkeypatch.setattr(jax_function, "SEGMENT", 7)

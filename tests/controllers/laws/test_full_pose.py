@@ -18,7 +18,6 @@ from tiltsim_controllers.code.traceable import traceable
 from tiltsim_controllers.gaits.parameters import FIXED, GaitParameters
 from tiltsim_controllers.laws import attitude_altitude
 from tiltsim_controllers.laws.allocation import RotorRange
-from tiltsim_controllers.laws.failures import UNHARMED, Failure
 from tiltsim_controllers.laws.full_pose import (
     GAIN_SETS,
     PUBLISHED_TILT_WEIGHT,
@@ -31,7 +30,7 @@ from tiltsim_controllers.laws.full_pose import (
     turning_rates,
 )
 from tiltsim_controllers.laws.gains import GAIN_SETS as ATTITUDE_GAINS
-from tiltsim_controllers.laws.observed import Seen
+from tiltsim_controllers.laws.observed import UNHARMED, Failure, Seen
 from tiltsim_controllers.laws.supervisor import Supervisor
 from tiltsim_controllers.mathematics.attitude import attitude_error, rotation_matrix
 from tiltsim_controllers.mathematics.linear import least_norm
@@ -319,6 +318,7 @@ def full(gait, duration, step, **options):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("gait", GAITS)
 def test_full_pose_control_is_faster_with_less_overshoot_and_fast_tilting(gait):
     """Ch. 3, Sec. 6.3 against Secs. 6.1.1 and 6.1.2: same start, with less thrust than weight."""

@@ -7,7 +7,7 @@ import pytest
 
 from tests.controllers.multirotors import ring
 from tiltsim_controllers.laws.observed import Observed
-from tiltsim_controllers.laws.rotor_allocation import (
+from tiltsim_controllers.laws.outer_loop import (
     allocated_thrusts,
     allocated_with_tilts,
     lift_without_torque,

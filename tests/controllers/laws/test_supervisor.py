@@ -19,9 +19,12 @@ from tiltsim_controllers.gaits.plans import continuous_trot as trot
 from tiltsim_controllers.gaits.plans import fixed, waypoints
 from tiltsim_controllers.gaits.plans import instant_trot as trot_instant
 from tiltsim_controllers.laws.decouplers import exact_decoupler
-from tiltsim_controllers.laws.multirotor_supervisor import multirotor_supervision_of, watched
+from tiltsim_controllers.laws.supervised_vehicles import (
+    SUPERVISION,
+    multirotor_supervision_of,
+    watched,
+)
 from tiltsim_controllers.laws.supervisor import BAND, LAG, STRATEGIES, Supervisor, turned_along
-from tiltsim_controllers.laws.tiltrotor_supervisor import SUPERVISION
 from tiltsim_controllers.vehicle.effectiveness import cross_table, tilt_of_rotor
 from tiltsim_controllers.vehicle.parameters import PRESETS, drag_ratio
 
@@ -76,6 +79,7 @@ def random_cases(random):
         yield watch_all, (vehicle, table), tuple(tilts), random.uniform(-0.9, 0.9, 2)
 
 
+@pytest.mark.slow
 def test_the_scale_is_the_largest_that_is_allowed():
     """The largest scale of a dense grid, except for a range of scales between two sixteenths."""
     dense, unseen, nearest, partial, beyond = 128, 0, 0, 0, 0

@@ -205,6 +205,7 @@ def snap_cost(shift, times, snap):
     return np.trapezoid((snap + bent) ** 2, times)
 
 
+@pytest.mark.slow
 def test_no_bump_between_waypoints_lowers_the_snap():
     flown = snap_along_the_way()
     at_rest = snap_cost(0.0, *flown)

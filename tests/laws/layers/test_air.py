@@ -10,7 +10,7 @@ import pytest
 
 import tiltsim
 from tests.laws.restarting import assert_restarts
-from tiltsim.engines.callback import control_callback
+from tiltsim.engines.control import control_callback
 from tiltsim.errors import InputError
 from tiltsim.laws.assembling import LOOPS, assemble, loop_of
 from tiltsim.plants.factory import make_plant

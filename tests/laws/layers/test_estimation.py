@@ -114,6 +114,7 @@ def test_outliers_are_refused():
     assert flight["innovation_mocap_position_x"].max() > 50.0
 
 
+@pytest.mark.slow
 def test_ten_times_the_noise_worsens_the_flight():
     def rms(factor):
         noisy = {

@@ -22,11 +22,11 @@ from tests.laws.layers.test_on_equations import (
     scenario,
 )
 from tests.simulation.test_batch import three_ways
-from tiltsim.engines.callback import control_callback
+from tiltsim.engines.control import control_callback
 from tiltsim.equations.actuator_level import actuator_plant
 from tiltsim.errors import InputError
 from tiltsim.laws.assembling import LOOPS, assemble, loop_of
-from tiltsim.laws.layers.measured_acceleration import plant_acceleration_of
+from tiltsim.laws.layers.instruments import plant_acceleration_of
 from tiltsim.laws.layers.on_equations import read_actuators
 from tiltsim.models.hover import hover_speeds
 from tiltsim.plants.factory import make_plant

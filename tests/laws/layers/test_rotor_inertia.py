@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import tiltsim
-from tiltsim.engines.callback import control_callback
+from tiltsim.engines.control import control_callback
 from tiltsim.errors import InputError
 from tiltsim.laws.assembling import LOOPS, assemble, loop_of
 from tiltsim.plants.command import Command, check_command

@@ -235,6 +235,3 @@ ROTORCRAFT: Final = rotorcraft_kind(CROSS, tuple(EXTRA_COLUMNS))
 
 COLUMNS: Final = ROTORCRAFT.columns
 """The columns of every flight of tiltrotor and quadrotor."""
-
-OTHER_LAYOUT: Final = rotorcraft_kind(CROSS)
-"""A user's rotorcraft without the four equal arms that the extra columns assume."""

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 
 from tiltsim.flight.flight import Flight
 from tiltsim.flight.vectors import VECTORS
-from tiltsim.laws.supervision import SUPERVISION
+from tiltsim.laws.law import SUPERVISION
 from tiltsim.scenario.gait import PenguinGait
 from tiltsim.system.text import Quantity
 from tiltsim.views import attitude_plane
