@@ -263,8 +263,9 @@ def time_per_call(assembly: Assembly) -> float:
     qpos, qvel = loop.kind.initial_motion(assembly)
     act = tuple(map(float, loop.initial_activations(assembly, setup)))
     header = [*Header(assembly.scenario.simulation.timestep)]
+    others = [0.0] * loop.sizes.others, [0.0] * loop.sizes.history
     none: list[float] = []
-    vectors = [*map(float, qpos)], [*map(float, qvel)], [*act], none, none, none
+    vectors = [*map(float, qpos)], [*map(float, qvel)], [*act], *others, none
     step = control_step(assembly, setup.userdata.tolist(), "controls")
 
     def calls() -> None:
