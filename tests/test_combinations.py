@@ -29,7 +29,7 @@ from tiltsim.scenario.vehicle import VehicleUnion
 from tiltsim.studies.multirotor_analysis import FLEET, fleet_file
 from tiltsim.views.figures.style import save
 from tiltsim.views.rerun.recording import save_recording
-from tiltsim.views.video.overlay import Overlay
+from tiltsim.views.video.offscreen import Overlay
 
 SHORT = {"duration": 0.02, "timestep": 0.002, "engine": "python"}
 TABLES = key_tables(scenario_schema())

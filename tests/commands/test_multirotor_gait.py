@@ -12,7 +12,7 @@ from tiltsim.cli import main
 from tiltsim.models.user_vehicle import read_user_vehicle
 from tiltsim.resources import shipped_folder
 from tiltsim.studies.multirotor_analysis import FLEET, fleet_file, tilted_rotors
-from tiltsim.views.figures.multirotor import multirotor_figure
+from tiltsim.views.figures.vehicles import multirotor_figure
 from tiltsim_controllers.analysis.attainable import TiltedRotors
 from tiltsim_controllers.analysis.singularity import singularity_margin
 from tiltsim_controllers.analysis.statics import hover_rotor_speeds

@@ -16,7 +16,7 @@ from tiltsim.studies.comparison import Compared, Entry, compare_one, controller_
 from tiltsim.studies.league_page import league_page, league_table
 from tiltsim.studies.multirotor_analysis import FEW_ROTORS, FLEET
 from tiltsim.studies.scores import AIMS, INTERACTION, STEP, score
-from tiltsim.views.figures.arena_scores import arena_figure, panels_of
+from tiltsim.views.figures.comparisons import arena_figure, panels_of
 
 UNLIMITED = ["--league", "unlimited"]
 

@@ -29,7 +29,7 @@ from tiltsim.studies.comparison import (
     is_last_tried,
     why_none,
 )
-from tiltsim.views.figures.controllers_compared import comparison_figure
+from tiltsim.views.figures.comparisons import comparison_figure
 
 SETPOINT = "ch04_tracking/setpoint#rho_0_modified"
 SHORT = {"simulation.duration": 0.3, "initial.position": [0.3, 0.0, 0.0], "expect": []}

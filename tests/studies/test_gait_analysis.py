@@ -25,9 +25,8 @@ from tiltsim.simulation.simulate import simulate
 from tiltsim.studies.gait_analysis import gait_report, map_report, vehicle_name
 from tiltsim.system import files
 from tiltsim.views.figures import style
-from tiltsim.views.figures.gait import gait_figure
-from tiltsim.views.figures.multirotor import attainable_figure
-from tiltsim.views.figures.two_color_map import map_figure
+from tiltsim.views.figures.gaits import gait_figure, map_figure
+from tiltsim.views.figures.vehicles import attainable_figure
 from tiltsim_controllers.analysis.fault_tolerance import fixed_tilt_hover
 from tiltsim_controllers.analysis.published_gaits import (
     DETERMINANT_CASES,

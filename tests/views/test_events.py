@@ -11,7 +11,7 @@ from tests.flights import SAMPLE_FIELDS, flight
 from tiltsim.flight.end import End
 from tiltsim.laws.assembling import assemble
 from tiltsim.scenario.loading import load_scenario
-from tiltsim.views.events import EventDetector, conditions
+from tiltsim.views.titles import EventDetector, conditions
 
 
 def flight_events(flight):

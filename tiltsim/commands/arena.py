@@ -138,7 +138,7 @@ def _written(
     from tiltsim.studies.arena_page import arena_page
     from tiltsim.studies.league_page import by_world, league_page, league_table
     from tiltsim.views.figures import style
-    from tiltsim.views.figures.arena_scores import arena_figure, panels_of, tasks_of, vehicles_of
+    from tiltsim.views.figures.comparisons import arena_figure, panels_of, tasks_of, vehicles_of
 
     if league == "limited":
         page, panels = league_page(rows, made), {}

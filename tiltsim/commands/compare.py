@@ -100,7 +100,7 @@ def run(
             _print(rows, [key for key in MEASURES if not (nominal and key in searched)])
         if rows and out is not None:
             text.write_text(out / "comparison.json", text.json_text(rows))
-            drawn = figures.controllers_compared.comparison_figure(compared)
+            drawn = figures.comparisons.comparison_figure(compared)
             figures.style.save(drawn, out / "comparison.png")
             if not json:
                 text.print_line(f"comparison written to {out}")

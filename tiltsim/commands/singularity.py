@@ -36,10 +36,7 @@ def run(
     report = _report(parameters, roll or 0.0, pitch or 0.0)
 
     figure.show(
-        lambda: figures.determinant.singularity_figure(parameters),
-        report,
-        _summary(report),
-        json=json,
+        lambda: figures.vehicles.singularity_figure(parameters), report, _summary(report), json=json
     )
     return 0
 

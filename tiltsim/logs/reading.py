@@ -9,7 +9,7 @@ import csv
 import tomllib
 from os import PathLike
 from pathlib import Path
-from typing import Any, Final, Literal
+from typing import Final, Literal
 
 import numpy as np
 from pydantic import Field, ValidationError
@@ -17,6 +17,7 @@ from scipy.spatial.transform import Rotation
 
 from tiltsim.errors import InputError
 from tiltsim.flight.reading import flight_file
+from tiltsim.flight.vectors import VECTORS
 from tiltsim.logs import formats
 from tiltsim.logs.formats import Signals
 from tiltsim.logs.log import LOG_SUFFIXES, UNITS, Log
@@ -31,11 +32,8 @@ from tiltsim_controllers.mathematics.scalar import Floats
 
 SUFFIXES: Final = (*LOG_SUFFIXES, ".parquet")
 
-VECTORS: Final = {
-    "world": (("x", "y", "z"), ("vx", "vy", "vz")),
-    "body": (("p", "q", "r"), ("accelerometer_x", "accelerometer_y", "accelerometer_z")),
-}
-"""Columns that are vectors in the frames of a map."""
+WORLD_VECTORS: Final = (VECTORS["position"], VECTORS["velocity"])
+BODY_VECTORS: Final = (VECTORS["body_rates"], tuple(f"accelerometer_{axis}" for axis in "xyz"))
 
 
 class Signal(Table):
@@ -88,7 +86,7 @@ PX4: Final = LogMap(
     body="frd",
     attitude=tuple(f"vehicle_attitude.q[{i}]" for i in range(4)),
     columns={
-        **{name: f"vehicle_local_position.{name}" for pair in VECTORS["world"] for name in pair},
+        **{name: f"vehicle_local_position.{name}" for each in WORLD_VECTORS for name in each},
         **{rate: f"vehicle_angular_velocity.xyz[{i}]" for i, rate in enumerate("pqr")},
         **{
             f"accelerometer_{axis}": f"sensor_combined.accelerometer_m_s2[{i}]"
@@ -159,30 +157,26 @@ def read_log(
     if suffix == ".csv":
         return _exported(file, {name: values for name, (_, values) in signals.items()}, {})
     if "vehicle_local_position.x" in signals or "vehicle_attitude.q[0]" in signals:
-        return _mapped(file, signals, PX4.model_copy(update=_present(PX4, signals)))
+        there = {name: one for name, one in PX4.columns.items() if one in signals}
+        attitude = PX4.attitude if PX4.attitude[0] in signals else ()
+        chart = PX4.model_copy(update={"columns": there, "attitude": attitude})
+        return _mapped(file, signals, chart)
     found = ", ".join(list(signals)[:8]) or "no numbers"
     raise InputError(
         f"{file}: give a map (--map FILE) from its signals, such as {printable(found)}"
     )
 
 
-def _present(chart: LogMap, signals: Signals) -> dict[str, Any]:
-    """The part of a map whose signals exist."""
-    columns = {name: one for name, one in chart.columns.items() if one in signals}
-    return {"columns": columns, "attitude": chart.attitude if chart.attitude[0] in signals else ()}
-
-
 def _exported(file: Path, columns: dict[str, Floats], information: dict[str, str]) -> Log:
     """Columns that have tiltsim's names, as they are."""
-    units = {name: information.pop(f"unit_{name}", UNITS.get(name, "-")) for name in columns}
+    columns = {"time": columns["time"], **columns}  # the first one
     columns.pop("timestamp", None)
-    units.pop("timestamp", None)
     _check_times(file, columns["time"])
+    units = {name: information.get(f"unit_{name}", UNITS.get(name, "-")) for name in columns}
     origin = {key: text for key, text in information.items() if not key.startswith("unit_")}
-    notes = [] if origin else _defects(columns)
-    order = ["time", *(name for name in columns if name != "time")]
-    by_name = {name: np.ascontiguousarray(columns[name]) for name in order}
-    return Log(str(file), by_name, {name: units[name] for name in order}, tuple(notes), origin)
+    notes = () if origin else tuple(_defects(columns))
+    by_name = {name: np.ascontiguousarray(column) for name, column in columns.items()}
+    return Log(str(file), by_name, units, notes, origin)
 
 
 def _mapped(file: Path, signals: Signals, chart: LogMap) -> Log:
@@ -209,18 +203,17 @@ def _mapped(file: Path, signals: Signals, chart: LogMap) -> Log:
         held = "command" in name
         column = _at(time, signals[one.signal], chart.max_gap, held=held)
         columns[name] = one.scale * column + one.offset
-    flips = {"world": FLIP if chart.world == "ned" else np.ones(3)}
-    flips["body"] = FLIP if chart.body == "frd" else np.ones(3)
-    for frame, vectors in VECTORS.items():
-        for vector in vectors:
-            for name, sign in zip(vector, flips[frame], strict=True):
-                if name in columns:
-                    columns[name] = columns[name] * sign + 0.0
+    world = FLIP if chart.world == "ned" else np.ones(3)
+    body = FLIP if chart.body == "frd" else np.ones(3)
+    for vectors, signs in ((WORLD_VECTORS, world), (BODY_VECTORS, body)):
+        for name, sign in ((name, s) for each in vectors for name, s in zip(each, signs)):
+            if name in columns:
+                columns[name] = columns[name] * sign + 0.0
     if chart.attitude:
         turned = np.stack(
             [_at(time, one, chart.max_gap) for one in _continuous(signals, chart.attitude)], axis=1
         )
-        columns |= _attitude(file, turned, flips["world"], flips["body"])
+        columns |= _attitude(file, turned, world, body)
     order = [name for name in UNITS if name in columns]
     notes += _defects(columns)
     by_name = {name: columns[name] for name in order}

@@ -16,7 +16,7 @@ from tiltsim.errors import InputError
 from tiltsim.laws.assembling import assemble
 from tiltsim.laws.layers import estimation
 from tiltsim.laws.layers.estimation import fusion_of
-from tiltsim.views.figures.tubes import errors_of
+from tiltsim.views.figures.panels import errors_of
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.code.traceable import traceable
 from tiltsim_controllers.mathematics.probability import chi_square_quantile
@@ -274,7 +274,7 @@ def test_a_native_sample_takes_less_than_fifteen_microseconds(name):
 
 def test_the_tube_of_the_attitude_turns_about_world_axes():
     flight = tiltsim.simulate(scenario(INSTRUMENTS["mocap"]))
-    errors, deviation = errors_of(flight, "estimate_attitude_error")
+    errors, deviation = errors_of(flight, "attitude")
     true, estimated = (
         Rotation.from_euler("ZYX", np.stack([flight[f"{start}{a}"] for a in angles], axis=-1))
         for angles in [("yaw", "pitch", "roll")]

@@ -25,12 +25,12 @@ from tiltsim.views.attitude_plane import (
     torque_free_directions,
     unreachable_pitch,
 )
-from tiltsim.views.events import Event, EventDetector
 from tiltsim.views.replay import visible_model
 from tiltsim.views.rerun import timeline
 from tiltsim.views.rerun.scene import Scene
 from tiltsim.views.rerun.timeline import Color, Ticks, Trail, dimmed, send_rows
 from tiltsim.views.signals import Signal, Signals, has_attitude_plane, signals_of
+from tiltsim.views.titles import Event, EventDetector
 from tiltsim_controllers.mathematics.scalar import Floats
 
 MEASURED_WIDTH: Final = 1.8
