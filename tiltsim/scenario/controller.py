@@ -21,7 +21,7 @@ from tiltsim.scenario.quadrotor_controllers import (
     SwitchingController,
     YawPositionController,
 )
-from tiltsim.scenario.table import Positive, example
+from tiltsim.scenario.table import Positive, default, example, required
 from tiltsim.scenario.tilt_car_controllers import (
     FourthDerivativeController,
     PlannedDirectionController,
@@ -42,9 +42,9 @@ class OwnFunctionController(ControllerTable):
     follows_turns = True
     needs_four_rotors = False
 
-    function: str = Field(
-        description="FILE.py:NAME of a function or class; FILE in the scenario's folder",
-        examples=["my_controller.py:hover"],
+    function: str = required(
+        "FILE.py:NAME of a function or class; FILE in the scenario's folder",
+        "my_controller.py:hover",
     )
 
     @model_validator(mode="before")
@@ -80,7 +80,7 @@ class PythonController(OwnFunctionController):
     rotors_have_speeds = True
     leans_unrecorded = True
 
-    law: Literal["python"] = Field(description="a user's own controller")
+    law: Literal["python"] = required("a user's own controller")
 
 
 class NumpyController(OwnFunctionController, TiltingTable):
@@ -90,30 +90,26 @@ class NumpyController(OwnFunctionController, TiltingTable):
 
     reference_kinds = ("position", "pose", "attitude_altitude")
 
-    law: Literal["numpy"] = Field(
-        description="your own law, a function of NumPy arrays, which flies as compiled code"
+    law: Literal["numpy"] = required(
+        "your own law, a function of NumPy arrays, which flies as compiled code"
     )
-    parameters: dict[str, Any] = Field(
+    parameters: dict[str, Any] = default(
+        {}, "keys of the law, where it is a class, a tiltsim.LawController", {"stiffness": 4.0}
+    )
+    states: StateUnits = default(
+        {}, "the law's own states: their names and units", {"state_integral": "m s"}
+    )
+    discrete_states: StateUnits = default(
         {},
-        description="keys of the law, where it is a class, a tiltsim.LawController",
-        examples=[{"stiffness": 4.0}],
+        "states that the law sets at control samples, such as flags and queues: their names and "
+        "units; needs simulation.control_timestep > 0",
+        {"state_flag": "1"},
     )
-    states: StateUnits = Field(
-        {},
-        description="the law's own states: their names and units",
-        examples=[{"state_integral": "m s"}],
-    )
-    discrete_states: StateUnits = Field(
-        {},
-        description="states that the law sets at control samples, such as flags and queues: their "
-        "names and units; needs simulation.control_timestep > 0",
-        examples=[{"state_flag": "1"}],
-    )
-    push_stiffness: Positive | None = Field(
+    push_stiffness: Positive | None = default(
         None,
-        description="force per mass and per error of position that the law makes at rest, for a "
-        "reference that pushes; default: it does not push [1/s^2]",
-        examples=[4.0],
+        "force per mass and per error of position that the law makes at rest, for a reference "
+        "that pushes; default: it does not push [1/s^2]",
+        4.0,
     )
 
     @property

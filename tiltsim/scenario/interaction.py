@@ -10,7 +10,18 @@ from tiltsim.models.cables import Cable
 from tiltsim.models.mjcf_editing import MAX_BYTES
 from tiltsim.models.objects import Body, Load, Objects, Tool
 from tiltsim.scenario.messages import choose
-from tiltsim.scenario.table import Angles3, Name, NonNegative, Positive, Table, Vector3
+from tiltsim.scenario.table import (
+    ZEROS,
+    Angles3,
+    Many,
+    Name,
+    NonNegative,
+    Positive,
+    Table,
+    Vector3,
+    default,
+    required,
+)
 from tiltsim.system.files import is_file
 from tiltsim_controllers.mathematics.attitude import quaternion_of_euler
 
@@ -32,60 +43,41 @@ class ObjectTable(Table):
 
     table_name = "object"
 
-    name: Name = Field(
-        description="its name, which begins the names of its columns", examples=["wall"]
+    name: Name = required("its name, which begins the names of its columns", "wall")
+    type: Literal["wall", "box", "sphere", "mesh"] = required(
+        "a wall 0.1 m thick whose face looks along its -x, a box, a sphere, or the convex hull of "
+        "a mesh",
+        "wall",
     )
-    type: Literal["wall", "box", "sphere", "mesh"] = Field(
-        description="a wall 0.1 m thick whose face looks along its -x, a box, a sphere, or the "
-        "convex hull of a mesh",
-        examples=["wall"],
+    position: Vector3 = required(
+        "of the face's center or of the center, in the world [m]", [1.0, 0.0, 0.0]
     )
-    position: Vector3 = Field(
-        description="of the face's center or of the center, in the world [m]",
-        examples=[[1.0, 0.0, 0.0]],
+    attitude: Angles3 = default(
+        ZEROS, "roll, pitch and yaw from the world's axes to its own [rad]", [0.0, 0.0, 0.5]
     )
-    attitude: Angles3 = Field(
-        (0.0, 0.0, 0.0),
-        description="roll, pitch and yaw from the world's axes to its own [rad]",
-        examples=[[0.0, 0.0, 0.5]],
+    size: Annotated[Many[Positive], Field(min_length=1, max_length=3)] = required(
+        "width along y and height along z of a wall, edges of a box, radius of a sphere, length "
+        "of the unit of a mesh [m]",
+        [2.0, 2.0],
     )
-    size: Annotated[tuple[Positive, ...], Field(strict=False, min_length=1, max_length=3)] = Field(
-        description="width along y and height along z of a wall, edges of a box, radius of a "
-        "sphere, length of the unit of a mesh [m]",
-        examples=[[2.0, 2.0]],
+    file: str | None = default(
+        None, "STL or OBJ file of a mesh, relative to the scenario's folder", "valve.stl"
     )
-    file: str | None = Field(
-        None,
-        description="STL or OBJ file of a mesh, relative to the scenario's folder",
-        examples=["valve.stl"],
-    )
-    joint: Literal["fixed", "hinged", "free"] = Field(
-        "fixed", description="whether it moves, and how"
-    )
-    mass: Mass | None = Field(
-        None, description="of one that moves; evenly spread [kg]", examples=[1.0]
-    )
-    friction: NonNegative = Field(0.5, description="coefficient of sliding friction [-]")
-    softness: Softness = Field(
+    joint: Literal["fixed", "hinged", "free"] = default("fixed", "whether it moves, and how")
+    mass: Mass | None = default(None, "of one that moves; evenly spread [kg]", 1.0)
+    friction: NonNegative = default(0.5, "coefficient of sliding friction [-]")
+    softness: Softness = default(
         0.01,
-        description="time constant of its contacts, at least two time steps: twice as soft, half "
-        "the force of an impact [s]",
+        "time constant of its contacts, at least two time steps: twice as soft, half the force of "
+        "an impact [s]",
     )
-    hinge: Vector3 = Field(
-        (0.0, 0.0, 0.0),
-        description="a point of the hinge, in its own axes [m]",
-        examples=[[0.0, 0.5, 0.0]],
+    hinge: Vector3 = default(ZEROS, "a point of the hinge, in its own axes [m]", [0.0, 0.5, 0.0])
+    axis: Direction = default((0.0, 0.0, 1.0), "of the hinge, in its own axes [-]")
+    damping: NonNegative = default(0.0, "of the hinge [N m s/rad]", 0.1)
+    velocity: Vector3 = default(
+        ZEROS, "of a free one at time zero, in the world [m/s]", [0.2, 0.0, 0.0]
     )
-    axis: Direction = Field((0.0, 0.0, 1.0), description="of the hinge, in its own axes [-]")
-    damping: NonNegative = Field(0.0, description="of the hinge [N m s/rad]", examples=[0.1])
-    velocity: Vector3 = Field(
-        (0.0, 0.0, 0.0),
-        description="of a free one at time zero, in the world [m/s]",
-        examples=[[0.2, 0.0, 0.0]],
-    )
-    floating: bool = Field(
-        False, description="whether a free one has no weight, as on a cart or a boat"
-    )
+    floating: bool = default(False, "whether a free one has no weight, as on a cart or a boat")
 
     def _check_values(self) -> None:
         if len(self.size) != SIZES[self.type]:
@@ -143,18 +135,14 @@ class ToolTable(Table):
 
     table_name = "tool"
 
-    type: Literal["stick", "plate"] = Field(
-        "stick", description="a stick with a round tip, or a disc at the end of one"
+    type: Literal["stick", "plate"] = default(
+        "stick", "a stick with a round tip, or a disc at the end of one"
     )
-    position: Vector3 = Field(
-        (0.0, 0.0, 0.0),
-        description="where it begins, in body axes [m]",
-        examples=[[0.05, 0.0, 0.0]],
-    )
-    direction: Direction = Field((1.0, 0.0, 0.0), description="toward its tip, body axes [-]")
-    length: Positive = Field(description="to its tip [m]", examples=[0.3])
-    radius: Positive = Field(0.01, description="of the stick or of the disc [m]")
-    mass: Annotated[float, Field(ge=0.0, le=1e6)] = Field(0.0, description="evenly spread [kg]")
+    position: Vector3 = default(ZEROS, "where it begins, in body axes [m]", [0.05, 0.0, 0.0])
+    direction: Direction = default((1.0, 0.0, 0.0), "toward its tip, body axes [-]")
+    length: Positive = required("to its tip [m]", 0.3)
+    radius: Positive = default(0.01, "of the stick or of the disc [m]")
+    mass: Annotated[float, Field(ge=0.0, le=1e6)] = default(0.0, "evenly spread [kg]")
 
     def _check_values(self) -> None:
         if not any(self.direction):
@@ -173,24 +161,20 @@ class PayloadTable(Table):
 
     table_name = "payload"
 
-    mass: Mass = Field(description="of the load [kg]", examples=[0.1])
-    length: Positive = Field(
-        description="from the attachment to the center of the load [m]", examples=[1.0]
-    )
-    attachment: Vector3 = Field(
-        (0.0, 0.0, 0.0), description="in body axes [m]", examples=[[0.0, 0.0, -0.05]]
-    )
-    radius: Positive = Field(0.03, description="of the load, a ball [m]")
-    rigid: bool = Field(False, description="whether a fixed rod replaces the cable")
-    swing: Annotated[float, Field(ge=-0.5 * pi, le=0.5 * pi)] = Field(
-        0.0, description="angle of the cable at time zero, from straight down toward +x [rad]"
+    mass: Mass = required("of the load [kg]", 0.1)
+    length: Positive = required("from the attachment to the center of the load [m]", 1.0)
+    attachment: Vector3 = default(ZEROS, "in body axes [m]", [0.0, 0.0, -0.05])
+    radius: Positive = default(0.03, "of the load, a ball [m]")
+    rigid: bool = default(False, "whether a fixed rod replaces the cable")
+    swing: Annotated[float, Field(ge=-0.5 * pi, le=0.5 * pi)] = default(
+        0.0, "angle of the cable at time zero, from straight down toward +x [rad]"
     )
 
-    swing_damping: Annotated[float, Field(ge=0.0, le=1.0)] = Field(
+    swing_damping: Annotated[float, Field(ge=0.0, le=1.0)] = default(
         0.0,
-        description="damping ratio that a law gives the swing: its vehicle goes after the load, by "
-        "the measured angle of the cable; not with python; 0 does not [-]",
-        examples=[0.5],
+        "damping ratio that a law gives the swing: its vehicle goes after the load, by the "
+        "measured angle of the cable; not with python; 0 does not [-]",
+        0.5,
     )
 
     def _check_values(self) -> None:
@@ -209,23 +193,15 @@ class CableTable(Table):
 
     table_name = "cable"
 
-    name: Name = Field(
-        description="its name, which begins the name of its column", examples=["sling"]
+    name: Name = required("its name, which begins the name of its column", "sling")
+    object: str = required("the name of a free object", "parcel")
+    vehicle: str = default(
+        "", "the name of the companion that it hangs on; default: the first vehicle", "wing"
     )
-    object: str = Field(description="the name of a free object", examples=["parcel"])
-    vehicle: str = Field(
-        "",
-        description="the name of the companion that it hangs on; default: the first vehicle",
-        examples=["wing"],
-    )
-    attachment: Vector3 = Field(
-        (0.0, 0.0, 0.0), description="in body axes [m]", examples=[[0.0, 0.0, -0.05]]
-    )
-    length: Positive = Field(description="to the center of the object [m]", examples=[1.0])
-    start: NonNegative = Field(0.0, description="from when it holds [s]", examples=[5.0])
-    end: Positive | None = Field(
-        None, description="when it releases; default: never [s]", examples=[8.0]
-    )
+    attachment: Vector3 = default(ZEROS, "in body axes [m]", [0.0, 0.0, -0.05])
+    length: Positive = required("to the center of the object [m]", 1.0)
+    start: NonNegative = default(0.0, "from when it holds [s]", 5.0)
+    end: Positive | None = default(None, "when it releases; default: never [s]", 8.0)
 
     def _check_values(self) -> None:
         if self.end is not None and self.end <= self.start:
