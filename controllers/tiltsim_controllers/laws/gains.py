@@ -133,7 +133,7 @@ class PoleTable(Keys):
     @property
     def poles(self) -> Poles:
         """The poles as `gains_from_poles` takes them."""
-        return Poles(self.bandwidth, self.damping)
+        return Poles(**dict(self))
 
 
 class IntegralPoleTable(PoleTable):
@@ -144,10 +144,6 @@ class IntegralPoleTable(PoleTable):
         description="pole of integral action; 0 disables it; needs gait_rate_feedforward [rad/s]",
         examples=[0.5],
     )
-
-    @property
-    def poles(self) -> Poles:
-        return Poles(self.bandwidth, self.damping, self.integral)
 
 
 class PolePlacementTable(Keys):
