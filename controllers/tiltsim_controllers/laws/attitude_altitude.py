@@ -15,7 +15,7 @@ from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.code.traceable import traceable
 from tiltsim_controllers.gaits.parameters import NO_KNOTS, GaitParameters
 from tiltsim_controllers.laws.allocation import RotorRange
-from tiltsim_controllers.laws.decouplers import (
+from tiltsim_controllers.laws.feedback import (
     CONVENTIONAL,
     EXACT,
     NONE,

@@ -10,20 +10,18 @@ from pydantic import Field
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.gaits.parameters import GaitParameters
 from tiltsim_controllers.laws.allocation import RotorRange
-from tiltsim_controllers.laws.decouplers import (
+from tiltsim_controllers.laws.feedback import (
     CONVENTIONAL,
     EXACT,
-    conventional_decoupler,
-    exact_decoupler,
-    modified_decoupler,
-)
-from tiltsim_controllers.laws.feedback import (
     angular_jerk,
     attitude_jerk,
     body_rate_matrix,
+    conventional_decoupler,
+    exact_decoupler,
     force_control,
     integrator_rate,
     limited_acceleration,
+    modified_decoupler,
     position_feedback,
 )
 from tiltsim_controllers.laws.gains import Gains, GivenGains, IntegralGains
