@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tiltsim_controllers.laws.decouplers import (
+from tiltsim_controllers.laws.feedback import (
     CONVENTIONAL,
     EXACT,
     conventional_decoupler,

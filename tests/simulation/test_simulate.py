@@ -14,7 +14,7 @@ from tiltsim.plants.factory import make_plant
 from tiltsim.plants.mujoco_plant import MujocoPlant
 from tiltsim.system import progress
 from tiltsim.vehicles.rotorcraft import COLUMNS
-from tiltsim_controllers.laws.decouplers import DECOUPLERS
+from tiltsim_controllers.laws.feedback import DECOUPLERS
 from tiltsim_controllers.laws.gains import GAIN_SETS
 from tiltsim_controllers.vehicle.parameters import PRESETS
 from tiltsim_controllers.vehicle.states import TILTROTOR_FIELDS

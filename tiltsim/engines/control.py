@@ -1,6 +1,6 @@
 """Engines: the control step as Python on floats, or as machine code in MuJoCo's control callback.
 
-Machine code reads MuJoCo's state in place (`tiltsim.engines.mjdata_layout`). It also records
+Machine code reads MuJoCo's state in place (`tiltsim.engines.machine_code`). It also records
 samples, so that a flight of any length runs without returning to Python and without holding its
 lock.
 """
@@ -20,8 +20,7 @@ from tiltsim.closed_loop.userdata import CONTROL_PERIOD, EVALUATIONS, HEADER_SIZ
 from tiltsim.engines.base import Callback, EngineName, check_model, vectors_of
 from tiltsim.engines.glue import CALLBACK, EMPTY, filled
 from tiltsim.engines.glue import RECORDER as RECORDER_TEXT
-from tiltsim.engines.machine_code import MachineCode
-from tiltsim.engines.mjdata_layout import mjdata_layout
+from tiltsim.engines.machine_code import MachineCode, mjdata_layout
 from tiltsim.engines.programs import KEPT, LoopPrograms, setup_of
 from tiltsim.system.files import one_thread_at_a_time
 from tiltsim.system.hooks import mujoco_hooks

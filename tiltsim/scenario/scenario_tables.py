@@ -118,13 +118,19 @@ class ScenarioTables(WithAutopilot):
         """Whether the model has more in it than the vehicle and the ground."""
         return bool(self.object) or self.tool is not None or self.payload is not None
 
-    def require_alone(self, analysis: str) -> None:
-        """Refuse objects, loads and companions for an analysis, named in the `InputError`."""
-        if self.has_objects or self.companion:
-            raise InputError(
-                f"{self.address or 'scenario'}: {analysis} takes a vehicle alone; remove "
-                "[[object]], [tool], [payload] and [[companion]]"
-            )
+    def require_alone(self, analysis: str, *, loaded: bool = False) -> None:
+        """Refuse others, and unless ``loaded`` tool and load, for an analysis.
+
+        Raises:
+            InputError: It begins with the name of the analysis.
+        """
+        others: dict[str, Any] = {"[[object]]": self.object, "[[companion]]": self.companion}
+        if not loaded:
+            others |= {"[tool]": self.tool, "[payload]": self.payload}
+        found = ", ".join(name for name, tables in others.items() if tables)
+        if found:
+            where = self.address or "scenario"
+            raise InputError(f"{where}: {analysis} takes a vehicle alone; remove {found}")
 
     @property
     def time_tables(self) -> dict[str, TimeTable]:

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from tiltsim_controllers.analysis.stability import third_order_loop
-from tiltsim_controllers.laws.decouplers import conventional_decoupler, modified_decoupler
+from tiltsim_controllers.laws.feedback import conventional_decoupler, modified_decoupler
 from tiltsim_controllers.laws.gains import GAIN_SETS
 from tiltsim_controllers.vehicle.decoupling_matrix import (
     sines_and_cosines,
