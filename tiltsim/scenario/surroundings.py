@@ -22,13 +22,10 @@ from tiltsim.scenario.table import (
 )
 
 
-class GroundTable(Table):
+class GroundTable(Ground, Table):
     """Ground to take off from and land on; without this table there are no contacts."""
 
     model_config = example(height=0.0)
-
-    height: float = default(Ground.height, "z of the surface in the world [m]")
-    friction: Positive = default(Ground.friction, "coefficient of sliding friction [-]")
 
 
 class Acceleration(Table):
