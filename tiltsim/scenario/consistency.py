@@ -47,7 +47,7 @@ def check_consistency(scenario: ScenarioTables) -> None:
     _check_claims(scenario)
     _check_engine(scenario)
     scenario.controller.check_scenario(scenario)
-    _check_rigid_body(scenario)
+    _check_plant(scenario)
     check_companions(scenario)
 
 
@@ -65,16 +65,16 @@ def _check_engine(scenario: ScenarioTables) -> None:
         )
 
 
-def _check_rigid_body(scenario: ScenarioTables) -> None:
-    """Refuse vehicles that the plant ``rigid_body`` cannot be."""
-    vehicle = scenario.vehicle
-    if scenario.simulation.plant != "rigid_body":
+def _check_plant(scenario: ScenarioTables) -> None:
+    """Refuse vehicles that a plant of equations other than the thesis's cannot be."""
+    vehicle, plant = scenario.vehicle, scenario.simulation.plant
+    if plant in ("mujoco", "thesis"):
         return
     if not isinstance(vehicle, RotorcraftTable):
         reason = f"supports no {vehicle.model}; use mujoco or thesis"
         raise scenario.mistake("simulation.plant", reason)
     if isinstance(vehicle, VehicleTable):
-        scenario.require("vehicle.pod", PodTable(), "the rigid_body plant has massless pods")
+        scenario.require("vehicle.pod", PodTable(), f"the {plant} plant has massless pods")
     file = vehicle.user_vehicle
     if file is not None and file.unmodeled_properties:
         reason = f"neglects of vehicle.mjcf {file.unmodeled_properties}; use mujoco"
