@@ -2,33 +2,29 @@
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Iterator
 from functools import reduce
 from operator import or_
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, get_args
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
-from tiltsim.scenario.baseline_controllers import GeometricController, IndiController, PidController
+from tiltsim.scenario import (
+    baseline_controllers,
+    lqr_controller,
+    multirotor_controllers,
+    quadrotor_controllers,
+    tilt_car_controllers,
+    tiltrotor_controllers,
+    vectoring_controller,
+)
 from tiltsim.scenario.controller_packages import installed_controllers
 from tiltsim.scenario.controller_table import ControllerTable
 from tiltsim.scenario.law_controller import TiltingTable
-from tiltsim.scenario.lqr_controller import LqrController
 from tiltsim.scenario.messages import InvalidValueError
-from tiltsim.scenario.multirotor_controllers import AttitudeForceController
-from tiltsim.scenario.quadrotor_controllers import (
-    QuadrotorAttitudeAltitudeController,
-    SwitchingController,
-    YawPositionController,
-)
 from tiltsim.scenario.table import Positive, default, example, required
-from tiltsim.scenario.tilt_car_controllers import (
-    FourthDerivativeController,
-    PlannedDirectionController,
-    ThirdDerivativeController,
-)
-from tiltsim.scenario.tiltrotor_controllers import AttitudeAltitudeController, FullPoseController
-from tiltsim.scenario.vectoring_controller import VectoringController
 
 DEFAULT_LAW: Final = "attitude_altitude"
 
@@ -124,24 +120,27 @@ def _law(value: Any) -> str:
     return law if isinstance(law, str) else ""
 
 
-_BUILT_IN: Final[dict[str, type[ControllerTable]]] = {
-    "attitude_altitude": AttitudeAltitudeController,
-    "full_pose": FullPoseController,
-    "yaw_position": YawPositionController,
-    "switching": SwitchingController,
-    "quadrotor_attitude_altitude": QuadrotorAttitudeAltitudeController,
-    "attitude_force": AttitudeForceController,
-    "geometric": GeometricController,
-    "pid": PidController,
-    "indi": IndiController,
-    "lqr": LqrController,
-    "vectoring": VectoringController,
-    "python": PythonController,
-    "numpy": NumpyController,
-    "tilt_car_third_derivative": ThirdDerivativeController,
-    "tilt_car_fourth_derivative": FourthDerivativeController,
-    "tilt_car_planned_direction": PlannedDirectionController,
-}
+def _tables(*modules: str) -> Iterator[tuple[str, type[ControllerTable]]]:
+    """The tables that modules define, each with its law."""
+    for module in modules:
+        for table in vars(sys.modules[module]).values():
+            if getattr(table, "__module__", "") == module and hasattr(table, "model_fields"):
+                law = get_args(table.model_fields["law"].annotation)
+                yield from ((name, table) for name in law)
+
+
+_BUILT_IN: Final = dict(
+    _tables(
+        tiltrotor_controllers.__name__,
+        quadrotor_controllers.__name__,
+        multirotor_controllers.__name__,
+        baseline_controllers.__name__,
+        lqr_controller.__name__,
+        vectoring_controller.__name__,
+        __name__,
+        tilt_car_controllers.__name__,
+    )
+)
 
 CONTROLLERS: Final = _BUILT_IN | installed_controllers(_BUILT_IN)
 """The tables of all laws by their names: built-in laws, then laws of installed packages."""
