@@ -21,7 +21,7 @@ from tiltsim_controllers.laws.geometric import (
 from tiltsim_controllers.laws.indi import Indi, indi, state_units
 from tiltsim_controllers.laws.pid import STATES, Pid, pid
 from tiltsim_controllers.mathematics.scalar import Values
-from tiltsim_controllers.vehicle.effectiveness import CONSTANT, COSINE, ROTOR_FLOATS, SINE
+from tiltsim_controllers.vehicle.rotors import CONSTANT, COSINE, ROTOR_FLOATS, SINE
 
 FASTEST: Final = 1e6
 """rad/s, in place of no limit."""

@@ -11,7 +11,7 @@ from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.baseline_controllers import CompensatingController
 from tiltsim.scenario.law_controller import Airframe
 from tiltsim.scenario.messages import InvalidValueError
-from tiltsim_controllers.gaits.parameters import CUBIC
+from tiltsim_controllers.gaits.motion import CUBIC
 from tiltsim_controllers.gaits.plans import Gait
 from tiltsim_controllers.laws.decouplers import exact_decoupler
 from tiltsim_controllers.laws.lqr import Lqr, Parameters, lqr, lqr_along
@@ -25,7 +25,7 @@ from tiltsim_controllers.laws.periodic_lqr import (
     regulator_about_orbit,
 )
 from tiltsim_controllers.mathematics.scalar import Floats, Values
-from tiltsim_controllers.vehicle.effectiveness import force_and_torque, table_per_newton
+from tiltsim_controllers.vehicle.rotors import force_and_torque, table_per_newton
 
 
 class Weights(NamedTuple):

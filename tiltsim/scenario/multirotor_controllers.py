@@ -23,7 +23,7 @@ from tiltsim_controllers.gaits.plans import Gait
 from tiltsim_controllers.laws.attitude_altitude import PUBLISHED_DECOUPLING
 from tiltsim_controllers.laws.multirotor_steps import RESTORING, AttitudeForce, Form
 from tiltsim_controllers.mathematics.scalar import Floats, Triple
-from tiltsim_controllers.vehicle.effectiveness import force_and_torque
+from tiltsim_controllers.vehicle.rotors import force_and_torque
 
 
 class AttitudeForceController(AttitudeForce, GaitFollowingController, FailureAwareController):

@@ -13,8 +13,12 @@ from tiltsim.scenario.messages import choose
 from tiltsim.scenario.reference_table import PositionReference
 from tiltsim.scenario.table import NonNegative, Positive, Table, Vector3
 from tiltsim_controllers.mathematics.attitude import rotation_matrix
-from tiltsim_controllers.references.trajectories import REFERENCE_TYPES, ReferenceParameters
-from tiltsim_controllers.references.waypoints import COEFFICIENTS, minimum_snap_knots
+from tiltsim_controllers.references.trajectories import (
+    COEFFICIENTS,
+    REFERENCE_TYPES,
+    ReferenceParameters,
+    minimum_snap_knots,
+)
 
 if TYPE_CHECKING:
     from tiltsim_controllers.mathematics.scalar import Floats, Triple, Values

@@ -25,8 +25,9 @@ from tiltsim_controllers.laws.supervised_vehicles import (
     watched,
 )
 from tiltsim_controllers.laws.supervisor import BAND, LAG, STRATEGIES, Supervisor, turned_along
-from tiltsim_controllers.vehicle.effectiveness import cross_table, tilt_of_rotor
+from tiltsim_controllers.vehicle.cross import cross_table
 from tiltsim_controllers.vehicle.parameters import PRESETS, drag_ratio
+from tiltsim_controllers.vehicle.rotors import tilt_of_rotor
 
 assess = SUPERVISION.assess
 threshold_clearance = SUPERVISION.clearance
