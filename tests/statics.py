@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tiltsim_controllers.laws.decouplers import (
+from tiltsim_controllers.laws.feedback import (
     CONVENTIONAL,
     EXACT,
     conventional_decoupler,

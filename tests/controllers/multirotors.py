@@ -13,7 +13,7 @@ from tiltsim_controllers.code.program import trace_vectors
 from tiltsim_controllers.gaits import plans
 from tiltsim_controllers.laws.allocation import RotorRange
 from tiltsim_controllers.laws.attitude_altitude import EXACT_DECOUPLING
-from tiltsim_controllers.laws.decouplers import EXACT
+from tiltsim_controllers.laws.feedback import EXACT
 from tiltsim_controllers.laws.gains import GAIN_SETS, IntegralGains
 from tiltsim_controllers.laws.gait_feedforward import multirotor_law_of
 from tiltsim_controllers.laws.multirotor_steps import (

@@ -270,7 +270,7 @@ def test_the_built_in_command_among_objects_is_the_loop_s():
 def test_linear_analysis_refuses_objects():
     hovering = tiltsim.load_scenario(PUSH, FREE)
     for analysis in (tiltsim.linearize, tiltsim.stability):
-        assert "takes a vehicle alone" in refusal(analysis, hovering)
+        assert "takes a vehicle alone; remove [[object]]" in refusal(analysis, hovering)
 
 
 def test_a_push_of_a_custom_controller_has_its_columns_and_metric():

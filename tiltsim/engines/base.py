@@ -6,7 +6,7 @@ process, so an engine checks that a model is ours before it writes to it.
 """
 
 from collections.abc import Callable
-from typing import Any, Literal, NamedTuple, Protocol
+from typing import Literal, NamedTuple
 
 import mujoco
 
@@ -17,19 +17,6 @@ from tiltsim_controllers.mathematics.scalar import Floats
 EngineName = Literal["python", "native", "jax"]
 
 Callback = Callable[[mujoco.MjModel, mujoco.MjData], None]
-
-
-class Engine(Protocol):
-    """Evaluates the control step of one model whenever MuJoCo needs its controls."""
-
-    name: EngineName
-
-    def callback(self) -> Any:
-        """The control callback: a Python function, or a C function as `ctypes` shows it.
-
-        It evaluates the whole step or, between the samples of a held controller, only those
-        controls that follow the state, as thrusts follow the rotor speeds.
-        """
 
 
 class Vectors(NamedTuple):

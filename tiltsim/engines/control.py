@@ -1,6 +1,6 @@
 """Engines: the control step as Python on floats, or as machine code in MuJoCo's control callback.
 
-Machine code reads MuJoCo's state in place (`tiltsim.engines.mjdata_layout`). It also records
+Machine code reads MuJoCo's state in place (`tiltsim.engines.machine_code`). It also records
 samples, so that a flight of any length runs without returning to Python and without holding its
 lock.
 """
@@ -17,11 +17,10 @@ import mujoco
 
 from tiltsim.closed_loop.assembly import Assembly, ProgramKey, program_key
 from tiltsim.closed_loop.userdata import CONTROL_PERIOD, EVALUATIONS, HEADER_SIZE, RECORDER
-from tiltsim.engines.base import Callback, Engine, EngineName, check_model, vectors_of
+from tiltsim.engines.base import Callback, EngineName, check_model, vectors_of
 from tiltsim.engines.glue import CALLBACK, EMPTY, filled
 from tiltsim.engines.glue import RECORDER as RECORDER_TEXT
-from tiltsim.engines.machine_code import MachineCode
-from tiltsim.engines.mjdata_layout import mjdata_layout
+from tiltsim.engines.machine_code import MachineCode, mjdata_layout
 from tiltsim.engines.programs import KEPT, LoopPrograms, setup_of
 from tiltsim.system.files import one_thread_at_a_time
 from tiltsim.system.hooks import mujoco_hooks
@@ -55,38 +54,30 @@ def control_step(assembly: Assembly, user: list[float], name: str) -> Callable[.
     return LoopPrograms(key).functions_in_mujoco()[name].plain(setup_of(assembly.loop, user))
 
 
-class PythonEngine(Engine):
-    """Runs the control step on Python floats."""
+def python_callback(assembly: Assembly, data: mujoco.MjData) -> Callback:
+    """The control step on Python's floats; see `make_callback`."""
+    user = data.userdata[HEADER_SIZE:].tolist()
+    controls = control_step(assembly, user, "controls")
+    # Views of MuJoCo's memory; a look-up at every call would take a tenth of the callback.
+    vectors: Any = *vectors_of(assembly.loop, data), data.ctrl
+    qpos, qvel, act, others, history, ctrl = (memoryview(vector) for vector in vectors)
+    header: Any = memoryview(data.userdata[:HEADER_SIZE])
+    period = header[CONTROL_PERIOD]
+    hold = control_step(assembly, user, "hold") if period else controls
+    write_controls = partial(Struct(f"{len(ctrl)}d").pack_into, ctrl, 0)
 
-    name: EngineName = "python"
+    def evaluate(_model: mujoco.MjModel, called: mujoco.MjData) -> None:
+        if called is not data:
+            return  # another model of this process
+        count = header[EVALUATIONS]
+        sampled = period == 0.0 or count % period == 0.0
+        step = controls if sampled else hold
+        held = () if sampled else ctrl.tolist()
+        state = qpos.tolist(), qvel.tolist(), act.tolist(), others.tolist(), history.tolist()
+        write_controls(*step(header.tolist(), *state, held))
+        header[EVALUATIONS] = count + 1.0
 
-    def __init__(self, assembly: Assembly, model: mujoco.MjModel, data: mujoco.MjData) -> None:
-        check_model(assembly.loop, model, data)
-        user = data.userdata[HEADER_SIZE:].tolist()
-        controls = control_step(assembly, user, "controls")
-        # Views of MuJoCo's memory; a look-up at every call would take a tenth of the callback.
-        vectors: Any = *vectors_of(assembly.loop, data), data.ctrl
-        qpos, qvel, act, others, history, ctrl = (memoryview(vector) for vector in vectors)
-        header: Any = memoryview(data.userdata[:HEADER_SIZE])
-        period = header[CONTROL_PERIOD]
-        hold = control_step(assembly, user, "hold") if period else controls
-        write_controls = partial(Struct(f"{len(ctrl)}d").pack_into, ctrl, 0)
-
-        def evaluate(_model: mujoco.MjModel, called: mujoco.MjData) -> None:
-            if called is not data:
-                return  # another model of this process
-            count = header[EVALUATIONS]
-            sampled = period == 0.0 or count % period == 0.0
-            step = controls if sampled else hold
-            held = () if sampled else ctrl.tolist()
-            state = qpos.tolist(), qvel.tolist(), act.tolist(), others.tolist(), history.tolist()
-            write_controls(*step(header.tolist(), *state, held))
-            header[EVALUATIONS] = count + 1.0
-
-        self._callback = evaluate
-
-    def callback(self) -> Callback:
-        return self._callback
+    return evaluate
 
 
 def control_callback(callback: Any) -> AbstractContextManager[None]:
@@ -97,8 +88,6 @@ def control_callback(callback: Any) -> AbstractContextManager[None]:
     """
     clock = None
     if hasattr(callback, "argtypes"):  # a C function, as ctypes shows them
-        from tiltsim.engines.control import compile_stopped_clock
-
         clock = compile_stopped_clock()
     return mujoco_hooks(callback, clock)
 
@@ -132,19 +121,6 @@ def compile_control(key: ProgramKey) -> Any:
     return code.function("callback", None, _POINTER, _POINTER)
 
 
-class NativeEngine(Engine):
-    """Runs the control step as machine code."""
-
-    name: EngineName = "native"
-
-    def __init__(self, assembly: Assembly, model: mujoco.MjModel, data: mujoco.MjData) -> None:
-        check_model(assembly.loop, model, data)
-        self._control = compile_control(program_key(assembly))
-
-    def callback(self) -> Any:
-        return self._control
-
-
 @cache
 def _empty() -> MachineCode:
     return MachineCode(EMPTY)
@@ -164,21 +140,23 @@ def compile_stopped_clock() -> Any:
     return _empty().function("clock", ctypes.c_double)
 
 
-def make_engine(
-    name: EngineName, assembly: Assembly, model: mujoco.MjModel, data: mujoco.MjData
-) -> Engine:
-    """Build an engine for a model whose parameters are in ``data.userdata`` already.
+def make_callback(
+    engine: EngineName, assembly: Assembly, model: mujoco.MjModel, data: mujoco.MjData
+) -> Any:
+    """The control callback of an engine: a Python function, or a C function as `ctypes` shows it.
+
+    It evaluates the whole step or, between the samples of a held controller, only those controls
+    that follow the state, as thrusts follow the rotor speeds.
 
     Args:
-        name: The engine.
+        engine: The engine.
         assembly: The flight.
-        model, data: A model for its loop and its data.
+        model, data: A model for its loop and its data, which has the parameters in ``userdata``.
 
     Raises:
         ValueError: If model and data do not belong to a flight of its loop.
     """
-    if name == "python":
-        return PythonEngine(assembly, model, data)
-    from tiltsim.engines.control import NativeEngine
-
-    return NativeEngine(assembly, model, data)
+    check_model(assembly.loop, model, data)
+    if engine == "python":
+        return python_callback(assembly, data)
+    return compile_control(program_key(assembly))

@@ -214,6 +214,7 @@ class RotorFunctions(VehicleFunctions):
     # --- on equations of motion
 
     def initial_state(self, plan: FlightPlan) -> Vector:
+        """Motion, rotor speeds and the states of the law."""
         speeds, states = initial_rotor_speeds(plan), self.law.initial_states(plan)
         return (*initial_state(plan.scenario, speeds), *states)
 

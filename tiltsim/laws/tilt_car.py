@@ -59,6 +59,7 @@ class CarFunctions(VehicleFunctions):
         return xp.hstack([qpos[:2], qvel[:2], yaw, r, alpha, alpha_rate])
 
     def in_sample(self, time: Any, values: Any) -> Seen:
+        """From the fields of a sample."""
         v = parts(
             values, motion=4, yaw=1, _r=1, alpha=1, _rate=1, speeds=2, states=len(self.law.states)
         )
@@ -67,9 +68,11 @@ class CarFunctions(VehicleFunctions):
 
     @property
     def names(self) -> tuple[str, ...]:
+        """Names of the columns of `references`."""
         return ("x_ref", "y_ref", "vx_ref", "vy_ref", *(self.law.signals or ()))
 
     def references(self, time: Any, values: Any, parameters: Any, knots: Any) -> Any:
+        """Position and velocity to track, then the law's signals."""
         motion = reference_motion(time, parameters.law.reference, knots)[:2, :2]
         signals = self.law.step(self.in_sample(time, values), parameters.law, knots).signals
         return xp.hstack([motion.ravel(), signals])

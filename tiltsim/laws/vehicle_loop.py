@@ -1,10 +1,9 @@
 """Closed loops of laws with any kind of vehicle."""
 
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -40,66 +39,40 @@ def parts(vector: Any, **sizes: int) -> SimpleNamespace:
 
 
 @dataclass(frozen=True, eq=False)
-class VehicleFunctions(ABC):
+class VehicleFunctions:
     """The functions of arrays by which a law moves a kind of vehicle.
 
     In MuJoCo and on the equations of motion, ``parameters`` are a record with the law's own as
-    ``law``, and ``knots`` the table data of a flight; see `tiltsim.closed_loop.loop`.
+    ``law``, and ``knots`` the table data of a flight. A kind of vehicle has ``controls`` and
+    ``observe`` of `ClosedLoop`, the ``equation_...`` functions of `Equations`, and:
+
+    Attributes:
+        law: The law.
+        in_sample: ``(time, values)``: the vehicle as the law sees it, from the fields of a sample.
+        references: ``(time, values, parameters, knots)``: references and signals of a sample.
+        names: Their names, which are columns.
+        initial_state: ``(plan)``: the state of the equations at time zero.
     """
 
     law: Law
-
-    @abstractmethod
-    def controls(
-        self, time: Any, qpos: Any, qvel: Any, act: Any, parameters: Any, knots: Any
-    ) -> Any:
-        """The control step, see `ClosedLoop`."""
+    controls: ClassVar[Callable[..., Any]]
+    observe: ClassVar[Callable[..., Any]]
+    in_sample: ClassVar[Callable[..., Seen]]
+    references: ClassVar[Callable[..., Any]]
+    names: ClassVar[Any]
+    initial_state: ClassVar[Callable[..., Vector]]
+    equation_inputs: ClassVar[Callable[..., Any]]
+    equation_rates: ClassVar[Callable[..., Any]]
+    observe_equations: ClassVar[Callable[..., Any]]
 
     def hold(self, time: Any, qpos: Any, qvel: Any, act: Any, ctrl: Any, parameters: Any) -> Any:
         """The controls between samples, see `ClosedLoop`."""
         return ctrl
 
-    @abstractmethod
-    def observe(self, qpos: Any, qvel: Any, act: Any, ctrl: Any) -> Any:
-        """A sample, see `ClosedLoop`."""
-
-    @abstractmethod
-    def in_sample(self, time: Any, values: Any) -> Seen:
-        """The vehicle as the law sees it, from the fields of a sample."""
-
-    @property
-    @abstractmethod
-    def names(self) -> tuple[str, ...]:
-        """Names of the columns of `references`."""
-
-    @abstractmethod
-    def references(self, time: Any, values: Any, parameters: Any, knots: Any) -> Any:
-        """References and signals of a sample."""
-
     def signs(self, time: Any, values: Any, parameters: Any, knots: Any) -> Any:
         """See `ClosedLoop.sign_check_values`."""
         assert self.law.signs is not None
         return self.law.signs(self.in_sample(time, values), parameters.law, knots)
-
-    @abstractmethod
-    def initial_state(self, plan: FlightPlan) -> Vector:
-        """The state of the equations at time zero."""
-
-    @abstractmethod
-    def equation_inputs(self, time: Any, state: Any, parameters: Any, knots: Any) -> Any:
-        """See `Equations`."""
-
-    @abstractmethod
-    def equation_rates(
-        self, time: Any, state: Any, inputs: Any, parameters: Any, knots: Any, disturbance: Any
-    ) -> Any:
-        """See `Equations`."""
-
-    @abstractmethod
-    def observe_equations(
-        self, time: Any, state: Any, inputs: Any, parameters: Any, knots: Any
-    ) -> Any:
-        """See `Equations`."""
 
     def closed_loop(
         self,

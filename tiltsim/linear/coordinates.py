@@ -8,6 +8,7 @@ from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.closed_loop.loop import ClosedLoop
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.vehicles.rotorcraft.layout import layout_of
+from tiltsim.vehicles.rotorcraft.others import SWING
 from tiltsim_controllers.mathematics.attitude import quaternion_of_rotation, rotation_of_quaternion
 from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.vehicle.body import BODY_FIELDS
@@ -22,11 +23,12 @@ POSITION: Final = BODY_FIELDS[:3]
 VELOCITY: Final = BODY_FIELDS[3:6]
 BODY_RATES: Final = BODY_FIELDS[9:]
 PLANE: Final = ("x", "y", "vx", "vy")
+SWING_RATES: Final = ("swing_rate_x", "swing_rate_y")
 UNITS: Final = {
     **dict.fromkeys(POSITION, "m"),
     **dict.fromkeys(VELOCITY, "m/s"),
     **dict.fromkeys((*ROTATION_NAMES, "roll", "pitch", "yaw"), "rad"),
-    **dict.fromkeys(BODY_RATES, "rad/s"),
+    **dict.fromkeys((*BODY_RATES, *SWING_RATES), "rad/s"),
     **dict.fromkeys(("squared_speed_1", "squared_speed_2"), "rad^2/s^2"),
     "force": "N",
     **dict.fromkeys(("torque_x", "torque_y", "torque_z"), "N m"),
@@ -144,7 +146,7 @@ def numbered(kind: str, count: int) -> tuple[str, ...]:
 
 def is_of_vehicle(state: str) -> bool:
     """Whether a state is the vehicle's, not one of its controller or of commands under way."""
-    return state in BODY_FIELDS or state.startswith(("rotation_", "alpha", "rotor_speed"))
+    return state in BODY_FIELDS or state.startswith(("rotation_", "alpha", "rotor_speed", "swing_"))
 
 
 def activation_names(loop: ClosedLoop) -> tuple[str, ...]:
@@ -180,8 +182,9 @@ def mujoco_coordinates(loop: ClosedLoop) -> Coordinates:
         names = ("x", "y", "yaw", "alpha", "vx", "vy", "r", "alpha_rate")
         return _coordinates((*names, *activation_names(loop)), loop, 0)
     tilts = sizes.qpos - len(POSITION) - QUATERNION
-    places = (*POSITION, *ROTATION_NAMES, *numbered("alpha", tilts))
-    speeds = (*VELOCITY, *BODY_RATES, *numbered("alpha_rate", tilts))
+    swing, swinging = (SWING, SWING_RATES) if sizes.others else ((), ())
+    places = (*POSITION, *ROTATION_NAMES, *numbered("alpha", tilts), *swing)
+    speeds = (*VELOCITY, *BODY_RATES, *numbered("alpha_rate", tilts), *swinging)
     return _coordinates((*places, *speeds, *activation_names(loop)), loop, QUATERNION)
 
 

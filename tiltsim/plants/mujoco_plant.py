@@ -21,7 +21,7 @@ from tiltsim.closed_loop.userdata import (
     steps_taken,
 )
 from tiltsim.engines.base import EngineName, vectors_of
-from tiltsim.engines.control import control_callback, control_step, make_engine
+from tiltsim.engines.control import control_callback, control_step, make_callback
 from tiltsim.engines.programs import Recorder
 from tiltsim.models.cables import switch
 from tiltsim.plants.engine_choice import choose_engine
@@ -116,10 +116,10 @@ class MujocoPlant(Plant):
 
     def _prepare_engine(self) -> None:
         """Build the engine, which reads the parameters in ``userdata`` once."""
-        self._engine = make_engine(self.engine, self._assembly, self.model, self.data)
+        self._callback = make_callback(self.engine, self._assembly, self.model, self.data)
 
     def advance(self, steps: int) -> None:
-        with control_callback(self._engine.callback()):
+        with control_callback(self._callback):
             self._step(steps)
 
     def _step(self, steps: int) -> None:
@@ -144,8 +144,8 @@ class MujocoPlant(Plant):
 
     @property
     def callback(self) -> Any:
-        """The control callback for MuJoCo; see `tiltsim.engines.base.Engine.callback`."""
-        return self._engine.callback()
+        """The control callback for MuJoCo; see `tiltsim.engines.control.make_callback`."""
+        return self._callback
 
     @property
     def header_offset(self) -> int:

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Final, Literal
 from pydantic import Field, model_validator
 
 from tiltsim.scenario.messages import InvalidValueError
-from tiltsim.scenario.table import Positive, Table
+from tiltsim.scenario.table import Many, Positive, Table, default, required
 
 CONTROLLER: Final = {"law": "python", "function": "autopilot"}
 """The controller of a scenario with an autopilot."""
@@ -18,7 +18,7 @@ CHANNELS: Final = 32
 
 _OUTPUT: Final = re.compile(r"(rotor|along|across)_([1-9]\d?)")
 
-Row = Annotated[tuple[float, ...], Field(strict=False, min_length=2, max_length=17)]
+Row = Annotated[Many[float], Field(min_length=2, max_length=17)]
 
 
 class AutopilotTable(Table):
@@ -26,39 +26,38 @@ class AutopilotTable(Table):
 
     table_name = "autopilot"
 
-    type: Literal["ardupilot", "px4"] = Field(
-        description="ArduPilot's software in the loop, by its JSON interface over UDP; PX4's, by "
-        "MAVLink over TCP"
+    type: Literal["ardupilot", "px4"] = required(
+        "ArduPilot's software in the loop, by its JSON interface over UDP; PX4's, by MAVLink over "
+        "TCP"
     )
-    port: Annotated[int, Field(ge=1, le=65535)] = Field(
-        9002,
-        description="port of this machine, on loopback, to which the firmware sends; of PX4: 4560",
+    port: Annotated[int, Field(ge=1, le=65535)] = default(
+        9002, "port of this machine, on loopback, to which the firmware sends; of PX4: 4560"
     )
-    rate: Annotated[float, Field(ge=50.0, le=4000.0)] = Field(
+    rate: Annotated[float, Field(ge=50.0, le=4000.0)] = default(
         800.0,
-        description="exchanges per simulated second; must be at least 1.8 times the rate of the "
-        "firmware's main loop; of PX4: 250 [Hz]",
+        "exchanges per simulated second; must be at least 1.8 times the rate of the firmware's "
+        "main loop; of PX4: 250 [Hz]",
     )
-    outputs: Annotated[tuple[str, ...], Field(strict=False, max_length=CHANNELS)] = Field(
+    outputs: Annotated[Many[str], Field(max_length=CHANNELS)] = default(
         (),
-        description='what each output drives: "rotor_2" its speed, from 1000 to 2000 us, about '
-        '1500 us if the rotor reverses; "along_2" and "across_2" the parts of the thrust of a '
-        'tilting rotor along its upright axis and across; "" nothing; default: the rotors in order',
-        examples=[["rotor_3", "rotor_2", "rotor_1", "rotor_4"]],
+        'what each output drives: "rotor_2" its speed, from 1000 to 2000 us, about 1500 us if the '
+        'rotor reverses; "along_2" and "across_2" the parts of the thrust of a tilting rotor '
+        'along its upright axis and across; "" nothing; default: the rotors in order',
+        ["rotor_3", "rotor_2", "rotor_1", "rotor_4"],
     )
-    wait: Positive = Field(
-        20.0, description="longest time for the firmware to answer, before the link is lost [s]"
+    wait: Positive = default(
+        20.0, "longest time for the firmware to answer, before the link is lost [s]"
     )
-    hold: Positive = Field(
+    hold: Positive = default(
         90.0,
-        description="longest simulated time that the vehicle is held at rest until its thrust "
-        "exceeds its weight, in which a firmware starts its estimator [s]",
+        "longest simulated time that the vehicle is held at rest until its thrust exceeds its "
+        "weight, in which a firmware starts its estimator [s]",
     )
-    rc: Annotated[tuple[Row, ...], Field(strict=False, max_length=10_000)] = Field(
+    rc: Annotated[Many[Row], Field(max_length=10_000)] = default(
         (),
-        description="sticks and switches: rows of a time since the link began and the channels "
-        "from that time on [s, us]",
-        examples=[[[0.0, 1500, 1500, 1000, 1500], [40.0, 1500, 1500, 1700, 1500]]],
+        "sticks and switches: rows of a time since the link began and the channels from that time "
+        "on [s, us]",
+        [[0.0, 1500, 1500, 1000, 1500], [40.0, 1500, 1500, 1700, 1500]],
     )
 
     def _check_values(self) -> None:

@@ -2,33 +2,29 @@
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Iterator
 from functools import reduce
 from operator import or_
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, get_args
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
-from tiltsim.scenario.baseline_controllers import GeometricController, IndiController, PidController
+from tiltsim.scenario import (
+    baseline_controllers,
+    lqr_controller,
+    multirotor_controllers,
+    quadrotor_controllers,
+    tilt_car_controllers,
+    tiltrotor_controllers,
+    vectoring_controller,
+)
 from tiltsim.scenario.controller_packages import installed_controllers
 from tiltsim.scenario.controller_table import ControllerTable
 from tiltsim.scenario.law_controller import TiltingTable
-from tiltsim.scenario.lqr_controller import LqrController
 from tiltsim.scenario.messages import InvalidValueError
-from tiltsim.scenario.multirotor_controllers import AttitudeForceController
-from tiltsim.scenario.quadrotor_controllers import (
-    QuadrotorAttitudeAltitudeController,
-    SwitchingController,
-    YawPositionController,
-)
-from tiltsim.scenario.table import Positive, example
-from tiltsim.scenario.tilt_car_controllers import (
-    FourthDerivativeController,
-    PlannedDirectionController,
-    ThirdDerivativeController,
-)
-from tiltsim.scenario.tiltrotor_controllers import AttitudeAltitudeController, FullPoseController
-from tiltsim.scenario.vectoring_controller import VectoringController
+from tiltsim.scenario.table import Positive, default, example, required
 
 DEFAULT_LAW: Final = "attitude_altitude"
 
@@ -42,9 +38,9 @@ class OwnFunctionController(ControllerTable):
     follows_turns = True
     needs_four_rotors = False
 
-    function: str = Field(
-        description="FILE.py:NAME of a function or class; FILE in the scenario's folder",
-        examples=["my_controller.py:hover"],
+    function: str = required(
+        "FILE.py:NAME of a function or class; FILE in the scenario's folder",
+        "my_controller.py:hover",
     )
 
     @model_validator(mode="before")
@@ -80,7 +76,7 @@ class PythonController(OwnFunctionController):
     rotors_have_speeds = True
     leans_unrecorded = True
 
-    law: Literal["python"] = Field(description="a user's own controller")
+    law: Literal["python"] = required("a user's own controller")
 
 
 class NumpyController(OwnFunctionController, TiltingTable):
@@ -90,30 +86,26 @@ class NumpyController(OwnFunctionController, TiltingTable):
 
     reference_kinds = ("position", "pose", "attitude_altitude")
 
-    law: Literal["numpy"] = Field(
-        description="your own law, a function of NumPy arrays, which flies as compiled code"
+    law: Literal["numpy"] = required(
+        "your own law, a function of NumPy arrays, which flies as compiled code"
     )
-    parameters: dict[str, Any] = Field(
+    parameters: dict[str, Any] = default(
+        {}, "keys of the law, where it is a class, a tiltsim.LawController", {"stiffness": 4.0}
+    )
+    states: StateUnits = default(
+        {}, "the law's own states: their names and units", {"state_integral": "m s"}
+    )
+    discrete_states: StateUnits = default(
         {},
-        description="keys of the law, where it is a class, a tiltsim.LawController",
-        examples=[{"stiffness": 4.0}],
+        "states that the law sets at control samples, such as flags and queues: their names and "
+        "units; needs simulation.control_timestep > 0",
+        {"state_flag": "1"},
     )
-    states: StateUnits = Field(
-        {},
-        description="the law's own states: their names and units",
-        examples=[{"state_integral": "m s"}],
-    )
-    discrete_states: StateUnits = Field(
-        {},
-        description="states that the law sets at control samples, such as flags and queues: their "
-        "names and units; needs simulation.control_timestep > 0",
-        examples=[{"state_flag": "1"}],
-    )
-    push_stiffness: Positive | None = Field(
+    push_stiffness: Positive | None = default(
         None,
-        description="force per mass and per error of position that the law makes at rest, for a "
-        "reference that pushes; default: it does not push [1/s^2]",
-        examples=[4.0],
+        "force per mass and per error of position that the law makes at rest, for a reference "
+        "that pushes; default: it does not push [1/s^2]",
+        4.0,
     )
 
     @property
@@ -128,24 +120,27 @@ def _law(value: Any) -> str:
     return law if isinstance(law, str) else ""
 
 
-_BUILT_IN: Final[dict[str, type[ControllerTable]]] = {
-    "attitude_altitude": AttitudeAltitudeController,
-    "full_pose": FullPoseController,
-    "yaw_position": YawPositionController,
-    "switching": SwitchingController,
-    "quadrotor_attitude_altitude": QuadrotorAttitudeAltitudeController,
-    "attitude_force": AttitudeForceController,
-    "geometric": GeometricController,
-    "pid": PidController,
-    "indi": IndiController,
-    "lqr": LqrController,
-    "vectoring": VectoringController,
-    "python": PythonController,
-    "numpy": NumpyController,
-    "tilt_car_third_derivative": ThirdDerivativeController,
-    "tilt_car_fourth_derivative": FourthDerivativeController,
-    "tilt_car_planned_direction": PlannedDirectionController,
-}
+def _tables(*modules: str) -> Iterator[tuple[str, type[ControllerTable]]]:
+    """The tables that modules define, each with its law."""
+    for module in modules:
+        for table in vars(sys.modules[module]).values():
+            if getattr(table, "__module__", "") == module and hasattr(table, "model_fields"):
+                law = get_args(table.model_fields["law"].annotation)
+                yield from ((name, table) for name in law)
+
+
+_BUILT_IN: Final = dict(
+    _tables(
+        tiltrotor_controllers.__name__,
+        quadrotor_controllers.__name__,
+        multirotor_controllers.__name__,
+        baseline_controllers.__name__,
+        lqr_controller.__name__,
+        vectoring_controller.__name__,
+        __name__,
+        tilt_car_controllers.__name__,
+    )
+)
 
 CONTROLLERS: Final = _BUILT_IN | installed_controllers(_BUILT_IN)
 """The tables of all laws by their names: built-in laws, then laws of installed packages."""

@@ -13,7 +13,7 @@ from tiltsim.scenario.law_controller import Airframe
 from tiltsim.scenario.messages import InvalidValueError
 from tiltsim_controllers.gaits.motion import CUBIC
 from tiltsim_controllers.gaits.plans import Gait
-from tiltsim_controllers.laws.decouplers import exact_decoupler
+from tiltsim_controllers.laws.feedback import exact_decoupler
 from tiltsim_controllers.laws.lqr import Lqr, Parameters, lqr, lqr_along
 from tiltsim_controllers.laws.periodic_lqr import (
     LONGEST_PERIOD,

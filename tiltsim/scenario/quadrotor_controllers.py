@@ -18,14 +18,6 @@ class YawPositionController(YawPosition, ControllerTable):
     loop_gains = ("gains",)
 
 
-class QuadrotorAttitudeAltitudeController(QuadrotorAttitudeAltitude, ControllerTable):
-    """Attitude-altitude control of the quadrotor (ch. 2, Appendix B)."""
-
-    vehicle_models = ("quadrotor",)
-    reference_kinds = ("attitude_altitude",)
-    loop_gains = ("gains",)
-
-
 class SwitchingController(Switching, ControllerTable):
     """Yaw-position control that switches to attitude-altitude control in a zone (ch. 2)."""
 
@@ -40,3 +32,11 @@ class SwitchingController(Switching, ControllerTable):
             if low > high:
                 raise self.mistake(f"zone.{key}", "the first must not exceed the second")
         return self
+
+
+class QuadrotorAttitudeAltitudeController(QuadrotorAttitudeAltitude, ControllerTable):
+    """Attitude-altitude control of the quadrotor (ch. 2, Appendix B)."""
+
+    vehicle_models = ("quadrotor",)
+    reference_kinds = ("attitude_altitude",)
+    loop_gains = ("gains",)

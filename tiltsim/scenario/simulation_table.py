@@ -5,12 +5,14 @@ from typing import Annotated, Final, Literal
 from pydantic import Field
 
 from tiltsim.scenario.table import (
+    ZEROS,
     Angles3,
     NonNegative,
     Positive,
     PositiveEach,
     Table,
     Vector3,
+    default,
     example,
 )
 
@@ -36,54 +38,49 @@ class SimulationTable(Table):
     model_config = example(duration=20.0, plant="thesis")
     table_name = "simulation"
 
-    duration: Positive = Field(40.0, description="length of the flight [s]")
-    timestep: Annotated[float, Field(ge=1e-6, le=0.1)] = Field(
-        0.001, description="time step of the physics [s]"
+    duration: Positive = default(40.0, "length of the flight [s]")
+    timestep: Annotated[float, Field(ge=1e-6, le=0.1)] = default(
+        0.001, "time step of the physics [s]"
     )
-    control_timestep: NonNegative = Field(
+    control_timestep: NonNegative = default(
         0.0,
-        description="time between evaluations of the control law, a multiple of timestep; 0 "
-        "evaluates it at every stage of the integrator, as if it were continuous [s]",
-        examples=[0.004],
+        "time between evaluations of the control law, a multiple of timestep; 0 evaluates it at "
+        "every stage of the integrator, as if it were continuous [s]",
+        0.004,
     )
-    control_latency: NonNegative = Field(
-        0.0,
-        description="time from a measurement to its command, a multiple of control_timestep [s]",
-        examples=[0.008],
+    control_latency: NonNegative = default(
+        0.0, "time from a measurement to its command, a multiple of control_timestep [s]", 0.008
     )
-    record_timestep: Positive | None = Field(
+    record_timestep: Positive | None = default(
         None,
-        description="time between recorded samples; default: the multiple of timestep closest to "
-        "0.01 [s]",
-        examples=[0.02],
+        "time between recorded samples; default: the multiple of timestep closest to 0.01 [s]",
+        0.02,
     )
-    engine: Literal["auto", "python", "native", "jax"] = Field(
+    engine: Literal["auto", "python", "native", "jax"] = default(
         "auto",
-        description="evaluates the control law as Python or as compiled code, with bit-identical "
-        "flights; auto compiles for long flights; jax flies many on arrays, on the plants of "
-        "equations, thesis and rigid_body",
+        "evaluates the control law as Python or as compiled code, with bit-identical flights; "
+        "auto compiles for long flights; jax flies many on arrays, on the plants of equations, "
+        "thesis and rigid_body",
     )
-    precision: Literal["float64", "float32"] = Field(
-        "float64", description="numbers of the jax engine; the others always have float64"
+    precision: Literal["float64", "float32"] = default(
+        "float64", "numbers of the jax engine; the others always have float64"
     )
-    batch_functions: Literal["exact", "quick"] = Field(
+    batch_functions: Literal["exact", "quick"] = default(
         "exact",
-        description="sines and their inverses where native flights on equations fly side by side: "
-        "with the bits of a flight alone, or faster, with flights that differ by rounding",
+        "sines and their inverses where native flights on equations fly side by side: with the "
+        "bits of a flight alone, or faster, with flights that differ by rounding",
     )
-    plant: Literal["mujoco", "thesis", "rigid_body"] = Field(
+    plant: Literal["mujoco", "thesis", "rigid_body"] = default(
         "mujoco",
-        description="what is simulated: the MuJoCo model; the thesis's equations of motion; or the "
-        "equations of one rigid body with gyroscopic torque, tilt servos and massless pods",
+        "what is simulated: the MuJoCo model; the thesis's equations of motion; or the equations "
+        "of one rigid body with gyroscopic torque, tilt servos and massless pods",
     )
-    integrator: Literal["RK4", "implicitfast", "implicit", "Euler", "ode3"] = Field(
+    integrator: Literal["RK4", "implicitfast", "implicit", "Euler", "ode3"] = default(
         "RK4",
-        description="on the mujoco plant RK4, implicitfast, implicit or Euler; on rigid_body RK4 "
-        "or ode3, a method of third order; the thesis plant always uses ode3",
+        "on the mujoco plant RK4, implicitfast, implicit or Euler; on rigid_body RK4 or ode3, a "
+        "method of third order; the thesis plant always uses ode3",
     )
-    seed: Annotated[int, Field(ge=0)] = Field(
-        0, description="seed of sensor noise and turbulence", examples=[1]
-    )
+    seed: Annotated[int, Field(ge=0)] = default(0, "seed of sensor noise and turbulence", 1)
 
     @property
     def solver(self) -> str:
@@ -152,28 +149,20 @@ class InitialTable(Table):
 
     model_config = example(position=[0.0, 0.0, 1.0])
 
-    position: Vector3 = Field(
-        (0.0, 0.0, 0.0),
-        description="of the center of mass in the world, z up [m]",
-        examples=[[0.0, 0.0, 1.0]],
+    position: Vector3 = default(
+        ZEROS, "of the center of mass in the world, z up [m]", [0.0, 0.0, 1.0]
     )
-    velocity: Vector3 = Field(
-        (0.0, 0.0, 0.0), description="in the world [m/s]", examples=[[1.0, 0.0, 0.0]]
+    velocity: Vector3 = default(ZEROS, "in the world [m/s]", [1.0, 0.0, 0.0])
+    attitude: Angles3 = default(
+        ZEROS, "roll, pitch and yaw: turns about x, y and z, yaw first [rad]", [0.1, 0.0, 0.0]
     )
-    attitude: Angles3 = Field(
-        (0.0, 0.0, 0.0),
-        description="roll, pitch and yaw: turns about x, y and z, yaw first [rad]",
-        examples=[[0.1, 0.0, 0.0]],
-    )
-    angular_velocity: Vector3 = Field(
-        (0.0, 0.0, 0.0), description="p, q, r about the body axes [rad/s]", examples=[[0, 0, 0.5]]
-    )
-    rotor_speed: Positive | PositiveEach | None = Field(
+    angular_velocity: Vector3 = default(ZEROS, "p, q, r about the body axes [rad/s]", [0, 0, 0.5])
+    rotor_speed: Positive | PositiveEach | None = default(
         None,
-        description="absolute value, one for all rotors or one per rotor; rotors 1 and 3 of "
-        "tiltrotor and quadrotor turn clockwise seen from above, 2 and 4 counterclockwise; "
-        "default: 300, and of a multirotor those of hover at its initial tilts [rad/s]",
-        examples=[300.0],
+        "absolute value, one for all rotors or one per rotor; rotors 1 and 3 of tiltrotor and "
+        "quadrotor turn clockwise seen from above, 2 and 4 counterclockwise; default: 300, and of "
+        "a multirotor those of hover at its initial tilts [rad/s]",
+        300.0,
     )
 
     def rotor_speeds(self, rotors: int) -> tuple[float, ...]:

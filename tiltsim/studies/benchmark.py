@@ -22,7 +22,7 @@ from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.closed_loop.userdata import CONTROL_PERIOD as PERIOD_IN_USERDATA
 from tiltsim.closed_loop.userdata import Header
 from tiltsim.engines.base import EngineName
-from tiltsim.engines.control import compile_empty, control_callback, control_step, make_engine
+from tiltsim.engines.control import compile_empty, control_callback, control_step, make_callback
 from tiltsim.laws.assembling import assemble
 from tiltsim.plants.mujoco_plant import MujocoPlant
 from tiltsim.scenario.loading import parse_scenario
@@ -74,7 +74,7 @@ def bench_single(integrator: str, rounds: int = ROUNDS) -> Rows:
     assembly, plant = flying_plant(integrator)
     model, data, state = plant.model, plant.data, plant.state
     callbacks = {"bare": None, "empty": compile_empty()} | {
-        name: make_engine(name, assembly, model, data).callback() for name in ENGINES
+        name: make_callback(name, assembly, model, data) for name in ENGINES
     }
 
     def stepping(callback: Any, steps: int) -> Callable[[], float]:

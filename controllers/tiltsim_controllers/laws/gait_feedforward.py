@@ -20,7 +20,7 @@ from tiltsim_controllers.gaits.motion import (
 )
 from tiltsim_controllers.laws.allocation import RotorRange, limited_accelerations
 from tiltsim_controllers.laws.attitude_altitude import OPTIONS, AttitudeAltitude
-from tiltsim_controllers.laws.decouplers import NONE
+from tiltsim_controllers.laws.feedback import NONE
 from tiltsim_controllers.laws.gains import Gains, IntegralGains
 from tiltsim_controllers.laws.keys import record_of
 from tiltsim_controllers.laws.multirotor import attitude_force, present_wrench

@@ -44,8 +44,7 @@ from typing import Any, Final, NamedTuple
 
 from tiltsim_controllers.code.arrays import traceable, xp
 from tiltsim_controllers.laws.attitude_altitude import PUBLISHED_DECOUPLING
-from tiltsim_controllers.laws.decouplers import NONE
-from tiltsim_controllers.laws.feedback import attitude_motion, swept
+from tiltsim_controllers.laws.feedback import NONE, attitude_motion, swept
 from tiltsim_controllers.laws.force_directions import (
     factors,
     jerk_along,

@@ -15,7 +15,7 @@ from typing import Any, Final
 import numpy as np
 
 from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.laws.decouplers import exact_decoupler
+from tiltsim_controllers.laws.feedback import exact_decoupler
 from tiltsim_controllers.laws.observed import Observed
 from tiltsim_controllers.mathematics.attitude import rotation_matrix
 from tiltsim_controllers.mathematics.linear import (

@@ -15,11 +15,18 @@ from __future__ import annotations
 
 from typing import Any, ClassVar, Final, Literal
 
-from pydantic import Field
-
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.gaits.motion import NO_KNOTS
-from tiltsim_controllers.laws.keys import Gains2, Gains4, GainSets, Keys, NamedGains, record_of
+from tiltsim_controllers.laws.keys import (
+    Gains2,
+    Gains4,
+    GainSets,
+    Keys,
+    NamedGains,
+    default,
+    record_of,
+    required,
+)
 from tiltsim_controllers.mathematics.attitude import euler_rates, rotation_matrix, wrapped
 from tiltsim_controllers.mathematics.linear import cross
 from tiltsim_controllers.references.trajectories import ReferenceParameters, reference_motion
@@ -29,14 +36,12 @@ from tiltsim_controllers.vehicle.parameters import Vehicle
 class YawPositionGainTable(Keys):
     """Explicit gains of yaw-position control."""
 
-    position: Gains4 = Field(
-        description="k_1 to k_4, on the errors of jerk, acceleration, velocity and position "
-        "[1/s, 1/s^2, 1/s^3, 1/s^4]",
-        examples=[[10.0, 37.5, 62.5, 39.0625]],
+    position: Gains4 = required(
+        "k_1 to k_4, on the errors of jerk, acceleration, velocity and position [1/s, 1/s^2, "
+        "1/s^3, 1/s^4]",
+        [10.0, 37.5, 62.5, 39.0625],
     )
-    yaw: Gains2 = Field(
-        (5.0, 5.0), description="on the errors of the yaw rate and of yaw [1/s, 1/s^2]"
-    )
+    yaw: Gains2 = default((5.0, 5.0), "on the errors of the yaw rate and of yaw [1/s, 1/s^2]")
 
 
 Gains = record_of(YawPositionGainTable)
@@ -61,10 +66,10 @@ class YawPosition(Keys):
 
     gain_sets: ClassVar[GainSets] = {"gains": GAIN_SETS}
 
-    law: Literal["yaw_position"] = Field(
-        description="the quadrotor's thrust and three torques control position and yaw"
+    law: Literal["yaw_position"] = required(
+        "the quadrotor's thrust and three torques control position and yaw"
     )
-    gains: YawPositionGains = Field("stable", description=YAW_POSITION_GAINS)
+    gains: YawPositionGains = default("stable", YAW_POSITION_GAINS)
 
 
 Parameters = record_of(YawPosition, vehicle=Vehicle, reference=ReferenceParameters)

@@ -13,7 +13,7 @@ from tests.thesis import force_matrix, torque_matrix
 from tiltsim_controllers.gaits.motion import FIXED, GaitParameters
 from tiltsim_controllers.laws.allocation import RotorRange
 from tiltsim_controllers.laws.attitude_altitude import DECOUPLINGS, Gains, Parameters
-from tiltsim_controllers.laws.decouplers import (
+from tiltsim_controllers.laws.feedback import (
     DECOUPLERS,
     conventional_decoupler,
     exact_decoupler,

@@ -17,11 +17,12 @@ from tiltsim_controllers.gaits.motion import FIXED, GaitParameters
 from tiltsim_controllers.gaits.plans import continuous_trot, fixed
 from tiltsim_controllers.laws.allocation import RotorRange
 from tiltsim_controllers.laws.attitude_altitude import EXACT_DECOUPLING, Gains
-from tiltsim_controllers.laws.decouplers import DECOUPLERS, exact_decoupler
 from tiltsim_controllers.laws.feedback import (
+    DECOUPLERS,
     angular_jerk,
     attitude_jerk,
     attitude_motion,
+    exact_decoupler,
     integrator_rate,
     limited_acceleration,
     swept,

@@ -30,7 +30,7 @@ from tiltsim_controllers.analysis.torque_free import (
 from tiltsim_controllers.gaits import plans
 from tiltsim_controllers.laws import attitude_altitude
 from tiltsim_controllers.laws.allocation import RotorRange
-from tiltsim_controllers.laws.decouplers import DECOUPLERS
+from tiltsim_controllers.laws.feedback import DECOUPLERS
 from tiltsim_controllers.laws.gains import GAIN_SETS, Poles, gains_from_poles
 from tiltsim_controllers.laws.gait_feedforward import multirotor_law_of
 from tiltsim_controllers.laws.multirotor import independence

@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 
 from tiltsim_controllers.analysis.stability import third_order_loop
-from tiltsim_controllers.laws.decouplers import conventional_decoupler, modified_decoupler
+from tiltsim_controllers.laws.feedback import conventional_decoupler, modified_decoupler
 from tiltsim_controllers.laws.gains import GAIN_SETS
 from tiltsim_controllers.vehicle.cross import torque_free_force
 from tiltsim_controllers.vehicle.parameters import PRESETS, drag_ratio

@@ -102,7 +102,7 @@ def motion_at_start(plan: FlightPlan) -> tuple[Vector, Vector]:
         if table.joint == "hinged":
             positions, velocities = [*positions, 0.0], [*velocities, 0.0]
         elif table.joint == "free":
-            positions += [*table.position, *table.body.quaternion]
+            positions += [*table.position, *table.quaternion]
             velocities += [*table.velocity, 0.0, 0.0, 0.0]
     payload, initial = scenario.payload, scenario.initial
     if payload is not None and not payload.rigid:

@@ -21,7 +21,7 @@ from tiltsim_controllers.analysis.two_color_map import curve_l, delta, point_p, 
 from tiltsim_controllers.gaits.cat import FORWARD, SWINGS
 from tiltsim_controllers.gaits.colors import colored_angles
 from tiltsim_controllers.gaits.plans import cat, continuous_trot
-from tiltsim_controllers.laws.decouplers import (
+from tiltsim_controllers.laws.feedback import (
     conventional_decoupler,
     exact_decoupler,
     modified_decoupler,
