@@ -27,7 +27,7 @@ from tiltsim.laws.rotor_loop import layout_of_vehicle
 from tiltsim.laws.tilt_car import FOURTH_DERIVATIVE, PLANNED_DIRECTION, THIRD_DERIVATIVE
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.law_controller import LawTable
-from tiltsim.scenario.multirotor_controllers import AttitudeForceController
+from tiltsim.scenario.linearizing_controllers import AttitudeForceController
 from tiltsim.scenario.scenario import Scenario, plan_flight
 from tiltsim.system.files import one_thread_at_a_time
 from tiltsim.vehicles.rotorcraft.others import others_of

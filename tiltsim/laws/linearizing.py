@@ -22,7 +22,7 @@ from tiltsim.laws.rotor_loop import (
     singular_attitude,
 )
 from tiltsim.models.rotor_table import Multirotor
-from tiltsim.scenario.multirotor_controllers import AttitudeForceController, upper_side
+from tiltsim.scenario.linearizing_controllers import AttitudeForceController, upper_side
 from tiltsim.scenario.scenario import FlightPlan
 from tiltsim.vehicles.rotorcraft import EXTRA_COLUMNS, initial_tilts
 from tiltsim_controllers.analysis.singularity import determinant, margin_over_gait

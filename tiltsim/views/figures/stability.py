@@ -18,7 +18,7 @@ from tiltsim.linear.linearization import Linearization
 from tiltsim.linear.margins import TOGETHER, broken_loops, frequency_grid
 from tiltsim.linear.modes import NEUTRAL
 from tiltsim.linear.stability import Point, Stability
-from tiltsim.scenario.key_units import quantity_of_key
+from tiltsim.scenario.schema import quantity_of_key
 from tiltsim.system.text import in_words
 from tiltsim.views.figures import style
 from tiltsim.views.titles import address_in_words
