@@ -12,7 +12,7 @@ from tiltsim.laws.companions import Member, with_companions
 from tiltsim.laws.flown_law import loop_of_law
 from tiltsim.laws.layers.actuation import with_actuation
 from tiltsim.laws.layers.contact import with_force_loop, with_impedance, with_objects
-from tiltsim.laws.layers.estimation import fusion_of, with_estimator
+from tiltsim.laws.layers.estimation import Fusion, with_estimator
 from tiltsim.laws.layers.forces import with_air, with_loads, with_rotor_inertia
 from tiltsim.laws.layers.instruments import (
     instruments_of,
@@ -94,7 +94,7 @@ def loop_of(
         loop = LOOPS[controller.loop_name]
     loop = adapted(loop)
     if controller.estimator is not None:
-        loop = with_estimator(loop, fusion_of(scenario))
+        loop = with_estimator(loop, Fusion(instruments_of(scenario)))
     if scenario.reference.type == "push" and not external:
         loop = (with_impedance if scenario.reference.impedance else with_force_loop)(loop)
     if scenario.payload is not None and scenario.payload.swing_damping and not external:
