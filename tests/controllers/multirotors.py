@@ -16,13 +16,7 @@ from tiltsim_controllers.laws.attitude_altitude import EXACT_DECOUPLING
 from tiltsim_controllers.laws.feedback import EXACT
 from tiltsim_controllers.laws.gains import GAIN_SETS, IntegralGains
 from tiltsim_controllers.laws.gait_feedforward import multirotor_law_of
-from tiltsim_controllers.laws.multirotor_steps import (
-    ROTATION,
-    Direction,
-    FeedforwardTerms,
-    Form,
-    Parameters,
-)
+from tiltsim_controllers.laws.multirotor_steps import ROTATION, FeedforwardTerms, Form, Parameters
 from tiltsim_controllers.laws.observed import Failure
 from tiltsim_controllers.laws.supervised_vehicles import Watched
 from tiltsim_controllers.laws.supervisor import Supervisor
@@ -127,8 +121,8 @@ def parameters_of(vehicle, gait=None, reference=None, **changes):
         supervisor=Supervisor(),
         watched=Watched(),
         watched_without=Watched(),
-        upper_side=Direction(),
-        upper_side_without=Direction(),
+        upper_side=(0.0, 0.0, 0.0),
+        upper_side_without=(0.0, 0.0, 0.0),
     )
     return law._replace(**changes), (*gait.knots, *vehicle.table)
 

@@ -23,7 +23,7 @@ from tiltsim.laws.assembling import loop_of
 from tiltsim.laws.commanded import commanded_parameters, with_command
 from tiltsim.laws.layers.on_equations import on_equations
 from tiltsim.plants.command import Observation, Reference
-from tiltsim.scenario.override_keys import split_key, value_at, with_value
+from tiltsim.scenario.documents import split_key, value_at, with_value
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.scenario.surroundings import SensorTable
 from tiltsim.scenario.vehicle import PodTable, VehicleTable

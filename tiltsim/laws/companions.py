@@ -35,6 +35,11 @@ if TYPE_CHECKING:
 DOWNWASH: Final = "downwash"
 """Column of the force (N) of the wakes of other vehicles along the world's z."""
 
+TRACED: Final = ("controls", "hold", "observe", "sign_check_values")
+PLANNED: Final = ("setup", "initial_activations", "derive", "causes")
+OF_KIND: Final = ("compile", "initial_motion", "thrusts", "metrics")
+"""Functions of `ClosedLoop`, traced or not, and of `VehicleKind`, that several vehicles replace."""
+
 
 class Member(NamedTuple):
     """A vehicle among several."""
@@ -206,7 +211,7 @@ class Several:
         found = zip(self._loops, self._states(qpos, qvel, act), self._controls_of(ctrl))
         return xp.hstack([loop.observe(*s, c) for loop, s, c in found])
 
-    def signs(self, time: Any, values: Any, parameters: Any, knots: Any) -> Any:
+    def sign_check_values(self, time: Any, values: Any, parameters: Any, knots: Any) -> Any:
         """See `ClosedLoop`."""
         found = zip(self._loops, self._values_of(values), self._setups(parameters, knots))
         checked = [loop.sign_check_values(time, v, *p) for loop, v, p in found]
@@ -323,26 +328,17 @@ class Several:
             first,
             kind=replace(
                 first.kind,
-                compile=self.compile,
-                initial_motion=self.initial_motion,
                 limit_exceeded=traceable(self.limit_exceeded),
-                thrusts=self.thrusts,
-                metrics=self.metrics,
+                **{name: getattr(self, name) for name in OF_KIND},
             ),
             parameters=self._record,
-            setup=self.setup,
             model=" and ".join(loop.model for loop in self._loops),
             sizes=self._total,
-            initial_activations=self.initial_activations,
-            controls=traceable(self.controls),
-            hold=traceable(self.hold),
-            observe=traceable(self.observe),
-            derive=self.derive,
+            **{name: getattr(self, name) for name in PLANNED},
+            **{name: traceable(getattr(self, name)) for name in TRACED},
             fields=(*first.fields, *fields),
             further_units={k: u for each in units for k, u in each.items()},
             observe_reads_controls=any(loop.observe_reads_controls for loop in self._loops),
-            sign_check_values=traceable(self.signs),
-            causes=self.causes,
             equations=None,
             within=first,  # for its controller
             traced=all(loop.is_traceable for loop in self._loops),

@@ -8,8 +8,8 @@ import numpy as np
 from tiltsim.models.hover import hover_speeds
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.gait_following import GaitFollowingController
+from tiltsim.scenario.linearizing_controllers import AttitudeForceController
 from tiltsim.scenario.messages import InvalidValueError
-from tiltsim.scenario.multirotor_controllers import AttitudeForceController
 from tiltsim.scenario.rotorcraft import RotorcraftTable
 from tiltsim.scenario.scenario_tables import ScenarioTables
 from tiltsim.scenario.simulation_table import SimulationTable

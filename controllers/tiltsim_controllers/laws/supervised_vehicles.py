@@ -29,6 +29,7 @@ from tiltsim_controllers.laws.force_directions import factors, share
 from tiltsim_controllers.laws.supervisor import UNTILTED, Supervision, Supervisor, WayBack
 from tiltsim_controllers.mathematics.linear import norm
 from tiltsim_controllers.mathematics.moving import Moving
+from tiltsim_controllers.mathematics.records import Vector3
 from tiltsim_controllers.mathematics.scalar import Triple
 from tiltsim_controllers.vehicle.cross import torque_free_force
 from tiltsim_controllers.vehicle.parameters import drag_ratio
@@ -47,9 +48,7 @@ class Watched(NamedTuple):
 
     rotors: float = 0.0  # where in the knots the table of the rotors begins
     per_volume: float = 0.0  # of the determinant, 1 / (N^3 m^3) and units of the speeds
-    side_x: float = 0.0  # of the torque-free force that points up, if it has two; else zero
-    side_y: float = 0.0
-    side_z: float = 0.0
+    side: Vector3 = (0.0, 0.0, 0.0)  # of the torque-free force that points up, if it has two
 
 
 def untilted_volume(table: Sequence[float]) -> float:
@@ -63,7 +62,7 @@ def untilted_volume(table: Sequence[float]) -> float:
 
 def watched(table: Sequence[float], rotors: int, side: Triple) -> Watched:
     """Parameters of a vehicle whose table begins at an index of the knots."""
-    return Watched(float(rotors), UNTILTED / untilted_volume(table), *side)
+    return Watched(float(rotors), UNTILTED / untilted_volume(table), side)
 
 
 @traceable
@@ -116,8 +115,7 @@ def multirotor_supervision_of(
         regular = size > 0.0
         margin = _margin(up, direction, dimension)
         if dimension == 1:
-            side = xp.array([vehicle.side_x, vehicle.side_y, vehicle.side_z])
-            sign = xp.where(units[3] @ (side @ force) < 0.0, -1.0, 1.0)
+            sign = xp.where(units[3] @ (vehicle.side @ force) < 0.0, -1.0, 1.0)
             margin, size = sign * margin, sign * size
         return (
             xp.where(regular, margin, 0.0),

@@ -64,6 +64,8 @@ class Instrument(NamedTuple):
     errors: int
     under_way: int  # readings that wait for their delay
     walks: bool
+    first: int  # of its values among all readings
+    late: int  # control steps, its delay
 
     @property
     def columns(self) -> dict[str, str]:
@@ -79,7 +81,7 @@ class Instrument(NamedTuple):
 def instruments_of(scenario: Scenario) -> tuple[Instrument, ...]:
     """The instruments of a scenario, in the order of their readings."""
     rotors, step = scenario.any_rotorcraft.rotor_count, scenario.simulation.control_timestep
-    found = []
+    found: list[Instrument] = []
     for name, table in scenario.sensors.instruments.items():
         units = {
             column.replace("#", str(i)): unit
@@ -87,9 +89,11 @@ def instruments_of(scenario: Scenario) -> tuple[Instrument, ...]:
             for i in range(1, 1 + (rotors if "#" in column else 1))
         }
         errors, period = table.errors(1.0, rotors), table.period(step)
-        under_way = ceil(table.delay / period - 1e-6)
-        one = Instrument(name, tuple(units.items()), len(errors.noise), under_way, any(errors.walk))
-        found.append(one)
+        late = (ceil(table.delay / span - 1e-6) for span in (period, step))
+        first = sum(len(each.columns) for each in found)
+        walks, (under_way, steps) = any(errors.walk), late
+        own = len(errors.noise), under_way, walks, first, steps
+        found.append(Instrument(name, tuple(units.items()), *own))
     return tuple(found)
 
 

@@ -27,7 +27,7 @@ from tiltsim.models.hover import hover_speeds
 from tiltsim.models.parts import ExtraActuators, Pod, RotorLimits, TiltServo, Visuals
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.interaction import objects_of
-from tiltsim.scenario.multirotor_controllers import AttitudeForceController
+from tiltsim.scenario.linearizing_controllers import AttitudeForceController
 from tiltsim.scenario.scenario import FlightPlan, Scenario
 from tiltsim.scenario.vehicle import VehicleTable
 from tiltsim.system.text import Quantity, subscript
