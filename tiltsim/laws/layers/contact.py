@@ -18,8 +18,7 @@ from tiltsim.models.cables import CABLE_READING
 from tiltsim.models.objects import COORDINATES, FORCE
 from tiltsim.models.parts import ExtraActuators
 from tiltsim.vehicles.rotorcraft.others import CONTACT_FORCE, FELT, SWING, Others
-from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.code.traceable import traceable
+from tiltsim_controllers.code.arrays import traceable, xp
 from tiltsim_controllers.mathematics.attitude import (
     euler_angles,
     rotation_matrix,
