@@ -5,8 +5,7 @@ from typing import Final
 
 from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.closed_loop.loop import ClosedLoop
-from tiltsim.equations.actuator_level import ActuatorPlant, actuator_plant
-from tiltsim.equations.rigid_body import rigid_body
+from tiltsim.equations.actuator_level import ActuatorPlant, actuator_plant, rigid_body
 from tiltsim.laws.commanded import commanded_loop
 from tiltsim.laws.companions import Member, with_companions
 from tiltsim.laws.flown_law import loop_of_law
@@ -27,7 +26,7 @@ from tiltsim.laws.rotor_loop import layout_of_vehicle
 from tiltsim.laws.tilt_car import FOURTH_DERIVATIVE, PLANNED_DIRECTION, THIRD_DERIVATIVE
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.law_controller import LawTable
-from tiltsim.scenario.multirotor_controllers import AttitudeForceController
+from tiltsim.scenario.linearizing_controllers import AttitudeForceController
 from tiltsim.scenario.scenario import Scenario, plan_flight
 from tiltsim.system.files import one_thread_at_a_time
 from tiltsim.vehicles.rotorcraft.others import others_of

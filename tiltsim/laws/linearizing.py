@@ -22,7 +22,7 @@ from tiltsim.laws.rotor_loop import (
     singular_attitude,
 )
 from tiltsim.models.rotor_table import Multirotor
-from tiltsim.scenario.multirotor_controllers import AttitudeForceController, upper_side
+from tiltsim.scenario.linearizing_controllers import AttitudeForceController, upper_side
 from tiltsim.scenario.scenario import FlightPlan
 from tiltsim.vehicles.rotorcraft import EXTRA_COLUMNS, initial_tilts
 from tiltsim_controllers.analysis.singularity import determinant, margin_over_gait
@@ -43,10 +43,9 @@ from tiltsim_controllers.mathematics.attitude import rotation_matrix
 from tiltsim_controllers.mathematics.linear import kernel
 from tiltsim_controllers.mathematics.records import changed_record
 from tiltsim_controllers.mathematics.scalar import Floats, Values
-from tiltsim_controllers.vehicle.effectiveness import without_rotor
+from tiltsim_controllers.vehicle.body import TILT_FIELDS, state_of
 from tiltsim_controllers.vehicle.parameters import SPIN, Vehicle
-from tiltsim_controllers.vehicle.rotors import airframe, wrench_map
-from tiltsim_controllers.vehicle.states import TILT_FIELDS, state_of
+from tiltsim_controllers.vehicle.rotors import airframe, without_rotor, wrench_map
 
 TILTROTOR: Final = RotorLayout((0, 1, 2, 3), SPIN, "tiltrotor")
 
