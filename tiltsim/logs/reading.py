@@ -21,7 +21,7 @@ from tiltsim.flight.vectors import VECTORS
 from tiltsim.logs import formats
 from tiltsim.logs.formats import Signals
 from tiltsim.logs.log import LOG_SUFFIXES, UNITS, Log
-from tiltsim.scenario.limits import read_text
+from tiltsim.scenario.library import read_text
 from tiltsim.scenario.messages import choose, did_you_mean, one_line_message
 from tiltsim.scenario.table import NotTiny, Table, default, required
 from tiltsim.system.files import is_file, is_folder

@@ -17,7 +17,7 @@ from tiltsim.logs.model import LoggedMotion, LoggedVehicle, Parameter, numbers_o
 from tiltsim.system.numbers import is_finite
 from tiltsim.system.text import short_repr
 from tiltsim_controllers.mathematics.scalar import Floats
-from tiltsim_controllers.vehicle.effectiveness import TiltOfRotor, tilts_of
+from tiltsim_controllers.vehicle.rotors import TiltOfRotor, tilts_of
 
 LONGEST_STEP: Final = 0.005
 """Longest step (s) of the integration between two samples."""

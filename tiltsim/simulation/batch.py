@@ -18,8 +18,8 @@ from tiltsim.flight.flight import Flight
 from tiltsim.laws.assembling import assemble
 from tiltsim.plants.engine_choice import native_pays_off
 from tiltsim.scenario.loading import as_scenario
+from tiltsim.scenario.own_code import require_trust
 from tiltsim.scenario.scenario import Scenario
-from tiltsim.scenario.trust import require_trust
 from tiltsim.scenario.vehicle import VehicleTable
 from tiltsim.simulation.lane_batch import LaneBatch, lanes_for
 from tiltsim.simulation.native_batch import NativeBatch

@@ -141,7 +141,7 @@ class PoleTable(Keys):
     @property
     def poles(self) -> Poles:
         """The poles as `gains_from_poles` takes them."""
-        return Poles(self.bandwidth, self.damping)
+        return Poles(**dict(self))
 
 
 class IntegralPoleTable(PoleTable):
@@ -150,10 +150,6 @@ class IntegralPoleTable(PoleTable):
     integral: NonNegative = default(
         0.0, "pole of integral action; 0 disables it; needs gait_rate_feedforward [rad/s]", 0.5
     )
-
-    @property
-    def poles(self) -> Poles:
-        return Poles(self.bandwidth, self.damping, self.integral)
 
 
 class PolePlacementTable(Keys):

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Final, Literal, NamedTuple
 from pydantic import Field
 
 from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.gaits.parameters import GaitParameters
+from tiltsim_controllers.gaits.motion import GaitParameters
 from tiltsim_controllers.laws.allocation import RotorRange
 from tiltsim_controllers.laws.feedback import (
     CONVENTIONAL,
@@ -32,9 +32,9 @@ from tiltsim_controllers.laws.supervisor import Supervisor
 from tiltsim_controllers.mathematics.attitude import attitude_error, rotation_matrix, wrapped
 from tiltsim_controllers.mathematics.linear import cross
 from tiltsim_controllers.mathematics.moving import Moving, at_rest, cosine, sine, stacked, value_of
+from tiltsim_controllers.mathematics.records import vector_of
 from tiltsim_controllers.references.trajectories import ReferenceParameters
-from tiltsim_controllers.vehicle.body import Body
-from tiltsim_controllers.vehicle.states import RotorcraftState
+from tiltsim_controllers.vehicle.body import Body, RotorcraftState
 
 ROTATION: Final = 0.0
 """An error of attitude: the rotation that remains, which has no singular pitch."""
@@ -67,14 +67,6 @@ class Form(NamedTuple):
     supervised: bool = False  # whether a supervisor changes its gait
     own_yaw: bool = False  # whether its decoupler takes yaw and planned tilts even if all rests
     spin: bool = False  # whether it takes along the angular momentum of the rotors
-
-
-class Direction(NamedTuple):
-    """A vector in body axes."""
-
-    x: float = 0.0
-    y: float = 0.0
-    z: float = 0.0
 
 
 RESTORING: Final = 0.5
@@ -158,8 +150,8 @@ Parameters = record_of(
     supervisor=Supervisor,
     watched=Watched,
     watched_without=Watched,  # once the failed rotor is known
-    upper_side=Direction,  # of the force with which it lifts, if it has two; else 0
-    upper_side_without=Direction,  # once the failed rotor is known
+    upper_side=vector_of(3),  # body axes, of the force with which it lifts, if it has two; else 0
+    upper_side_without=vector_of(3),  # once the failed rotor is known
 )
 """Parameters of the law: its keys and these."""
 

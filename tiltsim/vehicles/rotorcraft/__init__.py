@@ -27,18 +27,17 @@ from tiltsim.models.hover import hover_speeds
 from tiltsim.models.parts import ExtraActuators, Pod, RotorLimits, TiltServo, Visuals
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.interaction import objects_of
-from tiltsim.scenario.multirotor_controllers import AttitudeForceController
+from tiltsim.scenario.linearizing_controllers import AttitudeForceController
 from tiltsim.scenario.scenario import FlightPlan, Scenario
 from tiltsim.scenario.vehicle import VehicleTable
 from tiltsim.system.text import Quantity, subscript
 from tiltsim.vehicles.rotorcraft.layout import CROSS, Layout
 from tiltsim.vehicles.rotorcraft.metrics import rotorcraft_metrics
-from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.code.traceable import traceable
+from tiltsim_controllers.code.arrays import traceable, xp
 from tiltsim_controllers.mathematics.attitude import quaternion_of_euler
 from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector
 from tiltsim_controllers.references.trajectories import ReferenceParameters
-from tiltsim_controllers.vehicle.states import P
+from tiltsim_controllers.vehicle.body import P
 
 if TYPE_CHECKING:
     import mujoco

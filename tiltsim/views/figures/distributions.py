@@ -8,8 +8,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy.stats import binomtest, spearmanr
 
-from tiltsim.scenario.key_units import quantity_of_key
 from tiltsim.scenario.metric_names import METRICS
+from tiltsim.scenario.schema import quantity_of_key
 from tiltsim.sweeps.dataset import Column, SweepResults
 from tiltsim.sweeps.tables import GridAxis, NormalAxis, UniformAxis
 from tiltsim.views.figures.style import CYCLE, DASHES, INK, MARKERS, new_figure, verbatim

@@ -25,10 +25,10 @@ from tiltsim_controllers.analysis.singularity import (
     margin_over_gait,
     singular_values,
     torque_free_direction,
+    unacceptable_attitudes,
 )
 from tiltsim_controllers.analysis.two_color_map import curve_l, delta, point_p, red_residual
 from tiltsim_controllers.analysis.two_color_planner import Circle, Path, check_path
-from tiltsim_controllers.analysis.unacceptable_attitudes import unacceptable_attitudes
 from tiltsim_controllers.gaits.plans import Gait
 from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.vehicle.parameters import Vehicle, drag_ratio

@@ -18,11 +18,11 @@ from tiltsim.linear.linearization import Linearization
 from tiltsim.linear.margins import TOGETHER, broken_loops, frequency_grid
 from tiltsim.linear.modes import NEUTRAL
 from tiltsim.linear.stability import Point, Stability
-from tiltsim.scenario.key_units import quantity_of_key
+from tiltsim.scenario.schema import quantity_of_key
 from tiltsim.system.text import in_words
 from tiltsim.views.figures import style
 from tiltsim.views.titles import address_in_words
-from tiltsim_controllers.analysis.unacceptable_attitudes import unacceptable_attitudes
+from tiltsim_controllers.analysis.singularity import unacceptable_attitudes
 from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.vehicle.parameters import Vehicle
 
