@@ -224,10 +224,10 @@ FOUR_ROTORS = {"ROTORS", "SPIN", "TILT_FIELDS", "ROTOR_FIELDS", "TILTROTOR_FIELD
 """Names that presume the four rotors of the thesis's vehicles."""
 
 OF_FOUR_ROTORS = {
-    *("quadrotor", "tiltrotor"),
+    *("quadrotor", "linearizing"),
     *("cross", "metrics", "user_vehicle", "vehicle", "vehicle_parts"),
     *("attitude_plane", "concepts", "gait_analysis", "vehicle_drawing"),
-    *("attainable", "effectiveness", "fault_tolerance", "rotorcraft", "statics"),
+    *("attainable", "fault_tolerance", "rotorcraft", "singularity"),
 }
 """The last names of modules that know these vehicles: their laws, models, tables, and figures."""
 
@@ -241,7 +241,7 @@ def test_modules_for_any_number_of_rotors_do_not_know_four():
     }
     others = {module for module in importing if "tilt_car" not in module}
     assert {module.rpartition(".")[2] for module in others} == OF_FOUR_ROTORS
-    general = ("tiltsim.closed_loop.", "tiltsim.laws.layers.", "tiltsim.laws.rotorcraft")
+    general = ("tiltsim.closed_loop.", "tiltsim.laws.layers.", "tiltsim.laws.rotor_loop")
     assert not [module for module in importing if module.startswith(general)]
 
 
@@ -311,7 +311,7 @@ POSIX_ONLY = {
 """Modules, attributes and beginnings of paths that Windows does not have."""
 
 GUARDED = {
-    "tiltsim.engines.code_folder": {"os.getuid"},
+    "tiltsim.engines.machine_code": {"os.getuid"},
     "tiltsim.report.made": {"/proc/"},
     "tiltsim.studies.benchmark": {"/proc/", "resource"},
     "tiltsim.system.files": {"fcntl", "os.O_NOFOLLOW"},

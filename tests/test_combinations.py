@@ -21,15 +21,15 @@ import tiltsim.env
 from tiltsim.commands.key_tables import key_tables
 from tiltsim.commands.schema import scenario_schema
 from tiltsim.errors import TiltsimError
-from tiltsim.scenario.arguments import leaves
 from tiltsim.scenario.controller import CONTROLLERS, OwnFunctionController
+from tiltsim.scenario.documents import leaves
 from tiltsim.scenario.scenario_tables import DESCRIPTIVE
 from tiltsim.scenario.simulation_table import SimulationTable
 from tiltsim.scenario.vehicle import VehicleUnion
 from tiltsim.studies.multirotor_analysis import FLEET, fleet_file
 from tiltsim.views.figures.style import save
-from tiltsim.views.rerun.recording_file import save_recording
-from tiltsim.views.video.overlay import Overlay
+from tiltsim.views.rerun.recording import save_recording
+from tiltsim.views.video.offscreen import Overlay
 
 SHORT = {"duration": 0.02, "timestep": 0.002, "engine": "python"}
 TABLES = key_tables(scenario_schema())
@@ -43,7 +43,7 @@ MULTIROTORS = {
 }
 VEHICLES = SHIPPED | MULTIROTORS
 FEW = [*SHIPPED, "multirotor tilt_hexarotor"]
-"""Vehicles of the fast tests: all models, and of multirotors one with tilts."""
+"""All models, and of multirotors one with tilts."""
 
 
 @pytest.fixture(autouse=True)
@@ -139,11 +139,21 @@ def in_turn(pairs):
     return [(*pair, PLANTS[place % len(PLANTS)]) for place, pair in enumerate(pairs)]
 
 
+def one_of_each(groups):
+    """One pair of each group: the first of the first, the second of the next, and so on."""
+    return [group[place % len(group)] for place, group in enumerate(groups)]
+
+
+FITTING = claimed(FEW)
+EACH_LAW = one_of_each([pair for pair in FITTING if pair[0] == law] for law in dict(FITTING))
 PAIRS = [
-    pytest.param(law, vehicle, marks=[] if vehicle in FEW else pytest.mark.slow)
-    for law, vehicle in claimed(VEHICLES)
+    pytest.param(*pair, marks=[] if pair in EACH_LAW else pytest.mark.slow)
+    for pair in claimed(VEHICLES)
 ]
 each_pair = pytest.mark.parametrize(("law", "vehicle"), PAIRS)
+OTHERS = [vehicle for vehicle in VEHICLES if vehicle not in FEW]
+DRAWN = FITTING + one_of_each(claimed([vehicle]) for vehicle in OTHERS)
+"""All models with every law, and each other vehicle with one law."""
 
 
 def test_every_law_flies_all_that_it_claims_and_nothing_else():
@@ -299,7 +309,7 @@ def test_every_flight_can_be_used(law, vehicle, tmp_path):
 
 
 @pytest.mark.slow
-@each_pair
+@pytest.mark.parametrize(("law", "vehicle"), DRAWN)
 def test_every_flight_can_be_rendered(law, vehicle, tmp_path):
     if fits(law, vehicle):
         for use in SLOW_USES_OF_FLIGHTS.values():
@@ -399,17 +409,19 @@ KEYS = {
 }
 
 
-def fly(law, vehicle, change, plant="mujoco"):
-    """Fly a pair with these values; None if they are of another law or vehicle."""
+def concerns(change, law, vehicle):
+    """Whether these values are not of another law or vehicle."""
     own = {"controller.law": law, "vehicle.model": VEHICLES[vehicle]["model"]}
-    if not fits(law, vehicle) or any(change.get(key, value) != value for key, value in own.items()):
+    return fits(law, vehicle) and all(change.get(key, own[key]) == own[key] for key in own)
+
+
+def fly(law, vehicle, change, plant="mujoco"):
+    """Fly a pair with these values; None if they do not concern it."""
+    if not concerns(change, law, vehicle):
         return None
     short = {f"simulation.{key}": value for key, value in SHORT.items()}
     scenario = fitting(law, vehicle).replace({**change, "simulation.plant": plant, **short})
     return tiltsim.simulate(scenario)
-
-
-FITTING = claimed(FEW)
 
 
 @pytest.mark.parametrize("layer", LAYERS)
@@ -441,9 +453,13 @@ def test_every_pair_takes_every_table_or_refuses_it_in_a_line(law, vehicle, plan
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("law", "vehicle"), FITTING)
-def test_every_pair_takes_every_key_or_refuses_it_in_a_line(law, vehicle):
+@pytest.mark.parametrize("law", dict(FITTING))
+def test_every_law_takes_every_key_or_refuses_it_in_a_line(law):
+    """Its vehicles, and the plants, take the keys in turn."""
     for number, change in enumerate(KEYS.values()):
-        flight, _ = attempt(fly, law, vehicle, change, PLANTS[number % len(PLANTS)])
-        if flight is not None:
-            flight.metrics()
+        pairs = [pair for pair in FITTING if pair[0] == law and concerns(change, *pair)]
+        if pairs:
+            turn, place = divmod(number, len(pairs))
+            flight, _ = attempt(fly, *pairs[place], change, PLANTS[turn % len(PLANTS)])
+            if flight is not None:
+                flight.metrics()

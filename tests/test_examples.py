@@ -34,7 +34,7 @@ PRINTED = {
 """Text that each prints."""
 
 SLOW = {"identify", "first_flight", "stability", "csv_reference", "controllers", "learning", "wind"}
-SLOW.add("predictive_control")
+SLOW |= {"monte_carlo", "predictive_control"}
 """Examples that take more than 3 s."""
 
 NEEDS = {"learning": "gymnasium", "optimal_control": "casadi", "predictive_control": "casadi"}

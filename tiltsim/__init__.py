@@ -18,17 +18,16 @@ if TYPE_CHECKING:
     from tiltsim.flight.end import End
     from tiltsim.flight.flight import Flight
     from tiltsim.flight.reading import load_flight
-    from tiltsim.laws.airframe import airframe
+    from tiltsim.laws.law_loop import airframe
     from tiltsim.linear.attraction import attraction
     from tiltsim.linear.linearization import linearize
     from tiltsim.linear.margins import margins
     from tiltsim.linear.stability import stability
     from tiltsim.linear.symbolic import symbolic
-    from tiltsim.logs.export import export
-    from tiltsim.logs.identify import Estimate, identify
+    from tiltsim.logs.formats import export
+    from tiltsim.logs.identify import Estimate, Replay, identify, replay
     from tiltsim.logs.log import Log
     from tiltsim.logs.reading import read_log
-    from tiltsim.logs.replay import Replay, replay
     from tiltsim.plants.command import Observation
     from tiltsim.scenario.law_controller import Airframe, Command, LawController, Observed, law, xp
     from tiltsim.scenario.loading import load_scenario, parse_scenario
@@ -53,13 +52,13 @@ _HOMES = {
     "Log": "logs.log",
     "Observation": "plants.command",
     "Observed": "scenario.law_controller",
-    "Replay": "logs.replay",
+    "Replay": "logs.identify",
     "Scenario": "scenario.scenario",
     "Simulation": "simulation.stepwise",
     "TiltsimError": "errors",
-    "airframe": "laws.airframe",
+    "airframe": "laws.law_loop",
     "attraction": "linear.attraction",
-    "export": "logs.export",
+    "export": "logs.formats",
     "fly": "simulation.batch",
     "identify": "logs.identify",
     "law": "scenario.law_controller",
@@ -69,7 +68,7 @@ _HOMES = {
     "margins": "linear.margins",
     "parse_scenario": "scenario.loading",
     "read_log": "logs.reading",
-    "replay": "logs.replay",
+    "replay": "logs.identify",
     "simulate": "simulation.simulate",
     "plot": "views.figures.plot",
     "show_progress": "commands.progress",  # for progress=True

@@ -7,12 +7,13 @@ from pydantic import Field
 import tiltsim
 from tiltsim_controllers.analysis.stability import linear_loop
 from tiltsim_controllers.laws.outer_loop import (
+    allocated_thrusts,
+    lift_without_torque,
     pointing_attitude,
     push_along,
     torque_for,
     tracking_errors,
 )
-from tiltsim_controllers.laws.rotor_allocation import allocated_thrusts, lift_without_torque
 from tiltsim_controllers.mathematics.attitude import attitude_error
 
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from tiltsim.cli import main
-from tiltsim.views.figures.determinant import singularity_figure, surfaces
+from tiltsim.views.figures.vehicles import singularity_figure, surfaces
 from tiltsim_controllers.analysis.balance import balanced_gait
-from tiltsim_controllers.analysis.quadrotor_singularity import published_determinant
+from tiltsim_controllers.analysis.singularity import published_determinant
 from tiltsim_controllers.vehicle.parameters import PRESETS
 
 

@@ -15,7 +15,7 @@ import pytest
 
 from tests.docs.pages import ROOT, code
 from tests.environments import new_environment
-from tiltsim.engines.code_folder import code_folder
+from tiltsim.engines.machine_code import code_folder
 
 yaml = pytest.importorskip("yaml")
 

@@ -18,7 +18,7 @@ from tests.docs.shell import commands
 from tiltsim.cli import build_parser, main
 from tiltsim.errors import InputError
 from tiltsim.exit_codes import DONE, EXPECTATION_FAILED, VEHICLE_LOST
-from tiltsim.logs.map import LogMap
+from tiltsim.logs.reading import LogMap
 from tiltsim.scenario.loading import find_scenario_file
 from tiltsim.scenario.scenario_tables import ScenarioTables
 from tiltsim.studies.checking import collect

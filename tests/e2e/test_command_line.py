@@ -447,6 +447,7 @@ def test_interrupted_run_keeps_its_files_and_says_so(tmp_path, capsys, monkeypat
     assert 0.0 < flown < 2000.0
 
 
+@pytest.mark.slow
 def test_check_on_several_processes_keeps_the_order_of_junit(tmp_path):
     for name in ("a", "b", "c"):
         (tmp_path / f"{name}.toml").write_text(EXPECTING.format(bound=1.0))

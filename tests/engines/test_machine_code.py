@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from tiltsim.engines import code_folder, machine_code
+from tiltsim.engines import machine_code
 from tiltsim.engines.glue import filled
 from tiltsim.engines.machine_code import MachineCode
 
@@ -63,7 +63,7 @@ def test_code_lives_as_long_as_its_function(folder):
 
 
 def test_code_that_cannot_be_saved_is_used_all_the_same(folder):
-    assert code_folder.is_usable(folder)
+    assert machine_code.is_usable(folder)
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (10, before[1]))
     try:
@@ -78,7 +78,7 @@ def test_the_folder_is_private_whatever_the_umask(folder):
     folder.parent.chmod(0o777)
     previous = os.umask(0)
     try:
-        assert code_folder.is_usable(folder)
+        assert machine_code.is_usable(folder)
     finally:
         os.umask(previous)
     assert [path.stat().st_mode & 0o777 for path in (folder.parent, folder)] == [0o700, 0o700]
@@ -87,7 +87,7 @@ def test_the_folder_is_private_whatever_the_umask(folder):
 def test_a_folder_of_another_user_is_not_trusted(folder, monkeypatch):
     assert [twice(), twice()] == ["compiled", "loaded"]
     monkeypatch.setattr(os, "getuid", lambda: 12345)
-    assert not code_folder.is_usable(folder)
+    assert not machine_code.is_usable(folder)
     assert twice() == "compiled"
 
 
@@ -115,7 +115,7 @@ def test_the_next_process_loads_what_the_last_one_compiled(tmp_path):
 
 def test_a_relative_folder_of_caches_is_ignored(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    assert code_folder.code_folder().parent == tmp_path / "tiltsim"
+    assert machine_code.code_folder().parent == tmp_path / "tiltsim"
     for relative in ("rel", "./rel", ""):
         monkeypatch.setenv("XDG_CACHE_HOME", relative)
-        assert code_folder.code_folder().parent == Path.home() / ".cache" / "tiltsim"
+        assert machine_code.code_folder().parent == Path.home() / ".cache" / "tiltsim"

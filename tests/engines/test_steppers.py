@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tests.simulation.test_lane_batch import shifted
-from tiltsim.engines.recorder import recorder_head
+from tiltsim.engines.programs import recorder_head
 from tiltsim.engines.steppers import LaneStepper
 from tiltsim.laws.assembling import assemble
 from tiltsim.plants.equations_plant import EquationsPlant, initial_state, integrated, layout_of

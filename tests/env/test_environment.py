@@ -448,6 +448,7 @@ def documented(arrays):
     return re.findall(r"```python\n(.*?)```", text, re.DOTALL)
 
 
+@pytest.mark.slow
 def test_the_documented_examples_run(tmp_path, monkeypatch, capsys):
     pytest.importorskip("gymnasium")
     monkeypatch.chdir(tmp_path)

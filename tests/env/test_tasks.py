@@ -46,7 +46,11 @@ def mean_is_plausible(scores, mean, deviation):
     return abs(np.mean(scores) - mean) < 3.0 * deviation * (1 / len(scores) + 1 / 20) ** 0.5
 
 
-@pytest.fixture(scope="module", params=TASKS)
+LONG = {"SetPoint", "Push", "Carry"}
+tasks = [pytest.param(task, marks=[pytest.mark.slow] if task in LONG else []) for task in TASKS]
+
+
+@pytest.fixture(scope="module", params=tasks)
 def flown(request):
     """A task, its environment after one episode of the built-in controller, and its score."""
     env = make(request.param).unwrapped
@@ -70,6 +74,7 @@ def test_the_built_in_controller_flies_to_the_end_with_the_stated_score(flown):
     assert len(env.env.flight()) == EPISODE_STEPS + 1
 
 
+@pytest.mark.slow
 def test_an_episode_of_a_push_is_repeated_bit_for_bit_and_holds_its_force():
     env = make("Push").unwrapped
     scores = [score(env, BuiltInPolicy(env), seed=0) for _ in range(2)]
@@ -104,7 +109,7 @@ def test_tasks_with_contact_fly_in_vectors_of_single_environments(task):
         np.testing.assert_array_equal(observation, make(task).reset(seed=seed)[0])
 
 
-@each_task
+@pytest.mark.parametrize("task", tasks)
 def test_zero_actions_lose_the_vehicle_with_the_stated_score(task):
     env = make(task).unwrapped
     scores = []
@@ -286,6 +291,7 @@ def test_controllers_that_need_more_than_observations_are_refused(controller):
 # --- pictures ------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_every_picture_shows_the_present_state_of_its_environment():
     first, second = make("Hover", render_mode="rgb_array"), make("Hover", render_mode="rgb_array")
     with pytest.raises(InputError, match="call reset"):

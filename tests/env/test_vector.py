@@ -11,7 +11,7 @@ from tiltsim.env.domain import Domain
 from tiltsim.env.environment import HOVER, TiltrotorEnv
 from tiltsim.env.functions import loop_on_equations
 from tiltsim.env.tasks import TASKS
-from tiltsim.equations.implicitfast import make_implicitfast_step
+from tiltsim.equations.solvers import make_implicitfast_step
 from tiltsim.errors import InputError
 from tiltsim.laws.assembling import assemble
 from tiltsim.laws.commanded import with_command
@@ -211,6 +211,7 @@ def test_make_vec_flies_a_task_on_arrays(two):
     assert two.spec.id == "tiltsim/Hover-v0"
 
 
+@pytest.mark.slow
 def test_a_termination_says_why(two):
     two.reset(seed=0)
     fall, hover = -np.ones(8), np.zeros(8)

@@ -19,11 +19,13 @@ from tiltsim.plants.factory import make_plant
 from tiltsim.plants.mujoco_plant import MujocoPlant
 from tiltsim.scenario.loading import merge
 from tiltsim_controllers.analysis.balance import balanced_gait
-from tiltsim_controllers.analysis.quadrotor_singularity import (
+from tiltsim_controllers.analysis.singularity import (
+    force_matrix,
     normalized_determinant,
     published_determinant,
+    torque_matrix,
+    world_up,
 )
-from tiltsim_controllers.analysis.singularity import force_matrix, torque_matrix, world_up
 from tiltsim_controllers.analysis.torque_free import singularity_margin, torque_free_forces
 from tiltsim_controllers.mathematics.attitude import rotation_matrix
 from tiltsim_controllers.vehicle.parameters import PRESETS
@@ -140,7 +142,7 @@ def test_the_table_has_the_columns_of_every_flight_and_the_laws_own(law):
     flight = fly(law, {"duration": 0.05})
     table = flight.to_arrow()
     loop = loop_of(flight.scenario)
-    assert table.column_names == [*loop.kind.columns, *loop.columns.units]
+    assert table.column_names == [*loop.kind.columns, *loop.further_units]
     for field in table.schema:
         assert field.metadata == {b"unit": flight.units[field.name].encode()}
     assert all(np.isfinite(column).all() for column in flight.columns.values())

@@ -12,7 +12,7 @@ import tiltsim
 from tests.refusals import refusal
 from tiltsim.errors import InputError
 from tiltsim.laws.assembling import assemble
-from tiltsim.laws.rotorcraft import torque_free_columns
+from tiltsim.laws.rotor_loop import torque_free_columns
 from tiltsim.models.hover import hover_speeds
 from tiltsim.plants.factory import make_plant
 from tiltsim.resources import shipped_folder
@@ -24,8 +24,8 @@ from tiltsim_controllers.analysis.torque_free import (
     singularity_margin,
     torque_free_forces,
 )
-from tiltsim_controllers.laws.failures import Failure
-from tiltsim_controllers.vehicle.effectiveness import force_and_torque
+from tiltsim_controllers.laws.observed import Failure
+from tiltsim_controllers.vehicle.rotors import force_and_torque
 
 TILTS = {"type": "waypoints", "angles": [[0.2, -0.2] * 3, [0.3, -0.3] * 3], "period": 2.0}
 CIRCLE = {"type": "circle", "radius": 1.0, "angular_frequency": 0.5}

@@ -162,6 +162,7 @@ def test_a_baseline_of_the_quadrotor_is_opened_at_its_rotors(law, plant):
     assert opened.B[rotors] == pytest.approx(np.eye(4))
 
 
+@pytest.mark.slow
 def test_disk_margins_are_worst_between_the_frequencies_of_the_grid():
     """Near instability, where the peak is narrower than the grid."""
     changes = {"vehicle.rotor_time_constant": 0.052, "simulation.control_timestep": 0.0}
@@ -268,6 +269,7 @@ def test_the_delay_margin_of_a_baseline_is_also_a_latency(law, step, vehicle):
     assert [is_lost(scenario, late * step) for late in (steps, steps + 1)] == [False, True]
 
 
+@pytest.mark.slow
 def test_a_baseline_with_a_latency_has_that_much_less_delay_margin():
     """Without flights: the loop equals the one with commands under way."""
     rest = {"reference.position": [0, 0, 0], "simulation.plant": "rigid_body"}

@@ -56,6 +56,7 @@ def deviations(estimate, flight):
     return (found - truth(flight.scenario)) / [estimate.sigma[name] for name in NAMES]
 
 
+@pytest.mark.slow
 def test_known_parameters_are_found_within_their_deviations():
     estimate = tiltsim.identify(noisy(flown(), 1), scenario(), FREE, noise=NOISE)
     assert np.abs(deviations(estimate, flown())).max() < 3.5
@@ -93,7 +94,7 @@ def test_factors_and_values_are_one_number():
 @pytest.mark.parametrize(
     ("free", "message"),
     [
-        (
+        pytest.param(
             [
                 "vehicle.mass",
                 "vehicle.thrust_coefficient",
@@ -101,6 +102,7 @@ def test_factors_and_values_are_one_number():
                 "vehicle.drag_coefficient",
             ],
             "does not tell",
+            marks=pytest.mark.slow,
         ),
         (["vehicle.weight"], "free = 'vehicle.weight': did you mean"),
         (["vehicle.mass", "model_error.mass"], "are one number"),

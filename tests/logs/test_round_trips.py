@@ -85,7 +85,7 @@ def test_px4s_topics_are_ned_and_come_back_in_z_up(exported, tmp_path):
 def test_a_long_scenario_survives_ulog(tmp_path):
     log = Log.of_flight(flight("fixed"))
     text = json.dumps({"title": "é" * 200_000}, ensure_ascii=False)
-    from tiltsim.logs.ulog import read_ulog, write_ulog
+    from tiltsim.logs.formats import read_ulog, write_ulog
 
     write_ulog(Log(log.name, log.columns, log.units, (), {"scenario": text}), tmp_path / "a.ulg")
     assert read_ulog(tmp_path / "a.ulg")[1]["scenario"] == text

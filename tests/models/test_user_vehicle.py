@@ -23,8 +23,8 @@ from tiltsim.plants.flight_model import build_model
 from tiltsim.resources import shipped_folder
 from tiltsim.vehicles.rotorcraft import COLUMNS
 from tiltsim.views.figures.plot import plot
-from tiltsim.views.rerun.recording_file import save_recording
-from tiltsim.views.video.overlay import Overlay
+from tiltsim.views.rerun.recording import save_recording
+from tiltsim.views.video.offscreen import Overlay
 
 DOCS = Path(__file__).parents[2] / "docs"
 TETRAHEDRON = "v 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nv 0 0 0.1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"

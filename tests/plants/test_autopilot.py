@@ -13,7 +13,7 @@ from tests.plants.firmware_double import HEIGHT, Firmware, Px4Firmware
 from tiltsim.models.cross import as_multirotor
 from tiltsim.plants.ardupilot_files import ardupilot_files
 from tiltsim.plants.autopilot_mixer import Mixer
-from tiltsim_controllers.vehicle.effectiveness import force_and_torque
+from tiltsim_controllers.vehicle.rotors import force_and_torque
 
 TILTING = [*(f"along_{i}" for i in range(1, 7)), *(f"across_{i}" for i in range(1, 7))]
 
@@ -74,6 +74,7 @@ def px4(**keys):
     return scenario(free_port(), 4.0, type="px4", **keys)
 
 
+@pytest.mark.slow
 def test_two_flights_of_px4_are_equal_in_every_bit_and_reach_their_height():
     flights = []
     for _ in range(2):
@@ -105,7 +106,7 @@ def test_a_wrong_answer_of_px4_ends_the_flight_with_its_cause(options, keys, cau
     assert cause in flight.end.cause
 
 
-@pytest.mark.parametrize("tilting", [False, True])
+@pytest.mark.parametrize("tilting", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_two_flights_are_equal_in_every_bit_and_reach_their_height(tilting):
     flights = []
     for repeat in (False, True):  # repeated outputs change nothing

@@ -20,7 +20,6 @@ from tiltsim.closed_loop.userdata import evaluation_time
 from tiltsim.errors import InputError
 from tiltsim.flight.reading import load_flight
 from tiltsim.laws.assembling import assemble, loop_of
-from tiltsim.laws.commanded import COMMANDED_LOOPS
 from tiltsim.plants.built_in_command import BuiltInController
 from tiltsim.plants.command import Command, check_command
 from tiltsim.plants.commanded_plant import CommandedPlant
@@ -363,7 +362,7 @@ def test_the_observation_is_the_state_the_reference_and_the_gait():
     rotated = np.zeros(3)
     mujoco.mju_rotVecQuat(rotated, np.array([0.0, 0.0, 1.0]), first.quaternion)
     assert rotated[2] == pytest.approx(np.cos(0.1) * np.cos(0.2))
-    sample = dict(zip(COMMANDED_LOOPS["tiltrotor"].sample_fields, flown.samples[1], strict=True))
+    sample = dict(zip(flown.assembly.loop.sample_fields, flown.samples[1], strict=True))
     assert sample["time"] == pytest.approx(second.time)
     np.testing.assert_array_equal(second.position, [sample[axis] for axis in "xyz"])
     np.testing.assert_array_equal(second.body_rates, [sample[axis] for axis in "pqr"])

@@ -373,6 +373,7 @@ def test_the_summary_is_stable_and_well_formed(full, library, kept):
         assert f"### {finding.title}" in text
 
 
+@pytest.mark.slow
 def test_the_command_writes_both_and_reports_bounds(library, tmp_path, capsys):
     out, summary = tmp_path / "out", tmp_path / "summary.md"
     arguments = ["report", f"{library}/bounded.toml", f"{library}/lost.toml", "--jobs", "2"]

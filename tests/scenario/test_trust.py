@@ -118,7 +118,7 @@ def test_sweeps_execute_no_code_elsewhere(folder, text, capsys, monkeypatch):
         ("attraction", ["--coarse", "1", "--refine", "0"]),
         ("compare", ["--controllers", "given", "--nominal", "--jobs", "1"]),
         ("report", ["--jobs", "1"]),
-        ("report", ["--jobs", "2"]),
+        pytest.param("report", ["--jobs", "2"], marks=pytest.mark.slow),
     ],
 )
 def test_commands_ask_before_the_flight_is_assembled(folder, command, options, capsys, monkeypatch):

@@ -49,6 +49,7 @@ def assert_rows_fly_as_alone(several):
     return rows
 
 
+@pytest.mark.slow
 def test_rows_differ_in_numbers_and_fly_as_alone():
     several = scenarios(
         CAR,

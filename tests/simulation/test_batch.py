@@ -507,6 +507,7 @@ def falling(_):
     return tiltsim.Command(rotor_accelerations=[-50.0] * 4)
 
 
+@pytest.mark.slow
 def test_processes_fly_own_controllers_alike():
     short = {"simulation": {"duration": 0.02}}
     own = [tiltsim.load_scenario({**short, "title": name}, controller=falling) for name in "abc"]

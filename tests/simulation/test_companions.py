@@ -9,6 +9,7 @@ import pytest
 import tiltsim
 from tests.refusals import refusal
 from tiltsim.laws.assembling import assemble
+from tiltsim.logs.model import LoggedVehicle
 from tiltsim.plants.flight_model import flight_model
 
 HOVER = "fleet/hexarotor#hover"
@@ -100,6 +101,52 @@ def test_a_saved_flight_is_read_back_whatever_becomes_of_the_files_that_it_names
     assert tiltsim.load_scenario(tmp_path / "flight" / "scenario.toml").companion
 
 
+def test_the_contact_forces_of_a_companion_are_its_own_on_both_engines():
+    """A box without weight flies against the companion's tool: Newton's second law, by steps."""
+    box = {"name": "box", "type": "box", "position": [2.1, 0.92, 0.02], "size": [0.2, 0.3, 0.4]}
+    box |= {"joint": "free", "mass": 0.7, "floating": True, "velocity": [0.0, -0.5, 0.0]}
+    wall = {"name": "wall", "type": "wall", "position": [0.0, -9.0, 0.0], "size": [2.0, 2.0]}
+    armed = WING | {"changes": {"tool": STICK}}
+    changes = {"object": [wall, box], "simulation.timestep": 0.001}
+    changes |= {"simulation.record_timestep": 0.001, "simulation.duration": 0.05}
+    python, native = (
+        tiltsim.simulate(together(armed, **changes, **{"simulation.engine": engine}))
+        for engine in ("python", "native")
+    )
+    for name in python:
+        np.testing.assert_array_equal(python[name], native[name], err_msg=name)
+    force = python["wing_contact_force_y"]
+    assert np.abs(force).max() > 1.0
+    speed = np.diff(python["box_y"], 2) / 0.001
+    np.testing.assert_allclose(0.7 * speed / 0.001, force[2:], atol=1e-6)
+    assert not python["contact_force_y"].any()
+    assert python["contact_time"][-1] == 0.0
+    assert python["wing_contact_time"][-1] == pytest.approx(0.001 * np.count_nonzero(force))
+    assert python["wing_peak_contact_force"][-1] >= np.abs(force).max()
+
+
+def test_vectors_of_a_companion_are_panels_and_hints():
+    flight = tiltsim.simulate(together(WING, **{"simulation.duration": 0.02}))
+    (axes,) = tiltsim.plot(flight, panels="wing_position", size="85x60mm").axes
+    shown = np.stack([line.get_ydata() for line in axes.lines[:3]], axis=-1)
+    np.testing.assert_array_equal(shown, flight["wing_position"])
+    assert "did you mean wing_position?" in refusal(tiltsim.plot, flight, panels="wing_positon")
+    begun = refusal(tiltsim.plot, flight, panels="reference")
+    assert "'reference': choose reference_position, " in begun
+
+
+@pytest.mark.parametrize(
+    ("analysis", "words"),
+    [
+        (tiltsim.attraction, "attraction takes one vehicle; remove [[companion]]"),
+        (lambda first: LoggedVehicle(first), "identify takes a vehicle alone"),
+        (tiltsim.stability, "linear analysis takes a vehicle alone"),
+    ],
+)
+def test_an_analysis_of_one_vehicle_refuses_companions(analysis, words):
+    assert words in refusal(analysis, together(WING))
+
+
 def test_a_companion_that_is_lost_ends_the_flight_by_its_name():
     spinning = WING | {"changes": {"initial": {"angular_velocity": [2000.0, 0.0, 0.0]}}}
     flight = tiltsim.simulate(together(spinning))
@@ -112,7 +159,8 @@ def test_a_companion_that_is_lost_ends_the_flight_by_its_name():
     [
         ([WING, WING], 'companion.name = "wing": is taken'),
         ([WING | {"name": "tilt"}], 'companion.name = "tilt": is taken'),
-        ([WING | {"name": "Wing 1"}], "companion[0].name"),
+        ([WING | {"name": "Wing 1"}], "up to 31 lowercase letters, digits and _"),
+        ([WING | {"scenario": "interaction/formation"}], "a companion has no companions"),
         ([WING | {"scenario": "fleet/no_such"}], 'companion.scenario = "fleet/no_such"'),
         ([WING | {"scenario": "missing.toml"}], 'missing.toml": no such file'),
         ([WING | {"scenario": "ch10_state_drift/circle"}], "companion"),
@@ -211,7 +259,15 @@ def test_a_companions_tool_that_touches_its_rotor_is_refused():
     assert "tool: touches wing_pod_1 of its own vehicle" in refusal(tiltsim.simulate, scenario)
 
 
-@pytest.mark.parametrize("objects", [{}, {"tool": STICK, "payload": {"mass": 0.1, "length": 0.3}}])
+@pytest.mark.parametrize(
+    "objects",
+    [
+        {},
+        pytest.param(
+            {"tool": STICK, "payload": {"mass": 0.1, "length": 0.3}}, marks=pytest.mark.slow
+        ),
+    ],
+)
 def test_the_first_vehicle_gives_the_command_that_it_gives_alone(objects):
     among = tiltsim.Simulation(together(WING, QUAD, **objects))
     alone = tiltsim.Simulation(among.scenario.replace({"companion": []}))

@@ -27,6 +27,7 @@ BOX = {
     "floating": True,
     "velocity": [0.0, -0.5, 0.1],
 }
+GEOMETRIC = {"law": "geometric", "tilts": "free", "position_bandwidth": 4.0}
 FREE = {"reference": {"type": "setpoint"}, "simulation.duration": 1.0, "expect": []}
 NEAR = {
     "reference.position": [0.0, 0.5, 0.0],
@@ -77,7 +78,7 @@ def test_vehicle_load_and_objects_keep_their_momentum(load):
     assembly = assemble(beside_a_box(**load))
     model = flight_model(assembly)
     model.opt.gravity[:] = 0.0
-    data, sizes = mujoco.MjData(model), assembly.loop.dynamics.sizes
+    data, sizes = mujoco.MjData(model), assembly.loop.sizes
     data.qpos[: sizes.qpos], _ = assembly.loop.kind.initial_motion(assembly)
     data.qpos[sizes.qpos :], data.qvel[sizes.qvel :] = motion_at_start(assembly)
     momenta, contacts = [], 0
@@ -90,8 +91,9 @@ def test_vehicle_load_and_objects_keep_their_momentum(load):
     assert np.ptp(momenta, axis=0).max() < 1e-6 * np.abs(momenta).max()
 
 
-def test_a_push_holds_its_force_on_both_engines_with_the_same_bits():
-    changes = NEAR | {"reference.ramp": 0.2, "simulation.duration": 1.5}
+@pytest.mark.parametrize("controller", [{}, {"controller": GEOMETRIC}])
+def test_a_push_holds_its_force_on_both_engines_with_the_same_bits(controller):
+    changes = NEAR | controller | {"reference.ramp": 0.2, "simulation.duration": 1.5}
     flights = [
         tiltsim.simulate(tiltsim.load_scenario(PUSH, changes | {"simulation.engine": engine}))
         for engine in ("python", "native")
@@ -198,6 +200,7 @@ WALL = {
         ({"simulation.integrator": "RK4"}, 'must be "implicitfast"'),
         ({"simulation.plant": "rigid_body", "simulation.integrator": "RK4"}, "use mujoco"),
         ({"controller": {"law": "attitude_force"}}, "cannot push; choose full_pose"),
+        ({"controller": {"law": "geometric"}}, "geometric with tilts = free, numpy with push_"),
         (
             {"reference.slide": {"positions": [[0, 0, 0], [0.1, 0, 0]], "times": [1.0, 2.0]}},
             "after the touch at 7 s",
@@ -267,7 +270,7 @@ def test_the_built_in_command_among_objects_is_the_loop_s():
 def test_linear_analysis_refuses_objects():
     hovering = tiltsim.load_scenario(PUSH, FREE)
     for analysis in (tiltsim.linearize, tiltsim.stability):
-        assert "takes a vehicle alone" in refusal(analysis, hovering)
+        assert "takes a vehicle alone; remove [[object]]" in refusal(analysis, hovering)
 
 
 def test_a_push_of_a_custom_controller_has_its_columns_and_metric():

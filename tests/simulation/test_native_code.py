@@ -11,13 +11,12 @@ import tiltsim
 import tiltsim.engines.sample_evaluation
 from tests.laws.test_laws import LAWS
 from tests.simulation.test_batch import ALL_LAWS, GAITS, scenario
-from tiltsim.closed_loop.choices import program_key
+from tiltsim.closed_loop.assembly import program_key
 from tiltsim.flight.end import End
 from tiltsim.laws.assembling import LOOPS, assemble
 from tiltsim.plants.engine_choice import choose_engine
 from tiltsim.plants.factory import make_plant
-from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.code.traceable import traceable
+from tiltsim_controllers.code.arrays import traceable, xp
 
 
 @pytest.mark.parametrize("law", LOOPS)
@@ -27,7 +26,7 @@ def test_every_sign_check_has_a_cause(law):
     sample = dict(zip(loop.sample_fields, (plant.time, *values), strict=True))
     assembly = assemble(scenario(ALL_LAWS[law]))
     numbers = assembly.sign_check_values(plant.time, values)
-    assert len(loop.monitoring.causes(sample, assembly.setup)) == len(numbers)
+    assert len(loop.causes(sample, assembly.setup)) == len(numbers)
     assert all(np.isfinite(numbers))
 
 

@@ -14,10 +14,10 @@ from tiltsim.plants.factory import make_plant
 from tiltsim.plants.mujoco_plant import MujocoPlant
 from tiltsim.system import progress
 from tiltsim.vehicles.rotorcraft import COLUMNS
-from tiltsim_controllers.laws.decouplers import DECOUPLERS
+from tiltsim_controllers.laws.feedback import DECOUPLERS
 from tiltsim_controllers.laws.gains import GAIN_SETS
+from tiltsim_controllers.vehicle.body import TILTROTOR_FIELDS
 from tiltsim_controllers.vehicle.parameters import PRESETS
-from tiltsim_controllers.vehicle.states import TILTROTOR_FIELDS
 
 PLANTS = ("mujoco", "thesis")
 ENGINES = ("python", "native")
@@ -375,8 +375,7 @@ def test_foreign_model_is_left_alone_by_the_callbacks(userdata):
     """MuJoCo's callback is global: stepping another model under it must not crash or write."""
     import mujoco
 
-    from tiltsim.engines.callback import control_callback
-    from tiltsim.engines.factory import make_engine
+    from tiltsim.engines.control import control_callback, make_callback
 
     assembly = assemble(scenario())
     plant = MujocoPlant(assembly)
@@ -387,8 +386,8 @@ def test_foreign_model_is_left_alone_by_the_callbacks(userdata):
     )
     data = mujoco.MjData(other)
     for name in ENGINES:
-        engine = make_engine(name, assembly, plant.model, plant.data)
-        with control_callback(engine.callback()):
+        callback = make_callback(name, assembly, plant.model, plant.data)
+        with control_callback(callback):
             mujoco.mj_step(other, data)
         assert data.ctrl.tolist() == [0.0]
     assert data.time == pytest.approx(2 * other.opt.timestep)

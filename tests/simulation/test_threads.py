@@ -21,7 +21,7 @@ from tests.simulation.test_batch import (
     layered,
     scenario,
 )
-from tiltsim.engines.callback import control_callback
+from tiltsim.engines.control import control_callback
 from tiltsim.env.environment import TiltrotorEnv
 from tiltsim.plants.command import Command
 from tiltsim.simulation.batch import fly

@@ -15,7 +15,8 @@ from tiltsim.studies.arena_page import arena_page
 from tiltsim.studies.comparison import Compared, Entry, compare_one, controller_tables
 from tiltsim.studies.league_page import league_page, league_table
 from tiltsim.studies.multirotor_analysis import FEW_ROTORS, FLEET
-from tiltsim.views.figures.arena_scores import arena_figure, panels_of
+from tiltsim.studies.scores import AIMS, INTERACTION, STEP, score
+from tiltsim.views.figures.comparisons import arena_figure, panels_of
 
 UNLIMITED = ["--league", "unlimited"]
 
@@ -34,7 +35,7 @@ def row(controller, task, position=0.0, yaw=0.0, end="completed", gains="default
         "gains": gains,
         "world": "",
     }
-    return made | {"score": arena.score(made)}
+    return made | {"score": score(made)}
 
 
 @pytest.fixture
@@ -51,14 +52,14 @@ def rows():
 
 def test_an_error_halves_the_score_where_it_says(rows):
     expected = [50.0, None, 100.0 / 3.0, 25.0, 0.0, 50.0]
-    assert list(map(arena.score, rows)) == pytest.approx(expected)
-    assert arena.score(row("pid", "circle")) == 100.0
-    assert arena.score(row("pid", "yaw_step", 0.0, 1.571 / 4)) == pytest.approx(50.0)
+    assert list(map(score, rows)) == pytest.approx(expected)
+    assert score(row("pid", "circle")) == 100.0
+    assert score(row("pid", "yaw_step", 0.0, 1.571 / 4)) == pytest.approx(50.0)
 
 
 def test_the_scale_of_a_step_belongs_to_a_first_order_response():
     time = np.linspace(0.0, 8.0, 8001)
-    assert pytest.approx(np.sqrt(np.mean(np.exp(-2.0 * time))), rel=1e-3) == arena.STEP
+    assert pytest.approx(np.sqrt(np.mean(np.exp(-2.0 * time))), rel=1e-3) == STEP
 
 
 def test_a_refusal_counts_as_zero_in_the_total_alone(rows):
@@ -119,7 +120,7 @@ def test_every_vehicle_of_the_fleet_has_tasks():
     assert of["tiltrotor"] >= of["quadrotor"]
     assert of["tiltrotor"] >= of["hexarotor"] == of["omni_octorotor"]
     limited = {task.partition("#")[2] for task in arena.vehicles("limited")["hexarotor"].tasks}
-    assert set(arena.HALF_OF) <= of["tiltrotor"] | limited
+    assert set(AIMS) <= of["tiltrotor"] | limited
     for name in ("quadrotor", "tiltrotor", "tilt_octorotor", "omni_octorotor"):
         for address in vehicles[name].tasks[::4]:
             flown = arena.entry_of(vehicles[name], address, "given", {}).scenario()
@@ -175,6 +176,7 @@ def flown(entries, **_):
     [
         (["--tune", "40", "--gains", "gains.json"], "--gains: not with --tune"),
         (["--seed", "2"], "--seed: only with --tune"),
+        (["--league", "interaction", "--tune", "9"], "--tune: not in the league of interaction"),
         (["--vehicles", ","], "--vehicles ,: name one at least"),
         (["--controllers", ""], "--controllers '': name one at least"),
     ],
@@ -237,17 +239,106 @@ def test_an_unknown_vehicle_is_refused():
         arena.chosen_vehicles(["boat"], "unlimited")
 
 
+def touching(task="push#hold", **changes):
+    """A flight of the league of interaction without an error."""
+    made = flight(scenario=f"interaction/{task}", time_in_contact=20.0)
+    return made | {"rms_force_error": 0.0, "peak_force": 0.0, "final_swing": 0.0} | changes
+
+
+def test_forces_impacts_swing_and_contact_count_in_their_tasks():
+    for address in INTERACTION:
+        assert score(touching(address.removeprefix("interaction/"))) == pytest.approx(100.0)
+    idle = {"idle_position_error": 1e9}  # of which a vehicle that stays has no score
+    assert score(touching(rms_force_error=0.5, **idle)) == pytest.approx(50.0)
+    assert score(touching("platform", peak_force=25.0, **idle)) == pytest.approx(50.0)
+    assert score(touching("carry#cable", final_swing=0.1, **idle)) == pytest.approx(50.0)
+    assert score(touching("door", time_in_contact=0.5, **idle)) == pytest.approx(50.0)
+    assert score(touching("carry#cable", time_in_contact=None)) == pytest.approx(100.0)
+
+
+@pytest.mark.parametrize("task", ["push#hold", "push#slide", "door", "platform"])
+def test_a_vehicle_that_never_touches_has_no_score(task):
+    assert score(touching(task, time_in_contact=0.0)) == 0.0
+    assert score(touching("push#hold", rms_force_error=None)) == 0.0  # never settled
+
+
+KEYS = "push_stiffness=9.0, rotor_bandwidth=400.0, tilts='free'"
+FLYERS = """
+import tiltsim
+from tiltsim import xp
+from tiltsim_controllers.laws.rotor_allocation import allocated_with_tilts
+
+
+def hover(observed, target, moves=1.0, stays=1.0):
+    body, reference = observed.vehicle, observed.reference
+    lift = xp.array([0.0, 0.0, body.gravity]) + moves * reference.acceleration
+    error, speed = target - observed.position, moves * reference.velocity - observed.velocity
+    push = body.mass * (lift + 9.0 * error + 6.0 * speed)
+    angular = -144.0 * observed.attitude - 24.0 * observed.body_rates
+    thrusts, tilts = allocated_with_tilts(
+        observed, observed.rotation.T @ push, observed.inertia @ angular
+    )
+    return tiltsim.Command(thrusts=stays * thrusts, tilt_angles=tilts)
+
+
+@tiltsim.law
+def idle(observed):
+    return hover(observed, observed.position, moves=0.0)  # else the force loop moves it
+
+
+@tiltsim.law
+def away(observed):
+    return hover(observed, observed.reference.position - xp.array([0.0, 0.3, -0.3]))
+
+
+@tiltsim.law
+def falls(observed):
+    stays = xp.where(observed.time > 7.0, 0.0, 1.0)
+    return hover(observed, observed.reference.position, stays=stays)
+
+
+@tiltsim.law
+def mine(observed):
+    return hover(observed, observed.reference.position)
+"""
+
+
+@pytest.mark.slow
+def test_laws_of_a_user_fly_the_league_of_interaction(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "own.py").write_text(FLYERS)
+    names = ("idle", "away", "falls", "mine")
+    own = [f'{one}={{law="numpy", function="own.py:{one}", {KEYS}}}' for one in names]
+    chosen = [word for one in own for word in ("--controller", one)]
+    command = ["arena", "--league", "interaction", "--vehicles", "tilt_hexarotor", "--quiet"]
+    laws = ["--controllers", "full_pose,vectoring,pid"]
+    assert main([*command, *laws, *chosen, "--jobs", "1", "--out", str(tmp_path), "--json"]) == 0
+    rows = json.loads(capsys.readouterr().out)["vehicles"]["tilt_hexarotor"]
+    scores = {(one["controller"], one["scenario"].rpartition("/")[2]): one["score"] for one in rows}
+    tasks = [address.rpartition("/")[2] for address in INTERACTION]
+    assert max(scores["idle", task] for task in tasks) < 1.0
+    assert max(scores["falls", task] for task in tasks if task != "platform") < 1.0
+    assert scores["falls", "platform"] < 20.0 < scores["mine", "platform"]
+    assert max(scores["away", task] for task in ("push#hold", "push#slide", "platform")) < 5.0
+    for name in ("full_pose", "vectoring", "mine"):
+        assert min(scores[name, task] for task in ("push#hold", "door", "carry#cable")) > 50.0
+    assert scores["pid", "push#hold"] is None
+    page = (tmp_path / "arena.md").read_text()
+    assert "- `pid` in `hold`, `slide`: reference.type" in page
+    assert "| `hold`: rms force error, N |" in page
+
+
 def flight(**changes):
     return row("pid", "step") | {"idle_position_error": 1.0, "idle_yaw_error": 0.5} | changes
 
 
 def test_neither_an_idle_vehicle_nor_a_late_crash_gains():
-    assert arena.score(flight(rms_position_error=1.0, rms_yaw_error=0.5)) == 0.0
-    assert arena.score(flight(rms_position_error=1.5, rms_yaw_error=0.5)) == 0.0
-    assert arena.score(flight()) == 100.0
-    assert arena.score(flight(rms_position_error=1e-3, end="diverged")) == 0.0
-    falling = arena.score(flight(rms_position_error=0.05, final_position_error=0.4))
-    assert falling == arena.score(flight(rms_position_error=0.4)) < 40.0
+    assert score(flight(rms_position_error=1.0, rms_yaw_error=0.5)) == 0.0
+    assert score(flight(rms_position_error=1.5, rms_yaw_error=0.5)) == 0.0
+    assert score(flight()) == 100.0
+    assert score(flight(rms_position_error=1e-3, end="diverged")) == 0.0
+    falling = score(flight(rms_position_error=0.05, final_position_error=0.4))
+    assert falling == score(flight(rms_position_error=0.4)) < 40.0
 
 
 def league_rows():

@@ -29,7 +29,7 @@ from tiltsim.studies.comparison import (
     is_last_tried,
     why_none,
 )
-from tiltsim.views.figures.controllers_compared import comparison_figure
+from tiltsim.views.figures.comparisons import comparison_figure
 
 SETPOINT = "ch04_tracking/setpoint#rho_0_modified"
 SHORT = {"simulation.duration": 0.3, "initial.position": [0.3, 0.0, 0.0], "expect": []}
@@ -136,6 +136,16 @@ def test_the_command_prints_rows_and_writes_a_folder(tmp_path, capsys):
     assert table[0] == SETPOINT
     assert table[1].split()[:2] == ["controller", "rms"]
     assert "yaw_position: " in table[4]
+
+
+def test_measures_of_contacts_are_shown_where_there_are_some(capsys):
+    short = ["--set", "simulation.duration=0.1", "--set", "expect=[]", "--nominal"]
+    command = ["compare", "interaction/door", "arena/quadrotor#step", "--controllers", "pid"]
+    assert main([*command, *short, "--jobs", "1"]) == 0
+    door, step = (line for line in capsys.readouterr().out.splitlines() if "rms error" in line)
+    assert "peak (N)" in door
+    assert "swing (rad)" not in door
+    assert "peak (N)" not in step
 
 
 def test_a_comparison_is_reported_as_soon_as_it_is_finished(monkeypatch):

@@ -25,9 +25,8 @@ from tiltsim.simulation.simulate import simulate
 from tiltsim.studies.gait_analysis import gait_report, map_report, vehicle_name
 from tiltsim.system import files
 from tiltsim.views.figures import style
-from tiltsim.views.figures.gait import gait_figure
-from tiltsim.views.figures.multirotor import attainable_figure
-from tiltsim.views.figures.two_color_map import map_figure
+from tiltsim.views.figures.gaits import gait_figure, map_figure
+from tiltsim.views.figures.vehicles import attainable_figure
 from tiltsim_controllers.analysis.fault_tolerance import fixed_tilt_hover
 from tiltsim_controllers.analysis.published_gaits import (
     DETERMINANT_CASES,
@@ -593,6 +592,12 @@ def test_the_legend_explains_only_what_is_drawn(gait, marks, bar) -> None:
     (legend,) = figure.legends
     assert [text.get_text() for text in legend.get_texts()] == marks
     assert any(axes.get_ylabel() == "time (s)" for axes in figure.axes) is bar
+
+
+def test_the_tilt_angles_of_a_constant_gait_are_level_lines() -> None:
+    angles = [0.1, 0.2, 0.3, 0.4]
+    (axes,) = gait_figure(plans.fixed(angles), AR_DRONE, ["tilt_angles"]).axes
+    assert [line.get_ydata().tolist() for line in axes.lines] == [[a, a] for a in angles]
 
 
 def test_equal_figures_give_equal_files(tmp_path) -> None:

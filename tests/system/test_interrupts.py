@@ -116,6 +116,7 @@ except KeyboardInterrupt:
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="needs a timer of POSIX")
 def test_an_interrupt_while_mujoco_warns_in_a_batch_is_raised_after_it():
     command = [sys.executable, "-c", DURING_A_BATCH]
@@ -216,6 +217,7 @@ def test_a_termination_waits_for_a_deferred_block(keyboard):
     assert done == ["inner", "outer"]
 
 
+@pytest.mark.slow
 def test_a_terminated_run_keeps_its_flight_and_leaves_no_part_file(tmp_path):
     law, out = tmp_path / "law.py", tmp_path / "out"
     law.write_text(TELLING, encoding="utf-8")

@@ -14,15 +14,14 @@ from tiltsim.flight.end import End
 from tiltsim.laws.assembling import assemble
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.views.attitude_plane import MOVING_TRAIL_TIME
-from tiltsim.views.rerun.blueprint import flight_blueprint
-from tiltsim.views.rerun.recording_file import new_recording
+from tiltsim.views.rerun.recording import Recording, flight_blueprint
 from tiltsim.views.signals import signals_of
 
 
 def views_of(*scenarios, names=(), flights=()):
     """The views of flights of these scenarios, by their titles."""
     assemblies = [assemble(scenario) for scenario in scenarios]
-    recorders = new_recording(assemblies, names)[1]
+    recorders = Recording(assemblies, names).recorders
     blueprint = flight_blueprint(recorders, flights)
     found, waiting = {}, [blueprint.root_container]
     while waiting:
@@ -40,11 +39,26 @@ def test_a_vehicle_without_tilt_angles_has_no_plot_of_them():
 
 def test_compared_flights_have_a_vehicle_and_a_plane_each():
     scenarios = [flight(name).scenario for name in ("fixed", "trot")]
-    recorders = new_recording([assemble(each) for each in scenarios])[1]
+    recorders = Recording([assemble(each) for each in scenarios]).recorders
     rows = flight_blueprint(recorders).root_container.contents[0].contents
     origins = [{view.name: view.origin for view in row.contents} for row in rows]
     assert origins[0] == {name: f"world/{name}/camera" for name in ("fixed", "trot")}
     assert origins[1] == {name: f"plane/{name}" for name in ("fixed", "trot")}
+
+
+def test_flights_of_a_tilt_car_and_a_rotorcraft_are_compared_in_the_plots_of_each():
+    compared = [flight("fixed"), flight("tilt_car")]
+    views = views_of(*(each.scenario for each in compared), flights=compared)
+    paths = {
+        name: sorted({path.partition("/")[0] for path in views[name].contents})
+        for name in ("Distance from the reference (m)", "Slowest rotor and limits (rad/s)")
+    }
+    recorders = Recording([each.assembly for each in compared]).recorders
+    names = [recorder.part for recorder in recorders]
+    assert paths == {
+        "Distance from the reference (m)": sorted(names),
+        "Slowest rotor and limits (rad/s)": names[:1],
+    }
 
 
 def range_of(view):

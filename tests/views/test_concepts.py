@@ -25,7 +25,7 @@ from tiltsim_controllers.analysis.singularity import (
     torque_free_direction,
 )
 from tiltsim_controllers.gaits.plans import continuous_trot
-from tiltsim_controllers.laws.decouplers import exact_decoupler
+from tiltsim_controllers.laws.feedback import exact_decoupler
 from tiltsim_controllers.vehicle.parameters import PRESETS, SPIN
 
 VEHICLE = PRESETS["ar_drone_2"]

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tiltsim.resources import shipped_folder
-from tiltsim.views.dressing import COUNTERCLOCKWISE, dress
+from tiltsim.views.replay import COUNTERCLOCKWISE, dress
 
 DOCS = Path(__file__).parents[2] / "docs"
 SKY = mujoco.mjtTexture.mjTEXTURE_SKYBOX

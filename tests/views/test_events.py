@@ -11,7 +11,7 @@ from tests.flights import SAMPLE_FIELDS, flight
 from tiltsim.flight.end import End
 from tiltsim.laws.assembling import assemble
 from tiltsim.scenario.loading import load_scenario
-from tiltsim.views.events import EventDetector, conditions
+from tiltsim.views.titles import EventDetector, conditions
 
 
 def flight_events(flight):
@@ -106,6 +106,6 @@ def test_switches_between_control_laws_are_reported():
 def test_a_tilt_cars_rotor_at_rest_is_saturated():
     this = flight("tilt_car")
     resting = this["rotor_speed_1"] <= 0.0
-    texts, _, holds = zip(*conditions(this), strict=True)
-    assert texts == ("rotor 1 saturated at zero", "rotor 2 saturated at zero")
-    assert (holds[0] == resting).all()
+    found = conditions(this)
+    assert [*found] == ["rotor 1 saturated at zero", "rotor 2 saturated at zero"]
+    assert (found["rotor 1 saturated at zero"] == resting).all()

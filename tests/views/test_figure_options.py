@@ -17,15 +17,14 @@ from tests.flights import OTHER_KINDS, RECIPES, SAMPLE_FIELDS, flight, saved
 from tiltsim.cli import build_parser, main
 from tiltsim.errors import InputError
 from tiltsim.laws.assembling import assemble
-from tiltsim.scenario.key_units import quantity_of_key
 from tiltsim.scenario.metric_names import METRICS
+from tiltsim.scenario.schema import quantity_of_key
 from tiltsim.sweeps.tables import PlotTable
 from tiltsim.views.figures import style
-from tiltsim.views.figures.distributions import distinct_texts
+from tiltsim.views.figures.distributions import distinct_texts, label_of
 from tiltsim.views.figures.layout import MIN_PANEL, relabel, retitle
 from tiltsim.views.figures.plot import plot
 from tiltsim.views.figures.sweep import _least_range
-from tiltsim.views.figures.sweep_columns import label_of
 
 
 def labels_of(figure):

@@ -6,7 +6,7 @@ from itertools import product
 
 import numpy as np
 
-from tiltsim.views.figures.multirotor import _faces
+from tiltsim.views.figures.vehicles import _faces
 
 
 def test_a_box_has_six_faces_with_their_corners_in_order() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import pickle
 import signal
+import struct
 import subprocess
 import sys
 from pathlib import Path
@@ -14,8 +15,8 @@ import pytest
 from tests.flights import flight
 from tests.views.recordings import rerun_rrd
 from tiltsim.errors import InputError
-from tiltsim.views.rerun.process import RecordingProcess
-from tiltsim.views.rerun.recording_file import save_recording
+from tiltsim.views.rerun.live import RecordingProcess
+from tiltsim.views.rerun.recording import save_recording
 
 
 def test_the_process_reports_an_error(tmp_path):
@@ -30,7 +31,7 @@ def test_a_recording_is_written_although_its_process_was_killed(tmp_path):
     this, paths = flight("trot"), [tmp_path / "a.rrd", tmp_path / "b.rrd"]
     with RecordingProcess(this.scenario) as process:
         process._process.kill()
-        process._process.wait()
+        process._process.join()
         process.start(this, paths[0])
         process.finish()
     save_recording([this], paths[1])
@@ -41,24 +42,29 @@ def test_a_recording_is_written_although_its_process_was_killed(tmp_path):
 def test_the_process_ends_with_an_interrupted_flight():
     with pytest.raises(KeyboardInterrupt), RecordingProcess(flight("trot").scenario) as process:
         raise KeyboardInterrupt
-    assert process._process.returncode is not None
+    assert process._process.exitcode is not None
 
 
+@pytest.mark.slow
 def test_the_process_prints_nothing_if_its_answer_is_not_read(tmp_path, capfd):
     """As if another file of the flight could not be written."""
     path = tmp_path / "flight.rrd"
     with RecordingProcess(flight("fixed").scenario) as process:
         process.start(flight("fixed"), path)
-    assert process._process.returncode == 0
+    assert process._process.exitcode == 0
     assert path.is_file()
     assert capfd.readouterr().err == ""
 
 
+@pytest.mark.slow
 def test_the_process_prints_nothing_about_an_incomplete_message(capfd):
     with RecordingProcess(flight("fixed").scenario) as process:
         process._work = flight("fixed"), Path("nowhere")
-        process._process.stdin.write(pickle.dumps(process._work)[:1000])
-    assert process._process.returncode == 0
+        message = pickle.dumps(process._work)
+        header = struct.pack("!i", len(message))  # of `multiprocessing.connection`
+        os.write(process._connection.fileno(), header + message[:1000])
+        process._answers = process._connection.close
+    assert process._process.exitcode == 0
     assert capfd.readouterr().err == ""
 
 
@@ -66,7 +72,7 @@ def test_the_process_ends_with_its_parent(tmp_path):
     """Even if that is killed and cannot clean up."""
     program = (
         "import os, signal; from tests.flights import flight; "
-        "from tiltsim.views.rerun.process import RecordingProcess; "
+        "from tiltsim.views.rerun.live import RecordingProcess; "
         "RecordingProcess(flight('fixed').scenario); os.kill(os.getpid(), signal.SIGKILL)"
     )
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}

@@ -21,9 +21,8 @@ from tests.refusals import refusal
 from tiltsim.cli import main
 from tiltsim.errors import InputError
 from tiltsim.views.attitude_plane import MOVING_TRAIL_TIME, torque_free_directions
-from tiltsim.views.video import has_display, offscreen, overlay, rendering
-from tiltsim.views.video.offscreen import make_contexts
-from tiltsim.views.video.overlay import Overlay, overlay_inset
+from tiltsim.views.video import has_display, offscreen, rendering
+from tiltsim.views.video.offscreen import Overlay, make_contexts, overlay_inset
 from tiltsim.views.video.rendering import (
     FlightRenderer,
     VideoFormat,
@@ -58,7 +57,7 @@ needs_gl = pytest.mark.skipif(bool(missing_gl()), reason=missing_gl())
 def plane(angles, attitude=(0.0, 0.0), margin=1.0, size=101):
     columns = {f"alpha_{i}": np.array([angle]) for i, angle in enumerate(angles, start=1)}
     n = torque_free_directions(columns, PRESETS["ar_drone_2"])[0]
-    return overlay.plane(size, n, 1.0, np.array([attitude]), near=margin < 0.2)
+    return offscreen.plane(size, n, 1.0, np.array([attitude]), near=margin < 0.2)
 
 
 def color_at(image, roll, pitch):
@@ -69,16 +68,16 @@ def color_at(image, roll, pitch):
 
 def test_the_inset_shades_unreachable_attitudes():
     image = plane((-0.65, -0.65, 0.65, 0.65))
-    assert color_at(image, 0.3, -1.45) == overlay.UNREACHABLE
-    assert color_at(image, 0.3, 0.6) == overlay.GROUND
-    assert color_at(plane((0.0, 0.0, 0.0, 0.0)), 0.3, -1.45) == overlay.GROUND
+    assert color_at(image, 0.3, -1.45) == offscreen.UNREACHABLE
+    assert color_at(image, 0.3, 0.6) == offscreen.GROUND
+    assert color_at(plane((0.0, 0.0, 0.0, 0.0)), 0.3, -1.45) == offscreen.GROUND
 
 
 def test_the_inset_has_the_attitude_with_pitch_upwards():
-    assert color_at(plane((0.0,) * 4, (0.5, 0.8)), 0.5, 0.8) == overlay.ATTITUDE
-    assert color_at(plane((0.0,) * 4, (0.5, 0.8), margin=0.1), 0.5, 0.8) == overlay.CURVE
+    assert color_at(plane((0.0,) * 4, (0.5, 0.8)), 0.5, 0.8) == offscreen.ATTITUDE
+    assert color_at(plane((0.0,) * 4, (0.5, 0.8), margin=0.1), 0.5, 0.8) == offscreen.CURVE
     beyond = plane((0.0,) * 4, (3.0, 0.0))
-    assert overlay.ATTITUDE in {tuple(pixel) for pixel in beyond[50, -5:-1].tolist()}
+    assert offscreen.ATTITUDE in {tuple(pixel) for pixel in beyond[50, -5:-1].tolist()}
 
 
 def test_an_inset_covers_only_its_corner():
@@ -91,8 +90,8 @@ def test_an_inset_covers_only_its_corner():
 @pytest.mark.parametrize(("name", "whole"), [("fixed", True), ("trot", False)])
 def test_the_insets_trail_is_short_if_the_curve_moves(name, whole, monkeypatch):
     this, trails = flight(name), []
-    monkeypatch.setattr(overlay, "plane", lambda *given, near: trails.append(given[3]))
-    monkeypatch.setattr(overlay, "overlay_inset", lambda *_: None)
+    monkeypatch.setattr(offscreen, "plane", lambda *given, near: trails.append(given[3]))
+    monkeypatch.setattr(offscreen, "overlay_inset", lambda *_: None)
     last = len(this) - 1
     Overlay(this, 180).paint(np.zeros((180, 320, 3), dtype=np.uint8), last)
     began = 0.0 if whole else this["time"][last] - MOVING_TRAIL_TIME
@@ -210,6 +209,7 @@ def test_a_video_may_show_a_part_of_the_flight():
     np.testing.assert_allclose(frame_times(this, dataclasses.replace(video, end=9.0))[-1], 1.2)
 
 
+@pytest.mark.slow
 @needs_gl
 def test_the_command_works_without_a_display(tmp_path):
     folder = saved("fixed", tmp_path)
@@ -231,6 +231,7 @@ def test_the_command_works_without_a_display(tmp_path):
 # --- errors ------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @needs_gl
 def test_a_terminated_command_leaves_no_file(tmp_path):
     folder = saved("fixed", tmp_path)

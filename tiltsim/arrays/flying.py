@@ -76,7 +76,7 @@ class Kernel:
         self._step = run(make_step(equations, course.solver))
         self._inputs = run(equations.inputs)
         self._observe = run(equations.observe)
-        self._check = run(loop.monitoring.sign_check_values)
+        self._check = run(loop.sign_check_values)
         self._limit = run(loop.kind.limit_exceeded)
         self._integration = Integration(
             course.timestep, course.control_steps, setup.parameters, setup.knots, disturbance

@@ -1,8 +1,4 @@
-"""A closed loop: a controller, as functions of arrays, around the model of a vehicle.
-
-Whichever controller it holds, a closed loop has four parts: the `Dynamics` of the model, the
-`Sampling` of the controller, the `Columns` of a flight and the `Monitoring` of its end.
-"""
+"""A closed loop: a controller, as functions of arrays, around the model of a vehicle."""
 
 from __future__ import annotations
 
@@ -10,16 +6,19 @@ import zlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from tiltsim.closed_loop.vehicle_kind import VehicleKind
-from tiltsim.models.parts import ExtraActuators
+from tiltsim.models.parts import ExtraActuators, Visuals
+from tiltsim.models.vehicle_parts import MAX_ROTORS
 from tiltsim.scenario.scenario import FlightPlan, Scenario
 from tiltsim.system.text import Quantity, in_words
 from tiltsim_controllers.mathematics.records import flatten, record_dtype, record_size
 from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector
+
+if TYPE_CHECKING:
+    import mujoco
 
 
 class Sizes(NamedTuple):
@@ -55,95 +54,36 @@ class ControlSetup(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Dynamics:
-    """The model in MuJoCo and its state.
+class VehicleKind:
+    """Common properties of all vehicles of a kind, and their construction in MuJoCo.
 
     Attributes:
-        model: Name of the MJCF model.
-        sizes: Lengths of its vectors, the controller's own states among the activations.
-        initial_activations: ``(plan, setup) -> act`` at time zero.
-        spins: Signs of the rotor speeds, one per rotor of a rotorcraft.
-        tilt_of_rotor: The number, from 0, of each rotor's tilt, -1 for a fixed one; empty for
-            vehicles whose rotors lie on a cross.
-        controller_states: Number of activations that are states of the controller.
-        extra_actuators: Actuators that layers around the controller append to the model, innermost
-            first.
-        commands_thrusts: Whether the controller commands thrusts, not rates of the rotor speeds:
-            these activations are then idle.
+        observed_fields: Fields of a sample after the time.
+        columns: Columns of every flight, their labels and units, in the order of the file.
+        thrusts: ``(columns so far, scenario) -> columns``: the rotors' thrusts, N.
+        compile: ``(scenario, law_states, extra_actuators, userdata_size, visuals) -> model``.
+            Raises `ValueError` where MuJoCo cannot build it.
+        initial_motion: ``(plan) -> qpos, qvel`` at time zero.
+        limit_exceeded: Function ``(time, values, reference, knots, follows_position) ->
+            code`` of the first limit of `tiltsim.closed_loop.limits` that a sample exceeds;
+            ``values`` begin with the observed fields.
+        metrics: ``(columns, scenario, follows_position) -> metrics``, without the metrics that all
+            kinds share. Columns have shape (..., N), the time (N,); numbers of the scenario may be
+            arrays (..., 1); metrics have shape (...) and are NaN where a flight has none.
     """
 
-    model: str
-    sizes: Sizes
-    initial_activations: Callable[[FlightPlan, ControlSetup], Vector]
-    controller_states: int = 0
-    spins: Values = ()
-    tilt_of_rotor: tuple[int, ...] = ()
-    extra_actuators: tuple[ExtraActuators, ...] = ()
-    commands_thrusts: bool = False
+    observed_fields: tuple[str, ...]
+    columns: Mapping[str, Quantity]
+    thrusts: Callable[[Mapping[str, Floats], Scenario], dict[str, Floats]]
+    compile: Callable[[Scenario, int, tuple[ExtraActuators, ...], int, Visuals], mujoco.MjModel]
+    initial_motion: Callable[[FlightPlan], tuple[Vector, Vector]]
+    limit_exceeded: Callable[..., Any]
+    metrics: Callable[[Mapping[str, Floats], Scenario, bool], dict[str, Any]]
 
-
-def _held_controls(time: Any, qpos: Any, qvel: Any, act: Any, ctrl: Any, parameters: Any) -> Any:
-    """For controllers whose controls stay as they were sampled."""
-    return ctrl
-
-
-@dataclass(frozen=True, eq=False)
-class Sampling:
-    """The control step, at the samples of the controller and between them.
-
-    Attributes:
-        controls: Function ``(time, qpos, qvel, act, parameters, knots) -> ctrl``: the whole
-            step.
-        hold: Function ``(time, qpos, qvel, act, ctrl, parameters) -> ctrl``: the controls
-            between the samples of a held controller.
-    """
-
-    controls: Callable[..., Values]
-    hold: Callable[..., Values] = _held_controls
-
-
-@dataclass(frozen=True, eq=False)
-class Columns:
-    """The samples of a flight, and the columns derived from them.
-
-    Attributes:
-        observe: Function ``(qpos, qvel, act, ctrl) -> values`` of the kind's fields and
-            ``fields``.
-        derive: ``(samples by field, setup) -> columns``: references, determinant, margin and the
-            columns in ``units``.
-        fields: Fields of a sample in addition to the fields of the vehicle's kind.
-        units: Columns of a flight in addition to the columns of the vehicle's kind, with their
-            units.
-        observe_reads_controls: Whether ``observe`` needs the controls in force.
-    """
-
-    observe: Callable[..., Values]
-    derive: Callable[[Mapping[str, Floats], ControlSetup], dict[str, Floats]]
-    fields: tuple[str, ...] = ()
-    units: Mapping[str, str] = field(default_factory=dict)
-    observe_reads_controls: bool = False
-
-
-def nothing_singular(time: Any, values: Any, parameters: Any, knots: Any) -> tuple[float]:
-    """For controllers that are singular nowhere."""
-    return (1.0,)
-
-
-@dataclass(frozen=True, eq=False)
-class Monitoring:
-    """Where the controller becomes singular: numbers that have to keep their sign.
-
-    Attributes:
-        sign_check_values: Function ``(time, values, parameters, knots) -> numbers``, from
-            the time (s) of a sample and its ``values`` as `Columns.observe` returns them.
-        causes: ``(sample by field, setup) -> texts``: why the flight ends where each of them
-            reaches zero.
-    """
-
-    sign_check_values: Callable[..., Values] = nothing_singular
-    causes: Callable[[Mapping[str, float], ControlSetup], tuple[str, ...]] = (
-        lambda _sample, _setup: ("",)
-    )
+    @property
+    def rotors(self) -> tuple[int, ...]:
+        """The numbers of the rotors."""
+        return tuple(i for i in range(1, MAX_ROTORS + 1) if f"rotor_speed_{i}" in self.columns)
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,16 +113,52 @@ class Equations:
     tilts: Callable[..., Values] | None = None
 
 
+def _held_controls(time: Any, qpos: Any, qvel: Any, act: Any, ctrl: Any, parameters: Any) -> Any:
+    """For controllers whose controls stay as they were sampled."""
+    return ctrl
+
+
+def nothing_singular(time: Any, values: Any, parameters: Any, knots: Any) -> tuple[float]:
+    """For controllers that are singular nowhere."""
+    return (1.0,)
+
+
 @dataclass(frozen=True, eq=False)
 class ClosedLoop:
-    """A controller around the model of a vehicle.
+    """A controller around the model of a vehicle; a layer makes one such record of another.
 
     Attributes:
         kind: The kind of the vehicle.
         parameters: Record at the head of `userdata`; its first field is ``signature``. The knots of
             gait and reference follow it.
         setup: ``(plan, signature) -> ControlSetup``.
-        dynamics, sampling, columns, monitoring: See there.
+        model: Name of the MJCF model.
+        sizes: Lengths of its vectors, the controller's own states among the activations.
+        initial_activations: ``(plan, setup) -> act`` at time zero.
+        controls: Function ``(time, qpos, qvel, act, parameters, knots) -> ctrl``: the whole control
+            step.
+        observe: Function ``(qpos, qvel, act, ctrl) -> values`` of the kind's fields and ``fields``.
+        derive: ``(samples by field, setup) -> columns``: references, determinant, margin and the
+            columns in ``further_units``.
+        hold: Function ``(time, qpos, qvel, act, ctrl, parameters) -> ctrl``: the controls between
+            the samples of a held controller.
+        fields: Fields of a sample in addition to the fields of the vehicle's kind.
+        further_units: Columns of a flight in addition to the columns of the vehicle's kind, with
+            their units.
+        observe_reads_controls: Whether ``observe`` needs the controls in force.
+        sign_check_values: Function ``(time, values, parameters, knots) -> numbers``, from the time
+            (s) of a sample and its ``values`` as ``observe`` returns them. They have to keep their
+            signs: where one is zero, the controller is singular.
+        causes: ``(sample by field, setup) -> texts``: why the flight ends where each of these
+            reaches zero.
+        controller_states: Number of activations that are states of the controller.
+        spins: Signs of the rotor speeds, one per rotor of a rotorcraft.
+        tilt_of_rotor: The number, from 0, of each rotor's tilt, -1 for a fixed one; empty for
+            vehicles whose rotors lie on a cross.
+        extra_actuators: Actuators that layers around the controller append to the model, innermost
+            first.
+        commands_thrusts: Whether the controller commands thrusts, not rates of the rotor speeds:
+            these activations are then idle.
         equations: This controller on the thesis's equations; None where it is supported in MuJoCo
             only or, inside a layer, by `tiltsim.laws.layers.on_equations`.
         follows_position: Whether a scenario has the controller follow the reference's horizontal
@@ -198,10 +174,23 @@ class ClosedLoop:
     kind: VehicleKind
     parameters: type[tuple[Any, ...]]
     setup: Callable[[FlightPlan, float], ControlSetup]
-    dynamics: Dynamics
-    sampling: Sampling
-    columns: Columns
-    monitoring: Monitoring = field(default_factory=Monitoring)
+    model: str
+    sizes: Sizes
+    initial_activations: Callable[[FlightPlan, ControlSetup], Vector]
+    controls: Callable[..., Values]
+    observe: Callable[..., Values]
+    derive: Callable[[Mapping[str, Floats], ControlSetup], dict[str, Floats]]
+    hold: Callable[..., Values] = _held_controls
+    fields: tuple[str, ...] = ()
+    further_units: Mapping[str, str] = field(default_factory=dict)
+    observe_reads_controls: bool = False
+    sign_check_values: Callable[..., Values] = nothing_singular
+    causes: Callable[[Mapping[str, float], ControlSetup], tuple[str, ...]] = lambda *_: ("",)
+    controller_states: int = 0
+    spins: Values = ()
+    tilt_of_rotor: tuple[int, ...] = ()
+    extra_actuators: tuple[ExtraActuators, ...] = ()
+    commands_thrusts: bool = False
     equations: Equations | None = None
     follows_position: Callable[[Scenario], bool] = lambda _scenario: True
     uses_gait: bool = True
@@ -217,7 +206,7 @@ class ClosedLoop:
     @cached_property
     def signature(self) -> float:
         """A checksum of the layout of `userdata`, which distinguishes our models from others."""
-        layout = (self.dynamics.model, self.dynamics.sizes, record_dtype(self.parameters))
+        layout = (self.model, self.sizes, record_dtype(self.parameters))
         return float(zlib.crc32(repr(layout).encode()))
 
     @cached_property
@@ -228,13 +217,13 @@ class ClosedLoop:
     @cached_property
     def sample_fields(self) -> tuple[str, ...]:
         """The fields of a recorded sample, in order."""
-        return ("time", *self.kind.observed_fields, *self.columns.fields)
+        return ("time", *self.kind.observed_fields, *self.fields)
 
     @cached_property
     def units(self) -> dict[str, str]:
         """The columns of a flight and their units, in order."""
         own = {name: what.unit for name, what in self.kind.columns.items()}
-        return {**own, **self.columns.units}
+        return {**own, **self.further_units}
 
     def label(self, column: str) -> Quantity:
         """The label and unit of a column of a flight."""

@@ -36,7 +36,7 @@ def run(
     out: Path = Path("arena"),
     controllers: Names = (),
     own: OwnControllers = (),
-    league: Literal["limited", "unlimited"] = "limited",
+    league: Literal["limited", "unlimited", "interaction"] = "limited",
     vehicles: Names = (),
     tune: Count = None,
     seed: Count = None,
@@ -46,18 +46,20 @@ def run(
     quiet: Quiet = False,
     trust: Trust = False,
 ) -> int:
-    """Fly the tasks of scenarios/arena under every controller that fits, and score them.
+    """Fly fixed tasks under every controller that fits, and score them.
 
     The limited league has rotor limits, lag, latency, noise and model errors, and baselines with
     observers and mixers; in the unlimited one all controllers that fit, also of packages, fly
-    without. Scores: 100 for no error, 50 for a root mean square error of 0.1 m or 0.1 rad of yaw
-    (steps: a quarter of the step), 0 for a vehicle that stays where it began and if the flight ends
-    early, - if the task refuses the controller.
+    without. In the one of interaction vehicles push, open a door, land and carry loads. Scores:
+    100 for no error, 50 for a root mean square error of 0.1 m or 0.1 rad of yaw (steps: a quarter
+    of the step), of 0.5 N of a push, or 0.1 rad of swing in the end; 0 for a vehicle that stays
+    where it began or never touches, and if the flight ends early, - if the task refuses the
+    controller.
 
     Args:
         out (DIR): folder for arena.csv, arena.json, arena.png and arena.md (default: arena)
         controllers: laws, or given, the scenarios' own; default without --controller: all that fit
-        league: limited or unlimited (default: limited)
+        league: limited, unlimited or interaction (default: limited)
         vehicles: default: all
         tune (N): first search each controller's gains with at most N flights on other tasks, and
             write them to limited_gains.json or tuned_gains.json
@@ -78,6 +80,8 @@ def run(
         raise InputError("--gains: not with --tune, which searches gains itself")
     if tune is None and seed is not None:
         raise InputError("--seed: only with --tune")
+    if tune is not None and league not in GAINS_FILE:
+        raise InputError(f"--tune: not in the league of {league}, which has no tuning tasks")
     given = chosen_controllers(controllers, own)
     chosen = chosen_vehicles(vehicles, league)
     tables = _tables(chosen, given, league)
@@ -88,8 +92,10 @@ def run(
             budget = {"flights": tune, "seed": seed or 1}
             searched = _tables(chosen, given, league, without=(OURS,) * (league == "limited"))
             tuning = _tuned(out / GAINS_FILE[league], chosen, searched, budget, jobs, progress)
-        else:
+        elif gains is not None or league in GAINS_FILE:
             tuning = read_tuning(gains or shipped_folder("scenarios") / FOLDER / GAINS_FILE[league])
+        else:
+            tuning = {"gains": {}}
         tuned = _tables_of(tuning, tables)
         flights = matches(league, chosen, tables, tuned, trusted=trust)
         progress.begin("flights", len(flights))
@@ -132,7 +138,7 @@ def _written(
     from tiltsim.studies.arena_page import arena_page
     from tiltsim.studies.league_page import by_world, league_page, league_table
     from tiltsim.views.figures import style
-    from tiltsim.views.figures.arena_scores import arena_figure, panels_of, tasks_of, vehicles_of
+    from tiltsim.views.figures.comparisons import arena_figure, panels_of, tasks_of, vehicles_of
 
     if league == "limited":
         page, panels = league_page(rows, made), {}
@@ -193,6 +199,8 @@ def _sentence(tuning: Mapping[str, Any], league: str) -> str:
     from tiltsim.studies.arena import SEEDS, WORLDS
 
     seeds = max((SEEDS[world] for world in WORLDS[league]), key=len)
+    if not tuning["gains"]:
+        return f"Seeds of the tasks: {', '.join(map(str, seeds))}."
     made = tuning["made"]
     at = f" at commit {made['commit']}" if made["commit"] else ""
     return (

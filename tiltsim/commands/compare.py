@@ -32,6 +32,10 @@ MEASURES: Final = {
     "min_singularity_margin": ("margin (rad)", ".2f", 1.0),
     "min_rotor_speed": ("slowest (rad/s)", ".0f", 1.0),
     "saturated_fraction": ("saturated (%)", ".1f", 100.0),
+    "rms_force_error": ("force (N)", ".3g", 1.0),
+    "peak_force": ("peak (N)", ".3g", 1.0),
+    "time_in_contact": ("contact (s)", ".1f", 1.0),
+    "final_swing": ("swing (rad)", ".3g", 1.0),
     "max_latency": ("latency (ms)", ".0f", 1000.0),
     "max_mass_factor": ("mass ×", ".2f", 1.0),
     "min_thrust_factor": ("thrust ×", ".2f", 1.0),
@@ -96,7 +100,7 @@ def run(
             _print(rows, [key for key in MEASURES if not (nominal and key in searched)])
         if rows and out is not None:
             text.write_text(out / "comparison.json", text.json_text(rows))
-            drawn = figures.controllers_compared.comparison_figure(compared)
+            drawn = figures.comparisons.comparison_figure(compared)
             figures.style.save(drawn, out / "comparison.png")
             if not json:
                 text.print_line(f"comparison written to {out}")
@@ -106,12 +110,15 @@ def run(
 
 def _print(rows: list[dict[str, Any]], shown: list[str]) -> None:
     """A table for every scenario, and below it why flights ended or were refused."""
-    columns: text.Columns = {
-        "controller": ("controller", ""),
-        **{MEASURES[key][0]: (partial(_cell, key), ">") for key in shown},
-    }
+    from tiltsim.studies.comparison import CONTACTS
+
     for scenario in dict.fromkeys(row["scenario"] for row in rows):
         chosen = [row for row in rows if row["scenario"] == scenario]
+        unknown = [key for key in CONTACTS if all(row[key] is None for row in chosen)]
+        columns: text.Columns = {
+            "controller": ("controller", ""),
+            **{MEASURES[k][0]: (partial(_cell, k), ">") for k in shown if k not in unknown},
+        }
         text.print_line(scenario)
         print(text.table(columns, chosen))
         for row in chosen:

@@ -24,7 +24,7 @@ def run(
         out (FILE): the file, or a folder (default: flight.mcap, .ulg or .csv beside the flight)
     """
     from tiltsim.flight.reading import load_flight
-    from tiltsim.logs.export import FORMATS, export
+    from tiltsim.logs.formats import FORMATS, export
 
     loaded = load_flight(flight)
     name = f"flight{FORMATS[format or 'mcap']}"

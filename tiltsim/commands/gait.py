@@ -70,7 +70,7 @@ def run(
         vehicle, case = gait.vehicle or parse_vehicle(DEFAULT_VEHICLE), figure.case or "equal"
         report = determinant_report(case, vehicle)
         figure.show(
-            lambda: figures.determinant.determinant_figure(case, vehicle),
+            lambda: figures.vehicles.determinant_figure(case, vehicle),
             report,
             determinant_text(report),
             json=json,
@@ -191,19 +191,19 @@ def _draw(selected: SelectedGait, options: GaitFigure) -> Figure:
         compared.append((selected.twin_title, selected.twin))
     match options.kind:
         case "faults":
-            return figures.gait.fault_figure(vehicle)
+            return figures.gaits.fault_figure(vehicle)
         case "attainable":
             if not chosen.is_constant:
                 raise InputError(f"--figure attainable: {chosen.name} moves; give fixed angles")
             limits = _speed_limits(selected, options)
-            return figures.multirotor.attainable_figure(chosen, vehicle, limits)
+            return figures.vehicles.attainable_figure(chosen, vehicle, limits)
         case "comparison":
             if len(compared) == 1:
                 raise InputError(f"--figure comparison: {chosen.name} has no bias to compare with")
-            return figures.gait.comparison_figure(compared, vehicle)
+            return figures.gaits.comparison_figure(compared, vehicle)
         case "margin":
-            return figures.gait.margin_figure(compared, vehicle)
-    return figures.gait.gait_figure(chosen, vehicle, tuple(options.panels))
+            return figures.gaits.margin_figure(compared, vehicle)
+    return figures.gaits.gait_figure(chosen, vehicle, tuple(options.panels))
 
 
 def _run_multirotor(
@@ -252,7 +252,7 @@ def _run_multirotor(
 
     def draw() -> Figure:
         rotors = tilted_rotors(vehicle, angles, limits)
-        return figures.multirotor.multirotor_figure(rotors, figure.kind or MULTIROTOR_FIGURES[0])
+        return figures.vehicles.multirotor_figure(rotors, figure.kind or MULTIROTOR_FIGURES[0])
 
     figure.show(draw, report, multirotor_text(report), json=json)
     return 0

@@ -54,10 +54,7 @@ def run(
 
     paths = [("path", path)] if path else None
     figure.show(
-        lambda: figures.two_color_map.map_figure(parameters, paths),
-        report,
-        _summary(report),
-        json=json,
+        lambda: figures.gaits.map_figure(parameters, paths), report, _summary(report), json=json
     )
     return DONE if path is None or report["path"]["sound"] else EXPECTATION_FAILED
 

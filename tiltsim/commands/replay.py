@@ -44,9 +44,9 @@ def run(
     """
     figure.check()
     (loaded,) = load_scenarios([scenario], overrides, trust)
+    from tiltsim.logs.identify import replay
     from tiltsim.logs.log import UNITS
     from tiltsim.logs.reading import read_log
-    from tiltsim.logs.replay import replay
 
     read = read_log(log, chart)
     found = replay(read, loaded, window=window)

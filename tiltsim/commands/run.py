@@ -85,7 +85,7 @@ def run(
 
     with ExitStack() as stack:
         if rerun is not None:
-            from tiltsim.views.rerun.process import RecordingProcess
+            from tiltsim.views.rerun.live import RecordingProcess
 
             recording = stack.enter_context(RecordingProcess(loaded))
         flight = fly(loaded, live=live, connect=connect, quiet=quiet)

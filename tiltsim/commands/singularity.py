@@ -36,10 +36,7 @@ def run(
     report = _report(parameters, roll or 0.0, pitch or 0.0)
 
     figure.show(
-        lambda: figures.determinant.singularity_figure(parameters),
-        report,
-        _summary(report),
-        json=json,
+        lambda: figures.vehicles.singularity_figure(parameters), report, _summary(report), json=json
     )
     return 0
 
@@ -47,7 +44,7 @@ def run(
 def _report(vehicle: Vehicle, roll: float, pitch: float) -> dict[str, Any]:
     from math import asin, cos
 
-    from tiltsim_controllers.analysis.quadrotor_singularity import (
+    from tiltsim_controllers.analysis.singularity import (
         exact_determinant,
         normalized_determinant,
         published_determinant,

@@ -45,7 +45,7 @@ def run(paths: tuple[Path, ...], *, rerun: Path | None = None, connect: str | No
 
         view_flights(flights, connect, names)
     else:
-        from tiltsim.views.rerun.recording_file import save_recording
+        from tiltsim.views.rerun.recording import save_recording
 
         save_recording(flights, rerun, names)
         print_line(f"recording written to {viewing(rerun)}")

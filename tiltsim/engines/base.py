@@ -1,12 +1,12 @@
 """Engines, which run the control step inside MuJoCo.
 
 One scalar source runs on Python floats (nothing to compile, best for one short flight) or as a
-native callback (`tiltsim.engines.native_engine`). MuJoCo's control callback is global to the
+native callback (`tiltsim.engines.control`). MuJoCo's control callback is global to the
 process, so an engine checks that a model is ours before it writes to it.
 """
 
 from collections.abc import Callable
-from typing import Any, Literal, NamedTuple, Protocol
+from typing import Literal, NamedTuple
 
 import mujoco
 
@@ -17,19 +17,6 @@ from tiltsim_controllers.mathematics.scalar import Floats
 EngineName = Literal["python", "native", "jax"]
 
 Callback = Callable[[mujoco.MjModel, mujoco.MjData], None]
-
-
-class Engine(Protocol):
-    """Evaluates the control step of one model whenever MuJoCo needs its controls."""
-
-    name: EngineName
-
-    def callback(self) -> Any:
-        """The control callback: a Python function, or a C function as `ctypes` shows it.
-
-        It evaluates the whole step or, between the samples of a held controller, only those
-        controls that follow the state, as thrusts follow the rotor speeds.
-        """
 
 
 class Vectors(NamedTuple):
@@ -53,20 +40,20 @@ class Vectors(NamedTuple):
 
 def vectors_of(loop: ClosedLoop, data: mujoco.MjData) -> Vectors:
     """Views of the state of a flight's data."""
-    sizes = loop.dynamics.sizes
+    sizes = loop.sizes
     qpos, others = data.qpos[: sizes.qpos], data.qpos[sizes.qpos :]
     return Vectors(qpos, data.qvel[: sizes.qvel], data.act, others, data.history)
 
 
 def check_model(loop: ClosedLoop, model: mujoco.MjModel, data: mujoco.MjData) -> None:
     """Raise ValueError unless model and data belong to a flight of this loop."""
-    known = loop.dynamics.sizes
+    known = loop.sizes
     moving = known.qvel if known.others else model.nv
     sizes = Sizes(model.nq - known.others, moving, model.na, model.nu, known.others, model.nhistory)
     head = HEADER_SIZE + loop.record_size
     signed = model.nuserdata >= head and data.userdata[HEADER_SIZE] == loop.signature
     if sizes != known or not signed:
         raise ValueError(
-            f"not a flight of the {loop.dynamics.model}: {sizes}, expected {known} "
+            f"not a flight of the {loop.model}: {sizes}, expected {known} "
             "with the parameters in userdata"
         )

@@ -142,7 +142,7 @@ define internal void @count_down(ptr %recorder) nounwind {
   ret void
 }
 """
-"""Access to the head of a `tiltsim.engines.recorder.Recorder`, or of one per lane."""
+"""Access to the head of a `tiltsim.engines.programs.Recorder`, or of one per lane."""
 
 CHOOSE: Final = """
 define internal void @choose(i64 %size, <B> %where, ptr %yes, ptr %no, ptr %out) nounwind {

@@ -1,15 +1,28 @@
-"""LLVM text as machine code, which is kept on disk."""
+"""LLVM text as machine code, which is kept on disk, and the memory in which it finds a flight.
+
+A C program reads ``d->qpos``; native code of ours has only the address ``d``. MuJoCo's functions
+for reading and writing the state (``mj_getState``) would copy all of it twice per call of the
+callback, which takes as long as a controller. So native code reads the fields in place. Their
+offsets depend on MuJoCo's version and are documented only in its C headers; here they are measured
+in the running library: a small model has, at these offsets, the addresses and values that the
+Python bindings report.
+"""
 
 import ctypes
+import os
 import platform
 import tempfile
 from collections.abc import Mapping
+from contextlib import suppress
 from functools import cache
 from hashlib import sha256
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
-from tiltsim.engines.code_folder import code_folder, is_usable
+import mujoco
+import numpy as np
+
+from tiltsim.system.hooks import mujoco_hooks
 from tiltsim_controllers.code.lanes import LaneMath
 
 OPTIMIZATION: Final = 1
@@ -79,11 +92,7 @@ def widest() -> int:
 
 @cache
 def lane_math(*, quick: bool) -> LaneMath:
-    """The functions of lanes that this machine has.
-
-    Args:
-        quick: Whether their last digits may differ from the C library's.
-    """
+    """The functions of lanes that this machine has; quick ones may differ in their last digits."""
     import llvmlite.binding as llvm
 
     fuses = llvm.get_host_cpu_features().get("fma") or platform.machine() in ("aarch64", "arm64")
@@ -114,3 +123,110 @@ def _save(file: Path, code: bytes) -> None:
         Path(own.name).replace(file)
     except OSError:
         Path(own.name).unlink(missing_ok=True)
+
+
+def code_folder() -> Path:
+    """The folder of compiled code, in the user's folder for caches."""
+    base = Path(os.environ.get("XDG_CACHE_HOME", ""))
+    if not base.is_absolute():  # to be ignored, as the specification of XDG_CACHE_HOME says
+        base = Path.home() / ".cache"
+    return base / "tiltsim" / "machine_code"
+
+
+def is_usable(folder: Path) -> bool:
+    """Whether compiled code may be kept and loaded: its folder is writable, and by nobody else.
+
+    Whoever can write there decides what a flight executes.
+    """
+    try:
+        return _is_private(folder.parent) and _is_private(folder) and os.access(folder, os.W_OK)
+    except OSError:
+        return False
+
+
+def _is_private(folder: Path) -> bool:
+    """Whether a folder is this user's alone; it is created so, whatever the umask."""
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    with suppress(FileExistsError):
+        folder.mkdir(mode=0o700)
+    if os.name == "nt":
+        return True
+    found = folder.stat()
+    if found.st_uid != os.getuid():
+        return False
+    if found.st_mode & 0o077:
+        folder.chmod(0o700)
+    return True
+
+
+_PROBE: Final = """
+<mujoco>
+  <size nuserdata="40503"/>
+  <worldbody><body><joint name="hinge"/><geom size="1"/></body></worldbody>
+  <actuator><general joint="hinge" dyntype="integrator"/></actuator>
+  <sensor><jointpos joint="hinge" nsample="1"/></sensor>
+</mujoco>
+"""
+_TIME: Final = 0.7853981634123456
+_ARRAYS: Final = ("qpos", "qvel", "act", "history", "ctrl", "userdata")
+
+_MODEL_BYTES: Final = 2048
+_DATA_BYTES: Final = 1 << 20
+"""Search ranges of the sizes in mjModel and of the time in mjData, which precedes the arrays."""
+
+_ARRAY_BYTES: Final = 512
+"""Search range of the arrays behind the time; they are the first of some hundred."""
+
+
+class Layout(NamedTuple):
+    """Offsets in bytes."""
+
+    model_userdata_size: int  # in mjModel, a 32-bit integer at least
+    qpos: int  # in mjData, as all below: the address of an array of floats
+    qvel: int
+    act: int
+    history: int
+    ctrl: int
+    userdata: int
+
+
+@cache
+def mjdata_layout() -> Layout:
+    """Measure the offsets.
+
+    Raises:
+        RuntimeError: If a field is not found in the search range.
+    """
+    with mujoco_hooks():
+        model = mujoco.MjModel.from_xml_string(_PROBE)
+    data = mujoco.MjData(model)
+    data.time = _TIME
+    size = _first(model._address, _MODEL_BYTES, ctypes.c_int32, model.nuserdata)
+    time = _first(data._address, _DATA_BYTES, ctypes.c_double, _TIME)
+    words = np.ctypeslib.as_array(
+        (ctypes.c_uint64 * (_ARRAY_BYTES // 8)).from_address(data._address + time)
+    )
+    offsets = {}
+    for name in _ARRAYS:
+        found = np.flatnonzero(words == getattr(data, name).ctypes.data)
+        if found.size == 0:
+            raise _not_found(f"mjData.{name}")
+        # An empty array in front of this one has the same address.
+        offsets[name] = time + 8 * int(found[-1])
+    return Layout(size, **offsets)
+
+
+def _first(address: int, reach: int, kind: Any, value: float) -> int:
+    """The first offset at which memory holds a value; memory behind it is not read."""
+    width = ctypes.sizeof(kind)
+    for offset in range(0, reach, width):
+        if kind.from_address(address + offset).value == value:
+            return offset
+    raise _not_found(f"{value!r}")
+
+
+def _not_found(what: str) -> RuntimeError:
+    return RuntimeError(
+        f"native code cannot find {what} in MuJoCo {mujoco.__version__}'s memory; "
+        'fly with simulation.engine = "python"'
+    )

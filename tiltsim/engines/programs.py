@@ -1,11 +1,12 @@
-"""The functions of a closed loop as programs of a few vectors."""
+"""The functions of a closed loop as programs of a few vectors; memory for recorded samples."""
 
 from collections.abc import Callable, Sequence
+from math import copysign, inf
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from tiltsim.closed_loop.choices import Choices, ProgramKey
+from tiltsim.closed_loop.assembly import Assembly, Choices, ProgramKey
 from tiltsim.closed_loop.limits import SINGULAR, WITHIN_LIMITS
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup
 from tiltsim.closed_loop.userdata import (
@@ -18,10 +19,11 @@ from tiltsim.closed_loop.userdata import (
 from tiltsim.engines.base import Vectors
 from tiltsim.equations.solvers import Integration, make_step
 from tiltsim.scenario.companion import MAX_COMPANIONS
-from tiltsim_controllers.code.arrays import flatten, xp
+from tiltsim_controllers.code.arrays import as_arrays, program_of, xp
+from tiltsim_controllers.code.arrays import flatten as flattened
 from tiltsim_controllers.code.program import Program
-from tiltsim_controllers.code.traceable import as_arrays, program_of
-from tiltsim_controllers.mathematics.records import record_size, unflatten
+from tiltsim_controllers.mathematics.records import flatten, record_size, unflatten
+from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.references.trajectories import ReferenceParameters
 
 KEPT: Final = 64
@@ -64,19 +66,14 @@ class LoopFunction(NamedTuple):
         return program_of(self.call, **self.sizes)
 
     def plain(self, setup: ControlSetup, **fixed: Sequence[float]) -> Callable[..., list[float]]:
-        """The function itself, where it cannot be traced, with some of its vectors bound.
-
-        Args:
-            setup: Parameters and knots.
-            fixed: Vectors by name.
-        """
+        """The function itself, where it cannot be traced, with some of its vectors bound."""
         bound = {"user": as_arrays(setup), **as_arrays(fixed)}
 
         def call(*vectors: Sequence[float]) -> list[float]:
             rest = iter(vectors)
             given = [bound[n] if n in bound else np.array(next(rest), float) for n in self.sizes]
             with np.errstate(all="ignore"):  # infinity and NaN, as in a program
-                return [float(value) for value in flatten(self.call(*given))[0]]
+                return [float(value) for value in flattened(self.call(*given))[0]]
 
         return call
 
@@ -85,7 +82,7 @@ class LoopPrograms:
     """Traces the functions of a loop, whose choices are constants.
 
     Args:
-        key: See `tiltsim.closed_loop.choices`.
+        key: See `tiltsim.closed_loop.assembly`.
     """
 
     def __init__(self, key: ProgramKey) -> None:
@@ -115,24 +112,22 @@ class LoopPrograms:
         "controls" and "hold" are the control step at and between the samples of the controller,
         "observe" the values of a sample, "sample" a sample as the recorder takes it.
         """
-        loop, sampling = self._loop, self._loop.sampling
-        sizes = loop.dynamics.sizes._asdict()
+        loop = self._loop
+        sizes = loop.sizes._asdict()
         state = {name: sizes[name] for name in (*Vectors._fields, "ctrl")}
         vectors = {"header": HEADER_SIZE, **state, "user": self.user_size}
 
         def controls(header: Any, qpos: Any, qvel: Any, *given: Any) -> Any:
             *act, _, user = given
-            return sampling.controls(
-                _next_time(header), qpos, qvel, xp.hstack(act), *self.setup(user)
-            )
+            return loop.controls(_next_time(header), qpos, qvel, xp.hstack(act), *self.setup(user))
 
         def hold(header: Any, qpos: Any, qvel: Any, *given: Any) -> Any:
             (*act, ctrl, user), time = given, _next_time(header)
-            return sampling.hold(time, qpos, qvel, xp.hstack(act), ctrl, self.setup(user)[0])
+            return loop.hold(time, qpos, qvel, xp.hstack(act), ctrl, self.setup(user)[0])
 
         def observe(_header: Any, qpos: Any, qvel: Any, *given: Any) -> Any:
             *act, ctrl, _ = given
-            return loop.columns.observe(qpos, qvel, xp.hstack(act), ctrl)
+            return loop.observe(qpos, qvel, xp.hstack(act), ctrl)
 
         def sample(header: Any, *given: Any) -> Any:
             *_, user, recorder = given
@@ -206,16 +201,12 @@ class LoopPrograms:
     def _checks(self, time: Any, values: Any, user: Any, head: Any) -> tuple[Any, Any]:
         """The code of the limit that a sample exceeds, and the numbers whose signs are checked.
 
-        Args:
-            time: s
-            values: Fields after the time.
-            user: Parameters and knots.
-            head: Whether the horizontal position has a limit, and the reference.
+        ``head`` is whether the horizontal position has a limit, and the reference.
         """
         loop, (parameters, knots) = self._loop, self.setup(user)
         reference = record_with_choices(ReferenceParameters, head[1:], self._key.reference)
         limit = loop.kind.limit_exceeded(time, values, reference, knots, head[0] != 0.0)
-        checked = loop.monitoring.sign_check_values(time, values, parameters, knots)
+        checked = loop.sign_check_values(time, values, parameters, knots)
         return limit, xp.array(checked)
 
     def checks(self) -> Program:
@@ -235,13 +226,7 @@ def setup_of(loop: ClosedLoop, user: Sequence[float]) -> ControlSetup:
 
 
 def record_with_choices(record: type[tuple[Any, ...]], numbers: Any, choices: Choices) -> Any:
-    """A record whose choices are constants.
-
-    Args:
-        record: Its type.
-        numbers: The numbers of the flattened record, or more.
-        choices: See `tiltsim.closed_loop.choices`.
-    """
+    """A record of a type whose choices are constants, from the numbers of the flattened record."""
     known = dict(choices)
     size = record_size(record)
     return unflatten(record, (known[i] if i in known else numbers[i] for i in range(size)))
@@ -250,3 +235,96 @@ def record_with_choices(record: type[tuple[Any, ...]], numbers: Any, choices: Ch
 def _next_time(header: Any) -> Any:
     """The time (s) of the next evaluation of the control step."""
     return evaluation_time(header[EVALUATIONS], header[EVALUATIONS_PER_STEP], header[TIMESTEP])
+
+
+SAMPLES, CAPACITY, TERMINATED = map(
+    RecorderHead._fields.index, ("samples", "capacity", "terminated")
+)
+
+UNLIMITED: Final = (inf, inf, inf, 0.0, inf)
+"""The head, up to its capacity, of a recorder that never takes a sample."""
+
+
+def recorder_head(
+    assembly: Assembly, left: int, samples: int, interval: int, last_interval: int
+) -> list[float]:
+    """The head of a recorder.
+
+    Args:
+        assembly: The flight.
+        left: Evaluations of the control step before the first sample.
+        samples: How many to take.
+        interval, last_interval: Evaluations between samples, and between the last two.
+    """
+    head = RecorderHead(
+        left=left,
+        interval=interval,
+        last_interval=last_interval,
+        samples=0.0,
+        capacity=samples,
+        terminated=0.0,
+        follows_position=assembly.follows_position,
+        reference=assembly.reference,
+    )
+    return [*flatten(head)]
+
+
+class Recorder:
+    """Memory for the samples of one flight, to which native code writes.
+
+    The callback takes a sample before the step that ends an interval, the first after a full one.
+    Once there is no room for more, or a sample ends the flight, it returns NaN controls: MuJoCo
+    warns of them and a batch stops there.
+
+    Args:
+        assembly: The flight.
+        samples: How many to take.
+        interval, last_interval: Evaluations of the control step between samples, and between the
+            last two.
+        checked: The numbers that must keep their signs, as they are now; see `ClosedLoop`.
+
+    Attributes:
+        head: The head and the signs to keep, shape (HEAD_SIZE + SIDES,).
+        rows: All samples, shape (samples, len(loop.sample_fields)).
+    """
+
+    def __init__(
+        self,
+        assembly: Assembly,
+        samples: int,
+        interval: int,
+        last_interval: int,
+        checked: Sequence[float],
+    ) -> None:
+        loop = assembly.loop
+        width = len(loop.sample_fields)
+        # After the last row there is room for the number that shows whether it ends the flight.
+        self._memory = np.zeros(HEAD_SIZE + SIDES + samples * width + 1)
+        self.head = self._memory[: HEAD_SIZE + SIDES]
+        self.rows = self._memory[HEAD_SIZE + SIDES : -1].reshape(samples, width)
+        left = interval if samples > 1 else last_interval
+        self.head[:HEAD_SIZE] = recorder_head(assembly, left, samples, interval, last_interval)
+        if len(checked) > SIDES:
+            raise ValueError(f"{loop.model}: {len(checked)} sign checks, at most {SIDES}")
+        for index, value in enumerate(checked):
+            self.head[HEAD_SIZE + index] = copysign(1.0, value)
+
+    @property
+    def address(self) -> float:
+        """For the `Header` in `userdata`; exact, since addresses are below 2^53."""
+        return float(self._memory.ctypes.data)
+
+    @property
+    def samples(self) -> Floats:
+        """The samples taken so far, shape (N, len(loop.sample_fields))."""
+        return self.rows[: int(self.head[SAMPLES])]
+
+    @property
+    def terminated(self) -> bool:
+        """Whether the last sample ends the flight."""
+        return bool(self.head[TERMINATED])
+
+    @property
+    def full(self) -> bool:
+        """Whether all samples have been taken."""
+        return bool(self.head[SAMPLES] == self.head[CAPACITY])

@@ -3,16 +3,24 @@
 import ctypes
 from collections.abc import Callable, Sequence
 from functools import cache, lru_cache, partial
-from typing import Any, Literal, NamedTuple, Protocol
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from tiltsim.closed_loop.choices import ProgramKey
+from tiltsim.closed_loop.assembly import ProgramKey
 from tiltsim.closed_loop.loop import Equations
 from tiltsim.engines.glue import stepper_text
 from tiltsim.engines.machine_code import MachineCode, lane_math
-from tiltsim.engines.programs import HEAD_SIZE, KEPT, SIDES, LoopFunction, LoopPrograms, setup_of
-from tiltsim.engines.recorder import UNLIMITED, Recorder
+from tiltsim.engines.programs import (
+    HEAD_SIZE,
+    KEPT,
+    SIDES,
+    UNLIMITED,
+    LoopFunction,
+    LoopPrograms,
+    Recorder,
+    setup_of,
+)
 from tiltsim.system.files import one_thread_at_a_time
 from tiltsim_controllers.code.llvm_text import llvm_functions
 from tiltsim_controllers.code.program import Program
@@ -75,19 +83,6 @@ class Integrated(NamedTuple):
         return (self.timestep, *self.disturbance)
 
 
-class Stepper(Protocol):
-    """Integrates the equations of a flight."""
-
-    def advance(self, step_index: int, now: Floats, steps: int) -> Floats:
-        """State and inputs in force, shape (states + inputs,), some steps later.
-
-        Args:
-            step_index: Number of steps so far.
-            now: State and inputs in force.
-            steps: Number of steps to take.
-        """
-
-
 @one_thread_at_a_time
 @lru_cache(maxsize=KEPT)
 def _program(layout: Layout, name: str) -> Program:
@@ -107,7 +102,7 @@ def _in_python(flight: Integrated, name: str, **fixed: Sequence[float]) -> Calla
     return _functions(flight.layout)[name].plain(setup_of(flight.layout.key.loop, user), **fixed)
 
 
-class PythonStepper(Stepper):
+class PythonStepper:
     """Integrates on Python's floats."""
 
     def __init__(self, flight: Integrated) -> None:
@@ -117,6 +112,13 @@ class PythonStepper(Stepper):
             self._held = _in_python(flight, "step_held")
 
     def advance(self, step_index: int, now: Floats, steps: int) -> Floats:
+        """State and inputs in force, shape (states + inputs,), some steps later.
+
+        Args:
+            step_index: Number of steps so far.
+            now: State and inputs in force.
+            steps: Number of steps to take.
+        """
         values: Any = now.tolist()
         for index in range(step_index, step_index + steps):
             step = self._held if index % self._every else self._sampled
@@ -127,8 +129,7 @@ class PythonStepper(Stepper):
 def observation(flight: Integrated) -> Callable[[int, Floats], Values]:
     """Samples without their time: ``(step_index, now) -> values``, as machine code takes them.
 
-    Args:
-        flight: Its state and the inputs in force are ``now``, shape (states + inputs,).
+    ``now`` are the state and the inputs in force, shape (states + inputs,).
     """
     every, fields = flight.control_steps or 1, len(flight.layout.key.loop.sample_fields)
     sample = cache(partial(_in_python, flight, recorder=[0.0] * (HEAD_SIZE + SIDES)))
@@ -197,7 +198,7 @@ class LaneStepper:
             lane: Number of the lane, from 0.
             flight: The flight.
             now: State and inputs in force.
-            head: Head of its recorder; see `tiltsim.engines.recorder.recorder_head`.
+            head: Head of its recorder; see `tiltsim.engines.programs.recorder_head`.
             rows: Memory for its samples, which has to live as long as it is in the lane.
         """
         self.index[:, lane] = 0.0
@@ -213,7 +214,7 @@ class LaneStepper:
         self._advance(steps, until_one_is_over, *self._addresses)
 
 
-class NativeStepper(Stepper):
+class NativeStepper:
     """Integrates one flight as machine code, without holding Python's lock."""
 
     def __init__(self, flight: Integrated) -> None:
@@ -222,6 +223,7 @@ class NativeStepper(Stepper):
         self._unlimited = self._lane.heads.copy()
 
     def advance(self, step_index: int, now: Floats, steps: int) -> Floats:
+        """See `PythonStepper.advance`."""
         self._lane.heads[:] = self._unlimited
         self._lane.index[:], self._lane.now[:, 0] = step_index, now
         self._lane.advance(steps)

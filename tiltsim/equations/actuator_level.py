@@ -14,12 +14,11 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from tiltsim.closed_loop.loop import Dynamics
+from tiltsim.closed_loop.loop import ClosedLoop
 from tiltsim.models.parts import WRENCH_SIZE
-from tiltsim.scenario.scenario import FlightPlan
+from tiltsim.scenario.scenario import FlightPlan, Scenario
 from tiltsim.vehicles.rotorcraft import initial_tilts
-from tiltsim.vehicles.rotorcraft.layout import layout_of, tilt_of_rotor
-from tiltsim.vehicles.rotorcraft.rotors import rotors_record, true_rotors
+from tiltsim.vehicles.rotorcraft.layout import layout_of, rotors_record, tilt_of_rotor, true_rotors
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.mathematics.attitude import (
     euler_rates,
@@ -32,10 +31,9 @@ from tiltsim_controllers.mathematics.attitude import (
 from tiltsim_controllers.mathematics.linear import norm
 from tiltsim_controllers.mathematics.records import make_record_type, vector_of
 from tiltsim_controllers.mathematics.scalar import Values
+from tiltsim_controllers.vehicle.body import accelerations, joined, rotation_rate
 from tiltsim_controllers.vehicle.craft import Craft, craft_of
-from tiltsim_controllers.vehicle.effectiveness import TiltOfRotor, tilts_of
-from tiltsim_controllers.vehicle.motion import accelerations, joined, rotation_rate
-from tiltsim_controllers.vehicle.rotors import of_tilts, wrench_map
+from tiltsim_controllers.vehicle.rotors import TiltOfRotor, of_tilts, tilts_of, wrench_map
 
 # --- parameters -------------------------------------------------------------------------------
 
@@ -176,7 +174,6 @@ class ActuatorPlant(NamedTuple):
             where there are no limits.
         initial: ``(plan)``: the motion at time zero.
         mechanics: The type of the parameters.
-        name: Part of the name of the layer.
         finish: ``(state, mechanics) -> state``: corrections at the end of a step; None for none.
     """
 
@@ -187,7 +184,6 @@ class ActuatorPlant(NamedTuple):
     project_onto_limits: Callable[[Any, Any], Any] | None
     initial: Callable[[FlightPlan], Values]
     mechanics: Any
-    name: str = "on_equations"
     finish: Callable[[Any, Any], Any] | None = None
 
 
@@ -197,11 +193,10 @@ class PlantForm(NamedTuple):
     Attributes:
         attitude: Representation of the attitude in the state.
         layout: Places of the parts of the motion.
-        tilt_of_rotor, spins: See `tiltsim.closed_loop.loop.Dynamics`.
+        tilt_of_rotor, spins: See `tiltsim.closed_loop.loop.ClosedLoop`.
         vehicle: The type of the vehicle's parameters.
         gyroscopic: Factor of the gyroscopic torque: 0 or 1.
         has_limits: Whether the rotors' speeds or the tilts have limits.
-        name: See `ActuatorPlant`.
     """
 
     attitude: Attitude
@@ -211,7 +206,6 @@ class PlantForm(NamedTuple):
     vehicle: Any
     gyroscopic: float
     has_limits: bool
-    name: str = "on_equations"
 
 
 def servo_accelerations(
@@ -327,23 +321,39 @@ def plant_of(form: PlantForm) -> ActuatorPlant:
         project_onto_limits if form.has_limits else None,
         initial,
         mechanics_record(form.vehicle, tilts),
-        form.name,
         normalized if form.attitude is QUATERNION else None,
     )
 
 
-def actuator_plant(dynamics: Dynamics) -> ActuatorPlant:
+def actuator_plant(loop: ClosedLoop) -> ActuatorPlant:
     """The thesis's equations (ch. 2, Eq. 15; ch. 3, Eqs. 1-7) of a model."""
-    is_quadrotor = dynamics.model == "quadrotor"
-    attitude, tilts = EULER if is_quadrotor else MATRIX, layout_of(dynamics).tilts
+    is_quadrotor = loop.model == "quadrotor"
+    attitude, tilts = EULER if is_quadrotor else MATRIX, layout_of(loop).tilts
     return plant_of(
         PlantForm(
             attitude,
             as_printed(attitude, tilts),
-            tilt_of_rotor(dynamics),
-            dynamics.spins,
-            rotors_record(dynamics),
+            tilt_of_rotor(loop),
+            loop.spins,
+            rotors_record(loop),
             gyroscopic=float(is_quadrotor),
             has_limits=not is_quadrotor,  # whose rotors make any thrust
+        )
+    )
+
+
+def rigid_body(scenario: Scenario) -> ActuatorPlant:
+    """The rigid body of a scenario's rotorcraft."""
+    vehicle = scenario.any_rotorcraft
+    has_limits = vehicle.has_rotor_limits or vehicle.tilt_servo.max_angle is not None
+    return plant_of(
+        PlantForm(
+            QUATERNION,
+            as_in_mujoco(vehicle.tilt_count if scenario.vehicle.has_tilting_rotors else 0),
+            tuple(map(vehicle.tilt_of_rotor, range(1, vehicle.rotor_count + 1))),
+            vehicle.spins,
+            type(true_rotors(scenario)),
+            gyroscopic=1.0,
+            has_limits=has_limits,
         )
     )

@@ -97,7 +97,7 @@ def metrics_of_rows(
     setup = ControlSetup(unflatten(loop.parameters, values), first.setup.knots)
     fields = np.ascontiguousarray(np.moveaxis(samples, -1, 0)).reshape(-1, rows * count)
     known = dict(zip(loop.sample_fields, fields, strict=True))
-    known |= loop.columns.derive(known, setup)
+    known |= loop.derive(known, setup)
     columns = {name: np.reshape(column, (rows, count)) for name, column in known.items()}
     metrics = loop.kind.metrics(columns | {"time": time}, scenario, first.follows_position)
     table = np.stack([*metrics.values()], axis=-1).tolist()

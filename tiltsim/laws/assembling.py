@@ -5,29 +5,28 @@ from typing import Final
 
 from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.closed_loop.loop import ClosedLoop
-from tiltsim.equations.actuator_level import ActuatorPlant, actuator_plant
-from tiltsim.equations.rigid_body import rigid_body
+from tiltsim.equations.actuator_level import ActuatorPlant, actuator_plant, rigid_body
 from tiltsim.laws.commanded import commanded_loop
 from tiltsim.laws.companions import Member, with_companions
 from tiltsim.laws.flown_law import loop_of_law
-from tiltsim.laws.full_pose import full_pose_loop, full_pose_loop_of
 from tiltsim.laws.layers.actuation import with_actuation
-from tiltsim.laws.layers.air import with_air
 from tiltsim.laws.layers.contact import with_force_loop, with_impedance, with_objects
-from tiltsim.laws.layers.estimation import fusion_of, with_estimator
-from tiltsim.laws.layers.instruments import instruments_of, with_instruments
-from tiltsim.laws.layers.loads import with_loads
-from tiltsim.laws.layers.measured_acceleration import with_measured_acceleration
+from tiltsim.laws.layers.estimation import Fusion, with_estimator
+from tiltsim.laws.layers.forces import with_air, with_loads, with_rotor_inertia
+from tiltsim.laws.layers.instruments import (
+    instruments_of,
+    with_instruments,
+    with_measured_acceleration,
+)
 from tiltsim.laws.layers.on_equations import on_equations
-from tiltsim.laws.layers.rotor_inertia import with_rotor_inertia
 from tiltsim.laws.layers.swing import with_swing_damping
-from tiltsim.laws.multirotor import loop_of_multirotor
+from tiltsim.laws.linearizing import TILTROTOR, full_pose_loop, multirotor_loop, tiltrotor_loop
 from tiltsim.laws.quadrotor import QUADROTOR_ATTITUDE_ALTITUDE, SWITCHING, YAW_POSITION
-from tiltsim.laws.tilt_car import FOURTH_DERIVATIVE, THIRD_DERIVATIVE
-from tiltsim.laws.tilt_car_planned import PLANNED_DIRECTION
-from tiltsim.laws.tiltrotor import LAYOUT as TILTROTOR
-from tiltsim.laws.tiltrotor import tiltrotor_loop
+from tiltsim.laws.rotor_loop import layout_of_vehicle
+from tiltsim.laws.tilt_car import FOURTH_DERIVATIVE, PLANNED_DIRECTION, THIRD_DERIVATIVE
+from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.law_controller import LawTable
+from tiltsim.scenario.linearizing_controllers import AttitudeForceController
 from tiltsim.scenario.scenario import Scenario, plan_flight
 from tiltsim.system.files import one_thread_at_a_time
 from tiltsim.vehicles.rotorcraft.others import others_of
@@ -46,8 +45,19 @@ LOOPS: Final[dict[str, ClosedLoop]] = {
 }
 """Loops by their names; see `tiltsim.scenario.controller_table.ControllerTable.loop_name`."""
 
-MULTIROTOR_LOOPS: Final = {"attitude_force": loop_of_multirotor, "full_pose": full_pose_loop_of}
-"""Makers of the loops of multirotors, which depend on the vehicle's layout."""
+
+def _linearizing_loop(scenario: Scenario, measured: bool) -> ClosedLoop:
+    """The loop of a law by feedback linearization, whose options and layout choose it."""
+    controller, vehicle = scenario.controller, scenario.vehicle.resolve()
+    strategy = controller.supervision.strategy if controller.supervision else ""
+    options = measured, strategy, controller.prioritizes_attitude
+    if not isinstance(vehicle, Multirotor):
+        return tiltrotor_loop(controller.loop_name, *options)
+    layout = layout_of_vehicle(vehicle)
+    if not isinstance(controller, AttitudeForceController):
+        return full_pose_loop(layout)
+    form = controller.resolve_force(vehicle, scenario.gait.plan(vehicle))
+    return multirotor_loop(layout, form, *options)
 
 
 def _unchanged(loop: ClosedLoop) -> ClosedLoop:
@@ -73,21 +83,17 @@ def loop_of(
     # The thesis's equations have no torque but the model's, as long as all is ideal.
     as_printed = plant == "thesis" and scenario.has_ideal_actuators_in_still_air
     measured = not as_printed and controller.measures_angular_acceleration
-    strategy = controller.supervision.strategy if controller.supervision else ""
     if external:
         loop = commanded_loop(scenario)
     elif isinstance(controller, LawTable):
         loop = loop_of_law(scenario, recorded=recorded)
-    elif scenario.vehicle.model == "multirotor":
-        loop = MULTIROTOR_LOOPS[controller.loop_name](scenario, measured, strategy)
-    elif measured or strategy or controller.prioritizes_attitude:
-        limited = controller.prioritizes_attitude
-        loop = tiltrotor_loop(controller.loop_name, measured, strategy, limited)
+    elif scenario.vehicle.model == "multirotor" or controller.law == "attitude_altitude":
+        loop = _linearizing_loop(scenario, measured)
     else:
         loop = LOOPS[controller.loop_name]
     loop = adapted(loop)
     if controller.estimator is not None:
-        loop = with_estimator(loop, fusion_of(scenario))
+        loop = with_estimator(loop, Fusion(instruments_of(scenario)))
     if scenario.reference.type == "push" and not external:
         loop = (with_impedance if scenario.reference.impedance else with_force_loop)(loop)
     if scenario.payload is not None and scenario.payload.swing_damping and not external:
@@ -123,7 +129,7 @@ def _plant_of(scenario: Scenario, loop: ClosedLoop) -> ActuatorPlant:
     """The equations on which the controls of MuJoCo's model act."""
     if scenario.simulation.plant == "rigid_body":
         return rigid_body(scenario)
-    return actuator_plant(loop.dynamics)
+    return actuator_plant(loop)
 
 
 def assemble(

@@ -5,31 +5,27 @@ of all vehicles are states here, so that commands may be speeds, thrusts or acce
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from functools import cache
-from typing import Any, Final
+from typing import Any
 
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup
-from tiltsim.closed_loop.vehicle_kind import VehicleKind
 from tiltsim.laws.law import Law
+from tiltsim.laws.linearizing import TILTROTOR, singularity_columns
 from tiltsim.laws.quadrotor import LAYOUT as QUADROTOR
 from tiltsim.laws.quadrotor import upright_columns
-from tiltsim.laws.rotor_loop import RotorLayout, layout_of_vehicle, rotor_loop
-from tiltsim.laws.rotorcraft import torque_free_columns
-from tiltsim.laws.tiltrotor import LAYOUT, singularity_columns
+from tiltsim.laws.rotor_loop import RotorLayout, layout_of_vehicle, rotor_loop, torque_free_columns
 from tiltsim.laws.vehicle_loop import servo_lead
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.scenario import FlightPlan, Scenario
-from tiltsim.vehicles.rotorcraft import OTHER_LAYOUT, ROTORCRAFT, rotorcraft_kind
+from tiltsim.vehicles.rotorcraft import EXTRA_COLUMNS
 from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.gaits.motion import planned_tilts
-from tiltsim_controllers.gaits.parameters import GaitParameters
+from tiltsim_controllers.gaits.motion import GaitParameters, planned_tilts
 from tiltsim_controllers.laws.observed import Step
 from tiltsim_controllers.mathematics.records import make_record_type, vector_of
 from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector
 from tiltsim_controllers.references.trajectories import ReferenceParameters
-from tiltsim_controllers.vehicle.effectiveness import ROTOR_FLOATS
 from tiltsim_controllers.vehicle.parameters import Vehicle
+from tiltsim_controllers.vehicle.rotors import ROTOR_FLOATS
 
 Singularity = Callable[[Mapping[str, Floats], Any], dict[str, Floats]]
 """``(samples, vehicle) -> columns``: how close a vehicle is to a singular attitude."""
@@ -69,17 +65,11 @@ def planned_servo_commands(
     return tuple(angle + lead * rate for angle, rate, _ in planned)
 
 
+@cache
 def _commanded_loop(
-    layout: RotorLayout, kind: VehicleKind, vehicle: type, singularity: Singularity
+    layout: RotorLayout, vehicle: Any, columns: tuple[str, ...], singularity: Singularity
 ) -> ClosedLoop:
-    """The loop of a vehicle.
-
-    Args:
-        layout: Layout of its numbers.
-        kind: Its kind, whose samples may have tilts that are idle.
-        vehicle: The type of its parameters.
-        singularity: Columns of the margin.
-    """
+    """The loop of the vehicles of a layout, with a type of parameters and columns of a margin."""
     rotors, tilts = layout.places
     planned, sent = layout.places.names("alpha_ref"), layout.places.names("tilt_command")
     command = make_record_type(
@@ -99,55 +89,49 @@ def _commanded_loop(
         commands = {column: samples[name] for column, name in zip(planned, sent, strict=True)}
         return {**commands, **singularity(samples, setup.parameters.law.vehicle)}
 
-    def setup(plan: FlightPlan) -> tuple[Any, Values]:
-        table, gait = plan.scenario.any_rotorcraft, plan.gait.parameters
-        lead, own = servo_lead(table.tilt_servo), table.resolve()
-        commands = planned_servo_commands(0.0, tilts, gait, plan.knots, lead)
-        held = command(commands, (0.0,) * rotors)
-        flown = vehicle(own.table) if isinstance(own, Multirotor) else own
-        return record(flown, gait, plan.reference, held), ()
+    def own(plan: FlightPlan) -> dict[str, Any]:
+        table = plan.scenario.any_rotorcraft
+        lead, flown = servo_lead(table.tilt_servo), table.resolve()
+        commands = planned_servo_commands(0.0, tilts, plan.gait.parameters, plan.knots, lead)
+        return {
+            "vehicle": vehicle(flown.table) if isinstance(flown, Multirotor) else flown,
+            "command": command(commands, (0.0,) * rotors),
+        }
 
     law = Law(
         lambda _seen, p, _knots: Step(p.command.accelerations),
         record,
-        setup,
+        own,
         tilts=lambda _seen, _rates, p, _knots: xp.stack([p.command.tilts, xp.zeros(tilts)], 1),
         units=dict.fromkeys(sent, "rad"),
         records_commands=True,
+        columns=columns,
         margins=margins,
         follows_position=lambda scenario: scenario.reference.kind != "attitude_altitude",
     )
-    return replace(rotor_loop(layout, law), kind=kind)
-
-
-COMMANDED_LOOPS: Final[dict[str, ClosedLoop]] = {
-    "tiltrotor": _commanded_loop(LAYOUT, ROTORCRAFT, Vehicle, singularity_columns),
-    "quadrotor": _commanded_loop(QUADROTOR, ROTORCRAFT, Vehicle, upright_columns),
-}
-"""Loops under commands, by the vehicle's model; commands of its servos are part of a sample."""
-
-OTHER_LAYOUT_LOOPS: Final = {
-    model: replace(loop, kind=OTHER_LAYOUT) for model, loop in COMMANDED_LOOPS.items()
-}
-"""Loops of a user's vehicle with another layout."""
+    return rotor_loop(layout, law)
 
 
 @cache
-def _commanded_multirotor(layout: RotorLayout) -> ClosedLoop:
+def _multirotor(layout: RotorLayout) -> ClosedLoop:
     places = layout.places
     table = make_record_type("Rotors", table=vector_of(ROTOR_FLOATS * places.rotors))
 
     def singularity(samples: Mapping[str, Floats], rotors: Any) -> dict[str, Floats]:
         return torque_free_columns(places, rotors.table, samples)
 
-    kind = rotorcraft_kind(places, ("singularity_margin",))
-    return _commanded_loop(layout, kind, table, singularity)
+    return _commanded_loop(layout, table, ("singularity_margin",), singularity)
 
 
 def commanded_loop(scenario: Scenario) -> ClosedLoop:
-    """The loop of a scenario's rotorcraft under commands, without layers."""
+    """The loop of a scenario's rotorcraft under commands, without layers.
+
+    A user's vehicle without the four equal arms has no columns of singularity.
+    """
     vehicle = scenario.vehicle.resolve()
     if isinstance(vehicle, Multirotor):
-        return _commanded_multirotor(layout_of_vehicle(vehicle))
-    loops = COMMANDED_LOOPS if scenario.rotorcraft.has_standard_layout else OTHER_LAYOUT_LOOPS
-    return loops[scenario.vehicle.model]
+        return _multirotor(layout_of_vehicle(vehicle))
+    columns = (*EXTRA_COLUMNS,) if scenario.rotorcraft.has_standard_layout else ()
+    if scenario.vehicle.model == "tiltrotor":
+        return _commanded_loop(TILTROTOR, Vehicle, columns, singularity_columns)
+    return _commanded_loop(QUADROTOR, Vehicle, columns, upright_columns)

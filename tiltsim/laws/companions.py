@@ -15,19 +15,18 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 
 from tiltsim.closed_loop.limits import VEHICLE, WITHIN_LIMITS
-from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Monitoring, Sampling, Sizes
+from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Sizes
 from tiltsim.engines.sample_evaluation import evaluate_over_samples
 from tiltsim.models.parts import ExtraActuators, Visuals
 from tiltsim.scenario.scenario import FlightPlan, Scenario, plan_flight
 from tiltsim.vehicles.rotorcraft import model_spec
 from tiltsim.vehicles.rotorcraft.layout import QW, TILT_1
 from tiltsim.vehicles.spans import position_error
-from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.code.traceable import traceable
+from tiltsim_controllers.code.arrays import traceable, xp
 from tiltsim_controllers.mathematics.attitude import rotation_of_quaternion
 from tiltsim_controllers.mathematics.records import make_record_type
 from tiltsim_controllers.mathematics.scalar import Floats, Vector
-from tiltsim_controllers.vehicle.downwash import Downwash, Wake, downwash_force
+from tiltsim_controllers.vehicle.air import Downwash, Wake, downwash_force
 
 if TYPE_CHECKING:
     import mujoco
@@ -35,6 +34,11 @@ if TYPE_CHECKING:
 
 DOWNWASH: Final = "downwash"
 """Column of the force (N) of the wakes of other vehicles along the world's z."""
+
+TRACED: Final = ("controls", "hold", "observe", "sign_check_values")
+PLANNED: Final = ("setup", "initial_activations", "derive", "causes")
+OF_KIND: Final = ("compile", "initial_motion", "thrusts", "metrics")
+"""Functions of `ClosedLoop`, traced or not, and of `VehicleKind`, that several vehicles replace."""
 
 
 class Member(NamedTuple):
@@ -55,22 +59,14 @@ class Member(NamedTuple):
         return tuple(f"{self.prefix}{name}" for name in self.loop.sample_fields[1:])
 
     def own(self, columns: Mapping[str, Any]) -> dict[str, Any]:
-        """Its columns by the names of a vehicle alone.
-
-        Args:
-            columns: Columns, or fields of a sample, of all vehicles.
-        """
+        """Its columns, or fields of a sample, of all vehicles' by the names of a vehicle alone."""
         size, common = len(self.prefix), {"time": columns["time"]}
         mine = columns.items() if size else ()
         found = {k[size:]: v for k, v in mine if k.startswith(self.prefix)}
         return common | found if size else {**columns}
 
     def shared(self, columns: Mapping[str, Any]) -> dict[str, Any]:
-        """Its columns by their names among several vehicles.
-
-        Args:
-            columns: Its columns by the names of a vehicle alone.
-        """
+        """Columns that have the names of a vehicle alone, by their names among several vehicles."""
         return {f"{self.prefix}{name}": value for name, value in columns.items() if name != "time"}
 
 
@@ -123,11 +119,9 @@ def _metrics_among(
 
 @cache
 def with_companions(members: tuple[Member, ...], downwash: bool) -> ClosedLoop:
-    """The loop of several vehicles; objects belong to the first one's scenario.
+    """The loop of several vehicles, the first of which keeps its names and has the objects.
 
-    Args:
-        members: The vehicles, of which the first keeps its names.
-        downwash: Whether their wakes act on vehicles below.
+    With downwash their wakes act on vehicles below.
     """
     return Several(members, downwash).closed_loop()
 
@@ -143,7 +137,7 @@ class Several:
         self._members, self._downwash = members, downwash
         self._loops = [member.loop for member in members]
         self._wrench = ExtraActuators(wrench=downwash)
-        own = [loop.dynamics.sizes for loop in self._loops]
+        own = [loop.sizes for loop in self._loops]
         self._sizes = [size._replace(ctrl=size.ctrl + self._wrench.controls) for size in own]
         self._total = Sizes(*(sum(numbers) for numbers in zip(*self._sizes, strict=True)))
         self._names = ["inner", *(f"vehicle_{number}" for number in range(1, len(members)))]
@@ -165,7 +159,7 @@ class Several:
 
     def _controls_of(self, ctrl: Any) -> Iterator[Any]:
         vehicles = zip(_parts([size.ctrl for size in self._sizes], ctrl), self._loops, strict=True)
-        return (own[: loop.dynamics.sizes.ctrl] for own, loop in vehicles)
+        return (own[: loop.sizes.ctrl] for own, loop in vehicles)
 
     def _values_of(self, values: Any) -> Iterator[Any]:
         return _parts([len(member.fields) for member in self._members], values)
@@ -180,16 +174,16 @@ class Several:
     def controls(
         self, time: Any, qpos: Any, qvel: Any, act: Any, parameters: Any, knots: Any
     ) -> Any:
-        """See `Sampling`."""
+        """See `ClosedLoop`."""
         found = zip(self._loops, self._states(qpos, qvel, act), self._setups(parameters, knots))
-        own = [loop.sampling.controls(time, *s, *p) for loop, s, p in found]
+        own = [loop.controls(time, *s, *p) for loop, s, p in found]
         return self._with_wakes(own, qpos, parameters)
 
     def hold(self, time: Any, qpos: Any, qvel: Any, act: Any, ctrl: Any, parameters: Any) -> Any:
-        """See `Sampling`."""
+        """See `ClosedLoop`."""
         states, held = self._states(qpos, qvel, act), self._controls_of(ctrl)
         found = zip(self._loops, states, held, self._parameters(parameters), strict=True)
-        own = [loop.sampling.hold(time, *s, c, p) for loop, s, c, p in found]
+        own = [loop.hold(time, *s, c, p) for loop, s, c, p in found]
         return self._with_wakes(own, qpos, parameters)
 
     def _with_wakes(self, controls: list[Any], qpos: Any, parameters: Any) -> Any:
@@ -203,14 +197,14 @@ class Several:
         return xp.hstack([part for both in zip(controls, wrenches) for part in both])
 
     def observe(self, qpos: Any, qvel: Any, act: Any, ctrl: Any) -> Any:
-        """See `Columns`."""
+        """See `ClosedLoop`."""
         found = zip(self._loops, self._states(qpos, qvel, act), self._controls_of(ctrl))
-        return xp.hstack([loop.columns.observe(*s, c) for loop, s, c in found])
+        return xp.hstack([loop.observe(*s, c) for loop, s, c in found])
 
-    def signs(self, time: Any, values: Any, parameters: Any, knots: Any) -> Any:
-        """See `Monitoring`."""
+    def sign_check_values(self, time: Any, values: Any, parameters: Any, knots: Any) -> Any:
+        """See `ClosedLoop`."""
         found = zip(self._loops, self._values_of(values), self._setups(parameters, knots))
-        checked = [loop.monitoring.sign_check_values(time, v, *p) for loop, v, p in found]
+        checked = [loop.sign_check_values(time, v, *p) for loop, v, p in found]
         return xp.hstack([*map(xp.array, checked)])
 
     def limit_exceeded(
@@ -235,9 +229,9 @@ class Several:
         return ControlSetup(self._record(signature, layer, *own), knots)
 
     def initial_activations(self, plan: FlightPlan, setup: ControlSetup) -> Vector:
-        """See `Dynamics`."""
+        """See `ClosedLoop`."""
         found = zip(self._loops, _plans(plan), self._setups(*setup), strict=True)
-        return [a for loop, p, s in found for a in loop.dynamics.initial_activations(p, s)]
+        return [a for loop, p, s in found for a in loop.initial_activations(p, s)]
 
     def initial_motion(self, plan: FlightPlan) -> tuple[Vector, Vector]:
         """See `VehicleKind`."""
@@ -245,10 +239,10 @@ class Several:
         return [q for qpos, _ in each for q in qpos], [v for _, qvel in each for v in qvel]
 
     def derive(self, samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
-        """See `Columns`."""
+        """See `ClosedLoop`."""
         found: dict[str, Floats] = {}
         for member, own in zip(self._members, self._setups(*setup), strict=True):
-            found |= member.shared(member.loop.columns.derive(member.own(samples), own))
+            found |= member.shared(member.loop.derive(member.own(samples), own))
         if self._downwash:
             names = [member.prefix + axis for member in self._members for axis in "xyz"]
             states = np.stack([samples[name] for name in names], axis=-1)
@@ -267,11 +261,11 @@ class Several:
         return xp.array([downwash_force(places, number, wakes, downwash) for number in numbers])
 
     def causes(self, sample: Mapping[str, float], setup: ControlSetup) -> tuple[str, ...]:
-        """See `Monitoring`."""
+        """See `ClosedLoop`."""
         return tuple(
             f"{member.name}: {text}" if member.name else text
             for member, own in zip(self._members, self._setups(*setup), strict=True)
-            for text in member.loop.monitoring.causes(member.own(sample), own)
+            for text in member.loop.causes(member.own(sample), own)
         )
 
     def thrusts(self, columns: Mapping[str, Floats], scenario: Scenario) -> dict[str, Floats]:
@@ -301,14 +295,14 @@ class Several:
         """
         from tiltsim.models.rotorcraft import compile_model
 
-        dynamics = [loop.dynamics for loop in self._loops]
         added = [self._wrench] if self._downwash else []
-        flown = zip((scenario, *scenario.companions), dynamics, strict=True)
+        flown = zip((scenario, *scenario.companions), self._loops, strict=True)
         first, *others = (
             replace(
-                model_spec(own, d.controller_states, (*d.extra_actuators, *added)), number=number
+                model_spec(own, loop.controller_states, (*loop.extra_actuators, *added)),
+                number=number,
             )
-            for number, (own, d) in enumerate(flown)
+            for number, (own, loop) in enumerate(flown)
         )
         names = (member.name for member in self._members[1:])
         spec = replace(first, userdata_size=size, companions=tuple(zip(names, others, strict=True)))
@@ -318,38 +312,23 @@ class Several:
         """The closed loop, whose columns are the first vehicle's, then all others with a prefix."""
         first, others = self._loops[0], self._members[1:]
         fields = [name for member in others for name in member.fields]
-        units = [first.columns.units, *(member.shared(member.loop.units) for member in others)]
+        units = [first.further_units, *(member.shared(member.loop.units) for member in others)]
         units += [{f"{m.prefix}{DOWNWASH}": "N" for m in self._members if self._downwash}]
         return replace(
             first,
             kind=replace(
                 first.kind,
-                compile=self.compile,
-                initial_motion=self.initial_motion,
                 limit_exceeded=traceable(self.limit_exceeded),
-                thrusts=self.thrusts,
-                metrics=self.metrics,
+                **{name: getattr(self, name) for name in OF_KIND},
             ),
             parameters=self._record,
-            setup=self.setup,
-            dynamics=replace(
-                first.dynamics,
-                model=" and ".join(loop.dynamics.model for loop in self._loops),
-                sizes=self._total,
-                initial_activations=self.initial_activations,
-            ),
-            sampling=Sampling(traceable(self.controls), traceable(self.hold)),
-            columns=replace(
-                first.columns,
-                observe=traceable(self.observe),
-                derive=self.derive,
-                fields=(*first.columns.fields, *fields),
-                units={k: u for each in units for k, u in each.items()},
-                observe_reads_controls=any(
-                    loop.columns.observe_reads_controls for loop in self._loops
-                ),
-            ),
-            monitoring=Monitoring(traceable(self.signs), self.causes),
+            model=" and ".join(loop.model for loop in self._loops),
+            sizes=self._total,
+            **{name: getattr(self, name) for name in PLANNED},
+            **{name: traceable(getattr(self, name)) for name in TRACED},
+            fields=(*first.fields, *fields),
+            further_units={k: u for each in units for k, u in each.items()},
+            observe_reads_controls=any(loop.observe_reads_controls for loop in self._loops),
             equations=None,
             within=first,  # for its controller
             traced=all(loop.is_traceable for loop in self._loops),

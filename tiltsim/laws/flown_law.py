@@ -7,12 +7,11 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from tiltsim.closed_loop.choices import ProgramKey, choices_of
+from tiltsim.closed_loop.assembly import ProgramKey, choices_of
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup
 from tiltsim.engines.programs import LoopPrograms
 from tiltsim.errors import InputError
-from tiltsim.laws.airframe import airframe_of
-from tiltsim.laws.law_loop import REMEDY, FlownLaw, Key, LawError, law_loop
+from tiltsim.laws.law_loop import NO_PARAMETERS, REMEDY, FlownLaw, LawError, airframe_of, law_loop
 from tiltsim.laws.layers.instruments import instruments_of, with_instruments
 from tiltsim.laws.rotor_loop import layout_of_vehicle
 from tiltsim.scenario.controller import NumpyController
@@ -25,10 +24,6 @@ from tiltsim.vehicles.rotorcraft import initial_tilts
 from tiltsim_controllers.code.messages import TraceError
 from tiltsim_controllers.laws.observed import Command, Observed
 from tiltsim_controllers.mathematics.attitude import quaternion_of_euler
-from tiltsim_controllers.mathematics.records import make_record_type
-
-NO_PARAMETERS = make_record_type("NoParameters", none=float)(0.0)
-"""For laws without parameters."""
 
 
 @cache
@@ -46,33 +41,26 @@ def _not_flown(_observed: Observed, _parameters: Any) -> Command:
     raise AssertionError("a recorded flight was flown")
 
 
-def law_of(plan: FlightPlan) -> FlownLaw:
-    """The law of a flight. Raises `InputError` or `InvalidValueError` if it cannot be used."""
-    table, airframe = plan.scenario.controller, airframe_of(plan)
-    if isinstance(table, NumpyController):
-        found = load_law(plan.scenario)
-        if not (isinstance(found, type) and issubclass(found, LawController)):
-            return _law_of_function(table, found)
-        table = _own_table(plan.scenario, table, found)
-    assert isinstance(table, LawController)
-    function = table.law_function(airframe)
-    return FlownLaw(
-        function,
-        table.law_parameters(airframe),
-        table.law_table(airframe),
-        table.state_units(airframe),
-        table.discrete_states,
-        table.initial_states(airframe),
-    )
+def table_of_law(plan: FlightPlan) -> LawController | None:
+    """The law of a flight with its keys; None for a user's function, which has none.
 
-
-def _law_of_function(table: NumpyController, function: Callable[..., Command]) -> FlownLaw:
+    Raises `InputError` or `InvalidValueError` if it cannot be used.
+    """
+    table, scenario = plan.scenario.controller, plan.scenario
+    if not isinstance(table, NumpyController):
+        assert isinstance(table, LawController)
+        return table
+    found = load_law(scenario)
+    if isinstance(found, type) and issubclass(found, LawController):
+        return _own_table(scenario, table, found)
     if table.parameters:
         raise table.mistake("parameters", f"{table.attribute} is a function, which has none")
-    zeros = (0.0,) * (len(table.states) + len(table.discrete_states))
-    law = _without_parameters(function)
-    units = table.states, table.discrete_states
-    return FlownLaw(law, NO_PARAMETERS, (), *units, zeros)
+    return None
+
+
+def recorded_table_of_law(plan: FlightPlan) -> LawController | None:
+    """`table_of_law` for a recorded flight: no code that its scenario names is executed."""
+    return None if isinstance(plan.scenario.controller, NumpyController) else table_of_law(plan)
 
 
 def _own_table(
@@ -91,14 +79,28 @@ def _own_table(
         raise InputError(text) from None
 
 
-def recorded_law_of(plan: FlightPlan) -> FlownLaw:
-    """`law_of` for a recorded flight: no code that its scenario names is executed."""
-    table = plan.scenario.controller
-    if not isinstance(table, NumpyController):
-        return law_of(plan)
-    units = table.states, table.discrete_states
-    zeros = (0.0,) * (len(table.states) + len(table.discrete_states))
-    return FlownLaw(_not_flown, NO_PARAMETERS, (), *units, zeros)
+def _flown_law(plan: FlightPlan, table: LawController | None, *, recorded: bool) -> FlownLaw:
+    """The law of a flight, given its table."""
+    scenario, airframe = plan.scenario, airframe_of(plan)
+    controller: Any = scenario.controller
+    function, parameters, states = _not_flown, NO_PARAMETERS, controller.states
+    if table is not None:
+        function, parameters = table.law_function(airframe), table.law_parameters(airframe)
+        states = table.state_units(airframe)
+        table.law_table(airframe)  # raises where there is none for this vehicle and gait
+    elif not recorded:
+        function = _without_parameters(load_law(scenario))
+    return FlownLaw(
+        layout_of_vehicle(airframe.vehicle, scenario.vehicle.model),
+        function,
+        type(parameters),
+        tuple(states.items()),
+        tuple(controller.discrete_states.items()),
+        controller.commands_tilts,
+        scenario.simulation.latency_steps > 0 and not controller.models_latency,
+        controller.models_latency,
+        scenario.has_objects,
+    )
 
 
 def loop_of_law(scenario: Scenario, *, recorded: bool = False) -> ClosedLoop:
@@ -110,28 +112,17 @@ def loop_of_law(scenario: Scenario, *, recorded: bool = False) -> ClosedLoop:
         InputError: If such a law returns an invalid value.
     """
     plan, name = plan_flight(scenario), scenario.address or "scenario"
-    find, controller = (recorded_law_of if recorded else law_of), scenario.controller
+    find, controller = (recorded_table_of_law if recorded else table_of_law), scenario.controller
     try:
-        law = find(plan)
+        flown = _flown_law(plan, find(plan), recorded=recorded)
     except InvalidValueError as error:  # found only with the vehicle and its gait at hand
         raise InputError(f"{name}: {error}") from error
-    if law.discrete and not scenario.simulation.control_timestep:
+    if flown.discrete and not scenario.simulation.control_timestep:
         raise InputError(
             f"{name}: simulation.control_timestep = 0: must be positive for a law with discrete "
             "states, which change at control samples"
         )
-    key = Key(
-        layout_of_vehicle(airframe_of(plan).vehicle, scenario.vehicle.model),
-        law.function,
-        type(law.parameters),
-        tuple(law.states.items()),
-        tuple(law.discrete.items()),
-        controller.commands_tilts,
-        scenario.simulation.latency_steps > 0 and not controller.models_latency,
-        controller.models_latency,
-        scenario.has_objects,
-    )
-    loop, module = law_loop(key, find), law.function.__module__
+    loop, module = law_loop(flown, find), flown.function.__module__
     if recorded or (module.startswith("tiltsim_controllers.")):
         return loop
     whole = loop
@@ -145,7 +136,7 @@ def loop_of_law(scenario: Scenario, *, recorded: bool = False) -> ClosedLoop:
     if not refusal:
         return loop
     _require_python(scenario, refusal)
-    return law_loop(key._replace(traced=False), find)
+    return law_loop(flown._replace(traced=False), find)
 
 
 @cache
@@ -184,11 +175,11 @@ def _try_once(loop: ClosedLoop, plan: FlightPlan, setup: ControlSetup) -> None:
     tilts, rates = initial_tilts(plan) if scenario.vehicle.has_tilting_rotors else ((), ())
     qpos = (*initial.position, *quaternion_of_euler(initial.attitude), *tilts)
     qvel = (*initial.velocity, *initial.angular_velocity, *rates)
-    activations = loop.dynamics.initial_activations(plan, setup)
-    act = (*map(float, activations), *(0.0,) * loop.dynamics.sizes.after_act)
+    activations = loop.initial_activations(plan, setup)
+    act = (*map(float, activations), *(0.0,) * loop.sizes.after_act)
     start = f'{scenario.address or "scenario"}: controller.law = "{scenario.controller.law}"'
     try:
-        loop.sampling.controls(0.0, qpos, qvel, act, setup.parameters, setup.knots)
+        loop.controls(0.0, qpos, qvel, act, setup.parameters, setup.knots)
     except LawError as error:
         raise InputError(f"{start}: the law {error}") from None
     except Exception as error:

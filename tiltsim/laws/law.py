@@ -1,15 +1,25 @@
-"""The record of a control law, from which `tiltsim.laws.vehicle_loop` makes a closed loop."""
+"""The record of a control law, its parameters in a flight, and its supervisor."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass, field, replace
+from typing import Any, Final
+
+import numpy as np
 
 from tiltsim.closed_loop.loop import ControlSetup
+from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.scenario import FlightPlan, Scenario
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.gaits.motion import planned_tilts
+from tiltsim_controllers.laws.allocation import RotorRange
+from tiltsim_controllers.laws.gait_feedforward import supervised_gait
+from tiltsim_controllers.laws.keys import number_of
+from tiltsim_controllers.laws.multirotor_steps import INTEGRAL_FIELDS
 from tiltsim_controllers.laws.observed import Seen, Step
+from tiltsim_controllers.laws.supervisor import HOLD, Supervision
 from tiltsim_controllers.mathematics.scalar import Floats, Values
+from tiltsim_controllers.vehicle.body import PITCH, ROLL, Body, body_of
+from tiltsim_controllers.vehicle.parameters import Vehicle
 
 Margins = Callable[[Mapping[str, Floats], ControlSetup], dict[str, Floats]]
 """``(samples by field, with the columns of references, setup) -> columns``."""
@@ -40,9 +50,11 @@ class Law:
         parameters: Type of its record. It has ``reference``; ``gait`` where the tilts follow it;
             and ``vehicle``, with ``rotors`` as the index of the rotors' table in the knots, see
             `tiltsim_controllers.vehicle.rotors.airframe`.
-        setup: ``(plan) -> parameters, knots to append``.
+        own: ``(plan) -> values by name`` of parameters other than keys, where `parameters_of` does
+            not know them.
+        tables: ``(plan) -> numbers`` that follow the knots of gait and reference.
         states: Names of the controller's states, part of a sample, and their units.
-        initial: ``(plan) -> states`` at time zero.
+        initial: ``(plan) -> states`` at time zero; None for zeros.
         signals: Names of the first signals of a step, columns of a flight: roll, pitch and yaw that
             it tracks, and any more. None for the attitude of the reference.
         units: Columns of a flight other than the states and the columns of its kind, with units;
@@ -50,29 +62,163 @@ class Law:
         tilts: See `Tilts`; None for `tilts_of_gait`.
         uses_gait: Whether the gait has a part in the flight.
         records_commands: Whether the commands of the tilt servos are part of a sample.
+        columns: Its columns among `tiltsim.vehicles.rotorcraft.EXTRA_COLUMNS`.
         margins: See `Margins`.
         signs: Function of arrays ``(seen, parameters, knots)``: numbers that keep their sign until
             the law becomes singular. None for a law that is singular nowhere.
         causes: ``(sample by field, setup) -> texts``: why a flight ends where each reaches zero.
         measured: Whether it sees the plant's angular acceleration, of
-            `tiltsim.laws.layers.measured_acceleration`.
+            `tiltsim.laws.layers.instruments`.
         feels: Whether it sees the contact force and the swing of a load, behind ``act``.
         follows_position: See `tiltsim.closed_loop.loop.ClosedLoop`.
     """
 
     step: Callable[[Seen, Any, Any], Step]
-    parameters: type[tuple[Any, ...]]
-    setup: Callable[[FlightPlan], tuple[Any, Values]]
+    parameters: Any
+    own: Callable[[FlightPlan], dict[str, Any]] = lambda _plan: {}
+    tables: Callable[[FlightPlan], Values] = lambda _plan: ()
     states: Mapping[str, str] = field(default_factory=dict)
-    initial: Callable[[FlightPlan], Values] = lambda _plan: ()
+    initial: Callable[[FlightPlan], Values] | None = None
     signals: tuple[str, ...] | None = None
     units: Mapping[str, str] = field(default_factory=dict)
     tilts: Tilts | None = None
     uses_gait: bool = True
     records_commands: bool = False
+    columns: tuple[str, ...] = ("singularity_margin",)
     margins: Margins = lambda _samples, _setup: {}
     signs: Callable[[Seen, Any, Any], Any] | None = None
     causes: Callable[[Mapping[str, float], ControlSetup], tuple[str, ...]] = lambda *_: ("",)
     measured: bool = False
     feels: bool = False
     follows_position: Callable[[Scenario], bool] = lambda _scenario: True
+
+    def initial_states(self, plan: FlightPlan) -> Values:
+        """Its states at time zero."""
+        return self.initial(plan) if self.initial else (0.0,) * len(self.states)
+
+
+INTEGRALS: Final = dict.fromkeys(INTEGRAL_FIELDS, "m s")
+"""States of a law that integrates the position error, with their units."""
+
+
+def vehicle_of(plan: FlightPlan) -> Body | Vehicle:
+    """The vehicle that a law knows: of a multirotor the rigid body."""
+    vehicle = plan.scenario.any_rotorcraft.resolve()
+    return body_of_vehicle(vehicle) if isinstance(vehicle, Multirotor) else vehicle
+
+
+def body_of_vehicle(vehicle: Multirotor) -> Body:
+    """The rigid body that a law knows of a multirotor."""
+    return body_of(vehicle.mass, np.reshape(vehicle.inertia, (3, 3)), vehicle.gravity)
+
+
+def _limits(plan: FlightPlan, horizon: float) -> RotorRange:
+    vehicle = plan.scenario.any_rotorcraft
+    low, high = vehicle.speeds_along_spin
+    if vehicle.model == "tiltrotor" and vehicle.min_rotor_speed is None:
+        low = 0.0  # its rotors do not reverse
+    return RotorRange(low, high, horizon)
+
+
+_VALUES: Final[dict[str, Callable[[FlightPlan, Any], Any]]] = {
+    "gait": lambda plan, _: plan.gait.parameters,
+    "reference": lambda plan, _: plan.reference,
+    "rotors": lambda plan, _: float(len(plan.knots)),  # where tables follow in the knots
+    "vehicle": lambda plan, _: vehicle_of(plan),
+    "car": lambda plan, _: plan.scenario.tilt_car.resolve(),
+    "gains": lambda _, keys: keys.resolve_gains(),
+    "integral": lambda _, keys: keys.resolve_integral_gains(),
+    "anticipation": lambda plan, keys: xp.minimum(
+        keys.anticipation, 0.5 * plan.gait.min_segment_time
+    ),
+    # The thesis's equations omit the gyroscopic torque.
+    "terms": lambda plan, keys: keys.resolve_feedforward_terms(
+        gyroscopic_torque=plan.scenario.simulation.plant != "thesis"
+    ),
+    "supervisor": lambda plan, keys: keys.resolve_supervisor(plan.scenario.vehicle.resolve()),
+    "failure": lambda _, keys: keys.resolve_failure(),
+    "limits": lambda plan, keys: _limits(plan, keys.allocation_horizon),
+}
+"""Values of parameters that several laws have and that are no number of a key, by name."""
+
+
+def parameters_of(plan: FlightPlan, law: Law) -> Any:
+    """The parameters of a flight's law: its own, numbers of keys, and parts of the plan."""
+    own, controller = law.own(plan), plan.scenario.controller
+
+    def value(name: str) -> Any:
+        if name in own:
+            return own[name]
+        return _VALUES[name](plan, controller) if name in _VALUES else number_of(controller, name)
+
+    return law.parameters(*map(value, law.parameters._fields))
+
+
+def decouples_position(scenario: Scenario) -> bool:
+    """Whether a decoupler steers the vehicle to the reference's horizontal position."""
+    controller: Any = scenario.controller
+    return bool(controller.decoupler != "none")
+
+
+SUPERVISION: Final = "supervision"
+"""A column: how much the supervisor intervenes, from 0 to 1.
+
+It is the share of the gait's angles or of its speed that is removed, or of the way to red.
+"""
+
+SUPERVISOR_FIELDS: Final = ("supervisor_state", "supervisor_rate")
+"""States of a supervisor that has any: see `tiltsim_controllers.laws.supervisor`."""
+
+_STATE_UNITS: Final = {"hold": ("s", "1"), "return_to_red": ("1", "1/s")}
+
+
+def supervised(law: Law, supervision: Supervision, strategy: str) -> Law:
+    """A law under a supervisor, whose states follow the law's.
+
+    Args:
+        law: Its parameters have ``gait`` and ``supervisor``.
+        supervision: The functions of the supervisor.
+        strategy: One of `tiltsim_controllers.laws.supervisor.STRATEGIES`, or empty for none.
+    """
+    if not strategy:
+        return law
+    assert law.signals is not None
+    units, own, tracked = _STATE_UNITS.get(strategy, ()), len(law.states), len(law.signals)
+
+    def watched(seen: Seen, p: Any, knots: Any) -> Seen:
+        """The vehicle as the law sees it, with the motion of the supervisor."""
+        state, rate = seen.states[own:]
+        motion = xp.array([state, rate, 0.0])
+        if not seen.recorded:
+            vehicle = supervision.watched(seen.time, p)
+            attitude = seen.state[ROLL], seen.state[PITCH]
+            motion = supervision.derivative(
+                seen.time, *attitude, state, rate, p.gait, knots, p.supervisor, vehicle
+            )
+        return seen._replace(states=seen.states[:own], supervisor=motion)
+
+    def step(seen: Seen, p: Any, knots: Any) -> Step:
+        if units:
+            seen = watched(seen, p, knots)
+            acts = seen.supervisor[1 if p.supervisor.strategy == HOLD else 0]
+        else:
+            acts = 1.0 - supervised_gait(seen, p, knots, supervision)[1]
+        step = law.step(seen, p, knots)
+        rates = xp.hstack([step.rates, seen.supervisor[1:]]) if units else step.rates
+        return Step(step.inputs, rates, xp.hstack([step.signals[:tracked], acts]))
+
+    def tilts(seen: Seen, rates: Any, p: Any, knots: Any) -> Any:
+        if units:
+            motion = xp.hstack([seen.states[own], rates[own:]])
+            seen = seen._replace(supervisor=motion)
+        return supervised_gait(seen, p, knots, supervision)[0][:, :2]
+
+    return replace(
+        law,
+        step=step,
+        states={**law.states, **dict(zip(SUPERVISOR_FIELDS, units, strict=False))},
+        initial=lambda plan: (*law.initial_states(plan), *(0.0,) * len(units)),
+        signals=(*law.signals, SUPERVISION),
+        units={**law.units, SUPERVISION: "1"},
+        tilts=tilts,
+    )

@@ -5,23 +5,27 @@ layout is compiled in. The rotors' speeds are states that approach the commanded
 tilts of a law that commands them.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cache, partial
+from os import PathLike
 from typing import Any, Final, NamedTuple
 
 from tiltsim.closed_loop.loop import ClosedLoop
-from tiltsim.errors import TiltsimError
-from tiltsim.laws.airframe import airframe_of
-from tiltsim.laws.law import Law, tilts_in_states
-from tiltsim.laws.rotor_loop import RotorLayout, body_of_vehicle, margins_of, rotor_loop
-from tiltsim.scenario.law_controller import LawTable
-from tiltsim.scenario.scenario import FlightPlan
+from tiltsim.errors import InputError, TiltsimError
+from tiltsim.laws.law import Law, body_of_vehicle, tilts_in_states, vehicle_of
+from tiltsim.laws.rotor_loop import RotorLayout, margins_of, rotor_loop
+from tiltsim.models.cross import as_multirotor
+from tiltsim.scenario.law_controller import Airframe, LawController, LawTable
+from tiltsim.scenario.loading import load_scenario
+from tiltsim.scenario.scenario import FlightPlan, Scenario, plan_flight
 from tiltsim.system.text import short_repr
+from tiltsim.vehicles.rotorcraft import initial_rotor_speeds, initial_tilts
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.code.tracing import as_array
-from tiltsim_controllers.gaits.motion import planned_tilts
-from tiltsim_controllers.gaits.parameters import GaitParameters
+from tiltsim_controllers.gaits.motion import GaitParameters, planned_tilts
 from tiltsim_controllers.laws.observed import ROTOR_COMMANDS, Command, Desired, Observed, Seen, Step
 from tiltsim_controllers.mathematics.attitude import rotation_matrix
 from tiltsim_controllers.mathematics.records import make_record_type
@@ -32,11 +36,11 @@ from tiltsim_controllers.references.trajectories import (
     reference_motion,
 )
 from tiltsim_controllers.vehicle.actuators import held_gain
-from tiltsim_controllers.vehicle.body import Body, inertia_matrix
-from tiltsim_controllers.vehicle.effectiveness import ROTOR_FLOATS, table_per_newton
+from tiltsim_controllers.vehicle.body import Body, inertia_matrix, state_of
 from tiltsim_controllers.vehicle.parameters import Vehicle
-from tiltsim_controllers.vehicle.rotors import rotors_in, wrench_map
-from tiltsim_controllers.vehicle.states import state_of
+from tiltsim_controllers.vehicle.rotors import ROTOR_FLOATS, rotors_in, table_per_newton, wrench_map
+
+_NO_CROSS: Final = Vehicle(*(0.0,) * len(Vehicle._fields))
 
 CORRECTION: Final = 5.0
 """1/s: the rate at which rotors approach the speeds of their model, slow beside any latency."""
@@ -50,37 +54,31 @@ class LawError(TiltsimError):
 
 
 class FlownLaw(NamedTuple):
-    """A law with the numbers of a flight.
-
-    Attributes:
-        function: ``(observed, parameters) -> command``.
-        parameters: A record.
-        table: Further numbers.
-        states, discrete: Names and units of its states.
-        initial: These at time zero.
-    """
-
-    function: Callable[..., Command]
-    parameters: tuple[Any, ...]
-    table: Values
-    states: Mapping[str, str]
-    discrete: Mapping[str, str]
-    initial: Values
-
-
-class Key(NamedTuple):
-    """All that a loop is compiled for."""
+    """A law of arrays, with all that its loop is compiled for."""
 
     layout: RotorLayout
-    law: Callable[..., Command]
-    parameters: type[tuple[Any, ...]]  # of the law
-    states: tuple[tuple[str, str], ...]  # of the law, with their units
+    function: Callable[..., Command]  # ``(observed, parameters) -> command``
+    parameters: type[tuple[Any, ...]]
+    states: tuple[tuple[str, str], ...]  # with their units
     discrete: tuple[tuple[str, str], ...]  # likewise, discrete ones
     tilts: bool  # whether the law commands the tilts
     models_rotors: bool  # whether the rotors follow a model of theirs, as they do with latency
     models_latency: bool = False  # whether the law knows its commands on their way
     feels: bool = False  # whether there are objects or a load
     traced: bool = True  # see `ClosedLoop.traced`
+
+    @property
+    def commanded(self) -> slice:
+        """Its states that are commanded tilts, behind its own and the discrete ones."""
+        first = len(self.states) + len(self.discrete)
+        return slice(first, first + self.layout.places.tilts * self.tilts)
+
+
+NO_PARAMETERS: Final = make_record_type("NoParameters", none=float)(0.0)
+"""For laws without parameters."""
+
+Find = Callable[[FlightPlan], LawController | None]
+"""The table of a flight's law with its numbers; None for a function without any."""
 
 
 @cache
@@ -121,23 +119,23 @@ def _vector(command: Command, name: str, size: int) -> Any:
     return array
 
 
-def _step_of(key: Key) -> Callable[..., Step]:
+def _step_of(flown: FlownLaw) -> Callable[..., Step]:
     """The function of `Law.step`.
 
     The states are the law's own, discrete ones last, the commanded tilts where it commands them,
     and the rotor speeds of their model where they have one.
     """
-    rotors, tilts = key.layout.places
-    own, discrete, layout = len(key.states), len(key.discrete), key.layout.tilt_of_rotor
+    rotors, tilts = flown.layout.places
+    own, layout, commanded = len(flown.states), flown.layout.tilt_of_rotor, flown.commanded
     per_newton, coefficients = ROTOR_FLOATS * rotors, 2 * ROTOR_FLOATS * rotors
-    is_cross = key.layout.model != "multirotor"
+    is_cross = flown.layout.model != "multirotor"
 
     def step(seen: Seen, known: Any, knots: Any) -> Step:
         # An array that outlives a trace would keep its precision in the next one of JAX.
-        spins, time, states = xp.array(key.layout.spins), seen.time, seen.states
+        spins, time, states = xp.array(flown.layout.spins), seen.time, seen.states
         at, now = int(known.rotors), state_of(seen.state, layout)
         motion = reference_motion(time, known.reference, knots)
-        moved = motion[:3] + seen.shift if key.feels else motion[:3]
+        moved = motion[:3] + seen.shift if flown.feels else motion[:3]
         attitude = reference_attitude(time, known.reference, knots)
         planned = planned_tilts(time, known.gait, knots, tilts)
         turning = spins * now.speeds
@@ -156,7 +154,7 @@ def _step_of(key: Key) -> Callable[..., Step]:
             rotor_speeds=turning,
             thrusts=k * turning * abs(turning),
             states=states[:own],
-            discrete=states[own : own + discrete],
+            discrete=states[own : commanded.start],
             reference=Desired(
                 *moved,  # type: ignore[call-arg]
                 motion[3],
@@ -171,16 +169,16 @@ def _step_of(key: Key) -> Callable[..., Step]:
             torque=wrench[3:],
             rotors=pushing,
             table=knots[at + coefficients + rotors :],
-            tilt_commands=states[own + discrete : own + discrete + tilts * key.tilts],
+            tilt_commands=states[commanded],
             contact_force=xp.array(seen.contact_force),
             swing=xp.array(seen.swing),
             readings=seen.readings,
         )
-        command = key.law(observed, known.own)
-        reached = states[len(states) - rotors :] if key.models_rotors else turning
+        command = flown.function(observed, known.own)
+        reached = states[len(states) - rotors :] if flown.models_rotors else turning
         along = _accelerations(command, known.rotor_gain, k, reached)
-        rates, moving = _state_rates(key, command, states, known)
-        if not key.models_rotors:
+        rates, moving = _state_rates(flown, command, states, known)
+        if not flown.models_rotors:
             return Step(spins * along, xp.hstack([rates, moving]))
         following = spins * (along + CORRECTION * (reached - turning))
         return Step(following, xp.hstack([rates, moving, along]))
@@ -189,13 +187,9 @@ def _step_of(key: Key) -> Callable[..., Step]:
 
 
 def _accelerations(command: Command, gain: Any, k: Any, speeds: Any) -> Any:
-    """Rotor accelerations (rad/s^2) along the spins, toward the commanded speeds.
+    """Rotor accelerations (rad/s^2) along the spins, toward the speeds that a command gives.
 
-    Args:
-        command: One of its vectors for the rotors is given.
-        gain: Gain of the speed errors, 1/s.
-        k: Thrust coefficients, N s^2, shape (N,).
-        speeds: rad/s along the spins, shape (N,).
+    The gain of the speed errors is in 1/s, ``k`` in N s^2, speeds in rad/s, shape (N,).
     """
     if not isinstance(command, Command):
         raise LawError(f"returned {short_repr(command)}; expected a tiltsim.Command")
@@ -209,102 +203,139 @@ def _accelerations(command: Command, gain: Any, k: Any, speeds: Any) -> Any:
     return gain * ((_signed_root(values / k) if given[0] == "thrusts" else values) - speeds)
 
 
-def _state_rates(key: Key, command: Command, states: Any, known: Any) -> tuple[Any, Any]:
+def _state_rates(flown: FlownLaw, command: Command, states: Any, known: Any) -> tuple[Any, Any]:
     """Rates of the law's states, and of the tilts where it commands them."""
-    own, discrete, tilts = len(key.states), len(key.discrete), key.layout.places.tilts
-    if not key.tilts and command.tilt_angles is not None:
+    own, commanded = len(flown.states), flown.commanded
+    if not flown.tilts and command.tilt_angles is not None:
         raise LawError("returned tilt_angles; needs controller.tilts = free")
     rates, moving = _vector(command, "rates", own), xp.zeros(0)
-    if discrete:
+    if flown.discrete:
         # Held for a period, these rates carry the states to their next values.
-        change = _vector(command, "discrete", discrete) - states[own : own + discrete]
+        before = states[own : commanded.start]
+        change = _vector(command, "discrete", len(before)) - before
         rates = xp.hstack([rates, change / known.control_period])
     elif command.discrete is not None:
         raise LawError("returned discrete; name these states in controller.discrete_states")
-    if key.tilts:
-        first = own + discrete
-        error = _vector(command, "tilt_angles", tilts) - states[first : first + tilts]
-        moving = known.tilt_gain * error
+    if flown.tilts:
+        before = states[commanded]
+        moving = known.tilt_gain * (_vector(command, "tilt_angles", len(before)) - before)
     return rates, moving
 
 
-def _setup_of(
-    record: Any, law_of: Callable[[FlightPlan], FlownLaw]
-) -> Callable[[FlightPlan], tuple[Any, Values]]:
-    """`Law.setup` of a law with a record of parameters."""
+def _own_of(find: Find) -> Callable[[FlightPlan], dict[str, Any]]:
+    """`Law.own` of a law that is found for each flight."""
 
-    def setup(plan: FlightPlan) -> tuple[Any, Values]:
-        scenario, airframe, law = plan.scenario, airframe_of(plan), law_of(plan)
-        controller, vehicle = scenario.controller, airframe.vehicle
+    def own(plan: FlightPlan) -> dict[str, Any]:
+        airframe, table, controller = airframe_of(plan), find(plan), plan.scenario.controller
         assert isinstance(controller, LawTable)
-        step, table = scenario.simulation.control_timestep, scenario.any_rotorcraft.resolve()
-        known = record(
-            plan.gait.parameters,
-            plan.reference,
-            body_of_vehicle(vehicle),
-            table if isinstance(table, Vehicle) else Vehicle(*(0.0,) * len(Vehicle._fields)),
-            airframe.gyroscopic,
-            float(len(plan.knots)),
-            held_gain(controller.rotor_bandwidth, step),
-            held_gain(controller.tilt_rate_gain, step),
-            step,
-            law.parameters,
-        )
-        per_newton = table_per_newton(vehicle.table, vehicle.thrust_coefficients)
-        tables = (*vehicle.table, *per_newton, *vehicle.thrust_coefficients)
-        return known, (*tables, *law.table)
+        step, vehicle = airframe.control_timestep, vehicle_of(plan)
+        return {
+            "vehicle": body_of_vehicle(airframe.vehicle),
+            "cross": vehicle if isinstance(vehicle, Vehicle) else _NO_CROSS,
+            "gyroscopic": airframe.gyroscopic,
+            "rotor_gain": held_gain(controller.rotor_bandwidth, step),
+            "tilt_gain": held_gain(controller.tilt_rate_gain, step),
+            "control_period": step,
+            "own": table.law_parameters(airframe) if table else NO_PARAMETERS,
+        }
 
-    return setup
+    return own
 
 
-def _initial_of(
-    law_of: Callable[[FlightPlan], FlownLaw], *, models_rotors: bool
-) -> Callable[[FlightPlan], Values]:
-    """`Law.initial`, with the states of a model of the rotors or without."""
+def _tables_of(find: Find) -> Callable[[FlightPlan], Values]:
+    """`Law.tables`: of the rotors, of these per newton, their coefficients, and the law's own."""
+
+    def tables(plan: FlightPlan) -> Values:
+        airframe, table = airframe_of(plan), find(plan)
+        rotors, coefficients = airframe.vehicle.table, airframe.vehicle.thrust_coefficients
+        own = table.law_table(airframe) if table else ()
+        return (*rotors, *table_per_newton(rotors, coefficients), *coefficients, *own)
+
+    return tables
+
+
+def _initial_of(flown: FlownLaw, find: Find) -> Callable[[FlightPlan], Values]:
+    """`Law.initial`: of the law, of the tilts that it commands, of a model of the rotors."""
 
     def initial(plan: FlightPlan) -> Values:
-        airframe = airframe_of(plan)
-        tilts = airframe.initial_tilts if plan.scenario.controller.commands_tilts else ()
-        speeds = airframe.initial_speeds if models_rotors else ()
-        return (*law_of(plan).initial, *tilts, *speeds)
+        airframe, table = airframe_of(plan), find(plan)
+        own = table.initial_states(airframe) if table else (0.0,) * flown.commanded.start
+        tilts = airframe.initial_tilts if flown.tilts else ()
+        return (*own, *tilts, *(airframe.initial_speeds if flown.models_rotors else ()))
 
     return initial
 
 
 @cache
-def law_loop(key: Key, law_of: Callable[[FlightPlan], FlownLaw]) -> ClosedLoop:
-    """The closed loop of a law.
-
-    Args:
-        key: All that it is compiled for.
-        law_of: Finds the law of a flight, whose numbers differ.
-    """
-    record, shown = record_of(key.parameters), key.layout.shown
-    commands = shown.names("tilt_command") if key.tilts else ()
-    modelled = shown.names("modelled_rotor_speed") if key.models_rotors else ()
+def law_loop(flown: FlownLaw, find: Find) -> ClosedLoop:
+    """The closed loop of a law, for which a function finds the numbers of each flight."""
+    shown, first = flown.layout.shown, flown.commanded.start
+    commands = shown.names("tilt_command") if flown.tilts else ()
+    modelled = shown.names("modelled_rotor_speed") if flown.models_rotors else ()
     law = Law(
-        _step_of(key),
-        record,
-        _setup_of(record, law_of),
+        _step_of(flown),
+        record_of(flown.parameters),
+        _own_of(find),
+        _tables_of(find),
         states={
-            **dict(key.states),
-            **dict(key.discrete),
+            **dict(flown.states),
+            **dict(flown.discrete),
             **dict.fromkeys(commands, "rad"),
             **dict.fromkeys(modelled, "rad/s"),
         },
-        initial=_initial_of(law_of, models_rotors=key.models_rotors),
-        margins=margins_of(key.layout),
-        tilts=tilts_in_states(len(key.states) + len(key.discrete), key.layout.places.tilts)
-        if key.tilts
-        else None,
-        uses_gait=not key.tilts,
-        feels=key.feels,
+        initial=_initial_of(flown, find),
+        margins=margins_of(flown.layout),
+        tilts=tilts_in_states(first, flown.layout.places.tilts) if flown.tilts else None,
+        uses_gait=not flown.tilts,
+        feels=flown.feels,
         follows_position=lambda scenario: scenario.reference.kind != "attitude_altitude",
     )
-    late = key._replace(models_rotors=True)
-    knows_latency = key.models_rotors or key.models_latency
+    late = flown._replace(models_rotors=True)
+    knows_latency = flown.models_rotors or flown.models_latency
     return replace(
-        rotor_loop(key.layout, law),
-        with_latency=None if knows_latency else partial(law_loop, late, law_of),
-        traced=key.traced,
+        rotor_loop(flown.layout, law),
+        with_latency=None if knows_latency else partial(law_loop, late, find),
+        traced=flown.traced,
+    )
+
+
+def airframe(scenario: Scenario | str | PathLike[str] | Mapping[str, Any]) -> Airframe:
+    """Facts that the controller of a scenario may use, as methods of a `LawController` take them.
+
+    Args:
+        scenario: Anything that `tiltsim.load_scenario` takes, of a rotorcraft.
+
+    Raises:
+        InputError: If it is not valid, or of a tilt-car.
+    """
+    loaded = load_scenario(scenario)
+    if loaded.vehicle.model == "tilt_car":
+        raise InputError(f"{loaded.address}: vehicle.model: airframe takes rotorcraft only")
+    return airframe_of(plan_flight(loaded))
+
+
+def airframe_of(plan: FlightPlan) -> Airframe:
+    """The airframe of a planned flight."""
+    scenario, simulation = plan.scenario, plan.scenario.simulation
+    table = scenario.any_rotorcraft
+    vehicle, tilting = table.resolve(), table.has_tilting_rotors
+    speeds = initial_rotor_speeds(plan)
+    return Airframe(
+        as_multirotor(vehicle, tilting=tilting),
+        plan.gait,
+        initial_tilts(plan)[0] if tilting else (),
+        tuple(spin * speed for spin, speed in zip(table.spins, speeds, strict=True)),
+        scenario.initial.position,
+        scenario.initial.velocity,
+        scenario.initial.attitude,
+        scenario.initial.angular_velocity,
+        # The thesis's equations omit the gyroscopic torque but for the quadrotor's.
+        float(simulation.plant != "thesis" or table.model == "quadrotor"),
+        simulation.timestep,
+        simulation.control_timestep,
+        simulation.latency_steps,
+        table.speeds_along_spin,
+        table.rotor_time_constant,
+        table.tilt_servo,
+        scenario.reference,
     )

@@ -5,30 +5,24 @@ and are not states. The model's four rotor speed states stay at zero.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from typing import Any, ClassVar, Final
 
 import numpy as np
 
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup
-from tiltsim.equations.quadrotor import equations_of_motion, initial_state
+from tiltsim.equations.thesis import equations_of_motion, initial_extended_state
 from tiltsim.laws.law import Law
-from tiltsim.laws.parameters import parameters_of
-from tiltsim.laws.rotor_loop import RotorFunctions, RotorLayout, rotor_loop
-from tiltsim.laws.rotorcraft import REFERENCE_COLUMNS
+from tiltsim.laws.rotor_loop import REFERENCE_COLUMNS, RotorFunctions, RotorLayout, rotor_loop
 from tiltsim.scenario.scenario import FlightPlan
-from tiltsim.vehicles.rotorcraft import ROTORCRAFT
-from tiltsim_controllers.analysis.quadrotor_singularity import (
-    normalized_determinant,
-    published_determinant,
-)
+from tiltsim.vehicles.rotorcraft import EXTRA_COLUMNS
+from tiltsim_controllers.analysis.singularity import normalized_determinant, published_determinant
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.laws import quadrotor_attitude_altitude, switching, yaw_position
 from tiltsim_controllers.laws.observed import Seen, Step
 from tiltsim_controllers.mathematics.scalar import Floats, Vector
+from tiltsim_controllers.vehicle.body import PITCH, ROLL
+from tiltsim_controllers.vehicle.cross import speed_along_spin, thrust_controls
 from tiltsim_controllers.vehicle.parameters import SPIN
-from tiltsim_controllers.vehicle.quadrotor_mixer import speed_along_spin, thrust_controls
-from tiltsim_controllers.vehicle.states import PITCH, ROLL
 
 LAYOUT: Final = RotorLayout((-1, -1, -1, -1), SPIN, "quadrotor")
 
@@ -45,7 +39,7 @@ class _Thrusting(RotorFunctions):
         return (0.0,) * 4
 
     def initial_state(self, plan: FlightPlan) -> Vector:
-        return (*initial_state(plan.scenario), *self.law.initial(plan))
+        return (*initial_extended_state(plan.scenario), *self.law.initial_states(plan))
 
     def controls(
         self, time: Any, qpos: Any, qvel: Any, act: Any, parameters: Any, knots: Any
@@ -170,13 +164,8 @@ def _extension(plan: FlightPlan) -> tuple[float, ...]:
 
 
 def _loop(step: Callable[[Seen, Any, Any], Step], record: Any, **options: Any) -> ClosedLoop:
-    def setup(plan: FlightPlan) -> tuple[Any, tuple[float, ...]]:
-        return parameters_of(plan, record, vehicle=plan.scenario.rotorcraft.resolve()), ()
-
-    law = Law(
-        step, record, setup, **{"signs": _thrust_axis, "causes": _thrust_axis_cause, **options}
-    )
-    return replace(rotor_loop(LAYOUT, law, _Thrusting), kind=ROTORCRAFT)
+    common = {"columns": (*EXTRA_COLUMNS,), "signs": _thrust_axis, "causes": _thrust_axis_cause}
+    return rotor_loop(LAYOUT, Law(step, record, **{**common, **options}), _Thrusting)
 
 
 YAW_POSITION: Final = _loop(

@@ -7,32 +7,35 @@ speeds are states whose accelerations a law commands.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, Final, NamedTuple
 
 import numpy as np
 
-from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Dynamics
-from tiltsim.equations.tiltrotor import airframe_of, body_fields, initial_state
+from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup
+from tiltsim.equations.thesis import airframe_of, body_fields, initial_state
 from tiltsim.laws.law import Law, Margins, Tilts, tilts_of_gait
-from tiltsim.laws.rotorcraft import REFERENCE_COLUMNS, torque_free_columns
 from tiltsim.laws.vehicle_loop import VehicleFunctions, parts, servo_lead
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.scenario import FlightPlan
 from tiltsim.vehicles.rotorcraft import initial_rotor_speeds, rotorcraft_kind
-from tiltsim.vehicles.rotorcraft.layout import CROSS
+from tiltsim.vehicles.rotorcraft.layout import CROSS, Layout
 from tiltsim.vehicles.rotorcraft.layout import Layout as Places
 from tiltsim.vehicles.rotorcraft.others import FELT, FELT_SIZE
-from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.code.traceable import traceable
-from tiltsim_controllers.laws.failures import UNHARMED
-from tiltsim_controllers.laws.observed import Seen
+from tiltsim_controllers.analysis.singularity import world_up
+from tiltsim_controllers.analysis.torque_free import (
+    controlled_axes,
+    decoupling_condition,
+    margin_over_flight,
+    torque_free_forces,
+)
+from tiltsim_controllers.code.arrays import traceable, xp
+from tiltsim_controllers.laws.observed import UNHARMED, Failure, Seen
 from tiltsim_controllers.mathematics.attitude import euler_angles
 from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector
 from tiltsim_controllers.references.trajectories import reference_attitude, reference_motion
-from tiltsim_controllers.vehicle.body import Body, body_of
-from tiltsim_controllers.vehicle.effectiveness import ROTOR_FLOATS
-from tiltsim_controllers.vehicle.motion import BODY_STATES, equations_of_motion
-from tiltsim_controllers.vehicle.states import BODY_FIELDS
+from tiltsim_controllers.vehicle.body import BODY_FIELDS, BODY_STATES
+from tiltsim_controllers.vehicle.craft import equations_of_motion
+from tiltsim_controllers.vehicle.rotors import ROTOR_FLOATS, force_and_torque
 
 
 class RotorLayout(NamedTuple):
@@ -66,24 +69,20 @@ def layout_of_vehicle(vehicle: Multirotor, model: str = "multirotor") -> RotorLa
     return RotorLayout(vehicle.tilt_of_rotor, vehicle.spins, model)
 
 
-def body_of_vehicle(vehicle: Multirotor) -> Body:
-    """The rigid body that a law knows of a vehicle."""
-    return body_of(vehicle.mass, np.reshape(vehicle.inertia, (3, 3)), vehicle.gravity)
-
-
 def table_of(places: Places, setup: ControlSetup) -> Values:
     """The table of the rotors, in the knots after the data of gait and reference."""
     first = int(setup.parameters.law.rotors)
     return setup.knots[first : first + ROTOR_FLOATS * places.rotors]
 
 
-def margins_of(layout: RotorLayout) -> Margins:
-    """The angle (rad) to the nearest singular attitude, for a law that knows of failures or not."""
+def margins_of(layout: RotorLayout, dimension: int | None = None) -> Margins:
+    """`torque_free_columns` for a law that knows of failures or not."""
     places = layout.places
 
     def margins(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
         failure = getattr(setup.parameters.law, "failure", UNHARMED)
-        return torque_free_columns(places, table_of(places, setup), samples, failure=failure)
+        table = table_of(places, setup)
+        return torque_free_columns(places, table, samples, dimension, failure)
 
     return margins
 
@@ -215,7 +214,8 @@ class RotorFunctions(VehicleFunctions):
     # --- on equations of motion
 
     def initial_state(self, plan: FlightPlan) -> Vector:
-        speeds, states = initial_rotor_speeds(plan), self.law.initial(plan)
+        """Motion, rotor speeds and the states of the law."""
+        speeds, states = initial_rotor_speeds(plan), self.law.initial_states(plan)
         return (*initial_state(plan.scenario, speeds), *states)
 
     def equation_inputs(self, time: Any, state: Any, parameters: Any, knots: Any) -> Any:
@@ -265,24 +265,84 @@ def rotor_loop(
     """
     places = layout.places
     flown = functions(law, layout, law.tilts or tilts_of_gait(places.tilts))
-    dynamics = Dynamics(
-        layout.name,
-        places.sizes(len(law.states))._replace(history=FELT_SIZE if law.feels else 0),
-        lambda plan, _setup: (*flown.initial_speeds(plan), *law.initial(plan)),
-        len(law.states),
-        layout.spins,
-        layout.tilt_of_rotor if layout.model == "multirotor" else (),
-        commands_thrusts=functions.commands_thrusts,
-    )
     loop = flown.closed_loop(
-        rotorcraft_kind(layout.shown, ("singularity_margin",)),
-        dynamics,
+        rotorcraft_kind(layout.shown, law.columns),
         {"servo_lead": lambda plan: servo_lead(plan.scenario.any_rotorcraft.tilt_servo)},
         places.rotors + len(law.states),
         places.names("tilt_command") if law.records_commands else (),
+        model=layout.name,
+        sizes=places.sizes(len(law.states))._replace(history=FELT_SIZE if law.feels else 0),
+        initial_activations=lambda plan, _: (
+            *flown.initial_speeds(plan),
+            *law.initial_states(plan),
+        ),
+        controller_states=len(law.states),
+        spins=layout.spins,
+        tilt_of_rotor=layout.tilt_of_rotor if layout.model == "multirotor" else (),
+        commands_thrusts=functions.commands_thrusts,
+        observe_reads_controls=functions.commands_thrusts,
     )
     if law.measured or law.records_commands:  # they need a plant with servos
         return replace(loop, equations=None)
     assert loop.equations is not None
     tilts = replace(loop.equations, tilts=traceable(flown.equation_tilts))
     return replace(loop, equations=tilts, uses_gait=places.tilts > 0 and law.uses_gait)
+
+
+REFERENCE_COLUMNS: Final = ("x_ref", "y_ref", "z_ref", "roll_ref", "pitch_ref", "yaw_ref")
+
+CONDITION: Final = "decoupling_condition"
+"""A column: smallest over largest singular value of the decoupling matrix."""
+
+
+def torque_free_columns(
+    layout: Layout,
+    table: Vector,
+    samples: Mapping[str, Floats],
+    dimension: int | None = None,
+    failure: Failure = UNHARMED,
+) -> dict[str, Floats]:
+    """Angle (rad) to the nearest singular attitude, and how well the decoupling matrix inverts.
+
+    Args:
+        layout: Layout of the vehicle.
+        table: Table of its rotors.
+        samples: By field.
+        dimension: How many components of force the controller controls; None for a controller
+            without a decoupling matrix.
+        failure: A rotor that the controller knows to have failed, which is left out from then on.
+    """
+    names = layout.names("alpha")
+    angles = np.reshape([samples[name] for name in names], (len(names), len(samples["time"]))).T
+    time, rotors = samples["time"], np.arange(1, layout.rotors + 1)
+    known = time >= failure.known_from
+    lost = known[:, np.newaxis] & (rotors == np.reshape(failure.rotor, (-1, 1)))
+    works = ~lost[:, np.newaxis]
+    force, torque = force_and_torque(table, angles)
+    pushing, up = (force * works, torque * works), world_up(samples["roll"], samples["pitch"])
+    forces = torque_free_forces(*pushing)
+    begins = (time == time[:1]) | (known != np.roll(known, 1))
+    columns = {"singularity_margin": margin_over_flight(forces, up, begins)}
+    if dimension is not None:
+        axes = controlled_axes(forces, up, dimension)
+        columns[CONDITION] = decoupling_condition(*pushing, axes)
+    return columns
+
+
+def rotor_stops(rotors: int, remedy: str = "") -> tuple[str, ...]:
+    """Causes of an end where the speed of a rotor reaches zero, one per rotor; a key may help."""
+    remedies = ["vehicle.min_rotor_speed = 100", *[remedy] * bool(remedy)]
+    advice = ", ".join(remedies) + ", or a smaller step of the reference may help"
+    return tuple(
+        f"the decoupling matrix became singular: rotor {rotor} came to a stop; {advice}"
+        for rotor in range(1, rotors + 1)
+    )
+
+
+def singular_attitude(sample: Mapping[str, float], tilts: tuple[str, ...]) -> str:
+    """Cause of an end at an attitude and tilt angles, which have these names."""
+    angles = ", ".join(f"{sample[name]:.3g}" for name in tilts)
+    return (
+        f"the decoupling matrix became singular at roll = {sample['roll']:.3g} rad, "
+        f"pitch = {sample['pitch']:.3g} rad" + (f", tilt angles ({angles}) rad" if tilts else "")
+    )

@@ -1,7 +1,7 @@
 """The closed loops with the tilt-car, in MuJoCo and on the equations of ch. 10 (Eqs. 2 and 3).
 
 Two laws integrate the rotor speeds and the command of the tilt servo; with the third, the tilt
-follows a gait and the thrusts are commanded (`tiltsim.laws.tilt_car_planned`).
+follows a gait and the thrusts are commanded (ch. 10, Sec. 5; ch. 11).
 """
 
 from collections.abc import Callable, Mapping
@@ -10,17 +10,17 @@ from typing import Any, Final
 
 import numpy as np
 
-from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Dynamics, Sizes
+from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Sizes
 from tiltsim.laws.law import Law
-from tiltsim.laws.parameters import parameters_of
 from tiltsim.laws.vehicle_loop import VehicleFunctions, parts, servo_lead
 from tiltsim.scenario.scenario import FlightPlan, Scenario
 from tiltsim.vehicles.tilt_car import ROTORS, TILT_CAR, initial_tilt
 from tiltsim_controllers.code.arrays import xp
+from tiltsim_controllers.gaits.motion import planned_tilts
 from tiltsim_controllers.laws.observed import Seen, Step
 from tiltsim_controllers.mathematics.scalar import Floats, Vector
 from tiltsim_controllers.references.trajectories import reference_motion
-from tiltsim_controllers.tilt_car import fourth_derivative, third_derivative
+from tiltsim_controllers.tilt_car import fourth_derivative, planned_direction, third_derivative
 from tiltsim_controllers.tilt_car.vehicle import TiltCar, acceleration, counter_yaw_per_tilt
 
 DEMANDED: Final = ("demanded_x", "demanded_y")
@@ -59,6 +59,7 @@ class CarFunctions(VehicleFunctions):
         return xp.hstack([qpos[:2], qvel[:2], yaw, r, alpha, alpha_rate])
 
     def in_sample(self, time: Any, values: Any) -> Seen:
+        """From the fields of a sample."""
         v = parts(
             values, motion=4, yaw=1, _r=1, alpha=1, _rate=1, speeds=2, states=len(self.law.states)
         )
@@ -67,9 +68,11 @@ class CarFunctions(VehicleFunctions):
 
     @property
     def names(self) -> tuple[str, ...]:
+        """Names of the columns of `references`."""
         return ("x_ref", "y_ref", "vx_ref", "vy_ref", *(self.law.signals or ()))
 
     def references(self, time: Any, values: Any, parameters: Any, knots: Any) -> Any:
+        """Position and velocity to track, then the law's signals."""
         motion = reference_motion(time, parameters.law.reference, knots)[:2, :2]
         signals = self.law.step(self.in_sample(time, values), parameters.law, knots).signals
         return xp.hstack([motion.ravel(), signals])
@@ -83,21 +86,25 @@ class CarFunctions(VehicleFunctions):
             commands_thrusts: Whether the rotor speeds among the activations are idle.
         """
         law = self.law
-        sizes = Sizes(qpos=4, qvel=4, act=2 + states, ctrl=5 + states)
 
         def activations(plan: FlightPlan, _setup: ControlSetup) -> Vector:
             speeds = plan.scenario.initial.rotor_speeds(2)
-            return (*((0.0, 0.0) if commands_thrusts else speeds), *law.initial(plan))
+            return (*((0.0, 0.0) if commands_thrusts else speeds), *law.initial_states(plan))
 
         return self.closed_loop(
             TILT_CAR,
-            Dynamics("tilt_car", sizes, activations, states, commands_thrusts=commands_thrusts),
             {
                 "servo_lead": lambda plan: servo_lead(plan.scenario.tilt_car.tilt_servo),
                 "heading": lambda plan: plan.scenario.initial.attitude[2],
             },
             inputs_size,
             tuple(f"law_speed_{rotor}" for rotor in ROTORS if states > 1),
+            model="tilt_car",
+            sizes=Sizes(qpos=4, qvel=4, act=2 + states, ctrl=5 + states),
+            initial_activations=activations,
+            controller_states=states,
+            commands_thrusts=commands_thrusts,
+            observe_reads_controls=commands_thrusts,
         )
 
 
@@ -113,11 +120,6 @@ def direction_columns(samples: Mapping[str, Floats], setup: ControlSetup) -> dic
         "direction_ref": direction + np.arctan2(np.sin(away), np.cos(away)),
         "input_split": samples["rotor_speed_1"] ** 2 - samples["rotor_speed_2"] ** 2,
     }
-
-
-def car_setup_of(record: Any) -> Callable[[FlightPlan], tuple[Any, tuple[float, ...]]]:
-    """`Law.setup` of a law with a record of parameters."""
-    return lambda plan: (parameters_of(plan, record, car=plan.scenario.tilt_car.resolve()), ())
 
 
 # --- laws that integrate -----------------------------------------------------------------------
@@ -181,7 +183,7 @@ class _Integrating(CarFunctions):
         return Seen(time, seen, states=xp.hstack([s.alpha, s.further]))
 
     def initial_state(self, plan: FlightPlan) -> Vector:
-        tilt, *further = self.law.initial(plan)
+        tilt, *further = self.law.initial_states(plan)
         speeds = plan.scenario.initial.rotor_speeds(2)
         return (*initial_motion(plan.scenario), tilt, *speeds, *further)
 
@@ -237,7 +239,6 @@ def _integrating(
     law = Law(
         step,
         record,
-        car_setup_of(record),
         states={"alpha_ref": "rad", **states},
         initial=lambda plan: (initial_tilt(plan)[0], *(0.0,) * len(states)),
         signals=DEMANDED,
@@ -264,4 +265,107 @@ FOURTH_DERIVATIVE: Final = _integrating(
 
 ``law_speed_i`` are the rotor speeds that the controller integrates; the true ones are never below
 zero.
+"""
+
+
+SQUARES: Final = tuple(f"wanted_square_{rotor}" for rotor in ROTORS)
+
+
+def _tilt(time: Any, p: Any, knots: Any) -> Any:
+    """The planned tilt angle with its rate, rad and rad/s, shape (2,)."""
+    return planned_tilts(time, p.gait, knots, 1)[0][:2]
+
+
+def _speeds_of_squares(squares: Any) -> Any:
+    """The rotor speeds (rad/s) of controls; NaN for a negative one or NaN."""
+    return xp.where(squares >= 0.0, xp.sqrt(xp.where(squares >= 0.0, squares, 0.0)), xp.nan)
+
+
+class _Planned(CarFunctions):
+    """A law whose inputs are the squares of the rotor speeds; the tilt follows its gait."""
+
+    def controls(
+        self, time: Any, qpos: Any, qvel: Any, act: Any, parameters: Any, knots: Any
+    ) -> Any:
+        """Tilt servo, thrusts, idle rotor states.
+
+        The law reads the true direction of the thrusts, which lags behind the gait's steps.
+        """
+        tilt, tilt_rate = _tilt(time, parameters.law, knots)
+        seen = Seen(time, xp.hstack([qpos[:2], qvel[:2], qpos[2:4]]))
+        squares = self.law.step(seen, parameters.law, knots).inputs
+        return xp.hstack([tilt + parameters.servo_lead * tilt_rate, squares, xp.zeros(2)])
+
+    def observe(self, qpos: Any, qvel: Any, act: Any, ctrl: Any) -> Any:
+        return xp.hstack([self.discs(qpos, qvel), _speeds_of_squares(ctrl[1:3])])
+
+    def in_equations(self, time: Any, state: Any, parameters: Any, knots: Any) -> Seen:
+        """From a state of the equations, with the planned tilt."""
+        tilt = _tilt(time, parameters.law, knots)[0]
+        return Seen(time, xp.hstack([state[:4], yaw(tilt, parameters), tilt]))
+
+    def initial_state(self, plan: FlightPlan) -> Vector:
+        return initial_motion(plan.scenario)
+
+    def equation_inputs(self, time: Any, state: Any, parameters: Any, knots: Any) -> Any:
+        seen = self.in_equations(time, state, parameters, knots)
+        return self.law.step(seen, parameters.law, knots).inputs
+
+    def equation_rates(
+        self, time: Any, state: Any, inputs: Any, parameters: Any, knots: Any, disturbance: Any
+    ) -> Any:
+        """The thesis's equations with a tilt that follows the gait exactly."""
+        seen = self.in_equations(time, state, parameters, knots).state
+        return motion_rates(state, seen[4] + seen[5], inputs, parameters.law.car, disturbance)
+
+    def observe_equations(
+        self, time: Any, state: Any, inputs: Any, parameters: Any, knots: Any
+    ) -> Any:
+        tilt, tilt_rate = _tilt(time, parameters.law, knots)
+        yaw_rate = -counter_yaw_per_tilt(parameters.law.car) * tilt_rate
+        discs = xp.array([yaw(tilt, parameters), yaw_rate, tilt, tilt_rate])
+        return xp.hstack([state[:4], discs, _speeds_of_squares(inputs)])
+
+
+def _step(seen: Seen, p: Any, knots: Any) -> Step:
+    time, state = seen.time, seen.state
+    signals = [
+        planned_direction.demanded_acceleration(time, state, p),
+        planned_direction.demanded_squared_speeds(time, state, p),
+        _tilt(time, p, knots)[:1],
+    ]
+    inputs = planned_direction.planned_direction_inputs(time, state, p)
+    return Step(inputs, signals=xp.hstack(signals))
+
+
+def _columns(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
+    """Directions, switches of the thrusts and the candidate of a Lyapunov function."""
+    error: Any = samples["y_ref"] - samples["y"]
+    error_rate: Any = samples["vy_ref"] - samples["vy"]
+    gains = setup.parameters.law.gains
+    lyapunov: Any = planned_direction.lyapunov_candidate(error, error_rate, gains)
+    switches = {
+        f"switch_{rotor}": (samples[name] > 0.0).astype(float)
+        for rotor, name in zip(ROTORS, SQUARES, strict=True)
+    }
+    return {**direction_columns(samples, setup), **switches, "lyapunov": lyapunov}
+
+
+PLANNED_DIRECTION: Final = _Planned(
+    Law(
+        _step,
+        planned_direction.Parameters,
+        signals=(*DEMANDED, *SQUARES, "alpha_ref"),
+        units={
+            **dict.fromkeys(SQUARES, "rad^2/s^2"),
+            **{f"switch_{rotor}": "1" for rotor in ROTORS},
+            "lyapunov": "m^2/s^2",
+        },
+        margins=_columns,
+    )
+).car_loop(0, 2, commands_thrusts=True)
+"""The tilt-car with a planned direction of its thrusts (ch. 10, Sec. 5; ch. 11).
+
+``switch_1`` and ``switch_2`` are ``p`` and ``q`` of ch. 11's switch matrix (Eqs. 22-24), 0 where a
+rotor's thrust is saturated at zero; ``wanted_square_i`` is the demand without that limit.
 """

@@ -1,30 +1,26 @@
 """Closed loops of laws with any kind of vehicle."""
 
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
 from tiltsim.closed_loop.loop import (
     ClosedLoop,
-    Columns,
     ControlSetup,
-    Dynamics,
     Equations,
-    Monitoring,
-    Sampling,
+    VehicleKind,
+    nothing_singular,
 )
-from tiltsim.closed_loop.vehicle_kind import VehicleKind
 from tiltsim.engines.sample_evaluation import evaluate_over_samples
-from tiltsim.laws.law import Law
-from tiltsim.laws.parameters import head_of
+from tiltsim.laws.law import Law, parameters_of
 from tiltsim.scenario.rotorcraft import ServoTable
 from tiltsim.scenario.scenario import FlightPlan
-from tiltsim_controllers.code.traceable import traceable
+from tiltsim_controllers.code.arrays import traceable
 from tiltsim_controllers.laws.observed import Seen
+from tiltsim_controllers.mathematics.records import make_record_type
 from tiltsim_controllers.mathematics.scalar import Floats, Vector
 
 
@@ -43,92 +39,67 @@ def parts(vector: Any, **sizes: int) -> SimpleNamespace:
 
 
 @dataclass(frozen=True, eq=False)
-class VehicleFunctions(ABC):
+class VehicleFunctions:
     """The functions of arrays by which a law moves a kind of vehicle.
 
     In MuJoCo and on the equations of motion, ``parameters`` are a record with the law's own as
-    ``law``, and ``knots`` the table data of a flight; see `tiltsim.closed_loop.loop`.
+    ``law``, and ``knots`` the table data of a flight. A kind of vehicle has ``controls`` and
+    ``observe`` of `ClosedLoop`, the ``equation_...`` functions of `Equations`, and:
+
+    Attributes:
+        law: The law.
+        in_sample: ``(time, values)``: the vehicle as the law sees it, from the fields of a sample.
+        references: ``(time, values, parameters, knots)``: references and signals of a sample.
+        names: Their names, which are columns.
+        initial_state: ``(plan)``: the state of the equations at time zero.
     """
 
     law: Law
-
-    @abstractmethod
-    def controls(
-        self, time: Any, qpos: Any, qvel: Any, act: Any, parameters: Any, knots: Any
-    ) -> Any:
-        """The control step, see `Sampling`."""
+    controls: ClassVar[Callable[..., Any]]
+    observe: ClassVar[Callable[..., Any]]
+    in_sample: ClassVar[Callable[..., Seen]]
+    references: ClassVar[Callable[..., Any]]
+    names: ClassVar[Any]
+    initial_state: ClassVar[Callable[..., Vector]]
+    equation_inputs: ClassVar[Callable[..., Any]]
+    equation_rates: ClassVar[Callable[..., Any]]
+    observe_equations: ClassVar[Callable[..., Any]]
 
     def hold(self, time: Any, qpos: Any, qvel: Any, act: Any, ctrl: Any, parameters: Any) -> Any:
-        """The controls between samples, see `Sampling`."""
+        """The controls between samples, see `ClosedLoop`."""
         return ctrl
 
-    @abstractmethod
-    def observe(self, qpos: Any, qvel: Any, act: Any, ctrl: Any) -> Any:
-        """A sample, see `Columns`."""
-
-    @abstractmethod
-    def in_sample(self, time: Any, values: Any) -> Seen:
-        """The vehicle as the law sees it, from the fields of a sample."""
-
-    @property
-    @abstractmethod
-    def names(self) -> tuple[str, ...]:
-        """Names of the columns of `references`."""
-
-    @abstractmethod
-    def references(self, time: Any, values: Any, parameters: Any, knots: Any) -> Any:
-        """References and signals of a sample."""
-
     def signs(self, time: Any, values: Any, parameters: Any, knots: Any) -> Any:
-        """See `Monitoring`."""
+        """See `ClosedLoop.sign_check_values`."""
         assert self.law.signs is not None
         return self.law.signs(self.in_sample(time, values), parameters.law, knots)
-
-    @abstractmethod
-    def initial_state(self, plan: FlightPlan) -> Vector:
-        """The state of the equations at time zero."""
-
-    @abstractmethod
-    def equation_inputs(self, time: Any, state: Any, parameters: Any, knots: Any) -> Any:
-        """See `Equations`."""
-
-    @abstractmethod
-    def equation_rates(
-        self, time: Any, state: Any, inputs: Any, parameters: Any, knots: Any, disturbance: Any
-    ) -> Any:
-        """See `Equations`."""
-
-    @abstractmethod
-    def observe_equations(
-        self, time: Any, state: Any, inputs: Any, parameters: Any, knots: Any
-    ) -> Any:
-        """See `Equations`."""
 
     def closed_loop(
         self,
         kind: VehicleKind,
-        dynamics: Dynamics,
         head: Mapping[str, Callable[[FlightPlan], float]],
         inputs_size: int,
         fields: tuple[str, ...] = (),
+        **model: Any,
     ) -> ClosedLoop:
         """The closed loop.
 
         Args:
             kind: Kind of the vehicle.
-            dynamics: Its model.
             head: Parameters beside the law's, by name.
             inputs_size: Number of inputs of the equations.
             fields: Fields of a sample after the kind's and the states of the law.
+            model: Fields of `ClosedLoop` that describe the model.
         """
         law, references, names = self.law, traceable(self.references), self.names
-        record = head_of(law.parameters, **dict.fromkeys(head, float))
+        numbers = dict.fromkeys(head, float)
+        record = make_record_type("LoopParameters", signature=float, **numbers, law=law.parameters)
         read, units = (*kind.observed_fields, *law.states), {**law.states, **law.units}
 
         def setup(plan: FlightPlan, signature: float) -> ControlSetup:
-            parameters, further = law.setup(plan)
             own = [value(plan) for value in head.values()]
-            return ControlSetup(record(signature, *own, parameters), (*plan.knots, *further))
+            parameters = record(signature, *own, parameters_of(plan, law))
+            return ControlSetup(parameters, (*plan.knots, *law.tables(plan)))
 
         def derive(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
             states = np.stack([samples[name] for name in read], axis=-1)
@@ -140,16 +111,14 @@ class VehicleFunctions(ABC):
             kind=kind,
             parameters=record,
             setup=setup,
-            dynamics=dynamics,
-            sampling=Sampling(traceable(self.controls), traceable(self.hold)),
-            columns=Columns(
-                traceable(self.observe),
-                derive,
-                fields=(*law.states, *fields),
-                units={name: unit for name, unit in units.items() if name not in kind.columns},
-                observe_reads_controls=dynamics.commands_thrusts,
-            ),
-            monitoring=Monitoring(traceable(self.signs), law.causes) if law.signs else Monitoring(),
+            controls=traceable(self.controls),
+            hold=traceable(self.hold),
+            observe=traceable(self.observe),
+            derive=derive,
+            fields=(*law.states, *fields),
+            further_units={name: unit for name, unit in units.items() if name not in kind.columns},
+            sign_check_values=traceable(self.signs) if law.signs else nothing_singular,
+            causes=law.causes,
             equations=Equations(
                 inputs=traceable(self.equation_inputs),
                 inputs_size=inputs_size,
@@ -159,4 +128,5 @@ class VehicleFunctions(ABC):
             ),
             follows_position=law.follows_position,
             uses_gait=law.uses_gait,
+            **model,
         )

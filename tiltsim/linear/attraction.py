@@ -204,6 +204,9 @@ def _check(scenario: Scenario, axes: tuple[str, str], coarse: int, refinements: 
         )
     if scenario.vehicle.model == "tilt_car":
         raise InputError(f"{scenario.address}: vehicle.model: attraction takes rotorcraft only")
+    if scenario.companion:
+        where = scenario.address or "scenario"
+        raise InputError(f"{where}: companion: attraction takes one vehicle; remove [[companion]]")
 
 
 def _edges(axis: str, given: tuple[float, float] | None, cells: int) -> Floats:

@@ -8,9 +8,10 @@ from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.closed_loop.loop import ClosedLoop
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.vehicles.rotorcraft.layout import layout_of
+from tiltsim.vehicles.rotorcraft.others import SWING
 from tiltsim_controllers.mathematics.attitude import quaternion_of_rotation, rotation_of_quaternion
 from tiltsim_controllers.mathematics.scalar import Floats
-from tiltsim_controllers.vehicle.states import BODY_FIELDS
+from tiltsim_controllers.vehicle.body import BODY_FIELDS
 
 ROTATION_NAMES: Final = ("rotation_x", "rotation_y", "rotation_z")
 """A small turn about the body axes, rad; at level attitude roll, pitch and yaw."""
@@ -22,11 +23,12 @@ POSITION: Final = BODY_FIELDS[:3]
 VELOCITY: Final = BODY_FIELDS[3:6]
 BODY_RATES: Final = BODY_FIELDS[9:]
 PLANE: Final = ("x", "y", "vx", "vy")
+SWING_RATES: Final = ("swing_rate_x", "swing_rate_y")
 UNITS: Final = {
     **dict.fromkeys(POSITION, "m"),
     **dict.fromkeys(VELOCITY, "m/s"),
     **dict.fromkeys((*ROTATION_NAMES, "roll", "pitch", "yaw"), "rad"),
-    **dict.fromkeys(BODY_RATES, "rad/s"),
+    **dict.fromkeys((*BODY_RATES, *SWING_RATES), "rad/s"),
     **dict.fromkeys(("squared_speed_1", "squared_speed_2"), "rad^2/s^2"),
     "force": "N",
     **dict.fromkeys(("torque_x", "torque_y", "torque_z"), "N m"),
@@ -144,7 +146,7 @@ def numbered(kind: str, count: int) -> tuple[str, ...]:
 
 def is_of_vehicle(state: str) -> bool:
     """Whether a state is the vehicle's, not one of its controller or of commands under way."""
-    return state in BODY_FIELDS or state.startswith(("rotation_", "alpha", "rotor_speed"))
+    return state in BODY_FIELDS or state.startswith(("rotation_", "alpha", "rotor_speed", "swing_"))
 
 
 def activation_names(loop: ClosedLoop) -> tuple[str, ...]:
@@ -156,13 +158,12 @@ def activation_names(loop: ClosedLoop) -> tuple[str, ...]:
     inner = loop
     while inner.within is not None:
         inner = inner.within
-    dynamics, names = loop.dynamics, inner.columns.fields
-    own = dynamics.controller_states
+    names, own = inner.fields, loop.controller_states
     if len(names) != own:
         names = numbered("law", own)
-    rotors = dynamics.sizes.act - own - sum(extra.states for extra in dynamics.extra_actuators)
+    rotors = loop.sizes.act - own - sum(extra.states for extra in loop.extra_actuators)
     layers: list[str] = []
-    for index, extra in enumerate(dynamics.extra_actuators):
+    for index, extra in enumerate(loop.extra_actuators):
         if extra.begins_with_rotor_speeds:
             layers += numbered("speed_command", rotors)
             tilts = numbered("tilt_command", extra.memories - rotors)
@@ -176,37 +177,38 @@ def activation_names(loop: ClosedLoop) -> tuple[str, ...]:
 
 def mujoco_coordinates(loop: ClosedLoop) -> Coordinates:
     """Coordinates of `qpos`, `qvel` and `act`."""
-    sizes = loop.dynamics.sizes
-    if loop.dynamics.model == "tilt_car":
+    sizes = loop.sizes
+    if loop.model == "tilt_car":
         names = ("x", "y", "yaw", "alpha", "vx", "vy", "r", "alpha_rate")
         return _coordinates((*names, *activation_names(loop)), loop, 0)
     tilts = sizes.qpos - len(POSITION) - QUATERNION
-    places = (*POSITION, *ROTATION_NAMES, *numbered("alpha", tilts))
-    speeds = (*VELOCITY, *BODY_RATES, *numbered("alpha_rate", tilts))
+    swing, swinging = (SWING, SWING_RATES) if sizes.others else ((), ())
+    places = (*POSITION, *ROTATION_NAMES, *numbered("alpha", tilts), *swing)
+    speeds = (*VELOCITY, *BODY_RATES, *numbered("alpha_rate", tilts), *swinging)
     return _coordinates((*places, *speeds, *activation_names(loop)), loop, QUATERNION)
 
 
 def equation_coordinates(assembly: Assembly, size: int) -> Coordinates:
     """Coordinates of a state of the equations of this size; a rigid body has MuJoCo's."""
     loop, model = assembly.loop, assembly.scenario.vehicle.model
-    if assembly.scenario.simulation.plant == "rigid_body":
+    if assembly.scenario.simulation.plant != "thesis":
         return mujoco_coordinates(loop)
     rotation = 0 if model in {"quadrotor", "tilt_car"} else MATRIX
     body = BODY_FIELDS
     if rotation:
         body = (*POSITION, *VELOCITY, *ROTATION_NAMES, *BODY_RATES)
     if model != "tilt_car" and loop.within is not None:
-        tilts = layout_of(loop.dynamics).tilts
+        tilts = layout_of(loop).tilts
         servos = (*numbered("alpha", tilts), *numbered("alpha_rate", tilts))
         names = (*body, *servos, *activation_names(loop))
     elif model == "tilt_car":
         driven = ("alpha", "rotor_speed_1", "rotor_speed_2")
         names = (*PLANE, *(driven if size > len(PLANE) else ()))
     else:
-        rotors = numbered("rotor_speed", len(loop.dynamics.spins)) if rotation else ()
+        rotors = numbered("rotor_speed", len(loop.spins)) if rotation else ()
         names = (*body, *rotors)
     further = size - len(names) - (rotation - 3 if rotation else 0)
-    own = loop.columns.fields if len(loop.columns.fields) == further else numbered("law", further)
+    own = loop.fields if len(loop.fields) == further else numbered("law", further)
     return _coordinates((*names, *own), loop, rotation)
 
 
@@ -235,16 +237,16 @@ class Input(NamedTuple):
 
 def control_inputs(assembly: Assembly) -> tuple[Input, ...]:
     """Inputs of the vehicle among the controls of its model."""
-    dynamics = assembly.loop.dynamics
-    rotors, sizes = len(dynamics.spins), dynamics.sizes
-    if dynamics.model == "tilt_car":
+    loop = assembly.loop
+    rotors, sizes = len(loop.spins), loop.sizes
+    if loop.model == "tilt_car":
         rotors = 2
         named: tuple[str, ...] = ("tilt_command",)
     else:
         named = numbered("tilt_command", sizes.qpos - len(POSITION) - QUATERNION)
     tilts = len(named)
     kind, first, per_unit = ROTOR_INPUT, tilts + rotors, 1.0
-    if dynamics.commands_thrusts:  # as squared rotor speeds
+    if loop.commands_thrusts:  # as squared rotor speeds
         vehicle = assembly.scenario.vehicle.resolve()
         assert not isinstance(vehicle, Multirotor)  # its controllers command rates of rotor speeds
         per_unit = 1.0 / vehicle.thrust_coefficient
@@ -266,7 +268,7 @@ def equation_inputs(assembly: Assembly, size: int) -> tuple[Input, ...]:
             names = (*numbered(ROTOR_INPUT, 2), "alpha_rate")
     else:
         # Further inputs turn the arms if they integrate to commands of tilts.
-        commands = (f for f in loop.columns.fields if f.startswith("tilt_command"))
+        commands = (f for f in loop.fields if f.startswith("tilt_command"))
         rates = (command.replace("tilt_command", "alpha_rate") for command in commands)
-        names = (*numbered(ROTOR_INPUT, len(loop.dynamics.spins)), *rates)
+        names = (*numbered(ROTOR_INPUT, len(loop.spins)), *rates)
     return tuple(Input(name, index) for index, name in enumerate(names))

@@ -14,22 +14,21 @@ from typing import Any, Final
 
 import numpy as np
 
-from tiltsim.closed_loop.assembly import Assembly
-from tiltsim.closed_loop.choices import program_key
+from tiltsim.closed_loop.assembly import Assembly, program_key
 from tiltsim.closed_loop.loop import ClosedLoop, Equations
 from tiltsim.closed_loop.userdata import EVALUATIONS, EVALUATIONS_PER_STEP, HEADER_SIZE
 from tiltsim.engines.base import EngineName
-from tiltsim.engines.callback import control_callback
+from tiltsim.engines.control import control_callback
 from tiltsim.engines.programs import LoopPrograms
-from tiltsim.errors import InputError
 from tiltsim.laws.assembling import assemble
 from tiltsim.linear import coordinates
+from tiltsim.linear.hanging import Pendulum
+from tiltsim.models.objects import FORCE
 from tiltsim.plants.equations_plant import EquationsPlant
 from tiltsim.plants.mujoco_plant import MujocoPlant
 from tiltsim.scenario.scenario import Scenario
-from tiltsim_controllers.code.arrays import xp
+from tiltsim_controllers.code.arrays import program_of, xp
 from tiltsim_controllers.code.python_source import python_function
-from tiltsim_controllers.code.traceable import program_of
 from tiltsim_controllers.mathematics.scalar import Floats, Values
 
 LONG: Final = 1000
@@ -55,12 +54,7 @@ class Motion(ABC):
     """
 
     def __init__(self, scenario: Scenario, engine: EngineName | None, late: bool = False) -> None:
-        if scenario.has_objects or scenario.companion:
-            where = scenario.address or "scenario"
-            raise InputError(
-                f"{where}: linear analysis takes a vehicle alone; remove [[object]], [tool], "
-                "[payload] and [[companion]]"
-            )
+        scenario.require_alone("linear analysis", loaded=True)
         self.scenario, self.engine, self._late = scenario, engine, late
         self._commanded: Values = ()
         self._inputs: tuple[coordinates.Input, ...] = ()
@@ -85,12 +79,11 @@ class Motion(ABC):
         It is not traced: offsets are not parameters.
         """
         loop = self._as_flown(loop)
-        sampling, equations = loop.sampling, loop.equations
+        equations = loop.equations
         if equations is not None:
             equations = replace(equations, inputs=self._with_offsets(equations.inputs))
-        controls = self._with_offsets(sampling.controls)
-        sampling = replace(sampling, controls=controls)
-        return replace(loop, sampling=sampling, equations=equations, traced=False)
+        controls = self._with_offsets(loop.controls)
+        return replace(loop, controls=controls, equations=equations, traced=False)
 
     def _evaluated(self, function: Callable[..., Any], **sizes: int) -> Callable[..., Values]:
         """A function of the loop on Python's floats, at the offsets of the moment.
@@ -251,7 +244,12 @@ class EquationMotion(Motion):
 
 
 class MujocoMotion(Motion):
-    """In MuJoCo; a state is `qpos`, `qvel` and `act`."""
+    """In MuJoCo; a state is `qpos`, `qvel` and `act`, the angles of a load behind the former."""
+
+    @cached_property
+    def _load(self) -> Pendulum | None:
+        load = self.scenario.payload
+        return None if load is None or load.rigid else Pendulum(load.length, load.attachment)
 
     def _names(self) -> tuple[coordinates.Coordinates, tuple[coordinates.Input, ...]]:
         return coordinates.mujoco_coordinates(self.assembly.loop), coordinates.control_inputs(
@@ -273,16 +271,37 @@ class MujocoMotion(Motion):
 
     @cached_property
     def initial(self) -> Floats:
-        return self._whole[self._part]
+        return self._read(self._whole)
 
     @property
     def _part(self) -> slice:
-        sizes = self.assembly.loop.dynamics.sizes
-        return slice(1, 1 + sizes.qpos + sizes.qvel + sizes.act)
+        model = self._varied.model
+        return slice(1, 1 + model.nq + model.nv + model.na)
+
+    def _read(self, whole: Floats) -> Floats:
+        """The state of an integration state."""
+        model = self._varied.model
+        qpos, qvel, act = np.split(whole[self._part], (model.nq, model.nq + model.nv))
+        if self._load is not None:
+            qpos, qvel = self._load.angles(qpos, qvel)
+        return np.concatenate((qpos, qvel, act))
 
     def _split(self, state: Floats) -> list[Floats]:
-        sizes = self.assembly.loop.dynamics.sizes
-        return np.split(state, (sizes.qpos, sizes.qpos + sizes.qvel))
+        sizes, swing = self.assembly.loop.sizes, 0 if self._load is None else 2
+        return np.split(state, (sizes.qpos + swing, sizes.qpos + sizes.qvel + 2 * swing))
+
+    def _placed(self, state: Floats) -> list[Floats]:
+        """MuJoCo's `qpos`, `qvel` and `act`."""
+        qpos, qvel, act = self._split(state)
+        return [qpos, qvel, act] if self._load is None else [*self._load.placed(qpos, qvel), act]
+
+    def _seen(self, state: Floats, tension: float = 0.0) -> list[list[float]]:
+        """Arguments of the functions of the loop: the vehicle's `qpos` and `qvel`, and `act`."""
+        sizes, (qpos, qvel, act) = self.assembly.loop.sizes, self._placed(state)
+        history = np.zeros(sizes.history)
+        history[FORCE : FORCE + 1] = tension
+        behind = (*act, *qpos[sizes.qpos :], *history)
+        return [qpos[: sizes.qpos].tolist(), qvel[: sizes.qvel].tolist(), [*map(float, behind)]]
 
     @cached_property
     def _all_controls(self) -> Callable[..., Values]:
@@ -290,28 +309,34 @@ class MujocoMotion(Motion):
         loop = self.assembly.loop
 
         def controls(setup: Any, time: Any, *parts: Any) -> Any:
-            values = loop.sampling.controls(time[0], *parts, *setup)
+            values = loop.controls(time[0], *parts, *setup)
             return (*values, *self._commanded)
 
-        sizes = loop.dynamics.sizes
-        return self._evaluated(controls, time=1, qpos=sizes.qpos, qvel=sizes.qvel, act=sizes.act)
+        qpos, qvel, act, _, *behind = loop.sizes
+        return self._evaluated(controls, time=1, qpos=qpos, qvel=qvel, act=act + sum(behind))
 
     def _controls(self, time: float, state: Floats) -> Values:
-        parts = (part.tolist() for part in self._split(state))
-        values, count = self._all_controls((time,), *parts), self._varied.model.nu
+        values, count = self._all_controls((time,), *self._seen(state)), self._varied.model.nu
         self._commanded = values[count:]
         return values[:count]
 
     def rates(self, time: float, state: Floats) -> Floats:
+        accelerations, _ = self._forward(time, state)
+        return np.concatenate((self._split(state)[1], accelerations, self._varied.data.act_dot))
+
+    def _forward(self, time: float, state: Floats) -> tuple[Floats, float]:
+        """Accelerations of the coordinates, and the tension of a cable, N."""
         import mujoco
 
-        plant, (qpos, qvel, act) = self._varied, self._split(state)
-        data = plant.data
-        data.qpos[:], data.qvel[:], data.act[:] = qpos, qvel, act
+        model, data = self._varied.model, self._varied.data
+        data.qpos[:], data.qvel[:], data.act[:] = self._placed(state)
         data.ctrl[:] = self._controls(time, state)
+        limited = model.tendon_limited.copy()
+        model.tendon_limited[:] = 0  # `Pendulum` holds the load instead
         with control_callback(None):
-            mujoco.mj_forward(plant.model, data)
-        return np.concatenate((qvel, data.qacc, data.act_dot))
+            mujoco.mj_forward(model, data)
+        model.tendon_limited[:] = limited
+        return (data.qacc, 0.0) if self._load is None else self._load.accelerations(model, data)
 
     def limited(self, state: Floats) -> Floats:
         model, parts = self._varied.model, self._split(state)
@@ -327,12 +352,12 @@ class MujocoMotion(Motion):
         plant.advance(steps)
         if plant.fault():  # MuJoCo has reset the state
             return np.full(len(state), np.nan)
-        return plant.state[self._part]
+        return self._read(plant.state)
 
     def _whole_at(self, step: int, state: Floats) -> Floats:
         """An integration state after ``step`` physics steps."""
         whole = self._whole.copy()
-        whole[self._part] = state
+        whole[self._part] = np.concatenate(self._placed(state))
         header = whole[self._varied.header_offset :][:HEADER_SIZE]
         header[EVALUATIONS] = step * header[EVALUATIONS_PER_STEP]
         return whole
@@ -345,7 +370,7 @@ class MujocoMotion(Motion):
         with control_callback(self._plant.callback):
             batch.rollout(steps, record=(), ids=places)
         lost = batch.warning[places].reshape(len(states), -1).any(axis=1)
-        ends = batch.state[places][:, self._part]
+        ends = [self._read(whole) for whole in batch.state[places]]
         return [np.full(len(end), np.nan) if fell else end for end, fell in zip(ends, lost)]
 
     @cached_property
@@ -355,9 +380,9 @@ class MujocoMotion(Motion):
         return Batch(self._plant.model, ROWS_PER_THREAD * THREADS, THREADS)
 
     def observed(self, time: float, state: Floats) -> Floats:
-        parts = [part.tolist() for part in self._split(state)]
+        tension = 0.0 if self._load is None else self._forward(time, state)[1]
         controls = self._controls(time, state)
-        return np.array(self.assembly.loop.columns.observe(*parts, controls))
+        return np.array(self.assembly.loop.observe(*self._seen(state, tension), controls))
 
 
 def make_motion(scenario: Scenario, engine: EngineName | None = None, late: bool = False) -> Motion:

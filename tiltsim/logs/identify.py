@@ -1,41 +1,40 @@
-"""Identification: parameters of a vehicle from a log, by Gauss-Newton over windows.
+"""A vehicle's model on the rotor speeds and tilts of a log, window by window.
 
-The rotor speeds and tilts of the log drive the model; the initial state of each window is found
-with the parameters (multiple shooting), and eliminated from the normal equations.
+`replay` compares it with the log. `identify` finds its parameters by Gauss-Newton; the initial
+state of each window is found with them (multiple shooting), and eliminated from the normal
+equations.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
 from os import PathLike
 from typing import Any, Final
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from tiltsim.arrays.jax_programs import require_jax
 from tiltsim.errors import InputError
-from tiltsim.logs.log import Log
-from tiltsim.logs.model import FACTORS, INITIAL, LoggedVehicle, Parameter, residuals_of
+from tiltsim.flight.vectors import VECTORS
+from tiltsim.logs.log import UNITS, Log
+from tiltsim.logs.model import FACTORS, LoggedVehicle, Parameter
 from tiltsim.logs.reading import read_log
-from tiltsim.logs.windows import MEASURED, Windows, noise_of, windows_of
+from tiltsim.logs.windows import INITIAL, MEASURED, Problem, windows_of
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.system.numbers import is_finite
 from tiltsim.system.text import html_table, short_repr
 from tiltsim_controllers.mathematics.scalar import Floats
-from tiltsim_controllers.vehicle.effectiveness import TiltOfRotor
-
-MOST_STEPS: Final = 30
-"""Gauss-Newton steps; a log with enough motion needs five."""
 
 VAGUE: Final = 0.5
 """A combination of parameters with a larger deviation than this, in their scales, is refused."""
 
 DEVIATIONS: Final = 4.0
 """Standard deviations from which chi2, or the correlation of neighboring residuals, warns."""
+
+FLOORS: Final = {**dict.fromkeys(MEASURED, 1e-6), "rotor_speeds": 1e-3, "tilt_angles": 1e-3}
+"""Smallest noise of vectors: below it, interpolation of the inputs limits the fit."""
 
 
 @dataclass(frozen=True)
@@ -101,6 +100,47 @@ class Estimate:
         return html_table("Estimate", lines, rows, ("parameter", "value", "sigma", "unit"))
 
 
+@dataclass(frozen=True)
+class Replay:
+    """How far a model leaves a log within a window, from the measured state at its beginning.
+
+    Attributes:
+        channels: The measured columns; attitude stands for small turns about the body axes.
+        time: Times of the samples, s, shape (windows, samples).
+        mismatch: Measured minus predicted, in units, shape (windows, samples, channels).
+    """
+
+    channels: tuple[str, ...]
+    time: Floats
+    mismatch: Floats
+
+    @property
+    def rms(self) -> dict[str, float]:
+        """Root of the mean squared mismatch of each channel, in its unit."""
+        sizes = np.sqrt(np.mean(self.mismatch**2, axis=(0, 1)))
+        return dict(zip(self.channels, sizes.tolist(), strict=True))
+
+    @property
+    def worst(self) -> dict[str, tuple[float, float]]:
+        """The largest mismatch of each channel in size, and the start of its window, s."""
+        size = np.abs(self.mismatch).max(axis=1)
+        where = size.argmax(axis=0)
+        starts = self.time[:, 0][where]
+        values = zip(size.max(axis=0).tolist(), starts.tolist(), strict=True)
+        return dict(zip(self.channels, values, strict=True))
+
+    def report(self) -> dict[str, Any]:
+        """The mismatch by channel and by window, for JSON."""
+        by_window = np.sqrt(np.mean(self.mismatch**2, axis=1))
+        return {
+            "rms": self.rms,
+            "worst": self.worst,
+            "units": {name: UNITS[name] for name in self.channels},
+            "start": self.time[:, 0].tolist(),
+            "by_window": dict(zip(self.channels, by_window.T.tolist(), strict=True)),
+        }
+
+
 def identify(
     log: Log | str | PathLike[str],
     scenario: Scenario | str | PathLike[str] | Mapping[str, Any],
@@ -139,7 +179,6 @@ def identify(
     cut = windows_of(read, window, len(vehicle.vehicle.rotors), vehicle.vehicle.tilts)
     if "lag" in fields and not np.isfinite(cut.speed_commands).all():
         raise InputError(f"{read.name}: rotor_command: has gaps")
-    sigmas |= {name: _input_noise(read, name) for name in ("rotor_speeds", "tilt_angles")}
     with jax.enable_x64(True):
         problem = Problem(vehicle, chosen, sigmas, cut)
         theta, residuals, information = problem.minimum(read.name)
@@ -147,135 +186,26 @@ def identify(
 
 
 def _noise(log: Log, given: Mapping[str, float]) -> dict[str, float]:
+    """Standard deviations of measured vectors and inputs, attitude as small angles.
+
+    Unless given, from third differences, in which a smooth motion vanishes: their median size is
+    0.6745 sqrt(20) times the deviation of white noise.
+    """
     for name, value in given.items():
         if name not in MEASURED:
             raise InputError(f"noise: {short_repr(name)}: choose {', '.join(MEASURED)}")
         if not is_finite(value) or value <= 0.0:
             raise InputError(f"noise: {name} = {short_repr(value)}: must be a positive number")
-    found = noise_of(log, given)
-    return {name: found[name] for name in MEASURED if name in found}
-
-
-def _input_noise(log: Log, name: str) -> float:
-    if name not in log:
-        return 1.0
-    jumps = np.abs(np.diff(log[name], 3, axis=0))
-    found = float(np.nanmedian(jumps)) / (0.6745 * 20.0**0.5)
-    return max(1e-3, found)
-
-
-@cache
-def _normal_equations(layout: TiltOfRotor, free: tuple[tuple[str, str], ...]) -> Any:
-    """The compiled residuals and normal equations of all windows."""
-    import jax
-
-    residuals = residuals_of(layout, free)
-
-    def normal(theta: Any, initial: Any, *given: Any) -> Any:
-        def both(theta: Any, initial: Any) -> Any:
-            found = residuals(theta, initial, *given)
-            return found.ravel(), found
-
-        slopes, found = jax.jacfwd(both, (0, 1), has_aux=True)(theta, initial)
-        (by_theta, by_initial), flat = slopes, found.ravel()
-        return (
-            found,
-            by_theta.T @ by_theta,
-            by_theta.T @ by_initial,
-            by_initial.T @ by_initial,
-            by_theta.T @ flat,
-            by_initial.T @ flat,
-        )
-
-    return jax.jit(jax.vmap(normal, (None, 0, 0, 0, None, None)))
-
-
-class Problem:
-    """Least squares over the windows of a log."""
-
-    def __init__(
-        self,
-        vehicle: LoggedVehicle,
-        chosen: Mapping[str, Parameter],
-        noise: Mapping[str, float],
-        windows: Windows,
-    ) -> None:
-        free = tuple((key, one.field) for key, one in chosen.items())
-        self._normal = _normal_equations(vehicle.vehicle.tilt_of_rotor, free)
-        numbers = vehicle.numbers | {
-            "starts": {key: one.nominal for key, one in chosen.items()},
-            "scales": {key: one.scale for key, one in chosen.items()},
-        }
-        self._given = (_guess(windows), windows, dict(noise), numbers)
-        self.start = np.zeros(sum(len(one.nominal) for one in chosen.values()))
-        self.initial = np.zeros((len(windows.start), INITIAL))
-
-    def at(self, theta: Floats, initial: Floats) -> tuple[Floats, list[Floats]]:
-        """Residuals and normal equations of each window."""
-        found, *parts = map(np.asarray, self._normal(theta, initial, *self._given))
-        return found, parts
-
-    def minimum(self, name: str) -> tuple[Floats, Floats, Floats]:
-        """Changes of the parameters, residuals, and the information matrix of the parameters.
-
-        Raises `InputError` if no minimum is found.
-        """
-        theta, initial, damping = self.start, self.initial, 1e-6
-        residuals, parts = self.at(theta, initial)
-        cost = float(np.sum(residuals**2))
-        if not np.isfinite(cost):
-            raise InputError(f"{name}: the model diverges from this log at once")
-        for _ in range(MOST_STEPS):
-            step, changes = _step(parts, damping)
-            tried, further = self.at(theta + step, initial + changes)
-            after = float(np.sum(tried**2))
-            if not after <= cost:
-                damping *= 10.0
-                if damping > 1e6:  # rounding is all that is left
-                    return theta, residuals, _reduced(parts, 0.0)[0]
-                continue
-            gain, cost, residuals, parts = cost - after, after, tried, further
-            theta, initial, damping = theta + step, initial + changes, max(1e-9, 0.1 * damping)
-            if gain < 1e-6 * max(cost, 1.0):
-                return theta, residuals, _reduced(parts, 0.0)[0]
-        raise InputError(f"{name}: no fit after {MOST_STEPS} steps: is it a log of this vehicle?")
-
-
-def _guess(windows: Windows) -> Floats:
-    """The measured states at the beginning of each window; derivatives where none is measured."""
-    first = windows.step[:, :1]
-    place = np.nan_to_num(windows.position)
-    velocity = (place[:, 1] - place[:, 0]) / first
-    measured = windows.velocity[:, 0]
-    velocity = np.where(np.isfinite(measured), measured, velocity)
-    turned = Rotation.from_quat(windows.attitude[:, :2, [1, 2, 3, 0]].reshape(-1, 4))
-    before, after = turned[::2], turned[1::2]
-    rates = (before.inv() * after).as_rotvec() / first
-    measured = windows.body_rates[:, 0]
-    rates = np.where(np.isfinite(measured), measured, rates)
-    return np.hstack([place[:, 0], velocity, windows.attitude[:, 0], rates])
-
-
-def _reduced(parts: list[Floats], damping: float) -> tuple[Floats, Floats, Floats, Floats]:
-    """Normal equations of the parameters alone, and how the initial states follow."""
-    both, mixed, own, slope, own_slope = parts
-    # A part of the initial state that nothing measures stays as it is guessed.
-    sizes = np.einsum("wii->wi", own)
-    floor = 1e-12 * sizes.max(axis=1, keepdims=True)
-    own = own + (damping * sizes + floor)[:, :, None] * np.eye(INITIAL)
-    back = np.linalg.solve(own, np.swapaxes(mixed, 1, 2))  # (W, 12, P)
-    moved = np.linalg.solve(own, own_slope[..., None])[..., 0]
-    matrix = np.sum(both - mixed @ back, axis=0)
-    right = np.sum(slope - (mixed @ moved[..., None])[..., 0], axis=0)
-    return matrix, right, back, moved
-
-
-def _step(parts: list[Floats], damping: float) -> tuple[Floats, Floats]:
-    """A damped step of the parameters and of the initial states."""
-    matrix, right, back, moved = _reduced(parts, damping)
-    size = np.diag(matrix) + 1e-12 * max(1.0, float(np.diag(matrix).max()))
-    step = -np.asarray(np.linalg.solve(matrix + np.diag(damping * size + 1e-300), right), float)
-    return step, -moved - back @ step
+    found = {"rotor_speeds": 1.0, "tilt_angles": 1.0, **given}
+    for name, floor in FLOORS.items():
+        if name in given or name not in log:
+            continue
+        values = np.unwrap(log[name], axis=0) if name == "attitude" else log[name]
+        jumps = np.abs(np.diff(values, 3, axis=0))
+        known = jumps[np.isfinite(jumps)]
+        if known.size:
+            found[name] = max(floor, float(np.median(known)) / (0.6745 * 20.0**0.5))
+    return found
 
 
 def _estimate(
@@ -349,3 +279,35 @@ def _covariance(names: Sequence[str], information: Floats) -> Floats:
             "richer motion"
         )
     return np.asarray(np.linalg.inv(information), float)
+
+
+def replay(
+    log: Log | str | PathLike[str],
+    scenario: Scenario | str | PathLike[str] | Mapping[str, Any],
+    *,
+    window: float = 0.3,
+    map: str | PathLike[str] | None = None,  # noqa: A002
+) -> Replay:
+    """Fly a vehicle's model on the rotor speeds and tilts of a log, and compare.
+
+    Args:
+        log: A `Log`, or anything that `tiltsim.read_log` takes.
+        scenario: The vehicle; anything that `tiltsim.load_scenario` takes.
+        window: Seconds from one measured state to the next, from which the model flies on alone.
+        map: See `tiltsim.read_log`.
+
+    Raises:
+        InputError: If the log is not of this vehicle, or has no whole window.
+    """
+    jax = require_jax("tiltsim.replay")
+    read = log if isinstance(log, Log) else read_log(log, map)
+    vehicle = LoggedVehicle(load_scenario(scenario))
+    cut = windows_of(read, window, len(vehicle.vehicle.rotors), vehicle.vehicle.tilts)
+    with jax.enable_x64(True):
+        problem = Problem(vehicle, {}, dict.fromkeys(MEASURED, 1.0), cut)
+        mismatch, _ = problem.at(problem.start, problem.initial)
+    columns = [column for name in MEASURED for column in VECTORS[name]]
+    kept = [place for place, column in enumerate(columns) if column in read.columns]
+    channels, mismatch = tuple(columns[place] for place in kept), mismatch[:, :, kept]
+    steps = np.cumsum(np.pad(cut.step, ((0, 0), (1, 0))), axis=1)
+    return Replay(channels, cut.start[:, None] + steps, mismatch)

@@ -10,18 +10,19 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from tiltsim.errors import InputError
-from tiltsim.flight.vectors import VECTORS, components
+from tiltsim.flight.vectors import ColumnsOverTime
 from tiltsim.flight.writing import FLIGHT
-from tiltsim.scenario.messages import did_you_mean
+from tiltsim.models.vehicle_parts import MAX_ROTORS
 from tiltsim.system.files import is_file, is_folder, prepare_folder, replacing
 from tiltsim.system.parquet import open_parquet, parquet_bytes
-from tiltsim.system.text import short_repr
+from tiltsim.vehicles.rotorcraft import rotorcraft_columns
+from tiltsim.vehicles.rotorcraft.layout import Layout
 from tiltsim_controllers.mathematics.scalar import Floats
 
 if TYPE_CHECKING:
@@ -29,33 +30,30 @@ if TYPE_CHECKING:
 
     from tiltsim.flight.flight import Flight
 
+_FLIGHT: Final = rotorcraft_columns(Layout(MAX_ROTORS, MAX_ROTORS))
+COMMANDS: Final = {"rotor_speed": "rotor_command", "alpha": "alpha_command"}
 UNITS: Final = {
-    "time": "s",
-    **dict.fromkeys(VECTORS["position"] + VECTORS["reference_position"], "m"),
-    **dict.fromkeys(VECTORS["velocity"], "m/s"),
-    **dict.fromkeys(VECTORS["attitude"] + VECTORS["reference_attitude"], "rad"),
-    **dict.fromkeys(VECTORS["body_rates"], "rad/s"),
-    **dict.fromkeys(VECTORS["tilt_angles"] + VECTORS["reference_tilt_angles"], "rad"),
-    **dict.fromkeys(VECTORS["tilt_rates"] + VECTORS["rotor_speeds"], "rad/s"),
-    **dict.fromkeys(VECTORS["thrusts"], "N"),
+    **{name: known.unit for name, known in _FLIGHT.items()},
     **{f"accelerometer_{axis}": "m/s^2" for axis in "xyz"},
-    **{name.replace("speed", "command"): "rad/s" for name in VECTORS["rotor_speeds"]},
-    **{name.replace("alpha", "alpha_command"): "rad" for name in VECTORS["tilt_angles"]},
+    **{
+        f"{command}_{number}": _FLIGHT[f"{name}_{number}"].unit
+        for name, command in COMMANDS.items()
+        for number in range(1, MAX_ROTORS + 1)
+    },
 }
 """Columns of a log of a real vehicle and their units; a flight has more."""
-
 
 LOG_SUFFIXES: Final = (".mcap", ".ulg", ".ulog", ".csv")
 """Suffixes of files in the formats of other tools."""
 
 
 @dataclass(frozen=True, repr=False)
-class Log:
+class Log(ColumnsOverTime):
     """Columns over time, each of shape (N,), with their units."""
 
     name: str
-    columns: Mapping[str, Floats]
-    units: Mapping[str, str]
+    columns: dict[str, Floats]
+    units: dict[str, str]
     notes: tuple[str, ...] = ()  # one line for each defect that was found while reading
     origin: Mapping[str, str] = field(default_factory=dict)  # of a flight: `Flight.origin`
 
@@ -74,23 +72,6 @@ class Log:
         """Number of samples."""
         return len(self.columns["time"])
 
-    def __contains__(self, name: object) -> bool:
-        """Whether there is a column or vector of this name."""
-        return isinstance(name, str) and (name in self.units or bool(components(name, self.units)))
-
-    def __getitem__(self, name: str) -> Floats:
-        """A column, shape (N,), or a vector such as ``position``, shape (N, components).
-
-        Raises `InputError` for other names.
-        """
-        if name in self.columns:
-            return self.columns[name]
-        found = components(name, self.units) if isinstance(name, str) else []
-        if not found:
-            hint = did_you_mean(name, self.units)
-            raise InputError(f"{short_repr(name)}: no column of this log; {hint}see Log.units")
-        return np.stack([self.columns[one] for one in found], axis=-1)
-
     @property
     def duration(self) -> float:
         """Seconds from the first sample to the last."""
@@ -106,20 +87,7 @@ class Log:
 
     def to_arrow(self) -> pyarrow.Table:
         """The columns as an Arrow table with units and `origin` as metadata."""
-        import pyarrow as pa
-
-        fields = [
-            pa.field(name, pa.float64(), nullable=False, metadata={"unit": unit})
-            for name, unit in self.units.items()
-        ]
-        metadata = dict(self.origin) or {"log": self.name}
-        return pa.table(
-            [pa.array(self.columns[name]) for name in self.units], pa.schema(fields, metadata)
-        )
-
-    def to_pandas(self) -> Any:
-        """The columns as a pandas DataFrame."""
-        return self.to_arrow().to_pandas()
+        return self.arrow_table(self.origin or {"log": self.name})
 
     def save(self, folder: str | PathLike[str]) -> None:
         """Write the log into a folder as flight.parquet; as a whole flight if tiltsim flew it.

@@ -6,14 +6,12 @@ Forces and torques, Euler's equation and drag are the functions of the vehicles'
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from tiltsim.arrays.jax_programs import InJax
 from tiltsim.errors import InputError
-from tiltsim.logs.windows import MEASURED, Windows
 from tiltsim.models.cross import as_multirotor
 from tiltsim.scenario.messages import choose
 from tiltsim.scenario.scenario import Scenario
@@ -23,10 +21,8 @@ from tiltsim_controllers.mathematics.attitude import quaternion_product, rotatio
 from tiltsim_controllers.mathematics.linear import cross, norm
 from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.vehicle.air import Drag, drag_force
-from tiltsim_controllers.vehicle.body import Body
-from tiltsim_controllers.vehicle.effectiveness import TiltOfRotor, tilts_of
-from tiltsim_controllers.vehicle.motion import accelerations
-from tiltsim_controllers.vehicle.rotors import Rotors, rotors_in, wrench_map
+from tiltsim_controllers.vehicle.body import Body, accelerations
+from tiltsim_controllers.vehicle.rotors import Rotors, TiltOfRotor, rotors_in, tilts_of, wrench_map
 
 
 class Parameter(NamedTuple):
@@ -55,19 +51,6 @@ CONJUGATE: Final = np.array([1.0, -1.0, -1.0, -1.0])
 TINY: Final = 1e-12
 """Velocity (m/s) at which the drag of a vehicle at rest still has a derivative."""
 
-STAGE_INPUTS: Final = np.array([0, 1, 1, 2])
-"""Half steps after the beginning of a step at which the stages of RK4 take their inputs."""
-
-RUNGE_KUTTA: Final = (
-    np.array([0.0, 0.5, 0.5, 1.0]),
-    np.array([1.0, 2.0, 2.0, 1.0]) / 6.0,
-    np.array([False, False, False, True]),
-)
-"""By stage: how far along the last slope, the weight of its slope, and whether it ends the step."""
-
-INITIAL: Final = 12
-"""Numbers of a window's initial state: position, velocity, small turn, body rates."""
-
 
 class LoggedVehicle:
     """A scenario's vehicle as a model of a log, and its parameters by key.
@@ -82,6 +65,7 @@ class LoggedVehicle:
     def __init__(self, scenario: Scenario) -> None:
         if scenario.vehicle.model == "tilt_car":
             raise InputError(f"{scenario.address}: vehicle.model: takes rotorcraft only")
+        scenario.require_alone("identify")
         table = scenario.any_rotorcraft
         tilting = table.has_tilting_rotors
         assumed = as_multirotor(table.resolve(), tilting=tilting)
@@ -147,66 +131,39 @@ class LoggedVehicle:
         return {key: self.parameters[key] for key in free}
 
 
-def _values(free: tuple[tuple[str, str], ...], numbers: Any, theta: Any) -> dict[str, Any]:
-    """Numbers of the model by field.
+def numbers_of(free: tuple[tuple[str, str], ...], known: Any, theta: Any) -> dict[str, Any]:
+    """The numbers of a model by name, of which some are free.
 
     Args:
         free: Key and field of each free parameter.
-        numbers: See `LoggedVehicle.numbers`, with ``starts`` and ``scales`` by key.
+        known: See `LoggedVehicle.numbers`, with ``starts`` and ``scales`` by key.
         theta: Changes of the free parameters, in their scales.
     """
-    found, first = dict(numbers["nominal"]), 0
-    for key, field in free:
-        size = len(found[field])
-        change = numbers["scales"][key] * theta[first : first + size]
-        value = numbers["starts"][key] + change
-        found[field] = value * found[field] if key.startswith("model_error.") else value
-        first += size
-    return found
-
-
-class Numbers(NamedTuple):
-    """The numbers of a model, each an array, which a compiled program takes as inputs."""
-
-    body: Body
-    constant: Any  # parts of the rotors' wrenches, shape (6 N,) each; see `Rotors`
-    cosine: Any
-    sine: Any
-    center: Any  # m, shape (3,)
-    drag: Drag
-    lag: Any  # s
-    frequency: Any  # rad/s
-    damping: Any
-    bias: Any  # rad/s, shape (3,)
-
-
-def _numbers(known: Any, values: dict[str, Any]) -> Numbers:
-    """The numbers of a model, of which some are free; see `LoggedVehicle.numbers`."""
     import jax.numpy as jnp
 
-    size = jnp.sqrt(values["inertia"] / jnp.diag(known["inertia"]))
-    inertia = known["inertia"] * jnp.outer(size, size)
-    inverse = jnp.linalg.inv(inertia)
+    values, first = dict(known["nominal"]), 0
+    for key, field in free:
+        size = len(values[field])
+        change = known["scales"][key] * theta[first : first + size]
+        value = known["starts"][key] + change
+        values[field] = value * values[field] if key.startswith("model_error.") else value
+        first += size
+    stretch = jnp.sqrt(values["inertia"] / jnp.diag(known["inertia"]))
+    inertia = known["inertia"] * jnp.outer(stretch, stretch)
     places = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
-    entries = [matrix[place] for matrix in (inertia, inverse) for place in places]
-    thrust = values["thrust"] / known["nominal"]["thrust"]
-    torque = values["torque"] / known["nominal"]["torque"]
-    constant, cosine, sine = (
-        (thrust * push + torque * turn).ravel()
-        for push, turn in zip(known["pushes"], known["turns"], strict=True)
-    )
-    return Numbers(
-        Body(values["mass"][0], known["gravity"], *entries),
-        constant,
-        cosine,
-        sine,
-        values["center"],
-        Drag(values["resistance"], known["area"], known["density"]),
-        values["lag"][0],
-        values["frequency"][0],
-        known["damping"],
-        values["bias"],
-    )
+    entries = [m[place] for m in (inertia, jnp.linalg.inv(inertia)) for place in places]
+    thrust, torque = (values[name] / known["nominal"][name] for name in ("thrust", "torque"))
+    parts = zip(known["pushes"], known["turns"], strict=True)
+    return {
+        "body": Body(values["mass"][0], known["gravity"], *entries),
+        "rotors": tuple((thrust * push + torque * turn).ravel() for push, turn in parts),
+        "center": values["center"],
+        "drag": Drag(values["resistance"], known["area"], known["density"]),
+        "lag": values["lag"][0],
+        "frequency": values["frequency"][0],
+        "damping": known["damping"],
+        "bias": values["bias"],
+    }
 
 
 class LoggedMotion:
@@ -241,14 +198,14 @@ class LoggedMotion:
         velocity = guess[3:6] + initial[3:6] + rotation @ cross(omega, center)
         return xp.hstack([place, velocity, turn, omega, speeds, tilts, 0.0 * tilts])
 
-    def rate(self, state: Any, speeds: Any, tilts: Any, commands: Any, p: Numbers) -> Any:
+    def rate(self, state: Any, speeds: Any, tilts: Any, commands: Any, p: dict[str, Any]) -> Any:
         """The derivative of a state.
 
         Args:
             state: See the class.
             speeds, tilts: Measured, rad/s and rad, shapes (N,) and (M,).
             commands: Speeds (rad/s), then tilts (rad), shape (N + M,).
-            p: The model's numbers.
+            p: See `numbers_of`.
         """
         n, m = self._rotors, self._tilts
         velocity, turn, omega = state[3:6], state[6:10], state[10:13]
@@ -256,136 +213,43 @@ class LoggedMotion:
         pods, pod_rates = followed[:m], followed[m:]
         speeds = lagging if "lag" in self._fields else speeds
         tilts = pods if "frequency" in self._fields else tilts
-        parts = (part.reshape(6, n) for part in (p.constant, p.cosine, p.sine))
+        parts = (part.reshape(6, n) for part in p["rotors"])
         rotors = Rotors(self._layout, np.ones(n), *parts)
         wrench = wrench_map(rotors, tilts) @ (speeds * abs(speeds))
         rotation = rotation_of_quaternion(turn)
-        force = wrench[:3] + drag_force(rotation.T @ velocity + TINY, p.drag)
-        torque = wrench[3:] - cross(p.center, wrench[:3])
+        force = wrench[:3] + drag_force(rotation.T @ velocity + TINY, p["drag"])
+        torque = wrench[3:] - cross(p["center"], wrench[:3])
         acceleration, spin = accelerations(
-            p.body, rotation, omega, xp.hstack([force, torque]), np.zeros(3), 1.0
+            p["body"], rotation, omega, xp.hstack([force, torque]), np.zeros(3), 1.0
         )
-        pull = p.frequency * p.frequency * (commands[n:] - pods)
+        pull = p["frequency"] * p["frequency"] * (commands[n:] - pods)
         return xp.hstack(
             [
                 velocity,
                 acceleration,
                 0.5 * quaternion_product(turn, xp.hstack([0.0, omega])),
                 spin,
-                (commands[:n] - lagging) / p.lag,
+                (commands[:n] - lagging) / p["lag"],
                 pod_rates,
-                pull - 2.0 * p.damping * p.frequency * pod_rates,
+                pull - 2.0 * p["damping"] * p["frequency"] * pod_rates,
             ]
         )
 
-    def errors(self, state: Any, measured: Any, p: Numbers) -> Any:
+    def errors(self, state: Any, measured: Any, p: dict[str, Any]) -> Any:
         """Measured minus predicted position, velocity, small turn and body rates, shape (12,).
 
         Args:
             state: See the class.
             measured: Position, velocity, quaternion and body rates, shape (13,).
-            p: The model's numbers.
+            p: See `numbers_of`.
         """
         rotation, omega = rotation_of_quaternion(state[6:10]), state[10:13]
         error = quaternion_product(state[6:10] * CONJUGATE, measured[6:10])
         return xp.hstack(
             [
-                measured[:3] - (state[:3] - rotation @ p.center),
-                measured[3:6] - (state[3:6] - rotation @ cross(omega, p.center)),
+                measured[:3] - (state[:3] - rotation @ p["center"]),
+                measured[3:6] - (state[3:6] - rotation @ cross(omega, p["center"])),
                 xp.where(error[0] < 0.0, -2.0, 2.0) * error[1:],
-                measured[10:] - (omega + p.bias),
+                measured[10:] - (omega + p["bias"]),
             ]
         )
-
-
-def residuals_of(layout: TiltOfRotor, free: tuple[tuple[str, str], ...]) -> Callable[..., Any]:
-    """The residuals of one window in JAX: ``(theta, initial, guess, window, noise, numbers)``.
-
-    ``initial`` are changes of the initial state ``guess``; the result has a row per sample and a
-    column per channel, (measured - predicted) over its noise, 0 where nothing is measured.
-
-    Args:
-        layout: The tilt of each rotor.
-        free: Key and field of each free parameter.
-    """
-    import jax
-    import jax.numpy as jnp
-
-    fields = frozenset(field for _, field in free)
-    motion, in_jax = LoggedMotion(layout, fields), InJax("float64")
-    start, rate, errors = (
-        _stacked(in_jax(function)) for function in (motion.start, motion.rate, motion.errors)
-    )
-    rotors, tilts = len(layout), tilts_of(layout)
-
-    def residuals(
-        theta: Any, initial: Any, guess: Any, window: Windows, noise: Any, numbers: Any
-    ) -> Any:
-        p = _numbers(numbers, _values(free, numbers, theta))
-        commands = jnp.concatenate(
-            [
-                window.speed_commands[:-1] if "lag" in fields else window.speeds[:, 0],
-                window.tilt_commands[:-1] if "frequency" in fields else window.tilts[:, 0],
-            ],
-            axis=1,
-        )
-        first = start(guess, initial, window.speeds[0, 0], window.tilts[0, 0], p.center)
-        advance = _runge_kutta(lambda *given: rate(*given, p))
-        inputs = (window.step, window.speeds, window.tilts, commands)
-        _, path = jax.lax.scan(advance, first, inputs)
-        path = jnp.concatenate([first[None], path])
-        found = jax.vmap(errors, (0, 0, None))(path, window.measured, p)
-        sizes = [noise.get(name, 1.0) for name in MEASURED for _ in range(3)]
-        parts = [jnp.where(window.is_measured, found / jnp.array(sizes), 0.0)]
-        if "lag" in fields:
-            error = at_samples(window.speeds) - path[:, 13 : 13 + rotors]
-            parts.append(error / noise["rotor_speeds"])
-        if "frequency" in fields:
-            error = at_samples(window.tilts) - path[:, 13 + rotors : 13 + rotors + tilts]
-            parts.append(error / noise["tilt_angles"])
-        return jnp.concatenate(parts, axis=1)
-
-    def at_samples(stages: Any) -> Any:
-        return jnp.concatenate([stages[:, 0], stages[-1:, -1]])
-
-    return residuals
-
-
-def _stacked(function: Callable[..., Any]) -> Callable[..., Any]:
-    """A function whose result, a tuple of numbers, is an array."""
-
-    def call(*args: Any) -> Any:
-        import jax.numpy as jnp
-
-        return jnp.stack(function(*args))
-
-    return call
-
-
-def _runge_kutta(rate: Callable[..., Any]) -> Callable[..., Any]:
-    """The fourth-order method from one sample to the next: ``(state, inputs) -> (state, state)``.
-
-    Args:
-        rate: ``(state, speeds, tilts, commands)``: the derivative of a state.
-    """
-    import jax
-    import jax.numpy as jnp
-
-    def stage(carried: Any, given: Any) -> tuple[Any, None]:
-        # One stage for all four of RK4: the program is compiled once, not four times.
-        base, slope, total, size, commands = carried
-        speeds, tilts, (reach, weight, is_last) = given
-        slope = rate(base + reach * size * slope, speeds, tilts, commands)
-        total = total + weight * size * slope
-        return (jnp.where(is_last, total, base), slope, total, size, commands), None
-
-    def advance(state: Any, given: Any) -> tuple[Any, Any]:
-        step, speeds, tilts, commands = given
-        substeps = (len(speeds) - 1) // 2
-        at = (2 * np.arange(substeps)[:, None] + STAGE_INPUTS).ravel()
-        schedule = tuple(np.tile(one, substeps) for one in RUNGE_KUTTA)
-        carried = (state, jnp.zeros_like(state), state, step / substeps, commands)
-        carried, _ = jax.lax.scan(stage, carried, (speeds[at], tilts[at], schedule))
-        return carried[0], carried[0]
-
-    return advance

@@ -1,23 +1,29 @@
-"""Reading logs: MCAP, ULog, CSV and Parquet become columns in tiltsim's names and frames."""
+"""Reading logs: MCAP, ULog, CSV and Parquet become columns in tiltsim's names and frames.
+
+Maps from the signals of a log to tiltsim's columns are TOML files, or the map of PX4's topics.
+"""
 
 from __future__ import annotations
 
 import csv
+import tomllib
 from os import PathLike
 from pathlib import Path
-from typing import Any, Final
+from typing import Final, Literal
 
 import numpy as np
+from pydantic import Field, ValidationError
 from scipy.spatial.transform import Rotation
 
 from tiltsim.errors import InputError
 from tiltsim.flight.reading import flight_file
-from tiltsim.logs import mcap, ulog
+from tiltsim.flight.vectors import VECTORS
+from tiltsim.logs import formats
+from tiltsim.logs.formats import Signals
 from tiltsim.logs.log import LOG_SUFFIXES, UNITS, Log
-from tiltsim.logs.map import PX4, LogMap, Signal, read_map
-from tiltsim.logs.signals import Signals
-from tiltsim.scenario.limits import read_text
-from tiltsim.scenario.messages import did_you_mean
+from tiltsim.scenario.library import read_text
+from tiltsim.scenario.messages import choose, did_you_mean, one_line_message
+from tiltsim.scenario.table import NotTiny, Table, default, required
 from tiltsim.system.files import is_file, is_folder
 from tiltsim.system.parquet import open_parquet
 from tiltsim.system.text import printable, short_repr
@@ -26,11 +32,82 @@ from tiltsim_controllers.mathematics.scalar import Floats
 
 SUFFIXES: Final = (*LOG_SUFFIXES, ".parquet")
 
-VECTORS: Final = {
-    "world": (("x", "y", "z"), ("vx", "vy", "vz")),
-    "body": (("p", "q", "r"), ("accelerometer_x", "accelerometer_y", "accelerometer_z")),
-}
-"""Columns that are vectors in the frames of a map."""
+WORLD_VECTORS: Final = (VECTORS["position"], VECTORS["velocity"])
+BODY_VECTORS: Final = (VECTORS["body_rates"], tuple(f"accelerometer_{axis}" for axis in "xyz"))
+
+
+class Signal(Table):
+    """A signal of the log, times a scale, plus an offset."""
+
+    signal: str = required("name in the log, such as actuator_motors.control[0]")
+    scale: float = default(1.0, "factor to tiltsim's unit")
+    offset: float = default(0.0, "added after the factor, in tiltsim's unit")
+
+
+class LogMap(Table):
+    """Where the columns of a log come from, and its frames."""
+
+    world: Literal["z_up", "ned"] = default(
+        "z_up", "axes of position and velocity: z up, or north, east, down"
+    )
+    body: Literal["flu", "frd"] = default(
+        "flu", "axes of body rates and accelerations: forward, left, up, or forward, right, down"
+    )
+    attitude: tuple[str, ...] = Field(
+        (),
+        strict=False,
+        description="signals of the rotation from body to world: four of a quaternion, w x y z, "
+        "or three of roll, pitch and yaw in rad",
+    )
+    max_gap: NotTiny = default(
+        0.2, "longest time between samples of a signal that is interpolated [s]"
+    )
+    columns: dict[str, str | Signal] = Field(
+        default_factory=dict,
+        description="a signal, or a table of signal, scale and offset, for each column",
+    )
+
+    def _check_values(self) -> None:
+        if len(self.attitude) not in {0, 3, 4}:
+            allowed = "three signals (roll, pitch, yaw) or four (w, x, y, z)"
+            raise self.mistake("attitude", allowed)
+        angles = {"roll", "pitch", "yaw"} & {*self.columns}
+        if angles:
+            raise self.mistake("columns", f"give {min(angles)} by the key attitude")
+        for name in self.columns:
+            if name not in UNITS or name == "time":
+                raise self.mistake("columns", f"column {name!r} is unknown; {choose(name, UNITS)}")
+
+
+PX4: Final = LogMap(
+    world="ned",
+    body="frd",
+    attitude=tuple(f"vehicle_attitude.q[{i}]" for i in range(4)),
+    columns={
+        **{name: f"vehicle_local_position.{name}" for each in WORLD_VECTORS for name in each},
+        **{rate: f"vehicle_angular_velocity.xyz[{i}]" for i, rate in enumerate("pqr")},
+        **{
+            f"accelerometer_{axis}": f"sensor_combined.accelerometer_m_s2[{i}]"
+            for i, axis in enumerate("xyz")
+        },
+        **{f"rotor_command_{i + 1}": f"actuator_motors.control[{i}]" for i in range(12)},
+        **{f"alpha_command_{i + 1}": f"actuator_servos.control[{i}]" for i in range(8)},
+    },
+)
+"""PX4's topics as they are; commands are fractions of full speed and of full travel."""
+
+
+def read_map(file: Path) -> LogMap:
+    """Read a map from a TOML file. Raises `InputError` in one line: file, key, value, allowed."""
+    if not is_file(file):
+        raise InputError(f"{file}: no such file")
+    try:
+        document = tomllib.loads(read_text(file))
+        return LogMap.model_validate(document)
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"{file}: not valid TOML: {error}") from error
+    except ValidationError as error:
+        raise InputError(f"{file}: {one_line_message(error, document, LogMap)}") from None
 
 
 def read_log(
@@ -68,40 +145,36 @@ def read_log(
     if suffix == ".csv":
         signals = _read_csv(file, needs_time=map is None)
     else:
-        signals, information = (mcap.read_mcap if suffix == ".mcap" else ulog.read_ulog)(file)
+        signals, information = (formats.read_mcap if suffix == ".mcap" else formats.read_ulog)(file)
     if map is not None:
         return _mapped(file, signals, read_map(Path(map)))
-    for sample in (f"{mcap.SAMPLE}.", f"{ulog.SAMPLE}."):
+    for sample in (f"{formats.MCAP_SAMPLE}.", f"{formats.ULOG_SAMPLE}."):
         names = [name.removeprefix(sample) for name in signals if name.startswith(sample)]
         if names:
             return _exported(file, {name: signals[sample + name][1] for name in names}, information)
     if suffix == ".csv":
         return _exported(file, {name: values for name, (_, values) in signals.items()}, {})
     if "vehicle_local_position.x" in signals or "vehicle_attitude.q[0]" in signals:
-        return _mapped(file, signals, PX4.model_copy(update=_present(PX4, signals)))
+        there = {name: one for name, one in PX4.columns.items() if one in signals}
+        attitude = PX4.attitude if PX4.attitude[0] in signals else ()
+        chart = PX4.model_copy(update={"columns": there, "attitude": attitude})
+        return _mapped(file, signals, chart)
     found = ", ".join(list(signals)[:8]) or "no numbers"
     raise InputError(
         f"{file}: give a map (--map FILE) from its signals, such as {printable(found)}"
     )
 
 
-def _present(chart: LogMap, signals: Signals) -> dict[str, Any]:
-    """The part of a map whose signals exist."""
-    columns = {name: one for name, one in chart.columns.items() if one in signals}
-    return {"columns": columns, "attitude": chart.attitude if chart.attitude[0] in signals else ()}
-
-
 def _exported(file: Path, columns: dict[str, Floats], information: dict[str, str]) -> Log:
     """Columns that have tiltsim's names, as they are."""
-    units = {name: information.pop(f"unit_{name}", UNITS.get(name, "-")) for name in columns}
+    columns = {"time": columns["time"], **columns}  # the first one
     columns.pop("timestamp", None)
-    units.pop("timestamp", None)
     _check_times(file, columns["time"])
+    units = {name: information.get(f"unit_{name}", UNITS.get(name, "-")) for name in columns}
     origin = {key: text for key, text in information.items() if not key.startswith("unit_")}
-    notes = [] if origin else _defects(columns)
-    order = ["time", *(name for name in columns if name != "time")]
-    by_name = {name: np.ascontiguousarray(columns[name]) for name in order}
-    return Log(str(file), by_name, {name: units[name] for name in order}, tuple(notes), origin)
+    notes = () if origin else tuple(_defects(columns))
+    by_name = {name: np.ascontiguousarray(column) for name, column in columns.items()}
+    return Log(str(file), by_name, units, notes, origin)
 
 
 def _mapped(file: Path, signals: Signals, chart: LogMap) -> Log:
@@ -128,18 +201,17 @@ def _mapped(file: Path, signals: Signals, chart: LogMap) -> Log:
         held = "command" in name
         column = _at(time, signals[one.signal], chart.max_gap, held=held)
         columns[name] = one.scale * column + one.offset
-    flips = {"world": FLIP if chart.world == "ned" else np.ones(3)}
-    flips["body"] = FLIP if chart.body == "frd" else np.ones(3)
-    for frame, vectors in VECTORS.items():
-        for vector in vectors:
-            for name, sign in zip(vector, flips[frame], strict=True):
-                if name in columns:
-                    columns[name] = columns[name] * sign + 0.0
+    world = FLIP if chart.world == "ned" else np.ones(3)
+    body = FLIP if chart.body == "frd" else np.ones(3)
+    for vectors, signs in ((WORLD_VECTORS, world), (BODY_VECTORS, body)):
+        for name, sign in ((name, s) for each in vectors for name, s in zip(each, signs)):
+            if name in columns:
+                columns[name] = columns[name] * sign + 0.0
     if chart.attitude:
         turned = np.stack(
             [_at(time, one, chart.max_gap) for one in _continuous(signals, chart.attitude)], axis=1
         )
-        columns |= _attitude(file, turned, flips["world"], flips["body"])
+        columns |= _attitude(file, turned, world, body)
     order = [name for name in UNITS if name in columns]
     notes += _defects(columns)
     by_name = {name: columns[name] for name in order}

@@ -11,25 +11,21 @@ from math import inf, nan, sqrt
 import mujoco
 import numpy as np
 
-from tiltsim.closed_loop.assembly import Assembly
-from tiltsim.closed_loop.choices import program_key
+from tiltsim.closed_loop.assembly import Assembly, program_key
 from tiltsim.closed_loop.userdata import EVALUATIONS, HEADER_SIZE
 from tiltsim.engines.base import vectors_of
-from tiltsim.engines.callback import control_callback
-from tiltsim.engines.python_engine import control_program, control_step
+from tiltsim.engines.control import control_callback, control_program, control_step
 from tiltsim.laws.commanded import commanded_parameters, planned_servo_commands, with_command
 from tiltsim.laws.vehicle_loop import servo_lead
 from tiltsim.plants.command import CheckedCommand, ControllerError, Observation
 from tiltsim.plants.mujoco_plant import MujocoPlant
 from tiltsim.plants.observing import Observer, flip_by_spin
-from tiltsim.vehicles.rotorcraft.layout import TILT_1, layout_of, tilt_of_rotor
-from tiltsim.vehicles.rotorcraft.rotors import true_rotors
+from tiltsim.vehicles.rotorcraft.layout import TILT_1, layout_of, tilt_of_rotor, true_rotors
+from tiltsim_controllers.code.arrays import as_arrays
 from tiltsim_controllers.code.python_source import python_function
-from tiltsim_controllers.code.traceable import as_arrays
 from tiltsim_controllers.mathematics.records import flatten
 from tiltsim_controllers.mathematics.scalar import Floats, Values, clipped
-from tiltsim_controllers.vehicle.craft import craft_of, thrust_axes
-from tiltsim_controllers.vehicle.rotor_inertia import hinge_torques
+from tiltsim_controllers.vehicle.craft import craft_of, hinge_torques, thrust_axes
 
 
 class CommandedPlant(MujocoPlant):
@@ -42,7 +38,7 @@ class CommandedPlant(MujocoPlant):
     def __init__(self, assembly: Assembly, model: mujoco.MjModel | None = None) -> None:
         super().__init__(assembly, model, engine="python")
         vehicle, simulation = assembly.scenario.any_rotorcraft, assembly.scenario.simulation
-        self.layout = layout = layout_of(self._loop.dynamics)
+        self.layout = layout = layout_of(self._loop)
         rotors = layout.rotors
         self._spins, self._coefficients = vehicle.spins, vehicle.thrust_coefficients
         # Along the spin, from the model: limits of the scenario or of a user's file.
@@ -60,7 +56,7 @@ class CommandedPlant(MujocoPlant):
         self._lagging = vehicle.rotor_time_constant is not None
         self._rotor_inertia = vehicle.rotor_inertia
         own = as_arrays(true_rotors(assembly.scenario))
-        self._craft = craft_of(own, tilt_of_rotor(self._loop.dynamics))
+        self._craft = craft_of(own, tilt_of_rotor(self._loop))
         first = rotors if self._lagging else 0
         self._speeds = slice(first, first + rotors)
         # The delay line in ``act``, the newest command first; without latency it is empty. A

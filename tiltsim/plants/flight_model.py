@@ -61,7 +61,7 @@ def build_model(
     size = HEADER_SIZE + loop.record_size + (len(assembly.setup.knots) if knots is None else knots)
     try:
         model = loop.kind.compile(
-            scenario, loop.dynamics.controller_states, loop.dynamics.extra_actuators, size, visuals
+            scenario, loop.controller_states, loop.extra_actuators, size, visuals
         )
     except ValueError as error:
         raise InputError(f"{scenario.address or 'scenario'}: vehicle: {error}") from error

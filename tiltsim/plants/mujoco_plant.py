@@ -21,10 +21,8 @@ from tiltsim.closed_loop.userdata import (
     steps_taken,
 )
 from tiltsim.engines.base import EngineName, vectors_of
-from tiltsim.engines.callback import control_callback
-from tiltsim.engines.factory import make_engine
-from tiltsim.engines.python_engine import control_step
-from tiltsim.engines.recorder import Recorder
+from tiltsim.engines.control import control_callback, control_step, make_callback
+from tiltsim.engines.programs import Recorder
 from tiltsim.models.cables import switch
 from tiltsim.plants.engine_choice import choose_engine
 from tiltsim.plants.flight_model import evaluations_per_step, flight_model
@@ -69,13 +67,13 @@ class MujocoPlant(Plant):
         )
         parameters = self._setup.userdata  # a shared model may have room for more
         data.userdata[HEADER_SIZE : HEADER_SIZE + len(parameters)] = parameters
-        sizes = self._loop.dynamics.sizes
+        sizes = self._loop.sizes
         motion = self._loop.kind.initial_motion(assembly)
         data.qpos[: sizes.qpos], data.qvel[: sizes.qvel] = motion
         if assembly.scenario.has_objects:
             others = motion_at_start(assembly)
             data.qpos[sizes.qpos :], data.qvel[sizes.qvel :] = others
-        data.act[:] = self._loop.dynamics.initial_activations(assembly, self._setup)
+        data.act[:] = self._loop.initial_activations(assembly, self._setup)
         objects = objects_of(assembly.scenario)
         self._cables = () if objects is None else objects.cables
         self._switches = {s for c in self._cables for s in c.switches(simulation.timestep)}
@@ -118,10 +116,10 @@ class MujocoPlant(Plant):
 
     def _prepare_engine(self) -> None:
         """Build the engine, which reads the parameters in ``userdata`` once."""
-        self._engine = make_engine(self.engine, self._assembly, self.model, self.data)
+        self._callback = make_callback(self.engine, self._assembly, self.model, self.data)
 
     def advance(self, steps: int) -> None:
-        with control_callback(self._engine.callback()):
+        with control_callback(self._callback):
             self._step(steps)
 
     def _step(self, steps: int) -> None:
@@ -146,8 +144,8 @@ class MujocoPlant(Plant):
 
     @property
     def callback(self) -> Any:
-        """The control callback for MuJoCo; see `tiltsim.engines.base.Engine.callback`."""
-        return self._engine.callback()
+        """The control callback for MuJoCo; see `tiltsim.engines.control.make_callback`."""
+        return self._callback
 
     @property
     def header_offset(self) -> int:
@@ -162,7 +160,7 @@ class MujocoPlant(Plant):
             samples: Number of samples.
             steps, last_steps: Physics steps between samples, and before the last one.
         """
-        from tiltsim.engines.recorder import Recorder
+        from tiltsim.engines.programs import Recorder
 
         evaluations = self._evaluations_per_step
         return Recorder(
@@ -189,7 +187,7 @@ class MujocoPlant(Plant):
         # MuJoCo keeps the controls of its last integrator stage.
         period = data.userdata[CONTROL_PERIOD]
         stale = period == 0.0 or data.userdata[EVALUATIONS] % period == 0.0
-        reads_controls = self._loop.columns.observe_reads_controls
+        reads_controls = self._loop.observe_reads_controls
         ctrl = self.controls(*state) if reads_controls and stale else data.ctrl.tolist()
         header = data.userdata[:HEADER_SIZE].tolist()
         try:

@@ -6,13 +6,13 @@ import numpy as np
 
 from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.engines.base import vectors_of
+from tiltsim.laws.layers.actuation import measured, sensor_parameters
 from tiltsim.laws.layers.contact import commanded_force, felt_among, push_of
-from tiltsim.laws.layers.sensing import measured, sensor_parameters
 from tiltsim.plants.command import Observation, Reference
 from tiltsim.plants.mujoco_plant import MujocoPlant
 from tiltsim.scenario.gait import tilts_of
 from tiltsim.vehicles.rotorcraft.others import FELT, others_of
-from tiltsim_controllers.code.traceable import as_arrays
+from tiltsim_controllers.code.arrays import as_arrays
 from tiltsim_controllers.mathematics.attitude import euler_angles
 from tiltsim_controllers.mathematics.scalar import Floats, Values
 from tiltsim_controllers.references.trajectories import attitude_reference, reference_derivatives

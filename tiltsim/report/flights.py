@@ -16,8 +16,8 @@ from tiltsim.flight.flight import Flight
 from tiltsim.report.store import flight_key, results, store
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.metric_names import WALL_CLOCK_METRICS
+from tiltsim.scenario.own_code import require_trust
 from tiltsim.scenario.scenario import Scenario
-from tiltsim.scenario.trust import require_trust
 
 Plant = Literal["thesis", "mujoco"]
 PLANTS: Final[tuple[Plant, ...]] = ("thesis", "mujoco")

@@ -14,18 +14,16 @@ from tiltsim.report.claim import Metrics
 from tiltsim.report.flights import PLANTS, Plant, variant_for
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.simulation.simulate import simulate_to_end
-from tiltsim.views.figures.determinant import determinant_figure, singularity_figure
-from tiltsim.views.figures.gait import comparison_figure
-from tiltsim.views.figures.multirotor import attainable_figure
-from tiltsim.views.figures.plot import plot
-from tiltsim.views.figures.stability import attraction_panels
-from tiltsim.views.figures.tracking_errors import (
+from tiltsim.views.figures.comparisons import (
     PeriodErrors,
     SetpointErrors,
     period_figure,
     setpoint_figure,
 )
-from tiltsim.views.figures.two_color_map import map_figure
+from tiltsim.views.figures.gaits import comparison_figure, map_figure
+from tiltsim.views.figures.plot import plot
+from tiltsim.views.figures.stability import attraction_panels
+from tiltsim.views.figures.vehicles import attainable_figure, determinant_figure, singularity_figure
 from tiltsim_controllers.analysis.published_gaits import PATHS, PUBLISHED_GAITS
 from tiltsim_controllers.vehicle.parameters import PRESETS
 

@@ -13,10 +13,11 @@ from pydantic import BeforeValidator, Field
 
 from tiltsim.errors import InputError
 from tiltsim.scenario.controller import OwnFunctionController
+from tiltsim.scenario.documents import merge
 from tiltsim.scenario.interaction import RESERVED
+from tiltsim.scenario.library import find_scenario_file, read_toml
 from tiltsim.scenario.messages import InvalidValueError, choose
-from tiltsim.scenario.override_keys import merge
-from tiltsim.scenario.table import Positive, Table, Vector3, example
+from tiltsim.scenario.table import ZEROS, Name, Positive, Table, Vector3, default, example, required
 from tiltsim.system.public import public
 
 TAKEN: Final = (
@@ -48,6 +49,11 @@ def _tables_at(value: Any) -> Any:
         raise InvalidValueError("companion.scenario", value, reason) from None
     if named.payload is not None:
         raise InvalidValueError("companion.scenario", value, "a companion carries no load")
+    name, _, variant = value.partition("#")
+    document = read_toml(find_scenario_file(name))
+    chosen = [one for one in document.get("variant", ()) if one["name"] == variant] or [document]
+    if chosen[0].get("companion", document.get("companion")):
+        raise InvalidValueError("companion.scenario", value, "a companion has no companions")
     tables = named.model_dump(mode="json", exclude_unset=True)
     return {key: tables[key] for key in TAKEN if key in tables}
 
@@ -58,9 +64,7 @@ class CompanionTable(Table):
     model_config = example(name="wing", offset=[2.0, 0.0, 0.0])
     table_name = "companion"
 
-    name: Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,30}$")] = Field(
-        description="its name, which begins the names of its columns", examples=["wing"]
-    )
+    name: Name = required("its name, which begins the names of its columns", "wing")
     scenario: Annotated[dict[str, Any], BeforeValidator(_tables_at)] = Field(
         {},
         description="address of the scenario whose vehicle, controller, gait, reference and the "
@@ -69,15 +73,13 @@ class CompanionTable(Table):
         examples=["fleet/hexarotor#hover"],
         json_schema_extra={"type": "string"},
     )
-    offset: Vector3 = Field(
-        (0.0, 0.0, 0.0),
-        description="of its start and of its reference, in the world [m]",
-        examples=[[2.0, 0.0, 0.0]],
+    offset: Vector3 = default(
+        ZEROS, "of its start and of its reference, in the world [m]", [2.0, 0.0, 0.0]
     )
-    changes: dict[str, Any] = Field(
+    changes: dict[str, Any] = default(
         {},
-        description="tables and keys in place of its scenario's",
-        examples=[{"reference": {"type": "setpoint", "yaw": 0.5}}],
+        "tables and keys in place of its scenario's",
+        {"reference": {"type": "setpoint", "yaw": 0.5}},
     )
 
     def tables(self, own: Mapping[str, Any], world: Mapping[str, Any]) -> dict[str, Any]:
@@ -129,10 +131,9 @@ class DownwashTable(Table):
 
     table_name = "downwash"
 
-    rotor_radius: Positive = Field(description="of the rotors of all vehicles [m]", examples=[0.1])
-    drag_area: Positive = Field(
-        description="drag coefficient times area of a vehicle in the wake from above [m^2]",
-        examples=[0.02],
+    rotor_radius: Positive = required("of the rotors of all vehicles [m]", 0.1)
+    drag_area: Positive = required(
+        "drag coefficient times area of a vehicle in the wake from above [m^2]", 0.02
     )
 
 

@@ -10,14 +10,17 @@ from tiltsim.scenario.expectation import NAME
 from tiltsim.scenario.gait import FixedGait, TableGait
 from tiltsim.scenario.instruments import check_instruments
 from tiltsim.scenario.interaction import check_objects
+from tiltsim.scenario.linearizing_controllers import (
+    AttitudeAltitudeController,
+    AttitudeForceController,
+    FullPoseController,
+)
 from tiltsim.scenario.messages import InvalidValueError, choose
-from tiltsim.scenario.multirotor_controllers import AttitudeForceController
 from tiltsim.scenario.outputs import check_decoupler, check_dimension, check_full_pose
 from tiltsim.scenario.reference import WaypointReference
 from tiltsim.scenario.rotorcraft import MultirotorTable, RotorcraftTable, TiltServoTable
 from tiltsim.scenario.scenario_tables import ScenarioTables
 from tiltsim.scenario.simulation_table import InitialTable
-from tiltsim.scenario.tiltrotor_controllers import AttitudeAltitudeController, FullPoseController
 from tiltsim.scenario.vehicle import (
     ModelErrorTable,
     PodTable,
@@ -47,7 +50,7 @@ def check_consistency(scenario: ScenarioTables) -> None:
     _check_claims(scenario)
     _check_engine(scenario)
     scenario.controller.check_scenario(scenario)
-    _check_rigid_body(scenario)
+    _check_plant(scenario)
     check_companions(scenario)
 
 
@@ -65,16 +68,16 @@ def _check_engine(scenario: ScenarioTables) -> None:
         )
 
 
-def _check_rigid_body(scenario: ScenarioTables) -> None:
-    """Refuse vehicles that the plant ``rigid_body`` cannot be."""
-    vehicle = scenario.vehicle
-    if scenario.simulation.plant != "rigid_body":
+def _check_plant(scenario: ScenarioTables) -> None:
+    """Refuse vehicles that a plant of equations other than the thesis's cannot be."""
+    vehicle, plant = scenario.vehicle, scenario.simulation.plant
+    if plant in ("mujoco", "thesis"):
         return
     if not isinstance(vehicle, RotorcraftTable):
         reason = f"supports no {vehicle.model}; use mujoco or thesis"
         raise scenario.mistake("simulation.plant", reason)
     if isinstance(vehicle, VehicleTable):
-        scenario.require("vehicle.pod", PodTable(), "the rigid_body plant has massless pods")
+        scenario.require("vehicle.pod", PodTable(), f"the {plant} plant has massless pods")
     file = vehicle.user_vehicle
     if file is not None and file.unmodeled_properties:
         reason = f"neglects of vehicle.mjcf {file.unmodeled_properties}; use mujoco"

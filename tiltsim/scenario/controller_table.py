@@ -6,12 +6,12 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 from pydantic import Field, model_validator
 
 from tiltsim.models.rotor_table import Multirotor
-from tiltsim.scenario.table import Positive, Table, example
+from tiltsim.scenario.table import Positive, Table, default, example
 from tiltsim_controllers.analysis.stability import ErrorLoop, linear_loop
 from tiltsim_controllers.code.arrays import is_known
-from tiltsim_controllers.gaits.red_gait import determinant_at_clearance
+from tiltsim_controllers.gaits.colors import determinant_at_clearance
 from tiltsim_controllers.laws.keys import GainSets, number_of, table_of
-from tiltsim_controllers.laws.multirotor_supervisor import untilted_volume
+from tiltsim_controllers.laws.supervised_vehicles import untilted_volume
 from tiltsim_controllers.laws.supervisor import STRATEGIES, UNTILTED, Supervisor
 from tiltsim_controllers.vehicle.parameters import Vehicle, drag_ratio
 
@@ -25,40 +25,40 @@ class SupervisorTable(Table):
     model_config = example(strategy="hold", min_margin=0.3)
     table_name = "controller.supervisor"
 
-    strategy: Literal["scale", "hold", "return_to_red"] = Field(
+    strategy: Literal["scale", "hold", "return_to_red"] = default(
         "scale",
-        description="what it does where the limits require it: scale shrinks the gait as little as "
-        "possible, hold stops its clock, return_to_red goes to the nearest red gait, in which "
-        "opposite rotors have equal angles",
+        "what it does where the limits require it: scale shrinks the gait as little as possible, "
+        "hold stops its clock, return_to_red goes to the nearest red gait, in which opposite "
+        "rotors have equal angles",
     )
-    min_margin: Annotated[float, Field(ge=0.0, lt=pi / 2)] = Field(
+    min_margin: Annotated[float, Field(ge=0.0, lt=pi / 2)] = default(
         0.2,
-        description="smallest singularity margin to allow: the rotation to the nearest attitude "
-        "at which the decoupling matrix is singular, where tilted rotors cannot carry the weight "
-        "without a torque; 0 disables the limit [rad]",
+        "smallest singularity margin to allow: the rotation to the nearest attitude at which the "
+        "decoupling matrix is singular, where tilted rotors cannot carry the weight without a "
+        "torque; 0 disables the limit [rad]",
     )
-    min_determinant: Annotated[float, Field(ge=0.0, lt=UNTILTED)] = Field(
+    min_determinant: Annotated[float, Field(ge=0.0, lt=UNTILTED)] = default(
         0.5,
-        description="smallest determinant of the decoupling matrix to allow, which relates rotor "
-        "speeds to torques and vertical force: 4 for a level untilted vehicle, 0 where it is "
-        "singular, and of multirotors less where components of side force depend on the others; 0 "
-        "disables the limit [-]",
+        "smallest determinant of the decoupling matrix to allow, which relates rotor speeds to "
+        "torques and vertical force: 4 for a level untilted vehicle, 0 where it is singular, and "
+        "of multirotors less where components of side force depend on the others; 0 disables the "
+        "limit [-]",
     )
-    horizon: Annotated[float, Field(gt=0.0, le=10.0)] = Field(
+    horizon: Annotated[float, Field(gt=0.0, le=10.0)] = default(
         0.5,
-        description="how far to look ahead along the gait, at eight instants; needs strategy hold "
-        "or return_to_red [s]",
-        examples=[1.0],
-    )
-    max_tilt_rate: Positive = Field(
+        "how far to look ahead along the gait, at eight instants; needs strategy hold or "
+        "return_to_red [s]",
         1.0,
-        description="tilt rate on the way to red and back, on top of the gait's; needs strategy "
-        "return_to_red [rad/s]",
     )
-    clearance: Annotated[float, Field(gt=0.0, lt=pi / 4)] = Field(
+    max_tilt_rate: Positive = default(
+        1.0,
+        "tilt rate on the way to red and back, on top of the gait's; needs strategy return_to_red "
+        "[rad/s]",
+    )
+    clearance: Annotated[float, Field(gt=0.0, lt=pi / 4)] = default(
         0.1,
-        description="distance on red from angles at which two rotors stop, below "
-        "delta = atan(K_m / (L K_f)); needs strategy return_to_red [rad]",
+        "distance on red from angles at which two rotors stop, below delta = atan(K_m / (L K_f)); "
+        "needs strategy return_to_red [rad]",
     )
 
     @model_validator(mode="after")
@@ -120,23 +120,21 @@ class EstimatorTable(Table):
     model_config = example(type="ekf", initial_position=0.2)
     table_name = "controller.estimator"
 
-    type: Literal["ekf"] = Field("ekf", description="an error-state Kalman filter")
-    gate: Annotated[float, Field(gt=0.5, lt=1.0)] = Field(
+    type: Literal["ekf"] = default("ekf", "an error-state Kalman filter")
+    gate: Annotated[float, Field(gt=0.5, lt=1.0)] = default(
         0.9999,
-        description="share of good readings that it accepts: it leaves out a reading whose "
-        "innovation is beyond this quantile of the chi-square distribution [-]",
-        examples=[0.999],
+        "share of good readings that it accepts: it leaves out a reading whose innovation is "
+        "beyond this quantile of the chi-square distribution [-]",
+        0.999,
     )
-    initial_position: Positive = Field(
-        0.05, description="standard deviation of its error at time zero, which is drawn [m]"
+    initial_position: Positive = default(
+        0.05, "standard deviation of its error at time zero, which is drawn [m]"
     )
-    initial_velocity: Positive = Field(
-        0.05, description="standard deviation of its error at time zero, which is drawn [m/s]"
+    initial_velocity: Positive = default(
+        0.05, "standard deviation of its error at time zero, which is drawn [m/s]"
     )
-    initial_attitude: Annotated[float, Field(gt=0.0, le=0.5)] = Field(
-        0.02,
-        description="standard deviation of its error about each axis at time zero, which is drawn "
-        "[rad]",
+    initial_attitude: Annotated[float, Field(gt=0.0, le=0.5)] = default(
+        0.02, "standard deviation of its error about each axis at time zero, which is drawn [rad]"
     )
 
 
@@ -162,14 +160,14 @@ class ControllerTable(Table):
 
     gain_sets: ClassVar[GainSets] = {}
 
-    allow_unstable: bool = Field(
-        False, description="accept gains that fail the Routh-Hurwitz criterion of stability"
+    allow_unstable: bool = default(
+        False, "accept gains that fail the Routh-Hurwitz criterion of stability"
     )
-    estimator: Literal["ekf"] | EstimatorTable | None = Field(
+    estimator: Literal["ekf"] | EstimatorTable | None = default(
         None,
-        description="the law flies on the estimate of a filter, which is driven by sensors.imu; "
-        "default: none, on the true state",
-        examples=["ekf"],
+        "the law flies on the estimate of a filter, which is driven by sensors.imu; default: "
+        "none, on the true state",
+        "ekf",
     )
     law: str
 

@@ -6,7 +6,8 @@ from pydantic import Field
 
 from tiltsim.scenario.messages import choose
 from tiltsim.scenario.metric_names import BOOLEAN_METRICS, METRICS
-from tiltsim.scenario.table import NonNegative, Range, Table, example
+from tiltsim.scenario.simulation_table import PlantName
+from tiltsim.scenario.table import NonNegative, Range, Table, default, example, required
 
 Origin = Literal[
     "path", "gains", "keyframes", "parameters", "flight", "start", "limits", "feedback"
@@ -23,33 +24,26 @@ class ClaimTable(Table):
 
     table_name = "claim"
 
-    statement: Words = Field(
-        description="the statement in one sentence", examples=["The error at rest is -0.38 m."]
+    statement: Words = required("the statement in one sentence", "The error at rest is -0.38 m.")
+    thesis: Words = required(
+        "the sentence that makes it, quoted or paraphrased, or what the figure shows",
+        "Fig. 4 shows A at -0.38 m.",
     )
-    thesis: Words = Field(
-        description="the sentence that makes it, quoted or paraphrased, or what the figure shows",
-        examples=["Fig. 4 shows A at -0.38 m."],
+    criterion: Words = required(
+        "what counts as reproduced, and what would not, in words", "The same to two digits."
     )
-    criterion: Words = Field(
-        description="what counts as reproduced, and what would not, in words",
-        examples=["The same to two digits."],
-    )
-    note: str = Field(
+    note: str = default(
         "",
-        description="what a reader must know to judge it, shown with every row",
-        examples=["The thesis does not give the mass."],
+        "what a reader must know to judge it, shown with every row",
+        "The thesis does not give the mass.",
     )
-    fitted: bool = Field(False, description="parameters were chosen so that it holds")
-    missing: str = Field(
+    fitted: bool = default(False, "parameters were chosen so that it holds")
+    missing: str = default(
         "",
-        description="what the text leaves open, so that the statement is not testable",
-        examples=["the figure with the path is not available"],
+        "what the text leaves open, so that the statement is not testable",
+        "the figure with the path is not available",
     )
-    finding: str = Field(
-        "",
-        description="key of the finding that settles it, if one does",
-        examples=["exact-decoupler"],
-    )
+    finding: str = default("", "key of the finding that settles it, if one does", "exact-decoupler")
 
 
 class Expectation(Table):
@@ -63,56 +57,41 @@ class Expectation(Table):
         description="a number that summarizes the flight; docs/metrics.md defines them all",
         json_schema_extra={"enum": list(METRICS)},
     )
-    claim: str = Field(
-        "",
-        description="name of the [claim.NAME] table with the thesis's statement, or a sentence",
-        examples=["your-name"],
+    claim: str = default(
+        "", "name of the [claim.NAME] table with the thesis's statement, or a sentence", "your-name"
     )
-    case: str = Field(
-        "",
-        description="label among the claim's rows, if a flight has several; default: its title",
-        examples=["along x"],
+    case: str = default(
+        "", "label among the claim's rows, if a flight has several; default: its title", "along x"
     )
-    published: float | bool | None = Field(
+    published: float | bool | None = default(
         None,
-        description="the thesis's value, shown beside the measured one; true or false: whether the "
-        "metric, or the statement that it lies within holds, is true in the thesis [the metric's]",
-        examples=[-0.38],
+        "the thesis's value, shown beside the measured one; true or false: whether the metric, or "
+        "the statement that it lies within holds, is true in the thesis [the metric's]",
+        -0.38,
     )
-    holds: Range | None = Field(
+    holds: Range | None = default(
         None,
-        description="where the thesis's statement is true; default: from min to max, which are "
-        "narrower bounds around our own value [the metric's]",
-        examples=[[-0.5, 0.0]],
+        "where the thesis's statement is true; default: from min to max, which are narrower "
+        "bounds around our own value [the metric's]",
+        [-0.5, 0.0],
     )
-    published_tolerance: NonNegative | None = Field(
+    published_tolerance: NonNegative | None = default(
         None,
-        description="largest deviation that counts as reproduced; default: half a unit of "
-        "the last digit [the metric's]",
-        examples=[0.005],
+        "largest deviation that counts as reproduced; default: half a unit of the last digit [the "
+        "metric's]",
+        0.005,
     )
-    in_kind: Range | None = Field(
+    in_kind: Range | None = default(
         None,
-        description="range in which the claim holds qualitatively although the number differs "
-        "[the metric's]",
-        examples=[[-0.5, -0.3]],
+        "range in which the claim holds qualitatively although the number differs [the metric's]",
+        [-0.5, -0.3],
     )
-    why: str = Field(
-        "",
-        description="the reason why the claim is not reproduced",
-        examples=["the thesis gives no mass"],
-    )
-    min: float | None = Field(
-        None, description="smallest value that holds [the metric's]", examples=[-0.4]
-    )
-    max: float | None = Field(
-        None, description="largest value that holds [the metric's]", examples=[0.1]
-    )
-    equals: bool | None = Field(
-        None, description="for metrics that are true or false", examples=[False]
-    )
-    plant: Literal["mujoco", "thesis", "rigid_body"] | None = Field(
-        None, description="evaluate on this plant only; default: on all", examples=["thesis"]
+    why: str = default("", "the reason why the claim is not reproduced", "the thesis gives no mass")
+    min: float | None = default(None, "smallest value that holds [the metric's]", -0.4)
+    max: float | None = default(None, "largest value that holds [the metric's]", 0.1)
+    equals: bool | None = default(None, "for metrics that are true or false", False)
+    plant: PlantName | None = default(
+        None, "evaluate on this plant only; default: on all", "thesis"
     )
 
     def _check_values(self) -> None:

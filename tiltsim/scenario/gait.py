@@ -15,10 +15,13 @@ from tiltsim.scenario.table import (
     Angles2,
     AnglesEach,
     Factor,
+    Many,
     Period,
     Positive,
     Table,
+    default,
     example,
+    required,
 )
 from tiltsim.scenario.time_table import GAIT_COLUMNS, Rows, TimeTable, gait_columns
 from tiltsim_controllers.analysis.two_color_planner import (
@@ -48,7 +51,7 @@ COLOR: Final = (
 )
 """The two colors of ch. 6, for descriptions."""
 
-GaitRow = Annotated[tuple[float, ...], Field(strict=False, min_length=2, max_length=17)]
+GaitRow = Annotated[Many[float], Field(min_length=2, max_length=17)]
 
 
 AnyVehicle = Vehicle | Multirotor | TiltCar
@@ -67,12 +70,10 @@ class GaitTable(Table, ABC):
     table_name = "gait"
     size_key: ClassVar[str]
 
-    scale: Annotated[float, Field(ge=1e-3, le=1e3)] = Field(
-        1.0, description="multiplies all tilt angles (ch. 5: 1/n) [-]", examples=[0.5]
+    scale: Annotated[float, Field(ge=1e-3, le=1e3)] = default(
+        1.0, "multiplies all tilt angles (ch. 5: 1/n) [-]", 0.5
     )
-    bias: Factor = Field(
-        1.0, description="eta, multiplies alpha_3 and alpha_4 (ch. 6) [-]", examples=[0.8]
-    )
+    bias: Factor = default(1.0, "eta, multiplies alpha_3 and alpha_4 (ch. 6) [-]", 0.8)
 
     def plan(self, vehicle: AnyVehicle) -> PlannedGait:
         """The gait for a vehicle. Raises ValueError if the numbers do not define one."""
@@ -104,11 +105,11 @@ class FixedGait(GaitTable):
     model_config = example(type="fixed", angles=[-0.65, -0.65, 0.65, 0.65])
     size_key = "angles"
 
-    type: Literal["fixed"] = Field("fixed", description="constant angles")
-    angles: AnglesEach = Field(
+    type: Literal["fixed"] = default("fixed", "constant angles")
+    angles: AnglesEach = default(
         (0.0, 0.0, 0.0, 0.0),
-        description=f"alpha_1..4; {SIGN}; a multirotor has one for each of its tilts [rad]",
-        examples=[[-0.65, -0.65, 0.65, 0.65]],
+        f"alpha_1..4; {SIGN}; a multirotor has one for each of its tilts [rad]",
+        [-0.65, -0.65, 0.65, 0.65],
     )
 
     @property
@@ -127,16 +128,16 @@ class TrotGait(GaitTable):
 
     size_key = "amplitude"
 
-    type: Literal["trot_instant", "trot_continuous"] = Field(
-        description="a trot: rotors 1 and 2 tilt by -rho, 3 and 4 by rho, so that diagonal legs "
-        "move together, and rho changes its sign twice a period: at once, or at a constant rate"
+    type: Literal["trot_instant", "trot_continuous"] = required(
+        "a trot: rotors 1 and 2 tilt by -rho, 3 and 4 by rho, so that diagonal legs move "
+        "together, and rho changes its sign twice a period: at once, or at a constant rate"
     )
-    amplitude: Angle = Field(
-        description="largest rho, with which the period begins; at positive rho rotors 1 and 3 "
-        "push to +y, 2 and 4 to -x [rad]",
-        examples=[0.65],
+    amplitude: Angle = required(
+        "largest rho, with which the period begins; at positive rho rotors 1 and 3 push to +y, 2 "
+        "and 4 to -x [rad]",
+        0.65,
     )
-    period: Period = Field(description="T, of the whole cycle [s]", examples=[2.0])
+    period: Period = required("T, of the whole cycle [s]", 2.0)
 
     def _unscaled(self, vehicle: AnyVehicle) -> PlannedGait:
         trot = plans.instant_trot if self.type == "trot_instant" else plans.continuous_trot
@@ -148,17 +149,13 @@ class CatGait(GaitTable):
 
     size_key = "amplitude"
 
-    type: Literal["walk", "run", "transverse_gallop", "rotary_gallop"] = Field(
-        description="how a cat moves its legs; a rotor is a leg: 1 right fore, 2 left fore, 3 left "
-        "hind, 4 right hind"
+    type: Literal["walk", "run", "transverse_gallop", "rotary_gallop"] = required(
+        "how a cat moves its legs; a rotor is a leg: 1 right fore, 2 left fore, 3 left hind, 4 "
+        "right hind"
     )
-    amplitude: Angle = Field(
-        description="swing of a leg to either side of its lean [rad]", examples=[0.5]
-    )
-    lean: Angle = Field(
-        0.0, description="mean angle of the legs, forward, toward +x and +y [rad]", examples=[0.5]
-    )
-    period: Period = Field(description="T, of one stride [s]", examples=[1.0])
+    amplitude: Angle = required("swing of a leg to either side of its lean [rad]", 0.5)
+    lean: Angle = default(0.0, "mean angle of the legs, forward, toward +x and +y [rad]", 0.5)
+    period: Period = required("T, of one stride [s]", 1.0)
 
     def _unscaled(self, vehicle: AnyVehicle) -> PlannedGait:
         return plans.cat(self.type, self.amplitude, self.period, self.lean)
@@ -169,18 +166,16 @@ class WaypointGait(GaitTable):
 
     size_key = "angles"
 
-    type: Literal["waypoints"] = Field(description="your own gait")
-    angles: Annotated[tuple[AnglesEach, ...], Field(min_length=2, strict=False)] = Field(
-        description=f"alpha_1..4 of each waypoint; {SIGN}; a multirotor has one for each of its "
-        "tilts [rad]",
-        examples=[[[-0.3, -0.1, 0.1, 0.3], [-0.1, -0.3, 0.3, 0.1]]],
+    type: Literal["waypoints"] = required("your own gait")
+    angles: Annotated[Many[AnglesEach], Field(min_length=2)] = required(
+        f"alpha_1..4 of each waypoint; {SIGN}; a multirotor has one for each of its tilts [rad]",
+        [[-0.3, -0.1, 0.1, 0.3], [-0.1, -0.3, 0.3, 0.1]],
     )
-    period: Period = Field(description="time to return to the first waypoint [s]", examples=[2.0])
-    phases: Annotated[tuple[float, ...], Field(strict=False)] | None = Field(
+    period: Period = required("time to return to the first waypoint [s]", 2.0)
+    phases: Many[float] | None = default(
         None,
-        description="time of each waypoint as a fraction of the period, from 0; default: evenly "
-        "spaced [-]",
-        examples=[[0.0, 0.4]],
+        "time of each waypoint as a fraction of the period, from 0; default: evenly spaced [-]",
+        [0.0, 0.4],
     )
 
     @property
@@ -200,27 +195,26 @@ class TableGait(GaitTable, TimeTable):
     columns = GAIT_COLUMNS
     largest = pi
 
-    type: Literal["table"] = Field(description="your own gait, as a table over time")
-    file: str | None = Field(
+    type: Literal["table"] = required("your own gait, as a table over time")
+    file: str | None = default(
         None,
-        description="CSV or Parquet file with the columns time and alpha_1 to alpha_4, in s and "
-        "rad, relative to the scenario's folder; times from 0, at least 1e-4 s apart; 2 to 10,000 "
-        "rows",
-        examples=["my_gait.csv"],
+        "CSV or Parquet file with the columns time and alpha_1 to alpha_4, in s and rad, relative "
+        "to the scenario's folder; times from 0, at least 1e-4 s apart; 2 to 10,000 rows",
+        "my_gait.csv",
     )
-    rows: Annotated[tuple[GaitRow, ...], Field(strict=False)] | None = Field(
+    rows: Many[GaitRow] | None = default(
         None,
-        description=f"the table itself in place of a file: time and alpha_1..4 of each row; {SIGN} "
+        f"the table itself in place of a file: time and alpha_1..4 of each row; {SIGN} "
         "[s, rad, rad, rad, rad]",
-        examples=[[[0.0, 0.0, 0.0, 0.0, 0.0], [1.0, 0.3, -0.3, 0.3, -0.3]]],
+        [[0.0, 0.0, 0.0, 0.0, 0.0], [1.0, 0.3, -0.3, 0.3, -0.3]],
     )
-    interpolation: Literal["cubic"] = Field(
-        "cubic", description="cubic splines, whose angular accelerations are continuous"
+    interpolation: Literal["cubic"] = default(
+        "cubic", "cubic splines, whose angular accelerations are continuous"
     )
-    repeat: bool = Field(
+    repeat: bool = default(
         False,
-        description="start over after the last row, which must then have the angles of the first; "
-        "otherwise the angles of the last row hold",
+        "start over after the last row, which must then have the angles of the first; otherwise "
+        "the angles of the last row hold",
     )
 
     def _check_values(self) -> None:
@@ -260,9 +254,9 @@ def _table_gait(rows: Rows, repeats: bool) -> PlannedGait:
 class TwoColorLeg(Table):
     """A part of a two-color path: line segments in one color."""
 
-    color: Literal["red", "blue"] = Field(description=COLOR)
-    vertices: Annotated[tuple[Angles2, ...], Field(min_length=2, strict=False)] = Field(
-        description="points (alpha_1, alpha_2) [rad]", examples=[[[-0.2, 0.2], [-0.1, 0.3]]]
+    color: Literal["red", "blue"] = required(COLOR)
+    vertices: Annotated[Many[Angles2], Field(min_length=2)] = required(
+        "points (alpha_1, alpha_2) [rad]", [[-0.2, 0.2], [-0.1, 0.3]]
     )
 
 
@@ -275,26 +269,24 @@ class TwoColorGait(GaitTable):
 
     model_config = example(rectangle=[[-0.3, -0.1], [0.1, 0.3]])
 
-    type: Literal["two_color"] = Field(
-        description="a closed curve of alpha_1 and alpha_2; its color gives the other two angles"
+    type: Literal["two_color"] = required(
+        "a closed curve of alpha_1 and alpha_2; its color gives the other two angles"
     )
-    period: Period = Field(description="time once around [s]", examples=[4.0])
-    color: Literal["red", "blue"] = Field("red", description=COLOR)
-    rectangle: Annotated[tuple[Angles2, Angles2], Field(strict=False)] | None = Field(
+    period: Period = required("time once around [s]", 4.0)
+    color: Literal["red", "blue"] = default("red", COLOR)
+    rectangle: Annotated[tuple[Angles2, Angles2], Field(strict=False)] | None = default(
         None,
-        description="the curve is a rectangle: ranges of alpha_1 and of alpha_2 [rad]",
-        examples=[[[-0.3, -0.1], [0.1, 0.3]]],
+        "the curve is a rectangle: ranges of alpha_1 and of alpha_2 [rad]",
+        [[-0.3, -0.1], [0.1, 0.3]],
     )
-    centre: Angles2 | None = Field(
-        None,
-        description="the curve is a circle about this point; needs radius [rad]",
-        examples=[[-0.2, 0.2]],
+    centre: Angles2 | None = default(
+        None, "the curve is a circle about this point; needs radius [rad]", [-0.2, 0.2]
     )
-    radius: Positive | None = Field(None, description="of the circle [rad]", examples=[0.1])
-    path: Annotated[tuple[TwoColorLeg, ...], Field(strict=False)] = Field(
+    radius: Positive | None = default(None, "of the circle [rad]", 0.1)
+    path: Many[TwoColorLeg] = default(
         (),
-        description="the curve consists of legs, each in one color; colors may change where the "
-        "two meet, at the point P = (delta, -delta)",
+        "the curve consists of legs, each in one color; colors may change where the two meet, at "
+        "the point P = (delta, -delta)",
     )
 
     def _check_values(self) -> None:
@@ -352,16 +344,15 @@ class PenguinGait(TiltCarGait):
 
     size_key = "amplitude"
 
-    type: Literal["penguin_small", "penguin_large"] = Field(
-        description="a penguin's waddle: the thrusts jump between two directions"
+    type: Literal["penguin_small", "penguin_large"] = required(
+        "a penguin's waddle: the thrusts jump between two directions"
     )
-    amplitude: Angle | None = Field(
+    amplitude: Angle | None = default(
         None,
-        description="either direction, from straight ahead; default: pi/8 (small), pi/3 (large) "
-        "[rad]",
-        examples=[0.4],
+        "either direction, from straight ahead; default: pi/8 (small), pi/3 (large) [rad]",
+        0.4,
     )
-    period: Period = Field(2.0, description="T, of the whole cycle [s]")
+    period: Period = default(2.0, "T, of the whole cycle [s]")
 
     def _tilt(self, per_direction: float) -> PlannedGait:
         swing = PENGUIN_SWINGS[self.type] if self.amplitude is None else self.amplitude
@@ -373,11 +364,11 @@ class RotatingGait(TiltCarGait):
 
     size_key = "rate"
 
-    type: Literal["rotating"] = Field(description="the thrusts turn without end")
-    rate: Annotated[float, Field(ge=-1e3, le=1e3)] = Field(
-        description="of the thrusts' direction [rad/s]", examples=[1.0]
+    type: Literal["rotating"] = required("the thrusts turn without end")
+    rate: Annotated[float, Field(ge=-1e3, le=1e3)] = required(
+        "of the thrusts' direction [rad/s]", 1.0
     )
-    start: Angle = Field(0.0, description="the thrusts' direction at time zero [rad]")
+    start: Angle = default(0.0, "the thrusts' direction at time zero [rad]")
 
     def _tilt(self, per_direction: float) -> PlannedGait:
         return plans.rotating(self.start * per_direction, self.rate * per_direction)

@@ -6,8 +6,7 @@ from pydantic import Field
 
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.controller_table import ControllerTable, SupervisorTable
-from tiltsim.scenario.table import NonNegative, Positive
-from tiltsim_controllers.laws.failures import Failure
+from tiltsim.scenario.table import Many, NonNegative, Positive, default
 from tiltsim_controllers.laws.gains import (
     GAIN_SETS,
     Gains,
@@ -18,6 +17,7 @@ from tiltsim_controllers.laws.gains import (
     gains_from_rows,
 )
 from tiltsim_controllers.laws.multirotor_steps import FeedforwardTerms
+from tiltsim_controllers.laws.observed import Failure
 from tiltsim_controllers.laws.supervisor import Supervisor
 from tiltsim_controllers.vehicle.parameters import Vehicle
 
@@ -37,45 +37,42 @@ class GaitFollowingController(ControllerTable):
     gains: GivenGains
     decoupling: str
 
-    allocation: Literal["inversion", "prioritized"] = Field(
+    allocation: Literal["inversion", "prioritized"] = default(
         "inversion",
-        description="at rotor limits: inversion saturates each rotor alone, prioritized gives up "
-        "the least important outputs first: side forces, then lift, then yaw, then roll and "
-        "pitch",
+        "at rotor limits: inversion saturates each rotor alone, prioritized gives up the least "
+        "important outputs first: side forces, then lift, then yaw, then roll and pitch",
     )
-    allocation_horizon: Positive = Field(
-        0.02, description="time for which prioritized allocation keeps within the limits [s]"
+    allocation_horizon: Positive = default(
+        0.02, "time for which prioritized allocation keeps within the limits [s]"
     )
-    supervisor: SupervisorTable | None = Field(
-        None,
-        description="acts on the gait before the decoupling matrix becomes singular; default: none",
+    supervisor: SupervisorTable | None = default(
+        None, "acts on the gait before the decoupling matrix becomes singular; default: none"
     )
-    angular_acceleration: Literal["model", "measured"] = Field(
+    angular_acceleration: Literal["model", "measured"] = default(
         "model",
-        description="fed back as second derivatives of roll, pitch and yaw: that of the law's "
-        "model, I^-1 tau w, or the simulated vehicle's, as ch. 4, Eq. (26), is written",
+        "fed back as second derivatives of roll, pitch and yaw: that of the law's model, I^-1 tau "
+        "w, or the simulated vehicle's, as ch. 4, Eq. (26), is written",
     )
-    max_acceleration: Positive = Field(
+    max_acceleration: Positive = default(
         3.0,
-        description="limit on the horizontal acceleration of the position feedback, at which its "
-        "integrators stop; law attitude_altitude needs gait_rate_feedforward [m/s^2]",
+        "limit on the horizontal acceleration of the position feedback, at which its integrators "
+        "stop; law attitude_altitude needs gait_rate_feedforward [m/s^2]",
     )
-    max_angular_acceleration: Positive = Field(
+    max_angular_acceleration: Positive = default(
         60.0,
-        description="limit on the demanded angular acceleration of each axis; law "
-        "attitude_altitude needs gait_rate_feedforward [rad/s^2]",
+        "limit on the demanded angular acceleration of each axis; law attitude_altitude needs "
+        "gait_rate_feedforward [rad/s^2]",
     )
-    anticipation: NonNegative = Field(
+    anticipation: NonNegative = default(
         0.12,
-        description="time before and after a corner of the gait in which the body turns, at most "
-        "half of the gait's shortest segment; law attitude_altitude needs gait_rate_feedforward "
-        "[s]",
+        "time before and after a corner of the gait in which the body turns, at most half of the "
+        "gait's shortest segment; law attitude_altitude needs gait_rate_feedforward [s]",
     )
-    leave_out: Annotated[tuple[FeedforwardTerm, ...], Field(strict=False)] = Field(
+    leave_out: Many[FeedforwardTerm] = default(
         (),
-        description="terms of the feed-forward to omit, for comparison; law attitude_altitude "
-        "needs gait_rate_feedforward",
-        examples=[["integral_action"]],
+        "terms of the feed-forward to omit, for comparison; law attitude_altitude needs "
+        "gait_rate_feedforward",
+        ["integral_action"],
     )
 
     def resolve_gains(self) -> Gains:
@@ -127,13 +124,11 @@ class GaitFollowingController(ControllerTable):
 class FailureAwareController(ControllerTable):
     """A law that can do without a rotor."""
 
-    failed_rotor: Annotated[int, Field(ge=1)] | None = Field(
-        None,
-        description="a rotor that the law knows to have failed and does not use; default: none",
-        examples=[2],
+    failed_rotor: Annotated[int, Field(ge=1)] | None = default(
+        None, "a rotor that the law knows to have failed and does not use; default: none", 2
     )
-    failure_known_from: NonNegative = Field(
-        0.0, description="time from which failed_rotor is known [s]", examples=[10.0]
+    failure_known_from: NonNegative = default(
+        0.0, "time from which failed_rotor is known [s]", 10.0
     )
 
     def check_failed_rotor(self, rotors: int) -> None:

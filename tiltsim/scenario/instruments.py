@@ -6,12 +6,23 @@ from typing import Annotated, Any, ClassVar, Final, Literal, NamedTuple
 
 from pydantic import Field, model_validator
 
-from tiltsim.scenario.table import Angles3, NonNegative, Positive, Table, Vector3, example
+from tiltsim.scenario.table import (
+    ZEROS,
+    Angles3,
+    NonNegative,
+    Positive,
+    Table,
+    Vector3,
+    default,
+    example,
+)
 
 Probability = Annotated[float, Field(ge=0.0, lt=1.0)]
-ZEROS: tuple[float, float, float] = (0.0, 0.0, 0.0)
 G: Final = 9.80665  # m/s^2
 MOST_UNDER_WAY: Final = 64  # readings that wait for their delay
+
+
+FINEST: Final = 1e-12  # step of readings: rounding is as coarse
 
 
 class Errors(NamedTuple):
@@ -39,13 +50,16 @@ class InstrumentTable(Table):
     columns: ClassVar[Mapping[str, str]] = {}
     """Its columns in a flight and their units; with ``#`` one for each rotor."""
 
-    rate: Positive | None = Field(
-        None, description="readings per second; default: one each control step [Hz]", examples=[100]
+    rate: Positive | None = default(
+        None, "readings per second; default: one each control step [Hz]", 100
     )
-    delay: NonNegative = Field(0.0, description="until a reading is available [s]", examples=[0.02])
-    dropout: Probability = Field(
-        0.0, description="probability that a reading is lost [-]", examples=[0.05]
-    )
+    delay: NonNegative = default(0.0, "until a reading is available [s]", 0.02)
+    dropout: Probability = default(0.0, "probability that a reading is lost [-]", 0.05)
+
+    def _check_values(self) -> None:
+        for key in type(self).model_fields:
+            if key.endswith("resolution") and 0.0 < getattr(self, key) < FINEST:
+                raise self.mistake(key, f"must be 0, for none, or at least {FINEST:g}")
 
     def period(self, timestep: float) -> float:
         """Time between readings (s), with a time between control steps (s)."""
@@ -93,37 +107,26 @@ class ImuTable(InstrumentTable):
             "gyro_resolution": radians(1.0 / 32.8),
         },
     }
-    """Typical values of the data sheets BST-BMI088-DS001 (+-6 g, +-1000 deg/s), DS-000189
-    (ICM-20948) and PS-MPU-6000A-00 (both +-4 g, +-1000 deg/s).
+    """Nominal densities of the data sheets BST-BMI088-DS001, DS-000189 (ICM-20948) and
+    PS-MPU-6000A-00, taken for all axes and ranges; resolutions of the ranges +-6 g, +-4 g and
+    +-4 g, and of +-1000 deg/s.
     """
 
-    preset: Literal["bmi088", "icm_20948", "mpu_6050"] | None = Field(
-        None, description="densities and resolutions of a part, unless given", examples=["bmi088"]
+    preset: Literal["bmi088", "icm_20948", "mpu_6050"] | None = default(
+        None, "densities and resolutions of a part, unless given", "bmi088"
     )
-    accelerometer_noise_density: NonNegative = Field(
-        0.0, description="of white noise [m/s^2/sqrt(Hz)]", examples=[0.0017]
+    accelerometer_noise_density: NonNegative = default(
+        0.0, "of white noise [m/s^2/sqrt(Hz)]", 0.0017
     )
-    accelerometer_random_walk: NonNegative = Field(
-        0.0, description="of the bias [m/s^3/sqrt(Hz)]", examples=[0.0003]
+    accelerometer_random_walk: NonNegative = default(0.0, "of the bias [m/s^3/sqrt(Hz)]", 0.0003)
+    accelerometer_bias: Vector3 = default(ZEROS, "constant error [m/s^2]", [0.1, 0.0, -0.05])
+    accelerometer_resolution: NonNegative = default(
+        0.0, "step of the readings; 0: none [m/s^2]", 0.0012
     )
-    accelerometer_bias: Vector3 = Field(
-        ZEROS, description="constant error [m/s^2]", examples=[[0.1, 0.0, -0.05]]
-    )
-    accelerometer_resolution: NonNegative = Field(
-        0.0, description="step of the readings; 0: none [m/s^2]", examples=[0.0012]
-    )
-    gyro_noise_density: NonNegative = Field(
-        0.0, description="of white noise [rad/s/sqrt(Hz)]", examples=[0.00024]
-    )
-    gyro_random_walk: NonNegative = Field(
-        0.0, description="of the bias [rad/s^2/sqrt(Hz)]", examples=[2e-5]
-    )
-    gyro_bias: Vector3 = Field(
-        ZEROS, description="constant error [rad/s]", examples=[[0.01, 0.0, -0.005]]
-    )
-    gyro_resolution: NonNegative = Field(
-        0.0, description="step of the readings; 0: none [rad/s]", examples=[0.0011]
-    )
+    gyro_noise_density: NonNegative = default(0.0, "of white noise [rad/s/sqrt(Hz)]", 0.00024)
+    gyro_random_walk: NonNegative = default(0.0, "of the bias [rad/s^2/sqrt(Hz)]", 2e-5)
+    gyro_bias: Vector3 = default(ZEROS, "constant error [rad/s]", [0.01, 0.0, -0.005])
+    gyro_resolution: NonNegative = default(0.0, "step of the readings; 0: none [rad/s]", 0.0011)
     position: Vector3 = POSITION
     orientation: Angles3 = ORIENTATION
 
@@ -161,20 +164,14 @@ class MocapTable(InstrumentTable):
         **{f"mocap_q{part}": "1" for part in "wxyz"},
     }
 
-    position_noise: NonNegative = Field(
-        0.0, description="standard deviation along each axis [m]", examples=[0.001]
+    position_noise: NonNegative = default(0.0, "standard deviation along each axis [m]", 0.001)
+    position_bias: Vector3 = default(ZEROS, "constant error, world axes [m]", [0.002, 0.0, 0.0])
+    position_resolution: NonNegative = default(0.0, "step of the readings; 0: none [m]", 0.0001)
+    attitude_noise: NonNegative = default(
+        0.0, "standard deviation about each body axis [rad]", 0.005
     )
-    position_bias: Vector3 = Field(
-        ZEROS, description="constant error, world axes [m]", examples=[[0.002, 0.0, 0.0]]
-    )
-    position_resolution: NonNegative = Field(
-        0.0, description="step of the readings; 0: none [m]", examples=[0.0001]
-    )
-    attitude_noise: NonNegative = Field(
-        0.0, description="standard deviation about each body axis [rad]", examples=[0.005]
-    )
-    attitude_bias: Vector3 = Field(
-        ZEROS, description="constant turn about the body axes [rad]", examples=[[0.01, 0.0, 0.0]]
+    attitude_bias: Vector3 = default(
+        ZEROS, "constant turn about the body axes [rad]", [0.01, 0.0, 0.0]
     )
 
     position: Vector3 = POSITION
@@ -196,21 +193,13 @@ class GpsTable(InstrumentTable):
         **{f"gps_velocity_{axis}": "m/s" for axis in "xyz"},
     }
 
-    position_noise: NonNegative = Field(
-        0.0, description="standard deviation along each axis [m]", examples=[1.0]
+    position_noise: NonNegative = default(0.0, "standard deviation along each axis [m]", 1.0)
+    position_random_walk: NonNegative = default(
+        0.0, "of the error of the position [m/sqrt(s)]", 0.05
     )
-    position_random_walk: NonNegative = Field(
-        0.0, description="of the error of the position [m/sqrt(s)]", examples=[0.05]
-    )
-    position_bias: Vector3 = Field(
-        ZEROS, description="constant error, world axes [m]", examples=[[1.0, 0.5, 0.0]]
-    )
-    velocity_noise: NonNegative = Field(
-        0.0, description="standard deviation along each axis [m/s]", examples=[0.05]
-    )
-    resolution: NonNegative = Field(
-        0.0, description="step of the positions; 0: none [m]", examples=[0.01]
-    )
+    position_bias: Vector3 = default(ZEROS, "constant error, world axes [m]", [1.0, 0.5, 0.0])
+    velocity_noise: NonNegative = default(0.0, "standard deviation along each axis [m/s]", 0.05)
+    resolution: NonNegative = default(0.0, "step of the positions; 0: none [m]", 0.01)
 
     position: Vector3 = POSITION
 
@@ -229,14 +218,10 @@ class BarometerTable(InstrumentTable):
     model_config = example(rate=50.0, noise=0.1)
     columns: ClassVar[Mapping[str, str]] = {"barometer_altitude": "m"}
 
-    noise: NonNegative = Field(0.0, description="standard deviation [m]", examples=[0.1])
-    random_walk: NonNegative = Field(
-        0.0, description="of the bias, as weather drifts [m/sqrt(s)]", examples=[0.01]
-    )
-    bias: float = Field(0.0, description="constant error [m]", examples=[0.5])
-    resolution: NonNegative = Field(
-        0.0, description="step of the readings; 0: none [m]", examples=[0.01]
-    )
+    noise: NonNegative = default(0.0, "standard deviation [m]", 0.1)
+    random_walk: NonNegative = default(0.0, "of the bias, as weather drifts [m/sqrt(s)]", 0.01)
+    bias: float = default(0.0, "constant error [m]", 0.5)
+    resolution: NonNegative = default(0.0, "step of the readings; 0: none [m]", 0.01)
 
     position: Vector3 = POSITION
 
@@ -252,17 +237,13 @@ class MagnetometerTable(InstrumentTable):
     model_config = example(rate=50.0, noise=0.01)
     columns: ClassVar[Mapping[str, str]] = {f"magnetometer_{axis}": "1" for axis in "xyz"}
 
-    noise: NonNegative = Field(
-        0.0, description="standard deviation on each axis, of the field's size [-]", examples=[0.01]
+    noise: NonNegative = default(
+        0.0, "standard deviation on each axis, of the field's size [-]", 0.01
     )
-    bias: Vector3 = Field(
-        ZEROS, description="of magnets on board, of the field's size [-]", examples=[[0.02, 0, 0]]
-    )
-    resolution: NonNegative = Field(
-        0.0, description="step of the readings; 0: none [-]", examples=[0.003]
-    )
-    inclination: Annotated[float, Field(ge=-1.55, le=1.55)] = Field(
-        1.1, description="of the field below the horizon, along x of the world [rad]"
+    bias: Vector3 = default(ZEROS, "of magnets on board, of the field's size [-]", [0.02, 0, 0])
+    resolution: NonNegative = default(0.0, "step of the readings; 0: none [-]", 0.003)
+    inclination: Annotated[float, Field(ge=-1.55, le=1.55)] = default(
+        1.1, "of the field below the horizon, along x of the world [rad]"
     )
 
     orientation: Angles3 = ORIENTATION
@@ -283,11 +264,9 @@ class RotorSpeedTable(InstrumentTable):
     model_config = example(rate=100.0, noise=2.0)
     columns: ClassVar[Mapping[str, str]] = {"rotor_speed_measured_#": "rad/s"}
 
-    noise: NonNegative = Field(0.0, description="standard deviation [rad/s]", examples=[2.0])
-    bias: float = Field(0.0, description="constant error [rad/s]", examples=[1.0])
-    resolution: NonNegative = Field(
-        0.0, description="step of the readings; 0: none [rad/s]", examples=[0.5]
-    )
+    noise: NonNegative = default(0.0, "standard deviation [rad/s]", 2.0)
+    bias: float = default(0.0, "constant error [rad/s]", 1.0)
+    resolution: NonNegative = default(0.0, "step of the readings; 0: none [rad/s]", 0.5)
 
     def errors(self, rate: float, rotors: int) -> Errors:
         return Errors(
@@ -298,8 +277,21 @@ class RotorSpeedTable(InstrumentTable):
         )
 
 
-INSTRUMENTS: tuple[str, ...] = ("imu", "mocap", "gps", "barometer", "magnetometer", "rotor_speed")
-"""Keys of ``[sensors]`` that are instruments, in the order of their readings."""
+class InstrumentTables(Table):
+    """The keys of ``[sensors]`` that are instruments, in the order of their readings."""
+
+    imu: ImuTable | None = default(None, "accelerometer and gyro")
+    mocap: MocapTable | None = default(None, "motion capture")
+    gps: GpsTable | None = default(None, "position and velocity from satellites")
+    barometer: BarometerTable | None = default(None, "altitude from air pressure")
+    magnetometer: MagnetometerTable | None = default(None, "direction of the field")
+    rotor_speed: RotorSpeedTable | None = default(None, "speeds of the rotors")
+
+    @property
+    def instruments(self) -> dict[str, InstrumentTable]:
+        """The instruments on the vehicle, by name."""
+        found = {name: getattr(self, name) for name in InstrumentTables.model_fields}
+        return {name: table for name, table in found.items() if table is not None}
 
 
 def check_instruments(scenario: Any) -> None:
@@ -311,13 +303,15 @@ def check_instruments(scenario: Any) -> None:
         return
     first, step = f"sensors.{next(iter(found))}", simulation.control_timestep
     reasons = {
-        "the tilt_car": scenario.vehicle.is_planar,
-        'controller.law = "python"': scenario.controller.is_external,
-        "[ground], [[object]], [tool], [payload] and [[companion]]": scenario.has_contacts,
+        "the tilt_car has no instruments; remove it": scenario.vehicle.is_planar,
+        "a Python controller observes the state, not readings; choose controller.law = "
+        '"numpy", or remove it': scenario.controller.is_external,
+        "does not sense contacts; remove it, or [ground], [[object]], [tool], [payload] and "
+        "[[companion]]": scenario.has_contacts,
     }
-    for what, present in reasons.items():
+    for reason, present in reasons.items():
         if present:
-            raise scenario.mistake(first, f"not supported with {what}; remove one of them")
+            raise scenario.mistake(first, reason)
     if step == 0.0:
         reason = f"[{first}] is read at control steps; must be above 0"
         raise scenario.mistake("simulation.control_timestep", reason)

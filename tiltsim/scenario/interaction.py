@@ -1,8 +1,8 @@
 """The tables of objects, of a tool and of a load: ``[[object]]``, ``[tool]``, ``[payload]``."""
 
-from math import inf, pi
+from math import pi
 from pathlib import Path
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Any, Final
 
 from pydantic import Field
 
@@ -10,9 +10,8 @@ from tiltsim.models.cables import Cable
 from tiltsim.models.mjcf_editing import MAX_BYTES
 from tiltsim.models.objects import Body, Load, Objects, Tool
 from tiltsim.scenario.messages import choose
-from tiltsim.scenario.table import Angles3, NonNegative, Positive, Table, Vector3
+from tiltsim.scenario.table import Table, default
 from tiltsim.system.files import is_file
-from tiltsim_controllers.mathematics.attitude import quaternion_of_euler
 
 SIZES: Final = {"wall": 2, "box": 3, "sphere": 1, "mesh": 1}
 """Numbers of the size of each type of object."""
@@ -22,70 +21,11 @@ MESHES: Final = (".stl", ".obj")
 RESERVED: Final = frozenset({"vehicle", "payload", "contact_force", "air", "tilt", "law"})
 """Names that columns and parts of the vehicle already have."""
 
-Mass = Annotated[float, Field(gt=1e-9, le=1e6)]
-Softness = Annotated[float, Field(ge=1e-4, le=1.0)]
-Direction = Annotated[Vector3, Field(examples=[[1.0, 0.0, 0.0]])]
 
-
-class ObjectTable(Table):
+class ObjectTable(Body, Table):
     """Something to touch: fixed in the world, on a hinge, or free."""
 
     table_name = "object"
-
-    name: Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,30}$")] = Field(
-        description="its name, which begins the names of its columns", examples=["wall"]
-    )
-    type: Literal["wall", "box", "sphere", "mesh"] = Field(
-        description="a wall 0.1 m thick whose face looks along its -x, a box, a sphere, or the "
-        "convex hull of a mesh",
-        examples=["wall"],
-    )
-    position: Vector3 = Field(
-        description="of the face's center or of the center, in the world [m]",
-        examples=[[1.0, 0.0, 0.0]],
-    )
-    attitude: Angles3 = Field(
-        (0.0, 0.0, 0.0),
-        description="roll, pitch and yaw from the world's axes to its own [rad]",
-        examples=[[0.0, 0.0, 0.5]],
-    )
-    size: Annotated[tuple[Positive, ...], Field(strict=False, min_length=1, max_length=3)] = Field(
-        description="width along y and height along z of a wall, edges of a box, radius of a "
-        "sphere, length of the unit of a mesh [m]",
-        examples=[[2.0, 2.0]],
-    )
-    file: str | None = Field(
-        None,
-        description="STL or OBJ file of a mesh, relative to the scenario's folder",
-        examples=["valve.stl"],
-    )
-    joint: Literal["fixed", "hinged", "free"] = Field(
-        "fixed", description="whether it moves, and how"
-    )
-    mass: Mass | None = Field(
-        None, description="of one that moves; evenly spread [kg]", examples=[1.0]
-    )
-    friction: NonNegative = Field(0.5, description="coefficient of sliding friction [-]")
-    softness: Softness = Field(
-        0.01,
-        description="time constant of its contacts, at least two time steps: twice as soft, half "
-        "the force of an impact [s]",
-    )
-    hinge: Vector3 = Field(
-        (0.0, 0.0, 0.0),
-        description="a point of the hinge, in its own axes [m]",
-        examples=[[0.0, 0.5, 0.0]],
-    )
-    axis: Direction = Field((0.0, 0.0, 1.0), description="of the hinge, in its own axes [-]")
-    damping: NonNegative = Field(0.0, description="of the hinge [N m s/rad]", examples=[0.1])
-    velocity: Vector3 = Field(
-        (0.0, 0.0, 0.0),
-        description="of a free one at time zero, in the world [m/s]",
-        examples=[[0.2, 0.0, 0.0]],
-    )
-    floating: bool = Field(
-        False, description="whether a free one has no weight, as on a cart or a boat"
-    )
 
     def _check_values(self) -> None:
         if len(self.size) != SIZES[self.type]:
@@ -117,44 +57,11 @@ class ObjectTable(Table):
         if file.stat().st_size > MAX_BYTES:
             raise self.mistake("file", f"has more than {MAX_BYTES // 2**20} MiB")
 
-    @property
-    def body(self) -> Body:
-        """The object for MuJoCo's model."""
-        return Body(
-            self.name,
-            self.type,
-            self.position,
-            tuple(quaternion_of_euler(self.attitude).tolist()),
-            self.size,
-            self.joint,
-            self.mass or 0.0,
-            self.friction,
-            self.softness,
-            self.hinge,
-            self.axis,
-            self.damping,
-            self.floating,
-            self.file or "",
-        )
 
-
-class ToolTable(Table):
+class ToolTable(Tool, Table):
     """A tool that the vehicle carries; the controller does not know its mass."""
 
     table_name = "tool"
-
-    type: Literal["stick", "plate"] = Field(
-        "stick", description="a stick with a round tip, or a disc at the end of one"
-    )
-    position: Vector3 = Field(
-        (0.0, 0.0, 0.0),
-        description="where it begins, in body axes [m]",
-        examples=[[0.05, 0.0, 0.0]],
-    )
-    direction: Direction = Field((1.0, 0.0, 0.0), description="toward its tip, body axes [-]")
-    length: Positive = Field(description="to its tip [m]", examples=[0.3])
-    radius: Positive = Field(0.01, description="of the stick or of the disc [m]")
-    mass: Annotated[float, Field(ge=0.0, le=1e6)] = Field(0.0, description="evenly spread [kg]")
 
     def _check_values(self) -> None:
         if not any(self.direction):
@@ -162,35 +69,21 @@ class ToolTable(Table):
         if self.type == "stick" and self.length <= 2.0 * self.radius:
             raise self.mistake("length", f"must exceed twice the radius = {self.radius}")
 
-    @property
-    def tool(self) -> Tool:
-        """The tool for MuJoCo's model."""
-        return Tool(self.type, self.position, self.direction, self.length, self.radius, self.mass)
 
-
-class PayloadTable(Table):
+class PayloadTable(Load, Table):
     """A load below the vehicle, on a cable that may be slack; the controller does not know it."""
 
     table_name = "payload"
 
-    mass: Mass = Field(description="of the load [kg]", examples=[0.1])
-    length: Positive = Field(
-        description="from the attachment to the center of the load [m]", examples=[1.0]
-    )
-    attachment: Vector3 = Field(
-        (0.0, 0.0, 0.0), description="in body axes [m]", examples=[[0.0, 0.0, -0.05]]
-    )
-    radius: Positive = Field(0.03, description="of the load, a ball [m]")
-    rigid: bool = Field(False, description="whether a fixed rod replaces the cable")
-    swing: Annotated[float, Field(ge=-0.5 * pi, le=0.5 * pi)] = Field(
-        0.0, description="angle of the cable at time zero, from straight down toward +x [rad]"
+    swing: Annotated[float, Field(ge=-0.5 * pi, le=0.5 * pi)] = default(
+        0.0, "angle of the cable at time zero, from straight down toward +x [rad]"
     )
 
-    swing_damping: Annotated[float, Field(ge=0.0, le=1.0)] = Field(
+    swing_damping: Annotated[float, Field(ge=0.0, le=1.0)] = default(
         0.0,
-        description="damping ratio that a law gives the swing: its vehicle goes after the load, by "
-        "the measured angle of the cable; not with python; 0 does not [-]",
-        examples=[0.5],
+        "damping ratio that a law gives the swing: its vehicle goes after the load, by the "
+        "measured angle of the cable; not with python; 0 does not [-]",
+        0.5,
     )
 
     def _check_values(self) -> None:
@@ -198,58 +91,22 @@ class PayloadTable(Table):
             keys = ("swing", "swing_damping")
             self.require_defaults(keys, "a rigid load does not swing; remove it")
 
-    @property
-    def load(self) -> Load:
-        """The load for MuJoCo's model."""
-        return Load(self.mass, self.length, self.attachment, self.radius, self.rigid)
 
-
-class CableTable(Table):
+class CableTable(Cable, Table):
     """A cable from a vehicle to a free object, taut or slack, from one time to another."""
 
     table_name = "cable"
 
-    name: Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,30}$")] = Field(
-        description="its name, which begins the name of its column", examples=["sling"]
-    )
-    object: str = Field(description="the name of a free object", examples=["parcel"])
-    vehicle: str = Field(
-        "",
-        description="the name of the companion that it hangs on; default: the first vehicle",
-        examples=["wing"],
-    )
-    attachment: Vector3 = Field(
-        (0.0, 0.0, 0.0), description="in body axes [m]", examples=[[0.0, 0.0, -0.05]]
-    )
-    length: Positive = Field(description="to the center of the object [m]", examples=[1.0])
-    start: NonNegative = Field(0.0, description="from when it holds [s]", examples=[5.0])
-    end: Positive | None = Field(
-        None, description="when it releases; default: never [s]", examples=[8.0]
-    )
-
     def _check_values(self) -> None:
         if self.end is not None and self.end <= self.start:
             raise self.mistake("end", f"must be after start = {self.start}")
-
-    @property
-    def cable(self) -> Cable:
-        """The cable for MuJoCo's model."""
-        end = inf if self.end is None else self.end
-        joined = self.name, self.vehicle, self.object
-        return Cable(*joined, self.attachment, self.length, self.start, end)
 
 
 def objects_of(scenario: Any) -> Objects | None:
     """All that a scenario adds to its vehicle's model; None for a vehicle alone."""
     if not scenario.has_objects:
         return None
-    tool, payload = scenario.tool, scenario.payload
-    return Objects(
-        tuple(table.body for table in scenario.object),
-        None if tool is None else tool.tool,
-        None if payload is None else payload.load,
-        tuple(table.cable for table in scenario.cable),
-    )
+    return Objects(scenario.object, scenario.tool, scenario.payload, scenario.cable)
 
 
 def _check_cables(scenario: Any) -> None:
@@ -288,7 +145,10 @@ def check_objects(scenario: Any) -> None:
         scenario.reference.after_gait((), scenario)
         controller = scenario.controller
         if controller.position_stiffness is None and not controller.is_external:
-            able = "choose full_pose, vectoring with position_bandwidth, or python"
+            able = (
+                "choose full_pose, vectoring with position_bandwidth, geometric with tilts = free, "
+                "numpy with push_stiffness, or python"
+            )
             reason = f"the {controller.law} law cannot push; {able}"
             raise scenario.mistake("reference.type", reason)
         scenario.reference.check_impedance(scenario)

@@ -12,13 +12,11 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any, ClassVar, Literal, TypeVar
 
-from pydantic import Field
-
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.controller_table import ControllerTable, ReferenceKind
 from tiltsim.scenario.reference import Reference
 from tiltsim.scenario.rotorcraft import TiltServoTable
-from tiltsim.scenario.table import Positive
+from tiltsim.scenario.table import Positive, default
 from tiltsim_controllers.analysis.stability import ErrorLoop, linear_loop
 from tiltsim_controllers.code.arrays import xp as xp
 from tiltsim_controllers.gaits.plans import Gait
@@ -105,10 +103,10 @@ class LawTable(ControllerTable):
     damps_swing = True
     leans_unrecorded = True
 
-    rotor_bandwidth: Positive = Field(
+    rotor_bandwidth: Positive = default(
         100.0,
-        description="of the rotors' speed controllers: the speeds approach the commanded ones as "
-        "a lag of first order [1/s]",
+        "of the rotors' speed controllers: the speeds approach the commanded ones as a lag of "
+        "first order [1/s]",
     )
 
     def error_loops(self, vehicle: Any) -> list[ErrorLoop]:
@@ -177,14 +175,13 @@ class LawController(LawTable):
 class TiltingTable(LawTable):
     """Tables of laws that may also command the tilts."""
 
-    tilts: Literal["gait", "free"] = Field(
+    tilts: Literal["gait", "free"] = default(
         "gait",
-        description="whether the tilts follow the gait, or are the law's, the gait being the "
-        "angles at the start",
+        "whether the tilts follow the gait, or are the law's, the gait being the angles at the "
+        "start",
     )
-    tilt_bandwidth: Positive = Field(
-        30.0,
-        description="of the approach to the tilts that the law commands; needs tilts = free [1/s]",
+    tilt_bandwidth: Positive = default(
+        30.0, "of the approach to the tilts that the law commands; needs tilts = free [1/s]"
     )
 
     @property

@@ -46,6 +46,14 @@ _PLAIN_TYPES: Final = {
     "dict_type": "must be a table",
 }
 
+_PATTERNS: Final = {
+    r"^[a-z][a-z0-9_]{0,30}$": "up to 31 lowercase letters, digits and _, a letter first",
+    r"^[A-Za-z0-9_.-]+$": "letters, digits, _, . and - only",
+    "^state_[a-z0-9_]+$": "state_, then lowercase letters, digits and _",
+    r"^[a-z0-9]+(-[a-z0-9]+)+$": "words of lowercase letters and digits, two or more, joined by -",
+}
+"""Patterns of names, in words."""
+
 
 def show(value: object) -> str:
     """A value as the user wrote it, shortened to 80 characters unless it is a path."""
@@ -99,6 +107,14 @@ def one_line_message(
         emptied: Dotted keys, such as ``gait.type``, whose change dropped other keys of the table.
     """
     details = error.errors(include_url=False)
+    # A table with mistakes in it is also none of the names that may stand instead.
+    wrong = {_mistake(detail, document) for detail in details}
+    details = [
+        detail
+        for detail in details
+        if detail["type"] != "literal_error"
+        or not any(key.startswith(f"{_mistake(detail, document)}.") for key in wrong)
+    ]
     # A misspelt key is often a missing key as well: the unknown one is more helpful.
     details.sort(key=lambda detail: detail["type"] != "extra_forbidden")
     # Missing entries of one list, and the options of one union, are one mistake each.
@@ -206,8 +222,11 @@ def _describe(
         return f"{key} = {show(value)}: angles are in rad, from -3.14159 to 3.14159"
     if kind == "tuple_type":
         return f"{key} = {show(value)}: must be a list{_entries(node)}"
-    if kind == "string_pattern_mismatch" and detail["loc"][-1] == "[key]":
-        return f"{key}: the name must match {context['pattern']}"
+    if kind == "string_pattern_mismatch":
+        words = _PATTERNS[context["pattern"]]
+        if detail["loc"][-1] == "[key]":
+            return f"{key}: the name must be {words}"
+        return f"{key} = {show(value)}: must be {words}"
     unit = node.meaning_and_unit[1]
     is_quantity = isinstance(value, str) and re.match(r"[-+.]*\d", value)
     if kind == "float_type" and is_quantity and not re.match("$|-$|the |.*,", unit):

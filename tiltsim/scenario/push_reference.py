@@ -11,10 +11,23 @@ from pydantic import Field
 from tiltsim.models.objects import distance_ahead
 from tiltsim.scenario.messages import choose
 from tiltsim.scenario.reference_table import PositionReference
-from tiltsim.scenario.table import NonNegative, Positive, Table, Vector3
+from tiltsim.scenario.table import (
+    ZEROS,
+    Many,
+    NonNegative,
+    Positive,
+    Table,
+    Vector3,
+    default,
+    required,
+)
 from tiltsim_controllers.mathematics.attitude import rotation_matrix
-from tiltsim_controllers.references.trajectories import REFERENCE_TYPES, ReferenceParameters
-from tiltsim_controllers.references.waypoints import COEFFICIENTS, minimum_snap_knots
+from tiltsim_controllers.references.trajectories import (
+    COEFFICIENTS,
+    REFERENCE_TYPES,
+    ReferenceParameters,
+    minimum_snap_knots,
+)
 
 if TYPE_CHECKING:
     from tiltsim_controllers.mathematics.scalar import Floats, Triple, Values
@@ -31,16 +44,11 @@ class Slide(Table):
 
     table_name = "reference.slide"
 
-    positions: Annotated[tuple[Vector3, ...], Field(min_length=2, max_length=50, strict=False)] = (
-        Field(
-            description="points from where the tool touches, along the world's axes; the first is "
-            "[0, 0, 0] [m]",
-            examples=[[[0.0, 0.0, 0.0], [0.0, 0.2, 0.0]]],
-        )
+    positions: Annotated[Many[Vector3], Field(min_length=2, max_length=50)] = required(
+        "points from where the tool touches, along the world's axes; the first is [0, 0, 0] [m]",
+        [[0.0, 0.0, 0.0], [0.0, 0.2, 0.0]],
     )
-    times: Annotated[tuple[float, ...], Field(strict=False)] = Field(
-        description="when it is there, one per point [s]", examples=[[8.0, 12.0]]
-    )
+    times: Many[float] = required("when it is there, one per point [s]", [8.0, 12.0])
 
     def _check_values(self) -> None:
         if any(self.positions[0]):
@@ -56,11 +64,10 @@ class ImpedanceTable(Table):
 
     table_name = "reference.impedance"
 
-    mass: Positive = Field(description="virtual [kg]", examples=[2.0])
-    damping: NonNegative = Field(description="virtual [N s/m]", examples=[40.0])
-    stiffness: NonNegative = Field(
-        description="of the vehicle's place against the object; 0 holds the force [N/m]",
-        examples=[20.0],
+    mass: Positive = required("virtual [kg]", 2.0)
+    damping: NonNegative = required("virtual [N s/m]", 40.0)
+    stiffness: NonNegative = required(
+        "of the vehicle's place against the object; 0 holds the force [N/m]", 20.0
     )
 
 
@@ -76,26 +83,24 @@ class Touch(NamedTuple):
 class PushReference(PositionReference):
     """Up to an object along the tool, then a force on it, and a path along it."""
 
-    type: Literal["push"] = Field(description="a push against an object")
-    position: Vector3 = Field(
-        (0.0, 0.0, 0.0),
-        description="where the approach begins; it goes along the tool [m]",
-        examples=[[0.0, 0.0, 1.0]],
+    type: Literal["push"] = required("a push against an object")
+    position: Vector3 = default(
+        ZEROS, "where the approach begins; it goes along the tool [m]", [0.0, 0.0, 1.0]
     )
-    object: str = Field(description="the name of the object", examples=["wall"])
-    force: NonNegative = Field(description="on the object, along the tool [N]", examples=[5.0])
-    approach: Positive = Field(0.1, description="speed toward the object [m/s]")
-    start: NonNegative = Field(1.0, description="when the approach begins [s]")
-    ramp: Positive = Field(1.0, description="from the touch to the full force [s]")
-    gain: NonNegative = Field(
-        4.0, description="integral gain from the error of the force to the commanded force [1/s]"
+    object: str = required("the name of the object", "wall")
+    force: NonNegative = required("on the object, along the tool [N]", 5.0)
+    approach: Positive = default(0.1, "speed toward the object [m/s]")
+    start: NonNegative = default(1.0, "when the approach begins [s]")
+    ramp: Positive = default(1.0, "from the touch to the full force [s]")
+    gain: NonNegative = default(
+        4.0, "integral gain from the error of the force to the commanded force [1/s]"
     )
-    proportional_gain: NonNegative = Field(
-        0.5, description="gain from the error of the force to the commanded force [-]"
+    proportional_gain: NonNegative = default(
+        0.5, "gain from the error of the force to the commanded force [-]"
     )
-    slide: Slide | None = Field(None, description="a path along the object; default: none")
-    impedance: ImpedanceTable | None = Field(
-        None, description="an impedance in place of the loop of force; default: none"
+    slide: Slide | None = default(None, "a path along the object; default: none")
+    impedance: ImpedanceTable | None = default(
+        None, "an impedance in place of the loop of force; default: none"
     )
 
     def _check_values(self) -> None:
@@ -121,17 +126,17 @@ class PushReference(PositionReference):
 
     def touch(self, scenario: Any) -> Touch:
         """Where and when it touches. Raises `mistake` for an object that it cannot touch."""
-        bodies = {table.name: table.body for table in scenario.object}
+        bodies = {table.name: table for table in scenario.object}
         if self.object not in bodies:
             reason = choose(self.object, bodies) if bodies else "there is no [[object]]"
             raise self.mistake("object", reason)
-        if bodies[self.object].shape == "mesh":
+        if bodies[self.object].type == "mesh":
             raise self.mistake("object", "is a mesh; a push needs a wall, box or sphere")
         if scenario.tool is None:
             raise self.mistake("object", "needs a [tool] to push with")
         turn = rotation_matrix((self.roll, self.pitch, self.yaw))
-        tool = scenario.tool.tool
-        unit, tip = turn @ tool.unit, np.array(self.position) + turn @ tool.tip
+        unit = turn @ scenario.tool.unit
+        tip = np.array(self.position) + turn @ scenario.tool.tip
         distance = distance_ahead(bodies[self.object], tip, unit)
         if distance is None:
             x, y, z = unit

@@ -12,7 +12,17 @@ from tiltsim.errors import InputError
 from tiltsim.scenario.controller_table import ReferenceKind
 from tiltsim.scenario.push_reference import PushReference
 from tiltsim.scenario.reference_table import PositionReference, ReferenceTable, Tilt
-from tiltsim.scenario.table import Angle, Angles3, Positive, Vector3, example
+from tiltsim.scenario.table import (
+    ZEROS,
+    Angle,
+    Angles3,
+    Many,
+    Positive,
+    Vector3,
+    default,
+    example,
+    required,
+)
 from tiltsim.scenario.time_table import (
     POSE_COLUMNS,
     QUATERNION_COLUMNS,
@@ -24,10 +34,14 @@ from tiltsim.scenario.time_table import (
     rows_with_angles,
 )
 from tiltsim_controllers.mathematics.scalar import Triple, Values
-from tiltsim_controllers.references.trajectories import POSES, ReferenceParameters
-from tiltsim_controllers.references.waypoints import minimum_snap_knots, table_knots
+from tiltsim_controllers.references.trajectories import (
+    POSES,
+    ReferenceParameters,
+    minimum_snap_knots,
+    table_knots,
+)
 
-ReferenceRow = Annotated[tuple[float, ...], Field(strict=False, min_length=4, max_length=8)]
+ReferenceRow = Annotated[Many[float], Field(min_length=4, max_length=8)]
 
 
 class SetpointReference(PositionReference):
@@ -35,36 +49,26 @@ class SetpointReference(PositionReference):
 
     model_config = example(type="setpoint", position=[1.0, 0.0, 0.5])
 
-    type: Literal["setpoint"] = Field("setpoint", description="a point to hold")
-    position: Vector3 = Field(
-        (0.0, 0.0, 0.0), description="the point, z up [m]", examples=[[1.0, 0.0, 0.5]]
-    )
+    type: Literal["setpoint"] = default("setpoint", "a point to hold")
+    position: Vector3 = default(ZEROS, "the point, z up [m]", [1.0, 0.0, 0.5])
 
 
 class LineReference(PositionReference):
     """Motion along a straight line, uniform or at a constant acceleration."""
 
-    type: Literal["line"] = Field(description="a straight line")
-    position: Vector3 = Field(
-        (0.0, 0.0, 0.0), description="at time zero [m]", examples=[[0.0, 0.0, 1.0]]
-    )
-    velocity: Vector3 = Field(description="at time zero [m/s]", examples=[[0.5, 0.0, 0.0]])
-    acceleration: Vector3 = Field(
-        (0.0, 0.0, 0.0), description="constant [m/s^2]", examples=[[0.1, 0.0, 0.0]]
-    )
+    type: Literal["line"] = required("a straight line")
+    position: Vector3 = default(ZEROS, "at time zero [m]", [0.0, 0.0, 1.0])
+    velocity: Vector3 = required("at time zero [m/s]", [0.5, 0.0, 0.0])
+    acceleration: Vector3 = default(ZEROS, "constant [m/s^2]", [0.1, 0.0, 0.0])
 
 
 class CircleReference(PositionReference):
     """Uniform motion on a horizontal circle, from +x toward +y; from -x where radius < 0."""
 
-    type: Literal["circle"] = Field(description="a horizontal circle")
-    position: Vector3 = Field(
-        (0.0, 0.0, 0.0), description="the center [m]", examples=[[0.0, 0.0, 1.0]]
-    )
-    radius: float = Field(description="negative to start on the other side [m]", examples=[5.0])
-    angular_frequency: float = Field(
-        description="positive is counterclockwise seen from above [rad/s]", examples=[0.1]
-    )
+    type: Literal["circle"] = required("a horizontal circle")
+    position: Vector3 = default(ZEROS, "the center [m]", [0.0, 0.0, 1.0])
+    radius: float = required("negative to start on the other side [m]", 5.0)
+    angular_frequency: float = required("positive is counterclockwise seen from above [rad/s]", 0.1)
 
     def _check_values(self) -> None:
         if self.radius == 0.0:
@@ -74,31 +78,21 @@ class CircleReference(PositionReference):
 class LissajousReference(PositionReference):
     """A sine along each axis: ``position + amplitude sin(angular_frequency t + phase)``."""
 
-    type: Literal["lissajous"] = Field(description="a sine along each axis")
-    position: Vector3 = Field(
-        (0.0, 0.0, 0.0), description="the center [m]", examples=[[0.0, 0.0, 1.0]]
-    )
-    amplitude: Vector3 = Field(description="along x, y and z [m]", examples=[[2.0, 1.0, 0.0]])
-    angular_frequency: Vector3 = Field(
-        description="along x, y and z [rad/s]", examples=[[0.5, 1.0, 0.0]]
-    )
-    phase: Angles3 = Field(
-        (0.0, 0.0, 0.0), description="at time zero [rad]", examples=[[1.5708, 0.0, 0.0]]
-    )
+    type: Literal["lissajous"] = required("a sine along each axis")
+    position: Vector3 = default(ZEROS, "the center [m]", [0.0, 0.0, 1.0])
+    amplitude: Vector3 = required("along x, y and z [m]", [2.0, 1.0, 0.0])
+    angular_frequency: Vector3 = required("along x, y and z [rad/s]", [0.5, 1.0, 0.0])
+    phase: Angles3 = default(ZEROS, "at time zero [rad]", [1.5708, 0.0, 0.0])
 
 
 class FigureEightReference(PositionReference):
     """A horizontal figure eight, from its crossing toward +x and +y; a 1:2 lissajous."""
 
-    type: Literal["figure_eight"] = Field(description="a horizontal figure eight")
-    position: Vector3 = Field(
-        (0.0, 0.0, 0.0), description="where it crosses itself [m]", examples=[[0.0, 0.0, 1.0]]
-    )
-    length: Positive = Field(description="along x [m]", examples=[4.0])
-    width: Positive = Field(description="along y [m]", examples=[2.0])
-    angular_frequency: Positive = Field(
-        description="2 pi over the time once around [rad/s]", examples=[0.5]
-    )
+    type: Literal["figure_eight"] = required("a horizontal figure eight")
+    position: Vector3 = default(ZEROS, "where it crosses itself [m]", [0.0, 0.0, 1.0])
+    length: Positive = required("along x [m]", 4.0)
+    width: Positive = required("along y [m]", 2.0)
+    angular_frequency: Positive = required("2 pi over the time once around [rad/s]", 0.5)
 
     def _motion(self) -> dict[str, float | Triple]:
         once = self.angular_frequency
@@ -112,19 +106,15 @@ class FigureEightReference(PositionReference):
 class WaypointReference(PositionReference):
     """Minimum-snap motion from rest to rest through points at given times."""
 
-    type: Literal["waypoints"] = Field(
-        description="a smooth motion through given points; it leaves the straight lines between "
-        "them, by half a side of a square in even times; further points on a line keep it closer"
+    type: Literal["waypoints"] = required(
+        "a smooth motion through given points; it leaves the straight lines between them, by half "
+        "a side of a square in even times; further points on a line keep it closer"
     )
-    positions: Annotated[tuple[Vector3, ...], Field(min_length=2, max_length=50, strict=False)] = (
-        Field(
-            description="the points; the first is the start [m]",
-            examples=[[[0.0, 0.0, 0.0], [1.0, 0.0, 0.5]]],
-        )
+    positions: Annotated[Many[Vector3], Field(min_length=2, max_length=50)] = required(
+        "the points; the first is the start [m]", [[0.0, 0.0, 0.0], [1.0, 0.0, 0.5]]
     )
-    times: Annotated[tuple[float, ...], Field(strict=False)] = Field(
-        description="one per point, from 0; after the last the reference rests [s]",
-        examples=[[0.0, 5.0]],
+    times: Many[float] = required(
+        "one per point, from 0; after the last the reference rests [s]", [0.0, 5.0]
     )
 
     def _motion(self) -> dict[str, float | Triple]:
@@ -132,7 +122,7 @@ class WaypointReference(PositionReference):
 
     @property
     def knots(self) -> Values:
-        """Polynomials; see `tiltsim_controllers.references.waypoints.minimum_snap_knots`."""
+        """Polynomials; see `tiltsim_controllers.references.trajectories.minimum_snap_knots`."""
         return _minimum_snap_knots(self.positions, self.times)
 
     def _check_values(self) -> None:
@@ -151,25 +141,24 @@ class TableReference(PositionReference, TimeTable):
     columns = REFERENCE_COLUMNS
     largest = 1e6
 
-    type: Literal["table"] = Field(description="your own motion, as a table over time")
-    file: str | None = Field(
+    type: Literal["table"] = required("your own motion, as a table over time")
+    file: str | None = default(
         None,
-        description="CSV or Parquet file with the columns time, x, y and z, in s and m, and for an "
-        "attitude that varies roll, pitch and yaw, in rad without jumps, or qw, qx, qy and qz, "
-        "relative to the scenario's folder; times from 0, at least 1e-4 s apart; 2 to 10,000 rows",
-        examples=["my_reference.csv"],
+        "CSV or Parquet file with the columns time, x, y and z, in s and m, and for an attitude "
+        "that varies roll, pitch and yaw, in rad without jumps, or qw, qx, qy and qz, relative to "
+        "the scenario's folder; times from 0, at least 1e-4 s apart; 2 to 10,000 rows",
+        "my_reference.csv",
     )
-    rows: Annotated[tuple[ReferenceRow, ...], Field(strict=False)] | None = Field(
+    rows: Many[ReferenceRow] | None = default(
         None,
-        description="the table itself in place of a file: time, x, y and z of each row, and roll, "
-        "pitch and yaw, or a quaternion, where they vary [s, m, m, m, rad, rad, rad]",
-        examples=[[[0.0, 0.0, 0.0, 0.0], [2.0, 0.5, 0.0, 0.2]]],
+        "the table itself in place of a file: time, x, y and z of each row, and roll, pitch and "
+        "yaw, or a quaternion, where they vary [s, m, m, m, rad, rad, rad]",
+        [[0.0, 0.0, 0.0, 0.0], [2.0, 0.5, 0.0, 0.2]],
     )
-    interpolation: Literal["minimum_snap", "cubic"] = Field(
+    interpolation: Literal["minimum_snap", "cubic"] = default(
         "minimum_snap",
-        description="minimum_snap: polynomials of degree 7 with six continuous derivatives, of "
-        "which laws use up to four; cubic: continuous acceleration only, for rows that are rounded "
-        "or noisy",
+        "minimum_snap: polynomials of degree 7 with six continuous derivatives, of which laws use "
+        "up to four; cubic: continuous acceleration only, for rows that are rounded or noisy",
     )
 
     @classmethod
@@ -204,7 +193,7 @@ class TableReference(PositionReference, TimeTable):
 
     @property
     def knots(self) -> Values:
-        """Polynomials; see `tiltsim_controllers.references.waypoints.table_knots`."""
+        """Polynomials; see `tiltsim_controllers.references.trajectories.table_knots`."""
         return _reference_table_knots(self.table, self.interpolation)
 
     def _check_attitude(self) -> None:
@@ -254,11 +243,11 @@ class AttitudeAltitudeReference(ReferenceTable):
 
     model_config = example(altitude=1.0, yaw=0.1)
 
-    type: Literal["attitude_altitude"] = Field(description="an attitude, and an altitude")
-    roll: Tilt = Field(0.0, description="turn about x [rad]", examples=[0.1])
-    pitch: Tilt = Field(0.0, description="turn about y [rad]", examples=[0.1])
-    yaw: Angle = Field(0.0, description="turn about z [rad]", examples=[0.1])
-    altitude: float = Field(0.0, description="z in the world [m]", examples=[1.0])
+    type: Literal["attitude_altitude"] = required("an attitude, and an altitude")
+    roll: Tilt = default(0.0, "turn about x [rad]", 0.1)
+    pitch: Tilt = default(0.0, "turn about y [rad]", 0.1)
+    yaw: Angle = default(0.0, "turn about z [rad]", 0.1)
+    altitude: float = default(0.0, "z in the world [m]", 1.0)
 
     @property
     def kind(self) -> ReferenceKind:

@@ -7,8 +7,8 @@ from typing import Annotated, Any, Final
 from pydantic import Field
 
 from tiltsim.scenario.controller_table import ReferenceKind
-from tiltsim.scenario.table import Angle, Table
-from tiltsim_controllers.gaits.parameters import NO_KNOTS
+from tiltsim.scenario.table import Angle, Table, default
+from tiltsim_controllers.gaits.motion import NO_KNOTS
 from tiltsim_controllers.mathematics.scalar import Triple, Values
 from tiltsim_controllers.references.trajectories import REFERENCE_TYPES, ReferenceParameters
 
@@ -84,18 +84,18 @@ class ReferenceTable(Table, ABC):
 class PositionReference(ReferenceTable):
     """A position, and the attitude at it."""
 
-    roll: Roll = Field(
+    roll: Roll = default(
         0.0,
-        description="angle to hold; for controller.law attitude_force, which alone takes pi/2 and "
-        "more, full_pose, switching, vectoring or python [rad]",
-        examples=[0.2],
+        "angle to hold; for controller.law attitude_force, which alone takes pi/2 and more, "
+        "full_pose, switching, vectoring or python [rad]",
+        0.2,
     )
-    pitch: Tilt = Field(0.0, description="as roll [rad]", examples=[0.2])
-    yaw: Angle = Field(0.0, description="heading to hold [rad]", examples=[0.5])
-    acceleration_feedforward: bool = Field(
+    pitch: Tilt = default(0.0, "as roll [rad]", 0.2)
+    yaw: Angle = default(0.0, "heading to hold [rad]", 0.5)
+    acceleration_feedforward: bool = default(
         False,
-        description="also demand the reference's acceleration; ch. 4 omits it, laws of higher "
-        "order always include it",
+        "also demand the reference's acceleration; ch. 4 omits it, laws of higher order always "
+        "include it",
     )
     type: str
 

@@ -9,7 +9,7 @@ from pydantic import Field
 from tiltsim.models.parts import TiltServo
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.models.user_vehicle import UserVehicle
-from tiltsim.scenario.table import NonNegative, Positive, Table, example
+from tiltsim.scenario.table import NonNegative, Positive, Table, default, example, required
 from tiltsim_controllers.mathematics.scalar import Values
 from tiltsim_controllers.tilt_car.vehicle import TiltCar
 from tiltsim_controllers.vehicle.parameters import Vehicle
@@ -20,12 +20,10 @@ class ServoTable(Table):
 
     model_config = example(natural_frequency=30.0)
 
-    natural_frequency: Positive = Field(
-        TiltServo.natural_frequency, description="bandwidth of the servo [rad/s]", examples=[30.0]
+    natural_frequency: Positive = default(
+        TiltServo.natural_frequency, "bandwidth of the servo [rad/s]", 30.0
     )
-    damping_ratio: Positive = Field(
-        TiltServo.damping_ratio, description="1 is critically damped [-]"
-    )
+    damping_ratio: Positive = default(TiltServo.damping_ratio, "1 is critically damped [-]")
 
     @property
     def angle_limit(self) -> float | None:
@@ -38,14 +36,11 @@ class TiltServoTable(ServoTable):
 
     model_config = example(natural_frequency=30.0, max_rate=2.0)
 
-    max_rate: Positive | None = Field(
-        None, description="largest tilt rate; default: unlimited [rad/s]", examples=[2.0]
-    )
-    max_angle: Annotated[float, Field(gt=0.0, le=pi)] | None = Field(
+    max_rate: Positive | None = default(None, "largest tilt rate; default: unlimited [rad/s]", 2.0)
+    max_angle: Annotated[float, Field(gt=0.0, le=pi)] | None = default(
         None,
-        description="mechanical stop to either side, within which the gait must stay; default: "
-        "none [rad]",
-        examples=[1.0],
+        "mechanical stop to either side, within which the gait must stay; default: none [rad]",
+        1.0,
     )
 
     @property
@@ -85,30 +80,27 @@ class RotorcraftTable(AnyVehicleTable, ABC):
     """The keys and properties of every vehicle that flies."""
 
     mjcf: str | None
-    min_rotor_speed: NonNegative | None = Field(
+    min_rotor_speed: NonNegative | None = default(
         None,
-        description="smallest absolute value; at 0 a rotor may stop but not reverse; default: "
-        "unlimited [rad/s]",
-        examples=[200.0],
+        "smallest absolute value; at 0 a rotor may stop but not reverse; default: unlimited "
+        "[rad/s]",
+        200.0,
     )
-    max_rotor_speed: Positive | None = Field(
-        None, description="largest absolute value; default: unlimited [rad/s]", examples=[390.0]
+    max_rotor_speed: Positive | None = default(
+        None, "largest absolute value; default: unlimited [rad/s]", 390.0
     )
-    rotor_time_constant: Positive | None = Field(
+    rotor_time_constant: Positive | None = default(
         None,
-        description="time constant of the lag between commanded and actual rotor speed; default: "
-        "no lag [s]",
-        examples=[0.04],
+        "time constant of the lag between commanded and actual rotor speed; default: no lag [s]",
+        0.04,
     )
-    rotor_inertia: NonNegative = Field(
+    rotor_inertia: NonNegative = default(
         0.0,
-        description="spin inertia of one rotor about its axis: reaction to its acceleration and "
-        "gyroscopic torque [kg m^2]",
-        examples=[1e-5],
+        "spin inertia of one rotor about its axis: reaction to its acceleration and gyroscopic "
+        "torque [kg m^2]",
+        1e-5,
     )
-    tilt_servo: TiltServoTable = Field(
-        TiltServoTable(), description="the servos that tilt the rotors"
-    )
+    tilt_servo: TiltServoTable = default(TiltServoTable(), "the servos that tilt the rotors")
 
     @abstractmethod
     def resolve(self) -> Vehicle | Multirotor: ...
@@ -190,13 +182,12 @@ class MultirotorTable(RotorcraftTable):
 
     model_config = example(model="multirotor", mjcf="mjcf/hexarotor.xml")
 
-    model: Literal["multirotor"] = Field(
-        description="2 to 16 rotors at any places, with any thrust axes, fixed or tilted about "
-        "hinges of any axes, of which two may share one"
+    model: Literal["multirotor"] = required(
+        "2 to 16 rotors at any places, with any thrust axes, fixed or tilted about hinges of any "
+        "axes, of which two may share one"
     )
-    mjcf: str = Field(
-        description="an MJCF file, relative to the scenario's folder, with all parameters",
-        examples=["my_hexarotor.xml"],
+    mjcf: str = required(
+        "an MJCF file, relative to the scenario's folder, with all parameters", "my_hexarotor.xml"
     )
 
     @property

@@ -14,12 +14,12 @@ from typing import Annotated, Any, Self
 from pydantic import ConfigDict, Field, ValidationError
 
 from tiltsim.errors import InputError
-from tiltsim.scenario.arguments import check_keys, leaves
 from tiltsim.scenario.companion import companions_of
 from tiltsim.scenario.consistency import check_consistency
+from tiltsim.scenario.documents import check_keys, leaves
 from tiltsim.scenario.messages import missing_keys, one_line_message, show
 from tiltsim.scenario.scenario_tables import DESCRIPTIVE, ScenarioTables
-from tiltsim.scenario.table import Table
+from tiltsim.scenario.table import Table, required
 from tiltsim.scenario.time_steps import check_time_steps
 from tiltsim.system.public import public
 from tiltsim.system.text import html_table, short_repr
@@ -117,8 +117,8 @@ class Variant(Table):
 
     model_config = ConfigDict(extra="allow")
 
-    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9_.-]+$")] = Field(
-        description="address of the variant: tiltsim run 'FILE#NAME'", examples=["slow"]
+    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9_.-]+$")] = required(
+        "address of the variant: tiltsim run 'FILE#NAME'", "slow"
     )
 
 

@@ -1,19 +1,25 @@
 """The tables of a scenario together, and properties that follow from several of them."""
 
-from typing import Annotated, Any, Final
+from typing import Any, Final
 
-from pydantic import Field, PrivateAttr
+from pydantic import PrivateAttr
 
+from tiltsim.errors import InputError
 from tiltsim.models.rotor_table import Multirotor
-from tiltsim.scenario.autopilot import AutopilotTable, WithAutopilot
 from tiltsim.scenario.companion import CompanionTable, DownwashTable
 from tiltsim.scenario.controller import Controller
 from tiltsim.scenario.expectation import ClaimName, ClaimTable, Expectation, Origin
 from tiltsim.scenario.gait import FixedGait, Gait
 from tiltsim.scenario.interaction import CableTable, ObjectTable, PayloadTable, ToolTable
+from tiltsim.scenario.linearizing_controllers import AttitudeAltitudeController
 from tiltsim.scenario.reference import Reference, SetpointReference
 from tiltsim.scenario.rotorcraft import MultirotorTable, RotorcraftTable, TiltServoTable
-from tiltsim.scenario.simulation_table import InitialTable, SimulationTable
+from tiltsim.scenario.simulation_table import (
+    AutopilotTable,
+    InitialTable,
+    SimulationTable,
+    WithAutopilot,
+)
 from tiltsim.scenario.surroundings import (
     Acceleration,
     AirTable,
@@ -24,7 +30,7 @@ from tiltsim.scenario.surroundings import (
     SensorTable,
     Torque,
 )
-from tiltsim.scenario.tiltrotor_controllers import AttitudeAltitudeController
+from tiltsim.scenario.table import Many, default
 from tiltsim.scenario.time_table import TimeTable
 from tiltsim.scenario.vehicle import ModelErrorTable, TiltCarTable, VehicleTable, VehicleUnion
 from tiltsim_controllers.mathematics.scalar import Values
@@ -37,77 +43,58 @@ DESCRIPTIVE: Final = ("title", "source", "without", "ours", "claim", "expect")
 class ScenarioTables(WithAutopilot):
     """One flight, fully specified; `tiltsim.scenario.scenario.Scenario` adds the checks."""
 
-    title: str = Field("", description="one line about the flight", examples=["My first flight"])
-    source: str = Field(
-        "", description="where the experiment is described", examples=["ch. 4, Sec. 7, Fig. 4"]
-    )
-    without: str = Field(
+    title: str = default("", "one line about the flight", "My first flight")
+    source: str = default("", "where the experiment is described", "ch. 4, Sec. 7, Fig. 4")
+    without: str = default(
         "",
-        description="address of the same flight without the feature that this one shows, #NAME in "
-        "the same file: tiltsim report compares the two",
-        examples=["#plain"],
+        "address of the same flight without the feature that this one shows, #NAME in the same "
+        "file: tiltsim report compares the two",
+        "#plain",
     )
-    vehicle: VehicleUnion = Field(
-        VehicleTable(), description="the vehicle that the controller assumes and that flies"
+    vehicle: VehicleUnion = default(
+        VehicleTable(), "the vehicle that the controller assumes and that flies"
     )
-    model_error: ModelErrorTable = Field(
-        ModelErrorTable(), description="what the controller has wrong about the vehicle"
+    model_error: ModelErrorTable = default(
+        ModelErrorTable(), "what the controller has wrong about the vehicle"
     )
-    simulation: SimulationTable = Field(
-        SimulationTable(), description="duration, time steps, plant and engine"
+    simulation: SimulationTable = default(
+        SimulationTable(), "duration, time steps, plant and engine"
     )
-    initial: InitialTable = Field(InitialTable(), description="the state at time zero")
-    controller: Controller = Field(
-        AttitudeAltitudeController(), description="the control law and its gains"
+    initial: InitialTable = default(InitialTable(), "the state at time zero")
+    controller: Controller = default(AttitudeAltitudeController(), "the control law and its gains")
+    autopilot: AutopilotTable | None = default(
+        None, "a firmware that flies in place of the controller; default: none"
     )
-    autopilot: AutopilotTable | None = Field(
-        None, description="a firmware that flies in place of the controller; default: none"
+    gait: Gait = default(
+        FixedGait(), "the plan of the tilt angles: prescribed functions of time, mostly periodic"
     )
-    gait: Gait = Field(
-        FixedGait(),
-        description="the plan of the tilt angles: prescribed functions of time, mostly periodic",
+    reference: Reference = default(SetpointReference(), "the motion to track")
+    ground: GroundTable | None = default(None, "ground to take off from and land on; default: none")
+    object: Many[ObjectTable] = default((), "things to touch, push, open and land on")
+    tool: ToolTable | None = default(None, "a tool that the vehicle carries; default: none")
+    payload: PayloadTable | None = default(None, "a load to carry; default: none")
+    cable: Many[CableTable] = default(
+        (), "cables between vehicles and free objects, which hold for a time"
     )
-    reference: Reference = Field(SetpointReference(), description="the motion to track")
-    ground: GroundTable | None = Field(
-        None, description="ground to take off from and land on; default: none"
+    companion: Many[CompanionTable] = default((), "further vehicles in the same world")
+    downwash: DownwashTable | None = default(
+        None, "the force of vehicles' wakes on vehicles below; default: none"
     )
-    object: Annotated[tuple[ObjectTable, ...], Field(strict=False)] = Field(
-        (), description="things to touch, push, open and land on"
+    disturbance: Many[Disturbance] = default(
+        (), "accelerations, forces and torques that the controller does not know of"
     )
-    tool: ToolTable | None = Field(
-        None, description="a tool that the vehicle carries; default: none"
+    air: AirTable = default(AirTable(), "wind, gusts, drag and ground effect")
+    sensors: SensorTable = default(SensorTable(), "errors of the measurements")
+    fault: Many[Fault] = default((), "rotors and servos that fail during the flight")
+    expect: Many[Expectation] = default((), "bounds on metrics, by which the flight is judged")
+    ours: Many[Origin] = default(
+        (), "what of this flight is not given in its source, for tiltsim report", ["gains"]
     )
-    payload: PayloadTable | None = Field(None, description="a load to carry; default: none")
-    cable: Annotated[tuple[CableTable, ...], Field(strict=False)] = Field(
-        (), description="cables between vehicles and free objects, which hold for a time"
-    )
-    companion: Annotated[tuple[CompanionTable, ...], Field(strict=False)] = Field(
-        (), description="further vehicles in the same world"
-    )
-    downwash: DownwashTable | None = Field(
-        None, description="the force of vehicles' wakes on vehicles below; default: none"
-    )
-    disturbance: Annotated[tuple[Disturbance, ...], Field(strict=False)] = Field(
-        (), description="accelerations, forces and torques that the controller does not know of"
-    )
-    air: AirTable = Field(AirTable(), description="wind, gusts, drag and ground effect")
-    sensors: SensorTable = Field(SensorTable(), description="errors of the measurements")
-    fault: Annotated[tuple[Fault, ...], Field(strict=False)] = Field(
-        (), description="rotors and servos that fail during the flight"
-    )
-    expect: Annotated[tuple[Expectation, ...], Field(strict=False)] = Field(
-        (), description="bounds on metrics, by which the flight is judged"
-    )
-    ours: Annotated[tuple[Origin, ...], Field(strict=False)] = Field(
-        (),
-        description="what of this flight is not given in its source, for tiltsim report",
-        examples=[["gains"]],
-    )
-    claim: dict[ClaimName, ClaimTable] = Field({}, description="statements of the source")
+    claim: dict[ClaimName, ClaimTable] = default({}, "statements of the source")
 
     _address: str = PrivateAttr("")
     _own: dict[str, Any] = PrivateAttr({})  # parts given in Python, by name
-    _trusted: bool = PrivateAttr(False)  # see `tiltsim.scenario.trust`
+    _trusted: bool = PrivateAttr(False)  # see `tiltsim.scenario.own_code`
 
     @property
     def address(self) -> str:
@@ -134,6 +121,20 @@ class ScenarioTables(WithAutopilot):
     def has_objects(self) -> bool:
         """Whether the model has more in it than the vehicle and the ground."""
         return bool(self.object) or self.tool is not None or self.payload is not None
+
+    def require_alone(self, analysis: str, *, loaded: bool = False) -> None:
+        """Refuse others, and unless ``loaded`` tool and load, for an analysis.
+
+        Raises:
+            InputError: It begins with the name of the analysis.
+        """
+        others: dict[str, Any] = {"[[object]]": self.object, "[[companion]]": self.companion}
+        if not loaded:
+            others |= {"[tool]": self.tool, "[payload]": self.payload}
+        found = ", ".join(name for name, tables in others.items() if tables)
+        if found:
+            where = self.address or "scenario"
+            raise InputError(f"{where}: {analysis} takes a vehicle alone; remove {found}")
 
     @property
     def time_tables(self) -> dict[str, TimeTable]:

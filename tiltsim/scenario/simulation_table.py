@@ -1,17 +1,25 @@
-"""The tables ``[simulation]`` and ``[initial]``."""
+"""The tables ``[simulation]``, ``[initial]`` and ``[autopilot]``."""
 
-from typing import Annotated, Final, Literal
+import re
+from collections.abc import Mapping
+from itertools import pairwise
+from typing import Annotated, Any, Final, Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
+from tiltsim.scenario.messages import InvalidValueError
 from tiltsim.scenario.table import (
+    ZEROS,
     Angles3,
+    Many,
     NonNegative,
     Positive,
     PositiveEach,
     Table,
     Vector3,
+    default,
     example,
+    required,
 )
 
 MAX_STEPS: Final = 100_000_000
@@ -19,6 +27,8 @@ MAX_STEPS: Final = 100_000_000
 
 DEFAULT_ROTOR_SPEED: Final = 300.0
 """rad/s, of the thesis's flights at time zero."""
+
+PlantName = Literal["mujoco", "thesis", "rigid_body"]
 
 INTEGRATORS: Final = {
     "mujoco": ("RK4", "implicitfast", "implicit", "Euler"),
@@ -36,54 +46,49 @@ class SimulationTable(Table):
     model_config = example(duration=20.0, plant="thesis")
     table_name = "simulation"
 
-    duration: Positive = Field(40.0, description="length of the flight [s]")
-    timestep: Annotated[float, Field(ge=1e-6, le=0.1)] = Field(
-        0.001, description="time step of the physics [s]"
+    duration: Positive = default(40.0, "length of the flight [s]")
+    timestep: Annotated[float, Field(ge=1e-6, le=0.1)] = default(
+        0.001, "time step of the physics [s]"
     )
-    control_timestep: NonNegative = Field(
+    control_timestep: NonNegative = default(
         0.0,
-        description="time between evaluations of the control law, a multiple of timestep; 0 "
-        "evaluates it at every stage of the integrator, as if it were continuous [s]",
-        examples=[0.004],
+        "time between evaluations of the control law, a multiple of timestep; 0 evaluates it at "
+        "every stage of the integrator, as if it were continuous [s]",
+        0.004,
     )
-    control_latency: NonNegative = Field(
-        0.0,
-        description="time from a measurement to its command, a multiple of control_timestep [s]",
-        examples=[0.008],
+    control_latency: NonNegative = default(
+        0.0, "time from a measurement to its command, a multiple of control_timestep [s]", 0.008
     )
-    record_timestep: Positive | None = Field(
+    record_timestep: Positive | None = default(
         None,
-        description="time between recorded samples; default: the multiple of timestep closest to "
-        "0.01 [s]",
-        examples=[0.02],
+        "time between recorded samples; default: the multiple of timestep closest to 0.01 [s]",
+        0.02,
     )
-    engine: Literal["auto", "python", "native", "jax"] = Field(
+    engine: Literal["auto", "python", "native", "jax"] = default(
         "auto",
-        description="evaluates the control law as Python or as compiled code, with bit-identical "
-        "flights; auto compiles for long flights; jax flies many on arrays, on the plants of "
-        "equations, thesis and rigid_body",
+        "evaluates the control law as Python or as compiled code, with bit-identical flights; "
+        "auto compiles for long flights; jax flies many on arrays, on the plants of equations, "
+        "thesis and rigid_body",
     )
-    precision: Literal["float64", "float32"] = Field(
-        "float64", description="numbers of the jax engine; the others always have float64"
+    precision: Literal["float64", "float32"] = default(
+        "float64", "numbers of the jax engine; the others always have float64"
     )
-    batch_functions: Literal["exact", "quick"] = Field(
+    batch_functions: Literal["exact", "quick"] = default(
         "exact",
-        description="sines and their inverses where native flights on equations fly side by side: "
-        "with the bits of a flight alone, or faster, with flights that differ by rounding",
+        "sines and their inverses where native flights on equations fly side by side: with the "
+        "bits of a flight alone, or faster, with flights that differ by rounding",
     )
-    plant: Literal["mujoco", "thesis", "rigid_body"] = Field(
+    plant: PlantName = default(
         "mujoco",
-        description="what is simulated: the MuJoCo model; the thesis's equations of motion; or the "
-        "equations of one rigid body with gyroscopic torque, tilt servos and massless pods",
+        "what is simulated: the MuJoCo model; the thesis's equations of motion; or the equations "
+        "of one rigid body with gyroscopic torque, tilt servos and massless pods",
     )
-    integrator: Literal["RK4", "implicitfast", "implicit", "Euler", "ode3"] = Field(
+    integrator: Literal["RK4", "implicitfast", "implicit", "Euler", "ode3"] = default(
         "RK4",
-        description="on the mujoco plant RK4, implicitfast, implicit or Euler; on rigid_body RK4 "
-        "or ode3, a method of third order; the thesis plant always uses ode3",
+        "on the mujoco plant RK4, implicitfast, implicit or Euler; on rigid_body RK4 or ode3, a "
+        "method of third order; the thesis plant always uses ode3",
     )
-    seed: Annotated[int, Field(ge=0)] = Field(
-        0, description="seed of sensor noise and turbulence", examples=[1]
-    )
+    seed: Annotated[int, Field(ge=0)] = default(0, "seed of sensor noise and turbulence", 1)
 
     @property
     def solver(self) -> str:
@@ -152,31 +157,130 @@ class InitialTable(Table):
 
     model_config = example(position=[0.0, 0.0, 1.0])
 
-    position: Vector3 = Field(
-        (0.0, 0.0, 0.0),
-        description="of the center of mass in the world, z up [m]",
-        examples=[[0.0, 0.0, 1.0]],
+    position: Vector3 = default(
+        ZEROS, "of the center of mass in the world, z up [m]", [0.0, 0.0, 1.0]
     )
-    velocity: Vector3 = Field(
-        (0.0, 0.0, 0.0), description="in the world [m/s]", examples=[[1.0, 0.0, 0.0]]
+    velocity: Vector3 = default(ZEROS, "in the world [m/s]", [1.0, 0.0, 0.0])
+    attitude: Angles3 = default(
+        ZEROS, "roll, pitch and yaw: turns about x, y and z, yaw first [rad]", [0.1, 0.0, 0.0]
     )
-    attitude: Angles3 = Field(
-        (0.0, 0.0, 0.0),
-        description="roll, pitch and yaw: turns about x, y and z, yaw first [rad]",
-        examples=[[0.1, 0.0, 0.0]],
-    )
-    angular_velocity: Vector3 = Field(
-        (0.0, 0.0, 0.0), description="p, q, r about the body axes [rad/s]", examples=[[0, 0, 0.5]]
-    )
-    rotor_speed: Positive | PositiveEach | None = Field(
+    angular_velocity: Vector3 = default(ZEROS, "p, q, r about the body axes [rad/s]", [0, 0, 0.5])
+    rotor_speed: Positive | PositiveEach | None = default(
         None,
-        description="absolute value, one for all rotors or one per rotor; rotors 1 and 3 of "
-        "tiltrotor and quadrotor turn clockwise seen from above, 2 and 4 counterclockwise; "
-        "default: 300, and of a multirotor those of hover at its initial tilts [rad/s]",
-        examples=[300.0],
+        "absolute value, one for all rotors or one per rotor; rotors 1 and 3 of tiltrotor and "
+        "quadrotor turn clockwise seen from above, 2 and 4 counterclockwise; default: 300, and of "
+        "a multirotor those of hover at its initial tilts [rad/s]",
+        300.0,
     )
 
     def rotor_speeds(self, rotors: int) -> tuple[float, ...]:
         """Absolute rotor speeds (rad/s), one for each of a number of rotors; by default 300."""
         speed = DEFAULT_ROTOR_SPEED if self.rotor_speed is None else self.rotor_speed
         return speed if isinstance(speed, tuple) else (speed,) * rotors
+
+
+CONTROLLER: Final = {"law": "python", "function": "autopilot"}
+"""The controller of a scenario with an autopilot."""
+
+CHANNELS: Final = 32
+"""Most outputs of a firmware."""
+
+_OUTPUT: Final = re.compile(r"(rotor|along|across)_([1-9]\d?)")
+
+Row = Annotated[Many[float], Field(min_length=2, max_length=17)]
+
+
+class AutopilotTable(Table):
+    """A firmware on this machine that gets sensor readings and returns outputs, in lockstep."""
+
+    table_name = "autopilot"
+
+    type: Literal["ardupilot", "px4"] = required(
+        "ArduPilot's software in the loop, by its JSON interface over UDP; PX4's, by MAVLink over "
+        "TCP"
+    )
+    port: Annotated[int, Field(ge=1, le=65535)] = default(
+        9002, "port of this machine, on loopback, to which the firmware sends; of PX4: 4560"
+    )
+    rate: Annotated[float, Field(ge=50.0, le=4000.0)] = default(
+        800.0,
+        "exchanges per simulated second; must be at least 1.8 times the rate of the firmware's "
+        "main loop; of PX4: 250 [Hz]",
+    )
+    outputs: Annotated[Many[str], Field(max_length=CHANNELS)] = default(
+        (),
+        'what each output drives: "rotor_2" its speed, from 1000 to 2000 us, about 1500 us if the '
+        'rotor reverses; "along_2" and "across_2" the parts of the thrust of a tilting rotor '
+        'along its upright axis and across; "" nothing; default: the rotors in order',
+        ["rotor_3", "rotor_2", "rotor_1", "rotor_4"],
+    )
+    wait: Positive = default(
+        20.0, "longest time for the firmware to answer, before the link is lost [s]"
+    )
+    hold: Positive = default(
+        90.0,
+        "longest simulated time that the vehicle is held at rest until its thrust exceeds its "
+        "weight, in which a firmware starts its estimator [s]",
+    )
+    rc: Annotated[Many[Row], Field(max_length=10_000)] = default(
+        (),
+        "sticks and switches: rows of a time since the link began and the channels from that time "
+        "on [s, us]",
+        [[0.0, 1500, 1500, 1000, 1500], [40.0, 1500, 1500, 1700, 1500]],
+    )
+
+    def _check_values(self) -> None:
+        used = [name for name in self.outputs if name]
+        for name in used:
+            if not _OUTPUT.fullmatch(name):
+                raise InvalidValueError(
+                    "autopilot.outputs", name, 'write "rotor_1", "along_1", "across_1" or ""'
+                )
+            if used.count(name) > 1:
+                raise InvalidValueError("autopilot.outputs", name, "twice")
+        times = [row[0] for row in self.rc]
+        if any(later <= time for time, later in pairwise(times)):
+            raise self.mistake("rc", "times must increase from row to row")
+
+    @property
+    def control_timestep(self) -> float:
+        """Simulated time between exchanges, s."""
+        return 1.0 / self.rate
+
+
+def with_controller(document: Mapping[str, Any]) -> Mapping[str, Any]:
+    """A scenario's document, with the controller and the control period of its autopilot.
+
+    Raises `InvalidValueError` if it has another controller as well.
+    """
+    table = document.get("autopilot")
+    if not isinstance(table, Mapping):
+        return document
+    controller = document.get("controller", CONTROLLER)
+    if controller != CONTROLLER:
+        raise InvalidValueError(
+            "controller", controller, "the autopilot is the controller; remove [controller]"
+        )
+    if table.get("type") == "px4":
+        table = {"port": 4560, "rate": 250.0, **table}
+    changed = {**document, "controller": CONTROLLER, "autopilot": table}
+    simulation, rate = document.get("simulation", {}), table.get("rate", 800.0)
+    if isinstance(simulation, Mapping) and isinstance(rate, int | float) and rate > 0.0:
+        step = 1.0 / rate
+        if simulation.get("control_timestep", step) != step:
+            raise InvalidValueError(
+                "simulation.control_timestep",
+                simulation["control_timestep"],
+                f"the autopilot's rate makes it {step:g}; remove it",
+            )
+        changed["simulation"] = {"timestep": step, **simulation, "control_timestep": step}
+    return changed
+
+
+class WithAutopilot(Table):
+    """A document in which an autopilot may take the controller's place."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _with_controller(cls, value: Any) -> Any:
+        return with_controller(value) if isinstance(value, Mapping) else value

@@ -6,34 +6,33 @@ from pydantic import Field
 
 from tiltsim.models.parts import Ground
 from tiltsim.models.vehicle_parts import MAX_ROTORS
-from tiltsim.scenario.instruments import (
-    INSTRUMENTS,
-    BarometerTable,
-    GpsTable,
-    ImuTable,
-    InstrumentTable,
-    MagnetometerTable,
-    MocapTable,
-    RotorSpeedTable,
-)
+from tiltsim.scenario.instruments import InstrumentTables
 from tiltsim.scenario.messages import InvalidValueError
-from tiltsim.scenario.table import Angle, Coordinate, NonNegative, Positive, Table, Vector3, example
+from tiltsim.scenario.table import (
+    ZEROS,
+    Angle,
+    Coordinate,
+    NonNegative,
+    Positive,
+    Table,
+    Vector3,
+    default,
+    example,
+    required,
+)
 
 
-class GroundTable(Table):
+class GroundTable(Ground, Table):
     """Ground to take off from and land on; without this table there are no contacts."""
 
     model_config = example(height=0.0)
-
-    height: float = Field(Ground.height, description="z of the surface in the world [m]")
-    friction: Positive = Field(Ground.friction, description="coefficient of sliding friction [-]")
 
 
 class Acceleration(Table):
     """A constant acceleration that the controller does not know of."""
 
-    type: Literal["acceleration"] = Field(description="acts on every mass, as gravity does")
-    value: Vector3 = Field(description="in the world [m/s^2]", examples=[[1.0, 0.0, 0.0]])
+    type: Literal["acceleration"] = required("acts on every mass, as gravity does")
+    value: Vector3 = required("in the world [m/s^2]", [1.0, 0.0, 0.0])
 
 
 class Load(Table):
@@ -41,11 +40,9 @@ class Load(Table):
 
     table_name = "disturbance"
 
-    frame: Literal["world", "body"] = Field("world", description="axes of value")
-    start: NonNegative = Field(0.0, description="when it begins [s]", examples=[5.0])
-    end: Positive | None = Field(
-        None, description="when it ends; default: it lasts [s]", examples=[5.2]
-    )
+    frame: Literal["world", "body"] = default("world", "axes of value")
+    start: NonNegative = default(0.0, "when it begins [s]", 5.0)
+    end: Positive | None = default(None, "when it ends; default: it lasts [s]", 5.2)
 
     def _check_values(self) -> None:
         if self.end is not None and self.end <= self.start:
@@ -55,27 +52,23 @@ class Load(Table):
 class Force(Load):
     """A force at a point of the vehicle: a push, a pull on a cable, a load hung on an arm."""
 
-    type: Literal["force"] = Field(description="acts at a point of the body")
-    value: Vector3 = Field(description="the force [N]", examples=[[2.0, 0.0, 0.0]])
-    point: Vector3 = Field(
-        (0.0, 0.0, 0.0),
-        description="from the center of mass, body axes [m]",
-        examples=[[0.0, 0.1, 0.05]],
-    )
+    type: Literal["force"] = required("acts at a point of the body")
+    value: Vector3 = required("the force [N]", [2.0, 0.0, 0.0])
+    point: Vector3 = default(ZEROS, "from the center of mass, body axes [m]", [0.0, 0.1, 0.05])
 
 
 class Torque(Load):
     """A torque on the vehicle."""
 
-    type: Literal["torque"] = Field(description="acts on the body")
-    value: Vector3 = Field(description="the torque [N m]", examples=[[0.0, 0.02, 0.0]])
+    type: Literal["torque"] = required("acts on the body")
+    value: Vector3 = required("the torque [N m]", [0.0, 0.02, 0.0])
 
 
 Disturbance = Annotated[Acceleration | Force | Torque, Field(discriminator="type")]
 """A ``[[disturbance]]`` table, discriminated by its type."""
 
 
-class SensorTable(Table):
+class SensorTable(InstrumentTables):
     """Measurements of the vehicle's motion that the controller receives; exact by default.
 
     Each measurement has its own zero-mean normal error of the given standard deviation on each
@@ -85,55 +78,27 @@ class SensorTable(Table):
 
     model_config = example(position_noise=0.01, attitude_noise=0.01)
 
-    position_noise: NonNegative = Field(
-        0.0, description="standard deviation along each axis [m]", examples=[0.01]
+    position_noise: NonNegative = default(0.0, "standard deviation along each axis [m]", 0.01)
+    position_bias: Vector3 = default(ZEROS, "constant error, world axes [m]", [0.1, 0.0, 0.0])
+    velocity_noise: NonNegative = default(0.0, "standard deviation along each axis [m/s]", 0.02)
+    velocity_bias: Vector3 = default(ZEROS, "constant error, world axes [m/s]", [0.05, 0, 0])
+    attitude_noise: NonNegative = default(
+        0.0, "standard deviation about each body axis [rad]", 0.01
     )
-    position_bias: Vector3 = Field(
-        (0.0, 0.0, 0.0), description="constant error, world axes [m]", examples=[[0.1, 0.0, 0.0]]
+    attitude_bias: Vector3 = default(ZEROS, "constant turn about the body axes [rad]", [0.02, 0, 0])
+    body_rates_noise: NonNegative = default(
+        0.0, "standard deviation about each body axis [rad/s]", 0.05
     )
-    velocity_noise: NonNegative = Field(
-        0.0, description="standard deviation along each axis [m/s]", examples=[0.02]
+    body_rates_bias: Vector3 = default(ZEROS, "constant error, body axes [rad/s]", [0.01, 0, 0])
+    sample_time: Positive | None = default(
+        None, "time between measurements; default: control_timestep, 0.01 if continuous [s]", 0.02
     )
-    velocity_bias: Vector3 = Field(
-        (0.0, 0.0, 0.0), description="constant error, world axes [m/s]", examples=[[0.05, 0, 0]]
-    )
-    attitude_noise: NonNegative = Field(
-        0.0, description="standard deviation about each body axis [rad]", examples=[0.01]
-    )
-    attitude_bias: Vector3 = Field(
-        (0.0, 0.0, 0.0),
-        description="constant turn about the body axes [rad]",
-        examples=[[0.02, 0, 0]],
-    )
-    body_rates_noise: NonNegative = Field(
-        0.0, description="standard deviation about each body axis [rad/s]", examples=[0.05]
-    )
-    body_rates_bias: Vector3 = Field(
-        (0.0, 0.0, 0.0), description="constant error, body axes [rad/s]", examples=[[0.01, 0, 0]]
-    )
-    sample_time: Positive | None = Field(
-        None,
-        description="time between measurements; default: control_timestep, 0.01 if continuous [s]",
-        examples=[0.02],
-    )
-    imu: ImuTable | None = Field(None, description="accelerometer and gyro")
-    mocap: MocapTable | None = Field(None, description="motion capture")
-    gps: GpsTable | None = Field(None, description="position and velocity from satellites")
-    barometer: BarometerTable | None = Field(None, description="altitude from air pressure")
-    magnetometer: MagnetometerTable | None = Field(None, description="direction of the field")
-    rotor_speed: RotorSpeedTable | None = Field(None, description="speeds of the rotors")
 
     @property
     def have_errors(self) -> bool:
         """Whether any measurement has an error."""
-        ideal = dict.fromkeys(("sample_time", *INSTRUMENTS))
+        ideal = dict.fromkeys(("sample_time", *InstrumentTables.model_fields))
         return self.model_copy(update=ideal) != SensorTable()
-
-    @property
-    def instruments(self) -> dict[str, InstrumentTable]:
-        """The instruments on the vehicle, by name."""
-        found = {name: getattr(self, name) for name in INSTRUMENTS}
-        return {name: table for name, table in found.items() if table is not None}
 
 
 Rotor = Annotated[
@@ -151,7 +116,7 @@ FaultTime = Annotated[NonNegative, Field(description="when it fails [s]", exampl
 class RotorLoss(Table):
     """A rotor that stops producing thrust and torque while its motor keeps turning."""
 
-    type: Literal["rotor_loss"] = Field(description="a rotor stops")
+    type: Literal["rotor_loss"] = required("a rotor stops")
     rotor: Rotor
     time: FaultTime
 
@@ -159,24 +124,22 @@ class RotorLoss(Table):
 class PartialThrust(Table):
     """A rotor that produces only a fraction of its thrust and drag torque."""
 
-    type: Literal["partial_thrust"] = Field(description="a rotor produces a fraction of its thrust")
+    type: Literal["partial_thrust"] = required("a rotor produces a fraction of its thrust")
     rotor: Rotor
     time: FaultTime
-    factor: Annotated[float, Field(ge=0.0, le=2.0)] = Field(
-        description="remaining fraction, 1 for all [-]", examples=[0.7]
+    factor: Annotated[float, Field(ge=0.0, le=2.0)] = required(
+        "remaining fraction, 1 for all [-]", 0.7
     )
 
 
 class StuckServo(Table):
     """A tilt servo that holds one angle regardless of its command."""
 
-    type: Literal["stuck_servo"] = Field(description="a servo holds one angle")
+    type: Literal["stuck_servo"] = required("a servo holds one angle")
     rotor: Rotor
     time: FaultTime
-    angle: Angle | None = Field(
-        None,
-        description="tilt angle that it holds; default: the gait's at that time [rad]",
-        examples=[0.3],
+    angle: Angle | None = default(
+        None, "tilt angle that it holds; default: the gait's at that time [rad]", 0.3
     )
 
 
@@ -191,14 +154,12 @@ class DragTable(Table):
 
     model_config = example(linear=[0.1, 0.1, 0.2])
 
-    linear: NonNegative3 = Field(
-        (0.0, 0.0, 0.0), description="force per airspeed [N s/m]", examples=[[0.1, 0.1, 0.2]]
-    )
-    area: NonNegative3 = Field(
-        (0.0, 0.0, 0.0),
-        description="drag coefficient times the area projected along the axis; the force grows "
-        "with the square of the airspeed [m^2]",
-        examples=[[0.01, 0.01, 0.02]],
+    linear: NonNegative3 = default(ZEROS, "force per airspeed [N s/m]", [0.1, 0.1, 0.2])
+    area: NonNegative3 = default(
+        ZEROS,
+        "drag coefficient times the area projected along the axis; the force grows with the "
+        "square of the airspeed [m^2]",
+        [0.01, 0.01, 0.02],
     )
 
 
@@ -207,16 +168,10 @@ class GustTable(Table):
 
     table_name = "air.gust"
 
-    velocity: Vector3 = Field(
-        description="of the air at the peak, world axes [m/s]", examples=[[4.0, 0.0, 0.0]]
-    )
-    start: NonNegative = Field(0.0, description="when it begins [s]", examples=[10.0])
-    rise: Positive = Field(
-        description="time to reach the peak, and to decay from it [s]", examples=[2.0]
-    )
-    duration: NonNegative = Field(
-        0.0, description="from start to end; 0 for a gust that lasts [s]", examples=[8.0]
-    )
+    velocity: Vector3 = required("of the air at the peak, world axes [m/s]", [4.0, 0.0, 0.0])
+    start: NonNegative = default(0.0, "when it begins [s]", 10.0)
+    rise: Positive = required("time to reach the peak, and to decay from it [s]", 2.0)
+    duration: NonNegative = default(0.0, "from start to end; 0 for a gust that lasts [s]", 8.0)
 
     def _check_values(self) -> None:
         if 0.0 < self.duration < 2.0 * self.rise:
@@ -226,21 +181,20 @@ class GustTable(Table):
 class TurbulenceTable(Table):
     """Dryden turbulence, low-altitude model (MIL-F-8785C), drawn from ``simulation.seed``."""
 
-    wind_at_6m: Positive = Field(
-        description="mean wind 20 ft above the ground, which sets the intensity [m/s]",
-        examples=[5.0],
+    wind_at_6m: Positive = required(
+        "mean wind 20 ft above the ground, which sets the intensity [m/s]", 5.0
     )
-    height: Annotated[float, Field(ge=3.048, le=304.8)] = Field(
-        10.0, description="above the ground, for intensity and scale [m]"
+    height: Annotated[float, Field(ge=3.048, le=304.8)] = default(
+        10.0, "above the ground, for intensity and scale [m]"
     )
-    sample_time: Positive = Field(0.01, description="time for which a noise sample is held [s]")
+    sample_time: Positive = default(0.01, "time for which a noise sample is held [s]")
 
 
 class GroundEffectTable(Table):
     """Ground effect on each rotor (Cheeseman and Bennett)."""
 
-    rotor_radius: Positive = Field(0.1, description="radius of each rotor [m]")
-    height: Coordinate = Field(description="z of the ground in the world [m]", examples=[0.0])
+    rotor_radius: Positive = default(0.1, "radius of each rotor [m]")
+    height: Coordinate = required("z of the ground in the world [m]", 0.0)
 
 
 class AirTable(Table):
@@ -248,17 +202,15 @@ class AirTable(Table):
 
     model_config = example(wind=[5.0, 0.0, 0.0], drag={"linear": [0.1, 0.1, 0.2]})
 
-    density: Positive = Field(1.225, description="of the air [kg/m^3]")
-    wind: Vector3 = Field(
-        (0.0, 0.0, 0.0),
-        description="velocity of the air in the world; acts through drag [m/s]",
-        examples=[[5.0, 0.0, 0.0]],
+    density: Positive = default(1.225, "of the air [kg/m^3]")
+    wind: Vector3 = default(
+        ZEROS, "velocity of the air in the world; acts through drag [m/s]", [5.0, 0.0, 0.0]
     )
-    drag: DragTable = Field(DragTable(), description="through which wind and gusts act")
-    gust: GustTable | None = Field(None, description="one gust on top of the wind; default: none")
-    turbulence: TurbulenceTable | None = Field(None, description="random gusts; default: none")
-    ground_effect: GroundEffectTable | None = Field(
-        None, description="more thrust near the ground; default: none"
+    drag: DragTable = default(DragTable(), "through which wind and gusts act")
+    gust: GustTable | None = default(None, "one gust on top of the wind; default: none")
+    turbulence: TurbulenceTable | None = default(None, "random gusts; default: none")
+    ground_effect: GroundEffectTable | None = default(
+        None, "more thrust near the ground; default: none"
     )
 
     def _check_values(self) -> None:

@@ -10,8 +10,8 @@ import numpy as np
 from pydantic import Field, PrivateAttr
 
 from tiltsim.errors import InputError
-from tiltsim.scenario.limits import MAX_FILE_SIZE, MAX_ROWS, read_text
-from tiltsim.scenario.table import Table
+from tiltsim.scenario.library import MAX_FILE_SIZE, MAX_ROWS, read_text
+from tiltsim.scenario.table import Table, default
 from tiltsim.system.files import exists, is_file
 from tiltsim.system.numbers import real_array
 from tiltsim.system.parquet import open_parquet
@@ -92,11 +92,11 @@ class TimeTable(Table):
     largest: ClassVar[float]  # magnitude of a value
 
     file: str | None = Field(None)
-    hold: bool = Field(
+    hold: bool = default(
         True,
-        description="after the last row, hold it, at rest: the velocity jumps there unless the "
-        "table ends at rest; false: the flight must not be longer than the table, as where a "
-        "function of time in Python was sampled",
+        "after the last row, hold it, at rest: the velocity jumps there unless the table ends at "
+        "rest; false: the flight must not be longer than the table, as where a function of time "
+        "in Python was sampled",
     )
     _rows: Rows = PrivateAttr(())
 

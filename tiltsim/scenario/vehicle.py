@@ -16,7 +16,7 @@ from tiltsim.scenario.rotorcraft import (
     RotorcraftTable,
     ServoTable,
 )
-from tiltsim.scenario.table import NotTiny, Positive, Table, example
+from tiltsim.scenario.table import NotTiny, Positive, Table, default, example, required
 from tiltsim_controllers.mathematics.scalar import Values
 from tiltsim_controllers.tilt_car.vehicle import THESIS_CAR, TiltCar
 from tiltsim_controllers.vehicle.parameters import PRESETS, SPIN, Vehicle
@@ -25,18 +25,10 @@ MOMENTS: Final = ("inertia_xx", "inertia_yy", "inertia_zz")
 """The principal moments among the fields of `Vehicle`."""
 
 
-class PodTable(Table):
+class PodTable(Pod, Table):
     """Mass properties of one rotor pod; nearly massless by default, as in the thesis."""
 
     model_config = example(mass=0.02, inertia=1e-5)
-
-    # MuJoCo refuses moving bodies below a tenth of these bounds.
-    mass: Annotated[float, Field(ge=1e-14)] = Field(
-        Pod.mass, description="of one pod [kg]", examples=[0.02]
-    )
-    inertia: Annotated[float, Field(ge=1e-14)] = Field(
-        Pod.inertia, description="about each axis of the pod [kg m^2]", examples=[1e-5]
-    )
 
 
 MIN_GYRATION: Final = 1e-3
@@ -60,51 +52,41 @@ class VehicleTable(RotorcraftTable):
 
     model_config = example(model="tiltrotor", mass=0.5)
 
-    model: Literal["tiltrotor", "quadrotor"] = Field(
-        "tiltrotor",
-        description="tiltrotor: each of the four rotors tilts about its arm; quadrotor: none does",
+    model: Literal["tiltrotor", "quadrotor"] = default(
+        "tiltrotor", "tiltrotor: each of the four rotors tilts about its arm; quadrotor: none does"
     )
-    preset: Literal["ar_drone_2", "ar_drone_2_unrounded", "luukkonen"] = Field(
+    preset: Literal["ar_drone_2", "ar_drone_2_unrounded", "luukkonen"] = default(
         "ar_drone_2",
-        description="parameters that are not given: ch. 3's vehicle, ch. 2's (the same with its "
-        "inertia unrounded), or ch. 12's",
+        "parameters that are not given: ch. 3's vehicle, ch. 2's (the same with its inertia "
+        "unrounded), or ch. 12's",
     )
-    mjcf: str | None = Field(
+    mjcf: str | None = default(
         None,
-        description="an MJCF file, relative to the scenario's folder, in place of the shipped "
-        "one; parameters that are not given here are the file's instead of the preset's",
-        examples=["my_tiltrotor.xml"],
+        "an MJCF file, relative to the scenario's folder, in place of the shipped one; parameters "
+        "that are not given here are the file's instead of the preset's",
+        "my_tiltrotor.xml",
     )
-    mass: Positive | None = Field(
-        None, description="pods included; default: the preset's [kg]", examples=[0.5]
-    )
-    inertia: Annotated[tuple[Positive, Positive, Positive], Field(strict=False)] | None = Field(
+    mass: Positive | None = default(None, "pods included; default: the preset's [kg]", 0.5)
+    inertia: Annotated[tuple[Positive, Positive, Positive], Field(strict=False)] | None = default(
         None,
-        description="principal moments about the center of mass, along the body axes, pods "
-        "included; default: the preset's [kg m^2]",
-        examples=[[2e-3, 3e-3, 5e-3]],
+        "principal moments about the center of mass, along the body axes, pods included; default: "
+        "the preset's [kg m^2]",
+        [2e-3, 3e-3, 5e-3],
     )
-    arm_length: NotTiny | None = Field(
+    arm_length: NotTiny | None = default(
+        None, "from the center of mass to a rotor; default: the preset's [m]", 0.2
+    )
+    thrust_coefficient: NotTiny | None = default(
+        None, "K_f, thrust per square of the rotor speed; default: the preset's [N s^2/rad^2]", 8e-6
+    )
+    drag_coefficient: NotTiny | None = default(
         None,
-        description="from the center of mass to a rotor; default: the preset's [m]",
-        examples=[0.2],
+        "K_m, torque about the rotor's axis per square of its speed; default: the preset's [N m "
+        "s^2/rad^2]",
+        2.4e-7,
     )
-    thrust_coefficient: NotTiny | None = Field(
-        None,
-        description="K_f, thrust per square of the rotor speed; default: the preset's "
-        "[N s^2/rad^2]",
-        examples=[8e-6],
-    )
-    drag_coefficient: NotTiny | None = Field(
-        None,
-        description="K_m, torque about the rotor's axis per square of its speed; default: the "
-        "preset's [N m s^2/rad^2]",
-        examples=[2.4e-7],
-    )
-    gravity: Positive | None = Field(
-        None, description="default: the preset's [m/s^2]", examples=[9.81]
-    )
-    pod: PodTable = Field(PodTable(), description="mass properties of the tilting part of an arm")
+    gravity: Positive | None = default(None, "default: the preset's [m/s^2]", 9.81)
+    pod: PodTable = default(PodTable(), "mass properties of the tilting part of an arm")
 
     def resolve(self) -> Vehicle:
         """The physical parameters: the preset's or the file's, overridden by the keys given."""
@@ -174,27 +156,25 @@ class TiltCarTable(AnyVehicleTable):
 
     is_planar = True
 
-    model: Literal["tilt_car"] = Field(
-        description="two discs on one axis that slide on a plane: the top one carries two rotors "
-        "and turns against the bottom one"
+    model: Literal["tilt_car"] = required(
+        "two discs on one axis that slide on a plane: the top one carries two rotors and turns "
+        "against the bottom one"
     )
-    mass: Positive = Field(THESIS_CAR.mass, description="the thesis does not give it [kg]")
-    top_inertia: Positive = Field(
-        THESIS_CAR.top_inertia, description="I_T, of the top disc about the axis [kg m^2]"
+    mass: Positive = default(THESIS_CAR.mass, "the thesis does not give it [kg]")
+    top_inertia: Positive = default(
+        THESIS_CAR.top_inertia, "I_T, of the top disc about the axis [kg m^2]"
     )
-    bottom_inertia: Positive = Field(
+    bottom_inertia: Positive = default(
         THESIS_CAR.bottom_inertia,
-        description="of the bottom disc alone about the axis; I_B is that of both discs [kg m^2]",
+        "of the bottom disc alone about the axis; I_B is that of both discs [kg m^2]",
     )
-    half_angle: Annotated[float, Field(gt=0.0, lt=pi / 2)] = Field(
-        THESIS_CAR.half_angle,
-        description="theta, between the mean thrust direction and either thrust [rad]",
+    half_angle: Annotated[float, Field(gt=0.0, lt=pi / 2)] = default(
+        THESIS_CAR.half_angle, "theta, between the mean thrust direction and either thrust [rad]"
     )
-    thrust_coefficient: Positive = Field(
-        THESIS_CAR.thrust_coefficient,
-        description="K_F, thrust per square of the rotor speed [N s^2/rad^2]",
+    thrust_coefficient: Positive = default(
+        THESIS_CAR.thrust_coefficient, "K_F, thrust per square of the rotor speed [N s^2/rad^2]"
     )
-    tilt_servo: ServoTable = Field(ServoTable(), description="the servo that turns the top disc")
+    tilt_servo: ServoTable = default(ServoTable(), "the servo that turns the top disc")
 
     @property
     def rotor_count(self) -> int:
@@ -234,23 +214,15 @@ class ModelErrorTable(Table):
 
     model_config = example(mass=1.1)
 
-    mass: ScaleFactor = Field(
-        1.0, description="factor on the mass; 1.1 is 10 % heavier than assumed [-]", examples=[1.1]
+    mass: ScaleFactor = default(
+        1.0, "factor on the mass; 1.1 is 10 % heavier than assumed [-]", 1.1
     )
-    inertia: Annotated[tuple[ScaleFactor, ScaleFactor, ScaleFactor], Field(strict=False)] = Field(
-        (1.0, 1.0, 1.0),
-        description="one factor per moment about a body axis [-]",
-        examples=[[1.1, 1.1, 1.0]],
+    inertia: Annotated[tuple[ScaleFactor, ScaleFactor, ScaleFactor], Field(strict=False)] = default(
+        (1.0, 1.0, 1.0), "one factor per moment about a body axis [-]", [1.1, 1.1, 1.0]
     )
-    arm_length: ScaleFactor = Field(
-        1.0, description="factor on the arms' length [-]", examples=[1.02]
-    )
-    thrust_coefficient: ScaleFactor = Field(
-        1.0, description="factor on every rotor's thrust [-]", examples=[0.9]
-    )
-    drag_coefficient: ScaleFactor = Field(
-        1.0, description="factor on every rotor's torque [-]", examples=[0.9]
-    )
+    arm_length: ScaleFactor = default(1.0, "factor on the arms' length [-]", 1.02)
+    thrust_coefficient: ScaleFactor = default(1.0, "factor on every rotor's thrust [-]", 0.9)
+    drag_coefficient: ScaleFactor = default(1.0, "factor on every rotor's torque [-]", 0.9)
 
     def apply_to_rotors(self, vehicle: Multirotor) -> Multirotor:
         """The simulated multirotor; products of inertia get the mean factor of their axes."""

@@ -14,8 +14,7 @@ import numpy as np
 
 from tiltsim.arrays.flying import Batch, Recording, compile_batch, course_of, double_precision
 from tiltsim.arrays.jax_programs import require_jax
-from tiltsim.closed_loop.assembly import Assembly
-from tiltsim.closed_loop.choices import program_key
+from tiltsim.closed_loop.assembly import Assembly, program_key
 from tiltsim.flight.end import End
 from tiltsim.flight.flight import Flight
 from tiltsim.plants.equations_plant import initial_state

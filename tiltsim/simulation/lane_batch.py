@@ -16,7 +16,7 @@ import numpy as np
 
 from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.engines.machine_code import widest
-from tiltsim.engines.recorder import SAMPLES, TERMINATED, recorder_head
+from tiltsim.engines.programs import SAMPLES, TERMINATED, recorder_head
 from tiltsim.engines.steppers import LaneStepper
 from tiltsim.flight.end import End
 from tiltsim.flight.flight import Flight

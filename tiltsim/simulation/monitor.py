@@ -57,7 +57,7 @@ class TerminationMonitor:
             return self._traced_checks(time, tuple(values))
         limits = self._reference, self._knots, self._follows_position
         code = self._loop.kind.limit_exceeded(time, values, *limits)
-        return code, *self._loop.monitoring.sign_check_values(time, values, *self._setup)
+        return code, *self._loop.sign_check_values(time, values, *self._setup)
 
     @cached_property
     def _traced_checks(self) -> Callable[[float, Values], Values]:
@@ -67,7 +67,7 @@ class TerminationMonitor:
     def passes(self, plant: Plant, samples: Floats) -> bool:
         """Whether none of the samples that `Plant.record` returned ends the flight.
 
-        Native code has checked all but the last; see `tiltsim.engines.recorder.Recorder`.
+        Native code has checked all but the last; see `tiltsim.engines.programs.Recorder`.
         """
         if plant.engine == "native":
             samples = samples[-1:]
@@ -100,7 +100,5 @@ class TerminationMonitor:
             # A number that changes its sign between two samples was zero in between.
             side = 0.0 if abs(value) < SINGULAR else copysign(1.0, value)
             if side == 0.0 or side != self._sides.setdefault(index, side):
-                return End(
-                    "singular", time, self._loop.monitoring.causes(state, self._setup)[index]
-                )
+                return End("singular", time, self._loop.causes(state, self._setup)[index])
         return None

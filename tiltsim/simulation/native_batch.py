@@ -16,7 +16,7 @@ import numpy as np
 
 from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.closed_loop.userdata import RECORDER, steps_taken
-from tiltsim.engines.callback import control_callback
+from tiltsim.engines.control import control_callback
 from tiltsim.flight.end import End
 from tiltsim.flight.flight import Flight
 from tiltsim.plants.flight_model import flight_model, model_cache_key

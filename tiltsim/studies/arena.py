@@ -15,6 +15,7 @@ from tiltsim.scenario.messages import choose
 from tiltsim.studies.checking import collect
 from tiltsim.studies.comparison import GIVEN, Entry, controller_tables, fly_entries
 from tiltsim.studies.multirotor_analysis import FEW_ROTORS, FLEET, fleet_file
+from tiltsim.studies.scores import INTERACTION, score, task_of
 
 FOLDER: Final = "arena"
 """Folder of the library with one file for each vehicle and one variant for each task."""
@@ -25,26 +26,11 @@ BASELINES: Final = ("geometric", "pid", "indi", "lqr")
 OURS: Final = "vectoring"
 """The law that flies the limited league with its default setting."""
 
-HALF: Final = (0.1, 0.1)
-"""Root mean square errors of position (m) and yaw (rad), each of which alone halves the score."""
-
-STEP: Final = 0.25
-"""Share of a step that is the root mean square of a first-order response in 1 s over 8 s."""
-
-HALF_OF: Final = {
-    "step": (STEP, 0.1),
-    "yaw_step": (0.1, 1.571 * STEP),
-    "latency": (0.3 * STEP, 0.1),
-    "late_step": (0.3 * STEP, 0.1),
-}
-"""Tasks with other errors than `HALF`: steps, whose error begins with the step itself."""
-
-
 MULTIROTOR: Final = "multirotor"
 """The file whose tasks the fleet flies, each vehicle in place of the file's own."""
 
-LEAGUES: Final = ("limited", "unlimited")
-"""The arena that counts, with limits, lag, latency and noise, and the one without."""
+LEAGUES: Final = ("limited", "unlimited", "interaction")
+"""The arena that counts, with limits, lag, latency and noise, the one without, and contacts."""
 
 LIMITED: Final = {
     "quadrotor": 525.0,
@@ -56,6 +42,12 @@ LIMITED: Final = {
     "omni_octorotor": 700.0,
 }
 """Vehicles of the limited league, with their highest rotor speeds (rad/s)."""
+
+TOUCHING: Final = ("tilt_hexarotor", "tilt_octorotor")
+"""Vehicles of the league of interaction: their rotors leave room for a tool."""
+
+TOUCHES: Final = {"position_bandwidth": 4.0, "attitude_bandwidth": 12.0}
+"""Keys of `vectoring` and `geometric` there; with its observer `geometric` chatters along walls."""
 
 REVERSING: Final = ("omni_octorotor",)
 """Vehicles whose rotors are built to reverse."""
@@ -72,6 +64,7 @@ WORLDS: Final[Mapping[str, Mapping[str, Mapping[str, Any]]]] = {
         "exact model": {"model_error.mass": 1.0, "model_error.thrust_coefficient": 1.0},
     },
     "unlimited": {"": {}},
+    "interaction": {"": {}},
 }
 """By league, the errors of the law's model: values by dotted key for each table."""
 
@@ -125,6 +118,8 @@ def vehicles(league: str) -> dict[str, Vehicle]:
 
     Unlimited are vehicles with their own file, then the fleet's others on a gait.
     """
+    if league == "interaction":
+        return {name: Vehicle(tuple(INTERACTION), _in_place(name)) for name in TOUCHING}
     found: dict[str, list[str]] = {}
     for address in collect([str(shipped_folder("scenarios") / FOLDER)]):
         found.setdefault(address.partition("#")[0].rpartition("/")[2], []).append(address)
@@ -132,39 +127,44 @@ def vehicles(league: str) -> dict[str, Vehicle]:
     if league == "limited":
         return {name: Vehicle(limited, _limited(name)) for name in LIMITED}
     every = {name: Vehicle(tuple(tasks), {}) for name, tasks in found.items()}
-    for name, angles in FLEET.items():
+    for name in FLEET:
         if name not in (*every, *FEW_ROTORS):
-            gait = {"gait": {"type": "fixed", "angles": [*angles]}} if angles else {}
-            own = {"vehicle.mjcf": str(fleet_file(name)), **gait, **OWN_KEYS.get(name, {})}
-            every[name] = Vehicle(shared, own)
+            every[name] = Vehicle(shared, _in_place(name) | OWN_KEYS.get(name, {}))
     return every
+
+
+def _in_place(name: str) -> dict[str, Any]:
+    """The values that put a vehicle of the fleet in place of the tasks' own."""
+    angles = (0.0,) * 4 if name == "tiltrotor" else FLEET[name]
+    gait = {"gait": {"type": "fixed", "angles": [*angles]}} if angles else {}
+    return {"vehicle.mjcf": str(fleet_file(name)), **gait}
 
 
 def _limited(name: str) -> dict[str, Any]:
     """The values that put a vehicle into the tasks with limits."""
-    angles = (0.0,) * 4 if name == "tiltrotor" else FLEET[name]
-    limits = {"vehicle.mjcf": str(fleet_file(name)), "vehicle.max_rotor_speed": LIMITED[name]}
+    limits = _in_place(name) | {"vehicle.max_rotor_speed": LIMITED[name]}
     if name in REVERSING:
         limits["vehicle.min_rotor_speed"] = None
-    if not angles:
-        return limits
-    gait = {"type": "fixed", "angles": [*angles]}
-    return limits | {"gait": gait, "vehicle.tilt_servo": SERVO}
+    return limits | ({"vehicle.tilt_servo": SERVO} if "gait" in limits else {})
 
 
 def tables_of(vehicle: Vehicle, league: str) -> dict[str, Mapping[str, Any]]:
     """The tables of the controllers of a vehicle, by name.
 
-    In the limited league they are `vectoring`, and baselines as their authors fly them.
+    In the limited league they are `vectoring`, and baselines as their authors fly them; in the one
+    of interaction with free tilts, and beside the tasks' own `full_pose`.
     """
     if league == "unlimited":
         return controller_tables(fitting(vehicle))
     flown: dict[str, Mapping[str, Any]] = {law: {"law": law, **AS_FLOWN} for law in BASELINES}
     if "gait" not in vehicle.overrides:
         return {"vectoring": {"law": "vectoring"}, **flown}
-    free = {"tilts": "free"}
-    own = {"vectoring": {"law": "vectoring", **free}}
-    return {**own, **flown, "geometric_free": {**flown["geometric"], **free}}
+    free: dict[str, Any] = {"tilts": "free"}
+    own = {"law": "vectoring", **free}
+    if league == "interaction":
+        geometric = {**flown["geometric"], **free, **TOUCHES, "observer": 0.0}
+        return {"full_pose": {}, "vectoring": own | TOUCHES, **flown, "geometric": geometric}
+    return {"vectoring": own, **flown, "geometric_free": {**flown["geometric"], **free}}
 
 
 def chosen_vehicles(names: Sequence[str], league: str) -> dict[str, Vehicle]:
@@ -277,39 +277,6 @@ def entry_of(
         if not table or not key.startswith("controller")
     }
     return Entry(address, name, table, {**own, **changes})
-
-
-def score(row: Mapping[str, Any]) -> float | None:
-    """The score of a row of `compare`, 0 to 100.
-
-    It is ``s = 100 / (1 + e_position / half + e_yaw / half)``, of which a vehicle that stays where
-    it began has none: ``100 (s - idle) / (100 - idle)``, at least 0. The position's error is the
-    greater of the root mean square of the flight and the mean of its last second, so that a vehicle
-    that falls at the end does not gain from the time before.
-
-    None if the task refuses the controller, 0 if the flight ends early.
-    """
-    if row["end"] == "refused":
-        return None
-    if row["end"] != "completed":
-        return 0.0
-    half = HALF_OF.get(task_of(row), HALF)
-    position = max(row["rms_position_error"], row["final_position_error"])
-    reached = _share(position, row["rms_yaw_error"], half)
-    idle = _share(row["idle_position_error"], row["idle_yaw_error"], half)
-    if idle < 1.0 - 1e-6:
-        reached = max(0.0, reached - idle) / (1.0 - idle)
-    return float(100.0 * reached)
-
-
-def _share(position: float, yaw: float, half: tuple[float, float]) -> float:
-    """The score of errors, 0 to 1, each of which alone halves it where it is ``half``."""
-    return 1.0 / (1.0 + position / half[0] + yaw / half[1])
-
-
-def task_of(row: Mapping[str, Any]) -> str:
-    """Name of the task of a row."""
-    return str(row["scenario"]).partition("#")[2]
 
 
 def standings(rows: Sequence[Mapping[str, Any]]) -> list[Standing]:

@@ -1,13 +1,25 @@
 """The arena's page in Markdown."""
 
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any, Final
 
 from tiltsim.studies.arena import Standing, are_rivals, beaten, standings
+from tiltsim.studies.comparison import refusal
+from tiltsim.studies.scores import HALF, INTERACTION, errors_of, task_of
+from tiltsim.system.text import in_words
+
+UNITS: Final = {
+    "position_error": "m",
+    "yaw_error": "rad",
+    "rms_force_error": "N",
+    "peak_force": "N",
+    "final_swing": "rad",
+}
+"""Units of the errors that scores are made of."""
 
 
 def arena_page(rows: Mapping[str, Sequence[Mapping[str, Any]]], made: Sequence[str]) -> str:
-    """How often baselines win, all totals, and a table for each vehicle.
+    """How often baselines win, all totals, a table for each vehicle, and every refusal.
 
     Args:
         rows: Rows of each vehicle.
@@ -18,7 +30,8 @@ def arena_page(rows: Mapping[str, Sequence[Mapping[str, Any]]], made: Sequence[s
     lines = ["# Arena", "", *_baselines_win(every, kinds), "## All tasks", "", *totals(every)]
     for vehicle, ranked in every.items():
         title = vehicle.replace("_", " ").capitalize()
-        lines += ["", f"## {title}", "", *_table(ranked)]
+        lines += ["", f"## {title}", "", *_table(ranked), *_errors(rows[vehicle], ranked)]
+    lines += _refusals(row for flown in rows.values() for row in flown)
     return "\n".join([*lines, "", *made, ""])
 
 
@@ -59,6 +72,37 @@ def _table(ranked: Sequence[Standing]) -> Iterator[str]:
         cells = " | ".join(cell(one.scores[task], one.tuned[task]) for one in ranked)
         yield f"| `{task}` | {cells} |"
     yield "| all tasks | " + " | ".join(cell(s.total, s.tuned_total) for s in ranked) + " |"
+
+
+def _errors(rows: Sequence[Mapping[str, Any]], ranked: Sequence[Standing]) -> Iterator[str]:
+    """Errors of flights with contacts or loads: tasks as rows, controllers as columns."""
+    names = [standing.controller for standing in ranked]
+    flown = {(row["scenario"], row["controller"]): row for row in rows}
+    tasks = dict.fromkeys(address for address, _ in flown if address in INTERACTION)
+    if tasks:
+        yield from ("", "| error | " + " | ".join(f"`{name}`" for name in names) + " |")
+        yield "| --- |" + " --: |" * len(names)
+    for address in tasks:
+        of = [flown[address, name] for name in names]
+        for measure in dict.fromkeys((*HALF, *INTERACTION[address].halves)):
+            ended = (row["end"] == "completed" for row in of)
+            values = [
+                f"{errors_of(row, [measure])[measure]:.3f}" if done else "-"
+                for row, done in zip(of, ended, strict=True)
+            ]
+            words = f"`{task_of(of[0])}`: {in_words(measure)}, {UNITS[measure]}"
+            yield f"| {words} | {' | '.join(values)} |"
+
+
+def _refusals(rows: Iterable[Mapping[str, Any]]) -> Iterator[str]:
+    """A line for every reason why tasks refuse a controller."""
+    found: dict[tuple[str, str], dict[str, None]] = {}
+    for row in rows:
+        if (reason := refusal(row)) is not None:
+            found.setdefault((row["controller"], reason), {})[task_of(row)] = None
+    yield from ("", "## Refused", "") if found else ()
+    for (name, reason), tasks in found.items():
+        yield f"- `{name}` in {', '.join(f'`{task}`' for task in tasks)}: {reason}"
 
 
 def cell(default: float | None, tuned: float | None) -> str:

@@ -12,7 +12,7 @@ import numpy as np
 
 from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.engines.base import EngineName
-from tiltsim.engines.recorder import recorder_head
+from tiltsim.engines.programs import recorder_head
 from tiltsim.engines.steppers import LaneStepper
 from tiltsim.laws.assembling import assemble
 from tiltsim.plants.equations_plant import initial_state, integrated, layout_of

@@ -22,10 +22,7 @@ from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.closed_loop.userdata import CONTROL_PERIOD as PERIOD_IN_USERDATA
 from tiltsim.closed_loop.userdata import Header
 from tiltsim.engines.base import EngineName
-from tiltsim.engines.callback import control_callback
-from tiltsim.engines.factory import make_engine
-from tiltsim.engines.native_engine import compile_empty
-from tiltsim.engines.python_engine import control_step
+from tiltsim.engines.control import compile_empty, control_callback, control_step, make_callback
 from tiltsim.laws.assembling import assemble
 from tiltsim.plants.mujoco_plant import MujocoPlant
 from tiltsim.scenario.loading import parse_scenario
@@ -77,7 +74,7 @@ def bench_single(integrator: str, rounds: int = ROUNDS) -> Rows:
     assembly, plant = flying_plant(integrator)
     model, data, state = plant.model, plant.data, plant.state
     callbacks = {"bare": None, "empty": compile_empty()} | {
-        name: make_engine(name, assembly, model, data).callback() for name in ENGINES
+        name: make_callback(name, assembly, model, data) for name in ENGINES
     }
 
     def stepping(callback: Any, steps: int) -> Callable[[], float]:
@@ -264,10 +261,11 @@ def time_per_call(assembly: Assembly) -> float:
     if assembly.scenario.controller.is_external:
         return nan
     qpos, qvel = loop.kind.initial_motion(assembly)
-    act = tuple(map(float, loop.dynamics.initial_activations(assembly, setup)))
+    act = tuple(map(float, loop.initial_activations(assembly, setup)))
     header = [*Header(assembly.scenario.simulation.timestep)]
+    others = [0.0] * loop.sizes.others, [0.0] * loop.sizes.history
     none: list[float] = []
-    vectors = [*map(float, qpos)], [*map(float, qvel)], [*act], none, none, none
+    vectors = [*map(float, qpos)], [*map(float, qvel)], [*act], *others, none
     step = control_step(assembly, setup.userdata.tolist(), "controls")
 
     def calls() -> None:

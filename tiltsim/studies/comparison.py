@@ -15,8 +15,8 @@ from tiltsim.plants.engine_choice import MIN_STEPS_TO_COMPILE
 from tiltsim.scenario.controller import CONTROLLERS
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.messages import choose
+from tiltsim.scenario.own_code import require_trust
 from tiltsim.scenario.scenario import Scenario
-from tiltsim.scenario.trust import require_trust
 from tiltsim.simulation.simulate import simulate_to_end
 from tiltsim.studies.benchmark import compiled_time_per_call, time_per_call
 from tiltsim.sweeps.chunks import boundary
@@ -54,6 +54,9 @@ SEARCHES: Final = {
 }
 """Measures of robustness: each the last value found that is survived."""
 
+CONTACTS: Final = ("rms_force_error", "peak_force", "time_in_contact", "final_swing")
+"""Metrics of flights that push, touch or carry a load; null in the others."""
+
 MEASURES: Final = (
     "rms_position_error",
     "max_position_error",
@@ -64,6 +67,7 @@ MEASURES: Final = (
     "min_singularity_margin",
     "min_rotor_speed",
     "saturated_fraction",
+    *CONTACTS,
     *SEARCHES,
     "control_period",
     "time_per_call",

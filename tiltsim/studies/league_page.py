@@ -6,8 +6,10 @@ from io import StringIO
 from statistics import mean, median
 from typing import Any, Final
 
-from tiltsim.studies.arena import LIMITED, OURS, Standing, best, standings, task_of
+from tiltsim.studies.arena import LIMITED, OURS, Standing, best, standings
 from tiltsim.studies.arena_page import shown, totals
+from tiltsim.studies.comparison import CONTACTS
+from tiltsim.studies.scores import task_of
 
 Rows = Mapping[str, Sequence[Mapping[str, Any]]]
 """Rows of flights, by vehicle."""
@@ -31,6 +33,7 @@ COLUMNS: Final = (
     "rms_rotor_acceleration",
     "peak_rotor_speed",
     "saturated_fraction",
+    *CONTACTS,
 )
 """Columns of the table of flights after vehicle and task, unrounded; SI units."""
 

@@ -24,8 +24,9 @@ from scipy.stats import qmc
 from tiltsim.errors import InputError
 from tiltsim.scenario.controller_table import ControllerTable
 from tiltsim.scenario.law_controller import LawTable
-from tiltsim.studies.arena import Vehicle, entry_of, score
+from tiltsim.studies.arena import Vehicle, entry_of
 from tiltsim.studies.comparison import Entry, compare_one
+from tiltsim.studies.scores import score
 from tiltsim.system.processes import in_processes
 from tiltsim_controllers.mathematics.scalar import Floats
 

@@ -11,7 +11,7 @@ from concurrent.futures import Future
 from contextlib import contextmanager, suppress
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from tiltsim.system.environment import variables_for_processes
 from tiltsim.system.interrupts import defer_interrupts
@@ -41,16 +41,16 @@ def in_processes(
         while waiting or busy:
             while waiting and len(busy) < jobs:
                 with defer_interrupts():  # a process that is not sent its work prints a traceback
-                    process, connection = _begin(work)
+                    process, connection = begin(work)
                     processes.append(process)
-                busy[connection] = process, _give(connection, waiting.pop())
+                busy[connection] = process, give(connection, waiting.pop())
             for ready in wait([*busy]):
                 assert isinstance(ready, Connection)
                 process, item = busy.pop(ready)
-                future: Future[Result] = _answer(ready, process)
+                future: Future[Result] = answer(ready, process)
                 # Send the next item first, so that the process does not wait for the loop's body.
                 if waiting and process.is_alive():
-                    busy[ready] = process, _give(ready, waiting.pop())
+                    busy[ready] = process, give(ready, waiting.pop())
                 else:
                     ready.close()
                 yield item, future
@@ -72,7 +72,8 @@ def in_order(found: Iterable[tuple[int, Result]]) -> Iterator[Result]:
             following += 1
 
 
-def _begin(work: Callable[[Item], Result]) -> tuple[BaseProcess, Connection]:
+def begin(work: Callable[[Item], Result]) -> tuple[BaseProcess, Connection]:
+    """Start a process that calls ``work`` for each item that it is sent; it ends with its pipe."""
     context = multiprocessing.get_context("spawn")
     here, there = context.Pipe()
     process = context.Process(target=_serve, args=(there, work), daemon=True)
@@ -117,14 +118,16 @@ def _interrupts_blocked() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def _give(connection: Connection, item: Item) -> Item:
+def give(connection: Connection, item: Item) -> Item:
+    """Send an item to a process of `begin`; returns it."""
     with suppress(OSError):  # if it has died, reading its answer reports it
         connection.send(item)
     return item
 
 
-def _answer(connection: Connection, process: BaseProcess) -> Future[Result]:
-    future: Future[Result] = Future()
+def answer(connection: Connection, process: BaseProcess) -> Future[Any]:
+    """Wait for the result of the next item; `ProcessDiedError` if the process has ended."""
+    future: Future[Any] = Future()
     try:
         result, error = connection.recv()
     except (EOFError, OSError):
@@ -145,16 +148,14 @@ def _serve(connection: Connection, work: Callable[[Item], Result]) -> None:
     parent = multiprocessing.parent_process()
     if parent is not None:
         threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
-    while True:
-        try:
+    with suppress(EOFError, OSError):  # there are no more items, or their sender has died
+        while True:
             item = connection.recv()
-        except EOFError:  # there are no more
-            return
-        try:
-            answer = pickle.dumps((work(item), None))
-        except Exception as error:
-            answer = pickle.dumps((None, error))
-        connection.send_bytes(answer)
+            try:
+                message = pickle.dumps((work(item), None))
+            except Exception as error:
+                message = pickle.dumps((None, error))
+            connection.send_bytes(message)
 
 
 def _end_with(parent: BaseProcess) -> None:

@@ -1,22 +1,23 @@
-"""Replaying a flight on a MuJoCo model: the pose of every body at every sample.
+"""Replaying a flight on a MuJoCo model: visuals, and the pose of every body at every sample.
 
 Independent of the vehicle. Free joints take the recorded position and attitude, every other joint
 the column of its name, where ``tilt`` is ``alpha``; a joint without a column keeps the model's
-default.
+default. Sky, floor, light, arms and rotor discs that a user's MJCF file lacks are added for
+pictures only.
 """
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from math import cos, floor, log10, radians, sin
-from typing import NamedTuple
+from typing import Any, Final, NamedTuple
 
 import mujoco
 import numpy as np
 
 from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.plants.flight_model import build_model
+from tiltsim.resources import shipped_folder
 from tiltsim.scenario.scenario import Scenario
-from tiltsim.views.dressing import dress
 from tiltsim_controllers.mathematics.attitude import quaternion_of_euler
 from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.references.trajectories import position_reference
@@ -68,11 +69,11 @@ def joint_positions(model: mujoco.MjModel, columns: Columns) -> Floats:
         kind, name = mujoco.mjtJoint(model.jnt_type[joint]), model.joint(joint).name
         if kind == mujoco.mjtJoint.mjJNT_FREE:
             of = "" if joint == 0 else f"{name.removesuffix('_vehicle')}_"
-            qpos[:, address : address + 3] = _stack(columns, (f"{of}x", f"{of}y", f"{of}z"))
+            qpos[:, address : address + 3] = positions(columns, of)
             if f"{of}roll" not in columns:  # a load, of which the attitude does not count
                 continue
-            angles = _stack(columns, (f"{of}roll", f"{of}pitch", f"{of}yaw"))
-            qpos[:, address + 3 : address + 7] = quaternion_of_euler(angles.T).T
+            angles = np.stack([columns[f"{of}{angle}"] for angle in ("roll", "pitch", "yaw")])
+            qpos[:, address + 3 : address + 7] = quaternion_of_euler(angles).T
         elif kind in (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE):
             column = re.sub(r"tilt(?=_\d+$|$)", "alpha", name)
             if column in columns:
@@ -117,7 +118,7 @@ def cables(
         places = rotate(world.quaternion[:, body], model.site_pos[sites])
         found[model.tendon(tendon).name] = world.position[:, body] + places
     for table in scenario.cable:
-        loose = [not table.cable.holds(at) for at in time.tolist()]
+        loose = [not table.holds(at) for at in time.tolist()]
         found[table.name][loose, 1] = found[table.name][loose, 0]
     return found
 
@@ -190,26 +191,21 @@ def _product(left: Floats, right: Floats) -> Floats:
     return np.concatenate([scalar, vector + np.cross(left[..., 1:], right[..., 1:])], axis=-1)
 
 
-def positions(columns: Columns, prefix: str = "") -> Floats:
-    """A vehicle's position at every sample (m), shape (N, 3); 0 for axes without a column.
+def positions(columns: Columns, prefix: str = "", suffix: str = "") -> Floats:
+    """A position at every sample (m), shape (N, 3); 0 for axes without a column.
 
     Args:
         columns: Columns of the flight.
         prefix: Beginning of the names of a companion's columns.
+        suffix: End of the names, such as ``_ref`` for the reference.
     """
     zero = np.zeros_like(columns["time"])
-    return np.stack([columns.get(f"{prefix}{axis}", zero) for axis in "xyz"], axis=1)
+    return np.stack([columns.get(f"{prefix}{axis}{suffix}", zero) for axis in "xyz"], axis=1)
 
 
 def prefixes(scenario: Scenario) -> list[str]:
     """The beginnings of the names of the columns of each vehicle, the first one's empty."""
     return ["", *(f"{each.name}_" for each in scenario.companion)]
-
-
-def reference_positions(columns: Columns) -> Floats:
-    """The reference position at every sample (m), shape (N, 3); 0 for axes without a column."""
-    zero = np.zeros_like(columns["time"])
-    return np.stack([columns.get(f"{axis}_ref", zero) for axis in "xyz"], axis=1)
 
 
 def reference_path(assembly: Assembly, end: float, points: int) -> Floats:
@@ -219,5 +215,91 @@ def reference_path(assembly: Assembly, end: float, points: int) -> Floats:
     return np.array([position_reference(time, reference, knots)[:3] for time in times])
 
 
-def _stack(columns: Columns, names: tuple[str, ...]) -> Floats:
-    return np.stack([columns[name] for name in names], axis=1)
+DISC_SHARE: Final = 0.45  # of the least distance between rotors: their discs do not touch
+MAX_DISC: Final = 0.6  # of a rotor's distance from the body, so that the arms can be seen
+ARM_SHARE: Final = 0.03  # of the distance of the farthest rotor
+DEPTH: Final = 3.0  # m below the origin, of a floor that the file lacks
+CLOCKWISE: Final = (0.05, 0.55, 0.50, 0.45)
+COUNTERCLOCKWISE: Final = (0.85, 0.38, 0.10, 0.45)
+CARBON: Final = (0.18, 0.19, 0.21, 1.0)
+PLANE: Final = mujoco.mjtGeom.mjGEOM_PLANE
+CYLINDER: Final = mujoco.mjtGeom.mjGEOM_CYLINDER
+CAPSULE: Final = mujoco.mjtGeom.mjGEOM_CAPSULE
+SKYBOX: Final = mujoco.mjtTexture.mjTEXTURE_SKYBOX
+
+
+def dress(spec: mujoco.MjSpec) -> None:
+    """Add the visuals that the files of the vehicles in a model lack."""
+    model = spec.copy().compile()
+    scene = mujoco.MjSpec.from_file(str(shipped_folder("mjcf") / "scene.xml"))
+    if SKYBOX not in [texture.type for texture in spec.textures]:
+        _copy_texture(spec, scene.texture("sky"))
+        spec.visual.headlight.ambient = scene.visual.headlight.ambient
+    if not model.nlight:
+        light = mujoco.mjtLightType.mjLIGHT_DIRECTIONAL
+        look = {"diffuse": (0.45, 0.45, 0.45), "dir": (0.1, 0.2, -1.0)}
+        spec.worldbody.add_light(type=light, pos=(0.0, 0.0, 10.0), **look)
+    planes = [geom for geom in spec.worldbody.geoms if geom.type == PLANE]
+    if not planes:
+        place = (0.0, 0.0, -DEPTH)
+        planes = [spec.worldbody.add_geom(type=PLANE, size=(0.0, 0.0, 1.0), pos=place)]
+        planes[0].contype = planes[0].conaffinity = 0
+    bare = [plane for plane in planes if not plane.material and not plane.size[:2].all()]
+    if bare:
+        _copy_texture(spec, scene.texture("grid"))
+        grid = spec.add_material(name="tiltsim_grid", texuniform=True, texrepeat=(1.0, 1.0))
+        grid.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "tiltsim_grid"
+        for plane in bare:
+            plane.material = grid.name
+    for body, shape in _missing_parts(model):
+        mass = {"mass": 0.0, "contype": 0, "conaffinity": 0, "group": 2}
+        spec.body(model.body(body).name).add_geom(**shape, **mass)
+
+
+def _copy_texture(spec: mujoco.MjSpec, texture: Any) -> None:
+    names = ("type", "builtin", "mark", "rgb1", "rgb2", "markrgb", "width", "height")
+    look = {name: getattr(texture, name) for name in names}
+    spec.add_texture(name=f"tiltsim_{texture.name}", **look)
+
+
+def _missing_parts(model: mujoco.MjModel) -> Iterator[tuple[int, dict[str, Any]]]:
+    """Bodies with the shapes of the arms and rotor discs that nothing in the model stands for."""
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    for body in range(model.nbody):
+        name = model.body(body).name
+        if name == "vehicle" or name.endswith("_vehicle"):
+            yield from _missing_on(model, data, body, name.removesuffix("vehicle"))
+
+
+def _missing_on(
+    model: mujoco.MjModel, data: mujoco.MjData, vehicle: int, prefix: str
+) -> Iterator[tuple[int, dict[str, Any]]]:
+    """See `_missing_parts`: on one vehicle, the names of whose parts begin with a prefix."""
+    name = f"{prefix}rotor_"
+    sites = [s for s in range(model.nsite) if model.site(s).name.startswith(name)]
+    places = data.site_xpos[sites]
+    turned = data.xmat[vehicle].reshape(3, 3)
+    hubs = (places - data.xpos[vehicle]) @ turned  # along the body's axes
+    lengths = np.linalg.norm(hubs, axis=1)
+    apart = np.linalg.norm(places[:, np.newaxis] - places, axis=2)
+    least = float(apart[apart > 1e-6].min(initial=2.0 * lengths.max()))
+    visible = np.flatnonzero((model.geom_group <= 2) & (model.geom_bodyid > 0))
+    centers, radii = data.geom_xpos[visible], model.geom_rbound[visible]
+    for site, place, hub, length in zip(sites, places, hubs, lengths, strict=True):
+        away = np.linalg.norm(centers - place, axis=1)
+        radius = min(DISC_SHARE * least, MAX_DISC * float(length) or np.inf)
+        if not ((radii >= 0.5 * radius) & (away < 0.5 * radius)).any():
+            number = model.site(site).name.removeprefix(name)
+            drag = float(model.actuator(f"{prefix}thrust_{number}").gear[5])
+            look = {"rgba": COUNTERCLOCKWISE if drag < 0.0 else CLOCKWISE}
+            look |= {"pos": model.site_pos[site], "quat": model.site_quat[site]}
+            disc = {"type": CYLINDER, "size": (radius, 0.02 * radius, 0.0), **look}
+            yield int(model.site_bodyid[site]), disc
+        middle = data.xpos[vehicle] + turned @ (0.6 * hub)
+        axes = data.geom_xmat[visible].reshape(-1, 3, 3)
+        local = np.einsum("gi,gij->gj", middle - centers, axes) - model.geom_aabb[visible, :3]
+        covered = (np.abs(local) <= model.geom_aabb[visible, 3:]).all(axis=1).any()
+        if length > 2.0 * ARM_SHARE * lengths.max() and not covered:
+            size, ends = (ARM_SHARE * float(lengths.max()), 0.0, 0.0), (0.0, 0.0, 0.0, *hub)
+            yield vehicle, {"type": CAPSULE, "size": size, "fromto": ends, "rgba": CARBON}

@@ -17,7 +17,7 @@ import numpy as np
 from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.flight.flight import Flight
 from tiltsim.flight.vectors import VECTORS, components
-from tiltsim.laws.supervision import SUPERVISION
+from tiltsim.laws.law import SUPERVISION
 from tiltsim.scenario.vehicle import VehicleTable
 from tiltsim.system.text import Quantity, in_words, subscript
 from tiltsim.views.attitude_plane import margin_threshold
@@ -103,17 +103,19 @@ class Signals:
         """Smallest range of the axis."""
         return self.floor or FLOORS.get(self.unit, SMALLEST)
 
-    def range_of(self, flights: Sequence[Flight]) -> tuple[float, float]:
-        """The range of the axis for some flights, with levels and references."""
-        drawn, ended = [], []
-        for flight in flights:
-            shown = flight["time"] >= min(self.settling, 0.5 * flight["time"][-1])
-            names = [*filter(None, (line.reference for line in self.lines)), *self.bounds]
-            values = [line.of(flight) for line in self.lines] + [flight[name] for name in names]
-            drawn += [one[shown] for one in values]
-            ended += [flight.end.kind != "completed"] * len(values)
-        drawn += [np.array([level.value]) for level in self.levels]
-        return scale(drawn, [*ended, *[False] * len(self.levels)], self.least)[:2]
+
+def range_of(shown: Sequence[tuple[Signals, Flight]]) -> tuple[float, float]:
+    """The range of an axis for a panel of each of some flights, with levels and references."""
+    drawn, ended = [], []
+    for panel, flight in shown:
+        whole = flight["time"] >= min(panel.settling, 0.5 * flight["time"][-1])
+        names = [*filter(None, (line.reference for line in panel.lines)), *panel.bounds]
+        values = [line.of(flight) for line in panel.lines] + [flight[name] for name in names]
+        drawn += [one[whole] for one in values]
+        ended += [flight.end.kind != "completed"] * len(values)
+    first = shown[0][0]
+    drawn += [np.array([level.value]) for level in first.levels]
+    return scale(drawn, [*ended, *[False] * len(first.levels)], first.least)[:2]
 
 
 def scale(
@@ -128,10 +130,7 @@ def scale(
         line[: -max(1, round(END_FRACTION * len(line)))] if early and len(line) > 1 else line
         for line, early in zip(drawn, ended, strict=True)
     ]
-    low = min((float(line.min()) for line in before if line.size), default=0.0)
-    high = max((float(line.max()) for line in before if line.size), default=0.0)
-    lowest = min((float(line.min()) for line in drawn if line.size), default=0.0)
-    highest = max((float(line.max()) for line in drawn if line.size), default=0.0)
+    (low, high), (lowest, highest) = _ends(before), _ends(drawn)
     tolerance = max(high - low, 1e-3 * max(abs(low), abs(high)), 1e-6)
     off = any(ended) and highest - lowest > MAX_WIDENING * tolerance
     low, high = (low, high) if off else (lowest, highest)
@@ -141,12 +140,17 @@ def scale(
     return low - pad - max(short, 0.0), high + pad + max(short, 0.0), off
 
 
+def _ends(lines: Sequence[Floats]) -> tuple[float, float]:
+    known = [line for line in lines if line.size] or [np.zeros(1)]
+    return min(float(line.min()) for line in known), max(float(line.max()) for line in known)
+
+
 def signals_of(assembly: Assembly) -> dict[str, Signals]:
     """All panels over time of a flight by their names; panels on request come last."""
     chosen = {panel.name: panel for panel in _chosen(assembly)}
-    drawn = {line.values for panel in chosen.values() for line in panel.lines}
-    drawn |= {line.reference for panel in chosen.values() for line in panel.lines}
-    drawn |= {bound for panel in chosen.values() for bound in panel.bounds} | {"time"}
+    drawn: set[Any] = {"time"}
+    for panel in chosen.values():
+        drawn |= {*panel.bounds}.union(*((line.values, line.reference) for line in panel.lines))
     tilting = assembly.scenario.vehicle.has_tilting_rotors
     left = {
         column
@@ -175,9 +179,8 @@ def stems(columns: Collection[str]) -> dict[str, list[str]]:
 def reference_of(assembly: Assembly, column: str) -> str:
     """The column with the reference of another; empty for none, as for an unrecorded lean."""
     scenario, name = assembly.scenario, f"{column}_ref"
-    if column in ("roll", "pitch") and "roll_ref" in assembly.loop.units:
-        return name if scenario.controller.records_attitude(scenario) else ""
-    return name if name in assembly.loop.units else ""
+    unrecorded = column in ("roll", "pitch") and not scenario.controller.records_attitude(scenario)
+    return name if name in assembly.loop.units and not unrecorded else ""
 
 
 def vector_signals(assembly: Assembly, name: str, columns: Sequence[str]) -> Signals:
@@ -195,38 +198,37 @@ def vector_signals(assembly: Assembly, name: str, columns: Sequence[str]) -> Sig
 
 def _chosen(assembly: Assembly) -> Iterator[Signals]:
     """Panels whose titles, limits or signals the columns alone do not give."""
-    units, vehicle = assembly.loop.units, assembly.scenario.vehicle
-    rotors = assembly.loop.kind.rotors
+    units, scenario = assembly.loop.units, assembly.scenario
     if "roll" in units:
         angles = [Signal(name, name, name, reference_of(assembly, name)) for name in ANGLES]
         compared = [angle._replace(label=angle.name.capitalize()) for angle in angles[:2]]
         yield Signals("attitude", "Attitude", "rad", angles, compared=compared, moves=True)
-    if "alpha_1" in units and vehicle.has_tilting_rotors:
+    if "alpha_1" in units and scenario.vehicle.has_tilting_rotors:
         tilts = enumerate(components("tilt_angles", units), start=1)
         lines = [Signal(name, f"α{subscript(i)}", name, f"alpha_ref_{i}") for i, name in tilts]
         yield Signals("tilt_angles", "Tilt angles", "rad", lines, moves=True)
     if "direction" in units:
         yield from _direction(assembly)
-    elif rotors:
-        craft = assembly.scenario.any_rotorcraft
+    elif rotors := assembly.loop.kind.rotors:
+        craft = scenario.any_rotorcraft
         limits = {"min": craft.min_rotor_speed, "max": craft.max_rotor_speed}
         levels = [Level(name, f"{name} limit", at) for name, at in limits.items() if at is not None]
-        lines = [Signal(f"rotor_{i}", f"{i}", partial(spin_speed, rotor=i)) for i in rotors]
-        slowest = [Signal("slowest", "Slowest rotor and limits", slowest_rotor)]
+        lines = [Signal(f"rotor_{i}", f"{i}", partial(along_spin, rotor=i)) for i in rotors]
+        slowest = [Signal("slowest", "Slowest rotor and limits", along_spin)]
         about: dict[str, Any] = {"detail": "along the spin", "floor": 20.0, "moves": True}
         yield Signals("rotor_speeds", "Rotor speeds", "rad/s", lines, levels, (), slowest, **about)
     if "singularity_margin" in units:
-        threshold = margin_threshold(assembly.scenario)
+        threshold = margin_threshold(scenario)
         line = Signal("margin", "margin", "singularity_margin")
-        active = [Signal(SUPERVISION, "supervisor, 0 to 1", SUPERVISION)]
-        lines = [line, *(active if SUPERVISION in units else [])]
+        lines = [line, Signal(SUPERVISION, "supervisor, 0 to 1", SUPERVISION)]
         levels = [Level("threshold", f"threshold {threshold:g}", threshold)]
         levels.append(Level("singular", "singular", 0.0))
         compared = [line._replace(label="Singularity margin and threshold")]
+        lines = lines if SUPERVISION in units else [line]
         yield Signals("margin", "Singularity margin", "rad", lines, levels, compared=compared)
     axes = [axis for axis in AXES if f"{axis}_ref" in units]
     axes = axes if assembly.follows_position else [axis for axis in axes if axis == "z"]
-    lines = [Signal(axis, axis, partial(error, axis)) for axis in axes]
+    lines = [Signal(axis, axis, partial(error, axis=axis)) for axis in axes]
     compared = [Signal("distance", "Distance from the reference", partial(distance, axes=axes))]
     yield Signals("position_error", "Position error", "m", lines, compared=compared)
     if "z" in units:
@@ -261,28 +263,21 @@ def _direction(assembly: Assembly) -> Iterator[Signals]:
         for i in assembly.loop.kind.rotors
     ]
     levels = [Level("minimum", "minimum", 0.0)]
-    about = {"compared": [Signal("split", "ω₁² - ω₂²", "input_split")], "moves": True}
-    about["settling"] = 2.0
+    compared = [Signal("split", "ω₁² - ω₂²", "input_split")]
+    about = {"compared": compared, "moves": True, "settling": 2.0}
     yield Signals("inputs", "Inputs squared", "rad^2/s^2", lines, levels, **about)
     lines = [Signal("alpha", "tilt", "alpha", "alpha_ref"), Signal("yaw", "yaw", "yaw")]
     yield Signals("discs", "Tilt and yaw", "rad", lines, on_request=True)
 
 
-def error(axis: str, flight: Flight) -> Floats:
+def error(flight: Flight, axis: str) -> Floats:
     """The position error along an axis: reference minus actual, m."""
     return flight[f"{axis}_ref"] - flight[axis]
 
 
 def distance(flight: Flight, axes: Sequence[str]) -> Floats:
     """The norm of the position error along some axes, m."""
-    return np.asarray(np.linalg.norm([error(axis, flight) for axis in axes], axis=0))
-
-
-def spin_speed(flight: Flight, rotor: int) -> Floats:
-    """The speed of a rotor along its spin, rad/s."""
-    return np.asarray(
-        flight.scenario.any_rotorcraft.spins[rotor - 1] * flight[f"rotor_speed_{rotor}"]
-    )
+    return np.asarray(np.linalg.norm([error(flight, axis) for axis in axes], axis=0))
 
 
 def squared_speed(flight: Flight, rotor: int) -> Floats:
@@ -290,10 +285,10 @@ def squared_speed(flight: Flight, rotor: int) -> Floats:
     return np.asarray(flight[f"rotor_speed_{rotor}"] ** 2)
 
 
-def slowest_rotor(flight: Flight) -> Floats:
-    """The speed of the slowest rotor along its spin, rad/s."""
-    spins = np.array(flight.scenario.any_rotorcraft.spins)
-    return np.asarray((spins * flight["rotor_speeds"]).min(axis=1))
+def along_spin(flight: Flight, rotor: int = 0) -> Floats:
+    """The speed of a rotor, or else of the slowest one, along its spin, rad/s."""
+    speeds = np.array(flight.scenario.any_rotorcraft.spins) * flight["rotor_speeds"]
+    return np.asarray(speeds[:, rotor - 1] if rotor else speeds.min(axis=1))
 
 
 def has_attitude_plane(assembly: Assembly) -> bool:

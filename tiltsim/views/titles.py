@@ -1,16 +1,24 @@
-"""Titles: names of flights that are shown together, and descriptions of gait and controller."""
+"""Texts about flights: titles, descriptions of gait and controller, log messages."""
 
 from collections.abc import Iterator, Sequence
 from itertools import chain, takewhile
 from pathlib import Path
-from typing import Final
+from typing import Final, Literal, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
 
 from tiltsim.closed_loop.assembly import Assembly
-from tiltsim.scenario.arguments import leaves
+from tiltsim.flight.end import End
+from tiltsim.flight.flight import Flight
+from tiltsim.laws.law import SUPERVISION
+from tiltsim.scenario.documents import leaves
+from tiltsim.scenario.linearizing_controllers import AttitudeAltitudeController
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.scenario.scenario_tables import DESCRIPTIVE
-from tiltsim.scenario.tiltrotor_controllers import AttitudeAltitudeController
 from tiltsim.system.text import in_words, valid_unicode
+from tiltsim.vehicles.spans import at_lower_limit, at_upper_limit
+from tiltsim.views.attitude_plane import SUPERVISION_THRESHOLD, margin_threshold
 
 MIN_WORDS: Final = 4  # words that titles must share to make a common title
 ABBREVIATIONS: Final = ("indi", "lqr", "pid")
@@ -109,3 +117,99 @@ def describe_controller(scenario: Scenario) -> list[str]:
         parts.append("tilt-rate feed-forward")
     leans = controller.decoupler != "none"
     return [f"{controller.decoupler} decoupler", *parts] if leans else parts
+
+
+Level = Literal["INFO", "WARN", "ERROR"]
+
+QUIET_TIME: Final = 0.5
+"""Time (s) for which a condition must have been false before it is reported again."""
+
+_SUPERVISOR_MESSAGES: Final = {
+    "scale": "supervisor scales the gait",
+    "hold": "supervisor holds the gait",
+    "return_to_red": "supervisor moves the gait toward red",
+}
+
+
+class Event(NamedTuple):
+    """A message with its time (s) and level."""
+
+    time: float
+    level: Level
+    text: str
+
+
+class EventDetector:
+    """Finds the events of one flight, which may be given in pieces."""
+
+    def __init__(self, assembly: Assembly) -> None:
+        self._assembly = assembly
+        self._last_true: dict[str, float] = {}
+        self._minimum_margin = (float("inf"), 0.0)  # rad, and its time in s
+
+    def opening(self) -> list[Event]:
+        """The scenario; its gait, controller and plant."""
+        scenario = self._assembly.scenario
+        title = scenario.title or scenario.address or "flight"
+        about = [describe_gait(self._assembly), describe_controller(scenario)]
+        texts = [title, *map(", ".join, about), f"{scenario.simulation.plant} plant"]
+        return [Event(0.0, "INFO", text) for text in texts if text]
+
+    def observe(self, piece: Flight) -> list[Event]:
+        """The events within the next piece of the flight, in order of time."""
+        events = []
+        for text, holds in conditions(piece).items():
+            for time in piece["time"][holds].tolist():
+                if time - self._last_true.get(text, -np.inf) > QUIET_TIME:
+                    events.append(Event(time, "WARN", text))
+                self._last_true[text] = time
+        if "singularity_margin" in piece.columns:
+            margin = np.abs(piece["singularity_margin"])
+            at = int(np.argmin(margin))
+            found = float(margin[at]), float(piece["time"][at])
+            self._minimum_margin = min(self._minimum_margin, found)
+        return sorted(events, key=lambda event: event.time)
+
+    def closing(self, end: End) -> list[Event]:
+        """The minimum singularity margin, and how the flight ended."""
+        margin, time = self._minimum_margin
+        if end.kind == "completed":
+            ending = Event(end.time, "INFO", "flight completed")
+        else:
+            cause = f": {end.cause}" if end.cause else ""
+            ending = Event(end.time, "ERROR", f"flight terminated early ({end.kind}){cause}")
+        if margin == float("inf"):
+            return [ending]
+        text = f"minimum singularity margin: {margin:.3f} rad at {time:.2f} s"
+        return [Event(end.time, "INFO", text), ending]
+
+
+def conditions(piece: Flight) -> dict[str, npt.NDArray[np.bool_]]:
+    """Messages about a piece of a flight, and the samples at which they hold, in a fixed order."""
+    found: dict[str, npt.NDArray[np.bool_]] = {}
+    scenario, columns = piece.scenario, piece.columns
+    if "singularity_margin" in columns:
+        threshold = margin_threshold(scenario)
+        near = np.abs(columns["singularity_margin"]) < threshold
+        found[f"singularity margin below {threshold:g} rad"] = near
+    if (supervisor := scenario.controller.supervision) is not None:
+        active = columns[SUPERVISION] > SUPERVISION_THRESHOLD
+        found[_SUPERVISOR_MESSAGES[supervisor.strategy]] = active
+    if "attitude_zone" in columns:
+        inside = columns["attitude_zone"] > 0.5
+        found["switched to attitude-altitude control"] = inside
+        found["switched to yaw-position control"] = ~inside
+    if "contact_time" in columns:
+        found["touches an object"] = np.diff(columns["contact_time"], prepend=np.inf) > 0.0
+    craft = None if scenario.vehicle.is_planar else scenario.any_rotorcraft
+    highest, lowest = (craft.max_rotor_speed, craft.min_rotor_speed) if craft else (None, 0.0)
+    for rotor in piece.assembly.loop.kind.rotors:
+        speed = columns[f"rotor_speed_{rotor}"]
+        if craft is not None:
+            speed = craft.spins[rotor - 1] * speed
+            found[f"rotor {rotor} reversed"] = speed <= 0.0
+        for limit, reached in ((highest, at_upper_limit), (lowest, at_lower_limit)):
+            if limit is not None:
+                text = f"{limit:g} rad/s" if limit else "zero"
+                found[f"rotor {rotor} saturated at {text}"] = reached(speed, limit)
+    return found

@@ -21,7 +21,7 @@ from tiltsim_controllers.analysis.vectoring_limits import (
     side_slope,
     sideways_limit,
 )
-from tiltsim_controllers.laws.failures import Failure
+from tiltsim_controllers.laws.observed import Failure
 from tiltsim_controllers.laws.vectoring import Vectoring
 from tiltsim_controllers.laws.vectoring_state import Ability, Parameters
 from tiltsim_controllers.mathematics.scalar import Values

@@ -20,6 +20,8 @@ The first three are linear programs, the last is a quadratic one. All are solved
 set method, for any number of rotors: along the objective's gradient, as far as the levels before it
 and the rotors at their limits allow; a rotor that the way meets at its limit stops there, and is
 let go again where its multiplier says so.
+
+`bounded_least_squares` is for demands that rotors and tilts meet together as their limits allow.
 """
 
 from __future__ import annotations
@@ -27,10 +29,8 @@ from __future__ import annotations
 from math import inf
 from typing import Any, Final, NamedTuple
 
-from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.code.blocks import branch, repeat
-from tiltsim_controllers.code.traceable import traceable
-from tiltsim_controllers.mathematics.linear import norm
+from tiltsim_controllers.code.arrays import branch, repeat, traceable, xp
+from tiltsim_controllers.mathematics.linear import norm, solved_symmetric
 
 NEGLIGIBLE: Final = 1e-9
 """Share of a row or gradient below which it is nothing: well above rounding.
@@ -70,15 +70,10 @@ def _unit(row: Any) -> Any:
 
 
 def _remainder(rows: Any, free: Any, gradient: Any) -> Any:
-    """The part of a gradient that rows and stopped rotors leave.
+    """The part of a gradient that rows and stopped rotors leave: the direction of steepest ascent.
 
-    It is orthogonal to the rows over the free rotors, for which it is the direction of steepest
-    ascent. Its other entries are the multipliers of the rotors that stopped.
-
-    Args:
-        rows: Rows of length 1 or 0, shape (N,) each.
-        free: 1 for rotors that move, 0 for rotors at a limit, shape (N,).
-        gradient: Shape (N,).
+    Its entries of rotors that stopped are their multipliers. Rows, of length 1 or 0, and gradient
+    have shape (N,); ``free`` is 1 for rotors that move, 0 for rotors at a limit.
     """
     units: list[Any] = []
     for row in (*rows, gradient):
@@ -217,3 +212,53 @@ def limited_accelerations(
     gain = 2.0 * abs(speeds)  # of w, per acceleration
     low, high = acceleration_range(speeds, spins, limits)
     return allocated(requested, gain * wrench[3:], gain * (up @ wrench[:3]), low, high)
+
+
+TOLERANCE: Final = 1e-12
+"""How far beyond a limit, in units of the weighted input, counts as beyond."""
+
+
+def bounded_least_squares(
+    matrix: Any, demand: Any, softness: Any, weights: Any, start: Any, low: Any, high: Any
+) -> Any:
+    """Inputs within limits that meet a demand, shape (n,).
+
+    The minimum of ``sum (G x - y)^2 / softness + sum q (x - start)^2`` has a dual system with a row
+    for each of the six demands, whatever the number of inputs. A small softness makes a demand
+    nearly exact, and sets its priority where limits forbid to meet all; inputs without any effect
+    stay at the start. Inputs beyond their limits leave the system in turn, the farthest first
+    (redistributed pseudoinverse, Bodson 2002, "Evaluation of optimization methods for control
+    allocation").
+
+    Args:
+        matrix: Effect of the inputs, ``G``, shape (6, n).
+        demand: ``y``, shape (6,).
+        softness: Shape (6,), positive.
+        weights: ``q``, shape (n,), positive.
+        start: Shape (n,).
+        low, high: Limits, shape (n,).
+    """
+    root = xp.sqrt(weights)
+    lead = xp.diag(softness)
+
+    def turn(_: Any, x: Any, free: Any, worst: Any) -> tuple[Any, Any, Any]:
+        rest = demand - matrix @ (free * start + (1.0 - free) * x)
+        dual = solved_symmetric((matrix * (free / weights)) @ matrix.T + lead, rest)
+        x = xp.where(free > 0.5, start + (dual @ matrix) / weights, x)
+        beyond = free * root * xp.maximum(low - x, x - high)
+        worst = largest(beyond)
+        leaves = (beyond > 0.5 * worst) & (beyond > TOLERANCE)
+        return xp.where(leaves, xp.clip(x, low, high), x), xp.where(leaves, 0.0, free), worst
+
+    size = len(start)
+    state = (start, xp.ones(size), 1.0)
+    x, _, _ = repeat(float(size), turn, *state, until=lambda _x, _free, worst: worst <= TOLERANCE)
+    return xp.clip(x, low, high)
+
+
+def largest(values: Any) -> Any:
+    """The largest of some numbers."""
+    most = values[0]
+    for value in values[1:]:
+        most = xp.maximum(most, value)
+    return most

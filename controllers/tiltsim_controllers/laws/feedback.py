@@ -1,16 +1,31 @@
-"""Steps of the feedback around a moving reference: position, force, attitude.
+"""Steps of the feedback around a moving reference: position, force, attitude, and decouplers.
 
 Vectors have an entry for each axis; quantities with derivatives are
 `tiltsim_controllers.mathematics.moving.Moving`.
+
+Attitude and altitude use all four rotor speeds, so the horizontal position is controlled by leaning
+the vehicle: a decoupler has the roll and pitch that produce a desired acceleration. The decouplers
+differ in their model of the tilted rotors: the conventional one ignores them (ch. 4, Eqs. 7-8), the
+modified one has the side force at level attitude, to first order (Eqs. 9-11), the exact one the
+whole direction of the force at zero torque.
 """
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Final
 
-from tiltsim_controllers.code.arrays import xp
+from tiltsim_controllers.code.arrays import traceable, xp
 from tiltsim_controllers.mathematics.linear import cross
-from tiltsim_controllers.mathematics.moving import Moving, cosine, sine, square_root, stacked, where
+from tiltsim_controllers.mathematics.moving import (
+    Moving,
+    angle,
+    cosine,
+    sine,
+    square_root,
+    stacked,
+    value_of,
+    where,
+)
 
 
 def limited_acceleration(acceleration: Moving, limit: Any) -> Any:
@@ -81,10 +96,7 @@ def attitude_jerk(desired: Moving, present: Moving, gains: Any, limit: Any) -> A
 def body_rate_matrix(roll: Any, pitch: Any) -> Any:
     """``M(roll, pitch)`` with ``omega = M eta'`` of the rates of roll, pitch and yaw, shape (3, 3).
 
-    Ch. 3, Eq. 8, takes it for the unit matrix.
-
-    Args:
-        roll, pitch: rad, moving.
+    The angles (rad) move. Ch. 3, Eq. 8, takes it for the unit matrix.
     """
     sr, cr, sp, cp = sine(roll), cosine(roll), sine(pitch), cosine(pitch)
     rows = (1.0, 0.0, -sp), (0.0, cr, sr * cp), (0.0, -sr, cr * cp)
@@ -110,11 +122,9 @@ def attitude_motion(attitude: Any, omega: Any, omega_rate: Any, *, exact: bool) 
 
 
 def angular_jerk(attitude: Moving, jerk: Any) -> Any:
-    """Second derivatives (rad/s^3) of the body rates: of ``omega = M eta'``, shape (3,).
+    """Second derivatives (rad/s^3) of the body rates ``omega = M eta'``, shape (3,).
 
-    Args:
-        attitude: Roll, pitch and yaw, rad, shape (3,).
-        jerk: Their third derivatives, rad/s^3, shape (3,).
+    ``attitude`` is roll, pitch and yaw, rad, ``jerk`` their third derivatives, rad/s^3, shape (3,).
     """
     rates = Moving(attitude.rate, attitude.acceleration, jerk)
     turned: Moving = body_rate_matrix(attitude[0], attitude[1]) @ rates
@@ -122,12 +132,87 @@ def angular_jerk(attitude: Moving, jerk: Any) -> Any:
 
 
 def swept(vector: Moving, omega: Any, omega_rate: Any) -> Moving:
-    """The rate of a vector that rotates with the body, with its derivative; body axes.
+    """The rate of a vector (3,) that moves in a body, with its derivative; body axes.
 
-    Args:
-        vector: Moving in body axes, shape (3,).
-        omega, omega_rate: Body rates (rad/s) and their rates (rad/s^2), shape (3,) each.
+    Body rates (rad/s) and their rates (rad/s^2) have shape (3,).
     """
     rate = vector.rate + cross(omega, vector.value)
     second = vector.acceleration + cross(omega_rate, vector.value)
     return Moving(rate, second + cross(omega, vector.rate), 0.0)
+
+
+NONE: Final = 0.0
+CONVENTIONAL: Final = 1.0
+MODIFIED: Final = 2.0
+EXACT: Final = 3.0
+
+DECOUPLERS: Final = {
+    "none": NONE,
+    "conventional": CONVENTIONAL,
+    "modified": MODIFIED,
+    "exact": EXACT,
+}
+"""Decouplers by their name in a scenario."""
+
+
+@traceable
+def conventional_decoupler(ax: Any, ay: Any, yaw: Any, gravity: Any) -> tuple[Any, Any]:
+    """Roll and pitch (rad) of a plain quadrotor near hover (ch. 4, Eqs. 7-8).
+
+    Args:
+        ax, ay: Desired acceleration, m/s^2, world axes.
+        yaw: rad.
+        gravity: m/s^2.
+    """
+    s, c = xp.sin(yaw), xp.cos(yaw)
+    return (ax * s - ay * c) / gravity, (ax * c + ay * s) / gravity
+
+
+@traceable
+def modified_decoupler(ax: Any, ay: Any, yaw: Any, gravity: Any, n: Any) -> tuple[Any, Any]:
+    """Conventional roll and pitch (rad) plus the side force at level hover (ch. 4, Eqs. 9-11).
+
+    Eq. 11 determines the rotor inputs with zero torque whose vertical force is the weight at level
+    attitude. Their force is parallel to ``n``, so ``F_X = m g n_x / n_z`` and ``F_Y = m g n_y /
+    n_z``: the printed 4 x 4 inverse in closed form. NaN where no such inputs exist.
+
+    Args:
+        ax, ay, yaw, gravity: See `conventional_decoupler`.
+        n: The torque-free force, of any unit, body axes, shape (3,).
+    """
+    roll, pitch = conventional_decoupler(ax, ay, yaw, gravity)
+    lift = xp.where(n[2] == 0.0, xp.nan, n[2])
+    return roll + n[1] / lift, pitch - n[0] / lift
+
+
+@traceable
+def exact_decoupler(ax: Any, ay: Any, az: Any, yaw: Any, gravity: Any, n: Any) -> tuple[Any, Any]:
+    """The roll and pitch (rad) that point the torque-free force along the desired one.
+
+    Solves ``Ry(pitch) Rx(roll) n = d |n|`` with ``d`` the unit vector along ``Rz(-yaw) (ax, ay,
+    g + az)``, on the branch that is level when ``n`` and ``d`` are vertical. Where no roll reaches
+    ``d`` the nearest one is returned, at rest; NaN where the torque-free force has neither a
+    lateral nor a vertical part, and in free fall, ``d = 0``.
+
+    All arguments but gravity may be `Moving`; roll and pitch are then as well.
+
+    Args:
+        ax, ay, az: Desired acceleration, m/s^2, world axes.
+        yaw, gravity, n: See `modified_decoupler`.
+    """
+    s, c = sine(yaw), cosine(yaw)
+    dx, dy, dz = ax * c + ay * s, ay * c - ax * s, gravity + az
+    # The rotors can push along n or against it; the side that points up is used.
+    n = n * xp.where(value_of(n[2]) >= 0.0, 1.0, -1.0)
+    lateral, desired = n[1] * n[1] + n[2] * n[2], dx * dx + dy * dy + dz * dz
+    none = (value_of(lateral) == 0.0) | (value_of(desired) == 0.0)
+    lateral, desired = where(none, xp.nan, lateral), where(none, xp.nan, desired)
+    # n_y cos(roll) - n_z sin(roll) = d_y |n| / |d|: the component along the pitch axis.
+    reach = dy * square_root((lateral + n[0] * n[0]) / desired)
+    rest, phase = lateral - reach * reach, angle(n[2], n[1])
+    reaches = value_of(rest) > 0.0
+    reached = angle(square_root(where(reaches, rest, 1.0)), reach) - phase
+    nearest = xp.arctan2(0.0, value_of(reach)) - value_of(phase)
+    roll = where(reaches, reached, nearest)
+    pitch = angle(dx, dz) - angle(n[0], n[1] * sine(roll) + n[2] * cosine(roll))
+    return roll, pitch

@@ -10,25 +10,28 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any, Final
 
-from tiltsim_controllers.code.traceable import traceable
-from tiltsim_controllers.gaits.motion import anticipated_tilts, planned_tilts
-from tiltsim_controllers.gaits.parameters import FIXED, NO_KNOTS, GaitParameters
+from tiltsim_controllers.code.arrays import traceable
+from tiltsim_controllers.gaits.motion import (
+    FIXED,
+    NO_KNOTS,
+    GaitParameters,
+    anticipated_tilts,
+    planned_tilts,
+)
 from tiltsim_controllers.laws.allocation import RotorRange, limited_accelerations
 from tiltsim_controllers.laws.attitude_altitude import OPTIONS, AttitudeAltitude
-from tiltsim_controllers.laws.decouplers import NONE
+from tiltsim_controllers.laws.feedback import NONE
 from tiltsim_controllers.laws.gains import Gains, IntegralGains
 from tiltsim_controllers.laws.keys import record_of
 from tiltsim_controllers.laws.multirotor import attitude_force, present_wrench
 from tiltsim_controllers.laws.multirotor_steps import FeedforwardTerms, Form
-from tiltsim_controllers.laws.multirotor_supervisor import multirotor_supervision_of
 from tiltsim_controllers.laws.observed import Seen, Step
+from tiltsim_controllers.laws.supervised_vehicles import SUPERVISION, multirotor_supervision_of
 from tiltsim_controllers.laws.supervisor import Supervision, Supervisor, gait_time
-from tiltsim_controllers.laws.tiltrotor_supervisor import SUPERVISION
 from tiltsim_controllers.references.trajectories import ReferenceParameters
-from tiltsim_controllers.vehicle.effectiveness import TiltOfRotor, tilts_of
+from tiltsim_controllers.vehicle.body import PITCH, ROLL, state_of
 from tiltsim_controllers.vehicle.parameters import Vehicle
-from tiltsim_controllers.vehicle.rotors import airframe
-from tiltsim_controllers.vehicle.states import PITCH, ROLL, state_of
+from tiltsim_controllers.vehicle.rotors import TiltOfRotor, airframe, tilts_of
 
 Parameters = record_of(
     AttitudeAltitude,
@@ -85,12 +88,7 @@ def gait_law_of(layout: TiltOfRotor, form: Form, supervision: Supervision) -> Ca
     """The control law of vehicles of a layout, `attitude_force` with the tilts of the gait.
 
     Its parameters are `Parameters`, or `multirotor_steps.Parameters` with the table of the rotors
-    in the knots.
-
-    Args:
-        layout: Layout of the vehicles.
-        form: Options of the law.
-        supervision: Functions of the supervisor, used where the form is supervised.
+    in the knots. The supervisor's functions are used where the form is supervised.
     """
     leans_with_gait = form.dimension < 3 and not form.forward and tilts_of(layout) > 0
 
@@ -111,12 +109,7 @@ def gait_law_of(layout: TiltOfRotor, form: Form, supervision: Supervision) -> Ca
 
 @cache
 def prioritized(law: Callable[..., Step], layout: TiltOfRotor) -> Callable[..., Step]:
-    """A law that keeps rotor accelerations within ``limits`` of its parameters, see `allocation`.
-
-    Args:
-        law: Plain inversion.
-        layout: Layout of the vehicles.
-    """
+    """A law by plain inversion, kept within ``limits`` of its parameters: see `allocation`."""
 
     @traceable
     def limited(seen: Seen, p: Any, knots: Any = NO_KNOTS) -> Step:

@@ -7,10 +7,12 @@ accelerations, ``(seen, parameters, knots) -> Step``.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import inf
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.vehicle.body import Body
 from tiltsim_controllers.vehicle.parameters import Vehicle
 from tiltsim_controllers.vehicle.rotors import Rotors
@@ -23,7 +25,7 @@ class Seen(NamedTuple):
     """The measured state of a vehicle, and the states of its controller."""
 
     time: Any  # s
-    state: Any  # `tiltsim_controllers.vehicle.states.RotorcraftState` in one vector
+    state: Any  # `tiltsim_controllers.vehicle.body.RotorcraftState` in one vector
     tilt_rates: Any = np.zeros(0)  # (M,), rad/s
     states: Any = np.zeros(0)  # (S,), of the controller
     measured: Any = None  # (3,), angular acceleration, rad/s^2, body axes; None: by the law's model
@@ -110,3 +112,22 @@ class Command:
     tilt_angles: Any = None
     rates: Any = None
     discrete: Any = None
+
+
+class Failure(NamedTuple):
+    """A failed rotor and when it is known: from then on the controller uses the others."""
+
+    rotor: float = 0.0  # from 1, 0 for none
+    known_from: float = inf  # s
+
+
+UNHARMED: Final = Failure()
+"""All rotors work, as far as is known."""
+
+
+def working(time: Any, failure: Failure, rotors: int) -> Any:
+    """1 for a rotor that works as far as is known at a time (s), 0 for one that failed, (N,)."""
+    known = time >= failure.known_from
+    return xp.array(
+        [xp.where(known & (failure.rotor == i), 0.0, 1.0) for i in range(1, rotors + 1)]
+    )

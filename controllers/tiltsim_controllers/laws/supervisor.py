@@ -4,7 +4,7 @@ It keeps two numbers above their thresholds: the singularity margin (rad, the di
 attitude from a singular one) and the determinant of the matrix, scaled to `UNTILTED`, its value for
 the level untilted tiltrotor. Only the determinant shows that a gait approaches tilt angles at which
 every attitude is singular. Both numbers depend on the kind of vehicle
-(`tiltsim_controllers.laws.tiltrotor_supervisor`, ``multirotor_supervisor``). There are three
+(`tiltsim_controllers.laws.supervised_vehicles`). There are three
 strategies.
 
 * ``SCALE`` scales all tilt angles toward zero as little as satisfies both thresholds. A function
@@ -31,11 +31,8 @@ from collections.abc import Callable
 from math import inf, pi
 from typing import Any, Final, NamedTuple
 
-from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.code.blocks import branch, repeat
-from tiltsim_controllers.code.traceable import traceable
-from tiltsim_controllers.gaits.motion import planned_tilts
-from tiltsim_controllers.gaits.parameters import NO_KNOTS, GaitParameters
+from tiltsim_controllers.code.arrays import branch, repeat, traceable, xp
+from tiltsim_controllers.gaits.motion import NO_KNOTS, GaitParameters, planned_tilts
 from tiltsim_controllers.mathematics.attitude import rotation_matrix
 from tiltsim_controllers.mathematics.linear import cross
 
@@ -59,7 +56,7 @@ FOLLOWED: Final = 0.0625
 """Time (s of the gait) by which the lean follows the tilts; less if samples are closer."""
 
 BAND: Final = 0.1
-"""`threshold_clearance` from which the clock of ``HOLD`` slows down, to stop at zero.
+"""Clearance above the thresholds from which the clock of ``HOLD`` slows down, to stop at zero.
 
 ``RETURN_TO_RED`` has full speed where the clearance is minus this: it undershoots a threshold by up
 to this, times the share of the maximum tilt rate that the gait requires.
@@ -116,7 +113,7 @@ def _on_clock(planned: Any, motion: Any) -> Any:
 
 
 def _relative_clearance(margin: Any, determinant: Any, supervisor: Supervisor) -> Any:
-    """The distance above the thresholds, as `Supervision.clearance`."""
+    """Distance above the thresholds by the largest possible; negative below them."""
     return xp.minimum(
         (margin - supervisor.min_margin) / (0.5 * pi - supervisor.min_margin),
         (determinant - supervisor.min_determinant) / (UNTILTED - supervisor.min_determinant),
@@ -125,11 +122,7 @@ def _relative_clearance(margin: Any, determinant: Any, supervisor: Supervisor) -
 
 @traceable
 def turned_along(up: Any, start: Any, end: Any) -> Any:
-    """A direction turned by the least rotation between two lines, if both have a length.
-
-    Args:
-        up, start, end: Shape (3,) each.
-    """
+    """A direction (3,) turned by the least rotation between two lines, if both have a length."""
     size = xp.sqrt((start @ start) * (end @ end))
     turns = size > 0.0
     along = start @ end / xp.where(turns, size, 1.0)
@@ -140,7 +133,7 @@ def turned_along(up: Any, start: Any, end: Any) -> Any:
     return xp.where(turns, along * up + cross(axis, up) + share * axis, up)
 
 
-class _Supervised(NamedTuple):
+class Supervised(NamedTuple):
     """A supervisor in a flight: how far a vehicle is from its thresholds.
 
     Attributes:
@@ -161,8 +154,8 @@ class _Supervised(NamedTuple):
         return _relative_clearance(margin, determinant, self.supervisor), direction
 
 
-def _largest_scale(tilts: Any, up: Any, supervised: _Supervised) -> Any:
-    """`Supervision.allowed_scale` at an attitude."""
+def _largest_scale(tilts: Any, up: Any, supervised: Supervised) -> Any:
+    """`Supervision.gait_scale` at an attitude."""
 
     def clearance_at(scale: Any) -> Any:
         return supervised.look(scale * tilts, up)[0]
@@ -193,17 +186,11 @@ def _largest_scale(tilts: Any, up: Any, supervised: _Supervised) -> Any:
     return branch(whole >= 0.0, lambda: 1.0, searched)
 
 
-def _smallest_ahead(clock: Any, up: Any, tilts_at: Callable[..., Any], now: _Supervised) -> Any:
+def _smallest_ahead(clock: Any, up: Any, tilts_at: Callable[..., Any], now: Supervised) -> Any:
     """The smallest clearance up to the horizon at the supervisor's present state.
 
     The vehicle meets each sample's tilts with the lean of a moment before. In hover it leans with
     their direction; it stays as far away from that as it is now.
-
-    Args:
-        clock: Time of the gait's clock, s.
-        up: World up in body axes, shape (3,).
-        tilts_at: The tilts (rad, shape (M,)) at a time of the clock.
-        now: The supervisor.
     """
     spacing = now.supervisor.horizon / LOOKAHEAD_SAMPLES
     smallest, start = now.look(tilts_at(clock), up)
@@ -240,48 +227,24 @@ class Supervision(NamedTuple):
     way_back: WayBack = NO_WAY_BACK
 
     @traceable
-    def clearance(
-        self, tilts: Any, up: Any, supervisor: Supervisor, vehicle: Any, knots: Any = NO_KNOTS
-    ) -> Any:
-        """Distance above the thresholds by the largest possible; negative below them.
-
-        Args:
-            tilts, up, vehicle, knots: See this class.
-            supervisor: Thresholds.
-        """
-        return _Supervised(self.assess, supervisor, vehicle, knots).look(tilts, up)[0]
-
-    @traceable
-    def allowed_scale(
+    def gait_scale(
         self, tilts: Any, roll: Any, pitch: Any, supervisor: Supervisor, vehicle: Any,
         knots: Any = NO_KNOTS,
     ) -> Any:  # fmt: skip
         """The largest scale in [0, 1] that satisfies the thresholds, or the nearest of the grid.
 
-        A range of scales between two of the grid may pass unseen.
+        A range of scales between two of the grid may pass unseen. 1 unless the strategy is `SCALE`.
 
         Args:
             tilts, roll, pitch, vehicle, knots: See this class.
-            supervisor: Thresholds.
-        """
-        supervised = _Supervised(self.assess, supervisor, vehicle, knots)
-        return _largest_scale(tilts, _up(roll, pitch), supervised)
-
-    @traceable
-    def gait_scale(
-        self, tilts: Any, roll: Any, pitch: Any, supervisor: Supervisor, vehicle: Any,
-        knots: Any = NO_KNOTS,
-    ) -> Any:  # fmt: skip
-        """Like `allowed_scale`, but 1 unless the strategy is `SCALE`.
-
-        Args:
-            tilts, roll, pitch, supervisor, vehicle, knots: See `allowed_scale`.
+            supervisor: Thresholds and strategy.
         """
         if supervisor.strategy != SCALE:
             return 1.0
+        supervised = Supervised(self.assess, supervisor, vehicle, knots)
         return branch(
             (supervisor.min_margin > 0.0) | (supervisor.min_determinant > 0.0),
-            lambda: self.allowed_scale(tilts, roll, pitch, supervisor, vehicle, knots),
+            lambda: _largest_scale(tilts, _up(roll, pitch), supervised),
             lambda: 1.0,
         )
 
@@ -328,7 +291,7 @@ class Supervision(NamedTuple):
             return self.tilts(planned, 1.0, still, supervisor, vehicle)[:, 0]
 
         clock = gait_time(time, still, supervisor)
-        now = _Supervised(self.assess, supervisor, vehicle, knots)
+        now = Supervised(self.assess, supervisor, vehicle, knots)
         share = _smallest_ahead(clock, _up(roll, pitch), tilts_at, now) / BAND
         if supervisor.strategy == HOLD:
             desired = 1.0 - xp.minimum(1.0, xp.maximum(0.0, share))

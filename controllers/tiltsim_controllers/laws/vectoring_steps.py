@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.laws.decouplers import exact_decoupler
-from tiltsim_controllers.laws.feedback import body_rate_matrix
+from tiltsim_controllers.laws.feedback import body_rate_matrix, exact_decoupler
 from tiltsim_controllers.mathematics.attitude import rotation_matrix
 from tiltsim_controllers.mathematics.linear import cross, norm, solved_symmetric
 from tiltsim_controllers.mathematics.moving import (

@@ -10,8 +10,7 @@ import pytest
 from tests.controllers.code.test_programs import SPECIAL, same
 from tests.natively import machine_code, machine_code_in_lanes
 from tiltsim_controllers.code import jax_function
-from tiltsim_controllers.code.arrays import flatten, xp
-from tiltsim_controllers.code.blocks import branch, repeat, take
+from tiltsim_controllers.code.arrays import branch, flatten, repeat, take, xp
 from tiltsim_controllers.code.casadi_function import casadi_function
 from tiltsim_controllers.code.jax_function import results_in_jax
 from tiltsim_controllers.code.messages import TraceError
@@ -99,7 +98,7 @@ def test_lanes_that_take_different_ways_keep_the_bits_of_each(function, lanes):
 
 
 @pytest.mark.parametrize("in_segments", [False, True])
-@pytest.mark.parametrize("function", [everything, nested])
+@pytest.mark.parametrize("function", [pytest.param(everything, marks=pytest.mark.slow), nested])
 def test_a_program_has_the_same_values_in_jax(function, in_segments, monkeypatch):
     jax = pytest.importorskip("jax")
     monkeypatch.setattr(jax_function, "SEGMENT", 7)

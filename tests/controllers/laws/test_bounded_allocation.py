@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
-from tiltsim_controllers.laws.bounded_allocation import bounded_least_squares
+from tiltsim_controllers.laws.allocation import bounded_least_squares
 
 SOFTNESS = np.array([1e-3, 1e-3, 1e-10, 1e-12, 1e-12, 1e-9])
 

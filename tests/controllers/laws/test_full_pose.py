@@ -14,11 +14,10 @@ from tests.controllers.laws.test_tracking import PATH, TIME, reference
 from tests.controllers.multirotors import FOUR, HEXAROTOR, Vehicle, random_states, ring, tiltrotor
 from tests.natively import compiled, natively
 from tiltsim_controllers.analysis.stability import is_hurwitz
-from tiltsim_controllers.code.traceable import traceable
-from tiltsim_controllers.gaits.parameters import FIXED, GaitParameters
+from tiltsim_controllers.code.arrays import traceable
+from tiltsim_controllers.gaits.motion import FIXED, GaitParameters
 from tiltsim_controllers.laws import attitude_altitude
 from tiltsim_controllers.laws.allocation import RotorRange
-from tiltsim_controllers.laws.failures import UNHARMED, Failure
 from tiltsim_controllers.laws.full_pose import (
     GAIN_SETS,
     PUBLISHED_TILT_WEIGHT,
@@ -31,7 +30,7 @@ from tiltsim_controllers.laws.full_pose import (
     turning_rates,
 )
 from tiltsim_controllers.laws.gains import GAIN_SETS as ATTITUDE_GAINS
-from tiltsim_controllers.laws.observed import Seen
+from tiltsim_controllers.laws.observed import UNHARMED, Failure, Seen
 from tiltsim_controllers.laws.supervisor import Supervisor
 from tiltsim_controllers.mathematics.attitude import attitude_error, rotation_matrix
 from tiltsim_controllers.mathematics.linear import least_norm
@@ -41,15 +40,15 @@ from tiltsim_controllers.references.trajectories import (
     ReferenceParameters,
     reference_motion,
 )
-from tiltsim_controllers.vehicle.effectiveness import (
-    cross_table,
+from tiltsim_controllers.vehicle.cross import cross_table
+from tiltsim_controllers.vehicle.parameters import PRESETS, SPIN, drag_ratio
+from tiltsim_controllers.vehicle.rotors import (
     force_and_torque,
     rotor_entries,
+    rotors_in,
     tilt_of_rotor,
     tilts_of,
 )
-from tiltsim_controllers.vehicle.parameters import PRESETS, SPIN, drag_ratio
-from tiltsim_controllers.vehicle.rotors import rotors_in
 
 TILTROTOR = PRESETS["ar_drone_2_unrounded"]
 GAINS = GAIN_SETS["ch03"]
@@ -319,6 +318,7 @@ def full(gait, duration, step, **options):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("gait", GAITS)
 def test_full_pose_control_is_faster_with_less_overshoot_and_fast_tilting(gait):
     """Ch. 3, Sec. 6.3 against Secs. 6.1.1 and 6.1.2: same start, with less thrust than weight."""

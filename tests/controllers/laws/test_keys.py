@@ -10,7 +10,7 @@ from pydantic import Field
 
 from tiltsim_controllers.laws import multirotor_steps
 from tiltsim_controllers.laws.attitude_altitude import DECOUPLINGS, AttitudeAltitude
-from tiltsim_controllers.laws.decouplers import DECOUPLERS
+from tiltsim_controllers.laws.feedback import DECOUPLERS
 from tiltsim_controllers.laws.keys import (
     Gains2,
     GainSets,

@@ -30,8 +30,7 @@ from tiltsim_controllers.analysis.torque_free import (
 from tiltsim_controllers.gaits import plans
 from tiltsim_controllers.laws import attitude_altitude
 from tiltsim_controllers.laws.allocation import RotorRange
-from tiltsim_controllers.laws.decouplers import DECOUPLERS
-from tiltsim_controllers.laws.failures import Failure
+from tiltsim_controllers.laws.feedback import DECOUPLERS
 from tiltsim_controllers.laws.gains import GAIN_SETS, Poles, gains_from_poles
 from tiltsim_controllers.laws.gait_feedforward import multirotor_law_of
 from tiltsim_controllers.laws.multirotor import independence
@@ -44,11 +43,12 @@ from tiltsim_controllers.laws.multirotor_steps import (
     side_control,
     turned,
 )
+from tiltsim_controllers.laws.observed import Failure
 from tiltsim_controllers.laws.supervisor import Supervisor
 from tiltsim_controllers.mathematics.attitude import attitude_error, rotation_matrix
 from tiltsim_controllers.mathematics.moving import Moving
 from tiltsim_controllers.references.trajectories import CIRCLE, SETPOINT, ReferenceParameters
-from tiltsim_controllers.vehicle.effectiveness import (
+from tiltsim_controllers.vehicle.rotors import (
     CONSTANT,
     ROTOR_FLOATS,
     force_and_torque,
@@ -231,6 +231,7 @@ def sway(tilts, periods=48):
     return plans.table(times.tolist(), angles.tolist(), repeats=True)
 
 
+@pytest.mark.slow
 def test_restoring_stops_the_drift_that_position_and_attitude_do_not_show():
     vehicle, gait = Vehicle(ring(7, hinged=True), HEXAROTOR, 3), sway(7)
     drifting, restored = (

@@ -14,6 +14,7 @@ from tiltsim_controllers.laws.indi import Indi, indi
 from tiltsim_controllers.laws.observed import Desired, Observed
 from tiltsim_controllers.laws.outer_loop import (
     demanded_acceleration,
+    lift_without_torque,
     pointing_attitude,
     pointing_rates,
     push_along,
@@ -21,7 +22,6 @@ from tiltsim_controllers.laws.outer_loop import (
     torque_for,
 )
 from tiltsim_controllers.laws.pid import Pid, pid
-from tiltsim_controllers.laws.rotor_allocation import lift_without_torque
 from tiltsim_controllers.mathematics.attitude import attitude_error, rotation_matrix
 
 AXIS = np.array([0.1, -0.2, 0.9])

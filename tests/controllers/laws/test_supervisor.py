@@ -15,25 +15,42 @@ from tiltsim_controllers.analysis.singularity import (
     torque_free_direction,
     world_up,
 )
+from tiltsim_controllers.gaits.motion import NO_KNOTS
 from tiltsim_controllers.gaits.plans import continuous_trot as trot
 from tiltsim_controllers.gaits.plans import fixed, waypoints
 from tiltsim_controllers.gaits.plans import instant_trot as trot_instant
-from tiltsim_controllers.laws.decouplers import exact_decoupler
-from tiltsim_controllers.laws.multirotor_supervisor import multirotor_supervision_of, watched
-from tiltsim_controllers.laws.supervisor import BAND, LAG, STRATEGIES, Supervisor, turned_along
-from tiltsim_controllers.laws.tiltrotor_supervisor import SUPERVISION
-from tiltsim_controllers.vehicle.effectiveness import cross_table, tilt_of_rotor
+from tiltsim_controllers.laws.feedback import exact_decoupler
+from tiltsim_controllers.laws.supervised_vehicles import (
+    SUPERVISION,
+    multirotor_supervision_of,
+    watched,
+)
+from tiltsim_controllers.laws.supervisor import (
+    BAND,
+    LAG,
+    STRATEGIES,
+    Supervised,
+    Supervisor,
+    turned_along,
+)
+from tiltsim_controllers.vehicle.cross import cross_table
 from tiltsim_controllers.vehicle.parameters import PRESETS, drag_ratio
+from tiltsim_controllers.vehicle.rotors import tilt_of_rotor
 
 assess = SUPERVISION.assess
-threshold_clearance = SUPERVISION.clearance
-allowed_scale = SUPERVISION.allowed_scale
 supervised_gait_scale = SUPERVISION.gait_scale
 supervised_tilts = SUPERVISION.tilts
 supervised_derivative = SUPERVISION.derivative
 VEHICLE = PRESETS["ar_drone_2"]
 RATIO = drag_ratio(VEHICLE)
 WATCH = Supervisor(min_margin=0.3, min_determinant=1.0)
+
+
+def clearance_of(code, tilts, up, limits, vehicle, knots=NO_KNOTS):
+    """Distance above the thresholds by the largest possible."""
+    supervised = Supervised(code.assess, limits, vehicle, knots)
+    return supervised.look(np.array(tilts), np.array(up))[0]
+
 
 angles = st.tuples(*[st.floats(-1.5, 1.5)] * 4)
 leans = st.floats(-0.5, 0.5)
@@ -53,7 +70,7 @@ def regular(scales, tilts, roll, pitch):
 @example((0.0, 0.0, -1.0, -1.5), 0.0, -0.5)
 @given(angles, leans, leans)
 def test_tilts_that_pass_are_regular_and_slightly_larger_ones_are_not(tilts, roll, pitch):
-    scale = allowed_scale(tilts, roll, pitch, WATCH, RATIO)
+    scale = supervised_gait_scale(tilts, roll, pitch, WATCH, RATIO)
     sixteenths = regular(np.arange(17) / 16, tilts, roll, pitch)
     if not sixteenths.any():
         return  # the vehicle leans too far for any share of this gait
@@ -76,14 +93,15 @@ def random_cases(random):
         yield watch_all, (vehicle, table), tuple(tilts), random.uniform(-0.9, 0.9, 2)
 
 
+@pytest.mark.slow
 def test_the_scale_is_the_largest_that_is_allowed():
     """The largest scale of a dense grid, except for a range of scales between two sixteenths."""
     dense, unseen, nearest, partial, beyond = 128, 0, 0, 0, 0
     for number, (code, seen, tilts, lean) in enumerate(random_cases(np.random.default_rng(5))):
         limits = WATCH._replace(min_margin=0.3 if number % 2 else 1.1)
-        scale, up = code.allowed_scale(tilts, *lean, limits, *seen), tuple(world_up(*lean))
+        scale, up = code.gait_scale(tilts, *lean, limits, *seen), tuple(world_up(*lean))
         scales = np.arange(dense + 1) / dense
-        left = [code.clearance(tuple(k * np.array(tilts)), up, limits, *seen) for k in scales]
+        left = [clearance_of(code, tuple(k * np.array(tilts)), up, limits, *seen) for k in scales]
         allowed, sixteenths = np.array(left) >= 0.0, np.array(left)[:: dense // 16]
         if not (sixteenths >= 0.0).any():
             assert scale == 1.0 - np.argmax(sixteenths[::-1]) / 16  # the nearest
@@ -92,7 +110,7 @@ def test_the_scale_is_the_largest_that_is_allowed():
             continue
         coarse, largest = np.flatnonzero(sixteenths >= 0.0).max() / 16, scales[allowed].max()
         assert coarse <= scale < coarse + 1 / 16
-        assert code.clearance(tuple(scale * np.array(tilts)), up, limits, *seen) >= 0.0
+        assert clearance_of(code, tuple(scale * np.array(tilts)), up, limits, *seen) >= 0.0
         unseen += largest >= scale + 1 / dense
         assert scale < largest + 1 / dense
         partial += 0.0 < scale < 1.0
@@ -109,7 +127,7 @@ def test_without_thresholds_everything_passes():
 
 
 def test_a_vehicle_that_leans_too_far_gets_no_tilt():
-    assert allowed_scale((0.2, 0.1, 0.2, 0.1), 1.4, 0.0, WATCH, RATIO) == 0.0
+    assert supervised_gait_scale((0.2, 0.1, 0.2, 0.1), 1.4, 0.0, WATCH, RATIO) == 0.0
 
 
 def test_a_gait_across_the_curve_l_stops_before_it():
@@ -117,10 +135,10 @@ def test_a_gait_across_the_curve_l_stops_before_it():
     across = (0.4, -0.2, 0.4, -0.2)
     margin_alone = Supervisor(min_margin=0.3)
     assert determinant(np.array(across), 0.0, 0.0, VEHICLE) < 0.0
-    stopped = allowed_scale(across, 0.0, 0.0, margin_alone, RATIO)
+    stopped = supervised_gait_scale(across, 0.0, 0.0, margin_alone, RATIO)
     at_l = np.array(across) * stopped
     assert abs(determinant(at_l, 0.0, 0.0, VEHICLE)) < 1e-4
-    kept = allowed_scale(across, 0.0, 0.0, WATCH, RATIO)
+    kept = supervised_gait_scale(across, 0.0, 0.0, WATCH, RATIO)
     assert determinant(np.array(across) * kept, 0.0, 0.0, VEHICLE) == pytest.approx(1.0, abs=1e-4)
 
 
@@ -146,9 +164,11 @@ def test_room_is_what_is_left_above_the_thresholds(tilts, roll, pitch):
     supervisor = watch("hold")
     margin = margin_over_gait(np.array([tilts]), VEHICLE, roll, pitch)[0]
     value = determinant(np.array(tilts), roll, pitch, VEHICLE)
-    left = threshold_clearance(tilts, tuple(world_up(roll, pitch)), supervisor, RATIO)
+    left = clearance_of(SUPERVISION, tilts, tuple(world_up(roll, pitch)), supervisor, RATIO)
     assert (left >= 0.0) == (value >= 0.5 and np.sign(value) * abs(margin) >= 0.3)
-    assert threshold_clearance((0.0,) * 4, (0.0, 0.0, 1.0), supervisor, RATIO) == pytest.approx(1.0)
+    assert clearance_of(
+        SUPERVISION, (0.0,) * 4, (0.0, 0.0, 1.0), supervisor, RATIO
+    ) == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize("strategy", WITH_STATES)
@@ -201,7 +221,7 @@ def test_the_clock_slows_down_within_the_band():
             time, 0.0, 0.0, 0.0, 0.0, gait.parameters, gait.knots, supervisor, RATIO
         )[2]
         ahead = tuple(gait.angles(time + 0.5))
-        left = threshold_clearance(ahead, (0.0, 0.0, 1.0), supervisor, RATIO)
+        left = clearance_of(SUPERVISION, ahead, (0.0, 0.0, 1.0), supervisor, RATIO)
         state, asked_rates = left, acceleration * LAG
         assert asked_rates == pytest.approx(min(1.0, max(0.0, 1.0 - left / BAND)), abs=1e-9)
         if left < 0.0:
@@ -224,7 +244,7 @@ def test_a_gait_with_which_the_vehicle_leans_is_flown(horizon):
     for time in np.arange(0.0, 1.6, 0.05):
         roll, pitch = lean_of(time, gait)
         later, up = tuple(gait.angles(time + 0.4)), tuple(world_up(roll, pitch))
-        blocked += threshold_clearance(later, up, supervisor, RATIO) < 0.0
+        blocked += clearance_of(SUPERVISION, later, up, supervisor, RATIO) < 0.0
         assert demand(time, roll, pitch, 0.0, 0.0, supervisor, gait) == 0.0
     assert blocked > 10
 
@@ -246,7 +266,6 @@ def test_only_the_scaling_strategy_scales(strategy):
     planned = (1.2, -0.9, 0.7, 1.1)
     scaling = Supervisor(0.3, 1.0, STRATEGIES["scale"])
     passed = supervised_gait_scale(planned, 0.2, -0.1, scaling, RATIO)
-    assert passed == allowed_scale(planned, 0.2, -0.1, scaling, RATIO)
     assert 0.0 < passed < 1.0
     other = scaling._replace(strategy=STRATEGIES[strategy])
     assert supervised_gait_scale(planned, 0.2, -0.1, other, RATIO) == 1.0
@@ -322,9 +341,9 @@ def test_tilts_exactly_at_the_threshold_are_allowed():
     tilts, lean = (0.4, -0.2, 0.1, 0.3), (0.2, -0.3)
     margin, determinant_there, _ = assess(tilts, tuple(world_up(*lean)), RATIO)
     for threshold in ({"min_margin": margin}, {"min_determinant": determinant_there}):
-        assert allowed_scale(tilts, *lean, Supervisor(**threshold), RATIO) == 1.0
+        assert supervised_gait_scale(tilts, *lean, Supervisor(**threshold), RATIO) == 1.0
         above = {name: value * (1.0 + 1e-15) for name, value in threshold.items()}
-        assert allowed_scale(tilts, *lean, Supervisor(**above), RATIO) < 1.0
+        assert supervised_gait_scale(tilts, *lean, Supervisor(**above), RATIO) < 1.0
 
 
 # --- any multirotor ------------------------------------------------------------------------------

@@ -15,13 +15,11 @@ from tiltsim_controllers.references.trajectories import (
     REFERENCE_TYPES,
     ReferenceParameters,
     attitude_reference,
+    minimum_snap_knots,
     position_reference,
     reference_attitude,
     reference_derivatives,
     reference_motion,
-)
-from tiltsim_controllers.references.waypoints import (
-    minimum_snap_knots,
     table_knots,
     waypoint_motion,
 )
@@ -205,6 +203,7 @@ def snap_cost(shift, times, snap):
     return np.trapezoid((snap + bent) ** 2, times)
 
 
+@pytest.mark.slow
 def test_no_bump_between_waypoints_lowers_the_snap():
     flown = snap_along_the_way()
     at_rest = snap_cost(0.0, *flown)

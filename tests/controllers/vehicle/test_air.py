@@ -168,6 +168,7 @@ def test_the_rates_are_driven_by_the_noise():
     np.testing.assert_allclose(rates, drive @ noise)
 
 
+@pytest.mark.slow
 def test_the_process_has_the_spectrum():
     fast = TURBULENCE._replace(sample_time=0.02, length_u=6.0, length_w=3.0)  # 1 s and 0.5 s
     velocity = simulated(fast, 60_000)

@@ -330,7 +330,7 @@ def test_allocation_from_a_lean_does_not_hang_on_a_last_bit():
 def test_commands_take_effect_after_the_latency():
     late = scenario(simulation=LATE)
     plant = make_plant(assemble(late))
-    controls = LOOPS["attitude_altitude"].sampling.controls
+    controls = LOOPS["attitude_altitude"].controls
     setup = loop_of(late).setup(plan_flight(late), 0.0)
     requested, in_force = [], []
     for _ in range(30):

@@ -10,7 +10,7 @@ import pytest
 
 import tiltsim
 from tests.laws.restarting import assert_restarts
-from tiltsim.engines.callback import control_callback
+from tiltsim.engines.control import control_callback
 from tiltsim.errors import InputError
 from tiltsim.laws.assembling import LOOPS, assemble, loop_of
 from tiltsim.plants.factory import make_plant
@@ -107,7 +107,7 @@ def accelerations(air, height, roll):
     plant.data.qpos[:7] = [0.0, 0.0, height, np.cos(roll / 2.0), np.sin(roll / 2.0), 0.0, 0.0]
     plant.data.act[:4] = [-hover, hover, -hover, hover]
     plant.data.qvel[:] = 0.0
-    with control_callback(plant._engine.callback()):
+    with control_callback(plant._callback):
         mujoco.mj_forward(plant.model, plant.data)
     return plant.data.qacc[:6].copy()
 

@@ -185,9 +185,9 @@ WEAK = [{"type": "partial_thrust", "rotor": 1, "time": 0.02, "factor": 0.95}]
     [
         ("mujoco", HOLD),
         ("thesis", HOLD | MEASURED),
-        ("rigid_body", SCALE),
-        ("mujoco", MEASURED),
-        ("rigid_body", PRIORITIZED | SCALE),
+        pytest.param("rigid_body", SCALE, marks=pytest.mark.slow),
+        pytest.param("mujoco", MEASURED, marks=pytest.mark.slow),
+        pytest.param("rigid_body", PRIORITIZED | SCALE, marks=pytest.mark.slow),
     ],
 )
 def test_with_further_parts_the_tiltrotor_flies_as_a_multirotor_does(plant, layer):

@@ -15,11 +15,11 @@ from tiltsim.engines.sample_evaluation import evaluate_over_samples
 from tiltsim.errors import InputError
 from tiltsim.laws.assembling import assemble
 from tiltsim.laws.layers import estimation
-from tiltsim.laws.layers.estimation import fusion_of
-from tiltsim.views.figures.tubes import errors_of
-from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.code.traceable import traceable
-from tiltsim_controllers.mathematics.probability import chi_square_quantile
+from tiltsim.laws.layers.estimation import Fusion
+from tiltsim.laws.layers.instruments import instruments_of
+from tiltsim.views.figures.panels import errors_of
+from tiltsim_controllers.code.arrays import traceable, xp
+from tiltsim_controllers.mathematics.scalar import chi_square_quantile
 
 IMU = {"gyro_noise_density": 2.5e-4, "accelerometer_noise_density": 2e-3}
 MOCAP = {"rate": 50.0, "position_noise": 0.004, "attitude_noise": 0.01}
@@ -114,6 +114,7 @@ def test_outliers_are_refused():
     assert flight["innovation_mocap_position_x"].max() > 50.0
 
 
+@pytest.mark.slow
 def test_ten_times_the_noise_worsens_the_flight():
     def rms(factor):
         noisy = {
@@ -197,9 +198,11 @@ def test_a_custom_law_estimates_from_the_readings(tmp_path):
 
 
 def test_lines_are_as_long_as_the_longest_delay():
-    fusion = fusion_of(scenario(INSTRUMENTS["late"]))
-    assert (fusion.waits, fusion.late, fusion.correctors[0].waits) == (2, 1, 0)
-    assert [each.waits for each in fusion_of(scenario(INSTRUMENTS["gps"])).correctors] == [0, 6, 6]
+    fusion = Fusion(instruments_of(scenario(INSTRUMENTS["late"])))
+    assert (fusion.waits(fusion.imu), fusion.imu.late) == (2, 1)
+    assert fusion.waits(fusion.correctors[0]) == 0
+    fusion = Fusion(instruments_of(scenario(INSTRUMENTS["gps"])))
+    assert [fusion.waits(each) for each in fusion.correctors] == [0, 6, 6]
 
 
 @pytest.mark.parametrize("degrees", [9, 450, 1e5])
@@ -245,7 +248,7 @@ def test_fifty_seeds_are_consistent():
 def test_a_native_sample_takes_less_than_fifteen_microseconds(name):
     """The filter alone with all readings due, the fastest of five runs."""
     assembly = assemble(scenario(INSTRUMENTS[name]))
-    fusion = fusion_of(assembly.scenario)
+    fusion = Fusion(instruments_of(assembly.scenario))
     own = assembly.setup.parameters
     while type(own.layer).__name__ != "Estimation":
         own = own.inner
@@ -273,7 +276,7 @@ def test_a_native_sample_takes_less_than_fifteen_microseconds(name):
 
 def test_the_tube_of_the_attitude_turns_about_world_axes():
     flight = tiltsim.simulate(scenario(INSTRUMENTS["mocap"]))
-    errors, deviation = errors_of(flight, "estimate_attitude_error")
+    errors, deviation = errors_of(flight, "attitude")
     true, estimated = (
         Rotation.from_euler("ZYX", np.stack([flight[f"{start}{a}"] for a in angles], axis=-1))
         for angles in [("yaw", "pitch", "roll")]

@@ -8,13 +8,13 @@ import pytest
 
 import tiltsim
 from tiltsim.closed_loop.loop import ControlSetup
-from tiltsim.engines.callback import control_callback
+from tiltsim.engines.control import control_callback
 from tiltsim.engines.sample_evaluation import evaluate_over_samples
 from tiltsim.errors import InputError
 from tiltsim.laws.assembling import assemble
 from tiltsim.plants.factory import make_plant
 from tiltsim.scenario.instruments import ImuTable
-from tiltsim_controllers.code.traceable import traceable
+from tiltsim_controllers.code.arrays import traceable
 from tiltsim_controllers.mathematics.attitude import rotation_matrix
 from tiltsim_controllers.vehicle import instruments
 
@@ -242,7 +242,21 @@ def test_a_preset_fills_in_what_is_not_given():
         ({"sensors": {"gps": {"dropout": 1.0}}}, "sensors.gps.dropout"),
         ({"sensors": {"imu": {"preset": "best"}}}, "sensors.imu.preset"),
         ({"sensors": {"imu": {"colour": 1}}}, "sensors.imu.colour"),
-        ({"sensors": {"mocap": {}}, "ground": {"height": -1.0}}, "sensors.mocap"),
+        ({"sensors": {"mocap": {}}, "ground": {"height": -1.0}}, "sensors.mocap = {}: does not"),
+        ({"sensors": {"gps": {"resolution": 1e-320}}}, "or at least 1e-12"),
+        (
+            {"sensors": {"imu": {}}, "controller": {"law": "python", "function": "a.py:f"}},
+            "observes the state, not readings; choose",
+        ),
+        (
+            {"sensors": {}, "controller": {"law": "pid", "estimator": {"gat": 1.0}}},
+            "estimator.gat = 1.0: unknown key; did you mean gate? known: gate, initial_attitude, "
+            "initial_position, initial_velocity, type",
+        ),
+        (
+            {"sensors": {}, "controller": {"law": "pid", "estimator": {"gate": -1.0}}},
+            "controller.estimator.gate = -1.0: must be greater than 0.5",
+        ),
     ],
 )
 def test_bad_keys_are_refused_in_one_line(tables, message):
@@ -250,6 +264,7 @@ def test_bad_keys_are_refused_in_one_line(tables, message):
         scenario(**tables)
     assert message in str(error.value)
     assert "\n" not in str(error.value)
+    assert "also wrong" not in str(error.value)
 
 
 def read_an_hour(own, rate, *, first):

@@ -22,18 +22,18 @@ from tests.laws.layers.test_on_equations import (
     scenario,
 )
 from tests.simulation.test_batch import three_ways
-from tiltsim.engines.callback import control_callback
+from tiltsim.engines.control import control_callback
 from tiltsim.equations.actuator_level import actuator_plant
 from tiltsim.errors import InputError
 from tiltsim.laws.assembling import LOOPS, assemble, loop_of
-from tiltsim.laws.layers.measured_acceleration import plant_acceleration_of
+from tiltsim.laws.layers.instruments import plant_acceleration_of
 from tiltsim.laws.layers.on_equations import read_actuators
 from tiltsim.models.hover import hover_speeds
 from tiltsim.plants.factory import make_plant
 from tiltsim.resources import shipped_folder
 from tiltsim.scenario.time_steps import _reaction_gains
-from tiltsim_controllers.analysis.statics import hover_rotor_speeds
-from tiltsim_controllers.code.traceable import as_arrays
+from tiltsim_controllers.analysis.singularity import hover_rotor_speeds
+from tiltsim_controllers.code.arrays import as_arrays
 from tiltsim_controllers.vehicle.parameters import SPIN
 
 MEASURED = {"controller": {"angular_acceleration": "measured"}}
@@ -83,8 +83,8 @@ def test_the_measurement_is_the_acceleration_that_mujoco_integrates(changes, tmp
     tables = [hexarotor(tmp_path, *this) if isinstance(this, tuple) else this for this in changes]
     plant = make_plant(assemble(scenario(*tables, MEASURED)))
     loop, parameters = plant._loop, plant._setup.parameters
-    _, wrench = read_actuators(loop.dynamics)
-    acceleration_of = plant_acceleration_of(loop.dynamics)
+    _, wrench = read_actuators(loop)
+    acceleration_of = plant_acceleration_of(loop)
     data, largest = plant.data, 0.0
     for _ in range(20):
         plant.advance(3)
@@ -108,14 +108,14 @@ def test_the_measurement_is_the_acceleration_that_the_equations_integrate():
     rates = loop.equations.rates(
         plant.time, state, inputs, setup.parameters, setup.knots, (0.0,) * 3
     )
-    body, (layer, inner) = actuator_plant(loop.dynamics), setup.parameters.inner[1:]
+    body, (layer, inner) = actuator_plant(loop), setup.parameters.inner[1:]
     qpos, qvel, act = body.qpos(state), body.qvel(state), state[body.motion :]
     unmeasured = loop.within.within
-    ctrl = unmeasured.sampling.controls(
+    ctrl = unmeasured.controls(
         plant.time, qpos, np.hstack([qvel, np.zeros(3)]), act, inner, setup.knots
     )
-    loads = read_actuators(unmeasured.dynamics)[1](ctrl)
-    seen = plant_acceleration_of(loop.dynamics)(qpos, qvel, ctrl, loads, layer)[3:]
+    loads = read_actuators(unmeasured)[1](ctrl)
+    seen = plant_acceleration_of(loop)(qpos, qvel, ctrl, loads, layer)[3:]
     np.testing.assert_allclose(seen, rates[15:18], rtol=1e-12)
 
 

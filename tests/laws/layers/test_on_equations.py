@@ -15,8 +15,7 @@ from tiltsim.laws import assembling
 from tiltsim.laws.assembling import LOOPS, assemble, loop_of
 from tiltsim.plants.factory import make_plant
 from tiltsim.scenario.loading import merge
-from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.code.traceable import traceable
+from tiltsim_controllers.code.arrays import traceable, xp
 from tiltsim_controllers.laws.yaw_position import gyroscopic_acceleration
 
 MOTION = ("x", "y", "z", "roll", "pitch", "yaw")
@@ -190,7 +189,7 @@ def test_a_state_that_has_overflowed_is_seen_as_no_number(base):
     """The last addition of a step may give infinity, of which floats have no sine."""
     assembly = assemble(scenario(base, STORM, {"simulation": {"plant": "thesis"}}))
     plant = make_plant(assembly)
-    state, motion = plant.state, actuator_plant(assembly.loop.dynamics).motion
+    state, motion = plant.state, actuator_plant(assembly.loop).motion
     first = 1 + len(plant._held)
     for index in range(motion):
         overflowed = state.copy()

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import tiltsim
-from tiltsim.engines.callback import control_callback
+from tiltsim.engines.control import control_callback
 from tiltsim.errors import InputError
 from tiltsim.laws.assembling import LOOPS, assemble, loop_of
 from tiltsim.plants.command import Command, check_command
@@ -17,8 +17,8 @@ from tiltsim.plants.flight_model import build_model
 from tiltsim.resources import shipped_folder
 from tiltsim.scenario.loading import merge
 from tiltsim.vehicles.rotorcraft.layout import Layout
+from tiltsim_controllers.vehicle.craft import accelerations_within_limits
 from tiltsim_controllers.vehicle.parameters import PRESETS
-from tiltsim_controllers.vehicle.rotor_inertia import accelerations_within_limits
 
 INERTIA = 2e-5  # kg m^2, of a rotor
 TROT = {
@@ -114,7 +114,7 @@ def test_accelerations_include_the_spin_of_bodies():
         data.act[:] = SPIN * rng.uniform(200.0, 400.0, 4)
         mujoco.mj_normalizeQuat(own, data.qpos)
         state = data.qpos.tolist(), data.qvel.tolist(), data.act.tolist()
-        data.ctrl[:] = assembly.loop.sampling.controls(0.0, *state, setup.parameters, setup.knots)
+        data.ctrl[:] = assembly.loop.controls(0.0, *state, setup.parameters, setup.knots)
         mujoco.mj_forward(own, data)
 
         mujoco.mj_resetData(real, other)

@@ -10,7 +10,6 @@ actuators that act on nothing. So the control step remains a pure function that 
 and a scenario with ideal actuators runs without the layer.
 """
 
-from collections.abc import Callable
 from functools import cache
 from math import inf
 from typing import Any, Final
@@ -19,14 +18,12 @@ import numpy as np
 
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup
 from tiltsim.laws.layers.layer import Layer, Samples, wrap_loop
-from tiltsim.laws.layers.sensing import measured, sensor_parameters
 from tiltsim.laws.vehicle_loop import servo_lead
 from tiltsim.models.parts import ExtraActuators
-from tiltsim.scenario.scenario import FlightPlan
+from tiltsim.scenario.scenario import FlightPlan, Scenario
 from tiltsim.vehicles.rotorcraft import initial_tilts
-from tiltsim.vehicles.rotorcraft.layout import TILT_1, layout_of
-from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.code.traceable import traceable
+from tiltsim.vehicles.rotorcraft.layout import QW, TILT_1, layout_of
+from tiltsim_controllers.code.arrays import traceable, xp
 from tiltsim_controllers.mathematics.records import make_record_type
 from tiltsim_controllers.mathematics.scalar import Floats, Vector
 from tiltsim_controllers.vehicle.actuators import (
@@ -35,7 +32,13 @@ from tiltsim_controllers.vehicle.actuators import (
     servo_commands,
     thrust_factors,
 )
-from tiltsim_controllers.vehicle.sensors import Sensors
+from tiltsim_controllers.vehicle.instruments import (
+    Sensor,
+    Sensors,
+    reading_error,
+    reading_index,
+    rotate_by_small_angle,
+)
 
 
 @cache
@@ -105,47 +108,38 @@ def with_actuation(loop: ClosedLoop, latency_steps: int, external: bool = False)
             commands are speeds (rad/s), which take effect at once: `tiltsim.plants.commanded_plant`
             moves these along the delay line, as no rate of activations makes a speed jump.
     """
-    law_controls, dynamics = loop.sampling.controls, loop.dynamics
-    layout = layout_of(dynamics)
+    layout = layout_of(loop)
     rotors, tilts = layout
     size = rotors + tilts  # commands of a controller
     under_way = (size + external) * latency_steps
     # Activations: the law's, speed commands of the motors, the line. Controls: the law's, then
     # rates of these, then the commands in force.
-    asked = slice(dynamics.sizes.act, dynamics.sizes.act + rotors)
+    asked = slice(loop.sizes.act, loop.sizes.act + rotors)
     line = slice(asked.stop, asked.stop + under_way)
-    states = slice(layout.further_rates, dynamics.sizes.ctrl)
+    states = slice(layout.further_rates, loop.sizes.ctrl)
     line_rates = slice(states.stop + rotors, states.stop + rotors + under_way)
 
     def controls_of(
         time: Any, qpos: Any, act: Any, ctrl: Any, commands: Any, rates: Any, actuation: Any
     ) -> Any:
-        spins = xp.array(dynamics.spins)
+        spins = xp.array(loop.spins)
         head = driven(time, qpos[TILT_1:], act[:rotors], act[asked], commands, spins, actuation)
         return xp.hstack([head, ctrl[states], commands[tilts:], rates, commands])
 
-    def sampled(time: Any, qpos: Any, act: Any, ctrl: Any, actuation: Any) -> Any:
+    def controls(
+        within: Any, time: Any, qpos: Any, qvel: Any, act: Any, own: Any, knots: Any
+    ) -> Any:
+        ctrl = within(*measured(time, qpos, qvel, own.sensors), act)
         commands = xp.hstack([ctrl[:tilts], ctrl[layout.accelerations]])
         rates = xp.zeros(under_way)  # the plant moves the line of external commands
         if not external:
             before = act[line].reshape(latency_steps, size)
-            commands, rates = along_line(before, commands, actuation.control_timestep)
-        return controls_of(time, qpos, act, ctrl, commands, rates.ravel(), actuation)
+            commands, rates = along_line(before, commands, own.control_timestep)
+        return controls_of(time, qpos, act, ctrl, commands, rates.ravel(), own)
 
-    def between(time: Any, qpos: Any, act: Any, ctrl: Any, actuation: Any) -> Any:
+    def hold(_within: Any, time: Any, qpos: Any, act: Any, ctrl: Any, own: Any) -> Any:
         commands = ctrl[line_rates.stop :]
-        return controls_of(time, qpos, act, ctrl, commands, ctrl[line_rates], actuation)
-
-    @traceable
-    def controls(time: Any, qpos: Any, qvel: Any, act: Any, parameters: Any, knots: Any) -> Any:
-        actuation = parameters.layer
-        seen_qpos, seen_qvel = measured(time, qpos, qvel, actuation.sensors)
-        ctrl = law_controls(time, seen_qpos, seen_qvel, act, parameters.inner, knots)
-        return sampled(time, qpos, act, ctrl, actuation)
-
-    @traceable
-    def hold(time: Any, qpos: Any, qvel: Any, act: Any, ctrl: Any, parameters: Any) -> Any:
-        return between(time, qpos, act, ctrl, parameters.layer)
+        return controls_of(time, qpos, act, ctrl, commands, ctrl[line_rates], own)
 
     def initial_activations(plan: FlightPlan, _layer: Any, inner: Vector) -> Vector:
         angles, at_rest = initial_tilts(plan)[0][:tilts], (0.0,) * rotors
@@ -153,7 +147,6 @@ def with_actuation(loop: ClosedLoop, latency_steps: int, external: bool = False)
         return (*inner[:rotors], *waiting * latency_steps)
 
     layer = Layer(
-        f"with_actuation.{latency_steps}",
         actuation_record(rotors),
         _actuation,
         controls=controls,
@@ -168,16 +161,13 @@ def with_actuation(loop: ClosedLoop, latency_steps: int, external: bool = False)
     return wrap_loop(loop, layer)
 
 
-def _derive(
-    inner: Callable[[], dict[str, Floats]], samples: Samples, setup: ControlSetup
-) -> dict[str, Floats]:
-    time, columns, faults = samples["time"], inner(), setup.parameters.layer.faults
+def _derive(samples: Samples, setup: ControlSetup) -> dict[str, Floats]:
+    time, faults = samples["time"], setup.parameters.layer.faults
     pairs = zip(faults.thrust_time, faults.thrust_factor, strict=True)
-    remaining = {
+    return {
         f"thrust_factor_{rotor}": np.where(time >= since, factor, 1.0)
         for rotor, (since, factor) in enumerate(pairs, start=1)
     }
-    return {**columns, **remaining}
 
 
 def _actuation(plan: FlightPlan) -> Any:
@@ -214,3 +204,50 @@ def _faults(plan: FlightPlan) -> Any:
             found["thrust_time"][rotor] = table.time
             found["thrust_factor"][rotor] = 0.0 if table.type == "rotor_loss" else table.factor
     return faults_record(vehicle.rotor_count)(**{k: tuple(v) for k, v in found.items()})
+
+
+DEFAULT_SAMPLE_TIME: Final = 0.01
+"""s between readings of the sensors, if neither they nor a held controller define it."""
+
+
+@traceable
+def measured(time: Any, qpos: Any, qvel: Any, sensors: Sensors) -> tuple[Any, Any]:
+    """The vehicle's ``qpos`` and ``qvel`` as its sensors read them.
+
+    Tilts and their rates are exact, and so is an angular acceleration that follows these.
+
+    Args:
+        time: s.
+        qpos, qvel: Shapes (7 + tilts,) and (6 + tilts + any,).
+        sensors: Errors of the measurements.
+    """
+    if sensors.active == 0.0:
+        return qpos, qvel
+    index = reading_index(time, sensors.period)
+
+    def error(sensor: Sensor, channel: float) -> Any:
+        return reading_error(sensor, sensors.seed, channel, index)
+
+    position = qpos[:3] + error(sensors.position, 0.0)
+    velocity = qvel[:3] + error(sensors.velocity, 3.0)
+    quaternion = rotate_by_small_angle(qpos[QW:TILT_1], error(sensors.attitude, 6.0))
+    body_rates = qvel[3:6] + error(sensors.body_rates, 9.0)
+    return (
+        xp.hstack([position, quaternion, qpos[TILT_1:]]),
+        xp.hstack([velocity, body_rates, qvel[6:]]),
+    )
+
+
+def sensor_parameters(scenario: Scenario) -> Sensors:
+    """The sensors of a scenario."""
+    sensors, simulation = scenario.sensors, scenario.simulation
+    vectors = {
+        name: Sensor(getattr(sensors, f"{name}_noise"), getattr(sensors, f"{name}_bias"))
+        for name in ("position", "velocity", "attitude", "body_rates")
+    }
+    return Sensors(
+        active=float(sensors.have_errors),
+        seed=float(simulation.seed),
+        period=sensors.sample_time or simulation.control_timestep or DEFAULT_SAMPLE_TIME,
+        **vectors,
+    )

@@ -15,11 +15,10 @@ import numpy as np
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup
 from tiltsim.laws.layers.layer import Layer, Samples, wrap_loop
 from tiltsim.models.cables import CABLE_READING
-from tiltsim.models.objects import CONTACT_READING, COORDINATES, FORCE
+from tiltsim.models.objects import COORDINATES, FORCE
 from tiltsim.models.parts import ExtraActuators
 from tiltsim.vehicles.rotorcraft.others import CONTACT_FORCE, FELT, SWING, Others
-from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.code.traceable import traceable
+from tiltsim_controllers.code.arrays import traceable, xp
 from tiltsim_controllers.mathematics.attitude import (
     euler_angles,
     rotation_matrix,
@@ -93,10 +92,11 @@ def with_force_loop(loop: ClosedLoop) -> ClosedLoop:
     filtered error of the force times a gain, plus its integral. Before the touch there is neither
     force nor error, and the law flies as it is.
     """
-    inner_controls, first = loop.sampling.controls, loop.dynamics.sizes.act
+    first = loop.sizes.act
 
-    def displaced(time: Any, qpos: Any, act: Any, own: ForceLoop) -> tuple[Any, Any]:
-        """``qpos`` as the law sees it, and the rates of the two states."""
+    def controls(
+        within: Any, time: Any, qpos: Any, qvel: Any, act: Any, own: Any, knots: Any
+    ) -> Any:
         direction, commanded = xp.array(own.push.direction), commanded_force(time, own.push)
         filtered, integral = act[first], act[first + 1]
         error = commanded - filtered
@@ -104,20 +104,13 @@ def with_force_loop(loop: ClosedLoop) -> ClosedLoop:
         place = qpos[:3] - force / own.stiffness * direction
         measured = act[FELT.push_force] @ direction
         rates = xp.hstack([FILTER * (measured - filtered), own.gain * error])
-        return xp.hstack([place, qpos[3:]]), rates
-
-    @traceable
-    def controls(time: Any, qpos: Any, qvel: Any, act: Any, parameters: Any, knots: Any) -> Any:
-        seen, rates = displaced(time, qpos, act, parameters.layer)
-        return xp.hstack([inner_controls(time, seen, qvel, act, parameters.inner, knots), rates])
+        return xp.hstack([within(xp.hstack([place, qpos[3:]]), qvel, act), rates])
 
     layer = Layer(
-        "with_force_loop",
         ForceLoop,
         _force_loop,
         controls=controls,
         actuators=ExtraActuators(states=2),
-        initial_activations=lambda _plan, _own, _inner: (0.0, 0.0),
         fields=("filtered_push_force", "push_integral"),
         units={"filtered_push_force": "N", "push_integral": "N"},
         of_controller=True,
@@ -132,11 +125,11 @@ def with_impedance(loop: ClosedLoop) -> ClosedLoop:
     The reference is ahead by a shift s with ``mass s'' + damping s' + stiffness s = error``, and by
     the way that a soft law needs for the commanded force.
     """
-    inner_controls, first = loop.sampling.controls, loop.dynamics.sizes.act
+    first = loop.sizes.act
 
-    @traceable
-    def controls(time: Any, qpos: Any, qvel: Any, act: Any, parameters: Any, knots: Any) -> Any:
-        own = parameters.layer
+    def controls(
+        within: Any, time: Any, qpos: Any, qvel: Any, act: Any, own: Any, knots: Any
+    ) -> Any:
         direction, commanded = xp.array(own.push.direction), commanded_force(time, own.push)
         filtered, shift, speed = act[first], act[first + 1], act[first + 2]
         along = shift + own.ahead * commanded
@@ -144,16 +137,13 @@ def with_impedance(loop: ClosedLoop) -> ClosedLoop:
         moving = xp.hstack([qvel[:3] - speed * direction, qvel[3:]])
         force = commanded - filtered - own.damping * speed - own.stiffness * shift
         following = FILTER * (act[FELT.push_force] @ direction - filtered)
-        ctrl = inner_controls(time, place, moving, act, parameters.inner, knots)
-        return xp.hstack([ctrl, following, speed, force / own.mass])
+        return xp.hstack([within(place, moving, act), following, speed, force / own.mass])
 
     layer = Layer(
-        "with_impedance",
         Impedance,
         _impedance,
         controls=controls,
         actuators=ExtraActuators(states=3),
-        initial_activations=lambda _plan, _own, _inner: (0.0,) * 3,
         fields=("filtered_push_force", "push_shift", "push_shift_rate"),
         units={"filtered_push_force": "N", "push_shift": "m", "push_shift_rate": "m/s"},
         of_controller=True,
@@ -191,40 +181,33 @@ def _force_loop(plan: FlightPlan) -> ForceLoop:
 @cache
 def with_objects(loop: ClosedLoop, others: Others) -> ClosedLoop:
     """A loop among objects; it goes around all other layers."""
-    inner_controls, inner_hold = loop.sampling.controls, loop.sampling.hold
-    inner_observe, sizes = loop.columns.observe, loop.dynamics.sizes
-    size, ctrl_size, states = sizes.act, sizes.ctrl, 2 * bool(others.names)
+    size, ctrl_size = loop.sizes.act, loop.sizes.ctrl
+    states = 2 * len(others.vehicles) * bool(others.names)
     readings = size + states + others.coordinates
     accumulated, observed = _accumulated(others, size, readings), _observed(others, size, readings)
     felt = felt_among(others)
 
-    def within(qpos: Any, act: Any, own: Among) -> Any:
+    def seen(qpos: Any, act: Any, own: Among) -> Any:
         return xp.hstack([act[:size], felt(qpos, act, own.attachment)])
 
-    @traceable
-    def controls(time: Any, qpos: Any, qvel: Any, act: Any, parameters: Any, knots: Any) -> Any:
-        seen = within(qpos, act, parameters.layer)
-        ctrl = inner_controls(time, qpos, qvel, seen, parameters.inner, knots)
-        return xp.hstack([ctrl, accumulated(act, parameters.layer)])
+    def controls(
+        within: Any, time: Any, qpos: Any, qvel: Any, act: Any, own: Any, knots: Any
+    ) -> Any:
+        return xp.hstack([within(qpos, qvel, seen(qpos, act, own)), accumulated(act, own)])
 
-    @traceable
-    def hold(time: Any, qpos: Any, qvel: Any, act: Any, ctrl: Any, parameters: Any) -> Any:
-        seen = within(qpos, act, parameters.layer)
-        held = inner_hold(time, qpos, qvel, seen, ctrl[:ctrl_size], parameters.inner)
-        return xp.hstack([held, accumulated(act, parameters.layer)])
+    def hold(within: Any, time: Any, qpos: Any, act: Any, ctrl: Any, own: Any) -> Any:
+        return xp.hstack([within(seen(qpos, act, own)), accumulated(act, own)])
 
     @traceable
     def observe(qpos: Any, qvel: Any, act: Any, ctrl: Any) -> Any:
-        return xp.hstack([inner_observe(qpos, qvel, act[:size], ctrl[:ctrl_size]), observed(act)])
+        return xp.hstack([loop.observe(qpos, qvel, act[:size], ctrl[:ctrl_size]), observed(act)])
 
     layer = Layer(
-        "with_objects",
         Among,
         _among,
         controls=controls,
         hold=hold,
         actuators=ExtraActuators(states=states),
-        initial_activations=lambda _plan, _own, _inner: (0.0,) * states,
         units={
             **others.columns,
             **(dict.fromkeys(PUSH_COLUMNS, "N") if others.pushed >= 0 else {}),
@@ -233,14 +216,9 @@ def with_objects(loop: ClosedLoop, others: Others) -> ClosedLoop:
         derive=partial(_derive, others),
     )
     wrapped = wrap_loop(loop, layer)
-    behind = {"others": others.coordinates, "history": others.readings}
-    return replace(
-        wrapped,
-        dynamics=replace(wrapped.dynamics, sizes=wrapped.dynamics.sizes._replace(**behind)),
-        columns=replace(
-            wrapped.columns, observe=observe, fields=(*loop.columns.fields, *others.columns)
-        ),
-    )
+    sizes = wrapped.sizes._replace(others=others.coordinates, history=others.readings)
+    fields = (*loop.fields, *others.columns)
+    return replace(wrapped, sizes=sizes, observe=observe, fields=fields)
 
 
 def _among(plan: FlightPlan) -> Among:
@@ -249,10 +227,9 @@ def _among(plan: FlightPlan) -> Among:
     return Among(scenario.simulation.timestep, push_of(scenario), attachment)
 
 
-def _derive(
-    others: Others, inner: Callable[[], dict[str, Floats]], samples: Samples, setup: ControlSetup
-) -> dict[str, Floats]:
-    columns, own = inner(), setup.parameters.layer
+def _derive(others: Others, samples: Samples, setup: ControlSetup) -> dict[str, Floats]:
+    columns: dict[str, Floats] = {}
+    own = setup.parameters.layer
     if others.pushed >= 0:
         along = zip(CONTACT_FORCE, own.push.direction, strict=True)
         columns |= {
@@ -272,8 +249,7 @@ def _derive(
 def swing(hanging: Any) -> Any:
     """Angles (rad), shape (2, ...), of a cable from straight down toward +x and +y.
 
-    Args:
-        hanging: From its attachment to the load, m, world axes, shape (3, ...).
+    ``hanging`` leads from its attachment to the load, m, world axes, shape (3, ...).
     """
     return xp.array([xp.arctan2(hanging[0], -hanging[2]), xp.arctan2(hanging[1], -hanging[2])])
 
@@ -302,22 +278,23 @@ def felt_among(others: Others) -> Callable[..., Values]:
     return felt
 
 
-def _total(readings: Any, others: Others) -> Any:
-    """The force (N, world) on all objects, shape (3,)."""
-    return sum(readings[others.force_places(index)] for index in range(len(others.names)))
+def _total(readings: Any, others: Others, vehicle: int = 0) -> Any:
+    """The force (N, world) of a vehicle on all objects, shape (3,)."""
+    return sum(readings[others.force_places(index, vehicle)] for index in range(len(others.names)))
 
 
 def _accumulated(others: Others, size: int, readings: int) -> Callable[..., Values]:
-    """A function ``(act, own)`` of the rates of the largest force and of the time in contact."""
+    """A function ``(act, own)`` of rates of each vehicle's largest force and time in contact."""
 
     @traceable
     def accumulated(act: Any, own: Among) -> Any:
-        if not others.names:
-            return act[:0]
-        force, peak = _total(act[readings:], others), act[size]
-        magnitude = xp.sqrt(force @ force)
-        rise = (xp.maximum(magnitude, peak) - peak) / own.timestep
-        return xp.array([rise, xp.where(magnitude > 0.0, 1.0, 0.0)])
+        rates = []
+        for vehicle in range(len(others.vehicles) if others.names else 0):
+            force, peak = _total(act[readings:], others, vehicle), act[size + 2 * vehicle]
+            magnitude = xp.sqrt(force @ force)
+            rise = (xp.maximum(magnitude, peak) - peak) / own.timestep
+            rates += [rise, xp.where(magnitude > 0.0, 1.0, 0.0)]
+        return xp.array(rates) if rates else act[:0]
 
     return accumulated
 
@@ -328,14 +305,15 @@ def _observed(others: Others, size: int, readings: int) -> Callable[..., Values]
     @traceable
     def observed(act: Any) -> Any:
         parts, at = [], readings - others.coordinates
-        if others.names:
-            parts += [_total(act[readings:], others), act[size : size + 2]]
+        for vehicle in range(len(others.vehicles) if others.names else 0):
+            kept = size + 2 * vehicle
+            parts += [_total(act[readings:], others, vehicle), act[kept : kept + 2]]
         for joint in others.joints:
             pose = act[at : at + COORDINATES[joint]]
             if joint == "free":
                 pose = xp.hstack([pose[:3], euler_angles(pose[3:])])
             parts, at = [*parts, pose], at + COORDINATES[joint]
-        tension = readings + CONTACT_READING * len(others.names) + FORCE
+        tension = readings + others.contact_readings + FORCE
         tensions = act[tension::CABLE_READING]  # of the load's cable first
         parts += [act[at : at + 3]] if others.hangs else []
         parts += [tensions] if others.hangs or others.cables else []

@@ -4,38 +4,53 @@ The layer takes readings of the true vehicle and keeps them for their delay. The
 sees them behind MuJoCo's velocities: of every instrument its values, then 1 if a reading arrived at
 this control step, else 0. Its memory, activations of MuJoCo, are walking biases, readings under way
 and the last ones that arrived.
+
+The plant's accelerations are known at the instant of a control step: thrusts, servos, air and
+lagging rotors depend on the state and not on the rotor accelerations that a controller commands. So
+the controls are computed once to find them, and once more with the readings.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
-from math import ceil
+from math import ceil, inf
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
+from tiltsim.closed_loop.loop import ClosedLoop
+from tiltsim.equations.actuator_level import mechanics, mechanics_record, servo_accelerations
 from tiltsim.laws.layers.layer import Layer, wrap_loop
-from tiltsim.laws.layers.measured_acceleration import (
-    motion_record,
-    plant_acceleration_of,
-    read_motion,
-)
 from tiltsim.laws.layers.on_equations import read_actuators
 from tiltsim.models.parts import ExtraActuators
-from tiltsim.vehicles.rotorcraft.layout import QW, TILT_1
-from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.code.traceable import traceable
+from tiltsim.scenario.scenario import FlightPlan
+from tiltsim.vehicles.rotorcraft import rotor_limits
+from tiltsim.vehicles.rotorcraft.layout import (
+    QW,
+    TILT_1,
+    TILT_RATE_1,
+    body_less,
+    layout_of,
+    rotors_record,
+    tilt_of_rotor,
+)
+from tiltsim_controllers.code.arrays import traceable, xp
 from tiltsim_controllers.mathematics.attitude import rotation_matrix, rotation_of_quaternion
 from tiltsim_controllers.mathematics.linear import cross
-from tiltsim_controllers.mathematics.records import Vector3, make_record_type
+from tiltsim_controllers.mathematics.records import Vector3, make_record_type, vector_of
 from tiltsim_controllers.vehicle import instruments
-from tiltsim_controllers.vehicle.sensors import reading_index
+from tiltsim_controllers.vehicle.body import Body, inertia_matrix, inverse_inertia_matrix
+from tiltsim_controllers.vehicle.craft import craft_of
+from tiltsim_controllers.vehicle.instruments import reading_index
+from tiltsim_controllers.vehicle.rotors import wrench_map
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from tiltsim.closed_loop.loop import ClosedLoop
     from tiltsim.scenario.scenario import FlightPlan, Scenario
+
 
 CHANNELS: Final = 64  # of the draws of an instrument; other parts of a flight use those below 1000
 WALK: Final = 32.0  # channels between the noise of an instrument and the walk of its biases
@@ -49,6 +64,8 @@ class Instrument(NamedTuple):
     errors: int
     under_way: int  # readings that wait for their delay
     walks: bool
+    first: int  # of its values among all readings
+    late: int  # control steps, its delay
 
     @property
     def columns(self) -> dict[str, str]:
@@ -64,7 +81,7 @@ class Instrument(NamedTuple):
 def instruments_of(scenario: Scenario) -> tuple[Instrument, ...]:
     """The instruments of a scenario, in the order of their readings."""
     rotors, step = scenario.any_rotorcraft.rotor_count, scenario.simulation.control_timestep
-    found = []
+    found: list[Instrument] = []
     for name, table in scenario.sensors.instruments.items():
         units = {
             column.replace("#", str(i)): unit
@@ -72,41 +89,37 @@ def instruments_of(scenario: Scenario) -> tuple[Instrument, ...]:
             for i in range(1, 1 + (rotors if "#" in column else 1))
         }
         errors, period = table.errors(1.0, rotors), table.period(step)
-        under_way = ceil(table.delay / period - 1e-6)
-        one = Instrument(name, tuple(units.items()), len(errors.noise), under_way, any(errors.walk))
-        found.append(one)
+        late = (ceil(table.delay / span - 1e-6) for span in (period, step))
+        first = sum(len(each.columns) for each in found)
+        walks, (under_way, steps) = any(errors.walk), late
+        own = len(errors.noise), under_way, walks, first, steps
+        found.append(Instrument(name, tuple(units.items()), *own))
     return tuple(found)
 
 
 @cache
 def with_instruments(loop: ClosedLoop, carried: tuple[Instrument, ...]) -> ClosedLoop:
-    """A loop whose controller sees the readings of instruments behind MuJoCo's velocities.
-
-    Args:
-        loop: The loop within.
-        carried: The instruments.
-    """
-    inner_controls, dynamics = loop.sampling.controls, loop.dynamics
-    first = dynamics.sizes.act
-    _, loads = read_actuators(dynamics)
-    acceleration, measured = plant_acceleration_of(dynamics), _measured(dynamics.spins)
+    """A loop whose controller sees the readings of instruments behind MuJoCo's velocities."""
+    first = loop.sizes.act
+    _, loads = read_actuators(loop)
+    acceleration, measured = plant_acceleration_of(loop), _measured(loop.spins)
     columns = {name: unit for each in carried for name, unit in each.columns.items()}
     states = sum(each.states for each in carried)
     record = make_record_type(
         "Instruments",
-        motion=motion_record(dynamics),
+        motion=motion_record(loop),
         control_period=float,  # s
         disturbance=Vector3,  # m/s^2, world
         field=Vector3,  # direction of the magnetic field, world
         **{each.name: instruments.instrument_record(each.errors) for each in carried},
     )
 
-    @traceable
-    def controls(time: Any, qpos: Any, qvel: Any, act: Any, parameters: Any, knots: Any) -> Any:
-        own, inner, memory = parameters.layer, parameters.inner, act[first : first + states]
+    def controls(
+        within: Any, time: Any, qpos: Any, qvel: Any, act: Any, own: Any, knots: Any
+    ) -> Any:
+        memory = act[first : first + states]
         # Forces of the air and of loads are among the controls, and depend on no reading.
-        blind = xp.hstack([qvel, xp.zeros(len(columns))])
-        ctrl = inner_controls(time, qpos, blind, act, inner, knots)
+        ctrl = within(qpos, xp.hstack([qvel, xp.zeros(len(columns))]), act)
         moved = acceleration(qpos, qvel, ctrl, loads(ctrl), own.motion)
         readings, kept = [], []
         for each in carried:
@@ -116,16 +129,13 @@ def with_instruments(loop: ClosedLoop, carried: tuple[Instrument, ...]) -> Close
             readings.append(seen)
             kept.append((after - remembered) / own.control_period)
         seen = xp.hstack(readings)
-        ctrl = inner_controls(time, qpos, xp.hstack([qvel, seen]), act, inner, knots)
-        return xp.hstack([ctrl, *kept, seen])
+        return xp.hstack([within(qpos, xp.hstack([qvel, seen]), act), *kept, seen])
 
     layer = Layer(
-        "with_instruments",
         record,
         lambda plan: _parameters(plan, record, loop, carried),
         controls=controls,
         actuators=ExtraActuators(states=states, memories=len(columns)),
-        initial_activations=lambda _plan, _own, _inner: (0.0,) * states,
         remembered=tuple(columns),
         units=columns,
     )
@@ -215,9 +225,96 @@ def _parameters(
             *table.errors(1.0 / period, rotors),
         )
     return record(
-        motion=read_motion(plan, loop.dynamics),
+        motion=read_motion(plan, loop),
         control_period=step,
         disturbance=scenario.disturbance_acceleration,
         field=(0.0, 0.0, 0.0) if magnetometer is None else magnetometer.field,
         **own,
     )
+
+
+@cache
+def motion_record(loop: ClosedLoop) -> Any:
+    """The type of the parameters of the angular acceleration."""
+    tilts = layout_of(loop).tilts
+    return make_record_type(
+        "Motion",
+        mechanics=mechanics_record(rotors_record(loop), tilts),
+        least_thrust=float,  # (rad/s)^2, limits of the thrusts' controls
+        greatest_thrust=float,
+        gyroscopic=float,  # factor of this torque, 0 of tilting vehicles on the thesis plant
+        pod_inertias=vector_of(tilts),  # kg m^2, about the hinges; 0 of massless pods
+        turning=Body,  # the body that turns where pods and the servos' armatures give way
+    )
+
+
+@cache
+def plant_acceleration_of(loop: ClosedLoop) -> Callable[..., Any]:
+    """The accelerations of a simulated vehicle by all forces but gravity, shape (6,).
+
+    It is ``(qpos, qvel, ctrl, loads, motion) -> acceleration``: MuJoCo's vectors, the loads of air
+    and spinning rotors, and a `motion_record`. In body axes, first the acceleration of the center
+    of mass (m/s^2), then the angular one (rad/s^2) by Euler's equation with the momentum of the
+    pods, ``I omega' + sum J alpha_i'' a_i + omega x (I omega + sum J alpha_i' a_i) = torque``, and
+    for each hinge with the servo's armature ``A`` ``(J + A) alpha_i'' + J a_i . omega' = servo
+    torque``. Impacts on stops or ground are left out.
+    """
+    layout, tilted = layout_of(loop), tilt_of_rotor(loop)
+
+    @traceable
+    def plant_acceleration(qpos: Any, qvel: Any, ctrl: Any, loads: Any, motion: Any) -> Any:
+        own, pods = motion.mechanics, motion.pod_inertias
+        craft, omega, tilts = craft_of(own.vehicle, tilted), qvel[3:6], qpos[TILT_1:]
+        tilt_rates = qvel[TILT_RATE_1 : TILT_RATE_1 + layout.tilts]
+        thrusts = xp.clip(ctrl[layout.thrusts], motion.least_thrust, motion.greatest_thrust)
+        # The controls are s varpi |varpi| with the spins s, the map's factors are without s.
+        turned = wrench_map(craft.rotors, tilts) @ (xp.array(loop.spins) * thrusts)
+        wrench = turned + loads[:6]
+        momentum = inertia_matrix(craft.body) @ omega + (pods * tilt_rates) @ craft.hinges
+        servos = servo_accelerations(craft, ctrl, thrusts, tilts, tilt_rates, loads, own)
+        remaining = wrench[3:] - motion.gyroscopic * cross(omega, momentum)
+        turning = inverse_inertia_matrix(motion.turning)
+        angular = turning @ (remaining - (pods * servos) @ craft.hinges)
+        return xp.hstack([wrench[:3] / craft.body.mass, angular])
+
+    return plant_acceleration
+
+
+def read_motion(plan: FlightPlan, loop: ClosedLoop) -> Any:
+    """The `motion_record` of a planned flight."""
+    scenario = plan.scenario
+    plant, vehicle = scenario.simulation.plant, scenario.any_rotorcraft
+    least, greatest = rotor_limits(scenario).thrust_range or (-inf, inf)
+    tilts = layout_of(loop).tilts
+    hinges = vehicle.hinge_inertias[:tilts]
+    pods = vehicle.pod_inertias[:tilts] if plant == "mujoco" else (0.0,) * tilts
+    # The share of a pod that its reaction turns; the rest of the hinge is the servo's armature.
+    carried = tuple(pod * (pod / hinge) for pod, hinge in zip(pods, hinges, strict=True))
+    return motion_record(loop)(
+        mechanics=mechanics(plan),
+        least_thrust=least,
+        greatest_thrust=greatest,
+        gyroscopic=float(plant != "thesis" or scenario.vehicle.model == "quadrotor"),
+        pod_inertias=pods,
+        turning=body_less(scenario, carried),
+    )
+
+
+@cache
+def with_measured_acceleration(loop: ClosedLoop) -> ClosedLoop:
+    """A loop whose controller reads, after MuJoCo's velocities, the angular acceleration.
+
+    It goes around all other layers, whose controls move the plant.
+    """
+    _, loads = read_actuators(loop)
+    plant_acceleration = plant_acceleration_of(loop)
+
+    def controls(
+        within: Any, time: Any, qpos: Any, qvel: Any, act: Any, own: Any, knots: Any
+    ) -> Any:
+        ctrl = within(qpos, xp.hstack([qvel, xp.zeros(3)]), act)
+        measured = plant_acceleration(qpos, qvel, ctrl, loads(ctrl), own)[3:]
+        return within(qpos, xp.hstack([qvel, measured]), act)
+
+    layer = Layer(motion_record(loop), lambda plan: read_motion(plan, loop), controls=controls)
+    return wrap_loop(loop, layer)

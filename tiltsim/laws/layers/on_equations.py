@@ -2,7 +2,7 @@
 
 The controls are the same function of time, `qpos`, `qvel` and `act` as in MuJoCo, with the same
 sensors, noise and latency. Only the plant on which they act differs: the thesis's vehicle
-(`tiltsim.equations.actuator_level`) or a rigid body (`tiltsim.equations.rigid_body`).
+(`tiltsim.equations.actuator_level`) or a rigid body (`tiltsim.equations.actuator_level`).
 """
 
 from collections.abc import Callable
@@ -11,30 +11,29 @@ from typing import Any
 
 import numpy as np
 
-from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Dynamics, Equations
+from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Equations
 from tiltsim.equations.actuator_level import ActuatorPlant, limit_speeds_of, mechanics
 from tiltsim.laws.layers.layer import Layer, wrap_loop
 from tiltsim.models.parts import WRENCH_SIZE, ExtraActuators
 from tiltsim.scenario.scenario import FlightPlan
 from tiltsim.vehicles.rotorcraft.layout import layout_of
-from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.code.traceable import traceable
+from tiltsim_controllers.code.arrays import traceable, xp
 from tiltsim_controllers.mathematics.scalar import Vector
 
 
 @cache
-def read_actuators(dynamics: Dynamics) -> tuple[Callable[..., Any], Callable[..., Any]]:
+def read_actuators(loop: ClosedLoop) -> tuple[Callable[..., Any], Callable[..., Any]]:
     """Functions of a model's controls, except thrusts and servos.
 
     Returns:
         ``rates(ctrl)`` of the activations, in their order, and ``loads(ctrl)``: force and torque on
         the body, then torques about the hinges; see `ActuatorPlant.rates`.
     """
-    layout = layout_of(dynamics)
-    own = ExtraActuators(states=layout.rotors + dynamics.controller_states)
+    layout = layout_of(loop)
+    own = ExtraActuators(states=layout.rotors + loop.controller_states)
     first, wrenches, hinges = layout.acceleration_1, [], []
     states: list[slice] = []
-    for this in (own, *dynamics.extra_actuators):
+    for this in (own, *loop.extra_actuators):
         states.append(slice(first, first + this.states))
         force = first + this.states + this.memories
         hinge = force + WRENCH_SIZE * this.wrench
@@ -53,13 +52,13 @@ def read_actuators(dynamics: Dynamics) -> tuple[Callable[..., Any], Callable[...
     return rates, loads
 
 
-def _projection(plant: ActuatorPlant, dynamics: Dynamics) -> Callable[..., Any]:
+def _projection(plant: ActuatorPlant, loop: ClosedLoop) -> Callable[..., Any]:
     """Function ``(state, mechanics) -> state`` with motion and speed commands within limits."""
-    first = plant.motion + len(dynamics.spins) + dynamics.controller_states
+    first = plant.motion + len(loop.spins) + loop.controller_states
     projections = [plant.project_onto_limits] if plant.project_onto_limits else []
-    for this in dynamics.extra_actuators:
+    for this in loop.extra_actuators:
         if this.begins_with_rotor_speeds:
-            projections += [limit_speeds_of(dynamics.spins, first)]
+            projections += [limit_speeds_of(loop.spins, first)]
         first += this.states
 
     def project(state: Any, mechanics: Any) -> Any:
@@ -76,22 +75,21 @@ def on_equations(loop: ClosedLoop, plant: ActuatorPlant) -> ClosedLoop:
 
     Their inputs are the controls, their state is the vehicle's motion followed by the activations.
     """
-    dynamics = loop.dynamics
     first, qpos_of, qvel_of = plant.motion, plant.qpos, plant.qvel
     motion_rates, finish = plant.rates, plant.finish
-    controls, held = loop.sampling.controls, loop.sampling.hold
-    observe = loop.columns.observe
-    activation_rates, loads = read_actuators(dynamics)
-    project_motion = _projection(plant, dynamics)
+    activation_rates, loads = read_actuators(loop)
+    project_motion = _projection(plant, loop)
 
     @traceable
     def equation_inputs(time: Any, state: Any, parameters: Any, knots: Any) -> Any:
-        return controls(
+        return loop.controls(
             time, qpos_of(state), qvel_of(state), state[first:], parameters.inner, knots
         )
 
     def controls_in_force(time: Any, state: Any, inputs: Any, parameters: Any) -> Any:
-        return held(time, qpos_of(state), qvel_of(state), state[first:], inputs, parameters.inner)
+        return loop.hold(
+            time, qpos_of(state), qvel_of(state), state[first:], inputs, parameters.inner
+        )
 
     @traceable
     def equation_rates(
@@ -106,7 +104,7 @@ def on_equations(loop: ClosedLoop, plant: ActuatorPlant) -> ClosedLoop:
     @traceable
     def observe_equations(time: Any, state: Any, inputs: Any, parameters: Any, knots: Any) -> Any:
         ctrl = controls_in_force(time, state, inputs, parameters)
-        return observe(qpos_of(state), qvel_of(state), state[first:], ctrl)
+        return loop.observe(qpos_of(state), qvel_of(state), state[first:], ctrl)
 
     @traceable
     def project_onto_limits(state: Any, parameters: Any) -> Any:
@@ -116,14 +114,14 @@ def on_equations(loop: ClosedLoop, plant: ActuatorPlant) -> ClosedLoop:
 
     def initial(plan: FlightPlan, setup: ControlSetup) -> Vector:
         inner = ControlSetup(setup.parameters.inner, setup.knots)
-        return (*plant.initial(plan), *dynamics.initial_activations(plan, inner))
+        return (*plant.initial(plan), *loop.initial_activations(plan, inner))
 
     equations = Equations(
         inputs=equation_inputs,
-        inputs_size=dynamics.sizes.ctrl,
+        inputs_size=loop.sizes.ctrl,
         rates=equation_rates,
         initial=initial,
         observe=observe_equations,
         project_onto_limits=project_onto_limits,
     )
-    return wrap_loop(loop, Layer(plant.name, plant.mechanics, mechanics, equations=equations))
+    return wrap_loop(loop, Layer(plant.mechanics, mechanics, equations=equations))

@@ -10,7 +10,6 @@ from tiltsim.laws.layers.layer import Layer, wrap_loop
 from tiltsim.models.parts import ExtraActuators
 from tiltsim.vehicles.rotorcraft.others import FELT
 from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.code.traceable import traceable
 from tiltsim_controllers.references.trajectories import ReferenceParameters, reference_motion
 
 if TYPE_CHECKING:
@@ -70,12 +69,12 @@ def with_swing_damping(loop: ClosedLoop) -> ClosedLoop:
     hangs back by that acceleration over gravity's. A law that does not read `Felt` sees the vehicle
     displaced in place of its reference.
     """
-    inner_controls, sizes = loop.sampling.controls, loop.dynamics.sizes
-    first = sizes.act
+    sizes, first = loop.sizes, loop.sizes.act
 
-    @traceable
-    def controls(time: Any, qpos: Any, qvel: Any, act: Any, parameters: Any, knots: Any) -> Any:
-        own, shift, filtered = parameters.layer, act[first : first + 2], act[first + 2 : first + 4]
+    def controls(
+        within: Any, time: Any, qpos: Any, qvel: Any, act: Any, own: Any, knots: Any
+    ) -> Any:
+        shift, filtered = act[first : first + 2], act[first + 2 : first + 4]
         hanging_back = reference_motion(time, own.reference, knots)[2][:2] / own.gravity
         displacement = own.length * (act[FELT.swing] + hanging_back)
         following = FILTER * (displacement - filtered)
@@ -86,16 +85,13 @@ def with_swing_damping(loop: ClosedLoop) -> ClosedLoop:
             seen = act
             qpos = xp.hstack([qpos[:2] - shift, qpos[2:]])
             qvel = xp.hstack([qvel[:2] - rate, qvel[2:]])
-        ctrl = inner_controls(time, qpos, qvel, seen, parameters.inner, knots)
-        return xp.hstack([ctrl, rate, following])
+        return xp.hstack([within(qpos, qvel, seen), rate, following])
 
     layer = Layer(
-        "with_swing_damping",
         SwingDamping,
         _swing_damping,
         controls=controls,
         actuators=ExtraActuators(states=4),
-        initial_activations=lambda _plan, _own, _inner: (0.0,) * 4,
         fields=(*SHIFTS, *STATES),
         units=dict.fromkeys((*SHIFTS, *STATES), "m"),
         of_controller=True,

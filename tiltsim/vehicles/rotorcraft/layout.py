@@ -1,9 +1,16 @@
-"""Places of a rotorcraft's numbers in a sample and in MuJoCo's vectors."""
+"""Places of a rotorcraft's numbers in a sample and in MuJoCo's vectors, and its true rotors."""
 
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
-from tiltsim.closed_loop.loop import Dynamics, Sizes
-from tiltsim_controllers.vehicle.states import BODY_FIELDS
+import numpy as np
+
+from tiltsim.closed_loop.loop import ClosedLoop, Sizes
+from tiltsim.models.rotor_table import Multirotor
+from tiltsim.scenario.scenario import Scenario
+from tiltsim_controllers.mathematics.scalar import Values
+from tiltsim_controllers.vehicle.body import BODY_FIELDS, Body, body_of, principal_body
+from tiltsim_controllers.vehicle.craft import craft_parameters, craft_record
+from tiltsim_controllers.vehicle.parameters import Vehicle
 
 # Places in ``qpos`` and ``qvel``: the quaternion, and the first tilt and tilt rate.
 QW, QX, QY, QZ, TILT_1 = range(3, 8)
@@ -73,17 +80,52 @@ class Layout(NamedTuple):
         return (*BODY_FIELDS, *(name for kind in kinds for name in self.names(kind)))
 
 
-def layout_of(dynamics: Dynamics) -> Layout:
+def layout_of(loop: ClosedLoop) -> Layout:
     """The layout of a model's vectors; the quadrotor's have no tilts."""
-    return Layout(len(dynamics.spins), dynamics.sizes.qpos - TILT_1)
+    return Layout(len(loop.spins), loop.sizes.qpos - TILT_1)
 
 
-def tilt_of_rotor(dynamics: Dynamics) -> tuple[int, ...]:
+def tilt_of_rotor(loop: ClosedLoop) -> tuple[int, ...]:
     """The number, from 0, of each rotor's tilt; -1: fixed."""
-    rotors, tilts = layout_of(dynamics)
+    rotors, tilts = layout_of(loop)
     on_cross = tuple(range(rotors)) if tilts else (-1,) * rotors
-    return dynamics.tilt_of_rotor or on_cross
+    return loop.tilt_of_rotor or on_cross
 
 
 CROSS: Final = Layout(4, 4)
-"""Tiltrotor and quadrotor, whose samples are alike; see `tiltsim_controllers.vehicle.states`."""
+"""Tiltrotor and quadrotor, whose samples are alike; see `tiltsim_controllers.vehicle.body`."""
+
+
+def rotors_record(loop: ClosedLoop) -> Any:
+    """The type of the parameters of a model's vehicle; see `true_rotors`."""
+    return craft_record(*layout_of(loop)) if loop.tilt_of_rotor else Vehicle
+
+
+def true_rotors(scenario: Scenario) -> Any:
+    """The parameters of the simulated vehicle, not the controller's.
+
+    `tiltsim_controllers.vehicle.craft.craft_of` makes its arrays.
+    """
+    vehicle = scenario.true_vehicle
+    if not isinstance(vehicle, Multirotor):
+        return vehicle
+    body = body_of(vehicle.mass, np.reshape(vehicle.inertia, (3, 3)), vehicle.gravity)
+    return craft_parameters(body, vehicle.rotors)
+
+
+def body_less(scenario: Scenario, inertias: Values) -> Body:
+    """The simulated vehicle's body without inertias (kg m^2) about its hinges."""
+    vehicle = scenario.true_vehicle
+    if isinstance(vehicle, Multirotor):
+        inertia = np.reshape(vehicle.inertia, (3, 3)).copy()
+        for tilt, own in enumerate(inertias):
+            axis = next(rotor.hinge_axis for rotor in vehicle.rotors if rotor.tilt == tilt)
+            inertia -= own * np.outer(axis, axis)
+        return body_of(vehicle.mass, inertia, vehicle.gravity)
+    # two hinges lie along each axis; a quadrotor has none
+    about_x, about_y = (2.0 * own for own in inertias[:2] or (0.0, 0.0))
+    return principal_body(
+        vehicle._replace(
+            inertia_xx=vehicle.inertia_xx - about_x, inertia_yy=vehicle.inertia_yy - about_y
+        )
+    )

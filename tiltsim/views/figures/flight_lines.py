@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from tiltsim.flight.flight import Flight
-from tiltsim.laws.supervision import SUPERVISION
+from tiltsim.laws.law import SUPERVISION
 from tiltsim.views.figures import style
 from tiltsim_controllers.mathematics.scalar import Floats
 

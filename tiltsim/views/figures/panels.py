@@ -10,7 +10,8 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from tiltsim.flight.flight import Flight
-from tiltsim.laws.supervision import SUPERVISION
+from tiltsim.flight.vectors import VECTORS
+from tiltsim.laws.law import SUPERVISION
 from tiltsim.scenario.gait import PenguinGait
 from tiltsim.system.text import Quantity
 from tiltsim.views import attitude_plane
@@ -22,18 +23,19 @@ from tiltsim.views.figures.flight_lines import (
     mark_end,
     plot_flights,
 )
-from tiltsim.views.figures.tubes import TUBES, draw_tube
 from tiltsim.views.signals import (
     AXES,
     FLOORS,
     Signals,
-    distance,
+    error,
     has_attitude_plane,
     reference_of,
     scale,
     signals_of,
     vector_signals,
 )
+from tiltsim_controllers.code.arrays import traceable
+from tiltsim_controllers.mathematics.attitude import attitude_error, rotation_matrix
 from tiltsim_controllers.mathematics.scalar import Floats
 
 SHOWN_PERIODS: Final = 4  # the last ones, shown instead
@@ -42,6 +44,10 @@ INSTANTS: Final = 120  # whose unreachable attitudes the roll-pitch plane shows
 SETTLED: Final = 0.01  # share of the largest error below which errors have settled
 SHORT: Final = 0.1  # share of a flight below which only the time until then is shown
 ROUNDING: Final = 1e-9  # m, below which errors are rounding
+ORDER: Final = ("position_error", "altitude", "margin", "attitude", "tilt_angles")
+"""The first panels of a page."""
+
+ESTIMATED: Final = ("position", "velocity", "attitude")  # vectors whose errors have panels
 
 
 @dataclass(frozen=True)
@@ -66,39 +72,34 @@ class Panel:
 def panels_of(flights: Sequence[Flight]) -> dict[str, Panel]:
     """The panels of a page by their names, in their order."""
     units = {column for flight in flights for column in flight.units}
-    supervised = SUPERVISION in units
+    several, assembly = len(flights) > 1, flights[0].assembly
     margin = Panel(_margins, needs="singularity_margin")
-    several = len(flights) > 1
-    common = {
-        "determinant": Panel(
-            _determinant, needs="determinant", on_request=not (several and supervised)
-        ),
-        "supervisor": Panel(_supervisor, needs=SUPERVISION, on_request=not several),
-    }
+    determinant = Panel(_determinant, needs="determinant")
+    determinant = replace(determinant, on_request=not (several and SUPERVISION in units))
+    supervisor = Panel(_supervisor, needs=SUPERVISION, on_request=not several)
+    common = {"determinant": determinant, "supervisor": supervisor}
     path = {"path": Panel(_path, over_time=False)}
     if several:
         away = Panel(_distance, signals=Signals("position_error", "", "m", ()))
         found = {"position_error": away, "margin": margin, **common}
         found |= {name: column_panel(flights, name) for name in ("roll", "pitch", "yaw")} | path
-    else:
-        assembly = flights[0].assembly
-        signals = signals_of(assembly)
-        order = ("position_error", "altitude", "margin", "attitude", "tilt_angles")
-        names = [name for name in order if name in signals]
-        names += [name for name in signals if name not in order]
-        found = {name: signals_panel(signals[name]) for name in names}
-        if "lyapunov" in found:  # which says the same
-            found["direction_error"] = replace(found["direction_error"], on_request=True)
-        found |= ({"margin": margin} if "margin" in found else {}) | common | path
-        if has_attitude_plane(assembly):
-            found["attitude_plane"] = Panel(_attitude_plane, over_time=False)
-        if "nees" in units:
-            tubes = {name: Panel(partial(draw_tube, name=name)) for name in TUBES}
-            found |= {
-                name: replace(tube, needs="nees", on_request=True) for name, tube in tubes.items()
-            }
-        if "direction" in units:
-            found["portrait"] = Panel(_portrait, over_time=False)
+        return {name: panel for name, panel in found.items() if panel.needs in units}
+    signals = signals_of(assembly)
+    found = {
+        name: signals_panel(signals[name])
+        for name in dict.fromkeys([*ORDER, *signals])
+        if name in signals
+    }
+    if "lyapunov" in found:  # which says the same
+        found["direction_error"] = replace(found["direction_error"], on_request=True)
+    found |= ({"margin": margin} if "margin" in found else {}) | common | path
+    if has_attitude_plane(assembly):
+        found["attitude_plane"] = Panel(_attitude_plane, over_time=False)
+    for name in ESTIMATED:
+        draw = partial(_tube, vector=name)
+        found[f"estimate_{name}_error"] = Panel(draw, needs="nees", on_request=True)
+    if "direction" in units:
+        found["portrait"] = Panel(_portrait, over_time=False)
     return {name: panel for name, panel in found.items() if panel.needs in units}
 
 
@@ -161,7 +162,7 @@ def _signals(axes: Axes, shown: Sequence[Shown], signals: Signals) -> None:
 def _zoom_to_start(axes: Axes, flight: Flight) -> None:
     """Show only the start of errors that settle soon, and say how small they are later."""
     time, names = flight["time"], [axis for axis in AXES if f"{axis}_ref" in flight.units]
-    size = np.max(np.abs([flight[f"{axis}_ref"] - flight[axis] for axis in names]), axis=0)
+    size = np.max(np.abs([error(flight, axis) for axis in names]), axis=0)
     settled = time[np.flatnonzero(size > SETTLED * size.max())[-1]] if size.any() else time[-1]
     if 2.0 * settled < SHORT * time[-1]:
         axes.set_xlim(0.0, 2.0 * settled)
@@ -172,12 +173,9 @@ def _zoom_to_start(axes: Axes, flight: Flight) -> None:
 
 def _distance(axes: Axes, shown: Sequence[Shown]) -> None:
     """The distance of every flight from its reference."""
-
-    def away(flight: Flight) -> Floats:
-        names = AXES if flight.assembly.follows_position else "z"
-        return distance(flight, [axis for axis in names if axis in flight.columns])
-
-    plot_flights(axes, shown, [away(one.flight) for one in shown])
+    panels = (signals_of(one.flight.assembly)["position_error"] for one in shown)
+    away = [panel.compared[0].of(one.flight) for panel, one in zip(panels, shown, strict=True)]
+    plot_flights(axes, shown, away)
     axes.set_ylabel("position error (m)")
 
 
@@ -300,22 +298,61 @@ def _attitude_plane(axes: Axes, shown: Sequence[Shown]) -> None:
 def _portrait(axes: Axes, shown: Sequence[Shown]) -> None:
     """The phase portrait of the error along y."""
     flight = shown[0].flight
-    error, rate = flight["y_ref"] - flight["y"], flight["vy_ref"] - flight["vy"]
+    away, rate = error(flight, "y"), error(flight, "vy")
     style.zero_lines(axes)
-    axes.plot(error, rate, color=style.BLUE, lw=1.0, label="path")
+    axes.plot(away, rate, color=style.BLUE, lw=1.0, label="path")
     gait = flight.scenario.gait
     if isinstance(gait, PenguinGait):
         half = flight["time"] / (0.5 * gait.period)
         at = (np.abs(half - np.round(half)) < 1e-6) & (half > 0.5)
-        axes.plot(error[at], rate[at], "o", color=style.RED, ms=4.5, zorder=4, label="at n T/2")
-    axes.plot(error[0], rate[0], "o", color=style.INK, mfc="white", ms=5, label="start")
-    axes.plot(error[-1], rate[-1], "s", color=style.INK, ms=4, label="end")
+        axes.plot(away[at], rate[at], "o", color=style.RED, ms=4.5, zorder=4, label="at n T/2")
+    axes.plot(away[0], rate[0], "o", color=style.INK, mfc="white", ms=5, label="start")
+    axes.plot(away[-1], rate[-1], "s", color=style.INK, ms=4, label="end")
     axes.margins(0.08)
     title = "Error along y and its rate"
     axes.set(xlabel="error along y (m)", ylabel="rate of the error (m/s)", title=title)
     for part, least in (("x", FLOORS["m"]), ("y", FLOORS["m/s"])):
         low, high = scale([np.array(getattr(axes, f"get_{part}lim")())], [False], least)[:2]
         getattr(axes, f"set_{part}lim")(low, high)
+    axes.locator_params(nbins=5)
+
+
+@traceable
+def _turn(true: Floats, estimated: Floats) -> Floats:
+    """The rotation (rad, world axes) from an estimated attitude to the true one, if small."""
+    about_body = attitude_error(rotation_matrix(estimated), rotation_matrix(true))
+    return rotation_matrix(estimated) @ about_body
+
+
+def errors_of(flight: Flight, vector: str) -> tuple[Floats, Floats]:
+    """Errors of an estimate and their standard deviations, each of shape (N, 3).
+
+    Args:
+        flight: A flight with an estimator.
+        vector: ``position``, ``velocity`` or ``attitude``.
+    """
+    turned, columns = vector == "attitude", VECTORS[vector]
+    estimated = np.stack([flight[f"estimate_{column}"] for column in columns], axis=-1)
+    shown = [f"rotation_{axis}" for axis in AXES] if turned else columns
+    deviation = np.stack([flight[f"deviation_{column}"] for column in shown], axis=-1)
+    if not turned:
+        return flight[vector] - estimated, deviation
+    return np.array([_turn(*pair) for pair in zip(flight[vector], estimated)]), deviation
+
+
+def _tube(axes: Axes, shown: Sequence[Shown], vector: str) -> None:
+    """The errors of an estimate with a tube of three standard deviations about zero."""
+    flight = shown[0].flight
+    errors, deviation = errors_of(flight, vector)
+    for axis, look in enumerate(style.AXIS_LINES):
+        axes.plot(flight["time"], errors[:, axis], label=AXES[axis], **{**look, "lw": 0.8})
+    widest = 3.0 * deviation.max(axis=-1)
+    axes.fill_between(flight["time"], -widest, widest, color=style.INK, alpha=0.12, lw=0.0)
+    settled = widest[len(widest) // 20 :].max()
+    axes.set_ylim(-2.0 * settled, 2.0 * settled)
+    axes.set_title(f"Estimate {vector} error", loc="left")
+    unit = flight.units[VECTORS[vector][0]]
+    axes.set_ylabel(f"{vector} error ({unit})")
 
 
 def set_scale(axes: Axes, signals: Signals, shown: Sequence[Shown]) -> None:

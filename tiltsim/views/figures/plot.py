@@ -156,7 +156,10 @@ def _chosen(flights: Sequence[Flight], names: Sequence[str]) -> dict[str, Panel]
     if not names:
         return {name: panel for name, panel in available.items() if not panel.on_request}
     columns = dict.fromkeys(column for flight in flights for column in flight.units)
-    vectors = stems(columns) | {name: components(name, columns) for name in VECTORS}
+    companions = (one.name for flight in flights for one in flight.scenario.companion)
+    prefixes = ("", *(f"{name}_" for name in companions))
+    named = (prefix + name for prefix in prefixes for name in VECTORS)
+    vectors = stems(columns) | {name: components(name, columns) for name in named}
     vectors = {name: parts for name, parts in vectors.items() if parts}
     chosen: dict[str, Panel] = {}
     for name in names:
@@ -170,7 +173,9 @@ def _chosen(flights: Sequence[Flight], names: Sequence[str]) -> dict[str, Panel]
             chosen |= {part: column_panel(flights, part) for part in vectors[name]}
         else:
             known = dict.fromkeys([*available, *vectors, *columns])
-            raise InputError(f"panels: {name!r}: {choose(name, known)}")
+            begun = [each for each in (*available, *vectors) if each.startswith(f"{name}_")]
+            reason = f"choose {', '.join(begun)}" if begun else choose(name, known)
+            raise InputError(f"panels: {name!r}: {reason}")
     return chosen
 
 

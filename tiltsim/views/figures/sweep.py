@@ -14,15 +14,15 @@ from tiltsim.scenario.metric_names import METRICS
 from tiltsim.sweeps.dataset import Column, SweepResults
 from tiltsim.sweeps.tables import GridAxis, SampledAxis
 from tiltsim.views.figures import style
-from tiltsim.views.figures.distributions import distributions_figure
-from tiltsim.views.figures.layout import add_heading, add_legend
-from tiltsim.views.figures.sweep_columns import (
+from tiltsim.views.figures.distributions import (
     completed_mask,
+    distributions_figure,
     groups_of,
     label_of,
     spans_decades,
     text_of,
 )
+from tiltsim.views.figures.layout import add_heading, add_legend
 from tiltsim.views.signals import FLOORS, SMALLEST, scale
 
 MAX_PANELS: Final = 24

@@ -1,6 +1,8 @@
-"""Streaming a flight to a viewer while it is simulated."""
+"""Recording a flight while it is simulated: streamed to a viewer, or by a separate process."""
 
+import gc
 import sys
+from pathlib import Path
 from queue import Empty, SimpleQueue
 from threading import Event, Thread
 from typing import Final, Self
@@ -12,8 +14,9 @@ from tiltsim.flight.end import End
 from tiltsim.flight.flight import Flight
 from tiltsim.laws.assembling import assemble
 from tiltsim.scenario.scenario import Scenario
+from tiltsim.system.processes import ProcessDiedError, answer, begin, give
 from tiltsim.system.text import printable
-from tiltsim.views.rerun import require_viewer
+from tiltsim.views.rerun import require_rerun, require_viewer
 from tiltsim.views.rerun.viewer import attach_viewer
 from tiltsim_controllers.mathematics.scalar import Floats
 
@@ -36,15 +39,13 @@ class LiveStream:
     def __init__(self, scenario: Scenario, url: str | None = None) -> None:
         require_viewer(url)
         # After the check, as Rerun takes a second to load.
-        from tiltsim.views.rerun.blueprint import flight_blueprint
-        from tiltsim.views.rerun.recording_file import new_recording
+        from tiltsim.views.rerun.recording import Recording, flight_blueprint
 
         self._assembly = assemble(scenario, recorded=True)
         # A unique name: a viewer would merge two flights of one scenario into one recording.
-        self._recording, recorders = new_recording([self._assembly], salt=uuid4().hex)
-        (self._recorder,) = recorders
-        blueprint = flight_blueprint(recorders, live=True)
-        attach_viewer(self._recording, url, blueprint)
+        recording = Recording([self._assembly], salt=uuid4().hex)
+        (self._recorder,), self._stream = recording.recorders, recording.stream
+        attach_viewer(self._stream, url, flight_blueprint(recording.recorders, live=True))
         self._samples: SimpleQueue[Floats] = SimpleQueue()
         self._end: End | None = None
         self._over = Event()
@@ -79,7 +80,7 @@ class LiveStream:
             self._send_queued()
             if self._end is not None:
                 self._recorder.finish(self._end)
-            self._recording.disconnect()
+            self._stream.disconnect()
         except Exception as error:  # the flight continues regardless of viewer errors
             sys.stderr.write(f"tiltsim: live view ended: {printable(error)}\n")
 
@@ -103,3 +104,72 @@ def _abandon_connection() -> None:
 
     rr.unregister_shutdown()
     sys.stderr.write("tiltsim: the viewer does not respond; the live view is incomplete\n")
+
+
+class RecordingProcess:
+    """Prepares a recording during the simulation and writes it while other files are written.
+
+    Importing Rerun and logging a vehicle take most of a second, which in a separate process does
+    not slow the simulation down. Use it as a context manager: call `start` after the flight and
+    `finish` after all other work.
+
+    Raises:
+        InputError: If the environment switches Rerun off.
+    """
+
+    def __init__(self, scenario: Scenario) -> None:
+        require_rerun()
+        self._process, self._connection = begin(_Writer())
+        self._work: tuple[Flight, Path] | None = None
+        give(self._connection, scenario)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_error: object) -> None:
+        if self._work is None:
+            self._process.kill()
+        else:  # its answer is not needed, but the file is
+            self._answers()
+        self._connection.close()
+        self._process.join()
+
+    def start(self, flight: Flight, path: Path) -> None:
+        """Start writing the flight to a file."""
+        flight.columns  # noqa: B018  computed here, where the code is already compiled
+        self._work = give(self._connection, (flight, path))
+
+    def finish(self) -> None:
+        """Wait until the file of `start` is written.
+
+        Raises:
+            InputError: If the file cannot be written.
+        """
+        assert self._work is not None
+        (flight, path), errors = self._work, self._answers()
+        self._work = None
+        for error in errors:
+            if not isinstance(error, ProcessDiedError):
+                raise error
+        if errors:  # the process was killed
+            from tiltsim.views.rerun.recording import save_recording
+
+            save_recording([flight], path)
+
+    def _answers(self) -> list[BaseException]:
+        """The errors of preparing and writing in the process."""
+        found = [answer(self._connection, self._process).exception() for _ in range(2)]
+        return [error for error in found if error is not None]
+
+
+class _Writer:
+    """The work of the process: it is called with the scenario, then with flight and path."""
+
+    def __call__(self, item: Scenario | tuple[Flight, Path]) -> None:
+        gc.disable()  # the process is too short-lived for garbage collection to pay off
+        from tiltsim.views.rerun.recording import RecordingFile
+
+        if isinstance(item, Scenario):
+            self._file = RecordingFile([assemble(item, recorded=True)])
+        else:
+            self._file.save([item[0]], item[1])

@@ -139,7 +139,7 @@ class Scene:
         send_rows(self._recording, self._floor, time[moved], move)
         self._floor_cell = cells[-1]
         if self._assembly.follows_position:
-            reference = replay.reference_positions(columns)
+            reference = replay.positions(columns, suffix="_ref")
             point = rr.Points3D.columns(positions=reference.astype(np.float32))
             send_rows(self._recording, f"{self.root}/reference/now", time, point)
 

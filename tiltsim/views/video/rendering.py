@@ -19,8 +19,7 @@ from tiltsim.models.cables import switch
 from tiltsim.system.files import replacing
 from tiltsim.views import replay
 from tiltsim.views.replay import CameraPose, vehicle_radius
-from tiltsim.views.video.offscreen import Canvas, Caption, Image
-from tiltsim.views.video.overlay import Overlay
+from tiltsim.views.video.offscreen import Canvas, Caption, Image, Overlay
 from tiltsim_controllers.mathematics.scalar import Floats
 
 TRAIL_TIME: Final = 20.0  # s, length of the trail
@@ -111,10 +110,10 @@ class FlightRenderer:
                 flight.assembly, float(flight["time"][-1]), REFERENCE_POINTS
             )
             self._reference = path if np.ptp(path, axis=0).max() > 0.0 else path[:1]
-        self._targets = replay.reference_positions(flight.columns)
+        self._targets = replay.positions(flight.columns, suffix="_ref")
         self._position = replay.positions(flight.columns)
         self._overlay = Overlay(flight, self._video.height)
-        self._cables = [table.cable for table in flight.scenario.cable]
+        self._cables = flight.scenario.cable
         self._camera = mujoco.MjvCamera()
         self._camera.type = mujoco.mjtCamera.mjCAMERA_TRACKING
         self._camera.trackbodyid = replay.first_free_body(self._model)

@@ -1,0 +1,225 @@
+"""The ``[controller]`` tables of feedback linearization: tiltrotor, quadrotor, multirotor."""
+
+from typing import Final, Self
+
+from pydantic import model_validator
+
+from tiltsim.models.rotor_table import Multirotor
+from tiltsim.scenario.controller_table import ControllerTable
+from tiltsim.scenario.gait_following import FailureAwareController, GaitFollowingController
+from tiltsim.scenario.messages import InvalidValueError
+from tiltsim.scenario.table import example
+from tiltsim_controllers.analysis.stability import (
+    ErrorLoop,
+    error_loops,
+    feedforward_loops,
+    linear_loop,
+)
+from tiltsim_controllers.analysis.torque_free import (
+    TorqueFreeForces,
+    hover_direction,
+    torque_free_forces,
+)
+from tiltsim_controllers.gaits.plans import Gait
+from tiltsim_controllers.laws.attitude_altitude import (
+    DECOUPLINGS,
+    PUBLISHED_DECOUPLING,
+    AttitudeAltitude,
+)
+from tiltsim_controllers.laws.full_pose import FullPose
+from tiltsim_controllers.laws.multirotor_steps import RESTORING, AttitudeForce, Form
+from tiltsim_controllers.laws.quadrotor_attitude_altitude import QuadrotorAttitudeAltitude
+from tiltsim_controllers.laws.switching import Switching
+from tiltsim_controllers.laws.yaw_position import YawPosition
+from tiltsim_controllers.mathematics.scalar import Floats, Triple
+from tiltsim_controllers.vehicle.parameters import Vehicle
+from tiltsim_controllers.vehicle.rotors import force_and_torque
+
+
+class AttitudeAltitudeController(AttitudeAltitude, GaitFollowingController):
+    """Attitude-altitude control of the tiltrotor under a planned gait (ch. 3 to 9)."""
+
+    model_config = example(law="attitude_altitude", decoupler="modified")
+
+    vehicle_models = ("tiltrotor",)
+    reference_kinds = ("position", "attitude_altitude")
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if not self.gait_rate_feedforward:
+            needs = "needs controller.gait_rate_feedforward = true"
+            self.require_defaults(_RATE_KEYS, needs)
+            if any(self.resolve_integral_gains()):
+                raise self.mistake("gains", f"integral action {needs}")
+            return self
+        for key, choices in (("decoupling", ("exact",)), ("decoupler", ("exact", "none"))):
+            if getattr(self, key) not in choices:
+                needs = f"gait_rate_feedforward = true needs {' or '.join(choices)}"
+                raise self.mistake(key, needs)
+        return self
+
+    def error_loops(self, vehicle: Vehicle) -> list[ErrorLoop]:
+        if self.gait_rate_feedforward:
+            return feedforward_loops(self.resolve_gains(), self.resolve_integral_gains())
+        speed = vehicle.hover_rotor_speed
+        return error_loops(self.resolve_gains(), speed, DECOUPLINGS[self.decoupling])
+
+    @property
+    def loop_name(self) -> str:
+        return "gait_feedforward" if self.gait_rate_feedforward else self.law
+
+    @property
+    def omits_reference_acceleration(self) -> bool:
+        return not self.gait_rate_feedforward
+
+
+_RATE_KEYS: Final = (
+    "leave_out",
+    "anticipation",
+    "max_acceleration",
+    "max_angular_acceleration",
+    "rotor_inertia_feedforward",
+)
+"""Keys of `AttitudeAltitudeController` that only gait_rate_feedforward reads."""
+
+
+class FullPoseController(FullPose, FailureAwareController):
+    """Position and attitude control with the tilt angles as inputs (ch. 3)."""
+
+    vehicle_models = ("tiltrotor", "multirotor")
+    reference_kinds = ("position", "pose", "attitude_altitude")
+    loop_gains = ("gains",)
+    damps_swing = True
+    commands_tilts = True
+    follows_turns = True
+
+    @property
+    def position_stiffness(self) -> float:
+        on_acceleration, _, on_position = self.resolve_gains().position
+        stiffness: float = on_position / on_acceleration
+        return stiffness
+
+
+class YawPositionController(YawPosition, ControllerTable):
+    """Yaw-position control of the quadrotor with dynamic extension (ch. 2)."""
+
+    vehicle_models = ("quadrotor",)
+    reference_kinds = ("position",)
+    loop_gains = ("gains",)
+
+
+class SwitchingController(Switching, ControllerTable):
+    """Yaw-position control that switches to attitude-altitude control in a zone (ch. 2)."""
+
+    vehicle_models = ("quadrotor",)
+    reference_kinds = ("pose",)
+    loop_gains = ("gains", "attitude_gains")
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        for key in ("roll", "pitch"):
+            low, high = getattr(self.zone, key)
+            if low > high:
+                raise self.mistake(f"zone.{key}", "the first must not exceed the second")
+        return self
+
+
+class QuadrotorAttitudeAltitudeController(QuadrotorAttitudeAltitude, ControllerTable):
+    """Attitude-altitude control of the quadrotor (ch. 2, Appendix B)."""
+
+    vehicle_models = ("quadrotor",)
+    reference_kinds = ("attitude_altitude",)
+    loop_gains = ("gains",)
+
+
+class AttitudeForceController(AttitudeForce, GaitFollowingController, FailureAwareController):
+    """Attitude and one, two or three components of force of a multirotor."""
+
+    model_config = example(law="attitude_force", dimension=1)
+
+    vehicle_models = ("multirotor",)
+    reference_kinds = ("position", "pose", "attitude_altitude")
+    follows_turns = True
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.norm == "speed":
+            self.require_defaults(("slowest_rotor",), 'needs controller.norm = "thrust"')
+        return self
+
+    def resolve_force(self, vehicle: Multirotor, gait: Gait) -> Form:
+        """The form of the law, whose components of force are checked over the gait."""
+        lost = self.failed_rotor
+        least, where = self.least_dimension(vehicle, gait)
+        if least == 0 and where.endswith(f"rotor {lost}"):
+            raise self.mistake("failed_rotor", "the others are singular at every attitude")
+        if least == 0:
+            raise InvalidValueError("gait.type", gait.name, f"singular at every attitude, {where}")
+        if self.dimension is not None and self.dimension > least:
+            raise self.mistake("dimension", f"the vehicle has {least} only, {where}")
+        forward = self.dimension == 2 and least == 3
+        return Form(
+            self.dimension or least,
+            self.norm,
+            forward,
+            lost is not None,
+            self.supervisor is not None,
+        )
+
+    def least_dimension(self, vehicle: Multirotor, gait: Gait) -> tuple[int, str]:
+        """The `force_dimension`, with and without the failed rotor."""
+        return min(force_dimension(vehicle, gait, lost) for lost in {None, self.failed_rotor})
+
+    def resolve_restoring(self, rotors: int, dimension: int, gait: Gait) -> float:
+        """The restoring rate, 1/s."""
+        if self.restoring is not None:
+            return self.restoring
+        return RESTORING if rotors > 3 + dimension and not gait.is_constant else 0.0
+
+    def error_loops(self, vehicle: Multirotor) -> list[ErrorLoop]:
+        gains = self.resolve_gains()
+        if self.decoupling == "published":
+            speed = vehicle.hover_rotor_speed
+            return error_loops(gains, speed, PUBLISHED_DECOUPLING)
+        side = linear_loop("side", self.side_gains)
+        return [*feedforward_loops(gains, self.resolve_integral_gains()), side]
+
+
+def _gait_angles(vehicle: Multirotor, gait: Gait) -> Floats:
+    times = gait.sample_times()
+    return gait.angles(times).reshape(len(times), vehicle.tilts)
+
+
+def _torque_free_forces(vehicle: Multirotor, gait: Gait, lost: int | None) -> TorqueFreeForces:
+    """Those over a gait, without a rotor that is lost."""
+    works = [float(rotor != lost) for rotor in range(1, len(vehicle.spins) + 1)]
+    force, torque = force_and_torque(vehicle.table, _gait_angles(vehicle, gait))
+    return torque_free_forces(force * works, torque * works)
+
+
+def upper_side(vehicle: Multirotor, gait: Gait, lost: int | None = None) -> Triple:
+    """The side (unit vector, body axes) on which level attitude starts, if there are two.
+
+    That is so where the singular directions of world up are a great circle all over the gait;
+    zero elsewhere. Arguments as of `force_dimension`.
+    """
+    forces = _torque_free_forces(vehicle, gait, lost)
+    if not (forces.dimension == 1).all():
+        return 0.0, 0.0, 0.0
+    x, y, z = hover_direction(forces)[0].tolist()
+    return x, y, z
+
+
+def force_dimension(vehicle: Multirotor, gait: Gait, lost: int | None = None) -> tuple[int, str]:
+    """The least dimension of the torque-free forces over a gait, and where, in words.
+
+    Args:
+        vehicle: The vehicle.
+        gait: Its gait.
+        lost: A rotor that does not work, from 1.
+    """
+    dimension = _torque_free_forces(vehicle, gait, lost).dimension
+    first = int(dimension.argmin())
+    at = ", ".join(f"{angle:.3g}" for angle in _gait_angles(vehicle, gait)[first])
+    where = f"at tilt angles ({at}) rad" if vehicle.tilts else "as its rotors are placed"
+    return int(dimension[first]), where if lost is None else f"{where}, without rotor {lost}"
