@@ -198,7 +198,7 @@ def known_of(observed: Observed, p: Parameters) -> Known:
         for name in Ability._fields[1:]
     }
     p = p._replace(axis=xp.where(harmed, xp.array(p.after.axis), xp.array(p.axis)), **able)
-    # What it touches pushes back and is no disturbance: meanwhile it learns nothing.
+    # An object that is touched pushes back and is no disturbance: nothing is learned meanwhile.
     learns = xp.where(observed.contact_force @ observed.contact_force > 0.0, 0.0, 1.0)
     p = p._replace(
         velocity_trust=1.0 - learns * (1.0 - xp.array(p.velocity_trust)),
