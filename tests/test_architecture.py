@@ -225,7 +225,7 @@ FOUR_ROTORS = {"ROTORS", "SPIN", "TILT_FIELDS", "ROTOR_FIELDS", "TILTROTOR_FIELD
 
 OF_FOUR_ROTORS = {
     *("quadrotor", "linearizing"),
-    *("cross", "metrics", "user_vehicle", "vehicle", "vehicle_parts"),
+    *("cross", "metrics", "user_vehicle", "vehicle_parts"),
     *("attitude_plane", "concepts", "gait_analysis", "vehicle_drawing"),
     *("attainable", "effectiveness", "fault_tolerance", "rotorcraft", "statics"),
 }
