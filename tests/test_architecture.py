@@ -132,7 +132,12 @@ def overrides(class_node, name):
     known = classes()
     bases = [known[base.id] for base in class_node.bases if getattr(base, "id", "") in known]
     return any(
-        any(getattr(member, "name", "") == name for member in base.body) or overrides(base, name)
+        any(
+            getattr(member, "name", "") == name
+            or getattr(getattr(member, "target", None), "id", "") == name  # a class attribute
+            for member in base.body
+        )
+        or overrides(base, name)
         for base in bases
     )
 
@@ -227,7 +232,7 @@ OF_FOUR_ROTORS = {
     *("quadrotor", "linearizing"),
     *("cross", "metrics", "user_vehicle", "vehicle_parts"),
     *("attitude_plane", "concepts", "gait_analysis", "vehicle_drawing"),
-    *("attainable", "effectiveness", "fault_tolerance", "rotorcraft", "statics"),
+    *("attainable", "fault_tolerance", "rotorcraft", "singularity"),
 }
 """The last names of modules that know these vehicles: their laws, models, tables, and figures."""
 

@@ -23,15 +23,15 @@ from tiltsim_controllers.laws.supervisor import Supervisor
 from tiltsim_controllers.mathematics.attitude import euler_of_rotation
 from tiltsim_controllers.references.trajectories import SETPOINT, ReferenceParameters
 from tiltsim_controllers.vehicle.body import body_of
-from tiltsim_controllers.vehicle.effectiveness import (
+from tiltsim_controllers.vehicle.craft import equations_of_motion
+from tiltsim_controllers.vehicle.parameters import PRESETS, SPIN
+from tiltsim_controllers.vehicle.rotors import (
     force_and_torque,
     rotor_entries,
+    rotors_in,
     tilt_of_rotor,
     tilts_of,
 )
-from tiltsim_controllers.vehicle.motion import equations_of_motion
-from tiltsim_controllers.vehicle.parameters import PRESETS, SPIN
-from tiltsim_controllers.vehicle.rotors import rotors_in
 
 FOUR = PRESETS["ar_drone_2"]
 HEXAROTOR = body_of(1.53, np.diag((0.0348, 0.0459, 0.08)), 9.81)

@@ -5,8 +5,7 @@ from typing import Final
 
 from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.closed_loop.loop import ClosedLoop
-from tiltsim.equations.actuator_level import ActuatorPlant, actuator_plant
-from tiltsim.equations.rigid_body import rigid_body
+from tiltsim.equations.actuator_level import ActuatorPlant, actuator_plant, rigid_body
 from tiltsim.laws.commanded import commanded_loop
 from tiltsim.laws.companions import Member, with_companions
 from tiltsim.laws.flown_law import loop_of_law

@@ -22,12 +22,11 @@ from tiltsim.scenario.scenario import FlightPlan, Scenario, plan_flight
 from tiltsim.vehicles.rotorcraft import model_spec
 from tiltsim.vehicles.rotorcraft.layout import QW, TILT_1
 from tiltsim.vehicles.spans import position_error
-from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.code.traceable import traceable
+from tiltsim_controllers.code.arrays import traceable, xp
 from tiltsim_controllers.mathematics.attitude import rotation_of_quaternion
 from tiltsim_controllers.mathematics.records import make_record_type
 from tiltsim_controllers.mathematics.scalar import Floats, Vector
-from tiltsim_controllers.vehicle.downwash import Downwash, Wake, downwash_force
+from tiltsim_controllers.vehicle.air import Downwash, Wake, downwash_force
 
 if TYPE_CHECKING:
     import mujoco

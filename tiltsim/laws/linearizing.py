@@ -43,10 +43,9 @@ from tiltsim_controllers.mathematics.attitude import rotation_matrix
 from tiltsim_controllers.mathematics.linear import kernel
 from tiltsim_controllers.mathematics.records import changed_record
 from tiltsim_controllers.mathematics.scalar import Floats, Values
-from tiltsim_controllers.vehicle.effectiveness import without_rotor
+from tiltsim_controllers.vehicle.body import TILT_FIELDS, state_of
 from tiltsim_controllers.vehicle.parameters import SPIN, Vehicle
-from tiltsim_controllers.vehicle.rotors import airframe, wrench_map
-from tiltsim_controllers.vehicle.states import TILT_FIELDS, state_of
+from tiltsim_controllers.vehicle.rotors import airframe, without_rotor, wrench_map
 
 TILTROTOR: Final = RotorLayout((0, 1, 2, 3), SPIN, "tiltrotor")
 

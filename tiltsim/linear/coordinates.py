@@ -11,7 +11,7 @@ from tiltsim.vehicles.rotorcraft.layout import layout_of
 from tiltsim.vehicles.rotorcraft.others import SWING
 from tiltsim_controllers.mathematics.attitude import quaternion_of_rotation, rotation_of_quaternion
 from tiltsim_controllers.mathematics.scalar import Floats
-from tiltsim_controllers.vehicle.states import BODY_FIELDS
+from tiltsim_controllers.vehicle.body import BODY_FIELDS
 
 ROTATION_NAMES: Final = ("rotation_x", "rotation_y", "rotation_z")
 """A small turn about the body axes, rad; at level attitude roll, pitch and yaw."""
@@ -191,7 +191,7 @@ def mujoco_coordinates(loop: ClosedLoop) -> Coordinates:
 def equation_coordinates(assembly: Assembly, size: int) -> Coordinates:
     """Coordinates of a state of the equations of this size; a rigid body has MuJoCo's."""
     loop, model = assembly.loop, assembly.scenario.vehicle.model
-    if assembly.scenario.simulation.plant == "rigid_body":
+    if assembly.scenario.simulation.plant != "thesis":
         return mujoco_coordinates(loop)
     rotation = 0 if model in {"quadrotor", "tilt_car"} else MATRIX
     body = BODY_FIELDS

@@ -11,10 +11,9 @@ from tiltsim.linear.coordinates import entry_names, equation_coordinates, equati
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.system.public import optional_package
-from tiltsim_controllers.code.arrays import xp
+from tiltsim_controllers.code.arrays import program_of, xp
 from tiltsim_controllers.code.casadi_function import casadi_function
 from tiltsim_controllers.code.messages import TraceError
-from tiltsim_controllers.code.traceable import program_of
 
 
 class Symbolic(NamedTuple):

@@ -21,10 +21,8 @@ from tiltsim_controllers.mathematics.attitude import quaternion_product, rotatio
 from tiltsim_controllers.mathematics.linear import cross, norm
 from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.vehicle.air import Drag, drag_force
-from tiltsim_controllers.vehicle.body import Body
-from tiltsim_controllers.vehicle.effectiveness import TiltOfRotor, tilts_of
-from tiltsim_controllers.vehicle.motion import accelerations
-from tiltsim_controllers.vehicle.rotors import Rotors, rotors_in, wrench_map
+from tiltsim_controllers.vehicle.body import Body, accelerations
+from tiltsim_controllers.vehicle.rotors import Rotors, TiltOfRotor, rotors_in, tilts_of, wrench_map
 
 
 class Parameter(NamedTuple):

@@ -12,7 +12,7 @@ from tiltsim.scenario.law_controller import Airframe, LawController, TiltingTabl
 from tiltsim.scenario.messages import InvalidValueError
 from tiltsim_controllers.analysis.stability import ErrorLoop, linear_loop
 from tiltsim_controllers.analysis.torque_free import RANK_TOLERANCE
-from tiltsim_controllers.gaits.parameters import CUBIC
+from tiltsim_controllers.gaits.motion import CUBIC
 from tiltsim_controllers.gaits.plans import Gait
 from tiltsim_controllers.laws.compensation import STATES as OBSERVER_STATES
 from tiltsim_controllers.laws.compensation import Compensating, compensated, record_of_limits
@@ -36,7 +36,7 @@ from tiltsim_controllers.laws.periodic_lqr import (
 )
 from tiltsim_controllers.laws.pid import STATES, Pid, pid
 from tiltsim_controllers.mathematics.scalar import Floats, Values
-from tiltsim_controllers.vehicle.effectiveness import (
+from tiltsim_controllers.vehicle.rotors import (
     CONSTANT,
     COSINE,
     ROTOR_FLOATS,

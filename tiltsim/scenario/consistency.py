@@ -71,7 +71,7 @@ def _refusals(scenario: ScenarioTables) -> Refusals:
             yield "expect.claim", "no such table; " + choose(name, scenario.claim), name
     yield from _engine(scenario)
     scenario.controller.check_scenario(scenario)
-    yield from _rigid_body(scenario)
+    yield from _plant(scenario)
     check_companions(scenario)
 
 
@@ -87,16 +87,16 @@ def _engine(scenario: ScenarioTables) -> Refusals:
         yield "simulation.batch_functions", 'needs simulation.plant = "thesis" or "rigid_body"'
 
 
-def _rigid_body(scenario: ScenarioTables) -> Refusals:
-    """Vehicles that the plant ``rigid_body`` cannot be."""
-    vehicle = scenario.vehicle
-    if scenario.simulation.plant != "rigid_body":
+def _plant(scenario: ScenarioTables) -> Refusals:
+    """Vehicles that a plant of equations other than the thesis's cannot be."""
+    vehicle, plant = scenario.vehicle, scenario.simulation.plant
+    if plant in ("mujoco", "thesis"):
         return
     if not isinstance(vehicle, RotorcraftTable):
         yield "simulation.plant", f"supports no {vehicle.model}; use mujoco or thesis"
         return
     if isinstance(vehicle, VehicleTable):
-        scenario.require("vehicle.pod", PodTable(), "the rigid_body plant has massless pods")
+        scenario.require("vehicle.pod", PodTable(), f"the {plant} plant has massless pods")
     file = vehicle.user_vehicle
     if file is not None and file.unmodeled_properties:
         reason = f"neglects of vehicle.mjcf {file.unmodeled_properties}; use mujoco"

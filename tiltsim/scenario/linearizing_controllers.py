@@ -32,8 +32,8 @@ from tiltsim_controllers.laws.quadrotor_attitude_altitude import QuadrotorAttitu
 from tiltsim_controllers.laws.switching import Switching
 from tiltsim_controllers.laws.yaw_position import YawPosition
 from tiltsim_controllers.mathematics.scalar import Floats, Triple
-from tiltsim_controllers.vehicle.effectiveness import force_and_torque
 from tiltsim_controllers.vehicle.parameters import Vehicle
+from tiltsim_controllers.vehicle.rotors import force_and_torque
 
 
 def check_decoupler(scenario: Any, decoupler: str) -> None:

@@ -22,8 +22,12 @@ from tiltsim.scenario.table import (
     required,
 )
 from tiltsim_controllers.mathematics.attitude import rotation_matrix
-from tiltsim_controllers.references.trajectories import REFERENCE_TYPES, ReferenceParameters
-from tiltsim_controllers.references.waypoints import COEFFICIENTS, minimum_snap_knots
+from tiltsim_controllers.references.trajectories import (
+    COEFFICIENTS,
+    REFERENCE_TYPES,
+    ReferenceParameters,
+    minimum_snap_knots,
+)
 
 if TYPE_CHECKING:
     from tiltsim_controllers.mathematics.scalar import Floats, Triple, Values

@@ -13,8 +13,8 @@ from tiltsim.models.user_vehicle import UserVehicle
 from tiltsim.scenario.table import NonNegative, Positive, Table, default, example, required
 from tiltsim_controllers.mathematics.scalar import Values
 from tiltsim_controllers.tilt_car.vehicle import TiltCar
-from tiltsim_controllers.vehicle.effectiveness import Rotor
 from tiltsim_controllers.vehicle.parameters import Vehicle
+from tiltsim_controllers.vehicle.rotors import Rotor
 
 
 class ServoTable(Table):

@@ -9,9 +9,8 @@ from __future__ import annotations
 
 from typing import Any, Final, Literal
 
-from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.code.traceable import traceable
-from tiltsim_controllers.gaits.parameters import NO_KNOTS, GaitParameters
+from tiltsim_controllers.code.arrays import traceable, xp
+from tiltsim_controllers.gaits.motion import NO_KNOTS, GaitParameters
 from tiltsim_controllers.laws.allocation import RotorRange
 from tiltsim_controllers.laws.feedback import (
     CONVENTIONAL,
@@ -28,10 +27,14 @@ from tiltsim_controllers.laws.supervisor import Supervisor
 from tiltsim_controllers.mathematics.attitude import rotation_matrix, wrapped
 from tiltsim_controllers.mathematics.linear import cross, kernel, solved
 from tiltsim_controllers.references.trajectories import ReferenceParameters, position_reference
-from tiltsim_controllers.vehicle.body import inertia_matrix, inverse_inertia_matrix
+from tiltsim_controllers.vehicle.body import (
+    RotorcraftState,
+    inertia_matrix,
+    inverse_inertia_matrix,
+    state_of,
+)
 from tiltsim_controllers.vehicle.parameters import Vehicle
 from tiltsim_controllers.vehicle.rotors import airframe, rotor_accelerations, wrench_map
-from tiltsim_controllers.vehicle.states import RotorcraftState, state_of
 
 PUBLISHED_DECOUPLING: Final = 0.0
 EXACT_DECOUPLING: Final = 1.0
@@ -139,7 +142,7 @@ def attitude_altitude(seen: Seen, parameters: Any, knots: Any = NO_KNOTS) -> Ste
     singular.
 
     Args:
-        seen: The state has `tiltsim_controllers.vehicle.states.TILTROTOR_FIELDS`; the model's
+        seen: The state has `tiltsim_controllers.vehicle.body.TILTROTOR_FIELDS`; the model's
             angular acceleration is ``I^-1 tau w``.
         parameters: `Parameters`.
         knots: Table data of the reference.

@@ -25,8 +25,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import Field
 
-from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.code.traceable import traceable
+from tiltsim_controllers.code.arrays import traceable, xp
 from tiltsim_controllers.laws.feedback import body_rate_matrix
 from tiltsim_controllers.laws.keys import (
     GainSets,
@@ -48,18 +47,18 @@ from tiltsim_controllers.references.trajectories import (
     reference_attitude,
     reference_motion,
 )
-from tiltsim_controllers.vehicle.body import Body, angular_acceleration, inertia_matrix
-from tiltsim_controllers.vehicle.effectiveness import TiltOfRotor, tilt_of_rotor
+from tiltsim_controllers.vehicle.body import Body, angular_acceleration, inertia_matrix, state_of
 from tiltsim_controllers.vehicle.rotors import (
     Rotors,
+    TiltOfRotor,
     airframe,
     by_tilt,
     rotor_accelerations,
     rotors_in,
+    tilt_of_rotor,
     wrench_map,
     wrench_slope,
 )
-from tiltsim_controllers.vehicle.states import state_of
 
 
 class FullPoseGainTable(Keys):
@@ -228,7 +227,7 @@ def pose_rank(table: Sequence[float], tilts: ArrayLike, w: ArrayLike) -> int:
     """How many of the six outputs the inputs move independently.
 
     Args:
-        table: Table of the rotors, see `tiltsim_controllers.vehicle.effectiveness`.
+        table: Table of the rotors, see `tiltsim_controllers.vehicle.rotors`.
         tilts: rad, shape (M,).
         w: ``varpi |varpi|`` of each rotor, of any unit, 0 for one that is not used, shape (N,).
     """

@@ -13,8 +13,7 @@ from typing import Any, Final, Literal, NamedTuple
 
 from pydantic import Field
 
-from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.code.blocks import take_row
+from tiltsim_controllers.code.arrays import take_row, xp
 from tiltsim_controllers.laws.keys import Keys, NonNegative, Positive, default, required
 from tiltsim_controllers.laws.observed import Command, Observed
 from tiltsim_controllers.laws.outer_loop import UP, pointing_attitude, tracking_errors

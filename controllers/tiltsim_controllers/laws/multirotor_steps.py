@@ -8,7 +8,7 @@ from typing import Annotated, Any, Final, Literal, NamedTuple
 from pydantic import Field
 
 from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.gaits.parameters import GaitParameters
+from tiltsim_controllers.gaits.motion import GaitParameters
 from tiltsim_controllers.laws.allocation import RotorRange
 from tiltsim_controllers.laws.feedback import (
     CONVENTIONAL,
@@ -34,8 +34,7 @@ from tiltsim_controllers.mathematics.linear import cross
 from tiltsim_controllers.mathematics.moving import Moving, at_rest, cosine, sine, stacked, value_of
 from tiltsim_controllers.mathematics.records import vector_of
 from tiltsim_controllers.references.trajectories import ReferenceParameters
-from tiltsim_controllers.vehicle.body import Body
-from tiltsim_controllers.vehicle.states import RotorcraftState
+from tiltsim_controllers.vehicle.body import Body, RotorcraftState
 
 ROTATION: Final = 0.0
 """An error of attitude: the rotation that remains, which has no singular pitch."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import Any, ClassVar, Final, Literal
 
 from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.gaits.parameters import NO_KNOTS
+from tiltsim_controllers.gaits.motion import NO_KNOTS
 from tiltsim_controllers.laws.keys import (
     Gains2,
     GainSets,
@@ -73,7 +73,7 @@ def attitude_altitude_inputs(
 
     Args:
         time: s
-        state: Begins with `tiltsim_controllers.vehicle.states.BODY_FIELDS`, shape (12,).
+        state: Begins with `tiltsim_controllers.vehicle.body.BODY_FIELDS`, shape (12,).
         vehicle, gains: The quadrotor and its gains.
         reference, knots: Altitude, roll, pitch and yaw, the angles constant.
     """

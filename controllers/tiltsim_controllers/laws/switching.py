@@ -18,9 +18,8 @@ from pydantic import ConfigDict
 
 import tiltsim_controllers.laws.quadrotor_attitude_altitude as attitude_altitude
 import tiltsim_controllers.laws.yaw_position as yaw_position
-from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.code.blocks import branch
-from tiltsim_controllers.gaits.parameters import NO_KNOTS
+from tiltsim_controllers.code.arrays import branch, xp
+from tiltsim_controllers.gaits.motion import NO_KNOTS
 from tiltsim_controllers.laws.keys import (
     Gains2,
     GainSets,
@@ -111,7 +110,7 @@ def attitude_altitude_thrust_rate(
 
     Args:
         time: s
-        state: Begins with `tiltsim_controllers.vehicle.states.BODY_FIELDS`, shape (12,).
+        state: Begins with `tiltsim_controllers.vehicle.body.BODY_FIELDS`, shape (12,).
         thrust: N
         p: `Parameters`.
         knots: Table data of the reference.
@@ -132,7 +131,7 @@ def switching_inputs(time: Any, state: Any, p: Any, knots: Any = NO_KNOTS) -> An
 
     Args:
         time: s
-        state: `tiltsim_controllers.vehicle.states.EXTENDED_QUADROTOR_FIELDS`, shape (14,).
+        state: `tiltsim_controllers.vehicle.body.EXTENDED_QUADROTOR_FIELDS`, shape (14,).
         p: `Parameters`.
         knots: Table data of the reference.
     """

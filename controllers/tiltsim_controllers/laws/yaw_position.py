@@ -7,7 +7,7 @@ the position four times (Eqs. 1-28).
 
 The thrust acts along the body's third axis ``b = R e3``. Its derivatives, ``b' = R (omega x e3)``
 and ``b'' = R (omega x (omega x e3) + omega' x e3)``, give the decoupling matrix in closed form; its
-determinant is in `tiltsim_controllers.analysis.quadrotor_singularity`. The axes are ours, z up; ch.
+determinant is in `tiltsim_controllers.analysis.singularity`. The axes are ours, z up; ch.
 2's have z down, which changes the signs of y and z, of pitch and yaw and of their torques.
 """
 
@@ -16,7 +16,7 @@ from __future__ import annotations
 from typing import Any, ClassVar, Final, Literal
 
 from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.gaits.parameters import NO_KNOTS
+from tiltsim_controllers.gaits.motion import NO_KNOTS
 from tiltsim_controllers.laws.keys import (
     Gains2,
     Gains4,
@@ -95,7 +95,7 @@ def drift(state: Any, vehicle: Vehicle) -> Any:
     """``Ma`` of ch. 2, Eq. (20): the derivatives of the outputs at zero input.
 
     Args:
-        state: `tiltsim_controllers.vehicle.states.EXTENDED_QUADROTOR_FIELDS`, shape (14,).
+        state: `tiltsim_controllers.vehicle.body.EXTENDED_QUADROTOR_FIELDS`, shape (14,).
         vehicle: That flies.
 
     Returns:
@@ -141,7 +141,7 @@ def yaw_position_inputs(time: Any, state: Any, p: Any, knots: Any = NO_KNOTS) ->
 
     Args:
         time: s
-        state: `tiltsim_controllers.vehicle.states.EXTENDED_QUADROTOR_FIELDS`, shape (14,).
+        state: `tiltsim_controllers.vehicle.body.EXTENDED_QUADROTOR_FIELDS`, shape (14,).
         p: `Parameters`, or the parameters of `switching`.
         knots: Table data of the reference.
     """

@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import Any, ClassVar, Final, Literal
 
 from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.gaits.parameters import GaitParameters
+from tiltsim_controllers.gaits.motion import GaitParameters
 from tiltsim_controllers.laws.keys import (
     Gains2,
     GainSets,

@@ -2,7 +2,7 @@
 
 Three inputs, the rates of both rotor speeds and of the tilt angle, determine two outputs, the third
 derivatives of the position. The controller takes the shortest of all solutions (`minimum_norm`,
-Eq. 12), which makes its states drift (`tiltsim_controllers.tilt_car.state_drift`). Optionally a
+Eq. 12), which makes its states drift (`tiltsim_controllers.tilt_car.cycles`). Optionally a
 restoring rate in the null space turns the thrusts' bisector back toward the acceleration.
 """
 

@@ -18,9 +18,8 @@ from tiltsim.laws.layers import estimation
 from tiltsim.laws.layers.estimation import Fusion
 from tiltsim.laws.layers.instruments import instruments_of
 from tiltsim.views.figures.panels import errors_of
-from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.code.traceable import traceable
-from tiltsim_controllers.mathematics.probability import chi_square_quantile
+from tiltsim_controllers.code.arrays import traceable, xp
+from tiltsim_controllers.mathematics.scalar import chi_square_quantile
 
 IMU = {"gyro_noise_density": 2.5e-4, "accelerometer_noise_density": 2e-3}
 MOCAP = {"rate": 50.0, "position_noise": 0.004, "attitude_noise": 0.01}

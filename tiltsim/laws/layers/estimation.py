@@ -20,8 +20,7 @@ from tiltsim.laws.vehicle_loop import parts
 from tiltsim.models.parts import ExtraActuators
 from tiltsim.scenario.scenario import FlightPlan
 from tiltsim.vehicles.rotorcraft.layout import QW, TILT_1, TILT_RATE_1
-from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.code.blocks import branch, normal
+from tiltsim_controllers.code.arrays import branch, normal, xp
 from tiltsim_controllers.laws import estimator as filters
 from tiltsim_controllers.laws.estimator import Estimate, ImuNoise, Outcome, Reading
 from tiltsim_controllers.mathematics.attitude import (
@@ -31,9 +30,8 @@ from tiltsim_controllers.mathematics.attitude import (
     rotation_of_quaternion,
 )
 from tiltsim_controllers.mathematics.linear import cross
-from tiltsim_controllers.mathematics.probability import chi_square_quantile
 from tiltsim_controllers.mathematics.records import Vector3, make_record_type, vector_of
-from tiltsim_controllers.mathematics.scalar import Vector
+from tiltsim_controllers.mathematics.scalar import Vector, chi_square_quantile
 
 AXES: Final = ("x", "y", "z")
 CORRECTIONS: Final = {

@@ -35,16 +35,15 @@ from tiltsim.vehicles.rotorcraft.layout import (
     rotors_record,
     tilt_of_rotor,
 )
-from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.code.traceable import traceable
+from tiltsim_controllers.code.arrays import traceable, xp
 from tiltsim_controllers.mathematics.attitude import rotation_matrix, rotation_of_quaternion
 from tiltsim_controllers.mathematics.linear import cross
 from tiltsim_controllers.mathematics.records import Vector3, make_record_type, vector_of
 from tiltsim_controllers.vehicle import instruments
 from tiltsim_controllers.vehicle.body import Body, inertia_matrix, inverse_inertia_matrix
 from tiltsim_controllers.vehicle.craft import craft_of
+from tiltsim_controllers.vehicle.instruments import reading_index
 from tiltsim_controllers.vehicle.rotors import wrench_map
-from tiltsim_controllers.vehicle.sensors import reading_index
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -6,12 +6,12 @@ from typing import Final
 
 import numpy as np
 
-from tiltsim_controllers.analysis.quadrotor_singularity import (
+from tiltsim_controllers.analysis.singularity import (
     normalized_determinant,
     published_determinant,
     published_singular_curve,
+    world_up,
 )
-from tiltsim_controllers.analysis.singularity import world_up
 from tiltsim_controllers.analysis.stability import is_hurwitz
 from tiltsim_controllers.laws import quadrotor_attitude_altitude, yaw_position
 from tiltsim_controllers.mathematics.attitude import euler_rates

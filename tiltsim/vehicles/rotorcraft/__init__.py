@@ -33,12 +33,11 @@ from tiltsim.scenario.vehicle import VehicleTable
 from tiltsim.system.text import Quantity, subscript
 from tiltsim.vehicles.rotorcraft.layout import CROSS, Layout
 from tiltsim.vehicles.rotorcraft.metrics import rotorcraft_metrics
-from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.code.traceable import traceable
+from tiltsim_controllers.code.arrays import traceable, xp
 from tiltsim_controllers.mathematics.attitude import quaternion_of_euler
 from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector
 from tiltsim_controllers.references.trajectories import ReferenceParameters
-from tiltsim_controllers.vehicle.states import P
+from tiltsim_controllers.vehicle.body import P
 
 if TYPE_CHECKING:
     import mujoco

@@ -27,8 +27,8 @@ from tiltsim_controllers.laws.feedback import (
     modified_decoupler,
 )
 from tiltsim_controllers.mathematics.scalar import Floats
+from tiltsim_controllers.vehicle.body import ROTORS
 from tiltsim_controllers.vehicle.parameters import PRESETS, Vehicle, drag_ratio
-from tiltsim_controllers.vehicle.states import ROTORS
 
 _WIDTH: Final = 6.4  # inches: about the width of a page of text
 POSITIVE_TILT: Final = 0.5  # tilt angle (rad) of all rotors in the drawing of the vehicle

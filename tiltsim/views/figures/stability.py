@@ -22,7 +22,7 @@ from tiltsim.scenario.schema import quantity_of_key
 from tiltsim.system.text import in_words
 from tiltsim.views.figures import style
 from tiltsim.views.titles import address_in_words
-from tiltsim_controllers.analysis.unacceptable_attitudes import unacceptable_attitudes
+from tiltsim_controllers.analysis.singularity import unacceptable_attitudes
 from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.vehicle.parameters import Vehicle
 

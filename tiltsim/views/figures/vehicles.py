@@ -27,12 +27,13 @@ from tiltsim_controllers.analysis.attainable import (
 )
 from tiltsim_controllers.analysis.hover import hover
 from tiltsim_controllers.analysis.published_gaits import DETERMINANT_CASES, TRIANGLE
-from tiltsim_controllers.analysis.quadrotor_singularity import (
+from tiltsim_controllers.analysis.singularity import (
     normalized_determinant,
     published_determinant,
     published_singular_curve,
+    residuals,
+    world_up,
 )
-from tiltsim_controllers.analysis.singularity import residuals, world_up
 from tiltsim_controllers.analysis.torque_free import (
     LEVEL,
     SINGULAR_ATTITUDES,
