@@ -34,7 +34,7 @@ class VectoringController(Vectoring, FailureAwareController, TiltingTable, LawCo
     control: ClassVar = staticmethod(vectoring)
 
     @property
-    def position_stiffness(self) -> float | None:
+    def position_stiffness(self) -> float | None:  # type: ignore[override]
         return None if self.position_bandwidth is None else self.position_bandwidth**2
 
     def check_scenario(self, scenario: Any) -> None:
