@@ -69,7 +69,8 @@ def vector_of(length: int) -> type:
 
 
 if TYPE_CHECKING:
-    Vector3 = Matrix3 = Any
+    Vector3 = Any
+    Matrix3 = Any
 else:  # types of fields, which are arrays in NumPy functions
     Vector3, Matrix3 = vector_of(3), vector_of(9)  # a matrix is given row by row
 
