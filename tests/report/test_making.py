@@ -19,7 +19,7 @@ from tiltsim.cli import main
 from tiltsim.exit_codes import EXPECTATION_FAILED, INVALID_INPUT
 from tiltsim.report import flights, store
 from tiltsim.report.claim import ClaimVerdict, scenario_claims
-from tiltsim.report.claim_rows import Cell, Row, count
+from tiltsim.report.claim_rows import Cell, Criterion, Row, count
 from tiltsim.report.claims import registered_claims
 from tiltsim.report.content import (
     Report,
@@ -29,16 +29,12 @@ from tiltsim.report.content import (
     measured_text,
     published_text,
 )
-from tiltsim.report.drawing import DPI, Drawing, png
-from tiltsim.report.errors import ERRORS
-from tiltsim.report.findings import FINDINGS
-from tiltsim.report.flights import FlightRecord, Unsupported, fly, report_entries
+from tiltsim.report.findings import ERRORS, FINDINGS
+from tiltsim.report.flights import FlightRecord, Unsupported, flight_key, fly, report_entries
 from tiltsim.report.made import Made
 from tiltsim.report.making import make_report
 from tiltsim.report.pages import errors_page, markdown, page, rows_csv, rows_json
-from tiltsim.report.pictures import Picture
-from tiltsim.report.sensitivity import Criterion
-from tiltsim.report.store import flight_key
+from tiltsim.report.pictures import DPI, Drawing, Picture, png
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.studies.checking import collect
 from tiltsim.views.figures.style import CYCLE, new_figure

@@ -12,7 +12,7 @@ A table is a statement, like the ``[claim.NAME]`` of scenarios, with the keys of
     unit = "rad"
 
 A row with ``flights``, addresses in the scenario library, is measured on them. With ``above`` or
-``below`` the row asks whether the measured number lies between these bounds. A statement with
+``below`` its value is whether the measured number lies between these bounds. A statement with
 several rows has them in ``[[ch6-blue-offset.row]]``; keys of the table are their defaults. ``each``
 repeats a row over lists of values, whose names stand in braces in its texts. Braces also stand for
 the words of the file's table ``[shared]``, of ``shared.toml``, and for the numbers of
