@@ -3,8 +3,7 @@
 import numpy as np
 
 import tiltsim
-from tiltsim_controllers.analysis.singularity import singularity_margin
-from tiltsim_controllers.analysis.unacceptable_attitudes import acceptable_share
+from tiltsim_controllers.analysis.singularity import acceptable_share, singularity_margin
 
 vehicle = tiltsim.load_scenario("ch04_tracking/setpoint#rho_065_modified").vehicle.resolve()
 

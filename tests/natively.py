@@ -9,9 +9,9 @@ import numpy as np
 
 from tiltsim.closed_loop.assembly import CHOICES
 from tiltsim.engines.machine_code import MachineCode
+from tiltsim_controllers.code.arrays import as_tuples, program_of
 from tiltsim_controllers.code.llvm_text import llvm_functions
 from tiltsim_controllers.code.program import trace_vectors
-from tiltsim_controllers.code.traceable import as_tuples, program_of
 
 RUN = """
 define void @run(ptr %values, ptr %results) nounwind {

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from tiltsim_controllers.laws.feedback import (
     CONVENTIONAL,
     EXACT,
@@ -9,19 +11,13 @@ from tiltsim_controllers.laws.feedback import (
     exact_decoupler,
     modified_decoupler,
 )
-from tiltsim_controllers.vehicle.decoupling_matrix import (
-    sines_and_cosines,
-    torque_entries,
-    torque_free_force,
-)
+from tiltsim_controllers.vehicle.cross import torque_free_force
 from tiltsim_controllers.vehicle.parameters import drag_ratio
 
 
 def hover_attitude(tilts, vehicle):
     """Roll and pitch (rad) at which the torque-free force of fixed tilt angles is vertical."""
-    trig = sines_and_cosines(*tilts)
-    ratio = drag_ratio(vehicle)
-    n = torque_free_force(trig, torque_entries(trig, ratio), ratio)
+    n = torque_free_force(np.array(tilts), drag_ratio(vehicle))
     return exact_decoupler(0.0, 0.0, 0.0, 0.0, vehicle.gravity, n)
 
 
@@ -39,9 +35,7 @@ def setpoint_error(tilts, vehicle, gains, decoupler):
     if decoupler == CONVENTIONAL:
         roll_bias, pitch_bias = conventional_decoupler(0.0, 0.0, 0.0, gravity)
     else:
-        trig = sines_and_cosines(*tilts)
-        ratio = drag_ratio(vehicle)
-        n = torque_free_force(trig, torque_entries(trig, ratio), ratio)
+        n = torque_free_force(np.array(tilts), drag_ratio(vehicle))
         roll_bias, pitch_bias = modified_decoupler(0.0, 0.0, 0.0, gravity, n)
     stiffness = gains.position_2
     return gravity * (pitch - pitch_bias) / stiffness, -gravity * (roll - roll_bias) / stiffness

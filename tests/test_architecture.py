@@ -227,7 +227,7 @@ OF_FOUR_ROTORS = {
     *("quadrotor", "linearizing"),
     *("cross", "metrics", "user_vehicle", "vehicle", "vehicle_parts"),
     *("attitude_plane", "concepts", "gait_analysis", "vehicle_drawing"),
-    *("attainable", "effectiveness", "fault_tolerance", "rotorcraft", "statics"),
+    *("attainable", "fault_tolerance", "rotorcraft", "singularity"),
 }
 """The last names of modules that know these vehicles: their laws, models, tables, and figures."""
 

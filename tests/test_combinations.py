@@ -21,8 +21,8 @@ import tiltsim.env
 from tiltsim.commands.key_tables import key_tables
 from tiltsim.commands.schema import scenario_schema
 from tiltsim.errors import TiltsimError
-from tiltsim.scenario.arguments import leaves
 from tiltsim.scenario.controller import CONTROLLERS, OwnFunctionController
+from tiltsim.scenario.documents import leaves
 from tiltsim.scenario.scenario_tables import DESCRIPTIVE
 from tiltsim.scenario.simulation_table import SimulationTable
 from tiltsim.scenario.vehicle import VehicleUnion

@@ -6,8 +6,7 @@ import pytest
 from tiltsim.arrays import jax_programs
 from tiltsim.arrays.flying import double_precision
 from tiltsim.arrays.jax_programs import InJax
-from tiltsim_controllers.code.blocks import take
-from tiltsim_controllers.code.traceable import traceable
+from tiltsim_controllers.code.arrays import take, traceable
 
 jax = pytest.importorskip("jax")
 

@@ -14,10 +14,9 @@ from tiltsim.resources import shipped_folder
 from tiltsim.studies.multirotor_analysis import FLEET, fleet_file, tilted_rotors
 from tiltsim.views.figures.vehicles import multirotor_figure
 from tiltsim_controllers.analysis.attainable import TiltedRotors
-from tiltsim_controllers.analysis.singularity import singularity_margin
-from tiltsim_controllers.analysis.statics import hover_rotor_speeds
-from tiltsim_controllers.vehicle.effectiveness import force_and_torque
+from tiltsim_controllers.analysis.singularity import hover_rotor_speeds, singularity_margin
 from tiltsim_controllers.vehicle.parameters import PRESETS
+from tiltsim_controllers.vehicle.rotors import force_and_torque
 
 FLEET_PAGE = Path(__file__).parents[2] / "docs" / "fleet.md"
 TILTS = (0.4, 0.1, -0.3, 0.2)

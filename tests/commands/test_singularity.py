@@ -10,7 +10,7 @@ import pytest
 from tiltsim.cli import main
 from tiltsim.views.figures.vehicles import singularity_figure, surfaces
 from tiltsim_controllers.analysis.balance import balanced_gait
-from tiltsim_controllers.analysis.quadrotor_singularity import published_determinant
+from tiltsim_controllers.analysis.singularity import published_determinant
 from tiltsim_controllers.vehicle.parameters import PRESETS
 
 

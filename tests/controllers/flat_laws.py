@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.code.traceable import traceable
+from tiltsim_controllers.code.arrays import traceable, xp
 from tiltsim_controllers.laws.attitude_altitude import attitude_altitude
 from tiltsim_controllers.laws.gait_feedforward import tiltrotor_law_of
 from tiltsim_controllers.laws.observed import Seen

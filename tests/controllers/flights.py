@@ -7,11 +7,7 @@ from math import cos, isfinite, pi, sin
 import numpy as np
 
 from tiltsim_controllers.mathematics.attitude import rotation_matrix
-from tiltsim_controllers.vehicle.decoupling_matrix import (
-    body_force,
-    sines_and_cosines,
-    torque_entries,
-)
+from tiltsim_controllers.vehicle.cross import cross_force, cross_torque
 from tiltsim_controllers.vehicle.parameters import drag_ratio
 
 
@@ -39,14 +35,12 @@ def quadrotor_rates(state, inputs, vehicle):
 def tiltrotor_rates(state, inputs, vehicle):
     """Ch. 3, Eqs. (1)-(7), with exact Euler rates; inputs are rotor accelerations, tilt rates."""
     _, _, _, vx, vy, vz, roll, pitch, yaw, p, q, r = state[:12]
-    trig = sines_and_cosines(*state[12:16])
-    w = [speed * abs(speed) for speed in state[16:20]]
+    tilts, speeds = np.array(state[12:16]), np.array(state[16:20])
+    w = speeds * abs(speeds)
     r11, r12, r13, r21, r22, r23, r31, r32, r33 = rotation_matrix((roll, pitch, yaw)).ravel()
-    fx, fy, fz = (
-        vehicle.thrust_coefficient / vehicle.mass * force for force in body_force(trig, *w)
-    )
-    x2, x4, y1, y3, z1, z2, z3, z4 = torque_entries(trig, drag_ratio(vehicle))
+    fx, fy, fz = vehicle.thrust_coefficient / vehicle.mass * (cross_force(tilts) @ w)
     lever = vehicle.thrust_coefficient * vehicle.arm_length
+    turning = lever * (cross_torque(tilts, drag_ratio(vehicle)) @ w) / vehicle.moments
     turn = (sin(roll) * q + cos(roll) * r) / cos(pitch)
     return (
         *(vx, vy, vz),
@@ -54,9 +48,7 @@ def tiltrotor_rates(state, inputs, vehicle):
         r21 * fx + r22 * fy + r23 * fz,
         r31 * fx + r32 * fy + r33 * fz - vehicle.gravity,
         *(p + sin(pitch) * turn, cos(roll) * q - sin(roll) * r, turn),
-        lever * (x2 * w[1] + x4 * w[3]) / vehicle.inertia_xx,
-        lever * (y1 * w[0] + y3 * w[2]) / vehicle.inertia_yy,
-        lever * (z1 * w[0] + z2 * w[1] + z3 * w[2] + z4 * w[3]) / vehicle.inertia_zz,
+        *turning.tolist(),
         *inputs[4:8],
         *inputs[:4],
     )

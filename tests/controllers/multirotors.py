@@ -16,28 +16,22 @@ from tiltsim_controllers.laws.attitude_altitude import EXACT_DECOUPLING
 from tiltsim_controllers.laws.feedback import EXACT
 from tiltsim_controllers.laws.gains import GAIN_SETS, IntegralGains
 from tiltsim_controllers.laws.gait_feedforward import multirotor_law_of
-from tiltsim_controllers.laws.multirotor_steps import (
-    ROTATION,
-    Direction,
-    FeedforwardTerms,
-    Form,
-    Parameters,
-)
+from tiltsim_controllers.laws.multirotor_steps import ROTATION, FeedforwardTerms, Form, Parameters
 from tiltsim_controllers.laws.observed import Failure
 from tiltsim_controllers.laws.supervised_vehicles import Watched
 from tiltsim_controllers.laws.supervisor import Supervisor
 from tiltsim_controllers.mathematics.attitude import euler_of_rotation
 from tiltsim_controllers.references.trajectories import SETPOINT, ReferenceParameters
 from tiltsim_controllers.vehicle.body import body_of
-from tiltsim_controllers.vehicle.effectiveness import (
+from tiltsim_controllers.vehicle.craft import equations_of_motion
+from tiltsim_controllers.vehicle.parameters import PRESETS, SPIN
+from tiltsim_controllers.vehicle.rotors import (
     force_and_torque,
     rotor_entries,
+    rotors_in,
     tilt_of_rotor,
     tilts_of,
 )
-from tiltsim_controllers.vehicle.motion import equations_of_motion
-from tiltsim_controllers.vehicle.parameters import PRESETS, SPIN
-from tiltsim_controllers.vehicle.rotors import rotors_in
 
 FOUR = PRESETS["ar_drone_2"]
 HEXAROTOR = body_of(1.53, np.diag((0.0348, 0.0459, 0.08)), 9.81)
@@ -127,8 +121,8 @@ def parameters_of(vehicle, gait=None, reference=None, **changes):
         supervisor=Supervisor(),
         watched=Watched(),
         watched_without=Watched(),
-        upper_side=Direction(),
-        upper_side_without=Direction(),
+        upper_side=(0.0, 0.0, 0.0),
+        upper_side_without=(0.0, 0.0, 0.0),
     )
     return law._replace(**changes), (*gait.knots, *vehicle.table)
 

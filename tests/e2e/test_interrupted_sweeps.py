@@ -15,5 +15,5 @@ from tests.e2e.interrupting import interrupt_sweeps
 def test_signals_at_any_moment_end_a_sweep_and_lose_nothing(engine):
     if engine == "jax":
         pytest.importorskip("jax")
-    mistakes, _ = interrupt_sweeps(engine, 20, seed=0)
+    mistakes, _ = interrupt_sweeps(engine, 8, seed=0)
     assert mistakes == []

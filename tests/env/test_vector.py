@@ -11,7 +11,7 @@ from tiltsim.env.domain import Domain
 from tiltsim.env.environment import HOVER, TiltrotorEnv
 from tiltsim.env.functions import loop_on_equations
 from tiltsim.env.tasks import TASKS
-from tiltsim.equations.implicitfast import make_implicitfast_step
+from tiltsim.equations.solvers import make_implicitfast_step
 from tiltsim.errors import InputError
 from tiltsim.laws.assembling import assemble
 from tiltsim.laws.commanded import with_command

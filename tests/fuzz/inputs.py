@@ -13,8 +13,8 @@ from tiltsim.cli import build_parser, main
 from tiltsim.commands.schema import scenario_schema, sweep_schema
 from tiltsim.flight.reading import load_flight
 from tiltsim.resources import shipped_folder
+from tiltsim.scenario.documents import parse_override
 from tiltsim.scenario.loading import load_scenario, parse_scenario
-from tiltsim.scenario.override_keys import parse_override
 from tiltsim.sweeps.loading import load_sweep
 
 SHORT = ["--quiet", "--set", "expect=[]"]  # each expectation that fails has a line

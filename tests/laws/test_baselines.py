@@ -12,7 +12,7 @@ from tests.laws.test_multirotor import TILTS, mjcf
 from tiltsim.laws.assembling import assemble
 from tiltsim_controllers.laws.periodic_lqr import PeriodicVehicle, linear_orbit
 from tiltsim_controllers.mathematics.attitude import attitude_error, rotation_matrix
-from tiltsim_controllers.vehicle.effectiveness import force_and_torque, table_per_newton
+from tiltsim_controllers.vehicle.rotors import force_and_torque, table_per_newton
 
 CIRCLE = {"type": "circle", "radius": 1.0, "angular_frequency": 0.5}
 ON_CIRCLE = {"position": [1.0, 0.0, 0.0], "velocity": [0.0, 0.5, 0.0]}

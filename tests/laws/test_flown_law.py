@@ -14,7 +14,7 @@ from pydantic import Field
 import tiltsim
 from tests.docs.pages import code
 from tiltsim import xp
-from tiltsim.scenario.controller_packages import installed_controllers
+from tiltsim.scenario.controller import installed_controllers
 from tiltsim_controllers.vehicle.actuators import held_gain
 
 TARGET = {"type": "setpoint", "position": [0.3, 0.2, 0.5]}
@@ -354,9 +354,7 @@ def entries(monkeypatch, *found):
         "entry_points",
         lambda group: [EntryPoint(name, value, group) for name, value in found],
     )
-    monkeypatch.setattr(
-        "tiltsim.scenario.controller_packages.entry_points", importlib.metadata.entry_points
-    )
+    monkeypatch.setattr("tiltsim.scenario.controller.entry_points", importlib.metadata.entry_points)
 
 
 @pytest.mark.parametrize(

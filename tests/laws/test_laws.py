@@ -19,11 +19,13 @@ from tiltsim.plants.factory import make_plant
 from tiltsim.plants.mujoco_plant import MujocoPlant
 from tiltsim.scenario.loading import merge
 from tiltsim_controllers.analysis.balance import balanced_gait
-from tiltsim_controllers.analysis.quadrotor_singularity import (
+from tiltsim_controllers.analysis.singularity import (
+    force_matrix,
     normalized_determinant,
     published_determinant,
+    torque_matrix,
+    world_up,
 )
-from tiltsim_controllers.analysis.singularity import force_matrix, torque_matrix, world_up
 from tiltsim_controllers.analysis.torque_free import singularity_margin, torque_free_forces
 from tiltsim_controllers.mathematics.attitude import rotation_matrix
 from tiltsim_controllers.vehicle.parameters import PRESETS

@@ -25,7 +25,7 @@ from tiltsim_controllers.analysis.torque_free import (
     torque_free_forces,
 )
 from tiltsim_controllers.laws.observed import Failure
-from tiltsim_controllers.vehicle.effectiveness import force_and_torque
+from tiltsim_controllers.vehicle.rotors import force_and_torque
 
 TILTS = {"type": "waypoints", "angles": [[0.2, -0.2] * 3, [0.3, -0.3] * 3], "period": 2.0}
 CIRCLE = {"type": "circle", "radius": 1.0, "angular_frequency": 0.5}

@@ -20,9 +20,8 @@ from tiltsim.views.figures.plot import plot
 from tiltsim.views.replay import thrust_sites, visible_model
 from tiltsim.views.rerun.recording import save_recording
 from tiltsim.views.rerun.scene import ground_height
-from tiltsim_controllers.tilt_car.penguin_cycle import Swing, limit_cycle, lyapunov, lyapunov_bound
+from tiltsim_controllers.tilt_car.cycles import Swing, limit_cycle, lyapunov, lyapunov_bound, orbit
 from tiltsim_controllers.tilt_car.planned_direction import GAIN_SETS
-from tiltsim_controllers.tilt_car.state_drift import orbit
 from tiltsim_controllers.tilt_car.vehicle import THESIS_CAR, acceleration, counter_yaw_per_tilt
 
 CIRCLE = {"type": "circle", "position": [10.0, 0.0, 0.0], "radius": -10.0, "angular_frequency": 1.0}

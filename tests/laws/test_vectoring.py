@@ -12,7 +12,7 @@ from tiltsim.studies.benchmark import compiled_time_per_call
 from tiltsim_controllers.analysis.vectoring_design import TRACKING
 from tiltsim_controllers.analysis.vectoring_limits import Craft, side_slope
 from tiltsim_controllers.laws.vectoring_steps import braked, turn_by
-from tiltsim_controllers.vehicle.effectiveness import table_per_newton
+from tiltsim_controllers.vehicle.rotors import table_per_newton
 
 LAG = {"rotor_time_constant": 0.03, "min_rotor_speed": 60.0, "max_rotor_speed": 838.0}
 LATE = {"timestep": 0.002, "control_timestep": 0.004, "control_latency": 0.008}

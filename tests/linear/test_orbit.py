@@ -17,7 +17,7 @@ from tiltsim.linear.forcing import forcing_of
 from tiltsim.linear.motion import make_motion
 from tiltsim.linear.newton import derivative_at
 from tiltsim.linear.stability import Point, crossings, stability_at, sweep_stability
-from tiltsim_controllers.tilt_car.penguin_cycle import Swing, limit_cycle, multipliers
+from tiltsim_controllers.tilt_car.cycles import Swing, limit_cycle, multipliers
 from tiltsim_controllers.tilt_car.planned_direction import GAIN_SETS
 
 QUICK = {"simulation.engine": "python", "simulation.duration": 1.0}

@@ -43,9 +43,12 @@ RICH = {
     "law_states": 2,
     "rotor_limits": RotorLimits(10.0, 900.0),
     "extra_actuators": LAYERS,
-    "ground": Ground(-1.0, 0.5),
+    "ground": Ground(height=-1.0, friction=0.5),
 }
-STOPS = {"pod": Pod(0.01, 1e-5), "tilt_servo": TiltServo(damping_ratio=0.0, max_angle=0.5)}
+STOPS = {
+    "pod": Pod(mass=0.01, inertia=1e-5),
+    "tilt_servo": TiltServo(damping_ratio=0.0, max_angle=0.5),
+}
 LUUKKONEN = PRESETS["luukkonen"]
 SHIPPED = {
     "tiltrotor": RotorcraftSpec("tiltrotor", LUUKKONEN),

@@ -41,7 +41,9 @@ def normal_force(model, data):
 @pytest.mark.parametrize("visuals", [True, False])
 @pytest.mark.parametrize("vehicle", ["tiltrotor", "quadrotor"])
 def test_a_vehicle_set_down_stands_on_its_skids_and_carries_its_weight(vehicle, visuals):
-    model = compile_model(RotorcraftSpec(vehicle, VEHICLE, ground=Ground(0.5)), visuals=visuals)
+    model = compile_model(
+        RotorcraftSpec(vehicle, VEHICLE, ground=Ground(height=0.5)), visuals=visuals
+    )
     data = mujoco.MjData(model)
     data.qpos[2] = 0.5 + ON_SKIDS + 0.01
     mujoco.mj_step(model, data, 2000)
@@ -84,7 +86,7 @@ def test_friction_holds_up_to_its_share_of_the_weight(friction):
 def test_a_slide_ends_where_coulomb_says_in_all_directions(along):
     """``v^2 / (2 mu g)``; while the skids redistribute the load, a few percent more."""
     friction = 0.5
-    model = compile_model(RotorcraftSpec("quadrotor", VEHICLE, ground=Ground(0.0, friction)))
+    model = compile_model(RotorcraftSpec("quadrotor", VEHICLE, ground=Ground(friction=friction)))
     data = standing(model)
     start, data.qvel[:2] = data.qpos[:2].copy(), along
     mujoco.mj_step(model, data, 300)
@@ -94,7 +96,7 @@ def test_a_slide_ends_where_coulomb_says_in_all_directions(along):
 
 
 def test_at_half_of_its_friction_the_vehicle_creeps_by_less_than_a_tenth_of_a_millimeter_a_second():
-    model = compile_model(RotorcraftSpec("quadrotor", VEHICLE, ground=Ground(0.0, 0.5)))
+    model = compile_model(RotorcraftSpec("quadrotor", VEHICLE, ground=Ground(friction=0.5)))
     data = standing(model)
     data.body("vehicle").xfrc_applied[0] = 0.25 * WEIGHT
     data.body("vehicle").xfrc_applied[4] = -0.25 * WEIGHT * ON_SKIDS

@@ -26,21 +26,7 @@ PINNED = """
 
 
 def body(**changes):
-    still = {
-        "name": "box",
-        "shape": "box",
-        "position": (1.0, 0.0, 0.0),
-        "quaternion": (1.0, 0.0, 0.0, 0.0),
-        "size": (0.2, 0.4, 0.6),
-        "joint": "fixed",
-        "mass": 0.0,
-        "friction": 0.5,
-        "softness": 0.01,
-        "hinge": (0.0, 0.0, 0.0),
-        "axis": (0.0, 0.0, 1.0),
-        "damping": 0.0,
-        "floating": False,
-    }
+    still = {"name": "box", "type": "box", "position": (1.0, 0.0, 0.0), "size": (0.2, 0.4, 0.6)}
     return Body(**(still | changes))
 
 
@@ -53,7 +39,7 @@ def pinned(*bodies, load=None):
 
 
 def pendulum(attached=(0.0, 0.0, 0.0)):
-    model, data = pinned(load=Load(MASS, LENGTH, attached, 0.03, rigid=False))
+    model, data = pinned(load=Load(mass=MASS, length=LENGTH, attachment=attached))
     data.qpos[7:10] = np.array([np.sin(ANGLE), 0.0, -np.cos(ANGLE)]) * LENGTH + attached
     return model, data
 
@@ -127,11 +113,11 @@ def test_a_box_on_a_box_does_not_creep():
         (body(), (0.0, 0.3, 0.2), (1.0, 0.0, 0.0), None),
         (body(), (2.0, 0.0, 0.0), (1.0, 0.0, 0.0), None),
         (body(), (2.0, 0.0, 0.0), (-1.0, 0.0, 0.0), 0.9),
-        (body(shape="wall", size=(1.0, 1.0)), (0.0, 0.0, 0.0), (0.8, 0.6, 0.0), None),
-        (body(shape="wall", size=(2.0, 1.0)), (0.0, 0.0, 0.0), (0.8, 0.6, 0.0), 1.25),
-        (body(shape="sphere", size=(0.25,)), (0.0, 0.15, 0.0), (1.0, 0.0, 0.0), 0.8),
-        (body(shape="sphere", size=(0.25,)), (0.0, 0.3, 0.0), (1.0, 0.0, 0.0), None),
-        (body(quaternion=(np.sqrt(0.5), 0, 0, np.sqrt(0.5))), (0, 0, 0), (1.0, 0, 0), 0.8),
+        (body(type="wall", size=(1.0, 1.0)), (0.0, 0.0, 0.0), (0.8, 0.6, 0.0), None),
+        (body(type="wall", size=(2.0, 1.0)), (0.0, 0.0, 0.0), (0.8, 0.6, 0.0), 1.25),
+        (body(type="sphere", size=(0.25,)), (0.0, 0.15, 0.0), (1.0, 0.0, 0.0), 0.8),
+        (body(type="sphere", size=(0.25,)), (0.0, 0.3, 0.0), (1.0, 0.0, 0.0), None),
+        (body(attitude=(0.0, 0.0, 0.5 * np.pi)), (0, 0, 0), (1.0, 0, 0), 0.8),
     ],
 )
 def test_the_distance_to_an_object_along_a_tool(thing, point, direction, distance):

@@ -13,7 +13,7 @@ from tiltsim.laws.assembling import assemble
 from tiltsim.models.user_vehicle import read_user_vehicle
 from tiltsim.plants.flight_model import build_model
 from tiltsim.resources import shipped_folder
-from tiltsim_controllers.vehicle.effectiveness import force_and_torque
+from tiltsim_controllers.vehicle.rotors import force_and_torque
 
 # A hinge that two rotors share, off both; a rotor that pushes down; center of mass off the origin.
 ODD = """

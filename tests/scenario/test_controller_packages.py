@@ -9,7 +9,7 @@ import warnings
 
 import pytest
 
-from tiltsim.scenario.controller_packages import installed_controllers
+from tiltsim.scenario.controller import installed_controllers
 
 TABLE = """
 from typing import Annotated, Literal

@@ -6,10 +6,9 @@ import pytest
 
 import tiltsim
 from tiltsim.errors import InputError
-from tiltsim.scenario.library import read_toml
-from tiltsim.scenario.limits import MAX_FILE_SIZE, MAX_VALUES
+from tiltsim.scenario.documents import parse_override, split_key
+from tiltsim.scenario.library import MAX_FILE_SIZE, MAX_VALUES, read_toml
 from tiltsim.scenario.loading import load_scenario
-from tiltsim.scenario.override_keys import parse_override, split_key
 from tiltsim.sweeps.definition import SweepDefinition
 from tiltsim.sweeps.expressions import evaluate
 

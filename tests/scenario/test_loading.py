@@ -11,10 +11,10 @@ import pytest
 
 from tests.refusals import refusal as refused
 from tiltsim.errors import InputError
+from tiltsim.scenario.documents import parse_override
 from tiltsim.scenario.library import library_entries
 from tiltsim.scenario.loading import load_scenario, merge, parse_scenario, scenario_toml
 from tiltsim.scenario.metric_names import METRICS
-from tiltsim.scenario.override_keys import parse_override
 from tiltsim.studies.checking import collect
 
 LIBRARY = [address for address, _, _ in library_entries()]

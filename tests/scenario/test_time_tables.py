@@ -14,10 +14,10 @@ import tiltsim
 from tests.refusals import refusal
 from tiltsim.errors import InputError
 from tiltsim.flight.flight import Flight
-from tiltsim.scenario.limits import MAX_ROWS
+from tiltsim.scenario.library import MAX_ROWS
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.sweeps.loading import load_sweep
-from tiltsim_controllers.references.waypoints import waypoint_motion
+from tiltsim_controllers.references.trajectories import waypoint_motion
 
 SHORT = {"simulation": {"duration": 0.4}, "controller": {"decoupling": "exact", "gains": "exact"}}
 TIMES = np.linspace(0.0, 0.4, 9)

@@ -121,7 +121,7 @@ def test_vehicles_and_load_keep_their_momentum_while_the_load_changes_hands():
     data.qvel[-6:-3] = -2.0, 0.5, -1.0
     momenta, taut = [], []
     for step in range(600):
-        switch(model, [table.cable for table in assembly.scenario.cable], 0.001 * step)
+        switch(model, assembly.scenario.cable, 0.001 * step)
         mujoco.mj_step(model, data)
         taut.append(data.history[data.history.size - 8 :][3::4] > 0.0)
         mujoco.mj_subtreeVel(model, data)

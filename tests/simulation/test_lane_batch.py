@@ -169,7 +169,7 @@ def test_quick_functions_are_for_equations():
 
 
 @pytest.mark.slow(longest=True)
-def test_library_flights_have_the_same_bits_for_their_first_second():
+def test_library_flights_have_the_same_bits_for_their_first_moments():
     """Whatever flies on the equations of a rigid body, or else on the thesis's."""
     scenarios = []
     for address, *_ in library_entries():
@@ -179,13 +179,13 @@ def test_library_flights_have_the_same_bits_for_their_first_second():
         for plant in ("rigid_body", "thesis"):
             tables = {"simulation.plant": plant, "simulation.engine": "native", "expect": []}
             try:
-                changed = tiltsim.load_scenario(address, {**tables, "simulation.duration": 1.0})
+                changed = tiltsim.load_scenario(address, {**tables, "simulation.duration": 0.24})
                 tiltsim.laws.assembling.assemble(changed)
             except InputError:
                 continue
-            scenarios += [changed.replace({"simulation.duration": t}) for t in (1.0, 0.7, 0.3)]
+            scenarios += [changed.replace({"simulation.duration": t}) for t in (0.24, 0.12)]
             break
-    assert len(scenarios) > 900
+    assert len(scenarios) > 600
     for first in range(0, len(scenarios), 90):
         part = scenarios[first : first + 90]
         for flown, result in zip(part, fly(part, keep_samples=True), strict=True):

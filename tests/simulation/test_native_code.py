@@ -16,8 +16,7 @@ from tiltsim.flight.end import End
 from tiltsim.laws.assembling import LOOPS, assemble
 from tiltsim.plants.engine_choice import choose_engine
 from tiltsim.plants.factory import make_plant
-from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.code.traceable import traceable
+from tiltsim_controllers.code.arrays import traceable, xp
 
 
 @pytest.mark.parametrize("law", LOOPS)

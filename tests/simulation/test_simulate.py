@@ -16,8 +16,8 @@ from tiltsim.system import progress
 from tiltsim.vehicles.rotorcraft import COLUMNS
 from tiltsim_controllers.laws.feedback import DECOUPLERS
 from tiltsim_controllers.laws.gains import GAIN_SETS
+from tiltsim_controllers.vehicle.body import TILTROTOR_FIELDS
 from tiltsim_controllers.vehicle.parameters import PRESETS
-from tiltsim_controllers.vehicle.states import TILTROTOR_FIELDS
 
 PLANTS = ("mujoco", "thesis")
 ENGINES = ("python", "native")

@@ -19,9 +19,9 @@ from tiltsim_controllers.analysis.singularity import (
     determinant,
     residuals,
     singularity_margin,
+    unacceptable_attitudes,
     world_up,
 )
-from tiltsim_controllers.analysis.unacceptable_attitudes import unacceptable_attitudes
 from tiltsim_controllers.vehicle.parameters import PRESETS
 
 VEHICLE = PRESETS["ar_drone_2"]

@@ -46,6 +46,20 @@ def test_compared_flights_have_a_vehicle_and_a_plane_each():
     assert origins[1] == {name: f"plane/{name}" for name in ("fixed", "trot")}
 
 
+def test_flights_of_a_tilt_car_and_a_rotorcraft_are_compared_in_the_plots_of_each():
+    compared = [flight("fixed"), flight("tilt_car")]
+    views = views_of(*(each.scenario for each in compared), flights=compared)
+    paths = {
+        name: sorted({path.partition("/")[0] for path in views[name].contents})
+        for name in ("Distance from the reference (m)", "Slowest rotor and limits (rad/s)")
+    }
+    names = [recorder.part for recorder in new_recording([each.assembly for each in compared])[1]]
+    assert paths == {
+        "Distance from the reference (m)": sorted(names),
+        "Slowest rotor and limits (rad/s)": names[:1],
+    }
+
+
 def range_of(view):
     ((low, high),) = view.properties["ScalarAxis"].range.as_arrow_array().to_pylist()
     return low, high

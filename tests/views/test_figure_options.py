@@ -17,8 +17,8 @@ from tests.flights import OTHER_KINDS, RECIPES, SAMPLE_FIELDS, flight, saved
 from tiltsim.cli import build_parser, main
 from tiltsim.errors import InputError
 from tiltsim.laws.assembling import assemble
-from tiltsim.scenario.key_units import quantity_of_key
 from tiltsim.scenario.metric_names import METRICS
+from tiltsim.scenario.schema import quantity_of_key
 from tiltsim.sweeps.tables import PlotTable
 from tiltsim.views.figures import style
 from tiltsim.views.figures.distributions import distinct_texts, label_of

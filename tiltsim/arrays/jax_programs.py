@@ -6,8 +6,8 @@ from typing import Any
 
 from tiltsim.arrays.xla_flags import merges_loops
 from tiltsim.system.public import optional_package
+from tiltsim_controllers.code.arrays import as_tuples, program_of
 from tiltsim_controllers.code.jax_function import results_in_jax
-from tiltsim_controllers.code.traceable import as_tuples, program_of
 
 Function = Callable[..., Any]
 

@@ -6,8 +6,8 @@ from typing import Any
 
 from tiltsim.commands.declaring import mistakes_in
 from tiltsim.scenario.controller import CONTROLLERS
+from tiltsim.scenario.documents import parse_override
 from tiltsim.scenario.messages import choose
-from tiltsim.scenario.override_keys import parse_override
 from tiltsim.studies.comparison import controller_tables
 from tiltsim.system.files import is_file
 

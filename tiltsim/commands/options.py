@@ -35,7 +35,7 @@ def names(text: str) -> list[str]:
 
 
 def _assignment(text: str) -> tuple[str, Any]:
-    from tiltsim.scenario.override_keys import parse_override
+    from tiltsim.scenario.documents import parse_override
 
     if "=" not in text:
         raise ValueError("write KEY=VALUE, as in controller.decoupler=exact")

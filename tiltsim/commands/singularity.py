@@ -44,7 +44,7 @@ def run(
 def _report(vehicle: Vehicle, roll: float, pitch: float) -> dict[str, Any]:
     from math import asin, cos
 
-    from tiltsim_controllers.analysis.quadrotor_singularity import (
+    from tiltsim_controllers.analysis.singularity import (
         exact_determinant,
         normalized_determinant,
         published_determinant,

@@ -19,10 +19,9 @@ from tiltsim.closed_loop.userdata import (
 from tiltsim.engines.base import Vectors
 from tiltsim.equations.solvers import Integration, make_step
 from tiltsim.scenario.companion import MAX_COMPANIONS
+from tiltsim_controllers.code.arrays import as_arrays, program_of, xp
 from tiltsim_controllers.code.arrays import flatten as flattened
-from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.code.program import Program
-from tiltsim_controllers.code.traceable import as_arrays, program_of
 from tiltsim_controllers.mathematics.records import flatten, record_size, unflatten
 from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.references.trajectories import ReferenceParameters

@@ -15,10 +15,10 @@ from tiltsim.engines.glue import ROWS, filled
 from tiltsim.engines.machine_code import MachineCode
 from tiltsim.engines.programs import KEPT, LoopPrograms, record_with_choices
 from tiltsim.system.files import one_thread_at_a_time
+from tiltsim_controllers.code.arrays import program_of
 from tiltsim_controllers.code.llvm_text import llvm_functions
 from tiltsim_controllers.code.program import InputVector, Program
 from tiltsim_controllers.code.python_source import python_function
-from tiltsim_controllers.code.traceable import program_of
 from tiltsim_controllers.mathematics.records import leaves, record_size, unflatten
 from tiltsim_controllers.mathematics.scalar import Floats, Values
 

@@ -3,7 +3,7 @@
 import ctypes
 from collections.abc import Callable, Sequence
 from functools import cache, lru_cache, partial
-from typing import Any, Literal, NamedTuple, Protocol
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -83,19 +83,6 @@ class Integrated(NamedTuple):
         return (self.timestep, *self.disturbance)
 
 
-class Stepper(Protocol):
-    """Integrates the equations of a flight."""
-
-    def advance(self, step_index: int, now: Floats, steps: int) -> Floats:
-        """State and inputs in force, shape (states + inputs,), some steps later.
-
-        Args:
-            step_index: Number of steps so far.
-            now: State and inputs in force.
-            steps: Number of steps to take.
-        """
-
-
 @one_thread_at_a_time
 @lru_cache(maxsize=KEPT)
 def _program(layout: Layout, name: str) -> Program:
@@ -115,7 +102,7 @@ def _in_python(flight: Integrated, name: str, **fixed: Sequence[float]) -> Calla
     return _functions(flight.layout)[name].plain(setup_of(flight.layout.key.loop, user), **fixed)
 
 
-class PythonStepper(Stepper):
+class PythonStepper:
     """Integrates on Python's floats."""
 
     def __init__(self, flight: Integrated) -> None:
@@ -125,6 +112,13 @@ class PythonStepper(Stepper):
             self._held = _in_python(flight, "step_held")
 
     def advance(self, step_index: int, now: Floats, steps: int) -> Floats:
+        """State and inputs in force, shape (states + inputs,), some steps later.
+
+        Args:
+            step_index: Number of steps so far.
+            now: State and inputs in force.
+            steps: Number of steps to take.
+        """
         values: Any = now.tolist()
         for index in range(step_index, step_index + steps):
             step = self._held if index % self._every else self._sampled
@@ -221,7 +215,7 @@ class LaneStepper:
         self._advance(steps, until_one_is_over, *self._addresses)
 
 
-class NativeStepper(Stepper):
+class NativeStepper:
     """Integrates one flight as machine code, without holding Python's lock."""
 
     def __init__(self, flight: Integrated) -> None:
@@ -230,6 +224,7 @@ class NativeStepper(Stepper):
         self._unlimited = self._lane.heads.copy()
 
     def advance(self, step_index: int, now: Floats, steps: int) -> Floats:
+        """See `PythonStepper.advance`."""
         self._lane.heads[:] = self._unlimited
         self._lane.index[:], self._lane.now[:, 0] = step_index, now
         self._lane.advance(steps)

@@ -16,14 +16,14 @@ from tiltsim.arrays.jax_programs import InJax, require_jax
 from tiltsim.closed_loop.limits import WITHIN_LIMITS
 from tiltsim.closed_loop.loop import ClosedLoop
 from tiltsim.env.task import Task
-from tiltsim.equations.implicitfast import make_implicitfast_step
-from tiltsim.equations.rigid_body import rigid_body
+from tiltsim.equations.actuator_level import rigid_body
+from tiltsim.equations.solvers import make_implicitfast_step
 from tiltsim.errors import InputError
 from tiltsim.laws.assembling import loop_of
 from tiltsim.laws.commanded import commanded_parameters, with_command
 from tiltsim.laws.layers.on_equations import on_equations
 from tiltsim.plants.command import Observation, Reference
-from tiltsim.scenario.override_keys import split_key, value_at, with_value
+from tiltsim.scenario.documents import split_key, value_at, with_value
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.scenario.surroundings import SensorTable
 from tiltsim.scenario.vehicle import PodTable, VehicleTable

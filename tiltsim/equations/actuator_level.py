@@ -16,7 +16,7 @@ import numpy as np
 
 from tiltsim.closed_loop.loop import ClosedLoop
 from tiltsim.models.parts import WRENCH_SIZE
-from tiltsim.scenario.scenario import FlightPlan
+from tiltsim.scenario.scenario import FlightPlan, Scenario
 from tiltsim.vehicles.rotorcraft import initial_tilts
 from tiltsim.vehicles.rotorcraft.layout import layout_of, rotors_record, tilt_of_rotor, true_rotors
 from tiltsim_controllers.code.arrays import xp
@@ -31,10 +31,9 @@ from tiltsim_controllers.mathematics.attitude import (
 from tiltsim_controllers.mathematics.linear import norm
 from tiltsim_controllers.mathematics.records import make_record_type, vector_of
 from tiltsim_controllers.mathematics.scalar import Values
+from tiltsim_controllers.vehicle.body import accelerations, joined, rotation_rate
 from tiltsim_controllers.vehicle.craft import Craft, craft_of
-from tiltsim_controllers.vehicle.effectiveness import TiltOfRotor, tilts_of
-from tiltsim_controllers.vehicle.motion import accelerations, joined, rotation_rate
-from tiltsim_controllers.vehicle.rotors import of_tilts, wrench_map
+from tiltsim_controllers.vehicle.rotors import TiltOfRotor, of_tilts, tilts_of, wrench_map
 
 # --- parameters -------------------------------------------------------------------------------
 
@@ -339,5 +338,22 @@ def actuator_plant(loop: ClosedLoop) -> ActuatorPlant:
             rotors_record(loop),
             gyroscopic=float(is_quadrotor),
             has_limits=not is_quadrotor,  # whose rotors make any thrust
+        )
+    )
+
+
+def rigid_body(scenario: Scenario) -> ActuatorPlant:
+    """The rigid body of a scenario's rotorcraft."""
+    vehicle = scenario.any_rotorcraft
+    has_limits = vehicle.has_rotor_limits or vehicle.tilt_servo.max_angle is not None
+    return plant_of(
+        PlantForm(
+            QUATERNION,
+            as_in_mujoco(vehicle.tilt_count if scenario.vehicle.has_tilting_rotors else 0),
+            tuple(map(vehicle.tilt_of_rotor, range(1, vehicle.rotor_count + 1))),
+            vehicle.spins,
+            type(true_rotors(scenario)),
+            gyroscopic=1.0,
+            has_limits=has_limits,
         )
     )

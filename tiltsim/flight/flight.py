@@ -18,17 +18,16 @@ import numpy as np
 
 from tiltsim.errors import InputError
 from tiltsim.flight.metrics import Metrics, compute_metrics
-from tiltsim.flight.vectors import VECTORS, components
+from tiltsim.flight.vectors import ColumnsOverTime
 from tiltsim.flight.writing import write_flight
 from tiltsim.laws.assembling import assemble
-from tiltsim.scenario.messages import did_you_mean
 from tiltsim.scenario.metric_names import unit_of
-from tiltsim.system.public import optional_package, public
+from tiltsim.system.public import public
 from tiltsim.system.text import html_table, short_repr, shortened, valid_unicode
 from tiltsim_controllers.mathematics.scalar import Floats
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Callable, Sequence
 
     import pyarrow
 
@@ -38,19 +37,13 @@ if TYPE_CHECKING:
     from tiltsim.scenario.scenario import Scenario
 
 
-class UnknownColumnError(InputError, KeyError):
-    """A flight has no column or vector of a name."""
-
-    __str__ = Exception.__str__  # a KeyError shows its message in quotes
-
-
 def _overflow_ignored() -> np.errstate:
     """For arithmetic with the last sample of a diverged flight, whose squares may overflow."""
     return np.errstate(over="ignore", invalid="ignore")
 
 
 @dataclass(frozen=True, repr=False)
-class Flight:
+class Flight(ColumnsOverTime):
     """The record of one flight; it pickles without its assembly, which is then built again."""
 
     assembly: Assembly
@@ -94,33 +87,6 @@ class Flight:
     def __len__(self) -> int:
         """Number of samples."""
         return len(self.samples)
-
-    def __getitem__(self, name: str) -> Floats:
-        """A column by name, shape (N,); or a vector of `VECTORS`, shape (N, components).
-
-        ``flight["x"]`` and ``flight["position"]``, both in the units of `units`. Raises
-        `UnknownColumnError` for other names.
-        """
-        known = isinstance(name, str)
-        if known and name in self.units:
-            return self.columns[name]
-        columns = components(name, self.units) if known else []
-        if not columns:
-            vectors = [vector for vector in VECTORS if components(vector, self.units)]
-            hint = did_you_mean(name, [*self.units, *vectors])
-            raise UnknownColumnError(
-                f"{short_repr(name)}: no column of this flight; {hint}see Flight.units, or the "
-                f"vectors {', '.join(vectors)}"
-            )
-        return np.stack([self.columns[column] for column in columns], axis=-1)
-
-    def __iter__(self) -> Iterator[str]:
-        """The names of the columns, as in a dict."""
-        return iter(self.units)
-
-    def __contains__(self, name: object) -> bool:
-        """Whether there is a column or vector of this name."""
-        return isinstance(name, str) and (name in self.units or bool(components(name, self.units)))
 
     @cached_property
     def units(self) -> dict[str, str]:
@@ -182,29 +148,9 @@ class Flight:
         lines = [scenario.address, how, size]
         return html_table(scenario.title or "Flight", lines, rows, ("metric", "value", "unit"))
 
-    def to_pandas(self) -> Any:
-        """The columns as a pandas DataFrame, whose ``attrs["units"]`` are `units`.
-
-        Raises `InputError` if pandas is not installed.
-        """
-        pandas = optional_package("pandas", "Flight.to_pandas")
-        frame = pandas.DataFrame(dict(self.columns))
-        frame.attrs["units"] = dict(self.units)
-        return frame
-
     def to_arrow(self) -> pyarrow.Table:
         """The columns as an Arrow table; units and `origin` are its metadata."""
-        import pyarrow as pa
-
-        fields = [
-            pa.field(name, pa.float64(), nullable=False, metadata={"unit": unit})
-            for name, unit in self.units.items()
-        ]
-        schema = pa.schema(fields, metadata=self.origin())
-        # From their bytes, as converting an array would import pandas where it is installed.
-        memory = [pa.py_buffer(np.ascontiguousarray(column)) for column in self.columns.values()]
-        columns = [pa.Array.from_buffers(pa.float64(), len(self), [None, one]) for one in memory]
-        return pa.table(columns, schema=schema)
+        return self.arrow_table(self.origin())
 
     def origin(self) -> dict[str, str]:
         """The metadata of the file: scenario (JSON), versions, seed, engine, end, wall time (s)."""

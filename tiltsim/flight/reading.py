@@ -15,7 +15,7 @@ from tiltsim.errors import InputError
 from tiltsim.flight.end import End, EndKind
 from tiltsim.flight.flight import Flight
 from tiltsim.laws.assembling import assemble
-from tiltsim.scenario.limits import check_limits
+from tiltsim.scenario.library import check_limits
 from tiltsim.scenario.loading import parse_scenario, without_none
 from tiltsim.system.files import is_file, is_folder
 from tiltsim.system.parquet import open_parquet

@@ -5,14 +5,13 @@ from typing import Final
 
 from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.closed_loop.loop import ClosedLoop
-from tiltsim.equations.actuator_level import ActuatorPlant, actuator_plant
-from tiltsim.equations.rigid_body import rigid_body
+from tiltsim.equations.actuator_level import ActuatorPlant, actuator_plant, rigid_body
 from tiltsim.laws.commanded import commanded_loop
 from tiltsim.laws.companions import Member, with_companions
 from tiltsim.laws.flown_law import loop_of_law
 from tiltsim.laws.layers.actuation import with_actuation
 from tiltsim.laws.layers.contact import with_force_loop, with_impedance, with_objects
-from tiltsim.laws.layers.estimation import fusion_of, with_estimator
+from tiltsim.laws.layers.estimation import Fusion, with_estimator
 from tiltsim.laws.layers.forces import with_air, with_loads, with_rotor_inertia
 from tiltsim.laws.layers.instruments import (
     instruments_of,
@@ -27,7 +26,7 @@ from tiltsim.laws.rotor_loop import layout_of_vehicle
 from tiltsim.laws.tilt_car import FOURTH_DERIVATIVE, PLANNED_DIRECTION, THIRD_DERIVATIVE
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.law_controller import LawTable
-from tiltsim.scenario.multirotor_controllers import AttitudeForceController
+from tiltsim.scenario.linearizing_controllers import AttitudeForceController
 from tiltsim.scenario.scenario import Scenario, plan_flight
 from tiltsim.system.files import one_thread_at_a_time
 from tiltsim.vehicles.rotorcraft.others import others_of
@@ -94,7 +93,7 @@ def loop_of(
         loop = LOOPS[controller.loop_name]
     loop = adapted(loop)
     if controller.estimator is not None:
-        loop = with_estimator(loop, fusion_of(scenario))
+        loop = with_estimator(loop, Fusion(instruments_of(scenario)))
     if scenario.reference.type == "push" and not external:
         loop = (with_impedance if scenario.reference.impedance else with_force_loop)(loop)
     if scenario.payload is not None and scenario.payload.swing_damping and not external:

@@ -19,14 +19,13 @@ from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.scenario import FlightPlan, Scenario
 from tiltsim.vehicles.rotorcraft import EXTRA_COLUMNS
 from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.gaits.motion import planned_tilts
-from tiltsim_controllers.gaits.parameters import GaitParameters
+from tiltsim_controllers.gaits.motion import GaitParameters, planned_tilts
 from tiltsim_controllers.laws.observed import Step
 from tiltsim_controllers.mathematics.records import make_record_type, vector_of
 from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector
 from tiltsim_controllers.references.trajectories import ReferenceParameters
-from tiltsim_controllers.vehicle.effectiveness import ROTOR_FLOATS
 from tiltsim_controllers.vehicle.parameters import Vehicle
+from tiltsim_controllers.vehicle.rotors import ROTOR_FLOATS
 
 Singularity = Callable[[Mapping[str, Floats], Any], dict[str, Floats]]
 """``(samples, vehicle) -> columns``: how close a vehicle is to a singular attitude."""

@@ -22,12 +22,11 @@ from tiltsim.scenario.scenario import FlightPlan, Scenario, plan_flight
 from tiltsim.vehicles.rotorcraft import model_spec
 from tiltsim.vehicles.rotorcraft.layout import QW, TILT_1
 from tiltsim.vehicles.spans import position_error
-from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.code.traceable import traceable
+from tiltsim_controllers.code.arrays import traceable, xp
 from tiltsim_controllers.mathematics.attitude import rotation_of_quaternion
 from tiltsim_controllers.mathematics.records import make_record_type
 from tiltsim_controllers.mathematics.scalar import Floats, Vector
-from tiltsim_controllers.vehicle.downwash import Downwash, Wake, downwash_force
+from tiltsim_controllers.vehicle.air import Downwash, Wake, downwash_force
 
 if TYPE_CHECKING:
     import mujoco
@@ -35,6 +34,11 @@ if TYPE_CHECKING:
 
 DOWNWASH: Final = "downwash"
 """Column of the force (N) of the wakes of other vehicles along the world's z."""
+
+TRACED: Final = ("controls", "hold", "observe", "sign_check_values")
+PLANNED: Final = ("setup", "initial_activations", "derive", "causes")
+OF_KIND: Final = ("compile", "initial_motion", "thrusts", "metrics")
+"""Functions of `ClosedLoop`, traced or not, and of `VehicleKind`, that several vehicles replace."""
 
 
 class Member(NamedTuple):
@@ -207,7 +211,7 @@ class Several:
         found = zip(self._loops, self._states(qpos, qvel, act), self._controls_of(ctrl))
         return xp.hstack([loop.observe(*s, c) for loop, s, c in found])
 
-    def signs(self, time: Any, values: Any, parameters: Any, knots: Any) -> Any:
+    def sign_check_values(self, time: Any, values: Any, parameters: Any, knots: Any) -> Any:
         """See `ClosedLoop`."""
         found = zip(self._loops, self._values_of(values), self._setups(parameters, knots))
         checked = [loop.sign_check_values(time, v, *p) for loop, v, p in found]
@@ -324,26 +328,17 @@ class Several:
             first,
             kind=replace(
                 first.kind,
-                compile=self.compile,
-                initial_motion=self.initial_motion,
                 limit_exceeded=traceable(self.limit_exceeded),
-                thrusts=self.thrusts,
-                metrics=self.metrics,
+                **{name: getattr(self, name) for name in OF_KIND},
             ),
             parameters=self._record,
-            setup=self.setup,
             model=" and ".join(loop.model for loop in self._loops),
             sizes=self._total,
-            initial_activations=self.initial_activations,
-            controls=traceable(self.controls),
-            hold=traceable(self.hold),
-            observe=traceable(self.observe),
-            derive=self.derive,
+            **{name: getattr(self, name) for name in PLANNED},
+            **{name: traceable(getattr(self, name)) for name in TRACED},
             fields=(*first.fields, *fields),
             further_units={k: u for each in units for k, u in each.items()},
             observe_reads_controls=any(loop.observe_reads_controls for loop in self._loops),
-            sign_check_values=traceable(self.signs),
-            causes=self.causes,
             equations=None,
             within=first,  # for its controller
             traced=all(loop.is_traceable for loop in self._loops),

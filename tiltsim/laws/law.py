@@ -18,9 +18,8 @@ from tiltsim_controllers.laws.multirotor_steps import INTEGRAL_FIELDS
 from tiltsim_controllers.laws.observed import Seen, Step
 from tiltsim_controllers.laws.supervisor import HOLD, Supervision
 from tiltsim_controllers.mathematics.scalar import Floats, Values
-from tiltsim_controllers.vehicle.body import Body, body_of
+from tiltsim_controllers.vehicle.body import PITCH, ROLL, Body, body_of
 from tiltsim_controllers.vehicle.parameters import Vehicle
-from tiltsim_controllers.vehicle.states import PITCH, ROLL
 
 Margins = Callable[[Mapping[str, Floats], ControlSetup], dict[str, Floats]]
 """``(samples by field, with the columns of references, setup) -> columns``."""

@@ -25,8 +25,7 @@ from tiltsim.system.text import short_repr
 from tiltsim.vehicles.rotorcraft import initial_rotor_speeds, initial_tilts
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.code.tracing import as_array
-from tiltsim_controllers.gaits.motion import planned_tilts
-from tiltsim_controllers.gaits.parameters import GaitParameters
+from tiltsim_controllers.gaits.motion import GaitParameters, planned_tilts
 from tiltsim_controllers.laws.observed import ROTOR_COMMANDS, Command, Desired, Observed, Seen, Step
 from tiltsim_controllers.mathematics.attitude import rotation_matrix
 from tiltsim_controllers.mathematics.records import make_record_type
@@ -37,11 +36,9 @@ from tiltsim_controllers.references.trajectories import (
     reference_motion,
 )
 from tiltsim_controllers.vehicle.actuators import held_gain
-from tiltsim_controllers.vehicle.body import Body, inertia_matrix
-from tiltsim_controllers.vehicle.effectiveness import ROTOR_FLOATS, table_per_newton
+from tiltsim_controllers.vehicle.body import Body, inertia_matrix, state_of
 from tiltsim_controllers.vehicle.parameters import Vehicle
-from tiltsim_controllers.vehicle.rotors import rotors_in, wrench_map
-from tiltsim_controllers.vehicle.states import state_of
+from tiltsim_controllers.vehicle.rotors import ROTOR_FLOATS, rotors_in, table_per_newton, wrench_map
 
 _NO_CROSS: Final = Vehicle(*(0.0,) * len(Vehicle._fields))
 

@@ -22,7 +22,7 @@ from tiltsim.laws.rotor_loop import (
     singular_attitude,
 )
 from tiltsim.models.rotor_table import Multirotor
-from tiltsim.scenario.multirotor_controllers import AttitudeForceController, upper_side
+from tiltsim.scenario.linearizing_controllers import AttitudeForceController, upper_side
 from tiltsim.scenario.scenario import FlightPlan
 from tiltsim.vehicles.rotorcraft import EXTRA_COLUMNS, initial_tilts
 from tiltsim_controllers.analysis.singularity import determinant, margin_over_gait
@@ -30,7 +30,7 @@ from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.laws import attitude_altitude, full_pose, gait_feedforward
 from tiltsim_controllers.laws.attitude_altitude import PUBLISHED_DECOUPLING
 from tiltsim_controllers.laws.multirotor import NULL_PART, SIGNALS, independence, present_wrench
-from tiltsim_controllers.laws.multirotor_steps import EULER_ANGLES, Direction, Form, Parameters
+from tiltsim_controllers.laws.multirotor_steps import EULER_ANGLES, Form, Parameters
 from tiltsim_controllers.laws.observed import UNHARMED, Seen, Step
 from tiltsim_controllers.laws.supervised_vehicles import (
     SUPERVISION,
@@ -43,10 +43,9 @@ from tiltsim_controllers.mathematics.attitude import rotation_matrix
 from tiltsim_controllers.mathematics.linear import kernel
 from tiltsim_controllers.mathematics.records import changed_record
 from tiltsim_controllers.mathematics.scalar import Floats, Values
-from tiltsim_controllers.vehicle.effectiveness import without_rotor
+from tiltsim_controllers.vehicle.body import TILT_FIELDS, state_of
 from tiltsim_controllers.vehicle.parameters import SPIN, Vehicle
-from tiltsim_controllers.vehicle.rotors import airframe, wrench_map
-from tiltsim_controllers.vehicle.states import TILT_FIELDS, state_of
+from tiltsim_controllers.vehicle.rotors import airframe, without_rotor, wrench_map
 
 TILTROTOR: Final = RotorLayout((0, 1, 2, 3), SPIN, "tiltrotor")
 
@@ -176,16 +175,15 @@ def _attitude_force(plan: FlightPlan) -> dict[str, Any]:
     if controller.supervision is not None:
         whole = watched(vehicle.table, len(plan.knots), side)
         if lost is not None:
-            x, y, z = side_without
             first = whole.rotors + len(vehicle.table)
-            rest = whole._replace(rotors=first, side_x=x, side_y=y, side_z=z)
+            rest = whole._replace(rotors=first, side=side_without)
     return {
         "side_integral": 0.0,
         "restoring": controller.resolve_restoring(len(vehicle.spins), dimension, gait),
         "watched": whole,
         "watched_without": rest,
-        "upper_side": Direction(*side),
-        "upper_side_without": Direction(*side_without),
+        "upper_side": side,
+        "upper_side_without": side_without,
     }
 
 
@@ -216,9 +214,8 @@ def multirotor_loop(
 
     def signs(seen: Seen, p: Any, knots: Any) -> Any:
         """Independence of the outputs and, in the norm of the speeds, the rotors' speeds."""
-        side, without = xp.array(p.upper_side), xp.array(p.upper_side_without)
         rows, up = present_wrench(seen, p, knots, rotors)
-        side = xp.where(seen.time >= p.failure.known_from, without, side)
+        side = xp.where(seen.time >= p.failure.known_from, p.upper_side_without, p.upper_side)
         speeds = state_of(seen.state, rotors).speeds[:turning]
         if p.decoupling == PUBLISHED_DECOUPLING:  # the factor 2 |varpi| is in rows of force only
             speeds = xp.ones(turning)

@@ -10,22 +10,19 @@ from typing import Any, ClassVar, Final
 import numpy as np
 
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup
-from tiltsim.equations.quadrotor import equations_of_motion, initial_state
+from tiltsim.equations.thesis import equations_of_motion, initial_extended_state
 from tiltsim.laws.law import Law
 from tiltsim.laws.rotor_loop import REFERENCE_COLUMNS, RotorFunctions, RotorLayout, rotor_loop
 from tiltsim.scenario.scenario import FlightPlan
 from tiltsim.vehicles.rotorcraft import EXTRA_COLUMNS
-from tiltsim_controllers.analysis.quadrotor_singularity import (
-    normalized_determinant,
-    published_determinant,
-)
+from tiltsim_controllers.analysis.singularity import normalized_determinant, published_determinant
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.laws import quadrotor_attitude_altitude, switching, yaw_position
 from tiltsim_controllers.laws.observed import Seen, Step
 from tiltsim_controllers.mathematics.scalar import Floats, Vector
+from tiltsim_controllers.vehicle.body import PITCH, ROLL
+from tiltsim_controllers.vehicle.cross import speed_along_spin, thrust_controls
 from tiltsim_controllers.vehicle.parameters import SPIN
-from tiltsim_controllers.vehicle.quadrotor_mixer import speed_along_spin, thrust_controls
-from tiltsim_controllers.vehicle.states import PITCH, ROLL
 
 LAYOUT: Final = RotorLayout((-1, -1, -1, -1), SPIN, "quadrotor")
 
@@ -42,7 +39,7 @@ class _Thrusting(RotorFunctions):
         return (0.0,) * 4
 
     def initial_state(self, plan: FlightPlan) -> Vector:
-        return (*initial_state(plan.scenario), *self.law.initial_states(plan))
+        return (*initial_extended_state(plan.scenario), *self.law.initial_states(plan))
 
     def controls(
         self, time: Any, qpos: Any, qvel: Any, act: Any, parameters: Any, knots: Any

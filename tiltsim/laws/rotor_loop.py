@@ -12,7 +12,7 @@ from typing import Any, ClassVar, Final, NamedTuple
 import numpy as np
 
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup
-from tiltsim.equations.tiltrotor import airframe_of, body_fields, initial_state
+from tiltsim.equations.thesis import airframe_of, body_fields, initial_state
 from tiltsim.laws.law import Law, Margins, Tilts, tilts_of_gait
 from tiltsim.laws.vehicle_loop import VehicleFunctions, parts, servo_lead
 from tiltsim.models.rotor_table import Multirotor
@@ -28,15 +28,14 @@ from tiltsim_controllers.analysis.torque_free import (
     margin_over_flight,
     torque_free_forces,
 )
-from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.code.traceable import traceable
+from tiltsim_controllers.code.arrays import traceable, xp
 from tiltsim_controllers.laws.observed import UNHARMED, Failure, Seen
 from tiltsim_controllers.mathematics.attitude import euler_angles
 from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector
 from tiltsim_controllers.references.trajectories import reference_attitude, reference_motion
-from tiltsim_controllers.vehicle.effectiveness import ROTOR_FLOATS, force_and_torque
-from tiltsim_controllers.vehicle.motion import BODY_STATES, equations_of_motion
-from tiltsim_controllers.vehicle.states import BODY_FIELDS
+from tiltsim_controllers.vehicle.body import BODY_FIELDS, BODY_STATES
+from tiltsim_controllers.vehicle.craft import equations_of_motion
+from tiltsim_controllers.vehicle.rotors import ROTOR_FLOATS, force_and_torque
 
 
 class RotorLayout(NamedTuple):

@@ -18,7 +18,7 @@ from tiltsim.engines.sample_evaluation import evaluate_over_samples
 from tiltsim.laws.law import Law, parameters_of
 from tiltsim.scenario.rotorcraft import ServoTable
 from tiltsim.scenario.scenario import FlightPlan
-from tiltsim_controllers.code.traceable import traceable
+from tiltsim_controllers.code.arrays import traceable
 from tiltsim_controllers.laws.observed import Seen
 from tiltsim_controllers.mathematics.records import make_record_type
 from tiltsim_controllers.mathematics.scalar import Floats, Vector

@@ -16,7 +16,7 @@ from tiltsim.vehicles.rotorcraft.layout import layout_of
 from tiltsim.vehicles.rotorcraft.others import SWING
 from tiltsim_controllers.mathematics.attitude import quaternion_of_rotation, rotation_of_quaternion
 from tiltsim_controllers.mathematics.scalar import Floats, Triple
-from tiltsim_controllers.vehicle.states import BODY_FIELDS
+from tiltsim_controllers.vehicle.body import BODY_FIELDS
 
 ROTATION_NAMES: Final = ("rotation_x", "rotation_y", "rotation_z")
 """A small turn about the body axes, rad; at level attitude roll, pitch and yaw."""

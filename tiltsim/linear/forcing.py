@@ -10,7 +10,7 @@ import numpy as np
 from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.errors import InputError
 from tiltsim.scenario.scenario import Scenario
-from tiltsim_controllers.gaits.parameters import CUBIC
+from tiltsim_controllers.gaits.motion import CUBIC
 from tiltsim_controllers.mathematics.scalar import Floats, Triple
 from tiltsim_controllers.references import trajectories
 

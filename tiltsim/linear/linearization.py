@@ -26,10 +26,9 @@ from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.system.public import optional_package
 from tiltsim.system.text import short_repr
-from tiltsim_controllers.code.arrays import xp
+from tiltsim_controllers.code.arrays import program_of, xp
 from tiltsim_controllers.code.casadi_function import casadi_function
 from tiltsim_controllers.code.messages import TraceError
-from tiltsim_controllers.code.traceable import program_of
 from tiltsim_controllers.mathematics.scalar import Floats
 
 INPUT_SCALE: Final = 100.0

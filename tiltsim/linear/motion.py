@@ -27,9 +27,8 @@ from tiltsim.models.objects import FORCE
 from tiltsim.plants.equations_plant import EquationsPlant
 from tiltsim.plants.mujoco_plant import MujocoPlant
 from tiltsim.scenario.scenario import Scenario
-from tiltsim_controllers.code.arrays import xp
+from tiltsim_controllers.code.arrays import program_of, xp
 from tiltsim_controllers.code.python_source import python_function
-from tiltsim_controllers.code.traceable import program_of
 from tiltsim_controllers.mathematics.scalar import Floats, Values
 
 LONG: Final = 1000

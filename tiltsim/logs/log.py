@@ -10,19 +10,17 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from tiltsim.errors import InputError
-from tiltsim.flight.vectors import components
+from tiltsim.flight.vectors import ColumnsOverTime
 from tiltsim.flight.writing import FLIGHT
 from tiltsim.models.vehicle_parts import MAX_ROTORS
-from tiltsim.scenario.messages import did_you_mean
 from tiltsim.system.files import is_file, is_folder, prepare_folder, replacing
 from tiltsim.system.parquet import open_parquet, parquet_bytes
-from tiltsim.system.text import short_repr
 from tiltsim.vehicles.rotorcraft import rotorcraft_columns
 from tiltsim.vehicles.rotorcraft.layout import Layout
 from tiltsim_controllers.mathematics.scalar import Floats
@@ -50,12 +48,12 @@ LOG_SUFFIXES: Final = (".mcap", ".ulg", ".ulog", ".csv")
 
 
 @dataclass(frozen=True, repr=False)
-class Log:
+class Log(ColumnsOverTime):
     """Columns over time, each of shape (N,), with their units."""
 
     name: str
-    columns: Mapping[str, Floats]
-    units: Mapping[str, str]
+    columns: dict[str, Floats]
+    units: dict[str, str]
     notes: tuple[str, ...] = ()  # one line for each defect that was found while reading
     origin: Mapping[str, str] = field(default_factory=dict)  # of a flight: `Flight.origin`
 
@@ -74,23 +72,6 @@ class Log:
         """Number of samples."""
         return len(self.columns["time"])
 
-    def __contains__(self, name: object) -> bool:
-        """Whether there is a column or vector of this name."""
-        return isinstance(name, str) and (name in self.units or bool(components(name, self.units)))
-
-    def __getitem__(self, name: str) -> Floats:
-        """A column, shape (N,), or a vector such as ``position``, shape (N, components).
-
-        Raises `InputError` for other names.
-        """
-        if name in self.columns:
-            return self.columns[name]
-        found = components(name, self.units) if isinstance(name, str) else []
-        if not found:
-            hint = did_you_mean(name, self.units)
-            raise InputError(f"{short_repr(name)}: no column of this log; {hint}see Log.units")
-        return np.stack([self.columns[one] for one in found], axis=-1)
-
     @property
     def duration(self) -> float:
         """Seconds from the first sample to the last."""
@@ -106,20 +87,7 @@ class Log:
 
     def to_arrow(self) -> pyarrow.Table:
         """The columns as an Arrow table with units and `origin` as metadata."""
-        import pyarrow as pa
-
-        fields = [
-            pa.field(name, pa.float64(), nullable=False, metadata={"unit": unit})
-            for name, unit in self.units.items()
-        ]
-        metadata = dict(self.origin) or {"log": self.name}
-        return pa.table(
-            [pa.array(self.columns[name]) for name in self.units], pa.schema(fields, metadata)
-        )
-
-    def to_pandas(self) -> Any:
-        """The columns as a pandas DataFrame."""
-        return self.to_arrow().to_pandas()
+        return self.arrow_table(self.origin or {"log": self.name})
 
     def save(self, folder: str | PathLike[str]) -> None:
         """Write the log into a folder as flight.parquet; as a whole flight if tiltsim flew it.

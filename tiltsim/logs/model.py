@@ -21,10 +21,8 @@ from tiltsim_controllers.mathematics.attitude import quaternion_product, rotatio
 from tiltsim_controllers.mathematics.linear import cross, norm
 from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.vehicle.air import Drag, drag_force
-from tiltsim_controllers.vehicle.body import Body
-from tiltsim_controllers.vehicle.effectiveness import TiltOfRotor, tilts_of
-from tiltsim_controllers.vehicle.motion import accelerations
-from tiltsim_controllers.vehicle.rotors import Rotors, rotors_in, wrench_map
+from tiltsim_controllers.vehicle.body import Body, accelerations
+from tiltsim_controllers.vehicle.rotors import Rotors, TiltOfRotor, rotors_in, tilts_of, wrench_map
 
 
 class Parameter(NamedTuple):
@@ -133,66 +131,39 @@ class LoggedVehicle:
         return {key: self.parameters[key] for key in free}
 
 
-def values_of(free: tuple[tuple[str, str], ...], numbers: Any, theta: Any) -> dict[str, Any]:
-    """Numbers of the model by field.
+def numbers_of(free: tuple[tuple[str, str], ...], known: Any, theta: Any) -> dict[str, Any]:
+    """The numbers of a model by name, of which some are free.
 
     Args:
         free: Key and field of each free parameter.
-        numbers: See `LoggedVehicle.numbers`, with ``starts`` and ``scales`` by key.
+        known: See `LoggedVehicle.numbers`, with ``starts`` and ``scales`` by key.
         theta: Changes of the free parameters, in their scales.
     """
-    found, first = dict(numbers["nominal"]), 0
-    for key, field in free:
-        size = len(found[field])
-        change = numbers["scales"][key] * theta[first : first + size]
-        value = numbers["starts"][key] + change
-        found[field] = value * found[field] if key.startswith("model_error.") else value
-        first += size
-    return found
-
-
-class Numbers(NamedTuple):
-    """The numbers of a model, each an array, which a compiled program takes as inputs."""
-
-    body: Body
-    constant: Any  # parts of the rotors' wrenches, shape (6 N,) each; see `Rotors`
-    cosine: Any
-    sine: Any
-    center: Any  # m, shape (3,)
-    drag: Drag
-    lag: Any  # s
-    frequency: Any  # rad/s
-    damping: Any
-    bias: Any  # rad/s, shape (3,)
-
-
-def numbers_of(known: Any, values: dict[str, Any]) -> Numbers:
-    """The numbers of a model, of which some are free; see `LoggedVehicle.numbers`."""
     import jax.numpy as jnp
 
-    size = jnp.sqrt(values["inertia"] / jnp.diag(known["inertia"]))
-    inertia = known["inertia"] * jnp.outer(size, size)
-    inverse = jnp.linalg.inv(inertia)
+    values, first = dict(known["nominal"]), 0
+    for key, field in free:
+        size = len(values[field])
+        change = known["scales"][key] * theta[first : first + size]
+        value = known["starts"][key] + change
+        values[field] = value * values[field] if key.startswith("model_error.") else value
+        first += size
+    stretch = jnp.sqrt(values["inertia"] / jnp.diag(known["inertia"]))
+    inertia = known["inertia"] * jnp.outer(stretch, stretch)
     places = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
-    entries = [matrix[place] for matrix in (inertia, inverse) for place in places]
-    thrust = values["thrust"] / known["nominal"]["thrust"]
-    torque = values["torque"] / known["nominal"]["torque"]
-    constant, cosine, sine = (
-        (thrust * push + torque * turn).ravel()
-        for push, turn in zip(known["pushes"], known["turns"], strict=True)
-    )
-    return Numbers(
-        Body(values["mass"][0], known["gravity"], *entries),
-        constant,
-        cosine,
-        sine,
-        values["center"],
-        Drag(values["resistance"], known["area"], known["density"]),
-        values["lag"][0],
-        values["frequency"][0],
-        known["damping"],
-        values["bias"],
-    )
+    entries = [m[place] for m in (inertia, jnp.linalg.inv(inertia)) for place in places]
+    thrust, torque = (values[name] / known["nominal"][name] for name in ("thrust", "torque"))
+    parts = zip(known["pushes"], known["turns"], strict=True)
+    return {
+        "body": Body(values["mass"][0], known["gravity"], *entries),
+        "rotors": tuple((thrust * push + torque * turn).ravel() for push, turn in parts),
+        "center": values["center"],
+        "drag": Drag(values["resistance"], known["area"], known["density"]),
+        "lag": values["lag"][0],
+        "frequency": values["frequency"][0],
+        "damping": known["damping"],
+        "bias": values["bias"],
+    }
 
 
 class LoggedMotion:
@@ -227,14 +198,14 @@ class LoggedMotion:
         velocity = guess[3:6] + initial[3:6] + rotation @ cross(omega, center)
         return xp.hstack([place, velocity, turn, omega, speeds, tilts, 0.0 * tilts])
 
-    def rate(self, state: Any, speeds: Any, tilts: Any, commands: Any, p: Numbers) -> Any:
+    def rate(self, state: Any, speeds: Any, tilts: Any, commands: Any, p: dict[str, Any]) -> Any:
         """The derivative of a state.
 
         Args:
             state: See the class.
             speeds, tilts: Measured, rad/s and rad, shapes (N,) and (M,).
             commands: Speeds (rad/s), then tilts (rad), shape (N + M,).
-            p: The model's numbers.
+            p: See `numbers_of`.
         """
         n, m = self._rotors, self._tilts
         velocity, turn, omega = state[3:6], state[6:10], state[10:13]
@@ -242,43 +213,43 @@ class LoggedMotion:
         pods, pod_rates = followed[:m], followed[m:]
         speeds = lagging if "lag" in self._fields else speeds
         tilts = pods if "frequency" in self._fields else tilts
-        parts = (part.reshape(6, n) for part in (p.constant, p.cosine, p.sine))
+        parts = (part.reshape(6, n) for part in p["rotors"])
         rotors = Rotors(self._layout, np.ones(n), *parts)
         wrench = wrench_map(rotors, tilts) @ (speeds * abs(speeds))
         rotation = rotation_of_quaternion(turn)
-        force = wrench[:3] + drag_force(rotation.T @ velocity + TINY, p.drag)
-        torque = wrench[3:] - cross(p.center, wrench[:3])
+        force = wrench[:3] + drag_force(rotation.T @ velocity + TINY, p["drag"])
+        torque = wrench[3:] - cross(p["center"], wrench[:3])
         acceleration, spin = accelerations(
-            p.body, rotation, omega, xp.hstack([force, torque]), np.zeros(3), 1.0
+            p["body"], rotation, omega, xp.hstack([force, torque]), np.zeros(3), 1.0
         )
-        pull = p.frequency * p.frequency * (commands[n:] - pods)
+        pull = p["frequency"] * p["frequency"] * (commands[n:] - pods)
         return xp.hstack(
             [
                 velocity,
                 acceleration,
                 0.5 * quaternion_product(turn, xp.hstack([0.0, omega])),
                 spin,
-                (commands[:n] - lagging) / p.lag,
+                (commands[:n] - lagging) / p["lag"],
                 pod_rates,
-                pull - 2.0 * p.damping * p.frequency * pod_rates,
+                pull - 2.0 * p["damping"] * p["frequency"] * pod_rates,
             ]
         )
 
-    def errors(self, state: Any, measured: Any, p: Numbers) -> Any:
+    def errors(self, state: Any, measured: Any, p: dict[str, Any]) -> Any:
         """Measured minus predicted position, velocity, small turn and body rates, shape (12,).
 
         Args:
             state: See the class.
             measured: Position, velocity, quaternion and body rates, shape (13,).
-            p: The model's numbers.
+            p: See `numbers_of`.
         """
         rotation, omega = rotation_of_quaternion(state[6:10]), state[10:13]
         error = quaternion_product(state[6:10] * CONJUGATE, measured[6:10])
         return xp.hstack(
             [
-                measured[:3] - (state[:3] - rotation @ p.center),
-                measured[3:6] - (state[3:6] - rotation @ cross(omega, p.center)),
+                measured[:3] - (state[:3] - rotation @ p["center"]),
+                measured[3:6] - (state[3:6] - rotation @ cross(omega, p["center"])),
                 xp.where(error[0] < 0.0, -2.0, 2.0) * error[1:],
-                measured[10:] - (omega + p.bias),
+                measured[10:] - (omega + p["bias"]),
             ]
         )

@@ -21,9 +21,9 @@ from tiltsim.flight.vectors import VECTORS
 from tiltsim.logs import formats
 from tiltsim.logs.formats import Signals
 from tiltsim.logs.log import LOG_SUFFIXES, UNITS, Log
-from tiltsim.scenario.limits import read_text
+from tiltsim.scenario.library import read_text
 from tiltsim.scenario.messages import choose, did_you_mean, one_line_message
-from tiltsim.scenario.table import NotTiny, Table
+from tiltsim.scenario.table import NotTiny, Table, default, required
 from tiltsim.system.files import is_file, is_folder
 from tiltsim.system.parquet import open_parquet
 from tiltsim.system.text import printable, short_repr
@@ -39,21 +39,19 @@ BODY_VECTORS: Final = (VECTORS["body_rates"], tuple(f"accelerometer_{axis}" for 
 class Signal(Table):
     """A signal of the log, times a scale, plus an offset."""
 
-    signal: str = Field(description="name in the log, such as actuator_motors.control[0]")
-    scale: float = Field(1.0, description="factor to tiltsim's unit")
-    offset: float = Field(0.0, description="added after the factor, in tiltsim's unit")
+    signal: str = required("name in the log, such as actuator_motors.control[0]")
+    scale: float = default(1.0, "factor to tiltsim's unit")
+    offset: float = default(0.0, "added after the factor, in tiltsim's unit")
 
 
 class LogMap(Table):
     """Where the columns of a log come from, and its frames."""
 
-    world: Literal["z_up", "ned"] = Field(
-        "z_up", description="axes of position and velocity: z up, or north, east, down"
+    world: Literal["z_up", "ned"] = default(
+        "z_up", "axes of position and velocity: z up, or north, east, down"
     )
-    body: Literal["flu", "frd"] = Field(
-        "flu",
-        description="axes of body rates and accelerations: forward, left, up, or "
-        "forward, right, down",
+    body: Literal["flu", "frd"] = default(
+        "flu", "axes of body rates and accelerations: forward, left, up, or forward, right, down"
     )
     attitude: tuple[str, ...] = Field(
         (),
@@ -61,8 +59,8 @@ class LogMap(Table):
         description="signals of the rotation from body to world: four of a quaternion, w x y z, "
         "or three of roll, pitch and yaw in rad",
     )
-    max_gap: NotTiny = Field(
-        0.2, description="longest time between samples of a signal that is interpolated [s]"
+    max_gap: NotTiny = default(
+        0.2, "longest time between samples of a signal that is interpolated [s]"
     )
     columns: dict[str, str | Signal] = Field(
         default_factory=dict,

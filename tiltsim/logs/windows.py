@@ -13,11 +13,11 @@ from scipy.spatial.transform import Rotation
 from tiltsim.arrays.jax_programs import InJax
 from tiltsim.errors import InputError
 from tiltsim.logs.log import Log
-from tiltsim.logs.model import LoggedMotion, LoggedVehicle, Parameter, numbers_of, values_of
+from tiltsim.logs.model import LoggedMotion, LoggedVehicle, Parameter, numbers_of
 from tiltsim.system.numbers import is_finite
 from tiltsim.system.text import short_repr
 from tiltsim_controllers.mathematics.scalar import Floats
-from tiltsim_controllers.vehicle.effectiveness import TiltOfRotor, tilts_of
+from tiltsim_controllers.vehicle.rotors import TiltOfRotor, tilts_of
 
 LONGEST_STEP: Final = 0.005
 """Longest step (s) of the integration between two samples."""
@@ -168,7 +168,7 @@ def residuals_of(layout: TiltOfRotor, free: tuple[tuple[str, str], ...]) -> Call
     def residuals(
         theta: Any, initial: Any, guess: Any, window: Windows, noise: Any, numbers: Any
     ) -> Any:
-        p = numbers_of(numbers, values_of(free, numbers, theta))
+        p = numbers_of(free, numbers, theta)
         commands = jnp.concatenate(
             [
                 window.speed_commands[:-1] if "lag" in fields else window.speeds[:, 0],
@@ -176,7 +176,7 @@ def residuals_of(layout: TiltOfRotor, free: tuple[tuple[str, str], ...]) -> Call
             ],
             axis=1,
         )
-        first = start(guess, initial, window.speeds[0, 0], window.tilts[0, 0], p.center)
+        first = start(guess, initial, window.speeds[0, 0], window.tilts[0, 0], p["center"])
         advance = _runge_kutta(lambda *given: rate(*given, p))
         inputs = (window.step, window.speeds, window.tilts, commands)
         _, path = jax.lax.scan(advance, first, inputs)

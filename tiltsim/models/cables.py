@@ -7,14 +7,23 @@ the model, so a plant switches its own model between steps, on every engine.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from math import inf
 from typing import TYPE_CHECKING, Final
 
+from tiltsim_controllers.laws.keys import (
+    ZEROS,
+    Keys,
+    Name,
+    NonNegative,
+    Positive,
+    Vector3,
+    default,
+    required,
+)
+from tiltsim_controllers.mathematics.scalar import Values
+
 if TYPE_CHECKING:
     import mujoco
-
-    from tiltsim_controllers.mathematics.scalar import Triple, Values
 
 CABLE_READING: Final = 4
 """Numbers in the memory of a sensor of tension: two of MuJoCo, the time and the force."""
@@ -25,35 +34,26 @@ IMPEDANCE: Final = (0.95, 0.99, 0.001, 0.5, 2.0)
 ROUNDING: Final = 1e-9  # s
 
 
-@dataclass(frozen=True)
-class Cable:
-    """A cable from a vehicle to the center of an object.
+class Cable(Keys):
+    """The keys of a cable from a vehicle to the center of an object."""
 
-    Attributes:
-        name: Its name.
-        vehicle: The companion, empty for the first vehicle.
-        object: The object's name.
-        attachment: On the vehicle, m, body axes.
-        length: m.
-        start, end: The times between which it holds, s.
-    """
-
-    name: str
-    vehicle: str
-    object: str
-    attachment: Triple
-    length: float
-    start: float = 0.0
-    end: float = inf
+    name: Name = required("its name, which begins the name of its column", "sling")
+    object: str = required("the name of a free object", "parcel")
+    vehicle: str = default(
+        "", "the name of the companion that it hangs on; default: the first vehicle", "wing"
+    )
+    attachment: Vector3 = default(ZEROS, "in body axes [m]", [0.0, 0.0, -0.05])
+    length: Positive = required("to the center of the object [m]", 1.0)
+    start: NonNegative = default(0.0, "from when it holds [s]", 5.0)
+    end: Positive | None = default(None, "when it releases; default: never [s]", 8.0)
 
     def holds(self, time: float) -> bool:
         """Whether it holds in the step that begins at a time (s)."""
-        return self.start - ROUNDING <= time < self.end - ROUNDING
+        return self.start - ROUNDING <= time < (inf if self.end is None else self.end) - ROUNDING
 
     def switches(self, timestep: float) -> Values:
         """The steps before which it begins to hold, and releases."""
-        times = (time for time in (self.start, self.end) if 0.0 < time < inf)
-        return tuple(round(time / timestep) for time in times)
+        return tuple(round(time / timestep) for time in (self.start, self.end) if time)
 
 
 def add_cable(spec: mujoco.MjSpec, cable: Cable) -> None:

@@ -1,16 +1,13 @@
 """The tiltrotor and the quadrotor of the thesis as multirotors."""
 
 from math import inf
-from typing import Final
 
 import numpy as np
 
 from tiltsim.models.rotor_table import Multirotor
-from tiltsim_controllers.vehicle.effectiveness import Rotor
+from tiltsim_controllers.vehicle.cross import ARMS
 from tiltsim_controllers.vehicle.parameters import SPIN, Vehicle
-
-ARMS: Final = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (-1.0, 0.0, 0.0), (0.0, -1.0, 0.0))
-"""Directions of the arms of rotors 1 to 4, about which the pods of the tiltrotor turn."""
+from tiltsim_controllers.vehicle.rotors import Rotor
 
 
 def as_multirotor(vehicle: Vehicle | Multirotor, *, tilting: bool) -> Multirotor:

@@ -11,7 +11,7 @@ from tiltsim_controllers.analysis.torque_free import (
     torque_free_forces,
 )
 from tiltsim_controllers.mathematics.scalar import Floats, Values
-from tiltsim_controllers.vehicle.effectiveness import force_and_torque
+from tiltsim_controllers.vehicle.rotors import force_and_torque
 
 TOLERANCE = 1e-9  # relative tolerance of the singular values of force and torque and of the limits
 NEARLY = 1e-3  # share of the weight by which the force of fewer than four rotors may miss it

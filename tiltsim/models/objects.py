@@ -9,12 +9,25 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 import numpy as np
+from pydantic import Field
 
-from tiltsim.models.cables import CABLE_READING, IMPEDANCE, Cable, add_cable, stretch
-from tiltsim_controllers.mathematics.attitude import rotation_of_quaternion
+from tiltsim.models.cables import IMPEDANCE, Cable, add_cable, stretch
+from tiltsim_controllers.laws.keys import (
+    ZEROS,
+    Angles3,
+    Keys,
+    Many,
+    Name,
+    NonNegative,
+    Positive,
+    Vector3,
+    default,
+    required,
+)
+from tiltsim_controllers.mathematics.attitude import quaternion_of_euler, rotation_of_quaternion
 from tiltsim_controllers.mathematics.scalar import Floats, Triple, Values
 
 if TYPE_CHECKING:
@@ -44,46 +57,59 @@ TOOL_COLOR: Final = (0.85, 0.20, 0.16, 1.0)
 LOAD_COLOR: Final = (0.25, 0.42, 0.30, 1.0)
 
 
-@dataclass(frozen=True)
-class Body:
-    """An object.
+Mass = Annotated[float, Field(gt=1e-9, le=1e6)]
+Softness = Annotated[float, Field(ge=1e-4, le=1.0)]
+Direction = Annotated[Vector3, Field(examples=[[1.0, 0.0, 0.0]])]
 
-    Attributes:
-        name: Its name.
-        shape: A wall's face is at its position and looks along its own -x.
-        position: m, world.
-        quaternion: From its axes to the world, scalar first.
-        size: m: of a wall width (y) and height (z), of a box its edges, of a sphere its radius, of
-            a mesh its unit.
-        joint: Whether it moves.
-        mass: kg, of one that moves.
-        friction: Coefficient of sliding friction.
-        softness: Time constant of a contact, s.
-        hinge, axis: A point of the hinge (m) and its direction, in its axes.
-        damping: Torque of the hinge per angular velocity, N m s/rad.
-        floating: Whether a free one has no weight.
-        file: File of a mesh.
-    """
 
-    name: str
-    shape: Literal["wall", "box", "sphere", "mesh"]
-    position: Triple
-    quaternion: Values
-    size: Values
-    joint: Literal["fixed", "hinged", "free"]
-    mass: float
-    friction: float
-    softness: float
-    hinge: Triple
-    axis: Triple
-    damping: float
-    floating: bool
-    file: str = ""
+class Body(Keys):
+    """The keys of an object."""
+
+    name: Name = required("its name, which begins the names of its columns", "wall")
+    type: Literal["wall", "box", "sphere", "mesh"] = required(
+        "a wall 0.1 m thick whose face looks along its -x, a box, a sphere, or the convex hull of "
+        "a mesh",
+        "wall",
+    )
+    position: Vector3 = required(
+        "of the face's center or of the center, in the world [m]", [1.0, 0.0, 0.0]
+    )
+    attitude: Angles3 = default(
+        ZEROS, "roll, pitch and yaw from the world's axes to its own [rad]", [0.0, 0.0, 0.5]
+    )
+    size: Annotated[Many[Positive], Field(min_length=1, max_length=3)] = required(
+        "width along y and height along z of a wall, edges of a box, radius of a sphere, length "
+        "of the unit of a mesh [m]",
+        [2.0, 2.0],
+    )
+    file: str | None = default(
+        None, "STL or OBJ file of a mesh, relative to the scenario's folder", "valve.stl"
+    )
+    joint: Literal["fixed", "hinged", "free"] = default("fixed", "whether it moves, and how")
+    mass: Mass | None = default(None, "of one that moves; evenly spread [kg]", 1.0)
+    friction: NonNegative = default(0.5, "coefficient of sliding friction [-]")
+    softness: Softness = default(
+        0.01,
+        "time constant of its contacts, at least two time steps: twice as soft, half the force of "
+        "an impact [s]",
+    )
+    hinge: Vector3 = default(ZEROS, "a point of the hinge, in its own axes [m]", [0.0, 0.5, 0.0])
+    axis: Direction = default((0.0, 0.0, 1.0), "of the hinge, in its own axes [-]")
+    damping: NonNegative = default(0.0, "of the hinge [N m s/rad]", 0.1)
+    velocity: Vector3 = default(
+        ZEROS, "of a free one at time zero, in the world [m/s]", [0.2, 0.0, 0.0]
+    )
+    floating: bool = default(False, "whether a free one has no weight, as on a cart or a boat")
+
+    @property
+    def quaternion(self) -> Values:
+        """From its axes to the world, scalar first."""
+        return tuple(quaternion_of_euler(self.attitude).tolist())
 
     @property
     def box(self) -> tuple[Triple, Triple]:
         """Center (m, its axes) and half edges (m) of a wall or box."""
-        if self.shape == "wall":
+        if self.type == "wall":
             width, height = self.size
             half = 0.5 * WALL_THICKNESS
             return (half, 0.0, 0.0), (half, 0.5 * width, 0.5 * height)
@@ -91,25 +117,17 @@ class Body:
         return (0.0, 0.0, 0.0), (0.5 * x, 0.5 * y, 0.5 * z)
 
 
-@dataclass(frozen=True)
-class Tool:
-    """A stick with a round tip, or a disc at the end of one; it cannot move on the vehicle.
+class Tool(Keys):
+    """The keys of a tool, which cannot move on the vehicle."""
 
-    Attributes:
-        shape: One of the two.
-        position: Where it begins, m, body axes.
-        direction: Body axes.
-        length: To its tip, m.
-        radius: Radius of the stick or the disc, m.
-        mass: kg.
-    """
-
-    shape: Literal["stick", "plate"]
-    position: Triple
-    direction: Triple
-    length: float
-    radius: float
-    mass: float
+    type: Literal["stick", "plate"] = default(
+        "stick", "a stick with a round tip, or a disc at the end of one"
+    )
+    position: Vector3 = default(ZEROS, "where it begins, in body axes [m]", [0.05, 0.0, 0.0])
+    direction: Direction = default((1.0, 0.0, 0.0), "toward its tip, body axes [-]")
+    length: Positive = required("to its tip [m]", 0.3)
+    radius: Positive = default(0.01, "of the stick or of the disc [m]")
+    mass: Annotated[float, Field(ge=0.0, le=1e6)] = default(0.0, "evenly spread [kg]")
 
     @property
     def unit(self) -> Floats:
@@ -123,23 +141,14 @@ class Tool:
         return np.asarray(np.array(self.position) + self.length * self.unit)
 
 
-@dataclass(frozen=True)
-class Load:
-    """A ball below the vehicle, on a cable or fixed.
+class Load(Keys):
+    """The keys of a load."""
 
-    Attributes:
-        mass: kg.
-        length: From the attachment to its center, m.
-        attachment: m, body axes.
-        radius: m.
-        rigid: Whether a rod that cannot turn replaces the cable.
-    """
-
-    mass: float
-    length: float
-    attachment: Triple
-    radius: float
-    rigid: bool
+    mass: Mass = required("of the load [kg]", 0.1)
+    length: Positive = required("from the attachment to the center of the load [m]", 1.0)
+    attachment: Vector3 = default(ZEROS, "in body axes [m]", [0.0, 0.0, -0.05])
+    radius: Positive = default(0.03, "of the load, a ball [m]")
+    rigid: bool = default(False, "whether a fixed rod replaces the cable")
 
 
 @dataclass(frozen=True)
@@ -155,17 +164,6 @@ class Objects:
     def hangs(self) -> bool:
         """Whether a load hangs on a cable."""
         return self.load is not None and not self.load.rigid
-
-    @property
-    def coordinates(self) -> int:
-        """Numbers in ``qpos`` behind the vehicle's."""
-        own = sum(COORDINATES[body.joint] for body in self.bodies)
-        return own + COORDINATES["free"] * self.hangs
-
-    @property
-    def readings(self) -> int:
-        """Numbers in the sensors' memories."""
-        return CONTACT_READING * len(self.bodies) + CABLE_READING * (self.hangs + len(self.cables))
 
 
 def touchable(root: Any, *, ground: bool, number: int = -1) -> None:
@@ -228,10 +226,10 @@ def add_objects(spec: mujoco.MjSpec, objects: Objects, companions: Sequence[str]
         _add_tool(spec, objects.tool)
     if objects.load is not None:
         _add_load(spec, objects.load)
-    for body in objects.bodies:
-        for vehicle in ("vehicle", *(f"{name}_vehicle" for name in companions)):
+    for vehicle in ("vehicle", *(f"{name}_vehicle" for name in companions)):
+        for body in objects.bodies:
             _add_pairs(spec, vehicle, body)
-        _add_force_sensor(spec, body.name)
+            _add_force_sensor(spec, vehicle, body.name)
     if objects.load is not None and objects.hangs:
         stretch(spec, "cable", ("payload_attachment", "payload"), objects.load.length)
     for cable in objects.cables:
@@ -254,17 +252,17 @@ def _add_body(spec: mujoco.MjSpec, body: Body) -> None:
     if body.floating or body.damping:  # passive forces, which a vehicle alone does not have
         spec.option.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_DAMPER)
     shape: dict[str, Any] = {"type": mujoco.mjtGeom.mjGEOM_BOX}
-    if body.shape == "mesh":
-        mesh = spec.add_mesh(name=f"object_{body.name}", file=body.file, scale=body.size * 3)
+    if body.type == "mesh":
+        mesh = spec.add_mesh(name=f"object_{body.name}", file=body.file or "", scale=body.size * 3)
         shape = {"type": mujoco.mjtGeom.mjGEOM_MESH, "meshname": mesh.name}
-    elif body.shape == "sphere":
+    elif body.type == "sphere":
         shape = {"type": mujoco.mjtGeom.mjGEOM_SPHERE, "size": (*body.size, 0.0, 0.0)}
     else:
         shape["pos"], shape["size"] = body.box
     own.add_geom(
         name=f"object_{body.name}",
         **shape,
-        mass=body.mass,
+        mass=body.mass or 0.0,
         rgba=FIXED_COLOR if body.joint == "fixed" else MOVING_COLOR,
         **_touching(body.friction, body.softness),
         priority=1,  # its friction and softness count
@@ -291,16 +289,15 @@ def _add_tool(spec: mujoco.MjSpec, tool: Tool) -> None:
     begin, tip, unit = np.array(tool.position), tool.tip, tool.unit
     touches = {"group": 2, "condim": 3, "contype": 1, "conaffinity": 0, "rgba": TOOL_COLOR}
     capsule = mujoco.mjtGeom.mjGEOM_CAPSULE
-    if tool.shape == "stick":
-        end, radius = tip - tool.radius * unit, (tool.radius, 0.0, 0.0)
-        ends = (*begin, *end)
+    radius = (tool.radius, 0.0, 0.0)
+    if tool.type == "stick":
+        ends = (*begin, *(tip - tool.radius * unit))
         shape = {"type": capsule, "size": radius, "fromto": ends}
     else:
         rod = {"type": capsule, "size": (0.2 * tool.radius, 0.0, 0.0), "mass": 0.0}
         rod |= {"fromto": (*begin, *(tip - tool.radius * 0.2 * unit)), "rgba": TOOL_COLOR}
         own.add_geom(name="tool_rod", group=2, contype=0, conaffinity=0, **rod)
         ends = (*(tip - PLATE_THICKNESS * unit), *tip)
-        radius = (tool.radius, 0.0, 0.0)
         shape = {"type": mujoco.mjtGeom.mjGEOM_CYLINDER, "size": radius, "fromto": ends}
     own.add_geom(name="tool_collision", mass=tool.mass, **touches, **shape)
 
@@ -348,15 +345,15 @@ def _add_pairs(spec: mujoco.MjSpec, vehicle: str, body: Body) -> None:
             )
 
 
-def _add_force_sensor(spec: mujoco.MjSpec, name: str) -> None:
-    """Measure the force (N, world) of the vehicle with all that it carries on an object."""
+def _add_force_sensor(spec: mujoco.MjSpec, vehicle: str, name: str) -> None:
+    """Measure the force (N, world) of a vehicle with all that it carries on an object."""
     import mujoco
 
     sensor = spec.add_sensor(
-        name=f"force_{name}",
+        name=f"{vehicle.removesuffix('vehicle')}force_{name}",
         type=mujoco.mjtSensor.mjSENS_CONTACT,
         objtype=mujoco.mjtObj.mjOBJ_XBODY,  # with the bodies that it carries
-        objname="vehicle",
+        objname=vehicle,
         reftype=mujoco.mjtObj.mjOBJ_BODY,
         refname=f"object_{name}",
         nsample=1,
@@ -375,10 +372,11 @@ def distance_ahead(body: Body, point: Floats, direction: Floats) -> float | None
     """
     turn = rotation_of_quaternion(np.array(body.quaternion))
     begin, along = turn.T @ (point - body.position), turn.T @ direction
-    if body.shape == "sphere":
+    if body.type == "sphere":
         radius, across = body.size[0], begin - (begin @ along) * along
         beside = radius**2 - across @ across
-        return None if beside < 0.0 else _ahead(-begin @ along - np.sqrt(beside))
+        distance = -begin @ along - np.sqrt(beside) if beside >= 0.0 else 0.0
+        return float(distance) if distance > 0.0 else None
     center, half = (np.array(part) for part in body.box)
     with np.errstate(divide="ignore", invalid="ignore"):
         faces = np.sort([(center - half - begin) / along, (center + half - begin) / along], axis=0)
@@ -386,8 +384,4 @@ def distance_ahead(body: Body, point: Floats, direction: Floats) -> float | None
     within = np.where(np.abs(begin - center) <= half, endless, -endless)
     faces = np.where(along == 0.0, within, faces)
     entry, leaving = float(faces[0].max()), float(faces[1].min())
-    return _ahead(entry) if entry <= leaving else None
-
-
-def _ahead(distance: float) -> float | None:
-    return float(distance) if distance > 0.0 else None
+    return entry if 0.0 < entry <= leaving else None

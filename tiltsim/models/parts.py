@@ -5,7 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from math import inf
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Final, NamedTuple
+
+from pydantic import Field
+
+from tiltsim_controllers.laws.keys import Keys, Positive, default
 
 if TYPE_CHECKING:
     import mujoco
@@ -57,22 +61,19 @@ It loads the servo but, other than the pod's own inertia, turns no body in react
 """
 
 
-@dataclass(frozen=True)
-class Pod:
-    """The part of a rotor that tilts; its center of mass lies on the hinge.
+class Pod(Keys):
+    """The keys of the part of a rotor that tilts; its center of mass lies on the hinge.
 
     The defaults are negligible, because the thesis gives its pods no inertia: a pod that turns by
-    1 rad then turns chapter 3's body by less than 5e-11 rad. MuJoCo refuses moving bodies below
-    1e-15; the armature keeps the hinge's equation well conditioned.
-
-    Attributes:
-        mass: kg.
-        inertia: About any axis through the pod's center of mass, kg m^2; equal for all axes, so
-            that the vehicle's inertia does not depend on the tilt.
+    1 rad then turns chapter 3's body by less than 5e-11 rad. MuJoCo refuses moving bodies below a
+    tenth of the bounds; the armature keeps the hinge's equation well conditioned. The inertia is
+    equal about all axes, so that the vehicle's does not depend on the tilt.
     """
 
-    mass: float = 1e-9
-    inertia: float = 1e-13
+    mass: Annotated[float, Field(ge=1e-14)] = default(1e-9, "of one pod [kg]", 0.02)
+    inertia: Annotated[float, Field(ge=1e-14)] = default(
+        1e-13, "about each axis of the pod [kg m^2]", 1e-5
+    )
 
 
 @dataclass(frozen=True)
@@ -114,12 +115,11 @@ class RotorLimits:
         return lower * abs(lower) * (least if lower > 0.0 else greatest), greatest * upper * upper
 
 
-@dataclass(frozen=True)
-class Ground:
-    """Level ground that the vehicle can stand on."""
+class Ground(Keys):
+    """The keys of level ground that the vehicle can stand on."""
 
-    height: float = 0.0  # m, world
-    friction: float = 0.8  # coefficient of sliding friction
+    height: float = default(0.0, "z of the surface in the world [m]")
+    friction: Positive = default(0.8, "coefficient of sliding friction [-]")
 
 
 @dataclass(frozen=True, kw_only=True)

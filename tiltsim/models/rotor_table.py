@@ -11,7 +11,7 @@ import numpy as np
 
 from tiltsim.models.vehicle_parts import Parts, VehiclePose
 from tiltsim_controllers.mathematics.scalar import Floats, Triple, Values
-from tiltsim_controllers.vehicle.effectiveness import Rotor
+from tiltsim_controllers.vehicle.rotors import Rotor
 
 if TYPE_CHECKING:
     import mujoco
@@ -41,7 +41,7 @@ class Multirotor:
 
     @cached_property
     def table(self) -> Values:
-        """Table of the rotors; see `tiltsim_controllers.vehicle.effectiveness`."""
+        """Table of the rotors; see `tiltsim_controllers.vehicle.rotors`."""
         return tuple(entry for rotor in self.rotors for entry in rotor.entries)
 
     @property

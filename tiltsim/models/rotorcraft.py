@@ -31,8 +31,8 @@ from tiltsim.resources import shipped_folder
 from tiltsim.system.files import one_thread_at_a_time
 from tiltsim.system.hooks import mujoco_hooks
 from tiltsim_controllers.mathematics.scalar import Values
+from tiltsim_controllers.vehicle.body import ROTORS
 from tiltsim_controllers.vehicle.parameters import PRESETS, SPIN, Vehicle
-from tiltsim_controllers.vehicle.states import ROTORS
 
 if TYPE_CHECKING:
     import mujoco

@@ -27,8 +27,8 @@ from tiltsim.models.vehicle_parts import (
 from tiltsim.system.files import one_thread_at_a_time
 from tiltsim.system.hooks import mujoco_hooks
 from tiltsim_controllers.mathematics.scalar import Floats
+from tiltsim_controllers.vehicle.body import ROTORS
 from tiltsim_controllers.vehicle.parameters import Vehicle
-from tiltsim_controllers.vehicle.states import ROTORS
 
 if TYPE_CHECKING:
     import mujoco

@@ -5,8 +5,8 @@ import numpy as np
 from tiltsim.plants.autopilot_links import LINKS, Link, Readings
 from tiltsim.plants.autopilot_mixer import Mixer
 from tiltsim.plants.command import Command, ControllerError, Observation
-from tiltsim.scenario.autopilot import AutopilotTable
 from tiltsim.scenario.scenario import Scenario
+from tiltsim.scenario.simulation_table import AutopilotTable
 from tiltsim_controllers.mathematics.attitude import FLIP, rotation_of_quaternion
 from tiltsim_controllers.mathematics.scalar import Floats
 

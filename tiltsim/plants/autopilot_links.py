@@ -16,7 +16,7 @@ import numpy as np
 
 from tiltsim.errors import InputError
 from tiltsim.plants.command import ControllerError
-from tiltsim.scenario.autopilot import AutopilotTable
+from tiltsim.scenario.simulation_table import AutopilotTable
 from tiltsim.system.public import optional_package
 from tiltsim_controllers.mathematics.attitude import rotation_of_quaternion
 from tiltsim_controllers.mathematics.scalar import Floats

@@ -10,7 +10,7 @@ from tiltsim.models.cross import as_multirotor
 from tiltsim.plants.command import Command
 from tiltsim.scenario.scenario import Scenario
 from tiltsim_controllers.mathematics.scalar import Floats
-from tiltsim_controllers.vehicle.effectiveness import force_and_torque
+from tiltsim_controllers.vehicle.rotors import force_and_torque
 
 
 class Mixer:

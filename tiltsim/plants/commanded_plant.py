@@ -21,12 +21,11 @@ from tiltsim.plants.command import CheckedCommand, ControllerError, Observation
 from tiltsim.plants.mujoco_plant import MujocoPlant
 from tiltsim.plants.observing import Observer, flip_by_spin
 from tiltsim.vehicles.rotorcraft.layout import TILT_1, layout_of, tilt_of_rotor, true_rotors
+from tiltsim_controllers.code.arrays import as_arrays
 from tiltsim_controllers.code.python_source import python_function
-from tiltsim_controllers.code.traceable import as_arrays
 from tiltsim_controllers.mathematics.records import flatten
 from tiltsim_controllers.mathematics.scalar import Floats, Values, clipped
-from tiltsim_controllers.vehicle.craft import craft_of, thrust_axes
-from tiltsim_controllers.vehicle.rotor_inertia import hinge_torques
+from tiltsim_controllers.vehicle.craft import craft_of, hinge_torques, thrust_axes
 
 
 class CommandedPlant(MujocoPlant):

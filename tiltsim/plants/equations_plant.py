@@ -1,22 +1,21 @@
 """Equations of motion as the plant, either the thesis's equations or a rigid body's."""
 
+from __future__ import annotations
+
 from math import nan
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from tiltsim.closed_loop.assembly import Assembly, program_key
 from tiltsim.engines.base import EngineName
-from tiltsim.engines.steppers import (
-    Integrated,
-    Layout,
-    NativeStepper,
-    PythonStepper,
-    Stepper,
-    observation,
-)
+from tiltsim.engines.steppers import Integrated, Layout, NativeStepper, PythonStepper, observation
 from tiltsim.plants.engine_choice import choose_engine
 from tiltsim.plants.plant import Plant
 from tiltsim_controllers.mathematics.scalar import Floats
+
+if TYPE_CHECKING:
+    from tiltsim.arrays.flying import JaxStepper
 
 
 def initial_state(assembly: Assembly) -> list[float]:
@@ -66,7 +65,7 @@ class EquationsPlant(Plant):
         self._timestep = scenario.simulation.timestep
         flight = integrated(assembly, layout_of(assembly, len(self._state)))
         self._observe = observation(flight)
-        self._stepper: Stepper
+        self._stepper: PythonStepper | NativeStepper | JaxStepper
         if self.engine == "native":
             self._native = self._stepper = NativeStepper(flight)
         elif self.engine == "jax":

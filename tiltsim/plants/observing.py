@@ -12,7 +12,7 @@ from tiltsim.plants.command import Observation, Reference
 from tiltsim.plants.mujoco_plant import MujocoPlant
 from tiltsim.scenario.gait import tilts_of
 from tiltsim.vehicles.rotorcraft.others import FELT, others_of
-from tiltsim_controllers.code.traceable import as_arrays
+from tiltsim_controllers.code.arrays import as_arrays
 from tiltsim_controllers.mathematics.attitude import euler_angles
 from tiltsim_controllers.mathematics.scalar import Floats, Values
 from tiltsim_controllers.references.trajectories import attitude_reference, reference_derivatives

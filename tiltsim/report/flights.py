@@ -22,9 +22,9 @@ from tiltsim.folders import FLYING
 from tiltsim.resources import shipped_folder
 from tiltsim.scenario.loading import load_scenario, named_files
 from tiltsim.scenario.metric_names import WALL_CLOCK_METRICS
+from tiltsim.scenario.own_code import require_trust
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.scenario.scenario_tables import DESCRIPTIVE
-from tiltsim.scenario.trust import require_trust
 from tiltsim.system.files import replacing
 from tiltsim.system.processes import in_processes
 

@@ -13,10 +13,10 @@ from pydantic import BeforeValidator, Field
 
 from tiltsim.errors import InputError
 from tiltsim.scenario.controller import OwnFunctionController
+from tiltsim.scenario.documents import merge
 from tiltsim.scenario.interaction import RESERVED
 from tiltsim.scenario.library import find_scenario_file, read_toml
 from tiltsim.scenario.messages import InvalidValueError, choose
-from tiltsim.scenario.override_keys import merge
 from tiltsim.scenario.table import ZEROS, Name, Positive, Table, Vector3, default, example, required
 from tiltsim.system.public import public
 

@@ -10,14 +10,17 @@ from tiltsim.scenario.expectation import NAME
 from tiltsim.scenario.gait import FixedGait, TableGait
 from tiltsim.scenario.instruments import check_instruments
 from tiltsim.scenario.interaction import check_objects
+from tiltsim.scenario.linearizing_controllers import (
+    AttitudeAltitudeController,
+    AttitudeForceController,
+    FullPoseController,
+)
 from tiltsim.scenario.messages import InvalidValueError, choose
-from tiltsim.scenario.multirotor_controllers import AttitudeForceController
 from tiltsim.scenario.outputs import check_decoupler, check_dimension, check_full_pose
 from tiltsim.scenario.reference import WaypointReference
 from tiltsim.scenario.rotorcraft import MultirotorTable, RotorcraftTable, TiltServoTable
 from tiltsim.scenario.scenario_tables import ScenarioTables
 from tiltsim.scenario.simulation_table import InitialTable
-from tiltsim.scenario.tiltrotor_controllers import AttitudeAltitudeController, FullPoseController
 from tiltsim.scenario.vehicle import (
     ModelErrorTable,
     PodTable,

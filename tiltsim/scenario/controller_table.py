@@ -9,7 +9,7 @@ from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.table import Positive, Table, default, example
 from tiltsim_controllers.analysis.stability import ErrorLoop, linear_loop
 from tiltsim_controllers.code.arrays import is_known
-from tiltsim_controllers.gaits.red_gait import determinant_at_clearance
+from tiltsim_controllers.gaits.colors import determinant_at_clearance
 from tiltsim_controllers.laws.keys import GainSets, number_of, table_of
 from tiltsim_controllers.laws.supervised_vehicles import untilted_volume
 from tiltsim_controllers.laws.supervisor import STRATEGIES, UNTILTED, Supervisor

@@ -277,8 +277,21 @@ class RotorSpeedTable(InstrumentTable):
         )
 
 
-INSTRUMENTS: tuple[str, ...] = ("imu", "mocap", "gps", "barometer", "magnetometer", "rotor_speed")
-"""Keys of ``[sensors]`` that are instruments, in the order of their readings."""
+class InstrumentTables(Table):
+    """The keys of ``[sensors]`` that are instruments, in the order of their readings."""
+
+    imu: ImuTable | None = default(None, "accelerometer and gyro")
+    mocap: MocapTable | None = default(None, "motion capture")
+    gps: GpsTable | None = default(None, "position and velocity from satellites")
+    barometer: BarometerTable | None = default(None, "altitude from air pressure")
+    magnetometer: MagnetometerTable | None = default(None, "direction of the field")
+    rotor_speed: RotorSpeedTable | None = default(None, "speeds of the rotors")
+
+    @property
+    def instruments(self) -> dict[str, InstrumentTable]:
+        """The instruments on the vehicle, by name."""
+        found = {name: getattr(self, name) for name in InstrumentTables.model_fields}
+        return {name: table for name, table in found.items() if table is not None}
 
 
 def check_instruments(scenario: Any) -> None:

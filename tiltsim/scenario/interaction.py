@@ -1,8 +1,8 @@
 """The tables of objects, of a tool and of a load: ``[[object]]``, ``[tool]``, ``[payload]``."""
 
-from math import inf, pi
+from math import pi
 from pathlib import Path
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Any, Final
 
 from pydantic import Field
 
@@ -10,20 +10,8 @@ from tiltsim.models.cables import Cable
 from tiltsim.models.mjcf_editing import MAX_BYTES
 from tiltsim.models.objects import Body, Load, Objects, Tool
 from tiltsim.scenario.messages import choose
-from tiltsim.scenario.table import (
-    ZEROS,
-    Angles3,
-    Many,
-    Name,
-    NonNegative,
-    Positive,
-    Table,
-    Vector3,
-    default,
-    required,
-)
+from tiltsim.scenario.table import Table, default
 from tiltsim.system.files import is_file
-from tiltsim_controllers.mathematics.attitude import quaternion_of_euler
 
 SIZES: Final = {"wall": 2, "box": 3, "sphere": 1, "mesh": 1}
 """Numbers of the size of each type of object."""
@@ -33,51 +21,11 @@ MESHES: Final = (".stl", ".obj")
 RESERVED: Final = frozenset({"vehicle", "payload", "contact_force", "air", "tilt", "law"})
 """Names that columns and parts of the vehicle already have."""
 
-Mass = Annotated[float, Field(gt=1e-9, le=1e6)]
-Softness = Annotated[float, Field(ge=1e-4, le=1.0)]
-Direction = Annotated[Vector3, Field(examples=[[1.0, 0.0, 0.0]])]
 
-
-class ObjectTable(Table):
+class ObjectTable(Body, Table):
     """Something to touch: fixed in the world, on a hinge, or free."""
 
     table_name = "object"
-
-    name: Name = required("its name, which begins the names of its columns", "wall")
-    type: Literal["wall", "box", "sphere", "mesh"] = required(
-        "a wall 0.1 m thick whose face looks along its -x, a box, a sphere, or the convex hull of "
-        "a mesh",
-        "wall",
-    )
-    position: Vector3 = required(
-        "of the face's center or of the center, in the world [m]", [1.0, 0.0, 0.0]
-    )
-    attitude: Angles3 = default(
-        ZEROS, "roll, pitch and yaw from the world's axes to its own [rad]", [0.0, 0.0, 0.5]
-    )
-    size: Annotated[Many[Positive], Field(min_length=1, max_length=3)] = required(
-        "width along y and height along z of a wall, edges of a box, radius of a sphere, length "
-        "of the unit of a mesh [m]",
-        [2.0, 2.0],
-    )
-    file: str | None = default(
-        None, "STL or OBJ file of a mesh, relative to the scenario's folder", "valve.stl"
-    )
-    joint: Literal["fixed", "hinged", "free"] = default("fixed", "whether it moves, and how")
-    mass: Mass | None = default(None, "of one that moves; evenly spread [kg]", 1.0)
-    friction: NonNegative = default(0.5, "coefficient of sliding friction [-]")
-    softness: Softness = default(
-        0.01,
-        "time constant of its contacts, at least two time steps: twice as soft, half the force of "
-        "an impact [s]",
-    )
-    hinge: Vector3 = default(ZEROS, "a point of the hinge, in its own axes [m]", [0.0, 0.5, 0.0])
-    axis: Direction = default((0.0, 0.0, 1.0), "of the hinge, in its own axes [-]")
-    damping: NonNegative = default(0.0, "of the hinge [N m s/rad]", 0.1)
-    velocity: Vector3 = default(
-        ZEROS, "of a free one at time zero, in the world [m/s]", [0.2, 0.0, 0.0]
-    )
-    floating: bool = default(False, "whether a free one has no weight, as on a cart or a boat")
 
     def _check_values(self) -> None:
         if len(self.size) != SIZES[self.type]:
@@ -109,40 +57,11 @@ class ObjectTable(Table):
         if file.stat().st_size > MAX_BYTES:
             raise self.mistake("file", f"has more than {MAX_BYTES // 2**20} MiB")
 
-    @property
-    def body(self) -> Body:
-        """The object for MuJoCo's model."""
-        return Body(
-            self.name,
-            self.type,
-            self.position,
-            tuple(quaternion_of_euler(self.attitude).tolist()),
-            self.size,
-            self.joint,
-            self.mass or 0.0,
-            self.friction,
-            self.softness,
-            self.hinge,
-            self.axis,
-            self.damping,
-            self.floating,
-            self.file or "",
-        )
 
-
-class ToolTable(Table):
+class ToolTable(Tool, Table):
     """A tool that the vehicle carries; the controller does not know its mass."""
 
     table_name = "tool"
-
-    type: Literal["stick", "plate"] = default(
-        "stick", "a stick with a round tip, or a disc at the end of one"
-    )
-    position: Vector3 = default(ZEROS, "where it begins, in body axes [m]", [0.05, 0.0, 0.0])
-    direction: Direction = default((1.0, 0.0, 0.0), "toward its tip, body axes [-]")
-    length: Positive = required("to its tip [m]", 0.3)
-    radius: Positive = default(0.01, "of the stick or of the disc [m]")
-    mass: Annotated[float, Field(ge=0.0, le=1e6)] = default(0.0, "evenly spread [kg]")
 
     def _check_values(self) -> None:
         if not any(self.direction):
@@ -150,22 +69,12 @@ class ToolTable(Table):
         if self.type == "stick" and self.length <= 2.0 * self.radius:
             raise self.mistake("length", f"must exceed twice the radius = {self.radius}")
 
-    @property
-    def tool(self) -> Tool:
-        """The tool for MuJoCo's model."""
-        return Tool(self.type, self.position, self.direction, self.length, self.radius, self.mass)
 
-
-class PayloadTable(Table):
+class PayloadTable(Load, Table):
     """A load below the vehicle, on a cable that may be slack; the controller does not know it."""
 
     table_name = "payload"
 
-    mass: Mass = required("of the load [kg]", 0.1)
-    length: Positive = required("from the attachment to the center of the load [m]", 1.0)
-    attachment: Vector3 = default(ZEROS, "in body axes [m]", [0.0, 0.0, -0.05])
-    radius: Positive = default(0.03, "of the load, a ball [m]")
-    rigid: bool = default(False, "whether a fixed rod replaces the cable")
     swing: Annotated[float, Field(ge=-0.5 * pi, le=0.5 * pi)] = default(
         0.0, "angle of the cable at time zero, from straight down toward +x [rad]"
     )
@@ -182,50 +91,22 @@ class PayloadTable(Table):
             keys = ("swing", "swing_damping")
             self.require_defaults(keys, "a rigid load does not swing; remove it")
 
-    @property
-    def load(self) -> Load:
-        """The load for MuJoCo's model."""
-        return Load(self.mass, self.length, self.attachment, self.radius, self.rigid)
 
-
-class CableTable(Table):
+class CableTable(Cable, Table):
     """A cable from a vehicle to a free object, taut or slack, from one time to another."""
 
     table_name = "cable"
 
-    name: Name = required("its name, which begins the name of its column", "sling")
-    object: str = required("the name of a free object", "parcel")
-    vehicle: str = default(
-        "", "the name of the companion that it hangs on; default: the first vehicle", "wing"
-    )
-    attachment: Vector3 = default(ZEROS, "in body axes [m]", [0.0, 0.0, -0.05])
-    length: Positive = required("to the center of the object [m]", 1.0)
-    start: NonNegative = default(0.0, "from when it holds [s]", 5.0)
-    end: Positive | None = default(None, "when it releases; default: never [s]", 8.0)
-
     def _check_values(self) -> None:
         if self.end is not None and self.end <= self.start:
             raise self.mistake("end", f"must be after start = {self.start}")
-
-    @property
-    def cable(self) -> Cable:
-        """The cable for MuJoCo's model."""
-        end = inf if self.end is None else self.end
-        joined = self.name, self.vehicle, self.object
-        return Cable(*joined, self.attachment, self.length, self.start, end)
 
 
 def objects_of(scenario: Any) -> Objects | None:
     """All that a scenario adds to its vehicle's model; None for a vehicle alone."""
     if not scenario.has_objects:
         return None
-    tool, payload = scenario.tool, scenario.payload
-    return Objects(
-        tuple(table.body for table in scenario.object),
-        None if tool is None else tool.tool,
-        None if payload is None else payload.load,
-        tuple(table.cable for table in scenario.cable),
-    )
+    return Objects(scenario.object, scenario.tool, scenario.payload, scenario.cable)
 
 
 def _check_cables(scenario: Any) -> None:

@@ -13,18 +13,21 @@ from pydantic import ValidationError
 
 from tiltsim.errors import InputError
 from tiltsim.models.mjcf_editing import check_mjcf
-from tiltsim.scenario.arguments import check_keys, check_no_other, own_title, plain
-from tiltsim.scenario.library import find_scenario_file, library_name, read_toml
-from tiltsim.scenario.limits import check_limits
-from tiltsim.scenario.messages import choose, did_you_mean, one_line_message, show
-from tiltsim.scenario.override_keys import (
+from tiltsim.scenario.documents import (
     KIND_KEYS,
+    check_keys,
+    check_no_other,
     has_other_keys,
     merge,
+    own_title,
+    plain,
     refuse_replaced,
     split_key,
     value_at,
 )
+from tiltsim.scenario.library import check_limits, find_scenario_file, library_name, read_toml
+from tiltsim.scenario.messages import choose, did_you_mean, one_line_message, show
+from tiltsim.scenario.own_code import is_trusted, with_trust
 from tiltsim.scenario.own_parts import (
     controller_table,
     drop_what_own_controllers_ignore,
@@ -35,7 +38,6 @@ from tiltsim.scenario.own_parts import (
 )
 from tiltsim.scenario.scenario import Scenario, Variant
 from tiltsim.scenario.scenario_tables import DESCRIPTIVE
-from tiltsim.scenario.trust import is_trusted, with_trust
 from tiltsim.system.text import short_repr, shortened, valid_unicode
 
 FILE_KEYS: Final = (

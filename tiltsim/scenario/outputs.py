@@ -1,9 +1,8 @@
 """Checks that a vehicle can control the outputs of its law, with its gait and without a rotor."""
 
 from tiltsim.models.rotor_table import Multirotor
-from tiltsim.scenario.multirotor_controllers import AttitudeForceController
+from tiltsim.scenario.linearizing_controllers import AttitudeForceController, FullPoseController
 from tiltsim.scenario.scenario_tables import ScenarioTables
-from tiltsim.scenario.tiltrotor_controllers import FullPoseController
 from tiltsim_controllers.gaits.plans import Gait, fixed
 from tiltsim_controllers.laws.full_pose import pose_rank
 

@@ -9,11 +9,11 @@ import numpy as np
 
 from tiltsim.errors import InputError
 from tiltsim.models.vehicle_parts import MAX_ROTORS
-from tiltsim.scenario.arguments import controller_name, given_keys
 from tiltsim.scenario.controller import NumpyController
+from tiltsim.scenario.documents import controller_name, given_keys
 from tiltsim.scenario.gait import TableGait
 from tiltsim.scenario.law_controller import LawController, is_law
-from tiltsim.scenario.limits import MAX_ROWS
+from tiltsim.scenario.library import MAX_ROWS
 from tiltsim.scenario.messages import tags_of
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.scenario.simulation_table import SimulationTable

@@ -22,8 +22,12 @@ from tiltsim.scenario.table import (
     required,
 )
 from tiltsim_controllers.mathematics.attitude import rotation_matrix
-from tiltsim_controllers.references.trajectories import REFERENCE_TYPES, ReferenceParameters
-from tiltsim_controllers.references.waypoints import COEFFICIENTS, minimum_snap_knots
+from tiltsim_controllers.references.trajectories import (
+    COEFFICIENTS,
+    REFERENCE_TYPES,
+    ReferenceParameters,
+    minimum_snap_knots,
+)
 
 if TYPE_CHECKING:
     from tiltsim_controllers.mathematics.scalar import Floats, Triple, Values
@@ -122,17 +126,17 @@ class PushReference(PositionReference):
 
     def touch(self, scenario: Any) -> Touch:
         """Where and when it touches. Raises `mistake` for an object that it cannot touch."""
-        bodies = {table.name: table.body for table in scenario.object}
+        bodies = {table.name: table for table in scenario.object}
         if self.object not in bodies:
             reason = choose(self.object, bodies) if bodies else "there is no [[object]]"
             raise self.mistake("object", reason)
-        if bodies[self.object].shape == "mesh":
+        if bodies[self.object].type == "mesh":
             raise self.mistake("object", "is a mesh; a push needs a wall, box or sphere")
         if scenario.tool is None:
             raise self.mistake("object", "needs a [tool] to push with")
         turn = rotation_matrix((self.roll, self.pitch, self.yaw))
-        tool = scenario.tool.tool
-        unit, tip = turn @ tool.unit, np.array(self.position) + turn @ tool.tip
+        unit = turn @ scenario.tool.unit
+        tip = np.array(self.position) + turn @ scenario.tool.tip
         distance = distance_ahead(bodies[self.object], tip, unit)
         if distance is None:
             x, y, z = unit

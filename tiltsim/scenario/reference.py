@@ -34,8 +34,12 @@ from tiltsim.scenario.time_table import (
     rows_with_angles,
 )
 from tiltsim_controllers.mathematics.scalar import Triple, Values
-from tiltsim_controllers.references.trajectories import POSES, ReferenceParameters
-from tiltsim_controllers.references.waypoints import minimum_snap_knots, table_knots
+from tiltsim_controllers.references.trajectories import (
+    POSES,
+    ReferenceParameters,
+    minimum_snap_knots,
+    table_knots,
+)
 
 ReferenceRow = Annotated[Many[float], Field(min_length=4, max_length=8)]
 
@@ -118,7 +122,7 @@ class WaypointReference(PositionReference):
 
     @property
     def knots(self) -> Values:
-        """Polynomials; see `tiltsim_controllers.references.waypoints.minimum_snap_knots`."""
+        """Polynomials; see `tiltsim_controllers.references.trajectories.minimum_snap_knots`."""
         return _minimum_snap_knots(self.positions, self.times)
 
     def _check_values(self) -> None:
@@ -189,7 +193,7 @@ class TableReference(PositionReference, TimeTable):
 
     @property
     def knots(self) -> Values:
-        """Polynomials; see `tiltsim_controllers.references.waypoints.table_knots`."""
+        """Polynomials; see `tiltsim_controllers.references.trajectories.table_knots`."""
         return _reference_table_knots(self.table, self.interpolation)
 
     def _check_attitude(self) -> None:

@@ -8,7 +8,7 @@ from pydantic import Field
 
 from tiltsim.scenario.controller_table import ReferenceKind
 from tiltsim.scenario.table import Angle, Table, default
-from tiltsim_controllers.gaits.parameters import NO_KNOTS
+from tiltsim_controllers.gaits.motion import NO_KNOTS
 from tiltsim_controllers.mathematics.scalar import Triple, Values
 from tiltsim_controllers.references.trajectories import REFERENCE_TYPES, ReferenceParameters
 

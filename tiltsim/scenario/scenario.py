@@ -14,9 +14,9 @@ from typing import Annotated, Any, Self
 from pydantic import ConfigDict, Field, ValidationError
 
 from tiltsim.errors import InputError
-from tiltsim.scenario.arguments import check_keys, leaves
 from tiltsim.scenario.companion import companions_of
 from tiltsim.scenario.consistency import check_consistency
+from tiltsim.scenario.documents import check_keys, leaves
 from tiltsim.scenario.messages import missing_keys, one_line_message, show
 from tiltsim.scenario.scenario_tables import DESCRIPTIVE, ScenarioTables
 from tiltsim.scenario.table import Table, required

@@ -6,15 +6,20 @@ from pydantic import PrivateAttr
 
 from tiltsim.errors import InputError
 from tiltsim.models.rotor_table import Multirotor
-from tiltsim.scenario.autopilot import AutopilotTable, WithAutopilot
 from tiltsim.scenario.companion import CompanionTable, DownwashTable
 from tiltsim.scenario.controller import Controller
 from tiltsim.scenario.expectation import ClaimName, ClaimTable, Expectation, Origin
 from tiltsim.scenario.gait import FixedGait, Gait
 from tiltsim.scenario.interaction import CableTable, ObjectTable, PayloadTable, ToolTable
+from tiltsim.scenario.linearizing_controllers import AttitudeAltitudeController
 from tiltsim.scenario.reference import Reference, SetpointReference
 from tiltsim.scenario.rotorcraft import MultirotorTable, RotorcraftTable, TiltServoTable
-from tiltsim.scenario.simulation_table import InitialTable, SimulationTable
+from tiltsim.scenario.simulation_table import (
+    AutopilotTable,
+    InitialTable,
+    SimulationTable,
+    WithAutopilot,
+)
 from tiltsim.scenario.surroundings import (
     Acceleration,
     AirTable,
@@ -26,7 +31,6 @@ from tiltsim.scenario.surroundings import (
     Torque,
 )
 from tiltsim.scenario.table import Many, default
-from tiltsim.scenario.tiltrotor_controllers import AttitudeAltitudeController
 from tiltsim.scenario.time_table import TimeTable
 from tiltsim.scenario.vehicle import ModelErrorTable, TiltCarTable, VehicleTable, VehicleUnion
 from tiltsim_controllers.mathematics.scalar import Values
@@ -90,7 +94,7 @@ class ScenarioTables(WithAutopilot):
 
     _address: str = PrivateAttr("")
     _own: dict[str, Any] = PrivateAttr({})  # parts given in Python, by name
-    _trusted: bool = PrivateAttr(False)  # see `tiltsim.scenario.trust`
+    _trusted: bool = PrivateAttr(False)  # see `tiltsim.scenario.own_code`
 
     @property
     def address(self) -> str:

@@ -6,16 +6,7 @@ from pydantic import Field
 
 from tiltsim.models.parts import Ground
 from tiltsim.models.vehicle_parts import MAX_ROTORS
-from tiltsim.scenario.instruments import (
-    INSTRUMENTS,
-    BarometerTable,
-    GpsTable,
-    ImuTable,
-    InstrumentTable,
-    MagnetometerTable,
-    MocapTable,
-    RotorSpeedTable,
-)
+from tiltsim.scenario.instruments import InstrumentTables
 from tiltsim.scenario.messages import InvalidValueError
 from tiltsim.scenario.table import (
     ZEROS,
@@ -31,13 +22,10 @@ from tiltsim.scenario.table import (
 )
 
 
-class GroundTable(Table):
+class GroundTable(Ground, Table):
     """Ground to take off from and land on; without this table there are no contacts."""
 
     model_config = example(height=0.0)
-
-    height: float = default(Ground.height, "z of the surface in the world [m]")
-    friction: Positive = default(Ground.friction, "coefficient of sliding friction [-]")
 
 
 class Acceleration(Table):
@@ -80,7 +68,7 @@ Disturbance = Annotated[Acceleration | Force | Torque, Field(discriminator="type
 """A ``[[disturbance]]`` table, discriminated by its type."""
 
 
-class SensorTable(Table):
+class SensorTable(InstrumentTables):
     """Measurements of the vehicle's motion that the controller receives; exact by default.
 
     Each measurement has its own zero-mean normal error of the given standard deviation on each
@@ -105,24 +93,12 @@ class SensorTable(Table):
     sample_time: Positive | None = default(
         None, "time between measurements; default: control_timestep, 0.01 if continuous [s]", 0.02
     )
-    imu: ImuTable | None = default(None, "accelerometer and gyro")
-    mocap: MocapTable | None = default(None, "motion capture")
-    gps: GpsTable | None = default(None, "position and velocity from satellites")
-    barometer: BarometerTable | None = default(None, "altitude from air pressure")
-    magnetometer: MagnetometerTable | None = default(None, "direction of the field")
-    rotor_speed: RotorSpeedTable | None = default(None, "speeds of the rotors")
 
     @property
     def have_errors(self) -> bool:
         """Whether any measurement has an error."""
-        ideal = dict.fromkeys(("sample_time", *INSTRUMENTS))
+        ideal = dict.fromkeys(("sample_time", *InstrumentTables.model_fields))
         return self.model_copy(update=ideal) != SensorTable()
-
-    @property
-    def instruments(self) -> dict[str, InstrumentTable]:
-        """The instruments on the vehicle, by name."""
-        found = {name: getattr(self, name) for name in INSTRUMENTS}
-        return {name: table for name, table in found.items() if table is not None}
 
 
 Rotor = Annotated[

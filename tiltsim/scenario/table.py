@@ -1,7 +1,6 @@
 """Base class and number types of the tables of a scenario file."""
 
 from collections.abc import Iterable
-from math import pi
 from operator import attrgetter
 from typing import Annotated, Any, ClassVar, Self
 
@@ -11,9 +10,12 @@ from tiltsim.errors import InputError
 from tiltsim.scenario.messages import InvalidValueError
 from tiltsim.system.text import short_repr, valid_unicode
 from tiltsim_controllers.laws.keys import ZEROS as ZEROS
+from tiltsim_controllers.laws.keys import Angle as Angle
+from tiltsim_controllers.laws.keys import Angles3 as Angles3
 from tiltsim_controllers.laws.keys import Coordinate as Coordinate
 from tiltsim_controllers.laws.keys import Gains2 as Gains2
 from tiltsim_controllers.laws.keys import Many as Many
+from tiltsim_controllers.laws.keys import Name as Name
 from tiltsim_controllers.laws.keys import NonNegative as NonNegative
 from tiltsim_controllers.laws.keys import Positive as Positive
 from tiltsim_controllers.laws.keys import Vector3 as Vector3
@@ -23,13 +25,10 @@ from tiltsim_controllers.laws.keys import required as required
 NotTiny = Annotated[float, Field(ge=1e-12, le=1e9)]  # for divisors
 Period = Annotated[float, Field(ge=1e-3, le=1e9)]
 Factor = Annotated[float, Field(ge=-1e3, le=1e3)]
-Angle = Annotated[float, Field(ge=-pi, le=pi)]
 Angles2 = Annotated[tuple[Angle, Angle], Field(strict=False)]
-Angles3 = Annotated[tuple[Angle, Angle, Angle], Field(strict=False)]
 AnglesEach = Annotated[Many[Angle], Field(min_length=1, max_length=16)]
 Gains4 = Annotated[tuple[float, float, float, float], Field(strict=False)]
 PositiveEach = Annotated[Many[Positive], Field(min_length=2, max_length=16)]
-Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,30}$")]
 Limit = Annotated[float, Field(allow_inf_nan=True)]
 Range = Annotated[tuple[Limit, Limit], Field(strict=False)]
 

@@ -8,22 +8,22 @@ import numpy as np
 from tiltsim.models.hover import hover_speeds
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.gait_following import GaitFollowingController
+from tiltsim.scenario.linearizing_controllers import AttitudeForceController
 from tiltsim.scenario.messages import InvalidValueError
-from tiltsim.scenario.multirotor_controllers import AttitudeForceController
 from tiltsim.scenario.rotorcraft import RotorcraftTable
 from tiltsim.scenario.scenario_tables import ScenarioTables
 from tiltsim.scenario.simulation_table import SimulationTable
-from tiltsim_controllers.analysis.rotor_reaction import (
+from tiltsim_controllers.analysis.singularity import hover_rotor_speeds
+from tiltsim_controllers.analysis.stability import (
+    ErrorLoop,
     attitude_feedback,
     largest_held_gain,
     reaction_gains,
 )
-from tiltsim_controllers.analysis.stability import ErrorLoop
-from tiltsim_controllers.analysis.statics import hover_rotor_speeds
 from tiltsim_controllers.laws.attitude_altitude import DECOUPLINGS
 from tiltsim_controllers.laws.supervisor import LAG
 from tiltsim_controllers.mathematics.scalar import Floats, Values
-from tiltsim_controllers.vehicle.effectiveness import cross_table
+from tiltsim_controllers.vehicle.cross import cross_table
 from tiltsim_controllers.vehicle.parameters import Vehicle
 
 MAX_LOOP_STEP: Final = 2.5

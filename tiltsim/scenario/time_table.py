@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import Field, PrivateAttr
 
 from tiltsim.errors import InputError
-from tiltsim.scenario.limits import MAX_FILE_SIZE, MAX_ROWS, read_text
+from tiltsim.scenario.library import MAX_FILE_SIZE, MAX_ROWS, read_text
 from tiltsim.scenario.table import Table, default
 from tiltsim.system.files import exists, is_file
 from tiltsim.system.numbers import real_array

@@ -18,7 +18,7 @@ from tiltsim_controllers.laws.vectoring_state import Parameters, state_units
 from tiltsim_controllers.mathematics.attitude import quaternion_of_euler
 from tiltsim_controllers.mathematics.scalar import Floats, Values
 from tiltsim_controllers.vehicle.actuators import held_gain
-from tiltsim_controllers.vehicle.effectiveness import table_per_newton
+from tiltsim_controllers.vehicle.rotors import table_per_newton
 
 LARGEST_LEAN = 1.57
 """rad: the axis of a pose points up."""

@@ -25,16 +25,10 @@ MOMENTS: Final = ("inertia_xx", "inertia_yy", "inertia_zz")
 """The principal moments among the fields of `Vehicle`."""
 
 
-class PodTable(Table):
+class PodTable(Pod, Table):
     """Mass properties of one rotor pod; nearly massless by default, as in the thesis."""
 
     model_config = example(mass=0.02, inertia=1e-5)
-
-    # MuJoCo refuses moving bodies below a tenth of these bounds.
-    mass: Annotated[float, Field(ge=1e-14)] = default(Pod.mass, "of one pod [kg]", 0.02)
-    inertia: Annotated[float, Field(ge=1e-14)] = default(
-        Pod.inertia, "about each axis of the pod [kg m^2]", 1e-5
-    )
 
 
 MIN_GYRATION: Final = 1e-3

@@ -12,8 +12,8 @@ from tiltsim.closed_loop.loop import ClosedLoop
 from tiltsim.scenario.instruments import InstrumentTable
 from tiltsim.scenario.scenario import Scenario, plan_flight
 from tiltsim.scenario.vehicle import VehicleTable
+from tiltsim_controllers.code.arrays import program_of
 from tiltsim_controllers.code.messages import TraceError
-from tiltsim_controllers.code.traceable import program_of
 from tiltsim_controllers.code.tracing import Expr
 from tiltsim_controllers.vehicle.parameters import Vehicle
 

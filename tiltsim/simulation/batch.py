@@ -17,10 +17,9 @@ from tiltsim.flight.end import End
 from tiltsim.flight.flight import Flight
 from tiltsim.laws.assembling import assemble
 from tiltsim.plants.engine_choice import native_pays_off
-from tiltsim.scenario.interaction import objects_of
 from tiltsim.scenario.loading import as_scenario
+from tiltsim.scenario.own_code import require_trust
 from tiltsim.scenario.scenario import Scenario
-from tiltsim.scenario.trust import require_trust
 from tiltsim.scenario.vehicle import VehicleTable
 from tiltsim.simulation.lane_batch import LaneBatch, lanes_for
 from tiltsim.simulation.native_batch import NativeBatch
@@ -32,6 +31,12 @@ from tiltsim.system.text import short_repr
 
 PARTS: Final = 4
 """Parts of the scenarios that each process gets in turn."""
+
+_START: Final[dict[str, Any]] = {
+    "object": {"__all__": {"velocity"}},
+    "payload": {"swing", "swing_damping"},
+}
+"""Keys of things beside the vehicle that are no part of its model."""
 
 WINDOW: Final = 2048
 """Number of scenarios that are grouped into batches at a time."""
@@ -279,6 +284,7 @@ def _way_to_fly(assembly: Assembly, native: bool) -> object:
     # Stops of the tilt servos are constraints, which lengthen a state; ground and objects add
     # geoms; a layer has its own states and controls; a user's file may have other bodies.
     vehicles = [each.vehicle for each in (scenario, *scenario.companions)]
+    added = scenario.model_dump_json(include={"object", "tool", "payload"}, exclude=_START)
     files = tuple(v.mjcf if isinstance(v, VehicleTable) else None for v in vehicles)
     stops = tuple(vehicle.tilt_servo.angle_limit is not None for vehicle in vehicles)
-    return key, stops, scenario.ground is not None, objects_of(scenario), files
+    return key, stops, scenario.ground is not None, added, files

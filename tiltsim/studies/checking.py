@@ -22,8 +22,8 @@ from tiltsim.scenario.library import (
     selected_entries,
 )
 from tiltsim.scenario.loading import load_scenario, variant_names
+from tiltsim.scenario.own_code import require_trust
 from tiltsim.scenario.scenario import Scenario
-from tiltsim.scenario.trust import require_trust
 from tiltsim.simulation.simulate import simulate_to_end
 from tiltsim.system.files import replacing
 from tiltsim.system.processes import in_processes

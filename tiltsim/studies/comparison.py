@@ -15,8 +15,8 @@ from tiltsim.plants.engine_choice import MIN_STEPS_TO_COMPILE
 from tiltsim.scenario.controller import CONTROLLERS
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.messages import choose
+from tiltsim.scenario.own_code import require_trust
 from tiltsim.scenario.scenario import Scenario
-from tiltsim.scenario.trust import require_trust
 from tiltsim.simulation.simulate import simulate_to_end
 from tiltsim.studies.benchmark import compiled_time_per_call, time_per_call
 from tiltsim.sweeps.chunks import boundary

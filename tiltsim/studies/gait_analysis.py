@@ -12,8 +12,10 @@ from numpy.typing import NDArray
 from tiltsim_controllers.analysis import fault_tolerance, two_color_map
 from tiltsim_controllers.analysis.published_gaits import DETERMINANT_CASES, TRIANGLE
 from tiltsim_controllers.analysis.singularity import (
+    acceptable_share,
     determinant,
     force_matrix,
+    hover_rotor_speeds,
     margin_over_gait,
     rank,
     residuals,
@@ -21,18 +23,14 @@ from tiltsim_controllers.analysis.singularity import (
     singularity_margin,
     torque_free_direction,
     torque_matrix,
-)
-from tiltsim_controllers.analysis.statics import hover_rotor_speeds
-from tiltsim_controllers.analysis.torque_free import SINGULAR_ATTITUDES, torque_free_forces
-from tiltsim_controllers.analysis.two_color_planner import Path, check_path
-from tiltsim_controllers.analysis.unacceptable_attitudes import (
-    acceptable_share,
     unacceptable_attitudes,
 )
+from tiltsim_controllers.analysis.torque_free import SINGULAR_ATTITUDES, torque_free_forces
+from tiltsim_controllers.analysis.two_color_planner import Path, check_path
 from tiltsim_controllers.gaits.plans import Gait
 from tiltsim_controllers.mathematics.scalar import Floats, Quad
+from tiltsim_controllers.vehicle.body import ROTORS
 from tiltsim_controllers.vehicle.parameters import PRESETS, Vehicle, drag_ratio
-from tiltsim_controllers.vehicle.states import ROTORS
 
 NEARLY_SINGULAR: Final = 1e-3
 """Ratio of singular values of tau below which a gait has full rank only because of rounding.

@@ -19,8 +19,14 @@ from tiltsim_controllers.analysis.attainable import (
     attainable_torques,
     side_force_share,
 )
-from tiltsim_controllers.analysis.hover import Hover, hover, rotor_losses
-from tiltsim_controllers.analysis.level_hover import MAX_TILT, level_hover, moved_outputs
+from tiltsim_controllers.analysis.hover import (
+    MAX_TILT,
+    Hover,
+    hover,
+    level_hover,
+    moved_outputs,
+    rotor_losses,
+)
 from tiltsim_controllers.analysis.singularity import world_up
 from tiltsim_controllers.analysis.torque_free import (
     SINGULAR_ATTITUDES,
@@ -30,7 +36,7 @@ from tiltsim_controllers.analysis.torque_free import (
 )
 from tiltsim_controllers.gaits.plans import Gait
 from tiltsim_controllers.mathematics.scalar import Floats
-from tiltsim_controllers.vehicle.effectiveness import ROTOR_FLOATS, force_and_torque
+from tiltsim_controllers.vehicle.rotors import ROTOR_FLOATS, force_and_torque
 
 UNLIMITED: Final = 100.0
 """Share of the weight that a rotor without a speed limit can carry, in a search for a hover."""

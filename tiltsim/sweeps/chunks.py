@@ -16,8 +16,8 @@ from tiltsim.errors import InputError
 from tiltsim.flight.expectations import Verdict
 from tiltsim.flight.flight import Flight
 from tiltsim.plants.engine_choice import with_engine
+from tiltsim.scenario.own_code import require_trust, with_trust
 from tiltsim.scenario.scenario import Scenario
-from tiltsim.scenario.trust import require_trust, with_trust
 from tiltsim.simulation.batch import fly
 from tiltsim.sweeps.definition import SweepDefinition
 from tiltsim.sweeps.points import SweepPoints

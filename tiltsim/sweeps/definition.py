@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
 from tiltsim.errors import InputError
-from tiltsim.scenario.limits import check_limits
+from tiltsim.scenario.library import check_limits
 from tiltsim.scenario.loading import parse_scenario, without_none
 from tiltsim.scenario.messages import show
 from tiltsim.scenario.scenario_tables import DESCRIPTIVE

@@ -13,7 +13,7 @@ from typing import Any, Final
 from pydantic import ValidationError
 
 from tiltsim.errors import InputError
-from tiltsim.scenario.arguments import check_keys, leaves, plain
+from tiltsim.scenario.documents import check_keys, leaves, plain
 from tiltsim.scenario.library import find_scenario_file, library_name, read_toml
 from tiltsim.scenario.loading import (
     FILE_KEYS,

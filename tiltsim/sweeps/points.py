@@ -13,10 +13,10 @@ from typing import Any, Final, cast
 import numpy as np
 
 from tiltsim.errors import InputError
+from tiltsim.scenario.documents import merge, value_at
 from tiltsim.scenario.loading import apply_overrides, parse_scenario
 from tiltsim.scenario.messages import show
 from tiltsim.scenario.metric_names import METRICS, WALL_CLOCK_METRICS
-from tiltsim.scenario.override_keys import merge, value_at
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.scenario.vehicle import MOMENTS, VehicleTable
 from tiltsim.sweeps import tables

@@ -15,7 +15,7 @@ from typing import Any, Final, cast
 from tiltsim.engines.base import EngineName
 from tiltsim.errors import InputError
 from tiltsim.plants.engine_choice import MIN_STEPS_TO_COMPILE
-from tiltsim.scenario.trust import is_trusted, require_trust, with_trust
+from tiltsim.scenario.own_code import is_trusted, require_trust, with_trust
 from tiltsim.sweeps.chunks import ChunkWork, FinishedChunk
 from tiltsim.sweeps.dataset import SweepResults, load_results
 from tiltsim.sweeps.definition import SweepDefinition

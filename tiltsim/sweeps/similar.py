@@ -6,9 +6,9 @@ from typing import Any, Final, NamedTuple
 
 from pydantic import BaseModel, ValidationError
 
+from tiltsim.scenario.documents import split_key, with_value
 from tiltsim.scenario.loading import parse_scenario
 from tiltsim.scenario.messages import InvalidValueError
-from tiltsim.scenario.override_keys import split_key, with_value
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.system.numbers import is_number
 

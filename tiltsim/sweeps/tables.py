@@ -6,16 +6,16 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, field_validator
 
-from tiltsim.scenario.arguments import leaves
+from tiltsim.scenario.documents import leaves
 from tiltsim.scenario.expectation import Expectation
-from tiltsim.scenario.limits import MAX_VALUES
+from tiltsim.scenario.library import MAX_VALUES
 from tiltsim.scenario.messages import InvalidValueError, choose
 from tiltsim.scenario.metric_names import METRICS, WALL_CLOCK_METRICS
-from tiltsim.scenario.table import Positive, Table, example
+from tiltsim.scenario.table import Many, Positive, Table, default, example, required
 from tiltsim_controllers.mathematics.scalar import clipped
 
-Keys = Annotated[tuple[str, ...], Field(strict=False, min_length=1)]
-Names = Annotated[tuple[str, ...], Field(strict=False)]
+Keys = Annotated[Many[str], Field(min_length=1)]
+Names = Many[str]
 Count = Annotated[int, Field(ge=1, le=10_000_000)]
 Group = Annotated[
     str | None,
@@ -29,18 +29,18 @@ class AxisTable(Table):
     model_config = example(key="gait.period")
     table_name = "axis"
 
-    key: str | None = Field(
+    key: str | None = default(
         None,
-        description="a key of the scenario such as gait.period or gait.angles[0], or a name "
-        "without a dot for use in [derive]",
-        examples=["gait.period"],
+        "a key of the scenario such as gait.period or gait.angles[0], or a name without a dot for "
+        "use in [derive]",
+        "gait.period",
     )
-    keys: Keys | None = Field(
+    keys: Keys | None = default(
         None,
-        description="several keys that move together, in place of key",
-        examples=[["gait.angles[0]", "gait.angles[1]"]],
+        "several keys that move together, in place of key",
+        ["gait.angles[0]", "gait.angles[1]"],
     )
-    relative: bool = Field(False, description="the values multiply the base scenario's own")
+    relative: bool = default(False, "the values multiply the base scenario's own")
 
     @property
     def targets(self) -> tuple[str, ...]:
@@ -71,9 +71,9 @@ def _leaves(value: Any) -> Iterator[Any]:
 class ListAxis(AxisTable):
     """A list of values; for several keys, a list of rows of values."""
 
-    type: Literal["list"] = Field(description="given values")
-    values: Annotated[tuple[Any, ...], Field(strict=False, min_length=1)] = Field(
-        description="of any kind that the key takes", examples=[[1.0, 2.0, 3.0]]
+    type: Literal["list"] = required("given values")
+    values: Annotated[Many[Any], Field(min_length=1)] = required(
+        "of any kind that the key takes", [1.0, 2.0, 3.0]
     )
     group: Group = None
 
@@ -101,12 +101,10 @@ class ListAxis(AxisTable):
 class LinspaceAxis(AxisTable):
     """Evenly spaced values, both ends included; several keys get the same value."""
 
-    type: Literal["linspace"] = Field(description="evenly spaced values")
-    start: float = Field(description="the first value [the key's]", examples=[1.0])
-    stop: float = Field(description="the last value [the key's]", examples=[3.0])
-    count: Annotated[int, Field(ge=2, le=MAX_VALUES)] = Field(
-        description="number of values", examples=[9]
-    )
+    type: Literal["linspace"] = required("evenly spaced values")
+    start: float = required("the first value [the key's]", 1.0)
+    stop: float = required("the last value [the key's]", 3.0)
+    count: Annotated[int, Field(ge=2, le=MAX_VALUES)] = required("number of values", 9)
     group: Group = None
 
     @property
@@ -129,9 +127,9 @@ class LinspaceAxis(AxisTable):
 class UniformAxis(AxisTable):
     """A number drawn from a uniform distribution; several keys get the same draw."""
 
-    type: Literal["uniform"] = Field(description="drawn evenly between two bounds")
-    low: float = Field(description="the lower bound [the key's]", examples=[1.0])
-    high: float = Field(description="the upper bound [the key's]", examples=[3.0])
+    type: Literal["uniform"] = required("drawn evenly between two bounds")
+    low: float = required("the lower bound [the key's]", 1.0)
+    high: float = required("the upper bound [the key's]", 3.0)
 
     def _check_values(self) -> None:
         super()._check_values()
@@ -142,9 +140,9 @@ class UniformAxis(AxisTable):
 class NormalAxis(AxisTable):
     """A number drawn from a normal distribution; several keys get the same draw."""
 
-    type: Literal["normal"] = Field(description="drawn from a normal distribution")
-    mean: float = Field(description="of the values [the key's]", examples=[2.0])
-    standard_deviation: Positive = Field(description="of the values [the key's]", examples=[0.1])
+    type: Literal["normal"] = required("drawn from a normal distribution")
+    mean: float = required("of the values [the key's]", 2.0)
+    standard_deviation: Positive = required("of the values [the key's]", 0.1)
 
 
 class SeedAxis(AxisTable):
@@ -152,9 +150,9 @@ class SeedAxis(AxisTable):
 
     model_config = example(key="simulation.seed")
 
-    type: Literal["seed"] = Field(description="a number of its own for each sample")
-    start: Annotated[int, Field(ge=0)] = Field(0, description="the first sample's", examples=[100])
-    relative: Literal[False] = Field(False, description="always false")
+    type: Literal["seed"] = required("a number of its own for each sample")
+    start: Annotated[int, Field(ge=0)] = default(0, "the first sample's", 100)
+    relative: Literal[False] = default(False, "always false")
 
 
 class CasesAxis(AxisTable):
@@ -162,15 +160,13 @@ class CasesAxis(AxisTable):
 
     model_config = example(key="law")
 
-    type: Literal["cases"] = Field(description="named sets of tables")
-    key: str = Field(
-        description="a name without a dot: the column with the name of the case", examples=["law"]
-    )
-    keys: None = Field(None, description="not for cases")
-    relative: Literal[False] = Field(False, description="always false")
-    cases: Annotated[dict[str, dict[str, Any]], Field(min_length=1)] = Field(
-        description="tables of the scenario by the name of the case",
-        examples=[{"exact": {"controller": {"decoupler": "exact"}}}],
+    type: Literal["cases"] = required("named sets of tables")
+    key: str = required("a name without a dot: the column with the name of the case", "law")
+    keys: None = default(None, "not for cases")
+    relative: Literal[False] = default(False, "always false")
+    cases: Annotated[dict[str, dict[str, Any]], Field(min_length=1)] = required(
+        "tables of the scenario by the name of the case",
+        {"exact": {"controller": {"decoupler": "exact"}}},
     )
     group: Group = None
 
@@ -204,14 +200,13 @@ class SampleTable(Table):
 
     table_name = "sample"
 
-    method: Literal["random", "latin_hypercube", "sobol"] = Field(
-        "random", description="independent draws, or draws that cover the ranges more evenly"
+    method: Literal["random", "latin_hypercube", "sobol"] = default(
+        "random", "independent draws, or draws that cover the ranges more evenly"
     )
-    count: Count = Field(
-        description="number of samples at each point of the other axes; a power of two for sobol",
-        examples=[64],
+    count: Count = required(
+        "number of samples at each point of the other axes; a power of two for sobol", 64
     )
-    seed: Annotated[int, Field(ge=0)] = Field(0, description="of the draws", examples=[1])
+    seed: Annotated[int, Field(ge=0)] = default(0, "of the draws", 1)
 
     def _check_values(self) -> None:
         if self.method == "sobol" and self.count & (self.count - 1):
@@ -225,23 +220,16 @@ class BisectTable(Table):
     on the boundary.
     """
 
-    key: str = Field(description="the key that is searched", examples=["gait.amplitude"])
-    start: float = Field(
-        description="where the search begins and the condition holds [the key's]", examples=[0.1]
+    key: str = required("the key that is searched", "gait.amplitude")
+    start: float = required("where the search begins and the condition holds [the key's]", 0.1)
+    stop: float | str = required("a number, or an expression over the axes' names [the key's]", 1.0)
+    step: Positive = required("of the walk that finds a value at which it fails [the key's]", 0.1)
+    tolerance: Positive = required(
+        "maximum width of the bracket at the end of the search [the key's]", 0.01
     )
-    stop: float | str = Field(
-        description="a number, or an expression over the axes' names [the key's]", examples=[1.0]
-    )
-    step: Positive = Field(
-        description="of the walk that finds a value at which it fails [the key's]", examples=[0.1]
-    )
-    tolerance: Positive = Field(
-        description="maximum width of the bracket at the end of the search [the key's]",
-        examples=[0.01],
-    )
-    holds: Annotated[tuple[Expectation, ...], Field(strict=False, min_length=1)] = Field(
-        description="bounds on metrics, as in [[expect]]; they fail if the flight terminates early",
-        examples=[[{"metric": "diverged", "equals": False}]],
+    holds: Annotated[Many[Expectation], Field(min_length=1)] = required(
+        "bounds on metrics, as in [[expect]]; they fail if the flight terminates early",
+        [{"metric": "diverged", "equals": False}],
     )
 
 
@@ -250,75 +238,53 @@ class PlotTable(Table):
 
     model_config = example(kind="lines", x="gait.period")
 
-    kind: Literal["lines", "map", "quantiles", "boundary", "plane"] | None = Field(
-        None, description="of figure; default: what suits the axes", examples=["map"]
+    kind: Literal["lines", "map", "quantiles", "boundary", "plane"] | None = default(
+        None, "of figure; default: what suits the axes", "map"
     )
-    x: str | None = Field(
-        None, description="a column, or an expression over columns", examples=["gait.period"]
+    x: str | None = default(None, "a column, or an expression over columns", "gait.period")
+    y: str | None = default(None, "likewise; for map and plane", "gait.amplitude")
+    metrics: Names = default((), "one row of panels each; default: a choice", ["max_abs_roll"])
+    lines: str | None = default(None, "a column; one line per value", "gait.amplitude")
+    panels: str | None = default(None, "a column; one panel per value", "gait.scale")
+    log: Annotated[tuple[Literal["x", "y"], ...], Field(strict=False)] = default(
+        (), "axes of lines with a logarithmic scale", ["y"]
     )
-    y: str | None = Field(
-        None, description="likewise; for map and plane", examples=["gait.amplitude"]
-    )
-    metrics: Names = Field(
-        (), description="one row of panels each; default: a choice", examples=[["max_abs_roll"]]
-    )
-    lines: str | None = Field(
-        None, description="a column; one line per value", examples=["gait.amplitude"]
-    )
-    panels: str | None = Field(
-        None, description="a column; one panel per value", examples=["gait.scale"]
-    )
-    log: Annotated[tuple[Literal["x", "y"], ...], Field(strict=False)] = Field(
-        (), description="axes of lines with a logarithmic scale", examples=[["y"]]
-    )
-    labels: dict[str, str] = Field(
-        {},
-        description="what the figure calls columns, with their units",
-        examples=[{"wind": "wind speed (m/s)"}],
+    labels: dict[str, str] = default(
+        {}, "what the figure calls columns, with their units", {"wind": "wind speed (m/s)"}
     )
 
 
 class Sweep(Table):
     """One sweep, fully specified."""
 
-    title: str = Field("", description="one line about the sweep", examples=["My first sweep"])
-    source: str = Field(
-        "", description="where the experiment is described", examples=["ch. 4, Sec. 6.3"]
+    title: str = default("", "one line about the sweep", "My first sweep")
+    source: str = default("", "where the experiment is described", "ch. 4, Sec. 6.3")
+    scenario: str | dict[str, Any] = required(
+        "the base: a file or an address of the library, or a scenario's tables",
+        "ch04_tracking/circle#continuous_t2_modified",
     )
-    scenario: str | dict[str, Any] = Field(
-        description="the base: a file or an address of the library, or a scenario's tables",
-        examples=["ch04_tracking/circle#continuous_t2_modified"],
+    set: dict[str, Any] = default(
+        {}, "values by dotted key, the same for all flights", {"simulation.duration": 85.0}
     )
-    set: dict[str, Any] = Field(
+    axis: Many[Axis] = default((), "what varies; axes are crossed, the last one fastest")
+    sample: SampleTable | None = default(
+        None, "how often and how uniform and normal axes are drawn"
+    )
+    derive: dict[str, Any] = default(
         {},
-        description="values by dotted key, the same for all flights",
-        examples=[{"simulation.duration": 85.0}],
+        "keys that follow from the axes: expressions, or lists of expressions",
+        {"gait.lean": "0.5 * scale"},
     )
-    axis: Annotated[tuple[Axis, ...], Field(strict=False)] = Field(
-        (), description="what varies; axes are crossed, the last one fastest"
-    )
-    sample: SampleTable | None = Field(
-        None, description="how often and how uniform and normal axes are drawn"
-    )
-    derive: dict[str, Any] = Field(
-        {},
-        description="keys that follow from the axes: expressions, or lists of expressions",
-        examples=[{"gait.lean": "0.5 * scale"}],
-    )
-    bisect: BisectTable | None = Field(
-        None, description="a search for a stability boundary at each point"
-    )
-    metrics: Names | None = Field(
-        None, description="metrics in the dataset; default: all", examples=[["max_abs_roll"]]
-    )
-    keep_flights: bool = Field(False, description="also keep every flight.parquet")
-    chunk_size: Count | None = Field(
+    bisect: BisectTable | None = default(None, "a search for a stability boundary at each point")
+    metrics: Names | None = default(None, "metrics in the dataset; default: all", ["max_abs_roll"])
+    keep_flights: bool = default(False, "also keep every flight.parquet")
+    chunk_size: Count | None = default(
         None,
-        description="number of points that are flown and saved together; default: 1/64 of "
-        "all, at most 32; with the jax engine a quarter, at most 1024",
-        examples=[100],
+        "number of points that are flown and saved together; default: 1/64 of all, at most 32; "
+        "with the jax engine a quarter, at most 1024",
+        100,
     )
-    plot: PlotTable = Field(PlotTable(), description="how tiltsim plot draws the sweep")
+    plot: PlotTable = default(PlotTable(), "how tiltsim plot draws the sweep")
 
     @field_validator("set", "derive", mode="before")
     @classmethod

@@ -27,7 +27,7 @@ from tiltsim.vehicles.spans import (
     position_error,
     saturation_metrics,
 )
-from tiltsim_controllers.code.traceable import traceable
+from tiltsim_controllers.code.arrays import traceable
 from tiltsim_controllers.mathematics.scalar import Floats, Vector
 from tiltsim_controllers.references.trajectories import ReferenceParameters
 from tiltsim_controllers.tilt_car.vehicle import counter_yaw_per_tilt

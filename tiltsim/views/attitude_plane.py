@@ -19,8 +19,8 @@ import numpy as np
 from tiltsim.scenario.scenario import Scenario
 from tiltsim_controllers.analysis.singularity import torque_free_direction, world_up
 from tiltsim_controllers.mathematics.scalar import Floats
+from tiltsim_controllers.vehicle.body import TILT_FIELDS
 from tiltsim_controllers.vehicle.parameters import Vehicle
-from tiltsim_controllers.vehicle.states import TILT_FIELDS
 
 HALF_WIDTH: Final = pi / 2  # largest absolute roll and pitch in the plane, rad
 MARGIN_THRESHOLD: Final = 0.2

@@ -118,7 +118,7 @@ def cables(
         places = rotate(world.quaternion[:, body], model.site_pos[sites])
         found[model.tendon(tendon).name] = world.position[:, body] + places
     for table in scenario.cable:
-        loose = [not table.cable.holds(at) for at in time.tolist()]
+        loose = [not table.holds(at) for at in time.tolist()]
         found[table.name][loose, 1] = found[table.name][loose, 0]
     return found
 

@@ -103,17 +103,19 @@ class Signals:
         """Smallest range of the axis."""
         return self.floor or FLOORS.get(self.unit, SMALLEST)
 
-    def range_of(self, flights: Sequence[Flight]) -> tuple[float, float]:
-        """The range of the axis for some flights, with levels and references."""
-        drawn, ended = [], []
-        for flight in flights:
-            shown = flight["time"] >= min(self.settling, 0.5 * flight["time"][-1])
-            names = [*filter(None, (line.reference for line in self.lines)), *self.bounds]
-            values = [line.of(flight) for line in self.lines] + [flight[name] for name in names]
-            drawn += [one[shown] for one in values]
-            ended += [flight.end.kind != "completed"] * len(values)
-        drawn += [np.array([level.value]) for level in self.levels]
-        return scale(drawn, [*ended, *[False] * len(self.levels)], self.least)[:2]
+
+def range_of(shown: Sequence[tuple[Signals, Flight]]) -> tuple[float, float]:
+    """The range of an axis for a panel of each of some flights, with levels and references."""
+    drawn, ended = [], []
+    for panel, flight in shown:
+        whole = flight["time"] >= min(panel.settling, 0.5 * flight["time"][-1])
+        names = [*filter(None, (line.reference for line in panel.lines)), *panel.bounds]
+        values = [line.of(flight) for line in panel.lines] + [flight[name] for name in names]
+        drawn += [one[whole] for one in values]
+        ended += [flight.end.kind != "completed"] * len(values)
+    first = shown[0][0]
+    drawn += [np.array([level.value]) for level in first.levels]
+    return scale(drawn, [*ended, *[False] * len(first.levels)], first.least)[:2]
 
 
 def scale(

@@ -1,10 +1,9 @@
 """Texts about flights: titles, descriptions of gait and controller, log messages."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from itertools import chain, takewhile
 from pathlib import Path
-from typing import Final, Literal
+from typing import Final, Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -13,14 +12,13 @@ from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.flight.end import End
 from tiltsim.flight.flight import Flight
 from tiltsim.laws.law import SUPERVISION
-from tiltsim.scenario.arguments import leaves
+from tiltsim.scenario.documents import leaves
+from tiltsim.scenario.linearizing_controllers import AttitudeAltitudeController
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.scenario.scenario_tables import DESCRIPTIVE
-from tiltsim.scenario.tiltrotor_controllers import AttitudeAltitudeController
 from tiltsim.system.text import in_words, valid_unicode
 from tiltsim.vehicles.spans import at_lower_limit, at_upper_limit
 from tiltsim.views.attitude_plane import SUPERVISION_THRESHOLD, margin_threshold
-from tiltsim_controllers.mathematics.scalar import Floats
 
 MIN_WORDS: Final = 4  # words that titles must share to make a common title
 ABBREVIATIONS: Final = ("indi", "lqr", "pid")
@@ -126,9 +124,6 @@ Level = Literal["INFO", "WARN", "ERROR"]
 QUIET_TIME: Final = 0.5
 """Time (s) for which a condition must have been false before it is reported again."""
 
-Condition = tuple[str, Floats, npt.NDArray[np.bool_]]
-"""A message, the times of the samples (s), and where the condition holds."""
-
 _SUPERVISOR_MESSAGES: Final = {
     "scale": "supervisor scales the gait",
     "hold": "supervisor holds the gait",
@@ -136,8 +131,7 @@ _SUPERVISOR_MESSAGES: Final = {
 }
 
 
-@dataclass(frozen=True)
-class Event:
+class Event(NamedTuple):
     """A message with its time (s) and level."""
 
     time: float
@@ -164,8 +158,8 @@ class EventDetector:
     def observe(self, piece: Flight) -> list[Event]:
         """The events within the next piece of the flight, in order of time."""
         events = []
-        for text, times, holds in conditions(piece):
-            for time in times[holds].tolist():
+        for text, holds in conditions(piece).items():
+            for time in piece["time"][holds].tolist():
                 if time - self._last_true.get(text, -np.inf) > QUIET_TIME:
                     events.append(Event(time, "WARN", text))
                 self._last_true[text] = time
@@ -190,35 +184,32 @@ class EventDetector:
         return [Event(end.time, "INFO", text), ending]
 
 
-def conditions(piece: Flight) -> Iterator[Condition]:
-    """The conditions to report for a piece of a flight, in a fixed order."""
-    time, scenario = piece["time"], piece.scenario
-    threshold = margin_threshold(scenario)
-    if "singularity_margin" in piece.columns:
-        near = np.abs(piece["singularity_margin"]) < threshold
-        yield f"singularity margin below {threshold:g} rad", time, near
-    supervisor = scenario.controller.supervision
-    if supervisor is not None:
-        active = piece[SUPERVISION] > SUPERVISION_THRESHOLD
-        yield _SUPERVISOR_MESSAGES[supervisor.strategy], time, active
-    if "attitude_zone" in piece.columns:
-        inside = piece["attitude_zone"] > 0.5
-        yield "switched to attitude-altitude control", time, inside
-        yield "switched to yaw-position control", time, ~inside
-    if "contact_time" in piece.columns:
-        yield "touches an object", time, np.diff(piece["contact_time"], prepend=np.inf) > 0.0
-    if scenario.vehicle.is_planar:
-        for rotor in piece.assembly.loop.kind.rotors:
-            stopped = at_lower_limit(piece[f"rotor_speed_{rotor}"], 0.0)
-            yield f"rotor {rotor} saturated at zero", time, stopped
-        return
-    vehicle = scenario.any_rotorcraft
-    for rotor, spin in enumerate(vehicle.spins, start=1):
-        speed = spin * piece[f"rotor_speed_{rotor}"]
-        yield f"rotor {rotor} reversed", time, speed <= 0.0
-        if vehicle.max_rotor_speed is not None:
-            text = f"rotor {rotor} saturated at {vehicle.max_rotor_speed:g} rad/s"
-            yield text, time, at_upper_limit(speed, vehicle.max_rotor_speed)
-        if vehicle.min_rotor_speed is not None:
-            text = f"rotor {rotor} saturated at {vehicle.min_rotor_speed:g} rad/s"
-            yield text, time, at_lower_limit(speed, vehicle.min_rotor_speed)
+def conditions(piece: Flight) -> dict[str, npt.NDArray[np.bool_]]:
+    """Messages about a piece of a flight, and the samples at which they hold, in a fixed order."""
+    found: dict[str, npt.NDArray[np.bool_]] = {}
+    scenario, columns = piece.scenario, piece.columns
+    if "singularity_margin" in columns:
+        threshold = margin_threshold(scenario)
+        near = np.abs(columns["singularity_margin"]) < threshold
+        found[f"singularity margin below {threshold:g} rad"] = near
+    if (supervisor := scenario.controller.supervision) is not None:
+        active = columns[SUPERVISION] > SUPERVISION_THRESHOLD
+        found[_SUPERVISOR_MESSAGES[supervisor.strategy]] = active
+    if "attitude_zone" in columns:
+        inside = columns["attitude_zone"] > 0.5
+        found["switched to attitude-altitude control"] = inside
+        found["switched to yaw-position control"] = ~inside
+    if "contact_time" in columns:
+        found["touches an object"] = np.diff(columns["contact_time"], prepend=np.inf) > 0.0
+    craft = None if scenario.vehicle.is_planar else scenario.any_rotorcraft
+    highest, lowest = (craft.max_rotor_speed, craft.min_rotor_speed) if craft else (None, 0.0)
+    for rotor in piece.assembly.loop.kind.rotors:
+        speed = columns[f"rotor_speed_{rotor}"]
+        if craft is not None:
+            speed = craft.spins[rotor - 1] * speed
+            found[f"rotor {rotor} reversed"] = speed <= 0.0
+        for limit, reached in ((highest, at_upper_limit), (lowest, at_lower_limit)):
+            if limit is not None:
+                text = f"{limit:g} rad/s" if limit else "zero"
+                found[f"rotor {rotor} saturated at {text}"] = reached(speed, limit)
+    return found

@@ -26,7 +26,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 from tiltsim_controllers.mathematics.scalar import Floats, Quad, Triple
-from tiltsim_controllers.vehicle.decoupling_matrix import torque_entries, torque_free_force
+from tiltsim_controllers.vehicle.cross import torque_free_force
 from tiltsim_controllers.vehicle.parameters import Vehicle, drag_ratio
 
 MAX_TILT: Final = radians(60.0)
@@ -175,14 +175,8 @@ def _onto_balance(tilts: Floats, x: float, y: float, ratio: float) -> Floats:
 
 def _imbalance(tilts: Any, x: float, y: float, ratio: float) -> Any:
     """Zero where ``n`` is parallel to ``(x, y, 1)``; on arrays real or complex."""
-    trig = _trig(tilts)
-    nx, ny, nz = torque_free_force(trig, torque_entries(trig, ratio), ratio)
+    nx, ny, nz = torque_free_force(tilts, ratio)
     return np.array([nx - x * nz, ny - y * nz])
-
-
-def _trig(tilts: Any) -> Any:
-    """`sines_and_cosines` for real or complex angles."""
-    return tuple(np.stack([np.sin(tilts), np.cos(tilts)], axis=1).ravel())
 
 
 def _jacobian(function: Callable[[Any], Any], point: Floats) -> Floats:

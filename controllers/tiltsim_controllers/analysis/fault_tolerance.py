@@ -33,10 +33,10 @@ import numpy as np
 from tiltsim_controllers.analysis.singularity import force_matrix, torque_matrix
 from tiltsim_controllers.laws.full_pose import input_matrix
 from tiltsim_controllers.mathematics.scalar import Floats, Quad
-from tiltsim_controllers.vehicle.effectiveness import cross_table
+from tiltsim_controllers.vehicle.body import ROTORS
+from tiltsim_controllers.vehicle.cross import cross_table
 from tiltsim_controllers.vehicle.parameters import SPIN, Vehicle, drag_ratio
 from tiltsim_controllers.vehicle.rotors import rotors_in
-from tiltsim_controllers.vehicle.states import ROTORS
 
 BALANCED: Final = 1e-9
 """Torque, in units of ``L m g``, that counts as zero."""
@@ -145,7 +145,7 @@ def fixed_tilt_hover(
     """The hover with fixed tilts and a fault; None if there is none.
 
     Rotors do not turn backwards. Without a fault it is the torque-free input of
-    `tiltsim_controllers.vehicle.decoupling_matrix`, unless a rotor would have to reverse.
+    `tiltsim_controllers.vehicle.cross`, unless a rotor would have to reverse.
 
     Args:
         tilts: rad

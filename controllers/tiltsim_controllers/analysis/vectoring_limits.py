@@ -15,13 +15,15 @@ import numpy as np
 
 from tiltsim_controllers.laws.full_pose import pose_rank
 from tiltsim_controllers.mathematics.scalar import Floats, Values
-from tiltsim_controllers.vehicle.effectiveness import (
+from tiltsim_controllers.vehicle.rotors import (
     ROTOR_FLOATS,
     SPIN_SIGN,
+    by_tilt,
     force_and_torque,
+    rotors_in,
     tilt_of_rotor,
+    wrench_slope,
 )
-from tiltsim_controllers.vehicle.rotors import by_tilt, rotors_in, wrench_slope
 
 SIDE_SHARE: Final = 0.65
 """Share of the greatest thrusts that side force may take."""

@@ -9,8 +9,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from tiltsim_controllers.code.noise import WORD, hash_word
-from tiltsim_controllers.code.operations import OPERATIONS
+from tiltsim_controllers.code.operations import OPERATIONS, WORD, hash_word
 from tiltsim_controllers.code.program import Program, operations_of
 from tiltsim_controllers.code.tracing import Block, Expr
 
@@ -139,7 +138,7 @@ class _Evaluation:
         return getattr(self._numpy, ufunc.__name__)(*values)
 
     def _uniform(self, integers: Sequence[Any]) -> Any:
-        """A draw of `tiltsim_controllers.code.noise.uniform`."""
+        """A draw of `tiltsim_controllers.code.operations.uniform`."""
         whole = self._numpy.int64 if self._jax.config.jax_enable_x64 else self._numpy.uint32
         word = whole(0)
         for integer in integers:

@@ -13,7 +13,7 @@ from functools import cache
 from math import factorial
 from typing import Any, Final, NamedTuple
 
-from tiltsim_controllers.code.blocks import take
+from tiltsim_controllers.code.arrays import take
 from tiltsim_controllers.code.lanes import PURE, Lanes
 from tiltsim_controllers.code.program import InputVector, Program, trace_vectors
 from tiltsim_controllers.code.tracing import Number, graph_in_use, make

@@ -50,7 +50,7 @@ define internal <D> @uniform(<D> %seed, <D> %channel, <D> %index) {
   ret <D> %m
 }
 """
-"""`tiltsim_controllers.code.noise.uniform`."""
+"""`tiltsim_controllers.code.operations.uniform`."""
 
 ANY: Final = {
     False: """

@@ -25,7 +25,7 @@ class Expr:
     Attributes:
         op: Its operation: a name of `OPERATIONS`; "in" for an input; "take" for an entry of a
             vector; "branch", "loop", "get" and "phi" for blocks, see
-            `tiltsim_controllers.code.blocks`.
+            `tiltsim_controllers.code.arrays`.
         args: Arguments of the operation: symbolic numbers, floats or bools.
         number: Its place in the graph.
         blocks: Operations within it.

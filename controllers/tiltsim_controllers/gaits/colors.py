@@ -1,9 +1,31 @@
-"""The colors of the Two Color Map (ch. 6 to 8, 12): tilt angles that two of them determine."""
+"""The colors of the Two Color Map (ch. 6 to 8, 12), and the red gait nearest to a given one.
+
+Red is the plane ``alpha_3 = alpha_1, alpha_4 = alpha_2``, on which the torque-free force ``n`` is
+vertical for all tilts except on the curve L, where it vanishes
+(`tiltsim_controllers.analysis.two_color_map`). The nearest point of the plane has the means of
+opposite angles. The straight path to it keeps their sums and reduces their differences. Where these
+are below a right angle, ``n_x`` and ``n_y`` only decrease and ``n_z`` only increases: the margin of
+a level vehicle grows along the whole path. With larger differences the path passes a difference of
+a right angle, where ``n`` leans most, so the margin may decrease first; beyond half a revolution
+``n_z`` also decreases, and the path may be singular.
+
+With ``delta = atan(r)``, ``u = alpha_1 - delta`` and ``v = alpha_2 + delta`` the residual on red is
+
+    ``R = 4 cos u cos v (cos delta sin(v - u) - 2 sin delta sin u sin v) / (cos delta sin 2 delta)``
+
+and the squares of the rotor speeds in hover are proportional to ``sin 2v`` (rotors 1 and 3) and
+``-sin 2u`` (rotors 2 and 4). So L, ``cot u - cot v = 2 r``, is not the only boundary: where ``u``
+or ``v`` changes sign two rotors stop, before L is reached. The untilted vehicle lies in the
+quadrant ``u < 0 < v``, which ends in P and does not intersect L. There the nearest point is found
+angle by angle.
+"""
 
 from __future__ import annotations
 
-from math import atan
-from typing import Final
+from math import atan, cos, sin
+from typing import Any, Final
+
+from tiltsim_controllers.code.arrays import traceable, xp
 
 COLORS: Final = ("red", "blue")
 """The colors of the Two Color Map (ch. 6)."""
@@ -36,3 +58,44 @@ def require_color(color: str) -> None:
     """Raise ValueError unless there is a color of this name."""
     if color not in COLORS:
         raise ValueError(f"{color!r} is not a color; choose {', '.join(COLORS)}")
+
+
+@traceable
+def nearest_red_angles(tilts: Any, drag_ratio: Any, clearance: Any) -> Any:
+    """``alpha_1`` and ``alpha_2`` of the red gait nearest to moving tilts.
+
+    Args:
+        tilts: Angles with rates and accelerations (rad, s), shape (4, 3).
+        drag_ratio: ``r = K_m / (L K_f)``.
+        clearance: Distance (rad, below ``delta``) from the sides of the quadrant ``u < 0 < v``,
+            where rotors stop, and from a right angle beyond them, where ``R`` vanishes.
+
+    Returns:
+        Angles, rates and accelerations, at rest on a side, shape (2, 3).
+    """
+    delta = xp.arctan(drag_ratio)
+    near, far = clearance - delta, 0.5 * xp.pi - delta - clearance
+    means = 0.5 * tilts[:2] + 0.5 * tilts[2:]
+    ends = xp.array([[-far, -near], [near, far]])
+    return xp.array([_limited(mean, *limits) for mean, limits in zip(means, ends)])
+
+
+def _limited(mean: Any, low: Any, high: Any) -> Any:
+    """A quantity limited to an interval, at rest on its ends, shape (3,)."""
+    below, above = mean[0] < low, mean[0] > high
+    angle = xp.where(below, low, xp.where(above, high, mean[0]))
+    return xp.hstack([angle, xp.where(below | above, 0.0, mean[1:])])
+
+
+def red_determinant(alpha_1: float, alpha_2: float, drag_ratio: float) -> float:
+    """``R`` on red (ch. 8, Eq. 7) of angles in rad, factored as above; 4 without tilt."""
+    delta = atan(drag_ratio)
+    u, v = alpha_1 - delta, alpha_2 + delta
+    beside_l = cos(delta) * sin(v - u) - 2.0 * sin(delta) * sin(u) * sin(v)
+    return 4.0 * cos(u) * cos(v) * beside_l / (cos(delta) * sin(2.0 * delta))
+
+
+def determinant_at_clearance(clearance: float, drag_ratio: float) -> float:
+    """``R`` at the corner next to P of the region that `nearest_red_angles` allows (rad)."""
+    angle = atan(drag_ratio) - clearance
+    return red_determinant(angle, -angle, drag_ratio)

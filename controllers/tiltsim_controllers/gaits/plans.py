@@ -20,8 +20,7 @@ from numpy.typing import ArrayLike
 from tiltsim_controllers.code.arrays import as_number, is_known, xp
 from tiltsim_controllers.gaits.cat import FOOTFALLS, cat_keyframes
 from tiltsim_controllers.gaits.colors import colored_angles
-from tiltsim_controllers.gaits.motion import planned_tilts
-from tiltsim_controllers.gaits.parameters import (
+from tiltsim_controllers.gaits.motion import (
     CUBIC,
     FIXED,
     HARMONIC,
@@ -30,6 +29,7 @@ from tiltsim_controllers.gaits.parameters import (
     POWERS,
     GaitParameters,
     check_phases,
+    planned_tilts,
 )
 from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.mathematics.splines import spline_knots

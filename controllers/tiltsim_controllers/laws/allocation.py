@@ -29,9 +29,7 @@ from __future__ import annotations
 from math import inf
 from typing import Any, Final, NamedTuple
 
-from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.code.blocks import branch, repeat
-from tiltsim_controllers.code.traceable import traceable
+from tiltsim_controllers.code.arrays import branch, repeat, traceable, xp
 from tiltsim_controllers.mathematics.linear import norm, solved_symmetric
 
 NEGLIGIBLE: Final = 1e-9

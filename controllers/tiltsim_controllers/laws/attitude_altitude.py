@@ -9,11 +9,8 @@ from __future__ import annotations
 
 from typing import Any, Final, Literal
 
-from pydantic import Field
-
-from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.code.traceable import traceable
-from tiltsim_controllers.gaits.parameters import NO_KNOTS, GaitParameters
+from tiltsim_controllers.code.arrays import traceable, xp
+from tiltsim_controllers.gaits.motion import NO_KNOTS, GaitParameters
 from tiltsim_controllers.laws.allocation import RotorRange
 from tiltsim_controllers.laws.feedback import (
     CONVENTIONAL,
@@ -24,16 +21,20 @@ from tiltsim_controllers.laws.feedback import (
     modified_decoupler,
 )
 from tiltsim_controllers.laws.gains import Gains, GivenGains
-from tiltsim_controllers.laws.keys import Keys, record_of
+from tiltsim_controllers.laws.keys import Keys, default, record_of
 from tiltsim_controllers.laws.observed import Seen, Step
 from tiltsim_controllers.laws.supervisor import Supervisor
 from tiltsim_controllers.mathematics.attitude import rotation_matrix, wrapped
 from tiltsim_controllers.mathematics.linear import cross, kernel, solved
 from tiltsim_controllers.references.trajectories import ReferenceParameters, position_reference
-from tiltsim_controllers.vehicle.body import inertia_matrix, inverse_inertia_matrix
+from tiltsim_controllers.vehicle.body import (
+    RotorcraftState,
+    inertia_matrix,
+    inverse_inertia_matrix,
+    state_of,
+)
 from tiltsim_controllers.vehicle.parameters import Vehicle
 from tiltsim_controllers.vehicle.rotors import airframe, rotor_accelerations, wrench_map
-from tiltsim_controllers.vehicle.states import RotorcraftState, state_of
 
 PUBLISHED_DECOUPLING: Final = 0.0
 EXACT_DECOUPLING: Final = 1.0
@@ -48,40 +49,40 @@ ROTORS: Final = (0, 1, 2, 3)
 class AttitudeAltitude(Keys):
     """Keys of `attitude_altitude`, also with feed-forward of the gait (`gait_feedforward`)."""
 
-    law: Literal["attitude_altitude"] = Field(
+    law: Literal["attitude_altitude"] = default(
         "attitude_altitude",
-        description="the four rotor speeds control roll, pitch, yaw and altitude by feedback "
-        "linearization; the tilt angles follow the gait",
+        "the four rotor speeds control roll, pitch, yaw and altitude by feedback linearization; "
+        "the tilt angles follow the gait",
     )
-    decoupling: Literal["published", "exact"] = Field(
+    decoupling: Literal["published", "exact"] = default(
         "published",
-        description="form of the decoupling matrix, which relates rotor accelerations to the third "
-        "derivatives of attitude and altitude: as the thesis prints it, without the factor "
-        "2 |rotor speed| in its attitude rows, or exact; the gains belong to one of the two",
+        "form of the decoupling matrix, which relates rotor accelerations to the third "
+        "derivatives of attitude and altitude: as the thesis prints it, without the factor 2 "
+        "|rotor speed| in its attitude rows, or exact; the gains belong to one of the two",
     )
-    decoupler: Literal["none", "conventional", "modified", "exact"] = Field(
+    decoupler: Literal["none", "conventional", "modified", "exact"] = default(
         "modified",
-        description="how the vehicle leans to control its horizontal position, for which no rotor "
-        "speed is left: conventional leans as a quadrotor does, as if no rotor tilted; modified "
-        "adds the lean that balances the tilted rotors' side force at hover, to first order; exact "
-        "points their whole torque-free force along the desired acceleration; none leaves the "
-        "position free, for reference.type attitude_altitude",
-        examples=["exact"],
+        "how the vehicle leans to control its horizontal position, for which no rotor speed is "
+        "left: conventional leans as a quadrotor does, as if no rotor tilted; modified adds the "
+        "lean that balances the tilted rotors' side force at hover, to first order; exact points "
+        "their whole torque-free force along the desired acceleration; none leaves the position "
+        "free, for reference.type attitude_altitude",
+        "exact",
     )
-    gains: GivenGains = Field(
+    gains: GivenGains = default(
         "ch04",
-        description="a named set, or a table of gains or of poles: ch03 and ch04 are the thesis's, "
-        "for decoupling published; exact and feedforward are for decoupling exact; with the set "
-        "exact a yaw step of 0.39 rad stops a rotor",
+        "a named set, or a table of gains or of poles: ch03 and ch04 are the thesis's, for "
+        "decoupling published; exact and feedforward are for decoupling exact; with the set exact "
+        "a yaw step of 0.39 rad stops a rotor",
     )
-    gait_rate_feedforward: bool = Field(
+    gait_rate_feedforward: bool = default(
         False,
-        description="use the planned tilt rates as well as the angles; needs decoupling and "
-        "decoupler exact, and allows integral action",
+        "use the planned tilt rates as well as the angles; needs decoupling and decoupler exact, "
+        "and allows integral action",
     )
-    rotor_inertia_feedforward: bool = Field(
+    rotor_inertia_feedforward: bool = default(
         False,
-        description="include the gyroscopic torque of the rotors' vehicle.rotor_inertia; needs "
+        "include the gyroscopic torque of the rotors' vehicle.rotor_inertia; needs "
         "gait_rate_feedforward",
     )
 
@@ -141,7 +142,7 @@ def attitude_altitude(seen: Seen, parameters: Any, knots: Any = NO_KNOTS) -> Ste
     singular.
 
     Args:
-        seen: The state has `tiltsim_controllers.vehicle.states.TILTROTOR_FIELDS`; the model's
+        seen: The state has `tiltsim_controllers.vehicle.body.TILTROTOR_FIELDS`; the model's
             angular acceleration is ``I^-1 tau w``.
         parameters: `Parameters`.
         knots: Table data of the reference.

@@ -16,11 +16,9 @@ from dataclasses import replace
 from functools import cache
 from typing import Any, Final, Literal
 
-from pydantic import Field
-
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.laws.allocation import bounded_least_squares, largest
-from tiltsim_controllers.laws.keys import Keys, NonNegative
+from tiltsim_controllers.laws.keys import Keys, NonNegative, default
 from tiltsim_controllers.laws.observed import Command, Observed
 from tiltsim_controllers.mathematics.linear import cross, nearest_solution, norm, solved_symmetric
 from tiltsim_controllers.mathematics.records import make_record_type, vector_of
@@ -40,15 +38,15 @@ SOFTNESS: Final = (1.0, 1.0, 1e-6, 1e-9, 1e-9, 1e-3)
 class Compensating(Keys):
     """Keys of `compensated`."""
 
-    observer: NonNegative = Field(
+    observer: NonNegative = default(
         0.0,
-        description="bandwidth of observers of a disturbing force and torque, which the law then "
-        "counters; 0: none [1/s]",
+        "bandwidth of observers of a disturbing force and torque, which the law then counters; 0: "
+        "none [1/s]",
     )
-    mixer: Literal["plain", "prioritized"] = Field(
+    mixer: Literal["plain", "prioritized"] = default(
         "plain",
-        description="whether thrusts beyond vehicle.min_rotor_speed and max_rotor_speed are cut "
-        "off one by one, or roll and pitch are kept before lift, yaw and side force",
+        "whether thrusts beyond vehicle.min_rotor_speed and max_rotor_speed are cut off one by "
+        "one, or roll and pitch are kept before lift, yaw and side force",
     )
 
 

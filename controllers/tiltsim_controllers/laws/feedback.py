@@ -14,8 +14,7 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.code.traceable import traceable
+from tiltsim_controllers.code.arrays import traceable, xp
 from tiltsim_controllers.mathematics.linear import cross
 from tiltsim_controllers.mathematics.moving import (
     Moving,

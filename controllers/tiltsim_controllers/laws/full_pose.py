@@ -25,10 +25,18 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import Field
 
-from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.code.traceable import traceable
+from tiltsim_controllers.code.arrays import traceable, xp
 from tiltsim_controllers.laws.feedback import body_rate_matrix
-from tiltsim_controllers.laws.keys import GainSets, Keys, NamedGains, Positive, Vector3, record_of
+from tiltsim_controllers.laws.keys import (
+    GainSets,
+    Keys,
+    NamedGains,
+    Positive,
+    Vector3,
+    default,
+    record_of,
+    required,
+)
 from tiltsim_controllers.laws.observed import Failure, Seen, Step, working
 from tiltsim_controllers.mathematics.attitude import attitude_error, rotation_matrix
 from tiltsim_controllers.mathematics.linear import cross, least_norm
@@ -39,31 +47,30 @@ from tiltsim_controllers.references.trajectories import (
     reference_attitude,
     reference_motion,
 )
-from tiltsim_controllers.vehicle.body import Body, angular_acceleration, inertia_matrix
-from tiltsim_controllers.vehicle.effectiveness import TiltOfRotor, tilt_of_rotor
+from tiltsim_controllers.vehicle.body import Body, angular_acceleration, inertia_matrix, state_of
 from tiltsim_controllers.vehicle.rotors import (
     Rotors,
+    TiltOfRotor,
     airframe,
     by_tilt,
     rotor_accelerations,
     rotors_in,
+    tilt_of_rotor,
     wrench_map,
     wrench_slope,
 )
-from tiltsim_controllers.vehicle.states import state_of
 
 
 class FullPoseGainTable(Keys):
     """Explicit gains of full-pose control."""
 
-    position: Vector3 = Field(
-        description="on the errors of acceleration, velocity and position [1/s, 1/s^2, 1/s^3]",
-        examples=[[750.0, 1875.0, 1562.0]],
+    position: Vector3 = required(
+        "on the errors of acceleration, velocity and position [1/s, 1/s^2, 1/s^3]",
+        [750.0, 1875.0, 1562.0],
     )
-    attitude: Vector3 = Field(
-        description="on the errors of angular acceleration, body rates and attitude "
-        "[1/s, 1/s^2, 1/s^3]",
-        examples=[[750.0, 1500.0, 2577.0]],
+    attitude: Vector3 = required(
+        "on the errors of angular acceleration, body rates and attitude [1/s, 1/s^2, 1/s^3]",
+        [750.0, 1500.0, 2577.0],
     )
 
 
@@ -81,23 +88,23 @@ class FullPose(Keys):
 
     gain_sets: ClassVar[GainSets] = {"gains": GAIN_SETS}
 
-    law: Literal["full_pose"] = Field(
-        description="position and attitude independently: the law commands the tilt angles as "
-        "well, of the tiltrotor or of a multirotor whose rotors and tilts move six outputs"
+    law: Literal["full_pose"] = required(
+        "position and attitude independently: the law commands the tilt angles as well, of the "
+        "tiltrotor or of a multirotor whose rotors and tilts move six outputs"
     )
-    gains: NamedGains[Literal["ch03"], FullPoseGainTable] = Field(
-        "ch03", description="a set by name, or a table of gains; ch03 is the thesis's author's"
+    gains: NamedGains[Literal["ch03"], FullPoseGainTable] = default(
+        "ch03", "a set by name, or a table of gains; ch03 is the thesis's author's"
     )
-    tilt_weight: Literal["even", "published"] = Field(
+    tilt_weight: Literal["even", "published"] = default(
         "even",
-        description="how tilt rates count against rotor accelerations in the least-norm solution: "
-        "even by the force that they change, published by number, which turns the rotors fast",
+        "how tilt rates count against rotor accelerations in the least-norm solution: even by the "
+        "force that they change, published by number, which turns the rotors fast",
     )
-    max_tilt_rate: Positive | None = Field(
-        None, description="limit enforced by the law; default: none [rad/s]", examples=[5.0]
+    max_tilt_rate: Positive | None = default(
+        None, "limit enforced by the law; default: none [rad/s]", 5.0
     )
-    max_tilt_angle: Annotated[float, Field(gt=0.0, le=pi)] | None = Field(
-        None, description="limit enforced by the law; default: none [rad]", examples=[1.0]
+    max_tilt_angle: Annotated[float, Field(gt=0.0, le=pi)] | None = default(
+        None, "limit enforced by the law; default: none [rad]", 1.0
     )
 
 
@@ -220,7 +227,7 @@ def pose_rank(table: Sequence[float], tilts: ArrayLike, w: ArrayLike) -> int:
     """How many of the six outputs the inputs move independently.
 
     Args:
-        table: Table of the rotors, see `tiltsim_controllers.vehicle.effectiveness`.
+        table: Table of the rotors, see `tiltsim_controllers.vehicle.rotors`.
         tilts: rad, shape (M,).
         w: ``varpi |varpi|`` of each rotor, of any unit, 0 for one that is not used, shape (N,).
     """

@@ -8,7 +8,16 @@ from typing import Annotated, Any, Final, Literal, NamedTuple
 from pydantic import ConfigDict, Discriminator, Field, Tag
 
 from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.laws.keys import Gains2, Keys, NonNegative, Positive, Vector3, gain_kind
+from tiltsim_controllers.laws.keys import (
+    Gains2,
+    Keys,
+    NonNegative,
+    Positive,
+    Vector3,
+    default,
+    gain_kind,
+    required,
+)
 
 
 class Gains(NamedTuple):
@@ -108,46 +117,39 @@ def gains_from_poles(
 class GainTable(Keys):
     """Explicit gains; see `tiltsim_controllers.laws.gains.gains_from_rows`."""
 
-    attitude: Annotated[tuple[Vector3, Vector3, Vector3], Field(strict=False)] = Field(
-        description="diagonals of K_P1, K_P2 and K_P3, each roll, pitch, yaw: on the errors of "
-        "angular acceleration, rate and angle [1/s, 1/s^2, 1/s^3]",
-        examples=[[[40, 40, 40], [600, 600, 600], [4000, 4000, 4000]]],
+    attitude: Annotated[tuple[Vector3, Vector3, Vector3], Field(strict=False)] = required(
+        "diagonals of K_P1, K_P2 and K_P3, each roll, pitch, yaw: on the errors of angular "
+        "acceleration, rate and angle [1/s, 1/s^2, 1/s^3]",
+        [[40, 40, 40], [600, 600, 600], [4000, 4000, 4000]],
     )
-    altitude: Vector3 = Field(
-        description="K_PZ1, K_PZ2, K_PZ3: on the errors of vertical acceleration, velocity and "
-        "altitude [1/s, 1/s^2, 1/s^3]",
-        examples=[[10.0, 15.0, 10.0]],
+    altitude: Vector3 = required(
+        "K_PZ1, K_PZ2, K_PZ3: on the errors of vertical acceleration, velocity and altitude [1/s, "
+        "1/s^2, 1/s^3]",
+        [10.0, 15.0, 10.0],
     )
-    position: Gains2 = Field(
-        (1.0, 1.0),
-        description="K_X1, K_X2: on the errors of horizontal velocity and position [1/s, 1/s^2]",
+    position: Gains2 = default(
+        (1.0, 1.0), "K_X1, K_X2: on the errors of horizontal velocity and position [1/s, 1/s^2]"
     )
 
 
 class PoleTable(Keys):
     """The poles of one closed loop: a pair, and for third order a real one at its bandwidth."""
 
-    bandwidth: Positive = Field(description="natural frequency [rad/s]", examples=[10.0])
-    damping: Positive = Field(1.0, description="damping ratio of the pair [-]", examples=[0.7])
+    bandwidth: Positive = required("natural frequency [rad/s]", 10.0)
+    damping: Positive = default(1.0, "damping ratio of the pair [-]", 0.7)
 
     @property
     def poles(self) -> Poles:
         """The poles as `gains_from_poles` takes them."""
-        return Poles(self.bandwidth, self.damping)
+        return Poles(**dict(self))
 
 
 class IntegralPoleTable(PoleTable):
     """The poles of a loop that may have integral action."""
 
-    integral: NonNegative = Field(
-        0.0,
-        description="pole of integral action; 0 disables it; needs gait_rate_feedforward [rad/s]",
-        examples=[0.5],
+    integral: NonNegative = default(
+        0.0, "pole of integral action; 0 disables it; needs gait_rate_feedforward [rad/s]", 0.5
     )
-
-    @property
-    def poles(self) -> Poles:
-        return Poles(self.bandwidth, self.damping, self.integral)
 
 
 class PolePlacementTable(Keys):
@@ -159,11 +161,11 @@ class PolePlacementTable(Keys):
         }
     )
 
-    attitude: PoleTable = Field(description="the loops of roll and pitch")
-    yaw: PoleTable | None = Field(None, description="the loop of yaw; default: as attitude")
-    altitude: IntegralPoleTable = Field(description="the loop of the altitude")
-    position: IntegralPoleTable = Field(
-        IntegralPoleTable(bandwidth=1.0, damping=0.5), description="the loops of x and y"
+    attitude: PoleTable = required("the loops of roll and pitch")
+    yaw: PoleTable | None = default(None, "the loop of yaw; default: as attitude")
+    altitude: IntegralPoleTable = required("the loop of the altitude")
+    position: IntegralPoleTable = default(
+        IntegralPoleTable(bandwidth=1.0, damping=0.5), "the loops of x and y"
     )
 
     def resolve(self) -> tuple[Gains, IntegralGains]:

@@ -10,9 +10,14 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any, Final
 
-from tiltsim_controllers.code.traceable import traceable
-from tiltsim_controllers.gaits.motion import anticipated_tilts, planned_tilts
-from tiltsim_controllers.gaits.parameters import FIXED, NO_KNOTS, GaitParameters
+from tiltsim_controllers.code.arrays import traceable
+from tiltsim_controllers.gaits.motion import (
+    FIXED,
+    NO_KNOTS,
+    GaitParameters,
+    anticipated_tilts,
+    planned_tilts,
+)
 from tiltsim_controllers.laws.allocation import RotorRange, limited_accelerations
 from tiltsim_controllers.laws.attitude_altitude import OPTIONS, AttitudeAltitude
 from tiltsim_controllers.laws.feedback import NONE
@@ -24,10 +29,9 @@ from tiltsim_controllers.laws.observed import Seen, Step
 from tiltsim_controllers.laws.supervised_vehicles import SUPERVISION, multirotor_supervision_of
 from tiltsim_controllers.laws.supervisor import Supervision, Supervisor, gait_time
 from tiltsim_controllers.references.trajectories import ReferenceParameters
-from tiltsim_controllers.vehicle.effectiveness import TiltOfRotor, tilts_of
+from tiltsim_controllers.vehicle.body import PITCH, ROLL, state_of
 from tiltsim_controllers.vehicle.parameters import Vehicle
-from tiltsim_controllers.vehicle.rotors import airframe
-from tiltsim_controllers.vehicle.states import PITCH, ROLL, state_of
+from tiltsim_controllers.vehicle.rotors import TiltOfRotor, airframe, tilts_of
 
 Parameters = record_of(
     AttitudeAltitude,

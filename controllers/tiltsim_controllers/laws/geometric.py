@@ -10,10 +10,8 @@ from __future__ import annotations
 
 from typing import Any, Literal
 
-from pydantic import Field
-
 from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.laws.keys import Keys, Positive
+from tiltsim_controllers.laws.keys import Keys, Positive, default, required
 from tiltsim_controllers.laws.observed import Command, Observed
 from tiltsim_controllers.laws.outer_loop import (
     UP,
@@ -34,22 +32,20 @@ from tiltsim_controllers.mathematics.linear import cross
 class Geometric(Keys):
     """Keys of `geometric` and `geometric_with_tilts`."""
 
-    law: Literal["geometric"] = Field(
-        description="tracking control on SE(3) (Lee et al. 2010), from any attitude; force and "
-        "torque are allocated to the rotors, or to rotors and tilts (Kamel et al. 2018)"
+    law: Literal["geometric"] = required(
+        "tracking control on SE(3) (Lee et al. 2010), from any attitude; force and torque are "
+        "allocated to the rotors, or to rotors and tilts (Kamel et al. 2018)"
     )
-    position_bandwidth: Positive = Field(
-        2.0, description="natural frequency of the position's error [rad/s]"
-    )
-    position_damping: Positive = Field(1.0, description="its damping ratio [-]")
-    attitude_bandwidth: Positive = Field(
+    position_bandwidth: Positive = default(2.0, "natural frequency of the position's error [rad/s]")
+    position_damping: Positive = default(1.0, "its damping ratio [-]")
+    attitude_bandwidth: Positive = default(
         10.0,
-        description="natural frequency of a small error of attitude, about an axis of the mean "
-        "moment of inertia [rad/s]",
+        "natural frequency of a small error of attitude, about an axis of the mean moment of "
+        "inertia [rad/s]",
     )
-    attitude_damping: Positive = Field(1.0, description="its damping ratio [-]")
-    max_acceleration: Positive = Field(
-        1e9, description="largest acceleration that the feedback of position demands [m/s^2]"
+    attitude_damping: Positive = default(1.0, "its damping ratio [-]")
+    max_acceleration: Positive = default(
+        1e9, "largest acceleration that the feedback of position demands [m/s^2]"
     )
 
 

@@ -15,10 +15,8 @@ from __future__ import annotations
 
 from typing import Any, Literal
 
-from pydantic import Field
-
 from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.laws.keys import Keys, Positive
+from tiltsim_controllers.laws.keys import Keys, Positive, default, required
 from tiltsim_controllers.laws.observed import Command, Observed
 from tiltsim_controllers.laws.outer_loop import (
     allocated_thrusts,
@@ -33,23 +31,23 @@ from tiltsim_controllers.mathematics.attitude import attitude_error
 class Indi(Keys):
     """Keys of `indi`."""
 
-    law: Literal["indi"] = Field(
-        description="incremental nonlinear dynamic inversion of the attitude (Smeur et al. 2016), "
-        "with filtered rates and thrusts"
+    law: Literal["indi"] = required(
+        "incremental nonlinear dynamic inversion of the attitude (Smeur et al. 2016), with "
+        "filtered rates and thrusts"
     )
-    position_bandwidth: Positive = Field(
-        2.0, description="natural frequency of the position's error, critically damped [rad/s]"
+    position_bandwidth: Positive = default(
+        2.0, "natural frequency of the position's error, critically damped [rad/s]"
     )
-    attitude_gain: Positive = Field(9.0, description="rates demanded per error of attitude [1/s]")
-    rate_gain: Positive = Field(
-        27.0, description="angular acceleration demanded per error of the rates [1/s]"
+    attitude_gain: Positive = default(9.0, "rates demanded per error of attitude [1/s]")
+    rate_gain: Positive = default(
+        27.0, "angular acceleration demanded per error of the rates [1/s]"
     )
-    filter_frequency: Positive = Field(
-        50.0, description="natural frequency of the filter of rates and thrusts [rad/s]"
+    filter_frequency: Positive = default(
+        50.0, "natural frequency of the filter of rates and thrusts [rad/s]"
     )
-    filter_damping: Positive = Field(0.55, description="its damping ratio [-]")
-    max_acceleration: Positive = Field(
-        5.0, description="largest acceleration that the feedback of position demands [m/s^2]"
+    filter_damping: Positive = default(0.55, "its damping ratio [-]")
+    max_acceleration: Positive = default(
+        5.0, "largest acceleration that the feedback of position demands [m/s^2]"
     )
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cache
-from math import inf
+from math import inf, pi
 from types import NoneType, UnionType
 from typing import Annotated, Any, ClassVar, Final, Literal, TypeVar, Union, get_args, get_origin
 
@@ -21,6 +21,9 @@ Positive = Annotated[float, Field(gt=0.0, le=1e9)]
 NonNegative = Annotated[float, Field(ge=0.0, le=1e9)]
 Coordinate = Annotated[float, Field(ge=-1e6, le=1e6)]
 Vector3 = Annotated[tuple[Coordinate, Coordinate, Coordinate], Field(strict=False)]
+Angle = Annotated[float, Field(ge=-pi, le=pi)]
+Angles3 = Annotated[tuple[Angle, Angle, Angle], Field(strict=False)]
+Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,30}$")]
 _Item = TypeVar("_Item")
 Many = Annotated[tuple[_Item, ...], Field(strict=False)]
 ZEROS: Final = (0.0, 0.0, 0.0)

@@ -13,9 +13,8 @@ from typing import Any, Final, Literal, NamedTuple
 
 from pydantic import Field
 
-from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.code.blocks import take_row
-from tiltsim_controllers.laws.keys import Keys, NonNegative, Positive
+from tiltsim_controllers.code.arrays import take_row, xp
+from tiltsim_controllers.laws.keys import Keys, NonNegative, Positive, default, required
 from tiltsim_controllers.laws.observed import Command, Observed
 from tiltsim_controllers.laws.outer_loop import UP, pointing_attitude, tracking_errors
 from tiltsim_controllers.mathematics.attitude import attitude_error, rotation_matrix
@@ -28,15 +27,15 @@ BODY: Final = 12
 class Lqr(Keys):
     """Keys of the design."""
 
-    law: Literal["lqr"] = Field(
-        description="linear-quadratic regulator about hover with fixed tilts, or with gains that "
-        "repeat with a moving gait about its orbit; weights are one over the square of an "
-        "acceptable deviation (Bryson's rule)"
+    law: Literal["lqr"] = required(
+        "linear-quadratic regulator about hover with fixed tilts, or with gains that repeat with "
+        "a moving gait about its orbit; weights are one over the square of an acceptable "
+        "deviation (Bryson's rule)"
     )
-    position_error: Positive = Field(0.5, description="acceptable [m]")
-    velocity_error: Positive = Field(1.0, description="acceptable [m/s]")
-    attitude_error: Positive = Field(0.3, description="acceptable [rad]")
-    rate_error: Positive = Field(3.0, description="acceptable [rad/s]")
+    position_error: Positive = default(0.5, "acceptable [m]")
+    velocity_error: Positive = default(1.0, "acceptable [m/s]")
+    attitude_error: Positive = default(0.3, "acceptable [rad]")
+    rate_error: Positive = default(3.0, "acceptable [rad/s]")
     thrust_change: NonNegative = Field(
         0.3, gt=0.0, description="acceptable, of every rotor, as a part of its thrust in hover [-]"
     )

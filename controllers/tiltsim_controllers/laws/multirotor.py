@@ -42,8 +42,7 @@ from __future__ import annotations
 
 from typing import Any, Final, NamedTuple
 
-from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.code.traceable import traceable
+from tiltsim_controllers.code.arrays import traceable, xp
 from tiltsim_controllers.laws.attitude_altitude import PUBLISHED_DECOUPLING
 from tiltsim_controllers.laws.feedback import NONE, attitude_motion, swept
 from tiltsim_controllers.laws.force_directions import (
@@ -71,10 +70,18 @@ from tiltsim_controllers.mathematics.attitude import rotation_matrix
 from tiltsim_controllers.mathematics.linear import cross, nearest_solution
 from tiltsim_controllers.mathematics.moving import Moving, at_rest, stacked
 from tiltsim_controllers.references.trajectories import POSES, reference_attitude, reference_motion
-from tiltsim_controllers.vehicle.body import angular_acceleration, torque_rate
-from tiltsim_controllers.vehicle.effectiveness import TiltOfRotor
-from tiltsim_controllers.vehicle.rotors import airframe, moving_wrench_map, rotor_accelerations
-from tiltsim_controllers.vehicle.states import RotorcraftState, state_of
+from tiltsim_controllers.vehicle.body import (
+    RotorcraftState,
+    angular_acceleration,
+    state_of,
+    torque_rate,
+)
+from tiltsim_controllers.vehicle.rotors import (
+    TiltOfRotor,
+    airframe,
+    moving_wrench_map,
+    rotor_accelerations,
+)
 
 NULL_PART: Final = "null_part"
 """A signal: the share of the rotors' ``varpi |varpi|`` that neither force nor torque show."""

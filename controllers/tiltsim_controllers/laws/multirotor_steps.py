@@ -8,7 +8,7 @@ from typing import Annotated, Any, Final, Literal, NamedTuple
 from pydantic import Field
 
 from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.gaits.parameters import GaitParameters
+from tiltsim_controllers.gaits.motion import GaitParameters
 from tiltsim_controllers.laws.allocation import RotorRange
 from tiltsim_controllers.laws.feedback import (
     CONVENTIONAL,
@@ -25,16 +25,16 @@ from tiltsim_controllers.laws.feedback import (
     position_feedback,
 )
 from tiltsim_controllers.laws.gains import Gains, GivenGains, IntegralGains
-from tiltsim_controllers.laws.keys import Keys, NonNegative, Vector3, record_of
+from tiltsim_controllers.laws.keys import Keys, NonNegative, Vector3, default, record_of, required
 from tiltsim_controllers.laws.observed import Failure
 from tiltsim_controllers.laws.supervised_vehicles import Watched
 from tiltsim_controllers.laws.supervisor import Supervisor
 from tiltsim_controllers.mathematics.attitude import attitude_error, rotation_matrix, wrapped
 from tiltsim_controllers.mathematics.linear import cross
 from tiltsim_controllers.mathematics.moving import Moving, at_rest, cosine, sine, stacked, value_of
+from tiltsim_controllers.mathematics.records import vector_of
 from tiltsim_controllers.references.trajectories import ReferenceParameters
-from tiltsim_controllers.vehicle.body import Body
-from tiltsim_controllers.vehicle.states import RotorcraftState
+from tiltsim_controllers.vehicle.body import Body, RotorcraftState
 
 ROTATION: Final = 0.0
 """An error of attitude: the rotation that remains, which has no singular pitch."""
@@ -69,14 +69,6 @@ class Form(NamedTuple):
     spin: bool = False  # whether it takes along the angular momentum of the rotors
 
 
-class Direction(NamedTuple):
-    """A vector in body axes."""
-
-    x: float = 0.0
-    y: float = 0.0
-    z: float = 0.0
-
-
 RESTORING: Final = 0.5
 """1/s, the default where rotor speeds would drift."""
 
@@ -84,59 +76,57 @@ RESTORING: Final = 0.5
 class AttitudeForce(Keys):
     """Keys of the law."""
 
-    law: Literal["attitude_force"] = Field(
-        description="feedback linearization of a multirotor: its rotor speeds control the attitude "
-        "and as many components of the force as it has; the tilt angles follow the gait"
+    law: Literal["attitude_force"] = required(
+        "feedback linearization of a multirotor: its rotor speeds control the attitude and as "
+        "many components of the force as it has; the tilt angles follow the gait"
     )
-    dimension: Annotated[int, Field(ge=1, le=3)] | None = Field(
+    dimension: Annotated[int, Field(ge=1, le=3)] | None = default(
         None,
-        description="how many components of the force are controlled beside the attitude: 1, lift; "
-        "2, one sideways, too, of a vehicle with three that along its x axis; 3, all, so that the "
+        "how many components of the force are controlled beside the attitude: 1, lift; 2, one "
+        "sideways, too, of a vehicle with three that along its x axis; 3, all, so that the "
         "vehicle need not lean; default: as many as the vehicle has at all angles of its gait [-]",
-        examples=[1],
+        1,
     )
-    decoupler: Literal["none", "conventional", "modified", "exact"] = Field(
+    decoupler: Literal["none", "conventional", "modified", "exact"] = default(
         "exact",
-        description="how the vehicle leans to control what its side force leaves of the horizontal "
-        "position: as for the tiltrotor; other than exact needs dimension 1 [-]",
+        "how the vehicle leans to control what its side force leaves of the horizontal position: "
+        "as for the tiltrotor; other than exact needs dimension 1 [-]",
     )
-    decoupling: Literal["published", "exact"] = Field(
+    decoupling: Literal["published", "exact"] = default(
         "exact",
-        description="form of the decoupling matrix; published lacks the factor 2 |rotor speed| in "
-        "its attitude rows, as the thesis prints it for the tiltrotor",
+        "form of the decoupling matrix; published lacks the factor 2 |rotor speed| in its "
+        "attitude rows, as the thesis prints it for the tiltrotor",
     )
-    attitude_error: Literal["rotation", "euler_angles"] = Field(
+    attitude_error: Literal["rotation", "euler_angles"] = default(
         "rotation",
-        description="what the attitude's error is: the rotation that remains, without any singular "
-        "attitude, or roll, pitch and yaw, as in the thesis",
+        "what the attitude's error is: the rotation that remains, without any singular attitude, "
+        "or roll, pitch and yaw, as in the thesis",
     )
-    gains: GivenGains = Field("exact", description="a named set, or a table of gains or of poles")
-    side_gains: Vector3 = Field(
+    gains: GivenGains = default("exact", "a named set, or a table of gains or of poles")
+    side_gains: Vector3 = default(
         (12.0, 48.0, 64.0),
-        description="on the errors of acceleration, velocity and position along directions that "
-        "side force moves [1/s, 1/s^2, 1/s^3]",
+        "on the errors of acceleration, velocity and position along directions that side force "
+        "moves [1/s, 1/s^2, 1/s^3]",
     )
-    norm: Literal["speed", "thrust"] = Field(
+    norm: Literal["speed", "thrust"] = default(
         "speed",
-        description="of all rotor accelerations that do the same, those of least norm: of the "
-        "accelerations themselves, for rotors that turn one way, or of the rates of thrust, for "
-        "rotors that reverse",
+        "of all rotor accelerations that do the same, those of least norm: of the accelerations "
+        "themselves, for rotors that turn one way, or of the rates of thrust, for rotors that "
+        "reverse",
     )
-    slowest_rotor: NonNegative = Field(
-        5.0,
-        description="speed below which norm = thrust accelerates a rotor as if it were that fast "
-        "[rad/s]",
+    slowest_rotor: NonNegative = default(
+        5.0, "speed below which norm = thrust accelerates a rotor as if it were that fast [rad/s]"
     )
-    restoring: NonNegative | None = Field(
+    restoring: NonNegative | None = default(
         None,
-        description="rate toward the rotor speeds of least power among those that do the same, "
+        "rate toward the rotor speeds of least power among those that do the same, "
         "with norm = thrust to those whose thrusts have the least sum of squares; default: "
         f"{RESTORING:g} where they would drift, which is with moving tilts and more rotors than "
         "outputs, else 0 [1/s]",
-        examples=[0.5],
+        0.5,
     )
-    turn_time: NonNegative = Field(
-        0.0, description="time in which the reference of roll and pitch is reached, smoothly [s]"
+    turn_time: NonNegative = default(
+        0.0, "time in which the reference of roll and pitch is reached, smoothly [s]"
     )
 
 
@@ -160,8 +150,8 @@ Parameters = record_of(
     supervisor=Supervisor,
     watched=Watched,
     watched_without=Watched,  # once the failed rotor is known
-    upper_side=Direction,  # of the force with which it lifts, if it has two; else 0
-    upper_side_without=Direction,  # once the failed rotor is known
+    upper_side=vector_of(3),  # body axes, of the force with which it lifts, if it has two; else 0
+    upper_side_without=vector_of(3),  # once the failed rotor is known
 )
 """Parameters of the law: its keys and these."""
 

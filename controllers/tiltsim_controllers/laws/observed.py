@@ -25,7 +25,7 @@ class Seen(NamedTuple):
     """The measured state of a vehicle, and the states of its controller."""
 
     time: Any  # s
-    state: Any  # `tiltsim_controllers.vehicle.states.RotorcraftState` in one vector
+    state: Any  # `tiltsim_controllers.vehicle.body.RotorcraftState` in one vector
     tilt_rates: Any = np.zeros(0)  # (M,), rad/s
     states: Any = np.zeros(0)  # (S,), of the controller
     measured: Any = None  # (3,), angular acceleration, rad/s^2, body axes; None: by the law's model

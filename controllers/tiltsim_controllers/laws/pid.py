@@ -9,10 +9,8 @@ from __future__ import annotations
 
 from typing import Final, Literal
 
-from pydantic import Field
-
 from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.laws.keys import Gains2, Keys, Positive, Vector3
+from tiltsim_controllers.laws.keys import Gains2, Keys, Positive, Vector3, default, required
 from tiltsim_controllers.laws.observed import Command, Observed
 from tiltsim_controllers.laws.outer_loop import (
     allocated_thrusts,
@@ -34,30 +32,25 @@ STATES: Final = {
 class Pid(Keys):
     """Keys of `pid`."""
 
-    law: Literal["pid"] = Field(
-        description="cascade: position (P), velocity (PI), attitude (P) and rates (PID)"
+    law: Literal["pid"] = required(
+        "cascade: position (P), velocity (PI), attitude (P) and rates (PID)"
     )
-    position_gain: Positive = Field(
-        1.0, description="velocity demanded per error of position [1/s]"
+    position_gain: Positive = default(1.0, "velocity demanded per error of position [1/s]")
+    max_speed: Positive = default(3.0, "largest velocity that the error of position demands [m/s]")
+    velocity_gains: Gains2 = default(
+        (3.0, 0.9), "acceleration demanded per error of velocity and per its integral [1/s, 1/s^2]"
     )
-    max_speed: Positive = Field(
-        3.0, description="largest velocity that the error of position demands [m/s]"
+    max_acceleration: Positive = default(
+        5.0, "largest acceleration that the feedback demands [m/s^2]"
     )
-    velocity_gains: Gains2 = Field(
-        (3.0, 0.9),
-        description="acceleration demanded per error of velocity and per its integral [1/s, 1/s^2]",
-    )
-    max_acceleration: Positive = Field(
-        5.0, description="largest acceleration that the feedback demands [m/s^2]"
-    )
-    attitude_gain: Positive = Field(9.0, description="rates demanded per error of attitude [1/s]")
-    rate_gains: Vector3 = Field(
+    attitude_gain: Positive = default(9.0, "rates demanded per error of attitude [1/s]")
+    rate_gains: Vector3 = default(
         (27.0, 72.9, 0.1),
-        description="angular acceleration demanded per error of the rates, per its integral, and "
-        "per minus the derivative of the rates [1/s, 1/s^2, 1]",
+        "angular acceleration demanded per error of the rates, per its integral, and per minus "
+        "the derivative of the rates [1/s, 1/s^2, 1]",
     )
-    derivative_filter: Positive = Field(
-        100.0, description="of the rates whose derivative is taken, a lag of first order [1/s]"
+    derivative_filter: Positive = default(
+        100.0, "of the rates whose derivative is taken, a lag of first order [1/s]"
     )
 
 

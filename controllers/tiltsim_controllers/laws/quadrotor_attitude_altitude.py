@@ -9,11 +9,17 @@ from __future__ import annotations
 
 from typing import Any, ClassVar, Final, Literal
 
-from pydantic import Field
-
 from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.gaits.parameters import NO_KNOTS
-from tiltsim_controllers.laws.keys import Gains2, GainSets, Keys, NamedGains, record_of
+from tiltsim_controllers.gaits.motion import NO_KNOTS
+from tiltsim_controllers.laws.keys import (
+    Gains2,
+    GainSets,
+    Keys,
+    NamedGains,
+    default,
+    record_of,
+    required,
+)
 from tiltsim_controllers.laws.yaw_position import gyroscopic_acceleration, moments_of
 from tiltsim_controllers.mathematics.attitude import euler_rates, wrapped
 from tiltsim_controllers.references.trajectories import ReferenceParameters, reference_motion
@@ -23,13 +29,11 @@ from tiltsim_controllers.vehicle.parameters import Vehicle
 class QuadrotorAttitudeGainTable(Keys):
     """Explicit gains of the quadrotor's attitude-altitude control."""
 
-    altitude: Gains2 = Field(
-        description="on the errors of vertical velocity and altitude [1/s, 1/s^2]",
-        examples=[[10.0, 10.0]],
+    altitude: Gains2 = required(
+        "on the errors of vertical velocity and altitude [1/s, 1/s^2]", [10.0, 10.0]
     )
-    attitude: Gains2 = Field(
-        description="on the errors of the rates and of roll, pitch and yaw [1/s, 1/s^2]",
-        examples=[[10.0, 10.0]],
+    attitude: Gains2 = required(
+        "on the errors of the rates and of roll, pitch and yaw [1/s, 1/s^2]", [10.0, 10.0]
     )
 
 
@@ -46,12 +50,10 @@ class QuadrotorAttitudeAltitude(Keys):
 
     gain_sets: ClassVar[GainSets] = {"gains": GAIN_SETS}
 
-    law: Literal["quadrotor_attitude_altitude"] = Field(
-        description="the quadrotor's thrust and three torques control attitude and altitude"
+    law: Literal["quadrotor_attitude_altitude"] = required(
+        "the quadrotor's thrust and three torques control attitude and altitude"
     )
-    gains: QuadrotorAttitudeGains = Field(
-        "ch02", description="the thesis's set, or a table of gains"
-    )
+    gains: QuadrotorAttitudeGains = default("ch02", "the thesis's set, or a table of gains")
 
 
 Parameters = record_of(QuadrotorAttitudeAltitude, vehicle=Vehicle, reference=ReferenceParameters)
@@ -71,7 +73,7 @@ def attitude_altitude_inputs(
 
     Args:
         time: s
-        state: Begins with `tiltsim_controllers.vehicle.states.BODY_FIELDS`, shape (12,).
+        state: Begins with `tiltsim_controllers.vehicle.body.BODY_FIELDS`, shape (12,).
         vehicle, gains: The quadrotor and its gains.
         reference, knots: Altitude, roll, pitch and yaw, the angles constant.
     """

@@ -22,24 +22,25 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.code.traceable import traceable
-from tiltsim_controllers.gaits.parameters import NO_KNOTS
-from tiltsim_controllers.gaits.red_gait import nearest_red_angles
+from tiltsim_controllers.code.arrays import traceable, xp
+from tiltsim_controllers.gaits.colors import nearest_red_angles
+from tiltsim_controllers.gaits.motion import NO_KNOTS
 from tiltsim_controllers.laws.force_directions import factors, share
 from tiltsim_controllers.laws.supervisor import UNTILTED, Supervision, Supervisor, WayBack
 from tiltsim_controllers.mathematics.linear import norm
 from tiltsim_controllers.mathematics.moving import Moving
+from tiltsim_controllers.mathematics.records import Vector3
 from tiltsim_controllers.mathematics.scalar import Triple
-from tiltsim_controllers.vehicle.decoupling_matrix import torque_entries, torque_free_force
-from tiltsim_controllers.vehicle.effectiveness import (
+from tiltsim_controllers.vehicle.cross import torque_free_force
+from tiltsim_controllers.vehicle.parameters import drag_ratio
+from tiltsim_controllers.vehicle.rotors import (
     TiltOfRotor,
     force_and_torque,
+    rotors_in,
     tilt_of_rotor,
     tilts_of,
+    wrench_map,
 )
-from tiltsim_controllers.vehicle.parameters import drag_ratio
-from tiltsim_controllers.vehicle.rotors import rotors_in, wrench_map
 
 
 class Watched(NamedTuple):
@@ -47,9 +48,7 @@ class Watched(NamedTuple):
 
     rotors: float = 0.0  # where in the knots the table of the rotors begins
     per_volume: float = 0.0  # of the determinant, 1 / (N^3 m^3) and units of the speeds
-    side_x: float = 0.0  # of the torque-free force that points up, if it has two; else zero
-    side_y: float = 0.0
-    side_z: float = 0.0
+    side: Vector3 = (0.0, 0.0, 0.0)  # of the torque-free force that points up, if it has two
 
 
 def untilted_volume(table: Sequence[float]) -> float:
@@ -63,7 +62,7 @@ def untilted_volume(table: Sequence[float]) -> float:
 
 def watched(table: Sequence[float], rotors: int, side: Triple) -> Watched:
     """Parameters of a vehicle whose table begins at an index of the knots."""
-    return Watched(float(rotors), UNTILTED / untilted_volume(table), *side)
+    return Watched(float(rotors), UNTILTED / untilted_volume(table), side)
 
 
 @traceable
@@ -116,8 +115,7 @@ def multirotor_supervision_of(
         regular = size > 0.0
         margin = _margin(up, direction, dimension)
         if dimension == 1:
-            side = xp.array([vehicle.side_x, vehicle.side_y, vehicle.side_z])
-            sign = xp.where(units[3] @ (side @ force) < 0.0, -1.0, 1.0)
+            sign = xp.where(units[3] @ (vehicle.side @ force) < 0.0, -1.0, 1.0)
             margin, size = sign * margin, sign * size
         return (
             xp.where(regular, margin, 0.0),
@@ -142,8 +140,7 @@ def assess(tilts: Any, up: Any, drag_ratio: Any, knots: Any = NO_KNOTS) -> tuple
         drag_ratio: ``r = K_m / (L K_f)``.
         knots: Not used here.
     """
-    trig = tuple(xp.array([xp.sin(tilts), xp.cos(tilts)]).T.ravel())
-    n = xp.array([*torque_free_force(trig, torque_entries(trig, drag_ratio), drag_ratio)])
+    n = torque_free_force(tilts, drag_ratio)
     along, length = n @ up, norm(n)
     exists = length != 0.0
     sine = xp.where(exists, along / xp.where(exists, length, 1.0), 0.0)

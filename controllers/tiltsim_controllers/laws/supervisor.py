@@ -31,11 +31,8 @@ from collections.abc import Callable
 from math import inf, pi
 from typing import Any, Final, NamedTuple
 
-from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.code.blocks import branch, repeat
-from tiltsim_controllers.code.traceable import traceable
-from tiltsim_controllers.gaits.motion import planned_tilts
-from tiltsim_controllers.gaits.parameters import NO_KNOTS, GaitParameters
+from tiltsim_controllers.code.arrays import branch, repeat, traceable, xp
+from tiltsim_controllers.gaits.motion import NO_KNOTS, GaitParameters, planned_tilts
 from tiltsim_controllers.mathematics.attitude import rotation_matrix
 from tiltsim_controllers.mathematics.linear import cross
 

@@ -14,14 +14,22 @@ from __future__ import annotations
 
 from typing import Any, ClassVar, Final, Literal
 
-from pydantic import ConfigDict, Field
+from pydantic import ConfigDict
 
 import tiltsim_controllers.laws.quadrotor_attitude_altitude as attitude_altitude
 import tiltsim_controllers.laws.yaw_position as yaw_position
-from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.code.blocks import branch
-from tiltsim_controllers.gaits.parameters import NO_KNOTS
-from tiltsim_controllers.laws.keys import Gains2, GainSets, Keys, Positive, choice, record_of
+from tiltsim_controllers.code.arrays import branch, xp
+from tiltsim_controllers.gaits.motion import NO_KNOTS
+from tiltsim_controllers.laws.keys import (
+    Gains2,
+    GainSets,
+    Keys,
+    Positive,
+    choice,
+    default,
+    record_of,
+    required,
+)
 from tiltsim_controllers.laws.quadrotor_attitude_altitude import (
     QuadrotorAttitudeGains,
     attitude_altitude_inputs,
@@ -47,10 +55,8 @@ class ZoneTable(Keys):
 
     model_config = ConfigDict(json_schema_extra={"examples": [{"roll": [-1.57, 0.2]}]})
 
-    roll: Gains2 = Field(
-        PUBLISHED_ROLL, description="smallest and largest roll [rad]", examples=[[-1.57, 0.2]]
-    )
-    pitch: Gains2 = Field(PUBLISHED_PITCH, description="smallest and largest pitch [rad]")
+    roll: Gains2 = default(PUBLISHED_ROLL, "smallest and largest roll [rad]", [-1.57, 0.2])
+    pitch: Gains2 = default(PUBLISHED_PITCH, "smallest and largest pitch [rad]")
 
 
 PUBLISHED_ZONE: Final = ZoneTable()
@@ -64,25 +70,23 @@ class Switching(Keys):
         "attitude_gains": attitude_altitude.GAIN_SETS,
     }
 
-    law: Literal["switching"] = Field(
-        description="yaw_position, and quadrotor_attitude_altitude while the attitude is in a zone"
+    law: Literal["switching"] = required(
+        "yaw_position, and quadrotor_attitude_altitude while the attitude is in a zone"
     )
-    gains: YawPositionGains = Field(
-        "stable", description=f"of the yaw-position law: {YAW_POSITION_GAINS}"
+    gains: YawPositionGains = default("stable", f"of the yaw-position law: {YAW_POSITION_GAINS}")
+    attitude_gains: QuadrotorAttitudeGains = default(
+        "ch02", "of the attitude-altitude law: the thesis's set, or a table of gains"
     )
-    attitude_gains: QuadrotorAttitudeGains = Field(
-        "ch02", description="of the attitude-altitude law: the thesis's set, or a table of gains"
+    zone: ZoneTable = default(
+        ZoneTable(), "the attitudes at which the attitude-altitude law is active"
     )
-    zone: ZoneTable = Field(
-        ZoneTable(), description="the attitudes at which the attitude-altitude law is active"
-    )
-    extension: Literal["bumpless", "held", "running"] = Field(
+    extension: Literal["bumpless", "held", "running"] = default(
         "bumpless",
-        description="the yaw-position law's own states, thrust and its rate, while the other law "
-        "is active: bumpless follows the actual thrust, held stops them, running goes on",
+        "the yaw-position law's own states, thrust and its rate, while the other law is active: "
+        "bumpless follows the actual thrust, held stops them, running goes on",
     )
-    extension_rate: Positive = Field(
-        100.0, description="rate at which bumpless states converge to the actual thrust [1/s]"
+    extension_rate: Positive = default(
+        100.0, "rate at which bumpless states converge to the actual thrust [1/s]"
     )
 
 
@@ -106,7 +110,7 @@ def attitude_altitude_thrust_rate(
 
     Args:
         time: s
-        state: Begins with `tiltsim_controllers.vehicle.states.BODY_FIELDS`, shape (12,).
+        state: Begins with `tiltsim_controllers.vehicle.body.BODY_FIELDS`, shape (12,).
         thrust: N
         p: `Parameters`.
         knots: Table data of the reference.
@@ -127,7 +131,7 @@ def switching_inputs(time: Any, state: Any, p: Any, knots: Any = NO_KNOTS) -> An
 
     Args:
         time: s
-        state: `tiltsim_controllers.vehicle.states.EXTENDED_QUADROTOR_FIELDS`, shape (14,).
+        state: `tiltsim_controllers.vehicle.body.EXTENDED_QUADROTOR_FIELDS`, shape (14,).
         p: `Parameters`.
         knots: Table data of the reference.
     """

@@ -10,12 +10,10 @@ from __future__ import annotations
 
 from typing import Any, Literal
 
-from pydantic import Field
-
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.laws.allocation import bounded_least_squares
 from tiltsim_controllers.laws.force_directions import torque_free_force
-from tiltsim_controllers.laws.keys import Keys, NonNegative, Positive
+from tiltsim_controllers.laws.keys import Keys, NonNegative, Positive, default, required
 from tiltsim_controllers.laws.observed import Command, Observed
 from tiltsim_controllers.laws.vectoring_state import (
     Ahead,
@@ -38,47 +36,41 @@ UP = (0.0, 0.0, 1.0)
 class Vectoring(Keys):
     """Keys of `vectoring`."""
 
-    law: Literal["vectoring"] = Field(
-        description="one law for every rotorcraft: observers of disturbances, prediction over "
-        "latency and lag, braking curves, allocation within limits; rotors and, with tilts = "
-        "free, tilts"
+    law: Literal["vectoring"] = required(
+        "one law for every rotorcraft: observers of disturbances, prediction over latency and "
+        "lag, braking curves, allocation within limits; rotors and, with tilts = free, tilts"
     )
-    position_bandwidth: Positive | None = Field(
+    position_bandwidth: Positive | None = default(
         None,
-        description="natural frequency of the position's error; default: a share of "
-        "attitude_bandwidth [rad/s]",
-        examples=[3.0],
-    )
-    attitude_bandwidth: Positive | None = Field(
-        None,
-        description="natural frequency of the attitude's error; default: what the lag of rotors, "
-        "latency and control period leave [rad/s]",
-        examples=[12.0],
-    )
-    observer: NonNegative = Field(
-        1.0,
-        description="bandwidth of the observers of force and torque over the designed one; 0: no "
-        "observers [-]",
-    )
-    lead: Positive = Field(
+        "natural frequency of the position's error; default: a share of attitude_bandwidth [rad/s]",
         3.0,
-        description="how much faster than a rotor's lag its thrust follows, by commands beyond [-]",
     )
-    restoring: NonNegative = Field(
+    attitude_bandwidth: Positive | None = default(
+        None,
+        "natural frequency of the attitude's error; default: what the lag of rotors, latency and "
+        "control period leave [rad/s]",
+        12.0,
+    )
+    observer: NonNegative = default(
+        1.0,
+        "bandwidth of the observers of force and torque over the designed one; 0: no observers [-]",
+    )
+    lead: Positive = default(
+        3.0, "how much faster than a rotor's lag its thrust follows, by commands beyond [-]"
+    )
+    restoring: NonNegative = default(
         8.0,
-        description="rate at which thrusts and tilts that no output sees return to the least and "
-        "to the preferred ones [1/s]",
+        "rate at which thrusts and tilts that no output sees return to the least and to the "
+        "preferred ones [1/s]",
     )
-    prediction: bool = Field(
-        True, description="predict the state over latency, control period and lag of the rotors"
+    prediction: bool = default(
+        True, "predict the state over latency, control period and lag of the rotors"
     )
-    lag_model: bool = Field(True, description="account for vehicle.rotor_time_constant")
-    bounded: bool = Field(
-        True, description="allocate within the limits of rotors and tilts; false: clip"
-    )
-    max_tilt_rate: Positive = Field(8.0, description="of tilts that the law commands [rad/s]")
-    max_tilt: Positive = Field(
-        0.7, description="of tilts that the law commands, from the preferred ones [rad]"
+    lag_model: bool = default(True, "account for vehicle.rotor_time_constant")
+    bounded: bool = default(True, "allocate within the limits of rotors and tilts; false: clip")
+    max_tilt_rate: Positive = default(8.0, "of tilts that the law commands [rad/s]")
+    max_tilt: Positive = default(
+        0.7, "of tilts that the law commands, from the preferred ones [rad]"
     )
 
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.code.blocks import repeat, take_row
+from tiltsim_controllers.code.arrays import repeat, take_row, xp
 from tiltsim_controllers.laws.observed import Failure, Observed, working
 from tiltsim_controllers.laws.vectoring_steps import Frame, Motion, moved, turn_by
 from tiltsim_controllers.mathematics.attitude import (

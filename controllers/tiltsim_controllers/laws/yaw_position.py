@@ -7,7 +7,7 @@ the position four times (Eqs. 1-28).
 
 The thrust acts along the body's third axis ``b = R e3``. Its derivatives, ``b' = R (omega x e3)``
 and ``b'' = R (omega x (omega x e3) + omega' x e3)``, give the decoupling matrix in closed form; its
-determinant is in `tiltsim_controllers.analysis.quadrotor_singularity`. The axes are ours, z up; ch.
+determinant is in `tiltsim_controllers.analysis.singularity`. The axes are ours, z up; ch.
 2's have z down, which changes the signs of y and z, of pitch and yaw and of their torques.
 """
 
@@ -15,11 +15,18 @@ from __future__ import annotations
 
 from typing import Any, ClassVar, Final, Literal
 
-from pydantic import Field
-
 from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.gaits.parameters import NO_KNOTS
-from tiltsim_controllers.laws.keys import Gains2, Gains4, GainSets, Keys, NamedGains, record_of
+from tiltsim_controllers.gaits.motion import NO_KNOTS
+from tiltsim_controllers.laws.keys import (
+    Gains2,
+    Gains4,
+    GainSets,
+    Keys,
+    NamedGains,
+    default,
+    record_of,
+    required,
+)
 from tiltsim_controllers.mathematics.attitude import euler_rates, rotation_matrix, wrapped
 from tiltsim_controllers.mathematics.linear import cross
 from tiltsim_controllers.references.trajectories import ReferenceParameters, reference_motion
@@ -29,14 +36,12 @@ from tiltsim_controllers.vehicle.parameters import Vehicle
 class YawPositionGainTable(Keys):
     """Explicit gains of yaw-position control."""
 
-    position: Gains4 = Field(
-        description="k_1 to k_4, on the errors of jerk, acceleration, velocity and position "
-        "[1/s, 1/s^2, 1/s^3, 1/s^4]",
-        examples=[[10.0, 37.5, 62.5, 39.0625]],
+    position: Gains4 = required(
+        "k_1 to k_4, on the errors of jerk, acceleration, velocity and position [1/s, 1/s^2, "
+        "1/s^3, 1/s^4]",
+        [10.0, 37.5, 62.5, 39.0625],
     )
-    yaw: Gains2 = Field(
-        (5.0, 5.0), description="on the errors of the yaw rate and of yaw [1/s, 1/s^2]"
-    )
+    yaw: Gains2 = default((5.0, 5.0), "on the errors of the yaw rate and of yaw [1/s, 1/s^2]")
 
 
 Gains = record_of(YawPositionGainTable)
@@ -61,10 +66,10 @@ class YawPosition(Keys):
 
     gain_sets: ClassVar[GainSets] = {"gains": GAIN_SETS}
 
-    law: Literal["yaw_position"] = Field(
-        description="the quadrotor's thrust and three torques control position and yaw"
+    law: Literal["yaw_position"] = required(
+        "the quadrotor's thrust and three torques control position and yaw"
     )
-    gains: YawPositionGains = Field("stable", description=YAW_POSITION_GAINS)
+    gains: YawPositionGains = default("stable", YAW_POSITION_GAINS)
 
 
 Parameters = record_of(YawPosition, vehicle=Vehicle, reference=ReferenceParameters)
@@ -90,7 +95,7 @@ def drift(state: Any, vehicle: Vehicle) -> Any:
     """``Ma`` of ch. 2, Eq. (20): the derivatives of the outputs at zero input.
 
     Args:
-        state: `tiltsim_controllers.vehicle.states.EXTENDED_QUADROTOR_FIELDS`, shape (14,).
+        state: `tiltsim_controllers.vehicle.body.EXTENDED_QUADROTOR_FIELDS`, shape (14,).
         vehicle: That flies.
 
     Returns:
@@ -136,7 +141,7 @@ def yaw_position_inputs(time: Any, state: Any, p: Any, knots: Any = NO_KNOTS) ->
 
     Args:
         time: s
-        state: `tiltsim_controllers.vehicle.states.EXTENDED_QUADROTOR_FIELDS`, shape (14,).
+        state: `tiltsim_controllers.vehicle.body.EXTENDED_QUADROTOR_FIELDS`, shape (14,).
         p: `Parameters`, or the parameters of `switching`.
         knots: Table data of the reference.
     """

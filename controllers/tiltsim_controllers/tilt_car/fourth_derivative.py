@@ -14,10 +14,17 @@ from __future__ import annotations
 
 from typing import Any, ClassVar, Final, Literal
 
-from pydantic import Field
-
 from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.laws.keys import Gains4, GainSets, Keys, NamedGains, choice, record_of
+from tiltsim_controllers.laws.keys import (
+    Gains4,
+    GainSets,
+    Keys,
+    NamedGains,
+    choice,
+    default,
+    record_of,
+    required,
+)
 from tiltsim_controllers.references.trajectories import ReferenceParameters, reference_motion
 from tiltsim_controllers.tilt_car.third_derivative import minimum_norm
 from tiltsim_controllers.tilt_car.vehicle import (
@@ -40,22 +47,19 @@ class FourthDerivative(Keys):
 
     gain_sets: ClassVar[GainSets] = {"gains": GAIN_SETS}
 
-    law: Literal["tilt_car_fourth_derivative"] = Field(
-        description="the tilt-car's rotor speeds and tilt control the fourth derivative of x and y"
+    law: Literal["tilt_car_fourth_derivative"] = required(
+        "the tilt-car's rotor speeds and tilt control the fourth derivative of x and y"
     )
-    decoupling: Literal["published", "exact"] = Field(
+    decoupling: Literal["published", "exact"] = default(
         "exact",
-        description="effect of the tilt in the decoupling matrix: as published, or with the yaw's "
-        "reaction",
+        "effect of the tilt in the decoupling matrix: as published, or with the yaw's reaction",
     )
-    anti_windup: bool = Field(
-        False, description="stop the rotor speeds that the law integrates at zero"
-    )
-    gains: NamedGains[Literal["ch10"], Gains4] = Field(
+    anti_windup: bool = default(False, "stop the rotor speeds that the law integrates at zero")
+    gains: NamedGains[Literal["ch10"], Gains4] = default(
         "ch10",
-        description="poles at -3, or four gains on the errors of jerk, acceleration, velocity and "
-        "position [1/s, 1/s^2, 1/s^3, 1/s^4]",
-        examples=[[12.0, 54.0, 108.0, 81.0]],
+        "poles at -3, or four gains on the errors of jerk, acceleration, velocity and position "
+        "[1/s, 1/s^2, 1/s^3, 1/s^4]",
+        [12.0, 54.0, 108.0, 81.0],
     )
 
 

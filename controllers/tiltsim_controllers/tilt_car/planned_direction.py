@@ -9,11 +9,17 @@ from __future__ import annotations
 
 from typing import Any, ClassVar, Final, Literal
 
-from pydantic import Field
-
 from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.gaits.parameters import GaitParameters
-from tiltsim_controllers.laws.keys import Gains2, GainSets, Keys, NamedGains, record_of
+from tiltsim_controllers.gaits.motion import GaitParameters
+from tiltsim_controllers.laws.keys import (
+    Gains2,
+    GainSets,
+    Keys,
+    NamedGains,
+    default,
+    record_of,
+    required,
+)
 from tiltsim_controllers.references.trajectories import ReferenceParameters, reference_motion
 from tiltsim_controllers.tilt_car.vehicle import TiltCar, rotation, squared_speeds
 
@@ -21,13 +27,11 @@ from tiltsim_controllers.tilt_car.vehicle import TiltCar, rotation, squared_spee
 class PlannedDirectionGainTable(Keys):
     """Explicit gains of the planned-direction law."""
 
-    x: Gains2 = Field(
-        description="K_X1, K_X2, on the errors of velocity and position along x [1/s, 1/s^2]",
-        examples=[[12.0, 6.0]],
+    x: Gains2 = required(
+        "K_X1, K_X2, on the errors of velocity and position along x [1/s, 1/s^2]", [12.0, 6.0]
     )
-    y: Gains2 = Field(
-        description="K_Y1, K_Y2, on the errors of velocity and position along y [1/s, 1/s^2]",
-        examples=[[9.0, 18.0]],
+    y: Gains2 = required(
+        "K_Y1, K_Y2, on the errors of velocity and position along y [1/s, 1/s^2]", [9.0, 18.0]
     )
 
 
@@ -47,12 +51,11 @@ class PlannedDirection(Keys):
 
     gain_sets: ClassVar[GainSets] = {"gains": GAIN_SETS}
 
-    law: Literal["tilt_car_planned_direction"] = Field(
-        description="the tilt-car's rotor speeds control x and y; the tilt follows the gait"
+    law: Literal["tilt_car_planned_direction"] = required(
+        "the tilt-car's rotor speeds control x and y; the tilt follows the gait"
     )
-    gains: NamedGains[Literal["ch10", "ch11"], PlannedDirectionGainTable] = Field(
-        "ch11",
-        description="ch11 is the thesis's set, ch10 has its poles at -2; or a table of gains",
+    gains: NamedGains[Literal["ch10", "ch11"], PlannedDirectionGainTable] = default(
+        "ch11", "ch11 is the thesis's set, ch10 has its poles at -2; or a table of gains"
     )
 
 

@@ -2,15 +2,13 @@
 
 Three inputs, the rates of both rotor speeds and of the tilt angle, determine two outputs, the third
 derivatives of the position. The controller takes the shortest of all solutions (`minimum_norm`,
-Eq. 12), which makes its states drift (`tiltsim_controllers.tilt_car.state_drift`). Optionally a
+Eq. 12), which makes its states drift (`tiltsim_controllers.tilt_car.cycles`). Optionally a
 restoring rate in the null space turns the thrusts' bisector back toward the acceleration.
 """
 
 from __future__ import annotations
 
 from typing import Any, ClassVar, Final, Literal
-
-from pydantic import Field
 
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.laws.keys import (
@@ -19,7 +17,9 @@ from tiltsim_controllers.laws.keys import (
     NamedGains,
     NonNegative,
     Vector3,
+    default,
     record_of,
+    required,
 )
 from tiltsim_controllers.references.trajectories import ReferenceParameters, reference_motion
 from tiltsim_controllers.tilt_car.vehicle import (
@@ -42,20 +42,19 @@ class ThirdDerivative(Keys):
 
     gain_sets: ClassVar[GainSets] = {"gains": GAIN_SETS}
 
-    law: Literal["tilt_car_third_derivative"] = Field(
-        description="the tilt-car's rotor speeds and tilt control the third derivative of x and y"
+    law: Literal["tilt_car_third_derivative"] = required(
+        "the tilt-car's rotor speeds and tilt control the third derivative of x and y"
     )
-    gains: NamedGains[Literal["ch10"], Vector3] = Field(
+    gains: NamedGains[Literal["ch10"], Vector3] = default(
         "ch10",
-        description="poles at -2, or three gains on the errors of acceleration, velocity and "
-        "position [1/s, 1/s^2, 1/s^3]",
-        examples=[[6.0, 12.0, 8.0]],
+        "poles at -2, or three gains on the errors of acceleration, velocity and position [1/s, "
+        "1/s^2, 1/s^3]",
+        [6.0, 12.0, 8.0],
     )
-    restoring_rate: NonNegative = Field(
+    restoring_rate: NonNegative = default(
         0.0,
-        description="rate of turning the mean thrust direction toward the acceleration; "
-        "0 as published [1/s]",
-        examples=[1.0],
+        "rate of turning the mean thrust direction toward the acceleration; 0 as published [1/s]",
+        1.0,
     )
 
 

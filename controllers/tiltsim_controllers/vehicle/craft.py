@@ -2,6 +2,12 @@
 
 The cross of the thesis (ch. 3) is a table of rotors whose entries are mostly constants; a traced
 program has no operation for an entry that is zero.
+
+The thesis neglects the rotors' own spin inertia. A rotor of inertia ``J_r`` about its axis ``d_i``,
+the thrust axis, has the angular momentum ``J_r varpi_i d_i`` beyond the part that turns with its
+pod. Its rate acts on the vehicle with the torque ``-d/dt sum_i J_r varpi_i d_i - omega x sum_i J_r
+varpi_i d_i``, and across the pod's hinge on its servo. All sums here are per unit of ``J_r``, in
+body axes.
 """
 
 from __future__ import annotations
@@ -12,21 +18,34 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from tiltsim_controllers.code.arrays import xp
+from tiltsim_controllers.code.arrays import traceable, xp
 from tiltsim_controllers.mathematics.linear import cross
 from tiltsim_controllers.mathematics.records import make_record_type, vector_of
 from tiltsim_controllers.mathematics.scalar import Values
-from tiltsim_controllers.vehicle.body import Body, principal_body
-from tiltsim_controllers.vehicle.effectiveness import (
-    ARMS,
+from tiltsim_controllers.vehicle.body import (
+    BODY_STATES,
+    Body,
+    RigidState,
+    accelerations,
+    joined,
+    principal_body,
+    rigid_state,
+    rotation_rate,
+)
+from tiltsim_controllers.vehicle.cross import ARMS, cross_table
+from tiltsim_controllers.vehicle.parameters import Vehicle
+from tiltsim_controllers.vehicle.rotors import (
     ROTOR_FLOATS,
     Rotor,
+    Rotors,
     TiltOfRotor,
-    cross_table,
+    of_rotors,
+    of_tilts,
+    rotors_in,
+    turned,
     turning_parts,
+    wrench_map,
 )
-from tiltsim_controllers.vehicle.parameters import Vehicle
-from tiltsim_controllers.vehicle.rotors import Rotors, rotors_in, turned
 
 
 class Craft(NamedTuple):
@@ -167,3 +186,80 @@ def wrench_of_lift(craft: Craft, tilts: Any, lifts: Any) -> Any:
     """
     axes = thrust_axes(craft, tilts)
     return xp.hstack([axes @ lifts, cross(places(craft, tilts), axes) @ lifts])
+
+
+def spin_torque(
+    craft: Craft, tilts: Any, tilt_rates: Any, speeds: Any, accelerations: Any, omega: Any
+) -> Any:
+    """The torque on the vehicle per unit of spin inertia, rad/s^2, shape (3,).
+
+    Args:
+        craft: N rotors on M pods.
+        tilts, tilt_rates: rad and rad/s, shape (M,).
+        speeds, accelerations: Signed, rad/s and rad/s^2, shape (N,).
+        omega: Body rates, rad/s, shape (3,).
+    """
+    axes, slopes = thrust_axes(craft, tilts), axis_slopes(craft, tilts)
+    tilting = slopes @ (of_rotors(craft.rotors, tilt_rates) * speeds)
+    return -(axes @ accelerations) - tilting - cross(omega, axes @ speeds)
+
+
+def hinge_torques(craft: Craft, tilts: Any, speeds: Any, accelerations: Any, omega: Any) -> Any:
+    """The torques on the pods about their hinges per unit of spin inertia, rad/s^2, shape (M,).
+
+    Each is the sum of ``varpi_i omega . d d_i / d alpha - varpi_i' a . d_i`` over the rotors of a
+    pod, with its hinge along ``a``.
+
+    Args:
+        craft: N rotors on M pods.
+        tilts: rad, shape (M,).
+        speeds, accelerations: Signed, rad/s and rad/s^2, shape (N,).
+        omega: Body rates, rad/s, shape (3,).
+    """
+    gyroscopic = speeds * (omega @ axis_slopes(craft, tilts))
+    return of_tilts(craft.rotors, gyroscopic - craft.along_hinges * accelerations)
+
+
+def accelerations_within_limits(
+    spins: Any, speeds: Any, demanded: Any, min_speed: Any, max_speed: Any
+) -> Any:
+    """The accelerations (rad/s^2) that rotors have: none beyond a speed limit.
+
+    Args:
+        spins: Signs of the speeds, shape (N,).
+        speeds, demanded: Signed, rad/s and rad/s^2, shape (N,).
+        min_speed, max_speed: Limits along the spin, rad/s.
+    """
+    along, faster = spins * speeds, spins * demanded
+    stops = ((along >= max_speed) & (faster > 0.0)) | ((along <= min_speed) & (faster < 0.0))
+    return xp.where(stops, 0.0, demanded)
+
+
+@traceable
+def equations_of_motion(
+    state: Any,
+    tilts: Any,
+    inputs: Any,
+    body: Body,
+    rotors: Rotors,
+    disturbance: Any,
+    gyroscopic: float,
+) -> Any:
+    """Derivative of a state of a vehicle with massless pods (ch. 3, Eqs. 1-7), (18 + N,).
+
+    Args:
+        state: `BODY_STATES` numbers and N rotor speeds, rad/s, shape (18 + N + any,).
+        tilts: rad, shape (M,).
+        inputs: Rotor accelerations, rad/s^2, shape (N + any,).
+        body: Body of the vehicle.
+        rotors: Its N rotors.
+        disturbance: An acceleration unknown to the controller, m/s^2, world axes, shape (3,).
+        gyroscopic: Factor of the gyroscopic torque, 1 or 0.
+    """
+    count = len(rotors.tilt_of_rotor)
+    motion, speeds = rigid_state(state), state[BODY_STATES : BODY_STATES + count]
+    wrench = wrench_map(rotors, tilts) @ (speeds * abs(speeds))
+    _, velocity, rotation, omega = motion
+    moved = accelerations(body, rotation, omega, wrench, disturbance, gyroscopic)
+    rates = RigidState(velocity, moved[0], rotation_rate(rotation, omega), moved[1])
+    return joined((*rates, inputs[:count]))

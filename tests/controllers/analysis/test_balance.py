@@ -11,12 +11,7 @@ from hypothesis import strategies as st
 from scipy.optimize import minimize
 
 from tiltsim_controllers.analysis.balance import balanced_gait
-from tiltsim_controllers.vehicle.decoupling_matrix import (
-    sines_and_cosines,
-    torque_entries,
-    torque_free_force,
-    torque_free_inputs,
-)
+from tiltsim_controllers.vehicle.cross import cross_torque, torque_free_force, torque_free_inputs
 from tiltsim_controllers.vehicle.parameters import PRESETS, SPIN, drag_ratio
 
 AR_DRONE = PRESETS["ar_drone_2"]
@@ -32,15 +27,14 @@ def rotor_loads(tilts, vehicle):
 
     Negative where a rotor would have to turn backwards. NaN where tau is rank-deficient.
     """
-    entries = torque_entries(sines_and_cosines(*tilts), drag_ratio(vehicle))
-    inputs = np.array(torque_free_inputs(entries)) * SPIN
+    torque = cross_torque(np.array(tilts), drag_ratio(vehicle))
+    inputs = torque_free_inputs(torque) * SPIN
     total = inputs.sum()
     return 4.0 * inputs / total if total != 0.0 else np.full(4, np.nan)
 
 
 def force(tilts, vehicle):
-    trig, ratio = sines_and_cosines(*tilts), drag_ratio(vehicle)
-    return np.array(torque_free_force(trig, torque_entries(trig, ratio), ratio))
+    return torque_free_force(np.array(tilts), drag_ratio(vehicle))
 
 
 def levers(tilts, vehicle):

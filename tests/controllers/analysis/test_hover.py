@@ -17,7 +17,7 @@ from tiltsim_controllers.analysis.attainable import (
 )
 from tiltsim_controllers.analysis.fault_tolerance import fixed_tilt_hover
 from tiltsim_controllers.analysis.hover import RESERVE, hover, rotor_losses
-from tiltsim_controllers.analysis.statics import hover_rotor_speeds
+from tiltsim_controllers.analysis.singularity import hover_rotor_speeds
 from tiltsim_controllers.vehicle.parameters import PRESETS
 
 WEIGHT, THRUST, FASTEST = 15.0, 8.5e-6, 838.0

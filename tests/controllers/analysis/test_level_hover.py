@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from tiltsim_controllers.analysis.balance import balanced_gait
-from tiltsim_controllers.analysis.level_hover import BALANCED, RESERVE, level_hover
-from tiltsim_controllers.vehicle.effectiveness import force_and_torque, rotor_entries
+from tiltsim_controllers.analysis.hover import BALANCED, LEVEL_RESERVE, level_hover
 from tiltsim_controllers.vehicle.parameters import PRESETS
+from tiltsim_controllers.vehicle.rotors import force_and_torque, rotor_entries
 
 AR_DRONE = PRESETS["ar_drone_2"]
 WIDE = 1e6
@@ -47,7 +47,7 @@ def test_the_tilts_balance_and_every_rotor_keeps_its_reserve(rotors, acceleratio
     weight = np.linalg.norm(force)
     np.testing.assert_allclose(made, force, atol=10.0 * BALANCED * weight)
     np.testing.assert_allclose(torque, 0.0, atol=10.0 * BALANCED * weight * AR_DRONE.arm_length)
-    least = RESERVE * weight / AR_DRONE.thrust_coefficient / rotors
+    least = LEVEL_RESERVE * weight / AR_DRONE.thrust_coefficient / rotors
     assert np.abs(w).min() > 0.999999 * least
     if acceleration == (0.0, 0.0, 0.0):
         np.testing.assert_allclose(tilts, 0.0, atol=1e-6)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import sympy
 
-from tiltsim_controllers.analysis.quadrotor_singularity import (
+from tiltsim_controllers.analysis.singularity import (
     exact_determinant,
     normalized_determinant,
     published_determinant,

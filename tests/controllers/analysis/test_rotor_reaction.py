@@ -7,14 +7,14 @@ from math import exp, inf
 import numpy as np
 import pytest
 
-from tiltsim_controllers.analysis.rotor_reaction import (
+from tiltsim_controllers.analysis.stability import (
     attitude_feedback,
     largest_held_gain,
     reaction_gains,
 )
 from tiltsim_controllers.laws.attitude_altitude import EXACT_DECOUPLING
 from tiltsim_controllers.laws.gains import GAIN_SETS
-from tiltsim_controllers.vehicle.effectiveness import cross_table
+from tiltsim_controllers.vehicle.cross import cross_table
 from tiltsim_controllers.vehicle.parameters import PRESETS
 
 

@@ -6,7 +6,6 @@ import itertools
 
 import numpy as np
 import pytest
-import sympy
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -19,16 +18,11 @@ from tiltsim_controllers.analysis.singularity import (
     residuals,
     singular_values,
     singularity_margin,
-    tilt_trigonometry,
     torque_free_direction,
     torque_matrix,
     world_up,
 )
-from tiltsim_controllers.vehicle.decoupling_matrix import (
-    torque_entries,
-    torque_free_force,
-    torque_free_inputs,
-)
+from tiltsim_controllers.vehicle.cross import cross_torque, torque_free_inputs
 from tiltsim_controllers.vehicle.parameters import PRESETS, Vehicle, drag_ratio
 
 AR_DRONE = PRESETS["ar_drone_2"]
@@ -103,7 +97,7 @@ def test_torque_and_force_matrices_are_the_published_ones() -> None:
 @given(gaits)
 def test_torque_free_inputs_are_the_minors_of_tau(angles) -> None:
     """Their norm is the product of the singular values, which spares looking for these."""
-    inputs = torque_free_inputs(torque_entries(tilt_trigonometry(angles), drag_ratio(AR_DRONE)))
+    inputs = torque_free_inputs(cross_torque(np.array(angles), drag_ratio(AR_DRONE)))
     product = singular_values(angles, AR_DRONE).prod()
     assert np.linalg.norm(inputs) == pytest.approx(product, rel=1e-9, abs=1e-14)
 
@@ -231,26 +225,16 @@ CH12_SCALE = 1.025
 
 
 def expand(vehicle: Vehicle) -> list[dict[str, float]]:
-    """Coefficients of the sixteen products in R, R_phi, R_theta, by exact expansion."""
-    sines, cosines = sympy.symbols("s1:5"), sympy.symbols("c1:5")
-    trig = tuple(itertools.chain.from_iterable(zip(sines, cosines, strict=True)))
-    ratio = sympy.Float(drag_ratio(vehicle), 30)
-    nx, ny, nz = torque_free_force(trig, torque_entries(trig, ratio), ratio)
+    """Coefficients of the sixteen products in R, R_phi, R_theta, which are linear in each product.
+
+    Each product is 1 at one corner of {0, pi/2}^4 and 0 at all others.
+    """
+    names = ["".join(letters) for letters in itertools.product("cs", repeat=4)]
+    corners = [[0.0 if letter == "c" else np.pi / 2 for letter in name] for name in names]
     tables = []
-    for part in (nz, ny, -nx):
-        # c^2 + s^2 = 1 has been used by the thesis; every product holds one factor per rotor.
-        expanded = sympy.expand(part)
-        for sine, cosine in zip(sines, cosines, strict=True):
-            expanded = sympy.expand(expanded.subs(sine**2, 1 - cosine**2))
-        polynomial = sympy.Poly(expanded, *sines, *cosines)
-        table = {}
-        for powers, coefficient in polynomial.terms():
-            if abs(coefficient) < 1e-12:
-                continue
-            name = "".join("s" if powers[i] else "c" for i in range(4))
-            assert all(powers[i] + powers[4 + i] == 1 for i in range(4)), powers
-            table[name] = float(coefficient)
-        tables.append(table)
+    for part in residuals(corners, vehicle):
+        pairs = zip(names, part.tolist(), strict=True)
+        tables.append({name: value for name, value in pairs if abs(value) > 1e-12})
     return tables
 
 

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from tests.statics import hover_attitude
 from tests.thesis import force_matrix, torque_matrix
-from tiltsim_controllers.analysis.statics import hover_rotor_speeds
+from tiltsim_controllers.analysis.singularity import hover_rotor_speeds
 from tiltsim_controllers.vehicle.parameters import PRESETS, SPIN, drag_ratio
 
 VEHICLE = PRESETS["ar_drone_2"]

@@ -7,9 +7,11 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from tiltsim_controllers.analysis.singularity import determinant, residuals, torque_free_direction
-from tiltsim_controllers.analysis.unacceptable_attitudes import (
+from tiltsim_controllers.analysis.singularity import (
     acceptable_share,
+    determinant,
+    residuals,
+    torque_free_direction,
     unacceptable_attitudes,
 )
 from tiltsim_controllers.vehicle.parameters import PRESETS, drag_ratio

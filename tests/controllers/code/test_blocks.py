@@ -10,8 +10,7 @@ import pytest
 from tests.controllers.code.test_programs import SPECIAL, same
 from tests.natively import machine_code, machine_code_in_lanes
 from tiltsim_controllers.code import jax_function
-from tiltsim_controllers.code.arrays import flatten, xp
-from tiltsim_controllers.code.blocks import branch, repeat, take
+from tiltsim_controllers.code.arrays import branch, flatten, repeat, take, xp
 from tiltsim_controllers.code.casadi_function import casadi_function
 from tiltsim_controllers.code.jax_function import results_in_jax
 from tiltsim_controllers.code.messages import TraceError

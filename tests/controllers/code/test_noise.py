@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from tiltsim_controllers.code.blocks import normal
+from tiltsim_controllers.code.arrays import normal, program_of
 from tiltsim_controllers.code.jax_function import results_in_jax
-from tiltsim_controllers.code.noise import hash_word, uniform
-from tiltsim_controllers.code.traceable import program_of
+from tiltsim_controllers.code.operations import hash_word, uniform
 
 COUNT = 4000
 

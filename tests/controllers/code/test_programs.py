@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tests.natively import machine_code, machine_code_in_lanes
-from tiltsim_controllers.code.blocks import take
+from tiltsim_controllers.code.arrays import take
 from tiltsim_controllers.code.messages import TraceError
 from tiltsim_controllers.code.operations import CONDITIONS, OPERATIONS
 from tiltsim_controllers.code.program import trace_vectors

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from tests.natively import natively
-from tiltsim_controllers.code.arrays import as_number, is_known, xp
-from tiltsim_controllers.code.traceable import program_of, traceable
+from tiltsim_controllers.code.arrays import as_number, is_known, program_of, traceable, xp
 from tiltsim_controllers.mathematics.linear import least_norm
 
 

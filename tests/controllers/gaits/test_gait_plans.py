@@ -15,8 +15,7 @@ from tiltsim_controllers.analysis.singularity import residuals
 from tiltsim_controllers.gaits import plans
 from tiltsim_controllers.gaits.cat import FOOTFALLS, FORWARD, SWINGS, Footfall, cat_keyframes
 from tiltsim_controllers.gaits.colors import colored_angles
-from tiltsim_controllers.gaits.motion import anticipated_tilts, planned_tilts
-from tiltsim_controllers.gaits.parameters import LINEAR
+from tiltsim_controllers.gaits.motion import LINEAR, anticipated_tilts, planned_tilts
 from tiltsim_controllers.gaits.plans import Gait
 from tiltsim_controllers.vehicle.parameters import PRESETS, drag_ratio
 

@@ -11,16 +11,12 @@ from hypothesis import strategies as st
 
 from tiltsim_controllers.analysis.singularity import determinant, margin_over_gait, residuals
 from tiltsim_controllers.analysis.two_color_map import curve_l, red_residual
-from tiltsim_controllers.gaits.red_gait import (
+from tiltsim_controllers.gaits.colors import (
     determinant_at_clearance,
     nearest_red_angles,
     red_determinant,
 )
-from tiltsim_controllers.vehicle.decoupling_matrix import (
-    sines_and_cosines,
-    torque_entries,
-    torque_free_inputs,
-)
+from tiltsim_controllers.vehicle.cross import cross_torque, torque_free_inputs
 from tiltsim_controllers.vehicle.parameters import PRESETS, drag_ratio
 
 VEHICLE = PRESETS["ar_drone_2"]
@@ -60,8 +56,8 @@ def test_the_determinant_vanishes_on_the_curve_l(alpha_1):
 def test_the_rotors_of_red_gaits_stop_on_the_sides_of_the_quadrant(low, high):
     """Hover on red needs squares of speeds as sin 2v to -sin 2u."""
     alpha_1, alpha_2 = DELTA - low, high - DELTA
-    trig = sines_and_cosines(alpha_1, alpha_2, alpha_1, alpha_2)
-    w1, w2, w3, w4 = torque_free_inputs(torque_entries(trig, RATIO))
+    tilts = np.array([alpha_1, alpha_2, alpha_1, alpha_2])
+    w1, w2, w3, w4 = torque_free_inputs(cross_torque(tilts, RATIO))
     assert (w3, w4) == (pytest.approx(w1, rel=1e-9), pytest.approx(w2, rel=1e-9))
     lengths = (cos(low) / sin(2.0 * low), cos(high) / sin(2.0 * high))
     assert -w1 * lengths[1] == pytest.approx(w2 * lengths[0], rel=1e-9)

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from tests.controllers.flat_laws import attitude_altitude_inputs
 from tests.thesis import force_matrix, torque_matrix
-from tiltsim_controllers.gaits.parameters import FIXED, GaitParameters
+from tiltsim_controllers.gaits.motion import FIXED, GaitParameters
 from tiltsim_controllers.laws.allocation import RotorRange
 from tiltsim_controllers.laws.attitude_altitude import DECOUPLINGS, Gains, Parameters
 from tiltsim_controllers.laws.feedback import (
@@ -23,11 +23,7 @@ from tiltsim_controllers.laws.gains import GAIN_SETS
 from tiltsim_controllers.laws.supervisor import Supervisor
 from tiltsim_controllers.mathematics.records import flatten, unflatten
 from tiltsim_controllers.references.trajectories import REFERENCE_TYPES, ReferenceParameters
-from tiltsim_controllers.vehicle.decoupling_matrix import (
-    sines_and_cosines,
-    torque_entries,
-    torque_free_force,
-)
+from tiltsim_controllers.vehicle.cross import torque_free_force
 from tiltsim_controllers.vehicle.parameters import PRESETS, SPIN, drag_ratio
 
 AR_DRONE = PRESETS["ar_drone_2"]
@@ -267,8 +263,7 @@ GRAVITY = 9.8
 
 def leaning(alpha, vehicle=AR_DRONE):
     """The direction of the torque-free force, as the law gives it to its decouplers."""
-    trig, ratio = sines_and_cosines(*alpha), drag_ratio(vehicle)
-    return torque_free_force(trig, torque_entries(trig, ratio), ratio)
+    return torque_free_force(np.array(alpha), drag_ratio(vehicle))
 
 
 def test_conventional_decoupler_is_eqs_7_and_8():

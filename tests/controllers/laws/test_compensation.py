@@ -12,7 +12,7 @@ from tests.controllers.laws.test_rotor_allocation import observing, per_newton
 from tests.controllers.multirotors import ring
 from tiltsim.errors import InputError
 from tiltsim_controllers.laws.compensation import mixed
-from tiltsim_controllers.vehicle.effectiveness import force_and_torque
+from tiltsim_controllers.vehicle.rotors import force_and_torque
 
 WEIGHT = 24.0
 LOW, HIGH = np.full(6, 0.2), np.full(6, 8.0)

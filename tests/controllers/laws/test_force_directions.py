@@ -15,8 +15,13 @@ from tiltsim_controllers.laws.force_directions import (
     normal_of_plane,
 )
 from tiltsim_controllers.mathematics.moving import Moving
-from tiltsim_controllers.vehicle.effectiveness import force_and_torque, tilt_of_rotor, tilts_of
-from tiltsim_controllers.vehicle.rotors import moving_wrench_map, rotors_in
+from tiltsim_controllers.vehicle.rotors import (
+    force_and_torque,
+    moving_wrench_map,
+    rotors_in,
+    tilt_of_rotor,
+    tilts_of,
+)
 
 H = 1e-3
 

@@ -14,8 +14,8 @@ from tests.controllers.laws.test_tracking import PATH, TIME, reference
 from tests.controllers.multirotors import FOUR, HEXAROTOR, Vehicle, random_states, ring, tiltrotor
 from tests.natively import compiled, natively
 from tiltsim_controllers.analysis.stability import is_hurwitz
-from tiltsim_controllers.code.traceable import traceable
-from tiltsim_controllers.gaits.parameters import FIXED, GaitParameters
+from tiltsim_controllers.code.arrays import traceable
+from tiltsim_controllers.gaits.motion import FIXED, GaitParameters
 from tiltsim_controllers.laws import attitude_altitude
 from tiltsim_controllers.laws.allocation import RotorRange
 from tiltsim_controllers.laws.full_pose import (
@@ -40,15 +40,15 @@ from tiltsim_controllers.references.trajectories import (
     ReferenceParameters,
     reference_motion,
 )
-from tiltsim_controllers.vehicle.effectiveness import (
-    cross_table,
+from tiltsim_controllers.vehicle.cross import cross_table
+from tiltsim_controllers.vehicle.parameters import PRESETS, SPIN, drag_ratio
+from tiltsim_controllers.vehicle.rotors import (
     force_and_torque,
     rotor_entries,
+    rotors_in,
     tilt_of_rotor,
     tilts_of,
 )
-from tiltsim_controllers.vehicle.parameters import PRESETS, SPIN, drag_ratio
-from tiltsim_controllers.vehicle.rotors import rotors_in
 
 TILTROTOR = PRESETS["ar_drone_2_unrounded"]
 GAINS = GAIN_SETS["ch03"]

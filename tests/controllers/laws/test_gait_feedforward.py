@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from tests.controllers.flat_laws import tracking_inputs
 from tests.thesis import force_matrix, torque_matrix
 from tiltsim_controllers.analysis.stability import feedforward_loops
-from tiltsim_controllers.gaits.parameters import FIXED, GaitParameters
+from tiltsim_controllers.gaits.motion import FIXED, GaitParameters
 from tiltsim_controllers.gaits.plans import continuous_trot, fixed
 from tiltsim_controllers.laws.allocation import RotorRange
 from tiltsim_controllers.laws.attitude_altitude import EXACT_DECOUPLING, Gains
@@ -40,12 +40,7 @@ from tiltsim_controllers.laws.multirotor_steps import EULER_ANGLES, FeedforwardT
 from tiltsim_controllers.laws.supervisor import Supervisor
 from tiltsim_controllers.mathematics.moving import Moving
 from tiltsim_controllers.references.trajectories import REFERENCE_TYPES, ReferenceParameters
-from tiltsim_controllers.vehicle.decoupling_matrix import (
-    sines_and_cosines,
-    torque_entries,
-    torque_free_force,
-)
-from tiltsim_controllers.vehicle.effectiveness import cross_table
+from tiltsim_controllers.vehicle.cross import cross_table, torque_free_force
 from tiltsim_controllers.vehicle.parameters import PRESETS, SPIN, drag_ratio
 from tiltsim_controllers.vehicle.rotors import moving_wrench_map, rotors_in
 
@@ -309,8 +304,7 @@ def test_the_requested_attitude_points_the_gaits_force_along_the_wanted_accelera
     speeds = [VEHICLE.hover_rotor_speed * sign for sign in SPIN]
     state = (*on_track, 0.0, 0.0, yaw, 0.0, 0.0, 0.0, *alpha, *speeds)
     roll, pitch, _ = tracking_inputs(time, state, (0.0,) * 4, (0.0,) * 3, law, gait.knots)[7:]
-    trig = sines_and_cosines(*alpha)
-    n = np.array(torque_free_force(trig, torque_entries(trig, drag_ratio(VEHICLE)), 1.0))
+    n = torque_free_force(np.array(alpha), drag_ratio(VEHICLE))
     force = Rotation.from_euler("ZYX", [yaw, pitch, roll]).apply(n)
     desired = np.array([-0.5 * cos(0.5 * time), -0.5 * sin(0.5 * time), VEHICLE.gravity])
     unit = [v / np.linalg.norm(v) for v in (force, desired)]

@@ -48,7 +48,7 @@ from tiltsim_controllers.laws.supervisor import Supervisor
 from tiltsim_controllers.mathematics.attitude import attitude_error, rotation_matrix
 from tiltsim_controllers.mathematics.moving import Moving
 from tiltsim_controllers.references.trajectories import CIRCLE, SETPOINT, ReferenceParameters
-from tiltsim_controllers.vehicle.effectiveness import (
+from tiltsim_controllers.vehicle.rotors import (
     CONSTANT,
     ROTOR_FLOATS,
     force_and_torque,

@@ -18,7 +18,7 @@ from tiltsim_controllers.laws.periodic_lqr import (
     regulator_about_orbit,
     riccati,
 )
-from tiltsim_controllers.vehicle.effectiveness import force_and_torque, table_per_newton
+from tiltsim_controllers.vehicle.rotors import force_and_torque, table_per_newton
 
 PERIOD, NODES = 0.8, 320
 INERTIA = np.array([[3.0e-3, 2.0e-4, -3.0e-4], [2.0e-4, 4.0e-3, 1.0e-4], [-3.0e-4, 1.0e-4, 5.0e-3]])

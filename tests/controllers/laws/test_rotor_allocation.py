@@ -12,12 +12,14 @@ from tiltsim_controllers.laws.outer_loop import (
     allocated_with_tilts,
     lift_without_torque,
 )
-from tiltsim_controllers.vehicle.effectiveness import (
+from tiltsim_controllers.vehicle.rotors import (
+    Rotors,
     force_and_torque,
+    rotors_in,
     table_per_newton,
     tilt_of_rotor,
+    wrench_map,
 )
-from tiltsim_controllers.vehicle.rotors import Rotors, rotors_in, wrench_map
 
 
 def observing(**known):

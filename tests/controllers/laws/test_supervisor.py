@@ -15,7 +15,7 @@ from tiltsim_controllers.analysis.singularity import (
     torque_free_direction,
     world_up,
 )
-from tiltsim_controllers.gaits.parameters import NO_KNOTS
+from tiltsim_controllers.gaits.motion import NO_KNOTS
 from tiltsim_controllers.gaits.plans import continuous_trot as trot
 from tiltsim_controllers.gaits.plans import fixed, waypoints
 from tiltsim_controllers.gaits.plans import instant_trot as trot_instant
@@ -33,8 +33,9 @@ from tiltsim_controllers.laws.supervisor import (
     Supervisor,
     turned_along,
 )
-from tiltsim_controllers.vehicle.effectiveness import cross_table, tilt_of_rotor
+from tiltsim_controllers.vehicle.cross import cross_table
 from tiltsim_controllers.vehicle.parameters import PRESETS, drag_ratio
+from tiltsim_controllers.vehicle.rotors import tilt_of_rotor
 
 assess = SUPERVISION.assess
 supervised_gait_scale = SUPERVISION.gait_scale

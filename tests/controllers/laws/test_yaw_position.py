@@ -10,10 +10,7 @@ import sympy
 
 from tests.controllers.flights import fly, quadrotor_rates, rk4_step
 from tests.natively import compiled_law
-from tiltsim_controllers.analysis.quadrotor_singularity import (
-    normalized_determinant,
-    published_determinant,
-)
+from tiltsim_controllers.analysis.singularity import normalized_determinant, published_determinant
 from tiltsim_controllers.analysis.stability import is_hurwitz
 from tiltsim_controllers.laws.yaw_position import (
     GAIN_SETS,
@@ -28,8 +25,8 @@ from tiltsim_controllers.references.trajectories import (
     ReferenceParameters,
     reference_motion,
 )
+from tiltsim_controllers.vehicle.body import EXTENDED_QUADROTOR_FIELDS
 from tiltsim_controllers.vehicle.parameters import PRESETS
-from tiltsim_controllers.vehicle.states import EXTENDED_QUADROTOR_FIELDS
 
 QUADROTOR = PRESETS["ar_drone_2_unrounded"]
 WEIGHT = QUADROTOR.mass * QUADROTOR.gravity

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from tiltsim_controllers.gaits.parameters import GaitParameters
+from tiltsim_controllers.gaits.motion import GaitParameters
 from tiltsim_controllers.laws.attitude_altitude import Gains, Parameters
 from tiltsim_controllers.mathematics.records import (
     flatten,

@@ -15,13 +15,11 @@ from tiltsim_controllers.references.trajectories import (
     REFERENCE_TYPES,
     ReferenceParameters,
     attitude_reference,
+    minimum_snap_knots,
     position_reference,
     reference_attitude,
     reference_derivatives,
     reference_motion,
-)
-from tiltsim_controllers.references.waypoints import (
-    minimum_snap_knots,
     table_knots,
     waypoint_motion,
 )

@@ -6,7 +6,7 @@ from math import copysign, cos, log, pi, sin, tan
 
 import numpy as np
 
-from tiltsim_controllers.tilt_car.state_drift import _scale, drift_rate
+from tiltsim_controllers.tilt_car.cycles import _scale, drift_rate
 from tiltsim_controllers.tilt_car.vehicle import squared_speeds, thrust_map, turn_per_tilt
 
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
-from tiltsim_controllers.tilt_car.penguin_cycle import (
+from tiltsim_controllers.tilt_car.cycles import (
     Swing,
     half_period,
     jacobian,

@@ -19,7 +19,7 @@ from tests.controllers.tilt_car.lean import (
     restored_lean,
     split_of_lean,
 )
-from tiltsim_controllers.tilt_car.state_drift import Orbit, drift_rate, lean_stiffness, orbit, twist
+from tiltsim_controllers.tilt_car.cycles import Orbit, drift_rate, lean_stiffness, orbit, twist
 from tiltsim_controllers.tilt_car.third_derivative import (
     minimum_norm,
     null_space_input,

@@ -10,7 +10,7 @@ import sympy as sp
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tiltsim_controllers.gaits.parameters import FIXED, GaitParameters
+from tiltsim_controllers.gaits.motion import FIXED, GaitParameters
 from tiltsim_controllers.laws.keys import choice
 from tiltsim_controllers.references.trajectories import (
     CIRCLE,

@@ -10,15 +10,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from tiltsim_controllers.code.blocks import normal
-from tiltsim_controllers.code.traceable import as_arrays
+from tiltsim_controllers.code.arrays import as_arrays, normal
 from tiltsim_controllers.vehicle.actuators import (
     faults_record,
     rate_limited_command,
     servo_commands,
     thrust_factors,
 )
-from tiltsim_controllers.vehicle.sensors import (
+from tiltsim_controllers.vehicle.instruments import (
     Sensor,
     Sensors,
     reading_error,

@@ -8,12 +8,11 @@ import numpy as np
 import pytest
 
 from tests.controllers.multirotors import SMALL
-from tiltsim_controllers.code.traceable import as_arrays
+from tiltsim_controllers.code.arrays import as_arrays
 from tiltsim_controllers.vehicle.body import inertia_matrix, inverse_inertia_matrix
 from tiltsim_controllers.vehicle.craft import craft_of, craft_parameters, places, wrench_of_lift
-from tiltsim_controllers.vehicle.effectiveness import Rotor
 from tiltsim_controllers.vehicle.parameters import PRESETS, SPIN
-from tiltsim_controllers.vehicle.rotors import wrench_map
+from tiltsim_controllers.vehicle.rotors import Rotor, wrench_map
 
 CROSS = PRESETS["ar_drone_2"]
 ARMS = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])

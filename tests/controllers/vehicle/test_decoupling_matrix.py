@@ -12,13 +12,11 @@ from hypothesis import strategies as st
 
 from tests.thesis import force_matrix, torque_matrix
 from tiltsim_controllers.mathematics.linear import solved
-from tiltsim_controllers.vehicle.decoupling_matrix import (
-    body_force,
-    sines_and_cosines,
-    torque_entries,
+from tiltsim_controllers.vehicle.cross import (
+    cross_force,
+    cross_torque,
     torque_free_force,
     torque_free_inputs,
-    vertical_force_entries,
 )
 from tiltsim_controllers.vehicle.parameters import PRESETS, Vehicle, drag_ratio
 
@@ -36,7 +34,6 @@ VEHICLES = [*PRESETS.values(), PIGEON]
 
 vehicles = st.sampled_from(VEHICLES)
 angles = st.tuples(*[st.floats(-pi, pi)] * 4)
-inputs = st.tuples(*[st.floats(-1e6, 1e6)] * 4)
 attitudes = st.tuples(st.floats(-pi, pi), st.floats(-pi / 2, pi / 2))
 
 quick = settings(deadline=None, max_examples=40)
@@ -54,38 +51,20 @@ def decoupling_matrix(vehicle, alpha, up):
 
 
 def torques(vehicle, alpha):
-    return torque_entries(sines_and_cosines(*alpha), drag_ratio(vehicle))
+    return cross_torque(np.array(alpha), drag_ratio(vehicle))
 
 
 def force_direction(vehicle, alpha):
-    trig = sines_and_cosines(*alpha)
-    ratio = drag_ratio(vehicle)
-    return np.array(torque_free_force(trig, torque_entries(trig, ratio), ratio))
+    return torque_free_force(np.array(alpha), drag_ratio(vehicle))
 
 
 @quick
 @given(vehicles, angles)
-def test_torque_entries_are_the_nonzero_entries_of_eq_5(vehicle, alpha):
-    x2, x4, y1, y3, z1, z2, z3, z4 = torques(vehicle, alpha)
-    built = np.array([[0, x2, 0, x4], [y1, 0, y3, 0], [z1, z2, z3, z4]])
-    lkf = vehicle.arm_length * vehicle.thrust_coefficient
-    np.testing.assert_allclose(built, torque_matrix(vehicle, alpha) / lkf, rtol=0, atol=1e-14)
-
-
-@quick
-@given(vehicles, angles, inputs)
-def test_body_force_is_eq_3_times_the_inputs(vehicle, alpha, w):
-    force = np.array(body_force(sines_and_cosines(*alpha), *w)) * vehicle.thrust_coefficient
-    expected = force_matrix(vehicle, alpha) @ w
-    np.testing.assert_allclose(force, expected, rtol=0, atol=1e-14 * np.abs(w).max())
-
-
-@quick
-@given(vehicles, angles, attitudes)
-def test_vertical_force_entries_are_the_last_row_of_eq_18(vehicle, alpha, attitude):
-    row = vertical_force_entries(sines_and_cosines(*alpha), *world_up(*attitude))
-    expected = world_up(*attitude) @ force_matrix(vehicle, alpha) / vehicle.thrust_coefficient
-    np.testing.assert_allclose(row, expected, rtol=0, atol=1e-14)
+def test_the_matrices_are_eqs_3_and_5(vehicle, alpha):
+    kf, lkf = vehicle.thrust_coefficient, vehicle.arm_length * vehicle.thrust_coefficient
+    force, torque = force_matrix(vehicle, alpha) / kf, torque_matrix(vehicle, alpha) / lkf
+    np.testing.assert_allclose(torques(vehicle, alpha), torque, rtol=0, atol=1e-14)
+    np.testing.assert_allclose(cross_force(np.array(alpha)), force, rtol=0, atol=1e-14)
 
 
 @quick
@@ -168,7 +147,7 @@ def test_published_coefficients_come_out_to_four_digits(axis, sign, published):
 @quick
 @given(vehicles, angles)
 def test_torque_free_inputs_make_no_torque(vehicle, alpha):
-    w = np.array(torque_free_inputs(torques(vehicle, alpha)))
+    w = torque_free_inputs(torques(vehicle, alpha))
     tau = torque_matrix(vehicle, alpha)
     residual = np.abs(tau @ w).max()
     assert residual <= 1e-13 * np.linalg.norm(tau) * max(1.0, np.linalg.norm(w))
@@ -179,7 +158,7 @@ def test_torque_free_inputs_make_no_torque(vehicle, alpha):
 def test_torque_free_inputs_span_the_kernel_where_the_rank_is_three(vehicle, alpha):
     _, values, rows = np.linalg.svd(torque_matrix(vehicle, alpha))
     assume(values[2] > 1e-2 * values[0])
-    w = np.array(torque_free_inputs(torques(vehicle, alpha)))
+    w = torque_free_inputs(torques(vehicle, alpha))
     assert np.linalg.norm(w) > 1e-4
     cosine = rows[3] @ w / np.linalg.norm(w)
     assert abs(cosine) == pytest.approx(1.0, abs=1e-12)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tiltsim_controllers.vehicle.downwash import Downwash, Wake, downwash_force, wake_velocity
+from tiltsim_controllers.vehicle.air import Downwash, Wake, downwash_force, wake_velocity
 
 WAKE = Wake(weight=24.0, disc_area=0.19)
 DENSITY = 1.2

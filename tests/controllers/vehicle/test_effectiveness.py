@@ -9,15 +9,15 @@ import pytest
 from tests.controllers.multirotors import FOUR, random_states, ring, tiltrotor
 from tests.thesis import force_matrix, torque_matrix
 from tiltsim_controllers.mathematics.attitude import rotation_matrix
-from tiltsim_controllers.vehicle.effectiveness import (
+from tiltsim_controllers.vehicle.craft import equations_of_motion
+from tiltsim_controllers.vehicle.rotors import (
     force_and_torque,
     rotor_entries,
+    rotors_in,
     tilt_of_rotor,
     tilts_of,
     without_rotor,
 )
-from tiltsim_controllers.vehicle.motion import equations_of_motion
-from tiltsim_controllers.vehicle.rotors import rotors_in
 
 
 def numbers(values):

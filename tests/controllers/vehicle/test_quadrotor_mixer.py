@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from tests.thesis import force_matrix, torque_matrix
+from tiltsim_controllers.vehicle.cross import speed_along_spin, thrust_controls
 from tiltsim_controllers.vehicle.parameters import PRESETS, SPIN
-from tiltsim_controllers.vehicle.quadrotor_mixer import speed_along_spin, thrust_controls
 
 WRENCHES = np.random.default_rng(4).uniform(-1.0, 1.0, (20, 4)) * (6.0, 0.5, 0.5, 0.1)
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.controllers.vehicle.test_craft import each_case
-from tiltsim_controllers.vehicle.rotor_inertia import (
+from tiltsim_controllers.vehicle.craft import (
     accelerations_within_limits,
     hinge_torques,
     spin_torque,

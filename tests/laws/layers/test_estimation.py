@@ -15,11 +15,11 @@ from tiltsim.engines.sample_evaluation import evaluate_over_samples
 from tiltsim.errors import InputError
 from tiltsim.laws.assembling import assemble
 from tiltsim.laws.layers import estimation
-from tiltsim.laws.layers.estimation import fusion_of
+from tiltsim.laws.layers.estimation import Fusion
+from tiltsim.laws.layers.instruments import instruments_of
 from tiltsim.views.figures.panels import errors_of
-from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.code.traceable import traceable
-from tiltsim_controllers.mathematics.probability import chi_square_quantile
+from tiltsim_controllers.code.arrays import traceable, xp
+from tiltsim_controllers.mathematics.scalar import chi_square_quantile
 
 IMU = {"gyro_noise_density": 2.5e-4, "accelerometer_noise_density": 2e-3}
 MOCAP = {"rate": 50.0, "position_noise": 0.004, "attitude_noise": 0.01}
@@ -198,9 +198,11 @@ def test_a_custom_law_estimates_from_the_readings(tmp_path):
 
 
 def test_lines_are_as_long_as_the_longest_delay():
-    fusion = fusion_of(scenario(INSTRUMENTS["late"]))
-    assert (fusion.waits, fusion.late, fusion.correctors[0].waits) == (2, 1, 0)
-    assert [each.waits for each in fusion_of(scenario(INSTRUMENTS["gps"])).correctors] == [0, 6, 6]
+    fusion = Fusion(instruments_of(scenario(INSTRUMENTS["late"])))
+    assert (fusion.waits(fusion.imu), fusion.imu.late) == (2, 1)
+    assert fusion.waits(fusion.correctors[0]) == 0
+    fusion = Fusion(instruments_of(scenario(INSTRUMENTS["gps"])))
+    assert [fusion.waits(each) for each in fusion.correctors] == [0, 6, 6]
 
 
 @pytest.mark.parametrize("degrees", [9, 450, 1e5])
@@ -246,7 +248,7 @@ def test_fifty_seeds_are_consistent():
 def test_a_native_sample_takes_less_than_fifteen_microseconds(name):
     """The filter alone with all readings due, the fastest of five runs."""
     assembly = assemble(scenario(INSTRUMENTS[name]))
-    fusion = fusion_of(assembly.scenario)
+    fusion = Fusion(instruments_of(assembly.scenario))
     own = assembly.setup.parameters
     while type(own.layer).__name__ != "Estimation":
         own = own.inner

@@ -14,7 +14,7 @@ from tiltsim.errors import InputError
 from tiltsim.laws.assembling import assemble
 from tiltsim.plants.factory import make_plant
 from tiltsim.scenario.instruments import ImuTable
-from tiltsim_controllers.code.traceable import traceable
+from tiltsim_controllers.code.arrays import traceable
 from tiltsim_controllers.mathematics.attitude import rotation_matrix
 from tiltsim_controllers.vehicle import instruments
 

@@ -32,8 +32,8 @@ from tiltsim.models.hover import hover_speeds
 from tiltsim.plants.factory import make_plant
 from tiltsim.resources import shipped_folder
 from tiltsim.scenario.time_steps import _reaction_gains
-from tiltsim_controllers.analysis.statics import hover_rotor_speeds
-from tiltsim_controllers.code.traceable import as_arrays
+from tiltsim_controllers.analysis.singularity import hover_rotor_speeds
+from tiltsim_controllers.code.arrays import as_arrays
 from tiltsim_controllers.vehicle.parameters import SPIN
 
 MEASURED = {"controller": {"angular_acceleration": "measured"}}

@@ -15,8 +15,7 @@ from tiltsim.laws import assembling
 from tiltsim.laws.assembling import LOOPS, assemble, loop_of
 from tiltsim.plants.factory import make_plant
 from tiltsim.scenario.loading import merge
-from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.code.traceable import traceable
+from tiltsim_controllers.code.arrays import traceable, xp
 from tiltsim_controllers.laws.yaw_position import gyroscopic_acceleration
 
 MOTION = ("x", "y", "z", "roll", "pitch", "yaw")

@@ -28,8 +28,9 @@ from tiltsim.plants.factory import make_plant
 from tiltsim.scenario.loading import merge
 from tiltsim.vehicles.rotorcraft.layout import QW
 from tiltsim_controllers.vehicle.body import body_of, principal_body
-from tiltsim_controllers.vehicle.effectiveness import cross_table, rotor_entries
+from tiltsim_controllers.vehicle.cross import cross_table
 from tiltsim_controllers.vehicle.parameters import PRESETS, SPIN
+from tiltsim_controllers.vehicle.rotors import rotor_entries
 
 VEHICLE = PRESETS["luukkonen"]
 RIGID = {"simulation": {"plant": "rigid_body"}}

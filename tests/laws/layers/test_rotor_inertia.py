@@ -17,8 +17,8 @@ from tiltsim.plants.flight_model import build_model
 from tiltsim.resources import shipped_folder
 from tiltsim.scenario.loading import merge
 from tiltsim.vehicles.rotorcraft.layout import Layout
+from tiltsim_controllers.vehicle.craft import accelerations_within_limits
 from tiltsim_controllers.vehicle.parameters import PRESETS
-from tiltsim_controllers.vehicle.rotor_inertia import accelerations_within_limits
 
 INERTIA = 2e-5  # kg m^2, of a rotor
 TROT = {

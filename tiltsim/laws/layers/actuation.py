@@ -23,8 +23,7 @@ from tiltsim.models.parts import ExtraActuators
 from tiltsim.scenario.scenario import FlightPlan, Scenario
 from tiltsim.vehicles.rotorcraft import initial_tilts
 from tiltsim.vehicles.rotorcraft.layout import QW, TILT_1, layout_of
-from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.code.traceable import traceable
+from tiltsim_controllers.code.arrays import traceable, xp
 from tiltsim_controllers.mathematics.records import make_record_type
 from tiltsim_controllers.mathematics.scalar import Floats, Vector
 from tiltsim_controllers.vehicle.actuators import (
@@ -33,7 +32,7 @@ from tiltsim_controllers.vehicle.actuators import (
     servo_commands,
     thrust_factors,
 )
-from tiltsim_controllers.vehicle.sensors import (
+from tiltsim_controllers.vehicle.instruments import (
     Sensor,
     Sensors,
     reading_error,

@@ -14,14 +14,13 @@ import numpy as np
 
 from tiltsim.closed_loop.loop import ClosedLoop
 from tiltsim.laws.layers.actuation import along_line
-from tiltsim.laws.layers.instruments import instruments_of
+from tiltsim.laws.layers.instruments import Instrument
 from tiltsim.laws.layers.layer import Layer, wrap_loop
 from tiltsim.laws.vehicle_loop import parts
 from tiltsim.models.parts import ExtraActuators
-from tiltsim.scenario.scenario import FlightPlan, Scenario
+from tiltsim.scenario.scenario import FlightPlan
 from tiltsim.vehicles.rotorcraft.layout import QW, TILT_1, TILT_RATE_1
-from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.code.blocks import branch, normal
+from tiltsim_controllers.code.arrays import branch, normal, xp
 from tiltsim_controllers.laws import estimator as filters
 from tiltsim_controllers.laws.estimator import Estimate, ImuNoise, Outcome, Reading
 from tiltsim_controllers.mathematics.attitude import (
@@ -31,9 +30,8 @@ from tiltsim_controllers.mathematics.attitude import (
     rotation_of_quaternion,
 )
 from tiltsim_controllers.mathematics.linear import cross
-from tiltsim_controllers.mathematics.probability import chi_square_quantile
 from tiltsim_controllers.mathematics.records import Vector3, make_record_type, vector_of
-from tiltsim_controllers.mathematics.scalar import Vector
+from tiltsim_controllers.mathematics.scalar import Vector, chi_square_quantile
 
 AXES: Final = ("x", "y", "z")
 CORRECTIONS: Final = {
@@ -86,23 +84,30 @@ CHANNEL: Final = 7000.0
 """First channel of the draws of the errors at the start."""
 
 
-class Corrector(NamedTuple):
-    """An instrument that corrects the filter."""
-
-    name: str
-    values: int
-    first: int  # of its values among the readings
-    waits: int  # control steps that a reading waits for the horizon
-
-
 class Fusion(NamedTuple):
-    """All that a filter is compiled for."""
+    """The instruments on a vehicle, for which a filter is compiled."""
 
-    readings: int  # numbers at the end of the velocities
-    imu: int  # first number of the inertial measurement unit's
-    waits: int  # control steps that an inertial reading waits for the horizon
-    late: int  # control steps, the delay of that unit
-    correctors: tuple[Corrector, ...]
+    carried: tuple[Instrument, ...]
+
+    @property
+    def imu(self) -> Instrument:
+        """The inertial measurement unit."""
+        return next(each for each in self.carried if each.name == "imu")
+
+    @property
+    def correctors(self) -> tuple[Instrument, ...]:
+        """Instruments that correct the filter."""
+        return tuple(each for name in CORRECTIONS for each in self.carried if each.name == name)
+
+    @property
+    def horizon(self) -> int:
+        """How far back the filter works, control steps."""
+        return max(each.late for each in (self.imu, *self.correctors))
+
+    @property
+    def readings(self) -> int:
+        """Numbers at the end of the velocities."""
+        return sum(len(each.columns) for each in self.carried)
 
     @property
     def innovations(self) -> tuple[str, ...]:
@@ -114,30 +119,16 @@ class Fusion(NamedTuple):
             for axis in COMPONENTS[kind]
         )
 
+    def waits(self, each: Instrument) -> int:
+        """Control steps that a reading waits for the horizon."""
+        return self.horizon - each.late
+
     @property
     def sizes(self) -> dict[str, int]:
         """Sizes of the parts of the states."""
-        lines = {each.name: each.waits * (each.values + 1) for each in self.correctors}
-        line, innovations = 6 * (self.waits + 1), len(self.innovations)
+        lines = {i.name: self.waits(i) * (len(i.units) + 1) for i in self.correctors}
+        line, innovations = 6 * (self.waits(self.imu) + 1), len(self.innovations)
         return {**_FILTER, "imu": line, **lines, "nis": 2, "innovations": innovations}
-
-
-def fusion_of(scenario: Scenario) -> Fusion:
-    """The instruments of a scenario with an estimator."""
-    sensors, timestep = scenario.sensors.instruments, scenario.simulation.control_timestep
-    delays = {name: ceil(table.delay / timestep - 1e-6) for name, table in sensors.items()}
-    places, size = {}, 0
-    for each in instruments_of(scenario):
-        places[each.name] = size, len(each.units)
-        size += len(each.columns)
-    used = [name for name in CORRECTIONS if name in sensors]
-    horizon, late = max(delays[name] for name in ("imu", *used)), delays["imu"]
-    correctors = tuple(
-        Corrector(name, count, place, horizon - delays[name])
-        for name in used
-        for place, count in [places[name]]
-    )
-    return Fusion(size, places["imu"][0], horizon - late, late, correctors)
 
 
 @cache
@@ -210,16 +201,16 @@ def _filtered(
     Returns:
         The state at the horizon, the state at present, and the rates of the states.
     """
-    T, W = p.control_timestep, fusion.waits
-    horizon = W + fusion.late
+    T, unit, horizon = p.control_timestep, fusion.imu, fusion.horizon
+    W, late = horizon - unit.late, unit.late
     at = parts(before, **fusion.sizes)
     past = at.imu.reshape(W + 1, 6)
-    imu = xp.vstack([readings[fusion.imu : fusion.imu + 6], past])  # the newest first
+    imu = xp.vstack([readings[unit.first : unit.first + 6], past])  # the newest first
     state = Estimate(*(getattr(at, name) for name in _FILTER))
 
     def moved(now: Estimate, through: Any, steps: range) -> Any:
         """Through control steps, numbered backwards from the latest reading."""
-        lengths = [xp.where(time > (step + fusion.late + 0.5) * T, T, 0.0) for step in steps]
+        lengths = [xp.where(time > (step + late + 0.5) * T, T, 0.0) for step in steps]
         means = [0.5 * (imu[step] + imu[step + 1]) for step in steps]
         length = sum(lengths)
         whole = sum(each * mean for each, mean in zip(lengths, means))
@@ -231,9 +222,9 @@ def _filtered(
     lines, shown, nis, count = [], [], at.nis[0], at.nis[1]
     first = 0
     for each in fusion.correctors:
-        own, size = getattr(p, each.name), each.values + 1
+        own, size = getattr(p, each.name), len(each.units) + 1
         sent = readings[each.first : each.first + size]
-        waiting = getattr(at, each.name).reshape(each.waits, size)
+        waiting = getattr(at, each.name).reshape(fusion.waits(each), size)
         value, line_rates = along_line(waiting, sent, T)
         lines.append(line_rates.ravel())
         names = sum(len(COMPONENTS[kind]) for kind in CORRECTIONS[each.name])
@@ -255,8 +246,8 @@ def _filtered(
     for first in reversed(range(0, W, together)):
         steps = range(first, min(first + together, W))
         present, through = moved(present, through, steps)
-    if fusion.late:  # nothing newer is known
-        length = xp.minimum(fusion.late * T, time)
+    if late:  # nothing newer is known
+        length = xp.minimum(late * T, time)
         present, through = filters.integrated(
             present, through, imu[0, 3:], imu[0, :3], length, p.gravity
         )
@@ -289,7 +280,7 @@ def with_estimator(loop: ClosedLoop, fusion: Fusion) -> ClosedLoop:
     to the velocities.
     """
     first = loop.sizes.act
-    states = sum(fusion.sizes.values())
+    states, gyro = sum(fusion.sizes.values()), fusion.imu.first + 3
     fields = {**ESTIMATED, **DEVIATIONS, **CONSISTENCY, **dict.fromkeys(fusion.innovations, "1")}
 
     def controls(within: Any, time: Any, qpos: Any, qvel: Any, act: Any, p: Any, knots: Any) -> Any:
@@ -297,7 +288,7 @@ def with_estimator(loop: ClosedLoop, fusion: Fusion) -> ClosedLoop:
         readings, before = qvel[size:], act[first : first + states]
         _, present, rates = _filtered(time, readings, before, fusion, p)
         rotation = rotation_of_quaternion(present.quaternion)
-        omega = readings[fusion.imu + 3 : fusion.imu + 6] - present.gyro_bias
+        omega = readings[gyro : gyro + 3] - present.gyro_bias
         position = present.position - rotation @ p.place
         velocity = present.velocity - rotation @ cross(omega, p.place)
         seen = (

@@ -33,9 +33,7 @@ from tiltsim.vehicles.rotorcraft.layout import (
     tilt_of_rotor,
     true_rotors,
 )
-from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.code.blocks import branch
-from tiltsim_controllers.code.traceable import traceable
+from tiltsim_controllers.code.arrays import branch, traceable, xp
 from tiltsim_controllers.code.tracing import make
 from tiltsim_controllers.mathematics.attitude import rotation_matrix, rotation_of_quaternion
 from tiltsim_controllers.mathematics.linear import cross
@@ -55,14 +53,24 @@ from tiltsim_controllers.vehicle.air import (
     low_altitude_turbulence,
     stationary_states,
 )
-from tiltsim_controllers.vehicle.body import inertia_matrix, inverse_inertia_matrix
-from tiltsim_controllers.vehicle.craft import Craft, craft_of, places, thrust_axes, wrench_of_lift
-from tiltsim_controllers.vehicle.loads import Load, wrench_of_loads
-from tiltsim_controllers.vehicle.motion import BODY_STATES, joined, rigid_state
-from tiltsim_controllers.vehicle.rotor_inertia import (
+from tiltsim_controllers.vehicle.body import (
+    BODY_STATES,
+    Load,
+    inertia_matrix,
+    inverse_inertia_matrix,
+    joined,
+    rigid_state,
+    wrench_of_loads,
+)
+from tiltsim_controllers.vehicle.craft import (
+    Craft,
     accelerations_within_limits,
+    craft_of,
     hinge_torques,
+    places,
     spin_torque,
+    thrust_axes,
+    wrench_of_lift,
 )
 
 AIR_COLUMNS: Final = ("air_vx", "air_vy", "air_vz")

@@ -35,16 +35,15 @@ from tiltsim.vehicles.rotorcraft.layout import (
     rotors_record,
     tilt_of_rotor,
 )
-from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.code.traceable import traceable
+from tiltsim_controllers.code.arrays import traceable, xp
 from tiltsim_controllers.mathematics.attitude import rotation_matrix, rotation_of_quaternion
 from tiltsim_controllers.mathematics.linear import cross
 from tiltsim_controllers.mathematics.records import Vector3, make_record_type, vector_of
 from tiltsim_controllers.vehicle import instruments
 from tiltsim_controllers.vehicle.body import Body, inertia_matrix, inverse_inertia_matrix
 from tiltsim_controllers.vehicle.craft import craft_of
+from tiltsim_controllers.vehicle.instruments import reading_index
 from tiltsim_controllers.vehicle.rotors import wrench_map
-from tiltsim_controllers.vehicle.sensors import reading_index
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -65,6 +64,8 @@ class Instrument(NamedTuple):
     errors: int
     under_way: int  # readings that wait for their delay
     walks: bool
+    first: int  # of its values among all readings
+    late: int  # control steps, its delay
 
     @property
     def columns(self) -> dict[str, str]:
@@ -80,7 +81,7 @@ class Instrument(NamedTuple):
 def instruments_of(scenario: Scenario) -> tuple[Instrument, ...]:
     """The instruments of a scenario, in the order of their readings."""
     rotors, step = scenario.any_rotorcraft.rotor_count, scenario.simulation.control_timestep
-    found = []
+    found: list[Instrument] = []
     for name, table in scenario.sensors.instruments.items():
         units = {
             column.replace("#", str(i)): unit
@@ -88,9 +89,11 @@ def instruments_of(scenario: Scenario) -> tuple[Instrument, ...]:
             for i in range(1, 1 + (rotors if "#" in column else 1))
         }
         errors, period = table.errors(1.0, rotors), table.period(step)
-        under_way = ceil(table.delay / period - 1e-6)
-        one = Instrument(name, tuple(units.items()), len(errors.noise), under_way, any(errors.walk))
-        found.append(one)
+        late = (ceil(table.delay / span - 1e-6) for span in (period, step))
+        first = sum(len(each.columns) for each in found)
+        walks, (under_way, steps) = any(errors.walk), late
+        own = len(errors.noise), under_way, walks, first, steps
+        found.append(Instrument(name, tuple(units.items()), *own))
     return tuple(found)
 
 

@@ -11,8 +11,7 @@ from typing import Any, Final
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Equations
 from tiltsim.models.parts import ExtraActuators
 from tiltsim.scenario.scenario import FlightPlan
-from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.code.traceable import traceable
+from tiltsim_controllers.code.arrays import traceable, xp
 from tiltsim_controllers.mathematics.records import make_record_type
 from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector
 

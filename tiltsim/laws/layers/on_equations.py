@@ -2,7 +2,7 @@
 
 The controls are the same function of time, `qpos`, `qvel` and `act` as in MuJoCo, with the same
 sensors, noise and latency. Only the plant on which they act differs: the thesis's vehicle
-(`tiltsim.equations.actuator_level`) or a rigid body (`tiltsim.equations.rigid_body`).
+(`tiltsim.equations.actuator_level`) or a rigid body (`tiltsim.equations.actuator_level`).
 """
 
 from collections.abc import Callable
@@ -17,8 +17,7 @@ from tiltsim.laws.layers.layer import Layer, wrap_loop
 from tiltsim.models.parts import WRENCH_SIZE, ExtraActuators
 from tiltsim.scenario.scenario import FlightPlan
 from tiltsim.vehicles.rotorcraft.layout import layout_of
-from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.code.traceable import traceable
+from tiltsim_controllers.code.arrays import traceable, xp
 from tiltsim_controllers.mathematics.scalar import Vector
 
 

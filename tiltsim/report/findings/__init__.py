@@ -23,15 +23,16 @@ from tiltsim_controllers.analysis.attainable import (
     published_speed_limits,
 )
 from tiltsim_controllers.analysis.published_gaits import PUBLISHED_GAITS
-from tiltsim_controllers.analysis.quadrotor_singularity import (
+from tiltsim_controllers.analysis.singularity import (
     normalized_determinant,
     published_singular_curve,
+    residuals,
+    singular_values,
 )
-from tiltsim_controllers.analysis.singularity import residuals, singular_values
 from tiltsim_controllers.analysis.stability import third_order_loop
 from tiltsim_controllers.analysis.two_color_map import delta, grid_roots
 from tiltsim_controllers.laws import gains, yaw_position
-from tiltsim_controllers.tilt_car.state_drift import drift_rate, orbit
+from tiltsim_controllers.tilt_car.cycles import drift_rate, orbit
 from tiltsim_controllers.tilt_car.vehicle import THESIS_CAR, turn_per_tilt
 from tiltsim_controllers.vehicle.parameters import PRESETS
 

@@ -13,22 +13,19 @@ from tiltsim_controllers.analysis.attainable import (
     published_speed_limits,
 )
 from tiltsim_controllers.analysis.published_gaits import PUBLISHED_GAITS
-from tiltsim_controllers.analysis.quadrotor_singularity import (
+from tiltsim_controllers.analysis.singularity import (
     normalized_determinant,
     published_determinant,
     published_singular_curve,
+    rank,
+    world_up,
 )
-from tiltsim_controllers.analysis.singularity import rank, world_up
 from tiltsim_controllers.analysis.stability import is_hurwitz, third_order_loop
 from tiltsim_controllers.laws import quadrotor_attitude_altitude, yaw_position
 from tiltsim_controllers.laws.feedback import conventional_decoupler, modified_decoupler
 from tiltsim_controllers.laws.gains import GAIN_SETS
 from tiltsim_controllers.mathematics.attitude import euler_rates
-from tiltsim_controllers.vehicle.decoupling_matrix import (
-    sines_and_cosines,
-    torque_entries,
-    torque_free_force,
-)
+from tiltsim_controllers.vehicle.cross import torque_free_force
 from tiltsim_controllers.vehicle.parameters import PRESETS, drag_ratio
 
 _VEHICLE: Final = PRESETS["ar_drone_2"]
@@ -128,9 +125,7 @@ def position_gains_are_positive() -> bool:
 
 def decouplers_agree_without_tilt() -> bool:
     """Whether both decouplers demand the same roll and pitch of the untilted vehicle."""
-    trig = sines_and_cosines(0.0, 0.0, 0.0, 0.0)
-    ratio = drag_ratio(_VEHICLE)
-    n = torque_free_force(trig, torque_entries(trig, ratio), ratio)
+    n = torque_free_force(np.zeros(4), drag_ratio(_VEHICLE))
     desired = (1.3, -0.7, 0.4, _VEHICLE.gravity)  # m/s^2, m/s^2, rad, m/s^2
     pair = zip(modified_decoupler(*desired, n), conventional_decoupler(*desired), strict=True)
     return max(abs(modified - conventional) for modified, conventional in pair) < 1e-12

@@ -8,10 +8,10 @@ from typing import Final
 import numpy as np
 
 from tiltsim.report.measures.flown import Flown
-from tiltsim_controllers.gaits.parameters import FIXED, GaitParameters
+from tiltsim_controllers.gaits.motion import FIXED, GaitParameters
 from tiltsim_controllers.mathematics.scalar import Pair
 from tiltsim_controllers.references.trajectories import LINE, ReferenceParameters
-from tiltsim_controllers.tilt_car.penguin_cycle import (
+from tiltsim_controllers.tilt_car.cycles import (
     LyapunovBound,
     Swing,
     half_period,

@@ -24,21 +24,20 @@ from tiltsim.closed_loop.limits import (
 )
 from tiltsim.closed_loop.loop import VehicleKind
 from tiltsim.models.hover import hover_speeds
-from tiltsim.models.parts import ExtraActuators, Ground, Pod, RotorLimits, TiltServo, Visuals
+from tiltsim.models.parts import ExtraActuators, Pod, RotorLimits, TiltServo, Visuals
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.interaction import objects_of
-from tiltsim.scenario.multirotor_controllers import AttitudeForceController
+from tiltsim.scenario.linearizing_controllers import AttitudeForceController
 from tiltsim.scenario.scenario import FlightPlan, Scenario
 from tiltsim.scenario.vehicle import VehicleTable
 from tiltsim.system.text import Quantity, subscript
 from tiltsim.vehicles.rotorcraft.layout import CROSS, Layout
 from tiltsim.vehicles.rotorcraft.metrics import rotorcraft_metrics
-from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.code.traceable import traceable
+from tiltsim_controllers.code.arrays import traceable, xp
 from tiltsim_controllers.mathematics.attitude import quaternion_of_euler
 from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector
 from tiltsim_controllers.references.trajectories import ReferenceParameters
-from tiltsim_controllers.vehicle.states import P
+from tiltsim_controllers.vehicle.body import P
 
 if TYPE_CHECKING:
     import mujoco
@@ -149,18 +148,18 @@ def model_spec(
     from tiltsim.models.rotorcraft import RotorcraftSpec
 
     vehicle = scenario.any_rotorcraft
-    simulation, ground = scenario.simulation, scenario.ground
+    simulation = scenario.simulation
     return RotorcraftSpec(
         vehicle.model,
         scenario.true_vehicle,
         timestep=simulation.timestep,
         integrator=simulation.integrator,
         tilt_servo=TiltServo(**vehicle.tilt_servo.model_dump(exclude={"max_rate"})),
-        pod=Pod(**vehicle.pod.model_dump()) if isinstance(vehicle, VehicleTable) else Pod(),
+        pod=vehicle.pod if isinstance(vehicle, VehicleTable) else Pod(),
         rotor_limits=rotor_limits(scenario),
         law_states=law_states,
         extra_actuators=extra_actuators,
-        ground=None if ground is None else Ground(ground.height, ground.friction),
+        ground=scenario.ground,
         objects=objects_of(scenario),
         user_vehicle=vehicle.user_vehicle,
     )

@@ -8,10 +8,9 @@ from tiltsim.closed_loop.loop import ClosedLoop, Sizes
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.scenario import Scenario
 from tiltsim_controllers.mathematics.scalar import Values
-from tiltsim_controllers.vehicle.body import Body, body_of, principal_body
+from tiltsim_controllers.vehicle.body import BODY_FIELDS, Body, body_of, principal_body
 from tiltsim_controllers.vehicle.craft import craft_parameters, craft_record
 from tiltsim_controllers.vehicle.parameters import Vehicle
-from tiltsim_controllers.vehicle.states import BODY_FIELDS
 
 # Places in ``qpos`` and ``qvel``: the quaternion, and the first tilt and tilt rate.
 QW, QX, QY, QZ, TILT_1 = range(3, 8)
@@ -94,7 +93,7 @@ def tilt_of_rotor(loop: ClosedLoop) -> tuple[int, ...]:
 
 
 CROSS: Final = Layout(4, 4)
-"""Tiltrotor and quadrotor, whose samples are alike; see `tiltsim_controllers.vehicle.states`."""
+"""Tiltrotor and quadrotor, whose samples are alike; see `tiltsim_controllers.vehicle.body`."""
 
 
 def rotors_record(loop: ClosedLoop) -> Any:

@@ -23,10 +23,9 @@ from tiltsim.vehicles.spans import (
 )
 from tiltsim_controllers.analysis.singularity import force_matrix, torque_matrix, world_up
 from tiltsim_controllers.laws.estimator import NAVIGATION_ERRORS
-from tiltsim_controllers.mathematics.probability import chi_square_quantile
-from tiltsim_controllers.mathematics.scalar import Floats
+from tiltsim_controllers.mathematics.scalar import Floats, chi_square_quantile
+from tiltsim_controllers.vehicle.body import TILT_FIELDS
 from tiltsim_controllers.vehicle.parameters import Vehicle
-from tiltsim_controllers.vehicle.states import TILT_FIELDS
 
 SETTLED_ALTITUDE: Final = 0.005  # m
 

@@ -1,4 +1,4 @@
-"""Comparisons of controllers: errors and tolerated disturbances, scores of the arena, gaits."""
+"""Comparisons of controllers: errors, tolerated disturbances, scores, setpoints and periods."""
 
 from collections.abc import Mapping, Sequence
 from itertools import islice
@@ -39,9 +39,7 @@ def comparison_figure(rows: Sequence[Compared]) -> Figure:
     looks = {name: style.line_style(number) for number, name in enumerate(names)}
     figure = style.new_figure(9.0 if searched else 5.6, 2.9 * len(scenarios) + 0.5)
     ratios = {"width_ratios": [1.1, 1.0]} if searched else {}
-    grid: Any = figure.subplots(
-        len(scenarios), 1 + searched, squeeze=False, gridspec_kw=ratios or None
-    )
+    grid = figure.subplots(len(scenarios), 1 + searched, squeeze=False, gridspec_kw=ratios or None)
     for line, scenario in zip(grid, scenarios, strict=True):
         chosen = [c for c in rows if c.row["scenario"] == scenario]
         _draw_errors(line[0], chosen, looks)
@@ -122,7 +120,7 @@ def tasks_of(ranked: Sequence[Standing]) -> Cells:
     return {
         task: {one.controller: (one.scores[task], one.tuned[task]) for one in ranked}
         for task in ranked[0].scores
-    } | {ALL: {one.controller: (one.total, one.tuned_total) for one in ranked}}
+    } | vehicles_of({ALL: ranked})
 
 
 def vehicles_of(every: Mapping[str, Sequence[Standing]]) -> Cells:
@@ -142,9 +140,7 @@ def arena_figure(panels: Mapping[str, Cells]) -> Figure:
     heights = [1 + len(cells) for cells in panels.values()]
     height = 1.1 + 0.5 * len(heights) + 0.24 * sum(heights)
     figure = style.new_figure(max(4.5, 1.4 + 0.72 * len(names)), height)
-    grid: Any = figure.subplots(
-        len(heights), 1, squeeze=False, gridspec_kw={"height_ratios": heights}
-    )
+    grid = figure.subplots(len(heights), 1, squeeze=False, gridspec_kw={"height_ratios": heights})
     for axes, (title, cells) in zip(grid[:, 0], panels.items(), strict=True):
         _draw(axes, cells, names)
         axes.set_title(style.verbatim(in_words(title)))
@@ -197,7 +193,7 @@ def setpoint_figure(families: Sequence[SetpointErrors]) -> Figure:
     One panel per family, each with its own scale, so that every point has room for its name.
     """
     figure = style.new_figure(4.2 * len(families), 4.3)
-    row: Any = figure.subplots(1, len(families), squeeze=False)[0]
+    row = figure.subplots(1, len(families), squeeze=False)[0]
     for axes, family, color in zip(row, families, (style.RED, style.BLUE), strict=False):
         style.zero_lines(axes)
         published, points = zip(*family.published, strict=True), zip(*family.points, strict=True)
@@ -221,7 +217,7 @@ def period_figure(panels: Sequence[tuple[str, Sequence[PeriodErrors]]]) -> Figur
     terminated early.
     """
     figure = style.new_figure(2.5 * len(panels) + 0.9, 3.0)
-    row: Any = figure.subplots(1, len(panels), sharey=True, squeeze=False)[0]
+    row = figure.subplots(1, len(panels), sharey=True, squeeze=False)[0]
     looks = [(style.RED, "o-"), (style.BLUE, "s-"), (style.RED, "o:"), (style.BLUE, "s:")]
     terminated = False
     for axes, (title, series) in zip(row, panels, strict=True):

@@ -27,8 +27,8 @@ from tiltsim_controllers.laws.feedback import (
     modified_decoupler,
 )
 from tiltsim_controllers.mathematics.scalar import Floats
+from tiltsim_controllers.vehicle.body import ROTORS
 from tiltsim_controllers.vehicle.parameters import PRESETS, Vehicle, drag_ratio
-from tiltsim_controllers.vehicle.states import ROTORS
 
 _WIDTH: Final = 6.4  # inches: about the width of a page of text
 POSITIVE_TILT: Final = 0.5  # tilt angle (rad) of all rotors in the drawing of the vehicle
@@ -61,11 +61,10 @@ def _drawing_style() -> Iterator[None]:
         yield
 
 
-def _new_figure(height: float) -> Figure:
+def _new_figure(height: float) -> Any:
     """An empty figure with a white border, for dark pages."""
     figure = style.new_figure(_WIDTH, height)
-    layout: Any = figure.get_layout_engine()
-    layout.set(w_pad=0.1, h_pad=0.1)
+    figure.get_layout_engine().set(w_pad=0.1, h_pad=0.1)
     return figure
 
 
@@ -74,8 +73,7 @@ def vehicle_figure() -> Figure:
     """Body axes, rotor numbers, spins and positive tilts, as the compiled model has them."""
     pose = drawing.Pose((POSITIVE_TILT,) * 4)
     figure = _new_figure(3.7)
-    row: Any = figure.subplots(1, 2, width_ratios=[1.12, 1.0])
-    beside, above = row
+    beside, above = figure.subplots(1, 2, width_ratios=[1.12, 1.0])
     for axes, view in ((beside, BESIDE), (above, drawing.ABOVE)):
         drawing.blank(axes)
         pose.draw(axes, view)
@@ -139,7 +137,7 @@ def gait_figure() -> Figure:
     """Two gaits over two periods: the four tilt angles, and who leans forward when."""
     times = np.linspace(0.0, 2.0, 801)
     figure = _new_figure(4.3)
-    grid: Any = figure.subplots(2, 2, sharex=True, sharey="row", height_ratios=[1.25, 1.0])
+    grid = figure.subplots(2, 2, sharex=True, sharey="row", height_ratios=[1.25, 1.0])
     for column, (name, gait) in zip(grid.T, _SHOWN_GAITS, strict=True):
         angles = gait.angles(times)
         upper, lower = column
@@ -173,9 +171,8 @@ def decoupler_figure(flights: Mapping[str, Flight]) -> Figure:
     vehicle, tilts = first.scenario.true_rotorcraft, first.assembly.gait.angles(0.0)
     n = torque_free_direction(tilts, vehicle)
     figure = _new_figure(5.6)
-    halves: Any = figure.subfigures(2, 1, height_ratios=[1.0, 1.2])
-    above, below = halves
-    sketches: Any = above.subplots(1, len(flights), sharex=True, sharey=True)
+    above, below = figure.subfigures(2, 1, height_ratios=[1.0, 1.2])
+    sketches = above.subplots(1, len(flights), sharex=True, sharey=True)
     plan, error = below.subplots(1, 2)
     for sketch, (name, flight), line in zip(
         sketches, flights.items(), style.AXIS_LINES, strict=True
@@ -193,8 +190,8 @@ def decoupler_figure(flights: Mapping[str, Flight]) -> Figure:
     error.set(xlabel="time (s)", title="Distance from the set point (m)")
     error.set(yticks=[1e-6, 1e-4, 1e-2, 1.0], ylim=(1e-8, 20.0), xlim=(0.0, first["time"][-1]))
     error.yaxis.minorticks_off()
-    handles, labels = plan.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=len(flights))
+    handles, _ = plan.get_legend_handles_labels()
+    figure.legend(handles=handles, loc="outside lower center", ncols=len(flights))
     return figure
 
 
@@ -234,9 +231,9 @@ def attitude_figure() -> Figure:
     vehicle = PRESETS["ar_drone_2"]
     n = torque_free_direction(TROT_ANGLES, vehicle)[np.newaxis]
     figure = _new_figure(3.6)
-    row: Any = figure.subplots(1, 2, width_ratios=[1.0, 1.1])
-    _side_view(row[0], n[0])
-    _roll_pitch_plane(row[1], n, vehicle)
+    beside, plane = figure.subplots(1, 2, width_ratios=[1.0, 1.1])
+    _side_view(beside, n[0])
+    _roll_pitch_plane(plane, n, vehicle)
     return figure
 
 
@@ -291,8 +288,7 @@ def color_figure() -> Figure:
     angle = delta(vehicle)
     side = np.linspace(-pi / 2, pi / 2, 401)
     figure = _new_figure(3.4)
-    row: Any = figure.subplots(1, 2)
-    lines, plane = row
+    lines, plane = figure.subplots(1, 2)
     red, blue = [
         np.transpose([colored_angles(a, 0.0, name, drag_ratio(vehicle)) for a in side])
         for name in ("red", "blue")
@@ -316,7 +312,7 @@ def color_figure() -> Figure:
     drawing.text(plane, (0.75, -0.9), "unreachable\nR < 0", color=style.SINGULAR)
     drawing.text(plane, (-0.8, 0.95), "R > 0")
     plane.set(xlabel="α₁ = α₃ (rad)", ylabel="α₂ = α₄ (rad)", title="Red gaits")
-    for axes in row:
+    for axes in (lines, plane):
         for axis in "xy":
             style.angle_axis(axes, axis, pi / 2)
         axes.set_aspect("equal")

@@ -8,8 +8,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy.stats import binomtest, spearmanr
 
-from tiltsim.scenario.key_units import quantity_of_key
 from tiltsim.scenario.metric_names import METRICS
+from tiltsim.scenario.schema import quantity_of_key
 from tiltsim.sweeps.dataset import Column, SweepResults
 from tiltsim.sweeps.tables import GridAxis, NormalAxis, UniformAxis
 from tiltsim.views.figures.style import CYCLE, DASHES, INK, MARKERS, new_figure, verbatim
@@ -90,7 +90,7 @@ def distributions_figure(results: SweepResults, metrics: tuple[str, ...]) -> Fig
     groups = [*groups_of(results, lines, np.ones(len(results), dtype=bool))]
     keys, completed = _most_effective(results, metrics[0], groups), completed_mask(results)
     figure = new_figure(10.0, 6.2 if keys else 3.2)
-    parts: Any = figure.subfigures(2 if keys else 1, 1, squeeze=False)
+    parts = figure.subfigures(2 if keys else 1, 1, squeeze=False)
     above, below = parts[0, 0], parts[-1, 0]
     ratios = [0.62, *(1.0 for _ in metrics)]
     shares, *curves = above.subplots(1, 1 + len(metrics), width_ratios=ratios)

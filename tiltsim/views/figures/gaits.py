@@ -25,10 +25,10 @@ from tiltsim_controllers.analysis.singularity import (
     margin_over_gait,
     singular_values,
     torque_free_direction,
+    unacceptable_attitudes,
 )
 from tiltsim_controllers.analysis.two_color_map import curve_l, delta, point_p, red_residual
 from tiltsim_controllers.analysis.two_color_planner import Circle, Path, check_path
-from tiltsim_controllers.analysis.unacceptable_attitudes import unacceptable_attitudes
 from tiltsim_controllers.gaits.plans import Gait
 from tiltsim_controllers.vehicle.parameters import Vehicle, drag_ratio
 
@@ -93,7 +93,7 @@ def comparison_figure(gaits: list[tuple[str, Gait]], vehicle: Vehicle) -> Figure
 def margin_figure(gaits: list[tuple[str, Gait]], vehicle: Vehicle) -> Figure:
     """Singularity margin over a period for several gaits, given with their labels."""
     figure = style.new_figure(5.4, 3.2)
-    axes: Any = figure.subplots()
+    axes = figure.subplots()
     _margin(axes, [(gait, label) for label, gait in gaits], vehicle)
     place_legends(Page(figure, [axes], [[axes]]))
     return figure
@@ -187,8 +187,7 @@ def _margin(axes: Axes, gaits: list[tuple[Gait, str]], vehicle: Vehicle) -> None
 def fault_figure(vehicle: Vehicle) -> Figure:
     """Maximum rotor speed in hover over a servo's stuck angle and over the remaining thrust."""
     figure = style.new_figure(6.6, 2.7)
-    row: Any = figure.subplots(1, 2, sharey=True)
-    stuck, partial = row
+    stuck, partial = figure.subplots(1, 2, sharey=True)
     angles = np.linspace(-pi, pi, 49)
     for upright, line, place, text in (
         (False, "-", (-3.0, 395.0), "at any\nattitude"),
@@ -245,7 +244,7 @@ _DASHES: Final[dict[str, Any]] = {"red": "-", "blue": (0, (4, 2))}
 def map_figure(vehicle: Vehicle, paths: list[tuple[str, Path]] | None = None) -> Figure:
     """Regions S_U and S_D of red, the curve L, the point P, and paths given with their labels."""
     figure = style.new_figure(5.4, 6.3)
-    axes: Any = figure.subplots()
+    axes = figure.subplots()
     axes.grid(False)
     limit = pi / 2
     side = np.linspace(-limit, limit, 401)

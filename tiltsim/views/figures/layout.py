@@ -48,7 +48,8 @@ def new_page(over_time: Sequence[bool]) -> Page:
     natural = 8.4 if many else 5.4 if longest else 0.0
     natural += 3.6 * max(0, sum(kind for kind, _ in blocks) - 1)
     natural += min(square, 3 if not longest else 1) * (3.0 if longest else 4.2)
-    width = style.figure_width(natural)
+    requested = style.requested_size()
+    width = natural if requested is None else requested.width
     columns = 0 if not longest else 2 if many and width >= 2 * MIN_COLUMN else 1
     parts = [columns if kind else 1 for kind, _ in blocks]
     beside = len(blocks) > 1 and width >= sum(parts) * MIN_COLUMN
@@ -94,20 +95,22 @@ def fitting(draw: Callable[[], Page]) -> Figure:
     if requested is None:
         return page.figure
     first, (width, height) = page, page.figure.get_size_inches()
+
+    def redrawn(height: float | None) -> tuple[Page, float, int]:
+        with style.paper_style(size=style.Size(width, height)):
+            page = draw()
+        return page, *_heights(page)
+
     lowest, rows = _heights(page)
     if rows == 0:
-        with style.paper_style(size=style.Size(width)):
-            page = draw()
-        height = page.figure.get_size_inches()[1]
-        lowest, rows = _heights(page)
-        height, lowest = height - rows * (lowest - MIN_PANEL), 0.0
+        page, lowest, rows = redrawn(None)
+        height = page.figure.get_size_inches()[1] - rows * (lowest - MIN_PANEL)
+        lowest = 0.0
     for _ in range(_TRIES):
         if rows == 0 or lowest >= MIN_PANEL:
             break
         height = ceil(25.4 * (height + rows * max(0.0, MIN_PANEL - lowest))) / 25.4
-        with style.paper_style(size=style.Size(width, height)):
-            page = draw()
-        lowest, rows = _heights(page)
+        page, lowest, rows = redrawn(height)
     if rows == 0:
         raise InputError(style.too_small(first.figure))
     if page is first:
@@ -148,22 +151,17 @@ def add_heading(figure: Figure, title: str, more: str = "", legend: Sequence[Any
     width, height = figure.get_size_inches() * figure.dpi
     gap = 0.07 * figure.dpi
     top = height - gap
-    bold = {"size": rcParams["figure.titlesize"], "weight": rcParams["figure.titleweight"]}
-    looks: list[tuple[str, dict[str, Any]]] = [
-        (title, {**bold, "gid": HEADING}),
-        (more, {"color": "#555555"}),
-    ]
-    for text, look in looks:
+    bold: dict[str, Any] = {"gid": HEADING, "size": rcParams["figure.titlesize"]}
+    bold["weight"] = rcParams["figure.titleweight"]
+    for text, look in ((title, bold), (more, {"color": "#555555"})):
         if text:
             written = figure.text(2.0 * gap / width, top / height, text, va="top", **look)
             wrap(written, width - 4.0 * gap)
             top -= written.get_window_extent().height + gap
     if legend:
-        place: dict[str, Any] = {
-            "bbox_to_anchor": (2.0 * gap / width, top / height),
-            "borderaxespad": 0.0,
-        }
-        drawn = add_legend(figure, legend, loc="upper left", borderpad=0.0, **place)
+        place: dict[str, Any] = {"bbox_to_anchor": (2.0 * gap / width, top / height)}
+        place |= {"loc": "upper left", "borderaxespad": 0.0, "borderpad": 0.0}
+        drawn = add_legend(figure, legend, **place)
         top -= drawn.get_window_extent().height + gap
     layout: Any = figure.get_layout_engine()
     layout.set(rect=(0.0, 0.0, 1.0, top / height))
@@ -175,17 +173,15 @@ def add_legend(figure: Figure, handles: Sequence[Any], columns: int = 9, **look:
     # Letters are a little wider in the resolution of print.
     width = min(0.96 * inches, 0.97 * (inches - 0.28)) * figure.dpi
     look = {"loc": "outside lower center", **look}
-    columns = min(columns, len(handles))
-    while True:
-        legend = figure.legend(handles=handles, ncols=columns, **look)
+    for number in range(min(columns, len(handles)), 0, -1):
+        legend = figure.legend(handles=handles, ncols=number, **look)
         if legend.get_window_extent().width <= width:
             return legend
-        if columns == 1:
-            for text in legend.get_texts():
-                wrap(text, width - 3.0 * float(text.get_fontsize()) * figure.dpi / 72.0)
-            return legend
-        legend.remove()
-        columns -= 1
+        if number > 1:
+            legend.remove()
+    for text in legend.get_texts():
+        wrap(text, width - 3.0 * float(text.get_fontsize()) * figure.dpi / 72.0)
+    return legend
 
 
 def wrap(text: Text, width: float) -> None:

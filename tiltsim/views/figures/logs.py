@@ -42,7 +42,7 @@ def logs_figure(logs: Sequence[Log], names: Sequence[str], title: str | None) ->
     if not rows:
         raise InputError(f"{logs[0].name}: nothing to draw: no column of a vehicle's motion")
     figure = style.new_figure(9.0, 1.4 * len(rows) + 0.9)
-    grid: Any = figure.subplots(len(rows), 3, sharex=True, squeeze=False)
+    grid = figure.subplots(len(rows), 3, sharex=True, squeeze=False)
     looks = [style.marked_line(number, max(map(len, logs))) for number in range(len(logs))]
     for axes, row in zip(grid, rows, strict=True):
         for one in axes[len(row) :]:
@@ -68,7 +68,7 @@ def replay_figure(found: Replay) -> Figure:
     """Measured minus predicted over time, a panel for each vector."""
     vectors = [name for name in VECTORS if {*VECTORS[name]} & {*found.channels}]
     figure = style.new_figure(7.0, 1.7 * len(vectors) + 0.8)
-    column: Any = figure.subplots(len(vectors), 1, sharex=True, squeeze=False)[:, 0]
+    column = figure.subplots(len(vectors), 1, sharex=True, squeeze=False)[:, 0]
     for axes, vector in zip(column, vectors, strict=True):
         for name, color in zip(VECTORS[vector], style.CYCLE, strict=False):
             values = found.mismatch[:, :, found.channels.index(name)]

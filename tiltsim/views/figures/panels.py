@@ -34,7 +34,7 @@ from tiltsim.views.signals import (
     signals_of,
     vector_signals,
 )
-from tiltsim_controllers.code.traceable import traceable
+from tiltsim_controllers.code.arrays import traceable
 from tiltsim_controllers.mathematics.attitude import attitude_error, rotation_matrix
 from tiltsim_controllers.mathematics.scalar import Floats
 

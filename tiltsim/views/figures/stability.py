@@ -18,11 +18,11 @@ from tiltsim.linear.linearization import Linearization
 from tiltsim.linear.margins import TOGETHER, broken_loops, frequency_grid
 from tiltsim.linear.modes import NEUTRAL
 from tiltsim.linear.stability import Point, Stability
-from tiltsim.scenario.key_units import quantity_of_key
+from tiltsim.scenario.schema import quantity_of_key
 from tiltsim.system.text import in_words
 from tiltsim.views.figures import style
 from tiltsim.views.titles import address_in_words
-from tiltsim_controllers.analysis.unacceptable_attitudes import unacceptable_attitudes
+from tiltsim_controllers.analysis.singularity import unacceptable_attitudes
 from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.vehicle.parameters import Vehicle
 
@@ -39,7 +39,7 @@ CURVES: Final = 8  # curves of singular attitudes of a moving gait
 def stability_figure(found: Stability) -> Figure:
     """The poles of a rest point in the complex plane, or the multipliers of an orbit."""
     figure = style.new_figure(5.2, 4.2)
-    axes: Any = figure.subplots()
+    axes = figure.subplots()
     values = found.poles if found.poles is not None else found.multipliers
     assert values is not None  # it is an orbit, if not a rest point
     if found.poles is not None:
@@ -87,8 +87,7 @@ def sweep_figure(key: str, sweeps: Mapping[str, Sequence[Point]]) -> Figure:
     upper.set(ylabel="largest multiplier", title="Remainder of a disturbance after one period")
     lower.set(ylabel="growth rate (1/s)", xlabel=quantity_of_key(key).text)
     lower.set_title("Slowest mode other than altitude")
-    handles, labels = upper.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=2)
+    figure.legend(handles=upper.get_legend_handles_labels()[0], loc="outside lower center", ncols=2)
     return figure
 
 
@@ -126,8 +125,7 @@ def loop_figure(system: Linearization) -> Figure:
     nyquist.set(xlabel="real part", ylabel="imaginary part")
     sensitivity.set(xlabel="frequency (rad/s)", ylabel="largest singular value (1)")
     sensitivity.set_title("All inputs together")
-    handles, labels = gain.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=4)
+    figure.legend(handles=gain.get_legend_handles_labels()[0], loc="outside lower center", ncols=4)
     return figure
 
 
@@ -171,7 +169,7 @@ def _stretch(axes: Any, name: str, parts: Floats) -> float:
 def attraction_figure(found: Attraction) -> Figure:
     """Initial states that come back, with the gait's singular attitudes."""
     figure = style.new_figure(5.0, 5.0)
-    axes: Any = figure.subplots()
+    axes = figure.subplots()
     handles = _draw_map(axes, found)
     places = [PLACES[name] for name in found.axes]
     start = [getattr(found.scenario.initial, key)[index] for key, index in places]
@@ -189,7 +187,7 @@ def attraction_panels(maps: Mapping[str, Attraction], columns: int = 4) -> Figur
     """Maps of roll and pitch side by side, by title: the initial attitudes that come back."""
     rows = -(-len(maps) // columns)
     figure = style.new_figure(2.5 * columns, 2.9 * rows)
-    grid: Any = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
+    grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
     handles: dict[str, Artist] = {}
     for axes, (title, found) in zip(grid.flat, maps.items(), strict=False):
         drawn = _draw_map(axes, found)

@@ -273,8 +273,8 @@ def verbatim(text: str) -> str:
     return shortened(text, LONGEST_TEXT).replace("$", r"\$")
 
 
-def new_figure(width: float, height: float) -> Figure:
-    """An empty figure with constrained layout.
+def new_figure(width: float, height: float) -> Any:
+    """An empty `ShownFigure` with constrained layout.
 
     It has the size of the context or, without one, this size (inches); with the width alone given,
     the same proportions.
@@ -289,12 +289,6 @@ def new_figure(width: float, height: float) -> Figure:
 def requested_size() -> Size | None:
     """The size of the context."""
     return _size.get()
-
-
-def figure_width(natural: float) -> float:
-    """The width (inches) that a new figure will have if this is its natural one."""
-    requested = _size.get()
-    return natural if requested is None else requested.width
 
 
 def angle_axis(axes: Axes, axis: str, limit: float) -> None:

@@ -20,8 +20,8 @@ from tiltsim.models.rotorcraft import RotorcraftSpec, compile_model
 from tiltsim.views.figures import style
 from tiltsim_controllers.mathematics.attitude import quaternion_of_euler
 from tiltsim_controllers.mathematics.scalar import Floats, Quad
+from tiltsim_controllers.vehicle.body import ROTORS
 from tiltsim_controllers.vehicle.parameters import PRESETS
-from tiltsim_controllers.vehicle.states import ROTORS
 
 _VISUAL: Final = 2  # group of the geoms that are drawn
 _ON_TOP: Final = 5.0  # draw order of lines and texts that nothing covers

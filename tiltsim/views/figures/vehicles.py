@@ -27,12 +27,13 @@ from tiltsim_controllers.analysis.attainable import (
 )
 from tiltsim_controllers.analysis.hover import hover
 from tiltsim_controllers.analysis.published_gaits import DETERMINANT_CASES, TRIANGLE
-from tiltsim_controllers.analysis.quadrotor_singularity import (
+from tiltsim_controllers.analysis.singularity import (
     normalized_determinant,
     published_determinant,
     published_singular_curve,
+    residuals,
+    world_up,
 )
-from tiltsim_controllers.analysis.singularity import residuals, world_up
 from tiltsim_controllers.analysis.torque_free import (
     LEVEL,
     SINGULAR_ATTITUDES,
@@ -69,15 +70,14 @@ def determinant_figure(case: str, vehicle: Vehicle) -> Figure:
     values = [determinant(pair, *grid) for pair in pairs]
     largest = float(np.abs(values).max())
     figure = style.new_figure(9.2, 5.6)
-    parts: Any = figure.subfigures(2, 1, height_ratios=[1.0, 1.45])
-    upper, lower = parts
+    upper, lower = figure.subfigures(2, 1, height_ratios=[1.0, 1.45])
     title = f"Determinant R at level attitude, {restriction}"
     upper.suptitle(title, x=0.012, ha="left", size="medium")
     plane, *sections = lower.subplots(1, 3, width_ratios=[1.25, 1.0, 1.0])
     slopes = ((-1.0, -1.5, 1.5, "−α₂"), (1.0, 0.0, 1.0, "α₂"))  # with start and end, rad
     for place, (pair, R, shade, look) in enumerate(zip(pairs, values, shades, looks, strict=True)):
         label = f"α₁ = {pair[0]:g}".replace("-", "−")
-        surface: Any = upper.add_subplot(1, len(pairs), place + 1, projection="3d")
+        surface = upper.add_subplot(1, len(pairs), place + 1, projection="3d")
         _surface(surface, [*grid, R], largest)
         surface.set_title(label, y=0.93, loc="center")
         plane.contour(*grid, R, [0.0], colors=[shade], linestyles=[look], linewidths=[1.6])
@@ -96,9 +96,12 @@ def determinant_figure(case: str, vehicle: Vehicle) -> Figure:
         axes.axhline(0.0, color=style.INK, lw=0.8)
         axes.set(xlabel="α₂ (rad)", ylabel="R", title=f"R along α₄ = {name}")
         axes.margins(x=0.0)
-    handles, labels = sections[0].get_legend_handles_labels()
     # Opposite values of alpha_1 may give equal curves: short dashes over long ones show both.
-    lower.legend(handles, labels, loc="outside lower center", ncols=len(pairs))
+    lower.legend(
+        handles=sections[0].get_legend_handles_labels()[0],
+        loc="outside lower center",
+        ncols=len(pairs),
+    )
     return figure
 
 
@@ -138,20 +141,20 @@ def singularity_figure(vehicle: Vehicle) -> Figure:
     figure = style.new_figure(9.6, 6.2)
     grid = figure.add_gridspec(2, 3, width_ratios=[1.1, 1.0, 1.0])
     for row, (title, values, levels) in enumerate(determinants):
-        surface: Any = figure.add_subplot(grid[row, 0], projection="3d")
+        surface = figure.add_subplot(grid[row, 0], projection="3d")
         look: dict[str, Any] = {"cmap": style.SEQUENTIAL, "rstride": 4, "cstride": 4, "lw": 0.2}
         surface.plot_surface(roll, pitch, np.minimum(values, levels[-1]), **look)
         surface.view_init(elev=24, azim=-125)
         surface.set_box_aspect((1.0, 1.0, 0.75), zoom=0.85)
         surface.set(xlabel="roll φ (rad)", ylabel="pitch θ (rad)", title=title)
-        contour: Any = figure.add_subplot(grid[row, 1])
+        contour = figure.add_subplot(grid[row, 1])
         look = {"cmap": style.SEQUENTIAL, "extend": "both"}
         shades = contour.contourf(roll, pitch, values, levels, **look)
         figure.colorbar(shades, ax=contour, shrink=0.85)
         contour.set_title(title)
         style.roll_pitch_axes(contour)
     curve = published_singular_curve()
-    alone: Any = figure.add_subplot(grid[0, 2])
+    alone = figure.add_subplot(grid[0, 2])
     alone.plot(*curve, color=style.RED)
     alone.plot(0.0, 0.0, "o", ms=3.5, color=style.INK)
     alone.annotate("level", (0.0, 0.0), (5, 3), textcoords="offset points")
@@ -169,8 +172,7 @@ def singularity_figure(vehicle: Vehicle) -> Figure:
     axes.plot(border, np.roll(border, 1), color=style.BLUE, lw=2.0, label=text)
     axes.set_title("Published switching zone")
     style.roll_pitch_axes(axes)
-    handles, labels = axes.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=4)
+    figure.legend(handles=axes.get_legend_handles_labels()[0], loc="outside lower center", ncols=4)
     return figure
 
 
@@ -195,7 +197,7 @@ def multirotor_figure(rotors: TiltedRotors, kind: str) -> Figure:
          "{} (N m)"),
     )  # fmt: skip
     for place, (title, attainable, unit, label) in enumerate(sets, start=1):
-        space: Any = figure.add_subplot(1, 2, place, projection="3d")
+        space = figure.add_subplot(1, 2, place, projection="3d")
         space.set_title(title)
         _polytope(space, attainable, unit, label)
     return figure
@@ -308,7 +310,7 @@ def attainable_figure(
     conditions = f"Rotor speeds from {limits[0]:.2f} to {limits[1]:.2f} rad/s. Body axes."
     if whole.is_empty:  # a note in place of the set
         figure = style.new_figure(5.0, 1.2)
-        axes: Any = figure.subplots()
+        axes = figure.subplots()
         axes.set_axis_off()
         axes.set_title(title)
         reason = "Empty set: no rotor speeds within the limits give zero yaw torque."
@@ -317,8 +319,8 @@ def attainable_figure(
         return figure
     figure = style.new_figure(8.8, 4.0)
     grid = figure.add_gridspec(1, 2, width_ratios=[1.25, 1.0])
-    space: Any = figure.add_subplot(grid[0], projection="3d")
-    plane: Any = figure.add_subplot(grid[1])
+    space = figure.add_subplot(grid[0], projection="3d")
+    plane = figure.add_subplot(grid[1])
     space.set_title(title)
     if whole.dimension == 3:
         draw_set(space, whole, style.SKY, alpha=0.15)

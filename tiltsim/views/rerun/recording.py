@@ -28,7 +28,7 @@ from tiltsim.views.rerun import require_rerun
 from tiltsim.views.rerun.flight_recorder import BOUND, FlightRecorder, plotted_lines
 from tiltsim.views.rerun.scene import REFERENCE_POINTS, ground_height
 from tiltsim.views.rerun.timeline import FLIGHTS, TIMELINE
-from tiltsim.views.signals import Signals
+from tiltsim.views.signals import Signals, range_of
 from tiltsim.views.titles import common_title, flight_names
 from tiltsim_controllers.mathematics.scalar import Floats
 
@@ -186,7 +186,7 @@ def _plots(recorders: Sequence[FlightRecorder], flights: Sequence[Flight]) -> rr
         return rrb.Vertical(*_compared(recorders, flights, times))
 
     def plot(panel: Signals, title: str, *, legend: bool = False) -> rrb.View:
-        limits = panel.range_of(flights) if flights else None
+        limits = range_of([(panel, flight) for flight in flights]) if flights else None
         return _plot(title, [f"{panel.path}/**"], limits, times, legend=legend)
 
     rows: list[rrb.View | rrb.Container] = []
@@ -216,18 +216,19 @@ def _compared(
     recorders: Sequence[FlightRecorder], flights: Sequence[Flight], times: tuple[float, float]
 ) -> Iterator[rrb.View]:
     """A plot of each compared signal, with one line per flight."""
-    names = dict.fromkeys(name for one in recorders for name in one.signals)
-    legend = True
-    for name in names:
-        having = [number for number, one in enumerate(recorders) if name in one.signals]
-        panel = recorders[having[0]].signals[name]
-        for line in panel.compared:
-            paths = [f"{recorders[number].part}/{panel.path}/{line.name}" for number in having]
-            paths += [f"{recorders[0].part}/{panel.path}/{each.name}" for each in panel.levels]
-            alone = replace(panel, title=line.label, detail="", lines=[line], bounds=())
-            limits = alone.range_of([flights[number] for number in having]) if flights else None
-            yield _plot(alone.text, paths, limits, times, legend=legend)
-            legend = False
+    found: dict[tuple[str, str], dict[int, Signals]] = {}
+    for number, one in enumerate(recorders):
+        for panel in one.signals.values():
+            for line in panel.compared:
+                alone = replace(panel, title=line.label, detail="", lines=[line], bounds=())
+                found.setdefault((panel.path, line.name), {})[number] = alone
+    for place, ((path, name), panels) in enumerate(found.items()):
+        first = next(iter(panels.values()))
+        paths = [f"{recorders[number].part}/{path}/{name}" for number in panels]
+        paths += [f"{recorders[0].part}/{path}/{each.name}" for each in first.levels]
+        shown = [(panel, flights[number]) for number, panel in panels.items() if flights]
+        limits = range_of(shown) if shown else None
+        yield _plot(first.text, paths, limits, times, legend=place == 0)
 
 
 def _plot(

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 FORMATS: Final = (".mp4", ".gif")
 GIF_MAX_FPS: Final = 50  # browsers slow down GIFs with shorter delays
+RANGES: Final = {"start": (0.0, inf), "end": (0.0, inf), "speed": (0.01, 100.0), "fps": (1, 240)}
 
 
 def video(
@@ -99,45 +100,40 @@ def video_format(
             shown = f"{value:g}" if isinstance(value, float) else short_repr(value)
             raise InputError(f"{prefix}{name} {shown}: {allowed}")
 
-    def number(name: str, default: float, least: float, most: float = inf) -> float:
-        value = default if options.get(name) is None else options[name]
-        allowed = f"from {least:g} to {most:g}" if most < inf else f"of at least {least:g}"
-        fits = is_finite(value) and least <= value <= most
-        require(name, f"must be a number {allowed}", fits=fits or options.get(name) is None)
-        return float(value)
-
-    def several(name: str, ranges: Sequence[tuple[float, float]], allowed: str) -> Any:
-        values = options[name]
-        fits = isinstance(values, list | tuple) and len(values) == len(ranges)
-        pairs = zip(values, ranges, strict=True) if fits else []
-        inside = all(is_finite(value) and low <= value <= high for value, (low, high) in pairs)
-        require(name, allowed, fits=fits and inside)
-        return values
-
-    quality = options.get("quality")
+    quality, size, camera = (options.get(name) for name in ("quality", "size", "camera"))
     known = isinstance(quality, str) and quality in QUALITIES
     require("quality", choose(quality, QUALITIES), fits=known)
-    made = QUALITIES[str(quality)]
-    start, end = number("start", 0.0, 0.0), number("end", inf, 0.0)
+    changes = {name: options[name] for name in RANGES if options.get(name) is not None}
+    for name, value in changes.items():
+        low, high = RANGES[name]
+        allowed = f"from {low:g} to {high:g}" if high < inf else f"of at least {low:g}"
+        require(name, f"must be a number {allowed}", fits=_fit([value], [RANGES[name]]))
+    made = replace(QUALITIES[str(quality)], **changes)
+    made = replace(made, fps=round(made.fps))
     flight_end = float(flight["time"][-1])
     if flight_end == 0.0:
         raise InputError("the flight ended at 0 s, so that there is nothing to show")
-    reason = f"is not before the end {end:g}" if end < flight_end else "is not in it"
+    reason = f"is not before the end {made.end:g}" if made.end < flight_end else "is not in it"
     reason = f"{reason}; the flight ends at {flight_end:g} s"
-    require("start", reason, fits=start < min(flight_end, end))
-    if options.get("size") is not None:
+    require("start", reason, fits=made.start < min(flight_end, made.end))
+    if size is not None:
         allowed = "must be even numbers of pixels from 64 to 4096, such as 1280 and 720"
-        width, height = several("size", [(64, 4096)] * 2, allowed)
-        even = all(isinstance(side, int) and side % 2 == 0 for side in (width, height))
-        require("size", allowed, fits=even)
-        made = replace(made, width=width, height=height)
-    fps = round(number("fps", made.fps, 1, 240))
-    slow = path.suffix.lower() != ".gif" or fps <= GIF_MAX_FPS
+        fits = _fit(size, [(64, 4096)] * 2)
+        fits = fits and all(isinstance(side, int) and side % 2 == 0 for side in size)
+        require("size", allowed, fits=fits)
+        made = replace(made, width=size[0], height=size[1])
+    slow = path.suffix.lower() != ".gif" or made.fps <= GIF_MAX_FPS
     require("fps", f"a GIF has at most {GIF_MAX_FPS} frames per second", fits=slow)
-    if options.get("camera") is not None:
-        ranges = [(1.5, 1000.0), (-360.0, 360.0), (-90.0, 90.0)]
+    if camera is not None:
         allowed = "must be vehicle radii from 1.5 to 1000 and two angles in degrees"
-        pose = several("camera", ranges, f"{allowed}, such as 7.5, 130, -24")
-        made = replace(made, camera=CameraPose(*pose))
-    speed = number("speed", 1.0, 0.01, 100.0)
-    return replace(made, fps=fps, speed=speed, start=start, end=end)
+        fits = _fit(camera, [(1.5, 1000.0), (-360.0, 360.0), (-90.0, 90.0)])
+        require("camera", f"{allowed}, such as 7.5, 130, -24", fits=fits)
+        made = replace(made, camera=CameraPose(*camera))
+    return made
+
+
+def _fit(values: Any, ranges: Sequence[tuple[float, float]]) -> bool:
+    """Whether values are a list of numbers, each within its range."""
+    if not isinstance(values, list | tuple) or len(values) != len(ranges):
+        return False
+    return all(is_finite(v) and low <= v <= high for v, (low, high) in zip(values, ranges))

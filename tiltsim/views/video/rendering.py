@@ -113,7 +113,7 @@ class FlightRenderer:
         self._targets = replay.positions(flight.columns, suffix="_ref")
         self._position = replay.positions(flight.columns)
         self._overlay = Overlay(flight, self._video.height)
-        self._cables = [table.cable for table in flight.scenario.cable]
+        self._cables = flight.scenario.cable
         self._camera = mujoco.MjvCamera()
         self._camera.type = mujoco.mjtCamera.mjCAMERA_TRACKING
         self._camera.trackbodyid = replay.first_free_body(self._model)

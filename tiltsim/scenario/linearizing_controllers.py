@@ -1,10 +1,11 @@
-"""The ``[controller]`` table of a multirotor."""
+"""The ``[controller]`` tables of feedback linearization: tiltrotor, quadrotor, multirotor."""
 
-from typing import Self
+from typing import Final, Self
 
 from pydantic import model_validator
 
 from tiltsim.models.rotor_table import Multirotor
+from tiltsim.scenario.controller_table import ControllerTable
 from tiltsim.scenario.gait_following import FailureAwareController, GaitFollowingController
 from tiltsim.scenario.messages import InvalidValueError
 from tiltsim.scenario.table import example
@@ -20,10 +21,115 @@ from tiltsim_controllers.analysis.torque_free import (
     torque_free_forces,
 )
 from tiltsim_controllers.gaits.plans import Gait
-from tiltsim_controllers.laws.attitude_altitude import PUBLISHED_DECOUPLING
+from tiltsim_controllers.laws.attitude_altitude import (
+    DECOUPLINGS,
+    PUBLISHED_DECOUPLING,
+    AttitudeAltitude,
+)
+from tiltsim_controllers.laws.full_pose import FullPose
 from tiltsim_controllers.laws.multirotor_steps import RESTORING, AttitudeForce, Form
+from tiltsim_controllers.laws.quadrotor_attitude_altitude import QuadrotorAttitudeAltitude
+from tiltsim_controllers.laws.switching import Switching
+from tiltsim_controllers.laws.yaw_position import YawPosition
 from tiltsim_controllers.mathematics.scalar import Floats, Triple
-from tiltsim_controllers.vehicle.effectiveness import force_and_torque
+from tiltsim_controllers.vehicle.parameters import Vehicle
+from tiltsim_controllers.vehicle.rotors import force_and_torque
+
+
+class AttitudeAltitudeController(AttitudeAltitude, GaitFollowingController):
+    """Attitude-altitude control of the tiltrotor under a planned gait (ch. 3 to 9)."""
+
+    model_config = example(law="attitude_altitude", decoupler="modified")
+
+    vehicle_models = ("tiltrotor",)
+    reference_kinds = ("position", "attitude_altitude")
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if not self.gait_rate_feedforward:
+            needs = "needs controller.gait_rate_feedforward = true"
+            self.require_defaults(_RATE_KEYS, needs)
+            if any(self.resolve_integral_gains()):
+                raise self.mistake("gains", f"integral action {needs}")
+            return self
+        for key, choices in (("decoupling", ("exact",)), ("decoupler", ("exact", "none"))):
+            if getattr(self, key) not in choices:
+                needs = f"gait_rate_feedforward = true needs {' or '.join(choices)}"
+                raise self.mistake(key, needs)
+        return self
+
+    def error_loops(self, vehicle: Vehicle) -> list[ErrorLoop]:
+        if self.gait_rate_feedforward:
+            return feedforward_loops(self.resolve_gains(), self.resolve_integral_gains())
+        speed = vehicle.hover_rotor_speed
+        return error_loops(self.resolve_gains(), speed, DECOUPLINGS[self.decoupling])
+
+    @property
+    def loop_name(self) -> str:
+        return "gait_feedforward" if self.gait_rate_feedforward else self.law
+
+    @property
+    def omits_reference_acceleration(self) -> bool:
+        return not self.gait_rate_feedforward
+
+
+_RATE_KEYS: Final = (
+    "leave_out",
+    "anticipation",
+    "max_acceleration",
+    "max_angular_acceleration",
+    "rotor_inertia_feedforward",
+)
+"""Keys of `AttitudeAltitudeController` that only gait_rate_feedforward reads."""
+
+
+class FullPoseController(FullPose, FailureAwareController):
+    """Position and attitude control with the tilt angles as inputs (ch. 3)."""
+
+    vehicle_models = ("tiltrotor", "multirotor")
+    reference_kinds = ("position", "pose", "attitude_altitude")
+    loop_gains = ("gains",)
+    damps_swing = True
+    commands_tilts = True
+    follows_turns = True
+
+    @property
+    def position_stiffness(self) -> float:
+        on_acceleration, _, on_position = self.resolve_gains().position
+        stiffness: float = on_position / on_acceleration
+        return stiffness
+
+
+class YawPositionController(YawPosition, ControllerTable):
+    """Yaw-position control of the quadrotor with dynamic extension (ch. 2)."""
+
+    vehicle_models = ("quadrotor",)
+    reference_kinds = ("position",)
+    loop_gains = ("gains",)
+
+
+class SwitchingController(Switching, ControllerTable):
+    """Yaw-position control that switches to attitude-altitude control in a zone (ch. 2)."""
+
+    vehicle_models = ("quadrotor",)
+    reference_kinds = ("pose",)
+    loop_gains = ("gains", "attitude_gains")
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        for key in ("roll", "pitch"):
+            low, high = getattr(self.zone, key)
+            if low > high:
+                raise self.mistake(f"zone.{key}", "the first must not exceed the second")
+        return self
+
+
+class QuadrotorAttitudeAltitudeController(QuadrotorAttitudeAltitude, ControllerTable):
+    """Attitude-altitude control of the quadrotor (ch. 2, Appendix B)."""
+
+    vehicle_models = ("quadrotor",)
+    reference_kinds = ("attitude_altitude",)
+    loop_gains = ("gains",)
 
 
 class AttitudeForceController(AttitudeForce, GaitFollowingController, FailureAwareController):
