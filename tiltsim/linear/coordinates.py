@@ -196,7 +196,7 @@ def mujoco_coordinates(loop: ClosedLoop) -> Coordinates:
 def equation_coordinates(assembly: Assembly, size: int) -> Coordinates:
     """Coordinates of a state of the equations of this size; a rigid body has MuJoCo's."""
     loop, model = assembly.loop, assembly.scenario.vehicle.model
-    if assembly.scenario.simulation.plant == "rigid_body":
+    if assembly.scenario.simulation.plant != "thesis":
         return mujoco_coordinates(loop)
     rotation = 0 if model in {"quadrotor", "tilt_car"} else MATRIX
     body = BODY_FIELDS

@@ -249,8 +249,7 @@ def _derive(others: Others, samples: Samples, setup: ControlSetup) -> dict[str, 
 def swing(hanging: Any) -> Any:
     """Angles (rad), shape (2, ...), of a cable from straight down toward +x and +y.
 
-    Args:
-        hanging: From its attachment to the load, m, world axes, shape (3, ...).
+    ``hanging`` leads from its attachment to the load, m, world axes, shape (3, ...).
     """
     return xp.array([xp.arctan2(hanging[0], -hanging[2]), xp.arctan2(hanging[1], -hanging[2])])
 

@@ -68,12 +68,7 @@ class Layer:
 def wrap_loop(inner: ClosedLoop, layer: Layer) -> ClosedLoop:
     """A closed loop with one more layer around it.
 
-    Args:
-        inner: The loop within.
-        layer: The layer around it.
-
-    Returns:
-        A loop whose parameters are the signature, the ``layer``'s and the ``inner`` loop's.
+    Its parameters are the signature, the ``layer``'s and the ``inner`` loop's.
     """
     record = make_record_type(
         f"{layer.parameters.__name__}Parameters",
