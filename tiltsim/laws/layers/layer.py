@@ -111,7 +111,7 @@ def wrap_loop(inner: ClosedLoop, layer: Layer) -> ClosedLoop:
 
 
 def _functions_within(inner: ClosedLoop, layer: Layer, first: int) -> dict[str, Any]:
-    """Functions of a loop, by name, with a layer around it; ``first`` is what it remembers."""
+    """Functions of a loop, by name, in a layer that remembers controls from ``first`` on."""
     act_size, ctrl_size = inner.sizes.act, inner.sizes.ctrl
     end = act_size + len(layer.fields)
     adds = layer.adds or (lambda *_: xp.zeros(0))
