@@ -55,7 +55,7 @@ class VectoringController(Vectoring, FailureAwareController, TiltingTable, LawCo
             *airframe.initial_velocity,
             *quaternion_of_euler(airframe.initial_attitude),
             *airframe.initial_body_rates,
-            *(0.0,) * 6,
+            *(0.0,) * 7,
             *airframe.initial_speeds * (airframe.latency + 1),
             *tilts * airframe.latency,
             *(0.0,) * len(tilts),
