@@ -101,6 +101,30 @@ def test_a_saved_flight_is_read_back_whatever_becomes_of_the_files_that_it_names
     assert tiltsim.load_scenario(tmp_path / "flight" / "scenario.toml").companion
 
 
+def test_the_contact_forces_of_a_companion_are_its_own_on_both_engines():
+    """A box without weight flies against the companion's tool: Newton's second law, by steps."""
+    box = {"name": "box", "type": "box", "position": [2.1, 0.92, 0.02], "size": [0.2, 0.3, 0.4]}
+    box |= {"joint": "free", "mass": 0.7, "floating": True, "velocity": [0.0, -0.5, 0.0]}
+    wall = {"name": "wall", "type": "wall", "position": [0.0, -9.0, 0.0], "size": [2.0, 2.0]}
+    armed = WING | {"changes": {"tool": STICK}}
+    changes = {"object": [wall, box], "simulation.timestep": 0.001}
+    changes |= {"simulation.record_timestep": 0.001, "simulation.duration": 0.05}
+    python, native = (
+        tiltsim.simulate(together(armed, **changes, **{"simulation.engine": engine}))
+        for engine in ("python", "native")
+    )
+    for name in python:
+        np.testing.assert_array_equal(python[name], native[name], err_msg=name)
+    force = python["wing_contact_force_y"]
+    assert np.abs(force).max() > 1.0
+    speed = np.diff(python["box_y"], 2) / 0.001
+    np.testing.assert_allclose(0.7 * speed / 0.001, force[2:], atol=1e-6)
+    assert not python["contact_force_y"].any()
+    assert python["contact_time"][-1] == 0.0
+    assert python["wing_contact_time"][-1] == pytest.approx(0.001 * np.count_nonzero(force))
+    assert python["wing_peak_contact_force"][-1] >= np.abs(force).max()
+
+
 def test_vectors_of_a_companion_are_panels_and_hints():
     flight = tiltsim.simulate(together(WING, **{"simulation.duration": 0.02}))
     (axes,) = tiltsim.plot(flight, panels="wing_position", size="85x60mm").axes

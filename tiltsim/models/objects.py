@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 import numpy as np
 from pydantic import Field
 
-from tiltsim.models.cables import CABLE_READING, IMPEDANCE, Cable, add_cable, stretch
+from tiltsim.models.cables import IMPEDANCE, Cable, add_cable, stretch
 from tiltsim_controllers.laws.keys import (
     ZEROS,
     Angles3,
@@ -165,17 +165,6 @@ class Objects:
         """Whether a load hangs on a cable."""
         return self.load is not None and not self.load.rigid
 
-    @property
-    def coordinates(self) -> int:
-        """Numbers in ``qpos`` behind the vehicle's."""
-        own = sum(COORDINATES[body.joint] for body in self.bodies)
-        return own + COORDINATES["free"] * self.hangs
-
-    @property
-    def readings(self) -> int:
-        """Numbers in the sensors' memories."""
-        return CONTACT_READING * len(self.bodies) + CABLE_READING * (self.hangs + len(self.cables))
-
 
 def touchable(root: Any, *, ground: bool, number: int = -1) -> None:
     """Let the vehicle's collision shapes touch other things, but not each other.
@@ -237,10 +226,10 @@ def add_objects(spec: mujoco.MjSpec, objects: Objects, companions: Sequence[str]
         _add_tool(spec, objects.tool)
     if objects.load is not None:
         _add_load(spec, objects.load)
-    for body in objects.bodies:
-        for vehicle in ("vehicle", *(f"{name}_vehicle" for name in companions)):
+    for vehicle in ("vehicle", *(f"{name}_vehicle" for name in companions)):
+        for body in objects.bodies:
             _add_pairs(spec, vehicle, body)
-        _add_force_sensor(spec, body.name)
+            _add_force_sensor(spec, vehicle, body.name)
     if objects.load is not None and objects.hangs:
         stretch(spec, "cable", ("payload_attachment", "payload"), objects.load.length)
     for cable in objects.cables:
@@ -356,15 +345,15 @@ def _add_pairs(spec: mujoco.MjSpec, vehicle: str, body: Body) -> None:
             )
 
 
-def _add_force_sensor(spec: mujoco.MjSpec, name: str) -> None:
-    """Measure the force (N, world) of the vehicle with all that it carries on an object."""
+def _add_force_sensor(spec: mujoco.MjSpec, vehicle: str, name: str) -> None:
+    """Measure the force (N, world) of a vehicle with all that it carries on an object."""
     import mujoco
 
     sensor = spec.add_sensor(
-        name=f"force_{name}",
+        name=f"{vehicle.removesuffix('vehicle')}force_{name}",
         type=mujoco.mjtSensor.mjSENS_CONTACT,
         objtype=mujoco.mjtObj.mjOBJ_XBODY,  # with the bodies that it carries
-        objname="vehicle",
+        objname=vehicle,
         reftype=mujoco.mjtObj.mjOBJ_BODY,
         refname=f"object_{name}",
         nsample=1,

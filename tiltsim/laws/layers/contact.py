@@ -15,7 +15,7 @@ import numpy as np
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup
 from tiltsim.laws.layers.layer import Layer, Samples, wrap_loop
 from tiltsim.models.cables import CABLE_READING
-from tiltsim.models.objects import CONTACT_READING, COORDINATES, FORCE
+from tiltsim.models.objects import COORDINATES, FORCE
 from tiltsim.models.parts import ExtraActuators
 from tiltsim.vehicles.rotorcraft.others import CONTACT_FORCE, FELT, SWING, Others
 from tiltsim_controllers.code.arrays import traceable, xp
@@ -110,9 +110,7 @@ def with_force_loop(loop: ClosedLoop) -> ClosedLoop:
         ForceLoop,
         _force_loop,
         controls=controls,
-        actuators=ExtraActuators(states=2),
-        fields=("filtered_push_force", "push_integral"),
-        units={"filtered_push_force": "N", "push_integral": "N"},
+        fields={"filtered_push_force": "N", "push_integral": "N"},
         of_controller=True,
     )
     return wrap_loop(loop, layer)
@@ -143,9 +141,7 @@ def with_impedance(loop: ClosedLoop) -> ClosedLoop:
         Impedance,
         _impedance,
         controls=controls,
-        actuators=ExtraActuators(states=3),
-        fields=("filtered_push_force", "push_shift", "push_shift_rate"),
-        units={"filtered_push_force": "N", "push_shift": "m", "push_shift_rate": "m/s"},
+        fields={"filtered_push_force": "N", "push_shift": "m", "push_shift_rate": "m/s"},
         of_controller=True,
     )
     return wrap_loop(loop, layer)
@@ -181,7 +177,8 @@ def _force_loop(plan: FlightPlan) -> ForceLoop:
 @cache
 def with_objects(loop: ClosedLoop, others: Others) -> ClosedLoop:
     """A loop among objects; it goes around all other layers."""
-    size, ctrl_size, states = loop.sizes.act, loop.sizes.ctrl, 2 * bool(others.names)
+    size, ctrl_size = loop.sizes.act, loop.sizes.ctrl
+    states = 2 * len(others.vehicles) * bool(others.names)
     readings = size + states + others.coordinates
     accumulated, observed = _accumulated(others, size, readings), _observed(others, size, readings)
     felt = felt_among(others)
@@ -248,8 +245,7 @@ def _derive(others: Others, samples: Samples, setup: ControlSetup) -> dict[str, 
 def swing(hanging: Any) -> Any:
     """Angles (rad), shape (2, ...), of a cable from straight down toward +x and +y.
 
-    Args:
-        hanging: From its attachment to the load, m, world axes, shape (3, ...).
+    ``hanging`` leads from its attachment to the load, m, world axes, shape (3, ...).
     """
     return xp.array([xp.arctan2(hanging[0], -hanging[2]), xp.arctan2(hanging[1], -hanging[2])])
 
@@ -278,22 +274,23 @@ def felt_among(others: Others) -> Callable[..., Values]:
     return felt
 
 
-def _total(readings: Any, others: Others) -> Any:
-    """The force (N, world) on all objects, shape (3,)."""
-    return sum(readings[others.force_places(index)] for index in range(len(others.names)))
+def _total(readings: Any, others: Others, vehicle: int = 0) -> Any:
+    """The force (N, world) of a vehicle on all objects, shape (3,)."""
+    return sum(readings[others.force_places(index, vehicle)] for index in range(len(others.names)))
 
 
 def _accumulated(others: Others, size: int, readings: int) -> Callable[..., Values]:
-    """A function ``(act, own)`` of the rates of the largest force and of the time in contact."""
+    """A function ``(act, own)`` of rates of each vehicle's largest force and time in contact."""
 
     @traceable
     def accumulated(act: Any, own: Among) -> Any:
-        if not others.names:
-            return act[:0]
-        force, peak = _total(act[readings:], others), act[size]
-        magnitude = xp.sqrt(force @ force)
-        rise = (xp.maximum(magnitude, peak) - peak) / own.timestep
-        return xp.array([rise, xp.where(magnitude > 0.0, 1.0, 0.0)])
+        rates = []
+        for vehicle in range(len(others.vehicles) if others.names else 0):
+            force, peak = _total(act[readings:], others, vehicle), act[size + 2 * vehicle]
+            magnitude = xp.sqrt(force @ force)
+            rise = (xp.maximum(magnitude, peak) - peak) / own.timestep
+            rates += [rise, xp.where(magnitude > 0.0, 1.0, 0.0)]
+        return xp.array(rates) if rates else act[:0]
 
     return accumulated
 
@@ -304,14 +301,15 @@ def _observed(others: Others, size: int, readings: int) -> Callable[..., Values]
     @traceable
     def observed(act: Any) -> Any:
         parts, at = [], readings - others.coordinates
-        if others.names:
-            parts += [_total(act[readings:], others), act[size : size + 2]]
+        for vehicle in range(len(others.vehicles) if others.names else 0):
+            kept = size + 2 * vehicle
+            parts += [_total(act[readings:], others, vehicle), act[kept : kept + 2]]
         for joint in others.joints:
             pose = act[at : at + COORDINATES[joint]]
             if joint == "free":
                 pose = xp.hstack([pose[:3], euler_angles(pose[3:])])
             parts, at = [*parts, pose], at + COORDINATES[joint]
-        tension = readings + CONTACT_READING * len(others.names) + FORCE
+        tension = readings + others.contact_readings + FORCE
         tensions = act[tension::CABLE_READING]  # of the load's cable first
         parts += [act[at : at + 3]] if others.hangs else []
         parts += [tensions] if others.hangs or others.cables else []

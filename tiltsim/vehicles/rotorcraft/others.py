@@ -21,7 +21,7 @@ CONTACT_FORCE: Final = ("contact_force_x", "contact_force_y", "contact_force_z")
 CONTACT_COLUMNS: Final = dict.fromkeys((*CONTACT_FORCE, "peak_contact_force"), "N") | {
     "contact_time": "s"
 }
-"""Columns of flights with objects; the force is the vehicle's on all of them, world axes."""
+"""Columns of a vehicle among objects; the force is its on all of them, world axes."""
 
 LOAD_COLUMNS: Final = {**{f"payload_{axis}": "m" for axis in "xyz"}, "cable_tension": "N"}
 
@@ -50,6 +50,7 @@ class Others(NamedTuple):
     hangs: bool = False  # a load on a cable
     cables: tuple[str, ...] = ()
     pushed: int = -1  # the object that the reference pushes, -1 for none
+    vehicles: tuple[str, ...] = ("",)  # that touch them: beginnings of their columns' names
 
     @property
     def coordinates(self) -> int:
@@ -59,12 +60,18 @@ class Others(NamedTuple):
     @property
     def readings(self) -> int:
         """Numbers in the memories of the sensors."""
-        return CONTACT_READING * len(self.names) + CABLE_READING * (self.hangs + len(self.cables))
+        return self.contact_readings + CABLE_READING * (self.hangs + len(self.cables))
+
+    @property
+    def contact_readings(self) -> int:
+        """The first of these: of each vehicle, of each object."""
+        return CONTACT_READING * len(self.names) * len(self.vehicles)
 
     @property
     def columns(self) -> dict[str, str]:
         """The columns of their motion and forces, with their units."""
-        columns = dict(CONTACT_COLUMNS) if self.names else {}
+        touching = self.vehicles if self.names else ()
+        columns = {vehicle + k: unit for vehicle in touching for k, unit in CONTACT_COLUMNS.items()}
         for name, joint in zip(self.names, self.joints, strict=True):
             if joint == "hinged":
                 columns[f"{name}_angle"] = "rad"
@@ -74,9 +81,9 @@ class Others(NamedTuple):
         columns |= LOAD_COLUMNS if self.hangs else {}
         return columns | {f"{name}_tension": "N" for name in self.cables}
 
-    def force_places(self, index: int) -> slice:
-        """Where the force of an object is among the sensors' readings."""
-        first = CONTACT_READING * index + FORCE
+    def force_places(self, index: int, vehicle: int = 0) -> slice:
+        """Where the force of a vehicle on an object is among the sensors' readings."""
+        first = CONTACT_READING * (len(self.names) * vehicle + index) + FORCE
         return slice(first, first + 3)
 
 
@@ -90,7 +97,8 @@ def others_of(scenario: Scenario) -> Others:
     pushed = names.index(reference.object) if reference.type == "push" else -1
     joints = tuple(body.joint for body in objects.bodies)
     cables = tuple(cable.name for cable in objects.cables)
-    return Others(names, joints, objects.hangs, cables, pushed)
+    vehicles = ("", *(f"{companion.name}_" for companion in scenario.companion))
+    return Others(names, joints, objects.hangs, cables, pushed, vehicles)
 
 
 def motion_at_start(plan: FlightPlan) -> tuple[Vector, Vector]:
