@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-import tiltsim.sweeps.similar
+import tiltsim.sweeps.points
 from tiltsim.errors import InputError
 from tiltsim.scenario.loading import parse_scenario
 from tiltsim.sweeps.loading import load_sweep
@@ -33,7 +33,7 @@ def test_each_scenario_matches_its_document_and_one_of_a_kind_is_made_in_full(mo
     )
     documents = []
     monkeypatch.setattr(
-        tiltsim.sweeps.similar,
+        tiltsim.sweeps.points,
         "parse_scenario",
         lambda document, address: documents.append(document) or parse_scenario(document, address),
     )

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from tiltsim.flight.expectations import Verdict, check_expectations
+from tiltsim.flight.metrics import Verdict, check_expectations
 from tiltsim.report.claim import (
     AnalysisClaim,
     Claim,
