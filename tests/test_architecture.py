@@ -132,7 +132,12 @@ def overrides(class_node, name):
     known = classes()
     bases = [known[base.id] for base in class_node.bases if getattr(base, "id", "") in known]
     return any(
-        any(getattr(member, "name", "") == name for member in base.body) or overrides(base, name)
+        any(
+            getattr(member, "name", "") == name
+            or getattr(getattr(member, "target", None), "id", "") == name  # a class attribute
+            for member in base.body
+        )
+        or overrides(base, name)
         for base in bases
     )
 
@@ -225,7 +230,7 @@ FOUR_ROTORS = {"ROTORS", "SPIN", "TILT_FIELDS", "ROTOR_FIELDS", "TILTROTOR_FIELD
 
 OF_FOUR_ROTORS = {
     *("quadrotor", "linearizing"),
-    *("cross", "metrics", "user_vehicle", "vehicle", "vehicle_parts"),
+    *("cross", "metrics", "user_vehicle", "vehicle_parts"),
     *("attitude_plane", "concepts", "gait_analysis", "vehicle_drawing"),
     *("attainable", "fault_tolerance", "rotorcraft", "singularity"),
 }

@@ -20,10 +20,9 @@ if TYPE_CHECKING:
     from tiltsim.flight.reading import load_flight
     from tiltsim.laws.law_loop import airframe
     from tiltsim.linear.attraction import attraction
-    from tiltsim.linear.linearization import linearize
+    from tiltsim.linear.linearization import linearize, symbolic
     from tiltsim.linear.margins import margins
     from tiltsim.linear.stability import stability
-    from tiltsim.linear.symbolic import symbolic
     from tiltsim.logs.formats import export
     from tiltsim.logs.identify import Estimate, Replay, identify, replay
     from tiltsim.logs.log import Log
@@ -74,7 +73,7 @@ _HOMES = {
     "show_progress": "commands.text",  # for progress=True
     "stability": "linear.stability",
     "sweep": "sweeps.running",
-    "symbolic": "linear.symbolic",
+    "symbolic": "linear.linearization",
     "vectorized": "simulation.vectorized",
     "video": "views.video.making",
     "view": "views.rerun.viewer",

@@ -146,6 +146,19 @@ def test_five_canted_rotors_fly_a_circle(rotor):
 
 
 @pytest.mark.slow
+def test_a_landing_on_a_moving_platform_is_no_disturbance():
+    """Observers that took the push of the deck for a disturbance tipped the vehicle over."""
+    scenario = tiltsim.load_scenario("interaction/platform")
+    free = {"law": "vectoring", "tilts": "free"}
+    flight = tiltsim.simulate(scenario.replace({"controller": free}))
+    metrics = flight.metrics()
+    assert flight.end.kind == "completed", flight.end
+    assert metrics["time_in_contact"] > 2.5
+    assert metrics["max_abs_pitch"] < 0.01
+    assert abs(metrics["final_position_error_z"] + 0.02) < 1e-3
+
+
+@pytest.mark.slow
 def test_a_call_for_eight_rotors_with_eight_tilts_takes_microseconds():
     changed = tables("tilt_octorotor", 1.0)
     del changed["simulation"]["engine"]
@@ -179,7 +192,7 @@ def test_sensor_noise_costs_little():
     noise = {"attitude_noise": 0.01, "body_rates_noise": 0.05, "velocity_noise": 0.02}
     flight = fly("quadrotor", 4.0, sensors={**noise, "position_noise": 0.01}, **CIRCLE)
     changes = np.diff(flight["rotor_speeds"], axis=0) / np.diff(flight["time"])[:, np.newaxis]
-    assert np.sqrt(np.mean(changes**2)) < 900.0
+    assert np.sqrt(np.mean(changes**2)) < 1200.0
     assert position_error(flight)[flight["time"] > 2.0].max() < 0.03
 
 
@@ -297,12 +310,14 @@ def test_without_limits_and_observers_the_law_is_feedback_linearization(vehicle,
     periods = np.array([1.0, 2.0, 4.0, 8.0])
     found = [first_accelerations(vehicle, PLAIN, 1e-6 * period, **gait) for period in periods]
     limit = np.linalg.solve(np.vander(periods, increasing=True), found)[0]
-    yaw = design_of(vehicle, PLAIN, **gait).yaw
+    known = design_of(vehicle, PLAIN, **gait)
+    yaw = known.yaw
+    height = [C, C * 2.0 * known.rise_damping * known.rise, C * known.rise**2]
     rows = np.array([[C, C, C], [C * 1.8 * A, C * 1.8 * A, C * 1.8 * yaw], [C * A * A] * 3])
     rows[2, 2] = C * yaw * yaw
     exact = {
         "law": "attitude_force",
-        "gains": {"attitude": rows.tolist(), "altitude": [C, C * 4.0, C * 4.0]},
+        "gains": {"attitude": rows.tolist(), "altitude": height},
         "attitude_error": "euler_angles",
         "max_angular_acceleration": 1e6,
         **{"dimension": 1, "norm": "thrust", "restoring": 0.0},
@@ -322,7 +337,8 @@ def test_hover_has_the_poles_that_are_placed():
     found = tiltsim.stability(hover)
     assert found.stable
     rate = (1.0 - np.exp(-C * step)) / step
-    for damping, frequency in ((1.0, 2.0), (0.9, 9.0)):  # of altitude and yaw
+    known = design_of("quadrotor", PLAIN)
+    for damping, frequency in ((known.rise_damping, known.rise), (0.9, 9.0)):  # altitude and yaw
         cubic = np.array([1.0, 1.0, 2.0 * damping * frequency, frequency**2])
         for pole in np.roots(cubic * [1.0, rate, rate, rate]):
             assert np.abs(found.poles - pole).min() < 1e-6 * abs(pole)

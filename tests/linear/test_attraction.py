@@ -13,9 +13,9 @@ from tests.laws.test_laws import LAWS
 from tiltsim.errors import InputError
 from tiltsim.flight.metrics import End
 from tiltsim.linear import attraction as module
-from tiltsim.linear import settling
+from tiltsim.linear import stability as stability_module
 from tiltsim.linear.attraction import FinalStates, attraction
-from tiltsim.linear.settling import SlowestMode, advice_on_duration, slowest_mode
+from tiltsim.linear.stability import SlowestMode, advice_on_duration, slowest_mode
 from tiltsim.scenario.loading import merge
 
 SETPOINT = "ch04_tracking/setpoint#rho_065_modified"
@@ -147,7 +147,7 @@ def test_flights_without_an_analysis_have_no_slowest_mode(monkeypatch):
     assert (
         slowest_mode(tiltsim.load_scenario("ch04_tracking/circle#continuous_t2_modified")) is None
     )
-    monkeypatch.setattr(settling, "MOST_STEPS", 10)
+    monkeypatch.setattr(stability_module, "MOST_STEPS", 10)
     assert slowest_mode(tiltsim.load_scenario("ch04_tracking/line#continuous_t2_modified")) is None
 
 

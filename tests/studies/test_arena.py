@@ -389,4 +389,4 @@ def test_tuned_gains_take_the_place_of_default_ones_in_the_limited_league():
     tuned = {"hexarotor": {"pid": {"law": "pid", "position_gain": 1.5}}}
     flights = arena.matches("limited", vehicles, tables, tuned)
     assert {one.place["gains"] for one in flights} == {"tuned"}
-    assert len(flights) == 9 * (3 + 1)
+    assert len(flights) == 9 * (3 + 3)

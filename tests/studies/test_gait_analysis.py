@@ -594,6 +594,12 @@ def test_the_legend_explains_only_what_is_drawn(gait, marks, bar) -> None:
     assert any(axes.get_ylabel() == "time (s)" for axes in figure.axes) is bar
 
 
+def test_the_tilt_angles_of_a_constant_gait_are_level_lines() -> None:
+    angles = [0.1, 0.2, 0.3, 0.4]
+    (axes,) = gait_figure(plans.fixed(angles), AR_DRONE, ["tilt_angles"]).axes
+    assert [line.get_ydata().tolist() for line in axes.lines] == [[a, a] for a in angles]
+
+
 def test_equal_figures_give_equal_files(tmp_path) -> None:
     gait = plans.fixed([0.1, 0.2, 0.3, 0.4])
     figures = [gait_figure(gait, AR_DRONE, ["margin"]) for _ in range(2)]

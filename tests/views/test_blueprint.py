@@ -14,14 +14,14 @@ from tiltsim.flight.metrics import End
 from tiltsim.laws.assembling import assemble
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.views.attitude_plane import MOVING_TRAIL_TIME
-from tiltsim.views.rerun.recording import flight_blueprint, new_recording
+from tiltsim.views.rerun.recording import Recording, flight_blueprint
 from tiltsim.views.signals import signals_of
 
 
 def views_of(*scenarios, names=(), flights=()):
     """The views of flights of these scenarios, by their titles."""
     assemblies = [assemble(scenario) for scenario in scenarios]
-    recorders = new_recording(assemblies, names)[1]
+    recorders = Recording(assemblies, names).recorders
     blueprint = flight_blueprint(recorders, flights)
     found, waiting = {}, [blueprint.root_container]
     while waiting:
@@ -39,7 +39,7 @@ def test_a_vehicle_without_tilt_angles_has_no_plot_of_them():
 
 def test_compared_flights_have_a_vehicle_and_a_plane_each():
     scenarios = [flight(name).scenario for name in ("fixed", "trot")]
-    recorders = new_recording([assemble(each) for each in scenarios])[1]
+    recorders = Recording([assemble(each) for each in scenarios]).recorders
     rows = flight_blueprint(recorders).root_container.contents[0].contents
     origins = [{view.name: view.origin for view in row.contents} for row in rows]
     assert origins[0] == {name: f"world/{name}/camera" for name in ("fixed", "trot")}
@@ -53,7 +53,8 @@ def test_flights_of_a_tilt_car_and_a_rotorcraft_are_compared_in_the_plots_of_eac
         name: sorted({path.partition("/")[0] for path in views[name].contents})
         for name in ("Distance from the reference (m)", "Slowest rotor and limits (rad/s)")
     }
-    names = [recorder.part for recorder in new_recording([each.assembly for each in compared])[1]]
+    recorders = Recording([each.assembly for each in compared]).recorders
+    names = [recorder.part for recorder in recorders]
     assert paths == {
         "Distance from the reference (m)": sorted(names),
         "Slowest rotor and limits (rad/s)": names[:1],

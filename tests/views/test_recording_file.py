@@ -17,7 +17,7 @@ from tiltsim.cli import main
 from tiltsim.errors import InputError
 from tiltsim.flight.reading import load_flight
 from tiltsim.simulation.simulate import simulate
-from tiltsim.views.rerun.recording import new_recording, save_recording
+from tiltsim.views.rerun.recording import Recording, save_recording
 from tiltsim.views.rerun.timeline import TIMELINE
 from tiltsim.views.rerun.viewer import require_viewer
 from tiltsim.views.signals import signals_of
@@ -167,13 +167,14 @@ def test_a_flight_in_pieces_is_recorded_like_a_complete_one(tmp_path):
     paths = []
     for size in (len(this), 13):
         path = tmp_path / f"{size}.rrd"
-        recording, (recorder,) = new_recording([this.assembly])
-        recording.save(path)
+        recording = Recording([this.assembly])
+        (recorder,) = recording.recorders
+        recording.stream.save(path)
         recorder.draw_references(this.end.time)
         for at in range(0, len(this), size):
             recorder.append(replace(this, samples=this.samples[at : at + size]))
         recorder.finish(this.end)
-        recording.disconnect()
+        recording.stream.disconnect()
         paths.append(path)
     whole, pieces = paths
     assert entities(whole) == entities(pieces)

@@ -46,11 +46,7 @@ def altitude_error(time: Any, values: Any, reference: ReferenceParameters, knots
 
 
 def first_limit(exceeded: Iterable[tuple[Any, int]]) -> Any:
-    """The code of the first limit that is exceeded, `WITHIN_LIMITS` for none.
-
-    Args:
-        exceeded: Whether each is exceeded, and its code.
-    """
+    """The code of the first of pairs that is exceeded, `WITHIN_LIMITS` for none."""
     found: Any = float(WITHIN_LIMITS)
     for is_exceeded, code in reversed([*exceeded]):
         found = xp.where(is_exceeded, float(code), found)

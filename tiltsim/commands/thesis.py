@@ -299,11 +299,11 @@ def run_report(
     with show_progress(shown=not quiet) as progress:
         from tiltsim.report.claim_rows import count
         from tiltsim.report.content import failure_text
+        from tiltsim.report.flights import store
         from tiltsim.report.made import Made
         from tiltsim.report.making import make_report
         from tiltsim.report.pages import errors_page, page, rows_csv, rows_json
         from tiltsim.report.pages import markdown as markdown_of
-        from tiltsim.report.store import store
         from tiltsim.scenario.own_code import VARIABLE
         from tiltsim.system.files import prepare_file, prepare_folder
 

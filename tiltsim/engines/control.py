@@ -39,14 +39,8 @@ def control_program(key: ProgramKey, name: str) -> Program:
 def control_step(assembly: Assembly, user: list[float], name: str) -> Callable[..., Any]:
     """A function ``(header, *vectors, ctrl)`` of a loop, with parameters and knots bound.
 
-    The vectors are `tiltsim.engines.base.Vectors`.
-
-    Expressions of these alone are evaluated once.
-
-    Args:
-        assembly: The flight.
-        user: Parameters and knots.
-        name: See `LoopPrograms.in_mujoco`.
+    The vectors are `tiltsim.engines.base.Vectors`; the name is one of `LoopPrograms.in_mujoco`.
+    Expressions of parameters and knots alone are evaluated once.
     """
     key = program_key(assembly)
     if assembly.traced:

@@ -92,11 +92,7 @@ def widest() -> int:
 
 @cache
 def lane_math(*, quick: bool) -> LaneMath:
-    """The functions of lanes that this machine has.
-
-    Args:
-        quick: Whether their last digits may differ from the C library's.
-    """
+    """The functions of lanes that this machine has; quick ones may differ in their last digits."""
     import llvmlite.binding as llvm
 
     fuses = llvm.get_host_cpu_features().get("fma") or platform.machine() in ("aarch64", "arm64")

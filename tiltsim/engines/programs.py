@@ -66,12 +66,7 @@ class LoopFunction(NamedTuple):
         return program_of(self.call, **self.sizes)
 
     def plain(self, setup: ControlSetup, **fixed: Sequence[float]) -> Callable[..., list[float]]:
-        """The function itself, where it cannot be traced, with some of its vectors bound.
-
-        Args:
-            setup: Parameters and knots.
-            fixed: Vectors by name.
-        """
+        """The function itself, where it cannot be traced, with some of its vectors bound."""
         bound = {"user": as_arrays(setup), **as_arrays(fixed)}
 
         def call(*vectors: Sequence[float]) -> list[float]:
@@ -206,11 +201,7 @@ class LoopPrograms:
     def _checks(self, time: Any, values: Any, user: Any, head: Any) -> tuple[Any, Any]:
         """The code of the limit that a sample exceeds, and the numbers whose signs are checked.
 
-        Args:
-            time: s
-            values: Fields after the time.
-            user: Parameters and knots.
-            head: Whether the horizontal position has a limit, and the reference.
+        ``head`` is whether the horizontal position has a limit, and the reference.
         """
         loop, (parameters, knots) = self._loop, self.setup(user)
         reference = record_with_choices(ReferenceParameters, head[1:], self._key.reference)
@@ -235,13 +226,7 @@ def setup_of(loop: ClosedLoop, user: Sequence[float]) -> ControlSetup:
 
 
 def record_with_choices(record: type[tuple[Any, ...]], numbers: Any, choices: Choices) -> Any:
-    """A record whose choices are constants.
-
-    Args:
-        record: Its type.
-        numbers: The numbers of the flattened record, or more.
-        choices: See `tiltsim.closed_loop.assembly`.
-    """
+    """A record of a type whose choices are constants, from the numbers of the flattened record."""
     known = dict(choices)
     size = record_size(record)
     return unflatten(record, (known[i] if i in known else numbers[i] for i in range(size)))

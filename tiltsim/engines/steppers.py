@@ -129,8 +129,7 @@ class PythonStepper:
 def observation(flight: Integrated) -> Callable[[int, Floats], Values]:
     """Samples without their time: ``(step_index, now) -> values``, as machine code takes them.
 
-    Args:
-        flight: Its state and the inputs in force are ``now``, shape (states + inputs,).
+    ``now`` are the state and the inputs in force, shape (states + inputs,).
     """
     every, fields = flight.control_steps or 1, len(flight.layout.key.loop.sample_fields)
     sample = cache(partial(_in_python, flight, recorder=[0.0] * (HEAD_SIZE + SIDES)))

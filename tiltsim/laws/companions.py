@@ -59,22 +59,14 @@ class Member(NamedTuple):
         return tuple(f"{self.prefix}{name}" for name in self.loop.sample_fields[1:])
 
     def own(self, columns: Mapping[str, Any]) -> dict[str, Any]:
-        """Its columns by the names of a vehicle alone.
-
-        Args:
-            columns: Columns, or fields of a sample, of all vehicles.
-        """
+        """Its columns, or fields of a sample, of all vehicles' by the names of a vehicle alone."""
         size, common = len(self.prefix), {"time": columns["time"]}
         mine = columns.items() if size else ()
         found = {k[size:]: v for k, v in mine if k.startswith(self.prefix)}
         return common | found if size else {**columns}
 
     def shared(self, columns: Mapping[str, Any]) -> dict[str, Any]:
-        """Its columns by their names among several vehicles.
-
-        Args:
-            columns: Its columns by the names of a vehicle alone.
-        """
+        """Columns that have the names of a vehicle alone, by their names among several vehicles."""
         return {f"{self.prefix}{name}": value for name, value in columns.items() if name != "time"}
 
 
@@ -127,11 +119,9 @@ def _metrics_among(
 
 @cache
 def with_companions(members: tuple[Member, ...], downwash: bool) -> ClosedLoop:
-    """The loop of several vehicles; objects belong to the first one's scenario.
+    """The loop of several vehicles, the first of which keeps its names and has the objects.
 
-    Args:
-        members: The vehicles, of which the first keeps its names.
-        downwash: Whether their wakes act on vehicles below.
+    With downwash their wakes act on vehicles below.
     """
     return Several(members, downwash).closed_loop()
 

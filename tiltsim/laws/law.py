@@ -143,12 +143,7 @@ _VALUES: Final[dict[str, Callable[[FlightPlan, Any], Any]]] = {
 
 
 def parameters_of(plan: FlightPlan, law: Law) -> Any:
-    """The parameters of a flight's law: its own, numbers of keys, and parts of the plan.
-
-    Args:
-        plan: Plan of the flight.
-        law: The law.
-    """
+    """The parameters of a flight's law: its own, numbers of keys, and parts of the plan."""
     own, controller = law.own(plan), plan.scenario.controller
 
     def value(name: str) -> Any:

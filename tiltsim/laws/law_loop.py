@@ -187,13 +187,9 @@ def _step_of(flown: FlownLaw) -> Callable[..., Step]:
 
 
 def _accelerations(command: Command, gain: Any, k: Any, speeds: Any) -> Any:
-    """Rotor accelerations (rad/s^2) along the spins, toward the commanded speeds.
+    """Rotor accelerations (rad/s^2) along the spins, toward the speeds that a command gives.
 
-    Args:
-        command: One of its vectors for the rotors is given.
-        gain: Gain of the speed errors, 1/s.
-        k: Thrust coefficients, N s^2, shape (N,).
-        speeds: rad/s along the spins, shape (N,).
+    The gain of the speed errors is in 1/s, ``k`` in N s^2, speeds in rad/s, shape (N,).
     """
     if not isinstance(command, Command):
         raise LawError(f"returned {short_repr(command)}; expected a tiltsim.Command")
@@ -272,12 +268,7 @@ def _initial_of(flown: FlownLaw, find: Find) -> Callable[[FlightPlan], Values]:
 
 @cache
 def law_loop(flown: FlownLaw, find: Find) -> ClosedLoop:
-    """The closed loop of a law.
-
-    Args:
-        flown: The law.
-        find: Finds the numbers of a flight.
-    """
+    """The closed loop of a law, for which a function finds the numbers of each flight."""
     shown, first = flown.layout.shown, flown.commanded.start
     commands = shown.names("tilt_command") if flown.tilts else ()
     modelled = shown.names("modelled_rotor_speed") if flown.models_rotors else ()

@@ -330,12 +330,7 @@ def torque_free_columns(
 
 
 def rotor_stops(rotors: int, remedy: str = "") -> tuple[str, ...]:
-    """Causes of an end where the speed of a rotor reaches zero, one a rotor.
-
-    Args:
-        rotors: Their number.
-        remedy: A key that also helps.
-    """
+    """Causes of an end where the speed of a rotor reaches zero, one per rotor; a key may help."""
     remedies = ["vehicle.min_rotor_speed = 100", *[remedy] * bool(remedy)]
     advice = ", ".join(remedies) + ", or a smaller step of the reference may help"
     return tuple(

@@ -19,7 +19,7 @@ from tiltsim.flight.flight import Flight
 from tiltsim.flight.metrics import End
 from tiltsim.laws.assembling import assemble
 from tiltsim.linear import COARSE, REFINEMENTS
-from tiltsim.linear.settling import SlowestMode, advice_on_duration, slowest_mode
+from tiltsim.linear.stability import SlowestMode, advice_on_duration, slowest_mode
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.simulation.batch import fly_each

@@ -103,36 +103,35 @@ def windows_of(log: Log, seconds: float, rotors: int, tilts: int) -> Windows:
     commands = [_inputs(log, "rotor_command", rotors), _inputs(log, "alpha_command", tilts)]
     known: Any = np.isfinite(vectors["attitude"]).all(axis=1) & np.isfinite(speeds).all(axis=1)
     known &= np.isfinite(angles).all(axis=1)
-    parts: dict[str, list[Any]] = {name: [] for name in Windows._fields}
+    starts: list[int] = []
     first = 0
     while first + samples <= len(time):
         span = slice(first, first + samples)
         bad = np.flatnonzero(~known[span])
-        steps = np.diff(time[span])
-        gaps = np.flatnonzero(steps > 1.5 * usual)
+        gaps = np.flatnonzero(np.diff(time[span]) > 1.5 * usual)
         if len(bad) or len(gaps):
             first += 1 + int(max([*bad, *gaps]))
-            continue
-        fractions = np.arange(2 * substeps + 1) / (2 * substeps)
-        stages = time[span][:-1, None] + steps[:, None] * fractions
-        parts["start"].append(time[first])
-        parts["step"].append(steps)
-        for name in MEASURED:
-            parts[name].append(vectors[name][span])
-        for name, inputs in (("speeds", speeds), ("tilts", angles)):
-            parts[name].append(CubicSpline(time[span], inputs[span])(stages))
-        for name, held in zip(("speed_commands", "tilt_commands"), commands, strict=True):
-            parts[name].append(held[span])
-        first += samples - 1
-    if not parts["start"]:
+        else:
+            starts.append(first)
+            first += samples - 1
+    if not starts:
         raise InputError(
             f"{log.name}: no {seconds:g} s without gaps in attitude, rotor speeds and tilts; "
             "shorten the window"
         )
-    found = {name: np.array(values) for name, values in parts.items() if values}
-    known = np.concatenate([np.isfinite(found[name][..., :3]) for name in MEASURED], axis=-1)
-    measured = np.nan_to_num(np.concatenate([found[name] for name in MEASURED], axis=-1))
-    return Windows(**found, measured=measured, is_measured=known)
+    places = np.array(starts)[:, None] + np.arange(samples)
+    steps = np.diff(time[places], axis=1)
+    fractions = np.arange(2 * substeps + 1) / (2 * substeps)
+    stages = time[places][:, :-1, None] + steps[..., None] * fractions
+    at_stages = [
+        np.array([CubicSpline(time[at], inputs[at])(stage) for at, stage in zip(places, stages)])
+        for inputs in (speeds, angles)
+    ]
+    found = [vectors[name][places] for name in MEASURED]
+    measured = np.nan_to_num(np.concatenate(found, axis=-1))
+    is_measured = np.concatenate([np.isfinite(vector[..., :3]) for vector in found], axis=-1)
+    held = [inputs[places] for inputs in commands]
+    return Windows(*[time[starts], steps, *found, *at_stages, *held, measured, is_measured])
 
 
 def _inputs(log: Log, name: str, count: int) -> Floats:

@@ -225,6 +225,7 @@ def starter_scenario(kind: str, mjcf: str) -> str:
         speed=MAX_SPEED,
         controller=starter.controller,
         least="" if starter.reverses else _LEAST,
+        expectations="".join(_EXPECTATION.format(axis=axis) for axis in "xyz"),
         gait=_GAIT.format(angles=list(starter.angles)) if starter.angles else "",
     )
 
@@ -237,6 +238,13 @@ _GAIT: Final = """
 [gait]
 type = "fixed"                       # tilt angles, rad; or "waypoints", "table"
 angles = {angles}
+"""
+
+_EXPECTATION: Final = """
+[[expect]]                           # checked after the flight
+metric = "final_position_error_{axis}"
+min = -0.001                         # m
+max = 0.001
 """
 
 _SCENARIO: Final = """\
@@ -259,19 +267,4 @@ timestep = 0.004                     # s
 [reference]
 type = "setpoint"                    # or "circle", "figure_eight", "waypoints", "table"
 position = [0.3, -0.2, 0.2]          # m
-
-[[expect]]                           # checked after the flight
-metric = "final_position_error_x"
-min = -0.001                         # m
-max = 0.001
-
-[[expect]]
-metric = "final_position_error_y"
-min = -0.001
-max = 0.001
-
-[[expect]]
-metric = "final_position_error_z"
-min = -0.001
-max = 0.001
-"""
+{expectations}"""

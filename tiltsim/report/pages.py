@@ -36,9 +36,9 @@ from tiltsim.report.content import (
     published_text,
     why_of,
 )
-from tiltsim.report.drawing import Drawing
 from tiltsim.report.flights import PLANTS
 from tiltsim.report.made import Made
+from tiltsim.report.pictures import Drawing
 from tiltsim.report.statement import Origin
 from tiltsim.system.text import printable_markdown
 

@@ -137,7 +137,7 @@ class GeometricController(Geometric, TiltingTable, CompensatingController):
     control: ClassVar = staticmethod(geometric)
 
     @property
-    def position_stiffness(self) -> float | None:
+    def position_stiffness(self) -> float | None:  # type: ignore[override]
         return self.position_bandwidth**2 if self.commands_tilts else None
 
     def check_scenario(self, scenario: Any) -> None:

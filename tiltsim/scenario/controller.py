@@ -189,7 +189,7 @@ class NumpyController(OwnFunctionController, TiltingTable):
     )
 
     @property
-    def position_stiffness(self) -> float | None:
+    def position_stiffness(self) -> float | None:  # type: ignore[override]
         return self.push_stiffness
 
 

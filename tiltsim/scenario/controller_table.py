@@ -153,11 +153,19 @@ class ControllerTable(Table):
     needs_four_rotors: ClassVar[bool] = True  # or tilts that the law commands
     models_latency: ClassVar[bool] = False  # the law knows its commands on their way
     observes_forces: ClassVar[bool] = False  # and holds its place against them
-    damps_swing: ClassVar[bool] = (
-        False  # of a load, by a moving reference; see laws/layers/swing.py
-    )
+    damps_swing: ClassVar[bool] = False  # of a load, by a moving reference; see layers/swing.py
     leans_unrecorded: ClassVar[bool] = False  # toward a position; no column has this attitude
+    omits_reference_acceleration: ClassVar[bool] = False  # unless the reference says so
+    prioritizes_attitude: ClassVar[bool] = False  # within rotor limits
+    measures_angular_acceleration: ClassVar[bool] = False  # feeds the plant's back, not its model's
+    rotors_stop_at_zero: ClassVar[bool] = True  # where the law integrates their speeds
+    linearization: ClassVar[str] = "the exact decoupling matrix"  # where its loops are linear
+    supervision: ClassVar[SupervisorTable | None] = None  # the supervisor of the gait
+    position_stiffness: ClassVar[float | None] = None
+    """Force per mass and per error of position that a vehicle at rest makes, 1/s^2.
 
+    A force loop pushes through it, see `tiltsim.laws.layers.contact`; None for a law that cannot.
+    """
     gain_sets: ClassVar[GainSets] = {}
 
     allow_unstable: bool = default(
@@ -198,38 +206,9 @@ class ControllerTable(Table):
         return not leans or scenario.reference.kind != "position"
 
     @property
-    def position_stiffness(self) -> float | None:
-        """Force per mass and per error of position that a vehicle at rest makes, 1/s^2.
-
-        A force loop pushes through it, see `tiltsim.laws.layers.contact`; None for a law that
-        cannot push.
-        """
-        return None
-
-    @property
-    def linearization(self) -> str:
-        """The condition under which the closed loops are linear, for messages."""
-        return "the exact decoupling matrix"
-
-    @property
     def loop_name(self) -> str:
         """The name of the controller's closed loop in `tiltsim.laws.assembling.LOOPS`."""
         return self.law
-
-    @property
-    def supervision(self) -> SupervisorTable | None:
-        """The supervisor of the gait, if there is one."""
-        return None
-
-    @property
-    def omits_reference_acceleration(self) -> bool:
-        """Whether the law leaves the reference's acceleration out unless the reference says so."""
-        return False
-
-    @property
-    def prioritizes_attitude(self) -> bool:
-        """Whether rotor limits are shared out with attitude first."""
-        return False
 
     def in_full(self) -> Self:
         """The table with numbers in place of the names of sets of gains."""
@@ -240,13 +219,3 @@ class ControllerTable(Table):
                 for key in named
             }
         )
-
-    @property
-    def measures_angular_acceleration(self) -> bool:
-        """Whether the law feeds back the plant's angular acceleration, not its model's."""
-        return False
-
-    @property
-    def rotors_stop_at_zero(self) -> bool:
-        """Whether rotor speeds that the law integrates stop at zero."""
-        return True

@@ -6,6 +6,7 @@ from pydantic import Field
 
 from tiltsim.scenario.messages import choose
 from tiltsim.scenario.metric_names import BOOLEAN_METRICS, METRICS
+from tiltsim.scenario.simulation_table import PlantName
 from tiltsim.scenario.table import NonNegative, Range, Table, default, example, required
 
 Origin = Literal[
@@ -89,7 +90,7 @@ class Expectation(Table):
     min: float | None = default(None, "smallest value that holds [the metric's]", -0.4)
     max: float | None = default(None, "largest value that holds [the metric's]", 0.1)
     equals: bool | None = default(None, "for metrics that are true or false", False)
-    plant: Literal["mujoco", "thesis", "rigid_body"] | None = default(
+    plant: PlantName | None = default(
         None, "evaluate on this plant only; default: on all", "thesis"
     )
 

@@ -105,19 +105,19 @@ class GaitFollowingController(ControllerTable):
         return terms._replace(**dict.fromkeys(self.leave_out, 0.0))
 
     @property
-    def linearization(self) -> str:
+    def linearization(self) -> str:  # type: ignore[override]
         return f"the {self.decoupling} decoupling matrix"
 
     @property
-    def supervision(self) -> SupervisorTable | None:
+    def supervision(self) -> SupervisorTable | None:  # type: ignore[override]
         return self.supervisor
 
     @property
-    def measures_angular_acceleration(self) -> bool:
+    def measures_angular_acceleration(self) -> bool:  # type: ignore[override]
         return self.angular_acceleration == "measured"
 
     @property
-    def prioritizes_attitude(self) -> bool:
+    def prioritizes_attitude(self) -> bool:  # type: ignore[override]
         return self.allocation == "prioritized"
 
 

@@ -102,6 +102,7 @@ class LawTable(ControllerTable):
     rotors_have_speeds = True
     damps_swing = True
     leans_unrecorded = True
+    linearization = "exact allocation"
 
     rotor_bandwidth: Positive = default(
         100.0,
@@ -111,10 +112,6 @@ class LawTable(ControllerTable):
 
     def error_loops(self, vehicle: Any) -> list[ErrorLoop]:
         return [linear_loop("rotor speed", (self.rotor_bandwidth,))]
-
-    @property
-    def linearization(self) -> str:
-        return "exact allocation"
 
     @property
     def tilt_rate_gain(self) -> float:

@@ -1,6 +1,6 @@
 """The ``[controller]`` tables of feedback linearization: tiltrotor, quadrotor, multirotor."""
 
-from typing import Final, Self
+from typing import Any, Final, Self
 
 from pydantic import model_validator
 
@@ -20,13 +20,13 @@ from tiltsim_controllers.analysis.torque_free import (
     hover_direction,
     torque_free_forces,
 )
-from tiltsim_controllers.gaits.plans import Gait
+from tiltsim_controllers.gaits.plans import Gait, fixed
 from tiltsim_controllers.laws.attitude_altitude import (
     DECOUPLINGS,
     PUBLISHED_DECOUPLING,
     AttitudeAltitude,
 )
-from tiltsim_controllers.laws.full_pose import FullPose
+from tiltsim_controllers.laws.full_pose import FullPose, pose_rank
 from tiltsim_controllers.laws.multirotor_steps import RESTORING, AttitudeForce, Form
 from tiltsim_controllers.laws.quadrotor_attitude_altitude import QuadrotorAttitudeAltitude
 from tiltsim_controllers.laws.switching import Switching
@@ -34,6 +34,15 @@ from tiltsim_controllers.laws.yaw_position import YawPosition
 from tiltsim_controllers.mathematics.scalar import Floats, Triple
 from tiltsim_controllers.vehicle.parameters import Vehicle
 from tiltsim_controllers.vehicle.rotors import force_and_torque
+
+
+def check_decoupler(scenario: Any, decoupler: str) -> None:
+    """Refuse a decoupler of positions without a position to track, and the reverse."""
+    needs_none = scenario.reference.kind == "attitude_altitude"
+    if needs_none != (decoupler == "none"):
+        needs = "none" if needs_none else "conventional, modified or exact"
+        reason = f"reference.type = {scenario.reference.type!r} needs {needs}"
+        raise scenario.mistake("controller.decoupler", reason)
 
 
 class AttitudeAltitudeController(AttitudeAltitude, GaitFollowingController):
@@ -69,7 +78,7 @@ class AttitudeAltitudeController(AttitudeAltitude, GaitFollowingController):
         return "gait_feedforward" if self.gait_rate_feedforward else self.law
 
     @property
-    def omits_reference_acceleration(self) -> bool:
+    def omits_reference_acceleration(self) -> bool:  # type: ignore[override]
         return not self.gait_rate_feedforward
 
 
@@ -94,10 +103,21 @@ class FullPoseController(FullPose, FailureAwareController):
     follows_turns = True
 
     @property
-    def position_stiffness(self) -> float:
+    def position_stiffness(self) -> float:  # type: ignore[override]
         on_acceleration, _, on_position = self.resolve_gains().position
         stiffness: float = on_position / on_acceleration
         return stiffness
+
+    def check_outputs(self, scenario: Any, gait: Gait) -> None:
+        """Refuse a failed rotor that is not there, and inputs that do not move six outputs."""
+        vehicle, failed = scenario.vehicle.resolve(), self.failed_rotor
+        self.check_failed_rotor(scenario.vehicle.rotor_count)
+        if isinstance(vehicle, Multirotor):
+            w = [spin * (rotor != failed) for rotor, spin in enumerate(vehicle.spins, start=1)]
+            rank = pose_rank(vehicle.table, gait.angles(0.0).tolist(), w)
+            if rank < 6:
+                reason = f"at the initial tilt angles the inputs move {rank} of six outputs"
+                raise scenario.mistake("controller.law", reason)
 
 
 class YawPositionController(YawPosition, ControllerTable):
@@ -169,6 +189,41 @@ class AttitudeForceController(AttitudeForce, GaitFollowingController, FailureAwa
     def least_dimension(self, vehicle: Multirotor, gait: Gait) -> tuple[int, str]:
         """The `force_dimension`, with and without the failed rotor."""
         return min(force_dimension(vehicle, gait, lost) for lost in {None, self.failed_rotor})
+
+    def check_outputs(self, scenario: Any, gait: Gait) -> None:
+        """Refuse more components of force than the vehicle has, and a pose that it cannot take."""
+        self.check_failed_rotor(scenario.vehicle.rotor_count)
+        vehicle, reference = scenario.vehicle.resolve(), scenario.reference
+        dimension = self.resolve_force(vehicle, gait).dimension
+        self._check_scaling(vehicle, dimension)
+        check_decoupler(scenario, self.decoupler)
+        if reference.turns:
+            reason = "not supported where roll, pitch and yaw vary"
+            self.require_defaults(("attitude_error", "turn_time"), reason)
+        if reference.kind == "pose" and dimension < 3:
+            key = "type" if reference.turns else "roll" if reference.roll else "pitch"
+            reason = (
+                f"roll and pitch are no outputs: a vehicle that controls {dimension} of 3 "
+                "components of force leans to move; leave them out, or take a vehicle with 3"
+            )
+            raise scenario.mistake(f"reference.{key}", reason)
+        for key in ("decoupling", "decoupler"):
+            value = getattr(self, key)
+            if dimension > 1 and value != "exact":
+                reason = f"the vehicle has {dimension}; controller.{key} = {value!r} needs 1"
+                raise self.mistake("dimension", reason)
+
+    def _check_scaling(self, vehicle: Multirotor, dimension: int) -> None:
+        """Refuse to scale a gait toward angles without the force that is controlled."""
+        supervisor = self.supervisor
+        if supervisor is None or supervisor.strategy != "scale":
+            return
+        supervisor.resolve(vehicle)  # refuses a vehicle that has no lift there with all its rotors
+        untilted, where = self.least_dimension(vehicle, fixed((0.0,) * vehicle.tilts))
+        if untilted < dimension:
+            or_less = f", or set controller.dimension = {untilted}" if untilted else ""
+            reason = f"the vehicle has {untilted} of the {dimension} components of force {where}"
+            raise supervisor.mistake("strategy", f"{reason}; choose hold{or_less}")
 
     def resolve_restoring(self, rotors: int, dimension: int, gait: Gait) -> float:
         """The restoring rate, 1/s."""

@@ -1,16 +1,21 @@
 """Names, meanings and units of the metrics."""
 
-from typing import Final, NamedTuple
+from typing import Final, Literal, NamedTuple
 
 from tiltsim.system.text import Quantity
 
 
 class Metric(NamedTuple):
-    """A metric: its label in figures, its unit and its meaning."""
+    """A metric: its label in figures, its unit and its meaning.
+
+    One that is a number of a column is stated here with it; kinds of vehicles compute the others.
+    """
 
     label: str
     unit: str  # empty for dimensionless ones
     meaning: str
+    column: str = ""
+    number: Literal["max", "min", "max_abs", "last"] = "max"  # of this column
 
     @property
     def quantity(self) -> Quantity:
@@ -63,8 +68,8 @@ METRICS: Final = {
     "final_attitude_error": Metric(
         "final attitude error", "rad", "largest error of roll, pitch or yaw over the last second"
     ),
-    "max_abs_roll": Metric("largest roll", "rad", "largest absolute roll"),
-    "max_abs_pitch": Metric("largest pitch", "rad", "largest absolute pitch"),
+    "max_abs_roll": Metric("largest roll", "rad", "largest absolute roll", "roll", "max_abs"),
+    "max_abs_pitch": Metric("largest pitch", "rad", "largest absolute pitch", "pitch", "max_abs"),
     "min_rotor_speed": Metric(
         "lowest rotor speed",
         "rad/s",
@@ -83,12 +88,17 @@ METRICS: Final = {
         "time after which the altitude error stays within 5 mm",
     ),
     "max_published_determinant": Metric(
-        "largest published determinant S", "", "largest determinant surface S as published (ch. 2)"
+        "largest published determinant S",
+        "",
+        "largest determinant surface S as published (ch. 2)",
+        "published_determinant",
     ),
     "min_published_determinant": Metric(
         "smallest published determinant S",
         "",
         "smallest determinant surface S as published (ch. 2)",
+        "published_determinant",
+        "min",
     ),
     "switches": Metric(
         "switches of the control law", "", "switches between two laws, from sample to sample"
@@ -104,6 +114,7 @@ METRICS: Final = {
         "largest Lyapunov candidate",
         "m^2/s^2",
         "largest Lyapunov candidate e_y'^2/2 + K_Y2 e_y^2/2 (ch. 11)",
+        "lyapunov",
     ),
     "final_input_split": Metric(
         "final ω₁² − ω₂²",
@@ -115,6 +126,8 @@ METRICS: Final = {
         "smallest singularity margin",
         "rad",
         "smallest rotation to a singular attitude, negative beyond it",
+        "singularity_margin",
+        "min",
     ),
     "min_decoupling_condition": Metric(
         "smallest σ₃/σ₁ of the decoupling matrix",
@@ -126,18 +139,28 @@ METRICS: Final = {
         "largest null part of the rotor speeds",
         "",
         "largest share of varpi |varpi| that neither force nor torque show (multirotor)",
+        "null_part",
     ),
     "max_supervision": Metric(
         "largest intervention of the supervisor",
         "",
         "largest share of the gait's angles (scale) or of its speed (hold) that the supervisor "
         "takes away, or of the way to red; 0 where it never acted",
+        "supervision",
     ),
     "peak_force": Metric(
-        "largest contact force", "N", "largest force on all objects together, at any physics step"
+        "largest contact force",
+        "N",
+        "largest force on all objects together, at any physics step",
+        "peak_contact_force",
+        "last",
     ),
     "time_in_contact": Metric(
-        "time in contact", "s", "time for which the vehicle touched an object"
+        "time in contact",
+        "s",
+        "time for which the vehicle touched an object",
+        "contact_time",
+        "last",
     ),
     "max_cable_tension": Metric("largest tension of a cable", "N", "of the recorded samples"),
     "max_swing": Metric(

@@ -6,6 +6,7 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
+from tiltsim.models.cross import as_multirotor
 from tiltsim.models.parts import TiltServo
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.models.user_vehicle import UserVehicle
@@ -13,6 +14,7 @@ from tiltsim.scenario.table import NonNegative, Positive, Table, default, exampl
 from tiltsim_controllers.mathematics.scalar import Values
 from tiltsim_controllers.tilt_car.vehicle import TiltCar
 from tiltsim_controllers.vehicle.parameters import Vehicle
+from tiltsim_controllers.vehicle.rotors import Rotor
 
 
 class ServoTable(Table):
@@ -106,18 +108,23 @@ class RotorcraftTable(AnyVehicleTable, ABC):
     def resolve(self) -> Vehicle | Multirotor: ...
 
     @property
-    @abstractmethod
-    def spins(self) -> Values:
-        """Signs of the rotor speeds."""
+    def rotors(self) -> tuple[Rotor, ...]:
+        """Places, axes, coefficients and tilts of the rotors."""
+        return as_multirotor(self.resolve(), tilting=self.has_tilting_rotors).rotors
 
     @property
-    @abstractmethod
+    def spins(self) -> Values:
+        """Signs of the rotor speeds."""
+        return tuple(rotor.spin for rotor in self.rotors)
+
+    @property
     def thrust_coefficients(self) -> Values:
         """K_f of each rotor, N s^2/rad^2."""
+        return tuple(rotor.thrust for rotor in self.rotors)
 
-    @abstractmethod
     def tilt_of_rotor(self, rotor: int) -> int:
         """The number, from 0, of the tilt of a rotor, whose number is from 1; -1: fixed."""
+        return self.rotors[rotor - 1].tilt
 
     @property
     @abstractmethod
@@ -209,17 +216,6 @@ class MultirotorTable(RotorcraftTable):
     @property
     def tilt_count(self) -> int:
         return self.file.parts.tilts
-
-    @property
-    def spins(self) -> Values:
-        return self.resolve().spins
-
-    @property
-    def thrust_coefficients(self) -> Values:
-        return self.resolve().thrust_coefficients
-
-    def tilt_of_rotor(self, rotor: int) -> int:
-        return self.resolve().tilt_of_rotor[rotor - 1]
 
     @property
     def hinge_inertias(self) -> Values:

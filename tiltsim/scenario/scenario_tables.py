@@ -5,6 +5,7 @@ from typing import Any, Final
 from pydantic import PrivateAttr
 
 from tiltsim.errors import InputError
+from tiltsim.models.cross import as_multirotor
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.companion import CompanionTable, DownwashTable
 from tiltsim.scenario.controller import Controller
@@ -231,10 +232,7 @@ class ScenarioTables(WithAutopilot):
     @property
     def true_thrust_coefficients(self) -> Values:
         """K_f (N s^2/rad^2) of each rotor of any simulated rotorcraft."""
-        vehicle = self.true_vehicle
-        if isinstance(vehicle, Vehicle):
-            return (vehicle.thrust_coefficient,) * self.vehicle.rotor_count
-        return vehicle.thrust_coefficients
+        return as_multirotor(self.true_vehicle, tilting=False).thrust_coefficients
 
     @property
     def true_rotorcraft(self) -> Vehicle:

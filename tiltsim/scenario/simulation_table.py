@@ -28,6 +28,8 @@ MAX_STEPS: Final = 100_000_000
 DEFAULT_ROTOR_SPEED: Final = 300.0
 """rad/s, of the thesis's flights at time zero."""
 
+PlantName = Literal["mujoco", "thesis", "rigid_body"]
+
 INTEGRATORS: Final = {
     "mujoco": ("RK4", "implicitfast", "implicit", "Euler"),
     "rigid_body": ("RK4", "ode3"),
@@ -76,7 +78,7 @@ class SimulationTable(Table):
         "sines and their inverses where native flights on equations fly side by side: with the "
         "bits of a flight alone, or faster, with flights that differ by rounding",
     )
-    plant: Literal["mujoco", "thesis", "rigid_body"] = default(
+    plant: PlantName = default(
         "mujoco",
         "what is simulated: the MuJoCo model; the thesis's equations of motion; or the equations "
         "of one rigid body with gyroscopic torque, tilt servos and massless pods",

@@ -22,7 +22,7 @@ class FourthDerivativeController(FourthDerivative, ControllerTable):
     loop_gains = ("gains",)
 
     @property
-    def rotors_stop_at_zero(self) -> bool:
+    def rotors_stop_at_zero(self) -> bool:  # type: ignore[override]
         return self.anti_windup
 
 

@@ -34,7 +34,7 @@ class VectoringController(Vectoring, FailureAwareController, TiltingTable, LawCo
     control: ClassVar = staticmethod(vectoring)
 
     @property
-    def position_stiffness(self) -> float | None:
+    def position_stiffness(self) -> float | None:  # type: ignore[override]
         return None if self.position_bandwidth is None else self.position_bandwidth**2
 
     def check_scenario(self, scenario: Any) -> None:
@@ -55,7 +55,7 @@ class VectoringController(Vectoring, FailureAwareController, TiltingTable, LawCo
             *airframe.initial_velocity,
             *quaternion_of_euler(airframe.initial_attitude),
             *airframe.initial_body_rates,
-            *(0.0,) * 6,
+            *(0.0,) * 7,
             *airframe.initial_speeds * (airframe.latency + 1),
             *tilts * airframe.latency,
             *(0.0,) * len(tilts),

@@ -19,7 +19,7 @@ from tiltsim.scenario.rotorcraft import (
 from tiltsim.scenario.table import NotTiny, Positive, Table, default, example, required
 from tiltsim_controllers.mathematics.scalar import Values
 from tiltsim_controllers.tilt_car.vehicle import THESIS_CAR, TiltCar
-from tiltsim_controllers.vehicle.parameters import PRESETS, SPIN, Vehicle
+from tiltsim_controllers.vehicle.parameters import PRESETS, Vehicle
 
 MOMENTS: Final = ("inertia_xx", "inertia_yy", "inertia_zz")
 """The principal moments among the fields of `Vehicle`."""
@@ -105,17 +105,6 @@ class VehicleTable(RotorcraftTable):
     @property
     def tilt_count(self) -> int:
         return 4 if self.model == "tiltrotor" else 0
-
-    @property
-    def spins(self) -> Values:
-        return SPIN
-
-    @property
-    def thrust_coefficients(self) -> Values:
-        return (self.resolve().thrust_coefficient,) * self.rotor_count
-
-    def tilt_of_rotor(self, rotor: int) -> int:
-        return rotor - 1 if self.has_tilting_rotors else -1
 
     @property
     def hinge_inertias(self) -> Values:

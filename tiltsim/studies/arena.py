@@ -68,7 +68,7 @@ WORLDS: Final[Mapping[str, Mapping[str, Mapping[str, Any]]]] = {
 }
 """By league, the errors of the law's model: values by dotted key for each table."""
 
-SEEDS: Final = {"model error": (1, 2, 3), "exact model": (1,), "": (1,)}
+SEEDS: Final = {"model error": (1, 2, 3), "exact model": (1, 2, 3), "": (1,)}
 """Seeds of sensor noise and turbulence, by world."""
 
 OWN_KEYS: Final = {"omni_octorotor": {"controller.norm": "thrust"}}

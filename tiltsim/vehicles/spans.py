@@ -4,12 +4,13 @@ Columns have shape (..., N): one flight, or several in rows, with equal times (N
 Spans are counted in physics steps instead of sums of their lengths.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
+from tiltsim.scenario.metric_names import METRICS
 from tiltsim_controllers.mathematics.scalar import Floats
 
 SETTLED: Final = 20.0
@@ -45,6 +46,26 @@ def position_error(*errors: Floats) -> dict[str, Any]:
         "rms_position_error": np.sqrt(np.mean(square, axis=-1)),
         "max_position_error": np.sqrt(square).max(axis=-1),
     }
+
+
+NUMBERS: Final[Mapping[str, Callable[[Floats], Any]]] = {
+    "max": lambda column: column.max(axis=-1),
+    "min": lambda column: column.min(axis=-1),
+    "max_abs": lambda column: np.abs(column).max(axis=-1),
+    "last": lambda column: column[..., -1],
+}
+"""Numbers of a column that a metric may be."""
+
+
+def with_columns_metrics(own: dict[str, Any], columns: Mapping[str, Floats]) -> dict[str, Any]:
+    """Metrics of a kind of vehicle and the numbers of columns among the metrics, in order."""
+    found = {
+        name: NUMBERS[metric.number](columns[metric.column])
+        for name, metric in METRICS.items()
+        if metric.column in columns
+    }
+    whole = own | found
+    return {name: whole[name] for name in METRICS if name in whole}
 
 
 def largest(values: Iterable[Any]) -> Any:

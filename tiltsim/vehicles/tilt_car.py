@@ -26,6 +26,7 @@ from tiltsim.vehicles.spans import (
     mean_of,
     position_error,
     saturation_metrics,
+    with_columns_metrics,
 )
 from tiltsim_controllers.code.arrays import traceable
 from tiltsim_controllers.mathematics.scalar import Floats, Vector
@@ -154,15 +155,14 @@ def tilt_car_metrics(
     metrics |= position_error(*errors.values())
     metrics |= horizontal_error_metrics(columns, timestep)
     metrics |= {f"max_abs_error_{axis}": np.abs(e).max(axis=-1) for axis, e in errors.items()}
-    if "lyapunov" in columns:
-        metrics["max_lyapunov"] = columns["lyapunov"].max(axis=-1)
     metrics["final_input_split"] = mean_of(columns["input_split"], last_second)
     metrics["final_yaw"] = mean_of(columns["yaw"], last_second)
     metrics["min_rotor_speed"] = speeds.min(axis=(0, -1))
     metrics["max_rotor_speed"] = speeds.max(axis=(0, -1))
     metrics["max_tilt_rate"] = np.abs(columns["alpha_rate"]).max(axis=-1)
     # A thrust cannot pull: at rest a rotor is at its limit.
-    return metrics | saturation_metrics(columns["time"], at_lower_limit(speeds, 0.0))
+    metrics |= saturation_metrics(columns["time"], at_lower_limit(speeds, 0.0))
+    return with_columns_metrics(metrics, columns)
 
 
 TILT_CAR: Final = VehicleKind(

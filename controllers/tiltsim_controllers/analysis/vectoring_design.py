@@ -7,7 +7,7 @@ limits leave, and the side force that needs no lean from a linear program.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import exp
+from math import atan, cos, exp
 from typing import Any, Final
 
 import numpy as np
@@ -30,18 +30,32 @@ TOTAL_SHARE: Final = 0.9
 """Share of the greatest thrusts that is demanded in all."""
 DELAY_MARGIN: Final = 0.22
 """Attitude bandwidth times the delay that is left."""
-POSITION_SHARE: Final = 0.3
-"""Position bandwidth over attitude bandwidth, ..."""
+POSITION_SHARE: Final = 0.45
+"""Bandwidth of the position across over the attitude's, ..."""
 SIDEWAYS_POSITION: Final = 0.5
 """... and where the push of torques limits attitude."""
+AGILE_POSITION: Final = 0.75
+"""The largest one over the root of the angular acceleration."""
+RISE: Final = 0.6, 1.4
+"""Bandwidth of height over the attitude's, and damping ratio: no lean delays it."""
+VERTICAL: Final = 4.5, 2.5
+"""m/s^2: of the feedback of height, up and down; more would take torque or lean."""
+ACROSS: Final = 0.33
+"""Acceleration of the feedback across over the greatest that keeps the height."""
+SPIN: Final = 0.8
+"""Rate of the lean over the root of the angular acceleration that stops it."""
+LEAN: Final = 1.5, 2.0
+"""Time until a braking begins: over the attitude's, and over the root of lean by acceleration."""
 SIDEWAYS_SHARE: Final = 0.9
 """Attitude bandwidth over `sideways_limit`."""
-FASTEST: Final = (40.0, 23.0, 8.0)
-"""rad/s: attitude, yaw and position without lag and latency."""
+FASTEST: Final = (40.0, 23.0, 8.0, 16.0)
+"""rad/s: attitude, yaw, position across and height without lag and latency."""
 ERROR: Final = 0.1
 """rad: the error of attitude or yaw that demands all torque about its axis, or more."""
+SIDE_OBSERVER: Final = 0.6
+"""Bandwidth of the observer of side force over the position's."""
 TORQUE_OBSERVER: Final = 40.0
-"""1/s: the fastest observer of torque."""
+"""1/s: the fastest observers of torque and of the excess of thrust."""
 TRACKING: Final = 250.0
 """1/s: how fast the wrench follows its demand where rotors have no lag."""
 REACH: Final = 10.0
@@ -107,22 +121,31 @@ def _observers(factor: float, bandwidths: Values, period: float) -> dict[str, An
 
     Args:
         factor: Multiplies the bandwidths; 0 for no observers.
-        bandwidths: The observers' of force and torque, and the bandwidth of yaw, 1/s.
+        bandwidths: The observers' of side force, thrust and torque, and the bandwidth of yaw, 1/s.
         period: s, between calls.
     """
     if factor == 0.0:
-        trusts = dict.fromkeys(("position_trust", "velocity_trust", "attitude_trust"), 1.0)
-        return {**trusts, "rate_trust": (1.0,) * 3, "force_gain": 0.0, "torque_gain": (0.0,) * 3}
-    force, torque, yaw = (2.0 * factor * bandwidth * period for bandwidth in bandwidths)
+        trusts = dict.fromkeys(("position_trust", "velocity_trust", "rate_trust"), (1.0,) * 3)
+        none = {"force_gain": 0.0, "excess_gain": 0.0, "torque_gain": (0.0,) * 3}
+        return {**trusts, "attitude_trust": 1.0, **none}
+    side, rise, torque, yaw = (2.0 * factor * bandwidth * period for bandwidth in bandwidths)
+    pushing = side, side, rise
     turning = torque, torque, min(torque, 2.0 * yaw)
     return {
-        "position_trust": 1.0 - exp(-force),
-        "velocity_trust": 1.0 - exp(-2.0 * force),
+        "position_trust": tuple(1.0 - exp(-pole) for pole in pushing),
+        "velocity_trust": tuple(1.0 - exp(-2.0 * pole) for pole in pushing),
         "attitude_trust": 1.0 - exp(-torque),
         "rate_trust": tuple(1.0 - exp(-2.0 * pole) for pole in turning),
-        "force_gain": (1.0 - exp(-force)) ** 2 / period,
+        "force_gain": (1.0 - exp(-side)) ** 2 / period,
+        "excess_gain": (1.0 - exp(-rise)) ** 2 / period,
         "torque_gain": tuple((1.0 - exp(-pole)) ** 2 / period for pole in turning),
     }
+
+
+def _across(craft: Craft) -> float:
+    """Acceleration of the feedback across, m/s^2."""
+    greatest = float(craft.limits[1].sum()) / craft.mass / craft.gravity
+    return min(20.0, ACROSS * craft.gravity * max(0.0, greatest**2 - 1.0) ** 0.5)
 
 
 def ability(keys: Vectoring, craft: Craft, left: float, *, harmed: bool = False) -> Ability:
@@ -142,16 +165,19 @@ def ability(keys: Vectoring, craft: Craft, left: float, *, harmed: bool = False)
         sideways = SIDEWAYS_SHARE * sideways_limit(craft, rows)
         if sideways < fastest:
             fastest, share = sideways, SIDEWAYS_POSITION
-    attitude = keys.attitude_bandwidth or fastest
+    attitude, given = keys.attitude_bandwidth or fastest, keys.position_bandwidth
+    lean = atan(0.6 * _across(craft) / craft.gravity)
     return Ability(
         axis=tuple(free_axis(rows).tolist()),
         slope=slope,
         cone=pose_cone(craft, rows, slope),
-        position=keys.position_bandwidth or min(FASTEST[2], share * attitude),
-        lean_time=1.5 / attitude if slope < 1.0 else 0.0,
+        position=given or min(FASTEST[2], share * attitude, AGILE_POSITION * angular**0.5),
+        rise=RISE[0] * (given / POSITION_SHARE if given else min(FASTEST[3] / RISE[0], attitude)),
+        lean_time=LEAN[0] / attitude + LEAN[1] * (lean / angular) ** 0.5,
         attitude=attitude,
         yaw=min(FASTEST[1], attitude, (yaw_angular / ERROR) ** 0.5),
         angular=angular,
+        spin=SPIN * angular**0.5,
         yaw_angular=yaw_angular,
         side_softness=3e-4 if craft.works.sum() >= 6 else 1.0,
         # The tilts have made the torque that they can; a harmed vehicle has little of it to give.
@@ -173,7 +199,6 @@ def design(
     high = craft.limits[1]
     lag = timing.lag if keys.lag_model else 0.0
     greatest = float(high.sum()) / craft.mass
-    lift = max(0.0, (greatest / craft.gravity) ** 2 - 1.0) ** 0.5
     tracking = min(TRACKING, keys.lead / lag) if lag else TRACKING
     latency = timing.latency * h
     sample = h * timing.sampled
@@ -183,7 +208,8 @@ def design(
     works = 1.0 * (np.arange(1, len(craft.thrust) + 1) != failure.rotor)
     able = ability(keys, craft, left)
     after = ability(keys, replace(craft, works=works), left, harmed=True) if failure.rotor else able
-    following = (2.5 * able.position, min(TORQUE_OBSERVER, 0.5 / delay), able.yaw)
+    fast = min(TORQUE_OBSERVER, 0.5 / delay)
+    following = (SIDE_OBSERVER * fast, fast, fast, able.yaw)
     servo_angle, servo_rate = _servo_step(timing.servo, h)
     parameters = Parameters(
         period=h,
@@ -193,9 +219,12 @@ def design(
         bounded=float(keys.bounded),
         **able._asdict(),
         damping=1.0,
-        acceleration=min(20.0, 0.45 * craft.gravity * lift),
-        descent=6.0,
+        rise_damping=RISE[1],
+        acceleration=_across(craft),
+        ascent=VERTICAL[0],
+        descent=VERTICAL[1],
         greatest=TOTAL_SHARE * greatest,
+        lift=float(high.sum()) * (cos(keys.max_tilt) if craft.commanded else 1.0),
         attitude_damping=0.9,
         reversal=lag + h if lag else 0.0,
         share=1.0 - exp(-tracking * h),

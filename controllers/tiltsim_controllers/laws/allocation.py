@@ -70,15 +70,10 @@ def _unit(row: Any) -> Any:
 
 
 def _remainder(rows: Any, free: Any, gradient: Any) -> Any:
-    """The part of a gradient that rows and stopped rotors leave.
+    """The part of a gradient that rows and stopped rotors leave: the direction of steepest ascent.
 
-    It is orthogonal to the rows over the free rotors, for which it is the direction of steepest
-    ascent. Its other entries are the multipliers of the rotors that stopped.
-
-    Args:
-        rows: Rows of length 1 or 0, shape (N,) each.
-        free: 1 for rotors that move, 0 for rotors at a limit, shape (N,).
-        gradient: Shape (N,).
+    Its entries of rotors that stopped are their multipliers. Rows, of length 1 or 0, and gradient
+    have shape (N,); ``free`` is 1 for rotors that move, 0 for rotors at a limit.
     """
     units: list[Any] = []
     for row in (*rows, gradient):

@@ -105,8 +105,7 @@ Parameters = record_of(
 def torque_free_force(force: Any, torque: Any) -> Any:
     """The direction ``n`` in which four rotors push without torque, body axes, shape (3,).
 
-    Args:
-        force, torque: ``F(alpha)`` and ``tau(alpha)``, shape (3, 4) each (ch. 3, Eqs. 3, 5).
+    ``F(alpha)`` and ``tau(alpha)``, ch. 3, Eqs. 3 and 5, have shape (3, 4).
     """
     return force @ kernel(torque)
 

@@ -96,10 +96,7 @@ def attitude_jerk(desired: Moving, present: Moving, gains: Any, limit: Any) -> A
 def body_rate_matrix(roll: Any, pitch: Any) -> Any:
     """``M(roll, pitch)`` with ``omega = M eta'`` of the rates of roll, pitch and yaw, shape (3, 3).
 
-    Ch. 3, Eq. 8, takes it for the unit matrix.
-
-    Args:
-        roll, pitch: rad, moving.
+    The angles (rad) move. Ch. 3, Eq. 8, takes it for the unit matrix.
     """
     sr, cr, sp, cp = sine(roll), cosine(roll), sine(pitch), cosine(pitch)
     rows = (1.0, 0.0, -sp), (0.0, cr, sr * cp), (0.0, -sr, cr * cp)
@@ -125,11 +122,9 @@ def attitude_motion(attitude: Any, omega: Any, omega_rate: Any, *, exact: bool) 
 
 
 def angular_jerk(attitude: Moving, jerk: Any) -> Any:
-    """Second derivatives (rad/s^3) of the body rates: of ``omega = M eta'``, shape (3,).
+    """Second derivatives (rad/s^3) of the body rates ``omega = M eta'``, shape (3,).
 
-    Args:
-        attitude: Roll, pitch and yaw, rad, shape (3,).
-        jerk: Their third derivatives, rad/s^3, shape (3,).
+    ``attitude`` is roll, pitch and yaw, rad, ``jerk`` their third derivatives, rad/s^3, shape (3,).
     """
     rates = Moving(attitude.rate, attitude.acceleration, jerk)
     turned: Moving = body_rate_matrix(attitude[0], attitude[1]) @ rates
@@ -137,11 +132,9 @@ def angular_jerk(attitude: Moving, jerk: Any) -> Any:
 
 
 def swept(vector: Moving, omega: Any, omega_rate: Any) -> Moving:
-    """The rate of a vector that rotates with the body, with its derivative; body axes.
+    """The rate of a vector (3,) that moves in a body, with its derivative; body axes.
 
-    Args:
-        vector: Moving in body axes, shape (3,).
-        omega, omega_rate: Body rates (rad/s) and their rates (rad/s^2), shape (3,) each.
+    Body rates (rad/s) and their rates (rad/s^2) have shape (3,).
     """
     rate = vector.rate + cross(omega, vector.value)
     second = vector.acceleration + cross(omega_rate, vector.value)

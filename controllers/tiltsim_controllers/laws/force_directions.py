@@ -94,12 +94,8 @@ def nearest_in_plane(desired: Moving, normal: Any) -> Any:
 def torque_free_force(axis: Any, wrench: Moving) -> Any:
     """A torque-free force that moves with the pods, body axes, shape (3,).
 
-    Its inputs push along an axis, without their part that makes torque; their derivatives are the
-    least that keep the torque zero.
-
-    Args:
-        axis: Body axes, shape (3,).
-        wrench: Force and torque per rotor, shape (6, N).
+    Its inputs push along an axis (3,) of the body, without their part that makes torque; their
+    derivatives are the least that keep the torque zero. ``wrench`` is per rotor, shape (6, N).
     """
     force, torque = wrench[:3], wrench[3:]
     units = orthonormal_rows(torque.value)
@@ -116,10 +112,7 @@ def torque_free_force(axis: Any, wrench: Moving) -> Any:
 def moving_direction(wrench: Moving, up: Any, dimension: int) -> Any:
     """The ``direction`` of one or two components of force as the pods move, of any length.
 
-    Args:
-        wrench: Force and torque per rotor, shape (6, N).
-        up: World up in body axes, shape (3,).
-        dimension: 1 or 2.
+    ``wrench`` is force and torque per rotor, shape (6, N), ``up`` world up, body axes, shape (3,).
     """
     if dimension == 1:
         return torque_free_force(up, wrench)

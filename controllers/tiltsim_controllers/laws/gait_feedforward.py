@@ -88,12 +88,7 @@ def gait_law_of(layout: TiltOfRotor, form: Form, supervision: Supervision) -> Ca
     """The control law of vehicles of a layout, `attitude_force` with the tilts of the gait.
 
     Its parameters are `Parameters`, or `multirotor_steps.Parameters` with the table of the rotors
-    in the knots.
-
-    Args:
-        layout: Layout of the vehicles.
-        form: Options of the law.
-        supervision: Functions of the supervisor, used where the form is supervised.
+    in the knots. The supervisor's functions are used where the form is supervised.
     """
     leans_with_gait = form.dimension < 3 and not form.forward and tilts_of(layout) > 0
 
@@ -114,12 +109,7 @@ def gait_law_of(layout: TiltOfRotor, form: Form, supervision: Supervision) -> Ca
 
 @cache
 def prioritized(law: Callable[..., Step], layout: TiltOfRotor) -> Callable[..., Step]:
-    """A law that keeps rotor accelerations within ``limits`` of its parameters, see `allocation`.
-
-    Args:
-        law: Plain inversion.
-        layout: Layout of the vehicles.
-    """
+    """A law by plain inversion, kept within ``limits`` of its parameters: see `allocation`."""
 
     @traceable
     def limited(seen: Seen, p: Any, knots: Any = NO_KNOTS) -> Step:

@@ -295,12 +295,9 @@ def lean(force: Any, along: Moving, yaw: Any, parameters: Any) -> tuple[Moving, 
 
 
 def desired_direction(along: Moving, yaw: Any, gravity: Any) -> Moving:
-    """Direction in which the rotors have to push, in axes of the yaw, shape (3,).
+    """Direction in which the rotors have to push, in axes of the yaw (rad), shape (3,).
 
-    Args:
-        along: The desired acceleration, m/s^2, world axes, shape (3,).
-        yaw: rad.
-        gravity: m/s^2.
+    ``along`` is the desired acceleration, m/s^2, world axes, shape (3,); gravity in m/s^2.
     """
     (x, y, z), s, c = (along[0], along[1], along[2]), sine(yaw), cosine(yaw)
     return stacked(x * c + y * s, y * c - x * s, gravity + z)

@@ -126,13 +126,7 @@ UNHARMED: Final = Failure()
 
 
 def working(time: Any, failure: Failure, rotors: int) -> Any:
-    """1 for a rotor that works as far as is known, 0 for one that failed, shape (rotors,).
-
-    Args:
-        time: s.
-        failure: The failure that is known of.
-        rotors: Number of rotors.
-    """
+    """1 for a rotor that works as far as is known at a time (s), 0 for one that failed, (N,)."""
     known = time >= failure.known_from
     return xp.array(
         [xp.where(known & (failure.rotor == i), 0.0, 1.0) for i in range(1, rotors + 1)]

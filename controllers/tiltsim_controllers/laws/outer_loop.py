@@ -59,12 +59,9 @@ def demanded_acceleration(
 
 
 def pointing_attitude(observed: Observed, acceleration: Any, axis: Any) -> Any:
-    """The rotation, shape (3, 3), that points a body axis along the force for an acceleration.
+    """The rotation, shape (3, 3), that points a body axis (3,) along the force for an acceleration.
 
-    Args:
-        observed: Observation by the law; the yaw comes from its reference.
-        acceleration: m/s^2, world axes, shape (3,).
-        axis: Axis of the force, body axes, shape (3,).
+    The acceleration is in m/s^2, world axes, shape (3,); the yaw comes from the reference.
     """
     (ax, ay, az), yaw = acceleration, observed.reference.attitude[2]
     roll, pitch = exact_decoupler(ax, ay, az, yaw, observed.vehicle.gravity, axis)
@@ -142,11 +139,9 @@ def in_components(observed: Observed) -> Observed:
 
 
 def of_components(rotors: Rotors, components: Any) -> tuple[Any, Any]:
-    """Thrusts (N), shape (N,), and tilts (rad), shape (M,), of components of thrust.
+    """Thrusts (N), shape (N,), and tilts (rad), shape (M,), of rotors with one on each tilt.
 
-    Args:
-        rotors: With at most one on each tilt.
-        components: ``T cos(alpha)`` of all rotors, then ``T sin(alpha)``, N, shape (2 N,).
+    Components are ``T cos(alpha)`` of all rotors, then ``T sin(alpha)``, N, shape (2 N,).
     """
     along, across = components.reshape(2, -1)
     # Returned in the order of the tilts, which may differ from the order of the rotors.
@@ -159,11 +154,8 @@ def of_components(rotors: Rotors, components: Any) -> tuple[Any, Any]:
 def allocated_with_tilts(observed: Observed, force: Any, torque: Any) -> tuple[Any, Any]:
     """Thrusts (N), shape (N,), and tilts (rad), shape (M,), for rotors with a tilt each.
 
-    The shortest ``T cos(alpha), T sin(alpha)`` of all rotors; NaN where there are none.
-
-    Args:
-        observed: By the law.
-        force, torque: N and N m, body axes, shape (3,) each.
+    The shortest ``T cos(alpha), T sin(alpha)`` of all rotors for a force (N) and a torque (N m) in
+    body axes, shape (3,) each; NaN where there are none.
     """
     known, wrench = in_components(observed), xp.hstack([force, torque])
     rows = xp.vstack([known.force, known.torque])

@@ -67,11 +67,9 @@ def watched(table: Sequence[float], rotors: int, side: Triple) -> Watched:
 
 @traceable
 def watched_at(time: Any, parameters: Any) -> Watched:
-    """Parameters of the rotors that work: without a failed one once the failure is known.
+    """Parameters of the rotors that work at a time (s): without a failed one once it is known.
 
-    Args:
-        time: s.
-        parameters: ``watched``, ``watched_without`` and ``failure`` of a law.
+    A law's parameters have ``watched``, ``watched_without`` and ``failure``.
     """
     whole, rest = parameters.watched, parameters.watched_without
     if rest.rotors == 0.0:  # no table without a rotor: no failure will be known
@@ -96,9 +94,7 @@ def multirotor_supervision_of(
 ) -> Supervision:
     """The supervisor of vehicles of a layout, whose ``vehicle`` is a `Watched`.
 
-    Args:
-        layout: Layout of the table of rotors.
-        dimension, forward: See `tiltsim_controllers.laws.force_directions.factors`.
+    On dimension and forward see `tiltsim_controllers.laws.force_directions.factors`.
     """
 
     @traceable

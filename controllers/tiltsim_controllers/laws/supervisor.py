@@ -122,11 +122,7 @@ def _relative_clearance(margin: Any, determinant: Any, supervisor: Supervisor) -
 
 @traceable
 def turned_along(up: Any, start: Any, end: Any) -> Any:
-    """A direction turned by the least rotation between two lines, if both have a length.
-
-    Args:
-        up, start, end: Shape (3,) each.
-    """
+    """A direction (3,) turned by the least rotation between two lines, if both have a length."""
     size = xp.sqrt((start @ start) * (end @ end))
     turns = size > 0.0
     along = start @ end / xp.where(turns, size, 1.0)
@@ -195,12 +191,6 @@ def _smallest_ahead(clock: Any, up: Any, tilts_at: Callable[..., Any], now: Supe
 
     The vehicle meets each sample's tilts with the lean of a moment before. In hover it leans with
     their direction; it stays as far away from that as it is now.
-
-    Args:
-        clock: Time of the gait's clock, s.
-        up: World up in body axes, shape (3,).
-        tilts_at: The tilts (rad, shape (M,)) at a time of the clock.
-        now: The supervisor.
     """
     spacing = now.supervisor.horizon / LOOKAHEAD_SAMPLES
     smallest, start = now.look(tilts_at(clock), up)

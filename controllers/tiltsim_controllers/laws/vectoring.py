@@ -146,7 +146,7 @@ def _demand(known: Known, ahead: Ahead) -> Any:
     across = F - along * unit
     size, most = xp.sqrt(across @ across + 1e-24), 1.25 * p.slope * frame.mass * frame.gravity
     across = across * xp.where(size > most, most / size, 1.0)
-    return xp.hstack([xp.maximum(along, 0.0) * unit + across, torque])
+    return xp.hstack([xp.clip(along, 0.0, p.lift) * unit + across, torque])
 
 
 def _allocated(known: Known, ahead: Ahead, goal: Any, usable: Any) -> tuple[Any, Any]:

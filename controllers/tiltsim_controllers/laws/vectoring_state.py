@@ -15,7 +15,7 @@ from tiltsim_controllers.mathematics.attitude import (
 from tiltsim_controllers.mathematics.records import Vector3
 from tiltsim_controllers.vehicle.rotors import wrench_map
 
-MOTION = 19
+MOTION = 20
 """States of the modeled motion and its disturbance."""
 
 
@@ -26,10 +26,12 @@ class Ability(NamedTuple):
     slope: float
     cone: float
     position: float
+    rise: float
     lean_time: float
     attitude: float
     yaw: float
     angular: float
+    spin: float
     yaw_angular: float
     side_softness: float
     yaw_softness: float
@@ -48,24 +50,30 @@ class Parameters(NamedTuple):
     reads: float  # 1: rotors are where they are commanded to, else 0
     predicts: float  # 1 or 0
     bounded: float  # 1 or 0
-    position: float  # rad/s
+    position: float  # rad/s, across
     damping: float
-    acceleration: float  # m/s^2, of the feedback
+    rise: float  # rad/s, of height
+    rise_damping: float
+    acceleration: float  # m/s^2, of the feedback, across
+    ascent: float  # m/s^2, likewise upward
     descent: float  # m/s^2, likewise downward
     greatest: float  # m/s^2, of the rotors
+    lift: float  # N, the greatest along the axis
     lean_time: float  # s, until a braking begins
     attitude: float  # rad/s
     attitude_damping: float
     yaw: float  # rad/s
     angular: float  # rad/s^2, about x and y
+    spin: float  # rad/s, likewise
     yaw_angular: float  # rad/s^2
     reversal: float  # s, until a braking begins
     share: float  # of a demanded change of the wrench in a period
-    position_trust: float  # share of a measured position in its estimate, per call
-    velocity_trust: float
+    position_trust: Vector3  # share of a measured position in its estimate, per call
+    velocity_trust: Vector3
     attitude_trust: float
     rate_trust: Vector3
     force_gain: float  # 1/s, of the estimated disturbance, per call
+    excess_gain: float  # 1/s, of the excess of thrust per mass, likewise
     torque_gain: Vector3
     slope: float  # side force per lift without lean
     cone: float  # rad, from level: of the poses that the side force holds; pi: of all
@@ -96,6 +104,7 @@ class Memory(NamedTuple):
     omega: Any  # (3,), rad/s, modeled, body axes
     force: Any  # (3,), m/s^2, of the disturbance
     torque: Any  # (3,), rad/s^2, of the disturbance
+    excess: Any  # of the true thrust per mass over the known one
     speeds: Any  # (d + 1, N), rad/s: commanded, at the present and the next samples
     points: Any  # (d, M), rad: set points of the servos on their way
     doubt: Any  # (M,), s, for which servos did not move
@@ -111,6 +120,7 @@ def state_units(rotors: int, tilts: int, latency: int) -> dict[str, str]:
         **{f"state_modeled_rate_{axis}": "rad/s" for axis in "xyz"},
         **{f"state_disturbing_acceleration_{axis}": "m/s^2" for axis in "xyz"},
         **{f"state_disturbing_angular_acceleration_{axis}": "rad/s^2" for axis in "xyz"},
+        "state_excess_of_thrust_per_mass": "1",
         **{f"state_speed_command_{step}_{i}": "rad/s" for step in steps for i in numbers},
         **{f"state_set_point_{step}_{i}": "rad" for step in steps[1:] for i in pods},
         **{f"state_still_{i}": "s" for i in pods},
@@ -130,7 +140,8 @@ def memory_of(observed: Observed) -> Memory:
         states[6:10],
         states[10:13],
         states[13:16],
-        states[16:MOTION],
+        states[16:19],
+        states[19],
         speeds.reshape(steps + 1, rotors),
         points.reshape(steps, tilts),
         states[first + steps * tilts :],
@@ -187,12 +198,22 @@ def known_of(observed: Observed, p: Parameters) -> Known:
         for name in Ability._fields[1:]
     }
     p = p._replace(axis=xp.where(harmed, xp.array(p.after.axis), xp.array(p.axis)), **able)
+    # An object that is touched pushes back and is no disturbance: nothing is learned meanwhile.
+    learns = xp.where(observed.contact_force @ observed.contact_force > 0.0, 0.0, 1.0)
+    p = p._replace(
+        velocity_trust=1.0 - learns * (1.0 - xp.array(p.velocity_trust)),
+        rate_trust=1.0 - learns * (1.0 - xp.array(p.rate_trust)),
+        force_gain=learns * p.force_gain,
+        excess_gain=learns * p.excess_gain,
+        torque_gain=learns * xp.array(p.torque_gain),
+    )
+    mass = body.mass / (1.0 + memory.excess)
     thrust, slowest, fastest = table[: 3 * rotors].reshape(3, rotors)
     return Known(
         observed._replace(rotors=observed.rotors.masked(works)),
         p,
         memory,
-        Frame(body.mass, body.gravity, inertia, turns, memory.force, memory.torque),
+        Frame(mass, body.gravity, inertia, turns, memory.force, memory.torque),
         _estimated(observed, memory, p),
         memory.speeds + p.reads * (observed.rotor_speeds - memory.speeds[0]),
         thrust,
@@ -207,10 +228,10 @@ def _estimated(seen: Observed, memory: Memory, p: Parameters) -> Motion:
     rotation = rotation_of_quaternion(memory.attitude)
     turn = turn_by(p.attitude_trust * attitude_error(rotation, seen.rotation))
     return Motion(
-        memory.position + p.position_trust * (seen.position - memory.position),
+        memory.position + xp.array(p.position_trust) * (seen.position - memory.position),
         memory.velocity + p.velocity_trust * (seen.velocity - memory.velocity),
         rotation @ turn,
-        memory.omega + xp.array(p.rate_trust) * (seen.body_rates - memory.omega),
+        memory.omega + p.rate_trust * (seen.body_rates - memory.omega),
     )
 
 
@@ -221,6 +242,10 @@ def observer_rates(known: Known) -> Any:
     speeds = 0.5 * (seen.rotor_speeds + after)
     wrench = known.wrench(speeds, seen.tilt_angles + 0.5 * p.period * seen.tilt_rates)
     then = moved(known.now, wrench, known.frame, p.period)
+    # A disturbance along the thrust counts as an excess of it, and leans with the vehicle.
+    push = known.now.rotation @ wrench[:3] / seen.vehicle.mass
+    slip = seen.velocity - memory.velocity
+    along = (slip @ push) / (push @ push + 0.1 * seen.vehicle.gravity**2)
     attitude = quaternion_of_rotation(then.rotation)
     attitude = attitude * xp.copysign(1.0, attitude @ memory.attitude)
     change = [
@@ -228,8 +253,9 @@ def observer_rates(known: Known) -> Any:
         then.velocity - memory.velocity,
         attitude - memory.attitude,
         then.omega - memory.omega,
-        p.force_gain * (seen.velocity - memory.velocity),
-        xp.array(p.torque_gain) * (seen.body_rates - memory.omega),
+        p.force_gain * (slip - along * push),
+        p.torque_gain * (seen.body_rates - memory.omega),
+        xp.array([xp.clip(memory.excess + p.excess_gain * along, -0.3, 0.6) - memory.excess]),
     ]
     return xp.hstack(change) / p.period
 

@@ -114,13 +114,17 @@ def demanded(error: Moving, jerk_error: Any, ahead: Moving, frame: Frame, p: Any
         frame: The body.
         p: Parameters of the law.
     """
-    stiffness = p.position / (2.0 * p.damping)  # speed per error, 1/s
     slope = Moving(error.rate, error.acceleration, jerk_error)
-    size = square_root(error @ error + TINY)
-    speed = braked(size, stiffness, 0.6 * p.acceleration, p.lean_time) / size
-    feedback = 2.0 * p.damping * p.position * (speed * error + slope)
-    side = _within(feedback[:2], p.acceleration)
-    rise = _clipped(feedback[2], -p.descent, p.acceleration)
+
+    def feedback(axes: slice, bandwidth: Any, damping: Any, braking: Any, delay: Any) -> Moving:
+        stiffness = bandwidth / (2.0 * damping)  # speed per error, 1/s
+        size = square_root(error[axes] @ error[axes] + TINY)
+        speed = braked(size, stiffness, 0.6 * braking, delay) / size
+        return 2.0 * damping * bandwidth * (speed * error[axes] + slope[axes])
+
+    across = feedback(slice(0, 2), p.position, p.damping, p.acceleration, p.lean_time)
+    upward = feedback(slice(2, 3), p.rise, p.rise_damping, p.descent, p.reversal)
+    side, rise = _within(across, p.acceleration), _clipped(upward[0], -p.descent, p.ascent)
     target = ahead + stacked(side[0], side[1], rise) - frame.force
     lift = _clipped(target[2] + frame.gravity, 0.2 * frame.gravity, p.greatest)
     # No more side force than leaves the lift, and no lean beyond 60 degrees.
@@ -197,7 +201,11 @@ def turning(now: Motion, desired: Any, rates: Any, second: Any, p: Any) -> Any:
     lean = braked(angle, gain, 0.6 * p.angular, p.reversal) * way
     spin = braked(abs(yaw), gain_yaw, 0.6 * p.yaw_angular, p.reversal) * xp.copysign(1.0, yaw)
     led = error @ rates
-    gap = lean + spin * xp.array([0.0, 0.0, 1.0]) + led - now.omega
+    # No faster toward a lean than the vehicle can stop, should the lean stop.
+    aim = lean + led
+    fast = norm(aim[:2] + xp.array([TINY, 0.0]))
+    slower = xp.where(fast > p.spin, p.spin / fast, 1.0)
+    gap = xp.array([slower, slower, 1.0]) * aim + spin * xp.array([0.0, 0.0, 1.0]) - now.omega
     damping = 2.0 * p.attitude_damping * xp.array([p.attitude, p.attitude, p.yaw])
     limits = p.angular, p.yaw_angular
     ahead = _shared(error @ second - cross(now.omega, led), 0.5, limits)

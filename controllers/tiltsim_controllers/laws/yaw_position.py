@@ -81,12 +81,7 @@ def moments_of(vehicle: Vehicle) -> Any:
 
 
 def gyroscopic_acceleration(omega: Any, vehicle: Vehicle) -> Any:
-    """Angular acceleration (rad/s^2) without torque, shape (3,) (ch. 2, Eq. 15).
-
-    Args:
-        omega: Body rates, rad/s, shape (3,).
-        vehicle: Its inertia counts.
-    """
+    """Angular acceleration (rad/s^2) at body rates (rad/s) without torque, (3,) (ch. 2, Eq. 15)."""
     moments = moments_of(vehicle)
     return -cross(omega, moments * omega) / moments
 

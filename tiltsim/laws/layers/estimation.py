@@ -189,17 +189,9 @@ def _corrections(
 def _filtered(
     time: Any, readings: Any, before: Any, fusion: Fusion, p: Any
 ) -> tuple[Estimate, Estimate, Any]:
-    """One sample of the filter.
+    """One sample of the filter: the state at the horizon, at present, and the rates of the states.
 
-    Args:
-        time: s.
-        readings: As the layer of the instruments appends them.
-        before: The states, shape (S,).
-        fusion: The instruments.
-        p: The layer's parameters.
-
-    Returns:
-        The state at the horizon, the state at present, and the rates of the states.
+    Readings are as the layer of the instruments appends them, ``before`` the states, shape (S,).
     """
     T, unit, horizon = p.control_timestep, fusion.imu, fusion.horizon
     W, late = horizon - unit.late, unit.late
@@ -308,8 +300,7 @@ def with_estimator(loop: ClosedLoop, fusion: Fusion) -> ClosedLoop:
         controls=controls,
         actuators=ExtraActuators(states=states, memories=len(fields)),
         initial_activations=lambda plan, p, _inner: _start(plan, p, fusion),
-        remembered=tuple(fields),
-        units=fields,
+        remembered=fields,
         of_controller=True,
     )
     return wrap_loop(loop, layer)

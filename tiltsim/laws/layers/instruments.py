@@ -99,12 +99,7 @@ def instruments_of(scenario: Scenario) -> tuple[Instrument, ...]:
 
 @cache
 def with_instruments(loop: ClosedLoop, carried: tuple[Instrument, ...]) -> ClosedLoop:
-    """A loop whose controller sees the readings of instruments behind MuJoCo's velocities.
-
-    Args:
-        loop: The loop within.
-        carried: The instruments.
-    """
+    """A loop whose controller sees the readings of instruments behind MuJoCo's velocities."""
     first = loop.sizes.act
     _, loads = read_actuators(loop)
     acceleration, measured = plant_acceleration_of(loop), _measured(loop.spins)
@@ -141,8 +136,7 @@ def with_instruments(loop: ClosedLoop, carried: tuple[Instrument, ...]) -> Close
         lambda plan: _parameters(plan, record, loop, carried),
         controls=controls,
         actuators=ExtraActuators(states=states, memories=len(columns)),
-        remembered=tuple(columns),
-        units=columns,
+        remembered=columns,
     )
     return wrap_loop(loop, layer)
 

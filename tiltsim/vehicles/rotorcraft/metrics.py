@@ -20,6 +20,7 @@ from tiltsim.vehicles.spans import (
     saturation_metrics,
     time_of,
     when_settled,
+    with_columns_metrics,
 )
 from tiltsim_controllers.analysis.singularity import force_matrix, torque_matrix, world_up
 from tiltsim_controllers.laws.estimator import NAVIGATION_ERRORS
@@ -48,7 +49,7 @@ def rotorcraft_metrics(
     saturated |= at_lower_limit(spins, limits.min_rotor_speed)
     names = [name for name in columns if name.startswith("alpha_rate_")]
     rates = [np.abs(columns[name]).max(axis=-1) for name in names]
-    return {
+    own = {
         **_position_metrics(columns, scenario, follows_position),
         **_attitude_metrics(columns, scenario),
         "min_rotor_speed": spins.min(axis=(0, -1)),
@@ -58,11 +59,11 @@ def rotorcraft_metrics(
         **_singular_zone_metrics(columns),
         "max_tilt_rate": largest(rates) if rates else np.zeros(spins.shape[1:-1]),
         **_singularity_metrics(columns, limits.resolve()),
-        **_controller_metrics(columns),
         **_contact_metrics(columns, in_last_second(time, scenario.simulation.timestep)),
         **_estimate_metrics(columns),
         **saturation_metrics(time, saturated),
     }
+    return with_columns_metrics(own, columns)
 
 
 def _rms_change(time: Floats, speeds: Floats) -> Any:
@@ -112,8 +113,6 @@ def _attitude_metrics(columns: Mapping[str, Floats], scenario: Scenario) -> dict
             )
             for angle in angles
         )
-    for angle in ("roll", "pitch"):
-        metrics[f"max_abs_{angle}"] = np.abs(columns[angle]).max(axis=-1)
     return metrics
 
 
@@ -133,31 +132,20 @@ def _altitude_metrics(time: Floats, error: Floats) -> dict[str, Any]:
 
 
 def _singular_zone_metrics(columns: Mapping[str, Floats]) -> dict[str, Any]:
-    """Chapter 2's determinant and the switches between its laws, where a flight has them."""
-    metrics = {}
-    if "published_determinant" in columns:
-        metrics["max_published_determinant"] = columns["published_determinant"].max(axis=-1)
-        metrics["min_published_determinant"] = columns["published_determinant"].min(axis=-1)
-    if "attitude_zone" in columns:
-        switched = np.diff(columns["attitude_zone"]) != 0.0
-        first, _ = first_and_last(switched)
-        metrics["switches"] = switched.sum(axis=-1, dtype=float)
-        metrics["first_switch_time"] = time_of(columns["time"], np.where(first < 0, -1, first + 1))
-    return metrics
-
-
-def _controller_metrics(columns: Mapping[str, Floats]) -> dict[str, Any]:
-    """The largest values of columns that some controllers have."""
-    names = [name for name in ("null_part", "supervision") if name in columns]
-    return {f"max_{name}": columns[name].max(axis=-1) for name in names}
+    """The switches between chapter 2's laws, where a flight has them."""
+    if "attitude_zone" not in columns:
+        return {}
+    switched = np.diff(columns["attitude_zone"]) != 0.0
+    first, _ = first_and_last(switched)
+    return {
+        "switches": switched.sum(axis=-1, dtype=float),
+        "first_switch_time": time_of(columns["time"], np.where(first < 0, -1, first + 1)),
+    }
 
 
 def _contact_metrics(columns: Mapping[str, Floats], last_second: Any) -> dict[str, Any]:
-    """Forces on objects, where a flight has any; peak and time are kept at every step."""
+    """Forces on objects and swing of a load, where a flight has any."""
     metrics = {}
-    if "peak_contact_force" in columns:
-        metrics["peak_force"] = columns["peak_contact_force"][..., -1]
-        metrics["time_in_contact"] = columns["contact_time"][..., -1]
     tensions = [column for name, column in columns.items() if name.endswith("_tension")]
     if tensions:
         metrics["max_cable_tension"] = np.max(tensions, axis=(0, -1))
@@ -201,12 +189,11 @@ def _singularity_metrics(
     """How close the decoupling matrix came to a singular one, where a flight has such columns."""
     if "singularity_margin" not in columns:
         return {}
-    metrics = {"min_singularity_margin": columns["singularity_margin"].min(axis=-1)}
     if "decoupling_condition" in columns:
-        metrics["min_decoupling_condition"] = columns["decoupling_condition"].min(axis=-1)
-    elif isinstance(vehicle, Vehicle):
-        metrics["min_decoupling_condition"] = _min_decoupling_condition(columns, vehicle)
-    return metrics
+        return {"min_decoupling_condition": columns["decoupling_condition"].min(axis=-1)}
+    if isinstance(vehicle, Vehicle):
+        return {"min_decoupling_condition": _min_decoupling_condition(columns, vehicle)}
+    return {}
 
 
 def _min_decoupling_condition(columns: Mapping[str, Floats], vehicle: Vehicle) -> Any:

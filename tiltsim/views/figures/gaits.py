@@ -30,6 +30,7 @@ from tiltsim_controllers.analysis.singularity import (
 from tiltsim_controllers.analysis.two_color_map import curve_l, delta, point_p, red_residual
 from tiltsim_controllers.analysis.two_color_planner import Circle, Path, check_path
 from tiltsim_controllers.gaits.plans import Gait
+from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.vehicle.parameters import Vehicle, drag_ratio
 
 _CURVES: Final = 24  # instants of a period for which the curve of singular attitudes is drawn
@@ -61,7 +62,7 @@ def gait_figure(gait: Gait, vehicle: Vehicle, panels: Sequence[str] = ()) -> Fig
         elif name == "margin":
             _margin(axes, [(gait, "")], vehicle)
         else:
-            times = gait.sample_times(401)
+            times = _times(gait)
             lines = zip("₁₂₃₄", gait.angles(times).T, style.ROTOR_LINES, strict=True)
             for rotor, angle, line in lines:
                 axes.plot(times, angle, label=f"α{rotor}", **line)
@@ -169,10 +170,15 @@ def _roll_pitch_legend(
     add_legend(figure, handles)
 
 
+def _times(gait: Gait) -> Floats:
+    """Times (s) of a period, or a second of a constant gait."""
+    return np.array([0.0, 1.0]) if gait.is_constant else gait.sample_times(401)
+
+
 def _margin(axes: Axes, gaits: list[tuple[Gait, str]], vehicle: Vehicle) -> None:
     longest = lowest = 0.0
     for (gait, label), look in zip(gaits, ["-", "--", "-.", ":"] * len(gaits), strict=False):
-        times = np.array([0.0, 1.0]) if gait.is_constant else gait.sample_times(401)
+        times = _times(gait)
         margin = margin_over_gait(gait.angles(times), vehicle)
         longest, lowest = max(longest, gait.period or 1.0), min(lowest, float(margin.min()))
         axes.plot(times, margin, look, label=label.replace("_", " "))

@@ -313,6 +313,7 @@ def _portrait(axes: Axes, shown: Sequence[Shown]) -> None:
     for part, least in (("x", FLOORS["m"]), ("y", FLOORS["m/s"])):
         low, high = scale([np.array(getattr(axes, f"get_{part}lim")())], [False], least)[:2]
         getattr(axes, f"set_{part}lim")(low, high)
+    axes.locator_params(nbins=5)
 
 
 @traceable

@@ -108,18 +108,16 @@ class FlightRecorder:
         assembly: The assembly of the flight.
         name: The flight's name in a comparison; empty for a single flight.
         color: The flight's color.
-        first: Whether this is the first flight of the recording, which also draws the shared
-            entities.
+        first: Whether it also draws the entities that all flights share.
     """
 
     def __init__(
         self,
         recording: rr.RecordingStream,
         assembly: Assembly,
-        *,
-        name: str = "",
-        color: Color = timeline.SKY,
-        first: bool = True,
+        name: str,
+        color: Color,
+        first: bool,
     ) -> None:
         part = rr.escape_entity_path_part(name) if name else ""
         suffix = f"/{part}" if name else ""

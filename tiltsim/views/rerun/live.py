@@ -39,14 +39,13 @@ class LiveStream:
     def __init__(self, scenario: Scenario, url: str | None = None) -> None:
         require_viewer(url)
         # After the check, as Rerun takes a second to load.
-        from tiltsim.views.rerun.recording import flight_blueprint, new_recording
+        from tiltsim.views.rerun.recording import Recording, flight_blueprint
 
         self._assembly = assemble(scenario, recorded=True)
         # A unique name: a viewer would merge two flights of one scenario into one recording.
-        self._recording, recorders = new_recording([self._assembly], salt=uuid4().hex)
-        (self._recorder,) = recorders
-        blueprint = flight_blueprint(recorders, live=True)
-        attach_viewer(self._recording, url, blueprint)
+        recording = Recording([self._assembly], salt=uuid4().hex)
+        (self._recorder,), self._stream = recording.recorders, recording.stream
+        attach_viewer(self._stream, url, flight_blueprint(recording.recorders, live=True))
         self._samples: SimpleQueue[Floats] = SimpleQueue()
         self._end: End | None = None
         self._over = Event()
@@ -81,7 +80,7 @@ class LiveStream:
             self._send_queued()
             if self._end is not None:
                 self._recorder.finish(self._end)
-            self._recording.disconnect()
+            self._stream.disconnect()
         except Exception as error:  # the flight continues regardless of viewer errors
             sys.stderr.write(f"tiltsim: live view ended: {printable(error)}\n")
 

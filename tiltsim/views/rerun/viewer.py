@@ -64,13 +64,13 @@ def _inline_viewer(flights: Sequence[Flight]) -> Any:
         optional_package("rerun_notebook", "Rerun in a notebook", "'rerun-sdk[notebook]'")
     from rerun.notebook import Viewer
 
-    from tiltsim.views.rerun.recording import flight_blueprint, new_recording, write_flights
+    from tiltsim.views.rerun.recording import Recording, flight_blueprint
 
-    recording, recorders = new_recording([flight.assembly for flight in flights])
-    blueprint = flight_blueprint(recorders, flights)
-    widget = Viewer(recording=recording, blueprint=blueprint, width="auto")
-    write_flights(recorders, flights)
-    recording.flush()
+    recording = Recording([flight.assembly for flight in flights])
+    blueprint = flight_blueprint(recording.recorders, flights)
+    widget = Viewer(recording=recording.stream, blueprint=blueprint, width="auto")
+    recording.write(flights)
+    recording.stream.flush()
     return widget
 
 
@@ -84,13 +84,13 @@ def view_flights(
     Raises:
         InputError: If no viewer listens at the address, or there is no screen to open one on.
     """
-    from tiltsim.views.rerun.recording import flight_blueprint, new_recording, write_flights
+    from tiltsim.views.rerun.recording import Recording, flight_blueprint
 
     require_viewer(url)
-    recording, recorders = new_recording([flight.assembly for flight in flights], names)
-    attach_viewer(recording, url, flight_blueprint(recorders, flights))
-    write_flights(recorders, flights)
-    recording.disconnect()
+    recording = Recording([flight.assembly for flight in flights], names)
+    attach_viewer(recording.stream, url, flight_blueprint(recording.recorders, flights))
+    recording.write(flights)
+    recording.stream.disconnect()
 
 
 def view_recordings(paths: Sequence[Path]) -> None:
