@@ -24,8 +24,8 @@ from tests.laws.test_multirotor import TILTS, document
 from tests.simulation.test_batch import GAITS
 from tiltsim.errors import InputError
 from tiltsim.laws.assembling import assemble
-from tiltsim.plants.factory import make_plant
 from tiltsim.scenario.loading import merge
+from tiltsim.simulation.simulate import make_plant
 from tiltsim.vehicles.rotorcraft.layout import QW
 from tiltsim_controllers.vehicle.body import body_of, principal_body
 from tiltsim_controllers.vehicle.cross import cross_table
