@@ -11,7 +11,7 @@ import pytest
 import tiltsim
 from tests.laws.test_laws import LAWS
 from tiltsim.errors import InputError
-from tiltsim.flight.end import End
+from tiltsim.flight.metrics import End
 from tiltsim.linear import attraction as module
 from tiltsim.linear import stability as stability_module
 from tiltsim.linear.attraction import Grid, attraction

@@ -15,16 +15,15 @@ from numpy.typing import NDArray
 
 from tiltsim.engines.base import EngineName
 from tiltsim.errors import InputError
-from tiltsim.flight.end import End
 from tiltsim.flight.flight import Flight
+from tiltsim.flight.metrics import End
 from tiltsim.laws.assembling import assemble
 from tiltsim.linear import COARSE, REFINEMENTS
 from tiltsim.linear.stability import SlowestMode, advice_on_duration, slowest_mode
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.simulation.batch import fly_each
-from tiltsim.system.numbers import is_number
-from tiltsim.system.progress import check_function
+from tiltsim.system.arguments import check_function, is_number
 from tiltsim.system.text import short_repr
 from tiltsim.vehicles.spans import in_last_second
 from tiltsim_controllers.analysis.singularity import determinant

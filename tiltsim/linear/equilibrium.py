@@ -16,7 +16,7 @@ from tiltsim.linear import newton
 from tiltsim.linear.coordinates import PLANE
 from tiltsim.linear.forcing import Forcing, forcing_of
 from tiltsim.linear.motion import LONG, Motion, make_motion
-from tiltsim.plants.engine_choice import native_pays_off
+from tiltsim.plants.plant import native_pays_off
 from tiltsim.scenario.scenario import Scenario
 from tiltsim_controllers.mathematics.scalar import Floats
 
