@@ -15,15 +15,14 @@ if TYPE_CHECKING:
     from typing import Any
 
     from tiltsim.errors import InputError, TiltsimError
-    from tiltsim.flight.end import End
     from tiltsim.flight.flight import Flight
+    from tiltsim.flight.metrics import End
     from tiltsim.flight.reading import load_flight
     from tiltsim.laws.law_loop import airframe
     from tiltsim.linear.attraction import attraction
-    from tiltsim.linear.linearization import linearize
+    from tiltsim.linear.linearization import linearize, symbolic
     from tiltsim.linear.margins import margins
     from tiltsim.linear.stability import stability
-    from tiltsim.linear.symbolic import symbolic
     from tiltsim.logs.formats import export
     from tiltsim.logs.identify import Estimate, Replay, identify, replay
     from tiltsim.logs.log import Log
@@ -44,7 +43,7 @@ if TYPE_CHECKING:
 _HOMES = {
     "Airframe": "scenario.law_controller",
     "Command": "scenario.law_controller",
-    "End": "flight.end",
+    "End": "flight.metrics",
     "Estimate": "logs.identify",
     "Flight": "flight.flight",
     "InputError": "errors",
@@ -71,10 +70,10 @@ _HOMES = {
     "replay": "logs.identify",
     "simulate": "simulation.simulate",
     "plot": "views.figures.plot",
-    "show_progress": "commands.progress",  # for progress=True
+    "show_progress": "commands.text",  # for progress=True
     "stability": "linear.stability",
     "sweep": "sweeps.running",
-    "symbolic": "linear.symbolic",
+    "symbolic": "linear.linearization",
     "vectorized": "simulation.vectorized",
     "video": "views.video.making",
     "view": "views.rerun.viewer",

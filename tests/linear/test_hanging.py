@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import tiltsim
+from tiltsim.linear.coordinates import Pendulum
 from tiltsim.linear.equilibrium import equilibrium_of
-from tiltsim.linear.hanging import Pendulum
 
 MASS, LENGTH = 0.1, 0.8
 ALONE = {

@@ -11,7 +11,7 @@ import pytest
 from tests.docs.pages import ROOT
 from tiltsim.report.claim import scenario_claims
 from tiltsim.report.claims import registered_claims
-from tiltsim.report.errors import ERRORS
+from tiltsim.report.findings import ERRORS
 from tiltsim.report.measures.slips import RIGHT, deviation
 
 NAMED = defaultdict(list)

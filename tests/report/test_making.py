@@ -17,9 +17,9 @@ from PIL import Image
 
 from tiltsim.cli import main
 from tiltsim.exit_codes import EXPECTATION_FAILED, INVALID_INPUT
-from tiltsim.report import flights, store
+from tiltsim.report import flights
 from tiltsim.report.claim import ClaimVerdict, scenario_claims
-from tiltsim.report.claim_rows import Cell, Row, count
+from tiltsim.report.claim_rows import Cell, Criterion, Row, count
 from tiltsim.report.claims import registered_claims
 from tiltsim.report.content import (
     Report,
@@ -29,16 +29,12 @@ from tiltsim.report.content import (
     measured_text,
     published_text,
 )
-from tiltsim.report.drawing import DPI, Drawing, png
-from tiltsim.report.errors import ERRORS
-from tiltsim.report.findings import FINDINGS
-from tiltsim.report.flights import FlightRecord, Unsupported, fly, report_entries
+from tiltsim.report.findings import ERRORS, FINDINGS
+from tiltsim.report.flights import FlightRecord, Unsupported, flight_key, fly, report_entries
 from tiltsim.report.made import Made
 from tiltsim.report.making import make_report
 from tiltsim.report.pages import errors_page, markdown, page, rows_csv, rows_json
-from tiltsim.report.pictures import Picture
-from tiltsim.report.sensitivity import Criterion
-from tiltsim.report.store import flight_key
+from tiltsim.report.pictures import DPI, Drawing, Picture, png
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.studies.checking import collect
 from tiltsim.views.figures.style import CYCLE, new_figure
@@ -189,18 +185,18 @@ def test_a_changed_file_of_the_users_means_another_key(tmp_path, keys, name, bef
 def test_a_changed_source_means_another_key(library, monkeypatch):
     [entry] = report_entries([f"{library}/lost.toml"])
     before = flight_key(entry.scenario)
-    monkeypatch.setattr(store, "code_digest", lambda: b"another")
+    monkeypatch.setattr(flights, "code_digest", lambda: b"another")
     assert flight_key(entry.scenario) != before
 
 
 def test_the_digest_covers_the_core_and_spares_the_screens(monkeypatch):
     seen = []
-    monkeypatch.setattr(store, "sources_digest", lambda files, *_: seen.extend(files) or b"")
-    store.code_digest.__wrapped__()
+    monkeypatch.setattr(flights, "sources_digest", lambda files, *_: seen.extend(files) or b"")
+    flights.code_digest.__wrapped__()
     names = {file.as_posix() for file in seen}
     for name in (
         "tiltsim/flight/metrics.py",
-        "tiltsim/laws/tiltrotor.py",
+        "tiltsim/laws/rotor_loop.py",
         "controllers/tiltsim_controllers/vehicle/parameters.py",
     ):
         assert any(path.endswith(name) for path in names), name
@@ -412,7 +408,7 @@ def test_digest_of_sources_depends_on_their_contents_alone(tmp_path):
             (tmp_path / folder / "law.py").write_text(text)
     here = sorted(tmp_path.glob("[ab]/law.py"))
     there = sorted(tmp_path.glob("[cz]/law.py"))
-    assert store.sources_digest(here, "numpy") == store.sources_digest(there, "numpy")
-    assert store.sources_digest(here) != store.sources_digest(here, "numpy")
+    assert flights.sources_digest(here, "numpy") == flights.sources_digest(there, "numpy")
+    assert flights.sources_digest(here) != flights.sources_digest(here, "numpy")
     there[0].write_text("three")
-    assert store.sources_digest(here, "numpy") != store.sources_digest(there, "numpy")
+    assert flights.sources_digest(here, "numpy") != flights.sources_digest(there, "numpy")

@@ -5,9 +5,8 @@ from __future__ import annotations
 import pytest
 
 from tiltsim.report.claim import AnalysisClaim, ClaimVerdict
-from tiltsim.report.claim_rows import row_of
+from tiltsim.report.claim_rows import criteria, row_of
 from tiltsim.report.claims import registered_claims, words
-from tiltsim.report.sensitivity import criteria
 
 
 def rows_using(name):

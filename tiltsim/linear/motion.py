@@ -22,7 +22,7 @@ from tiltsim.engines.control import control_callback
 from tiltsim.engines.programs import LoopPrograms
 from tiltsim.laws.assembling import assemble
 from tiltsim.linear import coordinates
-from tiltsim.linear.hanging import Pendulum
+from tiltsim.linear.coordinates import Pendulum
 from tiltsim.models.objects import FORCE
 from tiltsim.plants.equations_plant import EquationsPlant
 from tiltsim.plants.mujoco_plant import MujocoPlant

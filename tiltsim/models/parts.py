@@ -41,17 +41,11 @@ class TiltServo:
 
     This holds exactly on a body that does not move; on a free one, which gives way to the pod's
     reaction, the servo is slightly faster.
-
-    Attributes:
-        natural_frequency: ``w``, rad/s.
-        damping_ratio: ``zeta``, dimensionless.
-        max_angle: Largest tilt angle either way, rad: the command is clipped there and the hinge
-            has a stop. None leaves the pod free to turn around.
     """
 
-    natural_frequency: float = 300.0
-    damping_ratio: float = 1.0
-    max_angle: float | None = None
+    natural_frequency: float = 300.0  # w, rad/s
+    damping_ratio: float = 1.0  # zeta
+    max_angle: float | None = None  # of hinge and command, either way, rad; None to turn around
 
 
 SERVO_ARMATURE: Final = 1e-6
@@ -82,19 +76,11 @@ class RotorLimits:
 
     Within a step the stages of RK4 may see speeds beyond a limit by the change in one step. The
     thrust also stays within the limits there.
-
-    Attributes:
-        min_speed: Smallest ``|varpi|``, rad/s: the rotor cannot reverse. None lets it stop and
-            reverse.
-        max_speed: Largest ``|varpi|``, rad/s, in either sense where the rotor may reverse. None is
-            unlimited.
-        thrust_factors: The smallest and the largest factor that faults put on the thrust during the
-            flight.
     """
 
-    min_speed: float | None = None
-    max_speed: float | None = None
-    thrust_factors: tuple[float, float] = (1.0, 1.0)
+    min_speed: float | None = None  # smallest |varpi|, rad/s; None: it may stop and reverse
+    max_speed: float | None = None  # largest |varpi|, rad/s, in either sense; None: unlimited
+    thrust_factors: tuple[float, float] = (1.0, 1.0)  # extremes that faults put on the thrust
 
     def speed_range(self, spin: float) -> tuple[float, float] | None:
         """The range (rad/s) of the signed speed of a rotor with this spin; None if unlimited."""
@@ -124,19 +110,11 @@ class Ground(Keys):
 
 @dataclass(frozen=True, kw_only=True)
 class ModelSpec:
-    """Common specification of the vehicles' models; a scenario's tables have checked its values.
+    """Common specification of the vehicles' models; a scenario's tables have checked its values."""
 
-    Attributes:
-        timestep: Physics time step, s.
-        integrator: MuJoCo's name: ``Euler``, ``RK4``, ``implicit`` or ``implicitfast``.
-        userdata_size: Numbers of user data in the simulation's state.
-        tilt_servo: The tilt servos. Ignored for a quadrotor; a tilt-car's angle is not limited.
-        law_states: Number of the control law's own states: integrators ``law_1``, ``law_2``, ...
-            after the vehicle's actuators, which act on nothing; ctrl is the state's rate.
-    """
-
-    timestep: float = 1e-3
-    integrator: str = "RK4"
-    userdata_size: int = 0
-    tilt_servo: TiltServo = field(default=TiltServo())
+    timestep: float = 1e-3  # of the physics, s
+    integrator: str = "RK4"  # MuJoCo's name: Euler, RK4, implicit or implicitfast
+    userdata_size: int = 0  # numbers of user data in the simulation's state
+    # Integrators law_1, law_2, ... after the vehicle's actuators, which act on nothing.
     law_states: int = 0
+    tilt_servo: TiltServo = field(default=TiltServo())  # ignored for a quadrotor

@@ -19,25 +19,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Multirotor:
-    """Physical parameters of a vehicle with any number of rotors, along the body's axes.
+    """Physical parameters of a vehicle with any number of rotors, along the body's axes."""
 
-    Attributes:
-        mass: kg.
-        gravity: m/s^2.
-        inertia: About the center of mass, untilted, everything on board included: nine entries,
-            rows first, kg m^2.
-        rotors: Places, axes and coefficients of the rotors.
-        speed_ranges: Lowest and highest speed of each rotor, signed, rad/s; infinite where the file
-            gives none.
-        tilts: Number of tilt hinges.
-    """
-
-    mass: float
-    gravity: float
-    inertia: Values
-    rotors: tuple[Rotor, ...]
-    speed_ranges: tuple[tuple[float, float], ...]
-    tilts: int
+    mass: float  # kg
+    gravity: float  # m/s^2
+    inertia: Values  # (9,), rows first, untilted, with all on board, about the center, kg m^2
+    rotors: tuple[Rotor, ...]  # places, axes and coefficients
+    speed_ranges: tuple[tuple[float, float], ...]  # signed, rad/s; infinite where no file gives any
+    tilts: int  # number of tilt hinges
 
     @cached_property
     def table(self) -> Values:

@@ -42,34 +42,20 @@ START_SPEED: Final = 300.0  # rotor speed (rad/s) of the keyframe ``start``
 
 @dataclass(frozen=True)
 class RotorcraftSpec(ModelSpec):
-    """Specification of a rotorcraft's model.
+    """Specification of a rotorcraft's model."""
 
-    Attributes:
-        model: ``tiltrotor``, ``quadrotor`` (without hinges; its pods are part of the body) or
-            ``multirotor``, which is a user's file.
-        vehicle: Physical parameters, the pods' included.
-        pod: Mass and inertia of a pod. Ignored for a quadrotor.
-        rotor_limits: Limits on the rotor speeds.
-        extra_actuators: Actuators that layers append after the law's states.
-        ground: Ground to take off from and land on; None disables contacts.
-        objects: Objects, tool and load; None for a vehicle alone.
-        companions: Further vehicles in the same world by name.
-        number: Its number, from 0, among vehicles that touch each other; -1 for one alone.
-        user_vehicle: A user's file in place of the shipped one, with its own arms and pods; its
-            geoms may have mass and are always kept.
-    """
-
-    model: str
-    vehicle: Vehicle | Multirotor
+    model: str  # tiltrotor, quadrotor (no hinges; pods are part of the body) or multirotor (a file)
+    vehicle: Vehicle | Multirotor  # physical parameters, the pods' included
     _: KW_ONLY
-    pod: Pod = field(default=Pod())
+    pod: Pod = field(default=Pod())  # ignored for a quadrotor
     rotor_limits: RotorLimits = field(default=RotorLimits())
-    extra_actuators: tuple[ExtraActuators, ...] = ()
-    ground: Ground | None = None
-    objects: Objects | None = None
-    companions: tuple[tuple[str, RotorcraftSpec], ...] = ()
-    number: int = -1
+    extra_actuators: tuple[ExtraActuators, ...] = ()  # of layers, after the law's states
+    ground: Ground | None = None  # None disables contacts
+    objects: Objects | None = None  # None for a vehicle alone
+    companions: tuple[tuple[str, RotorcraftSpec], ...] = ()  # in the same world, by name
+    number: int = -1  # from 0, among vehicles that touch each other; -1 for one alone
     user_vehicle: UserVehicle | None = None
+    """A user's file in place of the shipped one; its geoms may have mass and are always kept."""
 
     @property
     def spins(self) -> Values:

@@ -15,23 +15,14 @@ MAX_SPEED: Final = 850.0  # highest speed of the rotors, rad/s
 
 
 class Starter(NamedTuple):
-    """A kind of vehicle.
+    """A kind of vehicle."""
 
-    Args:
-        title: Such as "Planar hexarotor".
-        places: (N, 3), m, the rotors in body axes: x forward, y left, z up.
-        axes: (N, 3), unit vectors of their thrusts, at zero tilt angles.
-        angles: (N,), rad, tilt angles that the scenario holds; empty if the rotors do not tilt.
-        reverses: Whether the rotors also turn backwards.
-        controller: The table of the scenario, as text.
-    """
-
-    title: str
-    places: Floats
-    axes: Floats
-    angles: tuple[float, ...] = ()
-    reverses: bool = False
-    controller: str = ""
+    title: str  # such as "Planar hexarotor"
+    places: Floats  # (N, 3), m, the rotors in body axes: x forward, y left, z up
+    axes: Floats  # (N, 3), unit vectors of their thrusts, at zero tilt angles
+    angles: tuple[float, ...] = ()  # (N,), rad, that the scenario holds; empty without tilts
+    reverses: bool = False  # whether the rotors also turn backwards
+    controller: str = ""  # the table of the scenario, as text
 
     def spin(self, rotor: int) -> int:
         """Sense of rotation of a rotor, from 0: 1 is counter-clockwise about its thrust."""
@@ -66,13 +57,7 @@ def _cube(title: str, radius: float) -> Starter:
 
 
 def _pair(title: str, width: float, height: float) -> Starter:
-    """Two rotors beside the hull that tilt about the lateral axis.
-
-    Args:
-        title: Title of the kind.
-        width: Length of each arm, m.
-        height: From the hull's center up to the rotors, m.
-    """
+    """Two rotors on arms of a width, at a height (m), that tilt about the lateral axis."""
     places, axes = np.array([[0.0, width, height], [0.0, -width, height]]), np.eye(3)[[2, 2]]
     return Starter(title, places, axes, (0.0, 0.0), controller=_GEOMETRIC)
 

@@ -49,38 +49,21 @@ PRODUCT_TOLERANCE: Final = 0.01
 
 @dataclass(frozen=True, eq=False)
 class UserVehicle:
-    """A user's MJCF file and its measured properties, untilted, along the body's axes.
-
-    Attributes:
-        path: The file.
-        vehicle: Its parameters; inertia about the center of mass.
-        parts: Numbers of rotors and hinges.
-        layout_mismatch: Difference from the layout that the built-in control laws assume; empty
-            if it does not.
-        hinge_inertias: About each tilt hinge, armature included, kg m^2.
-        pod_inertias: About each tilt hinge, without armature, kg m^2.
-        pods_are_balanced: Whether mass and inertia stay where they are as the pods turn.
-        carried: Mass properties of all bodies that the body ``vehicle`` carries, about its origin.
-        center: The whole vehicle's center of mass, m, shape (3,).
-        radius: Distance of the rotor that is farthest from the body's origin, m.
-        products: The entries xy, xz and yz of its inertia about the center of mass, kg m^2.
-        has_contact_geoms: Whether it has the geoms that contacts with a scenario's ground need.
-        obstacles: Names of the world's geoms that could collide, but for ``ground``.
-    """
+    """A user's MJCF file and its measured properties, untilted, along the body's axes."""
 
     path: str
-    vehicle: Vehicle | Multirotor
-    parts: Parts
-    layout_mismatch: str
-    hinge_inertias: tuple[float, ...]
-    pod_inertias: tuple[float, ...]
-    pods_are_balanced: bool
-    carried: Moments
-    center: Floats
-    radius: float
-    products: tuple[float, float, float]
-    has_contact_geoms: bool
-    obstacles: tuple[str, ...]
+    vehicle: Vehicle | Multirotor  # inertia about the center of mass
+    parts: Parts  # numbers of rotors and hinges
+    layout_mismatch: str  # difference from the layout that the built-in laws assume; empty if none
+    hinge_inertias: tuple[float, ...]  # about each tilt hinge, armature included, kg m^2
+    pod_inertias: tuple[float, ...]  # about each tilt hinge, without armature, kg m^2
+    pods_are_balanced: bool  # whether mass and inertia stay where they are as the pods turn
+    carried: Moments  # of all bodies that the body ``vehicle`` carries, about its origin
+    center: Floats  # the whole vehicle's center of mass, m, shape (3,)
+    radius: float  # distance of the rotor that is farthest from the body's origin, m
+    products: tuple[float, float, float]  # xy, xz, yz of the inertia about the center, kg m^2
+    has_contact_geoms: bool  # geoms that contacts with a scenario's ground need
+    obstacles: tuple[str, ...]  # names of the world's geoms that could collide, but for ``ground``
 
     @property
     def unmodeled_properties(self) -> str:

@@ -20,7 +20,7 @@ against the thesis if it fails.
 
 A row that does not hold names its ``fault`` if a proof says why: ``refuted`` (the statement is
 false), ``misprint`` (of a formula or number), both with the ``error`` that it belongs to in the
-list of errors (`tiltsim.report.errors`, ``errors.toml``); or ``rounding``: true of the printed
+list of errors (`tiltsim.report.findings`, ``errors.toml``); or ``rounding``: true of the printed
 digits, which another row of the statement tests. A value that the thesis does not claim is no row.
 
 **One flight is enough.** The row is in the scenario file::

@@ -11,14 +11,10 @@ from math import floor, inf, isfinite, log10
 from typing import Final
 
 from tiltsim.report.claim import Claim, ClaimVerdict, ExpectationClaim, FlightClaim
-from tiltsim.report.claim_rows import Cell, Failure, Row, count, count_statements, errors
-from tiltsim.report.comparisons import Comparison
-from tiltsim.report.drawing import Drawing
-from tiltsim.report.errors import ERRORS, PublishedError
-from tiltsim.report.findings import FINDINGS, Finding
-from tiltsim.report.flights import Flights, ReportEntry
-from tiltsim.report.pictures import Picture
-from tiltsim.report.sensitivity import Criterion
+from tiltsim.report.claim_rows import Cell, Criterion, Failure, Row, count, count_statements, errors
+from tiltsim.report.findings import ERRORS, FINDINGS, Finding, PublishedError
+from tiltsim.report.flights import Comparison, Flights, ReportEntry
+from tiltsim.report.pictures import Drawing, Picture
 from tiltsim.report.statement import Origin, Statement
 from tiltsim.scenario.metric_names import METRICS
 from tiltsim.scenario.scenario import Scenario

@@ -1,18 +1,35 @@
-"""The figures of the report, a few per chapter, drawn with `tiltsim.views.figures`."""
+"""The figures of the report, a few per chapter, drawn with `tiltsim.views.figures` and stored."""
 
+import hashlib
 import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
+from io import BytesIO
 from itertools import product
 from pathlib import Path
 from typing import Any, Final, TypeAlias
 
 from matplotlib.figure import Figure
+from PIL import Image
 
 from tiltsim.linear.attraction import Attraction, attraction
 from tiltsim.report.claim import Metrics
-from tiltsim.report.flights import PLANTS, Plant, variant_for
+from tiltsim.report.flights import (
+    PLANTS,
+    FlightRecord,
+    Flights,
+    Plant,
+    ReportEntry,
+    code_digest,
+    flight_key,
+    results,
+    sources_digest,
+    store,
+    variant_for,
+)
 from tiltsim.scenario.loading import load_scenario
+from tiltsim.scenario.scenario import Scenario
 from tiltsim.simulation.simulate import simulate_to_end
 from tiltsim.views.figures.comparisons import (
     PeriodErrors,
@@ -23,6 +40,7 @@ from tiltsim.views.figures.comparisons import (
 from tiltsim.views.figures.gaits import comparison_figure, map_figure
 from tiltsim.views.figures.plot import plot
 from tiltsim.views.figures.stability import attraction_panels
+from tiltsim.views.figures.style import paper_style
 from tiltsim.views.figures.vehicles import attainable_figure, determinant_figure, singularity_figure
 from tiltsim_controllers.analysis.published_gaits import PATHS, PUBLISHED_GAITS
 from tiltsim_controllers.vehicle.parameters import PRESETS
@@ -99,7 +117,7 @@ def trot_errors(metrics: FlightMetrics) -> Figure:
     return period_figure(panels)
 
 
-def gait_and_biased(metrics: FlightMetrics, key: str) -> Figure:
+def gait_and_biased(key: str) -> Figure:
     """A published gait beside its biased twin."""
     published = PUBLISHED_GAITS[key]
     assert published.biased is not None
@@ -107,32 +125,6 @@ def gait_and_biased(metrics: FlightMetrics, key: str) -> Figure:
     return comparison_figure(
         [("as published", published.gait), (biased, published.biased)], _VEHICLE
     )
-
-
-def singular_surface(metrics: FlightMetrics) -> Figure:
-    """Ch. 2, Figs. 1 to 3, and the exact determinant."""
-    return singularity_figure(PRESETS["ar_drone_2_unrounded"])
-
-
-def determinants(metrics: FlightMetrics) -> Figure:
-    """Ch. 3, Figs. 2, 3, 10."""
-    return determinant_figure("equal", _VEHICLE)
-
-
-def two_color_map(metrics: FlightMetrics, vehicle: str) -> Figure:
-    """The map of a vehicle; for the vehicle of ch. 3, with the examples of ch. 8."""
-    paths = list(PATHS.items()) if vehicle == "ar_drone_2" else None
-    return map_figure(PRESETS[vehicle], paths)
-
-
-def attainable(metrics: FlightMetrics) -> Figure:
-    """Ch. 9, Figs. 2, 8."""
-    return attainable_figure(PUBLISHED_GAITS["ch09_gait_2"].gait, _VEHICLE)
-
-
-def attraction_maps(metrics: FlightMetrics) -> Figure:
-    """From which attitudes gaits come back."""
-    return attraction_panels({name: attraction_map(name) for name in GAITS})
 
 
 GAITS: Final[dict[str, tuple[str, dict[str, Any]]]] = {
@@ -163,25 +155,35 @@ def attraction_map(name: str, coarse: int = 10, refinements: int = 1) -> Attract
     return attraction(scenario, coarse=coarse, refinements=refinements)
 
 
-_FLIGHTS: Final = {
-    "setpoint_errors": tuple(product(_SETPOINTS, PLANTS)),
-    "trot_errors": tuple(product(_TROTS, PLANTS)),
+_OF_FLIGHTS: Final = {
+    "setpoint_errors": (setpoint_errors, tuple(product(_SETPOINTS, PLANTS))),
+    "trot_errors": (trot_errors, tuple(product(_TROTS, PLANTS))),
 }
-"""The flights whose metrics a function needs."""
+"""Functions of metrics, with the flights whose metrics they need."""
+
+_OF_ANALYSIS: Final[dict[str, Callable[..., Figure]]] = {
+    "singular_surface": lambda: singularity_figure(PRESETS["ar_drone_2_unrounded"]),
+    "determinants": lambda: determinant_figure("equal", _VEHICLE),
+    "two_color_map": lambda name: map_figure(
+        PRESETS[name], [*PATHS.items()] if name == "ar_drone_2" else None
+    ),
+    "gait_and_biased": gait_and_biased,
+    "attraction_maps": lambda: attraction_panels({name: attraction_map(name) for name in GAITS}),
+    "attainable": lambda: attainable_figure(PUBLISHED_GAITS["ch09_gait_2"].gait, _VEHICLE),
+}
+"""Functions of the ``args`` of a picture."""
 
 
 def _picture(name: str, chapter: int, caption: str, **how: Any) -> Picture:
     if "flight" in how:
-        address = how["flight"]
-
-        def draw(metrics: object) -> Figure:
-            return plot(simulate_to_end(variant_for(address, "mujoco")))
-
-        return Picture(chapter, name, caption, draw, ((address, "mujoco"),))
-    function = globals()[how["draw"]]
-    args = how.get("args", ())
-    flights = _FLIGHTS.get(how["draw"], ())
-    return Picture(chapter, name, caption, lambda metrics: function(metrics, *args), flights)
+        flight = how["flight"], PLANTS[1]
+        return Picture(
+            chapter, name, caption, lambda _: plot(simulate_to_end(variant_for(*flight))), (flight,)
+        )
+    if how["draw"] in _OF_FLIGHTS:
+        return Picture(chapter, name, caption, *_OF_FLIGHTS[how["draw"]])
+    draw = partial(_OF_ANALYSIS[how["draw"]], *how.get("args", ()))
+    return Picture(chapter, name, caption, lambda _: draw())
 
 
 PICTURES: Final[tuple[Picture, ...]] = tuple(
@@ -191,3 +193,111 @@ PICTURES: Final[tuple[Picture, ...]] = tuple(
     ).items()
 )
 """All figures, in order."""
+
+
+DPI: Final = 144
+SHOWN_DPI: Final = 108
+COLORS: Final = 256
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """A picture as PNG."""
+
+    picture: Picture
+    png: bytes
+
+    @property
+    def width(self) -> int:
+        """As shown, pixels; drawn at a higher resolution, for dense screens and print."""
+        return self._shown(16)
+
+    @property
+    def height(self) -> int:
+        """As shown, pixels."""
+        return self._shown(20)
+
+    def _shown(self, offset: int) -> int:
+        return round(int.from_bytes(self.png[offset : offset + 4], "big") * SHOWN_DPI / DPI)
+
+
+def draw_all(
+    entries: list[ReportEntry],
+    flights: Flights,
+    folder: Path,
+    jobs: int,
+    progress: Callable[[int, int], None],
+    *,
+    whole: bool,
+) -> list[Drawing]:
+    """Draw the pictures whose flights are available; drawings are stored in the folder.
+
+    Args:
+        entries, flights: The scenarios and their records.
+        folder: Where drawings are stored.
+        jobs: Processes.
+        progress: Called with the number of drawn figures and their total.
+        whole: Whether to include pictures that need no flight.
+
+    Raises:
+        InputError: If a figure cannot be drawn or a process dies.
+    """
+    own = Path(__file__).parent
+    folders = own.parent / "views" / "figures", own.parent / "linear"
+    sources = [own / name for name in ("pictures.py", "pictures.toml")]
+    sources += [file for folder in folders for file in folder.glob("*.py")]
+    style = sources_digest(sources, code_digest().hex())
+    scenarios = {
+        (entry.address, plant): scenario
+        for entry in entries
+        for plant, scenario in entry.plants.items()
+        if isinstance(scenario, Scenario)
+    }
+    metrics = {key: r.metrics for key, r in flights.items() if isinstance(r, FlightRecord)}
+    files: dict[str, Path] = {}
+    for picture in PICTURES:
+        if (picture.flights or whole) and all(flight in scenarios for flight in picture.flights):
+            shown = [scenarios[flight] for flight in picture.flights]
+            content = [picture.name, *(flight_key(one) + one.title for one in shown)]
+            digest = hashlib.sha256(style + "".join(content).encode()).hexdigest()
+            files[picture.name] = folder / f"{digest[:24]}.png"
+    steps = {
+        picture.name: sum(scenarios[one].simulation.steps for one in picture.flights)
+        for picture in PICTURES
+        if picture.name in files
+    }
+    # Long flights first, so that no process ends up alone with one of them.
+    by_length = sorted(files.items(), key=lambda item: -steps[item[0]])
+    missing = [(name, file) for name, file in by_length if not file.is_file()]
+    progress(0, len(missing))
+    work = partial(_draw_one, metrics=metrics)
+    drawn = results(work, missing, jobs, lambda task: f"figure {task[0]}")
+    for done, _ in enumerate(drawn, start=1):
+        progress(done, len(missing))
+    return [
+        Drawing(picture, files[picture.name].read_bytes())
+        for picture in PICTURES
+        if picture.name in files
+    ]
+
+
+def _draw_one(task: tuple[str, Path], metrics: FlightMetrics) -> None:
+    name, file = task
+    picture = next(candidate for candidate in PICTURES if candidate.name == name)
+    store(file, png(picture.draw(metrics)))
+
+
+def png(figure: Figure) -> bytes:
+    """A figure as PNG, equal for equal figures.
+
+    A palette of 256 colors makes the page a third as large without a visible difference.
+    """
+    drawn, packed = BytesIO(), BytesIO()
+    with paper_style():
+        figure.savefig(drawn, format="png", dpi=DPI)
+    with Image.open(drawn) as image:
+        # Other methods spend the palette on large areas and shift the hue of thin lines.
+        method, dither = Image.Quantize.MAXCOVERAGE, Image.Dither.NONE
+        few = image.convert("RGB").quantize(COLORS, method, dither=dither)
+    few.save(packed, format="PNG", optimize=True)
+    return packed.getvalue()

@@ -5,8 +5,11 @@ from typing import Any, Final, Self
 from pydantic import model_validator
 
 from tiltsim.models.rotor_table import Multirotor
-from tiltsim.scenario.controller_table import ControllerTable
-from tiltsim.scenario.gait_following import FailureAwareController, GaitFollowingController
+from tiltsim.scenario.controller_table import (
+    ControllerTable,
+    FailureAwareController,
+    GaitFollowingController,
+)
 from tiltsim.scenario.messages import InvalidValueError
 from tiltsim.scenario.table import example
 from tiltsim_controllers.analysis.stability import (

@@ -10,8 +10,7 @@ from pydantic import Field
 
 from tiltsim.errors import InputError
 from tiltsim.scenario.controller_table import ReferenceKind
-from tiltsim.scenario.push_reference import PushReference
-from tiltsim.scenario.reference_table import PositionReference, ReferenceTable, Tilt
+from tiltsim.scenario.reference_table import PositionReference, PushReference, ReferenceTable, Tilt
 from tiltsim.scenario.table import (
     ZEROS,
     Angle,

@@ -24,17 +24,11 @@ _UNIT: Final = re.compile(r"(.*) \[([^]]+)\]", re.DOTALL)
 
 @dataclass(frozen=True)
 class Node:
-    """A table, a key or an entry of a list.
+    """A table, a key or an entry of a list."""
 
-    Args:
-        value: Its schema.
-        definitions: The tables of the document by name.
-        name: The table's name there; empty for the document and for keys.
-    """
-
-    value: dict[str, Any]
-    definitions: dict[str, Any]
-    name: str = ""
+    value: dict[str, Any]  # its schema
+    definitions: dict[str, Any]  # the tables of the document by name
+    name: str = ""  # the table's name there; empty for the document and for keys
 
     def _at(self, value: dict[str, Any]) -> Node:
         return Node(value, self.definitions)

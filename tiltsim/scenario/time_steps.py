@@ -7,7 +7,7 @@ import numpy as np
 
 from tiltsim.models.hover import hover_speeds
 from tiltsim.models.rotor_table import Multirotor
-from tiltsim.scenario.gait_following import GaitFollowingController
+from tiltsim.scenario.controller_table import GaitFollowingController
 from tiltsim.scenario.linearizing_controllers import AttitudeForceController
 from tiltsim.scenario.messages import InvalidValueError
 from tiltsim.scenario.rotorcraft import RotorcraftTable

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from tiltsim.scenario.gait_following import FailureAwareController
+from tiltsim.scenario.controller_table import FailureAwareController
 from tiltsim.scenario.law_controller import Airframe, LawController, TiltingTable
 from tiltsim_controllers.analysis.stability import ErrorLoop
 from tiltsim_controllers.analysis.vectoring_design import REACH, Timing, design

@@ -110,9 +110,7 @@ def with_force_loop(loop: ClosedLoop) -> ClosedLoop:
         ForceLoop,
         _force_loop,
         controls=controls,
-        actuators=ExtraActuators(states=2),
-        fields=("filtered_push_force", "push_integral"),
-        units={"filtered_push_force": "N", "push_integral": "N"},
+        fields={"filtered_push_force": "N", "push_integral": "N"},
         of_controller=True,
     )
     return wrap_loop(loop, layer)
@@ -143,9 +141,7 @@ def with_impedance(loop: ClosedLoop) -> ClosedLoop:
         Impedance,
         _impedance,
         controls=controls,
-        actuators=ExtraActuators(states=3),
-        fields=("filtered_push_force", "push_shift", "push_shift_rate"),
-        units={"filtered_push_force": "N", "push_shift": "m", "push_shift_rate": "m/s"},
+        fields={"filtered_push_force": "N", "push_shift": "m", "push_shift_rate": "m/s"},
         of_controller=True,
     )
     return wrap_loop(loop, layer)

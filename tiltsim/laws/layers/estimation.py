@@ -300,8 +300,7 @@ def with_estimator(loop: ClosedLoop, fusion: Fusion) -> ClosedLoop:
         controls=controls,
         actuators=ExtraActuators(states=states, memories=len(fields)),
         initial_activations=lambda plan, p, _inner: _start(plan, p, fusion),
-        remembered=tuple(fields),
-        units=fields,
+        remembered=fields,
         of_controller=True,
     )
     return wrap_loop(loop, layer)

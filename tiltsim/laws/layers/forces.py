@@ -123,8 +123,8 @@ def with_air(loop: ClosedLoop) -> ClosedLoop:
         actuators=ExtraActuators(states=DRYDEN_STATES, wrench=True),
         initial_activations=lambda _plan, air, _inner: stationary_states(air.air.turbulence),
         derive=_air_columns,
-        fields=DRYDEN_FIELDS,
-        units={**dict.fromkeys(AIR_COLUMNS, "m/s"), **dict.fromkeys(DRYDEN_FIELDS, "1/s^0.5")},
+        fields=dict.fromkeys(DRYDEN_FIELDS, "1/s^0.5"),
+        units=dict.fromkeys(AIR_COLUMNS, "m/s"),
     )
     return wrap_loop(loop, layer)
 

@@ -136,8 +136,7 @@ def with_instruments(loop: ClosedLoop, carried: tuple[Instrument, ...]) -> Close
         lambda plan: _parameters(plan, record, loop, carried),
         controls=controls,
         actuators=ExtraActuators(states=states, memories=len(columns)),
-        remembered=tuple(columns),
-        units=columns,
+        remembered=columns,
     )
     return wrap_loop(loop, layer)
 

@@ -6,7 +6,7 @@ within. `wrap_loop` is the one place where that is put together.
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, Final
+from typing import Any
 
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Equations
 from tiltsim.models.parts import ExtraActuators
@@ -14,8 +14,6 @@ from tiltsim.scenario.scenario import FlightPlan
 from tiltsim_controllers.code.arrays import traceable, xp
 from tiltsim_controllers.mathematics.records import make_record_type
 from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector
-
-_NO_ACTUATORS: Final = ExtraActuators()
 
 Samples = Mapping[str, Floats]
 
@@ -36,14 +34,14 @@ class Layer:
         hold: Traceable function ``(within, time, qpos, act, ctrl, own) -> ctrl``, likewise.
         adds: Traceable function ``(time, qpos, qvel, act, ctrl, own) -> further controls``, which
             follow the controls ``ctrl`` of the loop within, also while these are held.
-        actuators: Appended to the actuators of the model.
+        actuators: Appended to the actuators of the model; by default a state for each field.
         initial_activations: ``(plan, own, inner activations) -> activations`` of these actuators at
             time zero; None for zeros.
         derive: ``(samples by field, setup) -> further columns``.
-        fields: Fields of a sample: the first activations of the layer's actuators.
-        remembered: Further fields: the first controls of the layer's actuators after the rates of
-            their activations.
-        units: Columns of a flight that the layer adds, with their units.
+        fields: Fields of a sample with their units: the first activations of these actuators.
+        remembered: Further fields: the first controls of these actuators after the rates of their
+            activations.
+        units: Columns of a flight that the layer derives, with their units.
         equations: See `ClosedLoop`; for the parameters of the whole. The equations of the loop
             within are not used: they do not know the layer.
         of_controller: Whether it is part of the controller, as a supervisor is: the loop around it
@@ -55,11 +53,11 @@ class Layer:
     controls: Callable[..., Values] | None = None
     hold: Callable[..., Values] | None = None
     adds: Callable[..., Values] | None = None
-    actuators: ExtraActuators = _NO_ACTUATORS
+    actuators: ExtraActuators | None = None
     initial_activations: Callable[[FlightPlan, Any, Vector], Vector] | None = None
     derive: Callable[[Samples, ControlSetup], dict[str, Floats]] = lambda _samples, _setup: {}
-    fields: tuple[str, ...] = ()
-    remembered: tuple[str, ...] = ()
+    fields: Mapping[str, str] = field(default_factory=dict)
+    remembered: Mapping[str, str] = field(default_factory=dict)
     units: Mapping[str, str] = field(default_factory=dict)
     equations: Equations | None = None
     of_controller: bool = False
@@ -76,7 +74,7 @@ def wrap_loop(inner: ClosedLoop, layer: Layer) -> ClosedLoop:
         layer=layer.parameters,
         inner=inner.parameters,
     )
-    added = layer.actuators
+    added = layer.actuators or ExtraActuators(states=len(layer.fields))
     sizes = inner.sizes._replace(
         act=inner.sizes.act + added.states, ctrl=inner.sizes.ctrl + added.controls
     )
@@ -96,7 +94,7 @@ def wrap_loop(inner: ClosedLoop, layer: Layer) -> ClosedLoop:
 
     return replace(
         inner,
-        **_functions_within(inner, layer),
+        **_functions_within(inner, layer, inner.sizes.ctrl + added.states),
         parameters=record,
         setup=setup,
         sizes=sizes,
@@ -104,7 +102,7 @@ def wrap_loop(inner: ClosedLoop, layer: Layer) -> ClosedLoop:
         extra_actuators=(*inner.extra_actuators, *([added] if any(added) else ())),
         derive=lambda s, own: {**inner.derive(s, within(own)), **layer.derive(s, own)},
         fields=(*inner.fields, *layer.fields, *layer.remembered),
-        further_units={**inner.further_units, **layer.units},
+        further_units={**inner.further_units, **layer.units, **layer.fields, **layer.remembered},
         observe_reads_controls=inner.observe_reads_controls or bool(layer.remembered),
         causes=lambda sample, own: inner.causes(sample, within(own)),
         equations=layer.equations,
@@ -112,10 +110,10 @@ def wrap_loop(inner: ClosedLoop, layer: Layer) -> ClosedLoop:
     )
 
 
-def _functions_within(inner: ClosedLoop, layer: Layer) -> dict[str, Any]:
-    """Functions of a loop, by name, with a layer around it."""
+def _functions_within(inner: ClosedLoop, layer: Layer, first: int) -> dict[str, Any]:
+    """Functions of a loop, by name, in a layer that remembers controls from ``first`` on."""
     act_size, ctrl_size = inner.sizes.act, inner.sizes.ctrl
-    end, first = act_size + len(layer.fields), ctrl_size + layer.actuators.states
+    end = act_size + len(layer.fields)
     adds = layer.adds or (lambda *_: xp.zeros(0))
 
     @traceable

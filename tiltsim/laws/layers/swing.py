@@ -7,7 +7,6 @@ from math import sqrt
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from tiltsim.laws.layers.layer import Layer, wrap_loop
-from tiltsim.models.parts import ExtraActuators
 from tiltsim.vehicles.rotorcraft.others import FELT
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.references.trajectories import ReferenceParameters, reference_motion
@@ -91,9 +90,7 @@ def with_swing_damping(loop: ClosedLoop) -> ClosedLoop:
         SwingDamping,
         _swing_damping,
         controls=controls,
-        actuators=ExtraActuators(states=4),
-        fields=(*SHIFTS, *STATES),
-        units=dict.fromkeys((*SHIFTS, *STATES), "m"),
+        fields=dict.fromkeys((*SHIFTS, *STATES), "m"),
         of_controller=True,
     )
     return wrap_loop(loop, layer)

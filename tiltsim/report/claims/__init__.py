@@ -11,7 +11,8 @@ A table is a statement, like the ``[claim.NAME]`` of scenarios, with the keys of
     published = "0.334198"        # digits as printed: good to 0.0000005; default: true, yes
     unit = "rad"
 
-A row with ``flights``, addresses in the scenario library, is measured on them. A statement with
+A row with ``flights``, addresses in the scenario library, is measured on them. With ``above`` or
+``below`` its value is whether the measured number lies between these bounds. A statement with
 several rows has them in ``[[ch6-blue-offset.row]]``; keys of the table are their defaults. ``each``
 repeats a row over lists of values, whose names stand in braces in its texts. Braces also stand for
 the words of the file's table ``[shared]``, of ``shared.toml``, and for the numbers of
@@ -22,13 +23,13 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Iterator, Mapping
-from functools import cache, partial
+from collections.abc import Iterator, Mapping, Sequence
+from functools import cache
 from itertools import product
 from pathlib import Path
 from typing import Any, Final, TypeAlias
 
-from tiltsim.report.claim import AnalysisClaim, FlightClaim
+from tiltsim.report.claim import AnalysisClaim, FlightClaim, Metrics, Value
 from tiltsim.report.measures import measures
 from tiltsim.report.statement import Origin, Statement
 
@@ -36,7 +37,7 @@ RegisteredClaim: TypeAlias = AnalysisClaim | FlightClaim
 
 _NAME: Final = re.compile(r"{(\w+)(?:\.(\w+))?}")
 _OF_ROWS: Final = (
-    "args", "case", "each", "flights", "in_kind", "key", "measure", "published",
+    "above", "args", "below", "case", "each", "flights", "in_kind", "key", "measure", "published",
     "error", "fault", "tolerance", "unit", "where", "why",
 )  # fmt: skip
 """Keys of rows that a statement's table may also have, as defaults."""
@@ -84,7 +85,8 @@ def _chapter(tables: dict[str, Any], shared: Mapping[str, Any]) -> Iterator[Regi
         for row in rows:
             row = defaults | row
             each = _filled(row.pop("each", {}), known)
-            used = tuple(n for n in words("thresholds") if f"{{{n}}}" in row.get("args", ()))
+            numbers = (*row.get("args", ()), row.get("above"), row.get("below"))
+            used = tuple(n for n in words("thresholds") if f"{{{n}}}" in numbers)
             for values in product(*each.values()):
                 filled = _filled(row, {**known, **dict(zip(each, values))})
                 yield _claim(statement, filled | {"thresholds": used})
@@ -111,18 +113,20 @@ def _filled(value: Any, known: Mapping[str, Any]) -> Any:
 def _claim(statement: Statement, row: dict[str, Any]) -> RegisteredClaim:
     if statement.missing and "measure" not in row:
         return AnalysisClaim(statement, **row)
-    measure, args = measures()[row.pop("measure")], row.pop("args", ())
+    own, args = measures()[row.pop("measure")], row.pop("args", ())
+    low, high = row.pop("above", None), row.pop("below", None)
+
+    def measure(*flown: Sequence[Metrics]) -> Value:
+        value = own(*flown, *args)
+        if low is None and high is None:
+            return value
+        return (low is None or value > low) and (high is None or value < high)
+
     origins = tuple(Origin[name.upper()] for name in row.pop("ours", ()))
     flights = tuple(one for pattern in row.pop("flights", ()) for one in _expanded(pattern))
     if not flights:
-        return AnalysisClaim(statement, measure=partial(measure, *args), origins=origins, **row)
-    return FlightClaim(
-        statement,
-        flights=flights,
-        measure=lambda flown: measure(flown, *args),
-        origins=origins,
-        **row,
-    )
+        return AnalysisClaim(statement, measure=measure, origins=origins, **row)
+    return FlightClaim(statement, flights=flights, measure=measure, origins=origins, **row)
 
 
 def _expanded(pattern: str) -> list[str]:

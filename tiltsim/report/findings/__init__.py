@@ -1,5 +1,7 @@
-"""Our own findings, each with its proof, a demonstration, and the tests that support it.
+"""Our own findings, each with its proof, and the list of errors of the thesis.
 
+An error counts if a row with the verdict refuted or misprint names it
+(`tiltsim.report.claim_rows.errors`); its proof runs when the report is made.
 The texts, in the TOML files of this folder, contain no measured number: functions compute them when
 the report is made.
 """
@@ -10,10 +12,11 @@ import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
+from tiltsim.report.measures.slips import deviation
 from tiltsim_controllers.analysis.attainable import (
     attainable_accelerations,
     attainable_torque_thrust,
@@ -194,17 +197,47 @@ NUMBERS: Final[Mapping[str, Callable[[], dict[str, str]]]] = {
 }
 
 
-def _read(name: str) -> list[Finding]:
-    """The findings of a file: a table each, named by its key, with the fields of `Finding`."""
-    tables = tomllib.loads((Path(__file__).parent / name).read_text(encoding="utf-8"))
-    return [
-        Finding(key=key, numbers=NUMBERS.get(key, dict), **table) for key, table in tables.items()
-    ]
+def _tables(name: str) -> dict[str, Any]:
+    return tomllib.loads((Path(__file__).parent / f"{name}.toml").read_text(encoding="utf-8"))
 
 
-FINDINGS: Final[tuple[Finding, ...]] = (
-    *_read("singularities.toml"),
-    *_read("flights.toml"),
-    *_read("tilt_car.toml"),
+FINDINGS: Final = tuple(
+    Finding(key=key, numbers=NUMBERS.get(key, dict), **table)
+    for name in ("singularities", "flights", "tilt_car")
+    for key, table in _tables(name).items()
 )
 """All findings, in the order of the report."""
+
+
+TEST: Final = (
+    "tests/report/test_errors.py::test_the_printed_formula_is_wrong_and_the_mended_one_right"
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class PublishedError:
+    """A formula, number or statement of the thesis that is wrong."""
+
+    key: str
+    title: str
+    place: str
+    printed: str
+    mended: str
+    proof: str
+    changes: str  # its consequences downstream
+
+    @property
+    def off(self) -> str:
+        """How far the printed and the mended formula are from the truth."""
+        return (
+            f"{deviation(self.key, False):.3g} as printed, {deviation(self.key, True):.1g} mended"
+        )
+
+    @property
+    def command(self) -> str:
+        """The command that runs the proof."""
+        return f"pytest -n 0 '{TEST}[{self.key}]'"
+
+
+ERRORS: Final = {key: PublishedError(key=key, **table) for key, table in _tables("errors").items()}
+"""All entries by key: first the one of most consequence, then in the order of the text."""

@@ -1,17 +1,113 @@
-"""Gains and decouplers of the attitude-altitude law (ch. 4 and 5)."""
+"""The alleged singular zone, gains and decouplers, and rotor limits (ch. 2, 4, 5 and 9)."""
 
 from collections.abc import Sequence
+from math import comb
 from typing import Final
 
 import numpy as np
 
-from tiltsim_controllers.analysis.stability import third_order_loop
+from tiltsim_controllers.analysis.attainable import (
+    AttainableSet,
+    attainable_accelerations,
+    attainable_torque_thrust,
+    published_speed_limits,
+)
+from tiltsim_controllers.analysis.published_gaits import PUBLISHED_GAITS
+from tiltsim_controllers.analysis.singularity import (
+    normalized_determinant,
+    published_determinant,
+    published_singular_curve,
+    rank,
+    world_up,
+)
+from tiltsim_controllers.analysis.stability import is_hurwitz, third_order_loop
+from tiltsim_controllers.laws import quadrotor_attitude_altitude, yaw_position
 from tiltsim_controllers.laws.feedback import conventional_decoupler, modified_decoupler
 from tiltsim_controllers.laws.gains import GAIN_SETS
+from tiltsim_controllers.mathematics.attitude import euler_rates
 from tiltsim_controllers.vehicle.cross import torque_free_force
 from tiltsim_controllers.vehicle.parameters import PRESETS, drag_ratio
 
 _VEHICLE: Final = PRESETS["ar_drone_2"]
+_QUADROTOR: Final = PRESETS["ar_drone_2_unrounded"]
+_HOVER: Final = _QUADROTOR.mass * _QUADROTOR.gravity
+_SINGULAR: Final = 1e-9
+_LIMITS: Final = published_speed_limits(_VEHICLE)
+
+
+def exact_zero_on_published_curve() -> bool:
+    """Whether the exact determinant vanishes somewhere on S = 0."""
+    curve = published_singular_curve()
+    return bool(np.abs(normalized_determinant(*curve, _HOVER, _QUADROTOR)).min() < _SINGULAR)
+
+
+def exact_zero_within_90_degrees() -> bool:
+    """Whether the exact determinant vanishes or changes its sign within 90 degrees."""
+    angles = np.linspace(-np.pi / 2, np.pi / 2, 301)[1:-1]
+    roll, pitch = np.meshgrid(angles, angles)
+    return bool((normalized_determinant(roll, pitch, _HOVER, _QUADROTOR) <= 0.0).any())
+
+
+def eq_43_as_printed() -> bool:
+    """Whether S is the determinant of the matrix of Eq. (43), with its printed zero."""
+    rng = np.random.default_rng(0)
+    worst = 0.0
+    for phi, theta, psi in rng.uniform(-1.5, 1.5, (200, 3)):
+        (sf, st, sp), (cf, cp) = np.sin([phi, theta, psi]), np.cos([phi, psi])
+        first = cp * st * cf - cp * st * sf + sp * sf + sp * cf
+        second = sp * st * cf - sp * st * sf - cp * sf - cp * cf
+        matrix = [[first, sp * cf, cp], [second, -cp * cf, sp], [0.0, sf, st]]
+        worst = max(worst, abs(np.linalg.det(matrix) - published_determinant(phi, theta)))
+    return bool(worst < 1e-12)
+
+
+def level_determinant() -> float:
+    """The exact determinant at level attitude, over its value in hover."""
+    return float(normalized_determinant(0.0, 0.0, _HOVER, _QUADROTOR))
+
+
+def singular_without_thrust() -> bool:
+    """Whether the exact determinant is 0 at zero thrust."""
+    return float(normalized_determinant(0.3, 0.2, 0.0, _QUADROTOR)) == 0.0
+
+
+def quadrotor_gains_are_stable(law: str) -> bool:
+    """Whether Appendix B's gains, of position or altitude, and of yaw stabilize their loops."""
+    module = yaw_position if law == "yaw_position" else quadrotor_attitude_altitude
+    return all(is_hurwitz((1.0, *gains)) for gains in module.GAIN_SETS["ch02"])
+
+
+def attitude_altitude_is_singular() -> bool:
+    """The matrix from thrust and torques to (z, roll, pitch, yaw) accelerations, over a grid."""
+    angles = np.linspace(-1.55, 1.55, 63)
+    for roll in angles:
+        for pitch in angles:
+            rates = euler_rates(np.array([roll, pitch, 0.0]), np.eye(3))
+            lift = float(world_up(roll, pitch)[2])
+            if abs(lift * np.linalg.det(rates)) < _SINGULAR:
+                return True
+    return False
+
+
+def axis_has_no_influence(roll_sign: float, pitch_sign: float) -> bool:
+    """Whether the exact determinant stays the same if body axes are reversed."""
+    angles = np.linspace(-1.5, 1.5, 61)
+    roll, pitch = np.meshgrid(angles, angles)
+    exact = normalized_determinant(roll, pitch, _HOVER, _QUADROTOR)
+    flipped = normalized_determinant(roll_sign * roll, pitch_sign * pitch, _HOVER, _QUADROTOR)
+    return bool(np.abs(exact - flipped).max() < _SINGULAR)
+
+
+def zone_holds_the_curve() -> bool:
+    """Whether the zone of Eq. (47) contains all of S = 0."""
+    roll, pitch = published_singular_curve()
+    inside = (np.abs(pitch) <= 0.5) & (roll >= -np.pi / 2) & (roll <= 0.2)
+    return bool(inside.all())
+
+
+def choices_of_six(picked: Sequence[int]) -> tuple[float, ...]:
+    """In how many ways each number of outputs can be picked out of six."""
+    return tuple(float(comb(6, number)) for number in picked)
 
 
 def routh_holds(rows: Sequence[str]) -> bool:
@@ -33,3 +129,64 @@ def decouplers_agree_without_tilt() -> bool:
     desired = (1.3, -0.7, 0.4, _VEHICLE.gravity)  # m/s^2, m/s^2, rad, m/s^2
     pair = zip(modified_decoupler(*desired, n), conventional_decoupler(*desired), strict=True)
     return max(abs(modified - conventional) for modified, conventional in pair) < 1e-12
+
+
+def weight() -> float:
+    """Mass times gravity, N."""
+    return _VEHICLE.mass * _VEHICLE.gravity
+
+
+def centripetal(speeds: list[float]) -> tuple[float, ...]:
+    """Accelerations (m/s^2) on the circle of 5 m at angular frequencies (rad/s)."""
+    return tuple(5.0 * speed**2 for speed in speeds)
+
+
+def _angles(number: int, *, exact: bool = False) -> list[float]:
+    published = PUBLISHED_GAITS[f"ch09_gait_{number}"]
+    gait = (published.exact or published.gait) if exact else published.gait
+    return [float(angle) for angle in gait.angles(np.array([0.0]))[0]]
+
+
+def _torques(number: int, thrust: float | None = None, *, exact: bool = False) -> AttainableSet:
+    angles = _angles(number, exact=exact)
+    return attainable_torque_thrust(angles, _VEHICLE, _LIMITS, vertical_thrust=thrust)
+
+
+def has_solution(number: int, thrust: float | None = None) -> bool:
+    """Whether a gait has torques and thrusts without yaw torque, at a vertical thrust (N)."""
+    return not _torques(number, thrust).is_empty
+
+
+def largest_thrust(number: int) -> float:
+    """The largest vertical thrust of a gait without yaw torque, N."""
+    return float(_torques(number).upper[2])
+
+
+def torques_are_coupled(number: int) -> bool:
+    """Whether for one thrust in the middle the torques on the exact lines are on a line."""
+    thrusts = _torques(number, exact=True)
+    middle = 0.5 * float(thrusts.lower[2] + thrusts.upper[2])
+    return _torques(number, middle, exact=True).dimension <= 1
+
+
+def has_full_rank(number: int, exact: bool) -> bool:
+    """Whether the torque matrix of a gait, on the exact lines or as printed, has rank 3."""
+    return bool(rank(_angles(number, exact=exact), _VEHICLE) == 3)
+
+
+def accelerations(number: int) -> tuple[float, ...]:
+    """Attainable accelerations in body axes, m/s^2: least along x and y, largest along x and y."""
+    reached = attainable_accelerations(_angles(number), _VEHICLE, _LIMITS)
+    return (*reached.lower.tolist(), *reached.upper.tolist())
+
+
+def accelerations_are_a_rectangle(number: int) -> bool:
+    """Whether their set has four corners, with two values along each axis."""
+    corners = attainable_accelerations(_angles(number), _VEHICLE, _LIMITS).vertices
+    spans = [np.unique(np.round(axis, 9)) for axis in corners.T]
+    return len(corners) == 4 and all(len(span) == 2 for span in spans)
+
+
+def accelerations_are_equal(first: int, second: int) -> bool:
+    """Whether two gaits reach the same accelerations, to six digits."""
+    return bool(np.allclose(accelerations(first), accelerations(second), rtol=1e-6))

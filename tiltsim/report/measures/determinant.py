@@ -186,9 +186,9 @@ def eight_inputs_have_full_rank() -> bool:
     return True
 
 
-def speed_carries_the_weight(speed: float) -> bool:
-    """Whether four untilted rotors at this speed (rad/s) carry the weight."""
-    return _VEHICLE.hover_rotor_speed <= speed
+def hover_rotor_speed() -> float:
+    """Speed (rad/s) at which four untilted rotors carry the weight."""
+    return _VEHICLE.hover_rotor_speed
 
 
 def shrunk_gaits_are_regular() -> bool:

@@ -33,6 +33,45 @@ def _means(flights: Flown, quantity: str, size: int) -> list[float]:
     return [float(mean) for mean in np.reshape(_values(flights, quantity), (-1, size)).mean(1)]
 
 
+def least(flights: Flown, quantity: str) -> float:
+    """The smallest value of all flights."""
+    return min(_values(flights, quantity))
+
+
+def largest(flights: Flown, quantity: str) -> float:
+    """The largest value of all flights."""
+    return max(_values(flights, quantity))
+
+
+def first_over_last(flights: Flown, quantity: str) -> float:
+    """The value of the first flight, as a multiple of the last one's."""
+    values = _values(flights, quantity)
+    return _over(values[0], values[-1])
+
+
+def difference(flights: Flown, quantity: str) -> float:
+    """Difference of the first two flights, as a share of the largest value of all."""
+    values = _values(flights, quantity)
+    return _over(abs(values[0] - values[1]), max(values))
+
+
+def spread_of_means(flights: Flown, quantity: str, size: int) -> float:
+    """Spread of the means of groups of ``size`` flights, as a share of the largest mean."""
+    means = _means(flights, quantity, size)
+    return _over(max(means) - min(means), max(means))
+
+
+def ratio(flights: Flown, quantity: str, other: str) -> float:
+    """The only flight's quantity as a multiple of another one."""
+    return _over(_values(flights, quantity)[0], _values(flights, other)[0])
+
+
+def _over(value: float, other: float) -> float:
+    """A ratio; infinite, or NaN, over zero."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return float(np.divide(value, other))
+
+
 def grows(flights: Flown, quantity: str) -> bool:
     """Whether it increases from each flight to the next."""
     return all(first < second for first, second in pairwise(_values(flights, quantity)))
@@ -52,16 +91,6 @@ def grows_until_lost(flights: Flown, quantity: str) -> bool:
 def grows_in_both_decouplers(flights: Flown, quantity: str) -> bool:
     """Whether it increases along every second flight, from the first and from the second on."""
     return all(grows(flights[start::2], quantity) for start in (0, 1))
-
-
-def remains_above(flights: Flown, quantity: str, limit: float) -> bool:
-    """Whether it is above a limit in all flights."""
-    return min(_values(flights, quantity)) > limit
-
-
-def remains_below(flights: Flown, quantity: str, limit: float) -> bool:
-    """Whether it is below a limit in all flights."""
-    return max(_values(flights, quantity)) < limit
 
 
 def stable_corners(small: float) -> float:
@@ -98,24 +127,6 @@ def falls_along_both_axes(family: str) -> bool:
     return all(modified < conventional for conventional, modified in zip(*largest))
 
 
-def first_is_least(flights: Flown, quantity: str) -> bool:
-    """Whether it is smallest in the first flight."""
-    values = _values(flights, quantity)
-    return values.index(min(values)) == 0
-
-
-def exceeds(flights: Flown, quantity: str, factor: float) -> bool:
-    """Whether it is more than ``factor`` times as large in the first flight as in the last."""
-    values = _values(flights, quantity)
-    return values[0] > factor * values[-1]
-
-
-def differs_little(flights: Flown, quantity: str, share: float) -> bool:
-    """Whether the first two flights differ by less than a share of the largest of all."""
-    values = _values(flights, quantity)
-    return abs(values[0] - values[1]) < share * max(values)
-
-
 def second_half_is_smaller(flights: Flown, quantity: str) -> bool:
     """Whether each flight of the second half has less than the one in its place in the first."""
     values = _values(flights, quantity)
@@ -140,43 +151,6 @@ def largest_mean_is_second(flights: Flown, quantity: str, size: int) -> bool:
     return int(np.argmax(_means(flights, quantity, size))) == 1
 
 
-def means_are_alike(flights: Flown, quantity: str, size: int, share: float) -> bool:
-    """Whether the means of groups of flights differ by less than a share of the largest.
-
-    Args:
-        flights: The metrics.
-        quantity: The averaged quantity.
-        size: Flights of a group.
-        share: Share of the largest mean.
-    """
-    means = _means(flights, quantity, size)
-    return max(means) - min(means) < share * max(means)
-
-
-def ratio_is_below(flights: Flown, larger: str, smaller: str, limit: float) -> bool:
-    """Whether a metric is less than a multiple of another one in the only flight.
-
-    Args:
-        flights: The metrics.
-        larger, smaller: Names of the metrics.
-        limit: The multiple.
-    """
-    [metrics] = flights
-    return float(metrics[larger]) < limit * float(metrics[smaller])
-
-
-def ratio_is_above(flights: Flown, larger: str, smaller: str, limit: float) -> bool:
-    """Whether a metric is more than a multiple of another one in the only flight.
-
-    Args:
-        flights: The metrics.
-        larger, smaller: Names of the metrics.
-        limit: The multiple.
-    """
-    [metrics] = flights
-    return float(metrics[larger]) > limit * float(metrics[smaller])
-
-
 def all_complete(flights: Flown) -> bool:
     """Whether no flight is lost."""
     return not any(metrics["diverged"] for metrics in flights)
@@ -187,14 +161,9 @@ def is_lost(flights: Flown) -> bool:
     return not all_complete(flights)
 
 
-def no_rotor_stops(flights: Flown) -> bool:
-    """Whether all rotors keep turning in all flights."""
-    return all(float(metrics["min_rotor_speed"]) > 0.0 for metrics in flights)
-
-
 def all_complete_and_turn(flights: Flown) -> bool:
     """Whether no flight is lost and no rotor stops or reverses."""
-    return all_complete(flights) and no_rotor_stops(flights)
+    return all_complete(flights) and least(flights, "min_rotor_speed") > 0.0
 
 
 def lost_at_the_published_curve(flights: Flown) -> bool:

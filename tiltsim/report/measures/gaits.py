@@ -3,7 +3,6 @@
 from collections.abc import Callable
 from functools import cache
 from itertools import pairwise
-from math import pi
 from typing import Final
 
 import numpy as np
@@ -61,31 +60,9 @@ def beats_its_biased_twin(key: str) -> bool:
     return bool(robustness(PUBLISHED_GAITS[key]).claim_holds)
 
 
-def margin_exceeds(key: str, limit: float) -> bool:
-    """Whether the smallest margin (rad) of a gait with its printed angles exceeds a limit."""
-    return robustness(PUBLISHED_GAITS[key]).margin > limit
-
-
-def exact_margin_exceeds(key: str, limit: float) -> bool:
-    """Whether the smallest margin (rad) of a gait on the exact lines exceeds a limit."""
-    return robustness(PUBLISHED_GAITS[key]).margin_exact > limit
-
-
-def biased_margin_exceeds(key: str, limit: float) -> bool:
-    """Whether the smallest margin (rad) of a gait's biased twin exceeds a limit."""
-    margin = robustness(PUBLISHED_GAITS[key]).margin_biased
-    return margin is not None and margin > limit
-
-
-def biased_margin_is_below(key: str, limit: float) -> bool:
-    """Whether the smallest margin (rad) of its biased twin is below a limit."""
-    margin = robustness(PUBLISHED_GAITS[key]).margin_biased
-    return margin is not None and margin < limit
-
-
-def has_no_singular_attitude(key: str) -> bool:
-    """Whether the margin of a gait is a right angle all along."""
-    return margin_exceeds(key, 0.5 * pi - 1e-9)
+def gait_margin(key: str, of: str = "margin") -> float:
+    """Smallest margin (rad) of a gait, by a field of its `robustness`."""
+    return float(getattr(robustness(PUBLISHED_GAITS[key]), of))
 
 
 def angles_as_printed(key: str, offset: float) -> Floats:
@@ -120,15 +97,15 @@ def printed_beats_its_biased_twin(key: str, offset: float) -> bool:
     return own > twin
 
 
-def printed_margin_exceeds(key: str, offset: float, limit: float) -> bool:
-    """Whether the margin (rad) of a gait with the printed offset exceeds a limit."""
-    return _margins_as_printed(key, offset)[0] > limit
+def printed_margin(key: str, offset: float) -> float:
+    """Smallest margin (rad) of a gait with the printed offset."""
+    return _margins_as_printed(key, offset)[0]
 
 
 def red_is_more_robust_than_blue(blue: str, red: list[str], offset: float) -> bool:
     """Whether red gaits have larger margins than a blue one with the printed offset."""
     margin, _ = _margins_as_printed(blue, offset)
-    return all(margin_exceeds(key, margin) for key in red)
+    return all(gait_margin(key) > margin for key in red)
 
 
 def printed_is_regular(key: str, offset: float) -> bool:
@@ -196,8 +173,7 @@ def advantage_on_exact_lines(key: str) -> bool:
 
 def is_more_robust_than(key: str, other: str) -> bool:
     """Whether a gait has the larger margin on the exact lines."""
-    own, others = (robustness(PUBLISHED_GAITS[name]).margin_exact for name in (key, other))
-    return own > others
+    return gait_margin(key, "margin_exact") > gait_margin(other, "margin_exact")
 
 
 def red_beats_blue_as_published(red: str, blue: str, offset: float, formulas: list[str]) -> bool:
@@ -208,7 +184,7 @@ def red_beats_blue_as_published(red: str, blue: str, offset: float, formulas: li
         offset: The printed offset of blue, rad.
         formulas: The printed R, R_phi and R_theta.
     """
-    return margin_exceeds(red, _as_published(blue, offset, formulas)[0])
+    return gait_margin(red) > _as_published(blue, offset, formulas)[0]
 
 
 def partial_scaling_can_harm(keys: list[str]) -> bool:

@@ -2,7 +2,7 @@
 
 Every function takes ``mended`` and returns a deviation that is zero, up to rounding, of a formula
 that is right. The truth is computed without the formula: by difference quotients, determinants,
-eigenvalues or linear programs. `tiltsim.report.errors` lists them with their texts.
+eigenvalues or linear programs. `tiltsim.report.findings` lists them with their texts.
 """
 
 from collections.abc import Callable
@@ -11,8 +11,8 @@ from typing import Final
 
 import numpy as np
 
+from tiltsim.report.measures.control import accelerations, largest_thrust
 from tiltsim.report.measures.determinant import determinant_coefficients, terms
-from tiltsim.report.measures.limits import accelerations, largest_thrust
 from tiltsim.report.measures.tilt_car import counter_yaw, tilt_column_off
 from tiltsim_controllers.analysis.published_gaits import DETERMINANT_CASES
 from tiltsim_controllers.analysis.singularity import force_matrix, residuals, torque_matrix

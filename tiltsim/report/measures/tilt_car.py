@@ -4,7 +4,6 @@ from math import asin, cos, inf, pi, sin
 
 import numpy as np
 
-from tiltsim.report.claim import Metrics
 from tiltsim.report.measures.flown import Flown
 from tiltsim_controllers.tilt_car.vehicle import (
     THESIS_CAR,
@@ -122,25 +121,11 @@ def tilt_column_off(mended: bool) -> float:
     return max(0.0, float(np.abs(exact - printed).max() / np.hypot(x, y)) - 1e-6)
 
 
-def _lean(flight: Metrics) -> float:
-    """Angle (rad) from the middle of the thrusts to the center, in steady motion."""
-    _, across = thrust_map(THESIS_CAR) @ (float(flight["final_input_split"]), 0.0)
-    return abs(asin(across / (_RADIUS * _OMEGA**2)))
-
-
-def thrusts_point_to_the_center(flights: Flown, aligned: float) -> bool:
-    """Whether the middle of the thrusts is less than an angle (rad) from the center."""
-    return _lean(flights[0]) < aligned
-
-
-def thrusts_point_elsewhere(flights: Flown, share: float) -> bool:
-    """Whether it is more than a share of the thrusts' half angle from the center."""
-    return _lean(flights[0]) > share * THESIS_CAR.half_angle
-
-
-def inputs_saturate_for_a_while(flights: Flown) -> bool:
-    """Whether a rotor rests in some samples, but not in all."""
-    return 0.0 < float(flights[0]["saturated_fraction"]) < 1.0
+def lean(flights: Flown, as_share: bool = False) -> float:
+    """Angle (rad) from the middle of the thrusts to the center, or over their half angle."""
+    _, across = thrust_map(THESIS_CAR) @ (float(flights[0]["final_input_split"]), 0.0)
+    angle = abs(asin(across / (_RADIUS * _OMEGA**2)))
+    return angle / THESIS_CAR.half_angle if as_share else angle
 
 
 def fails_after_a_rotor_stops(flights: Flown, small: float) -> bool:

@@ -227,9 +227,9 @@ def p_lies_below(vehicle: str = "ar_drone_2") -> bool:
     return region(*point_p(PRESETS[vehicle]), PRESETS[vehicle]) == "S_D"
 
 
-def red_residual_is_negative(p: float, vehicle: str = "ar_drone_2") -> bool:
-    """Whether R at (p, -p), as printed to six digits, is below zero on red."""
-    return float(red_residual(p, -p, PRESETS[vehicle])) < 0.0
+def red_residual_at(p: float, vehicle: str = "ar_drone_2") -> float:
+    """R at (p, -p) on red."""
+    return float(red_residual(p, -p, PRESETS[vehicle]))
 
 
 def coefficients_vanish_as_printed(offset: float, with_roll: str, with_pitch: str) -> bool:
@@ -287,22 +287,16 @@ def colors_meet_nowhere_else() -> bool:
     )
 
 
-def _l_apart() -> float:
-    """Largest distance (rad) of L from the curve of ch. 12's vehicle along the second angle."""
+def shift_from_chapter_8(part: str) -> float:
+    """Distance (rad) from ch. 8 to ch. 12 of P, or the largest one of L along the second angle."""
+    if part == "P":
+        return abs(point_p(PRESETS["luukkonen"])[0] - _P[0])
     axis = np.linspace(-1.0, 1.0, 41)
     return float(np.abs(curve_l(axis, PRESETS["luukkonen"]) - curve_l(axis, _VEHICLE)).max())
-
-
-def _p_apart() -> float:
-    return abs(point_p(PRESETS["luukkonen"])[0] - _P[0])
 
 
 def maps_are_similar(p_near: float, l_near: float) -> bool:
     """Whether root counts are equal, and P and L nearer than ``p_near`` and ``l_near`` (rad)."""
     own, former = (root_counts(grid_roots(PRESETS[n])) for n in ("luukkonen", "ar_drone_2"))
-    return bool(np.array_equal(own, former)) and _p_apart() < p_near and _l_apart() < l_near
-
-
-def moves_by_more(what: str, moved: float) -> bool:
-    """Whether P or L moves by more than an angle (rad) from ch. 8 to ch. 12."""
-    return (_p_apart() if what == "P" else _l_apart()) > moved
+    near = shift_from_chapter_8("P") < p_near and shift_from_chapter_8("L") < l_near
+    return near and bool(np.array_equal(own, former))

@@ -25,23 +25,13 @@ class Layout(NamedTuple):
 
     def sizes(self, controller_states: int = 0) -> Sizes:
         """Lengths of MuJoCo's vectors, the controller's states included."""
-        act = self.rotors + controller_states
-        return Sizes(
-            TILT_1 + self.tilts,
-            TILT_RATE_1 + self.tilts,
-            act,
-            self.further_rates + act - self.rotors,
-        )
-
-    @property
-    def thrust_1(self) -> int:
-        """In ``ctrl``: the thrusts follow the tilt servos."""
-        return self.tilts
+        act, ctrl = self.rotors + controller_states, self.further_rates + controller_states
+        return Sizes(TILT_1 + self.tilts, TILT_RATE_1 + self.tilts, act, ctrl)
 
     @property
     def thrusts(self) -> slice:
         """In ``ctrl``: the thrusts follow the tilt servos."""
-        return slice(self.thrust_1, self.acceleration_1)
+        return slice(self.tilts, self.acceleration_1)
 
     @property
     def accelerations(self) -> slice:
@@ -59,14 +49,9 @@ class Layout(NamedTuple):
         return self.tilts + 2 * self.rotors
 
     @property
-    def alpha_1(self) -> int:
-        """In the values of a sample: the tilts follow the rigid body."""
-        return len(BODY_FIELDS)
-
-    @property
     def speed_1(self) -> int:
-        """In the values of a sample: the rotor speeds follow the tilts."""
-        return self.alpha_1 + self.tilts
+        """In the values of a sample: the rotor speeds follow the rigid body and the tilts."""
+        return len(BODY_FIELDS) + self.tilts
 
     def names(self, kind: str) -> tuple[str, ...]:
         """Names of fields or columns: one a tilt where the kind begins with alpha, else a rotor."""
