@@ -15,7 +15,7 @@ import pytest
 
 import tiltsim
 import tiltsim_controllers
-from tiltsim.commands import gait_options, options, video
+from tiltsim.commands import gait_options, look, options
 from tiltsim.folders import CONTROLLERS, ENTRANCE, FLYING, FOUNDATION, SHOWING
 
 ROOT = Path(tiltsim.__file__).parent
@@ -277,7 +277,7 @@ def test_every_public_function_documents_its_arguments():
     """
     bare = []
     kinds = {**vars(options)}
-    kinds |= {**vars(gait_options), **vars(video)}
+    kinds |= {**vars(gait_options), **vars(look)}
     options_of_commands = [getattr(kind, "__metadata__", ()) for kind in kinds.values()]
     shared = {name for name, found in zip(kinds, options_of_commands) if found and found[0].help}
     shared |= {name for name, kind in kinds.items() if is_dataclass(kind)}

@@ -18,8 +18,8 @@ from pydantic import TypeAdapter
 
 import tiltsim
 import tiltsim.env
+from tiltsim.commands.files import scenario_schema
 from tiltsim.commands.key_tables import key_tables
-from tiltsim.commands.schema import scenario_schema
 from tiltsim.errors import TiltsimError
 from tiltsim.scenario.controller import CONTROLLERS, OwnFunctionController
 from tiltsim.scenario.documents import leaves

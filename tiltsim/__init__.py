@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from typing import Any
 
     from tiltsim.errors import InputError, TiltsimError
-    from tiltsim.flight.end import End
     from tiltsim.flight.flight import Flight
+    from tiltsim.flight.metrics import End
     from tiltsim.flight.reading import load_flight
     from tiltsim.laws.law_loop import airframe
     from tiltsim.linear.attraction import attraction
@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 _HOMES = {
     "Airframe": "scenario.law_controller",
     "Command": "scenario.law_controller",
-    "End": "flight.end",
+    "End": "flight.metrics",
     "Estimate": "logs.identify",
     "Flight": "flight.flight",
     "InputError": "errors",
@@ -70,7 +70,7 @@ _HOMES = {
     "replay": "logs.identify",
     "simulate": "simulation.simulate",
     "plot": "views.figures.plot",
-    "show_progress": "commands.progress",  # for progress=True
+    "show_progress": "commands.text",  # for progress=True
     "stability": "linear.stability",
     "sweep": "sweeps.running",
     "symbolic": "linear.linearization",

@@ -1,4 +1,4 @@
-"""The command line: one subcommand per module of `tiltsim.commands`, each a thin layer."""
+"""The command line: one subcommand per function of `tiltsim.commands`, each a thin layer."""
 
 import argparse
 import atexit
@@ -7,6 +7,7 @@ import os
 import re
 import sys
 import warnings
+from collections.abc import Callable
 from importlib import import_module
 from io import TextIOWrapper
 from traceback import walk_tb
@@ -58,7 +59,15 @@ tool:
   bench        measure the speed of the closed loop relative to bare MuJoCo
 
 exit codes: 0 done, 1 an expectation failed, 2 invalid input, 3 vehicle lost"""
-"""The end of ``tiltsim --help``; each command is ``run`` of a module of its name."""
+"""The end of ``tiltsim --help``; a command is ``run`` of the module of its name, or of `SHARED`."""
+
+SHARED: Final = {
+    "files": ("new", "list", "autopilot", "schema"),
+    "look": ("view", "plot", "video"),
+    "logs": ("export", "import", "replay", "identify"),
+    "thesis": ("map", "singularity", "concepts", "report"),
+}
+"""Modules of several commands, each its function ``run_NAME``."""
 
 LONGEST_MESSAGE: Final = 1000
 """Characters of a message, which may show a name or value of any length."""
@@ -126,8 +135,16 @@ def build_parser(only: str | None = None) -> argparse.ArgumentParser:
     for name in re.findall(r"^  (\w+)", COMMANDS, re.MULTILINE):
         subparser = subparsers.add_parser(name)
         if only in {None, name}:
-            declare(subparser, import_module(f"tiltsim.commands.{name}").run)
+            declare(subparser, command(name))
     return parser
+
+
+def command(name: str) -> Callable[..., int]:
+    """The function of a command, from its module."""
+    shared = next((module for module, names in SHARED.items() if name in names), None)
+    module = import_module(f"tiltsim.commands.{shared or name}")
+    run: Callable[..., int] = getattr(module, f"run_{name}" if shared else "run")
+    return run
 
 
 OPENGL_USERS: Final = ("mujoco", "dm_control._render")

@@ -8,7 +8,7 @@ import pytest
 import tiltsim
 from tiltsim.closed_loop.userdata import EVALUATIONS, evaluation_time
 from tiltsim.laws.assembling import assemble
-from tiltsim.plants.factory import make_plant
+from tiltsim.simulation.simulate import make_plant
 from tiltsim_controllers.gaits.plans import continuous_trot, instant_trot, keyframes
 
 THIRDS = [(p / 3.0, k, 0, 0, 0) for k in range(3) for p in (k, k + 1)]

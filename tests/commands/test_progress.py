@@ -18,8 +18,8 @@ import tiltsim.views.video.rendering
 from tests.flights import saved
 from tests.sweeps.files import short_sweep
 from tiltsim.cli import main
-from tiltsim.commands import progress
-from tiltsim.commands.progress import show_progress
+from tiltsim.commands import text
+from tiltsim.commands.text import show_progress
 
 pty = pytest.importorskip("pty")
 
@@ -78,15 +78,15 @@ def test_a_total_may_change(monkeypatch, capsys):
 
 
 def test_the_clock_moves_while_nothing_is_finished(monkeypatch):
-    ticks, tick = Semaphore(0), progress._Bars.tick
+    ticks, tick = Semaphore(0), text._Bars.tick
 
     def counted(bars):
         tick(bars)
         if bars._bar is not None:
             ticks.release()
 
-    monkeypatch.setattr(progress._Bars, "tick", counted)
-    monkeypatch.setattr(progress.Progress, "interval", 0.02)
+    monkeypatch.setattr(text._Bars, "tick", counted)
+    monkeypatch.setattr(text.Progress, "interval", 0.02)
     with terminal_as_stderr(monkeypatch) as shown, show_progress(shown=True) as moving:
         moving.begin("flights", 5)
         assert all(ticks.acquire(timeout=60.0) for _ in range(6))
@@ -111,9 +111,9 @@ def test_lines_of_results_and_bars_do_not_mix(monkeypatch, capsys):
 
 
 def test_without_a_terminal_lines_tell_how_far_it_is(monkeypatch, capsys):
-    monkeypatch.setattr(progress._Lines, "interval", 1e6)
+    monkeypatch.setattr(text._Lines, "interval", 1e6)
     clock = iter(range(0, 10_000, 30))
-    monkeypatch.setattr(progress, "monotonic", lambda: next(clock))
+    monkeypatch.setattr(text, "monotonic", lambda: next(clock))
     with show_progress(shown=True) as lines:
         lines.tick()
         lines.tell("flights", 1_234_010, 1_234_100)
@@ -127,14 +127,14 @@ def test_without_a_terminal_lines_tell_how_far_it_is(monkeypatch, capsys):
 
 def test_without_a_terminal_a_line_comes_every_interval(monkeypatch):
     ticks = Semaphore(0)
-    monkeypatch.setattr(progress._Lines, "interval", 0.01)
-    monkeypatch.setattr(progress._Lines, "tick", lambda _lines: ticks.release())
+    monkeypatch.setattr(text._Lines, "interval", 0.01)
+    monkeypatch.setattr(text._Lines, "tick", lambda _lines: ticks.release())
     with show_progress(shown=True):
         assert all(ticks.acquire(timeout=60.0) for _ in range(3))
 
 
 def test_the_silence_is_below_ten_seconds_and_short_work_says_nothing(capsys):
-    assert 5.0 < progress._Lines.interval < 10.0
+    assert 5.0 < text._Lines.interval < 10.0
     with show_progress(shown=True) as lines:
         lines.begin("flights", 5)
     assert capsys.readouterr().err == ""

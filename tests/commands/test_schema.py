@@ -9,8 +9,8 @@ import pytest
 from pydantic import ConfigDict, TypeAdapter
 
 from tiltsim.cli import main
+from tiltsim.commands.files import scenario_schema, sweep_schema
 from tiltsim.commands.key_tables import key_tables
-from tiltsim.commands.schema import scenario_schema, sweep_schema
 from tiltsim.scenario.scenario_tables import ScenarioTables
 from tiltsim.scenario.schema import TAG_KEYS, Node
 from tiltsim.scenario.table import Table

@@ -2,6 +2,6 @@
 
 import tiltsim.cli
 import tiltsim.commands.sweep
-import tiltsim.plants.engine_choice
+import tiltsim.plants.plant
 import tiltsim.simulation.native_batch
 import tiltsim.sweeps.running  # noqa: F401

@@ -123,7 +123,7 @@ def test_an_interrupt_that_became_another_error_stays_one(capsys, monkeypatch):
             raise ImportError("initialization failed") from error
 
     monkeypatch.setenv("MUJOCO_GL", "egl")
-    monkeypatch.setattr("tiltsim.commands.list.run", imported)
+    monkeypatch.setattr("tiltsim.commands.files.run_list", imported)
     assert main(["list"]) == 130
     assert capsys.readouterr() == ("", "tiltsim: interrupted\n")
 
@@ -136,7 +136,7 @@ def test_an_interrupt_that_compiled_code_turns_into_another_error_stays_one(caps
             signal.raise_signal(signal.SIGINT)
         raise RuntimeError("SchemaError")
 
-    monkeypatch.setattr("tiltsim.commands.list.run", validated)
+    monkeypatch.setattr("tiltsim.commands.files.run_list", validated)
     assert main(["list"]) == 130
     assert capsys.readouterr() == ("", "tiltsim: interrupted\n")
 

@@ -21,7 +21,7 @@ import pytest
 
 from tiltsim.cli import main
 from tiltsim.commands import run as run_command
-from tiltsim.commands.progress import Progress
+from tiltsim.commands.text import Progress
 from tiltsim.scenario.loading import is_changed_from_library, load_scenario
 from tiltsim.scenario.metric_names import METRICS
 from tiltsim.studies import benchmark

@@ -17,7 +17,7 @@ import tiltsim
 from tiltsim.env.environment import Environment, TiltrotorEnv
 from tiltsim.env.task import Task
 from tiltsim.errors import InputError
-from tiltsim.flight.end import End
+from tiltsim.flight.metrics import End
 from tiltsim.flight.reading import load_flight
 from tiltsim.plants.command import Command, ControllerError
 from tiltsim.studies.multirotor_analysis import fleet_file

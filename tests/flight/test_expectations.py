@@ -7,7 +7,7 @@ from math import inf, nan, nextafter
 import pytest
 
 from tiltsim.commands.run import expectation_lines
-from tiltsim.flight.expectations import Verdict, check_expectations
+from tiltsim.flight.metrics import Verdict, check_expectations
 from tiltsim.scenario.expectation import Expectation
 from tiltsim.scenario.scenario import Scenario
 

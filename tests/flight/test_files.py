@@ -17,8 +17,8 @@ from tests.flights import SAMPLE_FIELDS
 from tests.refusals import refusal
 from tiltsim.errors import InputError
 from tiltsim.flight import writing
-from tiltsim.flight.end import End
 from tiltsim.flight.flight import Flight
+from tiltsim.flight.metrics import End
 from tiltsim.flight.reading import load_flight
 from tiltsim.flight.writing import metrics_json
 from tiltsim.scenario.loading import parse_scenario, scenario_toml, without_none

@@ -12,9 +12,9 @@ import pytest
 
 import tiltsim
 from tests.flights import SAMPLE_FIELDS, flight
-from tiltsim.commands.schema import scenario_schema
-from tiltsim.flight.end import End
+from tiltsim.commands.files import scenario_schema
 from tiltsim.flight.flight import Flight
+from tiltsim.flight.metrics import End
 from tiltsim.scenario.loading import load_scenario, parse_scenario
 from tiltsim.scenario.metric_names import BOOLEAN_METRICS, METRICS
 from tiltsim.vehicles.rotorcraft import COLUMNS

@@ -10,7 +10,7 @@ import pytest
 import tiltsim
 from tests.arguments import ADDRESS, hover
 from tests.flights import TILT_CAR
-from tiltsim.flight.vectors import VECTORS
+from tiltsim.flight.flight import VECTORS
 from tiltsim.vehicles.rotorcraft import COLUMNS
 
 SHORT = {"simulation.duration": 0.02, "simulation.engine": "python"}

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from tests.laws.test_laws import LAWS
-from tiltsim.flight.end import End
 from tiltsim.flight.flight import Flight
-from tiltsim.flight.metrics import Metrics, metrics_of_rows
+from tiltsim.flight.metrics import End, Metrics, metrics_of_rows
 from tiltsim.laws.assembling import assemble
 from tiltsim.scenario.loading import load_scenario
 from tiltsim_controllers.mathematics.records import flatten

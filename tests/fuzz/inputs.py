@@ -10,7 +10,7 @@ from random import Random
 from tests.fuzz.calls import python_call
 from tests.fuzz.documents import STRANGE, Documents, damaged, dotted, toml_document, toml_text
 from tiltsim.cli import build_parser, main
-from tiltsim.commands.schema import scenario_schema, sweep_schema
+from tiltsim.commands.files import scenario_schema, sweep_schema
 from tiltsim.flight.reading import load_flight
 from tiltsim.resources import shipped_folder
 from tiltsim.scenario.documents import parse_override

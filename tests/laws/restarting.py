@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tiltsim.laws.assembling import assemble
-from tiltsim.plants.factory import make_plant
+from tiltsim.simulation.simulate import make_plant
 
 
 def assert_restarts(scenario, saved_at, steps):

@@ -15,9 +15,9 @@ from tests.refusals import refusal
 from tiltsim.flight.reading import load_flight
 from tiltsim.laws.assembling import LOOPS, assemble, loop_of
 from tiltsim.models.rotorcraft import RotorcraftSpec, compile_model
-from tiltsim.plants.factory import make_plant
 from tiltsim.plants.mujoco_plant import MujocoPlant
 from tiltsim.scenario.loading import merge
+from tiltsim.simulation.simulate import make_plant
 from tiltsim_controllers.analysis.balance import balanced_gait
 from tiltsim_controllers.analysis.singularity import (
     force_matrix,

@@ -14,9 +14,9 @@ from tiltsim.errors import InputError
 from tiltsim.laws.assembling import assemble
 from tiltsim.laws.rotor_loop import torque_free_columns
 from tiltsim.models.hover import hover_speeds
-from tiltsim.plants.factory import make_plant
 from tiltsim.resources import shipped_folder
 from tiltsim.scenario.loading import merge
+from tiltsim.simulation.simulate import make_plant
 from tiltsim.vehicles.rotorcraft.layout import Layout
 from tiltsim_controllers.analysis.singularity import world_up
 from tiltsim_controllers.analysis.torque_free import (

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import tiltsim
-from tiltsim.flight.vectors import VECTORS
+from tiltsim.flight.flight import VECTORS
 from tiltsim.logs.log import Log
 
 NOISE = {"position": 0.005, "velocity": 0.01, "attitude": 0.005, "body_rates": 0.02}

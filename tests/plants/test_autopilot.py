@@ -11,8 +11,7 @@ import pytest
 import tiltsim
 from tests.plants.firmware_double import HEIGHT, Firmware, Px4Firmware
 from tiltsim.models.cross import as_multirotor
-from tiltsim.plants.ardupilot_files import ardupilot_files
-from tiltsim.plants.autopilot_mixer import Mixer
+from tiltsim.plants.autopilot import Mixer, ardupilot_files
 from tiltsim_controllers.vehicle.rotors import force_and_torque
 
 TILTING = [*(f"along_{i}" for i in range(1, 7)), *(f"across_{i}" for i in range(1, 7))]

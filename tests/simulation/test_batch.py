@@ -11,7 +11,7 @@ import pytest
 
 import tiltsim
 import tiltsim.engines.sample_evaluation
-import tiltsim.plants.engine_choice
+import tiltsim.plants.plant
 import tiltsim.simulation.native_batch
 from tests.flights import TILT_CAR
 from tests.laws.layers.test_actuation import EVERYTHING
@@ -27,7 +27,7 @@ from tiltsim.scenario.loading import merge
 from tiltsim.simulation import batch
 from tiltsim.simulation.batch import fly
 from tiltsim.simulation.native_batch import ROWS_PER_THREAD
-from tiltsim.system import progress
+from tiltsim.system import arguments
 
 TROT = {"amplitude": 0.3, "period": 0.8}
 GAITS = {
@@ -480,7 +480,7 @@ def test_all_kinds_of_flights_together():
 @pytest.mark.parametrize("plant", ["mujoco", "thesis"])
 def test_many_short_flights_are_worth_the_native_engine(plant, monkeypatch):
     scenarios = [scenario({}, engine="auto", plant=plant, duration=0.05)] * 6
-    monkeypatch.setattr(tiltsim.plants.engine_choice, "MIN_STEPS_TO_COMPILE", 300)
+    monkeypatch.setattr(tiltsim.plants.plant, "MIN_STEPS_TO_COMPILE", 300)
     results = list(fly(scenarios, keep_samples=True))
     assert {result.flight.engine for result in results} == {"native"}
     assert [result.scenario for result in results] == scenarios
@@ -536,7 +536,7 @@ def test_a_batch_reports_flights_whose_results_wait_for_others(monkeypatch):
 
     monkeypatch.setattr(batch, "NativeBatch", Flown)
     monkeypatch.setattr(batch, "_way_to_fly", lambda assembly, _: assembly.scenario.title)
-    monkeypatch.setattr(progress, "INTERVAL", 0.0)
+    monkeypatch.setattr(arguments, "INTERVAL", 0.0)
     counts = []
     results = tiltsim.fly([{"title": title} for title in "ABAB"], progress=counts.append)
     next(results)

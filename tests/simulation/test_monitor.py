@@ -8,9 +8,8 @@ import pytest
 
 import tiltsim
 from tiltsim.laws.assembling import assemble
-from tiltsim.plants.factory import make_plant
 from tiltsim.plants.plant import take_sample
-from tiltsim.simulation.monitor import TerminationMonitor
+from tiltsim.simulation.simulate import TerminationMonitor, make_plant
 
 
 @pytest.fixture

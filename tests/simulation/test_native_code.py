@@ -12,10 +12,10 @@ import tiltsim.engines.sample_evaluation
 from tests.laws.test_laws import LAWS
 from tests.simulation.test_batch import ALL_LAWS, GAITS, scenario
 from tiltsim.closed_loop.assembly import program_key
-from tiltsim.flight.end import End
+from tiltsim.flight.metrics import End
 from tiltsim.laws.assembling import LOOPS, assemble
-from tiltsim.plants.engine_choice import choose_engine
-from tiltsim.plants.factory import make_plant
+from tiltsim.plants.plant import choose_engine
+from tiltsim.simulation.simulate import make_plant
 from tiltsim_controllers.code.arrays import traceable, xp
 
 

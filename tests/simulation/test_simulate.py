@@ -10,9 +10,9 @@ import pytest
 import tiltsim
 from tests.statics import setpoint_error
 from tiltsim.laws.assembling import assemble
-from tiltsim.plants.factory import make_plant
 from tiltsim.plants.mujoco_plant import MujocoPlant
-from tiltsim.system import progress
+from tiltsim.simulation.simulate import make_plant
+from tiltsim.system import arguments
 from tiltsim.vehicles.rotorcraft import COLUMNS
 from tiltsim_controllers.laws.feedback import DECOUPLERS
 from tiltsim_controllers.laws.gains import GAIN_SETS
@@ -434,7 +434,7 @@ def test_a_flight_has_a_one_line_repr_and_lists_its_columns():
 
 
 def test_progress_is_reported_now_and_then_and_at_the_end(monkeypatch):
-    monkeypatch.setattr(progress, "INTERVAL", 1e9)
+    monkeypatch.setattr(arguments, "INTERVAL", 1e9)
     times = []
     flight = tiltsim.simulate({"simulation": {"duration": 0.2}}, progress=times.append)
     assert times[-1] == flight["time"][-1] == pytest.approx(0.2)

@@ -14,7 +14,7 @@ from tiltsim.errors import InputError
 from tiltsim.laws.assembling import loop_of
 from tiltsim.scenario.loading import merge
 from tiltsim.scenario.scenario import plan_flight
-from tiltsim.simulation.array_plan import ArrayPlan
+from tiltsim.simulation.vectorized import ArrayPlan
 
 jax = pytest.importorskip("jax")
 

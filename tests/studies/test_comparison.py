@@ -10,7 +10,7 @@ import pytest
 
 import tiltsim
 from tiltsim.cli import main
-from tiltsim.commands.controllers import chosen_controllers
+from tiltsim.commands.compare import chosen_controllers
 from tiltsim.errors import InputError
 from tiltsim.exit_codes import INTERRUPTED
 from tiltsim.studies.benchmark import compiled_time_per_call

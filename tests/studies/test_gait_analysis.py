@@ -15,7 +15,7 @@ import pytest
 from tests.refusals import refusal
 from tiltsim.cli import build_parser
 from tiltsim.commands import gait as gait_command
-from tiltsim.commands import map as map_command
+from tiltsim.commands import thesis
 from tiltsim.commands.declaring import call
 from tiltsim.commands.gait_options import Case, parse_vehicle
 from tiltsim.commands.text import json_text, number
@@ -630,7 +630,7 @@ def test_a_bad_target_is_noticed_before_any_work(tmp_path, monkeypatch) -> None:
         raise AssertionError("worked")
 
     monkeypatch.setattr(gait_command, "_select", work)
-    monkeypatch.setattr(map_command, "parse_vehicle", work)
+    monkeypatch.setattr(thesis, "parse_vehicle", work)
     closed = tmp_path / "closed.png"
     closed.touch()
     monkeypatch.setattr(files.os, "access", lambda path, mode: path != closed)

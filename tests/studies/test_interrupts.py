@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 import tiltsim.simulation.simulate
-from tiltsim.commands.concepts import fly_decouplers
+from tiltsim.commands.thesis import fly_decouplers
 from tiltsim.report.pictures import PICTURES
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.studies.benchmark import bench_accuracy

@@ -10,7 +10,7 @@ import pytest
 from tests.models.test_user_vehicle import TETRAHEDRON, XML
 from tiltsim.errors import InputError
 from tiltsim.scenario.loading import load_scenario
-from tiltsim.sweeps.folder import open_sweep_folder
+from tiltsim.sweeps.dataset import open_sweep_folder
 from tiltsim.sweeps.loading import load_sweep
 from tiltsim.sweeps.points import SweepPoints
 from tiltsim.sweeps.running import run_sweep

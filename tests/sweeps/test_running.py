@@ -25,8 +25,7 @@ from tiltsim.simulation import batch
 from tiltsim.simulation.simulate import simulate
 from tiltsim.sweeps import chunks, running
 from tiltsim.sweeps.chunks import ChunkWork, fly_points
-from tiltsim.sweeps.dataset import load_results
-from tiltsim.sweeps.folder import open_sweep_folder
+from tiltsim.sweeps.dataset import load_results, open_sweep_folder
 from tiltsim.sweeps.loading import load_sweep
 from tiltsim.sweeps.points import SweepPoints
 from tiltsim.sweeps.running import run_sweep

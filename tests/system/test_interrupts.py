@@ -161,13 +161,13 @@ def test_a_swallowed_interrupt_of_a_command_is_sent_again(keyboard, number, caps
 def test_the_exit_code_is_the_same_if_text_is_executed(number, code):
     script = f"""
 import signal, sys
-import tiltsim.commands.list
+import tiltsim.commands.files
 from tiltsim.__main__ import main
 
 def run():
     exec("signal.raise_signal({int(number)})")
 
-tiltsim.commands.list.run = run
+tiltsim.commands.files.run_list = run
 sys.argv = ["tiltsim", "list"]
 sys.exit(main())
 """

@@ -10,7 +10,7 @@ import pytest
 from tests.flights import SAMPLE_FIELDS, flight
 from tests.views.recordings import entities
 from tiltsim.cli import main
-from tiltsim.flight.end import End
+from tiltsim.flight.metrics import End
 from tiltsim.laws.assembling import assemble
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.views.attitude_plane import MOVING_TRAIL_TIME

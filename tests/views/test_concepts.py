@@ -13,9 +13,9 @@ import pytest
 
 from tests.flights import flight
 from tiltsim.cli import main
-from tiltsim.commands.concepts import DECOUPLER_FLIGHTS, drawings, fly_decouplers
+from tiltsim.commands.files import scenario_schema
 from tiltsim.commands.key_tables import key_tables
-from tiltsim.commands.schema import scenario_schema
+from tiltsim.commands.thesis import DECOUPLER_FLIGHTS, drawings, fly_decouplers
 from tiltsim.scenario.metric_names import METRICS
 from tiltsim.views.figures import concepts, vehicle_drawing
 from tiltsim.views.figures.vehicle_drawing import ABOVE, Pose, View
@@ -177,7 +177,7 @@ def test_the_decouplers_rest_where_the_page_says(flown):
 
 @pytest.mark.slow
 def test_the_command_draws_the_pictures_of_the_page(flown, tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr("tiltsim.commands.concepts.fly_decouplers", lambda: flown)
+    monkeypatch.setattr("tiltsim.commands.thesis.fly_decouplers", lambda: flown)
     assert main(["concepts", "--out", str(tmp_path / "pictures")]) == 0
     files = sorted(tmp_path.glob("pictures/*"))
     assert {file.name for file in files} == {f"concepts_{name}.svg" for name in drawings()}

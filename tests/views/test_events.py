@@ -8,7 +8,7 @@ import pytest
 
 import tiltsim
 from tests.flights import SAMPLE_FIELDS, flight
-from tiltsim.flight.end import End
+from tiltsim.flight.metrics import End
 from tiltsim.laws.assembling import assemble
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.views.titles import EventDetector, conditions

@@ -12,7 +12,7 @@ import pytest
 import tiltsim
 from tests.flights import BASE, RECIPES, SAMPLE_FIELDS, flight, saved
 from tiltsim.cli import main
-from tiltsim.flight.end import End
+from tiltsim.flight.metrics import End
 from tiltsim.laws.assembling import assemble
 from tiltsim.views.figures import style
 from tiltsim.views.figures.plot import plot

@@ -17,8 +17,14 @@ from tiltsim.commands.options import (
     Trust,
     positive_integer,
 )
-from tiltsim.commands.progress import Progress, show_progress
-from tiltsim.commands.text import json_text, print_line, require_flown, write_text
+from tiltsim.commands.text import (
+    Progress,
+    json_text,
+    print_line,
+    require_flown,
+    show_progress,
+    write_text,
+)
 from tiltsim.errors import InputError
 
 if TYPE_CHECKING:
@@ -68,7 +74,7 @@ def run(
     """
     from dataclasses import asdict
 
-    from tiltsim.commands.controllers import chosen_controllers
+    from tiltsim.commands.compare import chosen_controllers
     from tiltsim.report.made import Made
     from tiltsim.resources import shipped_folder
     from tiltsim.studies.arena import FOLDER, OURS, chosen_vehicles, fly_matches, matches

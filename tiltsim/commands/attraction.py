@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 from tiltsim.commands.declaring import Option
 from tiltsim.commands.options import Json, Overrides, PlotOptions, Quiet, Trust, load_scenarios
-from tiltsim.commands.progress import Progress, show_progress
-from tiltsim.commands.text import aligned, number
+from tiltsim.commands.text import Progress, aligned, number, show_progress
 from tiltsim.errors import InputError
 from tiltsim.linear import COARSE, REFINEMENTS
 from tiltsim.views import figures

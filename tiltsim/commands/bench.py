@@ -4,8 +4,7 @@ from functools import partial
 from typing import Any, Final, Literal
 
 from tiltsim.commands.options import Json, Quiet, refuse_both
-from tiltsim.commands.progress import show_progress
-from tiltsim.commands.text import Columns, json_text, table
+from tiltsim.commands.text import Columns, json_text, show_progress, table
 from tiltsim.errors import InputError
 
 _STEP: Final = (lambda row: 1e3 * row["timestep"], "g")

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 from tiltsim.commands.declaring import Option
 from tiltsim.commands.options import CORES, Jobs, Overrides, Quiet, Trust
-from tiltsim.commands.progress import show_progress
-from tiltsim.commands.text import counted, json_text, print_line, tally, write_text
+from tiltsim.commands.text import counted, json_text, print_line, show_progress, tally, write_text
 from tiltsim.system.interrupts import defer_interrupts
 
 if TYPE_CHECKING:

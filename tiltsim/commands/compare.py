@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from tiltsim.commands import text
+from tiltsim.commands.declaring import mistakes_in
 from tiltsim.commands.options import (
     CORES,
     Jobs,
@@ -17,7 +19,7 @@ from tiltsim.commands.options import (
     Quiet,
     Trust,
 )
-from tiltsim.commands.progress import show_progress
+from tiltsim.commands.text import show_progress
 from tiltsim.views import figures
 
 if TYPE_CHECKING:
@@ -72,7 +74,6 @@ def run(
         nominal: leave out the search for robustness, forty flights each
         out (DIR): also write comparison.json and comparison.png
     """
-    from tiltsim.commands.controllers import chosen_controllers
     from tiltsim.studies.checking import collect
     from tiltsim.studies.comparison import SEARCHES, compare, refusal
     from tiltsim.system.files import prepare_folder
@@ -136,3 +137,50 @@ def _cell(key: str, row: dict[str, Any]) -> str:
     if row[key] is None:
         return why_none(row, key)
     return text.number(factor * row[key], form) + "+" * is_last_tried(row, key)
+
+
+def chosen_controllers(laws: Sequence[str], own: Sequence[str]) -> dict[str, Mapping[str, Any]]:
+    """The tables of ``--controllers`` and ``--controller``, by name. Raises `InputError`."""
+    from tiltsim.studies.comparison import controller_tables
+
+    chosen = controller_tables(laws)
+    for given in own:
+        with mistakes_in(f"--controller {given}"):
+            name, table = _own(given)
+            if name in chosen:
+                raise ValueError(f"{name} is there twice; choose another name")
+            chosen[name] = table
+    return chosen
+
+
+def _own(text: str) -> tuple[str, dict[str, Any]]:
+    """Name and table of a ``--controller``. Raises ValueError for an unknown law or key."""
+    from tiltsim.scenario.controller import CONTROLLERS
+    from tiltsim.scenario.documents import parse_override
+    from tiltsim.scenario.messages import choose
+
+    if "=" not in text and ".py:" in text:
+        return text.rpartition(":")[2], {"law": "numpy", "function": _absolute(text)}
+    name, table = parse_override(text) if text.find("=") > 0 else (text, None)
+    if not isinstance(table, dict) or not isinstance(table.get("law"), str):
+        raise ValueError('write NAME={law="pid", KEY=VALUE, ...} or FILE.py:FUNCTION')
+    law = table["law"]
+    if law not in CONTROLLERS:
+        raise ValueError(f"law: {choose(law, CONTROLLERS)}")
+    known = CONTROLLERS[law].model_fields
+    for key in table:
+        if key not in known:
+            raise ValueError(f"{key}: {choose(key, known)}")
+    if isinstance(table.get("function"), str):
+        table["function"] = _absolute(table["function"])
+    return name, table
+
+
+def _absolute(function: str) -> str:
+    """A function of a file of the working folder, for scenarios of other folders."""
+    from tiltsim.system.files import is_file
+
+    file, colon, name = function.rpartition(":")
+    if file and not is_file(Path(file)):
+        raise ValueError(f"{file}: no such file")
+    return f"{Path(file).resolve()}{colon}{name}" if file else function

@@ -7,8 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from tiltsim.commands.options import Overrides, Silent, refuse_both
-from tiltsim.commands.progress import show_progress
-from tiltsim.commands.text import print_line, table, viewing, warn
+from tiltsim.commands.text import print_line, show_progress, table, viewing, warn
 from tiltsim.exit_codes import DONE, EXPECTATION_FAILED, INTERRUPTED, VEHICLE_LOST
 from tiltsim.system.interrupts import defer_interrupts
 from tiltsim.system.text import printable
@@ -16,8 +15,8 @@ from tiltsim.system.text import printable
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
-    from tiltsim.flight.expectations import Verdict
     from tiltsim.flight.flight import Flight
+    from tiltsim.flight.metrics import Verdict
     from tiltsim.scenario.scenario import Scenario
     from tiltsim.views.rerun.live import LiveStream
     from tiltsim_controllers.mathematics.scalar import Floats
@@ -62,7 +61,7 @@ def run(
         live: watch the flight in the Rerun viewer
         connect (URL): stream to a Rerun viewer that is already open
     """
-    from tiltsim.flight.expectations import check_expectations
+    from tiltsim.flight.metrics import check_expectations
     from tiltsim.flight.writing import prepare_flight_folder
     from tiltsim.scenario.loading import is_changed_from_library, load_scenario
     from tiltsim.system.files import prepare_file

@@ -7,8 +7,7 @@ from math import degrees, isfinite
 from typing import TYPE_CHECKING, Any, Final
 
 from tiltsim.commands.options import Json, Overrides, PlotOptions, Quiet, Trust, load_scenarios
-from tiltsim.commands.progress import show_progress
-from tiltsim.commands.text import Columns, aligned, number, table
+from tiltsim.commands.text import Columns, aligned, number, show_progress, table
 from tiltsim.errors import InputError
 from tiltsim.views import figures
 

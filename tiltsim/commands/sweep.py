@@ -5,8 +5,14 @@ from pathlib import Path
 from typing import Final
 
 from tiltsim.commands.options import CORES, Jobs, Overrides, Silent, Trust
-from tiltsim.commands.progress import show_progress
-from tiltsim.commands.text import counted, most_frequent, print_line, require_flown, tally
+from tiltsim.commands.text import (
+    counted,
+    most_frequent,
+    print_line,
+    require_flown,
+    show_progress,
+    tally,
+)
 from tiltsim.exit_codes import INTERRUPTED
 
 NOT_FLOWN: Final = frozenset({"invalid", "crashed"})  # ends of rows without a flight

@@ -15,8 +15,8 @@ import numpy as np
 
 from tiltsim.env.gymnasium import GymnasiumEnv
 from tiltsim.env.tasks import TASKS
-from tiltsim.plants.built_in_command import BuiltInController
 from tiltsim.plants.command import Command
+from tiltsim.plants.observing import BuiltInController
 from tiltsim_controllers.mathematics.scalar import Floats
 
 Policy = Callable[[Any], Floats]  # from the observation to the action, both scaled to -1 .. 1.

@@ -17,12 +17,11 @@ import numpy as np
 import numpy.typing as npt
 from dm_env import specs
 
-from tiltsim.env.arrays import clip_action
 from tiltsim.env.domain import Domain
-from tiltsim.env.task import Reward, Task, hover_reward
+from tiltsim.env.task import Reward, Task, clip_action, hover_reward
 from tiltsim.errors import InputError
-from tiltsim.flight.end import End
 from tiltsim.flight.flight import Flight
+from tiltsim.flight.metrics import End
 from tiltsim.laws.assembling import assemble
 from tiltsim.plants.command import Command, Observation, check_command
 from tiltsim.plants.commanded_plant import CommandedPlant
@@ -30,7 +29,7 @@ from tiltsim.plants.flight_model import model_cache_key
 from tiltsim.plants.plant import take_sample
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.scenario import Scenario
-from tiltsim.simulation.monitor import TerminationMonitor
+from tiltsim.simulation.simulate import TerminationMonitor
 from tiltsim.system.text import short_repr
 from tiltsim_controllers.mathematics.scalar import Floats
 
@@ -212,7 +211,7 @@ class TiltrotorEnv(Environment):
     Actions are the thrusts of the rotors (N), then the tilt angles (rad), clipped to the bounds of
     `action_spec`; without tilt servos, the thrusts alone. Each is held for
     ``simulation.control_timestep``. Observations are a flat dict of arrays, see
-    `tiltsim.env.arrays.BOUNDS`. An episode ends after ``simulation.duration`` with a discount of
+    `tiltsim.env.task.BOUNDS`. An episode ends after ``simulation.duration`` with a discount of
     1, or with a discount and a reward of 0 when the vehicle is lost.
 
     Args:
@@ -225,8 +224,8 @@ class TiltrotorEnv(Environment):
             0.9, "high": 1.1, "relative": True}``, drawn again for every episode.
         seed: Seed of the draws; default: the scenario's ``simulation.seed``.
         max_position_error: Distance from the reference (m) beyond which the vehicle counts as lost.
-        observations: Names of `tiltsim.env.arrays.OBSERVATIONS` and the largest absolute value of
-            each, in their order; default: `tiltsim.env.arrays.BOUNDS`.
+        observations: Names of `tiltsim.env.task.OBSERVATIONS` and the largest absolute value of
+            each, in their order; default: `tiltsim.env.task.BOUNDS`.
         max_tilt_angle: Largest tilt angle (rad) of an action, if less than the vehicle's own.
 
     Raises:

@@ -27,7 +27,7 @@ from tiltsim.scenario.documents import split_key, value_at, with_value
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.scenario.surroundings import SensorTable
 from tiltsim.scenario.vehicle import PodTable, VehicleTable
-from tiltsim.simulation.array_plan import ArrayPlan, PlannedFlight
+from tiltsim.simulation.vectorized import ArrayPlan, PlannedFlight
 from tiltsim.system.text import short_repr
 from tiltsim.vehicles.rotorcraft.layout import QW, TILT_1, TILT_RATE_1
 from tiltsim_controllers.mathematics.attitude import euler_angles, rotation_of_quaternion

@@ -18,7 +18,7 @@ from tiltsim.env.tasks import TASKS
 from tiltsim.errors import InputError
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.messages import choose
-from tiltsim.system.numbers import is_number
+from tiltsim.system.arguments import is_number
 from tiltsim.system.public import optional_package
 from tiltsim.system.text import short_repr
 

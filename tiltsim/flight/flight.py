@@ -7,34 +7,137 @@ and Rerun.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from importlib.metadata import version
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, Final, Self
 
 import numpy as np
 
+from tiltsim.closed_loop.assembly import Assembly
+from tiltsim.engines.base import EngineName
 from tiltsim.errors import InputError
-from tiltsim.flight.metrics import Metrics, compute_metrics
-from tiltsim.flight.vectors import ColumnsOverTime
+from tiltsim.flight.metrics import End, Metrics, compute_metrics, metrics_of_rows
 from tiltsim.flight.writing import write_flight
 from tiltsim.laws.assembling import assemble
+from tiltsim.models.vehicle_parts import MAX_ROTORS
+from tiltsim.scenario.messages import did_you_mean
 from tiltsim.scenario.metric_names import unit_of
-from tiltsim.system.public import public
+from tiltsim.system.public import optional_package, public
 from tiltsim.system.text import html_table, short_repr, shortened, valid_unicode
 from tiltsim_controllers.mathematics.scalar import Floats
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
     import pyarrow
 
-    from tiltsim.closed_loop.assembly import Assembly
-    from tiltsim.engines.base import EngineName
-    from tiltsim.flight.end import End
     from tiltsim.scenario.scenario import Scenario
+
+
+def _each_rotor(name: str) -> tuple[str, ...]:
+    return tuple(f"{name}_{rotor}" for rotor in range(1, MAX_ROTORS + 1))
+
+
+VECTORS: Final = {
+    "position": ("x", "y", "z"),
+    "velocity": ("vx", "vy", "vz"),
+    "attitude": ("roll", "pitch", "yaw"),
+    "body_rates": ("p", "q", "r"),
+    "tilt_angles": _each_rotor("alpha"),
+    "tilt_rates": _each_rotor("alpha_rate"),
+    "rotor_speeds": _each_rotor("rotor_speed"),
+    "thrusts": _each_rotor("thrust"),
+    "reference_position": ("x_ref", "y_ref", "z_ref"),
+    "reference_attitude": ("roll_ref", "pitch_ref", "yaw_ref"),
+    "reference_tilt_angles": _each_rotor("alpha_ref"),
+}
+"""Vectors by name and their components; a vehicle in a plane has some of them."""
+
+
+def components(name: str, columns: Iterable[str]) -> list[str]:
+    """The columns of a flight that make a vector, in its order; empty if there are none.
+
+    Args:
+        name: The vector, for a companion after its name, such as ``wing_position``.
+        columns: All columns of the flight.
+    """
+    present, own = {*columns}, name if name in VECTORS else ""
+    own = own or next((vector for vector in VECTORS if name.endswith(f"_{vector}")), "")
+    prefix = name.removesuffix(own)
+    return [prefix + part for part in VECTORS.get(own, ()) if prefix + part in present]
+
+
+class UnknownColumnError(InputError, KeyError):
+    """A flight or log has no column or vector of a name."""
+
+    __str__ = Exception.__str__  # a KeyError shows its message in quotes
+
+
+class ColumnsOverTime:
+    """Columns by name, each of shape (N,), and their units: a flight, or the log of another tool.
+
+    It iterates over the names of the columns, as a dict does.
+    """
+
+    if TYPE_CHECKING:
+
+        @property
+        def columns(self) -> dict[str, Floats]: ...
+
+        @property
+        def units(self) -> dict[str, str]: ...
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.units)
+
+    def __contains__(self, name: object) -> bool:
+        """Whether there is a column or vector of this name."""
+        return isinstance(name, str) and (name in self.units or bool(components(name, self.units)))
+
+    def __getitem__(self, name: str) -> Floats:
+        """A column by name, shape (N,); or a vector of `VECTORS`, shape (N, components).
+
+        ``flight["x"]`` and ``flight["position"]``, both in the units of `units`. Raises
+        `UnknownColumnError` for other names.
+        """
+        known = isinstance(name, str)
+        if known and name in self.units:
+            return self.columns[name]
+        columns = components(name, self.units) if known else []
+        if not columns:
+            vectors = [vector for vector in VECTORS if components(vector, self.units)]
+            hint, kind = did_you_mean(name, [*self.units, *vectors]), type(self).__name__
+            raise UnknownColumnError(
+                f"{short_repr(name)}: no column of this {kind.lower()}; {hint}see {kind}.units, or "
+                f"the vectors {', '.join(vectors)}"
+            )
+        return np.stack([self.columns[column] for column in columns], axis=-1)
+
+    def to_pandas(self) -> Any:
+        """The columns as a pandas DataFrame, whose ``attrs["units"]`` are `units`.
+
+        Raises `InputError` if pandas is not installed.
+        """
+        pandas = optional_package("pandas", f"{type(self).__name__}.to_pandas")
+        frame = pandas.DataFrame(dict(self.columns))
+        frame.attrs["units"] = dict(self.units)
+        return frame
+
+    def arrow_table(self, metadata: Mapping[str, str]) -> pyarrow.Table:
+        """The columns as an Arrow table with units and further metadata."""
+        import pyarrow as pa
+
+        fields = [
+            pa.field(name, pa.float64(), nullable=False, metadata={"unit": unit})
+            for name, unit in self.units.items()
+        ]
+        # From their bytes, as converting an array would import pandas where it is installed.
+        columns = [np.ascontiguousarray(self.columns[name]) for name in self.units]
+        memory = [(len(column), [None, pa.py_buffer(column)]) for column in columns]
+        arrays = [pa.Array.from_buffers(pa.float64(), *one) for one in memory]
+        return pa.table(arrays, schema=pa.schema(fields, metadata=dict(metadata)))
 
 
 def _overflow_ignored() -> np.errstate:
@@ -187,3 +290,46 @@ def as_flights(flights: Flight | Sequence[Flight]) -> list[Flight]:
         allowed = "must be a tiltsim.Flight or a list of them"
         raise InputError(f"flights = {short_repr(flights)}: {allowed}")
     return [*several]
+
+
+METRICS_ROWS: Final = 128
+"""Flights whose metrics are computed together: they fit into the caches of a core."""
+
+
+def completed_flights(
+    assemblies: Sequence[Assembly],
+    numbers: Floats,
+    samples: Floats,
+    engine: EngineName,
+    seconds: Sequence[float],
+) -> list[Flight]:
+    """Flights of one closed loop that were flown to the end of their duration.
+
+    Args:
+        assemblies: One per flight.
+        numbers: Parameters of their loops, shape (flights, numbers), as `flatten` returns them.
+        samples: Shape (flights, N, fields), at the same times.
+        engine: That flew them.
+        seconds: Time that each took.
+
+    Returns:
+        The flights; the metrics of all of them are computed when the first is requested.
+    """
+    if not assemblies:
+        return []
+    end = End("completed", float(samples[0, -1, 0]))
+
+    @cache
+    def together() -> list[Metrics] | None:
+        if len({assembly.setup.knots for assembly in assemblies}) > 1 or len(assemblies) < 2:
+            return None
+        return metrics_of_rows(assemblies, numbers, samples, end, seconds)
+
+    def metrics_of(place: int) -> Metrics | None:
+        found = together()
+        return None if found is None else found[place]
+
+    return [
+        Flight(assembly, own, end, engine, time, lambda place=place: metrics_of(place))  # type: ignore[misc]
+        for place, (assembly, own, time) in enumerate(zip(assemblies, samples, seconds))
+    ]

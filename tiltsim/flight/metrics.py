@@ -1,8 +1,11 @@
-"""A flight in numbers: the metrics that expectations check and sweeps collect."""
+"""A flight in numbers: its end, its metrics, and verdicts on its scenario's expectations."""
+
+from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from math import isfinite
-from typing import Any, NoReturn
+from dataclasses import dataclass
+from math import isfinite, isnan
+from typing import Any, Literal, NoReturn
 
 import numpy as np
 from pydantic import BaseModel
@@ -10,12 +13,30 @@ from pydantic import BaseModel
 from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.closed_loop.loop import ControlSetup
 from tiltsim.errors import InputError
-from tiltsim.flight.end import End
+from tiltsim.scenario.expectation import Expectation
 from tiltsim.scenario.messages import did_you_mean
 from tiltsim.scenario.metric_names import METRICS
+from tiltsim.scenario.scenario import Scenario
 from tiltsim.system.text import short_repr
 from tiltsim_controllers.mathematics.records import unflatten
 from tiltsim_controllers.mathematics.scalar import Floats
+
+EndKind = Literal["completed", "diverged", "singular", "interrupted", "failed"]
+"""``singular``: at a singular decoupling matrix; ``failed``: a user's own controller failed."""
+
+
+@dataclass(frozen=True)
+class End:
+    """Kind, time and cause of a flight's end."""
+
+    kind: EndKind
+    time: float  # s
+    cause: str = ""
+
+    @property
+    def message(self) -> str:
+        """One line on a flight that was not completed."""
+        return f"flight terminated early at t = {self.time:.3f} s ({self.kind}): {self.cause}"
 
 
 class UnknownMetricError(InputError, KeyError):
@@ -127,3 +148,42 @@ def _together(tables: Sequence[Any]) -> Any:
     if isinstance(first, float):
         return np.array(tables)[:, np.newaxis]
     raise _DifferentError
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """One expectation with the measured value, None where the flight does not have the metric."""
+
+    expectation: Expectation
+    measured: float | bool | None
+
+    @property
+    def holds(self) -> bool:
+        """Whether the measured value lies within the bounds."""
+        value, expected = self.measured, self.expectation
+        if value is None or isnan(value):
+            return False
+        if expected.equals is not None and value is not expected.equals:
+            return False
+        if expected.min is not None and value < expected.min:
+            return False
+        return expected.max is None or value <= expected.max
+
+    @property
+    def bounds(self) -> str:
+        """The bounds as text, such as ``-0.4 .. -0.36``."""
+        low, high, equals = self.expectation.min, self.expectation.max, self.expectation.equals
+        if equals is not None:
+            return str(equals).lower()
+        if low is None:
+            return f"<= {high:g}"
+        return f">= {low:g}" if high is None else f"{low:g} .. {high:g}"
+
+
+def check_expectations(scenario: Scenario, metrics: Mapping[str, float | bool]) -> list[Verdict]:
+    """The verdict on every expectation of a scenario that applies to its plant, in order."""
+    return [
+        Verdict(expected, metrics.get(expected.metric))
+        for expected in scenario.expect
+        if expected.plant in {None, scenario.simulation.plant}
+    ]

@@ -12,8 +12,8 @@ import numpy as np
 
 from tiltsim.engines.base import EngineName
 from tiltsim.errors import InputError
-from tiltsim.flight.end import End, EndKind
 from tiltsim.flight.flight import Flight
+from tiltsim.flight.metrics import End, EndKind
 from tiltsim.laws.assembling import assemble
 from tiltsim.scenario.library import check_limits
 from tiltsim.scenario.loading import parse_scenario, without_none

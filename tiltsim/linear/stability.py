@@ -19,7 +19,7 @@ from tiltsim.linear.modes import KINDS, Mode, exponents, is_stable, modes_of, sp
 from tiltsim.linear.newton import ERROR
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.scenario import Scenario
-from tiltsim.system.progress import check_function
+from tiltsim.system.arguments import check_function
 from tiltsim.system.text import short_repr
 from tiltsim_controllers.mathematics.scalar import Floats
 

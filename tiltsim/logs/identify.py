@@ -16,14 +16,14 @@ import numpy as np
 
 from tiltsim.arrays.jax_programs import require_jax
 from tiltsim.errors import InputError
-from tiltsim.flight.vectors import VECTORS
+from tiltsim.flight.flight import VECTORS
 from tiltsim.logs.log import UNITS, Log
 from tiltsim.logs.model import FACTORS, LoggedVehicle, Parameter
 from tiltsim.logs.reading import read_log
 from tiltsim.logs.windows import INITIAL, MEASURED, Problem, windows_of
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.scenario import Scenario
-from tiltsim.system.numbers import is_finite
+from tiltsim.system.arguments import is_finite
 from tiltsim.system.text import html_table, short_repr
 from tiltsim_controllers.mathematics.scalar import Floats
 

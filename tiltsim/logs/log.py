@@ -16,7 +16,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from tiltsim.errors import InputError
-from tiltsim.flight.vectors import ColumnsOverTime
+from tiltsim.flight.flight import ColumnsOverTime
 from tiltsim.flight.writing import FLIGHT
 from tiltsim.models.vehicle_parts import MAX_ROTORS
 from tiltsim.system.files import is_file, is_folder, prepare_folder, replacing

@@ -16,8 +16,8 @@ from pydantic import Field, ValidationError
 from scipy.spatial.transform import Rotation
 
 from tiltsim.errors import InputError
+from tiltsim.flight.flight import VECTORS
 from tiltsim.flight.reading import flight_file
-from tiltsim.flight.vectors import VECTORS
 from tiltsim.logs import formats
 from tiltsim.logs.formats import Signals
 from tiltsim.logs.log import LOG_SUFFIXES, UNITS, Log

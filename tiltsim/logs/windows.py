@@ -14,7 +14,7 @@ from tiltsim.arrays.jax_programs import InJax
 from tiltsim.errors import InputError
 from tiltsim.logs.log import Log
 from tiltsim.logs.model import LoggedMotion, LoggedVehicle, Parameter, numbers_of
-from tiltsim.system.numbers import is_finite
+from tiltsim.system.arguments import is_finite
 from tiltsim.system.text import short_repr
 from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.vehicle.rotors import TiltOfRotor, tilts_of

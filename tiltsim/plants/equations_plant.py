@@ -10,8 +10,7 @@ import numpy as np
 from tiltsim.closed_loop.assembly import Assembly, program_key
 from tiltsim.engines.base import EngineName
 from tiltsim.engines.steppers import Integrated, Layout, NativeStepper, PythonStepper, observation
-from tiltsim.plants.engine_choice import choose_engine
-from tiltsim.plants.plant import Plant
+from tiltsim.plants.plant import Plant, choose_engine
 from tiltsim_controllers.mathematics.scalar import Floats
 
 if TYPE_CHECKING:

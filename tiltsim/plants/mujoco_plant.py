@@ -24,10 +24,8 @@ from tiltsim.engines.base import EngineName, vectors_of
 from tiltsim.engines.control import control_callback, control_step, make_callback
 from tiltsim.engines.programs import Recorder
 from tiltsim.models.cables import switch
-from tiltsim.plants.engine_choice import choose_engine
-from tiltsim.plants.flight_model import evaluations_per_step, flight_model
-from tiltsim.plants.plant import Plant
-from tiltsim.plants.start_of_contact import check_start
+from tiltsim.plants.flight_model import check_start, evaluations_per_step, flight_model
+from tiltsim.plants.plant import Plant, choose_engine
 from tiltsim.scenario.interaction import objects_of
 from tiltsim.vehicles.rotorcraft.others import motion_at_start
 from tiltsim_controllers.mathematics.scalar import Floats

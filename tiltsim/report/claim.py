@@ -10,7 +10,7 @@ from math import isfinite
 from pathlib import Path
 from typing import Final, TypeAlias
 
-from tiltsim.flight.expectations import Verdict
+from tiltsim.flight.metrics import Verdict
 from tiltsim.report.statement import CHAPTER, Origin, Statement, slug
 from tiltsim.scenario.expectation import Expectation
 from tiltsim.scenario.metric_names import METRICS

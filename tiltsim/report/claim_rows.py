@@ -10,7 +10,7 @@ from math import isfinite
 from pathlib import Path
 from typing import Final
 
-from tiltsim.flight.expectations import Verdict, check_expectations
+from tiltsim.flight.metrics import Verdict, check_expectations
 from tiltsim.report.claim import (
     AnalysisClaim,
     Claim,

@@ -15,8 +15,8 @@ from tiltsim.errors import InputError
 from tiltsim.scenario.controller import OwnFunctionController
 from tiltsim.scenario.messages import show
 from tiltsim.scenario.scenario import Scenario
+from tiltsim.system.arguments import true_or_false
 from tiltsim.system.files import digest, is_file
-from tiltsim.system.numbers import true_or_false
 from tiltsim.system.text import error_text
 
 VARIABLE: Final = "TILTSIM_TRUST"

@@ -24,7 +24,7 @@ from tiltsim.scenario.time_table import (
     reference_columns_among,
     rows_of_columns,
 )
-from tiltsim.system.numbers import is_finite, real_array
+from tiltsim.system.arguments import is_finite, real_array
 from tiltsim.system.text import short_repr
 from tiltsim_controllers.mathematics.scalar import Values
 

@@ -12,8 +12,8 @@ from pydantic import Field, PrivateAttr
 from tiltsim.errors import InputError
 from tiltsim.scenario.library import MAX_FILE_SIZE, MAX_ROWS, read_text
 from tiltsim.scenario.table import Table, default
+from tiltsim.system.arguments import real_array
 from tiltsim.system.files import exists, is_file
-from tiltsim.system.numbers import real_array
 from tiltsim.system.parquet import open_parquet
 from tiltsim.system.text import short_repr
 from tiltsim_controllers.mathematics.attitude import euler_angles

@@ -15,12 +15,10 @@ import numpy as np
 from tiltsim.arrays.flying import Batch, Recording, compile_batch, course_of, double_precision
 from tiltsim.arrays.jax_programs import require_jax
 from tiltsim.closed_loop.assembly import Assembly, program_key
-from tiltsim.flight.end import End
-from tiltsim.flight.flight import Flight
+from tiltsim.flight.flight import METRICS_ROWS, Flight, completed_flights
+from tiltsim.flight.metrics import End
 from tiltsim.plants.equations_plant import initial_state
-from tiltsim.simulation.completed_flights import METRICS_ROWS, completed_flights
-from tiltsim.simulation.monitor import TerminationMonitor
-from tiltsim.simulation.simulate import simulate_assembly
+from tiltsim.simulation.simulate import TerminationMonitor, simulate_assembly
 from tiltsim_controllers.mathematics.records import flatten, record_size
 from tiltsim_controllers.mathematics.scalar import Floats
 

@@ -13,10 +13,10 @@ from warnings import warn
 
 from tiltsim.closed_loop.assembly import Assembly, program_key
 from tiltsim.errors import InputError
-from tiltsim.flight.end import End
 from tiltsim.flight.flight import Flight
+from tiltsim.flight.metrics import End
 from tiltsim.laws.assembling import assemble
-from tiltsim.plants.engine_choice import native_pays_off
+from tiltsim.plants.plant import native_pays_off
 from tiltsim.scenario.loading import as_scenario
 from tiltsim.scenario.own_code import require_trust
 from tiltsim.scenario.scenario import Scenario
@@ -24,9 +24,8 @@ from tiltsim.scenario.vehicle import VehicleTable
 from tiltsim.simulation.lane_batch import LaneBatch, lanes_for
 from tiltsim.simulation.native_batch import NativeBatch
 from tiltsim.simulation.simulate import simulate_assembly
-from tiltsim.system.numbers import true_or_false, whole_number
+from tiltsim.system.arguments import Report, check_progress, reported, true_or_false, whole_number
 from tiltsim.system.processes import ProcessDiedError, in_order, in_processes
-from tiltsim.system.progress import Report, check_progress, reported
 from tiltsim.system.text import short_repr
 
 PARTS: Final = 4

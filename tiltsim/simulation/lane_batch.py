@@ -18,12 +18,10 @@ from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.engines.machine_code import widest
 from tiltsim.engines.programs import SAMPLES, TERMINATED, recorder_head
 from tiltsim.engines.steppers import LaneStepper
-from tiltsim.flight.end import End
-from tiltsim.flight.flight import Flight
+from tiltsim.flight.flight import METRICS_ROWS, Flight, completed_flights
+from tiltsim.flight.metrics import End
 from tiltsim.plants.equations_plant import EquationsPlant, initial_state, integrated, layout_of
-from tiltsim.simulation.completed_flights import METRICS_ROWS, completed_flights
-from tiltsim.simulation.monitor import TerminationMonitor
-from tiltsim.simulation.simulate import fly_intervals, intervals_of
+from tiltsim.simulation.simulate import TerminationMonitor, fly_intervals, intervals_of
 from tiltsim_controllers.mathematics.scalar import Floats
 
 MEMORY: Final = 256 * 2**20

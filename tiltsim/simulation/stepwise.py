@@ -9,22 +9,19 @@ import mujoco
 import numpy as np
 
 from tiltsim.errors import InputError
-from tiltsim.flight.end import End
 from tiltsim.flight.flight import Flight
+from tiltsim.flight.metrics import End
 from tiltsim.laws.assembling import assemble
-from tiltsim.plants.built_in_command import built_in_command
 from tiltsim.plants.command import Command, Controller, ControllerError, Observation
-from tiltsim.plants.factory import make_plant
 from tiltsim.plants.flight_model import flight_model
 from tiltsim.plants.mujoco_plant import MujocoPlant
-from tiltsim.plants.observing import Observer
+from tiltsim.plants.observing import Observer, built_in_command
 from tiltsim.plants.plant import take_sample
 from tiltsim.plants.user_controller import UserControlledPlant
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.scenario import Scenario
-from tiltsim.simulation.monitor import TerminationMonitor
-from tiltsim.simulation.simulate import failure, fly_chunk
-from tiltsim.system.numbers import whole_number
+from tiltsim.simulation.simulate import TerminationMonitor, failure, fly_chunk, make_plant
+from tiltsim.system.arguments import whole_number
 from tiltsim_controllers.mathematics.scalar import Floats
 
 

@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 
 from tiltsim.errors import InputError
 from tiltsim.exit_codes import DONE, EXPECTATION_FAILED, INVALID_INPUT, VEHICLE_LOST
-from tiltsim.flight.expectations import Verdict, check_expectations
+from tiltsim.flight.metrics import Verdict, check_expectations
 from tiltsim.laws.assembling import loop_of
 from tiltsim.resources import shipped_folder
 from tiltsim.scenario.library import (

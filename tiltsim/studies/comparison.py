@@ -11,7 +11,7 @@ import numpy as np
 from tiltsim.errors import InputError
 from tiltsim.flight.flight import Flight
 from tiltsim.laws.assembling import assemble
-from tiltsim.plants.engine_choice import MIN_STEPS_TO_COMPILE
+from tiltsim.plants.plant import MIN_STEPS_TO_COMPILE
 from tiltsim.scenario.controller import CONTROLLERS
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.messages import choose

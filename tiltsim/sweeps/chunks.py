@@ -13,9 +13,9 @@ from typing import Any, Final, NamedTuple
 
 from tiltsim.engines.base import EngineName
 from tiltsim.errors import InputError
-from tiltsim.flight.expectations import Verdict
 from tiltsim.flight.flight import Flight
-from tiltsim.plants.engine_choice import with_engine
+from tiltsim.flight.metrics import Verdict
+from tiltsim.plants.plant import with_engine
 from tiltsim.scenario.own_code import require_trust, with_trust
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.simulation.batch import fly

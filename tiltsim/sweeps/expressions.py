@@ -8,7 +8,7 @@ from functools import lru_cache
 from typing import Any, Final
 
 from tiltsim.scenario.messages import did_you_mean
-from tiltsim.system.numbers import is_number
+from tiltsim.system.arguments import is_number
 
 _BINARY: Final[dict[type[ast.operator], Callable[[Any, Any], Any]]] = {
     ast.Add: operator.add,

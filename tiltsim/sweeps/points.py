@@ -1,30 +1,106 @@
-"""The points of a sweep: which there are, in which order, and which scenario each one flies.
+"""The points of a sweep: which there are, in which order, and which scenario each one flies."""
 
-Everything follows from the `SweepDefinition`, so that processes and machines that share it agree on
-every point.
-"""
-
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from copy import deepcopy
-from functools import cached_property
+from functools import cache, cached_property
 from math import prod
-from typing import Any, Final, cast
+from typing import Any, Final, NamedTuple, cast
 
 import numpy as np
+from pydantic import BaseModel, ValidationError
 
 from tiltsim.errors import InputError
-from tiltsim.scenario.documents import merge, value_at
+from tiltsim.scenario.documents import merge, split_key, value_at, with_value
 from tiltsim.scenario.loading import apply_overrides, parse_scenario
-from tiltsim.scenario.messages import show
+from tiltsim.scenario.messages import InvalidValueError, show
 from tiltsim.scenario.metric_names import METRICS, WALL_CLOCK_METRICS
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.scenario.vehicle import MOMENTS, VehicleTable
 from tiltsim.sweeps import tables
 from tiltsim.sweeps.definition import SweepDefinition
 from tiltsim.sweeps.expressions import evaluate
-from tiltsim.sweeps.similar import SimilarScenarios
-from tiltsim.system.numbers import is_number
+from tiltsim.system.arguments import is_number
 from tiltsim_controllers.mathematics.scalar import Floats
+
+Document = dict[str, Any]
+
+
+class _Known(NamedTuple):
+    """A scenario with the values by key that it was made from."""
+
+    values: Mapping[str, Any]
+    document: Document
+    scenario: Scenario
+
+
+class SimilarScenarios:
+    """Makes scenarios from documents; one of each kind is made in full.
+
+    Args:
+        address: Name of the documents in messages.
+    """
+
+    def __init__(self, address: str) -> None:
+        self._address = address
+        self._known: dict[object, _Known] = {}
+
+    def scenario(
+        self, kind: object, values: Mapping[str, Any], document: Callable[[], Document]
+    ) -> Scenario:
+        """A scenario, from values by dotted key. Raises `InputError` if it is not valid.
+
+        ``kind`` is equal for documents in which only ``values`` differ.
+        """
+        known = self._known.get(kind)
+        if known is not None:
+            changes = _changes(known.values, values)
+            similar = None if changes is None else _similar(known, changes)
+            if similar is not None:
+                return similar
+        made = document()
+        scenario = parse_scenario(made, self._address)
+        self._known.setdefault(kind, _Known(values, made, scenario))
+        return scenario
+
+
+def _changes(before: Mapping[str, Any], now: Mapping[str, Any]) -> dict[str, Any] | None:
+    """The values that changed; None if one is no number or list of numbers as before."""
+    # 0.0 equals -0.0 and 1, but a flight's scenario is the one that its row names.
+    changed = {key: value for key, value in now.items() if repr(value) != repr(before.get(key))}
+    if before.keys() != now.keys():
+        return None
+    return changed if all(_alike(before[key], value) for key, value in changed.items()) else None
+
+
+def _alike(first: Any, second: Any) -> bool:
+    if isinstance(first, list) and isinstance(second, list):
+        return len(first) == len(second) and all(map(_alike, first, second))
+    return type(first) is type(second) and is_number(first)
+
+
+def _similar(known: _Known, changes: Mapping[str, Any]) -> Scenario | None:
+    """A known scenario with other numbers; None if it is not valid, or its tables have no keys."""
+    changed: Document = {}
+    for key, value in changes.items():
+        name, *path = _split(key)
+        if not isinstance(getattr(known.scenario, str(name), None), BaseModel):
+            return None
+        table = changed.get(str(name), known.document[str(name)])
+        changed[str(name)] = with_value(table, path, value)
+    try:
+        tables = {
+            name: type(getattr(known.scenario, name)).model_validate(table)
+            for name, table in changed.items()
+        }
+        scenario = known.scenario.model_copy(update=tables)
+        scenario.require_consistency()
+    except (ValidationError, InvalidValueError):  # in words of the whole document: by the caller
+        return None
+    return scenario
+
+
+_split: Final = cache(split_key)
+
 
 MAX_POINTS: Final = 10_000_000
 LARGEST_CHUNK: Final = 32

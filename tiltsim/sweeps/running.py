@@ -14,18 +14,16 @@ from typing import Any, Final, cast
 
 from tiltsim.engines.base import EngineName
 from tiltsim.errors import InputError
-from tiltsim.plants.engine_choice import MIN_STEPS_TO_COMPILE
+from tiltsim.plants.plant import MIN_STEPS_TO_COMPILE
 from tiltsim.scenario.own_code import is_trusted, require_trust, with_trust
 from tiltsim.sweeps.chunks import ChunkWork, FinishedChunk
-from tiltsim.sweeps.dataset import SweepResults, load_results
+from tiltsim.sweeps.dataset import SweepResults, load_results, open_sweep_folder
 from tiltsim.sweeps.definition import SweepDefinition
-from tiltsim.sweeps.folder import open_sweep_folder
 from tiltsim.sweeps.loading import check_points, load_sweep
 from tiltsim.sweeps.points import SweepPoints
 from tiltsim.sweeps.rows import installed_versions
-from tiltsim.system.numbers import true_or_false, whole_number
+from tiltsim.system.arguments import Report, reported, true_or_false, whole_number
 from tiltsim.system.processes import ProcessDiedError, in_processes
-from tiltsim.system.progress import Report, reported
 from tiltsim.system.text import short_repr
 
 MAX_DEATHS: Final = 3
@@ -47,7 +45,7 @@ def run_sweep(
 
     Args:
         definition: The sweep, from `tiltsim.sweeps.loading.load_sweep`.
-        out: Its folder; see `tiltsim.sweeps.folder`.
+        out: Its folder; see `tiltsim.sweeps.dataset`.
         jobs: Processes on this machine.
         cluster: Address of a Dask scheduler whose workers fly instead.
         report: Called with the number of finished rows, at the start and after every chunk.

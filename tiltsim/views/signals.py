@@ -15,8 +15,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from tiltsim.closed_loop.assembly import Assembly
-from tiltsim.flight.flight import Flight
-from tiltsim.flight.vectors import VECTORS, components
+from tiltsim.flight.flight import VECTORS, Flight, components
 from tiltsim.laws.law import SUPERVISION
 from tiltsim.scenario.vehicle import VehicleTable
 from tiltsim.system.text import Quantity, in_words, subscript

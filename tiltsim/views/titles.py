@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from tiltsim.closed_loop.assembly import Assembly
-from tiltsim.flight.end import End
 from tiltsim.flight.flight import Flight
+from tiltsim.flight.metrics import End
 from tiltsim.laws.law import SUPERVISION
 from tiltsim.scenario.documents import leaves
 from tiltsim.scenario.linearizing_controllers import AttitudeAltitudeController

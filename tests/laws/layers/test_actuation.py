@@ -9,9 +9,9 @@ import tiltsim
 from tests.laws.restarting import assert_restarts
 from tiltsim.errors import InputError
 from tiltsim.laws.assembling import LOOPS, assemble, loop_of
-from tiltsim.plants.factory import make_plant
 from tiltsim.scenario.loading import merge
 from tiltsim.scenario.scenario import plan_flight
+from tiltsim.simulation.simulate import make_plant
 from tiltsim_controllers.analysis.stability import is_hurwitz
 from tiltsim_controllers.laws.gains import GAIN_SETS
 

@@ -13,7 +13,7 @@ from tests.laws.restarting import assert_restarts
 from tiltsim.engines.control import control_callback
 from tiltsim.errors import InputError
 from tiltsim.laws.assembling import LOOPS, assemble, loop_of
-from tiltsim.plants.factory import make_plant
+from tiltsim.simulation.simulate import make_plant
 from tiltsim_controllers.vehicle.air import dryden_velocity, ground_effect
 
 DRAG = {"linear": [0.2, 0.2, 0.1], "area": [0.01, 0.01, 0.02]}

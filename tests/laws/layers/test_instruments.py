@@ -12,8 +12,8 @@ from tiltsim.engines.control import control_callback
 from tiltsim.engines.sample_evaluation import evaluate_over_samples
 from tiltsim.errors import InputError
 from tiltsim.laws.assembling import assemble
-from tiltsim.plants.factory import make_plant
 from tiltsim.scenario.instruments import ImuTable
+from tiltsim.simulation.simulate import make_plant
 from tiltsim_controllers.code.arrays import traceable
 from tiltsim_controllers.mathematics.attitude import rotation_matrix
 from tiltsim_controllers.vehicle import instruments

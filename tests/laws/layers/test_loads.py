@@ -11,8 +11,8 @@ from tests.laws.restarting import assert_restarts
 from tests.laws.test_multirotor import document
 from tests.refusals import refusal
 from tiltsim.laws.assembling import assemble
-from tiltsim.plants.factory import make_plant
 from tiltsim.scenario.loading import merge
+from tiltsim.simulation.simulate import make_plant
 
 PUSH = {"type": "force", "value": [0.6, -0.3, 0.2], "point": [0.1, 0.05, 0.02]}
 TWIST = {"type": "torque", "value": [0.004, -0.003, 0.002], "frame": "body", "start": 0.1}

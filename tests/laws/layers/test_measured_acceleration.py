@@ -29,9 +29,9 @@ from tiltsim.laws.assembling import LOOPS, assemble, loop_of
 from tiltsim.laws.layers.instruments import plant_acceleration_of
 from tiltsim.laws.layers.on_equations import read_actuators
 from tiltsim.models.hover import hover_speeds
-from tiltsim.plants.factory import make_plant
 from tiltsim.resources import shipped_folder
 from tiltsim.scenario.time_steps import _reaction_gains
+from tiltsim.simulation.simulate import make_plant
 from tiltsim_controllers.analysis.singularity import hover_rotor_speeds
 from tiltsim_controllers.code.arrays import as_arrays
 from tiltsim_controllers.vehicle.parameters import SPIN

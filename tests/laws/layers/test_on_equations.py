@@ -13,8 +13,8 @@ from tiltsim.equations.actuator_level import actuator_plant
 from tiltsim.errors import InputError
 from tiltsim.laws import assembling
 from tiltsim.laws.assembling import LOOPS, assemble, loop_of
-from tiltsim.plants.factory import make_plant
 from tiltsim.scenario.loading import merge
+from tiltsim.simulation.simulate import make_plant
 from tiltsim_controllers.code.arrays import traceable, xp
 from tiltsim_controllers.laws.yaw_position import gyroscopic_acceleration
 

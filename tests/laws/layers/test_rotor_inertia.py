@@ -12,10 +12,10 @@ from tiltsim.errors import InputError
 from tiltsim.laws.assembling import LOOPS, assemble, loop_of
 from tiltsim.plants.command import Command, check_command
 from tiltsim.plants.commanded_plant import CommandedPlant
-from tiltsim.plants.factory import make_plant
 from tiltsim.plants.flight_model import build_model
 from tiltsim.resources import shipped_folder
 from tiltsim.scenario.loading import merge
+from tiltsim.simulation.simulate import make_plant
 from tiltsim.vehicles.rotorcraft.layout import Layout
 from tiltsim_controllers.vehicle.craft import accelerations_within_limits
 from tiltsim_controllers.vehicle.parameters import PRESETS

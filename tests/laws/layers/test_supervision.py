@@ -8,8 +8,8 @@ import pytest
 import tiltsim
 from tests.refusals import refusal
 from tiltsim.laws.assembling import assemble
-from tiltsim.plants.factory import make_plant
 from tiltsim.simulation.batch import fly
+from tiltsim.simulation.simulate import make_plant
 from tiltsim_controllers.analysis.singularity import determinant
 from tiltsim_controllers.vehicle.parameters import PRESETS
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from tiltsim.errors import InputError
-from tiltsim.flight.vectors import VECTORS, components
+from tiltsim.flight.flight import VECTORS, components
 from tiltsim.logs.identify import Estimate, Replay
 from tiltsim.logs.log import UNITS, Log
 from tiltsim.system.text import in_words

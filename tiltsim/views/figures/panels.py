@@ -9,8 +9,7 @@ from typing import Any, Final
 import numpy as np
 from matplotlib.axes import Axes
 
-from tiltsim.flight.flight import Flight
-from tiltsim.flight.vectors import VECTORS
+from tiltsim.flight.flight import VECTORS, Flight
 from tiltsim.laws.law import SUPERVISION
 from tiltsim.scenario.gait import PenguinGait
 from tiltsim.system.text import Quantity

@@ -13,8 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from tiltsim.errors import InputError
-from tiltsim.flight.flight import Flight, as_flights
-from tiltsim.flight.vectors import VECTORS, components
+from tiltsim.flight.flight import VECTORS, Flight, as_flights, components
 from tiltsim.scenario.messages import choose
 from tiltsim.system.text import short_repr
 from tiltsim.views.figures import layout, style

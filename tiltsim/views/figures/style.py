@@ -21,8 +21,8 @@ from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 
 from tiltsim.errors import InputError
+from tiltsim.system.arguments import is_finite
 from tiltsim.system.files import replacing
-from tiltsim.system.numbers import is_finite
 from tiltsim.system.text import short_repr, shortened
 from tiltsim_controllers.mathematics.scalar import Floats
 

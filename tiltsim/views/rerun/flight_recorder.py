@@ -13,8 +13,8 @@ import numpy.typing as npt
 import rerun as rr
 
 from tiltsim.closed_loop.assembly import Assembly
-from tiltsim.flight.end import End
 from tiltsim.flight.flight import Flight
+from tiltsim.flight.metrics import End
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.views.attitude_plane import (
     HALF_WIDTH,

@@ -10,8 +10,8 @@ from uuid import uuid4
 
 import numpy as np
 
-from tiltsim.flight.end import End
 from tiltsim.flight.flight import Flight
+from tiltsim.flight.metrics import End
 from tiltsim.laws.assembling import assemble
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.system.processes import ProcessDiedError, answer, begin, give

@@ -12,9 +12,8 @@ from typing import TYPE_CHECKING, Any, Final
 from tiltsim.errors import InputError
 from tiltsim.flight.flight import Flight
 from tiltsim.scenario.messages import choose
+from tiltsim.system.arguments import Report, is_finite, reported
 from tiltsim.system.files import prepare_file
-from tiltsim.system.numbers import is_finite
-from tiltsim.system.progress import Report, reported
 from tiltsim.system.text import short_repr
 from tiltsim.views.video import prefer_offscreen_gl
 
