@@ -89,7 +89,7 @@ def test_the_balanced_gait_points_its_force_into_the_gust(capsys):
         ("1,2", "must be three numbers"),
         ("a,b,c", "must be three numbers"),
         ("nan,0,0", "must be finite"),
-        ("0,9,0", "out of reach"),
+        ("0,20,0", "out of reach"),
         ("0,0,10", "must be smaller"),
     ],
 )

@@ -187,27 +187,6 @@ class ActuatorPlant(NamedTuple):
     finish: Callable[[Any, Any], Any] | None = None
 
 
-class PlantForm(NamedTuple):
-    """The equations of a plant; all numbers of the vehicle are data.
-
-    Attributes:
-        attitude: Representation of the attitude in the state.
-        layout: Places of the parts of the motion.
-        tilt_of_rotor, spins: See `tiltsim.closed_loop.loop.ClosedLoop`.
-        vehicle: The type of the vehicle's parameters.
-        gyroscopic: Factor of the gyroscopic torque: 0 or 1.
-        has_limits: Whether the rotors' speeds or the tilts have limits.
-    """
-
-    attitude: Attitude
-    layout: StateLayout
-    tilt_of_rotor: TiltOfRotor
-    spins: Values
-    vehicle: Any
-    gyroscopic: float
-    has_limits: bool
-
-
 def servo_accelerations(
     craft: Craft, ctrl: Any, thrusts: Any, tilts: Any, rates: Any, loads: Any, mechanics: Any
 ) -> Any:
@@ -259,15 +238,31 @@ def _stopped(motion: Motion, stop: Any) -> Motion:
 
 
 @cache
-def plant_of(form: PlantForm) -> ActuatorPlant:
-    """The plant of a form."""
-    layout, tilt_of_rotor = form.layout, form.tilt_of_rotor
+def plant_of(
+    attitude: Attitude,
+    layout: StateLayout,
+    tilt_of_rotor: TiltOfRotor,
+    spins: Values,
+    vehicle: Any,
+    *,
+    gyroscopic: float,
+    has_limits: bool,
+) -> ActuatorPlant:
+    """The equations of a plant; all numbers of the vehicle are data.
+
+    Args:
+        attitude, layout: Representation of the attitude, and places of the parts of the motion.
+        tilt_of_rotor, spins: See `tiltsim.closed_loop.loop.ClosedLoop`.
+        vehicle: The type of the vehicle's parameters.
+        gyroscopic: Factor of the gyroscopic torque: 0 or 1.
+        has_limits: Whether the rotors' speeds or the tilts have limits.
+    """
     rotors, tilts = len(tilt_of_rotor), tilts_of(tilt_of_rotor)
-    limit_speeds = limit_speeds_of(form.spins, layout.size)
+    limit_speeds = limit_speeds_of(spins, layout.size)
 
     def qpos(state: Any) -> Any:
         motion = layout.split(state)
-        return joined((motion.position, form.attitude.quaternion(motion.attitude), motion.tilts))
+        return joined((motion.position, attitude.quaternion(motion.attitude), motion.tilts))
 
     def qvel(state: Any) -> Any:
         motion = layout.split(state)
@@ -275,22 +270,21 @@ def plant_of(form: PlantForm) -> ActuatorPlant:
 
     def rates(state: Any, ctrl: Any, loads: Any, mechanics: Any, disturbance: Any) -> Any:
         motion, craft = layout.split(state), craft_of(mechanics.vehicle, tilt_of_rotor)
-        thrusts, spins = ctrl[tilts : tilts + rotors], xp.array(form.spins)
+        thrusts = ctrl[tilts : tilts + rotors]
         # The controls are s varpi |varpi| with the spins s, the map's factors are without s.
-        wrench = wrench_map(craft.rotors, motion.tilts) @ (spins * thrusts) + loads[:WRENCH_SIZE]
-        rotation = form.attitude.rotation(motion.attitude)
+        w, pods = xp.array(spins) * thrusts, (motion.tilts, motion.tilt_rates)
+        wrench = wrench_map(craft.rotors, motion.tilts) @ w + loads[:WRENCH_SIZE]
+        rotation = attitude.rotation(motion.attitude)
         acceleration, turning = accelerations(
-            craft.body, rotation, motion.omega, wrench, disturbance, form.gyroscopic
+            craft.body, rotation, motion.omega, wrench, disturbance, gyroscopic
         )
         moved = Motion(
             position=motion.velocity,
-            attitude=form.attitude.rates(motion.attitude, motion.omega),
+            attitude=attitude.rates(motion.attitude, motion.omega),
             velocity=acceleration,
             omega=turning,
             tilts=motion.tilt_rates,
-            tilt_rates=servo_accelerations(
-                craft, ctrl, thrusts, motion.tilts, motion.tilt_rates, loads, mechanics
-            ),
+            tilt_rates=servo_accelerations(craft, ctrl, thrusts, *pods, loads, mechanics),
         )
         return layout.joined(moved)
 
@@ -310,50 +304,45 @@ def plant_of(form: PlantForm) -> ActuatorPlant:
         angles, angle_rates = initial_tilts(plan) if tilts else ((), ())
         vectors = start.position, start.attitude, start.velocity, start.angular_velocity
         motion = Motion(*map(xp.array, (*vectors, angles, angle_rates)))
-        attitude = form.attitude.of_euler(motion.attitude)
-        return (*layout.joined(motion._replace(attitude=attitude)),)
+        return (*layout.joined(motion._replace(attitude=attitude.of_euler(motion.attitude))),)
 
     return ActuatorPlant(
         layout.size,
         qpos,
         qvel,
         rates,
-        project_onto_limits if form.has_limits else None,
+        project_onto_limits if has_limits else None,
         initial,
-        mechanics_record(form.vehicle, tilts),
-        normalized if form.attitude is QUATERNION else None,
+        mechanics_record(vehicle, tilts),
+        normalized if attitude is QUATERNION else None,
     )
 
 
 def actuator_plant(loop: ClosedLoop) -> ActuatorPlant:
     """The thesis's equations (ch. 2, Eq. 15; ch. 3, Eqs. 1-7) of a model."""
     is_quadrotor = loop.model == "quadrotor"
-    attitude, tilts = EULER if is_quadrotor else MATRIX, layout_of(loop).tilts
+    attitude = EULER if is_quadrotor else MATRIX
     return plant_of(
-        PlantForm(
-            attitude,
-            as_printed(attitude, tilts),
-            tilt_of_rotor(loop),
-            loop.spins,
-            rotors_record(loop),
-            gyroscopic=float(is_quadrotor),
-            has_limits=not is_quadrotor,  # whose rotors make any thrust
-        )
+        attitude,
+        as_printed(attitude, layout_of(loop).tilts),
+        tilt_of_rotor(loop),
+        loop.spins,
+        rotors_record(loop),
+        gyroscopic=float(is_quadrotor),
+        has_limits=not is_quadrotor,  # whose rotors make any thrust
     )
 
 
 def rigid_body(scenario: Scenario) -> ActuatorPlant:
     """The rigid body of a scenario's rotorcraft."""
     vehicle = scenario.any_rotorcraft
-    has_limits = vehicle.has_rotor_limits or vehicle.tilt_servo.max_angle is not None
+    record: Any = type(true_rotors(scenario))
     return plant_of(
-        PlantForm(
-            QUATERNION,
-            as_in_mujoco(vehicle.tilt_count if scenario.vehicle.has_tilting_rotors else 0),
-            tuple(map(vehicle.tilt_of_rotor, range(1, vehicle.rotor_count + 1))),
-            vehicle.spins,
-            type(true_rotors(scenario)),
-            gyroscopic=1.0,
-            has_limits=has_limits,
-        )
+        QUATERNION,
+        as_in_mujoco(vehicle.tilt_count if scenario.vehicle.has_tilting_rotors else 0),
+        tuple(map(vehicle.tilt_of_rotor, range(1, vehicle.rotor_count + 1))),
+        vehicle.spins,
+        record,
+        gyroscopic=1.0,
+        has_limits=vehicle.has_rotor_limits or vehicle.tilt_servo.max_angle is not None,
     )

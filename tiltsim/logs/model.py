@@ -150,12 +150,12 @@ def numbers_of(free: tuple[tuple[str, str], ...], known: Any, theta: Any) -> dic
         first += size
     stretch = jnp.sqrt(values["inertia"] / jnp.diag(known["inertia"]))
     inertia = known["inertia"] * jnp.outer(stretch, stretch)
-    places = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
-    entries = [m[place] for m in (inertia, jnp.linalg.inv(inertia)) for place in places]
     thrust, torque = (values[name] / known["nominal"][name] for name in ("thrust", "torque"))
     parts = zip(known["pushes"], known["turns"], strict=True)
     return {
-        "body": Body(values["mass"][0], known["gravity"], *entries),
+        "body": Body(
+            values["mass"][0], known["gravity"], inertia.ravel(), jnp.linalg.inv(inertia).ravel()
+        ),
         "rotors": tuple((thrust * push + torque * turn).ravel() for push, turn in parts),
         "center": values["center"],
         "drag": Drag(values["resistance"], known["area"], known["density"]),

@@ -8,8 +8,8 @@ from pydantic import Field, model_validator
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.table import Many, NonNegative, Positive, Table, default, example
 from tiltsim_controllers.analysis.stability import ErrorLoop, linear_loop
+from tiltsim_controllers.analysis.two_color_map import red_residual
 from tiltsim_controllers.code.arrays import is_known
-from tiltsim_controllers.gaits.colors import determinant_at_clearance
 from tiltsim_controllers.laws.gains import (
     GAIN_SETS,
     Gains,
@@ -94,7 +94,9 @@ class SupervisorTable(Table):
         elif self.strategy == "return_to_red" and all(
             map(is_known, (ratio := drag_ratio(vehicle), self.clearance, self.min_determinant))
         ):
-            delta, reached = atan(ratio), determinant_at_clearance(self.clearance, ratio)
+            delta = atan(ratio)
+            corner = delta - self.clearance  # next to P, of the allowed region
+            reached = float(red_residual(corner, -corner, vehicle))
             if self.clearance >= delta:
                 reason = f"must be below {delta:.4g}, which the untilted vehicle keeps"
                 raise self.mistake("clearance", reason)

@@ -14,7 +14,6 @@ Two published findings are not reproduced: the body accelerations of +-2 m/s^2 (
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations, product
 from typing import Final, NamedTuple
@@ -169,10 +168,14 @@ def attainable_torque_thrust(
         vertical_thrust: condition (slices of the figures), N; None for none
     """
     torque, force = _wrench(angles, vehicle)
+    given = [(torque[2], yaw_torque), (force[2], vertical_thrust)]
+    active = [(row, value) for row, value in given if value is not None]
+    conditions = (
+        np.array([row for row, _ in active]).reshape(-1, 4),
+        np.array([value for _, value in active], dtype=float),
+    )
     image = np.stack([torque[0], torque[1], force[2]])
-    labels = ("tau_L (N m)", "tau_M (N m)", "F_Z (N)")
-    conditions = [(torque[2], yaw_torque), (force[2], vertical_thrust)]
-    return _attainable(image, labels, conditions, speed_limits)
+    return _image_of_slice(image, (*TORQUES[:2], FORCES[2]), conditions, input_box(speed_limits))
 
 
 def attainable_accelerations(
@@ -185,8 +188,8 @@ def attainable_accelerations(
     """
     torque, force = _wrench(angles, vehicle)
     labels = ("a_X (m/s^2)", "a_Y (m/s^2)")
-    conditions = [(torque[2], 0.0), (force[2], HOVER_THRUST)]
-    return _attainable(force[:2] / vehicle.mass, labels, conditions, speed_limits)
+    conditions = np.stack([torque[2], force[2]]), np.array([0.0, HOVER_THRUST])
+    return _image_of_slice(force[:2] / vehicle.mass, labels, conditions, input_box(speed_limits))
 
 
 def _wrench(angles: ArrayLike, vehicle: Vehicle) -> tuple[Floats, Floats]:
@@ -194,18 +197,6 @@ def _wrench(angles: ArrayLike, vehicle: Vehicle) -> tuple[Floats, Floats]:
     per_force = vehicle.thrust_coefficient
     torque = torque_matrix(angles, vehicle) * (vehicle.arm_length * per_force)
     return torque, force_matrix(angles) * per_force
-
-
-def _attainable(
-    image: Floats,
-    labels: tuple[str, ...],
-    conditions: Sequence[tuple[Floats, float | None]],
-    speed_limits: tuple[float, float],
-) -> AttainableSet:
-    active = [(row, value) for row, value in conditions if value is not None]
-    rows = np.array([row for row, _ in active]).reshape(-1, 4)
-    values = np.array([value for _, value in active], dtype=float)
-    return _image_of_slice(image, labels, (rows, values), input_box(speed_limits))
 
 
 def attainable_forces(rotors: TiltedRotors) -> AttainableSet:

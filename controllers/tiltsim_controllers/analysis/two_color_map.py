@@ -182,17 +182,12 @@ def root_classes(roots: list[list[list[Root]]]) -> Counter[str]:
 def _classify(
     alpha_1: float, alpha_2: float, alpha_3: float, alpha_4: float, vehicle: Vehicle, same: float
 ) -> Root:
-    offset = 2.0 * delta(vehicle)
-    R = float(residuals((alpha_1, alpha_2, alpha_3, alpha_4), vehicle).R)
-    return Root(
-        alpha_1,
-        alpha_2,
-        alpha_3,
-        alpha_4,
-        R,
-        plane_3=_plane(alpha_3, alpha_1, offset - alpha_1, same),
-        plane_4=_plane(alpha_4, alpha_2, -offset - alpha_2, same),
+    offset, angles = 2.0 * delta(vehicle), (alpha_1, alpha_2, alpha_3, alpha_4)
+    planes = (
+        _plane(alpha_3, alpha_1, offset - alpha_1, same),
+        _plane(alpha_4, alpha_2, -offset - alpha_2, same),
     )
+    return Root(*angles, float(residuals(angles, vehicle).R), *planes)
 
 
 def _plane(angle: float, growing: float, falling: float, same: float) -> Literal["+", "-", "?"]:

@@ -22,7 +22,7 @@ angle by angle.
 
 from __future__ import annotations
 
-from math import atan, cos, sin
+from math import atan
 from typing import Any, Final
 
 from tiltsim_controllers.code.arrays import traceable, xp
@@ -85,17 +85,3 @@ def _limited(mean: Any, low: Any, high: Any) -> Any:
     below, above = mean[0] < low, mean[0] > high
     angle = xp.where(below, low, xp.where(above, high, mean[0]))
     return xp.hstack([angle, xp.where(below | above, 0.0, mean[1:])])
-
-
-def red_determinant(alpha_1: float, alpha_2: float, drag_ratio: float) -> float:
-    """``R`` on red (ch. 8, Eq. 7) of angles in rad, factored as above; 4 without tilt."""
-    delta = atan(drag_ratio)
-    u, v = alpha_1 - delta, alpha_2 + delta
-    beside_l = cos(delta) * sin(v - u) - 2.0 * sin(delta) * sin(u) * sin(v)
-    return 4.0 * cos(u) * cos(v) * beside_l / (cos(delta) * sin(2.0 * delta))
-
-
-def determinant_at_clearance(clearance: float, drag_ratio: float) -> float:
-    """``R`` at the corner next to P of the region that `nearest_red_angles` allows (rad)."""
-    angle = atan(drag_ratio) - clearance
-    return red_determinant(angle, -angle, drag_ratio)

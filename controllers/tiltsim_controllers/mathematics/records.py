@@ -70,8 +70,9 @@ def vector_of(length: int) -> type:
 
 if TYPE_CHECKING:
     Vector3 = Any
-else:
-    Vector3 = vector_of(3)  # the type of a field with three floats: an array in NumPy functions
+    Matrix3 = Any
+else:  # types of fields, which are arrays in NumPy functions
+    Vector3, Matrix3 = vector_of(3), vector_of(9)  # a matrix is given row by row
 
 
 def _take(kind: Any, values: Iterator[float]) -> Any:

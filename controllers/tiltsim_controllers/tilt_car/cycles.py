@@ -33,6 +33,7 @@ within the unit circle.
 from __future__ import annotations
 
 import itertools
+from collections.abc import Callable
 from dataclasses import dataclass
 from math import cos, exp, isclose, pi, sin, sqrt, tan
 from typing import Any, NamedTuple
@@ -40,6 +41,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from tiltsim_controllers.mathematics.scalar import Floats, Pair
+from tiltsim_controllers.tilt_car.planned_direction import lyapunov_candidate
 from tiltsim_controllers.tilt_car.third_derivative import null_space_input
 from tiltsim_controllers.tilt_car.vehicle import TiltCar, input_matrix, turn_per_tilt
 
@@ -82,20 +84,21 @@ def twist(speed_1: float, speed_2: float, car: TiltCar) -> float:
     Only if it were zero would the minimum-norm planes be tangent to surfaces (Frobenius), on which
     every lap closes. By central differences at rotor speeds (rad/s); ``n`` is independent of tilt.
     """
-    steps = 1e-5 * speed_1, 1e-5 * speed_2
+    speeds = np.array([speed_1, speed_2])
 
-    def direction(w1: float, w2: float) -> Floats:
-        n = null_space_input(input_matrix(np.array([w1, w2]), car))
+    def direction(speeds: Floats) -> Floats:
+        n = null_space_input(input_matrix(speeds, car))
         return np.asarray(n / np.linalg.norm(n))
 
-    by_1 = (direction(speed_1 + steps[0], speed_2) - direction(speed_1 - steps[0], speed_2)) / (
-        2.0 * steps[0]
-    )
-    by_2 = (direction(speed_1, speed_2 + steps[1]) - direction(speed_1, speed_2 - steps[1])) / (
-        2.0 * steps[1]
-    )
+    by_1, by_2 = _slopes(direction, speeds, 1e-5 * speeds).T
     curl = np.array([by_2[2], -by_1[2], by_1[1] - by_2[0]])
-    return float(direction(speed_1, speed_2) @ curl)
+    return float(direction(speeds) @ curl)
+
+
+def _slopes(function: Callable[[Floats], Floats], at: Floats, steps: Floats) -> Floats:
+    """Derivatives by the entries of a vector, as columns, by central differences."""
+    sides = [(function(at + step), function(at - step)) for step in np.diag(steps)]
+    return np.stack([(up - down) / (2.0 * h) for (up, down), h in zip(sides, steps)], axis=1)
 
 
 STEPS = 64
@@ -183,22 +186,19 @@ def half_period(swing: Swing, start: Pair) -> Half:
     times = np.linspace(0.0, swing.half_period, STEPS + 1).tolist()
     for low, high in itertools.pairwise(times):
         if not swing.both_push(swing.after_both_push(high, start)):
-            switch = _bisect(swing, start, low, high)
+            _, switch = _bisected(
+                lambda time: swing.both_push(swing.after_both_push(time, start)), low, high
+            )
             between = swing.after_both_push(switch, start)
             return Half(swing.after_one_push(swing.half_period - switch, between), switch)
     return Half(swing.after_both_push(swing.half_period, start), swing.half_period)
 
 
-def _bisect(swing: Swing, start: Pair, low: float, high: float) -> float:
-    for _ in range(100):
-        middle = 0.5 * (low + high)
-        if middle in (low, high):
-            break
-        if swing.both_push(swing.after_both_push(middle, start)):
-            low = middle
-        else:
-            high = middle
-    return high
+def _bisected(holds: Callable[[float], bool], low: float, high: float) -> Pair:
+    """The neighboring numbers between which a condition that holds at the first ends."""
+    while (middle := 0.5 * (low + high)) not in (low, high):
+        low, high = (middle, high) if holds(middle) else (low, middle)
+    return low, high
 
 
 def mirrored_map(swing: Swing, state: Pair) -> Pair:
@@ -209,15 +209,11 @@ def mirrored_map(swing: Swing, state: Pair) -> Pair:
 
 def jacobian(swing: Swing, state: Pair) -> Floats:
     """The mirrored map's Jacobian at a state, shape (2, 2), by central differences."""
-    columns = []
-    for index in (0, 1):
-        ends = []
-        for side in (1e-6, -1e-6):
-            shifted = [*state]
-            shifted[index] += side
-            ends.append(np.array(mirrored_map(swing, (shifted[0], shifted[1]))))
-        columns.append((ends[0] - ends[1]) / 2e-6)
-    return np.stack(columns, axis=1)
+
+    def mapped(state: Floats) -> Floats:
+        return np.array(mirrored_map(swing, (float(state[0]), float(state[1]))))
+
+    return _slopes(mapped, np.array(state), np.full(2, 1e-6))
 
 
 def limit_cycle(swing: Swing, guess: Pair = (0.2, 0.7)) -> Pair:
@@ -247,8 +243,7 @@ def multipliers(swing: Swing, state: Pair) -> Floats:
 
 def lyapunov(swing: Swing, state: Pair) -> float:
     """The Lyapunov candidate of ch. 11 at a state, m^2/s^2 (Eq. 49)."""
-    error, rate = state
-    return 0.5 * rate * rate + 0.5 * swing.gains.y[1] * error * error
+    return lyapunov_candidate(*state, swing.gains)
 
 
 def lyapunov_growth(swing: Swing, state: Pair) -> float:
@@ -294,15 +289,14 @@ def lyapunov_bound(swing: Swing, points: int = 161) -> LyapunovBound:
         largest = max(largest, gain)
         if gain < 0.0:
             continue
+
+        def grows(share: float, unit: Pair = unit) -> bool:
+            return lyapunov_growth(swing, (share * unit[0], share * unit[1])) > 0.0
+
         low, high = edge, max(2.0 * edge, 1.0)
-        while lyapunov_growth(swing, (high * unit[0], high * unit[1])) > 0.0:
+        while grows(high):
             low, high = high, 2.0 * high
-        for _ in range(60):
-            middle = 0.5 * (low + high)
-            if lyapunov_growth(swing, (middle * unit[0], middle * unit[1])) > 0.0:
-                low = middle
-            else:
-                high = middle
+        low, _ = _bisected(grows, low, high)
         if low * low > critical:
             critical, at = low * low, (low * unit[0], low * unit[1])
     return LyapunovBound(critical, largest, at)

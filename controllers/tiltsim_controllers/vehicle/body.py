@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.mathematics.linear import cross
-from tiltsim_controllers.mathematics.records import Vector3
+from tiltsim_controllers.mathematics.records import Matrix3, Vector3
 from tiltsim_controllers.vehicle.parameters import Vehicle
 
 X, Y, Z, VX, VY, VZ, ROLL, PITCH, YAW, P, Q, R = range(12)
@@ -65,58 +65,33 @@ class Body(NamedTuple):
 
     mass: float  # kg
     gravity: float  # m/s^2
-    inertia_xx: float  # kg m^2
-    inertia_yy: float
-    inertia_zz: float
-    inertia_xy: float  # of the matrix: minus the product of inertia
-    inertia_xz: float
-    inertia_yz: float
-    inverse_xx: float  # 1/(kg m^2), of the inverse matrix
-    inverse_yy: float
-    inverse_zz: float
-    inverse_xy: float
-    inverse_xz: float
-    inverse_yz: float
+    inertia: Matrix3  # kg m^2
+    inverse: Matrix3  # of the inertia, 1/(kg m^2)
 
 
 def body_of(mass: float, inertia: ArrayLike, gravity: float) -> Body:
     """The body of a mass (kg) and an inertia matrix (kg m^2), shape (3, 3)."""
     matrix = np.asarray(inertia, float)
-    inverse = np.linalg.inv(matrix)
-    entries = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
-    return Body(mass, gravity, *(float(m[entry]) for m in (matrix, inverse) for entry in entries))
+    symmetric = (np.triu(m) + np.triu(m, 1).T for m in (matrix, np.linalg.inv(matrix)))
+    return Body(mass, gravity, *(tuple(m.ravel().tolist()) for m in symmetric))
 
 
 def principal_body(vehicle: Vehicle) -> Body:
     """The body of a vehicle whose principal axes are the body axes."""
-    moments = vehicle.inertia_xx, vehicle.inertia_yy, vehicle.inertia_zz
-    xx, yy, zz = moments
-    none = (0.0, 0.0, 0.0)
-    return Body(vehicle.mass, vehicle.gravity, *moments, *none, 1.0 / xx, 1.0 / yy, 1.0 / zz, *none)
+    x, y, z = vehicle.moments
+    inertia = (x, 0.0, 0.0, 0.0, y, 0.0, 0.0, 0.0, z)
+    inverse = (1.0 / x, 0.0, 0.0, 0.0, 1.0 / y, 0.0, 0.0, 0.0, 1.0 / z)
+    return Body(vehicle.mass, vehicle.gravity, inertia, inverse)
 
 
 def inertia_matrix(body: Any) -> Any:
     """The inertia matrix (kg m^2), shape (3, 3), of a `Body`."""
-    b = body
-    return xp.array(
-        [
-            [b.inertia_xx, b.inertia_xy, b.inertia_xz],
-            [b.inertia_xy, b.inertia_yy, b.inertia_yz],
-            [b.inertia_xz, b.inertia_yz, b.inertia_zz],
-        ]
-    )
+    return xp.array(body.inertia).reshape(3, 3)
 
 
 def inverse_inertia_matrix(body: Any) -> Any:
     """The inverse of `inertia_matrix`, 1/(kg m^2)."""
-    b = body
-    return xp.array(
-        [
-            [b.inverse_xx, b.inverse_xy, b.inverse_xz],
-            [b.inverse_xy, b.inverse_yy, b.inverse_yz],
-            [b.inverse_xz, b.inverse_yz, b.inverse_zz],
-        ]
-    )
+    return xp.array(body.inverse).reshape(3, 3)
 
 
 def angular_acceleration(body: Any, torque: Any, omega: Any, gyroscopic: float) -> Any:

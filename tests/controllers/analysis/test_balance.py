@@ -16,7 +16,7 @@ from tiltsim_controllers.vehicle.parameters import PRESETS, SPIN, drag_ratio
 
 AR_DRONE = PRESETS["ar_drone_2"]
 VEHICLES = {name: PRESETS[name] for name in ("ar_drone_2", "luukkonen")}
-quick = settings(deadline=None, max_examples=40)
+quick = settings(deadline=None, max_examples=15)
 accelerations = st.tuples(st.floats(-2, 2), st.floats(-2, 2), st.floats(-5, 3))
 
 every_vehicle = pytest.mark.parametrize("vehicle", VEHICLES.values(), ids=VEHICLES)

@@ -11,11 +11,7 @@ from hypothesis import strategies as st
 
 from tiltsim_controllers.analysis.singularity import determinant, margin_over_gait, residuals
 from tiltsim_controllers.analysis.two_color_map import curve_l, red_residual
-from tiltsim_controllers.gaits.colors import (
-    determinant_at_clearance,
-    nearest_red_angles,
-    red_determinant,
-)
+from tiltsim_controllers.gaits.colors import nearest_red_angles
 from tiltsim_controllers.vehicle.cross import cross_torque, torque_free_inputs
 from tiltsim_controllers.vehicle.parameters import PRESETS, drag_ratio
 
@@ -37,14 +33,16 @@ def red(angles):
 
 
 @given(angle, angle)
-def test_the_determinant_on_red_agrees_with_the_two_color_map(alpha_1, alpha_2):
-    desired = float(red_residual(alpha_1, alpha_2, VEHICLE))
-    assert red_determinant(alpha_1, alpha_2, RATIO) == pytest.approx(desired, abs=1e-12)
+def test_the_determinant_on_red_has_the_form_of_u_and_v(alpha_1, alpha_2):
+    u, v = alpha_1 - DELTA, alpha_2 + DELTA
+    beside_l = cos(DELTA) * sin(v - u) - 2.0 * sin(DELTA) * sin(u) * sin(v)
+    expected = 4.0 * cos(u) * cos(v) * beside_l / (cos(DELTA) * sin(2.0 * DELTA))
+    assert red_residual(alpha_1, alpha_2, VEHICLE) == pytest.approx(expected, abs=1e-12)
 
 
 @given(st.floats(-1.4, 1.4))
 def test_the_determinant_vanishes_on_the_curve_l(alpha_1):
-    assert red_determinant(alpha_1, float(curve_l(alpha_1, VEHICLE)), RATIO) == pytest.approx(
+    assert red_residual(alpha_1, float(curve_l(alpha_1, VEHICLE)), VEHICLE) == pytest.approx(
         0.0, abs=1e-12
     )
     u, v = alpha_1 - DELTA, float(curve_l(alpha_1, VEHICLE)) + DELTA
@@ -68,7 +66,7 @@ def test_the_nearest_red_gait_is_clear_of_l(angles):
     found = red(angles)
     assert -(pi / 2 - CLEARANCE) <= found[0] - DELTA <= -CLEARANCE + 1e-12
     assert CLEARANCE - 1e-12 <= found[1] + DELTA <= pi / 2 - CLEARANCE + 1e-12
-    assert red_determinant(found[0], found[1], RATIO) > 0.0
+    assert red_residual(found[0], found[1], VEHICLE) > 0.0
 
 
 @given(tilts, angle, angle)
@@ -124,10 +122,3 @@ def test_rates_are_derivatives_of_the_moving_angles():
     for low, middle, high in zip(before, now, after, strict=True):
         assert middle[1] == pytest.approx((high[0] - low[0]) / (2.0 * step), abs=1e-7)
         assert middle[2] == pytest.approx((high[1] - low[1]) / (2.0 * step), abs=1e-7)
-
-
-def test_the_least_determinant_next_to_p():
-    assert determinant_at_clearance(DELTA, RATIO) == pytest.approx(4.0)
-    corner = red_determinant(DELTA - CLEARANCE, CLEARANCE - DELTA, RATIO)
-    assert determinant_at_clearance(CLEARANCE, RATIO) == corner
-    assert 0.0 < corner < 4.0

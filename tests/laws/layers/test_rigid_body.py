@@ -161,7 +161,8 @@ def test_a_cross_has_the_table_of_its_rotors(tilting):
 
 def test_principal_moments_are_a_matrix():
     whole = body_of(VEHICLE.mass, np.diag(VEHICLE[1:4]), VEHICLE.gravity)
-    assert principal_body(VEHICLE) == pytest.approx(whole, rel=1e-15)
+    for found, expected in zip(principal_body(VEHICLE), whole, strict=True):
+        assert found == pytest.approx(expected, rel=1e-15)
 
 
 # --- mistakes ----------------------------------------------------------------------------------
