@@ -14,7 +14,7 @@ from tiltsim.errors import InputError
 from tiltsim.flight.metrics import End
 from tiltsim.linear import attraction as module
 from tiltsim.linear import stability as stability_module
-from tiltsim.linear.attraction import FinalStates, attraction
+from tiltsim.linear.attraction import Grid, attraction
 from tiltsim.linear.stability import SlowestMode, advice_on_duration, slowest_mode
 from tiltsim.scenario.loading import merge
 
@@ -27,15 +27,14 @@ def flown(monkeypatch):
     """Scenarios that were flown, on a plant from which an ellipse comes back."""
     scenarios = []
 
-    class Ellipse(FinalStates):
-        def fly(self, these):
-            for scenario in these:
-                scenarios.append(scenario)
-                roll, pitch, _ = scenario.initial.attitude
-                back = (roll / 1.2) ** 2 + (pitch / 0.7) ** 2 < 1.0
-                yield End("completed" if back else "diverged", 0.5), np.zeros(6)
+    def ellipse(grid, these):
+        for scenario in these:
+            scenarios.append(scenario)
+            roll, pitch, _ = scenario.initial.attitude
+            back = (roll / 1.2) ** 2 + (pitch / 0.7) ** 2 < 1.0
+            yield End("completed" if back else "diverged", 0.5), np.zeros(6)
 
-    monkeypatch.setattr(module, "FinalStates", Ellipse)
+    monkeypatch.setattr(Grid, "ends", ellipse)
     monkeypatch.setattr(module, "slowest_mode", lambda scenario: None)
     return scenarios
 
@@ -106,7 +105,7 @@ def test_a_flight_comes_back_if_it_ends_as_the_undisturbed_one():
     """Two real corners of a small square: at rest to begin with, and too far to be back in 1 s."""
     scenario = tiltsim.load_scenario(SETPOINT, SHORT)
     square = np.array([0.0, 1.0])
-    grid = module._Grid(scenario, ("x", "y"), (square, square), lambda _count, _expected: None)
+    grid = Grid(scenario, ("x", "y"), (square, square), lambda _count, _total: None)
     grid.fly({(0, 0), (1, 1)}, 1)
     assert grid.returned == {(0, 0): True, (1, 1): False}
 

@@ -113,6 +113,13 @@ def test_a_comparison_of_flights_can_come_out_either_way(claim):
     pytest.fail(f"always {verdicts}")
 
 
+@pytest.mark.parametrize(("planned", "holds"), [(0.0, True), (0.1, True), (6.0, False)])
+def test_a_gait_at_rest_is_infinitely_slower(planned, holds):
+    [claim] = (claim for claim in FLOWN if claim.id == "ch1-planned-gaits")
+    assert claim.measure([{"max_tilt_rate": 60.0}, {"max_tilt_rate": planned}]) is holds
+    assert claim.measure([{"max_tilt_rate": 0.0}, {"max_tilt_rate": 0.0}]) is False
+
+
 class RandomMetrics(dict):
     """A flight with random metrics of all sizes; a fraction ``bad`` diverges or stops a rotor."""
 

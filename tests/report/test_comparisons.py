@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from tiltsim.report.comparisons import other_address
+from tiltsim.report.flights import other_address
 from tiltsim.report.made import Made
 from tiltsim.report.making import make_report
 from tiltsim.report.pages import page

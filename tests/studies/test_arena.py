@@ -266,7 +266,7 @@ KEYS = "push_stiffness=9.0, rotor_bandwidth=400.0, tilts='free'"
 FLYERS = """
 import tiltsim
 from tiltsim import xp
-from tiltsim_controllers.laws.rotor_allocation import allocated_with_tilts
+from tiltsim_controllers.laws.outer_loop import allocated_with_tilts
 
 
 def hover(observed, target, moves=1.0, stays=1.0):

@@ -160,7 +160,7 @@ def attraction(
         advice = advice_on_duration(slowest, scenario.simulation.duration, NEAR, MEAN)
         if advice:
             raise InputError(f"{scenario.address or 'scenario'}: {advice}")
-    grid = _Grid(scenario, axes, (edges[0], edges[1]), progress)
+    grid = Grid(scenario, axes, (edges[0], edges[1]), progress)
     leaves = [(i, j, size) for i in range(0, cells, size) for j in range(0, cells, size)]
     returned = np.zeros((cells + 1, cells + 1), dtype=bool)
     while leaves:
@@ -225,13 +225,15 @@ def _corners(i: int, j: int, width: int) -> tuple[tuple[int, int], ...]:
     return (i, j), (i + width, j), (i, j + width), (i + width, j + width)
 
 
-def _expected(following: int, width: int) -> int:
-    """Expected number of flights after a level of cells of a width, as a boundary is a line."""
-    return following * (width - 1)  # each level doubles the number of cells at the boundary
+class Grid:
+    """Flights from points of a grid, each flown once: whether they come back.
 
-
-class _Grid:
-    """Flights from points of a grid, each flown once."""
+    Args:
+        scenario: The scenario, without the disturbance.
+        axes: Names of the two initial quantities.
+        edges: Cell edges along each axis, SI units, shape (cells + 1,) each.
+        progress: See `attraction`.
+    """
 
     def __init__(
         self,
@@ -245,21 +247,18 @@ class _Grid:
         self._across = len(edges[0]) - 1
         self.returned: dict[tuple[int, int], bool] = {}
         follows = assemble(scenario).follows_position
-        self._states = FinalStates("xyz" if follows else "z")
+        self._held = "xyz" if follows else "z"
         self._goal: Floats | None = None
-
-    @property
-    def engine(self) -> str | None:
-        """The engine of the last flight."""
-        return self._states.engine
+        self.engine: EngineName | None = None  # the engine of the last flight
 
     def fly(self, points: set[tuple[int, int]], width: int) -> None:
         """Fly from new points, corners of cells of a width, all but the first at the boundary."""
         new = sorted(points - self.returned.keys())
         undisturbed = [self._scenario] if self._goal is None else []
         following = 8 * (self._across // width) if undisturbed else 2 * len(new)
-        expected = len(self.returned) + len(new) + _expected(following, width)
-        flown = self._states.fly([*undisturbed, *(self._from(*point) for point in new)])
+        # Each level doubles the number of cells at the boundary, as a boundary is a line.
+        expected = len(self.returned) + len(new) + following * (width - 1)
+        flown = self.ends([*undisturbed, *(self._from(*point) for point in new)])
         if undisturbed:
             end, self._goal = next(flown)
             if end.kind != "completed":
@@ -271,6 +270,22 @@ class _Grid:
         for point, (end, state) in zip(new, flown, strict=True):
             self.returned[point] = end.kind == "completed" and _is_near(state - self._goal)
             self._progress(len(self.returned), expected)
+
+    def ends(self, scenarios: Sequence[Scenario]) -> Iterator[tuple[End, Floats]]:
+        """The end of each flight, and means over its last second, shape (3 + held axes,).
+
+        They are the angles (rad), which may exceed a revolution, and the errors (m).
+        """
+        return fly_each(scenarios, self._final, os.cpu_count() or 1)
+
+    def _final(self, flight: Flight) -> tuple[End, Floats]:
+        self.engine = flight.engine
+        timestep = flight.scenario.simulation.timestep
+        last = in_last_second(flight.samples[:, 0], timestep)
+        columns = replace(flight, samples=flight.samples[last]).columns
+        angles = [np.unwrap(columns[name]).mean() for name in ANGLES]
+        errors = [(columns[f"{axis}_ref"] - columns[axis]).mean() for axis in self._held]
+        return flight.end, np.array([*angles, *errors])
 
     def _from(self, i: int, j: int) -> Scenario:
         """The scenario from another initial state, which is not validated again."""
@@ -302,31 +317,3 @@ def _acceptable(scenario: Scenario, roll: Floats, pitch: Floats) -> NDArray[np.b
         level = determinant(angles, 0.0, 0.0, vehicle)
         inside &= determinant(angles, across, up, vehicle) * level > 0.0
     return inside
-
-
-class FinalStates:
-    """Flights of one scenario from other initial states: where each of them ends.
-
-    Args:
-        axes: Whose errors count: some of x, y and z.
-    """
-
-    def __init__(self, axes: str) -> None:
-        self._axes = axes
-        self.engine: EngineName | None = None  # the engine of the last flight
-
-    def fly(self, scenarios: Sequence[Scenario]) -> Iterator[tuple[End, Floats]]:
-        """The end of each flight, and means over its last second, shape (3 + axes,).
-
-        They are the angles (rad), which may exceed a revolution, and the errors (m).
-        """
-        return fly_each(scenarios, self._final, os.cpu_count() or 1)
-
-    def _final(self, flight: Flight) -> tuple[End, Floats]:
-        self.engine = flight.engine
-        timestep = flight.scenario.simulation.timestep
-        last = in_last_second(flight.samples[:, 0], timestep)
-        columns = replace(flight, samples=flight.samples[last]).columns
-        angles = [np.unwrap(columns[name]).mean() for name in ANGLES]
-        errors = [(columns[f"{axis}_ref"] - columns[axis]).mean() for axis in self._axes]
-        return flight.end, np.array([*angles, *errors])

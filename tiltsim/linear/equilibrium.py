@@ -188,30 +188,22 @@ def _in_whole_steps(scenario: Scenario, period: float) -> Scenario:
     return scenario.model_copy(update={"simulation": changed})
 
 
+@dataclass
 class _Search:
-    """The search for a state that returns.
+    """The search for a state that returns, by the attributes of an `Equilibrium`."""
 
-    Args:
-        motion, forcing, step, steps: See `Equilibrium`.
-        returns: Largest number of returns until the flight has settled.
-        progress: See `equilibrium_of`.
-    """
+    motion: Motion
+    forcing: Forcing
+    step: int
+    steps: int
+    returns: int  # at most, until the flight has settled
+    progress: Callable[[int], None]
 
-    def __init__(
-        self,
-        motion: Motion,
-        forcing: Forcing,
-        step: int,
-        steps: int,
-        returns: int,
-        progress: Callable[[int], None],
-    ) -> None:
-        self._motion, self._forcing, self._step, self._steps = motion, forcing, step, steps
-        self._returns, self._progress, self._flights = returns, progress, 0
-        self._timestep = motion.assembly.scenario.simulation.timestep
-        self._start = step * self._timestep
-        self._held = np.ones(motion.coordinates.size, dtype=bool)
-        self._sides = self._signs(motion.initial)
+    def __post_init__(self) -> None:
+        self._flights, self._timestep = 0, self.motion.assembly.scenario.simulation.timestep
+        self._start = self.step * self._timestep
+        self._held = np.ones(self.motion.coordinates.size, dtype=bool)
+        self._sides = self._signs(self.motion.initial)
 
     def root(self, near: Floats | None = None) -> tuple[newton.Root, tuple[str, ...]]:
         """The state, sought near another one first, and names left out, or an `InputError`.
@@ -219,12 +211,12 @@ class _Search:
         Where no law holds x and y, a vehicle that drifts rests in its other coordinates: in air in
         all but these, for its airspeed becomes steady, else in all but these and their rates.
         """
-        assembly = self._motion.assembly
-        tolerance = ORBIT if self._forcing.period is not None else REST
+        assembly = self.motion.assembly
+        tolerance = ORBIT if self.forcing.period is not None else REST
         drifting = ("x", "y") if assembly.scenario.has_air else PLANE
         best = None
         for left_out in ((),) if assembly.follows_position else ((), drifting):
-            self._held = ~np.isin(self._motion.coordinates.names, left_out)
+            self._held = ~np.isin(self.motion.coordinates.names, left_out)
             for state in self._starts(near):
                 root = self._solve(state, tolerance)
                 if root is not None and root.residual <= tolerance and self._is_apart(root):
@@ -232,7 +224,7 @@ class _Search:
                 if root is not None and (best is None or root.residual < best.residual):
                     best = root
         address = assembly.scenario.address or "scenario"
-        what = "rest point" if self._forcing.period is None else "periodic orbit"
+        what = "rest point" if self.forcing.period is None else "periodic orbit"
         left = "" if best is None else f" (the best leaves {best.residual:.2g}, in SI units)"
         drifts = "" if assembly.follows_position else ", also without x and y, which nothing holds"
         raise InputError(f"{address}: found no {what} near its flight{drifts}{left}")
@@ -244,23 +236,23 @@ class _Search:
         return bool((rows[:, ~self._held] < REST * largest).all())
 
     def _solve(self, state: Floats, tolerance: float) -> newton.Root | None:
-        of_period = newton.CENTRAL if self._steps > LONG else newton.AVERAGED
-        stencil = newton.HALF_STENCIL if self._forcing.period is None else of_period
+        of_period = newton.CENTRAL if self.steps > LONG else newton.AVERAGED
+        stencil = newton.HALF_STENCIL if self.forcing.period is None else of_period
         root = newton.solve(
-            self._changes, self._motion.coordinates, state, 1e-4 * tolerance, stencil
+            self._changes, self.motion.coordinates, state, 1e-4 * tolerance, stencil
         )
         regular = np.array_equal(self._signs(root.state), self._sides)
-        passed = self._motion.coordinates.between(root.state, self._motion.limited(root.state))
+        passed = self.motion.coordinates.between(root.state, self.motion.limited(root.state))
         if not (regular and np.abs(passed).max() <= REST and np.isfinite(root.derivative).all()):
             return None  # beyond a singular attitude or a limit, or a rotor turns backwards
         return root
 
     def _starts(self, near: Floats | None) -> Iterator[Floats]:
         """States to start from: first of a rest point that no event precedes the initial one."""
-        initial = self._motion.initial
+        initial = self.motion.initial
         if near is not None:
             yield near
-        at_once = self._forcing.period is None and self._step == 0
+        at_once = self.forcing.period is None and self.step == 0
         if at_once:
             yield initial
         yield self._settled()
@@ -269,70 +261,62 @@ class _Search:
 
     def _settled(self) -> Floats:
         """The state at which the flight, once steady, changes least from a return to the next."""
-        state, step = self._motion.initial, self._step
+        state, step = self.motion.initial, self.step
         if step:
-            state = self._motion.flown(0, state, step)
-        between = self._steps or ceil(1.0 / self._timestep)
-        count = self._returns if self._steps else ceil(self._returns / between)
+            state = self.motion.flown(0, state, step)
+        between = self.steps or ceil(1.0 / self._timestep)
+        count = self.returns if self.steps else ceil(self.returns / between)
         best, least = state, np.inf
         for _ in range(count):
-            after = self._flown(step, state, between)
+            (after,) = self.motion.flown_each(step, [state], between)
+            self._count()
             moved = self._frame(step * self._timestep, (step + between) * self._timestep)
-            apart = self._motion.coordinates.between(state, after) - moved
+            apart = self.motion.coordinates.between(state, after) - moved
             change = np.linalg.norm(apart * self._held)
             step += between
             state = after
             if not np.isfinite(change):
                 break
             if change < least:
-                best, least = self._back(after, step * self._timestep), float(change)
+                back = self._frame(step * self._timestep, self._start)
+                best, least = self.motion.coordinates.moved(after, back), float(change)
             if change < SETTLED:
                 break
         return best
 
-    def _flown(self, step: int, state: Floats, steps: int) -> Floats:
-        """The state some steps after a step, reported."""
-        (after,) = self._motion.flown_each(step, [state], steps)
-        self._count()
-        return after
-
     def _frame(self, start: float, end: float) -> Floats:
         """Motion of the moving frame from one time (s) to another."""
-        return self._forcing.motion(self._motion.coordinates.names, start, end)
-
-    def _back(self, state: Floats, time: float) -> Floats:
-        """A state in the moving frame, where it was at the time of the search."""
-        return self._motion.coordinates.moved(state, self._frame(time, self._start))
+        return self.forcing.motion(self.motion.coordinates.names, start, end)
 
     def _changes(self, states: list[Floats]) -> Iterator[Floats]:
         """Rates, or the changes over the steps, in the moving frame."""
-        motion, start = self._motion, self._start
-        if self._steps == 0:
-            frame = self._forcing.rates(motion.coordinates.names, start)
+        motion, start = self.motion, self._start
+        if self.steps == 0:
+            frame = self.forcing.rates(motion.coordinates.names, start)
             yield from ((self._rates(state) - frame) * self._held for state in states)
             return
-        moved = self._frame(start, start + self._steps * self._timestep)
-        ends = motion.flown_each(self._step, states, self._steps)
+        moved = self._frame(start, start + self.steps * self._timestep)
+        ends = motion.flown_each(self.step, states, self.steps)
         for state, after in zip(states, ends, strict=True):
             self._count()
             yield (motion.coordinates.between(state, after) - moved) * self._held
 
     def _rates(self, state: Floats) -> Floats:
         try:
-            return self._motion.rates(self._start, state)
+            return self.motion.rates(self._start, state)
         except (ArithmeticError, ValueError):
-            return np.full(self._motion.coordinates.size, np.nan)
+            return np.full(self.motion.coordinates.size, np.nan)
 
     def _count(self) -> None:
         """Report one more flight."""
         self._flights += 1
-        self._progress(self._flights)
+        self.progress(self._flights)
 
     def _signs(self, state: Floats) -> Floats:
         """Signs that the flight keeps: of the determinant and of the rotors' speeds."""
         try:
-            sample = self._motion.observed(self._start, state)
-            values = self._motion.assembly.sign_check_values(self._start, tuple(sample.tolist()))
+            sample = self.motion.observed(self._start, state)
+            values = self.motion.assembly.sign_check_values(self._start, tuple(sample.tolist()))
         except (ArithmeticError, ValueError):
             return np.full(1, np.nan)
         return np.sign(values)

@@ -8,6 +8,7 @@ the corner lies outside, or else it is reported.
 """
 
 from collections.abc import Callable, Iterable
+from functools import partial
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -152,9 +153,8 @@ def derivative_at(
         state: State at which the derivative is taken.
         stencil: Stencil of the differences.
     """
-    return _derivative_of_each(
-        lambda states: [function(each) for each in states], coordinates, state, stencil
-    ).matrix
+    each = partial(map, function)
+    return _derivative_of_each(each, coordinates, state, stencil).matrix
 
 
 def _derivative_of_each(

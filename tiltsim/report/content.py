@@ -12,9 +12,8 @@ from typing import Final
 
 from tiltsim.report.claim import Claim, ClaimVerdict, ExpectationClaim, FlightClaim
 from tiltsim.report.claim_rows import Cell, Criterion, Failure, Row, count, count_statements, errors
-from tiltsim.report.comparisons import Comparison
 from tiltsim.report.findings import ERRORS, FINDINGS, Finding, PublishedError
-from tiltsim.report.flights import Flights, ReportEntry
+from tiltsim.report.flights import Comparison, Flights, ReportEntry
 from tiltsim.report.pictures import Drawing, Picture
 from tiltsim.report.statement import Origin, Statement
 from tiltsim.scenario.metric_names import METRICS

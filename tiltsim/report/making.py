@@ -5,10 +5,9 @@ from functools import partial
 from pathlib import Path
 
 from tiltsim.report.claim_rows import analyze, criteria, failures, make_rows
-from tiltsim.report.comparisons import compare
 from tiltsim.report.content import Report
 from tiltsim.report.findings import FINDINGS
-from tiltsim.report.flights import fly, report_entries
+from tiltsim.report.flights import compare, fly, report_entries
 from tiltsim.report.pictures import draw_all
 from tiltsim.resources import shipped_folder
 from tiltsim.studies.checking import collect

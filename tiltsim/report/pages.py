@@ -24,7 +24,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 from PIL import Image
 
-from tiltsim.report import comparisons, content
+from tiltsim.report import content, flights
 from tiltsim.report.claim import Claim, ClaimVerdict
 from tiltsim.report.claim_rows import Row, count, count_statements
 from tiltsim.report.content import (
@@ -101,23 +101,15 @@ def _rendered(template: str, report: Report, **more: Any) -> str:
     }
     thesis = _toml("thesis.toml")
     return environment.get_template(template).render(
-        vars(content)
+        {**vars(content), **vars(flights)}
         | {
             "report": report,
-            "title": content.TITLE,
-            "subject": content.SUBJECT,
-            "method": content.METHOD,
-            "provenance": content.PROVENANCE,
             "thesis": thesis["thesis"],
             "thesis_bibtex": thesis["bibtex"].strip(),
             "journals": {int(number): text for number, text in thesis["chapters"].items()},
             "withdrawn": _toml("withdrawn.toml") if report.findings else {},
-            "chapters": content.CHAPTERS,
             "verdicts": list(ClaimVerdict),
             "origins": list(Origin),
-            "plants": PLANTS,
-            "beyond_title": comparisons.TITLE,
-            "beyond_text": comparisons.EXPLANATION,
         }
         | more
     )

@@ -117,7 +117,7 @@ def trot_errors(metrics: FlightMetrics) -> Figure:
     return period_figure(panels)
 
 
-def gait_and_biased(metrics: FlightMetrics, key: str) -> Figure:
+def gait_and_biased(key: str) -> Figure:
     """A published gait beside its biased twin."""
     published = PUBLISHED_GAITS[key]
     assert published.biased is not None
@@ -125,32 +125,6 @@ def gait_and_biased(metrics: FlightMetrics, key: str) -> Figure:
     return comparison_figure(
         [("as published", published.gait), (biased, published.biased)], _VEHICLE
     )
-
-
-def singular_surface(metrics: FlightMetrics) -> Figure:
-    """Ch. 2, Figs. 1 to 3, and the exact determinant."""
-    return singularity_figure(PRESETS["ar_drone_2_unrounded"])
-
-
-def determinants(metrics: FlightMetrics) -> Figure:
-    """Ch. 3, Figs. 2, 3, 10."""
-    return determinant_figure("equal", _VEHICLE)
-
-
-def two_color_map(metrics: FlightMetrics, vehicle: str) -> Figure:
-    """The map of a vehicle; for the vehicle of ch. 3, with the examples of ch. 8."""
-    paths = list(PATHS.items()) if vehicle == "ar_drone_2" else None
-    return map_figure(PRESETS[vehicle], paths)
-
-
-def attainable(metrics: FlightMetrics) -> Figure:
-    """Ch. 9, Figs. 2, 8."""
-    return attainable_figure(PUBLISHED_GAITS["ch09_gait_2"].gait, _VEHICLE)
-
-
-def attraction_maps(metrics: FlightMetrics) -> Figure:
-    """From which attitudes gaits come back."""
-    return attraction_panels({name: attraction_map(name) for name in GAITS})
 
 
 GAITS: Final[dict[str, tuple[str, dict[str, Any]]]] = {
@@ -181,25 +155,35 @@ def attraction_map(name: str, coarse: int = 10, refinements: int = 1) -> Attract
     return attraction(scenario, coarse=coarse, refinements=refinements)
 
 
-_FLIGHTS: Final = {
-    "setpoint_errors": tuple(product(_SETPOINTS, PLANTS)),
-    "trot_errors": tuple(product(_TROTS, PLANTS)),
+_OF_FLIGHTS: Final = {
+    "setpoint_errors": (setpoint_errors, tuple(product(_SETPOINTS, PLANTS))),
+    "trot_errors": (trot_errors, tuple(product(_TROTS, PLANTS))),
 }
-"""The flights whose metrics a function needs."""
+"""Functions of metrics, with the flights whose metrics they need."""
+
+_OF_ANALYSIS: Final[dict[str, Callable[..., Figure]]] = {
+    "singular_surface": lambda: singularity_figure(PRESETS["ar_drone_2_unrounded"]),
+    "determinants": lambda: determinant_figure("equal", _VEHICLE),
+    "two_color_map": lambda name: map_figure(
+        PRESETS[name], [*PATHS.items()] if name == "ar_drone_2" else None
+    ),
+    "gait_and_biased": gait_and_biased,
+    "attraction_maps": lambda: attraction_panels({name: attraction_map(name) for name in GAITS}),
+    "attainable": lambda: attainable_figure(PUBLISHED_GAITS["ch09_gait_2"].gait, _VEHICLE),
+}
+"""Functions of the ``args`` of a picture."""
 
 
 def _picture(name: str, chapter: int, caption: str, **how: Any) -> Picture:
     if "flight" in how:
-        address = how["flight"]
-
-        def draw(metrics: object) -> Figure:
-            return plot(simulate_to_end(variant_for(address, "mujoco")))
-
-        return Picture(chapter, name, caption, draw, ((address, "mujoco"),))
-    function = globals()[how["draw"]]
-    args = how.get("args", ())
-    flights = _FLIGHTS.get(how["draw"], ())
-    return Picture(chapter, name, caption, lambda metrics: function(metrics, *args), flights)
+        flight = how["flight"], PLANTS[1]
+        return Picture(
+            chapter, name, caption, lambda _: plot(simulate_to_end(variant_for(*flight))), (flight,)
+        )
+    if how["draw"] in _OF_FLIGHTS:
+        return Picture(chapter, name, caption, *_OF_FLIGHTS[how["draw"]])
+    draw = partial(_OF_ANALYSIS[how["draw"]], *how.get("args", ()))
+    return Picture(chapter, name, caption, lambda _: draw())
 
 
 PICTURES: Final[tuple[Picture, ...]] = tuple(

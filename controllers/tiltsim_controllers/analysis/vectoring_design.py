@@ -38,7 +38,7 @@ AGILE_POSITION: Final = 0.75
 """The largest one over the root of the angular acceleration."""
 RISE: Final = 0.6, 1.4
 """Bandwidth of height over the attitude's, and damping ratio: no lean delays it."""
-VERTICAL: Final = 4.5, 2.5
+VERTICAL: Final = 4.5, 1.5
 """m/s^2: of the feedback of height, up and down; more would take torque or lean."""
 ACROSS: Final = 0.33
 """Acceleration of the feedback across over the greatest that keeps the height."""

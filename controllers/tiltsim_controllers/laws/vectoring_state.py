@@ -198,8 +198,9 @@ def known_of(observed: Observed, p: Parameters) -> Known:
         for name in Ability._fields[1:]
     }
     p = p._replace(axis=xp.where(harmed, xp.array(p.after.axis), xp.array(p.axis)), **able)
-    # An object that is touched pushes back and is no disturbance: nothing is learned meanwhile.
-    learns = xp.where(observed.contact_force @ observed.contact_force > 0.0, 0.0, 1.0)
+    # An object to stand on carries the vehicle and is no disturbance: nothing is learned there.
+    push = observed.contact_force
+    learns = xp.where((push[2] < 0.0) & (4.0 * push[2] * push[2] > push @ push), 0.0, 1.0)
     p = p._replace(
         velocity_trust=1.0 - learns * (1.0 - xp.array(p.velocity_trust)),
         rate_trust=1.0 - learns * (1.0 - xp.array(p.rate_trust)),

@@ -26,7 +26,6 @@ import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
 from itertools import product
-from math import inf
 from pathlib import Path
 from typing import Any, Final, TypeAlias
 
@@ -115,12 +114,13 @@ def _claim(statement: Statement, row: dict[str, Any]) -> RegisteredClaim:
     if statement.missing and "measure" not in row:
         return AnalysisClaim(statement, **row)
     own, args = measures()[row.pop("measure")], row.pop("args", ())
-    asked = "above" in row or "below" in row
-    low, high = row.pop("above", -inf), row.pop("below", inf)
+    low, high = row.pop("above", None), row.pop("below", None)
 
     def measure(*flown: Sequence[Metrics]) -> Value:
         value = own(*flown, *args)
-        return low < value < high if asked else value
+        if low is None and high is None:
+            return value
+        return (low is None or value > low) and (high is None or value < high)
 
     origins = tuple(Origin[name.upper()] for name in row.pop("ours", ()))
     flights = tuple(one for pattern in row.pop("flights", ()) for one in _expanded(pattern))

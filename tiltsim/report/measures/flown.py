@@ -46,24 +46,30 @@ def largest(flights: Flown, quantity: str) -> float:
 def first_over_last(flights: Flown, quantity: str) -> float:
     """The value of the first flight, as a multiple of the last one's."""
     values = _values(flights, quantity)
-    return values[0] / values[-1]
+    return _over(values[0], values[-1])
 
 
 def difference(flights: Flown, quantity: str) -> float:
     """Difference of the first two flights, as a share of the largest value of all."""
     values = _values(flights, quantity)
-    return abs(values[0] - values[1]) / max(values)
+    return _over(abs(values[0] - values[1]), max(values))
 
 
 def spread_of_means(flights: Flown, quantity: str, size: int) -> float:
     """Spread of the means of groups of ``size`` flights, as a share of the largest mean."""
     means = _means(flights, quantity, size)
-    return (max(means) - min(means)) / max(means)
+    return _over(max(means) - min(means), max(means))
 
 
 def ratio(flights: Flown, quantity: str, other: str) -> float:
     """The only flight's quantity as a multiple of another one."""
-    return _values(flights, quantity)[0] / _values(flights, other)[0]
+    return _over(_values(flights, quantity)[0], _values(flights, other)[0])
+
+
+def _over(value: float, other: float) -> float:
+    """A ratio; infinite, or NaN, over zero."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return float(np.divide(value, other))
 
 
 def grows(flights: Flown, quantity: str) -> bool:
