@@ -12,6 +12,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 from xml.etree import ElementTree
 
+import numpy as np
+
 from tiltsim.models.parts import TiltServo
 from tiltsim.system.files import is_file, is_folder
 
@@ -159,17 +161,12 @@ def _set_stop(root: Any, joint: Any, actuator: Any, max_angle: float) -> None:
 
 def add_states(root: Any, name: str, count: int) -> None:
     """Append integrators ``name_1``, ... that act on nothing; in the keyframes they are zero."""
-    _add_idle_actuators(root, name, count, dyntype="integrator")
-    _extend_keyframes(root, act=count, ctrl=count)
+    add_memories(root, name, count, dyntype="integrator")
+    _extend_keyframes(root, "act", count)
 
 
-def add_memories(root: Any, name: str, count: int) -> None:
+def add_memories(root: Any, name: str, count: int, **attributes: str) -> None:
     """Append actuators ``name_1``, ... without gain, whose controls hold a sampled law's output."""
-    _add_idle_actuators(root, name, count)
-    _extend_keyframes(root, ctrl=count)
-
-
-def _add_idle_actuators(root: Any, name: str, count: int, **attributes: str) -> None:
     vehicle = root.find("body", "vehicle")
     # Acting on a joint costs MuJoCo least.
     joint = vehicle.find_all("joint", immediate_children_only=True)[-1]
@@ -179,32 +176,27 @@ def _add_idle_actuators(root: Any, name: str, count: int, **attributes: str) -> 
 
 def add_wrench(root: Any, name: str, site: str) -> None:
     """Append a force and a torque at a site, along its axes."""
-    for index, axis in enumerate(
-        ("force_x", "force_y", "force_z", "torque_x", "torque_y", "torque_z")
-    ):
-        gear = [0.0] * 6
-        gear[index] = 1.0
+    axes = [f"{kind}_{axis}" for kind in ("force", "torque") for axis in "xyz"]
+    for axis, gear in zip(axes, np.eye(6).tolist(), strict=True):
         _add_actuator(root, f"{name}_{axis}", site=site, gear=gear)
-    _extend_keyframes(root, ctrl=6)
 
 
 def add_hinge_torques(root: Any, name: str, hinges: int) -> None:
     """Append a torque about each of the first ``hinges`` tilt hinges."""
     for i in range(1, hinges + 1):
         _add_actuator(root, f"{name}_hinge_{i}", joint=f"tilt_{i}")
-    _extend_keyframes(root, ctrl=hinges)
 
 
 def _add_actuator(root: Any, name: str, **attributes: Any) -> None:
     root.actuator.add("general", name=name, **(_PLAIN | attributes))
+    _extend_keyframes(root, "ctrl", 1)
 
 
-def _extend_keyframes(root: Any, act: int = 0, ctrl: int = 0) -> None:
+def _extend_keyframes(root: Any, vector: str, count: int) -> None:
     for key in root.find_all("key"):
-        for name, count in (("act", act), ("ctrl", ctrl)):
-            values = getattr(key, name)
-            if values is not None:  # else MuJoCo takes zeros for all
-                setattr(key, name, [*values, *[0.0] * count])
+        values = getattr(key, vector)
+        if values is not None:  # else MuJoCo takes zeros for all
+            setattr(key, vector, [*values, *[0.0] * count])
 
 
 def check_mjcf(path: Path) -> set[Path]:

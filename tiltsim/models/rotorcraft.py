@@ -148,10 +148,7 @@ def _set_parameters(tree: MjSpecTree, spec: RotorcraftSpec) -> None:
 
 @lru_cache(maxsize=64)  # dm_control takes a hundred times longer than MuJoCo's compiler
 def _compose(spec: RotorcraftSpec) -> tuple[mujoco.MjSpec, mujoco.MjSpec]:
-    """The complete vehicle, and the one without visuals.
-
-    They are the same where drawn and measured parts would be missed.
-    """
+    """The complete vehicle, and one without visuals, or the complete one where they act."""
     vehicle, servo, user_vehicle = spec.vehicle, spec.tilt_servo, spec.user_vehicle
     shipped = shipped_folder("mjcf") / f"{spec.model}.xml"
     root = mjcf_editing.parse_mjcf(shipped if user_vehicle is None else Path(user_vehicle.path))

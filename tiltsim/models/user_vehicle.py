@@ -209,10 +209,7 @@ def _check_magnitudes(compiled: mujoco.MjModel) -> None:
 
 
 def _pods_are_balanced(pose: VehiclePose, tilts: int, bodies: list[int], untilted: Moments) -> bool:
-    """Whether each pod, turned alone by a right angle, leaves the vehicle's moments as they are.
-
-    Then it is balanced about its hinge, and its inertia the same across all directions.
-    """
+    """Whether each pod, turned alone by a right angle, leaves the vehicle's moments as they are."""
     import mujoco
 
     compiled, data = pose.compiled, mujoco.MjData(pose.compiled)

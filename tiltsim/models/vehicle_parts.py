@@ -124,10 +124,7 @@ def _check_joints(compiled: mujoco.MjModel) -> None:
 
 
 def _check_thrusts(compiled: mujoco.MjModel, parts: Parts, spins: tuple[float, ...] | None) -> None:
-    """Raise ValueError where an actuator of a rotor does not match its name.
-
-    ``spins`` prescribes the senses of rotation, and that all coefficients are equal.
-    """
+    """Refuse actuators unlike their names; ``spins`` prescribes senses, and equal coefficients."""
     import mujoco
 
     gears = []

@@ -128,10 +128,7 @@ def as_scenario(source: Scenario | str | PathLike[str] | Mapping[str, Any]) -> S
 
 
 def _document(source: object, *, with_base: bool) -> tuple[dict[str, Any], str]:
-    """The tables of a `load_scenario` source, which may be changed, and its name in messages.
-
-    ``with_base`` allows a family without ``#variant``, whose base it is then.
-    """
+    """The tables of a source, free to change, and its name; ``with_base`` allows a family."""
     if isinstance(source, Scenario):
         # Without defaults, as a change of one key may change the default of another.
         given = source.model_dump(mode="json", exclude_unset=True)

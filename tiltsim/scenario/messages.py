@@ -145,12 +145,7 @@ def missing_keys(
 def _dropped_keys(
     missing: Mapping[str, bool], document: Mapping[str, Any], emptied: Iterable[str]
 ) -> tuple[list[str], str] | None:
-    """Required keys that a change of kind dropped, and the line for them; None if it is not first.
-
-    Args:
-        missing: The keys with mistakes, and whether they are missing.
-        document, emptied: See `one_line_message`.
-    """
+    """Required keys that a change of kind dropped, and their line; None if they are not first."""
     first = next(iter(missing))
     for kind in emptied:
         table, _, tag = kind.rpartition(".")
@@ -239,10 +234,7 @@ def _describe(
 def _locate(
     location: tuple[Any, ...], document: Mapping[str, Any], *, keep_last: bool = False
 ) -> tuple[str, Any]:
-    """Dotted key and value of an error's location, without the union tags that pydantic adds.
-
-    Parts that are not in the document are tags; ``keep_last`` keeps the last part all the same.
-    """
+    """Dotted key and value of a location, without tags; ``keep_last`` keeps the last part."""
     keys: list[str] = []
     value: Any = document
     tag: object = None
@@ -275,10 +267,7 @@ def tags_of(schema: type[BaseModel], location: tuple[Any, ...]) -> tuple[str, li
 
 
 def _known_keys(root: Node, location: tuple[Any, ...], key: str, missing: Sequence[str]) -> str:
-    """The keys allowed instead of an unknown one, after a hint where it may belong.
-
-    ``missing`` are the required keys that its table lacks.
-    """
+    """The keys allowed instead of an unknown one, and a hint; ``missing`` are required ones."""
     name = key.rpartition(".")[2]
     union, table = root, root
     for part in location[:-1]:

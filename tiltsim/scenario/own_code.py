@@ -59,10 +59,7 @@ def describe(error: BaseException, own_frames: int = 1) -> str:
 
 
 def _place(error: BaseException, own_frames: int) -> str:
-    """The innermost file and line of the controller's own code in an error's traceback.
-
-    The function instead of the file where there is none, as in a notebook.
-    """
+    """The last line of the controller's own file, or function in a notebook, in a traceback."""
     frames = traceback.extract_tb(error.__traceback__)[own_frames:]
     if not frames:
         return ""

@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import Field
 
 from tiltsim.models.cross import as_multirotor
-from tiltsim.models.parts import TiltServo
+from tiltsim.models.parts import RotorLimits, TiltServo
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.models.user_vehicle import UserVehicle
 from tiltsim.scenario.table import NonNegative, Positive, Table, default, example, required
@@ -152,9 +152,8 @@ class RotorcraftTable(AnyVehicleTable, ABC):
     @property
     def speeds_along_spin(self) -> tuple[float, float]:
         """Lowest and highest speed (rad/s) of a rotor along its spin; infinite without limits."""
-        low, high = self.min_rotor_speed, self.max_rotor_speed
-        highest = inf if high is None else high
-        return -highest if low is None else low, highest
+        limits = RotorLimits(self.min_rotor_speed, self.max_rotor_speed)
+        return limits.speed_range(1.0) or (-inf, inf)
 
     @property
     def has_rotor_limits(self) -> bool:

@@ -107,11 +107,7 @@ class VectoringController(Vectoring, FailureAwareController, TiltingTable, LawCo
 
 
 def _speeds(airframe: Airframe, thrust: Floats) -> tuple[Floats, Floats]:
-    """Lowest and highest speeds of the rotors along their spins, rad/s, shape (N,) each.
-
-    Limits that the plant enforces, else the range in the vehicle's file, else the speeds of a
-    multiple of the hover thrust.
-    """
+    """Least and largest speeds along the spins, rad/s, (N,): limits, the file's, or by thrusts."""
     vehicle = airframe.vehicle
     spins = np.array(vehicle.spins)[:, np.newaxis]
     low, high = np.sort(spins * np.array(vehicle.speed_ranges), axis=1).T
