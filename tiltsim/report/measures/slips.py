@@ -285,7 +285,7 @@ def _iff(mended: bool) -> float:
 
 
 def _tilt_column(mended: bool) -> float:
-    """Ch. 10: how far Eq. (27), or it times 1 - I_T/I_B, is from the column of the tilt, as share.
+    """Ch. 10: relative deviation of Eq. (27), or of it times 1 - I_T/I_B, from the tilt's column.
 
     The column of the tilt's second derivative in the fourth derivative of the position equals the
     column of the tilt in the acceleration, yaw following by Eq. (2): no other term contains it.
