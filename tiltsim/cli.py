@@ -65,6 +65,7 @@ SHARED: Final = {
     "files": ("new", "list", "autopilot", "schema"),
     "look": ("view", "plot", "video"),
     "logs": ("export", "import", "replay", "identify"),
+    "stability": ("stability", "attraction"),
     "thesis": ("map", "singularity", "concepts", "report"),
 }
 """Modules of several commands, each its function ``run_NAME``."""

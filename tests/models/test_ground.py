@@ -11,7 +11,7 @@ from tests.refusals import refusal
 from tiltsim.laws.assembling import assemble
 from tiltsim.models.parts import Ground
 from tiltsim.models.rotorcraft import RotorcraftSpec, compile_model
-from tiltsim.plants.flight_model import flight_model
+from tiltsim.plants.mujoco_plant import flight_model
 from tiltsim_controllers.vehicle.parameters import PRESETS
 
 VEHICLE = PRESETS["ar_drone_2"]

@@ -11,7 +11,7 @@ import pytest
 import tiltsim
 from tiltsim.laws.assembling import assemble
 from tiltsim.models.user_vehicle import read_user_vehicle
-from tiltsim.plants.flight_model import build_model
+from tiltsim.plants.mujoco_plant import build_model
 from tiltsim.resources import shipped_folder
 from tiltsim_controllers.vehicle.rotors import force_and_torque
 

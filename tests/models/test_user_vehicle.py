@@ -19,7 +19,7 @@ from tiltsim.models.parts import TiltServo
 from tiltsim.models.rotorcraft import RotorcraftSpec, compile_model
 from tiltsim.models.user_vehicle import read_user_vehicle
 from tiltsim.plants.command import Command
-from tiltsim.plants.flight_model import build_model
+from tiltsim.plants.mujoco_plant import build_model
 from tiltsim.resources import shipped_folder
 from tiltsim.vehicles.rotorcraft import COLUMNS
 from tiltsim.views.figures.plot import plot

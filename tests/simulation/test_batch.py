@@ -19,8 +19,7 @@ from tests.laws.layers.test_air import STORM
 from tests.laws.test_laws import GUST, LAWS
 from tests.refusals import refusal
 from tiltsim.laws.assembling import LOOPS, assemble, loop_of
-from tiltsim.plants.flight_model import flight_model, model_cache_key
-from tiltsim.plants.mujoco_plant import MujocoPlant
+from tiltsim.plants.mujoco_plant import MujocoPlant, flight_model, model_cache_key
 from tiltsim.resources import shipped_folder
 from tiltsim.scenario.gait import Gait
 from tiltsim.scenario.loading import merge

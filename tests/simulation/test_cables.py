@@ -10,7 +10,7 @@ import tiltsim
 from tests.refusals import refusal
 from tiltsim.laws.assembling import assemble
 from tiltsim.models.cables import switch
-from tiltsim.plants.flight_model import flight_model
+from tiltsim.plants.mujoco_plant import flight_model
 from tiltsim.vehicles.rotorcraft.others import motion_at_start
 
 HANDOVER = "interaction/handover"

@@ -10,7 +10,7 @@ import tiltsim
 from tests.refusals import refusal
 from tiltsim.laws.assembling import assemble
 from tiltsim.logs.model import LoggedVehicle
-from tiltsim.plants.flight_model import flight_model
+from tiltsim.plants.mujoco_plant import flight_model
 
 HOVER = "fleet/hexarotor#hover"
 SIMULATION = {"duration": 0.3, "integrator": "implicitfast", "engine": "python"}

@@ -12,7 +12,7 @@ import tiltsim
 from tests.refusals import refusal
 from tiltsim.laws.assembling import assemble
 from tiltsim.laws.rotor_loop import layout_of_vehicle
-from tiltsim.plants.flight_model import flight_model
+from tiltsim.plants.mujoco_plant import flight_model
 from tiltsim.vehicles.rotorcraft.others import CONTACT_FORCE, motion_at_start
 
 PUSH = "interaction/push#hold"

@@ -7,7 +7,7 @@ import pytest
 
 import tiltsim
 from tiltsim.laws.assembling import assemble
-from tiltsim.plants.flight_model import build_model
+from tiltsim.plants.mujoco_plant import build_model
 from tiltsim_controllers.vehicle.parameters import PRESETS
 
 HOVER = {

@@ -25,7 +25,7 @@ from tiltsim.flight.metrics import End
 from tiltsim.laws.assembling import assemble
 from tiltsim.plants.command import Command, Observation, check_command
 from tiltsim.plants.commanded_plant import CommandedPlant
-from tiltsim.plants.flight_model import model_cache_key
+from tiltsim.plants.mujoco_plant import model_cache_key
 from tiltsim.plants.plant import take_sample
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.scenario import Scenario

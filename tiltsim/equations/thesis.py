@@ -61,11 +61,6 @@ def initial_state(scenario: Scenario, rotor_speeds: Vector) -> Values:
     return (*motion, *rotation, *initial.angular_velocity, *rotor_speeds)
 
 
-def rigid_body(state: Any) -> Any:
-    """The twelve states of the rigid body."""
-    return state[:12]
-
-
 @traceable
 def equations_of_motion(state: Any, inputs: Any, vehicle: Vehicle, disturbance: Any) -> Values:
     """Time derivative of the rigid body's twelve states, shape (12,).

@@ -139,11 +139,11 @@ def _foxglove_messages(
         }
         for place in rotors.tolist()
     ]
-    for number, (stamp, place, turn, wanted, direction) in enumerate(zip(stamps, *vectors)):
+    for number, (stamp, place, turn, target, direction) in enumerate(zip(stamps, *vectors)):
         time = {"sec": stamp // NANO, "nsec": stamp % NANO}
         frames = {"timestamp": time, "parent_frame_id": "world", "child_frame_id": "vehicle"}
         moved = {"translation": _named("xyz", place), "rotation": _named("wxyz", turn)}
-        pose = {"position": _named("xyz", wanted), "orientation": _named("wxyz", direction)}
+        pose = {"position": _named("xyz", target), "orientation": _named("wxyz", direction)}
         reference = {"timestamp": time, "frame_id": "world", "pose": pose}
         drawn: dict[str, tuple[str, dict[str, Any]]] = {
             "/tf": ("foxglove.FrameTransform", frames | moved),

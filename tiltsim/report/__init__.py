@@ -59,6 +59,8 @@ per chapter, measured by a function of `tiltsim.report.measures`::
     args = ["sup_position_error_after_20s"]
     flights = ["ch04_tracking/line#instant_t{1,2,3}_modified"]
 
+A measure is a yes or no, or a number, which the keys ``above`` and ``below`` turn into one.
+
 No measured value is written down: verdicts are computed when the report is made. Texts may have
 `code` between backticks. ``tests/report/test_statements.py`` checks every row.
 """

@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass
 from decimal import Decimal
-from enum import Enum
 from math import isfinite
 from pathlib import Path
 from typing import Final, TypeAlias
 
 from tiltsim.flight.metrics import Verdict
-from tiltsim.report.statement import CHAPTER, Origin, Statement, slug
+from tiltsim.report.statement import CHAPTER, Described, Origin, Statement, slug
 from tiltsim.scenario.expectation import Expectation
 from tiltsim.scenario.metric_names import METRICS
 from tiltsim.scenario.scenario import Scenario
@@ -29,17 +28,8 @@ _FAULTS: Final = {"REFUTED", "MISPRINT", "ROUNDING"}
 ROUNDING: Final = 1.0 + 1e-9  # 0.345 is not exact in binary, but should round to 0.35
 
 
-class ClaimVerdict(Enum):
+class ClaimVerdict(Described):
     """The verdict on a claim, from best to worst, with its meaning."""
-
-    meaning: str
-
-    def __new__(cls, words: str, meaning: str) -> ClaimVerdict:
-        """A verdict with its words as value."""
-        verdict = object.__new__(cls)
-        verdict._value_ = words
-        verdict.meaning = meaning
-        return verdict
 
     REPRODUCED = "reproduced", "equal within the printed digits, or the same yes/no answer"
     QUALITATIVE = "reproduced qualitatively", "the statement holds, but the number differs"

@@ -180,12 +180,7 @@ def _measured(row: Row) -> list[str]:
 
 
 def _case_rows(group: Group, errors: list[str]) -> list[list[str]]:
-    """Rows of Markdown: one with the statement and its only case, or one above all cases.
-
-    Args:
-        group: The rows of a statement.
-        errors: Keys of the list of errors, in its order.
-    """
+    """Rows of Markdown: one with the statement and its only case, or one above all cases."""
     fits = group.many_fits
     rows = [
         [row.claim.case, published_text(row), *_measured(row), _described(row, group, errors)]

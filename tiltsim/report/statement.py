@@ -16,34 +16,42 @@ _SPELLED: Final = {
 }  # fmt: skip
 
 
-class Origin(Enum):
+class Described(Enum):
+    """Words for readers, with their meaning in one sentence."""
+
+    meaning: str
+
+    def __new__(cls, words: str, meaning: str) -> Self:
+        """A member with its words as value."""
+        member = object.__new__(cls)
+        member._value_ = words
+        member.meaning = meaning
+        return member
+
+
+class Origin(Described):
     """A part of a test that does not come from the thesis; a row may have several."""
 
-    PATH = "path ours"
-    GAINS = "gains ours"
-    KEYFRAMES = "keyframes fitted"
-    PARAMETERS = "parameters ours"
-    FLIGHT = "flight ours"
-    START = "start ours"
-    LIMITS = "no rotor limits"
-    FEEDBACK = "feedback ours"
-
-    @property
-    def meaning(self) -> str:
-        """One sentence."""
-        return _MEANINGS[self]
-
-
-_MEANINGS: Final = {
-    Origin.PATH: "the thesis's figure with the gait's path is not available: we drew one",
-    Origin.GAINS: "the thesis prints no gains: we chose them",
-    Origin.KEYFRAMES: "its keyframes are not available: ours were fitted to its statements",
-    Origin.PARAMETERS: "the thesis does not give all masses or coefficients: we chose them",
-    Origin.FLIGHT: "the thesis flies nothing here: the flight tests what its statement implies",
-    Origin.START: "the thesis does not print the initial state: we chose it",
-    Origin.LIMITS: "the flight ignores the rotor limits that its chapter states",
-    Origin.FEEDBACK: "the thesis does not say whether a derivative is measured or modeled",
-}
+    PATH = "path ours", "the thesis's figure with the gait's path is not available: we drew one"
+    GAINS = "gains ours", "the thesis prints no gains: we chose them"
+    KEYFRAMES = (
+        "keyframes fitted",
+        "its keyframes are not available: ours were fitted to its statements",
+    )
+    PARAMETERS = (
+        "parameters ours",
+        "the thesis does not give all masses or coefficients: we chose them",
+    )
+    FLIGHT = (
+        "flight ours",
+        "the thesis flies nothing here: the flight tests what its statement implies",
+    )
+    START = "start ours", "the thesis does not print the initial state: we chose it"
+    LIMITS = "no rotor limits", "the flight ignores the rotor limits that its chapter states"
+    FEEDBACK = (
+        "feedback ours",
+        "the thesis does not say whether a derivative is measured or modeled",
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -148,7 +148,7 @@ class OwnFunctionController(ControllerTable):
 
 
 class PythonController(OwnFunctionController):
-    """A user's own controller in Python; see `tiltsim.plants.user_controller`."""
+    """A user's own controller in Python; see `tiltsim.plants.commanded_plant`."""
 
     vehicle_models = ("tiltrotor", "quadrotor", "multirotor")
     reference_kinds = ("position", "pose", "attitude_altitude")

@@ -19,8 +19,7 @@ from tiltsim.closed_loop.userdata import RECORDER, steps_taken
 from tiltsim.engines.control import control_callback
 from tiltsim.flight.flight import Flight
 from tiltsim.flight.metrics import End
-from tiltsim.plants.flight_model import flight_model, model_cache_key
-from tiltsim.plants.mujoco_plant import MujocoPlant
+from tiltsim.plants.mujoco_plant import MujocoPlant, flight_model, model_cache_key
 from tiltsim.plants.plant import take_sample
 from tiltsim.simulation.simulate import TerminationMonitor, fly_intervals, intervals_of
 from tiltsim_controllers.mathematics.scalar import Floats

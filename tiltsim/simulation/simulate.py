@@ -30,10 +30,10 @@ from tiltsim.flight.flight import Flight
 from tiltsim.flight.metrics import End
 from tiltsim.laws.assembling import assemble
 from tiltsim.plants.command import Controller, ControllerError
+from tiltsim.plants.commanded_plant import UserControlledPlant
 from tiltsim.plants.equations_plant import EquationsPlant
 from tiltsim.plants.mujoco_plant import MujocoPlant
 from tiltsim.plants.plant import Plant, take_sample
-from tiltsim.plants.user_controller import UserControlledPlant
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.system.arguments import Report, reported

@@ -13,11 +13,10 @@ from tiltsim.flight.flight import Flight
 from tiltsim.flight.metrics import End
 from tiltsim.laws.assembling import assemble
 from tiltsim.plants.command import Command, Controller, ControllerError, Observation
-from tiltsim.plants.flight_model import flight_model
-from tiltsim.plants.mujoco_plant import MujocoPlant
+from tiltsim.plants.commanded_plant import UserControlledPlant
+from tiltsim.plants.mujoco_plant import MujocoPlant, flight_model
 from tiltsim.plants.observing import Observer, built_in_command
 from tiltsim.plants.plant import take_sample
-from tiltsim.plants.user_controller import UserControlledPlant
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.simulation.simulate import TerminationMonitor, failure, fly_chunk, make_plant

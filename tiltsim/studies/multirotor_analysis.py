@@ -190,14 +190,14 @@ def _with_tilts(vehicle: Multirotor, rotors: TiltedRotors) -> dict[str, Any] | N
     tilts, w = found
     return {
         "angles": np.round(tilts, 9).tolist(),
-        "rotor_speeds": _speeds_along(w, vehicle),
+        "rotor_speeds": _speeds_along(w, vehicle.spins),
         **moved_outputs(vehicle.table, tilts, w)._asdict(),
     }
 
 
-def _speeds_along(w: Floats, vehicle: Multirotor) -> list[float]:
+def _speeds_along(w: Floats, spins: Sequence[float]) -> list[float]:
     """Rotor speeds (rad/s) along the spins, of inputs w."""
-    return (np.array(vehicle.spins) * np.copysign(np.sqrt(np.abs(w)), w)).tolist()
+    return (np.array(spins) * np.copysign(np.sqrt(np.abs(w)), w)).tolist()
 
 
 def _free_tilts(vehicle: Multirotor, rotors: TiltedRotors, lost: int) -> dict[str, Any] | None:
@@ -213,8 +213,7 @@ def _free_tilts(vehicle: Multirotor, rotors: TiltedRotors, lost: int) -> dict[st
     force, torque = force_and_torque(table, tilts)
     hovering = hover(remaining._replace(force=force, torque=torque))
     assert hovering is not None
-    spins = np.delete(vehicle.spins, lost)
-    speeds = spins * np.copysign(np.sqrt(np.abs(found[1])), found[1])
+    speeds = _speeds_along(found[1], np.delete(vehicle.spins, lost).tolist())
     return {
         "angles": tilts,
         "rotor_speeds": np.insert(speeds, lost, 0.0).tolist(),
@@ -246,7 +245,7 @@ def balance_report(
     return {
         "acceleration": list(acceleration),
         "angles": tilts.tolist(),
-        "rotor_speeds": _speeds_along(w, vehicle),
+        "rotor_speeds": _speeds_along(w, vehicle.spins),
     }
 
 

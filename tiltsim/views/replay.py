@@ -15,7 +15,7 @@ import mujoco
 import numpy as np
 
 from tiltsim.closed_loop.assembly import Assembly
-from tiltsim.plants.flight_model import build_model
+from tiltsim.plants.mujoco_plant import build_model
 from tiltsim.resources import shipped_folder
 from tiltsim.scenario.scenario import Scenario
 from tiltsim_controllers.mathematics.attitude import quaternion_of_euler

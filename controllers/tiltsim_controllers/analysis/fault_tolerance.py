@@ -242,16 +242,8 @@ def _strong_hovers(
     A free pod makes any thrust in a disk spanned by the directions across its arm and up, a stuck
     one any on a segment, so that forces without torque form a convex set. The strongest of them is
     the strongest along its own direction. Along a direction, with disks replaced by polygons, it
-    is the optimum of a linear program; the force found gives the next direction.
-
-    Args:
-        vehicle: the tiltrotor
-        scale: spin times remaining fraction of thrust, by rotor
-        stuck: A rotor, 1 to 4, and the angle (rad) its servo holds.
-        upright: Whether the force must not point down in the body.
-
-    Returns:
-        Tilts (rad), rotor inputs and their bound, in units of the weight, shape (hovers, 9).
+    is the optimum of a linear program; the force found gives the next direction. A row has the
+    tilts (rad), the rotor inputs and their bound, in units of the weight.
     """
     from scipy.optimize import linprog
     from scipy.sparse import block_diag

@@ -77,39 +77,35 @@ class PublishedGait:
         return None if self.bias is None else self.gait.biased(self.bias)
 
 
-def _fixed(key: str, angles: Sequence[float], color: str | None = None) -> PublishedGait:
+def _source(key: str) -> str:
     chapter, number = key.split("_gait_")
-    gait = plans.fixed(angles, name=key, source=f"ch. {int(chapter[2:])}, Gait {number}")
-    exact = None
-    if color == "blue":
-        exact = _on_exact_lines(key, [(angles[0], angles[1])])
-    return PublishedGait(key, gait, color, printed=True, exact=exact)
+    return f"ch. {int(chapter[2:])}, Gait {number}"
 
 
-def _on_exact_lines(key: str, points: Sequence[tuple[float, float]]) -> Gait:
-    ratio = drag_ratio(_AR_DRONE)
-    angles = [(a, b, *colored_angles(a, b, "blue", ratio)) for a, b in points]
-    if len(angles) == 1:
-        return plans.fixed(angles[0], name=f"{key}, exact blue")
-    return plans.waypoints(angles, _PERIOD)
-
-
-def _vertices(
-    key: str, color: str, bias: float, vertices: Sequence[Sequence[float]]
+def _printed(
+    key: str,
+    vertices: Sequence[Sequence[float]],
+    color: str | None = None,
+    bias: float | None = None,
 ) -> PublishedGait:
-    chapter, number = key.split("_gait_")
-    rows = [(i / 4.0, *vertices[i % 4]) for i in range(5)]
-    source = f"ch. {int(chapter[2:])}, Gait {number}"
-    gait = plans.keyframes(rows, _PERIOD, name=key, source=source)
+    """A gait through four printed vertices, or at one."""
+
+    def through(rows: Sequence[Sequence[float]], name: str) -> Gait:
+        if len(rows) == 1:
+            return plans.fixed(rows[0], name=name, source=_source(key))
+        frames = [(i / 4.0, *rows[i % 4]) for i in range(5)]
+        return plans.keyframes(frames, _PERIOD, name=name, source=_source(key))
+
     exact = None
     if color == "blue":
-        exact = _on_exact_lines(key, [(vertex[0], vertex[1]) for vertex in vertices])
-    return PublishedGait(key, gait, color, printed=True, bias=bias, exact=exact)
+        ratio = drag_ratio(_AR_DRONE)
+        rows = [(a, b, *colored_angles(a, b, "blue", ratio)) for a, b, *_ in vertices]
+        exact = through(rows, f"{key}, exact blue")
+    return PublishedGait(key, through(vertices, key), color, True, bias, exact)
 
 
 def _path(key: str, color: str, path: Path) -> PublishedGait:
-    chapter, number = key.split("_gait_")
-    source = f"ch. {int(chapter[2:])}, Gait {number}; size of the path ours"
+    source = f"{_source(key)}; size of the path ours"
     gait = four_angle_gait(path, _PERIOD, _AR_DRONE, name=key, source=source)
     return PublishedGait(key, gait, color, printed=False, bias=0.8)
 
@@ -129,52 +125,52 @@ PUBLISHED_GAITS: Final = {
     gait.key: gait
     for gait in (
         # ch. 3, Sec. 6.1
-        _fixed("ch03_gait_1", (-0.1, 0.1, -0.2, 0.1)),
-        _fixed("ch03_gait_2", (-0.15, -0.1, 0.3, -0.1)),
+        _printed("ch03_gait_1", [(-0.1, 0.1, -0.2, 0.1)]),
+        _printed("ch03_gait_2", [(-0.15, -0.1, 0.3, -0.1)]),
         # ch. 6, Sec. 5
-        _vertices(
+        _printed(
             "ch06_gait_1",
-            "blue",
-            0.8,
             [
                 (5 * pi / 16, pi / 8, -0.648, -0.727),
                 (5 * pi / 16, 3 * pi / 8, -0.648, -1.512),
                 (pi / 16, 3 * pi / 8, 0.138, -1.512),
                 (pi / 16, pi / 8, 0.138, -0.727),
             ],
-        ),
-        _vertices(
-            "ch06_gait_2",
             "blue",
-            0.99,
+            0.8,
+        ),
+        _printed(
+            "ch06_gait_2",
             [
                 (3 * pi / 8, -3 * pi / 8, -0.844, 0.844),
                 (3 * pi / 8, -pi / 8, -0.844, 0.059),
                 (pi / 8, -pi / 8, -0.059, 0.059),
                 (pi / 8, -3 * pi / 8, -0.059, 0.844),
             ],
+            "blue",
+            0.99,
         ),
-        _vertices(
+        _printed(
             "ch06_gait_3",
-            "red",
-            0.8,
             [
                 (3 * pi / 8, -3 * pi / 8, 1.178, -1.178),
                 (3 * pi / 8, -pi / 8, 1.178, -0.393),
                 (pi / 8, -pi / 8, 0.393, -0.393),
                 (pi / 8, -3 * pi / 8, 0.393, -1.178),
             ],
-        ),
-        _vertices(
-            "ch06_gait_4",
             "red",
             0.8,
+        ),
+        _printed(
+            "ch06_gait_4",
             [
                 (-pi / 8, pi / 8, -0.393, 0.393),
                 (-pi / 8, 3 * pi / 8, -0.393, 1.178),
                 (-3 * pi / 8, 3 * pi / 8, -1.178, 1.178),
                 (-3 * pi / 8, pi / 8, -1.178, 0.393),
             ],
+            "red",
+            0.8,
         ),
         # ch. 7, Fig. 4 (missing): rectangles, gait 1 blue, gaits 2 and 3 red
         _path("ch07_gait_1", "blue", rectangle((0.2, 0.8), (-0.8, -0.2), "blue")),
@@ -187,14 +183,14 @@ PUBLISHED_GAITS: Final = {
         _path("ch08_gait_2", "red", Circle("red", (0.5, -0.5), 0.3)),
         _path("ch08_gait_3", "blue", Circle("blue", (0.5, -0.5), 0.3)),
         # ch. 9, Eqs. (12)-(19)
-        _fixed("ch09_gait_1", (-0.5, -0.5, -0.5, -0.5), "red"),
-        _fixed("ch09_gait_2", (-0.5, 0.5, -0.5, 0.5), "red"),
-        _fixed("ch09_gait_3", (0.5, -0.5, 0.5, -0.5), "red"),
-        _fixed("ch09_gait_4", (0.5, 0.5, 0.5, 0.5), "red"),
-        _fixed("ch09_gait_5", (-0.5, -0.5, 0.834, 0.166), "blue"),
-        _fixed("ch09_gait_6", (-0.5, 0.5, 0.834, -0.834), "blue"),
-        _fixed("ch09_gait_7", (0.5, -0.5, -0.166, 0.166), "blue"),
-        _fixed("ch09_gait_8", (0.5, 0.5, -0.166, -0.834), "blue"),
+        _printed("ch09_gait_1", [(-0.5, -0.5, -0.5, -0.5)], "red"),
+        _printed("ch09_gait_2", [(-0.5, 0.5, -0.5, 0.5)], "red"),
+        _printed("ch09_gait_3", [(0.5, -0.5, 0.5, -0.5)], "red"),
+        _printed("ch09_gait_4", [(0.5, 0.5, 0.5, 0.5)], "red"),
+        _printed("ch09_gait_5", [(-0.5, -0.5, 0.834, 0.166)], "blue"),
+        _printed("ch09_gait_6", [(-0.5, 0.5, 0.834, -0.834)], "blue"),
+        _printed("ch09_gait_7", [(0.5, -0.5, -0.166, 0.166)], "blue"),
+        _printed("ch09_gait_8", [(0.5, 0.5, -0.166, -0.834)], "blue"),
     )
 }
 """Every gait of ch. 3 and 6 to 9 that the thesis names."""

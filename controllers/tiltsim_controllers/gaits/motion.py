@@ -55,10 +55,6 @@ def check_phases(phases: Sequence[float]) -> None:
         raise ValueError(f"keyframe phases {phases}: at most two rows may share a phase")
 
 
-Jets = Any
-"""Angles with rates and accelerations, shape (M, 3), rad and s."""
-
-
 @traceable
 def planned_tilts(time: Any, gait: GaitParameters, knots: Any, tilts: int) -> Any:
     """The tilt angles (rad) of a gait with their rates and accelerations.

@@ -15,8 +15,6 @@ from typing import Any
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.mathematics.linear import cross as plain_cross
 
-Product = Callable[[Any, Any], Any]
-
 
 @dataclass(frozen=True, slots=True)
 class Moving:
@@ -78,7 +76,7 @@ class Moving:
         return at_rest(other) / self
 
 
-def product(multiply: Product, x: Any, y: Any) -> Any:
+def product(multiply: Callable[[Any, Any], Any], x: Any, y: Any) -> Any:
     """Any product of two quantities, one of which moves.
 
     Args:

@@ -11,7 +11,6 @@ import numpy.typing as npt
 Pair = tuple[float, float]
 Triple = tuple[float, float, float]
 Quad = tuple[float, float, float, float]
-Octet = tuple[float, float, float, float, float, float, float, float]
 Values = tuple[float, ...]
 Vector = Sequence[float]
 Floats = npt.NDArray[np.float64]

@@ -12,7 +12,7 @@ from tiltsim.laws.assembling import assemble
 from tiltsim.models.vehicle_parts import VehiclePose
 from tiltsim.plants.command import Command, check_command
 from tiltsim.plants.commanded_plant import CommandedPlant
-from tiltsim.plants.flight_model import build_model
+from tiltsim.plants.mujoco_plant import build_model
 from tiltsim.simulation.simulate import make_plant
 from tiltsim.studies.multirotor_analysis import fleet_file
 from tiltsim.vehicles.rotorcraft.layout import Layout

@@ -51,19 +51,13 @@ def registered_claims(scaled: str = "", factor: float = 1.0) -> tuple[Registered
         scaled: Name of a threshold of ``thresholds.toml`` to change.
         factor: By which it is multiplied, or its distance from the number ``from``.
     """
-    values = {
-        name: _scaled(one["value"], one.get("from", 0.0), factor)
-        if name == scaled
-        else one["value"]
-        for name, one in words("thresholds").items()
-    }
+    values = {name: one["value"] for name, one in words("thresholds").items()}
+    if scaled:
+        start = words("thresholds")[scaled].get("from", 0.0)
+        values[scaled] = start + (values[scaled] - start) * factor
     files = sorted(Path(__file__).parent.glob("ch*.toml"))
     shared = words("shared") | values
     return tuple(claim for file in files for claim in _chapter(words(file.stem), shared))
-
-
-def _scaled(value: float, start: float, factor: float) -> float:
-    return start + (value - start) * factor
 
 
 @cache

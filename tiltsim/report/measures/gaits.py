@@ -189,8 +189,7 @@ def red_beats_blue_as_published(red: str, blue: str, offset: float, formulas: li
 
 def partial_scaling_can_harm(keys: list[str]) -> bool:
     """Whether a gait's biased twin has a smaller margin than the gait."""
-    rows = [robustness(PUBLISHED_GAITS[key]) for key in keys]
-    return any(row.margin_biased is not None and row.margin_biased < row.margin for row in rows)
+    return any(gait_margin(key, "margin_biased") < gait_margin(key) for key in keys)
 
 
 def printed_angles_lie_on_the_lines(key: str) -> bool:

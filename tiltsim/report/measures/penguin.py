@@ -159,17 +159,12 @@ def switch_matrix_is_the_limit() -> bool:
     return True
 
 
-def _polynomial_43(growth: float, state: Pair) -> float:
-    """The left side of Eq. (43) at ``growth = exp(3 t)``."""
-    error, rate = state
-    mixed = 2.0 * error + rate / 3.0
-    return growth * growth / (9.0 * _SQRT_3) + mixed * growth - 4.0 * error - 4.0 / 3.0 * rate
-
-
 def eq_43_holds(state: Pair) -> bool:
     """At the time at which a rotor stops."""
-    growth = exp(3.0 * half_period(SWING, state).free_time)
-    return abs(_polynomial_43(growth, state)) < 1e-9 * growth * growth
+    error, rate = state
+    mixed, growth = 2.0 * error + rate / 3.0, exp(3.0 * half_period(SWING, state).free_time)
+    left = growth * growth / (9.0 * _SQRT_3) + mixed * growth - 4.0 * error - 4.0 / 3.0 * rate
+    return abs(left) < 1e-9 * growth * growth
 
 
 def _printed_time(state: Pair, side: float) -> float:

@@ -103,24 +103,6 @@ def fourth_derivative_is_right() -> bool:
     return bool(np.abs(printed - exact).max() < 1e-5 * np.abs(exact).max())
 
 
-def tilt_column_off(mended: bool) -> float:
-    """By how much Eq. (27), or it times 1 - I_T/I_B, is not the column of the tilt, relatively.
-
-    The column of the tilt's second derivative in the fourth derivative of the position equals the
-    column of the tilt in the acceleration, yaw following by Eq. (2): no other term contains it.
-    """
-    tilt, step, squares = 0.7, 1e-6, np.array([150.0**2, 120.0**2])
-    turn = turn_per_tilt(THESIS_CAR)
-
-    def at(alpha: float) -> np.ndarray:
-        return np.array(acceleration(turn * alpha, squares, THESIS_CAR))
-
-    ahead, behind, (x, y) = at(tilt + step), at(tilt - step), at(tilt)
-    exact = np.subtract(ahead, behind) / (2.0 * step)
-    printed = np.array((-y, x)) * (turn if mended else 1.0)
-    return max(0.0, float(np.abs(exact - printed).max() / np.hypot(x, y)) - 1e-6)
-
-
 def lean(flights: Flown, as_share: bool = False) -> float:
     """Angle (rad) from the middle of the thrusts to the center, or over their half angle."""
     _, across = thrust_map(THESIS_CAR) @ (float(flights[0]["final_input_split"]), 0.0)
