@@ -144,10 +144,7 @@ def _key(name: str, node: Node, required: bool) -> Key:
 
 
 def _example(node: Node) -> Any:
-    """A value to show: as declared, or another than the default, or the default.
-
-    None for tables, whose keys have examples.
-    """
+    """A value to show: as declared, else not the default, else the default; None for tables."""
     default, choices = node.value.get("default"), node.choices
     if "examples" in node.value:
         return node.value["examples"][0]

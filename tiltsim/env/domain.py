@@ -123,10 +123,7 @@ def _flat(values: Mapping[str, Any]) -> Floats:
 
 
 def _row(axis: Axis, generator: np.random.Generator, positions: dict[str, int]) -> Sequence[Any]:
-    """One value for each key of an axis; keys that move together get the same draw.
-
-    ``positions`` holds the positions drawn for groups so far.
-    """
+    """One value for each key of an axis, which share a draw; ``positions`` of groups so far."""
     if isinstance(axis, UniformAxis):
         return [float(generator.uniform(axis.low, axis.high))] * len(axis.targets)
     if isinstance(axis, NormalAxis):

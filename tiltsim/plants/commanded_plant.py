@@ -254,7 +254,6 @@ class UserControlledPlant(CommandedPlant):
 
     An interval may be repeated from a saved state, to find the step on which a flight ended. The
     commands are kept for that, so that a controller with a memory is called once per sample.
-
     """
 
     def __init__(self, assembly: Assembly, model: mujoco.MjModel | None = None) -> None:

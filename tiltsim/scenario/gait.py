@@ -18,6 +18,7 @@ from tiltsim.scenario.table import (
     Many,
     Period,
     Positive,
+    Row,
     Table,
     default,
     example,
@@ -50,9 +51,6 @@ COLOR: Final = (
     "and the matrix is singular"
 )
 """The two colors of ch. 6, for descriptions."""
-
-GaitRow = Annotated[Many[float], Field(min_length=2, max_length=17)]
-
 
 AnyVehicle = Vehicle | Multirotor | TiltCar
 
@@ -202,7 +200,7 @@ class TableGait(GaitTable, TimeTable):
         "to the scenario's folder; times from 0, at least 1e-4 s apart; 2 to 10,000 rows",
         "my_gait.csv",
     )
-    rows: Many[GaitRow] | None = default(
+    rows: Many[Row] | None = default(
         None,
         f"the table itself in place of a file: time and alpha_1..4 of each row; {SIGN} "
         "[s, rad, rad, rad, rad]",

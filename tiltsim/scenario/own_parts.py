@@ -122,7 +122,8 @@ def sample_functions(document: Mapping[str, Any], own: Mapping[str, Any]) -> Non
         if isinstance(rows, list) and (not rows or rows[-1][0] != span):
             size = len(COLUMNS[name]) - 1
             if name == "gait" and _is_multirotor(document):
-                size = _tilts_of(own[name])
+                found = _size_of(own[name])
+                size = found if 1 <= found <= MAX_ROTORS else size
             if name == "reference" and (given := _size_of(own[name])) + 1 in WIDTHS:
                 size = given
             rows[:] = _samples(name, own[name], size, span)
@@ -141,12 +142,6 @@ def _size_of(function: Callable[[float], Any]) -> int:
     except Exception:
         return 0
     return values.size if values.ndim == 1 else 0
-
-
-def _tilts_of(gait: Callable[[float], Any]) -> int:
-    """Number of tilt angles that a function of time returns; 4 if it returns no such vector."""
-    size = _size_of(gait)
-    return size if 1 <= size <= MAX_ROTORS else 4
 
 
 def _table(name: str, value: Any, multirotor: bool) -> dict[str, Any]:

@@ -41,7 +41,6 @@ if TYPE_CHECKING:
     from tiltsim_controllers.mathematics.scalar import Floats, Triple, Values
 
 Tilt = Annotated[float, Field(gt=-pi / 2, lt=pi / 2)]
-Roll = Annotated[float, Field(ge=-pi, le=pi)]
 
 
 _PREFIXES: Final = {"position": "", "angular_frequency": "frequency_"}
@@ -112,7 +111,7 @@ class ReferenceTable(Table, ABC):
 class PositionReference(ReferenceTable):
     """A position, and the attitude at it."""
 
-    roll: Roll = default(
+    roll: Angle = default(
         0.0,
         "angle to hold; for controller.law attitude_force, which alone takes pi/2 and more, "
         "full_pose, switching, vectoring or python [rad]",

@@ -15,6 +15,7 @@ from tiltsim.scenario.table import (
     NonNegative,
     Positive,
     PositiveEach,
+    Row,
     Table,
     Vector3,
     default,
@@ -186,8 +187,6 @@ CHANNELS: Final = 32
 """Most outputs of a firmware."""
 
 _OUTPUT: Final = re.compile(r"(rotor|along|across)_([1-9]\d?)")
-
-Row = Annotated[Many[float], Field(min_length=2, max_length=17)]
 
 
 class AutopilotTable(Table):

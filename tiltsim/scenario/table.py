@@ -27,7 +27,7 @@ Period = Annotated[float, Field(ge=1e-3, le=1e9)]
 Factor = Annotated[float, Field(ge=-1e3, le=1e3)]
 Angles2 = Annotated[tuple[Angle, Angle], Field(strict=False)]
 AnglesEach = Annotated[Many[Angle], Field(min_length=1, max_length=16)]
-Gains4 = Annotated[tuple[float, float, float, float], Field(strict=False)]
+Row = Annotated[Many[float], Field(min_length=2, max_length=17)]  # of a time and values
 PositiveEach = Annotated[Many[Positive], Field(min_length=2, max_length=16)]
 Limit = Annotated[float, Field(allow_inf_nan=True)]
 Range = Annotated[tuple[Limit, Limit], Field(strict=False)]

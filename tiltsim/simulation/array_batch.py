@@ -159,16 +159,7 @@ class ArrayBatch(Generic[Result]):
         closer: Floats,
         seconds: float,
     ) -> Flight:
-        """The flight of a row that ended before the end of the duration.
-
-        Args:
-            index: Index of its assembly.
-            row: Row in the recording.
-            samples: As if nothing ended it.
-            recording: Recording of the part.
-            closer: Its samples from step to step in the interval in which it ended.
-            seconds: That it took.
-        """
+        """The flight of a row that ended early; ``closer`` are its samples by step at the end."""
         assembly, course = self._assemblies[index], self._course
         monitor, sound = TerminationMonitor(assembly), _Sound()
         end = monitor.check(sound, samples[0])  # type: ignore[arg-type]

@@ -43,27 +43,17 @@ def lanes_for(flights: int) -> int:
 
 @dataclass
 class _Flown:
-    """A flight while it is in a lane, and after.
+    """A flight while it is in a lane, and after."""
 
-    Attributes:
-        index: Its place in the batch.
-        assembly: The flight.
-        samples: Memory for the samples, the first at time zero.
-        taken: Number of samples taken.
-        terminated: Whether the last sample ends the flight.
-        numbers: Parameters of its loop.
-        saved: Index, state and inputs in force at the last sample before the end.
-        seconds: Time that it took.
-    """
-
-    index: int
+    index: int  # its place in the batch
     assembly: Assembly
-    samples: Floats
-    taken: int = 0
-    terminated: bool = False
-    numbers: Floats = field(default_factory=lambda: np.empty(0))
+    samples: Floats  # memory for them, the first at time zero
+    taken: int = 0  # number of samples
+    terminated: bool = False  # whether the last sample ends the flight
+    numbers: Floats = field(default_factory=lambda: np.empty(0))  # parameters of its loop
     saved: Floats = field(default_factory=lambda: np.empty(0))
-    seconds: float = 0.0
+    """Index, state and inputs in force at the last sample before the end."""
+    seconds: float = 0.0  # that it took
 
     @property
     def alike(self) -> tuple[object, ...]:

@@ -158,10 +158,7 @@ def _document(source: object) -> tuple[dict[str, Any], str, Path | None]:
 
 
 def _base(sweep: Sweep, folder: Path | None, address: str) -> dict[str, Any]:
-    """The base scenario with ``[set]`` and all defaults, without its expectations.
-
-    If it lacks a key that an axis gives, with the first values of the axes.
-    """
+    """The base with ``[set]`` and defaults; with first values of axes if it needs their keys."""
     try:
         return _scenario(sweep, sweep.set, folder, address)
     except InputError as error:

@@ -122,10 +122,7 @@ def _difference(found: str, expected: str) -> str:
 
 
 def _wrong_column(found: pa.Schema, points: SweepPoints) -> str:
-    """The first column that is there twice, has another type, or is missing.
-
-    Versions differ in their metrics, which are optional here.
-    """
+    """The first column that is there twice, has another type or, unless a metric, is missing."""
     for name in found.names:
         if found.names.count(name) > 1:
             return f"has two columns {name}"
@@ -140,10 +137,7 @@ def _wrong_column(found: pa.Schema, points: SweepPoints) -> str:
 
 
 def _damaged_column(table: pa.Table, points: SweepPoints) -> str:
-    """The first column with a NaN or an infinity, which no sweep stores, or an axis without values.
-
-    Values that a flight does not have are stored as null.
-    """
+    """The first column with a number that is not finite, or of an axis with missing values."""
     axes = {key for axis in points.sweep.axis for key in axis.targets}
     for name in table.column_names:
         values = table[name]

@@ -85,11 +85,7 @@ def begin(work: Callable[[Item], Result]) -> tuple[BaseProcess, Connection]:
 
 @contextmanager
 def _environment() -> Iterator[None]:
-    """Start processes within the block with the variables of `variables_for_processes`.
-
-    Until it has the path of this process, Python's own ``python -c`` finds a signal.py in the
-    working folder.
-    """
+    """Start processes with `variables_for_processes`: else they find the folder's signal.py."""
     added = variables_for_processes()
     os.environ |= added
     try:
@@ -101,10 +97,7 @@ def _environment() -> Iterator[None]:
 
 @contextmanager
 def _interrupts_blocked() -> Iterator[None]:
-    """Block SIGINT until the end of the block, also for processes started within it.
-
-    An interrupt during a process's imports would print a traceback.
-    """
+    """Block SIGINT in the block and its processes, whose imports would print a traceback."""
     if sys.platform == "win32":
         yield
         return
