@@ -423,7 +423,7 @@ def test_force_and_torque_change_as_desired_with_the_least_inputs(table, failure
         rate = (wrench(step) - wrench(-step)) / (2.0 * step)
         rotation = rotation_matrix(body[6:9])
         force, torque = np.split(wrench(0.0), 2)
-        inertia = np.diag((HEXAROTOR.inertia_xx, HEXAROTOR.inertia_yy, HEXAROTOR.inertia_zz))
+        inertia = np.reshape(HEXAROTOR.inertia, (3, 3))
         present = rotation @ force / HEXAROTOR.mass - (0.0, 0.0, HEXAROTOR.gravity)
         jerk = target[3] + np.dot(
             GAINS.position, (target[2] - present, target[1] - body[3:6], target[0] - body[:3])
