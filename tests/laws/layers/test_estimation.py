@@ -254,7 +254,8 @@ def test_a_native_sample_takes_less_than_fifteen_microseconds(name):
         own = own.inner
     start = estimation._start(assembly, own.layer, fusion)
     readings = np.ones(fusion.readings)
-    readings[fusion.imu : fusion.imu + 6] = [0.1, 0.2, 9.8, 0.01, 0.02, 0.03]
+    first = fusion.imu.first
+    readings[first : first + 6] = [0.1, 0.2, 9.8, 0.01, 0.02, 0.03]
 
     @traceable
     def sample(time, state, parameters, knots):

@@ -295,7 +295,7 @@ class Recording:
         options = {"send_properties": False, "batcher_config": batching}
         self.stream = rr.RecordingStream(APPLICATION, recording_id=name, **options)
         self.stream.set_log_time_enabled(False)
-        names = names or (flight_names(scenarios) if len(scenarios) > 1 else [""])
+        names = (names or flight_names(scenarios)) if len(scenarios) > 1 else [""]
         title = ": ".join(filter(None, (common_title(scenarios), " / ".join(names))))
         self.stream.send_recording_name(title or scenarios[0].address or "flight")
         self.recorders = [
@@ -319,6 +319,7 @@ class RecordingFile(Recording):
         # Flushed by row and byte counts only: timed flushes would make no two files equal.
         batching = rr.ChunkBatcherConfig(flush_tick=FLUSH_INTERVAL)
         super().__init__(assemblies, names, batching=batching)
+        self._content = self.stream.memory_recording()  # as Rerun does not report a full disk
 
     def save(self, flights: Sequence[Flight], path: Path) -> None:
         """Write the flights, one per assembly, atomically.
@@ -326,14 +327,13 @@ class RecordingFile(Recording):
         Raises:
             InputError: If the file cannot be written.
         """
-        content = self.stream.memory_recording()  # as Rerun does not report a full disk
         blueprint = flight_blueprint(self.recorders, flights)
         self.stream.send_blueprint(blueprint, make_active=False, make_default=True)
         self.write(flights)
-        saved = content.drain_as_bytes()
+        content = self._content.drain_as_bytes()
         self.stream.disconnect()
         with replacing(path) as temporary:
-            temporary.write_bytes(saved)
+            temporary.write_bytes(content)
 
 
 def save_recording(flights: Sequence[Flight], path: Path, names: Sequence[str] = ()) -> None:
