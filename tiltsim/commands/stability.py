@@ -204,7 +204,7 @@ def stability_text(found: Stability) -> str:
     kind = "rest point" if found.period is None else f"orbit of {number(found.period)} s"
     verdict = "stable" if found.stable else "unstable"
     if found.neutral:
-        verdict += f", {found.neutral} neutral: disturbed along them, it does not come back"
+        verdict += f", {found.neutral} neutral: a disturbance of these neither grows nor decays"
     rows = [("kind", kind), ("verdict", verdict), ("residual", number(found.residual, ".2g"))]
     if found.multipliers is not None:
         largest = found.multipliers[0]
