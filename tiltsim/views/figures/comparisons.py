@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from tiltsim.studies.arena import Standing
-from tiltsim.studies.arena_page import cell
+from tiltsim.studies.arena_page import cell, shown
 from tiltsim.studies.comparison import Compared, is_last_tried, why_none
 from tiltsim.system.text import in_words
 from tiltsim.views.figures import style
@@ -101,7 +101,6 @@ def _draw_survived(axes: Axes, rows: Sequence[Compared], looks: Mapping[str, Any
 DETAILED: Final = 2  # vehicles with a separate panel; all have a row in the panel of totals
 WIDE: Final = 9  # letters of a controller's name that fit above its column
 ALL: Final = "all tasks"
-LEGEND: Final = "100 without error; default → tuned gains; – where refused"
 
 Cells = dict[str, dict[str, tuple[float | None, float | None]]]
 """Scores with default and tuned gains, by row and controller."""
@@ -144,8 +143,18 @@ def arena_figure(panels: Mapping[str, Cells]) -> Figure:
     for axes, (title, cells) in zip(grid[:, 0], panels.items(), strict=True):
         _draw(axes, cells, names)
         axes.set_title(style.verbatim(in_words(title)))
-    add_heading(figure, "Scores", LEGEND)
+    add_heading(figure, "Scores", _legend([pair for row in rows for pair in row.values()]))
     return figure
+
+
+def _legend(pairs: Sequence[tuple[float | None, float | None]]) -> str:
+    """The meaning of the numbers that are drawn."""
+    words = ["100 without error"]
+    if any(shown(default) != shown(tuned) for default, tuned in pairs):
+        words.append("default → tuned gains")
+    if any(tuned is None for _, tuned in pairs):
+        words.append("– where refused")
+    return "; ".join(words)
 
 
 def _draw(axes: Any, cells: Cells, names: Sequence[str]) -> None:
