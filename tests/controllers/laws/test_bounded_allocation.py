@@ -17,10 +17,6 @@ def example(seed, size):
     return matrix, demand, random.uniform(0.5, 2.0, size), 0.1 * random.normal(size=size)
 
 
-def cost(x, matrix, demand, weights, start):
-    return ((matrix @ x - demand) ** 2 / SOFTNESS).sum() + (weights * (x - start) ** 2).sum()
-
-
 @pytest.mark.parametrize("size", [4, 8, 16])
 def test_without_limits_it_is_the_least_squares_solution(size):
     matrix, demand, weights, start = example(size, size)
@@ -31,18 +27,19 @@ def test_without_limits_it_is_the_least_squares_solution(size):
     np.testing.assert_allclose(found, np.linalg.lstsq(rows, values)[0], atol=2e-6)
 
 
-@pytest.mark.parametrize("seed", range(20))
-def test_within_limits_it_is_close_to_the_optimum(seed):
-    """Inputs that left are not taken back, so that the optimum may be lower, never higher."""
-    matrix, demand, weights, start = example(seed, 8)
-    low, high = np.full(8, -0.5), np.full(8, 0.7)
-    found = bounded_least_squares(matrix, demand, SOFTNESS, weights, start, low, high)
-    assert (found >= low).all()
-    assert (found <= high).all()
-    rows = np.vstack([matrix / np.sqrt(SOFTNESS)[:, None], np.diag(np.sqrt(weights))])
-    values = np.hstack([demand / np.sqrt(SOFTNESS), np.sqrt(weights) * start])
-    best = lsq_linear(rows, values, (low, high), tol=1e-14).x
-    clipped = np.clip(np.linalg.lstsq(rows, values)[0], low, high)
-    costs = [cost(x, matrix, demand, weights, start) for x in (best, found, clipped)]
-    assert costs[0] <= costs[1] * (1.0 + 1e-6)
-    assert costs[1] <= costs[2] * (1.0 + 1e-12)
+@pytest.mark.parametrize("softest", [1e-2, 1e-1])
+@pytest.mark.parametrize("size", [4, 8, 16])
+def test_within_limits_it_is_the_optimum(size, softest):
+    """Without the release of limits that no longer hold, half of the cases miss it."""
+    softness = softest * np.array([1.0, 1.0, 1e-4, 1e-5, 1e-5, 1e-4])
+    released = 0
+    for seed in range(40):
+        matrix, demand, weights, start = example(seed, size)
+        low, high = np.full(size, -0.3), np.full(size, 0.4)
+        found = bounded_least_squares(matrix, demand, softness, weights, start, low, high)
+        rows = np.vstack([matrix / np.sqrt(softness)[:, None], np.diag(np.sqrt(weights))])
+        values = np.hstack([demand / np.sqrt(softness), np.sqrt(weights) * start])
+        best = lsq_linear(rows, values, (low, high), method="bvls", tol=1e-15, max_iter=999).x
+        np.testing.assert_allclose(found, best, atol=1e-9)
+        released += abs(np.clip(np.linalg.lstsq(rows, values)[0], low, high) - best).max() > 1e-6
+    assert released > 20
