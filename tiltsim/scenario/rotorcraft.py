@@ -87,7 +87,7 @@ class AnyVehicleTable(Table, ABC):
         """The physical parameters."""
 
     def refusals(self, _scenario: Any) -> Refusals:
-        """What a scenario of this vehicle may not have: keys, reasons, and values not their own."""
+        """Contradictions to a scenario of this vehicle: keys, reasons, and values not their own."""
         yield from ()
 
 

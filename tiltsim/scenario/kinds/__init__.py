@@ -24,7 +24,7 @@ def tables_of(base: type[T], key: str, modules: Iterable[str]) -> dict[str, type
 
     Args:
         base: Class of the tables.
-        key: The key whose value tells them apart.
+        key: The key whose values are the names.
         modules: Names of the modules that define them.
     """
     return {
