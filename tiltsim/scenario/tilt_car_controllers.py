@@ -1,9 +1,8 @@
 """The ``[controller]`` tables of the tilt-car."""
 
 from tiltsim.scenario.controller_table import ControllerTable
-from tiltsim_controllers.tilt_car.fourth_derivative import FourthDerivative
+from tiltsim_controllers.tilt_car.integrating import FourthDerivative, ThirdDerivative
 from tiltsim_controllers.tilt_car.planned_direction import PlannedDirection
-from tiltsim_controllers.tilt_car.third_derivative import ThirdDerivative
 
 
 class ThirdDerivativeController(ThirdDerivative, ControllerTable):
