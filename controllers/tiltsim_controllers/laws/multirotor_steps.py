@@ -1,7 +1,5 @@
 """Parameters and steps of the control law of attitude and force, `multirotor`."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Annotated, Any, Final, Literal, NamedTuple
 
@@ -210,9 +208,7 @@ def horizontal_control(
     gains, limit = parameters.gains, parameters.max_acceleration
     k3 = parameters.terms.integral_action * parameters.integral.position
     error, ahead = motion.error[:2], motion.acceleration[:2]
-    back = position_feedback(
-        error, ahead.rate - jerk[:2], integrals[:2], (gains.position_1, gains.position_2, k3)
-    )
+    back = position_feedback(error, ahead.rate - jerk[:2], integrals[:2], (*gains.position, k3))
     rates = integrator_rate(error.value, back.value, limit)
     return ahead + limited_acceleration(back, limit), rates
 

@@ -9,8 +9,6 @@ periodic Riccati equation", in "The Riccati Equation", Springer), solved as a di
 to node of a table, backward until it repeats.
 """
 
-from __future__ import annotations
-
 from typing import Any, Final, NamedTuple
 
 import numpy as np

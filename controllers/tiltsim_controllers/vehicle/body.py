@@ -1,7 +1,5 @@
 """A rigid body: its state by name, its mass and inertia, its motion, and the loads on it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from math import inf
 from typing import Any, Final, NamedTuple
