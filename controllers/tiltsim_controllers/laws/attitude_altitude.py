@@ -10,14 +10,7 @@ from typing import Any, Final, Literal
 from tiltsim_controllers.code.arrays import traceable, xp
 from tiltsim_controllers.gaits.motion import NO_KNOTS, GaitParameters
 from tiltsim_controllers.laws.allocation import RotorRange
-from tiltsim_controllers.laws.feedback import (
-    CONVENTIONAL,
-    EXACT,
-    NONE,
-    conventional_decoupler,
-    exact_decoupler,
-    modified_decoupler,
-)
+from tiltsim_controllers.laws.feedback import NONE, decoupled
 from tiltsim_controllers.laws.gains import Gains, GivenGains
 from tiltsim_controllers.laws.keys import Keys, default, record_of
 from tiltsim_controllers.laws.observed import Seen, Step
@@ -116,13 +109,9 @@ def _attitude_reference(now: RotorcraftState, target: Any, wrench: Any, p: Any) 
     p_ref, v_ref, a_ref = target
     K_1, K_2 = p.gains.position
     ax, ay, _ = a_ref + K_1 * (v_ref - now.velocity) + K_2 * (p_ref - now.position)  # Eq. 28
-    if p.decoupler == CONVENTIONAL:
-        return xp.array([*conventional_decoupler(ax, ay, yaw, gravity), yaw])
-    n = torque_free_force(wrench[:3], wrench[3:])
-    # (F_X, F_Y) / (m g) of Eqs. 29 and 30 is (n_x, n_y) / n_z
-    if p.decoupler == EXACT:
-        return xp.array([*exact_decoupler(ax, ay, a_ref[2], yaw, gravity, n), yaw])
-    return xp.array([*modified_decoupler(ax, ay, yaw, gravity, n), yaw])
+    n = torque_free_force(wrench[:3], wrench[3:])  # F_X / (m g) of Eq. 30 is n_x / n_z
+    roll, pitch = decoupled(p.decoupler, (ax, ay, a_ref[2]), yaw, gravity, n)
+    return xp.array([roll, pitch, yaw])
 
 
 @traceable

@@ -232,3 +232,19 @@ def exact_decoupler(ax: Any, ay: Any, az: Any, yaw: Any, gravity: Any, n: Any) -
     roll = where(reaches, reached, nearest)
     pitch = angle(dx, dz) - angle(n[0], n[1] * sine(roll) + n[2] * cosine(roll))
     return roll, pitch
+
+
+def decoupled(decoupler: float, acceleration: Any, yaw: Any, gravity: Any, n: Any) -> Any:
+    """Roll and pitch (rad) by a decoupler of `DECOUPLERS` other than none.
+
+    Args:
+        decoupler: Its number.
+        acceleration: Desired, m/s^2, world axes, shape (3,).
+        yaw, gravity, n: See `modified_decoupler`; with the exact one they may move.
+    """
+    ax, ay, az = acceleration[0], acceleration[1], acceleration[2]
+    if decoupler == EXACT:
+        return exact_decoupler(ax, ay, az, yaw, gravity, n)
+    if decoupler == CONVENTIONAL:
+        return conventional_decoupler(ax, ay, yaw, gravity)
+    return modified_decoupler(ax, ay, yaw, gravity, n)
