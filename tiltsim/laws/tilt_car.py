@@ -32,6 +32,10 @@ def initial_motion(scenario: Scenario) -> tuple[float, ...]:
     return (*scenario.initial.position[:2], *scenario.initial.velocity[:2])
 
 
+def _car(plan: FlightPlan) -> dict[str, Any]:
+    return {"car": plan.scenario.vehicle.resolve()}
+
+
 def yaw(alpha: Any, parameters: Any) -> Any:
     """Yaw (rad) at a tilt angle (rad); Eq. (2)."""
     return parameters.heading - counter_yaw_per_tilt(parameters.law.car) * alpha
@@ -94,7 +98,7 @@ class CarFunctions(VehicleFunctions):
         return self.closed_loop(
             TILT_CAR,
             {
-                "servo_lead": lambda plan: servo_lead(plan.scenario.tilt_car.tilt_servo),
+                "servo_lead": lambda plan: servo_lead(plan.scenario.vehicle.tilt_servo),
                 "heading": lambda plan: plan.scenario.initial.attitude[2],
             },
             inputs_size,
@@ -239,6 +243,7 @@ def _integrating(
     law = Law(
         step,
         record,
+        _car,
         states={"alpha_ref": "rad", **states},
         initial=lambda plan: (initial_tilt(plan)[0], *(0.0,) * len(states)),
         signals=DEMANDED,
@@ -355,6 +360,7 @@ PLANNED_DIRECTION: Final = _Planned(
     Law(
         _step,
         planned_direction.Parameters,
+        _car,
         signals=(*DEMANDED, *SQUARES, "alpha_ref"),
         units={
             **dict.fromkeys(SQUARES, "rad^2/s^2"),

@@ -156,7 +156,7 @@ class ControllerTable(Table):
     table_name = "controller"
     vehicle_models: ClassVar[tuple[str, ...]]
     reference_kinds: ClassVar[tuple[ReferenceKind, ...]]
-    gait_types: ClassVar[tuple[str, ...]] = ("fixed",)  # of the tilt-car's controllers
+    gait_types: ClassVar[tuple[str, ...]] = ("fixed",)  # of laws of vehicles in a plane
     loop_gains: ClassVar[tuple[str, ...]] = ()  # keys of the gains of independent linear loops
     is_external: ClassVar[bool] = False  # commands come from Python code, not from a built-in law
     commands_tilts: ClassVar[bool] = False  # the tilt angles are inputs, not planned by a gait

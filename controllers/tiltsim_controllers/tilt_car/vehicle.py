@@ -21,6 +21,11 @@ class TiltCar(NamedTuple):
     half_angle: float  # [theta] rad, from the bisector of the thrusts to either
     thrust_coefficient: float  # [K_F] N s^2/rad^2
 
+    @property
+    def tilts(self) -> int:
+        """The number of tilt angles that a gait plans."""
+        return 1
+
 
 THESIS_CAR: Final = TiltCar(
     mass=1.0, top_inertia=0.001, bottom_inertia=0.001, half_angle=pi / 6, thrust_coefficient=0.001

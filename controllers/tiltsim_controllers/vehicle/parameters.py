@@ -24,6 +24,11 @@ class Vehicle(NamedTuple):
         return self[1:4]
 
     @property
+    def tilts(self) -> int:
+        """The number of tilt angles that a gait plans; without hinges they are idle."""
+        return 4
+
+    @property
     def hover_rotor_speed(self) -> Any:
         """The speed (rad/s) at which four untilted rotors carry the weight."""
         return (self.mass * self.gravity / (4.0 * self.thrust_coefficient)) ** 0.5
