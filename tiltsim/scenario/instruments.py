@@ -303,7 +303,7 @@ def check_instruments(scenario: Any) -> None:
         return
     first, step = f"sensors.{next(iter(found))}", simulation.control_timestep
     reasons = {
-        "the tilt_car has no instruments; remove it": scenario.vehicle.is_planar,
+        f"the {scenario.vehicle.model} has no instruments; remove it": scenario.vehicle.is_planar,
         "a Python controller observes the state, not readings; choose controller.law = "
         '"numpy", or remove it': scenario.controller.is_external,
         "does not sense contacts; remove it, or [ground], [[object]], [tool], [payload] and "
