@@ -222,11 +222,13 @@ def test_untilted_it_makes_a_fourth_order_loop_of_yaw(form):
         per_torque /= 2.0 * vehicle.hover_rotor_speed
     reaction = desired.vehicle.rotor_inertia * per_torque
     factor = 2.0 * vehicle.hover_rotor_speed * vehicle.drag_coefficient * per_torque
-    loop = np.polymul([reaction, factor], [gains.yaw_1, gains.yaw_2, gains.yaw_3])
+    loop = np.polymul([reaction, factor], gains.loops["yaw"])
     poles = poles_of_hover(desired)
     for expected in np.roots(np.polyadd([LAG, 1.0, 0.0, 0.0, 0.0], loop)):
         assert np.abs(poles - expected).min() < 1e-5 * abs(expected)
-    assert gains_of_reaction(desired).max() == pytest.approx(gains.yaw_1 * reaction, rel=1e-12)
+    assert gains_of_reaction(desired).max() == pytest.approx(
+        gains.attitude_1[2] * reaction, rel=1e-12
+    )
 
 
 @pytest.mark.parametrize("form", [{}, EXACT], ids=["published", "exact"])
