@@ -112,7 +112,7 @@ class ScenarioTables(WithAutopilot):
 
     _address: str = PrivateAttr("")
     _own: dict[str, Any] = PrivateAttr({})  # parts given in Python, by name
-    _trusted: bool = PrivateAttr(False)  # see `tiltsim.scenario.own_code`
+    _trusted: bool = PrivateAttr(False)  # see `tiltsim.scenario.own_parts`
 
     @property
     def address(self) -> str:
