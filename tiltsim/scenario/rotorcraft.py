@@ -19,6 +19,9 @@ from tiltsim_controllers.vehicle.rotors import Rotor
 
 Refusals = Iterator[tuple[str, str] | tuple[str, str, object]]
 
+ROTORCRAFT: Final = ("tiltrotor", "quadrotor", "multirotor")
+"""The models of all vehicles that fly."""
+
 SPATIAL_KEYS: Final = ("position", "velocity", "acceleration", "amplitude")
 """Keys of references that hold a vector in the world."""
 
@@ -86,6 +89,16 @@ class AnyVehicleTable(Table, ABC):
     def resolve(self) -> Any:
         """The physical parameters."""
 
+    @property
+    def spins(self) -> Values:
+        """Signs of the rotor speeds."""
+        return (1.0,) * self.rotor_count
+
+    @property
+    @abstractmethod
+    def rotor_range(self) -> tuple[float | None, float | None]:
+        """Smallest and largest speed (rad/s) of a rotor along its spin; None without limit."""
+
     def refusals(self, _scenario: Any) -> Refusals:
         """Contradictions to a scenario of this vehicle: keys, reasons, and values not their own."""
         yield from ()
@@ -95,6 +108,11 @@ class PlanarTable(AnyVehicleTable, ABC):
     """A vehicle that moves in the plane of x and y, whose laws control these two."""
 
     is_planar = True
+
+    @property
+    def rotor_range(self) -> tuple[float | None, float | None]:
+        """Thrusts push and cannot pull."""
+        return 0.0, None
 
     def refusals(self, scenario: Any) -> Refusals:
         """Motion out of the plane, references of yaw, and gaits that the law does not follow."""
@@ -158,8 +176,16 @@ class RotorcraftTable(AnyVehicleTable, ABC):
         return as_multirotor(self.resolve(), tilting=self.has_tilting_rotors).rotors
 
     @property
+    def cross(self) -> str:
+        """The model of four rotors on a cross, each on its own hinge or fixed; empty for others."""
+        return ""
+
+    @property
+    def rotor_range(self) -> tuple[float | None, float | None]:
+        return self.min_rotor_speed, self.max_rotor_speed
+
+    @property
     def spins(self) -> Values:
-        """Signs of the rotor speeds."""
         return tuple(rotor.spin for rotor in self.rotors)
 
     @property
