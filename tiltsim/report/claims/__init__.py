@@ -27,13 +27,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
 from itertools import product
 from pathlib import Path
-from typing import Any, Final, TypeAlias
+from typing import Any, Final
 
-from tiltsim.report.claim import AnalysisClaim, FlightClaim, Metrics, Value
+from tiltsim.report.claim import Claim, Metrics, Value
 from tiltsim.report.measures import measures
-from tiltsim.report.statement import Origin, Statement
-
-RegisteredClaim: TypeAlias = AnalysisClaim | FlightClaim
+from tiltsim.report.statement import Statement, origins_of
 
 _NAME: Final = re.compile(r"{(\w+)(?:\.(\w+))?}")
 _OF_ROWS: Final = (
@@ -44,7 +42,7 @@ _OF_ROWS: Final = (
 
 
 @cache
-def registered_claims(scaled: str = "", factor: float = 1.0) -> tuple[RegisteredClaim, ...]:
+def registered_claims(scaled: str = "", factor: float = 1.0) -> tuple[Claim, ...]:
     """All claims of the files of this folder, chapter by chapter.
 
     Args:
@@ -67,7 +65,7 @@ def words(name: str) -> dict[str, Any]:
     return tomllib.loads(text)
 
 
-def _chapter(tables: dict[str, Any], shared: Mapping[str, Any]) -> Iterator[RegisteredClaim]:
+def _chapter(tables: dict[str, Any], shared: Mapping[str, Any]) -> Iterator[Claim]:
     known = {**shared, **tables.get("shared", {})}
     for name, full in tables.items():
         if name == "shared":
@@ -104,9 +102,9 @@ def _filled(value: Any, known: Mapping[str, Any]) -> Any:
     return _NAME.sub(lambda found: str(_filled(word(found), known)), value)
 
 
-def _claim(statement: Statement, row: dict[str, Any]) -> RegisteredClaim:
+def _claim(statement: Statement, row: dict[str, Any]) -> Claim:
     if statement.missing and "measure" not in row:
-        return AnalysisClaim(statement, **row)
+        return Claim(statement, **row)
     own, args = measures()[row.pop("measure")], row.pop("args", ())
     low, high = row.pop("above", None), row.pop("below", None)
 
@@ -116,11 +114,9 @@ def _claim(statement: Statement, row: dict[str, Any]) -> RegisteredClaim:
             return value
         return (low is None or value > low) and (high is None or value < high)
 
-    origins = tuple(Origin[name.upper()] for name in row.pop("ours", ()))
+    origins = origins_of(row.pop("ours", ()))
     flights = tuple(one for pattern in row.pop("flights", ()) for one in _expanded(pattern))
-    if not flights:
-        return AnalysisClaim(statement, measure=measure, origins=origins, **row)
-    return FlightClaim(statement, flights=flights, measure=measure, origins=origins, **row)
+    return Claim(statement, flights=flights, measure=measure, origins=origins, **row)
 
 
 def _expanded(pattern: str) -> list[str]:

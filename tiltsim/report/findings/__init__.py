@@ -143,14 +143,14 @@ def _quadrotor_numbers() -> dict[str, str]:
 
 def _matrix_gain() -> dict[str, str]:
     """Routh's numbers for ch. 4's roll gains, and the loop gain that the printed matrix adds."""
-    roll = gains.GAIN_SETS["ch04"]
+    roll = gains.GAIN_SETS["ch04"].loops["roll"]
     factor = 2.0 * _VEHICLE.hover_rotor_speed
-    loop = third_order_loop("roll", (roll.roll_1, roll.roll_2, roll.roll_3), 1.0)
+    loop = third_order_loop("roll", roll, 1.0)
     worst = max(root.real for root in np.roots(loop.polynomial))
     return {
         "factor": f"{factor:.0f}",
-        "product": f"{roll.roll_1 * roll.roll_2:g}",
-        "third": f"{roll.roll_3:g}",
+        "product": f"{roll[0] * roll[1]:g}",
+        "third": f"{roll[2]:g}",
         "root": f"{worst:+.2f}",
     }
 
