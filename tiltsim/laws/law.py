@@ -19,7 +19,6 @@ from tiltsim_controllers.laws.observed import Seen, Step
 from tiltsim_controllers.laws.supervisor import HOLD, Supervision
 from tiltsim_controllers.mathematics.scalar import Floats, Values
 from tiltsim_controllers.vehicle.body import PITCH, ROLL, Body, body_of
-from tiltsim_controllers.vehicle.parameters import Vehicle
 
 Margins = Callable[[Mapping[str, Floats], ControlSetup], dict[str, Floats]]
 """``(samples by field, with the columns of references, setup) -> columns``."""
@@ -101,9 +100,9 @@ INTEGRALS: Final = dict.fromkeys(INTEGRAL_FIELDS, "m s")
 """States of a law that integrates the position error, with their units."""
 
 
-def vehicle_of(plan: FlightPlan) -> Body | Vehicle:
+def vehicle_of(plan: FlightPlan) -> Any:
     """The vehicle that a law knows: of a multirotor the rigid body."""
-    vehicle = plan.scenario.any_rotorcraft.resolve()
+    vehicle = plan.scenario.vehicle.resolve()
     return body_of_vehicle(vehicle) if isinstance(vehicle, Multirotor) else vehicle
 
 
@@ -125,7 +124,6 @@ _VALUES: Final[dict[str, Callable[[FlightPlan, Any], Any]]] = {
     "reference": lambda plan, _: plan.reference,
     "rotors": lambda plan, _: float(len(plan.knots)),  # where tables follow in the knots
     "vehicle": lambda plan, _: vehicle_of(plan),
-    "car": lambda plan, _: plan.scenario.tilt_car.resolve(),
     "gains": lambda _, keys: keys.resolve_gains(),
     "integral": lambda _, keys: keys.resolve_integral_gains(),
     "anticipation": lambda plan, keys: xp.minimum(

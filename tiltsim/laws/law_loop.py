@@ -5,8 +5,6 @@ layout is compiled in. The rotors' speeds are states that approach the commanded
 tilts of a law that commands them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cache, partial
@@ -14,7 +12,7 @@ from os import PathLike
 from typing import Any, Final, NamedTuple
 
 from tiltsim.closed_loop.loop import ClosedLoop
-from tiltsim.errors import InputError, TiltsimError
+from tiltsim.errors import TiltsimError
 from tiltsim.laws.law import Law, body_of_vehicle, tilts_in_states, vehicle_of
 from tiltsim.laws.rotor_loop import RotorLayout, margins_of, rotor_loop
 from tiltsim.models.cross import as_multirotor
@@ -306,11 +304,10 @@ def airframe(scenario: Scenario | str | PathLike[str] | Mapping[str, Any]) -> Ai
         scenario: Anything that `tiltsim.load_scenario` takes, of a rotorcraft.
 
     Raises:
-        InputError: If it is not valid, or of a tilt-car.
+        InputError: If it is not valid, or of no rotorcraft.
     """
     loaded = load_scenario(scenario)
-    if loaded.vehicle.model == "tilt_car":
-        raise InputError(f"{loaded.address}: vehicle.model: airframe takes rotorcraft only")
+    loaded.require_rotorcraft("airframe")
     return airframe_of(plan_flight(loaded))
 
 

@@ -20,7 +20,7 @@ from tiltsim_controllers.gaits.motion import planned_tilts
 from tiltsim_controllers.laws.observed import Seen, Step
 from tiltsim_controllers.mathematics.scalar import Floats, Vector
 from tiltsim_controllers.references.trajectories import reference_motion
-from tiltsim_controllers.tilt_car import fourth_derivative, planned_direction, third_derivative
+from tiltsim_controllers.tilt_car import integrating, planned_direction
 from tiltsim_controllers.tilt_car.vehicle import TiltCar, acceleration, counter_yaw_per_tilt
 
 DEMANDED: Final = ("demanded_x", "demanded_y")
@@ -30,6 +30,10 @@ DEMANDED: Final = ("demanded_x", "demanded_y")
 def initial_motion(scenario: Scenario) -> tuple[float, ...]:
     """Position (m) and velocity (m/s) on the plane at time zero."""
     return (*scenario.initial.position[:2], *scenario.initial.velocity[:2])
+
+
+def _car(plan: FlightPlan) -> dict[str, Any]:
+    return {"car": plan.scenario.vehicle.resolve()}
 
 
 def yaw(alpha: Any, parameters: Any) -> Any:
@@ -94,7 +98,7 @@ class CarFunctions(VehicleFunctions):
         return self.closed_loop(
             TILT_CAR,
             {
-                "servo_lead": lambda plan: servo_lead(plan.scenario.tilt_car.tilt_servo),
+                "servo_lead": lambda plan: servo_lead(plan.scenario.vehicle.tilt_servo),
                 "heading": lambda plan: plan.scenario.initial.attitude[2],
             },
             inputs_size,
@@ -219,14 +223,14 @@ class _Integrating(CarFunctions):
 
 
 def _third(seen: Seen, p: Any, knots: Any) -> Step:
-    found = third_derivative.third_derivative_inputs(seen.time, seen.state, p)
+    found = integrating.third_derivative_inputs(seen.time, seen.state, p)
     return Step(found[:2], found[2:], reference_motion(seen.time, p.reference)[2, :2])
 
 
 def _fourth(seen: Seen, p: Any, knots: Any) -> Step:
     state = xp.hstack([seen.state, seen.states[1:]])
     _, tilt_rate, *accelerations = seen.states
-    second = fourth_derivative.fourth_derivative_inputs(seen.time, state, p)
+    second = integrating.fourth_derivative_inputs(seen.time, state, p)
     rates = xp.hstack([tilt_rate, second[2], second[:2]])
     demanded = reference_motion(seen.time, p.reference)[2, :2]
     return Step(xp.array(accelerations), rates, demanded)
@@ -239,6 +243,7 @@ def _integrating(
     law = Law(
         step,
         record,
+        _car,
         states={"alpha_ref": "rad", **states},
         initial=lambda plan: (initial_tilt(plan)[0], *(0.0,) * len(states)),
         signals=DEMANDED,
@@ -252,12 +257,12 @@ def _integrating(
     return _Integrating(law, twice).car_loop(1 + len(states), 3, commands_thrusts=False)
 
 
-THIRD_DERIVATIVE: Final = _integrating(_third, third_derivative.Parameters, {}, twice=False)
+THIRD_DERIVATIVE: Final = _integrating(_third, integrating.ThirdParameters, {}, twice=False)
 """Third-derivative feedback linearization of the tilt-car (ch. 10, Sec. 3.1)."""
 
 FOURTH_DERIVATIVE: Final = _integrating(
     _fourth,
-    fourth_derivative.Parameters,
+    integrating.FourthParameters,
     {"alpha_ref_rate": "rad/s", **{f"rotor_acceleration_{rotor}": "rad/s^2" for rotor in ROTORS}},
     twice=True,
 )
@@ -355,6 +360,7 @@ PLANNED_DIRECTION: Final = _Planned(
     Law(
         _step,
         planned_direction.Parameters,
+        _car,
         signals=(*DEMANDED, *SQUARES, "alpha_ref"),
         units={
             **dict.fromkeys(SQUARES, "rad^2/s^2"),

@@ -201,8 +201,7 @@ def _check(scenario: Scenario, axes: tuple[str, str], coarse: int, refinements: 
             f"coarse = {short_repr(coarse)}: must be 1 to {most}, for {MOST_CELLS} cells across at "
             "most"
         )
-    if scenario.vehicle.model == "tilt_car":
-        raise InputError(f"{scenario.address}: vehicle.model: attraction takes rotorcraft only")
+    scenario.require_rotorcraft("attraction")
     if scenario.companion:
         where = scenario.address or "scenario"
         raise InputError(f"{where}: companion: attraction takes one vehicle; remove [[companion]]")

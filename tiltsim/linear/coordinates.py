@@ -14,7 +14,11 @@ from tiltsim.closed_loop.loop import ClosedLoop
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.vehicles.rotorcraft.layout import layout_of
 from tiltsim.vehicles.rotorcraft.others import SWING
-from tiltsim_controllers.mathematics.attitude import quaternion_of_rotation, rotation_of_quaternion
+from tiltsim_controllers.mathematics.attitude import (
+    quaternion_of_rotation,
+    quaternion_product,
+    rotation_of_quaternion,
+)
 from tiltsim_controllers.mathematics.scalar import Floats, Triple
 from tiltsim_controllers.vehicle.body import BODY_FIELDS
 
@@ -94,16 +98,11 @@ class Coordinates(NamedTuple):
         return np.concatenate((derivative[:first], rates, derivative[after:]))
 
 
-def _product(p: Floats, q: Floats) -> Floats:
-    """The product of two quaternions."""
-    vector = p[0] * q[1:] + q[0] * p[1:] + np.cross(p[1:], q[1:])
-    return np.array((p[0] * q[0] - p[1:] @ q[1:], *vector))
-
-
 def _turn_rates(rotation: Floats, derivative: Floats) -> Floats:
     """The body rates of a rotation, from the derivative of its entries."""
     if len(rotation) == QUATERNION:
-        return 2.0 * _product(rotation * (1.0, -1.0, -1.0, -1.0), derivative)[1:]
+        inverse = rotation * (1.0, -1.0, -1.0, -1.0)
+        return np.asarray(2.0 * quaternion_product(inverse, derivative)[1:])
     skew = rotation.reshape(3, 3).T @ derivative.reshape(3, 3)
     turning = (skew[2, 1] - skew[1, 2], skew[0, 2] - skew[2, 0], skew[1, 0] - skew[0, 1])
     return 0.5 * np.array(turning)
@@ -120,7 +119,7 @@ def _turned(rotation: Floats, vector: Floats) -> Floats:
     """A rotation, turned by a vector in body axes."""
     half = 0.5 * float(np.linalg.norm(vector))
     turn = np.array((np.cos(half), *(0.5 * np.sinc(half / np.pi) * vector)))
-    turned = _product(_quaternion(rotation), turn)
+    turned = quaternion_product(_quaternion(rotation), turn)
     if len(rotation) == MATRIX:
         matrix: Floats = rotation_of_quaternion(turned).ravel()
         return matrix
@@ -130,7 +129,7 @@ def _turned(rotation: Floats, vector: Floats) -> Floats:
 def _turn(start: Floats, end: Floats) -> Floats:
     """The vector, in the axes of ``start``, of the turn from one rotation to another."""
     inverse = _quaternion(start) * (1.0, -1.0, -1.0, -1.0)
-    turn = _product(inverse, _quaternion(end))
+    turn = quaternion_product(inverse, _quaternion(end))
     if turn[0] < 0.0:
         turn = -turn
     half = np.arctan2(np.linalg.norm(turn[1:]), turn[0])

@@ -63,8 +63,7 @@ class LoggedVehicle:
     """
 
     def __init__(self, scenario: Scenario) -> None:
-        if scenario.vehicle.model == "tilt_car":
-            raise InputError(f"{scenario.address}: vehicle.model: takes rotorcraft only")
+        scenario.require_rotorcraft("identify")
         scenario.require_alone("identify")
         table = scenario.any_rotorcraft
         tilting = table.has_tilting_rotors

@@ -16,7 +16,6 @@ from tiltsim.laws.layers.on_equations import read_actuators
 from tiltsim.plants.command import Command, Observation, Reference
 from tiltsim.plants.mujoco_plant import MujocoPlant
 from tiltsim.scenario.controller import PythonController
-from tiltsim.scenario.gait import tilts_of
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.vehicles.rotorcraft.layout import layout_of
 from tiltsim.vehicles.rotorcraft.others import FELT, others_of
@@ -36,7 +35,7 @@ class Observer:
     def __init__(self, assembly: Assembly) -> None:
         vehicle = assembly.scenario.any_rotorcraft
         self._vehicle, self._tilting = vehicle.resolve(), vehicle.has_tilting_rotors
-        self._tilts, self._spins = tilts_of(self._vehicle), np.array(vehicle.spins)
+        self._tilts, self._spins = self._vehicle.tilts, np.array(vehicle.spins)
         scenario = assembly.scenario
         self._felt = felt_among(others_of(scenario)) if scenario.has_objects else None
         self._push = push_of(scenario)

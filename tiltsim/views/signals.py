@@ -251,7 +251,7 @@ def _direction(assembly: Assembly) -> Iterator[Signals]:
     compared = [middle._replace(label="Direction of the thrusts")]
     bounds = ("direction_lower", "direction_upper")
     yield Signals("direction", "Direction", "rad", lines, (), bounds, compared, latest=10.0)
-    half = assembly.scenario.tilt_car.half_angle
+    half = assembly.scenario.vehicle.resolve().half_angle
     lines = [Signal("error", "desired minus middle", lambda f: f["direction_ref"] - f["direction"])]
     levels = [Level("low", "admissible", -half), Level("high", "admissible", half)]
     # At the start they may be far larger.

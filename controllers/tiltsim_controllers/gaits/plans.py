@@ -227,7 +227,7 @@ def continuous_trot(amplitude: float, period: float) -> Gait:
 
 
 def penguin(name: str, amplitude: float, period: float) -> Gait:
-    """The tilt-car's swing between minus and plus the amplitude (rad) (ch. 11, Sec. 3)."""
+    """A swing of one tilt between minus and plus the amplitude (rad) (ch. 11, Sec. 3)."""
     pieces = [(0.0, 0.0, -amplitude), (0.5 * period, 0.0, amplitude)]
     return _swinging(name, "ch. 11, Sec. 3, Figs. 7 and 8", period, (1.0,), pieces)
 

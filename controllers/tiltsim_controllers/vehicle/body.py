@@ -1,7 +1,5 @@
 """A rigid body: its state by name, its mass and inertia, its motion, and the loads on it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from math import inf
 from typing import Any, Final, NamedTuple
@@ -14,9 +12,8 @@ from tiltsim_controllers.mathematics.linear import cross
 from tiltsim_controllers.mathematics.records import Matrix3, Vector3
 from tiltsim_controllers.vehicle.parameters import Vehicle
 
-X, Y, Z, VX, VY, VZ, ROLL, PITCH, YAW, P, Q, R = range(12)
-ALPHA_1, ALPHA_2, ALPHA_3, ALPHA_4, SPEED_1, SPEED_2, SPEED_3, SPEED_4 = range(12, 20)
-THRUST, THRUST_RATE = range(12, 14)
+ROLL, PITCH, P = 6, 7, 9
+"""Places in `BODY_FIELDS`."""
 
 ROTORS: Final = (1, 2, 3, 4)
 """Numbers of the rotors of tiltrotor and quadrotor."""

@@ -118,20 +118,18 @@ def choices_of_six(picked: Sequence[int]) -> tuple[float, ...]:
 
 def routh_holds(rows: Sequence[str]) -> bool:
     """Whether ch. 4's gains satisfy Routh's condition as printed, without another loop gain."""
-    gains = GAIN_SETS["ch04"]._asdict()
-    triples = [tuple(gains[f"{row}_{i}"] for i in (1, 2, 3)) for row in rows]
-    return all(third_order_loop("", triple, 1.0).stable for triple in triples)
+    loops = GAIN_SETS["ch04"].loops
+    return all(third_order_loop("", loops[row], 1.0).stable for row in rows)
 
 
 def roll_gain(number: int) -> float:
     """A gain of ch. 4's roll loop, 1 to 3."""
-    return float(getattr(GAIN_SETS["ch04"], f"roll_{number}"))
+    return float(GAIN_SETS["ch04"].loops["roll"][number - 1])
 
 
 def position_gains_are_positive() -> bool:
     """Whether both gains of ch. 4's position loop are positive."""
-    gains = GAIN_SETS["ch04"]
-    return min(gains.position_1, gains.position_2) > 0.0
+    return min(GAIN_SETS["ch04"].position) > 0.0
 
 
 def decouplers_agree_without_tilt() -> bool:

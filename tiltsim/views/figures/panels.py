@@ -11,7 +11,6 @@ from matplotlib.axes import Axes
 
 from tiltsim.flight.flight import VECTORS, Flight
 from tiltsim.laws.law import SUPERVISION
-from tiltsim.scenario.gait import PenguinGait
 from tiltsim.system.text import Quantity
 from tiltsim.views import attitude_plane
 from tiltsim.views.figures import style
@@ -300,8 +299,8 @@ def _portrait(axes: Axes, shown: Sequence[Shown]) -> None:
     away, rate = error(flight, "y"), error(flight, "vy")
     style.zero_lines(axes)
     axes.plot(away, rate, color=style.BLUE, lw=1.0, label="path")
-    gait = flight.scenario.gait
-    if isinstance(gait, PenguinGait):
+    gait: Any = flight.scenario.gait
+    if gait.alternates:
         half = flight["time"] / (0.5 * gait.period)
         at = (np.abs(half - np.round(half)) < 1e-6) & (half > 0.5)
         axes.plot(away[at], rate[at], "o", color=style.RED, ms=4.5, zorder=4, label="at n T/2")
