@@ -392,7 +392,7 @@ def companions(document):
 
 
 def changes(table, keys=()):
-    """The example of a table, and those of some of its keys, as values by dotted key."""
+    """The examples of a table and of some of its keys, as values by dotted key."""
     document = at = tomllib.loads(table.toml)
     for place in table.places[0]:
         at = at.setdefault(place.name, {})

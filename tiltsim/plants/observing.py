@@ -144,7 +144,7 @@ class _Law:
         self._step = control_step(bare, self.setup.userdata.tolist(), "controls")
 
     def controls(self, time: float, qpos: Values, qvel: Values, act: Values) -> list[float]:
-        """Its controls at a step's beginning (s); the forces that it feels are at the end of ``act``."""
+        """Its controls at a time (s), where a step begins; the forces felt are last in ``act``."""
         now = Header(timestep=time, evaluations=1.0)  # whose next evaluation is now
         own = self.loop.sizes.act
         vectors = (now, qpos, qvel, act[:own], (), act[own:], ())
