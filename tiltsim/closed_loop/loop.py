@@ -102,6 +102,11 @@ class Equations:
     tilts: Callable[..., Values] | None = None
     """Function ``(time, state, parameters, knots) -> tilt angles`` (rad), where they follow the
     plan exactly."""
+    states: tuple[str, ...] = ()
+    """Names of the coordinates of the vehicle's state, which begins the state: three for a
+    rotation."""
+    input_names: tuple[str, ...] = ()
+    """Names of the first inputs; empty where they are the controls of the model."""
 
 
 def _held_controls(time: Any, qpos: Any, qvel: Any, act: Any, ctrl: Any, parameters: Any) -> Any:
@@ -134,6 +139,8 @@ class ClosedLoop:
     derive: Callable[[Mapping[str, Floats], ControlSetup], dict[str, Floats]]
     """``(samples by field, setup) -> columns``: references, determinant, margin and the columns in
     ``further_units``."""
+    motion: tuple[tuple[str, ...], tuple[str, ...]] = ((), ())
+    """Names of the coordinates of ``qpos`` and ``qvel``, three for a rotation."""
     hold: Callable[..., Values] = _held_controls
     """Function ``(time, qpos, qvel, act, ctrl, parameters) -> ctrl``: the controls between the
     samples of a held controller."""

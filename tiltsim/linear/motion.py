@@ -176,7 +176,7 @@ class EquationMotion(Motion):
     """On equations of motion."""
 
     def _names(self) -> tuple[coordinates.Coordinates, tuple[coordinates.Input, ...]]:
-        inputs = coordinates.equation_inputs(self.assembly, self._equations.inputs_size)
+        inputs = coordinates.equation_inputs(self.assembly)
         return coordinates.equation_coordinates(self.assembly, len(self.initial)), inputs
 
     @cached_property
