@@ -263,7 +263,7 @@ class InstrumentTables(Table):
 
 
 def instrument_refusals(scenario: Any) -> Refusals:
-    """Instruments that a flight cannot read, and an estimator without those that it needs."""
+    """Instruments that a flight cannot read, and an estimator that lacks some."""
     found, sensors, controller = scenario.sensors.instruments, scenario.sensors, scenario.controller
     planar, step = scenario.vehicle.is_planar, scenario.simulation.control_timestep
     if controller.estimator is not None:

@@ -43,7 +43,7 @@ Range = Annotated[tuple[Limit, Limit], Field(strict=False)]
 
 
 Refusals = Iterator[tuple[str, str] | tuple[str, str, object]]
-"""Key and reason of what is refused, and a value where it is not the key's."""
+"""Key and reason of each refusal, and a value where it is not the key's."""
 
 
 def example(**keys: Any) -> ConfigDict:
