@@ -60,8 +60,7 @@ def forcing_of(assembly: Assembly) -> Forcing:
     periods = _periods(reference, scenario)
     velocity, acceleration = _AT_REST, _AT_REST
     if reference.type == trajectories.LINE:
-        velocity = reference.velocity_x, reference.velocity_y, reference.velocity_z
-        acceleration = reference.acceleration_x, reference.acceleration_y, reference.acceleration_z
+        velocity, acceleration = reference.velocity, reference.acceleration
         _check_line(scenario, velocity, acceleration)
     if assembly.loop.uses_gait and gait.period is not None:
         kind = gait.parameters
@@ -122,11 +121,7 @@ def _periods(reference: trajectories.ReferenceParameters, scenario: Scenario) ->
     if reference.type == trajectories.CIRCLE:
         rates = [reference.angular_frequency]
     elif reference.type == trajectories.LISSAJOUS:
-        rates = [
-            getattr(reference, f"frequency_{axis}")
-            for axis in "xyz"
-            if getattr(reference, f"amplitude_{axis}")
-        ]
+        rates = [w for w, size in zip(reference.frequency, reference.amplitude) if size]
     else:
         raise InputError(
             f'{scenario.address or "scenario"}: reference.type = "{scenario.reference.type}": the '
