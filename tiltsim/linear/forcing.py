@@ -23,20 +23,14 @@ PERIODIC: Final = {trajectories.CIRCLE, trajectories.LISSAJOUS}
 
 
 class Forcing(NamedTuple):
-    """The dependence of a closed loop on time.
+    """The dependence of a closed loop on time."""
 
-    Attributes:
-        period: s; None if only the motion of the frame depends on time.
-        velocity, acceleration: Motion of a frame in which the reference repeats, at time zero, m/s
-        and m/s^2, world axes.
-        start: Time (s) from which this holds: faults have happened and are known, gusts and
-            pushes have passed, the commanded attitude is reached.
-    """
-
-    period: float | None
-    velocity: Triple
-    acceleration: Triple
+    period: float | None  # s; None if only the motion of the frame depends on time
+    velocity: Triple  # m/s, world axes, of a frame in which the reference repeats, at time zero
+    acceleration: Triple  # m/s^2
     start: float
+    """Time (s) from which this holds: faults have happened and are known, gusts and pushes have
+    passed, the commanded attitude is reached."""
 
     def motion(self, names: Sequence[str], start: float, end: float) -> Floats:
         """Motion of the frame from one time (s) to another, in coordinates of these names."""
