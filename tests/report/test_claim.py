@@ -201,8 +201,8 @@ def test_an_expectation_with_a_published_value_is_a_claim():
     assert made[1].case == "A flight"
     assert made[1].unit == "rad"
     assert made[1].in_kind == (0.1, inf)
-    assert made[1].measure({"final_roll": 0.2}) == 0.2
-    assert made[1].measure({}) is None
+    assert made[1].measured([{"final_roll": 0.2}]) == 0.2
+    assert made[1].measured([{}]) is None
 
 
 def test_a_flight_of_ours_claims_nothing_for_the_thesis():
@@ -232,24 +232,24 @@ def test_the_words_of_a_claim_stand_in_its_table():
 def test_yes_about_a_number_means_that_it_lies_within_the_bounds():
     expect = {"metric": "max_tilt_rate", "min": 20.0, "published": True, "claim": "Tilting is fast"}
     [made] = scenario_claims(scenario([expect]))
-    assert made.measure({"max_tilt_rate": 30.0}) is True
-    assert made.measure({"max_tilt_rate": 10.0}) is False
-    assert verdict_on(made, made.measure({"max_tilt_rate": 10.0})) is ClaimVerdict.NOT_REPRODUCED
+    assert made.measured([{"max_tilt_rate": 30.0}]) is True
+    assert made.measured([{"max_tilt_rate": 10.0}]) is False
+    assert verdict_on(made, made.measured([{"max_tilt_rate": 10.0}])) is ClaimVerdict.NOT_REPRODUCED
 
 
 def test_where_a_statement_is_true_is_not_where_our_value_lies():
     tight = {"metric": "final_roll", "min": 0.31, "max": 0.33, "claim": "It rolls by 0.2 or more"}
     [made] = scenario_claims(scenario([tight | {"published": True, "holds": [0.2, inf]}]))
-    assert made.measure({"final_roll": 0.25}) is True
-    assert made.measure({"final_roll": 0.15}) is False
+    assert made.measured([{"final_roll": 0.25}]) is True
+    assert made.measured([{"final_roll": 0.15}]) is False
 
 
 def test_a_flight_published_as_flown_and_lost_here_is_not_reproduced():
     [made] = scenario_claims(
         scenario([{"metric": "diverged", "equals": True, "published": False, "claim": "It flies"}])
     )
-    assert verdict_on(made, made.measure({"diverged": True})) is ClaimVerdict.NOT_REPRODUCED
-    assert verdict_on(made, made.measure({"diverged": False})) is ClaimVerdict.REPRODUCED
+    assert verdict_on(made, made.measured([{"diverged": True}])) is ClaimVerdict.NOT_REPRODUCED
+    assert verdict_on(made, made.measured([{"diverged": False}])) is ClaimVerdict.REPRODUCED
 
 
 @pytest.mark.parametrize(

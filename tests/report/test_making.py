@@ -25,7 +25,6 @@ from tiltsim.report.content import (
     Report,
     criterion_text,
     failure_text,
-    flights_of,
     measured_text,
     published_text,
 )
@@ -57,12 +56,12 @@ def test_every_scenario_is_flown_on_both_plants_or_gives_the_reason(report, libr
 
 def test_rows_hold_both_plants_and_their_verdicts(report):
     level, tilted = rows_of(report, "It stays where it is")
-    assert [plant for plant, _ in level.plants] == ["thesis", "mujoco"]
+    assert [*level.cells] == ["thesis", "mujoco"]
     assert level.verdict is ClaimVerdict.REPRODUCED
     assert tilted.verdict is ClaimVerdict.QUALITATIVE
     for row in (level, tilted):
-        for plant, cell in row.plants:
-            record = report.flights[row.claim.address, plant]
+        for plant, cell in row.cells.items():
+            record = report.flights[row.claim.flights[0], plant]
             assert cell.measured == record.metrics["final_position_error_x"]
     [flies] = rows_of(report, "It flies | to the end")
     assert flies.verdict is ClaimVerdict.NOT_REPRODUCED
@@ -71,21 +70,23 @@ def test_rows_hold_both_plants_and_their_verdicts(report):
 
 def test_an_unsupported_plant_has_no_cell(report):
     [row] = rows_of(report, "Rotors are slow")
-    assert row.cell("thesis") is None
-    assert row.cell("mujoco").measured is False
-    speed = report.flights[row.claim.address, "mujoco"].metrics["max_rotor_speed"]
-    assert measured_text(row.claim, row.cell("mujoco")) == f"no ({speed:.4g} rad/s)"
+    assert "thesis" not in row.cells
+    assert row.cells["mujoco"].measured is False
+    speed = report.flights[row.claim.flights[0], "mujoco"].metrics["max_rotor_speed"]
+    assert measured_text(row.claim, row.cells["mujoco"]) == f"no ({speed:.4g} rad/s)"
     assert row.verdict is ClaimVerdict.REPRODUCED
 
 
 def test_a_flight_that_terminates_early_has_no_final_values(report):
     [ended] = rows_of(report, "The flight terminates early")
     assert ended.verdict is ClaimVerdict.REPRODUCED
-    assert re.fullmatch(r"terminated at [\d.]+ s", measured_text(ended.claim, ended.cell("mujoco")))
+    assert re.fullmatch(
+        r"terminated at [\d.]+ s", measured_text(ended.claim, ended.cells["mujoco"])
+    )
     [level] = rows_of(report, "It ends level")
-    assert level.cell("thesis").measured is None
+    assert level.cells["thesis"].measured is None
     assert level.verdict is ClaimVerdict.NOT_REPRODUCED
-    assert measured_text(level.claim, level.cell("thesis")).startswith("terminated at ")
+    assert measured_text(level.claim, level.cells["thesis"]).startswith("terminated at ")
 
 
 def test_bounds_that_do_not_hold_are_named(report, library):
@@ -101,9 +102,9 @@ def test_bounds_that_do_not_hold_are_named(report, library):
 def test_values_are_shown_a_digit_finer_than_printed(report):
     level, tilted = rows_of(report, "It stays where it is")
     assert published_text(level) == "0 m"
-    assert measured_text(level.claim, level.cell("mujoco")) == "0.0000 m"
+    assert measured_text(level.claim, level.cells["mujoco"]) == "0.0000 m"
     assert published_text(tilted) == "5 m"
-    assert re.fullmatch(r"−?\d\.\d{2} m", measured_text(tilted.claim, tilted.cell("mujoco")))
+    assert re.fullmatch(r"−?\d\.\d{2} m", measured_text(tilted.claim, tilted.cells["mujoco"]))
 
 
 def test_a_second_report_flies_nothing(library, kept, report, monkeypatch):
@@ -236,7 +237,7 @@ def full(report):
 
     figure = Figure(figsize=(2.0, 1.0))
     figure.subplots().plot([0.0, 1.0])
-    flight = report.rows[-1].claim.address
+    flight = report.rows[-1].claim.flights[0]
     picture = Picture(4, "line", "A <line>", lambda _: figure, ((flight, "mujoco"),))
     return dataclasses.replace(report, findings=FINDINGS, drawings=[Drawing(picture, png(figure))])
 
@@ -286,7 +287,7 @@ def test_every_row_can_be_linked_to_and_checked(full):
         assert f'id="{row.claim.id}"' in text
         assert f'id="{row.statement.id}"' in text
         assert escape(criterion_text(row.claim), quote=False) in text.replace("<code>", "`")
-        for address in flights_of(row.claim):
+        for address in row.claim.flights:
             assert f"tiltsim run '{escape(address)}'" in text
     assert text.count('<details class="row"') == len(full.rows)
 
@@ -303,9 +304,9 @@ def test_the_files_have_the_rows_of_the_page(full):
         assert cells["verdict"] == record["verdict"] == row.verdict.value
         assert cells["published"] == published_text(row)
         for plant in ("thesis", "mujoco"):
-            cell = row.cell(plant)
+            cell = row.cells.get(plant)
             assert cells[plant] == (measured_text(row.claim, cell) if cell else "")
-        assert record["flights"] == list(flights_of(row.claim)) == cells["flights"].split()
+        assert record["flights"] == list(row.claim.flights) == cells["flights"].split()
 
 
 def test_the_library_has_no_anchor_twice(scenarios):
@@ -325,8 +326,7 @@ def test_a_criterion_and_an_error_stand_on_the_page(full):
         claim=dataclasses.replace(
             full.rows[0].claim, published=9.0, fault="refuted", error="routh", why="It is not."
         ),
-        plants=(),
-        analysis=Cell(1.0, ClaimVerdict.REFUTED),
+        cells={"computed": Cell(1.0, ClaimVerdict.REFUTED)},
     )
     criterion = Criterion("short", "0.05 m", "As thick as a line.", 4, (1, 2))
     changed = dataclasses.replace(full, rows=[row], criteria=[criterion])

@@ -78,12 +78,13 @@ def run(
         return 0
     loaded = None
     if scenario is not None:
+        from tiltsim.models.rotor_table import Multirotor
         from tiltsim.scenario.loading import load_scenario
 
         loaded = load_scenario(scenario)
         if gait.vehicle is not None:
             raise InputError("--vehicle: the scenario defines its own vehicle; remove one of them")
-        if loaded.vehicle.model == "multirotor":
+        if isinstance(loaded.vehicle.resolve(), Multirotor):
             return _run_multirotor(scenario, loaded, gait, figure, json=json)
     selected = _select(gait) if loaded is None else _of_scenario(str(scenario), loaded)
     report = gait_report(selected.gait, selected.vehicle, roll=gait.roll, pitch=gait.pitch)
@@ -118,7 +119,8 @@ def _check_options(scenario: str | None, gait: GaitOptions, figure: GaitFigure) 
 
 def _select(options: GaitOptions) -> SelectedGait:
     """The gait and the vehicle that the options select. Raises `InputError` if one is unknown."""
-    from tiltsim_controllers.analysis.balance import balanced_gait
+    from tiltsim.models.cross import as_multirotor
+    from tiltsim.studies.multirotor_analysis import balance_report
     from tiltsim_controllers.analysis.published_gaits import PUBLISHED_GAITS
     from tiltsim_controllers.gaits import plans
 
@@ -127,7 +129,8 @@ def _select(options: GaitOptions) -> SelectedGait:
         return SelectedGait(plans.fixed(options.read_angles(4)), vehicle)
     if options.balance is not None:
         with mistakes_in(f"--balance {options.acceleration}"):
-            fixed = plans.fixed(balanced_gait(options.balance, vehicle))
+            rotors = as_multirotor(vehicle, tilting=True, reverses=False)
+            fixed = plans.fixed(balance_report(rotors, options.balance)["angles"])
         source = f"balances {options.acceleration} m/s^2 at level attitude"
         return SelectedGait(replace(fixed, source=source), vehicle)
     if options.published not in PUBLISHED_GAITS:

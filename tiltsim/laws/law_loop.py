@@ -5,8 +5,6 @@ layout is compiled in. The rotors' speeds are states that approach the commanded
 tilts of a law that commands them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cache, partial
@@ -14,7 +12,7 @@ from os import PathLike
 from typing import Any, Final, NamedTuple
 
 from tiltsim.closed_loop.loop import ClosedLoop
-from tiltsim.errors import InputError, TiltsimError
+from tiltsim.errors import TiltsimError
 from tiltsim.laws.law import Law, body_of_vehicle, tilts_in_states, vehicle_of
 from tiltsim.laws.layers.actuation import sensor_parameters
 from tiltsim.laws.rotor_loop import RotorLayout, margins_of, rotor_loop
@@ -129,7 +127,7 @@ def _step_of(flown: FlownLaw) -> Callable[..., Step]:
     rotors, tilts = flown.layout.places
     own, layout, commanded = len(flown.states), flown.layout.tilt_of_rotor, flown.commanded
     per_newton, coefficients = ROTOR_FLOATS * rotors, 2 * ROTOR_FLOATS * rotors
-    is_cross = flown.layout.model != "multirotor"
+    is_cross = flown.layout.cross != ""
 
     def step(seen: Seen, known: Any, knots: Any) -> Step:
         # An array that outlives a trace would keep its precision in the next one of JAX.
@@ -307,11 +305,10 @@ def airframe(scenario: Scenario | str | PathLike[str] | Mapping[str, Any]) -> Ai
         scenario: Anything that `tiltsim.load_scenario` takes, of a rotorcraft.
 
     Raises:
-        InputError: If it is not valid, or of a tilt-car.
+        InputError: If it is not valid, or of no rotorcraft.
     """
     loaded = load_scenario(scenario)
-    if loaded.vehicle.model == "tilt_car":
-        raise InputError(f"{loaded.address}: vehicle.model: airframe takes rotorcraft only")
+    loaded.require_rotorcraft("airframe")
     return airframe_of(plan_flight(loaded))
 
 
@@ -331,8 +328,7 @@ def airframe_of(plan: FlightPlan) -> Airframe:
         scenario.initial.velocity,
         scenario.initial.attitude,
         scenario.initial.angular_velocity,
-        # The thesis's equations omit the gyroscopic torque but for the quadrotor's.
-        float(simulation.plant != "thesis" or table.model == "quadrotor"),
+        scenario.gyroscopic,
         simulation.timestep,
         simulation.control_timestep,
         simulation.latency_steps,

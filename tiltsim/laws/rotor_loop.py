@@ -12,6 +12,7 @@ from typing import Any, ClassVar, Final, NamedTuple
 import numpy as np
 
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup
+from tiltsim.equations.actuator_level import MATRIX, as_printed
 from tiltsim.equations.thesis import airframe_of, body_fields, initial_state
 from tiltsim.laws.law import Law, Margins, Tilts, tilts_of_gait
 from tiltsim.laws.vehicle_loop import VehicleFunctions, parts, servo_lead
@@ -43,7 +44,7 @@ class RotorLayout(NamedTuple):
 
     tilt_of_rotor: tuple[int, ...]  # from 0; -1 for a fixed rotor
     spins: Values
-    model: str = "multirotor"  # ``vehicle.model``; of others the layout is known
+    cross: str = ""  # ``vehicle.model`` of rotors on a cross, whose layout it is
 
     @property
     def places(self) -> Places:
@@ -53,20 +54,20 @@ class RotorLayout(NamedTuple):
     @property
     def shown(self) -> Places:
         """Places in a sample, which may have tilts that are idle."""
-        return self.places if self.model == "multirotor" else CROSS
+        return CROSS if self.cross else self.places
 
     @property
     def name(self) -> str:
         """For files and models."""
-        if self.model != "multirotor":
-            return self.model
+        if self.cross:
+            return self.cross
         tilts = "_".join(str(tilt) if tilt >= 0 else "f" for tilt in self.tilt_of_rotor)
         return f"multirotor_{tilts}_{''.join('p' if spin > 0.0 else 'm' for spin in self.spins)}"
 
 
-def layout_of_vehicle(vehicle: Multirotor, model: str = "multirotor") -> RotorLayout:
+def layout_of_vehicle(vehicle: Multirotor, cross: str = "") -> RotorLayout:
     """The layout of a vehicle."""
-    return RotorLayout(vehicle.tilt_of_rotor, vehicle.spins, model)
+    return RotorLayout(vehicle.tilt_of_rotor, vehicle.spins, cross)
 
 
 def table_of(places: Places, setup: ControlSetup) -> Values:
@@ -213,6 +214,18 @@ class RotorFunctions(VehicleFunctions):
 
     # --- on equations of motion
 
+    @property
+    def state_names(self) -> tuple[str, ...]:
+        """The body with a matrix of its rotation, and the rotor speeds."""
+        return (*as_printed(MATRIX, 0).names, *self.layout.places.names("rotor_speed"))
+
+    @property
+    def input_names(self) -> tuple[str, ...]:
+        """Rotor accelerations; then rates that integrate to commands of tilts."""
+        commands = (state for state in self.law.states if state.startswith("tilt_command"))
+        rates = (command.replace("tilt_command", "alpha_rate") for command in commands)
+        return (*self.layout.places.names("rotor_acceleration"), *rates)
+
     def initial_state(self, plan: FlightPlan) -> Vector:
         """Motion, rotor speeds and the states of the law."""
         speeds, states = initial_rotor_speeds(plan), self.law.initial_states(plan)
@@ -240,7 +253,7 @@ class RotorFunctions(VehicleFunctions):
         """
         N, _, S = self.sizes
         body, rotors = airframe_of(parameters.law, knots, self.layout.tilt_of_rotor)
-        gyroscopic = float(self.layout.model == "quadrotor")
+        gyroscopic = float(self.layout.cross != "" and not self.layout.places.tilts)
         tilts = self.equation_tilts(time, state, parameters, knots)
         moved = equations_of_motion(state, tilts, inputs, body, rotors, disturbance, gyroscopic)
         return xp.hstack([moved, inputs[N : N + S]])
@@ -271,6 +284,7 @@ def rotor_loop(
         places.rotors + len(law.states),
         places.names("tilt_command") if law.records_commands else (),
         model=layout.name,
+        motion=places.motion,
         sizes=places.sizes(len(law.states))._replace(history=FELT_SIZE if law.feels else 0),
         initial_activations=lambda plan, _: (
             *flown.initial_speeds(plan),
@@ -278,7 +292,7 @@ def rotor_loop(
         ),
         controller_states=len(law.states),
         spins=layout.spins,
-        tilt_of_rotor=layout.tilt_of_rotor if layout.model == "multirotor" else (),
+        tilt_of_rotor=() if layout.cross else layout.tilt_of_rotor,
         commands_thrusts=functions.commands_thrusts,
         observe_reads_controls=functions.commands_thrusts,
     )

@@ -71,8 +71,9 @@ def export(
         raise InputError(f"{given}: choose {', '.join(FORMATS)}")
     prepare_file("path", file)
     log = Log.of_flight(flight)
-    if chosen != "csv" and flight.scenario.vehicle.model == "tilt_car":
-        raise InputError(f"{file}: a tilt-car moves in a plane; choose csv")
+    if chosen != "csv" and flight.scenario.vehicle.is_planar:
+        model = flight.scenario.vehicle.model
+        raise InputError(f"{file}: the {model} moves in a plane; choose csv")
     with replacing(file) as temporary:
         if chosen == "csv":
             rows = np.stack([log[name] for name in log.units], axis=1).tolist()

@@ -9,8 +9,11 @@ from math import isfinite
 from pathlib import Path
 from typing import Final, TypeAlias
 
+import numpy as np
+from numpy.typing import ArrayLike
+
 from tiltsim.flight.metrics import Verdict
-from tiltsim.report.statement import CHAPTER, Described, Origin, Statement, slug
+from tiltsim.report.statement import CHAPTER, Described, Origin, Statement, origins_of, slug
 from tiltsim.scenario.expectation import Expectation
 from tiltsim.scenario.metric_names import METRICS
 from tiltsim.scenario.scenario import Scenario
@@ -69,6 +72,12 @@ class Claim:
 
     statement: Statement
     _: KW_ONLY
+    flights: tuple[str, ...] = ()
+    """Addresses in the scenario library; a claim without flights is computed."""
+    measure: Callable[[Sequence[Metrics]], ArrayLike] | None = None
+    """From the metrics of the flights, in order, none if it is computed, to the value."""
+    expectation: Expectation | None = None
+    """The bound in a scenario file on a metric of its only flight, in place of a measure."""
     published: Published = True
     """The published value; True if the thesis says that the statement holds."""
     case: str = ""  # label, if the statement has several rows
@@ -159,33 +168,21 @@ class Claim:
         half_a_digit = 0.5 * 10.0**exponent
         return float(digits), half_a_digit if self.tolerance is None else self.tolerance
 
+    def measured(self, flown: Sequence[Metrics] = ()) -> Value | None:
+        """The value, from the metrics of the flights on one plant; None if there is none.
 
-@dataclass(frozen=True)
-class AnalysisClaim(Claim):
-    """A claim that is computed, without a flight."""
-
-    measure: Callable[[], Value] | None = None  # None if its statement is not testable
-
-
-@dataclass(frozen=True)
-class FlightClaim(Claim):
-    """A claim about several flights, for example that one tracks better than another."""
-
-    flights: tuple[str, ...]  # addresses in the scenario library
-    measure: Callable[[Sequence[Metrics]], Value]
-    """From the metrics of the flights, in order, to the measured value; called per plant."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class ExpectationClaim(Claim):
-    """A claim in a scenario file, about one metric of one flight."""
-
-    address: str
-    expectation: Expectation
-
-    def measure(self, metrics: Metrics) -> Value | None:
-        """The measured value, or whether the bounds hold if the thesis gives a yes/no answer."""
-        value = metrics.get(self.expectation.metric)
+        For an expectation whose published value is true or false: whether the bounds hold.
+        """
+        if self.expectation is None:
+            if self.measure is None:
+                return None
+            try:
+                return plain(self.measure(flown))
+            except KeyError:  # a flight that terminates early has no final values
+                if not self.flights:
+                    raise
+                return None
+        value = flown[0].get(self.expectation.metric)
         if value is None or isinstance(value, bool) or not isinstance(self.published, bool):
             return value
         if self.expectation.holds is None:
@@ -228,12 +225,12 @@ def _agrees(claim: Claim, measured: Value, widened: float) -> bool:
     )
 
 
-def plain(measured: object) -> Value:
-    """A measured value in plain Python types: NumPy scalars are unwrapped."""
-    if isinstance(measured, tuple | list):
-        return tuple(float(value) for value in measured)
-    value = measured.item() if hasattr(measured, "item") else measured
-    return value if isinstance(value, bool) else float(value)  # type: ignore[arg-type]
+def plain(measured: ArrayLike) -> Value:
+    """A measured value, or several, in plain Python types; an array of one value is this value."""
+    values = np.ravel(measured).tolist()
+    if len(values) > 1 or isinstance(measured, tuple | list):
+        return tuple(map(float, values))
+    return values[0] if isinstance(values[0], bool) else float(values[0])
 
 
 def worst(verdicts: list[ClaimVerdict]) -> ClaimVerdict:
@@ -241,7 +238,7 @@ def worst(verdicts: list[ClaimVerdict]) -> ClaimVerdict:
     return max(verdicts, key=lambda verdict: verdict.rank)
 
 
-def scenario_claims(scenario: Scenario) -> list[ExpectationClaim]:
+def scenario_claims(scenario: Scenario) -> list[Claim]:
     """The claims of a scenario, in order: its expectations with a ``published`` value.
 
     A scenario beyond the thesis, whose ``source`` names no chapter, has none.
@@ -249,7 +246,7 @@ def scenario_claims(scenario: Scenario) -> list[ExpectationClaim]:
     if CHAPTER.match(scenario.source) is None:
         return []
     return [
-        ExpectationClaim(
+        Claim(
             statement=_statement(scenario, expectation),
             case=", ".join(filter(None, (scenario.title, case := _case(scenario, expectation)))),
             key=slug(f"{_short(scenario.address)} {case}"),
@@ -259,8 +256,8 @@ def scenario_claims(scenario: Scenario) -> list[ExpectationClaim]:
             tolerance=expectation.published_tolerance,
             in_kind=expectation.in_kind,
             why=expectation.why,
-            origins=tuple(Origin[name.upper()] for name in scenario.ours),
-            address=scenario.address,
+            origins=origins_of(scenario.ours),
+            flights=(scenario.address,),
             expectation=expectation,
         )
         for expectation in scenario.expect

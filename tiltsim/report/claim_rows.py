@@ -11,18 +11,7 @@ from pathlib import Path
 from typing import Final
 
 from tiltsim.flight.metrics import Verdict, check_expectations
-from tiltsim.report.claim import (
-    AnalysisClaim,
-    Claim,
-    ClaimVerdict,
-    ExpectationClaim,
-    FlightClaim,
-    Value,
-    plain,
-    scenario_claims,
-    verdict_on,
-    worst,
-)
+from tiltsim.report.claim import Claim, ClaimVerdict, Value, scenario_claims, verdict_on, worst
 from tiltsim.report.claims import registered_claims, words
 from tiltsim.report.flights import (
     PLANTS,
@@ -34,8 +23,11 @@ from tiltsim.report.flights import (
     sources_digest,
     store,
 )
-from tiltsim.report.statement import Origin, Statement
+from tiltsim.report.statement import Origin, Statement, origins_of
 from tiltsim.scenario.scenario import Scenario
+
+COMPUTED: Final = "computed"
+"""Name of the cell of a row without flights."""
 
 
 @dataclass(frozen=True)
@@ -50,11 +42,10 @@ class Cell:
 
 @dataclass(frozen=True)
 class Row:
-    """A claim with a cell per plant, or the single cell of an analysis."""
+    """A claim with a cell per plant, or the single cell `COMPUTED`."""
 
     claim: Claim
-    analysis: Cell | None = None
-    plants: tuple[tuple[Plant, Cell], ...] = ()
+    cells: Mapping[str, Cell]
     origins: tuple[Origin, ...] = ()
     """Choices in it that are ours, by its statement, itself and its flights."""
 
@@ -70,23 +61,14 @@ class Row:
         return self.verdict is ClaimVerdict.REPRODUCED and not ours
 
     @property
-    def cells(self) -> list[Cell]:
-        """All cells."""
-        return [self.analysis] if self.analysis else [cell for _, cell in self.plants]
-
-    @property
     def verdict(self) -> ClaimVerdict:
         """The worst verdict of the cells."""
-        return worst([cell.verdict for cell in self.cells])
+        return worst([cell.verdict for cell in self.cells.values()])
 
     @property
     def splits(self) -> bool:
         """Whether the plants have different verdicts."""
-        return len({cell.verdict for cell in self.cells}) > 1
-
-    def cell(self, plant: Plant) -> Cell | None:
-        """The cell of a plant, None if it has none."""
-        return dict(self.plants).get(plant)
+        return len({cell.verdict for cell in self.cells.values()}) > 1
 
 
 @dataclass(frozen=True)
@@ -118,24 +100,18 @@ def analyze(
     values: dict[str, Value] = {
         key: tuple(value) if isinstance(value, list) else value for key, value in stored.items()
     }
-    missing = {key: claim for key, claim in _computed().items() if key not in values}
+    computed = [claim for claim in registered_claims() if claim.measure and not claim.flights]
+    missing = [claim for claim in computed if claim.id not in values]
     if missing:
         progress(0, len(missing))
-        for done, (key, claim) in enumerate(missing.items(), start=1):
-            assert claim.measure is not None
-            values[key] = plain(claim.measure())
+        for done, claim in enumerate(missing, start=1):
+            value = claim.measured()
+            assert value is not None
+            values[claim.id] = value
             progress(done, len(missing))
         folder.mkdir(parents=True, exist_ok=True)
         store(path, json.dumps(values, indent=1).encode())
     return values
-
-
-def _computed() -> dict[str, AnalysisClaim]:
-    return {
-        claim.id: claim
-        for claim in registered_claims()
-        if isinstance(claim, AnalysisClaim) and claim.measure
-    }
 
 
 def make_rows(
@@ -151,73 +127,58 @@ def make_rows(
         whole: Whether this is the whole library. Otherwise computed claims are omitted, and so are
             claims about several flights of which one is missing.
     """
-    rows = _expectation_rows(entries, flights)
-    ours = {entry.address: entry.scenario.ours for entry in entries}
-    for claim in registered_claims():
-        flown = claim.flights if isinstance(claim, FlightClaim) else ()
-        if whole or (flown and all((address, "mujoco") in flights for address in flown)):
-            rows.append(row_of(claim, flights, values.get(claim.id)))
+    rows: dict[str, Row] = {}
+    own = [claim for entry in entries for claim in scenario_claims(entry.scenario)]
+    for claim in (*own, *registered_claims()):
+        known = all((address, plant) in flights for address in claim.flights for plant in PLANTS)
+        if not (whole or (claim.flights and known)):
+            continue
+        row = row_of(claim, flights, values.get(claim.id))
+        if row.cells and (first := rows.get(claim.id)):  # of another plant
+            first = replace(first, claim=replace(first.claim, why=first.claim.why or claim.why))
+            row = replace(first, cells={**first.cells, **row.cells})
+        if row.cells:
+            rows[claim.id] = row
+    ours = {entry.address: origins_of(entry.scenario.ours) for entry in entries}
     return [
         replace(row, origins=_origins(row.claim, ours))
-        for row in sorted(rows, key=lambda row: row.claim.chapter)
-        if row.cells
+        for row in sorted(rows.values(), key=lambda row: row.claim.chapter)
     ]
 
 
-def _origins(claim: Claim, ours: Mapping[str, tuple[str, ...]]) -> tuple[Origin, ...]:
-    flights = claim.flights if isinstance(claim, FlightClaim) else ()
-    flown = {Origin[name.upper()] for address in flights for name in ours.get(address, ())}
+def _origins(claim: Claim, ours: Mapping[str, tuple[Origin, ...]]) -> tuple[Origin, ...]:
+    flown = (origin for address in claim.flights for origin in ours.get(address, ()))
     found = {*claim.statement.origins, *claim.origins, *flown}
     return tuple(origin for origin in Origin if origin in found)
 
 
-def _expectation_rows(entries: list[ReportEntry], flights: Flights) -> list[Row]:
-    rows: dict[str, Row] = {}
-    for entry in entries:
-        for claim in scenario_claims(entry.scenario):
-            for plant in PLANTS:
-                record = flights[entry.address, plant]
-                if claim.expectation.plant in {None, plant} and isinstance(record, FlightRecord):
-                    row = rows.get(claim.id, Row(claim))
-                    cell = _expectation_cell(claim, record)
-                    if claim.why and not row.claim.why:
-                        row = replace(row, claim=replace(row.claim, why=claim.why))
-                    rows[claim.id] = replace(row, plants=(*row.plants, (plant, cell)))
-    return list(rows.values())
+def row_of(claim: Claim, flights: Flights, computed: Value | None = None) -> Row:
+    """The row of a claim from the records of its flights, or the measured value of a computed one.
 
-
-def _expectation_cell(claim: ExpectationClaim, record: FlightRecord) -> Cell:
-    measured = claim.measure(record.metrics)
-    value = record.metrics.get(claim.expectation.metric)
-    behind = value if isinstance(measured, bool) and not isinstance(value, bool) else None
-    return Cell(measured, verdict_on(claim, measured), _ending(record), behind)
-
-
-def _ending(record: FlightRecord) -> str:
-    if not record.ended_early:
-        return ""
-    time = f"{record.end_time:#.3g}".rstrip(".")
-    return f"terminated at {time} s"
-
-
-def row_of(claim: AnalysisClaim | FlightClaim, flights: Flights, value: Value | None) -> Row:
-    """The row of a claim, with the measured value of a computed one."""
-    if isinstance(claim, AnalysisClaim):
-        return Row(claim, analysis=Cell(value, verdict_on(claim, value)))
-    cells: list[tuple[Plant, Cell]] = []
+    A plant that does not support one of the flights has no cell.
+    """
+    if not claim.flights:
+        return Row(claim, {COMPUTED: Cell(computed, verdict_on(claim, computed))})
+    cells: dict[str, Cell] = {}
+    bound = claim.expectation
     for plant in PLANTS:
         records = [flights[address, plant] for address in claim.flights]
         flown = [record for record in records if isinstance(record, FlightRecord)]
-        if len(flown) < len(records):
+        if len(flown) < len(records) or (bound and bound.plant not in {None, plant}):
             continue
-        try:
-            value = plain(claim.measure([record.metrics for record in flown]))
-        except KeyError:  # a flight that terminates early has no final values
-            value = None
-        ended_early = any(record.ended_early for record in flown)
-        note = "terminated" if value is None and ended_early else ""
-        cells.append((plant, Cell(value, verdict_on(claim, value), note)))
-    return Row(claim, plants=tuple(cells))
+        value = claim.measured([record.metrics for record in flown])
+        early = [record for record in flown if record.ended_early]
+        behind, note = None, "terminated" if early else ""
+        if bound is not None:
+            note = f"terminated at {_time(early[0])} s" if early else ""
+            metric = flown[0].metrics.get(bound.metric)
+            behind = metric if isinstance(value, bool) and not isinstance(metric, bool) else None
+        cells[plant] = Cell(value, verdict_on(claim, value), note, behind)
+    return Row(claim, cells)
+
+
+def _time(record: FlightRecord) -> str:
+    return f"{record.end_time:#.3g}".rstrip(".")
 
 
 def failures(entries: list[ReportEntry], flights: Flights) -> list[Failure]:
@@ -292,9 +253,7 @@ def criteria(rows: Sequence[Row], flights: Flights) -> list[Criterion]:
         for factor in FACTORS:
             scaled = [claim for claim in registered_claims(name, factor) if claim.id in ids]
             new = (
-                row_of(claim, flights, plain(claim.measure()))
-                if isinstance(claim, AnalysisClaim) and claim.measure
-                else row_of(claim, flights, None)
+                row_of(claim, flights, None if claim.flights else claim.measured())
                 for claim in scaled
             )
             changed.append(sum(row.verdict is not before[row.claim.id].verdict for row in new))
@@ -302,7 +261,11 @@ def criteria(rows: Sequence[Row], flights: Flights) -> list[Criterion]:
         found.append(Criterion(name, value, table["reason"], len(users), tuple(changed)))
     numbers = [row for row in rows if not isinstance(row.claim.published, bool)]
     digits = tuple(sum(_widened(row, f) for row in numbers) for f in FACTORS)
-    bounded = [row for row in rows if _bounds(row) and row.statement.id not in _OWN]
+    bounded = [
+        row
+        for row in rows
+        if (bound := row.claim.expectation) and bound.holds and row.statement.id not in _OWN
+    ]
     bounds = tuple(sum(_moved(row, flights, f) for row in bounded) for f in FACTORS)
     return [
         Criterion("digits", "half a unit", _DIGITS, len(numbers), digits),
@@ -313,23 +276,15 @@ def criteria(rows: Sequence[Row], flights: Flights) -> list[Criterion]:
 
 def _widened(row: Row, factor: float) -> bool:
     """Whether the verdict changes with the tolerance of its numbers."""
-    verdicts = [verdict_on(row.claim, cell.measured, factor) for cell in row.cells]
+    cells = row.cells.values()
+    verdicts = [verdict_on(row.claim, cell.measured, factor) for cell in cells]
     return worst(verdicts) is not row.verdict
-
-
-def _bounds(row: Row) -> tuple[float, float] | None:
-    claim = row.claim
-    return claim.expectation.holds if isinstance(claim, ExpectationClaim) else None
 
 
 def _moved(row: Row, flights: Flights, factor: float) -> bool:
     """Whether the verdict changes if the bounds of a statement about a metric are scaled."""
-    claim, bounds = row.claim, _bounds(row)
-    assert isinstance(claim, ExpectationClaim)
-    assert bounds is not None
+    assert row.claim.expectation is not None
+    bounds = row.claim.expectation.holds or ()
     moved = tuple(bound * factor if isfinite(bound) else bound for bound in bounds)
-    expectation = claim.expectation.model_copy(update={"holds": moved})
-    scaled = replace(claim, expectation=expectation)
-    records = [flights[claim.address, plant] for plant, _ in row.plants]
-    values = [scaled.measure(r.metrics) for r in records if isinstance(r, FlightRecord)]
-    return worst([verdict_on(scaled, value) for value in values]) is not row.verdict
+    expectation = row.claim.expectation.model_copy(update={"holds": moved})
+    return row_of(replace(row.claim, expectation=expectation), flights).verdict is not row.verdict

@@ -10,7 +10,7 @@ from itertools import groupby
 from math import floor, inf, isfinite, log10
 from typing import Final
 
-from tiltsim.report.claim import Claim, ClaimVerdict, ExpectationClaim, FlightClaim
+from tiltsim.report.claim import Claim, ClaimVerdict
 from tiltsim.report.claim_rows import Cell, Criterion, Failure, Row, count, count_statements, errors
 from tiltsim.report.findings import ERRORS, FINDINGS, Finding, PublishedError
 from tiltsim.report.flights import Comparison, Flights, ReportEntry
@@ -176,7 +176,7 @@ class Group:
 
     def shown(self, drawings: list[Drawing]) -> list[Drawing]:
         """The pictures that the statement names, and the pictures of a flight of its rows."""
-        flown = {flight for row in self.rows for flight in flights_of(row.claim)}
+        flown = {flight for row in self.rows for flight in row.claim.flights}
 
         def shows(picture: Picture) -> bool:
             alone = len(picture.flights) == 1 and picture.flights[0][0] in flown
@@ -211,37 +211,26 @@ def why_of(row: Row) -> str:
     )
 
 
-def flights_of(claim: Claim) -> tuple[str, ...]:
-    """Addresses of the flights that a row rests on."""
-    if isinstance(claim, ExpectationClaim):
-        return (claim.address,)
-    return claim.flights if isinstance(claim, FlightClaim) else ()
-
-
 def test_of(claim: Claim) -> str:
     """The commands that check a row, in a checkout."""
-    if isinstance(claim, ExpectationClaim):
-        lines = [f"tiltsim check '{claim.address}'"]
-    elif isinstance(claim, FlightClaim):
-        lines = [f"pytest -n 0 '{_TESTS}::{_FLOWN}[{claim.id}]'"]
-    else:
-        lines = [f"pytest -n 0 '{_TESTS}::{_COMPUTED}[{claim.id}]'"]
-    return "\n".join([*lines, *(f"pytest -n 0 tests/{test}" for test in claim.statement.tests)])
+    test = _FLOWN if claim.flights else _COMPUTED
+    first = f"pytest -n 0 '{_TESTS}::{test}[{claim.id}]'"
+    if claim.expectation is not None:
+        first = f"tiltsim check '{claim.flights[0]}'"
+    return "\n".join([first, *(f"pytest -n 0 tests/{test}" for test in claim.statement.tests)])
 
 
 def criterion_text(claim: Claim) -> str:
     """The condition under which the row would fail, in words, with its tolerance or range."""
     if not claim.statement.criterion:
         return ""
-    parts = [claim.statement.criterion.rstrip(".")]
+    parts, bound = [claim.statement.criterion.rstrip(".")], claim.expectation
     if not isinstance(claim.published, bool):
-        tolerances = dict.fromkeys(f"{tolerance:g}" for _, tolerance in claim.numbers())
-        parts.append(f"tolerance {' and '.join(tolerances)} {claim.unit}".rstrip())
-    elif isinstance(claim, ExpectationClaim) and claim.expectation.equals is None:
-        low, high = claim.expectation.holds or (claim.expectation.min, claim.expectation.max)
-        parts.append(
-            _range_text(METRICS[claim.expectation.metric].described, low, high, claim.unit)
-        )
+        tolerances = claim.tolerances.replace(", ", " and ")
+        parts.append(f"tolerance {tolerances} {claim.unit}".rstrip())
+    elif bound is not None and bound.equals is None:
+        low, high = bound.holds or (bound.min, bound.max)
+        parts.append(_range_text(METRICS[bound.metric].described, low, high, claim.unit))
     if claim.in_kind is not None:
         parts.append("qualitatively: " + _range_text("value", *claim.in_kind, claim.unit))
     return "; ".join(parts) + "."
@@ -290,7 +279,7 @@ def measured_text(claim: Claim, cell: Cell) -> str:
 
 
 def _yes_or_no(value: bool, claim: Claim) -> str:
-    if isinstance(claim, ExpectationClaim) and claim.expectation.metric == "diverged":
+    if claim.expectation is not None and claim.expectation.metric == "diverged":
         return "terminated" if value else "completed"
     return "yes" if value else "no"
 
@@ -344,7 +333,7 @@ def lead_text(rows: list[Row]) -> str:
     """The first sentences of the summary, without verdicts that no row has."""
     counts, statements = count(rows), count_statements(rows)
     alone = sum(row.on_the_thesis_alone for row in rows)
-    flown = sum(row.analysis is None for row in rows)
+    flown = sum(bool(row.claim.flights) for row in rows)
     share = f", {alone} of them with no number of ours in setting or criterion" if alone else ""
     wrong = counts[ClaimVerdict.REFUTED] + counts[ClaimVerdict.MISPRINT]
     found = {

@@ -26,12 +26,11 @@ from PIL import Image
 
 from tiltsim.report import content, flights
 from tiltsim.report.claim import Claim, ClaimVerdict
-from tiltsim.report.claim_rows import Row, count, count_statements
+from tiltsim.report.claim_rows import COMPUTED, Row, count, count_statements
 from tiltsim.report.content import (
     Group,
     Report,
     criterion_text,
-    flights_of,
     measured_text,
     published_text,
     why_of,
@@ -173,10 +172,10 @@ def _thumbnail_styles(drawings: list[Drawing]) -> str:
 
 def _measured(row: Row) -> list[str]:
     """The two cells of Markdown with measured values."""
-    if row.analysis is not None:
-        return [f"{content.measured_text(row.claim, row.analysis)} (computed)", ""]
-    cells = [row.cell(plant) for plant in PLANTS]
-    return ["" if cell is None else content.measured_text(row.claim, cell) for cell in cells]
+    texts = {name: measured_text(row.claim, cell) for name, cell in row.cells.items()}
+    if COMPUTED in texts:
+        return [f"{texts[COMPUTED]} (computed)", ""]
+    return [texts.get(plant, "") for plant in PLANTS]
 
 
 def _case_rows(group: Group, errors: list[str]) -> list[list[str]]:
@@ -200,7 +199,7 @@ def _described(row: Row, group: Group, errors: list[str]) -> str:
     tags = f" (*{', '.join(origin.value for origin in row.origins)}*)" if row.origins else ""
     if row.claim.error:
         return f"{row.verdict.value}{tags}: [error {errors.index(row.claim.error) + 1}](errors.md)"
-    why = content.why_of(row) if not group.shared_why else ""
+    why = why_of(row) if not group.shared_why else ""
     return f"{row.verdict.value}{tags}{f': {why}' if why else ''}"
 
 
@@ -212,39 +211,31 @@ def markdown_cell(text: str) -> str:
 
 def records(report: Report) -> list[dict[str, str | int | list[str]]]:
     """One record per row, in the order of the page."""
-    rows = [
-        row
-        for chapter in report.chapters
-        for group in report.chapter_groups(chapter)
-        for row in group.rows
-    ]
-    found: list[dict[str, str | int | list[str]]] = []
-    for row in rows:
-        claim = row.claim
-        shown = {plant: row.cell(plant) for plant in PLANTS} | {"computed": row.analysis}
-        found.append(
-            {
-                "id": claim.id,
-                "statement_id": row.statement.id,
-                "chapter": claim.chapter,
-                "place": claim.source,
-                "statement": row.statement.text,
-                "case": claim.case,
-                "thesis": row.statement.thesis,
-                "criterion": criterion_text(claim),
-                "published": published_text(row),
-                **{
-                    name: measured_text(claim, cell) if cell else "" for name, cell in shown.items()
-                },
-                "verdict": row.verdict.value,
-                "why": why_of(row),
-                "error": claim.error,
-                "ours": [origin.name.lower() for origin in row.origins],
-                "thresholds": list(claim.thresholds),
-                "flights": list(flights_of(claim)),
-            }
-        )
-    return found
+    groups = (group for chapter in report.chapters for group in report.chapter_groups(chapter))
+    return [_record(row) for group in groups for row in group.rows]
+
+
+def _record(row: Row) -> dict[str, str | int | list[str]]:
+    claim = row.claim
+    texts = {name: measured_text(claim, cell) for name, cell in row.cells.items()}
+    return {
+        "id": claim.id,
+        "statement_id": row.statement.id,
+        "chapter": claim.chapter,
+        "place": claim.source,
+        "statement": row.statement.text,
+        "case": claim.case,
+        "thesis": row.statement.thesis,
+        "criterion": criterion_text(claim),
+        "published": published_text(row),
+        **{name: texts.get(name, "") for name in (*PLANTS, COMPUTED)},
+        "verdict": row.verdict.value,
+        "why": why_of(row),
+        "error": claim.error,
+        "ours": [origin.name.lower() for origin in row.origins],
+        "thresholds": list(claim.thresholds),
+        "flights": list(claim.flights),
+    }
 
 
 def rows_json(report: Report) -> str:

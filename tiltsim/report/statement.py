@@ -54,6 +54,11 @@ class Origin(Described):
     )
 
 
+def origins_of(ours: Iterable[str]) -> tuple[Origin, ...]:
+    """The origins that a file names: "gains"."""
+    return tuple(Origin[name.upper()] for name in ours)
+
+
 @dataclass(frozen=True, kw_only=True)
 class Statement:
     """One statement of the thesis; its rows are the cases in which it is tested.
@@ -89,8 +94,7 @@ class Statement:
             ours: Names of its origins: "gains".
             more: The other fields under their names.
         """
-        origins = tuple(Origin[name.upper()] for name in ours)
-        return cls(id=name, text=statement, origins=origins, **more)
+        return cls(id=name, text=statement, origins=origins_of(ours), **more)
 
     def __post_init__(self) -> None:
         for name in ("text", "thesis", "criterion"):

@@ -4,16 +4,15 @@ A check yields what it refuses: a key and the reason, and a value where it is no
 """
 
 import re
-from collections.abc import Iterator
 from math import pi
 from typing import Final
 
 from tiltsim.scenario.companion import check_companions
 from tiltsim.scenario.controller import CONTROLLERS, laws_for
 from tiltsim.scenario.expectation import NAME
-from tiltsim.scenario.gait import FixedGait, TableGait
-from tiltsim.scenario.instruments import check_instruments
-from tiltsim.scenario.interaction import check_objects
+from tiltsim.scenario.gait import TableGait
+from tiltsim.scenario.instruments import instrument_refusals
+from tiltsim.scenario.interaction import object_refusals
 from tiltsim.scenario.linearizing_controllers import (
     AttitudeAltitudeController,
     AttitudeForceController,
@@ -22,9 +21,9 @@ from tiltsim.scenario.linearizing_controllers import (
 )
 from tiltsim.scenario.messages import InvalidValueError, choose
 from tiltsim.scenario.reference import WaypointReference
-from tiltsim.scenario.rotorcraft import MultirotorTable, RotorcraftTable, TiltServoTable
+from tiltsim.scenario.rotorcraft import MultirotorTable, RotorcraftTable
 from tiltsim.scenario.scenario_tables import ScenarioTables
-from tiltsim.scenario.simulation_table import InitialTable
+from tiltsim.scenario.table import Refusals
 from tiltsim.scenario.vehicle import (
     ModelErrorTable,
     PodTable,
@@ -34,9 +33,6 @@ from tiltsim.scenario.vehicle import (
 
 MAX_KNOTS: Final = 1500
 """Numbers of a gait and a reference together, except tables, which have a separate limit."""
-
-
-Refusals = Iterator[tuple[str, str] | tuple[str, str, object]]
 
 
 def check_consistency(scenario: ScenarioTables) -> None:
@@ -63,8 +59,8 @@ def _refusals(scenario: ScenarioTables) -> Refusals:
             yield "simulation.duration", reason
     yield from _rotor_limits(scenario)
     yield from _ground(scenario)
-    check_instruments(scenario)
-    check_objects(scenario)
+    yield from instrument_refusals(scenario)
+    yield from object_refusals(scenario)
     for expectation in scenario.expect:
         name = expectation.claim
         if re.match(NAME, name) and name not in scenario.claim:
@@ -115,42 +111,14 @@ def _law(scenario: ScenarioTables) -> Refusals:
     if isinstance(speed, tuple) and len(speed) != rotors:
         reason = f"the {vehicle.model} has {rotors} rotors; give one value or one each"
         yield "initial.rotor_speed", reason
-    if vehicle.is_planar:
-        yield from _plane(scenario)
-        yield from _planar_gait(scenario)
-    else:
+    if not vehicle.is_planar:
         yield from _layout(scenario)
         if controller.is_external:
             reason = 'law = "python" is supported on the {} only'
             scenario.require("simulation.plant", "mujoco", reason.format("mujoco plant"))
             if scenario.simulation.engine not in ("auto", "python"):
                 yield "simulation.engine", reason.format("python engine")
-    if vehicle.model == "quadrotor":
-        _check_fixed_rotors(scenario)
-    if isinstance(vehicle, MultirotorTable):
-        tilts = vehicle.has_tilting_rotors
-        if not tilts:
-            reason = "vehicle.mjcf has no tilts; remove it"
-            scenario.require("vehicle.tilt_servo", TiltServoTable(), reason)
-        if rotors < 4 and controller.needs_four_rotors and not controller.commands_tilts:
-            reason = f"{rotors} rotors control attitude and lift only together with their tilts"
-            if not tilts:
-                yield "vehicle.mjcf", f"{reason}, and none of them tilts"
-            choice = "choose full_pose, or geometric with tilts = free"
-            yield "controller.law", f"{reason}; {choice}"
-
-
-def _check_fixed_rotors(scenario: ScenarioTables) -> None:
-    keys = {"gait.type": "fixed", "gait": FixedGait()}
-    keys |= {"vehicle.tilt_servo": TiltServoTable(), "vehicle.pod": PodTable()}
-    if not scenario.controller.rotors_have_speeds:
-        keys |= {"vehicle.min_rotor_speed": None, "vehicle.max_rotor_speed": None}
-        keys["initial.rotor_speed"] = InitialTable().rotor_speed
-    if not scenario.controller.is_external:
-        keys["vehicle.rotor_inertia"] = 0.0
-    reason = "not supported for the quadrotor, whose rotors do not tilt and produce the commanded"
-    for key, default in keys.items():
-        scenario.require(key, default, f"{reason} thrust at once; remove it")
+    yield from vehicle.refusals(scenario)
 
 
 def _actuators(scenario: ScenarioTables) -> Refusals:
@@ -160,14 +128,13 @@ def _actuators(scenario: ScenarioTables) -> Refusals:
     unsupported = f"not supported for the {vehicle.model}"
     for load in scenario.loads if vehicle.is_planar else ():
         yield "disturbance.type", f"{unsupported}; choose acceleration", load.type
-    supported = vehicle.model in {"tiltrotor", "multirotor"}
     for key, value, ideal in scenario.actuator_options:
-        if value != ideal and not supported:
+        if value != ideal and not vehicle.has_actuators:
             yield key, f"{unsupported}; remove it", value
     for fault in scenario.fault:
         if fault.rotor > rotors:
             yield "fault.rotor", f"the vehicle has {rotors} rotors", fault.rotor
-        fixed = supported and scenario.any_rotorcraft.tilt_of_rotor(fault.rotor) < 0
+        fixed = vehicle.has_actuators and scenario.any_rotorcraft.tilt_of_rotor(fault.rotor) < 0
         if fault.type == "stuck_servo" and fixed:
             yield "fault.rotor", "is fixed and has no servo", fault.rotor
     faults = [(fault.rotor, fault.type == "stuck_servo") for fault in scenario.fault]
@@ -221,37 +188,6 @@ def _model_error(scenario: ScenarioTables) -> Refusals:
     require_physical_inertia("model_error.inertia", list(error.inertia), vehicle.moments)
 
 
-_SPATIAL_KEYS: Final = ("position", "velocity", "acceleration", "amplitude")
-"""Keys of references that hold a vector in the world."""
-
-
-def _plane(scenario: ScenarioTables) -> Refusals:
-    """Motion out of a tilt-car's plane, and references of yaw, which is not controlled."""
-    initial, reference = scenario.initial, scenario.reference
-    out_of_plane: dict[str, tuple[float, ...]] = {
-        "initial.position": initial.position[2:],
-        "initial.velocity": initial.velocity[2:],
-        "initial.attitude": initial.attitude[:2],
-        "initial.angular_velocity": initial.angular_velocity[:2],
-    }
-    out_of_plane |= {f"reference.{key}": v[2:] for key, v in reference if key in _SPATIAL_KEYS}
-    for key, components in out_of_plane.items():
-        if any(components):
-            yield key, "the tilt_car stays in its plane: only x, y and yaw may be nonzero"
-    scenario.require("reference.yaw", 0.0, "yaw is not an output of the tilt_car's laws")
-
-
-def _planar_gait(scenario: ScenarioTables) -> Refusals:
-    law, allowed = f"the {scenario.controller.law} law", scenario.controller.gait_types
-    if allowed != ("fixed",):
-        if scenario.gait.type not in allowed:
-            yield "gait.type", f"{law} needs one of {', '.join(allowed)}"
-        return
-    if scenario.gait.type != "fixed":
-        yield "gait.type", f"{law} does not use a gait; remove [gait]"
-    scenario.require("gait", FixedGait(), f"{law} commands the tilt itself; remove [gait]")
-
-
 def _reference(scenario: ScenarioTables) -> Refusals:
     controller, reference = scenario.controller, scenario.reference
     law, kinds = f"the {controller.law} law", {*controller.reference_kinds}
@@ -269,7 +205,7 @@ def _reference(scenario: ScenarioTables) -> Refusals:
     if abs(reference.roll) >= 0.5 * pi and not isinstance(controller, AttitudeForceController):
         yield "reference.roll", f"{law} cannot turn it over; must be below pi/2"
     if reference.type in {"waypoints", "table"} and scenario.vehicle.is_planar:
-        yield "reference.type", "the tilt_car's laws cannot track it"
+        yield "reference.type", f"the {scenario.vehicle.model}'s laws cannot track it"
     if reference.adds_acceleration and not controller.omits_reference_acceleration:
         own = isinstance(controller, AttitudeAltitudeController)
         option = " with gait_rate_feedforward" if own else ""
@@ -312,7 +248,7 @@ def _ground(scenario: ScenarioTables) -> Refusals:
     if ground is None:
         return
     if scenario.vehicle.is_planar:
-        yield "ground", "not supported for the tilt_car, which moves in a plane"
+        yield "ground", f"not supported for the {scenario.vehicle.model}, which moves in a plane"
     reason = "its equations have no ground contact; use mujoco"
     scenario.require("simulation.plant", "mujoco", reason)
     file = scenario.any_rotorcraft.user_vehicle

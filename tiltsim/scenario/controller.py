@@ -7,9 +7,8 @@ warning, so that a broken package does not stop flights that do not need it.
 
 from __future__ import annotations
 
-import sys
 import warnings
-from collections.abc import Container, Iterator
+from collections.abc import Container
 from contextlib import suppress
 from functools import reduce
 from importlib.metadata import Distribution, EntryPoint, distributions, entry_points
@@ -20,15 +19,12 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, get_args
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
-from tiltsim.scenario import (
-    baseline_controllers,
-    linearizing_controllers,
-    tilt_car_controllers,
-    vectoring_controller,
-)
+from tiltsim.scenario import baseline_controllers, linearizing_controllers, vectoring_controller
 from tiltsim.scenario.controller_table import ControllerTable
+from tiltsim.scenario.kinds import KINDS, tables_of
 from tiltsim.scenario.law_controller import LawController, TiltingTable
 from tiltsim.scenario.messages import InvalidValueError
+from tiltsim.scenario.rotorcraft import ROTORCRAFT
 from tiltsim.scenario.table import Positive, default, example, required
 from tiltsim.system.interrupts import defer_interrupts
 from tiltsim.system.text import error_text, printable
@@ -150,7 +146,7 @@ class OwnFunctionController(ControllerTable):
 class PythonController(OwnFunctionController):
     """A user's own controller in Python; see `tiltsim.plants.commanded_plant`."""
 
-    vehicle_models = ("tiltrotor", "quadrotor", "multirotor")
+    vehicle_models = ROTORCRAFT
     reference_kinds = ("position", "pose", "attitude_altitude")
     is_external = True
     rotors_have_speeds = True
@@ -200,24 +196,15 @@ def _law(value: Any) -> str:
     return law if isinstance(law, str) else ""
 
 
-def _tables(*modules: str) -> Iterator[tuple[str, type[ControllerTable]]]:
-    """The tables that modules define, each with its law."""
-    for module in modules:
-        for table in vars(sys.modules[module]).values():
-            if getattr(table, "__module__", "") == module and hasattr(table, "model_fields"):
-                law = get_args(table.model_fields["law"].annotation)
-                yield from ((name, table) for name in law)
-
-
-_BUILT_IN: Final = dict(
-    _tables(
-        linearizing_controllers.__name__,
-        baseline_controllers.__name__,
-        vectoring_controller.__name__,
-        __name__,
-        tilt_car_controllers.__name__,
-    )
+_MODULES: Final = (
+    linearizing_controllers.__name__,
+    baseline_controllers.__name__,
+    vectoring_controller.__name__,
+    __name__,
+    *KINDS,
 )
+
+_BUILT_IN: Final = tables_of(ControllerTable, "law", _MODULES)
 
 CONTROLLERS: Final = _BUILT_IN | installed_controllers(_BUILT_IN)
 """The tables of all laws by their names: built-in laws, then laws of installed packages."""

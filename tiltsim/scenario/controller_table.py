@@ -17,7 +17,6 @@ from tiltsim_controllers.laws.gains import (
     GivenGains,
     IntegralGains,
     PolePlacementTable,
-    gains_from_rows,
 )
 from tiltsim_controllers.laws.keys import GainSets, number_of, table_of
 from tiltsim_controllers.laws.multirotor_steps import FeedforwardTerms
@@ -157,7 +156,7 @@ class ControllerTable(Table):
     table_name = "controller"
     vehicle_models: ClassVar[tuple[str, ...]]
     reference_kinds: ClassVar[tuple[ReferenceKind, ...]]
-    gait_types: ClassVar[tuple[str, ...]] = ("fixed",)  # of the tilt-car's controllers
+    gait_types: ClassVar[tuple[str, ...]] = ("fixed",)  # of laws of vehicles in a plane
     loop_gains: ClassVar[tuple[str, ...]] = ()  # keys of the gains of independent linear loops
     is_external: ClassVar[bool] = False  # commands come from Python code, not from a built-in law
     commands_tilts: ClassVar[bool] = False  # the tilt angles are inputs, not planned by a gait
@@ -291,16 +290,14 @@ class GaitFollowingController(ControllerTable):
     def resolve_gains(self) -> Gains:
         gains = self.gains
         if isinstance(gains, GainTable):
-            return gains_from_rows(gains.attitude, gains.altitude, gains.position)
+            return Gains(*gains.attitude, gains.altitude, gains.position)
         return gains.resolve()[0] if isinstance(gains, PolePlacementTable) else GAIN_SETS[gains]
 
     def in_full(self) -> Self:
         if not isinstance(self.gains, str):
             return self
-        values = (*self.resolve_gains(),)
-        first, second, third = zip(values[:3], values[3:6], values[6:9], strict=True)
-        attitude = (first, second, third)
-        table = GainTable(attitude=attitude, altitude=values[9:12], position=values[12:])
+        *attitude, altitude, position = self.resolve_gains()
+        table = GainTable(attitude=tuple(attitude), altitude=altitude, position=position)
         return self.model_copy(update={"gains": table})
 
     def resolve_integral_gains(self) -> IntegralGains:

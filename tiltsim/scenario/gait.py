@@ -4,11 +4,10 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from functools import lru_cache
 from math import pi
-from typing import Annotated, ClassVar, Final, Literal
+from typing import TYPE_CHECKING, Annotated, ClassVar, Final, Literal, Protocol
 
 from pydantic import Field
 
-from tiltsim.models.rotor_table import Multirotor
 from tiltsim.models.vehicle_parts import MAX_ROTORS
 from tiltsim.scenario.table import (
     Angle,
@@ -36,7 +35,6 @@ from tiltsim_controllers.analysis.two_color_planner import (
 from tiltsim_controllers.code.arrays import is_known
 from tiltsim_controllers.gaits import plans
 from tiltsim_controllers.gaits.plans import Gait as PlannedGait
-from tiltsim_controllers.tilt_car.vehicle import TiltCar, turn_per_tilt
 from tiltsim_controllers.vehicle.parameters import Vehicle
 
 SIGN: Final = (
@@ -52,14 +50,13 @@ COLOR: Final = (
 )
 """The two colors of ch. 6, for descriptions."""
 
-AnyVehicle = Vehicle | Multirotor | TiltCar
 
+class AnyVehicle(Protocol):
+    """The parameters of a vehicle of any kind."""
 
-def tilts_of(vehicle: AnyVehicle) -> int:
-    """The number of tilt angles that a gait of a vehicle plans; the quadrotor's are idle."""
-    if isinstance(vehicle, Multirotor):
-        return vehicle.tilts
-    return 4 if isinstance(vehicle, Vehicle) else 1
+    @property
+    def tilts(self) -> int:
+        """The number of tilt angles that a gait plans."""
 
 
 class GaitTable(Table, ABC):
@@ -67,6 +64,9 @@ class GaitTable(Table, ABC):
 
     table_name = "gait"
     size_key: ClassVar[str]
+    alternates: ClassVar[bool] = False  # between two sides, half a period on each
+    if TYPE_CHECKING:
+        type: str
 
     scale: Annotated[float, Field(ge=1e-3, le=1e3)] = default(
         1.0, "multiplies all tilt angles (ch. 5: 1/n) [-]", 0.5
@@ -75,8 +75,8 @@ class GaitTable(Table, ABC):
 
     def plan(self, vehicle: AnyVehicle) -> PlannedGait:
         """The gait for a vehicle. Raises ValueError if the numbers do not define one."""
-        needed = tilts_of(vehicle)
-        if self.tilts not in {None, needed} and not isinstance(vehicle, TiltCar):
+        needed = vehicle.tilts
+        if self.tilts not in {None, needed}:
             raise ValueError(f"has {self.tilts} tilt angles; the vehicle has {needed}")
         if needed not in {1, 4} and self.bias != 1.0:
             raise ValueError(f"gait.bias needs four tilt angles; the vehicle has {needed}")
@@ -116,7 +116,7 @@ class FixedGait(GaitTable):
         return len(self.angles) if some else None
 
     def _unscaled(self, vehicle: AnyVehicle) -> PlannedGait:
-        if isinstance(vehicle, Multirotor) and self.tilts is None:
+        if self.tilts is None:
             return plans.fixed((0.0,) * vehicle.tilts)
         return plans.fixed(self.angles)
 
@@ -312,75 +312,3 @@ class TwoColorGait(GaitTable):
         if self.rectangle is not None:
             return "rectangle", self.rectangle
         return ("radius", self.radius) if self.radius is not None else ("path", len(self.path))
-
-
-class TiltCarGait(GaitTable):
-    """Base of the tilt-car's gaits, which plan the direction of the thrusts."""
-
-    @property
-    def tilts(self) -> None:
-        return None
-
-    def _unscaled(self, vehicle: AnyVehicle) -> PlannedGait:
-        if not isinstance(vehicle, TiltCar):
-            number = "four" if isinstance(vehicle, Vehicle) else vehicle.tilts
-            raise ValueError(f"is a gait of the tilt_car; this vehicle has {number} tilt angles")
-        # The bottom disc counter-rotates, so that the tilt exceeds the thrusts' rotation.
-        return self._tilt(1.0 / turn_per_tilt(vehicle))
-
-    @abstractmethod
-    def _tilt(self, per_direction: float) -> PlannedGait:
-        """The gait of the tilt angle, given the tilt for a thrust direction of 1 rad."""
-
-
-PENGUIN_SWINGS: Final = {"penguin_small": pi / 8, "penguin_large": pi / 3}
-"""Directions of the thrusts (rad) between which the penguins swing (ch. 11, Figs. 7 and 8)."""
-
-
-class PenguinGait(TiltCarGait):
-    """The penguin-inspired gaits of ch. 11: half a period on one side, half on the other."""
-
-    size_key = "amplitude"
-
-    type: Literal["penguin_small", "penguin_large"] = required(
-        "a penguin's waddle: the thrusts jump between two directions"
-    )
-    amplitude: Angle | None = default(
-        None,
-        "either direction, from straight ahead; default: pi/8 (small), pi/3 (large) [rad]",
-        0.4,
-    )
-    period: Period = default(2.0, "T, of the whole cycle [s]")
-
-    def _tilt(self, per_direction: float) -> PlannedGait:
-        swing = PENGUIN_SWINGS[self.type] if self.amplitude is None else self.amplitude
-        return plans.penguin(self.type, swing * per_direction, self.period)
-
-
-class RotatingGait(TiltCarGait):
-    """Thrusts that rotate at a constant rate (ch. 10, Eq. 18)."""
-
-    size_key = "rate"
-
-    type: Literal["rotating"] = required("the thrusts turn without end")
-    rate: Annotated[float, Field(ge=-1e3, le=1e3)] = required(
-        "of the thrusts' direction [rad/s]", 1.0
-    )
-    start: Angle = default(0.0, "the thrusts' direction at time zero [rad]")
-
-    def _tilt(self, per_direction: float) -> PlannedGait:
-        return plans.rotating(self.start * per_direction, self.rate * per_direction)
-
-
-Gait = Annotated[
-    FixedGait
-    | TrotGait
-    | CatGait
-    | WaypointGait
-    | TableGait
-    | TwoColorGait
-    | PenguinGait
-    | RotatingGait,
-    Field(discriminator="type"),
-]
-"""The ``[gait]`` table, discriminated by its type."""

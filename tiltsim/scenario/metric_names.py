@@ -105,10 +105,10 @@ METRICS: Final = {
     ),
     "first_switch_time": Metric("time of the first switch", "s", "first sample after a switch"),
     "max_abs_error_x": Metric(
-        "largest error along x", "m", "largest absolute position error along x (tilt_car)"
+        "largest error along x", "m", "largest absolute position error along x, in a plane"
     ),
     "max_abs_error_y": Metric(
-        "largest error along y", "m", "largest absolute position error along y (tilt_car)"
+        "largest error along y", "m", "largest absolute position error along y, in a plane"
     ),
     "max_lyapunov": Metric(
         "largest Lyapunov candidate",
@@ -117,9 +117,7 @@ METRICS: Final = {
         "lyapunov",
     ),
     "final_input_split": Metric(
-        "final ω₁² − ω₂²",
-        "rad^2/s^2",
-        "omega_1^2 - omega_2^2, mean over the last second (tilt_car)",
+        "final ω₁² − ω₂²", "rad^2/s^2", "omega_1^2 - omega_2^2, mean over the last second"
     ),
     "max_tilt_rate": Metric("largest tilt rate", "rad/s", "largest absolute tilt rate"),
     "min_singularity_margin": Metric(

@@ -2,7 +2,7 @@
 
 from abc import ABC, abstractmethod
 from math import inf, pi
-from typing import Annotated, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Final, Literal
 
 from pydantic import Field
 
@@ -10,11 +10,25 @@ from tiltsim.models.cross import as_multirotor
 from tiltsim.models.parts import RotorLimits, TiltServo
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.models.user_vehicle import UserVehicle
-from tiltsim.scenario.table import NonNegative, Positive, Table, default, example, required
+from tiltsim.scenario.gait import FixedGait
+from tiltsim.scenario.table import (
+    NonNegative,
+    Positive,
+    Refusals,
+    Table,
+    default,
+    example,
+    required,
+)
 from tiltsim_controllers.mathematics.scalar import Values
-from tiltsim_controllers.tilt_car.vehicle import TiltCar
 from tiltsim_controllers.vehicle.parameters import Vehicle
 from tiltsim_controllers.vehicle.rotors import Rotor
+
+ROTORCRAFT: Final = ("tiltrotor", "quadrotor", "multirotor")
+"""The models of all vehicles that fly."""
+
+SPATIAL_KEYS: Final = ("position", "velocity", "acceleration", "amplitude")
+"""Keys of references that hold a vector in the world."""
 
 
 class ServoTable(Table):
@@ -55,8 +69,12 @@ class AnyVehicleTable(Table, ABC):
 
     table_name = "vehicle"
     is_planar: ClassVar[bool] = False  # moves on a plane, without gravity, air or ground
+    has_actuators: ClassVar[bool] = False  # which may lag, have limits and fail
+    any_tilts: ClassVar[bool] = False  # a gait has the tilts of the vehicle's file
 
     model: str
+    if TYPE_CHECKING:
+        tilt_servo: ServoTable
 
     @property
     @abstractmethod
@@ -74,12 +92,63 @@ class AnyVehicleTable(Table, ABC):
         return self.tilt_count > 0
 
     @abstractmethod
-    def resolve(self) -> Vehicle | Multirotor | TiltCar:
+    def resolve(self) -> Any:
         """The physical parameters."""
+
+    @property
+    def spins(self) -> Values:
+        """Signs of the rotor speeds."""
+        return (1.0,) * self.rotor_count
+
+    @property
+    @abstractmethod
+    def rotor_range(self) -> tuple[float | None, float | None]:
+        """Smallest and largest speed (rad/s) of a rotor along its spin; None without limit."""
+
+    def refusals(self, _scenario: Any) -> Refusals:
+        """Contradictions to a scenario of this vehicle: keys, reasons, and values not their own."""
+        yield from ()
+
+
+class PlanarTable(AnyVehicleTable, ABC):
+    """A vehicle that moves in the plane of x and y, whose laws control these two."""
+
+    is_planar = True
+
+    @property
+    def rotor_range(self) -> tuple[float | None, float | None]:
+        """Thrusts push and cannot pull."""
+        return 0.0, None
+
+    def refusals(self, scenario: Any) -> Refusals:
+        """Motion out of the plane, references of yaw, and gaits that the law does not follow."""
+        initial, controller, gait = scenario.initial, scenario.controller, scenario.gait
+        out_of_plane: dict[str, tuple[float, ...]] = {
+            "initial.position": initial.position[2:],
+            "initial.velocity": initial.velocity[2:],
+            "initial.attitude": initial.attitude[:2],
+            "initial.angular_velocity": initial.angular_velocity[:2],
+        }
+        spatial = ((key, vector) for key, vector in scenario.reference if key in SPATIAL_KEYS)
+        out_of_plane |= {f"reference.{key}": vector[2:] for key, vector in spatial}
+        for key, components in out_of_plane.items():
+            if any(components):
+                yield key, f"the {self.model} stays in its plane: only x, y and yaw may be nonzero"
+        scenario.require("reference.yaw", 0.0, f"yaw is not an output of the {self.model}'s laws")
+        law, allowed = f"the {controller.law} law", controller.gait_types
+        if allowed != ("fixed",):
+            if gait.type not in allowed:
+                yield "gait.type", f"{law} needs one of {', '.join(allowed)}"
+            return
+        if gait.type != "fixed":
+            yield "gait.type", f"{law} does not use a gait; remove [gait]"
+        scenario.require("gait", FixedGait(), f"{law} commands the tilt itself; remove [gait]")
 
 
 class RotorcraftTable(AnyVehicleTable, ABC):
     """The keys and properties of every vehicle that flies."""
+
+    has_actuators = True
 
     mjcf: str | None
     min_rotor_speed: NonNegative | None = default(
@@ -113,8 +182,16 @@ class RotorcraftTable(AnyVehicleTable, ABC):
         return as_multirotor(self.resolve(), tilting=self.has_tilting_rotors).rotors
 
     @property
+    def cross(self) -> str:
+        """The model of four rotors on a cross, each on its own hinge or fixed; empty for others."""
+        return ""
+
+    @property
+    def rotor_range(self) -> tuple[float | None, float | None]:
+        return self.min_rotor_speed, self.max_rotor_speed
+
+    @property
     def spins(self) -> Values:
-        """Signs of the rotor speeds."""
         return tuple(rotor.spin for rotor in self.rotors)
 
     @property
@@ -188,6 +265,8 @@ class MultirotorTable(RotorcraftTable):
 
     model_config = example(model="multirotor", mjcf="mjcf/hexarotor.xml")
 
+    any_tilts = True
+
     model: Literal["multirotor"] = required(
         "2 to 16 rotors at any places, with any thrust axes, fixed or tilted about hinges of any "
         "axes, of which two may share one"
@@ -223,6 +302,20 @@ class MultirotorTable(RotorcraftTable):
     @property
     def pod_inertias(self) -> Values:
         return self.file.pod_inertias
+
+    def refusals(self, scenario: Any) -> Refusals:
+        """Servos without tilts, and laws for which the rotors are too few."""
+        tilts, controller = self.has_tilting_rotors, scenario.controller
+        if not tilts:
+            reason = "vehicle.mjcf has no tilts; remove it"
+            scenario.require("vehicle.tilt_servo", TiltServoTable(), reason)
+        too_few = self.rotor_count < 4 and controller.needs_four_rotors
+        if too_few and not controller.commands_tilts:
+            reason = f"{self.rotor_count} rotors control attitude and lift only together with"
+            if not tilts:
+                yield "vehicle.mjcf", f"{reason} their tilts, and none of them tilts"
+            choice = "choose full_pose, or geometric with tilts = free"
+            yield "controller.law", f"{reason} their tilts; {choice}"
 
     def _check_values(self) -> None:
         self._check_rotor_inertia(self.resolve().max_rotor_inertia)

@@ -1,17 +1,21 @@
 """The tables of a scenario together, and properties that follow from several of them."""
 
-from typing import Any, Final
+from functools import reduce
+from operator import or_
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
-from pydantic import PrivateAttr
+from pydantic import Field, PrivateAttr
 
 from tiltsim.errors import InputError
 from tiltsim.models.cross import as_multirotor
 from tiltsim.models.rotor_table import Multirotor
+from tiltsim.scenario import gait
 from tiltsim.scenario.companion import CompanionTable, DownwashTable
 from tiltsim.scenario.controller import Controller
 from tiltsim.scenario.expectation import ClaimName, ClaimTable, Expectation, Origin
-from tiltsim.scenario.gait import FixedGait, Gait
+from tiltsim.scenario.gait import FixedGait, GaitTable
 from tiltsim.scenario.interaction import CableTable, ObjectTable, PayloadTable, ToolTable
+from tiltsim.scenario.kinds import KINDS, tables_of
 from tiltsim.scenario.linearizing_controllers import AttitudeAltitudeController
 from tiltsim.scenario.reference import Reference, SetpointReference
 from tiltsim.scenario.rotorcraft import MultirotorTable, RotorcraftTable, TiltServoTable
@@ -33,9 +37,22 @@ from tiltsim.scenario.surroundings import (
 )
 from tiltsim.scenario.table import Many, default
 from tiltsim.scenario.time_table import TimeTable
-from tiltsim.scenario.vehicle import ModelErrorTable, TiltCarTable, VehicleTable, VehicleUnion
+from tiltsim.scenario.vehicle import ModelErrorTable, VehicleTable, VehicleUnion
 from tiltsim_controllers.mathematics.scalar import Values
 from tiltsim_controllers.vehicle.parameters import Vehicle
+
+GAITS: Final = tables_of(
+    GaitTable,  # type: ignore[type-abstract]
+    "type",
+    (gait.__name__, *KINDS),
+)
+"""The tables of all gaits by their types."""
+
+if TYPE_CHECKING:
+    Gait = GaitTable
+else:
+    Gait = Annotated[reduce(or_, GAITS.values()), Field(discriminator="type")]
+"""The ``[gait]`` table, discriminated by its type."""
 
 DESCRIPTIVE: Final = ("title", "source", "without", "ours", "claim", "expect")
 """Keys that describe and judge a flight, and change nothing in it."""
@@ -95,7 +112,7 @@ class ScenarioTables(WithAutopilot):
 
     _address: str = PrivateAttr("")
     _own: dict[str, Any] = PrivateAttr({})  # parts given in Python, by name
-    _trusted: bool = PrivateAttr(False)  # see `tiltsim.scenario.own_code`
+    _trusted: bool = PrivateAttr(False)  # see `tiltsim.scenario.own_parts`
 
     @property
     def address(self) -> str:
@@ -136,6 +153,12 @@ class ScenarioTables(WithAutopilot):
         if found:
             where = self.address or "scenario"
             raise InputError(f"{where}: {analysis} takes a vehicle alone; remove {found}")
+
+    def require_rotorcraft(self, analysis: str) -> None:
+        """Refuse a vehicle in a plane for an analysis. Raises `InputError` with its name."""
+        if self.vehicle.is_planar:
+            where = self.address or "scenario"
+            raise InputError(f"{where}: vehicle.model: {analysis} takes rotorcraft only")
 
     @property
     def time_tables(self) -> dict[str, TimeTable]:
@@ -189,6 +212,15 @@ class ScenarioTables(WithAutopilot):
         return isinstance(self.vehicle, RotorcraftTable) and self.vehicle.rotor_inertia > 0.0
 
     @property
+    def gyroscopic(self) -> float:
+        """Factor of the gyroscopic torque: the thesis's equations have a vehicle's without hinges.
+
+        That is ch. 2's; ch. 3's equations omit it.
+        """
+        fixed = not self.vehicle.has_actuators
+        return float(self.simulation.plant != "thesis" or fixed)
+
+    @property
     def has_ideal_actuators_in_still_air(self) -> bool:
         """Whether pods and rotors follow their commands, and nothing else acts, as in the thesis.
 
@@ -238,10 +270,3 @@ class ScenarioTables(WithAutopilot):
     def true_rotorcraft(self) -> Vehicle:
         """The simulated vehicle; the controller assumes ``rotorcraft.resolve()``."""
         return self.model_error.apply(self.rotorcraft.resolve())
-
-    @property
-    def tilt_car(self) -> TiltCarTable:
-        """The vehicle of a tilt-car. Raises TypeError for other vehicles."""
-        if not isinstance(self.vehicle, TiltCarTable):
-            raise TypeError(f"the {self.vehicle.model} is not a tilt-car")
-        return self.vehicle

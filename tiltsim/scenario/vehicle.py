@@ -1,24 +1,24 @@
 """The tables of a scenario that describe the vehicle: ``[vehicle]`` and ``[model_error]``."""
 
 from dataclasses import replace
-from math import pi, sqrt
-from typing import Annotated, Any, Final, Literal
+from functools import reduce
+from math import sqrt
+from operator import or_
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 import numpy as np
 from pydantic import Discriminator, Field, Tag
 
 from tiltsim.models.parts import SERVO_ARMATURE, Pod
 from tiltsim.models.rotor_table import Multirotor
+from tiltsim.scenario import rotorcraft
+from tiltsim.scenario.gait import FixedGait
+from tiltsim.scenario.kinds import KINDS, tables_of
 from tiltsim.scenario.messages import InvalidValueError
-from tiltsim.scenario.rotorcraft import (
-    AnyVehicleTable,
-    MultirotorTable,
-    RotorcraftTable,
-    ServoTable,
-)
-from tiltsim.scenario.table import NotTiny, Positive, Table, default, example, required
+from tiltsim.scenario.rotorcraft import AnyVehicleTable, RotorcraftTable, TiltServoTable
+from tiltsim.scenario.simulation_table import InitialTable
+from tiltsim.scenario.table import NotTiny, Positive, Refusals, Table, default, example
 from tiltsim_controllers.mathematics.scalar import Values
-from tiltsim_controllers.tilt_car.vehicle import THESIS_CAR, TiltCar
 from tiltsim_controllers.vehicle.parameters import PRESETS, Vehicle
 
 MOMENTS: Final = ("inertia_xx", "inertia_yy", "inertia_zz")
@@ -107,6 +107,10 @@ class VehicleTable(RotorcraftTable):
         return 4 if self.model == "tiltrotor" else 0
 
     @property
+    def cross(self) -> str:
+        return self.model
+
+    @property
     def hinge_inertias(self) -> Values:
         user_vehicle, shipped = self.user_vehicle, SERVO_ARMATURE + self.pod.inertia
         of_file = () if user_vehicle is None else user_vehicle.hinge_inertias
@@ -121,6 +125,26 @@ class VehicleTable(RotorcraftTable):
     def has_standard_layout(self) -> bool:
         """Whether the rotors are at the ends of four equal arms at right angles."""
         return self.user_vehicle is None or not self.user_vehicle.layout_mismatch
+
+    @property
+    def has_actuators(self) -> bool:  # type: ignore[override]
+        return self.has_tilting_rotors
+
+    def refusals(self, scenario: Any) -> Refusals:
+        """Without hinges the rotors produce the commanded thrust at once."""
+        if self.has_actuators:
+            return
+        keys = {"gait.type": "fixed", "gait": FixedGait()}
+        keys |= {"vehicle.tilt_servo": TiltServoTable(), "vehicle.pod": PodTable()}
+        if not scenario.controller.rotors_have_speeds:
+            keys |= {"vehicle.min_rotor_speed": None, "vehicle.max_rotor_speed": None}
+            keys["initial.rotor_speed"] = InitialTable().rotor_speed
+        if not scenario.controller.is_external:
+            keys["vehicle.rotor_inertia"] = 0.0
+        reason = f"not supported for the {self.model}, whose rotors do not tilt and produce the"
+        for key, ideal in keys.items():
+            scenario.require(key, ideal, f"{reason} commanded thrust at once; remove it")
+        yield from ()
 
     def _check_values(self) -> None:
         if self.mjcf is not None:
@@ -140,59 +164,31 @@ class VehicleTable(RotorcraftTable):
         self._check_limits()
 
 
-class TiltCarTable(AnyVehicleTable):
-    """The tilt-car of ch. 10; defaults: `tiltsim_controllers.tilt_car.vehicle.THESIS_CAR`."""
+VEHICLES: Final = tables_of(
+    AnyVehicleTable,  # type: ignore[type-abstract]
+    "model",
+    (__name__, rotorcraft.__name__, *KINDS),
+)
+"""The tables of all vehicles by their models."""
 
-    is_planar = True
-
-    model: Literal["tilt_car"] = required(
-        "two discs on one axis that slide on a plane: the top one carries two rotors and turns "
-        "against the bottom one"
-    )
-    mass: Positive = default(THESIS_CAR.mass, "the thesis does not give it [kg]")
-    top_inertia: Positive = default(
-        THESIS_CAR.top_inertia, "I_T, of the top disc about the axis [kg m^2]"
-    )
-    bottom_inertia: Positive = default(
-        THESIS_CAR.bottom_inertia,
-        "of the bottom disc alone about the axis; I_B is that of both discs [kg m^2]",
-    )
-    half_angle: Annotated[float, Field(gt=0.0, lt=pi / 2)] = default(
-        THESIS_CAR.half_angle, "theta, between the mean thrust direction and either thrust [rad]"
-    )
-    thrust_coefficient: Positive = default(
-        THESIS_CAR.thrust_coefficient, "K_F, thrust per square of the rotor speed [N s^2/rad^2]"
-    )
-    tilt_servo: ServoTable = default(ServoTable(), "the servo that turns the top disc")
-
-    @property
-    def rotor_count(self) -> int:
-        return 2
-
-    @property
-    def tilt_count(self) -> int:
-        return 1
-
-    def resolve(self) -> TiltCar:
-        return TiltCar(**{key: value for key, value in self if key in TiltCar._fields})
+_TAGS: Final = {table: model for model, table in reversed(VEHICLES.items())}
 
 
-def _model(value: Any) -> str:
+def _tag(value: Any) -> str:
     if isinstance(value, AnyVehicleTable):
-        model: object = value.model
-    else:
-        model = value.get("model", "tiltrotor") if isinstance(value, dict) else "tiltrotor"
+        return _TAGS[type(value)]
+    default = VehicleTable.model_fields["model"].default
+    model = value.get("model", default) if isinstance(value, dict) else default
     if not isinstance(model, str):
         return ""
-    return "tiltrotor" if model == "quadrotor" else model
+    return _TAGS[VEHICLES[model]] if model in VEHICLES else model
 
 
-VehicleUnion = Annotated[
-    Annotated[VehicleTable, Tag("tiltrotor")]
-    | Annotated[MultirotorTable, Tag("multirotor")]
-    | Annotated[TiltCarTable, Tag("tilt_car")],
-    Discriminator(_model),
-]
+if TYPE_CHECKING:
+    VehicleUnion = AnyVehicleTable
+else:
+    tagged = (Annotated[table, Tag(_TAGS[table])] for table in dict.fromkeys(VEHICLES.values()))
+    VehicleUnion = Annotated[reduce(or_, tagged), Discriminator(_tag)]
 """The ``[vehicle]`` table, discriminated by its model."""
 
 ScaleFactor = Annotated[float, Field(ge=0.01, le=100.0)]

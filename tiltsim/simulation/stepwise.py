@@ -143,7 +143,7 @@ class Simulation:
     def observation(self) -> Observation:
         """The state as a controller sees it now, through the scenario's sensors.
 
-        Raises `InputError` for the tilt-car, which has none.
+        Raises `InputError` for vehicles in a plane, which have none.
         """
         self._require_rotorcraft("observation")
         values = dict(zip(self._assembly.loop.sample_fields[1:], self._plant.observe()))
@@ -153,8 +153,8 @@ class Simulation:
     def command(self) -> Command:
         """The command of the built-in controller now, before latency, servos and motors.
 
-        Rotor accelerations and tilt angles; thrusts for the quadrotor. Raises `InputError` for the
-        tilt-car, and if the scenario has a custom controller.
+        Rotor accelerations and tilt angles; thrusts for the quadrotor. Raises `InputError` for
+        vehicles in a plane, and if the scenario has a custom controller.
         """
         self._require_rotorcraft("command")
         if self.scenario.controller.is_external:

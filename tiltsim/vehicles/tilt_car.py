@@ -53,8 +53,7 @@ OBSERVED_FIELDS: Final = (
 )
 """A sample of any tilt-car after its time: both discs and the rotor speeds."""
 
-SPEED_1, SPEED_2 = 8, 9
-"""Where in a sample the rotor speeds lie."""
+SPEED_1, SPEED_2 = 8, 9  # where in a sample the rotor speeds lie
 
 COLUMNS: Final = {
     "time": Quantity("time", "s"),
@@ -96,7 +95,7 @@ def tilt_car_limit_exceeded(
 
 
 def _thrusts(columns: Mapping[str, Floats], scenario: Scenario) -> dict[str, Floats]:
-    coefficient = scenario.tilt_car.thrust_coefficient
+    coefficient = scenario.vehicle.resolve().thrust_coefficient
     return {f"thrust_{i}": coefficient * columns[f"rotor_speed_{i}"] ** 2 for i in ROTORS}
 
 
@@ -109,7 +108,7 @@ def _compile(
 ) -> mujoco.MjModel:
     from tiltsim.models.tilt_car import TiltCarSpec, compile_tilt_car
 
-    car, simulation = scenario.tilt_car, scenario.simulation
+    car, simulation = scenario.vehicle, scenario.simulation
     if extra_actuators:
         raise ValueError("the tilt-car takes no actuators beyond its own")
     spec = TiltCarSpec(
@@ -133,7 +132,7 @@ def initial_tilt(plan: FlightPlan) -> tuple[float, float]:
 def _initial_motion(plan: FlightPlan) -> tuple[Vector, Vector]:
     """The car turned out of zero tilt at ``initial.attitude``'s yaw, angular momentum conserved."""
     initial = plan.scenario.initial
-    share = counter_yaw_per_tilt(plan.scenario.tilt_car.resolve())
+    share = counter_yaw_per_tilt(plan.scenario.vehicle.resolve())
     tilt, rate = initial_tilt(plan)
     x, y, _ = initial.position
     vx, vy, _ = initial.velocity

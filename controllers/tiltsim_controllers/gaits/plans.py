@@ -44,20 +44,13 @@ _AFTER: Final = 1.0 + 2.0**-52
 
 @dataclass(frozen=True)
 class Gait:
-    """A gait ready to be flown.
+    """A gait ready to be flown."""
 
-    Attributes:
-        name: Name of the gait.
-        parameters, knots: Arguments of `planned_tilts`.
-        source: Where it comes from.
-        tilts: Number of tilt angles.
-    """
-
-    name: str
-    parameters: GaitParameters
-    knots: tuple[float, ...] = NO_KNOTS
-    source: str = ""
-    tilts: int = 4
+    name: str  # name of the gait
+    parameters: GaitParameters  # first argument of `planned_tilts`
+    knots: tuple[float, ...] = NO_KNOTS  # its table data
+    source: str = ""  # where it comes from
+    tilts: int = 4  # number of tilt angles
 
     @property
     def is_constant(self) -> bool:
@@ -227,7 +220,7 @@ def continuous_trot(amplitude: float, period: float) -> Gait:
 
 
 def penguin(name: str, amplitude: float, period: float) -> Gait:
-    """The tilt-car's swing between minus and plus the amplitude (rad) (ch. 11, Sec. 3)."""
+    """A swing of one tilt between minus and plus the amplitude (rad) (ch. 11, Sec. 3)."""
     pieces = [(0.0, 0.0, -amplitude), (0.5 * period, 0.0, amplitude)]
     return _swinging(name, "ch. 11, Sec. 3, Figs. 7 and 8", period, (1.0,), pieces)
 

@@ -30,8 +30,6 @@ within the unit circle.
 ``+Lambda``. Everything is in the frame of that half; for the other one both signs change.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -41,8 +39,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from tiltsim_controllers.mathematics.scalar import Floats, Pair
+from tiltsim_controllers.tilt_car.integrating import null_space_input
 from tiltsim_controllers.tilt_car.planned_direction import lyapunov_candidate
-from tiltsim_controllers.tilt_car.third_derivative import null_space_input
 from tiltsim_controllers.tilt_car.vehicle import TiltCar, input_matrix, turn_per_tilt
 
 
@@ -107,19 +105,12 @@ STEPS = 64
 
 @dataclass(frozen=True)
 class Swing:
-    """A penguin swing under the controller of ch. 11.
+    """A penguin swing under the controller of ch. 11."""
 
-    Attributes:
-        half_angle: ``theta``, rad
-        half_period: ``T / 2``, s
-        gains: of the controller
-        reference_acceleration: along x, m/s^2
-    """
-
-    half_angle: float
-    half_period: float
+    half_angle: float  # ``theta``, rad
+    half_period: float  # ``T / 2``, s
     gains: Any  # of `planned_direction`
-    reference_acceleration: float = 1.0
+    reference_acceleration: float = 1.0  # along x, m/s^2
 
     @property
     def direction(self) -> float:
@@ -253,19 +244,13 @@ def lyapunov_growth(swing: Swing, state: Pair) -> float:
 
 @dataclass(frozen=True)
 class LyapunovBound:
-    """Proposition 7 in numbers.
-
-    Attributes:
-        critical: ``L_critical``: the largest candidate from which the next half period may still
-            raise it.
-        largest_gain: the largest growth over a half period; the chapter rounds it up to 3/4 (Eq.
-            71).
-        at: the state of ``L_critical``
-    """
+    """Proposition 7 in numbers."""
 
     critical: float
+    """``L_critical``: the largest candidate from which the next half period may still raise it."""
     largest_gain: float
-    at: Pair
+    """The largest growth over a half period; the chapter rounds it up to 3/4 (Eq. 71)."""
+    at: Pair  # the state of ``L_critical``
 
     @property
     def published(self) -> float:

@@ -6,8 +6,6 @@ The bisector has the direction ``psi + alpha``: yaw of the bottom disc plus tilt
 relative to it.
 """
 
-from __future__ import annotations
-
 from math import pi
 from typing import Any, Final, NamedTuple
 
@@ -22,6 +20,11 @@ class TiltCar(NamedTuple):
     bottom_inertia: float  # kg m^2, of the bottom disc about the axis
     half_angle: float  # [theta] rad, from the bisector of the thrusts to either
     thrust_coefficient: float  # [K_F] N s^2/rad^2
+
+    @property
+    def tilts(self) -> int:
+        """The number of tilt angles that a gait plans."""
+        return 1
 
 
 THESIS_CAR: Final = TiltCar(

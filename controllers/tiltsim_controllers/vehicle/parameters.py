@@ -1,7 +1,5 @@
 """Physical parameters of the tiltrotor, and the vehicles known by name."""
 
-from __future__ import annotations
-
 from typing import Any, Final, NamedTuple
 
 
@@ -24,6 +22,11 @@ class Vehicle(NamedTuple):
     def moments(self) -> tuple[float, ...]:
         """Principal moments of inertia, kg m^2."""
         return self[1:4]
+
+    @property
+    def tilts(self) -> int:
+        """The number of tilt angles that a gait plans; without hinges they are idle."""
+        return 4
 
     @property
     def hover_rotor_speed(self) -> Any:

@@ -157,20 +157,13 @@ def force_and_torque(table: Sequence[float], tilts: ArrayLike = ()) -> tuple[Flo
 
 
 class Rotors(NamedTuple):
-    """The rotors of a vehicle, N of them on M tilting pods or fixed.
+    """The rotors of a vehicle, N of them on M tilting pods or fixed."""
 
-    Attributes:
-        tilt_of_rotor: The number of each rotor's tilt, from 0; -1 for a fixed rotor.
-        spins: Signs of the speeds with which they push along their axes, shape (N,).
-        constant, cosine, sine: Force (N) and torque (N m) in body axes per unit of ``w``
-            ((rad/s)^2), shape (6, N) each.
-    """
-
-    tilt_of_rotor: TiltOfRotor
-    spins: Any
-    constant: Any
-    cosine: Any
-    sine: Any
+    tilt_of_rotor: TiltOfRotor  # the number of each rotor's tilt, from 0; -1 for a fixed rotor
+    spins: Any  # signs of the speeds with which they push along their axes, shape (N,)
+    constant: Any  # force (N) and torque (N m), body axes, per unit of ``w`` ((rad/s)^2), (6, N)
+    cosine: Any  # likewise, times the cosine of the tilt, shape (6, N)
+    sine: Any  # likewise, times its sine, shape (6, N)
 
     def masked(self, works: Any) -> Rotors:
         """Rotors with their force and torque multiplied by 1 or 0, shape (N,)."""
@@ -240,9 +233,13 @@ def of_tilts(rotors: Rotors, values: Any) -> Any:
         rotors: The layout is used.
         values: Values of the rotors, shape (N,).
     """
+    return xp.array([sum(values[i] for i in pod) for pod in _pods(rotors)])
+
+
+def _pods(rotors: Rotors) -> list[list[int]]:
+    """The rotors on each pod."""
     layout = rotors.tilt_of_rotor
-    pods = [[i for i, own in enumerate(layout) if own == tilt] for tilt in range(max(layout) + 1)]
-    return xp.array([sum(values[i] for i in pod) for pod in pods])
+    return [[i for i, own in enumerate(layout) if own == tilt] for tilt in range(tilts_of(layout))]
 
 
 def turned(rotors: Rotors, parts: Any, tilts: Any) -> Any:
@@ -283,11 +280,7 @@ def wrench_slope(rotors: Rotors, tilts: Any) -> Any:
 
 def by_tilt(rotors: Rotors, columns: Any) -> Any:
     """Sums of columns of rotors over each tilt, shape (6, N) to (6, M)."""
-    layout = rotors.tilt_of_rotor
-    groups = [
-        [i for i, own in enumerate(layout) if own == tilt] for tilt in range(tilts_of(layout))
-    ]
-    sums = [sum((columns[:, i] for i in group), xp.zeros(6)) for group in groups]
+    sums = [sum((columns[:, i] for i in pod), xp.zeros(6)) for pod in _pods(rotors)]
     return xp.array(sums).T.reshape(6, -1)
 
 

@@ -29,7 +29,6 @@ from tiltsim_controllers.vehicle.parameters import PRESETS, SPIN, drag_ratio
 AR_DRONE = PRESETS["ar_drone_2"]
 STATES = 25  # random states for each combination
 TIME = 3.7
-ACCELERATIONS = ("acceleration_x", "acceleration_y", "acceleration_z")
 POSITION_DECOUPLERS = ("conventional", "modified", "exact")
 
 
@@ -97,16 +96,14 @@ def random_case(seed, decoupling, decoupler):
     kind = "attitude_altitude" if decoupler == "none" else random.choice(["line", "circle"])
     parameters = Parameters(
         vehicle=PRESETS[vehicle],
-        gains=Gains(*random.uniform(0.2, 60.0, len(Gains._fields))),
+        gains=unflatten(Gains, random.uniform(0.2, 60.0, 14)),
         gait=GaitParameters(FIXED),
         reference=ReferenceParameters(
             REFERENCE_TYPES[kind],
-            *spread(3, 0.05),
-            *spread(3, 0.05),
+            *map(tuple, (spread(3, 0.05), spread(3, 0.05), spread(3, 0.2))),
             *random.uniform(0.1, 0.3, 2),
-            *spread(3, 0.4),
+            **dict(zip(("roll", "pitch", "yaw"), spread(3, 0.4))),
             acceleration_feedforward=float(random.integers(2)),
-            **dict(zip(ACCELERATIONS, spread(3, 0.2))),
         ),
         supervisor=Supervisor(),
         limits=RotorRange(),
@@ -127,15 +124,14 @@ def random_case(seed, decoupling, decoupler):
 
 def reference_motion(reference):
     """Position, velocity, acceleration to track: ch. 4, Eqs. (42)-(44)."""
-    centre = np.array([reference.x, reference.y, reference.z])
+    centre = np.array(reference.position)
     if reference.type == REFERENCE_TYPES["circle"]:
         rate, radius = reference.angular_frequency, reference.radius
         turn = rotation(0, 0, rate * TIME)
         out = turn @ [radius, 0, 0]
         passed_on = reference.acceleration_feedforward
         return centre + out, rate * turn @ [0, radius, 0], -passed_on * rate**2 * out
-    velocity = np.array([reference.velocity_x, reference.velocity_y, reference.velocity_z])
-    steady = np.array([getattr(reference, name) for name in ACCELERATIONS])
+    velocity, steady = np.array(reference.velocity), np.array(reference.acceleration)
     position = centre + velocity * TIME + 0.5 * steady * TIME**2
     return position, velocity + steady * TIME, reference.acceleration_feedforward * steady
 
@@ -152,13 +148,11 @@ def demanded_third_derivatives(parameters, state):
     else:
         ax, ay, _ = (
             demanded_acceleration
-            + gains.position_1 * (wanted_velocity - velocity)
-            + gains.position_2 * (wanted_position - position)
+            + gains.position[0] * (wanted_velocity - velocity)
+            + gains.position[1] * (wanted_position - position)
         )
         lean = attitude_for(parameters, alpha, ax, ay, demanded_acceleration[2])
-    k1 = np.array([gains.roll_1, gains.pitch_1, gains.yaw_1, gains.altitude_1])
-    k2 = np.array([gains.roll_2, gains.pitch_2, gains.yaw_2, gains.altitude_2])
-    k3 = np.array([gains.roll_3, gains.pitch_3, gains.yaw_3, gains.altitude_3])
+    k1, k2, k3 = np.transpose([*gains.loops.values()])
     second = second_derivatives(parameters.vehicle, alpha, rotation(*attitude), speeds)
     return (
         k1 * ([0, 0, 0, demanded_acceleration[2]] - second)
@@ -225,7 +219,7 @@ def test_hover_at_the_setpoint_needs_no_rotor_acceleration(decoupling, decoupler
         vehicle=AR_DRONE,
         gains=GAIN_SETS["ch04"],
         gait=GaitParameters(FIXED),
-        reference=ReferenceParameters(REFERENCE_TYPES["setpoint"], 1.0, 2.0, 3.0, yaw=0.3),
+        reference=ReferenceParameters(REFERENCE_TYPES["setpoint"], (1.0, 2.0, 3.0), yaw=0.3),
         supervisor=Supervisor(),
         limits=RotorRange(),
         decoupler=DECOUPLERS[decoupler],

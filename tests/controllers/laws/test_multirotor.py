@@ -56,7 +56,7 @@ from tiltsim_controllers.vehicle.rotors import (
 )
 
 ON_CIRCLE = ReferenceParameters(
-    CIRCLE, x=0.3, y=-0.2, z=0.1, radius=2.0, angular_frequency=0.5, yaw=0.4,
+    CIRCLE, (0.3, -0.2, 0.1), radius=2.0, angular_frequency=0.5, yaw=0.4,
     acceleration_feedforward=1.0,
 )  # fmt: skip
 AS_PUBLISHED = FeedforwardTerms(0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
@@ -329,10 +329,9 @@ def test_attitude_control_feeds_the_motion_of_its_reference_forward():
     error = attitude_error(body(now), desired(now))
     gains = law.gains
     expected = (
-        np.array((gains.roll_1, gains.pitch_1, gains.yaw_1))
-        * (rate(demand, now) - rate(present, now))
-        + np.array((gains.roll_2, gains.pitch_2, gains.yaw_2)) * (demand(now) - present(now))
-        + np.array((gains.roll_3, gains.pitch_3, gains.yaw_3)) * error
+        np.array(gains.attitude_1) * (rate(demand, now) - rate(present, now))
+        + np.array(gains.attitude_2) * (demand(now) - present(now))
+        + np.array(gains.attitude_3) * error
     )
     motion = body(now), present(now), rate(present, now)
     references = turned(now, 0.8, 1.0), turned(now, -0.6, 1.3), turned(now, 0.9, 1.1)

@@ -8,7 +8,13 @@ from tiltsim.closed_loop.loop import ClosedLoop, Sizes
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.scenario import Scenario
 from tiltsim_controllers.mathematics.scalar import Values
-from tiltsim_controllers.vehicle.body import BODY_FIELDS, Body, body_of, principal_body
+from tiltsim_controllers.vehicle.body import (
+    BODY_FIELDS,
+    ROTATION_NAMES,
+    Body,
+    body_of,
+    principal_body,
+)
 from tiltsim_controllers.vehicle.craft import craft_parameters, craft_record
 from tiltsim_controllers.vehicle.parameters import Vehicle
 
@@ -59,6 +65,12 @@ class Layout(NamedTuple):
         return tuple(f"{kind}_{i}" for i in range(1, count + 1))
 
     @property
+    def motion(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
+        """Names of the coordinates of ``qpos`` and ``qvel``, see `ClosedLoop`."""
+        places = (*BODY_FIELDS[:3], *ROTATION_NAMES, *self.names("alpha"))
+        return places, (*BODY_FIELDS[3:6], *BODY_FIELDS[9:], *self.names("alpha_rate"))
+
+    @property
     def observed_fields(self) -> tuple[str, ...]:
         """A sample after its time: rigid body, tilts, rotor speeds, tilt rates."""
         kinds = ("alpha", "rotor_speed", "alpha_rate")
@@ -68,6 +80,11 @@ class Layout(NamedTuple):
 def layout_of(loop: ClosedLoop) -> Layout:
     """The layout of a model's vectors; the quadrotor's have no tilts."""
     return Layout(len(loop.spins), loop.sizes.qpos - TILT_1)
+
+
+def is_fixed_cross(loop: ClosedLoop) -> bool:
+    """Whether its rotors are on a cross without hinges and make any thrust at once, as in ch. 2."""
+    return not loop.tilt_of_rotor and not layout_of(loop).tilts
 
 
 def tilt_of_rotor(loop: ClosedLoop) -> tuple[int, ...]:

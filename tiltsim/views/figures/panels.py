@@ -11,7 +11,6 @@ from matplotlib.axes import Axes
 
 from tiltsim.flight.flight import VECTORS, Flight
 from tiltsim.laws.law import SUPERVISION
-from tiltsim.scenario.gait import PenguinGait
 from tiltsim.system.text import Quantity
 from tiltsim.views import attitude_plane
 from tiltsim.views.figures import style
@@ -51,21 +50,15 @@ ESTIMATED: Final = ("position", "velocity", "attitude")  # vectors whose errors 
 
 @dataclass(frozen=True)
 class Panel:
-    """A part of a figure of flights.
-
-    Attributes:
-        draw: ``(axes, shown)``: draws the flights, one or several, and labels the axes.
-        over_time: Whether its x axis is the time; else it is a square.
-        signals: Signals over time, which set the limits of both axes; without them, `draw` does.
-        needs: A column that the flights must have.
-        on_request: Whether it is only drawn on request.
-    """
+    """A part of a figure of flights."""
 
     draw: Callable[[Axes, Sequence[Shown]], None]
-    over_time: bool = True
+    """``(axes, shown)``: draws the flights, one or several, and labels the axes."""
+    over_time: bool = True  # whether its x axis is the time; else it is a square
     signals: Signals | None = None
-    needs: str = "time"
-    on_request: bool = False
+    """Signals over time, which set the limits of both axes; without them, `draw` does."""
+    needs: str = "time"  # a column that the flights must have
+    on_request: bool = False  # whether it is only drawn on request
 
 
 def panels_of(flights: Sequence[Flight]) -> dict[str, Panel]:
@@ -300,8 +293,8 @@ def _portrait(axes: Axes, shown: Sequence[Shown]) -> None:
     away, rate = error(flight, "y"), error(flight, "vy")
     style.zero_lines(axes)
     axes.plot(away, rate, color=style.BLUE, lw=1.0, label="path")
-    gait = flight.scenario.gait
-    if isinstance(gait, PenguinGait):
+    gait: Any = flight.scenario.gait
+    if gait.alternates:
         half = flight["time"] / (0.5 * gait.period)
         at = (np.abs(half - np.round(half)) < 1e-6) & (half > 0.5)
         axes.plot(away[at], rate[at], "o", color=style.RED, ms=4.5, zorder=4, label="at n T/2")
