@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import cached_property
+from math import ceil
 from typing import Any, Final
 
 import numpy as np
@@ -33,6 +34,8 @@ from tiltsim_controllers.mathematics.scalar import Floats, Values
 
 LONG: Final = 1000
 """Steps, from which on a flight is long: worth a thread, and a derivative of fewer evaluations."""
+
+SETTLING_TIME: Final = 40.0  # s, flown at most to approach an orbit or a rest point
 
 THREADS: Final = os.cpu_count() or 1
 ROWS_PER_THREAD: Final = 4  # flights of a thread between reports of progress
@@ -278,10 +281,14 @@ class MujocoMotion(Motion):
         model = self._varied.model
         return slice(1, 1 + model.nq + model.nv + model.na)
 
+    def _divided(self, whole: Floats) -> list[Floats]:
+        """MuJoCo's `qpos`, `qvel` and `act` of an integration state."""
+        model = self._varied.model
+        return np.split(whole[self._part], (model.nq, model.nq + model.nv))
+
     def _read(self, whole: Floats) -> Floats:
         """The state of an integration state."""
-        model = self._varied.model
-        qpos, qvel, act = np.split(whole[self._part], (model.nq, model.nq + model.nv))
+        qpos, qvel, act = self._divided(whole)
         if self._load is not None:
             qpos, qvel = self._load.angles(qpos, qvel)
         return np.concatenate((qpos, qvel, act))
@@ -290,10 +297,23 @@ class MujocoMotion(Motion):
         sizes, swing = self.assembly.loop.sizes, 0 if self._load is None else 2
         return np.split(state, (sizes.qpos + swing, sizes.qpos + sizes.qvel + 2 * swing))
 
-    def _placed(self, state: Floats) -> list[Floats]:
-        """MuJoCo's `qpos`, `qvel` and `act`."""
-        qpos, qvel, act = self._split(state)
-        return [qpos, qvel, act] if self._load is None else [*self._load.placed(qpos, qvel), act]
+    def _placed(self, state: Floats, load: Pendulum | None = None) -> list[Floats]:
+        """MuJoCo's `qpos`, `qvel` and `act`, with the load on its cable or on another."""
+        (qpos, qvel, act), load = self._split(state), load or self._load
+        return [qpos, qvel, act] if load is None else [*load.placed(qpos, qvel), act]
+
+    @cached_property
+    def _stretched(self) -> Pendulum | None:
+        """The load on its cable as stretched after a flight, which is then steady if at rest."""
+        if self._load is None:
+            return None
+        plant = self._plant
+        plant.state = self._whole
+        plant.advance(ceil(SETTLING_TIME / self.scenario.simulation.timestep))
+        qpos, qvel, _ = self._divided(plant.state)
+        length = self._load.distance(qpos, qvel)
+        lost = plant.fault() or not length > 0.0
+        return self._load if lost else self._load._replace(length=length)
 
     def _seen(self, state: Floats, tension: float = 0.0) -> list[list[float]]:
         """Arguments of the functions of the loop: the vehicle's `qpos` and `qvel`, and `act`."""
@@ -357,7 +377,7 @@ class MujocoMotion(Motion):
     def _whole_at(self, step: int, state: Floats) -> Floats:
         """An integration state after ``step`` physics steps."""
         whole = self._whole.copy()
-        whole[self._part] = np.concatenate(self._placed(state))
+        whole[self._part] = np.concatenate(self._placed(state, self._stretched))
         header = whole[self._varied.header_offset :][:HEADER_SIZE]
         header[EVALUATIONS] = step * header[EVALUATIONS_PER_STEP]
         return whole
