@@ -37,5 +37,5 @@ def setpoint_error(tilts, vehicle, gains, decoupler):
     else:
         n = torque_free_force(np.array(tilts), drag_ratio(vehicle))
         roll_bias, pitch_bias = modified_decoupler(0.0, 0.0, 0.0, gravity, n)
-    stiffness = gains.position_2
+    stiffness = gains.position[1]
     return gravity * (pitch - pitch_bias) / stiffness, -gravity * (roll - roll_bias) / stiffness

@@ -9,7 +9,6 @@ import pytest
 
 from tiltsim.cli import main
 from tiltsim.views.figures.vehicles import singularity_figure, surfaces
-from tiltsim_controllers.analysis.balance import balanced_gait
 from tiltsim_controllers.analysis.singularity import published_determinant
 from tiltsim_controllers.vehicle.parameters import PRESETS
 
@@ -76,7 +75,6 @@ def test_mistakes_exit_with_2(capsys, words):
 def test_the_balanced_gait_points_its_force_into_the_gust(capsys):
     gait = report(capsys, "gait", "--balance", "-2,1,0.5", "--vehicle", "luukkonen")
     vehicle = PRESETS["luukkonen"]
-    assert gait["angles"] == list(balanced_gait((-2.0, 1.0, 0.5), vehicle))
     force = np.array([2.0, -1.0, vehicle.gravity - 0.5])
     np.testing.assert_allclose(
         gait["torque_free_direction"], force / np.linalg.norm(force), atol=1e-9
@@ -89,8 +87,8 @@ def test_the_balanced_gait_points_its_force_into_the_gust(capsys):
         ("1,2", "must be three numbers"),
         ("a,b,c", "must be three numbers"),
         ("nan,0,0", "must be finite"),
-        ("0,20,0", "out of reach"),
-        ("0,0,10", "must be smaller"),
+        ("0,20,0", "no tilt angles up to 1.05 rad"),
+        ("0,0,10", "no tilt angles up to 1.05 rad"),
     ],
 )
 def test_an_acceleration_that_cannot_be_balanced_is_one_line(capsys, value, message):

@@ -14,11 +14,12 @@ from tests.laws.restarting import assert_restarts
 from tests.refusals import refusal
 from tiltsim.flight.reading import load_flight
 from tiltsim.laws.assembling import LOOPS, assemble, loop_of
+from tiltsim.models.cross import as_multirotor
 from tiltsim.models.rotorcraft import RotorcraftSpec, compile_model
 from tiltsim.plants.mujoco_plant import MujocoPlant
 from tiltsim.scenario.loading import merge
 from tiltsim.simulation.simulate import make_plant
-from tiltsim_controllers.analysis.balance import balanced_gait
+from tiltsim.studies.multirotor_analysis import balance_report
 from tiltsim_controllers.analysis.singularity import (
     force_matrix,
     normalized_determinant,
@@ -340,7 +341,8 @@ def test_plants_agree_on_a_gust():
 
 def test_the_gust_scenarios_gait_is_the_balanced_one():
     gait = tiltsim.load_scenario("ch01_gust/hover#perfect_gait").gait
-    desired = balanced_gait((1.0, 0.0, 0.0), PRESETS["ar_drone_2"])
+    rotors = as_multirotor(PRESETS["ar_drone_2"], tilting=True, reverses=False)
+    desired = balance_report(rotors, (1.0, 0.0, 0.0))["angles"]
     np.testing.assert_allclose(gait.angles, desired, atol=1e-8)
 
 

@@ -45,10 +45,7 @@ def margins(scenario):
 def test_margins_of_all_inputs_equal_the_margins_of_the_error_loops(scenario, margins):
     """Under the exact matrix the loci are the loops of roll, pitch, yaw and altitude."""
     gains = scenario.controller.resolve_gains()
-    loops = [
-        third_order([getattr(gains, f"{name}_{order}") for order in (1, 2, 3)])
-        for name in ("roll", "pitch", "yaw", "altitude")
-    ]
+    loops = [third_order(own) for own in gains.loops.values()]
     found = margins["all inputs"]
     assert found.gain[0] == pytest.approx(max(loop[0] for loop in loops), rel=1e-6)
     assert found.phase == pytest.approx(min(loop[1] for loop in loops), rel=1e-6)
@@ -58,8 +55,8 @@ def test_margins_of_all_inputs_equal_the_margins_of_the_error_loops(scenario, ma
 
 def test_gain_margins_of_measured_states_agree_with_routh(scenario, margins):
     """The altitude's gain may grow until K1 K2 = K3, its rate's may shrink to that."""
-    gains = scenario.controller.resolve_gains()
-    ratio = gains.altitude_1 * gains.altitude_2 / gains.altitude_3
+    k1, k2, k3 = scenario.controller.resolve_gains().altitude
+    ratio = k1 * k2 / k3
     assert margins["z"].gain == (0.0, pytest.approx(ratio, rel=1e-6))
     assert margins["vz"].gain == (pytest.approx(1.0 / ratio, rel=1e-6), np.inf)
     assert "x" not in margins  # nothing follows it

@@ -20,14 +20,15 @@ from tiltsim.commands.declaring import call
 from tiltsim.commands.gait_options import Case, parse_vehicle
 from tiltsim.commands.text import json_text, number
 from tiltsim.errors import InputError
+from tiltsim.models.cross import as_multirotor
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.simulation.simulate import simulate
 from tiltsim.studies.gait_analysis import gait_report, map_report, vehicle_name
+from tiltsim.studies.multirotor_analysis import multirotor_report
 from tiltsim.system import files
 from tiltsim.views.figures import style
 from tiltsim.views.figures.gaits import gait_figure, map_figure
 from tiltsim.views.figures.vehicles import attainable_figure
-from tiltsim_controllers.analysis.fault_tolerance import fixed_tilt_hover
 from tiltsim_controllers.analysis.published_gaits import (
     DETERMINANT_CASES,
     PATHS,
@@ -259,13 +260,12 @@ def test_rotors_that_would_spin_backwards_to_hover_are_named(capsys, angles, bac
     assert ("warning: " in text) is bool(backward)
 
 
-def test_a_leaning_hover_agrees_with_the_fault_analysis() -> None:
+def test_a_leaning_hover_agrees_with_the_analysis_of_any_rotors() -> None:
     tilts = (-0.65, -0.65, 0.65, 0.65)
-    hover = fixed_tilt_hover(tilts, AR_DRONE)
-    assert hover is not None
-    assert gait_report(plans.fixed(tilts), AR_DRONE)["hover_rotor_speeds"] == pytest.approx(
-        hover.rotor_speeds
-    )
+    rotors = as_multirotor(AR_DRONE, tilting=True, reverses=False)
+    found = multirotor_report(rotors, tilts)["hover_rotor_speeds"]
+    expected = gait_report(plans.fixed(tilts), AR_DRONE)["hover_rotor_speeds"]
+    np.testing.assert_allclose(found, expected, rtol=1e-6)
 
 
 def test_without_a_hover_there_are_no_hover_speeds(capsys) -> None:

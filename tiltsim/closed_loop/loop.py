@@ -102,6 +102,9 @@ class Equations:
             step: puts back what has passed a limit. None where there are no limits.
         tilts: Function ``(time, state, parameters, knots) -> tilt angles`` (rad), where
             they follow the plan exactly.
+        states: Names of the coordinates of the vehicle's state, which begins the state: three for
+            a rotation.
+        input_names: Names of the first inputs; empty where they are the controls of the model.
     """
 
     inputs: Callable[..., Values]
@@ -111,6 +114,8 @@ class Equations:
     observe: Callable[..., Values]
     project_onto_limits: Callable[..., Vector] | None = None
     tilts: Callable[..., Values] | None = None
+    states: tuple[str, ...] = ()
+    input_names: tuple[str, ...] = ()
 
 
 def _held_controls(time: Any, qpos: Any, qvel: Any, act: Any, ctrl: Any, parameters: Any) -> Any:
@@ -134,6 +139,7 @@ class ClosedLoop:
         setup: ``(plan, signature) -> ControlSetup``.
         model: Name of the MJCF model.
         sizes: Lengths of its vectors, the controller's own states among the activations.
+        motion: Names of the coordinates of ``qpos`` and ``qvel``, three for a rotation.
         initial_activations: ``(plan, setup) -> act`` at time zero.
         controls: Function ``(time, qpos, qvel, act, parameters, knots) -> ctrl``: the whole control
             step.
@@ -180,6 +186,7 @@ class ClosedLoop:
     controls: Callable[..., Values]
     observe: Callable[..., Values]
     derive: Callable[[Mapping[str, Floats], ControlSetup], dict[str, Floats]]
+    motion: tuple[tuple[str, ...], tuple[str, ...]] = ((), ())
     hold: Callable[..., Values] = _held_controls
     fields: tuple[str, ...] = ()
     further_units: Mapping[str, str] = field(default_factory=dict)

@@ -118,7 +118,8 @@ def _check_options(scenario: str | None, gait: GaitOptions, figure: GaitFigure) 
 
 def _select(options: GaitOptions) -> SelectedGait:
     """The gait and the vehicle that the options select. Raises `InputError` if one is unknown."""
-    from tiltsim_controllers.analysis.balance import balanced_gait
+    from tiltsim.models.cross import as_multirotor
+    from tiltsim.studies.multirotor_analysis import balance_report
     from tiltsim_controllers.analysis.published_gaits import PUBLISHED_GAITS
     from tiltsim_controllers.gaits import plans
 
@@ -127,7 +128,8 @@ def _select(options: GaitOptions) -> SelectedGait:
         return SelectedGait(plans.fixed(options.read_angles(4)), vehicle)
     if options.balance is not None:
         with mistakes_in(f"--balance {options.acceleration}"):
-            fixed = plans.fixed(balanced_gait(options.balance, vehicle))
+            rotors = as_multirotor(vehicle, tilting=True, reverses=False)
+            fixed = plans.fixed(balance_report(rotors, options.balance)["angles"])
         source = f"balances {options.acceleration} m/s^2 at level attitude"
         return SelectedGait(replace(fixed, source=source), vehicle)
     if options.published not in PUBLISHED_GAITS:

@@ -52,6 +52,8 @@ def _acceleration(text: str) -> tuple[float, float, float]:
         ax, ay, az = (float(part) for part in text.split(","))
     except ValueError:
         raise ValueError("must be three numbers, m/s^2") from None
+    if not all(map(isfinite, (ax, ay, az))):
+        raise ValueError("must be finite")
     return ax, ay, az
 
 

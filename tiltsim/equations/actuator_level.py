@@ -18,7 +18,13 @@ from tiltsim.closed_loop.loop import ClosedLoop
 from tiltsim.models.parts import WRENCH_SIZE
 from tiltsim.scenario.scenario import FlightPlan, Scenario
 from tiltsim.vehicles.rotorcraft import initial_tilts
-from tiltsim.vehicles.rotorcraft.layout import layout_of, rotors_record, tilt_of_rotor, true_rotors
+from tiltsim.vehicles.rotorcraft.layout import (
+    Layout,
+    layout_of,
+    rotors_record,
+    tilt_of_rotor,
+    true_rotors,
+)
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.mathematics.attitude import (
     euler_rates,
@@ -31,7 +37,7 @@ from tiltsim_controllers.mathematics.attitude import (
 from tiltsim_controllers.mathematics.linear import norm
 from tiltsim_controllers.mathematics.records import make_record_type, vector_of
 from tiltsim_controllers.mathematics.scalar import Values
-from tiltsim_controllers.vehicle.body import accelerations, joined, rotation_rate
+from tiltsim_controllers.vehicle.body import BODY_FIELDS, accelerations, joined, rotation_rate
 from tiltsim_controllers.vehicle.craft import Craft, craft_of
 from tiltsim_controllers.vehicle.rotors import TiltOfRotor, of_tilts, tilts_of, wrench_map
 
@@ -133,6 +139,16 @@ class StateLayout(NamedTuple):
         """Number of entries of the motion."""
         return sum(size for _, size in self.sizes)
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the coordinates of a motion, three for a rotation."""
+        sizes = dict(self.sizes)
+        places, speeds = Layout(0, sizes["tilts"]).motion
+        turned = BODY_FIELDS[6:9] if sizes["attitude"] == EULER.size else places[3:6]
+        vectors = places[:3], turned, speeds[:3], speeds[3:6], places[6:], speeds[6:]
+        named = dict(zip(Motion._fields, vectors, strict=True))
+        return tuple(name for part in sizes for name in named[part])
+
     def split(self, state: Any) -> Motion:
         """The parts of a state, shape (``size`` + any,)."""
         ends = np.cumsum([size for _, size in self.sizes]).tolist()
@@ -166,6 +182,7 @@ class ActuatorPlant(NamedTuple):
 
     Attributes:
         motion: Number of entries of the state before the activations.
+        names: Names of their coordinates, see `Equations.states`.
         qpos, qvel: ``(state)``: MuJoCo's vectors.
         rates: ``(state, ctrl, loads, mechanics, disturbance)``: time derivative of the motion.
             ``loads`` are force (N) and torque (N m) on the body, body axes, and torques (N m) about
@@ -178,6 +195,7 @@ class ActuatorPlant(NamedTuple):
     """
 
     motion: int
+    names: tuple[str, ...]
     qpos: Callable[[Any], Any]
     qvel: Callable[[Any], Any]
     rates: Callable[..., Any]
@@ -308,6 +326,7 @@ def plant_of(
 
     return ActuatorPlant(
         layout.size,
+        layout.names,
         qpos,
         qvel,
         rates,

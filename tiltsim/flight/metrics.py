@@ -1,7 +1,5 @@
 """A flight in numbers: its end, its metrics, and verdicts on its scenario's expectations."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite, isnan

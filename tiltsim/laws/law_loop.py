@@ -5,8 +5,6 @@ layout is compiled in. The rotors' speeds are states that approach the commanded
 tilts of a law that commands them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cache, partial

@@ -16,7 +16,7 @@ from tiltsim.linear import newton
 from tiltsim.linear.coordinates import PLANE
 from tiltsim.linear.forcing import Forcing, forcing_of
 from tiltsim.linear.motion import LONG, SETTLING_TIME, Motion, make_motion
-from tiltsim.plants.plant import native_pays_off
+from tiltsim.plants.plant import MIN_STEPS_TO_COMPILE
 from tiltsim.scenario.scenario import Scenario
 from tiltsim_controllers.mathematics.scalar import Floats
 
@@ -171,10 +171,7 @@ def _engine(scenario: Scenario, steps: int) -> EngineName:
     engine = scenario.simulation.engine
     if engine == "python" or engine == "native":
         return engine
-    duration = steps * scenario.simulation.timestep
-    longer = scenario.simulation.model_copy(update={"duration": duration})
-    flown = scenario.model_copy(update={"simulation": longer})
-    return "native" if native_pays_off([flown]) else "python"
+    return "native" if steps >= MIN_STEPS_TO_COMPILE else "python"
 
 
 def _in_whole_steps(scenario: Scenario, period: float) -> Scenario:

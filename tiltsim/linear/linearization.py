@@ -219,7 +219,7 @@ class Symbolic(NamedTuple):
 def _input_names(assembly: Assembly, size: int) -> tuple[str, ...]:
     """Names of the inputs of equations; a thrust is among them as a squared speed."""
     names = [""] * size
-    for found in equation_inputs(assembly, size):
+    for found in equation_inputs(assembly):
         scaled = found.per_unit != 1.0
         names[found.place] = found.name.replace("thrust", "squared_speed" if scaled else "thrust")
     return tuple(names)

@@ -23,23 +23,7 @@ from tiltsim.linear.modes import NEUTRAL, exponents
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.scenario import Scenario
 from tiltsim_controllers.mathematics.scalar import Floats
-
-MEASURED: Final = (
-    "x",
-    "y",
-    "z",
-    "vx",
-    "vy",
-    "vz",
-    "rotation_",
-    "roll",
-    "pitch",
-    "yaw",
-    "p",
-    "q",
-    "r",
-)
-"""States that sensors measure, by name or its beginning."""
+from tiltsim_controllers.vehicle.body import BODY_FIELDS
 
 TOGETHER: Final = "all inputs"
 PER_DECADE: Final = 100  # frequencies
@@ -140,7 +124,7 @@ def broken_loops(system: Linearization) -> Iterator[BrokenLoop]:
         yield BrokenLoop(system.inputs[index].name, system.A - column @ row, column, row, timestep)
     for index, signal in enumerate(system.states):
         name = signal.name
-        measured = name in MEASURED or name.startswith("rotation_")
+        measured = name in BODY_FIELDS or name.startswith("rotation_")
         if measured and np.abs(gains[:, index]).max() > 0.0:
             column = b @ gains[:, [index]]
             column[memory] = system.A[np.ix_(memory, [index])]

@@ -249,14 +249,6 @@ class SlowestMode(NamedTuple):
     name: str
     decay_rate: float  # 1/s
 
-    def left_after(self, time: float) -> float:
-        """The share of a disturbance that is left after a time (s)."""
-        return exp(-self.decay_rate * time)
-
-    def time_until(self, left: float) -> float:
-        """When this share of a disturbance is left, s."""
-        return -log(left) / self.decay_rate
-
 
 def slowest_mode(scenario: Scenario) -> SlowestMode | None:
     """The slowest mode of a flight, as `tiltsim.linear.stability` has it.
@@ -290,10 +282,10 @@ def advice_on_duration(slowest: SlowestMode, duration: float, near: float, mean:
         near: Admissible remainder of a disturbance of 1 m or rad.
         mean: Seconds at the end over which the mean is taken.
     """
-    left = slowest.left_after(max(0.0, duration - mean))
+    left = exp(-slowest.decay_rate * max(0.0, duration - mean))
     if left <= near:
         return ""
-    enough = ceil(slowest.time_until(near) + mean)
+    enough = ceil(-log(near) / slowest.decay_rate + mean)
     return (
         f"simulation.duration = {duration:g} s is short: the slowest mode, {slowest.name}, decays "
         f"as exp(-{slowest.decay_rate:.3g} t) and leaves {100.0 * left:.2g} % of a disturbance, "

@@ -10,10 +10,15 @@ from tiltsim_controllers.vehicle.parameters import SPIN, Vehicle
 from tiltsim_controllers.vehicle.rotors import Rotor
 
 
-def as_multirotor(vehicle: Vehicle | Multirotor, *, tilting: bool) -> Multirotor:
-    """A vehicle with four equal arms at right angles, by its rotors, ``tilting`` about the arms.
+def as_multirotor(
+    vehicle: Vehicle | Multirotor, *, tilting: bool, reverses: bool = True
+) -> Multirotor:
+    """A vehicle with four equal arms at right angles, by its rotors; a multirotor as it is.
 
-    A multirotor is returned as it is.
+    Args:
+        vehicle: The vehicle.
+        tilting: Whether its rotors tilt about the arms.
+        reverses: Whether they may turn against their spins.
     """
     if isinstance(vehicle, Multirotor):
         return vehicle
@@ -31,6 +36,9 @@ def as_multirotor(vehicle: Vehicle | Multirotor, *, tilting: bool) -> Multirotor
         gravity=vehicle.gravity,
         inertia=tuple(inertia.ravel().tolist()),
         rotors=tuple(rotors),
-        speed_ranges=((-inf, inf),) * len(ARMS),
+        speed_ranges=tuple(
+            (-inf if reverses or spin < 0.0 else 0.0, inf if reverses or spin > 0.0 else 0.0)
+            for spin in SPIN
+        ),
         tilts=len(ARMS) if tilting else 0,
     )

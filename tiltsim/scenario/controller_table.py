@@ -17,7 +17,6 @@ from tiltsim_controllers.laws.gains import (
     GivenGains,
     IntegralGains,
     PolePlacementTable,
-    gains_from_rows,
 )
 from tiltsim_controllers.laws.keys import GainSets, number_of, table_of
 from tiltsim_controllers.laws.multirotor_steps import FeedforwardTerms
@@ -291,16 +290,14 @@ class GaitFollowingController(ControllerTable):
     def resolve_gains(self) -> Gains:
         gains = self.gains
         if isinstance(gains, GainTable):
-            return gains_from_rows(gains.attitude, gains.altitude, gains.position)
+            return Gains(*gains.attitude, gains.altitude, gains.position)
         return gains.resolve()[0] if isinstance(gains, PolePlacementTable) else GAIN_SETS[gains]
 
     def in_full(self) -> Self:
         if not isinstance(self.gains, str):
             return self
-        values = (*self.resolve_gains(),)
-        first, second, third = zip(values[:3], values[3:6], values[6:9], strict=True)
-        attitude = (first, second, third)
-        table = GainTable(attitude=attitude, altitude=values[9:12], position=values[12:])
+        *attitude, altitude, position = self.resolve_gains()
+        table = GainTable(attitude=tuple(attitude), altitude=altitude, position=position)
         return self.model_copy(update={"gains": table})
 
     def resolve_integral_gains(self) -> IntegralGains:

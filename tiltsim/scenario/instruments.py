@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from math import cos, radians, sin, sqrt
 from typing import Annotated, Any, ClassVar, Final, Literal, NamedTuple
 
+import numpy as np
 from pydantic import Field, model_validator
 
 from tiltsim.scenario.table import (
@@ -20,8 +21,6 @@ from tiltsim.scenario.table import (
 Probability = Annotated[float, Field(ge=0.0, lt=1.0)]
 G: Final = 9.80665  # m/s^2
 MOST_UNDER_WAY: Final = 64  # readings that wait for their delay
-
-
 FINEST: Final = 1e-12  # step of readings: rounding is as coarse
 
 
@@ -33,6 +32,9 @@ class Errors(NamedTuple):
     bias: tuple[float, ...]
     resolution: tuple[float, ...]
 
+
+_ENDINGS: Final = ("noise", "noise_density", "random_walk", "bias", "resolution")
+"""Ends of the keys of errors."""
 
 POSITION: Any = Field(
     ZEROS, description="from the center of mass, body axes [m]", examples=[[0.05, 0.0, 0.01]]
@@ -49,6 +51,8 @@ class InstrumentTable(Table):
 
     columns: ClassVar[Mapping[str, str]] = {}
     """Its columns in a flight and their units; with ``#`` one for each rotor."""
+    quantities: ClassVar[tuple[tuple[str, int], ...]] = (("", 3),)
+    """Beginnings of the keys of its errors, with the sizes of their readings; 0: the rotors'."""
 
     rate: Positive | None = default(
         None, "readings per second; default: one each control step [Hz]", 100
@@ -67,15 +71,13 @@ class InstrumentTable(Table):
 
     def errors(self, rate: float, rotors: int) -> Errors:
         """Its errors at a rate (Hz) on a vehicle with a number of rotors."""
-        raise AssertionError
-
-
-def _axes(noise: float, walk: float, bias: Any, resolution: float) -> list[Any]:
-    return [(noise,) * 3, (walk,) * 3, tuple(bias), (resolution,) * 3]
-
-
-def _joined(*parts: list[Any]) -> Errors:
-    return Errors(*(sum(each, ()) for each in zip(*parts, strict=True)))
+        root, every = sqrt(rate), []
+        for begin, size in self.quantities:
+            given = {ending: getattr(self, begin + ending, 0.0) for ending in _ENDINGS}
+            noise = given["noise"] or given["noise_density"] * root
+            values = noise, given["random_walk"] / root, given["bias"], given["resolution"]
+            every.append([np.broadcast_to(value, size or rotors) for value in values])
+        return Errors(*(tuple(np.hstack(each).tolist()) for each in zip(*every, strict=True)))
 
 
 class ImuTable(InstrumentTable):
@@ -83,6 +85,7 @@ class ImuTable(InstrumentTable):
 
     table_name = "sensors.imu"
     model_config = example(preset="bmi088")
+    quantities = (("accelerometer_", 3), ("gyro_", 3))
     columns: ClassVar[Mapping[str, str]] = {
         **{f"imu_acceleration_{axis}": "m/s^2" for axis in "xyz"},
         **{f"imu_rate_{axis}": "rad/s" for axis in "xyz"},
@@ -136,29 +139,13 @@ class ImuTable(InstrumentTable):
         preset = cls.presets.get(str(given.get("preset"))) if isinstance(given, dict) else None
         return {**preset, **given} if preset else given
 
-    def errors(self, rate: float, rotors: int) -> Errors:
-        size, walked = sqrt(rate), 1.0 / sqrt(rate)
-        return _joined(
-            _axes(
-                self.accelerometer_noise_density * size,
-                self.accelerometer_random_walk * walked,
-                self.accelerometer_bias,
-                self.accelerometer_resolution,
-            ),
-            _axes(
-                self.gyro_noise_density * size,
-                self.gyro_random_walk * walked,
-                self.gyro_bias,
-                self.gyro_resolution,
-            ),
-        )
-
 
 class MocapTable(InstrumentTable):
     """Motion capture: position and attitude from cameras."""
 
     table_name = "sensors.mocap"
     model_config = example(rate=100.0, position_noise=0.001, delay=0.01)
+    quantities = (("position_", 3), ("attitude_", 3))
     columns: ClassVar[Mapping[str, str]] = {
         **{f"mocap_{axis}": "m" for axis in "xyz"},
         **{f"mocap_q{part}": "1" for part in "wxyz"},
@@ -176,18 +163,13 @@ class MocapTable(InstrumentTable):
 
     position: Vector3 = POSITION
 
-    def errors(self, rate: float, rotors: int) -> Errors:
-        return _joined(
-            _axes(self.position_noise, 0.0, self.position_bias, self.position_resolution),
-            _axes(self.attitude_noise, 0.0, self.attitude_bias, 0.0),
-        )
-
 
 class GpsTable(InstrumentTable):
     """Position and velocity from satellites."""
 
     table_name = "sensors.gps"
     model_config = example(rate=5.0, position_noise=1.0, velocity_noise=0.05, delay=0.12)
+    quantities = (("position_", 3), ("velocity_", 3))
     columns: ClassVar[Mapping[str, str]] = {
         **{f"gps_{axis}": "m" for axis in "xyz"},
         **{f"gps_velocity_{axis}": "m/s" for axis in "xyz"},
@@ -203,12 +185,10 @@ class GpsTable(InstrumentTable):
 
     position: Vector3 = POSITION
 
-    def errors(self, rate: float, rotors: int) -> Errors:
-        walk = self.position_random_walk / sqrt(rate)
-        return _joined(
-            _axes(self.position_noise, walk, self.position_bias, self.resolution),
-            _axes(self.velocity_noise, 0.0, ZEROS, 0.0),
-        )
+    @property
+    def position_resolution(self) -> float:
+        """Step of the positions, m."""
+        return self.resolution
 
 
 class BarometerTable(InstrumentTable):
@@ -216,6 +196,7 @@ class BarometerTable(InstrumentTable):
 
     table_name = "sensors.barometer"
     model_config = example(rate=50.0, noise=0.1)
+    quantities = (("", 1),)
     columns: ClassVar[Mapping[str, str]] = {"barometer_altitude": "m"}
 
     noise: NonNegative = default(0.0, "standard deviation [m]", 0.1)
@@ -224,10 +205,6 @@ class BarometerTable(InstrumentTable):
     resolution: NonNegative = default(0.0, "step of the readings; 0: none [m]", 0.01)
 
     position: Vector3 = POSITION
-
-    def errors(self, rate: float, rotors: int) -> Errors:
-        walk = self.random_walk / sqrt(rate)
-        return Errors((self.noise,), (walk,), (self.bias,), (self.resolution,))
 
 
 class MagnetometerTable(InstrumentTable):
@@ -253,28 +230,18 @@ class MagnetometerTable(InstrumentTable):
         """Direction of the field, a unit vector in world axes."""
         return cos(self.inclination), 0.0, -sin(self.inclination)
 
-    def errors(self, rate: float, rotors: int) -> Errors:
-        return Errors(*_axes(self.noise, 0.0, self.bias, self.resolution))
-
 
 class RotorSpeedTable(InstrumentTable):
     """Speeds of the rotors along their spin, as speed controllers report them."""
 
     table_name = "sensors.rotor_speed"
     model_config = example(rate=100.0, noise=2.0)
+    quantities = (("", 0),)
     columns: ClassVar[Mapping[str, str]] = {"rotor_speed_measured_#": "rad/s"}
 
     noise: NonNegative = default(0.0, "standard deviation [rad/s]", 2.0)
     bias: float = default(0.0, "constant error [rad/s]", 1.0)
     resolution: NonNegative = default(0.0, "step of the readings; 0: none [rad/s]", 0.5)
-
-    def errors(self, rate: float, rotors: int) -> Errors:
-        return Errors(
-            (self.noise,) * rotors,
-            (0.0,) * rotors,
-            (self.bias,) * rotors,
-            (self.resolution,) * rotors,
-        )
 
 
 class InstrumentTables(Table):

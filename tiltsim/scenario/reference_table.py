@@ -8,7 +8,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from itertools import pairwise
 from math import acos, cos, pi
-from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, NamedTuple
+from typing import Annotated, Any, Final, Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field
@@ -29,7 +29,7 @@ from tiltsim.scenario.table import (
 )
 from tiltsim_controllers.gaits.motion import NO_KNOTS
 from tiltsim_controllers.mathematics.attitude import rotation_matrix
-from tiltsim_controllers.mathematics.scalar import Triple, Values
+from tiltsim_controllers.mathematics.scalar import Floats, Triple, Values
 from tiltsim_controllers.references.trajectories import (
     COEFFICIENTS,
     REFERENCE_TYPES,
@@ -37,11 +37,7 @@ from tiltsim_controllers.references.trajectories import (
     minimum_snap_knots,
 )
 
-if TYPE_CHECKING:
-    from tiltsim_controllers.mathematics.scalar import Floats, Triple, Values
-
 Tilt = Annotated[float, Field(gt=-pi / 2, lt=pi / 2)]
-
 
 _PREFIXES: Final = {"position": "", "angular_frequency": "frequency_"}
 """Beginnings of the fields of `ReferenceParameters` that hold a vector, unless they are its key."""

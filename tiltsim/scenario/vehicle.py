@@ -160,7 +160,11 @@ class VehicleTable(RotorcraftTable):
         self._check_limits()
 
 
-VEHICLES: Final = tables_of(AnyVehicleTable, "model", (__name__, rotorcraft.__name__, *KINDS))
+VEHICLES: Final = tables_of(
+    AnyVehicleTable,  # type: ignore[type-abstract]
+    "model",
+    (__name__, rotorcraft.__name__, *KINDS),
+)
 """The tables of all vehicles by their models."""
 
 _TAGS: Final = {table: model for model, table in reversed(VEHICLES.items())}

@@ -18,11 +18,10 @@ from tiltsim.flight.metrics import End
 from tiltsim.laws.assembling import assemble
 from tiltsim.plants.plant import native_pays_off
 from tiltsim.scenario.loading import as_scenario
-from tiltsim.scenario.own_code import require_trust
+from tiltsim.scenario.own_parts import require_trust
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.scenario.vehicle import VehicleTable
-from tiltsim.simulation.lane_batch import LaneBatch, lanes_for
-from tiltsim.simulation.native_batch import NativeBatch
+from tiltsim.simulation.native_batch import LaneBatch, NativeBatch, lanes_for
 from tiltsim.simulation.simulate import simulate_assembly
 from tiltsim.system.arguments import Report, check_progress, reported, true_or_false, whole_number
 from tiltsim.system.processes import ProcessDiedError, in_order, in_processes

@@ -15,7 +15,7 @@ from tiltsim.plants.plant import MIN_STEPS_TO_COMPILE
 from tiltsim.scenario.controller import CONTROLLERS
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.messages import choose
-from tiltsim.scenario.own_code import require_trust
+from tiltsim.scenario.own_parts import require_trust
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.simulation.simulate import simulate_to_end
 from tiltsim.studies.benchmark import compiled_time_per_call, time_per_call

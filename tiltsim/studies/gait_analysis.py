@@ -9,7 +9,10 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from tiltsim.models.cross import as_multirotor
+from tiltsim.studies.multirotor_analysis import tilted_rotors
 from tiltsim_controllers.analysis import fault_tolerance, two_color_map
+from tiltsim_controllers.analysis.hover import rotor_losses
 from tiltsim_controllers.analysis.published_gaits import DETERMINANT_CASES, TRIANGLE
 from tiltsim_controllers.analysis.singularity import (
     acceptable_share,
@@ -159,17 +162,15 @@ def fault_report(tilts: Quad, vehicle: Vehicle, opposite_speed: float) -> dict[s
     ``least_speed`` is the maximum speed that the rotors must reach for it.
     """
     losses = []
-    for failed in ROTORS:
+    fixed = tilted_rotors(as_multirotor(vehicle, tilting=True, reverses=False), tilts)
+    for failed, hovers in zip(ROTORS, rotor_losses(fixed), strict=True):
         free = fault_tolerance.three_rotor_hover(failed, vehicle, opposite_speed=opposite_speed)
         factors = [0.0 if rotor == failed else 1.0 for rotor in ROTORS]
         losses.append(
             {
                 "rotor": failed,
                 "fixed_tilts_miss": fault_tolerance.fixed_tilt_imbalance(tilts, failed, vehicle),
-                "hovers_with_fixed_tilts": fault_tolerance.fixed_tilt_hover(
-                    tilts, vehicle, lost=failed
-                )
-                is not None,
+                "hovers_with_fixed_tilts": hovers is not None,
                 "least_speed": fault_tolerance.minimum_hover_speed(
                     vehicle, factors=(factors[0], factors[1], factors[2], factors[3])
                 ),

@@ -234,8 +234,7 @@ def balance_report(
     rotors = tilted_rotors(vehicle, (0.0,) * vehicle.tilts, limits)
     weight = np.array([0.0, 0.0, vehicle.gravity])
     force = vehicle.mass * (weight - acceleration)
-    possible = force.any() and np.isfinite(force).all()
-    found = level_hover(vehicle.table, force, rotors[2:4]) if possible else None
+    found = level_hover(vehicle.table, force, rotors[2:4]) if force.any() else None
     if found is None:
         raise ValueError(
             f"no tilt angles up to {MAX_TILT:.3g} rad and rotor speeds within the limits hold the"

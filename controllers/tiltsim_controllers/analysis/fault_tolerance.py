@@ -21,8 +21,6 @@ the vehicle, and mirror it for rotors 2 and 4):
   must avoid is necessary to hover on the pair. Pitch is uncontrolled.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from itertools import product
 from math import asin, atan, atan2, cos, hypot, pi, sin, sqrt
@@ -137,41 +135,6 @@ def fixed_tilt_imbalance(tilts: Quad, lost: int, vehicle: Vehicle) -> float:
     delta = atan(drag_ratio(vehicle))
     beside = tilts[lost % 4] + tilts[(lost + 2) % 4]
     return beside - 2.0 * SPIN[lost - 1] * delta
-
-
-def fixed_tilt_hover(
-    tilts: Quad, vehicle: Vehicle, *, lost: int | None = None, factors: Quad = (1.0, 1.0, 1.0, 1.0)
-) -> Hover | None:
-    """The hover with fixed tilts and a fault; None if there is none.
-
-    Rotors do not turn backwards. Without a fault it is the torque-free input of
-    `tiltsim_controllers.vehicle.cross`, unless a rotor would have to reverse.
-
-    Args:
-        tilts: rad
-        vehicle: the tiltrotor
-        lost: failed rotor, 1 to 4, or None
-        factors: remaining fraction of each rotor's thrust
-    """
-    sound = [index for index in range(4) if lost is None or index != lost - 1]
-    sound = [index for index in sound if factors[index] > 0.0]
-    torque = torque_matrix(np.array(tilts), vehicle)[:, sound] * np.array(SPIN)[sound]
-    _, values, rows = np.linalg.svd(torque, full_matrices=True)
-    for index, row in enumerate(rows):
-        is_kernel = index >= len(values) or values[index] < BALANCED * values[0]
-        thrusts = row * np.sign(row.sum())
-        if not is_kernel or thrusts.min() < -1e-9 * thrusts.max():
-            continue
-        w = np.zeros(4)
-        w[sound] = np.maximum(thrusts, 0.0)
-        force = np.linalg.norm(force_matrix(np.array(tilts)) @ (w * SPIN))
-        if force == 0.0:
-            continue
-        w *= vehicle.mass * vehicle.gravity / (vehicle.thrust_coefficient * force)
-        made = _hover(tilts, _quad(np.sqrt(w)), vehicle, lost)
-        commanded = np.sqrt(w / np.where(np.array(factors) > 0.0, factors, 1.0))
-        return Hover(tilts, _quad(commanded), made.roll, made.pitch, made.authority)
-    return None
 
 
 def minimum_hover_speed(

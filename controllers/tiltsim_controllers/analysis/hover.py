@@ -13,8 +13,6 @@ programming over tilts and rotor inputs together, from several starts. Without a
 tilts would load some rotors fully and stop others.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from itertools import combinations
 from math import acos, radians

@@ -5,8 +5,6 @@ ch. 7 and 8 are in figures that are missing: the paths here have the described s
 sizes of our choice, and `PublishedGait.printed` is False.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import pi

@@ -12,8 +12,6 @@ ratio, with these misprints: the term ``-2.880 s1 s2 c3 s4 sin(roll) cos(pitch)`
 scales everything by the constant 1.025.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from itertools import pairwise
 from math import atan, atan2, cos, inf, pi

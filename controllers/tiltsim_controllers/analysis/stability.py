@@ -10,8 +10,6 @@ published matrix and ``K_yaw J / (2 varpi K_m)`` with the exact one, in yaw, and
 other tilts it can be larger, or negative where tilted thrusts turn the body against the reaction.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from math import atan2, cos, exp, hypot, inf, pi, sin
 from typing import NamedTuple
@@ -65,9 +63,9 @@ def is_hurwitz(polynomial: Sequence[float]) -> bool:
     )
 
 
-def third_order_loop(name: str, gains: tuple[float, float, float], loop_gain: float) -> ErrorLoop:
+def third_order_loop(name: str, gains: Sequence[float], loop_gain: float) -> ErrorLoop:
     """The loop ``y''' + N K1 y'' + N K2 y' + N K3 y = 0`` (Eqs. 35-38), ``N`` the loop gain."""
-    k1, k2, k3 = scaled = tuple(loop_gain * gain for gain in gains)
+    k1, k2, k3 = scaled = [loop_gain * gain for gain in gains]
     condition = f"{name} K1 K2 = {k1 * k2:g} must exceed K3 = {k3:g}"
     return _loop(name, "K", gains, (1.0, *scaled), condition)
 
@@ -101,12 +99,10 @@ def error_loops(gains: Gains, hover_rotor_speed: float, decoupling: float) -> li
     """
     factor = 2.0 * hover_rotor_speed if decoupling == PUBLISHED_DECOUPLING else 1.0
     third_order = [
-        third_order_loop("roll", (gains.roll_1, gains.roll_2, gains.roll_3), factor),
-        third_order_loop("pitch", (gains.pitch_1, gains.pitch_2, gains.pitch_3), factor),
-        third_order_loop("yaw", (gains.yaw_1, gains.yaw_2, gains.yaw_3), factor),
-        third_order_loop("altitude", (gains.altitude_1, gains.altitude_2, gains.altitude_3), 1.0),
+        third_order_loop(name, own, 1.0 if name == "altitude" else factor)
+        for name, own in gains.loops.items()
     ]
-    position = (1.0, gains.position_1, gains.position_2)
+    position = (1.0, *gains.position)
     stable = is_hurwitz(position)
     condition = "" if stable else f"position gains {list(position[1:])} must both be positive"
     return [*third_order, ErrorLoop("position", position, stable, condition)]
@@ -114,22 +110,16 @@ def error_loops(gains: Gains, hover_rotor_speed: float, decoupling: float) -> li
 
 def feedforward_loops(gains: Gains, integral: IntegralGains) -> list[ErrorLoop]:
     """The loops of the controller with gait feed-forward, with its integrals."""
-    altitude = (gains.altitude_1, gains.altitude_2, gains.altitude_3)
-    position = (gains.position_1, gains.position_2)
-    with_altitude = (*altitude, integral.altitude) if integral.altitude else altitude
-    with_position = (*position, integral.position) if integral.position else position
+    further = integral._asdict()
     return [
-        linear_loop("roll", (gains.roll_1, gains.roll_2, gains.roll_3)),
-        linear_loop("pitch", (gains.pitch_1, gains.pitch_2, gains.pitch_3)),
-        linear_loop("yaw", (gains.yaw_1, gains.yaw_2, gains.yaw_3)),
-        linear_loop("altitude", with_altitude),
-        linear_loop("position", with_position),
+        linear_loop(name, (*own, further[name]) if further.get(name) else own)
+        for name, own in {**gains.loops, "position": gains.position}.items()
     ]
 
 
 def attitude_feedback(gains: Gains, inertia: Floats) -> Floats:
     """Torque rate (N m/s) against a torque (N m) whose acceleration is fed back, shape (3, 3)."""
-    fed_back = np.diag([gains.roll_1, gains.pitch_1, gains.yaw_1])
+    fed_back = np.diag(gains.attitude_1)
     return np.asarray(inertia @ fed_back @ np.linalg.inv(inertia))
 
 

@@ -12,8 +12,6 @@ torque-free forces ``V = F ker tau``. So the dimension of V decides which attitu
 - 0, and wherever ``tau`` has lost rank: all.
 """
 
-from __future__ import annotations
-
 from typing import Final, NamedTuple
 
 import numpy as np

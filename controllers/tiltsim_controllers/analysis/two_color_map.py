@@ -37,8 +37,6 @@ every attitude. ``R``, ``R_phi`` and ``R_theta`` vanish together. The thesis's r
 due to the rounding of its coefficients; the margin of a blue gait is zero.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from dataclasses import dataclass
 from math import acos, atan, atan2, cos, hypot, pi, sin

@@ -12,8 +12,6 @@ Both accept blue anywhere. An accepted path can still be singular, a warning of 
 has rank 2 at every attitude (`tiltsim_controllers.analysis.two_color_map`), and P lies on L.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise

@@ -181,7 +181,7 @@ def ability(keys: Vectoring, craft: Craft, left: float, *, harmed: bool = False)
         yaw_angular=yaw_angular,
         side_softness=3e-4 if craft.works.sum() >= 6 else 1.0,
         # The tilts have made the torque that they can; a harmed vehicle has little of it to give.
-        yaw_softness=1e-4 if craft.commanded or harmed else 1e-12,
+        yaw_softness=1e-4 if craft.commanded or harmed else 3e-13,
     )
 
 

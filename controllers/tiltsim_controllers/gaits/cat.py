@@ -31,8 +31,6 @@ Within these rules the numbers are chosen: with the walk's long stance and the r
 no rotor reverses its direction (ch. 5, Sec. 2); see `SWINGS` for the rest.
 """
 
-from __future__ import annotations
-
 from typing import Final, NamedTuple
 
 FORWARD: Final = (-1.0, 1.0, 1.0, -1.0)

@@ -20,8 +20,6 @@ quadrant ``u < 0 < v``, which ends in P and does not intersect L. There the near
 angle by angle.
 """
 
-from __future__ import annotations
-
 from math import atan
 from typing import Any, Final
 

@@ -4,8 +4,6 @@ Every gait is a piecewise polynomial or a harmonic motion of each tilt angle; it
 first of a flight's ``knots``.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Sequence
 from typing import Any, Final, NamedTuple

@@ -221,14 +221,17 @@ TOLERANCE: Final = 1e-12
 def bounded_least_squares(
     matrix: Any, demand: Any, softness: Any, weights: Any, start: Any, low: Any, high: Any
 ) -> Any:
-    """Inputs within limits that meet a demand, shape (n,).
+    """Inputs within limits that meet a demand best, shape (n,).
 
     The minimum of ``sum (G x - y)^2 / softness + sum q (x - start)^2`` has a dual system with a row
     for each of the six demands, whatever the number of inputs. A small softness makes a demand
     nearly exact, and sets its priority where limits forbid to meet all; inputs without any effect
-    stay at the start. Inputs beyond their limits leave the system in turn, the farthest first
-    (redistributed pseudoinverse, Bodson 2002, "Evaluation of optimization methods for control
-    allocation").
+    stay at the start.
+
+    Inputs beyond their limits first stop there in turn, the farthest ones first (redistributed
+    pseudoinverse; Bodson 2002, "Evaluation of optimization methods for control allocation"). From
+    there an active set method goes on to the optimum: an input that its limit holds for no reason
+    is let go, and one that the way to the next solution meets at its limit stops.
 
     Args:
         matrix: Effect of the inputs, ``G``, shape (6, n).
@@ -238,22 +241,42 @@ def bounded_least_squares(
         start: Shape (n,).
         low, high: Limits, shape (n,).
     """
+    lead, size = xp.diag(softness), len(start)
     root = xp.sqrt(weights)
-    lead = xp.diag(softness)
 
-    def turn(_: Any, x: Any, free: Any, worst: Any) -> tuple[Any, Any, Any]:
-        rest = demand - matrix @ (free * start + (1.0 - free) * x)
+    def turn(_: Any, x: Any, free: Any, settled: Any, _done: Any) -> tuple[Any, ...]:
+        moves = free > 0.0
+        rest = demand - matrix @ xp.where(moves, start, x)
         dual = solved_symmetric((matrix * (free / weights)) @ matrix.T + lead, rest)
-        x = xp.where(free > 0.5, start + (dual @ matrix) / weights, x)
-        beyond = free * root * xp.maximum(low - x, x - high)
-        worst = largest(beyond)
-        leaves = (beyond > 0.5 * worst) & (beyond > TOLERANCE)
-        return xp.where(leaves, xp.clip(x, low, high), x), xp.where(leaves, 0.0, free), worst
+        goal = start + (dual @ matrix) / weights  # of the inputs without limits
+        beyond = root * xp.maximum(low - goal, goal - high)
+        worst = largest(xp.where(moves, beyond, 0.0))
 
-    size = len(start)
-    state = (start, xp.ones(size), 1.0)
-    x, _, _ = repeat(float(size), turn, *state, until=lambda _x, _free, worst: worst <= TOLERANCE)
-    return xp.clip(x, low, high)
+        def stop() -> tuple[Any, ...]:
+            way = xp.where(moves, goal - x, 0.0)
+            room = xp.where(way > 0.0, high - x, low - x)
+            crosses = moves & (beyond > TOLERANCE)
+            shares = xp.where(crosses, room / xp.where(way == 0.0, 1.0, way), 2.0)
+            share = -largest(-shares)
+            far = crosses & (beyond > 0.5 * worst)
+            leaves = (settled > 0.0) & (shares == share) | (settled == 0.0) & far
+            along = xp.where(settled > 0.0, x + share * way, xp.where(moves, goal, x))
+            limit = xp.where(goal > high, high, low)
+            return xp.where(leaves, limit, along), xp.where(leaves, 0.0, free), settled, 0.0
+
+        def release() -> tuple[Any, ...]:
+            inward = root * xp.where(x < high, goal - x, x - goal)
+            held = xp.where(moves | (low == high), 0.0, inward)
+            most = largest(held)
+            freed = (held == most) & (most > TOLERANCE)
+            done = xp.where(most > TOLERANCE, 0.0, 1.0)
+            return xp.where(moves, goal, x), xp.where(freed, 1.0, free), 1.0, done
+
+        return branch(worst > TOLERANCE, stop, release)
+
+    state = (start, xp.ones(size), 0.0, 0.0)
+    found = repeat(4.0 * size, turn, *state, until=lambda _x, _free, _settled, done: done > 0.0)
+    return xp.clip(found[0], low, high)
 
 
 def largest(values: Any) -> Any:

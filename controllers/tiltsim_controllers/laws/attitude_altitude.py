@@ -5,21 +5,12 @@ third derivatives. The horizontal position is controlled through roll and pitch 
 control law is one function of time and state; its steps follow the order of ch. 4.
 """
 
-from __future__ import annotations
-
 from typing import Any, Final, Literal
 
 from tiltsim_controllers.code.arrays import traceable, xp
 from tiltsim_controllers.gaits.motion import NO_KNOTS, GaitParameters
 from tiltsim_controllers.laws.allocation import RotorRange
-from tiltsim_controllers.laws.feedback import (
-    CONVENTIONAL,
-    EXACT,
-    NONE,
-    conventional_decoupler,
-    exact_decoupler,
-    modified_decoupler,
-)
+from tiltsim_controllers.laws.feedback import NONE, decoupled
 from tiltsim_controllers.laws.gains import Gains, GivenGains
 from tiltsim_controllers.laws.keys import Keys, default, record_of
 from tiltsim_controllers.laws.observed import Seen, Step
@@ -42,7 +33,7 @@ EXACT_DECOUPLING: Final = 1.0
 DECOUPLINGS: Final = {"published": PUBLISHED_DECOUPLING, "exact": EXACT_DECOUPLING}
 """Forms of the decoupling matrix by their name in a scenario."""
 
-ROTORS: Final = (0, 1, 2, 3)
+LAYOUT: Final = (0, 1, 2, 3)
 """Every rotor of the tiltrotor has its own tilt."""
 
 
@@ -110,73 +101,71 @@ def torque_free_force(force: Any, torque: Any) -> Any:
     return force @ kernel(torque)
 
 
-def _attitude_reference(now: RotorcraftState, target: Any, wrench: Any, parameters: Any) -> Any:
+def _attitude_reference(now: RotorcraftState, target: Any, wrench: Any, p: Any) -> Any:
     """Roll, pitch and yaw to track (rad), shape (3,); ch. 4, Eqs. 28-30."""
-    reference, gravity = parameters.reference, parameters.vehicle.gravity
-    yaw, decoupler, gains = reference.yaw, parameters.decoupler, parameters.gains
-    if decoupler == NONE:
+    reference, gravity, yaw = p.reference, p.vehicle.gravity, p.reference.yaw
+    if p.decoupler == NONE:
         return xp.array([reference.roll, reference.pitch, yaw])
     p_ref, v_ref, a_ref = target
-    # Eq. 28: the desired acceleration.
-    ax, ay, _ = (
-        a_ref
-        + gains.position_1 * (v_ref - now.velocity)
-        + gains.position_2 * (p_ref - now.position)
-    )
-    if decoupler == CONVENTIONAL:
-        return xp.array([*conventional_decoupler(ax, ay, yaw, gravity), yaw])
-    n = torque_free_force(wrench[:3], wrench[3:])
-    if decoupler == EXACT:
-        return xp.array([*exact_decoupler(ax, ay, a_ref[2], yaw, gravity, n), yaw])
-    return xp.array([*modified_decoupler(ax, ay, yaw, gravity, n), yaw])
+    K_1, K_2 = p.gains.position
+    ax, ay, _ = a_ref + K_1 * (v_ref - now.velocity) + K_2 * (p_ref - now.position)  # Eq. 28
+    n = torque_free_force(wrench[:3], wrench[3:])  # F_X / (m g) of Eq. 30 is n_x / n_z
+    roll, pitch = decoupled(p.decoupler, (ax, ay, a_ref[2]), yaw, gravity, n)
+    return xp.array([roll, pitch, yaw])
 
 
 @traceable
-def attitude_altitude(seen: Seen, parameters: Any, knots: Any = NO_KNOTS) -> Step:
+def attitude_altitude(seen: Seen, p: Any, knots: Any = NO_KNOTS) -> Step:
     """The rotor accelerations (rad/s^2), 4, and as signals the attitude that they track (rad), 3.
 
-    Third-order error dynamics (ch. 4, Eqs. 26-27) give the desired third derivatives of the
-    outputs; the decoupling matrix and ``Ma`` (Eq. 18) convert them to inputs (Eq. 19). Body rates
-    are used for the rates of roll, pitch and yaw (ch. 3, Eq. 8). NaN where the decoupling matrix is
-    singular.
+    Equations and symbols are ch. 4's: the outputs ``y`` are roll, pitch, yaw and altitude, of which
+    third-order error dynamics demand third derivatives. Two things differ from the print. Its
+    rows of Eq. 18 are multiplied by the inertia and by the mass, so that they are ``tau`` and
+    ``r3^T F`` with world up in body axes ``r3``, the third row of R. And masses, forces and torques
+    are in units of ``K_f``, see `airframe`. NaN where the decoupling matrix is singular.
 
     Args:
-        seen: The state has `tiltsim_controllers.vehicle.body.TILTROTOR_FIELDS`; the model's
-            angular acceleration is ``I^-1 tau w``.
-        parameters: `Parameters`.
+        seen: The state has `tiltsim_controllers.vehicle.body.TILTROTOR_FIELDS`.
+        p: `Parameters`.
         knots: Table data of the reference.
     """
-    now, (body, rotors) = state_of(seen.state, ROTORS), airframe(parameters, (), ROTORS)
-    gains, measured = parameters.gains, seen.measured
-    target = position_reference(seen.time, parameters.reference, knots).reshape(3, 3)
+    now, (body, rotors) = state_of(seen.state, LAYOUT), airframe(p, (), LAYOUT)
+    # The reference's acceleration is zero unless reference.acceleration_feedforward is set.
+    target = position_reference(seen.time, p.reference, knots).reshape(3, 3)
     wrench = wrench_map(rotors, now.tilts)
-    force, torque = wrench[:3], wrench[3:]
+    F, tau = wrench[:3], wrench[3:]
     w = now.speeds * abs(now.speeds)
 
-    # Second derivatives of the outputs, Eq. 10.
-    up = rotation_matrix(now.attitude)[2]
-    lift = up @ force
-    omega_rate = inverse_inertia_matrix(body) @ (torque @ w) if measured is None else measured
-    climb_rate = lift @ w / body.mass - body.gravity
+    # Second derivatives of y (ch. 3, Eq. 10). Body rates count as rates of the angles (Eq. 8).
+    r3 = rotation_matrix(now.attitude)[2]
+    lift = r3 @ F
+    omega_rate = seen.measured  # by a sensor
+    if omega_rate is None:
+        omega_rate = inverse_inertia_matrix(body) @ (tau @ w)
+    z_acceleration = lift @ w / body.mass - body.gravity
 
-    # Third-order error dynamics, Eqs. 26 and 27; the reference of the attitude is at rest.
-    k1, k2, k3 = gains.attitude
-    tracked = _attitude_reference(now, target, wrench, parameters)
+    # Demanded third derivatives (Eqs. 26 and 27). The reference of the attitude counts as at rest.
+    tracked = _attitude_reference(now, target, wrench, p)
     error = tracked - now.attitude
     error = xp.array([error[0], error[1], wrapped(error[2])])
-    omega_jerk = k3 * error - k2 * now.omega - k1 * omega_rate
-    k1, k2, k3 = gains.altitude
-    z, vz, az = target[:, 2]
-    jerk = k3 * (z - now.position[2]) + k2 * (vz - now.velocity[2]) + k1 * (az - climb_rate)
+    K_P1, K_P2, K_P3 = p.gains.attitude
+    omega_jerk = K_P3 * error - K_P2 * now.omega - K_P1 * omega_rate
+    K_PZ1, K_PZ2, K_PZ3 = p.gains.altitude
+    z_ref, vz_ref, az_ref = target[:, 2]
+    z_jerk = (
+        K_PZ3 * (z_ref - now.position[2])
+        + K_PZ2 * (vz_ref - now.velocity[2])
+        + K_PZ1 * (az_ref - z_acceleration)
+    )
 
-    # Ma, Eq. 18: the thrust direction turns with the body.
-    turning = up @ cross(now.omega, force @ w)
-    desired = xp.hstack([inertia_matrix(body) @ omega_jerk, body.mass * jerk - turning])
+    # Eqs. 18 and 19; Ma is due to the thrusts, which turn with the body.
+    Ma = r3 @ cross(now.omega, F @ w)
+    desired = xp.hstack([inertia_matrix(body) @ omega_jerk, body.mass * z_jerk - Ma])
 
-    # Eq. 19. The published matrix has the factor 2 |varpi_i| in its last row only, the exact one in
-    # every row, so that the solution can be divided by it instead.
-    if parameters.decoupling == PUBLISHED_DECOUPLING:
-        inputs = solved(xp.vstack([torque, lift * (2.0 * abs(now.speeds))]), desired)
+    # w_i' = 2 |varpi_i| varpi_i' (Eq. 16). The print has this factor in the last row only. It
+    # belongs to every row, so that the exact solution is w', divided by the factor.
+    if p.decoupling == PUBLISHED_DECOUPLING:
+        inputs = solved(xp.vstack([tau, lift * (2.0 * abs(now.speeds))]), desired)
     else:
-        inputs = rotor_accelerations(solved(xp.vstack([torque, lift]), desired), now.speeds)
+        inputs = rotor_accelerations(solved(xp.vstack([tau, lift]), desired), now.speeds)
     return Step(inputs, signals=tracked)

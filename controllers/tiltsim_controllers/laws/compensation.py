@@ -9,8 +9,6 @@ mixer keeps thrusts within the limits: torque about x and y before lift, yaw and
 accurate aggressive quadrotor flight"). Integrators of the law itself rest while it limits.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache

@@ -7,8 +7,6 @@ nearly all entries of the Jacobians are zeros and ones, which a trace omits. See
 "Quaternion kinematics for the error-state Kalman filter" (2017), chapter 7 on global errors.
 """
 
-from __future__ import annotations
-
 from typing import Any, Final, NamedTuple
 
 import numpy as np

@@ -10,8 +10,7 @@ modified one has the side force at level attitude, to first order (Eqs. 9-11), t
 whole direction of the force at zero torque.
 """
 
-from __future__ import annotations
-
+from collections.abc import Sequence
 from typing import Any, Final
 
 from tiltsim_controllers.code.arrays import traceable, xp
@@ -26,6 +25,23 @@ from tiltsim_controllers.mathematics.moving import (
     value_of,
     where,
 )
+
+
+def error_dynamics(reference: Any, present: Sequence[Any], gains: Sequence[Any]) -> Any:
+    """The n-th derivative of outputs with which their errors decay: ``r_n + k_1 e_(n-1) + ...``.
+
+    It is ``r_n + k_1 (r_(n-1) - y_(n-1)) + ... + k_n (r_0 - y_0)`` (ch. 2, Eqs. A2-A5; ch. 4, Eqs.
+    26-27), ``r_i`` and ``y_i`` the i-th derivatives of reference and output.
+
+    Args:
+        reference: The reference and its n derivatives.
+        present: The outputs and n - 1 derivatives.
+        gains: ``k_1`` to ``k_n``, 1/s to 1/s^n.
+    """
+    *lower, total = reference
+    for gain, desired, actual in zip(gains, reversed(lower), reversed(present), strict=True):
+        total = total + gain * (desired - actual)
+    return total
 
 
 def limited_acceleration(acceleration: Moving, limit: Any) -> Any:
@@ -216,3 +232,19 @@ def exact_decoupler(ax: Any, ay: Any, az: Any, yaw: Any, gravity: Any, n: Any) -
     roll = where(reaches, reached, nearest)
     pitch = angle(dx, dz) - angle(n[0], n[1] * sine(roll) + n[2] * cosine(roll))
     return roll, pitch
+
+
+def decoupled(decoupler: float, acceleration: Any, yaw: Any, gravity: Any, n: Any) -> Any:
+    """Roll and pitch (rad) by a decoupler of `DECOUPLERS` other than none.
+
+    Args:
+        decoupler: Its number.
+        acceleration: Desired, m/s^2, world axes, shape (3,).
+        yaw, gravity, n: See `modified_decoupler`; with the exact one they may move.
+    """
+    ax, ay, az = acceleration[0], acceleration[1], acceleration[2]
+    if decoupler == EXACT:
+        return exact_decoupler(ax, ay, az, yaw, gravity, n)
+    if decoupler == CONVENTIONAL:
+        return conventional_decoupler(ax, ay, yaw, gravity)
+    return modified_decoupler(ax, ay, yaw, gravity, n)

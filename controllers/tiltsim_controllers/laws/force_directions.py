@@ -4,8 +4,6 @@ The ``direction`` is the torque-free force that goes with lift for one component
 normal of the plane of torque-free forces for two; see `tiltsim_controllers.laws.multirotor`.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 from tiltsim_controllers.code.arrays import xp

@@ -15,8 +15,6 @@ public model of the tiltrotor. The gyroscopic torque is omitted, as in ch. 3. A 
 is known to have failed is left out of the matrix, with the part of its tilt that moves it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from math import pi
 from typing import Annotated, Any, ClassVar, Final, Literal
@@ -26,7 +24,7 @@ from numpy.typing import ArrayLike
 from pydantic import Field
 
 from tiltsim_controllers.code.arrays import traceable, xp
-from tiltsim_controllers.laws.feedback import body_rate_matrix
+from tiltsim_controllers.laws.feedback import body_rate_matrix, error_dynamics
 from tiltsim_controllers.laws.keys import (
     GainSets,
     Keys,
@@ -181,41 +179,35 @@ def full_pose(seen: Seen, p: Any, knots: Any, tilt_of_rotor: TiltOfRotor) -> Ste
         knots: Table data of the flight, with the table of the rotors.
         tilt_of_rotor: The layout.
     """
-    time = seen.time
+    time, count = seen.time, len(tilt_of_rotor)
     now, (body, rotors) = state_of(seen.state, tilt_of_rotor), airframe(p, knots, tilt_of_rotor)
-    works = working(time, p.failure, len(tilt_of_rotor))
-    rotors = rotors.masked(works)
-    w = works * now.speeds * abs(now.speeds)
+    works = working(time, p.failure, count)  # 0 for a failed rotor
+    rotors, w = rotors.masked(works), works * now.speeds * abs(now.speeds)
 
-    # Second derivatives from the model, ch. 3, Eqs. (1) and (4), without gyroscopic torque.
+    # Second derivatives of position and attitude by the model (ch. 3, Eqs. 1 and 4).
     wrench = wrench_map(rotors, now.tilts) @ w
     force, torque = wrench[:3], wrench[3:]
-    rotation = rotation_matrix(now.attitude)
-    acceleration = rotation @ force / body.mass - xp.array([0.0, 0.0, body.gravity])
-    omega_rate = angular_acceleration(body, torque, now.omega, 0.0)
+    R = rotation_matrix(now.attitude)
+    acceleration = R @ force / body.mass - xp.array([0.0, 0.0, body.gravity])
+    omega_rate = angular_acceleration(body, torque, now.omega, 0.0)  # without gyroscopic torque
 
-    # Third-order error dynamics.
+    # Demanded third derivatives of the position, and of the attitude by its error in body axes.
     ref = reference_motion(time, p.reference, knots)
+    jerk = error_dynamics(ref[:4], (now.position, now.velocity, acceleration), p.gains.position)
     target = reference_attitude(time, p.reference, knots)
-    k1, k2, k3 = p.gains.position
-    jerk = (
-        ref[3]
-        + k1 * (ref[2] - acceleration)
-        + k2 * (ref[1] - now.velocity)
-        + k3 * (ref[0] - now.position)
-    )
-    k1, k2, k3 = p.gains.attitude
-    desired = rotation_matrix(target[0])
-    omega_jerk = k3 * attitude_error(rotation, desired) - k2 * now.omega - k1 * omega_rate
-    if p.reference.type == POSES:
-        ahead = turning_rates(target, rotation.T @ desired, now.omega, omega_rate)
+    R_d, (k1, k2, k3) = rotation_matrix(target[0]), p.gains.attitude
+    omega_jerk = k3 * attitude_error(R, R_d) - k2 * now.omega - k1 * omega_rate
+    if p.reference.type == POSES:  # only then does the desired attitude move
+        ahead = turning_rates(target, R.T @ R_d, now.omega, omega_rate)
         omega_jerk = omega_jerk + ahead.acceleration + k1 * ahead.rate + k2 * ahead.value
 
-    # In body axes, without the part of the force's rate with which it turns with the body.
-    force_rate = body.mass * (rotation.T @ jerk) - cross(now.omega, force)
+    # Six equations, (tau w)' = I omega'' and, as the force turns with the body, (F w)' = m R^T jerk
+    # - omega x F w, for N + M inputs, w' and tilt_weight alpha', of which the shortest are taken.
+    force_rate = body.mass * (R.T @ jerk) - cross(now.omega, force)
     rows = input_matrix(rotors, now.tilts, w, p.tilt_weight)
     rates = least_norm(rows, xp.hstack([inertia_matrix(body) @ omega_jerk, force_rate]))
-    count = len(tilt_of_rotor)
+
+    # Neither the pods nor the commanded angles go past their limit.
     tilt_rates = rates[count:] / p.tilt_weight
     for angles in (now.tilts, seen.states):
         if len(angles):

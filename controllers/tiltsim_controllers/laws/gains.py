@@ -1,8 +1,5 @@
 """Gains of attitude, altitude and position: their keys, poles, and sets by name."""
 
-from __future__ import annotations
-
-from collections.abc import Sequence
 from typing import Annotated, Any, Final, Literal, NamedTuple
 
 from pydantic import ConfigDict, Discriminator, Field, Tag
@@ -18,52 +15,31 @@ from tiltsim_controllers.laws.keys import (
     gain_kind,
     required,
 )
+from tiltsim_controllers.mathematics import records
 
 
 class Gains(NamedTuple):
     """Gains of the third-order error dynamics and of the position loop (ch. 4, Eqs. 26-28).
 
-    ``1`` multiplies the error of the second derivative, ``2`` of the first, ``3`` of the output;
-    in the position loop ``1`` multiplies the velocity error and ``2`` the position error.
+    By order: on the errors of the second derivative, of the first, and of the output.
     """
 
-    roll_1: float  # [K_P1] 1/s
-    roll_2: float  # [K_P2] 1/s^2
-    roll_3: float  # [K_P3] 1/s^3
-    pitch_1: float
-    pitch_2: float
-    pitch_3: float
-    yaw_1: float
-    yaw_2: float
-    yaw_3: float
-    altitude_1: float  # [K_PZ1] 1/s
-    altitude_2: float  # [K_PZ2] 1/s^2
-    altitude_3: float  # [K_PZ3] 1/s^3
-    position_1: float  # [K_X1 = K_Y1] 1/s
-    position_2: float  # [K_X2 = K_Y2] 1/s^2
+    attitude_1: records.Vector3  # [diagonal of K_P1] roll, pitch and yaw, 1/s
+    attitude_2: records.Vector3  # [K_P2] 1/s^2
+    attitude_3: records.Vector3  # [K_P3] 1/s^3
+    altitude: records.Vector3  # [K_PZ1, K_PZ2, K_PZ3] 1/s, 1/s^2, 1/s^3
+    position: records.Vector2  # [K_X1 = K_Y1, K_X2 = K_Y2] on velocity and position, 1/s, 1/s^2
 
     @property
     def attitude(self) -> Any:
         """Gains of roll, pitch and yaw, one row for each order, shape (3, 3)."""
-        return xp.array(self[:9]).reshape(3, 3).T
+        return xp.array(self[:3])
 
     @property
-    def altitude(self) -> tuple[float, float, float]:
-        """Gains of the altitude, by order."""
-        return self.altitude_1, self.altitude_2, self.altitude_3
-
-
-def gains_from_rows(
-    attitude: Sequence[Sequence[float]], altitude: Sequence[float], position: Sequence[float]
-) -> Gains:
-    """Gains in the layout of the thesis.
-
-    ``attitude`` contains the diagonals of K_P1, K_P2 and K_P3, each (roll, pitch, yaw);
-    ``altitude`` is (K_PZ1, K_PZ2, K_PZ3) and ``position`` (K_X1, K_X2).
-    """
-    (roll_1, pitch_1, yaw_1), (roll_2, pitch_2, yaw_2), (roll_3, pitch_3, yaw_3) = attitude
-    roll, pitch, yaw = (roll_1, roll_2, roll_3), (pitch_1, pitch_2, pitch_3), (yaw_1, yaw_2, yaw_3)
-    return Gains(*roll, *pitch, *yaw, *altitude, *position)
+    def loops(self) -> dict[str, tuple[float, ...]]:
+        """The three gains of each output with third-order error dynamics, by order."""
+        roll, pitch, yaw = zip(*self[:3])
+        return {"roll": roll, "pitch": pitch, "yaw": yaw, "altitude": self.altitude}
 
 
 class IntegralGains(NamedTuple):
@@ -110,12 +86,13 @@ def gains_from_poles(
     lean, turn = third_order_gains(attitude)[:3], third_order_gains(yaw)[:3]
     *climb, climb_integral = third_order_gains(altitude)
     *move, move_integral = second_order_gains(position)
-    gains = Gains(*lean, *lean, *turn, *climb, *move)
+    first, second, third = zip(lean, lean, turn)
+    gains = Gains(first, second, third, tuple(climb), tuple(move))
     return gains, IntegralGains(move_integral, climb_integral)
 
 
 class GainTable(Keys):
-    """Explicit gains; see `tiltsim_controllers.laws.gains.gains_from_rows`."""
+    """Explicit gains; see `tiltsim_controllers.laws.gains.Gains`."""
 
     attitude: Annotated[tuple[Vector3, Vector3, Vector3], Field(strict=False)] = required(
         "diagonals of K_P1, K_P2 and K_P3, each roll, pitch, yaw: on the errors of angular "
@@ -193,14 +170,16 @@ GivenGains = Annotated[
 """The name of a set of gains, gains, or poles."""
 
 
+_LAST: Final = ((10.0, 5.0, 10.0), (1.0, 1.0))  # ch. 4's gains of altitude and position
+
 GAIN_SETS: Final = {
     # ch. 3, Sec. 3.2; the position loop is ch. 4's, ch. 3 has none
-    "ch03": gains_from_rows([[1, 1, 1], [1, 1, 1], [1, 1, 1]], [10, 5, 10], [1, 1]),
+    "ch03": Gains((1.0,) * 3, (1.0,) * 3, (1.0,) * 3, *_LAST),
     # ch. 4, Sec. 3.4, Eqs. (26)-(28)
-    "ch04": gains_from_rows([[1, 1, 1], [10, 10, 1], [50, 50, 1]], [10, 5, 10], [1, 1]),
+    "ch04": Gains((1.0, 1.0, 1.0), (10.0, 10.0, 1.0), (50.0, 50.0, 1.0), *_LAST),
     # for the exact decoupling matrix, under which the two sets above fail Proposition 4: attitude
     # poles at -20 and -10 +- 10j, altitude poles well damped near -1 to -14
-    "exact": gains_from_rows([[40] * 3, [600] * 3, [4000] * 3], [10, 15, 10], [1, 1]),
+    "exact": Gains((40.0,) * 3, (600.0,) * 3, (4000.0,) * 3, (10.0, 15.0, 10.0), (1.0, 1.0)),
     # for gait-rate feed-forward: attitude poles at -25, yaw's and the altitude's at -10, -1.5
     "feedforward": gains_from_poles(Poles(25.0), Poles(10.0), Poles(10.0), Poles(1.5))[0],
 }

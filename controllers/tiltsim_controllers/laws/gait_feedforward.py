@@ -4,8 +4,6 @@ The tiltrotor's law with feed-forward is the one of attitude and one component o
 angles; its parameters and its supervisor are its own.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cache
 from typing import Any, Final
@@ -19,7 +17,7 @@ from tiltsim_controllers.gaits.motion import (
     planned_tilts,
 )
 from tiltsim_controllers.laws.allocation import RotorRange, limited_accelerations
-from tiltsim_controllers.laws.attitude_altitude import OPTIONS, AttitudeAltitude
+from tiltsim_controllers.laws.attitude_altitude import LAYOUT, OPTIONS, AttitudeAltitude
 from tiltsim_controllers.laws.feedback import NONE
 from tiltsim_controllers.laws.gains import Gains, IntegralGains
 from tiltsim_controllers.laws.keys import record_of
@@ -53,9 +51,6 @@ Parameters = record_of(
     turn_time=float,  # s, 0
 )
 """Parameters of the tiltrotor's controller."""
-
-TILTROTOR: Final = (0, 1, 2, 3)
-"""Every rotor of the tiltrotor has its own tilt."""
 
 FORM: Final = Form(1, "thrust", own_yaw=True, spin=True)
 """Its form of the law; four equations in four unknowns have one solution in every norm."""
@@ -129,4 +124,4 @@ def multirotor_law_of(layout: TiltOfRotor, form: Form) -> Callable[..., Step]:
 
 def tiltrotor_law_of(form: Form = FORM) -> Callable[..., Step]:
     """The `gait_law_of` the tiltrotor."""
-    return gait_law_of(TILTROTOR, form, SUPERVISION)
+    return gait_law_of(LAYOUT, form, SUPERVISION)

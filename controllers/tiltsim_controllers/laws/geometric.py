@@ -1,12 +1,16 @@
 """Tracking control on SE(3) for any rotorcraft.
 
 Lee, Leok and McClamroch (2010), "Geometric tracking control of a quadrotor UAV on SE(3)", Eqs. 10
-to 16. The force follows Eq. 12 along the axis in which the rotors push without torque, or, where
-the law commands the tilts of enough rotors, in any direction. The torque is Eq. 16 with the desired
-angular acceleration zero.
-"""
+to 16, with these changes:
 
-from __future__ import annotations
+- the axes have z up, theirs down, so that force and gravity change their signs;
+- ``b``, the axis in which the rotors push without torque, replaces the body's third axis; where the
+  law commands the tilts of enough rotors, the force has any direction;
+- the yaw of the desired attitude comes from the reference, in place of the heading ``b_1d``;
+- ``Omega_d`` follows from the reference's jerk, and its derivative counts as zero in Eq. 16;
+- gains are bandwidths and damping ratios, ``k_x`` and ``k_v`` per mass, and the feedback of
+  position is limited in length.
+"""
 
 from typing import Any, Literal
 
@@ -52,21 +56,20 @@ class Geometric(Keys):
 def geometric(observed: Observed, p: Geometric) -> Command:
     """The law where the tilts follow a gait."""
     acceleration = tracking_acceleration(observed, p)
-    lift = lift_without_torque(observed)
-    b = observed.force @ lift  # takes the place of Lee's third body axis
-    R_d = pointing_attitude(observed, acceleration, b)
+    lift = lift_without_torque(observed)  # thrusts, N
+    b = observed.force @ lift
+    R_d = pointing_attitude(observed, acceleration, b)  # turns b along the force of Eq. 12
     Omega_d = pointing_rates(observed, acceleration, b, R_d)
-    M = moment(observed, p, R_d, Omega_d)
-    return Command(
-        thrusts=allocated_thrusts(observed, lift, push_along(observed, acceleration, b), M)
-    )
+    f = push_along(observed, acceleration, b)  # Eq. 15
+    M = moment(observed, p, R_d, Omega_d)  # Eq. 16
+    return Command(thrusts=allocated_thrusts(observed, lift, f, M))
 
 
 def geometric_with_tilts(observed: Observed, p: Geometric) -> Command:
     """The law where it commands the tilts: it also tracks any attitude."""
     acceleration = tracking_acceleration(observed, p)
     m, g = observed.vehicle.mass, observed.vehicle.gravity
-    force = m * observed.rotation.T @ (acceleration + g * xp.array(UP))
+    force = m * observed.rotation.T @ (acceleration + g * xp.array(UP))  # body axes
     M = moment(observed, p, rotation_matrix(observed.reference.attitude), xp.zeros(3))
     thrusts, tilts = allocated_with_tilts(observed, force, M)
     return Command(thrusts=thrusts, tilt_angles=tilts)
@@ -81,7 +84,7 @@ def geometric_leaning_with_tilts(observed: Observed, p: Geometric) -> Command:
 
 def tracking_acceleration(observed: Observed, p: Geometric) -> Any:
     """The parenthesis of Eq. 12 per mass, without gravity: m/s^2, world axes, shape (3,)."""
-    k_x = p.position_bandwidth**2  # per mass
+    k_x = p.position_bandwidth**2
     k_v = 2.0 * p.position_damping * p.position_bandwidth
     return demanded_acceleration(observed, k_x, k_v, p.max_acceleration)
 
@@ -94,6 +97,8 @@ def moment(observed: Observed, p: Geometric, attitude: Any, rates: Any) -> Any:
         p: Its gains.
         attitude: Desired, R_d, shape (3, 3).
         rates: Desired, in the present body axes: ``R^T R_d Omega_d``, rad/s, shape (3,).
+
+    The gyroscopic torque is 0 on the thesis's equations, which omit it.
     """
     J, R, Omega = observed.inertia, observed.rotation, observed.body_rates
     j = xp.trace(J) / 3.0

@@ -11,8 +11,6 @@ keep forever the part of them that makes neither torque nor push, and with tilts
 side.
 """
 
-from __future__ import annotations
-
 from typing import Any, Literal
 
 from tiltsim_controllers.code.arrays import xp

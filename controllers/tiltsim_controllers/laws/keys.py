@@ -4,8 +4,6 @@ A description of a number ends with its unit in brackets, ``[m/s]``, or ``[-]`` 
 reads the numbers of its keys from a record with the names of the keys: `record_of`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from functools import cache
 from math import inf, pi

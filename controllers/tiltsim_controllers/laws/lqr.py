@@ -7,8 +7,6 @@ and Moore (1990), "Optimal Control", ch. 3; gains ``K`` from the Riccati equatio
 acceptable value.
 """
 
-from __future__ import annotations
-
 from typing import Any, Final, Literal, NamedTuple
 
 from pydantic import Field

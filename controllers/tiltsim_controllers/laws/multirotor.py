@@ -38,8 +38,6 @@ controller
 Each of these terms can be omitted, to measure its effect.
 """
 
-from __future__ import annotations
-
 from typing import Any, Final, NamedTuple
 
 from tiltsim_controllers.code.arrays import traceable, xp

@@ -1,7 +1,5 @@
 """Parameters and steps of the control law of attitude and force, `multirotor`."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Annotated, Any, Final, Literal, NamedTuple
 
@@ -11,17 +9,14 @@ from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.gaits.motion import GaitParameters
 from tiltsim_controllers.laws.allocation import RotorRange
 from tiltsim_controllers.laws.feedback import (
-    CONVENTIONAL,
     EXACT,
     angular_jerk,
     attitude_jerk,
     body_rate_matrix,
-    conventional_decoupler,
-    exact_decoupler,
+    decoupled,
     force_control,
     integrator_rate,
     limited_acceleration,
-    modified_decoupler,
     position_feedback,
 )
 from tiltsim_controllers.laws.gains import Gains, GivenGains, IntegralGains
@@ -210,9 +205,7 @@ def horizontal_control(
     gains, limit = parameters.gains, parameters.max_acceleration
     k3 = parameters.terms.integral_action * parameters.integral.position
     error, ahead = motion.error[:2], motion.acceleration[:2]
-    back = position_feedback(
-        error, ahead.rate - jerk[:2], integrals[:2], (gains.position_1, gains.position_2, k3)
-    )
+    back = position_feedback(error, ahead.rate - jerk[:2], integrals[:2], (*gains.position, k3))
     rates = integrator_rate(error.value, back.value, limit)
     return ahead + limited_acceleration(back, limit), rates
 
@@ -280,17 +273,12 @@ def lean(force: Any, along: Moving, yaw: Any, parameters: Any) -> tuple[Moving, 
         yaw: rad.
         parameters: Parameters of the controller.
     """
-    gravity, moves = parameters.vehicle.gravity, parameters.terms.attitude_rates != 0.0
-    if parameters.decoupler == EXACT and moves:
-        roll, pitch = exact_decoupler(along[0], along[1], along[2], yaw, gravity, force)
+    decoupler, gravity = parameters.decoupler, parameters.vehicle.gravity
+    if decoupler == EXACT and parameters.terms.attitude_rates != 0.0:
+        roll, pitch = decoupled(decoupler, along, yaw, gravity, force)
         return roll, pitch
-    (x, y, z), n, psi = along.value, value_of(force), value_of(yaw)
-    if parameters.decoupler == EXACT:
-        roll, pitch = exact_decoupler(x, y, z, psi, gravity, n)
-    elif parameters.decoupler == CONVENTIONAL:
-        roll, pitch = conventional_decoupler(x, y, psi, gravity)
-    else:
-        roll, pitch = modified_decoupler(x, y, psi, gravity, n)
+    present = along.value, value_of(yaw), gravity, value_of(force)
+    roll, pitch = decoupled(decoupler, *present)
     return at_rest(roll), at_rest(pitch)
 
 

@@ -4,8 +4,6 @@ A law is a function of small NumPy arrays: ``(observed, parameters) -> Command``
 accelerations, ``(seen, parameters, knots) -> Step``.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import inf
 from typing import Any, Final, NamedTuple

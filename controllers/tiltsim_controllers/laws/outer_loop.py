@@ -8,8 +8,6 @@ Voliro omniorientational hexacopter", Eqs. 10 to 13). With fewer components than
 tilting rotors, they make any torque and a force along one axis again.
 """
 
-from __future__ import annotations
-
 from typing import Any, Final
 
 import numpy as np

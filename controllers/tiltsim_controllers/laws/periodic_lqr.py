@@ -9,13 +9,12 @@ periodic Riccati equation", in "The Riccati Equation", Springer), solved as a di
 to node of a table, backward until it repeats.
 """
 
-from __future__ import annotations
-
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from tiltsim_controllers.laws.lqr import BODY
+from tiltsim_controllers.mathematics.attitude import rotation_matrix
 from tiltsim_controllers.mathematics.scalar import Floats
 
 LONGEST_STEP: Final = 0.005  # s, between two nodes
@@ -82,13 +81,7 @@ def node_count(period: float) -> int:
 
 def _turned(angles: Floats) -> Floats:
     """Rotations body to world of Euler angles, shape (..., 3, 3)."""
-    (sr, sp, sy), (cr, cp, cy) = (np.moveaxis(f(angles), -1, 0) for f in (np.sin, np.cos))
-    rows = (
-        (cp * cy, sr * sp * cy - cr * sy, cr * sp * cy + sr * sy),
-        (cp * sy, sr * sp * sy + cr * cy, cr * sp * sy - sr * cy),
-        (-sp, sr * cp, cr * cp),
-    )
-    return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
+    return np.moveaxis(rotation_matrix(np.moveaxis(angles, -1, 0)), (0, 1), (-2, -1))
 
 
 def _angle_rates(angles: Floats) -> Floats:

@@ -5,8 +5,6 @@ attitude (P) demands rates, and rates (PID) an angular acceleration. The integra
 stops while its demand is limited.
 """
 
-from __future__ import annotations
-
 from typing import Final, Literal
 
 from tiltsim_controllers.code.arrays import xp

@@ -5,8 +5,6 @@ to this controller near the published singular curve: its decoupling matrix is s
 roll or pitch of 90 degrees.
 """
 
-from __future__ import annotations
-
 from typing import Any, ClassVar, Final, Literal
 
 from tiltsim_controllers.code.arrays import xp

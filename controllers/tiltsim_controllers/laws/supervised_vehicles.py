@@ -13,8 +13,6 @@ approaches the curve L of the Two Color Map, where ``n`` vanishes whatever its d
 tilts and on red ``n`` is vertical.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import cache
 from math import pi

@@ -25,8 +25,6 @@ a saved state restarts and the same source runs in every engine. The rate has a 
 tilts have accelerations for the controllers that use them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from math import inf, pi
 from typing import Any, Final, NamedTuple

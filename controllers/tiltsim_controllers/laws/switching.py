@@ -10,8 +10,6 @@ and thrust rate of the attitude-altitude controller, so that both are continuous
 yaw-position controller takes over again.
 """
 
-from __future__ import annotations
-
 from typing import Any, ClassVar, Final, Literal
 
 from pydantic import ConfigDict

@@ -11,12 +11,11 @@ determinant is in `tiltsim_controllers.analysis.singularity`. The axes are ours,
 2's have z down, which changes the signs of y and z, of pitch and yaw and of their torques.
 """
 
-from __future__ import annotations
-
 from typing import Any, ClassVar, Final, Literal
 
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.gaits.motion import NO_KNOTS
+from tiltsim_controllers.laws.feedback import error_dynamics
 from tiltsim_controllers.laws.keys import (
     Gains2,
     Gains4,
@@ -152,14 +151,8 @@ def yaw_position_inputs(time: Any, state: Any, p: Any, knots: Any = NO_KNOTS) ->
 
     # The demanded fourth derivative of the position and second of yaw (Eqs. A2-A6).
     motion = reference_motion(time, reference, knots)
-    k1, k2, k3, k4 = p.gains.position
-    snap = (
-        motion[4]
-        + k1 * (motion[3] - jerk)
-        + k2 * (motion[2] - acceleration)
-        + k3 * (motion[1] - velocity)
-        + k4 * (motion[0] - position)
-    )
+    present = (position, velocity, acceleration, jerk)
+    snap = error_dynamics(motion, present, p.gains.position)
     k1, k2 = p.gains.yaw
     yaw_rate = euler_rates(attitude, omega)[2]
     turn = k2 * wrapped(reference.yaw - attitude[2]) - k1 * yaw_rate

@@ -1,7 +1,5 @@
 """Rotations between body and world as matrices, ``Rz(yaw) Ry(pitch) Rx(roll)`` (ch. 3, Eq. 2)."""
 
-from __future__ import annotations
-
 from typing import Any, Final
 
 import numpy as np

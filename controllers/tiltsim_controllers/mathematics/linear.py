@@ -1,7 +1,5 @@
 """Vectors, and linear equations with fewer equations than unknowns, for traced functions."""
 
-from __future__ import annotations
-
 from typing import Any, Final
 
 import numpy as np

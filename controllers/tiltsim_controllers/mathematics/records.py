@@ -69,10 +69,11 @@ def vector_of(length: int) -> type:
 
 
 if TYPE_CHECKING:
+    Vector2 = Any
     Vector3 = Any
     Matrix3 = Any
-else:  # types of fields, which are arrays in NumPy functions
-    Vector3, Matrix3 = vector_of(3), vector_of(9)  # a matrix is given row by row
+else:  # types of fields, which are arrays in NumPy functions; a matrix is given row by row
+    Vector2, Vector3, Matrix3 = vector_of(2), vector_of(3), vector_of(9)
 
 
 def _take(kind: Any, values: Iterator[float]) -> Any:

@@ -1,7 +1,5 @@
 """Types of numbers and vectors, and functions of plain numbers."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from math import sqrt
 

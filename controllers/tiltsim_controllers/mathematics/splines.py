@@ -3,8 +3,6 @@
 Splines are computed once, before a flight; real arrays and traced numbers evaluate them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from math import factorial
 from typing import Any

@@ -7,8 +7,6 @@ quadrotors", ICRA 2011): a spline of degree seven whose first three derivatives 
 It is computed once; a flight evaluates it from its knots.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Sequence
 from math import isfinite

@@ -30,8 +30,6 @@ within the unit circle.
 ``+Lambda``. Everything is in the frame of that half; for the other one both signs change.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -41,8 +39,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from tiltsim_controllers.mathematics.scalar import Floats, Pair
+from tiltsim_controllers.tilt_car.integrating import null_space_input
 from tiltsim_controllers.tilt_car.planned_direction import lyapunov_candidate
-from tiltsim_controllers.tilt_car.third_derivative import null_space_input
 from tiltsim_controllers.tilt_car.vehicle import TiltCar, input_matrix, turn_per_tilt
 
 

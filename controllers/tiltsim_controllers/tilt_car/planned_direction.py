@@ -5,8 +5,6 @@ outputs, so that no state drifts. A thrust cannot pull, so negative squares beco
 Eq. 13), which ch. 11 writes with the switch matrix ``S_pq``.
 """
 
-from __future__ import annotations
-
 from typing import Any, ClassVar, Final, Literal
 
 from tiltsim_controllers.code.arrays import xp

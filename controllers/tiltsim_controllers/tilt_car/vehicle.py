@@ -6,8 +6,6 @@ The bisector has the direction ``psi + alpha``: yaw of the bottom disc plus tilt
 relative to it.
 """
 
-from __future__ import annotations
-
 from math import pi
 from typing import Any, Final, NamedTuple
 

@@ -4,8 +4,6 @@ Everything is a function of time, state and parameters, so that it can be evalua
 integrator stage and restarted anywhere.
 """
 
-from __future__ import annotations
-
 from functools import cache
 from math import exp
 from typing import Any

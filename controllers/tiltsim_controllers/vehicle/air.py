@@ -13,8 +13,6 @@ arXiv 2403.13321): its velocity is a Gaussian of the distance from the axis, its
 proportion to the depth, and its momentum stays.
 """
 
-from __future__ import annotations
-
 from math import log, pi, sqrt
 from typing import Any, Final, NamedTuple
 

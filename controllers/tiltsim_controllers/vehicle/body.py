@@ -1,7 +1,5 @@
 """A rigid body: its state by name, its mass and inertia, its motion, and the loads on it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from math import inf
 from typing import Any, Final, NamedTuple
@@ -14,15 +12,17 @@ from tiltsim_controllers.mathematics.linear import cross
 from tiltsim_controllers.mathematics.records import Matrix3, Vector3
 from tiltsim_controllers.vehicle.parameters import Vehicle
 
-X, Y, Z, VX, VY, VZ, ROLL, PITCH, YAW, P, Q, R = range(12)
-ALPHA_1, ALPHA_2, ALPHA_3, ALPHA_4, SPEED_1, SPEED_2, SPEED_3, SPEED_4 = range(12, 20)
-THRUST, THRUST_RATE = range(12, 14)
+ROLL, PITCH, P = 6, 7, 9
+"""Places in `BODY_FIELDS`."""
 
 ROTORS: Final = (1, 2, 3, 4)
 """Numbers of the rotors of tiltrotor and quadrotor."""
 
 BODY_FIELDS: Final = ("x", "y", "z", "vx", "vy", "vz", "roll", "pitch", "yaw", "p", "q", "r")
 """A rigid body: position (m) and velocity (m/s), world axes; rad; body rates, rad/s."""
+
+ROTATION_NAMES: Final = ("rotation_x", "rotation_y", "rotation_z")
+"""A small turn about the body axes, rad; at level attitude roll, pitch and yaw."""
 
 TILT_FIELDS: Final = ("alpha_1", "alpha_2", "alpha_3", "alpha_4")
 """Tilt angles, rad."""

@@ -10,8 +10,6 @@ varpi_i d_i``, and across the pod's hinge on its servo. All sums here are per un
 body axes.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import cache
 from typing import Any, NamedTuple

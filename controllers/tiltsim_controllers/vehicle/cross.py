@@ -13,8 +13,6 @@ The matrix is singular exactly where world up is perpendicular to ``n``. Tilt an
 in units of ``K_f``; rotor inputs are ``w_i = varpi_i |varpi_i|`` (rad^2/s^2).
 """
 
-from __future__ import annotations
-
 from typing import Any, Final
 
 import numpy as np

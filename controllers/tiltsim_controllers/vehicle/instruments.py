@@ -6,8 +6,6 @@ noise and whether it is lost depend on this number and the seed alone, so that r
 on every engine and after a restart.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 from tiltsim_controllers.code.arrays import branch, normal, traceable, uniform, xp

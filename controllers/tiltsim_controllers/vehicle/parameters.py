@@ -1,7 +1,5 @@
 """Physical parameters of the tiltrotor, and the vehicles known by name."""
 
-from __future__ import annotations
-
 from typing import Any, Final, NamedTuple
 
 

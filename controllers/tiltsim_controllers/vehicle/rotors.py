@@ -240,9 +240,13 @@ def of_tilts(rotors: Rotors, values: Any) -> Any:
         rotors: The layout is used.
         values: Values of the rotors, shape (N,).
     """
+    return xp.array([sum(values[i] for i in pod) for pod in _pods(rotors)])
+
+
+def _pods(rotors: Rotors) -> list[list[int]]:
+    """The rotors on each pod."""
     layout = rotors.tilt_of_rotor
-    pods = [[i for i, own in enumerate(layout) if own == tilt] for tilt in range(max(layout) + 1)]
-    return xp.array([sum(values[i] for i in pod) for pod in pods])
+    return [[i for i, own in enumerate(layout) if own == tilt] for tilt in range(tilts_of(layout))]
 
 
 def turned(rotors: Rotors, parts: Any, tilts: Any) -> Any:
@@ -283,11 +287,7 @@ def wrench_slope(rotors: Rotors, tilts: Any) -> Any:
 
 def by_tilt(rotors: Rotors, columns: Any) -> Any:
     """Sums of columns of rotors over each tilt, shape (6, N) to (6, M)."""
-    layout = rotors.tilt_of_rotor
-    groups = [
-        [i for i, own in enumerate(layout) if own == tilt] for tilt in range(tilts_of(layout))
-    ]
-    sums = [sum((columns[:, i] for i in group), xp.zeros(6)) for group in groups]
+    sums = [sum((columns[:, i] for i in pod), xp.zeros(6)) for pod in _pods(rotors)]
     return xp.array(sums).T.reshape(6, -1)
 
 

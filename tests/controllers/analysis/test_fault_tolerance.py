@@ -9,14 +9,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tiltsim_controllers.analysis.attainable import TiltedRotors, input_box
 from tiltsim_controllers.analysis.fault_tolerance import (
     ROTORS,
-    fixed_tilt_hover,
     fixed_tilt_imbalance,
     minimum_hover_speed,
     pose_matrix,
     three_rotor_hover,
 )
+from tiltsim_controllers.analysis.hover import hover, rotor_losses
 from tiltsim_controllers.analysis.singularity import force_matrix, torque_matrix
 from tiltsim_controllers.analysis.two_color_map import delta
 from tiltsim_controllers.mathematics.attitude import rotation_matrix
@@ -30,9 +31,17 @@ DELTA = atan(drag_ratio(VEHICLE))
 each_loss = pytest.mark.parametrize("lost", ROTORS)
 
 
-def wrench(hover, factors=(1.0,) * 4):
+def at(tilts):
+    """The rotors at tilt angles; they do not turn backwards."""
+    factor = VEHICLE.thrust_coefficient
+    torque = torque_matrix(tilts, VEHICLE) * factor * VEHICLE.arm_length
+    limits = input_box((0.0, 10.0 * HOVER))
+    return TiltedRotors(force_matrix(tilts) * factor, torque, *limits, WEIGHT * factor)
+
+
+def wrench(hover):
     """Torque and force in units of the weight, the force in world axes."""
-    w = np.array(hover.rotor_speeds) ** 2 * SPIN * factors / WEIGHT
+    w = np.array(hover.rotor_speeds) ** 2 * SPIN / WEIGHT
     tilts = np.array(hover.tilts)
     turn = rotation_matrix((hover.roll, hover.pitch, 0.3))
     return torque_matrix(tilts, VEHICLE) @ w, turn @ force_matrix(tilts) @ w
@@ -109,36 +118,23 @@ def test_fixed_tilts_hover_without_a_rotor_only_on_its_blue_line(lost, split, ot
     middle = SPIN[lost - 1] * delta(VEHICLE)
     tilts[lost % 4], tilts[(lost + 2) % 4] = middle + split, middle - split
     assert fixed_tilt_imbalance(tuple(tilts), lost, VEHICLE) == pytest.approx(0.0, abs=1e-12)
-    hover = fixed_tilt_hover(tuple(tilts), VEHICLE, lost=lost)
-    torque, force = wrench(hover)
-    np.testing.assert_allclose(torque, 0.0, atol=1e-7)
-    np.testing.assert_allclose(force, [0.0, 0.0, 1.0], atol=1e-7)
-    assert hover.authority < 1e-6
+    found = rotor_losses(at(tilts))[lost - 1]
+    opposite = found.rotor_speeds[(lost + 1) % 4]
+    assert abs(opposite) < 1e-3 * found.max_rotor_speed
+    assert not found.controllable
 
     tilts[lost % 4] += off
-    assert fixed_tilt_hover(tuple(tilts), VEHICLE, lost=lost) is None
+    assert rotor_losses(at(tilts))[lost - 1] is None
 
 
 @given(st.floats(-0.6, 0.33))
 @settings(max_examples=30, deadline=None)
 def test_one_stuck_servo_of_a_level_gait_is_bearable_up_to_two_delta(angle):
-    assert fixed_tilt_hover((angle, 0.0, 0.0, 0.0), VEHICLE) is not None
-    assert fixed_tilt_hover((0.0, -angle, 0.0, 0.0), VEHICLE) is not None
+    assert hover(at((angle, 0.0, 0.0, 0.0))) is not None
+    assert hover(at((0.0, -angle, 0.0, 0.0))) is not None
     beyond = 2.0 * DELTA + 0.001 + abs(angle)
-    assert fixed_tilt_hover((beyond, 0.0, 0.0, 0.0), VEHICLE) is None
-    assert fixed_tilt_hover((0.0, 0.0, 0.0, -beyond), VEHICLE) is None
-
-
-@given(st.tuples(*[st.floats(0.3, 1.0)] * 4))
-@settings(max_examples=20, deadline=None)
-def test_rotors_with_less_thrust_turn_faster(factors):
-    tilts = (0.1, -0.1, 0.1, -0.1)
-    whole = fixed_tilt_hover(tilts, VEHICLE)
-    weak = fixed_tilt_hover(tilts, VEHICLE, factors=factors)
-    np.testing.assert_allclose(
-        weak.rotor_speeds, np.array(whole.rotor_speeds) / np.sqrt(factors), rtol=1e-9
-    )
-    np.testing.assert_allclose(wrench(weak, factors)[0], 0.0, atol=1e-9)
+    assert hover(at((beyond, 0.0, 0.0, 0.0))) is None
+    assert hover(at((0.0, 0.0, 0.0, -beyond))) is None
 
 
 # --- free tilts --------------------------------------------------------------------------------

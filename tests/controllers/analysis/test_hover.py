@@ -15,7 +15,6 @@ from tiltsim_controllers.analysis.attainable import (
     level_side_forces,
     side_force_share,
 )
-from tiltsim_controllers.analysis.fault_tolerance import fixed_tilt_hover
 from tiltsim_controllers.analysis.hover import RESERVE, hover, rotor_losses
 from tiltsim_controllers.analysis.singularity import hover_rotor_speeds
 from tiltsim_controllers.vehicle.parameters import PRESETS
@@ -148,5 +147,3 @@ def test_four_rotors_hover_as_the_closed_forms_say(tilts):
     assert np.sin(found.lean) == pytest.approx(
         np.cos(singularity.singularity_margin(tilts, AR_DRONE)), abs=1e-6
     )
-    for lost, hovers in enumerate(rotor_losses(rotors), start=1):
-        assert (hovers is None) == (fixed_tilt_hover(tilts, AR_DRONE, lost=lost) is None)

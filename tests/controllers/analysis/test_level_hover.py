@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from math import atan
+
 import numpy as np
 import pytest
 
-from tiltsim_controllers.analysis.balance import balanced_gait
 from tiltsim_controllers.analysis.hover import BALANCED, LEVEL_RESERVE, level_hover
-from tiltsim_controllers.vehicle.parameters import PRESETS
+from tiltsim_controllers.vehicle.cross import torque_free_force
+from tiltsim_controllers.vehicle.parameters import PRESETS, drag_ratio
 from tiltsim_controllers.vehicle.rotors import force_and_torque, rotor_entries
 
 AR_DRONE = PRESETS["ar_drone_2"]
@@ -53,9 +55,72 @@ def test_the_tilts_balance_and_every_rotor_keeps_its_reserve(rotors, acceleratio
         np.testing.assert_allclose(tilts, 0.0, atol=1e-6)
 
 
-def test_four_rotors_tilt_as_the_closed_form_says():
-    tilts, _ = level_hover(arms(4), needed((1.0, 0.0, 0.0)), box(4))
-    np.testing.assert_allclose(tilts, balanced_gait((1.0, 0.0, 0.0), AR_DRONE), atol=1e-5)
+def factors(tilts):
+    """``A`` and ``B``, the yaw levers of rotors 1 and 3 and of 2 and 4 relative to no tilt."""
+    twist = 2.0 * atan(drag_ratio(AR_DRONE))
+    sums = twist - tilts[0] - tilts[2], twist + tilts[1] + tilts[3]
+    return np.sin(sums) / np.sin(twist)
+
+
+def test_the_torque_free_force_of_four_rotors_factors():
+    """``n = (A sin D24, -B sin D13, ...)`` of sums E and differences D of opposite tilts."""
+    ratio = drag_ratio(AR_DRONE)
+    delta = atan(ratio)
+    for tilts in np.random.default_rng(0).uniform(-1.5, 1.5, (20, 4)):
+        (e13, e24), (d13, d24), (a, b) = (
+            tilts[:2] + tilts[2:],
+            tilts[:2] - tilts[2:],
+            factors(tilts),
+        )
+        n = (
+            a * np.sin(d24),
+            -b * np.sin(d13),
+            a * (np.cos(e24 + delta) / np.cos(delta) + np.cos(d24))
+            + b * (np.cos(e13 - delta) / np.cos(delta) + np.cos(d13)),
+        )
+        np.testing.assert_allclose(n, torque_free_force(tilts, ratio), rtol=0, atol=1e-13)
+
+
+@pytest.mark.parametrize("vertical", [-3.0, 0.0, 5.0])
+def test_a_vertical_acceleration_needs_no_tilt(vertical):
+    tilts, _ = level_hover(arms(4), needed((0.0, 0.0, vertical)), box(4))
+    np.testing.assert_array_equal(tilts, 0.0)
+
+
+@pytest.mark.parametrize(
+    "acceleration", [(1, 0, 0), (1, 1, 0), (1.2, 0.5, -1), (-2, 0.7, 0), (-2, 1, 0.5)]
+)
+def test_four_rotors_balance_an_acceleration_with_the_least_tilts(acceleration):
+    """The force along ``n`` opposes it; along the balanced tilts no step shortens their sum."""
+    desired, ratio = needed(acceleration), drag_ratio(AR_DRONE)
+    tilts, _ = level_hover(arms(4), desired, box(4))
+
+    def side(point):
+        n = torque_free_force(point, ratio)
+        return n[:2] - desired[:2] / desired[2] * n[2]
+
+    np.testing.assert_allclose(side(tilts), 0.0, atol=1e-8)
+    slopes = [(side(tilts + h) - side(tilts - h)) / 2e-6 for h in 1e-6 * np.eye(4)]
+    along = tilts - slopes @ np.linalg.lstsq(slopes, tilts, rcond=None)[0]
+    np.testing.assert_allclose(along, 0.0, atol=1e-6)
+
+
+def test_mirrored_accelerations_have_mirrored_gaits():
+    """Half a revolution about the vertical exchanges rotors 1 and 3, and 2 and 4."""
+    there, back = (
+        level_hover(arms(4), needed((s * 1.3, s * 0.4, 0.0)), box(4))[0] for s in (1, -1)
+    )
+    np.testing.assert_allclose(back, there[[2, 3, 0, 1]], rtol=0, atol=1e-6)
+
+
+def test_the_gust_of_chapter_1():
+    """1 m/s^2 along +x: our own figures, the thesis prints none."""
+    tilts, w = level_hover(arms(4), needed((1.0, 0.0, 0.0)), box(4))
+    np.testing.assert_allclose(tilts, (-0.0346, -0.2258, -0.0346, 0.0725), atol=1e-4)
+    loads = np.abs(w) / np.abs(w).mean()
+    np.testing.assert_allclose(loads, (0.63, 1.35, 0.63, 1.39), atol=0.01)
+    even = (0.0, -0.20557, 0.0, 0.20557)  # loads all rotors alike
+    assert np.linalg.norm(tilts) < 0.85 * np.linalg.norm(even)
 
 
 def test_two_rotors_on_a_pod_tilt_together():

@@ -153,11 +153,10 @@ def test_published_matrix_multiplies_the_attitude_loops_by_twice_the_hover_speed
 
 @pytest.mark.parametrize("position", [(0.0, 1.0), (1.0, -1.0)])
 def test_position_gains_must_both_be_positive(position):
-    velocity, place = position
-    bad = GAIN_SETS["ch04"]._replace(position_1=velocity, position_2=place)
+    bad = GAIN_SETS["ch04"]._replace(position=position)
     loop = error_loops(bad, AR_DRONE.hover_rotor_speed, DECOUPLINGS["published"])[-1]
     assert not loop.stable
-    assert loop.condition == f"position gains [{velocity}, {place}] must both be positive"
+    assert loop.condition == f"position gains {[*position]} must both be positive"
 
 
 @pytest.mark.parametrize(

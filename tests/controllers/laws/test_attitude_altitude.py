@@ -97,7 +97,7 @@ def random_case(seed, decoupling, decoupler):
     kind = "attitude_altitude" if decoupler == "none" else random.choice(["line", "circle"])
     parameters = Parameters(
         vehicle=PRESETS[vehicle],
-        gains=Gains(*random.uniform(0.2, 60.0, len(Gains._fields))),
+        gains=unflatten(Gains, random.uniform(0.2, 60.0, 14)),
         gait=GaitParameters(FIXED),
         reference=ReferenceParameters(
             REFERENCE_TYPES[kind],
@@ -152,13 +152,11 @@ def demanded_third_derivatives(parameters, state):
     else:
         ax, ay, _ = (
             demanded_acceleration
-            + gains.position_1 * (wanted_velocity - velocity)
-            + gains.position_2 * (wanted_position - position)
+            + gains.position[0] * (wanted_velocity - velocity)
+            + gains.position[1] * (wanted_position - position)
         )
         lean = attitude_for(parameters, alpha, ax, ay, demanded_acceleration[2])
-    k1 = np.array([gains.roll_1, gains.pitch_1, gains.yaw_1, gains.altitude_1])
-    k2 = np.array([gains.roll_2, gains.pitch_2, gains.yaw_2, gains.altitude_2])
-    k3 = np.array([gains.roll_3, gains.pitch_3, gains.yaw_3, gains.altitude_3])
+    k1, k2, k3 = np.transpose([*gains.loops.values()])
     second = second_derivatives(parameters.vehicle, alpha, rotation(*attitude), speeds)
     return (
         k1 * ([0, 0, 0, demanded_acceleration[2]] - second)

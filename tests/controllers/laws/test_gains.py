@@ -6,15 +6,14 @@ import numpy as np
 import pytest
 
 from tiltsim_controllers.laws import yaw_position
-from tiltsim_controllers.laws.gains import GAIN_SETS, Poles, gains_from_rows
-from tiltsim_controllers.tilt_car import fourth_derivative, planned_direction, third_derivative
+from tiltsim_controllers.laws.gains import GAIN_SETS, Gains, Poles
+from tiltsim_controllers.tilt_car import integrating, planned_direction
 
 AXES = ("roll", "pitch", "yaw", "altitude")
 
 
 def poles(name, axis):
-    gains = GAIN_SETS[name]
-    return np.roots([1.0, *(getattr(gains, f"{axis}_{order}") for order in (1, 2, 3))])
+    return np.roots([1.0, *GAIN_SETS[name].loops[axis]])
 
 
 def assert_poles(name, axis, expected):
@@ -37,14 +36,15 @@ def test_the_feedforward_set_has_the_poles_that_it_says():
         assert_poles("feedforward", axis, [-bandwidth] * 3)
     gains = GAIN_SETS["feedforward"]
     position = np.poly([-1.5, -1.5])
-    np.testing.assert_allclose([1.0, gains.position_1, gains.position_2], position, rtol=1e-12)
+    np.testing.assert_allclose([1.0, *gains.position], position, rtol=1e-12)
 
 
 def test_the_published_sets_are_as_printed():
     """Ch. 3, Sec. 3.2, and ch. 4, Eqs. (26)-(28), whose third column is the yaw's."""
     ch03, ch04 = GAIN_SETS["ch03"], GAIN_SETS["ch04"]
-    assert ch03 == (*[1] * 9, 10, 5, 10, 1, 1)
-    assert ch04 == (1, 10, 50, 1, 10, 50, 1, 1, 1, 10, 5, 10, 1, 1)
+    last = (10, 5, 10), (1, 1)
+    assert ch03 == (*[(1, 1, 1)] * 3, *last)
+    assert ch04 == ((1, 1, 1), (10, 10, 1), (50, 50, 1), *last)
 
 
 def test_other_sets_are_as_printed_and_ours_have_the_poles_that_they_say():
@@ -55,17 +55,17 @@ def test_other_sets_are_as_printed_and_ours_have_the_poles_that_they_say():
     loops = (
         (planned_direction.GAIN_SETS["ch10"].x, -2.0),
         (planned_direction.GAIN_SETS["ch10"].y, -2.0),
-        (third_derivative.GAIN_SETS["ch10"], -2.0),
-        (fourth_derivative.GAIN_SETS["ch10"], -3.0),
+        (integrating.THIRD_GAINS["ch10"], -2.0),
+        (integrating.FOURTH_GAINS["ch10"], -3.0),
     )
     for gains, pole in loops:
         np.testing.assert_allclose([1.0, *gains], np.poly([pole] * len(gains)), rtol=1e-12)
 
 
 def test_rows_are_diagonals_of_roll_pitch_and_yaw():
-    gains = gains_from_rows([[1, 2, 3], [4, 5, 6], [7, 8, 9]], [10, 11, 12], [13, 14])
-    assert gains == (1, 4, 7, 2, 5, 8, 3, 6, 9, 10, 11, 12, 13, 14)
-    assert (gains.pitch_2, gains.yaw_3, gains.altitude_1, gains.position_2) == (5, 9, 10, 14)
+    gains = Gains((1, 2, 3), (4, 5, 6), (7, 8, 9), (10, 11, 12), (13, 14))
+    outputs = {"roll": (1, 4, 7), "pitch": (2, 5, 8), "yaw": (3, 6, 9), "altitude": (10, 11, 12)}
+    assert gains.loops == outputs
 
 
 @pytest.mark.parametrize("field", ["damping", "integral"])

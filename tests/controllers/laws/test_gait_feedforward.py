@@ -370,7 +370,7 @@ def test_the_closed_loops_have_the_requested_poles():
     np.testing.assert_allclose(sorted(np.roots(loops["altitude"]).real)[-1], -0.5, rtol=1e-9)
     without = {loop.name: loop for loop in feedforward_loops(GAINS, IntegralGains())}
     assert len(without["position"].polynomial) == 3
-    unstable = feedforward_loops(Gains(*[1.0] * 14), IntegralGains(5.0))
+    unstable = feedforward_loops(Gains(*[(1.0,) * 3] * 4, (1.0, 1.0)), IntegralGains(5.0))
     assert not unstable[-1].stable
 
 

@@ -329,10 +329,9 @@ def test_attitude_control_feeds_the_motion_of_its_reference_forward():
     error = attitude_error(body(now), desired(now))
     gains = law.gains
     expected = (
-        np.array((gains.roll_1, gains.pitch_1, gains.yaw_1))
-        * (rate(demand, now) - rate(present, now))
-        + np.array((gains.roll_2, gains.pitch_2, gains.yaw_2)) * (demand(now) - present(now))
-        + np.array((gains.roll_3, gains.pitch_3, gains.yaw_3)) * error
+        np.array(gains.attitude_1) * (rate(demand, now) - rate(present, now))
+        + np.array(gains.attitude_2) * (demand(now) - present(now))
+        + np.array(gains.attitude_3) * error
     )
     motion = body(now), present(now), rate(present, now)
     references = turned(now, 0.8, 1.0), turned(now, -0.6, 1.3), turned(now, 0.9, 1.1)

@@ -113,7 +113,7 @@ def attitude_references(motion, law, euler_yaw):
     def demanded(t):
         integral, error, rate = motion.errors(t, terms)
         gains = law.gains
-        back = gains.position_1 * rate + gains.position_2 * error
+        back = gains.position[0] * rate + gains.position[1] * error
         back = (back + terms.integral_action * law.integral.position * integral)[:2]
         length = np.linalg.norm(back)
         if length > law.max_acceleration:
@@ -144,15 +144,15 @@ def demanded_third_derivatives(motion, law):
     gains = law.gains
     attitude = [
         k1 * (goal[2] - real[2]) + k2 * (goal[1] - real[1]) + k3 * (goal[0] - real[0])
-        for goal, real, (k1, k2, k3) in zip(desired, actual, (gains[0:3], gains[3:6], gains[6:9]))
+        for goal, real, (k1, k2, k3) in zip(desired, actual, zip(*gains.attitude))
     ]
     integral, error, rate = (value[2] for value in motion.errors(0.0, law.terms))
     known, counted = law.terms.reference_derivatives, law.terms.integral_action
     climb = (
         known * reference(TIME, 3)[2]
-        + gains.altitude_1 * (known * reference(TIME, 2)[2] - motion.acceleration(0.0)[2])
-        + gains.altitude_2 * rate
-        + gains.altitude_3 * error
+        + gains.altitude[0] * (known * reference(TIME, 2)[2] - motion.acceleration(0.0)[2])
+        + gains.altitude[1] * rate
+        + gains.altitude[2] * error
         + counted * law.integral.altitude * integral
     )
     return np.array([*attitude, climb])
@@ -163,7 +163,7 @@ def law_for(**changed):
     return base._replace(**{"max_acceleration": 100.0, **changed})
 
 
-NO_FEEDBACK = GAINS._replace(position_1=0.0, position_2=0.0)
+NO_FEEDBACK = GAINS._replace(position=(0.0, 0.0))
 LAWS = {
     "feed-forward alone": law_for(gains=NO_FEEDBACK, integral=INTEGRAL._replace(position=0.0)),
     "with feedback": law_for(),
@@ -200,7 +200,9 @@ def test_each_integrator_stops_where_its_own_axis_is_at_its_limit(axis, side):
     at_rest = ReferenceParameters(REFERENCE_TYPES["setpoint"])
     law = law_for(reference=at_rest, max_acceleration=limit)
     gains = law.gains
-    bound = limit * gains.altitude_1 / gains.altitude_3 if axis == 2 else limit / gains.position_2
+    bound = (
+        limit * gains.altitude[0] / gains.altitude[2] if axis == 2 else limit / gains.position[1]
+    )
     for share, moves in ((1.0 - 1e-9, True), (1.0 + 1e-9, False)):
         state = np.zeros(20)
         state[axis] = -side * share * bound

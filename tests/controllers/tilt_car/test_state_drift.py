@@ -20,7 +20,7 @@ from tests.controllers.tilt_car.lean import (
     split_of_lean,
 )
 from tiltsim_controllers.tilt_car.cycles import Orbit, drift_rate, lean_stiffness, orbit, twist
-from tiltsim_controllers.tilt_car.third_derivative import (
+from tiltsim_controllers.tilt_car.integrating import (
     minimum_norm,
     null_space_input,
     restoring_inputs,

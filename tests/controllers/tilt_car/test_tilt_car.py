@@ -18,9 +18,8 @@ from tiltsim_controllers.references.trajectories import (
     ReferenceParameters,
     reference_motion,
 )
-from tiltsim_controllers.tilt_car import fourth_derivative as fourth
+from tiltsim_controllers.tilt_car import integrating
 from tiltsim_controllers.tilt_car import planned_direction as planned
-from tiltsim_controllers.tilt_car import third_derivative as third
 from tiltsim_controllers.tilt_car.vehicle import (
     THESIS_CAR,
     TiltCar,
@@ -131,7 +130,7 @@ def test_drift_and_columns_make_the_fourth_derivative():
     (w1, d1, s1), (w2, d2, s2), (alpha, d3, s3) = INPUTS
     yaw = -counter_yaw_per_tilt(CAR) * alpha
     state = np.array([0.0, 0.0, 0.0, 0.0, yaw, alpha, w1, w2, d3, d1, d2])
-    drift = fourth.body_derivatives(state, CAR)[2]
+    drift = integrating.body_derivatives(state, CAR)[2]
     body = drift + matrix_at(w1, w2) @ (s1, s2, s3)
     np.testing.assert_allclose(rotation(yaw + alpha) @ body, desired, rtol=1e-12)
 
@@ -141,22 +140,24 @@ def test_the_inverse_is_numpys(speed_1, speed_2, x, y):
     matrix, outputs = matrix_at(speed_1, speed_2), np.array([x, y])
     desired = np.linalg.pinv(matrix) @ outputs
     scale = np.abs(desired).max() + 1e-9
-    np.testing.assert_allclose(third.minimum_norm(matrix, outputs), desired, atol=1e-9 * scale)
+    np.testing.assert_allclose(
+        integrating.minimum_norm(matrix, outputs), desired, atol=1e-9 * scale
+    )
 
 
 def test_one_rotor_at_rest_leaves_full_rank_two_do_not():
     one, outputs = matrix_at(80.0, 0.0), np.array([1.0, 2.0])
     assert np.linalg.matrix_rank(one) == 2
-    inputs = third.minimum_norm(one, outputs)
+    inputs = integrating.minimum_norm(one, outputs)
     assert inputs[1] == 0.0
     np.testing.assert_allclose(one @ inputs, outputs)
-    assert np.isnan(third.minimum_norm(matrix_at(0.0, 0.0), outputs)).all()
+    assert np.isnan(integrating.minimum_norm(matrix_at(0.0, 0.0), outputs)).all()
 
 
 @given(speeds, speeds)
 def test_silent_inputs_are_not_felt(speed_1, speed_2):
     matrix = matrix_at(speed_1, speed_2)
-    n = third.null_space_input(matrix)
+    n = integrating.null_space_input(matrix)
     scale = np.linalg.norm(matrix) * np.linalg.norm(n)
     np.testing.assert_allclose(matrix @ n, 0.0, atol=1e-12 * scale)
 
@@ -166,7 +167,7 @@ def test_restoring_turns_the_middle_and_nothing_else(speed_1, speed_2, rate):
     matrix = matrix_at(speed_1, speed_2)
     along, across = thrust_map(CAR) @ (speed_1**2, speed_2**2)
     lean = np.arctan2(across, along)
-    inputs = third.restoring_inputs(lean, rate, matrix, CAR)
+    inputs = integrating.restoring_inputs(lean, rate, matrix, CAR)
     scale = np.linalg.norm(matrix) * np.linalg.norm(inputs) + 1e-12
     np.testing.assert_allclose(matrix @ inputs, 0.0, atol=1e-10 * scale)
     # The acceleration stands still in the world, so the lean changes as the middle turns.
@@ -176,8 +177,10 @@ def test_restoring_turns_the_middle_and_nothing_else(speed_1, speed_2, rate):
 @pytest.mark.parametrize("restoring_rate", [0.0, 2.0])
 def test_the_third_derivative_law_makes_the_jerk_it_wants(restoring_rate):
     state = np.array([1.0, -2.0, 3.0, -4.0, -0.3, 0.9, 90.0, 70.0])
-    parameters = third.Parameters(CAR, CIRCLE_10, third.GAIN_SETS["ch10"], restoring_rate)
-    inputs = third.third_derivative_inputs(0.7, state, parameters)
+    parameters = integrating.ThirdParameters(
+        CAR, CIRCLE_10, integrating.THIRD_GAINS["ch10"], restoring_rate
+    )
+    inputs = integrating.third_derivative_inputs(0.7, state, parameters)
     made = rotation(0.6) @ matrix_at(90.0, 70.0) @ inputs
     reference = reference_motion(0.7, CIRCLE_10)[:, :2]
     pushed = acceleration(0.6, np.array([90.0**2, 70.0**2]), CAR)
@@ -191,12 +194,12 @@ def test_the_third_derivative_law_makes_the_jerk_it_wants(restoring_rate):
 
 
 def test_nothing_restores_the_lean_where_a_rotor_rests():
-    assert not third.restoring_inputs(0.3, 2.0, matrix_at(80.0, 0.0), CAR).any()
+    assert not integrating.restoring_inputs(0.3, 2.0, matrix_at(80.0, 0.0), CAR).any()
 
 
 def fourth_parameters(decoupling):
-    code = choice(fourth.FourthDerivative, "decoupling", decoupling)
-    return fourth.Parameters(CAR, CIRCLE_10, code, 0.0, fourth.GAIN_SETS["ch10"])
+    code = choice(integrating.FourthDerivative, "decoupling", decoupling)
+    return integrating.FourthParameters(CAR, CIRCLE_10, code, 0.0, integrating.FOURTH_GAINS["ch10"])
 
 
 def test_the_fourth_derivative_law_makes_the_snap_it_demands():
@@ -204,7 +207,7 @@ def test_the_fourth_derivative_law_makes_the_snap_it_demands():
     yaw = -0.3
     state = np.array([1.0, -2.0, 3.0, -4.0, yaw, alpha, w1, w2, d3, d1, d2])
     law = fourth_parameters("exact")
-    second = fourth.fourth_derivative_inputs(0.7, state, law)
+    second = integrating.fourth_derivative_inputs(0.7, state, law)
     motion = [(*values[:2], last) for values, last in zip(INPUTS, second)]
     frame = rotation(yaw + alpha - turn_per_tilt(CAR) * alpha)
     ax, jx, made = (
@@ -225,7 +228,7 @@ def test_the_fourth_derivative_law_makes_the_snap_it_demands():
 def test_the_printed_tilt_column_lacks_the_yaws_answer():
     state = np.array([0.1, 0.2, 0.3, 0.4, -0.2, 0.5, 90.0, 70.0, 1.0, 2.0, -3.0])
     inputs = {
-        name: fourth.fourth_derivative_inputs(0.3, state, fourth_parameters(name))
+        name: integrating.fourth_derivative_inputs(0.3, state, fourth_parameters(name))
         for name in ("published", "exact")
     }
     made = {}

@@ -186,8 +186,7 @@ def test_the_delay_margin_is_the_least_of_several():
 
 
 def test_the_named_gains_are_those_assumed_here():
-    gains = GAIN_SETS["exact"]
-    assert (gains.roll_1, gains.roll_2, gains.roll_3) == ATTITUDE
+    assert GAIN_SETS["exact"].loops["roll"] == ATTITUDE
 
 
 @pytest.mark.parametrize(("share", "survives"), [(0.9, True), (1.1, False)])

@@ -10,12 +10,10 @@ lagging rotors depend on the state and not on the rotor accelerations that a con
 the controls are computed once to find them, and once more with the readings.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cache
 from math import ceil, inf
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -24,7 +22,7 @@ from tiltsim.equations.actuator_level import mechanics, mechanics_record, servo_
 from tiltsim.laws.layers.layer import Layer, wrap_loop
 from tiltsim.laws.layers.on_equations import read_actuators
 from tiltsim.models.parts import ExtraActuators
-from tiltsim.scenario.scenario import FlightPlan
+from tiltsim.scenario.scenario import FlightPlan, Scenario
 from tiltsim.vehicles.rotorcraft import rotor_limits
 from tiltsim.vehicles.rotorcraft.layout import (
     QW,
@@ -44,13 +42,6 @@ from tiltsim_controllers.vehicle.body import Body, inertia_matrix, inverse_inert
 from tiltsim_controllers.vehicle.craft import craft_of
 from tiltsim_controllers.vehicle.instruments import reading_index
 from tiltsim_controllers.vehicle.rotors import wrench_map
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from tiltsim.closed_loop.loop import ClosedLoop
-    from tiltsim.scenario.scenario import FlightPlan, Scenario
-
 
 CHANNELS: Final = 64  # of the draws of an instrument; other parts of a flight use those below 1000
 WALK: Final = 32.0  # channels between the noise of an instrument and the walk of its biases

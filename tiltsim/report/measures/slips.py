@@ -225,7 +225,7 @@ def _ch2_gains(mended: bool) -> float:
 def _routh(mended: bool) -> float:
     """Largest real part above zero of ch. 4's roll loop, or with the loop gain 2 w of hover."""
     gains, factor = GAIN_SETS["ch04"], 2.0 * _VEHICLE.hover_rotor_speed if mended else 1.0
-    loop = (1.0, *(factor * gain for gain in (gains.roll_1, gains.roll_2, gains.roll_3)))
+    loop = (1.0, *(factor * gain for gain in gains.loops["roll"]))
     return max(0.0, float(np.roots(loop).real.max()))
 
 

@@ -1,0 +1,200 @@
+"""Third- and fourth-derivative feedback linearization of the tilt-car (ch. 10, Secs. 3.1 and 6.1).
+
+The inputs, the first or second derivatives of both rotor speeds and of the tilt angle, are three;
+they determine two outputs, the third or fourth derivatives of the position. The controller takes
+the shortest of all solutions (`minimum_norm`, Eq. 12), which makes its states drift
+(`tiltsim_controllers.tilt_car.cycles`). Optionally a restoring rate in the null space turns the
+thrusts' bisector back toward the acceleration.
+
+The first derivatives of the inputs are states of the controller of the fourth derivative. As
+printed, the tilt's column of its decoupling matrix (Eq. 27) lacks the factor ``1 - I_T / I_B`` due
+to the counter-rotation, which the ``decoupling`` ``exact`` includes. The rotor speeds that it
+integrates may drift below zero, where no thrust follows them. The controller then continues, as in
+the chapter, with speeds that no rotor has (windup), and fails; with ``anti_windup`` they stop at
+zero, and the other rotor and the tilt continue alone.
+"""
+
+from collections.abc import Sequence
+from typing import Any, ClassVar, Final, Literal
+
+from tiltsim_controllers.code.arrays import xp
+from tiltsim_controllers.laws.feedback import error_dynamics
+from tiltsim_controllers.laws.keys import (
+    Gains4,
+    GainSets,
+    Keys,
+    NamedGains,
+    NonNegative,
+    Vector3,
+    choice,
+    default,
+    record_of,
+    required,
+)
+from tiltsim_controllers.references.trajectories import ReferenceParameters, reference_motion
+from tiltsim_controllers.tilt_car.vehicle import (
+    TiltCar,
+    input_matrix,
+    rotation,
+    thrust_map,
+    turn_per_tilt,
+)
+
+THIRD_GAINS: Final = {"ch10": (6.0, 12.0, 8.0)}
+"""Gains of the third-derivative law by name, the same for both axes.
+
+Ours, all poles at -2: the thesis prints none.
+"""
+
+FOURTH_GAINS: Final = {"ch10": (12.0, 54.0, 108.0, 81.0)}
+"""Likewise of the fourth-derivative law, all poles at -3."""
+
+
+class ThirdDerivative(Keys):
+    """Keys of `third_derivative_inputs`."""
+
+    gain_sets: ClassVar[GainSets] = {"gains": THIRD_GAINS}
+
+    law: Literal["tilt_car_third_derivative"] = required(
+        "the tilt-car's rotor speeds and tilt control the third derivative of x and y"
+    )
+    gains: NamedGains[Literal["ch10"], Vector3] = default(
+        "ch10",
+        "poles at -2, or three gains on the errors of acceleration, velocity and position [1/s, "
+        "1/s^2, 1/s^3]",
+        [6.0, 12.0, 8.0],
+    )
+    restoring_rate: NonNegative = default(
+        0.0,
+        "rate of turning the mean thrust direction toward the acceleration; 0 as published [1/s]",
+        1.0,
+    )
+
+
+class FourthDerivative(Keys):
+    """Keys of `fourth_derivative_inputs`."""
+
+    gain_sets: ClassVar[GainSets] = {"gains": FOURTH_GAINS}
+
+    law: Literal["tilt_car_fourth_derivative"] = required(
+        "the tilt-car's rotor speeds and tilt control the fourth derivative of x and y"
+    )
+    decoupling: Literal["published", "exact"] = default(
+        "exact",
+        "effect of the tilt in the decoupling matrix: as published, or with the yaw's reaction",
+    )
+    anti_windup: bool = default(False, "stop the rotor speeds that the law integrates at zero")
+    gains: NamedGains[Literal["ch10"], Gains4] = default(
+        "ch10",
+        "poles at -3, or four gains on the errors of jerk, acceleration, velocity and position "
+        "[1/s, 1/s^2, 1/s^3, 1/s^4]",
+        [12.0, 54.0, 108.0, 81.0],
+    )
+
+
+ThirdParameters = record_of(ThirdDerivative, car=TiltCar, reference=ReferenceParameters)
+FourthParameters = record_of(FourthDerivative, car=TiltCar, reference=ReferenceParameters)
+
+PUBLISHED: Final = choice(FourthDerivative, "decoupling", "published")
+
+
+def minimum_norm(matrix: Any, desired: Any) -> Any:
+    """The shortest inputs for the desired outputs, ``Delta^T (Delta Delta^T)^-1`` (Eq. 12).
+
+    NaN where the matrix is rank-deficient: with both rotors at rest. With one rotor at rest it is
+    not, contrary to ch. 10: the tilt turns the other thrust.
+
+    Args:
+        matrix: `input_matrix`, shape (2, 3).
+        desired: Shape (2,).
+    """
+    (xx, xy), (_, yy) = gram = matrix @ matrix.T
+    determinant = xx * yy - xy * xy
+    adjugate = xp.array([[yy, -xy], [-xy, gram[0, 0]]])
+    shares = adjugate @ desired / xp.where(determinant == 0.0, xp.nan, determinant)
+    return matrix.T @ shares
+
+
+def null_space_input(matrix: Any) -> Any:
+    """The direction of inputs without effect on the outputs: the null space of ``Delta``, (3,)."""
+    (x1, x2, x3), (y1, y2, y3) = matrix
+    return xp.array([x2 * y3 - x3 * y2, x3 * y1 - x1 * y3, x1 * y2 - x2 * y1])
+
+
+def restoring_inputs(lean: Any, rate: Any, matrix: Any, car: TiltCar) -> Any:
+    """Inputs without effect on the outputs that reduce the lean, shape (3,).
+
+    Zero where a rotor rests, as then no input in the null space turns the bisector.
+
+    Args:
+        lean: Angle from the thrusts' bisector to the acceleration, rad.
+        rate: 1/s
+        matrix: `input_matrix`
+        car: The vehicle.
+    """
+    silent = null_space_input(matrix)
+    turns = silent[2] != 0.0
+    scale = rate * lean / (turn_per_tilt(car) * xp.where(turns, silent[2], 1.0))
+    return xp.where(turns, scale, 0.0) * silent
+
+
+def body_derivatives(state: Any, car: TiltCar) -> Any:
+    """Acceleration, jerk and drift ``M_P`` in the frame of the thrusts' bisector, shape (3, 2).
+
+    Eq. (21) without its terms in the second derivatives of the inputs, written with the turn rate
+    of the bisector, ``(1 - I_T / I_B) alpha'``, for the products of ``J_psi`` and ``J_alpha``.
+
+    Args:
+        state: `tiltsim_controllers.tilt_car.vehicle.STATE_FIELDS`, then the controller's own tilt
+            rate (rad/s) and rotor accelerations (rad/s^2), shape (11,).
+        car: The vehicle.
+    """
+    speeds, tilt_rate, rates = state[6:8], state[8], state[9:11]
+    turn = turn_per_tilt(car) * tilt_rate * xp.array([[0.0, -1.0], [1.0, 0.0]])
+    pushed, push_rate, push_curve = (
+        thrust_map(car) @ squares
+        for squares in (speeds * speeds, 2.0 * speeds * rates, 2.0 * rates * rates)
+    )
+    drift = push_curve + turn @ (turn @ pushed) + 2.0 * (turn @ push_rate)
+    return xp.array([pushed, push_rate + turn @ pushed, drift])
+
+
+def _demanded(time: Any, state: Any, p: Any, derivatives: Sequence[Any]) -> Any:
+    """The demanded derivative of the position after the present ones, along the bisector, (2,).
+
+    ``derivatives`` are the acceleration and any higher ones, along the bisector, m and s.
+    """
+    to_world = rotation(state[4] + state[5])
+    present = (state[0:2], state[2:4], *(to_world @ own for own in derivatives))
+    reference = reference_motion(time, p.reference)[: len(present) + 1, :2]
+    return to_world.T @ error_dynamics(reference, present, p.gains)
+
+
+def third_derivative_inputs(time: Any, state: Any, p: Any) -> Any:
+    """Rates of the rotor speeds (rad/s^2) and of the tilt angle (rad/s), shape (3,); Eq. (14).
+
+    Args:
+        time: s
+        state: `tiltsim_controllers.tilt_car.vehicle.STATE_FIELDS`, shape (8,).
+        p: `ThirdParameters`.
+    """
+    speeds, matrix = state[6:8], input_matrix(state[6:8], p.car)
+    pushed = thrust_map(p.car) @ (speeds * speeds)
+    lean = xp.arctan2(pushed[1], pushed[0])
+    restoring = restoring_inputs(lean, p.restoring_rate, matrix, p.car)
+    return minimum_norm(matrix, _demanded(time, state, p, [pushed])) + restoring
+
+
+def fourth_derivative_inputs(time: Any, state: Any, p: Any) -> Any:
+    """Second derivatives of rotor speeds (rad/s^3) and tilt angle (rad/s^2), (3,); Eq. (29).
+
+    Args:
+        time: s
+        state: See `body_derivatives`.
+        p: `FourthParameters`.
+    """
+    pushed, moved, drift = body_derivatives(state, p.car)
+    matrix = input_matrix(state[6:8], p.car)
+    if p.decoupling == PUBLISHED:
+        matrix = xp.hstack([matrix[:, :2], xp.array([[-pushed[1]], [pushed[0]]])])
+    return minimum_norm(matrix, _demanded(time, state, p, [pushed, moved]) - drift)
