@@ -245,15 +245,10 @@ FREE: tuple[slice, slice] = (slice(-7, None), slice(-6, None))
 
 
 class Pendulum(NamedTuple):
-    """A load on a cable below a vehicle, whose free joint is the first of ``qpos``.
+    """A load on a cable below a vehicle, whose free joint is the first of ``qpos``."""
 
-    Attributes:
-        length: m, of the cable.
-        attachment: m, body axes.
-    """
-
-    length: float
-    attachment: Triple
+    length: float  # m, of the cable
+    attachment: Triple  # m, body axes
 
     def placed(self, qpos: Floats, qvel: Floats) -> tuple[Floats, Floats]:
         """The motion in MuJoCo of a vehicle with angles (rad) and their rates behind it."""

@@ -37,25 +37,18 @@ SAMPLES: Final = 1000  # flown, that a rest point of a sampled controller takes
 
 @dataclass(frozen=True, eq=False)
 class Equilibrium:
-    """A state to which a closed loop returns: at once, after a control sample or after a period.
+    """A state to which a closed loop returns: at once, after a control sample or after a period."""
 
-    Attributes:
-        motion: The closed loop on its plant.
-        forcing: Its dependence on time.
-        root: The state at ``step``, the residual of its rates or of its change over ``steps``, and
-            the derivative of the residual.
-        step: The physics step at which it is considered.
-        steps: Physics steps after which it returns; 0 where it rests in continuous time.
-        left_out: Names of coordinates that nothing holds and that no other depends on: they move
-            on while the others rest.
-    """
-
-    motion: Motion
-    forcing: Forcing
+    motion: Motion  # the closed loop on its plant
+    forcing: Forcing  # its dependence on time
     root: newton.Root
-    step: int
-    steps: int
+    """The state at ``step``, the residual of its rates or of its change over ``steps``, and the
+    derivative of the residual."""
+    step: int  # the physics step at which it is considered
+    steps: int  # physics steps after which it returns; 0 where it rests in continuous time
     left_out: tuple[str, ...] = ()
+    """Names of coordinates that nothing holds and that no other depends on: they move on while the
+    others rest."""
 
     @property
     def time(self) -> float:

@@ -44,19 +44,12 @@ Result = TypeVar("Result")
 
 @dataclass(frozen=True, repr=False)
 class FlightResult:
-    """The result of one flight among many.
-
-    Attributes:
-        scenario: The scenario.
-        end: Its end.
-        metrics: Its metrics; see `tiltsim.scenario.metric_names.METRICS`.
-        flight: The flight itself, if its samples are kept.
-    """
+    """The result of one flight among many."""
 
     scenario: Scenario
     end: End
-    metrics: dict[str, float | bool]
-    flight: Flight | None = None
+    metrics: dict[str, float | bool]  # see `tiltsim.scenario.metric_names.METRICS`
+    flight: Flight | None = None  # the flight itself, if its samples are kept
 
     @property
     def has_failed(self) -> bool:
