@@ -36,7 +36,6 @@ LONG: Final = 1000
 """Steps, from which on a flight is long: worth a thread, and a derivative of fewer evaluations."""
 
 SETTLING_TIME: Final = 40.0  # s, flown at most to approach an orbit or a rest point
-
 THREADS: Final = os.cpu_count() or 1
 ROWS_PER_THREAD: Final = 4  # flights of a thread between reports of progress
 
@@ -77,10 +76,7 @@ class Motion(ABC):
         return assemble(self.scenario, self._as_flown)
 
     def _adapted(self, loop: ClosedLoop) -> ClosedLoop:
-        """A controller without layers, to whose inputs of the vehicle the offsets are added.
-
-        It is not traced: offsets are not parameters.
-        """
+        """A loop without layers whose commands get the offsets, which no trace would see change."""
         loop = self._as_flown(loop)
         equations = loop.equations
         if equations is not None:
@@ -221,9 +217,8 @@ class EquationMotion(Motion):
         return state if project is None else np.array(project(state.tolist(), parameters))
 
     def flown(self, step: int, state: Floats, steps: int) -> Floats:
-        return self._flown_by(
-            self._varied if self.offsets.any() else self._plant, step, state, steps
-        )
+        plant = self._varied if self.offsets.any() else self._plant
+        return self._flown_by(plant, step, state, steps)
 
     def _flown_by(self, plant: EquationsPlant, step: int, state: Floats, steps: int) -> Floats:
         held = self._equations.inputs_size
@@ -256,9 +251,8 @@ class MujocoMotion(Motion):
         return None if load is None or load.rigid else Pendulum(load.length, load.attachment)
 
     def _names(self) -> tuple[coordinates.Coordinates, tuple[coordinates.Input, ...]]:
-        return coordinates.mujoco_coordinates(self.assembly.loop), coordinates.control_inputs(
-            self.assembly
-        )
+        loop = self.assembly.loop
+        return coordinates.mujoco_coordinates(loop), coordinates.control_inputs(self.assembly)
 
     @cached_property
     def _varied(self) -> MujocoPlant:
@@ -282,14 +276,10 @@ class MujocoMotion(Motion):
         model = self._varied.model
         return slice(1, 1 + model.nq + model.nv + model.na)
 
-    def _divided(self, whole: Floats) -> list[Floats]:
-        """MuJoCo's `qpos`, `qvel` and `act` of an integration state."""
-        model = self._varied.model
-        return np.split(whole[self._part], (model.nq, model.nq + model.nv))
-
     def _read(self, whole: Floats) -> Floats:
         """The state of an integration state."""
-        qpos, qvel, act = self._divided(whole)
+        model = self._varied.model
+        qpos, qvel, act = np.split(whole[self._part], (model.nq, model.nq + model.nv))
         if self._load is not None:
             qpos, qvel = self._load.angles(qpos, qvel)
         return np.concatenate((qpos, qvel, act))
@@ -300,8 +290,8 @@ class MujocoMotion(Motion):
 
     def _placed(self, state: Floats, load: Pendulum | None = None) -> list[Floats]:
         """MuJoCo's `qpos`, `qvel` and `act`, with the load on its cable or on another."""
-        (qpos, qvel, act), load = self._split(state), load or self._load
-        return [qpos, qvel, act] if load is None else [*load.placed(qpos, qvel), act]
+        (*motion, act), load = self._split(state), load or self._load
+        return [*(motion if load is None else load.placed(*motion)), act]
 
     @cached_property
     def _stretched(self) -> Pendulum | None:
@@ -311,10 +301,8 @@ class MujocoMotion(Motion):
         plant = self._plant
         plant.state = self._whole
         plant.advance(ceil(SETTLING_TIME / self.scenario.simulation.timestep))
-        qpos, qvel, _ = self._divided(plant.state)
-        length = self._load.distance(qpos, qvel)
-        lost = plant.fault() or not length > 0.0
-        return self._load if lost else self._load._replace(length=length)
+        length = self._load.distance(plant.data.qpos, plant.data.qvel)
+        return self._load if plant.fault() else self._load._replace(length=length)
 
     def _seen(self, state: Floats, tension: float = 0.0) -> list[list[float]]:
         """Arguments of the functions of the loop: the vehicle's `qpos` and `qvel`, and `act`."""
