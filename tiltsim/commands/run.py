@@ -69,7 +69,7 @@ def run(
 
     refuse_both(judge=judge, no_judge=no_judge)
     refuse_both(live=live, connect=connect)
-    changes: dict[str, Any] = dict(overrides)
+    changes = dict(overrides)
     loaded = load_scenario(scenario, changes, controller=controller, trusted=True)
     expecting, judged = loaded, judge
     if judge is no_judge:
@@ -103,8 +103,7 @@ def run(
     metrics = flight.metrics()
     verdicts = check_expectations(expecting, metrics)
     if not quiet:
-        if flight.end.kind == "completed" and metrics["min_rotor_speed"] < 0.0:
-            speed = metrics["min_rotor_speed"]
+        if flight.end.kind == "completed" and (speed := metrics["min_rotor_speed"]) < 0.0:
             warn(f"a rotor stopped and reversed (min_rotor_speed = {speed:.4g} rad/s)")
         changes = _differing(changes, scenario, loaded)
         changes |= {} if controller is None else {"controller": controller}
