@@ -80,7 +80,7 @@ class Timing:
         servo: Natural frequency (rad/s) and damping ratio of the tilt servos.
         servo_limits: Largest rate (rad/s) and angle (rad) of these, infinite without limits.
         tilt_gain: 1/s, of the loop that moves the commanded tilts.
-        noise: Of measured velocities (m/s) and body rates (rad/s), in the mean of a second.
+        noise: Deviations of velocities (m/s) and body rates (rad/s), in the mean of a second.
     """
 
     period: float
@@ -129,7 +129,7 @@ def _observers(
 
     Args:
         factor: Multiplies the bandwidths; 0 for no observers.
-        bandwidths: The observers' of side force, thrust and torque, and the bandwidth of yaw, 1/s.
+        bandwidths: Estimates of side force, thrust and torque follow at these; last, yaw's, 1/s.
         noise: See `Timing`.
         period: s, between calls.
     """
@@ -160,7 +160,7 @@ def _observers(
 
 
 def _correction(pole: float, damping: float) -> tuple[float, float]:
-    """Shares of its error by which a call corrects a speed, and what disturbs it in a period."""
+    """Shares of its error by which a call corrects a speed, and its change in a period."""
     root = np.exp(pole * complex(-damping, (1.0 - damping**2) ** 0.5))
     trust = 2.0 - 2.0 * float(root.real)
     return trust, float(abs(root)) ** 2 - 1.0 + trust
