@@ -7,7 +7,7 @@ limits leave, and the side force that needs no lean from a linear program.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import atan, cos, exp, inf
+from math import atan, cos, exp, inf, pi
 from typing import Any, Final
 
 import numpy as np
@@ -190,11 +190,13 @@ def ability(keys: Vectoring, craft: Craft, left: float, *, harmed: bool = False)
         if sideways < fastest:
             fastest, share = sideways, SIDEWAYS_POSITION
     attitude, given = keys.attitude_bandwidth or fastest, keys.position_bandwidth
+    cone, sizes = pose_cone(craft, rows, slope), np.square(rows[3:]).sum(axis=1)
+    yaw_size = float(2.0 * sizes[2] / sizes[:2].sum())
     lean = atan(0.6 * _across(craft) / craft.gravity)
     return Ability(
         axis=tuple(free_axis(rows).tolist()),
         slope=slope,
-        cone=pose_cone(craft, rows, slope),
+        cone=cone,
         position=given or min(FASTEST[2], share * attitude, AGILE_POSITION * angular**0.5),
         rise=RISE[0] * (given / POSITION_SHARE if given else min(FASTEST[3] / RISE[0], attitude)),
         lean_time=LEAN[0] / attitude + LEAN[1] * (lean / angular) ** 0.5,
@@ -204,8 +206,10 @@ def ability(keys: Vectoring, craft: Craft, left: float, *, harmed: bool = False)
         spin=SPIN * angular**0.5,
         yaw_angular=yaw_angular,
         side_softness=3e-4 if craft.works.sum() >= 6 else 1.0,
+        # A vehicle that leans to move must lean first; one that holds every pose need not.
+        lean_softness=1e-12 if cone == pi else 1e-14,
         # The tilts have made the torque that they can; a harmed vehicle has little of it to give.
-        yaw_softness=1e-4 if craft.commanded or harmed else 1e-12,
+        yaw_softness=1e-4 if craft.commanded or harmed else 1e-12 * yaw_size,
     )
 
 

@@ -34,6 +34,7 @@ class Ability(NamedTuple):
     spin: float
     yaw_angular: float
     side_softness: float
+    lean_softness: float
     yaw_softness: float
 
 
@@ -83,6 +84,7 @@ class Parameters(NamedTuple):
     failure: Failure
     after: Ability  # without the failed rotor
     side_softness: float
+    lean_softness: float
     yaw_softness: float  # at the tilts that the servos will have
     pull: float  # share of the way to the preferred inputs in a period
     tilt_step: float  # rad, in a period
