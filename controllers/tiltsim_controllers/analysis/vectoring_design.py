@@ -56,8 +56,9 @@ SIDE_OBSERVER: Final = 0.6
 """Bandwidth of the observer of side force over the position's."""
 TORQUE_OBSERVER: Final = 40.0
 """1/s: the fastest observers of torque and of the excess of thrust."""
-OBSERVER_DAMPING: Final = 0.5, 1.0
-"""Damping ratio of the observers of force and torque; more would pass more noise."""
+OBSERVER_DAMPING: Final = 0.5, 0.7
+"""Damping ratio of the observers of force with noise, of which more would pass more, and without;
+more of it steadies pushes along walls."""
 ROUGHNESS: Final = 0.5, 1.4, 2.1
 """How far a disturbance walks in a second: side force and thrust (m/s^2), torque (rad/s^2)."""
 TRACKING: Final = 250.0
@@ -146,8 +147,9 @@ def _observers(
     noises = noise[0], noise[0], noise[1]
     side, rise, torque = map(steps, bandwidths, ROUGHNESS, noises)
     turning = torque, torque, min(torque, 4.0 * factor * bandwidths[3] * period)
-    pushes = [_correction(pole, OBSERVER_DAMPING[0]) for pole in (side, side, rise)]
-    turns = [_correction(pole, OBSERVER_DAMPING[1]) for pole in turning]
+    damping = OBSERVER_DAMPING[noise[0] == 0.0]
+    pushes = [_correction(pole, damping) for pole in (side, side, rise)]
+    turns = [_correction(pole, 1.0) for pole in turning]
     return {
         "position_trust": (1.0 - exp(-side), 1.0 - exp(-side), 1.0 - exp(-rise)),
         "velocity_trust": tuple(trust for trust, _ in pushes),
@@ -206,8 +208,9 @@ def ability(keys: Vectoring, craft: Craft, left: float, *, harmed: bool = False)
         spin=SPIN * angular**0.5,
         yaw_angular=yaw_angular,
         side_softness=3e-4 if craft.works.sum() >= 6 else 1.0,
-        # A vehicle that leans to move must lean first; one that holds every pose need not.
-        lean_softness=1e-12 if cone == pi else 1e-14,
+        # A vehicle that leans to move must lean first; one that holds every pose need not, and one
+        # without a rotor would lose its height.
+        lean_softness=1e-12 if cone == pi or (harmed and not craft.commanded) else 1e-14,
         # The tilts have made the torque that they can; a harmed vehicle has little of it to give.
         yaw_softness=1e-4 if craft.commanded or harmed else 1e-12 * yaw_size,
     )
