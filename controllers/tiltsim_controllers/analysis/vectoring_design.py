@@ -210,9 +210,9 @@ def ability(keys: Vectoring, craft: Craft, left: float, *, harmed: bool = False)
         side_softness=3e-4 if craft.works.sum() >= 6 else 1.0,
         # A vehicle that leans to move must lean first; one that holds every pose need not, and one
         # without a rotor would lose its height.
-        lean_softness=1e-12 if cone == pi or (harmed and not craft.commanded) else 1e-14,
+        lean_softness=1e-11 if cone == pi or (harmed and not craft.commanded) else 1e-13,
         # The tilts have made the torque that they can; a harmed vehicle has little of it to give.
-        yaw_softness=1e-4 if craft.commanded or harmed else 1e-12 * yaw_size,
+        yaw_softness=1e-4 if craft.commanded or harmed else 1e-11 * yaw_size,
     )
 
 

@@ -171,7 +171,7 @@ def _allocated(known: Known, ahead: Ahead, goal: Any, usable: Any) -> tuple[Any,
     made = rows @ thrusts if free else unit * known.wrench(ahead.speeds, ahead.tilts)
     target = made + p.share * (unit * goal - made)
     lean = p.lean_softness
-    softness = xp.array([side, side, 1e-12, lean, lean, p.yaw_softness])
+    softness = xp.array([side, side, 1e-11, lean, lean, p.yaw_softness])
     none = 1e9 * (1.0 - p.bounded)
     found = bounded_least_squares(
         rows, target, softness, xp.ones(count), start, low - none, high + none
