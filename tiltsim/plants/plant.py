@@ -39,11 +39,16 @@ class Plant(Protocol):
         None where a sample or the physics engine shows that the flight ended on the way; the state
         of the plant is then undefined.
         """
+        if self.engine == "native":
+            return self._record_natively(samples, steps)
         rows = []
         for _ in range(samples):
             self.advance(steps)
             rows.append(take_sample(self))
         return None if self.fault() else np.array(rows)
+
+    def _record_natively(self, samples: int, steps: int) -> Floats | None:
+        """`record` on the native engine."""
 
     def observe(self) -> tuple[float, ...]:
         """The present values of a sample's fields after the time: `ClosedLoop.sample_fields`."""
@@ -165,11 +170,6 @@ class EquationsPlant(Plant):
     def advance(self, steps: int) -> None:
         now = self._stepper.advance(self._step_index, self.state[1:], steps)
         self.state = np.array([self._step_index + steps, *now])
-
-    def record(self, samples: int, steps: int) -> Floats | None:
-        if self.engine == "native":
-            return self._record_natively(samples, steps)
-        return super().record(samples, steps)
 
     def _record_natively(self, samples: int, steps: int) -> Floats | None:
         checked = self._assembly.sign_check_values(self.time, self.observe())
