@@ -311,8 +311,7 @@ def _compiled_steps(
         now = jax.lax.fori_loop(0, steps, lambda _, now: kernel.step(now), now)
         return jnp.stack([*now.state, *now.held])
 
-    compiled: Callable[[int, Floats, int], Any] = jax.jit(many)
-    return compiled
+    return jax.jit(many)
 
 
 def _split(course: Course, numbers: Any) -> tuple[Any, Any]:

@@ -116,8 +116,7 @@ def _turned(rotation: Floats, vector: Floats) -> Floats:
     turn = np.array((np.cos(half), *(0.5 * np.sinc(half / np.pi) * vector)))
     turned = quaternion_product(_quaternion(rotation), turn)
     if len(rotation) == MATRIX:
-        matrix: Floats = rotation_of_quaternion(turned).ravel()
-        return matrix
+        return rotation_of_quaternion(turned).ravel()
     return turned
 
 

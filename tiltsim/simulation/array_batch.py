@@ -32,8 +32,7 @@ Result = TypeVar("Result")
 def numbers_of(assembly: Assembly) -> tuple[float, ...]:
     """Inputs of `tiltsim.arrays.flying.Batch` from a flight, without knots."""
     return (
-        *flatten(assembly.setup.parameters),
-        *map(float, assembly.reference),
+        *flatten((assembly.setup.parameters, assembly.reference)),
         *assembly.scenario.disturbance_acceleration,
         *initial_state(assembly),
     )
