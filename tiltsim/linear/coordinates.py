@@ -187,8 +187,7 @@ def equation_coordinates(assembly: Assembly, size: int) -> Coordinates:
     loop = assembly.loop
     if assembly.scenario.simulation.plant != "thesis":
         return mujoco_coordinates(loop)
-    assert loop.equations is not None
-    names = loop.equations.states
+    names = loop.required_equations.states
     if loop.within is not None:
         names = (*names, *activation_names(loop))
     further = size - len(names) - (MATRIX - 3 if ROTATION_NAMES[0] in names else 0)

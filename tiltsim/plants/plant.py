@@ -102,9 +102,8 @@ def with_engine(scenario: Scenario, engine: EngineName) -> Scenario:
 
 def initial_state(assembly: Assembly) -> list[float]:
     """The state at time zero of a flight whose loop has equations."""
-    equations = assembly.loop.equations
-    assert equations is not None  # other scenarios are refused
-    return [*map(float, equations.initial(assembly, assembly.setup))]
+    initial = assembly.loop.required_equations.initial(assembly, assembly.setup)
+    return [*map(float, initial)]
 
 
 def layout_of(assembly: Assembly, states: int) -> Layout:
@@ -141,10 +140,9 @@ class EquationsPlant(Plant):
 
     def __init__(self, assembly: Assembly, engine: EngineName | None = None) -> None:
         scenario, loop, setup = assembly.scenario, assembly.loop, assembly.setup
-        assert loop.equations is not None  # other scenarios are refused
         self._assembly = assembly
         start = initial_state(assembly)
-        self.state = np.array([0.0, *start, *(0.0,) * loop.equations.inputs_size])
+        self.state = np.array([0.0, *start, *(0.0,) * loop.required_equations.inputs_size])
         self.engine: EngineName = choose_engine(assembly, engine)
         self._timestep = scenario.simulation.timestep
         flight = integrated(assembly, layout_of(assembly, len(start)))
