@@ -44,6 +44,7 @@ def run(
     own: OwnControllers = (),
     league: Literal["limited", "unlimited", "interaction"] = "limited",
     vehicles: Names = (),
+    tasks: Names = (),
     tune: Count = None,
     seed: Count = None,
     gains: Path | None = None,
@@ -67,6 +68,7 @@ def run(
         controllers: laws, or given, the scenarios' own; default without --controller: all that fit
         league: limited, unlimited or interaction (default: limited)
         vehicles: default: all
+        tasks: names such as circle; default: all
         tune (N): first search each controller's gains with at most N flights on other tasks, and
             write them to limited_gains.json or tuned_gains.json
         seed (S): seed of that search (default: 1)
@@ -89,7 +91,7 @@ def run(
     if tune is not None and league not in GAINS_FILE:
         raise InputError(f"--tune: not in the league of {league}, which has no tuning tasks")
     given = chosen_controllers(controllers, own)
-    chosen = chosen_vehicles(vehicles, league)
+    chosen = chosen_vehicles(vehicles, league, tasks)
     tables = _tables(chosen, given, league)
     prepare_folder(out)
     rows: dict[str, list[dict[str, Any]]] = {name: [] for name in chosen}
