@@ -29,6 +29,11 @@ FILES = {
 }
 
 
+def source_of(module, node):
+    lines = FILES[module].read_text(encoding="utf-8").splitlines()
+    return "\n".join(lines[node.lineno - 1 : node.end_lineno])
+
+
 @cache
 def nodes():
     """All nodes of the syntax tree of every module, the module itself first."""
@@ -64,7 +69,7 @@ def prescribed():
         if module.startswith(("tiltsim.closed_loop.", "tiltsim.equations."))
         for node in found
         if isinstance(node, ast.ClassDef)
-        for signature in re.findall(r"``\((.*?)\) ->", ast.get_docstring(node) or "")
+        for signature in re.findall(r"``\((.*?)\) ->", source_of(module, node))
     }
 
 

@@ -8,7 +8,7 @@ from tests.simulation.test_lane_batch import shifted
 from tiltsim.engines.programs import recorder_head
 from tiltsim.engines.steppers import LaneStepper
 from tiltsim.laws.assembling import assemble
-from tiltsim.plants.equations_plant import EquationsPlant, initial_state, integrated, layout_of
+from tiltsim.plants.plant import EquationsPlant, initial_state, integrated, layout_of
 
 
 def lanes_of(samples):
@@ -31,8 +31,7 @@ def test_a_lane_rests_at_the_end_of_its_recording():
     plant = EquationsPlant(assembly, "native")
     for lane, steps in enumerate((10, 10)):
         plant.advance(steps)
-        state = plant.state[1 + plant._assembly.loop.equations.inputs_size :]
-        np.testing.assert_array_equal(stepper.now[: len(state), lane], state)
+        np.testing.assert_array_equal(stepper.now[:, lane], plant.state[1:])
     np.testing.assert_array_equal(rows[0], rows[1][:3])
     assert np.diff(rows[1][:, 0]).min() > 0.0
 

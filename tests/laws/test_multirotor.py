@@ -13,7 +13,7 @@ from tests.refusals import refusal
 from tiltsim.errors import InputError
 from tiltsim.laws.assembling import assemble
 from tiltsim.laws.rotor_loop import torque_free_columns
-from tiltsim.models.hover import hover_speeds
+from tiltsim.models.rotor_table import hover_speeds
 from tiltsim.resources import shipped_folder
 from tiltsim.scenario.loading import merge
 from tiltsim.simulation.simulate import make_plant

@@ -14,6 +14,7 @@ from tiltsim.linear.coordinates import (
     QUATERNION,
     ROTATION_NAMES,
     Coordinates,
+    equation_coordinates,
     equation_inputs,
 )
 from tiltsim.resources import shipped_folder
@@ -78,7 +79,18 @@ def test_a_vehicle_with_fewer_tilts_than_rotors_has_one_rate_per_tilt(tmp_path):
         "simulation": {"duration": 1.0, "plant": "thesis"},
     }
     assembly = assemble(load_scenario(tables))
-    names = equation_inputs(assembly, assembly.loop.equations.inputs_size)
+    names = equation_inputs(assembly)
     rates = [f"alpha_rate_{arm}" for arm in range(1, 6)]
     expected = [f"rotor_acceleration_{rotor}" for rotor in range(1, 7)] + rates
     assert names == tuple((name, index, 1.0) for index, name in enumerate(expected))
+
+
+def test_a_quadrotor_under_a_law_of_rotor_speeds_has_their_states_on_the_thesis_equations():
+    tables = {"vehicle": {"model": "quadrotor"}, "controller": {"law": "geometric"}}
+    assembly = assemble(load_scenario({**tables, "simulation": {"plant": "thesis"}}))
+    size = len(assembly.loop.equations.initial(assembly, assembly.setup))
+    found = equation_coordinates(assembly, size)
+    assert found.size == size - 6  # nine entries for the rotation's three
+    assert [found.names.index(f"rotor_speed_{rotor}") for rotor in (1, 4)] == [12, 15]
+    names = [name for name, *_ in equation_inputs(assembly)]
+    assert names == [f"rotor_acceleration_{rotor}" for rotor in (1, 2, 3, 4)]

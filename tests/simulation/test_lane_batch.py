@@ -12,9 +12,9 @@ from tests.simulation.test_batch import EXACT, LATE_LOSS, STOPPING_ROTOR, UPSIDE
 from tests.simulation.test_batch import without_speed as comparable
 from tiltsim.engines.machine_code import widest
 from tiltsim.errors import InputError
-from tiltsim.plants.equations_plant import EquationsPlant
+from tiltsim.plants.plant import EquationsPlant
 from tiltsim.scenario.library import library_entries
-from tiltsim.simulation import lane_batch
+from tiltsim.simulation import native_batch
 from tiltsim.simulation.batch import fly
 
 THESIS = {"plant": "thesis", "timestep": 0.002}
@@ -107,22 +107,22 @@ def test_samples_of_a_part_fit_into_memory(monkeypatch):
     scenarios = [shifted(i, duration=0.05) for i in range(11)]
     expected = [result.metrics["duration"] for result in fly(scenarios)]
     parts = []
-    fly_part = lane_batch.LaneBatch._fly_part
+    fly_part = native_batch.LaneBatch._fly_part
 
     def noted(batch, part):
         parts.append(len(part))
         return fly_part(batch, part)
 
-    monkeypatch.setattr(lane_batch.LaneBatch, "_fly_part", noted)
+    monkeypatch.setattr(native_batch.LaneBatch, "_fly_part", noted)
     size = 8 * 6 * len(tiltsim.simulate(scenarios[0]).assembly.loop.sample_fields)
-    monkeypatch.setattr(lane_batch, "MEMORY", 4 * size)
+    monkeypatch.setattr(native_batch, "MEMORY", 4 * size)
     assert [result.metrics["duration"] for result in fly(scenarios)] == expected
     assert parts == [4, 4, 3]
 
 
 def test_an_interrupted_batch_stops_after_the_present_calls(monkeypatch):
-    monkeypatch.setattr(lane_batch, "CALL_TIME", 0.01)
-    monkeypatch.setattr(lane_batch.LaneBatch, "_next_part", stopping(lane_batch.LaneBatch))
+    monkeypatch.setattr(native_batch, "CALL_TIME", 0.01)
+    monkeypatch.setattr(native_batch.LaneBatch, "_next_part", stopping(native_batch.LaneBatch))
     many = [shifted(i, duration=100_000.0, record_timestep=1000.0) for i in range(8)]
     with pytest.raises(KeyboardInterrupt):
         list(fly(many, threads=1))
@@ -148,8 +148,8 @@ def stopping(kind):
 
 
 def test_one_lane_per_flight_up_to_the_width_of_a_register():
-    assert [lane_batch.lanes_for(n) for n in (1, 2, 3)] == [1, 2, min(4, widest())]
-    assert lane_batch.lanes_for(100) == widest()
+    assert [native_batch.lanes_for(n) for n in (1, 2, 3)] == [1, 2, min(4, widest())]
+    assert native_batch.lanes_for(100) == widest()
 
 
 def test_quick_functions_change_the_last_digits_of_batches_alone():

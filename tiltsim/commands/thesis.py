@@ -304,7 +304,7 @@ def run_report(
         from tiltsim.report.making import make_report
         from tiltsim.report.pages import errors_page, page, rows_csv, rows_json
         from tiltsim.report.pages import markdown as markdown_of
-        from tiltsim.scenario.own_code import VARIABLE
+        from tiltsim.scenario.own_parts import VARIABLE
         from tiltsim.system.files import prepare_file, prepare_folder
 
         if trust:

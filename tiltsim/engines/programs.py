@@ -51,15 +51,10 @@ REFERENCE: Final = HEAD_SIZE - record_size(ReferenceParameters)
 
 
 class LoopFunction(NamedTuple):
-    """A function of vectors.
+    """A function of vectors."""
 
-    Attributes:
-        call: Returns numbers, arrays and tuples of them.
-        sizes: Sizes of its vectors, by name; ``user`` are parameters and knots.
-    """
-
-    call: Callable[..., Any]
-    sizes: dict[str, int]
+    call: Callable[..., Any]  # returns numbers, arrays and tuples of them
+    sizes: dict[str, int]  # sizes of its vectors, by name; ``user`` are parameters and knots
 
     def traced(self) -> Program:
         """Its program."""

@@ -2,23 +2,20 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-from pydantic import ValidationError
 
 from tiltsim.errors import InputError
 from tiltsim.scenario.loading import without_none
-from tiltsim.scenario.messages import one_line_message
 from tiltsim.scenario.scenario import Scenario
-from tiltsim.sweeps.definition import UNUSED, SweepDefinition
-from tiltsim.sweeps.loading import check_points, load_sweep
+from tiltsim.sweeps.definition import UNUSED
+from tiltsim.sweeps.loading import load_sweep
 from tiltsim.sweeps.points import SweepPoints
-from tiltsim.sweeps.tables import Axis, NormalAxis, SeedAxis, Sweep, UniformAxis
+from tiltsim.sweeps.tables import Axis, NormalAxis, SeedAxis, UniformAxis
 from tiltsim.system.text import short_repr
 from tiltsim_controllers.mathematics.scalar import Floats
 
@@ -44,20 +41,11 @@ class Domain:
             raise InputError(f"domain = {short_repr(axes)}: must be a list of axes, each a dict")
         drawn = any(axis.get("type") in {"uniform", "normal", "seed"} for axis in axes)
         document = {
-            "scenario": "base",
+            "scenario": without_none(scenario.model_dump(mode="json", exclude=UNUSED)),
             "axis": [dict(axis) for axis in axes],
             **({"sample": {"count": 1}} if drawn else {}),
         }
-        try:
-            sweep = Sweep.model_validate(document)
-        except ValidationError as error:
-            raise InputError(f"domain: {one_line_message(error, document, Sweep)}") from None
-        base = without_none(scenario.model_dump(mode="json", exclude=UNUSED))
-        tables = json.loads(sweep.model_dump_json(exclude_none=True))
-        definition = SweepDefinition("domain", tables, json.loads(json.dumps(base)), {})
-        points = SweepPoints(definition)
-        check_points(points)
-        return cls(points)
+        return cls(SweepPoints(load_sweep(document, name="domain")))
 
     @classmethod
     def from_sweep(cls, path: str | Path) -> Domain:

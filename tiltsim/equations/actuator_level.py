@@ -18,7 +18,13 @@ from tiltsim.closed_loop.loop import ClosedLoop
 from tiltsim.models.parts import WRENCH_SIZE
 from tiltsim.scenario.scenario import FlightPlan, Scenario
 from tiltsim.vehicles.rotorcraft import initial_tilts
-from tiltsim.vehicles.rotorcraft.layout import layout_of, rotors_record, tilt_of_rotor, true_rotors
+from tiltsim.vehicles.rotorcraft.layout import (
+    Layout,
+    layout_of,
+    rotors_record,
+    tilt_of_rotor,
+    true_rotors,
+)
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.mathematics.attitude import (
     euler_rates,
@@ -31,7 +37,7 @@ from tiltsim_controllers.mathematics.attitude import (
 from tiltsim_controllers.mathematics.linear import norm
 from tiltsim_controllers.mathematics.records import make_record_type, vector_of
 from tiltsim_controllers.mathematics.scalar import Values
-from tiltsim_controllers.vehicle.body import accelerations, joined, rotation_rate
+from tiltsim_controllers.vehicle.body import BODY_FIELDS, accelerations, joined, rotation_rate
 from tiltsim_controllers.vehicle.craft import Craft, craft_of
 from tiltsim_controllers.vehicle.rotors import TiltOfRotor, of_tilts, tilts_of, wrench_map
 
@@ -83,21 +89,14 @@ class Motion(NamedTuple):
 
 
 class Attitude(NamedTuple):
-    """Representation of the attitude in a state, as functions of arrays.
+    """Representation of the attitude in a state, as functions of arrays."""
 
-    Attributes:
-        size: Number of entries.
-        rotation: ``(attitude)``: body to world, shape (3, 3).
-        quaternion: ``(attitude)``: scalar first, shape (4,).
-        rates: ``(attitude, omega)``: its time derivative at body rates (rad/s).
-        of_euler: ``(angles)``: from roll, pitch and yaw, rad.
-    """
-
-    size: int
-    rotation: Callable[[Any], Any]
-    quaternion: Callable[[Any], Any]
+    size: int  # number of entries
+    rotation: Callable[[Any], Any]  # ``(attitude)``: body to world, shape (3, 3)
+    quaternion: Callable[[Any], Any]  # ``(attitude)``: scalar first, shape (4,)
     rates: Callable[[Any, Any], Any]
-    of_euler: Callable[[Any], Any]
+    """``(attitude, omega)``: its time derivative at body rates (rad/s)."""
+    of_euler: Callable[[Any], Any]  # ``(angles)``: from roll, pitch and yaw, rad
 
 
 def _matrix(attitude: Any) -> Any:
@@ -133,6 +132,16 @@ class StateLayout(NamedTuple):
         """Number of entries of the motion."""
         return sum(size for _, size in self.sizes)
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the coordinates of a motion, three for a rotation."""
+        sizes = dict(self.sizes)
+        places, speeds = Layout(0, sizes["tilts"]).motion
+        turned = BODY_FIELDS[6:9] if sizes["attitude"] == EULER.size else places[3:6]
+        vectors = places[:3], turned, speeds[:3], speeds[3:6], places[6:], speeds[6:]
+        named = dict(zip(Motion._fields, vectors, strict=True))
+        return tuple(name for part in sizes for name in named[part])
+
     def split(self, state: Any) -> Motion:
         """The parts of a state, shape (``size`` + any,)."""
         ends = np.cumsum([size for _, size in self.sizes]).tolist()
@@ -163,28 +172,23 @@ class ActuatorPlant(NamedTuple):
     """A vehicle whose state is its motion, followed by MuJoCo's activations.
 
     Its functions are traceable; ``mechanics`` is a `mechanics_record`.
-
-    Attributes:
-        motion: Number of entries of the state before the activations.
-        qpos, qvel: ``(state)``: MuJoCo's vectors.
-        rates: ``(state, ctrl, loads, mechanics, disturbance)``: time derivative of the motion.
-            ``loads`` are force (N) and torque (N m) on the body, body axes, and torques (N m) about
-            the hinges, without rotors and weight; the disturbance is in m/s^2, world axes.
-        project_onto_limits: ``(state, mechanics) -> state`` within limits of rotors and tilts; None
-            where there are no limits.
-        initial: ``(plan)``: the motion at time zero.
-        mechanics: The type of the parameters.
-        finish: ``(state, mechanics) -> state``: corrections at the end of a step; None for none.
     """
 
-    motion: int
-    qpos: Callable[[Any], Any]
-    qvel: Callable[[Any], Any]
+    motion: int  # number of entries of the state before the activations
+    names: tuple[str, ...]  # names of their coordinates, see `Equations.states`
+    qpos: Callable[[Any], Any]  # ``(state)``: MuJoCo's vector
+    qvel: Callable[[Any], Any]  # ``(state)``: MuJoCo's vector
     rates: Callable[..., Any]
+    """``(state, ctrl, loads, mechanics, disturbance)``: time derivative of the motion. ``loads``
+    are force (N) and torque (N m) on the body, body axes, and torques (N m) about the hinges,
+    without rotors and weight; the disturbance is in m/s^2, world axes."""
     project_onto_limits: Callable[[Any, Any], Any] | None
-    initial: Callable[[FlightPlan], Values]
-    mechanics: Any
+    """``(state, mechanics) -> state`` within limits of rotors and tilts; None where there are no
+    limits."""
+    initial: Callable[[FlightPlan], Values]  # ``(plan)``: the motion at time zero
+    mechanics: Any  # the type of the parameters
     finish: Callable[[Any, Any], Any] | None = None
+    """``(state, mechanics) -> state``: corrections at the end of a step; None for none."""
 
 
 def servo_accelerations(
@@ -308,6 +312,7 @@ def plant_of(
 
     return ActuatorPlant(
         layout.size,
+        layout.names,
         qpos,
         qvel,
         rates,

@@ -9,6 +9,7 @@ from tiltsim.equations.actuator_level import ActuatorPlant, actuator_plant, rigi
 from tiltsim.laws.commanded import commanded_loop
 from tiltsim.laws.companions import Member, with_companions
 from tiltsim.laws.flown_law import loop_of_law
+from tiltsim.laws.kinds import LOOPS_OF_KINDS
 from tiltsim.laws.layers.actuation import with_actuation
 from tiltsim.laws.layers.contact import with_force_loop, with_impedance, with_objects
 from tiltsim.laws.layers.estimation import Fusion, with_estimator
@@ -23,7 +24,6 @@ from tiltsim.laws.layers.swing import with_swing_damping
 from tiltsim.laws.linearizing import TILTROTOR, full_pose_loop, multirotor_loop, tiltrotor_loop
 from tiltsim.laws.quadrotor import QUADROTOR_ATTITUDE_ALTITUDE, SWITCHING, YAW_POSITION
 from tiltsim.laws.rotor_loop import layout_of_vehicle
-from tiltsim.laws.tilt_car import FOURTH_DERIVATIVE, PLANNED_DIRECTION, THIRD_DERIVATIVE
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.law_controller import LawTable
 from tiltsim.scenario.linearizing_controllers import AttitudeForceController
@@ -39,9 +39,7 @@ LOOPS: Final[dict[str, ClosedLoop]] = {
     "yaw_position": YAW_POSITION,
     "switching": SWITCHING,
     "quadrotor_attitude_altitude": QUADROTOR_ATTITUDE_ALTITUDE,
-    "tilt_car_third_derivative": THIRD_DERIVATIVE,
-    "tilt_car_fourth_derivative": FOURTH_DERIVATIVE,
-    "tilt_car_planned_direction": PLANNED_DIRECTION,
+    **LOOPS_OF_KINDS,
 }
 """Loops by their names; see `tiltsim.scenario.controller_table.ControllerTable.loop_name`."""
 

@@ -17,7 +17,7 @@ from tiltsim.laws.rotor_loop import layout_of_vehicle
 from tiltsim.scenario.controller import NumpyController
 from tiltsim.scenario.law_controller import LawController
 from tiltsim.scenario.messages import InvalidValueError, one_line_message
-from tiltsim.scenario.own_code import load_law, users_line
+from tiltsim.scenario.own_parts import load_law, users_line
 from tiltsim.scenario.scenario import FlightPlan, Scenario, plan_flight
 from tiltsim.system.text import error_text
 from tiltsim.vehicles.rotorcraft import initial_tilts

@@ -20,7 +20,7 @@ from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.laws import quadrotor_attitude_altitude, switching, yaw_position
 from tiltsim_controllers.laws.observed import Seen, Step
 from tiltsim_controllers.mathematics.scalar import Floats, Vector
-from tiltsim_controllers.vehicle.body import PITCH, ROLL
+from tiltsim_controllers.vehicle.body import BODY_FIELDS, PITCH, ROLL
 from tiltsim_controllers.vehicle.cross import speed_along_spin, thrust_controls
 from tiltsim_controllers.vehicle.parameters import SPIN
 
@@ -34,6 +34,8 @@ class _Thrusting(RotorFunctions):
     """The quadrotor under laws whose inputs are thrust (N) and torques (N m)."""
 
     commands_thrusts: ClassVar[bool] = True
+    state_names: ClassVar[Any] = BODY_FIELDS
+    input_names: ClassVar[Any] = ("force", "torque_x", "torque_y", "torque_z")
 
     def initial_speeds(self, plan: FlightPlan) -> Vector:
         return (0.0,) * 4

@@ -12,6 +12,7 @@ from typing import Any, ClassVar, Final, NamedTuple
 import numpy as np
 
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup
+from tiltsim.equations.actuator_level import MATRIX, as_printed
 from tiltsim.equations.thesis import airframe_of, body_fields, initial_state
 from tiltsim.laws.law import Law, Margins, Tilts, tilts_of_gait
 from tiltsim.laws.vehicle_loop import VehicleFunctions, parts, servo_lead
@@ -213,6 +214,18 @@ class RotorFunctions(VehicleFunctions):
 
     # --- on equations of motion
 
+    @property
+    def state_names(self) -> tuple[str, ...]:
+        """The body with a matrix of its rotation, and the rotor speeds."""
+        return (*as_printed(MATRIX, 0).names, *self.layout.places.names("rotor_speed"))
+
+    @property
+    def input_names(self) -> tuple[str, ...]:
+        """Rotor accelerations; then rates that integrate to commands of tilts."""
+        commands = (state for state in self.law.states if state.startswith("tilt_command"))
+        rates = (command.replace("tilt_command", "alpha_rate") for command in commands)
+        return (*self.layout.places.names("rotor_acceleration"), *rates)
+
     def initial_state(self, plan: FlightPlan) -> Vector:
         """Motion, rotor speeds and the states of the law."""
         speeds, states = initial_rotor_speeds(plan), self.law.initial_states(plan)
@@ -271,6 +284,7 @@ def rotor_loop(
         places.rotors + len(law.states),
         places.names("tilt_command") if law.records_commands else (),
         model=layout.name,
+        motion=places.motion,
         sizes=places.sizes(len(law.states))._replace(history=FELT_SIZE if law.feels else 0),
         initial_activations=lambda plan, _: (
             *flown.initial_speeds(plan),

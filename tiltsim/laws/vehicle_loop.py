@@ -52,6 +52,7 @@ class VehicleFunctions:
         references: ``(time, values, parameters, knots)``: references and signals of a sample.
         names: Their names, which are columns.
         initial_state: ``(plan)``: the state of the equations at time zero.
+        state_names, input_names: See `Equations`.
     """
 
     law: Law
@@ -61,6 +62,8 @@ class VehicleFunctions:
     references: ClassVar[Callable[..., Any]]
     names: ClassVar[Any]
     initial_state: ClassVar[Callable[..., Vector]]
+    state_names: ClassVar[Any]
+    input_names: ClassVar[Any]
     equation_inputs: ClassVar[Callable[..., Any]]
     equation_rates: ClassVar[Callable[..., Any]]
     observe_equations: ClassVar[Callable[..., Any]]
@@ -125,6 +128,8 @@ class VehicleFunctions:
                 rates=traceable(self.equation_rates),
                 initial=lambda plan, _setup: self.initial_state(plan),
                 observe=traceable(self.observe_equations),
+                states=self.state_names,
+                input_names=self.input_names,
             ),
             follows_position=law.follows_position,
             uses_gait=law.uses_gait,

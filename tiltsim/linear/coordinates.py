@@ -11,15 +11,14 @@ import numpy as np
 
 from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.closed_loop.loop import ClosedLoop
-from tiltsim.models.rotor_table import Multirotor
-from tiltsim.vehicles.rotorcraft.layout import layout_of
 from tiltsim.vehicles.rotorcraft.others import SWING
-from tiltsim_controllers.mathematics.attitude import quaternion_of_rotation, rotation_of_quaternion
+from tiltsim_controllers.mathematics.attitude import (
+    quaternion_of_rotation,
+    quaternion_product,
+    rotation_of_quaternion,
+)
 from tiltsim_controllers.mathematics.scalar import Floats, Triple
-from tiltsim_controllers.vehicle.body import BODY_FIELDS
-
-ROTATION_NAMES: Final = ("rotation_x", "rotation_y", "rotation_z")
-"""A small turn about the body axes, rad; at level attitude roll, pitch and yaw."""
+from tiltsim_controllers.vehicle.body import BODY_FIELDS, ROTATION_NAMES
 
 MATRIX: Final = 9
 QUATERNION: Final = 4
@@ -94,16 +93,11 @@ class Coordinates(NamedTuple):
         return np.concatenate((derivative[:first], rates, derivative[after:]))
 
 
-def _product(p: Floats, q: Floats) -> Floats:
-    """The product of two quaternions."""
-    vector = p[0] * q[1:] + q[0] * p[1:] + np.cross(p[1:], q[1:])
-    return np.array((p[0] * q[0] - p[1:] @ q[1:], *vector))
-
-
 def _turn_rates(rotation: Floats, derivative: Floats) -> Floats:
     """The body rates of a rotation, from the derivative of its entries."""
     if len(rotation) == QUATERNION:
-        return 2.0 * _product(rotation * (1.0, -1.0, -1.0, -1.0), derivative)[1:]
+        inverse = rotation * (1.0, -1.0, -1.0, -1.0)
+        return np.asarray(2.0 * quaternion_product(inverse, derivative)[1:])
     skew = rotation.reshape(3, 3).T @ derivative.reshape(3, 3)
     turning = (skew[2, 1] - skew[1, 2], skew[0, 2] - skew[2, 0], skew[1, 0] - skew[0, 1])
     return 0.5 * np.array(turning)
@@ -120,7 +114,7 @@ def _turned(rotation: Floats, vector: Floats) -> Floats:
     """A rotation, turned by a vector in body axes."""
     half = 0.5 * float(np.linalg.norm(vector))
     turn = np.array((np.cos(half), *(0.5 * np.sinc(half / np.pi) * vector)))
-    turned = _product(_quaternion(rotation), turn)
+    turned = quaternion_product(_quaternion(rotation), turn)
     if len(rotation) == MATRIX:
         matrix: Floats = rotation_of_quaternion(turned).ravel()
         return matrix
@@ -130,7 +124,7 @@ def _turned(rotation: Floats, vector: Floats) -> Floats:
 def _turn(start: Floats, end: Floats) -> Floats:
     """The vector, in the axes of ``start``, of the turn from one rotation to another."""
     inverse = _quaternion(start) * (1.0, -1.0, -1.0, -1.0)
-    turn = _product(inverse, _quaternion(end))
+    turn = quaternion_product(inverse, _quaternion(end))
     if turn[0] < 0.0:
         turn = -turn
     half = np.arctan2(np.linalg.norm(turn[1:]), turn[0])
@@ -182,42 +176,30 @@ def activation_names(loop: ClosedLoop) -> tuple[str, ...]:
 
 def mujoco_coordinates(loop: ClosedLoop) -> Coordinates:
     """Coordinates of `qpos`, `qvel` and `act`."""
-    sizes = loop.sizes
-    if loop.model == "tilt_car":
-        names = ("x", "y", "yaw", "alpha", "vx", "vy", "r", "alpha_rate")
-        return _coordinates((*names, *activation_names(loop)), loop, 0)
-    tilts = sizes.qpos - len(POSITION) - QUATERNION
-    swing, swinging = (SWING, SWING_RATES) if sizes.others else ((), ())
-    places = (*POSITION, *ROTATION_NAMES, *numbered("alpha", tilts), *swing)
-    speeds = (*VELOCITY, *BODY_RATES, *numbered("alpha_rate", tilts), *swinging)
-    return _coordinates((*places, *speeds, *activation_names(loop)), loop, QUATERNION)
+    places, speeds = loop.motion
+    swing, swinging = (SWING, SWING_RATES) if loop.sizes.others else ((), ())
+    return _coordinates(
+        (*places, *swing, *speeds, *swinging, *activation_names(loop)), loop, QUATERNION
+    )
 
 
 def equation_coordinates(assembly: Assembly, size: int) -> Coordinates:
     """Coordinates of a state of the equations of this size; a rigid body has MuJoCo's."""
-    loop, model = assembly.loop, assembly.scenario.vehicle.model
+    loop = assembly.loop
     if assembly.scenario.simulation.plant != "thesis":
         return mujoco_coordinates(loop)
-    rotation = 0 if model in {"quadrotor", "tilt_car"} else MATRIX
-    body = BODY_FIELDS
-    if rotation:
-        body = (*POSITION, *VELOCITY, *ROTATION_NAMES, *BODY_RATES)
-    if model != "tilt_car" and loop.within is not None:
-        tilts = layout_of(loop).tilts
-        servos = (*numbered("alpha", tilts), *numbered("alpha_rate", tilts))
-        names = (*body, *servos, *activation_names(loop))
-    elif model == "tilt_car":
-        driven = ("alpha", "rotor_speed_1", "rotor_speed_2")
-        names = (*PLANE, *(driven if size > len(PLANE) else ()))
-    else:
-        rotors = numbered("rotor_speed", len(loop.spins)) if rotation else ()
-        names = (*body, *rotors)
-    further = size - len(names) - (rotation - 3 if rotation else 0)
+    assert loop.equations is not None
+    names = loop.equations.states
+    if loop.within is not None:
+        names = (*names, *activation_names(loop))
+    further = size - len(names) - (MATRIX - 3 if ROTATION_NAMES[0] in names else 0)
     own = loop.fields if len(loop.fields) == further else numbered("law", further)
-    return _coordinates((*names, *own), loop, rotation)
+    return _coordinates((*names, *own), loop, MATRIX)
 
 
 def _coordinates(names: tuple[str, ...], loop: ClosedLoop, rotation: int) -> Coordinates:
+    """The coordinates of these names; a rotation among them has ``rotation`` entries."""
+    rotation = rotation if ROTATION_NAMES[0] in names else 0
     first = names.index(ROTATION_NAMES[0]) if rotation else 0
     return Coordinates(names, tuple(unit_of(name, loop) for name in names), rotation, first)
 
@@ -243,40 +225,22 @@ class Input(NamedTuple):
 def control_inputs(assembly: Assembly) -> tuple[Input, ...]:
     """Inputs of the vehicle among the controls of its model."""
     loop = assembly.loop
-    rotors, sizes = len(loop.spins), loop.sizes
-    if loop.model == "tilt_car":
-        rotors = 2
-        named: tuple[str, ...] = ("tilt_command",)
-    else:
-        named = numbered("tilt_command", sizes.qpos - len(POSITION) - QUATERNION)
-    tilts = len(named)
-    kind, first, per_unit = ROTOR_INPUT, tilts + rotors, 1.0
+    places, rotors = loop.motion[0], len(loop.kind.rotors)
+    tilts = [name.replace("alpha", "tilt_command") for name in places if name.startswith("alpha")]
+    kind, first, per_unit = ROTOR_INPUT, len(tilts) + rotors, 1.0
     if loop.commands_thrusts:  # as squared rotor speeds
-        vehicle = assembly.scenario.vehicle.resolve()
-        assert not isinstance(vehicle, Multirotor)  # its controllers command rates of rotor speeds
-        per_unit = 1.0 / vehicle.thrust_coefficient
-        kind, first = "thrust", tilts
+        per_unit = 1.0 / assembly.scenario.vehicle.resolve().thrust_coefficient
+        kind, first = "thrust", len(tilts)
     speeds = (Input(n, first + i, per_unit) for i, n in enumerate(numbered(kind, rotors)))
-    return (*speeds, *(Input(name, index) for index, name in enumerate(named)))
+    return (*speeds, *(Input(name, index) for index, name in enumerate(tilts)))
 
 
-def equation_inputs(assembly: Assembly, size: int) -> tuple[Input, ...]:
-    """Inputs of the vehicle among the ``size`` inputs of the equations."""
-    loop, model = assembly.loop, assembly.scenario.vehicle.model
-    if model != "tilt_car" and loop.within is not None:
+def equation_inputs(assembly: Assembly) -> tuple[Input, ...]:
+    """Inputs of the vehicle among the inputs of the equations."""
+    equations = assembly.loop.equations
+    if equations is None or not equations.input_names:
         return control_inputs(assembly)
-    if model == "quadrotor":
-        names: tuple[str, ...] = ("force", "torque_x", "torque_y", "torque_z")
-    elif model == "tilt_car":
-        names = ("squared_speed_1", "squared_speed_2")
-        if size > len(names):
-            names = (*numbered(ROTOR_INPUT, 2), "alpha_rate")
-    else:
-        # Further inputs turn the arms if they integrate to commands of tilts.
-        commands = (f for f in loop.fields if f.startswith("tilt_command"))
-        rates = (command.replace("tilt_command", "alpha_rate") for command in commands)
-        names = (*numbered(ROTOR_INPUT, len(loop.spins)), *rates)
-    return tuple(Input(name, index) for index, name in enumerate(names))
+    return tuple(Input(name, index) for index, name in enumerate(equations.input_names))
 
 
 FREE: tuple[slice, slice] = (slice(-7, None), slice(-6, None))
@@ -284,15 +248,10 @@ FREE: tuple[slice, slice] = (slice(-7, None), slice(-6, None))
 
 
 class Pendulum(NamedTuple):
-    """A load on a cable below a vehicle, whose free joint is the first of ``qpos``.
+    """A load on a cable below a vehicle, whose free joint is the first of ``qpos``."""
 
-    Attributes:
-        length: m, of the cable.
-        attachment: m, body axes.
-    """
-
-    length: float
-    attachment: Triple
+    length: float  # m, of the cable
+    attachment: Triple  # m, body axes
 
     def placed(self, qpos: Floats, qvel: Floats) -> tuple[Floats, Floats]:
         """The motion in MuJoCo of a vehicle with angles (rad) and their rates behind it."""

@@ -16,7 +16,7 @@ from tiltsim.linear import newton
 from tiltsim.linear.coordinates import PLANE
 from tiltsim.linear.forcing import Forcing, forcing_of
 from tiltsim.linear.motion import LONG, Motion, make_motion
-from tiltsim.plants.plant import native_pays_off
+from tiltsim.plants.plant import MIN_STEPS_TO_COMPILE
 from tiltsim.scenario.scenario import Scenario
 from tiltsim_controllers.mathematics.scalar import Floats
 
@@ -37,25 +37,18 @@ FLIGHTS: Final = 150  # over a period, that an orbit takes to find
 
 @dataclass(frozen=True, eq=False)
 class Equilibrium:
-    """A state to which a closed loop returns: at once, after a control sample or after a period.
+    """A state to which a closed loop returns: at once, after a control sample or after a period."""
 
-    Attributes:
-        motion: The closed loop on its plant.
-        forcing: Its dependence on time.
-        root: The state at ``step``, the residual of its rates or of its change over ``steps``, and
-            the derivative of the residual.
-        step: The physics step at which it is considered.
-        steps: Physics steps after which it returns; 0 where it rests in continuous time.
-        left_out: Names of coordinates that nothing holds and that no other depends on: they move
-            on while the others rest.
-    """
-
-    motion: Motion
-    forcing: Forcing
+    motion: Motion  # the closed loop on its plant
+    forcing: Forcing  # its dependence on time
     root: newton.Root
-    step: int
-    steps: int
+    """The state at ``step``, the residual of its rates or of its change over ``steps``, and the
+    derivative of the residual."""
+    step: int  # the physics step at which it is considered
+    steps: int  # physics steps after which it returns; 0 where it rests in continuous time
     left_out: tuple[str, ...] = ()
+    """Names of coordinates that nothing holds and that no other depends on: they move on while the
+    others rest."""
 
     @property
     def time(self) -> float:
@@ -171,10 +164,7 @@ def _engine(scenario: Scenario, steps: int) -> EngineName:
     engine = scenario.simulation.engine
     if engine == "python" or engine == "native":
         return engine
-    duration = steps * scenario.simulation.timestep
-    longer = scenario.simulation.model_copy(update={"duration": duration})
-    flown = scenario.model_copy(update={"simulation": longer})
-    return "native" if native_pays_off([flown]) else "python"
+    return "native" if steps >= MIN_STEPS_TO_COMPILE else "python"
 
 
 def _in_whole_steps(scenario: Scenario, period: float) -> Scenario:

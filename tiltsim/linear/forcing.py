@@ -1,6 +1,6 @@
 """The inputs from outside a closed loop: whether they are steady, periodic or neither."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from math import gcd, lcm, pi
 from typing import Final, NamedTuple
@@ -18,24 +18,19 @@ MOST_PERIODS: Final = 1000  # most periods of a gait or reference in their commo
 CONTROLLER_EVENTS: Final = ("turn_time", "failure_known_from")
 """Keys of controllers: times (s) until which they change."""
 
-_AT_REST: Final = (0.0, 0.0, 0.0)
+STEADY: Final = {trajectories.SETPOINT, trajectories.ATTITUDE_ALTITUDE, trajectories.LINE}
+PERIODIC: Final = {trajectories.CIRCLE, trajectories.LISSAJOUS}
 
 
 class Forcing(NamedTuple):
-    """The dependence of a closed loop on time.
+    """The dependence of a closed loop on time."""
 
-    Attributes:
-        period: s; None if only the motion of the frame depends on time.
-        velocity, acceleration: Motion of a frame in which the reference repeats, at time zero, m/s
-        and m/s^2, world axes.
-        start: Time (s) from which this holds: faults have happened and are known, gusts and
-            pushes have passed, the commanded attitude is reached.
-    """
-
-    period: float | None
-    velocity: Triple
-    acceleration: Triple
+    period: float | None  # s; None if only the motion of the frame depends on time
+    velocity: Triple  # m/s, world axes, of a frame in which the reference repeats, at time zero
+    acceleration: Triple  # m/s^2
     start: float
+    """Time (s) from which this holds: faults have happened and are known, gusts and pushes have
+    passed, the commanded attitude is reached."""
 
     def motion(self, names: Sequence[str], start: float, end: float) -> Floats:
         """Motion of the frame from one time (s) to another, in coordinates of these names."""
@@ -53,28 +48,13 @@ class Forcing(NamedTuple):
 
 def forcing_of(assembly: Assembly) -> Forcing:
     """The forcing of a flight. Raises `InputError` where it is neither steady nor periodic."""
-    scenario, gait = assembly.scenario, assembly.gait
-    _check(scenario)
-    address = scenario.address or "scenario"
-    reference = assembly.reference
-    periods = _periods(reference, scenario)
-    velocity, acceleration = _AT_REST, _AT_REST
-    if reference.type == trajectories.LINE:
-        velocity = reference.velocity_x, reference.velocity_y, reference.velocity_z
-        acceleration = reference.acceleration_x, reference.acceleration_y, reference.acceleration_z
-        _check_line(scenario, velocity, acceleration)
-    if assembly.loop.uses_gait and gait.period is not None:
-        kind = gait.parameters
-        if kind.type == CUBIC and not kind.repeats:
-            raise InputError(
-                f"{address}: gait.repeat = false: a table that does not repeat ends; set it to true"
-            )
-        if scenario.gait.type == "rotating" and scenario.simulation.plant != "thesis":
-            raise InputError(
-                f'{address}: gait.type = "rotating": its tilt angles grow for ever; '
-                'choose simulation.plant = "thesis"'
-            )
-        periods.append(gait.period)
+    for reason in _refusals(assembly):
+        raise InputError(f"{assembly.scenario.address or 'scenario'}: {reason}")
+    scenario, reference = assembly.scenario, assembly.reference
+    periods = _periods(reference)
+    if assembly.loop.uses_gait and assembly.gait.period is not None:
+        periods.append(assembly.gait.period)
+    velocity, acceleration = reference.velocity, reference.acceleration
     gust = None if scenario.air is None else scenario.air.gust
     passed = 0.0 if gust is None else gust.start + 2.0 * gust.rise + gust.duration
     events = [passed, *(fault.time for fault in scenario.fault)]
@@ -83,55 +63,50 @@ def forcing_of(assembly: Assembly) -> Forcing:
     return Forcing(_common(periods, scenario), velocity, acceleration, max(events))
 
 
-def _check(scenario: Scenario) -> None:
-    """Refuse what is random, and controllers whose states are unknown."""
-    address = scenario.address or "scenario"
+def _refusals(assembly: Assembly) -> Iterator[str]:
+    """Why a flight is neither steady nor periodic, or unknown."""
+    scenario, air = assembly.scenario, assembly.scenario.air
     if scenario.controller.is_external:
-        raise InputError(
-            f'{address}: controller.law = "{scenario.controller.law}": its states are unknown, so '
-            "it has no linear analysis"
+        law = scenario.controller.law
+        yield f'controller.law = "{law}": its states are unknown, so it has no linear analysis'
+    for name, value in scenario.sensors:
+        if name.endswith("_noise") and value:
+            yield f"sensors.{name}: with noise nothing repeats; set it to 0"
+    if air is not None and air.turbulence is not None:
+        yield "air.turbulence: in turbulence nothing repeats; leave it out"
+    if assembly.reference.type not in STEADY | PERIODIC:
+        yield (
+            f'reference.type = "{scenario.reference.type}": the flight is neither at rest nor '
+            "periodic; choose setpoint, line, circle or lissajous"
         )
-    noisy = [name for name, value in scenario.sensors if name.endswith("_noise") and value]
-    if noisy:
-        raise InputError(f"{address}: sensors.{noisy[0]}: with noise nothing repeats; set it to 0")
-    if scenario.air is not None and scenario.air.turbulence is not None:
-        raise InputError(f"{address}: air.turbulence: in turbulence nothing repeats; leave it out")
-
-
-def _check_line(scenario: Scenario, velocity: Triple, acceleration: Triple) -> None:
-    """Refuse lines along which the air acts differently from place to place or time to time."""
-    air, address = scenario.air, scenario.address or "scenario"
-    if air is None:
+    velocity, acceleration = assembly.reference.velocity, assembly.reference.acceleration
+    if air is not None and any(acceleration) and (any(air.drag.linear) or any(air.drag.area)):
+        yield (
+            f"reference.acceleration = {list(acceleration)}: with air.drag the flight is neither "
+            "at rest nor periodic, for its airspeed grows; leave out one of the two"
+        )
+    if air is not None and air.ground_effect is not None and (velocity[2] or acceleration[2]):
+        yield (
+            "reference: the line climbs or descends: with air.ground_effect the flight is neither "
+            "at rest nor periodic, for its height changes; leave out one of the two"
+        )
+    if not assembly.loop.uses_gait or assembly.gait.period is None:
         return
-    if any(acceleration) and (any(air.drag.linear) or any(air.drag.area)):
-        raise InputError(
-            f"{address}: reference.acceleration = {list(acceleration)}: with air.drag the flight "
-            "is neither at rest nor periodic, for its airspeed grows; leave out one of the two"
-        )
-    if air.ground_effect is not None and (velocity[2] or acceleration[2]):
-        raise InputError(
-            f"{address}: reference: the line climbs or descends: with air.ground_effect the flight "
-            "is neither at rest nor periodic, for its height changes; leave out one of the two"
+    kind = assembly.gait.parameters
+    if kind.type == CUBIC and not kind.repeats:
+        yield "gait.repeat = false: a table that does not repeat ends; set it to true"
+    if scenario.gait.type == "rotating" and scenario.simulation.plant != "thesis":
+        yield (
+            'gait.type = "rotating": its tilt angles grow for ever; choose simulation.plant = '
+            '"thesis"'
         )
 
 
-def _periods(reference: trajectories.ReferenceParameters, scenario: Scenario) -> list[float]:
+def _periods(reference: trajectories.ReferenceParameters) -> list[float]:
     """The periods (s) of a reference."""
-    if reference.type in {trajectories.SETPOINT, trajectories.ATTITUDE_ALTITUDE, trajectories.LINE}:
-        return []
-    if reference.type == trajectories.CIRCLE:
-        rates = [reference.angular_frequency]
-    elif reference.type == trajectories.LISSAJOUS:
-        rates = [
-            getattr(reference, f"frequency_{axis}")
-            for axis in "xyz"
-            if getattr(reference, f"amplitude_{axis}")
-        ]
-    else:
-        raise InputError(
-            f'{scenario.address or "scenario"}: reference.type = "{scenario.reference.type}": the '
-            "flight is neither at rest nor periodic; choose setpoint, line, circle or lissajous"
-        )
+    rates = [reference.angular_frequency] if reference.type == trajectories.CIRCLE else []
+    if reference.type == trajectories.LISSAJOUS:
+        rates = [w for w, size in zip(reference.frequency, reference.amplitude) if size]
     return [2.0 * pi / abs(rate) for rate in rates if rate]
 
 

@@ -23,23 +23,7 @@ from tiltsim.linear.modes import NEUTRAL, exponents
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.scenario import Scenario
 from tiltsim_controllers.mathematics.scalar import Floats
-
-MEASURED: Final = (
-    "x",
-    "y",
-    "z",
-    "vx",
-    "vy",
-    "vz",
-    "rotation_",
-    "roll",
-    "pitch",
-    "yaw",
-    "p",
-    "q",
-    "r",
-)
-"""States that sensors measure, by name or its beginning."""
+from tiltsim_controllers.vehicle.body import BODY_FIELDS
 
 TOGETHER: Final = "all inputs"
 PER_DECADE: Final = 100  # frequencies
@@ -55,26 +39,18 @@ REGULAR: Final = 1e12  # condition of a matrix whose inverse is more than roundi
 
 @dataclass(frozen=True)
 class Margin:
-    """Stability margins of a loop broken at one place.
+    """Stability margins of a loop broken at one place."""
 
-    Attributes:
-        place: An input, a measured state, or all inputs together.
-        gain: Factors of the loop's gain between which it stays stable; 0 and infinity without
-            limit.
-        phase: Smallest lag or lead at which it becomes unstable, rad; infinite if none does.
-        delay: Smallest further delay at which it becomes unstable, s.
-        frequency: Frequency of the smallest phase margin, rad/s; nan if there is none.
-        disk: Largest alpha of the disk of factors ``(1 + alpha d / 2) / (1 - alpha d / 2)``, any
-            complex ``|d| < 1``; 2 and more: any phase. At all inputs together d is any matrix
-            smaller than 1, so the disk holds for independent factors, which may bear more.
-    """
-
-    place: str
+    place: str  # an input, a measured state, or all inputs together
     gain: tuple[float, float]
-    phase: float
-    delay: float
-    frequency: float
+    """Factors of the loop's gain between which it stays stable; 0 and infinity without limit."""
+    phase: float  # smallest lag or lead at which it becomes unstable, rad; infinite if none does
+    delay: float  # smallest further delay at which it becomes unstable, s
+    frequency: float  # frequency of the smallest phase margin, rad/s; nan if there is none
     disk: float
+    """Largest alpha of the disk of factors ``(1 + alpha d / 2) / (1 - alpha d / 2)``, any complex
+    ``|d| < 1``; 2 and more: any phase. At all inputs together d is any matrix smaller than 1,
+    so the disk holds for independent factors, which may bear more."""
 
     @property
     def disk_gain(self) -> float:
@@ -140,7 +116,7 @@ def broken_loops(system: Linearization) -> Iterator[BrokenLoop]:
         yield BrokenLoop(system.inputs[index].name, system.A - column @ row, column, row, timestep)
     for index, signal in enumerate(system.states):
         name = signal.name
-        measured = name in MEASURED or name.startswith("rotation_")
+        measured = name in BODY_FIELDS or name.startswith("rotation_")
         if measured and np.abs(gains[:, index]).max() > 0.0:
             column = b @ gains[:, [index]]
             column[memory] = system.A[np.ix_(memory, [index])]

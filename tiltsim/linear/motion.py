@@ -24,8 +24,8 @@ from tiltsim.laws.assembling import assemble
 from tiltsim.linear import coordinates
 from tiltsim.linear.coordinates import Pendulum
 from tiltsim.models.objects import FORCE
-from tiltsim.plants.equations_plant import EquationsPlant
 from tiltsim.plants.mujoco_plant import MujocoPlant
+from tiltsim.plants.plant import EquationsPlant
 from tiltsim.scenario.scenario import Scenario
 from tiltsim_controllers.code.arrays import program_of, xp
 from tiltsim_controllers.code.python_source import python_function
@@ -176,7 +176,7 @@ class EquationMotion(Motion):
     """On equations of motion."""
 
     def _names(self) -> tuple[coordinates.Coordinates, tuple[coordinates.Input, ...]]:
-        inputs = coordinates.equation_inputs(self.assembly, self._equations.inputs_size)
+        inputs = coordinates.equation_inputs(self.assembly)
         return coordinates.equation_coordinates(self.assembly, len(self.initial)), inputs
 
     @cached_property
@@ -218,21 +218,22 @@ class EquationMotion(Motion):
         return state if project is None else np.array(project(state.tolist(), parameters))
 
     def flown(self, step: int, state: Floats, steps: int) -> Floats:
-        plant = self._varied if self.offsets.any() else self._plant
+        return self._flown_by(
+            self._varied if self.offsets.any() else self._plant, step, state, steps
+        )
+
+    def _flown_by(self, plant: EquationsPlant, step: int, state: Floats, steps: int) -> Floats:
         held = self._equations.inputs_size
-        plant.state = np.array((step, *(0.0,) * held, *state))  # a sample is due
+        plant.state = np.array((step, *state, *(0.0,) * held))  # a sample is due
         plant.advance(steps)
-        return plant.state[1 + held :]
+        return plant.state[1 : 1 + len(state)]
 
     def _together(self, step: int, states: Sequence[Floats], steps: int) -> list[Floats]:
-        held = (0.0,) * self._equations.inputs_size
         self._plant.advance(0)  # compiles before threads do
 
         def fly(state: Floats) -> Floats:
             plant = EquationsPlant(self._flown_assembly, self.engine)
-            plant.state = np.array((step, *held, *state))
-            plant.advance(steps)
-            return plant.state[1 + len(held) :]
+            return self._flown_by(plant, step, state, steps)
 
         with ThreadPoolExecutor(THREADS) as pool:
             return list(pool.map(fly, states))

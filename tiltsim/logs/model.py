@@ -26,19 +26,12 @@ from tiltsim_controllers.vehicle.rotors import Rotors, TiltOfRotor, rotors_in, t
 
 
 class Parameter(NamedTuple):
-    """A number or vector that a log may tell.
+    """A number or vector that a log may tell."""
 
-    Attributes:
-        field: The model's number.
-        unit: Its unit.
-        nominal: Its value in the scenario, shape (n,).
-        scale: A change that counts as large, in the unit, shape (n,).
-    """
-
-    field: str
-    unit: str
-    nominal: Floats
-    scale: Floats
+    field: str  # the model's number
+    unit: str  # its unit
+    nominal: Floats  # its value in the scenario, shape (n,)
+    scale: Floats  # a change that counts as large, in the unit, shape (n,)
 
 
 FACTORS: Final = tuple(

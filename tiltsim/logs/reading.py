@@ -6,13 +6,12 @@ Maps from the signals of a log to tiltsim's columns are TOML files, or the map o
 from __future__ import annotations
 
 import csv
-import tomllib
 from os import PathLike
 from pathlib import Path
 from typing import Final, Literal
 
 import numpy as np
-from pydantic import Field, ValidationError
+from pydantic import Field
 from scipy.spatial.transform import Rotation
 
 from tiltsim.errors import InputError
@@ -21,9 +20,9 @@ from tiltsim.flight.reading import flight_file
 from tiltsim.logs import formats
 from tiltsim.logs.formats import Signals
 from tiltsim.logs.log import LOG_SUFFIXES, UNITS, Log
-from tiltsim.scenario.library import read_text
-from tiltsim.scenario.messages import choose, did_you_mean, one_line_message
-from tiltsim.scenario.table import NotTiny, Table, default, required
+from tiltsim.scenario.library import read_text, read_toml
+from tiltsim.scenario.messages import choose, did_you_mean
+from tiltsim.scenario.table import NotTiny, Table, default, in_one_line, required
 from tiltsim.system.files import is_file, is_folder
 from tiltsim.system.parquet import open_parquet
 from tiltsim.system.text import printable, short_repr
@@ -101,13 +100,9 @@ def read_map(file: Path) -> LogMap:
     """Read a map from a TOML file. Raises `InputError` in one line: file, key, value, allowed."""
     if not is_file(file):
         raise InputError(f"{file}: no such file")
-    try:
-        document = tomllib.loads(read_text(file))
+    document = read_toml(file)
+    with in_one_line(f"{file}", document, LogMap):
         return LogMap.model_validate(document)
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{file}: not valid TOML: {error}") from error
-    except ValidationError as error:
-        raise InputError(f"{file}: {one_line_message(error, document, LogMap)}") from None
 
 
 def read_log(

@@ -49,15 +49,10 @@ class Windows(NamedTuple):
 
     start: Floats  # s, shape (W,)
     step: Floats  # s, shape (W, K - 1): between samples
-    position: Floats  # m, shape (W, K, 3)
-    velocity: Floats
-    attitude: Floats  # quaternions w x y z, shape (W, K, 4)
-    body_rates: Floats
     speeds: Floats  # rad/s, at the stages of the integration, shape (W, K - 1, 2 S + 1, N)
     tilts: Floats  # rad, shape (W, K - 1, 2 S + 1, M)
     speed_commands: Floats  # rad/s, held between samples, shape (W, K, N); NaN if not in the log
     tilt_commands: Floats
-
     measured: Floats  # position, velocity, quaternion, body rates, 0 if unknown, (W, K, 13)
     is_measured: Floats  # of the twelve errors, shape (W, K, 12)
 
@@ -131,7 +126,7 @@ def windows_of(log: Log, seconds: float, rotors: int, tilts: int) -> Windows:
     measured = np.nan_to_num(np.concatenate(found, axis=-1))
     is_measured = np.concatenate([np.isfinite(vector[..., :3]) for vector in found], axis=-1)
     held = [inputs[places] for inputs in commands]
-    return Windows(*[time[starts], steps, *found, *at_stages, *held, measured, is_measured])
+    return Windows(*[time[starts], steps, *at_stages, *held, measured, is_measured])
 
 
 def _inputs(log: Log, name: str, count: int) -> Floats:
@@ -305,17 +300,15 @@ class Problem:
 
 def _guess(windows: Windows) -> Floats:
     """The measured states at the beginning of each window; derivatives where none is measured."""
-    first = windows.step[:, :1]
-    place = np.nan_to_num(windows.position)
-    velocity = (place[:, 1] - place[:, 0]) / first
-    measured = windows.velocity[:, 0]
-    velocity = np.where(np.isfinite(measured), measured, velocity)
-    turned = Rotation.from_quat(windows.attitude[:, :2, [1, 2, 3, 0]].reshape(-1, 4))
-    before, after = turned[::2], turned[1::2]
-    rates = (before.inv() * after).as_rotvec() / first
-    measured = windows.body_rates[:, 0]
-    rates = np.where(np.isfinite(measured), measured, rates)
-    return np.hstack([place[:, 0], velocity, windows.attitude[:, 0], rates])
+    first, begin = windows.step[:, :1], windows.measured[:, :2]
+    is_measured = windows.is_measured[:, 0]
+    place, velocity, attitude, rates = np.split(begin, [3, 6, 10], axis=-1)
+    moved = (place[:, 1] - place[:, 0]) / first
+    velocity = np.where(is_measured[:, 3:6], velocity[:, 0], moved)
+    turned = Rotation.from_quat(attitude[..., [1, 2, 3, 0]].reshape(-1, 4))
+    moved = (turned[::2].inv() * turned[1::2]).as_rotvec() / first
+    rates = np.where(is_measured[:, 9:], rates[:, 0], moved)
+    return np.hstack([place[:, 0], velocity, attitude[:, 0], rates])
 
 
 def _reduced(parts: list[Floats], damping: float) -> tuple[Floats, Floats, Floats, Floats]:

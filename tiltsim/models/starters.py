@@ -1,9 +1,8 @@
 """Files to start from: a commented MJCF vehicle of each kind, and a scenario that flies it."""
 
 import json
-from collections.abc import Iterator
 from math import cos, pi, sin
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -102,62 +101,35 @@ STARTERS: Final[dict[str, Starter]] = {
 def starter_mjcf(kind: str) -> str:
     """The MJCF file of a kind in `STARTERS`."""
     starter = STARTERS[kind]
-    indices = range(len(starter.places))
-    tilting = indices if starter.angles else ()
-    body = [line for rotor in indices for line in _rotor(starter, rotor)]
-    actuators = [f'<position name="tilt_{i + 1}" joint="tilt_{i + 1}"/>' for i in tilting]
-    for i in indices:
-        sense = "counterclockwise" if starter.spin(i) > 0 else "clockwise"
-        actuators.append(f'<general name="thrust_{i + 1}" class="{sense}" site="rotor_{i + 1}"/>')
-    for i in indices:
-        low = -MAX_SPEED if starter.reverses or starter.spin(i) < 0 else 0.0
-        high = MAX_SPEED if starter.spin(i) > 0 else 0.0
-        actuators.append(
-            f'<general name="rotor_speed_{i + 1}" class="speed" joint="vehicle" '
-            f'actrange="{low:g} {high:g}"/>'
-        )
-    hinge = _HINGE if starter.angles else ""
-    return _MJCF.format(
-        kind=kind,
-        title=starter.title,
-        hinge=hinge,
-        thrust=THRUST,
-        drag=DRAG,
-        body="\n".join(f"      {line}" for line in body),
-        actuators="\n".join(f"    {line}" for line in actuators),
-    )
-
-
-def _rotor(starter: Starter, rotor: int) -> Iterator[str]:
-    """An arm with its motor and the site of its thrust, on a hinge if the rotors tilt."""
-    number, place, axis = rotor + 1, _row(starter.places[rotor]), _row(starter.axes[rotor])
-    hinge = _row(starter.places[rotor] * [1.0, 1.0, 0.0])
-    yield f'<geom class="arm" fromto="0 0 0 {place}"/>'
-    if not starter.angles:
-        yield f'<geom class="motor" pos="{place}" zaxis="{axis}"/>'
-        yield f'<site name="rotor_{number}" pos="{place}" zaxis="{axis}"/>'
-        return
-    yield f'<body name="pod_{number}" pos="{place}">'
-    yield f'  <joint name="tilt_{number}" class="hinge" axis="{hinge}"/>'
-    yield '  <geom class="motor"/>'
-    yield f'  <site name="rotor_{number}"/>'
-    yield "</body>"
+    rotors = [
+        {
+            "place": _row(place),
+            "axis": _row(axis),
+            "hinge": _row(place * [1.0, 1.0, 0.0]),
+            "sense": "counterclockwise" if spin > 0 else "clockwise",
+            "low": f"{-MAX_SPEED if starter.reverses or spin < 0 else 0.0:g}",
+            "high": f"{MAX_SPEED if spin > 0 else 0.0:g}",
+        }
+        for i, (place, axis) in enumerate(zip(starter.places, starter.axes, strict=True))
+        for spin in [starter.spin(i)]
+    ]
+    return _filled(_MJCF, kind=kind, starter=starter, rotors=rotors, thrust=THRUST, drag=DRAG)
 
 
 def _row(vector: Floats) -> str:
     return " ".join(f"{entry + 0.0:.6g}" for entry in np.round(vector, 6))
 
 
-_HINGE: Final = """\
-    <default class="hinge">
-      <!-- The armature is the servo's inertia; vehicle.tilt_servo in the scenario, its gains. -->
-      <joint type="hinge" armature="2e-5"/>
-    </default>
-"""
+def _filled(template: str, **values: Any) -> str:
+    from jinja2 import Environment
+
+    options = {"trim_blocks": True, "lstrip_blocks": True, "keep_trailing_newline": True}
+    return Environment(**options).from_string(template).render(values)  # type: ignore[arg-type]
+
 
 _MJCF: Final = """\
-<mujoco model="{kind}">
-  <!-- {title}.
+<mujoco model="{{ kind }}">
+  <!-- {{ starter.title }}.
        Body axes: x forward, y left, z up, from the center of mass. SI units, rad. tiltsim finds
        its parts by name: the body vehicle with its free joint, and for each rotor i = 1, 2, ...
        the site rotor_i, whose z axis is the direction of the thrust, the actuators
@@ -171,14 +143,20 @@ _MJCF: Final = """\
     <default class="motor">
       <geom type="cylinder" size="0.016 0.014" mass="0.05" rgba="0.3 0.32 0.35 1"/>
     </default>
-{hinge}\
+    {% if starter.angles %}
+    <default class="hinge">
+      <!-- The armature is the servo's inertia; vehicle.tilt_servo in the scenario, its gains. -->
+      <joint type="hinge" armature="2e-5"/>
+    </default>
+    {% endif %}
     <!-- Thrust and drag torque are gear times control, which is the signed square of the rotor
-         speed: {thrust:g} N and {drag:g} N m per (rad/s)^2. The drag torque opposes the spin. -->
+         speed: {{ thrust }} N and {{ drag }} N m per (rad/s)^2. The drag torque opposes \
+the spin. -->
     <default class="counterclockwise">
-      <general gear="0 0 {thrust:g} 0 0 -{drag:g}"/>
+      <general gear="0 0 {{ thrust }} 0 0 -{{ drag }}"/>
     </default>
     <default class="clockwise">
-      <general gear="0 0 {thrust:g} 0 0 {drag:g}"/>
+      <general gear="0 0 {{ thrust }} 0 0 {{ drag }}"/>
     </default>
     <!-- The rotor speeds, rad/s, are states of the simulation. -->
     <default class="speed">
@@ -191,11 +169,33 @@ _MJCF: Final = """\
       <!-- Masses in kg; MuJoCo computes the inertia from the geoms. -->
       <geom name="hull" type="ellipsoid" size="0.08 0.06 0.03" mass="0.7" rgba="0.6 0.63 0.67 1"/>
       <geom name="nose" type="sphere" size="0.02" pos="0.07 0 0" mass="0" rgba="0.8 0.1 0.1 1"/>
-{body}
+      {% for rotor in rotors %}
+      <geom class="arm" fromto="0 0 0 {{ rotor.place }}"/>
+      {% if starter.angles %}
+      <body name="pod_{{ loop.index }}" pos="{{ rotor.place }}">
+        <joint name="tilt_{{ loop.index }}" class="hinge" axis="{{ rotor.hinge }}"/>
+        <geom class="motor"/>
+        <site name="rotor_{{ loop.index }}"/>
+      </body>
+      {% else %}
+      <geom class="motor" pos="{{ rotor.place }}" zaxis="{{ rotor.axis }}"/>
+      <site name="rotor_{{ loop.index }}" pos="{{ rotor.place }}" zaxis="{{ rotor.axis }}"/>
+      {% endif %}
+      {% endfor %}
     </body>
   </worldbody>
   <actuator>
-{actuators}
+    {% for _ in starter.angles %}
+    <position name="tilt_{{ loop.index }}" joint="tilt_{{ loop.index }}"/>
+    {% endfor %}
+    {% for rotor in rotors %}
+    <general name="thrust_{{ loop.index }}" class="{{ rotor.sense }}" \
+site="rotor_{{ loop.index }}"/>
+    {% endfor %}
+    {% for rotor in rotors %}
+    <general name="rotor_speed_{{ loop.index }}" class="speed" joint="vehicle" \
+actrange="{{ rotor.low }} {{ rotor.high }}"/>
+    {% endfor %}
   </actuator>
 </mujoco>
 """
@@ -203,53 +203,43 @@ _MJCF: Final = """\
 
 def starter_scenario(kind: str, mjcf: str) -> str:
     """The scenario that flies a kind in `STARTERS`, whose file lies in its folder, to a point."""
-    starter = STARTERS[kind]
-    return _SCENARIO.format(
-        title=starter.title,
-        mjcf=json.dumps(mjcf, ensure_ascii=False),
-        speed=MAX_SPEED,
-        controller=starter.controller,
-        least="" if starter.reverses else _LEAST,
-        expectations="".join(_EXPECTATION.format(axis=axis) for axis in "xyz"),
-        gait=_GAIT.format(angles=list(starter.angles)) if starter.angles else "",
-    )
+    file = json.dumps(mjcf, ensure_ascii=False)
+    return _filled(_SCENARIO, starter=STARTERS[kind], mjcf=file, speed=MAX_SPEED)
 
-
-_LEAST: Final = """\
-min_rotor_speed = 100.0              # a rotor that stops would leave the vehicle without control
-"""
-
-_GAIT: Final = """
-[gait]
-type = "fixed"                       # tilt angles, rad; or "waypoints", "table"
-angles = {angles}
-"""
-
-_EXPECTATION: Final = """
-[[expect]]                           # checked after the flight
-metric = "final_position_error_{axis}"
-min = -0.001                         # m
-max = 0.001
-"""
 
 _SCENARIO: Final = """\
 # "tiltsim schema" explains every key, "tiltsim schema reference" the keys of a table.
-title = "{title} moves to a point and stays there"
+title = "{{ starter.title }} moves to a point and stays there"
 
 [vehicle]
 model = "multirotor"
-mjcf = {mjcf}  # in the folder of this file
-max_rotor_speed = {speed}              # rad/s
-{least}\
+mjcf = {{ mjcf }}  # in the folder of this file
+max_rotor_speed = {{ speed }}              # rad/s
+{% if not starter.reverses %}
+min_rotor_speed = 100.0              # a rotor that stops would leave the vehicle without control
+{% endif %}
 
 [simulation]
 duration = 20.0                      # s
 timestep = 0.004                     # s
 
 [controller]
-{controller}\
-{gait}
+{{ starter.controller }}\
+{% if starter.angles %}
+
+[gait]
+type = "fixed"                       # tilt angles, rad; or "waypoints", "table"
+angles = {{ starter.angles | list }}
+{% endif %}
+
 [reference]
 type = "setpoint"                    # or "circle", "figure_eight", "waypoints", "table"
 position = [0.3, -0.2, 0.2]          # m
-{expectations}"""
+{% for axis in "xyz" %}
+
+[[expect]]                           # checked after the flight
+metric = "final_position_error_{{ axis }}"
+min = -0.001                         # m
+max = 0.001
+{% endfor %}
+"""

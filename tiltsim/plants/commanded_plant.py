@@ -32,7 +32,7 @@ from tiltsim.plants.mujoco_plant import MujocoPlant
 from tiltsim.plants.observing import Observer, flip_by_spin
 from tiltsim.scenario.controller import PythonController
 from tiltsim.scenario.law_controller import is_law
-from tiltsim.scenario.own_code import describe, load_function
+from tiltsim.scenario.own_parts import describe, load_function
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.vehicles.rotorcraft.layout import TILT_1, Layout, layout_of, tilt_of_rotor, true_rotors
 from tiltsim_controllers.code.arrays import as_arrays

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from functools import cache, partial
 from itertools import pairwise
 from math import nan
-from typing import TYPE_CHECKING, Any, Final
+from typing import Final
 
 import mujoco
 import numpy as np
@@ -34,9 +34,6 @@ from tiltsim.scenario.scenario import Scenario
 from tiltsim.scenario.scenario_tables import DESCRIPTIVE
 from tiltsim.vehicles.rotorcraft.others import motion_at_start
 from tiltsim_controllers.mathematics.scalar import Floats
-
-if TYPE_CHECKING:
-    from tiltsim.scenario.scenario import Scenario
 
 _TABLES_WITHOUT_EFFECT: Final = frozenset(
     (*DESCRIPTIVE, "simulation", "initial", "gait", "reference", "sensors")
@@ -233,10 +230,10 @@ class MujocoPlant(Plant):
 
     def _prepare_engine(self) -> None:
         """Build the engine, which reads the parameters in ``userdata`` once."""
-        self._callback = make_callback(self.engine, self._assembly, self.model, self.data)
+        self.callback = make_callback(self.engine, self._assembly, self.model, self.data)
 
     def advance(self, steps: int) -> None:
-        with control_callback(self._callback):
+        with control_callback(self.callback):
             self._step(steps)
 
     def _step(self, steps: int) -> None:
@@ -260,11 +257,6 @@ class MujocoPlant(Plant):
         return evaluation_time(evaluations, per_step, timestep)
 
     @property
-    def callback(self) -> Any:
-        """The control callback for MuJoCo; see `tiltsim.engines.control.make_callback`."""
-        return self._callback
-
-    @property
     def header_offset(self) -> int:
         """Index in `state` at which the `tiltsim.closed_loop.userdata.Header` begins."""
         before = int(mujoco.mjtState.mjSTATE_USERDATA) - 1
@@ -277,8 +269,6 @@ class MujocoPlant(Plant):
             samples: Number of samples.
             steps, last_steps: Physics steps between samples, and before the last one.
         """
-        from tiltsim.engines.programs import Recorder
-
         evaluations = self._evaluations_per_step
         return Recorder(
             self._assembly,

@@ -1,31 +1,34 @@
-"""The interface of plants, and the choice of their engine."""
+"""The interface of plants, the choice of their engine, and equations of motion as a plant."""
+
+from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Final, Protocol
+from math import nan
+from typing import TYPE_CHECKING, Final, Protocol
 
 import numpy as np
 
-from tiltsim.closed_loop.assembly import Assembly
+from tiltsim.closed_loop.assembly import Assembly, program_key
 from tiltsim.engines.base import EngineName
+from tiltsim.engines.programs import Recorder
+from tiltsim.engines.steppers import Integrated, Layout, NativeStepper, PythonStepper, observation
 from tiltsim.scenario.scenario import Scenario
 from tiltsim_controllers.mathematics.scalar import Floats
+
+if TYPE_CHECKING:
+    from tiltsim.arrays.flying import JaxStepper
 
 
 class Plant(Protocol):
     """A vehicle under control, advanced step by step and restartable from its state."""
 
     engine: EngineName
+    state: Floats
+    """Everything that the future depends on, as a vector; assign it to restart there."""
 
     @property
     def time(self) -> float:
         """Simulated time, s."""
-
-    @property
-    def state(self) -> Floats:
-        """Everything that the future depends on, as a vector; assign it to restart there."""
-
-    @state.setter
-    def state(self, value: Floats) -> None: ...
 
     def advance(self, steps: int) -> None:
         """Take physics steps."""
@@ -90,3 +93,96 @@ def with_engine(scenario: Scenario, engine: EngineName) -> Scenario:
         return scenario
     simulation = scenario.simulation.model_copy(update={"engine": engine})
     return scenario.model_copy(update={"simulation": simulation})
+
+
+def initial_state(assembly: Assembly) -> list[float]:
+    """The state at time zero of a flight whose loop has equations."""
+    equations = assembly.loop.equations
+    assert equations is not None  # other scenarios are refused
+    return [*map(float, equations.initial(assembly, assembly.setup))]
+
+
+def layout_of(assembly: Assembly, states: int) -> Layout:
+    """The layout of a flight whose loop has equations, by its number of states."""
+    simulation = assembly.scenario.simulation
+    key = program_key(assembly)
+    held = simulation.control_steps > 0
+    return Layout(key, states, simulation.solver, held, simulation.batch_functions)
+
+
+def integrated(assembly: Assembly, layout: Layout) -> Integrated:
+    """A flight as steppers need it."""
+    simulation = assembly.scenario.simulation
+    return Integrated(
+        layout,
+        simulation.timestep,
+        simulation.control_steps,
+        assembly.setup.userdata,
+        assembly.scenario.disturbance_acceleration,
+        assembly.traced,
+    )
+
+
+class EquationsPlant(Plant):
+    """The equations of a loop, integrated by a solver of `tiltsim.equations.solvers`.
+
+    Its state is the step count, the state of the equations, and the inputs in force, as lanes save
+    it; the parameters are not part of it.
+
+    Args:
+        assembly: The flight; its loop has equations.
+        engine: Default: the one that the scenario requests.
+    """
+
+    def __init__(self, assembly: Assembly, engine: EngineName | None = None) -> None:
+        scenario, loop, setup = assembly.scenario, assembly.loop, assembly.setup
+        assert loop.equations is not None  # other scenarios are refused
+        self._assembly = assembly
+        start = initial_state(assembly)
+        self.state = np.array([0.0, *start, *(0.0,) * loop.equations.inputs_size])
+        self.engine: EngineName = choose_engine(assembly, engine)
+        self._timestep = scenario.simulation.timestep
+        flight = integrated(assembly, layout_of(assembly, len(start)))
+        self._observe = observation(flight)
+        self._stepper: PythonStepper | NativeStepper | JaxStepper
+        if self.engine == "native":
+            self._native = self._stepper = NativeStepper(flight)
+        elif self.engine == "jax":
+            from tiltsim.arrays.flying import JaxStepper, course_of
+
+            self._stepper = JaxStepper(course_of(assembly), setup, flight.disturbance)
+        else:
+            self._stepper = PythonStepper(flight)
+
+    @property
+    def _step_index(self) -> int:
+        return int(self.state[0])
+
+    @property
+    def time(self) -> float:
+        return self._step_index * self._timestep
+
+    def advance(self, steps: int) -> None:
+        now = self._stepper.advance(self._step_index, self.state[1:], steps)
+        self.state = np.array([self._step_index + steps, *now])
+
+    def record(self, samples: int, steps: int) -> Floats | None:
+        if self.engine == "native":
+            return self._record_natively(samples, steps)
+        return super().record(samples, steps)
+
+    def _record_natively(self, samples: int, steps: int) -> Floats | None:
+        checked = self._assembly.sign_check_values(self.time, self.observe())
+        recorder = Recorder(self._assembly, samples, steps, steps, checked)
+        found = self._native.record(self._step_index, self.state[1:], samples, steps, recorder)
+        self.state = np.array([found[0], *found[1]])
+        return None if recorder.terminated else recorder.samples
+
+    def observe(self) -> tuple[float, ...]:
+        try:
+            return self._observe(self._step_index, self.state[1:])
+        except (ArithmeticError, ValueError):
+            return (nan,) * (len(self._assembly.loop.sample_fields) - 1)
+
+    def fault(self) -> str:
+        return ""

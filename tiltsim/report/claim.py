@@ -9,6 +9,9 @@ from math import isfinite
 from pathlib import Path
 from typing import Final, TypeAlias
 
+import numpy as np
+from numpy.typing import ArrayLike
+
 from tiltsim.flight.metrics import Verdict
 from tiltsim.report.statement import CHAPTER, Described, Origin, Statement, origins_of, slug
 from tiltsim.scenario.expectation import Expectation
@@ -71,8 +74,8 @@ class Claim:
     _: KW_ONLY
     flights: tuple[str, ...] = ()
     """Addresses in the scenario library; a claim without flights is computed."""
-    measure: Callable[..., Value] | None = None
-    """From the metrics of the flights, a list in order, to the value; no argument if computed."""
+    measure: Callable[[Sequence[Metrics]], ArrayLike] | None = None
+    """From the metrics of the flights, in order, none if it is computed, to the value."""
     expectation: Expectation | None = None
     """The bound in a scenario file on a metric of its only flight, in place of a measure."""
     published: Published = True
@@ -174,7 +177,7 @@ class Claim:
             if self.measure is None:
                 return None
             try:
-                return plain(self.measure(*([flown] if self.flights else [])))
+                return plain(self.measure(flown))
             except KeyError:  # a flight that terminates early has no final values
                 if not self.flights:
                     raise
@@ -222,12 +225,12 @@ def _agrees(claim: Claim, measured: Value, widened: float) -> bool:
     )
 
 
-def plain(measured: object) -> Value:
-    """A measured value in plain Python types: NumPy scalars are unwrapped."""
-    if isinstance(measured, tuple | list):
-        return tuple(float(value) for value in measured)
-    value = measured.item() if hasattr(measured, "item") else measured
-    return value if isinstance(value, bool) else float(value)  # type: ignore[arg-type]
+def plain(measured: ArrayLike) -> Value:
+    """A measured value, or several, in plain Python types; an array of one value is this value."""
+    values = np.ravel(measured).tolist()
+    if len(values) > 1 or isinstance(measured, tuple | list):
+        return tuple(map(float, values))
+    return values[0] if isinstance(values[0], bool) else float(values[0])
 
 
 def worst(verdicts: list[ClaimVerdict]) -> ClaimVerdict:

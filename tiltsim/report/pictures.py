@@ -31,12 +31,7 @@ from tiltsim.report.flights import (
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.simulation.simulate import simulate_to_end
-from tiltsim.views.figures.comparisons import (
-    PeriodErrors,
-    SetpointErrors,
-    period_figure,
-    setpoint_figure,
-)
+from tiltsim.views.figures.comparisons import period_figure, setpoint_figure
 from tiltsim.views.figures.gaits import comparison_figure, map_figure
 from tiltsim.views.figures.plot import plot
 from tiltsim.views.figures.stability import attraction_panels
@@ -69,8 +64,14 @@ _PERIODS: Final = (1, 2, 3)
 _SETPOINTS: Final = tuple(
     f"ch04_tracking/setpoint#{rho}_{decoupler}" for decoupler in _LETTERS for rho in _RHOS
 )
+
+
+def _trot(reference: str, form: str, period: int, decoupler: str) -> str:
+    return f"ch04_tracking/{reference}#{form}_t{period}_{decoupler}"
+
+
 _TROTS: Final = tuple(
-    f"ch04_tracking/{reference}#{form}_t{period}_{decoupler}"
+    _trot(reference, form, period, decoupler)
     for (reference, form), period, decoupler in product(_PANELS, _PERIODS, _LETTERS)
 )
 FIG_4: Final = {
@@ -82,39 +83,39 @@ FIG_4: Final = {
 
 def setpoint_errors(metrics: FlightMetrics) -> Figure:
     """Ch. 4, Fig. 4."""
-    families = []
+
+    def error(address: str) -> tuple[float, float]:
+        flown = metrics[address, "mujoco"]
+        return float(flown["final_position_error_x"]), float(flown["final_position_error_y"])
+
+    families = {}
     for decoupler, letter in _LETTERS.items():
-        flown = [metrics[f"ch04_tracking/setpoint#{r}_{decoupler}", "mujoco"] for r in _RHOS]
-        points = [
-            (float(m["final_position_error_x"]), float(m["final_position_error_y"])) for m in flown
-        ]
-        names = [f"{letter}{number}" for number in range(1, 6)]
-        families.append(
-            SetpointErrors(f"{letter}: {decoupler}, MuJoCo", names, points, FIG_4[letter])
-        )
+        addresses = enumerate((a for a in _SETPOINTS if a.endswith(decoupler)), start=1)
+        points = {f"{letter}{number}": error(address) for number, address in addresses}
+        families[f"{letter}: {decoupler}, MuJoCo"] = points, FIG_4[letter]
     return setpoint_figure(families)
 
 
 def trot_errors(metrics: FlightMetrics) -> Figure:
     """Ch. 4, Figs. 8, 9, 13, 14."""
 
-    def series(reference: str, form: str, decoupler: str, plant: Plant) -> PeriodErrors:
-        errors: list[float | None] = []
-        for period in _PERIODS:
-            address = f"ch04_tracking/{reference}#{form}_t{period}_{decoupler}"
-            value = metrics[address, plant].get("sup_position_error_after_20s")
-            errors.append(None if value is None else float(value))
-        name = "MuJoCo" if plant == "mujoco" else "thesis plant"
-        return PeriodErrors(f"{decoupler}, {name}", _PERIODS, errors)
+    def error(address: str, plant: Plant) -> float | None:
+        value = metrics[address, plant].get("sup_position_error_after_20s")
+        return None if value is None else float(value)
 
-    panels = [
-        (
-            f"{reference}, {form}",
-            [series(reference, form, d, plant) for plant in reversed(PLANTS) for d in _LETTERS],
-        )
-        for reference, form in _PANELS
-    ]
-    return period_figure(panels)
+    names = {"mujoco": "MuJoCo", "thesis": "thesis plant"}
+    return period_figure(
+        {
+            f"{reference}, {form}": {
+                f"{decoupler}, {names[plant]}": {
+                    period: error(_trot(reference, form, period, decoupler), plant)
+                    for period in _PERIODS
+                }
+                for plant, decoupler in product(reversed(PLANTS), _LETTERS)
+            }
+            for reference, form in _PANELS
+        }
+    )
 
 
 def gait_and_biased(key: str) -> Figure:

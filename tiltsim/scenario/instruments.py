@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from math import cos, radians, sin, sqrt
 from typing import Annotated, Any, ClassVar, Final, Literal, NamedTuple
 
+import numpy as np
 from pydantic import Field, model_validator
 
 from tiltsim.scenario.table import (
@@ -11,6 +12,7 @@ from tiltsim.scenario.table import (
     Angles3,
     NonNegative,
     Positive,
+    Refusals,
     Table,
     Vector3,
     default,
@@ -20,8 +22,6 @@ from tiltsim.scenario.table import (
 Probability = Annotated[float, Field(ge=0.0, lt=1.0)]
 G: Final = 9.80665  # m/s^2
 MOST_UNDER_WAY: Final = 64  # readings that wait for their delay
-
-
 FINEST: Final = 1e-12  # step of readings: rounding is as coarse
 
 
@@ -33,6 +33,9 @@ class Errors(NamedTuple):
     bias: tuple[float, ...]
     resolution: tuple[float, ...]
 
+
+_ENDINGS: Final = ("noise", "noise_density", "random_walk", "bias", "resolution")
+"""Ends of the keys of errors."""
 
 POSITION: Any = Field(
     ZEROS, description="from the center of mass, body axes [m]", examples=[[0.05, 0.0, 0.01]]
@@ -49,6 +52,8 @@ class InstrumentTable(Table):
 
     columns: ClassVar[Mapping[str, str]] = {}
     """Its columns in a flight and their units; with ``#`` one for each rotor."""
+    quantities: ClassVar[tuple[tuple[str, int], ...]] = (("", 3),)
+    """Beginnings of the keys of its errors, with the sizes of their readings; 0: the rotors'."""
 
     rate: Positive | None = default(
         None, "readings per second; default: one each control step [Hz]", 100
@@ -67,15 +72,13 @@ class InstrumentTable(Table):
 
     def errors(self, rate: float, rotors: int) -> Errors:
         """Its errors at a rate (Hz) on a vehicle with a number of rotors."""
-        raise AssertionError
-
-
-def _axes(noise: float, walk: float, bias: Any, resolution: float) -> list[Any]:
-    return [(noise,) * 3, (walk,) * 3, tuple(bias), (resolution,) * 3]
-
-
-def _joined(*parts: list[Any]) -> Errors:
-    return Errors(*(sum(each, ()) for each in zip(*parts, strict=True)))
+        root, every = sqrt(rate), []
+        for begin, size in self.quantities:
+            given = {ending: getattr(self, begin + ending, 0.0) for ending in _ENDINGS}
+            noise = given["noise"] or given["noise_density"] * root
+            values = noise, given["random_walk"] / root, given["bias"], given["resolution"]
+            every.append([np.broadcast_to(value, size or rotors) for value in values])
+        return Errors(*(tuple(np.hstack(each).tolist()) for each in zip(*every, strict=True)))
 
 
 class ImuTable(InstrumentTable):
@@ -83,6 +86,7 @@ class ImuTable(InstrumentTable):
 
     table_name = "sensors.imu"
     model_config = example(preset="bmi088")
+    quantities = (("accelerometer_", 3), ("gyro_", 3))
     columns: ClassVar[Mapping[str, str]] = {
         **{f"imu_acceleration_{axis}": "m/s^2" for axis in "xyz"},
         **{f"imu_rate_{axis}": "rad/s" for axis in "xyz"},
@@ -136,29 +140,13 @@ class ImuTable(InstrumentTable):
         preset = cls.presets.get(str(given.get("preset"))) if isinstance(given, dict) else None
         return {**preset, **given} if preset else given
 
-    def errors(self, rate: float, rotors: int) -> Errors:
-        size, walked = sqrt(rate), 1.0 / sqrt(rate)
-        return _joined(
-            _axes(
-                self.accelerometer_noise_density * size,
-                self.accelerometer_random_walk * walked,
-                self.accelerometer_bias,
-                self.accelerometer_resolution,
-            ),
-            _axes(
-                self.gyro_noise_density * size,
-                self.gyro_random_walk * walked,
-                self.gyro_bias,
-                self.gyro_resolution,
-            ),
-        )
-
 
 class MocapTable(InstrumentTable):
     """Motion capture: position and attitude from cameras."""
 
     table_name = "sensors.mocap"
     model_config = example(rate=100.0, position_noise=0.001, delay=0.01)
+    quantities = (("position_", 3), ("attitude_", 3))
     columns: ClassVar[Mapping[str, str]] = {
         **{f"mocap_{axis}": "m" for axis in "xyz"},
         **{f"mocap_q{part}": "1" for part in "wxyz"},
@@ -176,18 +164,13 @@ class MocapTable(InstrumentTable):
 
     position: Vector3 = POSITION
 
-    def errors(self, rate: float, rotors: int) -> Errors:
-        return _joined(
-            _axes(self.position_noise, 0.0, self.position_bias, self.position_resolution),
-            _axes(self.attitude_noise, 0.0, self.attitude_bias, 0.0),
-        )
-
 
 class GpsTable(InstrumentTable):
     """Position and velocity from satellites."""
 
     table_name = "sensors.gps"
     model_config = example(rate=5.0, position_noise=1.0, velocity_noise=0.05, delay=0.12)
+    quantities = (("position_", 3), ("velocity_", 3))
     columns: ClassVar[Mapping[str, str]] = {
         **{f"gps_{axis}": "m" for axis in "xyz"},
         **{f"gps_velocity_{axis}": "m/s" for axis in "xyz"},
@@ -203,12 +186,10 @@ class GpsTable(InstrumentTable):
 
     position: Vector3 = POSITION
 
-    def errors(self, rate: float, rotors: int) -> Errors:
-        walk = self.position_random_walk / sqrt(rate)
-        return _joined(
-            _axes(self.position_noise, walk, self.position_bias, self.resolution),
-            _axes(self.velocity_noise, 0.0, ZEROS, 0.0),
-        )
+    @property
+    def position_resolution(self) -> float:
+        """Step of the positions, m."""
+        return self.resolution
 
 
 class BarometerTable(InstrumentTable):
@@ -216,6 +197,7 @@ class BarometerTable(InstrumentTable):
 
     table_name = "sensors.barometer"
     model_config = example(rate=50.0, noise=0.1)
+    quantities = (("", 1),)
     columns: ClassVar[Mapping[str, str]] = {"barometer_altitude": "m"}
 
     noise: NonNegative = default(0.0, "standard deviation [m]", 0.1)
@@ -224,10 +206,6 @@ class BarometerTable(InstrumentTable):
     resolution: NonNegative = default(0.0, "step of the readings; 0: none [m]", 0.01)
 
     position: Vector3 = POSITION
-
-    def errors(self, rate: float, rotors: int) -> Errors:
-        walk = self.random_walk / sqrt(rate)
-        return Errors((self.noise,), (walk,), (self.bias,), (self.resolution,))
 
 
 class MagnetometerTable(InstrumentTable):
@@ -253,28 +231,18 @@ class MagnetometerTable(InstrumentTable):
         """Direction of the field, a unit vector in world axes."""
         return cos(self.inclination), 0.0, -sin(self.inclination)
 
-    def errors(self, rate: float, rotors: int) -> Errors:
-        return Errors(*_axes(self.noise, 0.0, self.bias, self.resolution))
-
 
 class RotorSpeedTable(InstrumentTable):
     """Speeds of the rotors along their spin, as speed controllers report them."""
 
     table_name = "sensors.rotor_speed"
     model_config = example(rate=100.0, noise=2.0)
+    quantities = (("", 0),)
     columns: ClassVar[Mapping[str, str]] = {"rotor_speed_measured_#": "rad/s"}
 
     noise: NonNegative = default(0.0, "standard deviation [rad/s]", 2.0)
     bias: float = default(0.0, "constant error [rad/s]", 1.0)
     resolution: NonNegative = default(0.0, "step of the readings; 0: none [rad/s]", 0.5)
-
-    def errors(self, rate: float, rotors: int) -> Errors:
-        return Errors(
-            (self.noise,) * rotors,
-            (0.0,) * rotors,
-            (self.bias,) * rotors,
-            (self.resolution,) * rotors,
-        )
 
 
 class InstrumentTables(Table):
@@ -294,51 +262,39 @@ class InstrumentTables(Table):
         return {name: table for name, table in found.items() if table is not None}
 
 
-def check_instruments(scenario: Any) -> None:
-    """Refuse instruments that a flight cannot read, naming the key."""
-    found, simulation = scenario.sensors.instruments, scenario.simulation
-    if scenario.controller.estimator is not None:
-        _check_estimator(scenario)
+def instrument_refusals(scenario: Any) -> Refusals:
+    """Instruments that a flight cannot read, and an estimator that lacks some."""
+    found, sensors, controller = scenario.sensors.instruments, scenario.sensors, scenario.controller
+    planar, step = scenario.vehicle.is_planar, scenario.simulation.control_timestep
+    if controller.estimator is not None:
+        key = "controller.estimator"
+        if controller.is_external or planar:
+            yield key, "needs a law of a rotorcraft other than python; remove it"
+        if "imu" not in found or not {"mocap", "gps"} & {*found}:
+            yield key, "needs [sensors.imu], and [sensors.mocap] or [sensors.gps]"
+        if sensors.have_errors:
+            yield key, "reads instruments; remove noise and bias keys of [sensors] itself"
     if not found:
         return
-    first, step = f"sensors.{next(iter(found))}", simulation.control_timestep
-    reasons = {
-        f"the {scenario.vehicle.model} has no instruments; remove it": scenario.vehicle.is_planar,
-        "a Python controller observes the state, not readings; choose controller.law = "
-        '"numpy", or remove it': scenario.controller.is_external,
-        "does not sense contacts; remove it, or [ground], [[object]], [tool], [payload] and "
-        "[[companion]]": scenario.has_contacts,
-    }
-    for reason, present in reasons.items():
-        if present:
-            raise scenario.mistake(first, reason)
+    first = f"sensors.{next(iter(found))}"
+    if planar:
+        yield first, f"the {scenario.vehicle.model} has no instruments; remove it"
+    if controller.is_external:
+        choice = 'choose controller.law = "numpy", or remove it'
+        yield first, f"a Python controller observes the state, not readings; {choice}"
+    if scenario.has_contacts:
+        others = "[ground], [[object]], [tool], [payload] and [[companion]]"
+        yield first, f"does not sense contacts; remove it, or {others}"
     if step == 0.0:
         reason = f"[{first}] is read at control steps; must be above 0"
-        raise scenario.mistake("simulation.control_timestep", reason)
+        yield "simulation.control_timestep", reason
     for name, table in found.items():
-        if table.period(step) < step * (1.0 - 1e-9):
+        period = table.period(step)
+        if period < step * (1.0 - 1e-9):
             reason = f"at most {1.0 / step:g}, one reading each simulation.control_timestep"
-            raise scenario.mistake(f"sensors.{name}.rate", reason)
-        if table.delay > MOST_UNDER_WAY * table.period(step):
-            reason = (
-                f"at most {MOST_UNDER_WAY} readings late, {MOST_UNDER_WAY * table.period(step):g}"
-            )
-            raise scenario.mistake(f"sensors.{name}.delay", reason)
-    imu = scenario.sensors.imu
-    if imu is not None and any(imu.position) and scenario.controller.commands_tilts:
+            yield f"sensors.{name}.rate", reason
+        if table.delay > (latest := MOST_UNDER_WAY * period):
+            yield f"sensors.{name}.delay", f"at most {MOST_UNDER_WAY} readings late, {latest:g}"
+    if sensors.imu is not None and any(sensors.imu.position) and controller.commands_tilts:
         reason = "must be zero for a law that commands the tilts, which turn the body themselves"
-        raise scenario.mistake("sensors.imu.position", reason)
-
-
-def _check_estimator(scenario: Any) -> None:
-    """Refuse an estimator without the instruments that it needs."""
-    found, sensors = scenario.sensors.instruments, scenario.sensors
-    if scenario.controller.is_external or scenario.vehicle.is_planar:
-        reason = "needs a law of a rotorcraft other than python; remove it"
-        raise scenario.mistake("controller.estimator", reason)
-    if "imu" not in found or not {"mocap", "gps"} & {*found}:
-        reason = "needs [sensors.imu], and [sensors.mocap] or [sensors.gps]"
-        raise scenario.mistake("controller.estimator", reason)
-    if sensors.have_errors:
-        reason = "reads instruments; remove noise and bias keys of [sensors] itself"
-        raise scenario.mistake("controller.estimator", reason)
+        yield "sensors.imu.position", reason

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any, Final
 
 import tomli_w
-from pydantic import ValidationError
 
 from tiltsim.errors import InputError
 from tiltsim.models.mjcf_editing import check_mjcf
@@ -26,18 +25,20 @@ from tiltsim.scenario.documents import (
     value_at,
 )
 from tiltsim.scenario.library import check_limits, find_scenario_file, library_name, read_toml
-from tiltsim.scenario.messages import choose, did_you_mean, one_line_message, show
-from tiltsim.scenario.own_code import is_trusted, with_trust
+from tiltsim.scenario.messages import choose, did_you_mean, show
 from tiltsim.scenario.own_parts import (
     controller_table,
     drop_what_own_controllers_ignore,
     given_parts,
+    is_trusted,
     kept_functions,
     replace_tables,
     sample_functions,
+    with_trust,
 )
 from tiltsim.scenario.scenario import Scenario, Variant
 from tiltsim.scenario.scenario_tables import DESCRIPTIVE
+from tiltsim.scenario.table import in_one_line
 from tiltsim.system.text import short_repr, shortened, valid_unicode
 
 FILE_KEYS: Final = (
@@ -292,11 +293,8 @@ def variant_names(file: Path, document: Mapping[str, Any]) -> list[str]:
     if not isinstance(variants, list):
         raise InputError(f"{file}: variant = {show(variants)}: write [[variant]] tables")
     for table in variants:
-        try:
+        with in_one_line(f"{file}: variant", table, Variant):
             names.append(Variant.model_validate(table).name)
-        except ValidationError as error:
-            mistake = one_line_message(error, table, Variant)
-            raise InputError(f"{file}: variant: {mistake}") from None
         if names[-1] in names[:-1]:
             raise InputError(f"{file}: variant.name = {names[-1]!r}: used twice")
     return names

@@ -8,7 +8,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from itertools import pairwise
 from math import acos, cos, pi
-from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, NamedTuple
+from typing import Annotated, Any, Final, Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field
@@ -29,7 +29,7 @@ from tiltsim.scenario.table import (
 )
 from tiltsim_controllers.gaits.motion import NO_KNOTS
 from tiltsim_controllers.mathematics.attitude import rotation_matrix
-from tiltsim_controllers.mathematics.scalar import Triple, Values
+from tiltsim_controllers.mathematics.scalar import Floats, Triple, Values
 from tiltsim_controllers.references.trajectories import (
     COEFFICIENTS,
     REFERENCE_TYPES,
@@ -37,14 +37,7 @@ from tiltsim_controllers.references.trajectories import (
     minimum_snap_knots,
 )
 
-if TYPE_CHECKING:
-    from tiltsim_controllers.mathematics.scalar import Floats, Triple, Values
-
 Tilt = Annotated[float, Field(gt=-pi / 2, lt=pi / 2)]
-
-
-_PREFIXES: Final = {"position": "", "angular_frequency": "frequency_"}
-"""Beginnings of the fields of `ReferenceParameters` that hold a vector, unless they are its key."""
 
 
 class ReferenceTable(Table, ABC):
@@ -59,19 +52,16 @@ class ReferenceTable(Table, ABC):
 
     @property
     def parameters(self) -> ReferenceParameters:
-        """The record that the law reads: keys by their names, vectors by their components."""
+        """The record that the law reads: keys by their names."""
         given = dict(self)
-        fields = {angle: given[angle] for angle in ("roll", "pitch", "yaw")}
-        fields["acceleration_feedforward"] = float(self.adds_acceleration)
-        for key, value in self._motion().items():
-            if isinstance(value, tuple):
-                prefix = _PREFIXES.get(key, f"{key}_")
-                fields |= {f"{prefix}{axis}": n for axis, n in zip("xyz", value, strict=True)}
-            else:
-                fields[key] = value
-        return ReferenceParameters(REFERENCE_TYPES[given["type"]], **fields)
+        return ReferenceParameters(
+            REFERENCE_TYPES[given["type"]],
+            **self._motion(),
+            **{angle: given[angle] for angle in ("roll", "pitch", "yaw")},
+            acceleration_feedforward=float(self.adds_acceleration),
+        )
 
-    def _motion(self) -> dict[str, float | Triple]:
+    def _motion(self) -> dict[str, Any]:
         """The parameters of the motion: by default all keys of the reference's own type."""
         shared = PositionReference.model_fields
         return {key: value for key, value in self if key not in shared}
@@ -293,7 +283,7 @@ class PushReference(PositionReference):
         further[:, 0] += first
         return [*rows, *further]
 
-    def _motion(self) -> dict[str, float | Triple]:
+    def _motion(self) -> dict[str, Any]:
         return {}
 
     @property

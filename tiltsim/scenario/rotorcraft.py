@@ -1,7 +1,6 @@
 """Vehicles in general, and with any number of rotors, in a scenario's ``[vehicle]`` table."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
 from math import inf, pi
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Final, Literal
 
@@ -12,12 +11,18 @@ from tiltsim.models.parts import RotorLimits, TiltServo
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.models.user_vehicle import UserVehicle
 from tiltsim.scenario.gait import FixedGait
-from tiltsim.scenario.table import NonNegative, Positive, Table, default, example, required
+from tiltsim.scenario.table import (
+    NonNegative,
+    Positive,
+    Refusals,
+    Table,
+    default,
+    example,
+    required,
+)
 from tiltsim_controllers.mathematics.scalar import Values
 from tiltsim_controllers.vehicle.parameters import Vehicle
 from tiltsim_controllers.vehicle.rotors import Rotor
-
-Refusals = Iterator[tuple[str, str] | tuple[str, str, object]]
 
 SPATIAL_KEYS: Final = ("position", "velocity", "acceleration", "amplitude")
 """Keys of references that hold a vector in the world."""

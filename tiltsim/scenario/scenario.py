@@ -6,20 +6,19 @@ else. `tiltsim.scenario.loading` reads the files, `tiltsim.scenario.messages` wo
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, Self
 
-from pydantic import ConfigDict, Field, ValidationError
+from pydantic import ConfigDict, Field
 
 from tiltsim.errors import InputError
 from tiltsim.scenario.companion import companions_of
 from tiltsim.scenario.consistency import check_consistency
 from tiltsim.scenario.documents import check_keys, leaves
-from tiltsim.scenario.messages import missing_keys, one_line_message, show
+from tiltsim.scenario.messages import show
 from tiltsim.scenario.scenario_tables import DESCRIPTIVE, ScenarioTables
-from tiltsim.scenario.table import Table, required
+from tiltsim.scenario.table import Table, in_one_line, required
 from tiltsim.scenario.time_steps import check_time_steps
 from tiltsim.system.public import public
 from tiltsim.system.text import html_table, short_repr
@@ -28,22 +27,11 @@ from tiltsim_controllers.mathematics.scalar import Values
 from tiltsim_controllers.references.trajectories import ReferenceParameters
 
 
-@contextmanager
-def _in_one_line(address: str, document: Any, emptied: Collection[str] = ()) -> Iterator[None]:
-    """Raise `InputError` in place of pydantic's error."""
-    try:
-        yield
-    except ValidationError as error:
-        message = one_line_message(error, document, Scenario, emptied)
-        missing = missing_keys(error, document, Scenario)
-        raise InputError(f"{address}: {message}", missing) from None
-
-
 class Scenario(ScenarioTables):
     """One flight, fully specified and consistent."""
 
     def __init__(self, **tables: Any) -> None:
-        with _in_one_line("scenario", tables):
+        with in_one_line("scenario", tables, Scenario):
             super().__init__(**tables)
 
     __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]  # validation needs no call
@@ -62,7 +50,7 @@ class Scenario(ScenarioTables):
         """
         if not isinstance(obj, Mapping | Scenario):
             raise InputError(f"{address} = {short_repr(obj)}: must be a dict")
-        with _in_one_line(address, obj, emptied):
+        with in_one_line(address, obj, Scenario, emptied):
             return super().model_validate(obj, **options)
 
     def _check_values(self) -> None:

@@ -41,7 +41,11 @@ from tiltsim.scenario.vehicle import ModelErrorTable, VehicleTable, VehicleUnion
 from tiltsim_controllers.mathematics.scalar import Values
 from tiltsim_controllers.vehicle.parameters import Vehicle
 
-GAITS: Final = tables_of(GaitTable, "type", (gait.__name__, *KINDS))
+GAITS: Final = tables_of(
+    GaitTable,  # type: ignore[type-abstract]
+    "type",
+    (gait.__name__, *KINDS),
+)
 """The tables of all gaits by their types."""
 
 if TYPE_CHECKING:
@@ -108,7 +112,7 @@ class ScenarioTables(WithAutopilot):
 
     _address: str = PrivateAttr("")
     _own: dict[str, Any] = PrivateAttr({})  # parts given in Python, by name
-    _trusted: bool = PrivateAttr(False)  # see `tiltsim.scenario.own_code`
+    _trusted: bool = PrivateAttr(False)  # see `tiltsim.scenario.own_parts`
 
     @property
     def address(self) -> str:

@@ -1,13 +1,22 @@
 """Base class and number types of the tables of a scenario file."""
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable, Iterator
+from contextlib import contextmanager
 from operator import attrgetter
 from typing import Annotated, Any, ClassVar, Self
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator, model_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    ValidationError,
+    ValidationInfo,
+    field_validator,
+    model_validator,
+)
 
 from tiltsim.errors import InputError
-from tiltsim.scenario.messages import InvalidValueError
+from tiltsim.scenario.messages import InvalidValueError, missing_keys, one_line_message
 from tiltsim.system.text import short_repr, valid_unicode
 from tiltsim_controllers.laws.keys import ZEROS as ZEROS
 from tiltsim_controllers.laws.keys import Angle as Angle
@@ -31,6 +40,10 @@ Row = Annotated[Many[float], Field(min_length=2, max_length=17)]  # of a time an
 PositiveEach = Annotated[Many[Positive], Field(min_length=2, max_length=16)]
 Limit = Annotated[float, Field(allow_inf_nan=True)]
 Range = Annotated[tuple[Limit, Limit], Field(strict=False)]
+
+
+Refusals = Iterator[tuple[str, str] | tuple[str, str, object]]
+"""Key and reason of each refusal, and a value where it is not the key's."""
 
 
 def example(**keys: Any) -> ConfigDict:
@@ -105,3 +118,21 @@ class Table(BaseModel):
         """Refuse keys that are set although they have no effect, for a reason."""
         for key in keys:
             self.require(key, type(self).model_fields[key].default, reason)
+
+
+@contextmanager
+def in_one_line(
+    address: str, document: Any, table: type[BaseModel], emptied: Collection[str] = ()
+) -> Iterator[None]:
+    """Raise `InputError` in place of pydantic's error; see `one_line_message`.
+
+    Args:
+        address: Name of the document in the message.
+        document, table, emptied: The document, and the table that it is validated against.
+    """
+    try:
+        yield
+    except ValidationError as error:
+        message = one_line_message(error, document, table, emptied)
+        missing = missing_keys(error, document, table)
+        raise InputError(f"{address}: {message}", missing) from None

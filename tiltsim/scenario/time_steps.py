@@ -5,8 +5,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from tiltsim.models.hover import hover_speeds
-from tiltsim.models.rotor_table import Multirotor
+from tiltsim.models.rotor_table import Multirotor, hover_speeds
 from tiltsim.scenario.controller_table import GaitFollowingController
 from tiltsim.scenario.linearizing_controllers import AttitudeForceController
 from tiltsim.scenario.messages import InvalidValueError

@@ -15,9 +15,9 @@ from tiltsim.scenario import rotorcraft
 from tiltsim.scenario.gait import FixedGait
 from tiltsim.scenario.kinds import KINDS, tables_of
 from tiltsim.scenario.messages import InvalidValueError
-from tiltsim.scenario.rotorcraft import AnyVehicleTable, Refusals, RotorcraftTable, TiltServoTable
+from tiltsim.scenario.rotorcraft import AnyVehicleTable, RotorcraftTable, TiltServoTable
 from tiltsim.scenario.simulation_table import InitialTable
-from tiltsim.scenario.table import NotTiny, Positive, Table, default, example
+from tiltsim.scenario.table import NotTiny, Positive, Refusals, Table, default, example
 from tiltsim_controllers.mathematics.scalar import Values
 from tiltsim_controllers.vehicle.parameters import PRESETS, Vehicle
 
@@ -160,7 +160,11 @@ class VehicleTable(RotorcraftTable):
         self._check_limits()
 
 
-VEHICLES: Final = tables_of(AnyVehicleTable, "model", (__name__, rotorcraft.__name__, *KINDS))
+VEHICLES: Final = tables_of(
+    AnyVehicleTable,  # type: ignore[type-abstract]
+    "model",
+    (__name__, rotorcraft.__name__, *KINDS),
+)
 """The tables of all vehicles by their models."""
 
 _TAGS: Final = {table: model for model, table in reversed(VEHICLES.items())}

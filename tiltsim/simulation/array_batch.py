@@ -17,7 +17,7 @@ from tiltsim.arrays.jax_programs import require_jax
 from tiltsim.closed_loop.assembly import Assembly, program_key
 from tiltsim.flight.flight import METRICS_ROWS, Flight, completed_flights
 from tiltsim.flight.metrics import End
-from tiltsim.plants.equations_plant import initial_state
+from tiltsim.plants.plant import initial_state
 from tiltsim.simulation.simulate import TerminationMonitor, simulate_assembly
 from tiltsim_controllers.mathematics.records import flatten, record_size
 from tiltsim_controllers.mathematics.scalar import Floats

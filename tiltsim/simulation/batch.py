@@ -18,11 +18,10 @@ from tiltsim.flight.metrics import End
 from tiltsim.laws.assembling import assemble
 from tiltsim.plants.plant import native_pays_off
 from tiltsim.scenario.loading import as_scenario
-from tiltsim.scenario.own_code import require_trust
+from tiltsim.scenario.own_parts import require_trust
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.scenario.vehicle import VehicleTable
-from tiltsim.simulation.lane_batch import LaneBatch, lanes_for
-from tiltsim.simulation.native_batch import NativeBatch
+from tiltsim.simulation.native_batch import LaneBatch, NativeBatch, lanes_for
 from tiltsim.simulation.simulate import simulate_assembly
 from tiltsim.system.arguments import Report, check_progress, reported, true_or_false, whole_number
 from tiltsim.system.processes import ProcessDiedError, in_order, in_processes
@@ -45,19 +44,12 @@ Result = TypeVar("Result")
 
 @dataclass(frozen=True, repr=False)
 class FlightResult:
-    """The result of one flight among many.
-
-    Attributes:
-        scenario: The scenario.
-        end: Its end.
-        metrics: Its metrics; see `tiltsim.scenario.metric_names.METRICS`.
-        flight: The flight itself, if its samples are kept.
-    """
+    """The result of one flight among many."""
 
     scenario: Scenario
     end: End
-    metrics: dict[str, float | bool]
-    flight: Flight | None = None
+    metrics: dict[str, float | bool]  # see `tiltsim.scenario.metric_names.METRICS`
+    flight: Flight | None = None  # the flight itself, if its samples are kept
 
     @property
     def has_failed(self) -> bool:

@@ -31,9 +31,8 @@ from tiltsim.flight.metrics import End
 from tiltsim.laws.assembling import assemble
 from tiltsim.plants.command import Controller, ControllerError
 from tiltsim.plants.commanded_plant import UserControlledPlant
-from tiltsim.plants.equations_plant import EquationsPlant
 from tiltsim.plants.mujoco_plant import MujocoPlant
-from tiltsim.plants.plant import Plant, take_sample
+from tiltsim.plants.plant import EquationsPlant, Plant, take_sample
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.system.arguments import Report, reported

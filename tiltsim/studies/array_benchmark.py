@@ -15,10 +15,10 @@ from tiltsim.engines.base import EngineName
 from tiltsim.engines.programs import recorder_head
 from tiltsim.engines.steppers import LaneStepper
 from tiltsim.laws.assembling import assemble
-from tiltsim.plants.equations_plant import initial_state, integrated, layout_of
+from tiltsim.plants.plant import initial_state, integrated, layout_of
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.simulation.array_batch import numbers_of
-from tiltsim.simulation.lane_batch import lanes_for
+from tiltsim.simulation.native_batch import lanes_for
 from tiltsim.studies.peers import PEERS, Timing, running, speed, timed
 from tiltsim_controllers.mathematics.scalar import Floats
 

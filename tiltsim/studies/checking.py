@@ -22,7 +22,7 @@ from tiltsim.scenario.library import (
     selected_entries,
 )
 from tiltsim.scenario.loading import load_scenario, variant_names
-from tiltsim.scenario.own_code import require_trust
+from tiltsim.scenario.own_parts import require_trust
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.simulation.simulate import simulate_to_end
 from tiltsim.system.files import replacing

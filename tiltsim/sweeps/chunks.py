@@ -6,8 +6,8 @@ Only this module of the sweeps calls the simulation.
 import json
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
-from functools import lru_cache
+from dataclasses import dataclass, field
+from functools import lru_cache, partial
 from math import ceil, copysign
 from typing import Any, Final, NamedTuple
 
@@ -16,7 +16,7 @@ from tiltsim.errors import InputError
 from tiltsim.flight.flight import Flight
 from tiltsim.flight.metrics import Verdict
 from tiltsim.plants.plant import with_engine
-from tiltsim.scenario.own_code import require_trust, with_trust
+from tiltsim.scenario.own_parts import require_trust, with_trust
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.simulation.batch import fly
 from tiltsim.sweeps.definition import SweepDefinition
@@ -34,10 +34,10 @@ FEW: Final = 3  # crashed flights after which others of the sweep are tried befo
 class ScenarioResult:
     """The part of one flight that goes into the dataset."""
 
-    metrics: Mapping[str, float | bool]
     end: str  # an `EndKind`, invalid or crashed
-    end_time: float | None  # s
     cause: str
+    end_time: float | None = None  # s
+    metrics: Mapping[str, float | bool] = field(default_factory=dict)
     flight: bytes | None = None  # flight.parquet, if the sweep keeps flights
     scenario: Scenario | None = None  # as the sweep has it; None if invalid
 
@@ -108,39 +108,26 @@ def _fly_values(
     points: SweepPoints, batch: list[dict[str, Any]], engine: EngineName | None, trusted: bool
 ) -> list[ScenarioResult]:
     """Results for values of the axes, "invalid" where they do not make a scenario."""
-    results: dict[int, ScenarioResult] = {}
-    requested: dict[int, Scenario] = {}
-    scenarios: dict[int, Scenario] = {}
-    for position, values in enumerate(batch):
+    made: list[Scenario | ScenarioResult] = []
+    for values in batch:
         try:
-            scenario = with_trust(points.scenario(values), trusted)
+            made.append(with_trust(points.scenario(values), trusted))
         except InputError as error:
-            results[position] = ScenarioResult({}, "invalid", None, str(error))
-            continue
+            made.append(ScenarioResult("invalid", str(error)))
+    scenarios = [one for one in made if isinstance(one, Scenario)]
+    for scenario in scenarios:
         require_trust(scenario)
-        requested[position] = scenario
-        if engine is not None and scenario.simulation.engine == "auto":
-            scenario = with_engine(scenario, engine)
-        scenarios[position] = scenario
-    flown = _fly_scenarios(
-        list(scenarios.values()),
-        points.sweep.keep_flights,
-        lambda: _valid(points, points.spread(FEW), trusted),
-    )
-    for position, result in zip(scenarios, flown, strict=True):
-        results[position] = replace(result, scenario=requested[position])
-    return [results[position] for position in range(len(batch))]
 
+    def others() -> Iterator[Scenario]:
+        for values in points.spread(FEW):
+            with suppress(InputError):
+                scenario = with_trust(points.scenario(values), trusted)
+                require_trust(scenario)
+                yield scenario
 
-def _valid(
-    points: SweepPoints, several: Iterable[dict[str, Any]], trusted: bool
-) -> Iterator[Scenario]:
-    """The scenarios of points that have one, without code that is not trusted."""
-    for values in several:
-        with suppress(InputError):
-            scenario = with_trust(points.scenario(values), trusted)
-            require_trust(scenario)
-            yield scenario
+    fly_some = partial(_fly, engine, points.sweep.keep_flights)
+    flown = iter(_fly_scenarios(scenarios, fly_some, others))
+    return [next(flown) if isinstance(one, Scenario) else one for one in made]
 
 
 Search = Generator[dict[str, Any], ScenarioResult, tuple[Row, ScenarioResult]]
@@ -202,55 +189,59 @@ def _row(
 
 
 def _fly_scenarios(
-    scenarios: Sequence[Scenario], keep_flights: bool, others: Callable[[], Iterable[Scenario]]
+    scenarios: Sequence[Scenario],
+    fly_some: Callable[[Sequence[Scenario]], list[ScenarioResult]],
+    others: Callable[[], Iterable[Scenario]],
 ) -> list[ScenarioResult]:
     """Fly scenarios and return their results in the same order.
 
     Raises `InputError` if the first few crash, and the few that ``others`` makes from all over the
     sweep, all with one Python error; KeyboardInterrupt if a flight was interrupted.
     """
+
+    def alone(scenario: Scenario) -> ScenarioResult:
+        try:
+            return fly_some([scenario])[0]
+        except InputError as error:
+            return ScenarioResult("invalid", str(error), scenario=scenario)
+        except Exception as error:
+            cause = f"{type(error).__name__}: {error}"
+            return ScenarioResult("crashed", cause, scenario=scenario)
+
     try:
-        return _fly(scenarios, keep_flights)
+        return fly_some(scenarios)
     except Exception:
         # One bad flight must not end the others: find it by flying one at a time.
-        first = [_fly_alone(scenario, keep_flights) for scenario in scenarios[:FEW]]
+        first = [*map(alone, scenarios[:FEW])]
         if _have_one_crash(first):
-            crash = first[0]
-            tried = [*first, *(_fly_alone(scenario, False) for scenario in others())]
+            tried = [*first, *map(alone, others())]
             if len(tried) > len(first) and _have_one_crash(tried):
                 raise InputError(
-                    f"every flight tried, from all over the sweep, crashed with {crash.cause}"
+                    f"every flight tried, from all over the sweep, crashed with {first[0].cause}"
                 ) from None
-        return [*first, *(_fly_alone(scenario, keep_flights) for scenario in scenarios[FEW:])]
+        return [*first, *map(alone, scenarios[FEW:])]
 
 
 def _have_one_crash(results: Sequence[ScenarioResult]) -> bool:
     """Whether all flights crashed, for one reason."""
-    return len({(result.end, result.cause) for result in results}) == 1 and (
-        results[0].end == "crashed"
-    )
+    return results[0].end == "crashed" and len({(one.end, one.cause) for one in results}) == 1
 
 
-def _fly(scenarios: Sequence[Scenario], keep_flights: bool) -> list[ScenarioResult]:
-    return [
-        ScenarioResult(
-            result.metrics,
-            result.end.kind,
-            result.end.time,
-            result.end.cause,
-            None if result.flight is None else _flight_file(result.flight),
-        )
-        for result in fly(scenarios, threads=1, keep_samples=keep_flights)
+def _fly(
+    engine: EngineName | None, keep_flights: bool, scenarios: Sequence[Scenario]
+) -> list[ScenarioResult]:
+    """Fly scenarios, with an engine in place of ``auto``."""
+    chosen = [
+        with_engine(one, engine) if engine and one.simulation.engine == "auto" else one
+        for one in scenarios
     ]
-
-
-def _fly_alone(scenario: Scenario, keep_flight: bool) -> ScenarioResult:
-    try:
-        return _fly([scenario], keep_flight)[0]
-    except InputError as error:
-        return ScenarioResult({}, "invalid", None, str(error))
-    except Exception as error:
-        return ScenarioResult({}, "crashed", None, f"{type(error).__name__}: {error}")
+    results = []
+    for scenario, found in zip(scenarios, fly(chosen, threads=1, keep_samples=keep_flights)):
+        end, flight = found.end, found.flight
+        file = None if flight is None else _flight_file(flight)
+        kept = ScenarioResult(end.kind, end.cause, end.time, found.metrics, file, scenario)
+        results.append(kept)
+    return results
 
 
 def _flight_file(flight: Flight) -> bytes:

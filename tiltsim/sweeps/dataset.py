@@ -13,10 +13,10 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 import pyarrow as pa
-from pydantic import ValidationError
 
 from tiltsim.errors import InputError
-from tiltsim.scenario.messages import one_line_message, show
+from tiltsim.scenario.messages import show
+from tiltsim.scenario.table import in_one_line
 from tiltsim.sweeps.chunks import FinishedChunk
 from tiltsim.sweeps.definition import SweepDefinition
 from tiltsim.sweeps.expressions import evaluate
@@ -271,11 +271,8 @@ def load_results(folder: Path, *, scenarios: bool = False) -> SweepResults:
     is nothing yet, or it cannot be read.
     """
     definition = read_definition(folder / DEFINITION)
-    try:
+    with in_one_line(f"{folder / DEFINITION}", definition.sweep, Sweep):
         points = SweepPoints(definition)
-    except ValidationError as error:
-        mistake = one_line_message(error, definition.sweep, Sweep)
-        raise InputError(f"{folder / DEFINITION}: {mistake}") from None
     files = {part: points.chunk(number) for number, part in finished_parts(folder, points).items()}
     if (folder / DATASET).exists():
         files = {folder / DATASET: range(len(points))}

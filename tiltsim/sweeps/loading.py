@@ -10,8 +10,6 @@ from os import PathLike, fsdecode
 from pathlib import Path
 from typing import Any, Final
 
-from pydantic import ValidationError
-
 from tiltsim.errors import InputError
 from tiltsim.scenario.documents import check_keys, leaves, plain
 from tiltsim.scenario.library import find_scenario_file, library_name, read_toml
@@ -24,9 +22,9 @@ from tiltsim.scenario.loading import (
     parse_scenario,
     without_none,
 )
-from tiltsim.scenario.messages import one_line_message
 from tiltsim.scenario.metric_names import METRICS
 from tiltsim.scenario.scenario import Scenario
+from tiltsim.scenario.table import in_one_line
 from tiltsim.sweeps.definition import UNUSED, VERSIONS, SweepDefinition
 from tiltsim.sweeps.expressions import names
 from tiltsim.sweeps.points import SweepPoints
@@ -54,7 +52,10 @@ RESERVED: Final = ("index", "end", "end_time", "cause", "scenario", "flights")
 
 
 def load_sweep(
-    source: str | PathLike[str] | Mapping[str, Any], overrides: Mapping[str, Any] | None = None
+    source: str | PathLike[str] | Mapping[str, Any],
+    overrides: Mapping[str, Any] | None = None,
+    *,
+    name: str = "sweep",
 ) -> SweepDefinition:
     """Read a sweep.
 
@@ -62,6 +63,7 @@ def load_sweep(
         source: A TOML file, the name of a sweep in the library, or the tables of a file as a dict,
             whose ``scenario`` may be a `tiltsim.Scenario`.
         overrides: Values by dotted key of the scenario, on top of the file's ``[set]``.
+        name: Name of a dict in messages.
 
     Raises:
         InputError: In one line: the file, the key, the value and the allowed values. The base
@@ -69,16 +71,14 @@ def load_sweep(
     """
     if overrides is not None:
         check_keys("overrides", overrides)
-    document, address, folder = _document(source)
+    document, address, folder = _document(source, name)
     fixed = document.setdefault("set", {})
     if isinstance(fixed, dict):
         document["set"] = _located(dict(leaves(fixed)), folder, address) | plain(overrides or {})
     if "scenario" not in document and not {"axis", "bisect"} & document.keys():
         raise InputError(f"{address}: a scenario, not a sweep: it has no [[axis]]; use tiltsim run")
-    try:
+    with in_one_line(address, document, Sweep):
         sweep = Sweep.model_validate(document)
-    except ValidationError as error:
-        raise InputError(f"{address}: {one_line_message(error, document, Sweep)}") from None
     axes = tuple(_with_located_files(axis, folder, address) for axis in sweep.axis)
     sweep = sweep.model_copy(update={"axis": axes})
     base = _base(sweep, folder, address)
@@ -135,7 +135,7 @@ def _named_files(sweep: Sweep, base: dict[str, Any]) -> set[Path]:
     return {file for document in documents for file in named_files(document)}
 
 
-def _document(source: object) -> tuple[dict[str, Any], str, Path | None]:
+def _document(source: object, name: str) -> tuple[dict[str, Any], str, Path | None]:
     """The tables of a `load_sweep` source, its name in messages, and the folder of its file."""
     if isinstance(source, Mapping):
         check_keys("sweep", source)
@@ -148,7 +148,7 @@ def _document(source: object) -> tuple[dict[str, Any], str, Path | None]:
                 )
             tables = without_none(base.model_dump(mode="json", exclude_unset=True))
             source = {**source, "scenario": tables}
-        return plain(source), "sweep", None
+        return plain(source), name, None
     if not isinstance(source, str | PathLike):
         raise InputError(
             f"sweep = {short_repr(source)}: must be a name of the library, a TOML file or a dict"

@@ -15,7 +15,7 @@ from typing import Any, Final, cast
 from tiltsim.engines.base import EngineName
 from tiltsim.errors import InputError
 from tiltsim.plants.plant import MIN_STEPS_TO_COMPILE
-from tiltsim.scenario.own_code import is_trusted, require_trust, with_trust
+from tiltsim.scenario.own_parts import is_trusted, require_trust, with_trust
 from tiltsim.sweeps.chunks import ChunkWork, FinishedChunk
 from tiltsim.sweeps.dataset import SweepResults, load_results, open_sweep_folder
 from tiltsim.sweeps.definition import SweepDefinition
@@ -123,8 +123,33 @@ def fly_on_cluster(work: ChunkWork, numbers: list[int], address: str) -> Iterato
     answer or has no workers, or a worker fails or has other versions of the packages.
     """
     client = _connect(address)
-    with client:
-        yield from _fly_chunks(client, work, numbers, address)
+    from distributed import as_completed
+    from distributed.comm import CommClosedError
+
+    digest = hashlib.sha256(work.definition_json.encode()).hexdigest()[:16]
+    waiting = list(reversed(numbers))
+
+    def submit() -> Any:
+        number = waiting.pop()
+        key = f"tiltsim-{digest}-{number}"
+        return client.submit(work, number, key=key)
+
+    try:
+        with client:
+            first = [submit() for _ in range(min(len(waiting), _window(client)))]
+            submitted = as_completed(first, loop=client.loop)
+            for future in submitted:
+                part = _result(future, address)
+                _compare_versions(part, address)
+                future.release()
+                while waiting and submitted.count() < _window(client):
+                    submitted.add(submit())
+                yield part
+    except (CancelledError, CommClosedError) as error:
+        raise InputError(
+            f"--cluster {address}: the scheduler no longer answers; finished flights are kept, and "
+            "the same command continues"
+        ) from error
 
 
 def _connect(address: str) -> Any:
@@ -152,37 +177,6 @@ def _connect(address: str) -> Any:
             f"--cluster {address}: the scheduler has no workers; start some: dask worker {address}"
         )
     return client
-
-
-def _fly_chunks(
-    client: Any, work: ChunkWork, numbers: list[int], address: str
-) -> Iterator[FinishedChunk]:
-    from distributed import as_completed
-    from distributed.comm import CommClosedError
-
-    digest = hashlib.sha256(work.definition_json.encode()).hexdigest()[:16]
-    waiting = list(reversed(numbers))
-
-    def submit() -> Any:
-        number = waiting.pop()
-        key = f"tiltsim-{digest}-{number}"
-        return client.submit(work, number, key=key)
-
-    try:
-        first = [submit() for _ in range(min(len(waiting), _window(client)))]
-        submitted = as_completed(first, loop=client.loop)
-        for future in submitted:
-            part = _result(future, address)
-            _compare_versions(part, address)
-            future.release()
-            while waiting and submitted.count() < _window(client):
-                submitted.add(submit())
-            yield part
-    except (CancelledError, CommClosedError) as error:
-        raise InputError(
-            f"--cluster {address}: the scheduler no longer answers; finished flights are kept, and "
-            "the same command continues"
-        ) from error
 
 
 def _result(future: Any, address: str) -> FinishedChunk:

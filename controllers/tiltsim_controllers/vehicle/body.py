@@ -21,6 +21,9 @@ ROTORS: Final = (1, 2, 3, 4)
 BODY_FIELDS: Final = ("x", "y", "z", "vx", "vy", "vz", "roll", "pitch", "yaw", "p", "q", "r")
 """A rigid body: position (m) and velocity (m/s), world axes; rad; body rates, rad/s."""
 
+ROTATION_NAMES: Final = ("rotation_x", "rotation_y", "rotation_z")
+"""A small turn about the body axes, rad; at level attitude roll, pitch and yaw."""
+
 TILT_FIELDS: Final = ("alpha_1", "alpha_2", "alpha_3", "alpha_4")
 """Tilt angles, rad."""
 

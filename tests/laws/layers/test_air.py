@@ -107,7 +107,7 @@ def accelerations(air, height, roll):
     plant.data.qpos[:7] = [0.0, 0.0, height, np.cos(roll / 2.0), np.sin(roll / 2.0), 0.0, 0.0]
     plant.data.act[:4] = [-hover, hover, -hover, hover]
     plant.data.qvel[:] = 0.0
-    with control_callback(plant._callback):
+    with control_callback(plant.callback):
         mujoco.mj_forward(plant.model, plant.data)
     return plant.data.qacc[:6].copy()
 

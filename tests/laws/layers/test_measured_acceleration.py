@@ -28,7 +28,8 @@ from tiltsim.errors import InputError
 from tiltsim.laws.assembling import LOOPS, assemble, loop_of
 from tiltsim.laws.layers.instruments import plant_acceleration_of
 from tiltsim.laws.layers.on_equations import read_actuators
-from tiltsim.models.hover import hover_speeds
+from tiltsim.models.rotor_table import hover_speeds
+from tiltsim.plants.plant import initial_state
 from tiltsim.resources import shipped_folder
 from tiltsim.scenario.time_steps import _reaction_gains
 from tiltsim.simulation.simulate import make_plant
@@ -102,8 +103,8 @@ def test_the_measurement_is_the_acceleration_that_the_equations_integrate():
     assembly = assemble(desired)
     plant, loop = make_plant(assembly), assembly.loop
     plant.advance(60)
-    first = 1 + len(plant._held)
-    state, setup = plant.state[first:], as_arrays(assembly.setup)
+    end = 1 + len(initial_state(assembly))
+    state, setup = plant.state[1:end], as_arrays(assembly.setup)
     inputs = loop.equations.inputs(plant.time, state, setup.parameters, setup.knots)
     rates = loop.equations.rates(
         plant.time, state, inputs, setup.parameters, setup.knots, (0.0,) * 3

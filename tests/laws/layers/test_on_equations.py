@@ -190,10 +190,9 @@ def test_a_state_that_has_overflowed_is_seen_as_no_number(base):
     assembly = assemble(scenario(base, STORM, {"simulation": {"plant": "thesis"}}))
     plant = make_plant(assembly)
     state, motion = plant.state, actuator_plant(assembly.loop).motion
-    first = 1 + len(plant._held)
     for index in range(motion):
         overflowed = state.copy()
-        overflowed[first + index] = np.inf
+        overflowed[1 + index] = np.inf
         plant.state = overflowed
         assert not np.isfinite(plant.observe()).all()
 

@@ -123,5 +123,6 @@ def on_equations(loop: ClosedLoop, plant: ActuatorPlant) -> ClosedLoop:
         initial=initial,
         observe=observe_equations,
         project_onto_limits=project_onto_limits,
+        states=plant.names,
     )
     return wrap_loop(loop, Layer(plant.mechanics, mechanics, equations=equations))

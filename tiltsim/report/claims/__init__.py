@@ -6,37 +6,36 @@ A table is a statement, like the ``[claim.NAME]`` of scenarios, with the keys of
     source = "ch. 6, Sec. 3, Eq. (13)"
     statement = "On blue α₁ + α₃ is"
     ...
-    measure = "offset_over"       # a function of `tiltsim.report.measures`
-    args = [1]
+    value = "offset_over(1)"      # with functions of `tiltsim.report.measures`
     published = "0.334198"        # digits as printed: good to 0.0000005; default: true, yes
     unit = "rad"
 
-A row with ``flights``, addresses in the scenario library, is measured on them. With ``above`` or
-``below`` its value is whether the measured number lies between these bounds. A statement with
-several rows has them in ``[[ch6-blue-offset.row]]``; keys of the table are their defaults. ``each``
-repeats a row over lists of values, whose names stand in braces in its texts. Braces also stand for
-the words of the file's table ``[shared]``, of ``shared.toml``, and for the numbers of
-``thresholds.toml``; ``{a,b}`` in an address for both.
+A row with ``flights``, addresses in the scenario library, is measured on them: in its ``value`` the
+name of a metric stands for an array with a number per flight, as in ``all(diff(duration) > 0)``. A
+statement with several rows has them in ``[[ch6-blue-offset.row]]``; keys of the table are their
+defaults. ``each`` repeats a row over lists of values, whose names stand in braces in its texts.
+Braces also stand for the words of the file's table ``[shared]``, of ``shared.toml``, and for the
+numbers of ``thresholds.toml``; ``{a,b}`` in an address for both.
 """
 
 from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
-from functools import cache
+from collections.abc import Iterator, Mapping
+from functools import cache, partial
 from itertools import product
 from pathlib import Path
 from typing import Any, Final
 
-from tiltsim.report.claim import Claim, Metrics, Value
-from tiltsim.report.measures import measures
+from tiltsim.report.claim import Claim
+from tiltsim.report.measures import evaluate
 from tiltsim.report.statement import Statement, origins_of
 
 _NAME: Final = re.compile(r"{(\w+)(?:\.(\w+))?}")
 _OF_ROWS: Final = (
-    "above", "args", "below", "case", "each", "flights", "in_kind", "key", "measure", "published",
-    "error", "fault", "tolerance", "unit", "where", "why",
+    "case", "each", "error", "fault", "flights", "in_kind", "key", "published", "tolerance", "unit",
+    "value", "where", "why",
 )  # fmt: skip
 """Keys of rows that a statement's table may also have, as defaults."""
 
@@ -77,8 +76,7 @@ def _chapter(tables: dict[str, Any], shared: Mapping[str, Any]) -> Iterator[Clai
         for row in rows:
             row = defaults | row
             each = _filled(row.pop("each", {}), known)
-            numbers = (*row.get("args", ()), row.get("above"), row.get("below"))
-            used = tuple(n for n in words("thresholds") if f"{{{n}}}" in numbers)
+            used = tuple(n for n in words("thresholds") if f"{{{n}}}" in row.get("value", ""))
             for values in product(*each.values()):
                 filled = _filled(row, {**known, **dict(zip(each, values))})
                 yield _claim(statement, filled | {"thresholds": used})
@@ -103,20 +101,10 @@ def _filled(value: Any, known: Mapping[str, Any]) -> Any:
 
 
 def _claim(statement: Statement, row: dict[str, Any]) -> Claim:
-    if statement.missing and "measure" not in row:
-        return Claim(statement, **row)
-    own, args = measures()[row.pop("measure")], row.pop("args", ())
-    low, high = row.pop("above", None), row.pop("below", None)
-
-    def measure(*flown: Sequence[Metrics]) -> Value:
-        value = own(*flown, *args)
-        if low is None and high is None:
-            return value
-        return (low is None or value > low) and (high is None or value < high)
-
-    origins = origins_of(row.pop("ours", ()))
+    if "value" in row or not statement.missing:
+        row["measure"] = partial(evaluate, row.pop("value"))
     flights = tuple(one for pattern in row.pop("flights", ()) for one in _expanded(pattern))
-    return Claim(statement, flights=flights, measure=measure, origins=origins, **row)
+    return Claim(statement, flights=flights, origins=origins_of(row.pop("ours", ())), **row)
 
 
 def _expanded(pattern: str) -> list[str]:

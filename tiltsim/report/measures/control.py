@@ -25,6 +25,7 @@ from tiltsim_controllers.laws import quadrotor_attitude_altitude, yaw_position
 from tiltsim_controllers.laws.feedback import conventional_decoupler, modified_decoupler
 from tiltsim_controllers.laws.gains import GAIN_SETS
 from tiltsim_controllers.mathematics.attitude import euler_rates
+from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.vehicle.cross import torque_free_force
 from tiltsim_controllers.vehicle.parameters import PRESETS, drag_ratio
 
@@ -35,10 +36,15 @@ _SINGULAR: Final = 1e-9
 _LIMITS: Final = published_speed_limits(_VEHICLE)
 
 
-def exact_zero_on_published_curve() -> bool:
-    """Whether the exact determinant vanishes somewhere on S = 0."""
-    curve = published_singular_curve()
-    return bool(np.abs(normalized_determinant(*curve, _HOVER, _QUADROTOR)).min() < _SINGULAR)
+def exact_on_published_curve() -> Floats:
+    """The exact determinant on S = 0, over its value in level hover."""
+    return normalized_determinant(*published_singular_curve(), _HOVER, _QUADROTOR)
+
+
+def rightmost_root() -> complex:
+    """The root with the largest real part of ch. 2's position loop."""
+    roots = np.roots((1.0, *yaw_position.GAIN_SETS["ch02"].position))
+    return complex(roots[np.argmax(roots.real)])
 
 
 def exact_zero_within_90_degrees() -> bool:
@@ -116,6 +122,11 @@ def routh_holds(rows: Sequence[str]) -> bool:
     return all(third_order_loop("", loops[row], 1.0).stable for row in rows)
 
 
+def roll_gain(number: int) -> float:
+    """A gain of ch. 4's roll loop, 1 to 3."""
+    return float(GAIN_SETS["ch04"].loops["roll"][number - 1])
+
+
 def position_gains_are_positive() -> bool:
     """Whether both gains of ch. 4's position loop are positive."""
     return min(GAIN_SETS["ch04"].position) > 0.0
@@ -132,11 +143,6 @@ def decouplers_agree_without_tilt() -> bool:
 def weight() -> float:
     """Mass times gravity, N."""
     return _VEHICLE.mass * _VEHICLE.gravity
-
-
-def centripetal(speeds: list[float]) -> tuple[float, ...]:
-    """Accelerations (m/s^2) on the circle of 5 m at angular frequencies (rad/s)."""
-    return tuple(5.0 * speed**2 for speed in speeds)
 
 
 def _angles(number: int, *, exact: bool = False) -> list[float]:
@@ -158,6 +164,16 @@ def has_solution(number: int, thrust: float | None = None) -> bool:
 def largest_thrust(number: int) -> float:
     """The largest vertical thrust of a gait without yaw torque, N."""
     return float(_torques(number).upper[2])
+
+
+def least_thrust(number: int) -> float:
+    """The least vertical thrust of a gait without yaw torque, N."""
+    return float(_torques(number).lower[2])
+
+
+def speed_limit(which: str) -> float:
+    """The ``least`` or ``largest`` rotor speed of ch. 9, rad/s."""
+    return _LIMITS[which == "largest"]
 
 
 def torques_are_coupled(number: int) -> bool:
@@ -183,8 +199,3 @@ def accelerations_are_a_rectangle(number: int) -> bool:
     corners = attainable_accelerations(_angles(number), _VEHICLE, _LIMITS).vertices
     spans = [np.unique(np.round(axis, 9)) for axis in corners.T]
     return len(corners) == 4 and all(len(span) == 2 for span in spans)
-
-
-def accelerations_are_equal(first: int, second: int) -> bool:
-    """Whether two gaits reach the same accelerations, to six digits."""
-    return bool(np.allclose(accelerations(first), accelerations(second), rtol=1e-6))

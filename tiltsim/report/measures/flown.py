@@ -1,96 +1,43 @@
 """Measures of one flight or several, from their metrics."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Sequence
 from itertools import pairwise, product
-from math import hypot, inf
-from typing import Final, TypeAlias
+from math import inf
+from typing import TypeAlias
 
 import numpy as np
 
 from tiltsim.report.claim import Metrics
 from tiltsim_controllers.analysis.published_gaits import DETERMINANT_CASES
+from tiltsim_controllers.mathematics.scalar import Floats
 
 Flown: TypeAlias = Sequence[Metrics]
 
-_COMPUTED: Final[dict[str, Callable[[Metrics], float]]] = {
-    "attitude": lambda m: hypot(*(float(m[f"final_{a}"]) for a in ("roll", "pitch", "yaw"))),
-    "resting_error": lambda m: hypot(*(float(m[f"final_position_error_{a}"]) for a in "xy")),
-    "rotor_speed_range": lambda m: float(m["max_rotor_speed"]) - float(m["min_rotor_speed"]),
-}
-"""Quantities that are no metric themselves."""
+
+def norm(*parts: Floats) -> Floats:
+    """The Euclidean norm of components, one per flight, shape (N,)."""
+    return np.asarray(np.linalg.norm(parts, axis=0))
 
 
-def _values(flights: Iterable[Metrics], quantity: str) -> list[float]:
-    """A metric, one of `_COMPUTED`, or with a leading ``abs `` its absolute value, by flight."""
-    name = quantity.removeprefix("abs ")
-    of = _COMPUTED.get(name)
-    values = [of(metrics) if of else float(metrics[name]) for metrics in flights]
-    return values if name == quantity else [abs(value) for value in values]
-
-
-def _means(flights: Flown, quantity: str, size: int) -> list[float]:
+def means(values: Floats, size: int) -> Floats:
     """The means of successive groups of ``size`` flights."""
-    return [float(mean) for mean in np.reshape(_values(flights, quantity), (-1, size)).mean(1)]
+    return np.asarray(np.reshape(values, (-1, size)).mean(axis=1))
 
 
-def least(flights: Flown, quantity: str) -> float:
-    """The smallest value of all flights."""
-    return min(_values(flights, quantity))
+def spread(values: Floats) -> float:
+    """The spread of values, as a share of the largest one."""
+    return float(np.ptp(values) / np.max(values))
 
 
-def largest(flights: Flown, quantity: str) -> float:
-    """The largest value of all flights."""
-    return max(_values(flights, quantity))
-
-
-def first_over_last(flights: Flown, quantity: str) -> float:
+def first_over_last(values: Floats) -> float:
     """The value of the first flight, as a multiple of the last one's."""
-    values = _values(flights, quantity)
-    return _over(values[0], values[-1])
+    return float(values[0] / values[-1])
 
 
-def difference(flights: Flown, quantity: str) -> float:
-    """Difference of the first two flights, as a share of the largest value of all."""
-    values = _values(flights, quantity)
-    return _over(abs(values[0] - values[1]), max(values))
-
-
-def spread_of_means(flights: Flown, quantity: str, size: int) -> float:
-    """Spread of the means of groups of ``size`` flights, as a share of the largest mean."""
-    means = _means(flights, quantity, size)
-    return _over(max(means) - min(means), max(means))
-
-
-def ratio(flights: Flown, quantity: str, other: str) -> float:
-    """The only flight's quantity as a multiple of another one."""
-    return _over(_values(flights, quantity)[0], _values(flights, other)[0])
-
-
-def _over(value: float, other: float) -> float:
-    """A ratio; infinite, or NaN, over zero."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return float(np.divide(value, other))
-
-
-def grows(flights: Flown, quantity: str) -> bool:
-    """Whether it increases from each flight to the next."""
-    return all(first < second for first, second in pairwise(_values(flights, quantity)))
-
-
-def falls(flights: Flown, quantity: str) -> bool:
-    """Whether it decreases from each flight to the next."""
-    return grows(flights[::-1], quantity)
-
-
-def grows_until_lost(flights: Flown, quantity: str) -> bool:
+def grows_until_lost(flights: Flown, metric: str) -> bool:
     """Whether it increases from each flight to the next, where a lost flight has the largest."""
-    errors = [inf if m["diverged"] else _values([m], quantity)[0] for m in flights]
+    errors = [inf if metrics["diverged"] else float(metrics[metric]) for metrics in flights]
     return all(slower < faster for slower, faster in pairwise(errors))
-
-
-def grows_in_both_decouplers(flights: Flown, quantity: str) -> bool:
-    """Whether it increases along every second flight, from the first and from the second on."""
-    return all(grows(flights[start::2], quantity) for start in (0, 1))
 
 
 def stable_corners(small: float) -> float:
@@ -127,45 +74,6 @@ def falls_along_both_axes(family: str) -> bool:
     return all(modified < conventional for conventional, modified in zip(*largest))
 
 
-def second_half_is_smaller(flights: Flown, quantity: str) -> bool:
-    """Whether each flight of the second half has less than the one in its place in the first."""
-    values = _values(flights, quantity)
-    half = len(values) // 2
-    return all(second < first for first, second in zip(values[:half], values[half:], strict=True))
-
-
-def saves_most_where_largest(flights: Flown, quantity: str) -> bool:
-    """Whether the pair with the largest first value is the pair that falls the most."""
-    values = _values(flights, quantity)
-    saved = np.subtract(values[::2], values[1::2])
-    return int(np.argmax(values[::2])) == int(np.argmax(saved))
-
-
-def least_mean_is_first(flights: Flown, quantity: str, size: int) -> bool:
-    """Whether the first of the groups of ``size`` flights has the smallest mean."""
-    return int(np.argmin(_means(flights, quantity, size))) == 0
-
-
-def largest_mean_is_second(flights: Flown, quantity: str, size: int) -> bool:
-    """Whether the second of the groups of ``size`` flights has the largest mean."""
-    return int(np.argmax(_means(flights, quantity, size))) == 1
-
-
-def all_complete(flights: Flown) -> bool:
-    """Whether no flight is lost."""
-    return not any(metrics["diverged"] for metrics in flights)
-
-
-def is_lost(flights: Flown) -> bool:
-    """Whether the only flight is lost."""
-    return not all_complete(flights)
-
-
-def all_complete_and_turn(flights: Flown) -> bool:
-    """Whether no flight is lost and no rotor stops or reverses."""
-    return all_complete(flights) and least(flights, "min_rotor_speed") > 0.0
-
-
 def lost_at_the_published_curve(flights: Flown) -> bool:
     """Whether the flight that crosses S = 0 of ch. 2 is lost there."""
     [metrics] = flights
@@ -181,7 +89,8 @@ def stable_flights(flights: Flown, small: float) -> float:
     resting = ("final_roll", "final_pitch", "final_yaw", "final_position_error_z")
     return float(
         sum(
-            all_complete_and_turn([metrics])
+            not metrics["diverged"]
+            and metrics["min_rotor_speed"] > 0.0
             and all(abs(float(metrics[name])) < small for name in resting)
             for metrics in flights
         )

@@ -13,7 +13,7 @@ from tiltsim_controllers.analysis.published_gaits import (
     robustness,
     smallest_margin,
 )
-from tiltsim_controllers.analysis.singularity import margin_over_gait, residuals
+from tiltsim_controllers.analysis.singularity import margin_over_gait, residuals, singular_values
 from tiltsim_controllers.analysis.two_color_map import delta
 from tiltsim_controllers.gaits import plans
 from tiltsim_controllers.gaits.cat import SWINGS
@@ -25,21 +25,16 @@ _ZERO: Final = 1e-9
 
 
 @cache
-def _cat_margin(gait: str, scale: int) -> float:
+def cat_margin(gait: str, scale: int = 1) -> float:
+    """Smallest margin (rad) of a gait of ch. 5 over a period, with its angles over ``scale``."""
     swing = SWINGS[gait]
-    return smallest_margin(
-        plans.cat(gait, swing.amplitude, 1.0, swing.lean).scaled(scale), _VEHICLE
-    )
-
-
-def cat_gait_is_singular(gait: str) -> bool:
-    """Whether R of an unscaled gait of ch. 5 vanishes or changes its sign within a period."""
-    return _cat_margin(gait, 1) <= 0.0
+    plan = plans.cat(gait, swing.amplitude, 1.0, swing.lean)
+    return smallest_margin(plan.scaled(scale), _VEHICLE)
 
 
 def scaling_enlarges(gait: str) -> bool:
     """Whether the margin grows from 1 over 1/2 to 1/3, where a gait whose R vanishes has none."""
-    margins = [max(0.0, _cat_margin(gait, scale)) for scale in (1, 2, 3)]
+    margins = [max(0.0, cat_margin(gait, scale)) for scale in (1, 2, 3)]
     return all(first < second for first, second in pairwise(margins))
 
 
@@ -83,29 +78,10 @@ def angles_as_printed(key: str, offset: float) -> Floats:
     )
 
 
-def _margins_as_printed(key: str, offset: float) -> tuple[float, float]:
-    """Smallest margins (rad) of `angles_as_printed` and of its twin with a bias of 80 %."""
-    angles = angles_as_printed(key, offset)
-    biased = angles * (1.0, 1.0, 0.8, 0.8)
-    own, twin = (margin_over_gait(a, _VEHICLE).min() for a in (angles, biased))
-    return float(own), float(twin)
-
-
-def printed_beats_its_biased_twin(key: str, offset: float) -> bool:
-    """Whether a gait with the printed offset is more robust than its biased twin."""
-    own, twin = _margins_as_printed(key, offset)
-    return own > twin
-
-
-def printed_margin(key: str, offset: float) -> float:
-    """Smallest margin (rad) of a gait with the printed offset."""
-    return _margins_as_printed(key, offset)[0]
-
-
-def red_is_more_robust_than_blue(blue: str, red: list[str], offset: float) -> bool:
-    """Whether red gaits have larger margins than a blue one with the printed offset."""
-    margin, _ = _margins_as_printed(blue, offset)
-    return all(gait_margin(key) > margin for key in red)
+def printed_margin(key: str, offset: float, bias: float = 1.0) -> float:
+    """Smallest margin (rad) of `angles_as_printed`, the last two of them times ``bias``."""
+    angles = angles_as_printed(key, offset) * (1.0, 1.0, bias, bias)
+    return float(margin_over_gait(angles, _VEHICLE).min())
 
 
 def printed_is_regular(key: str, offset: float) -> bool:
@@ -120,6 +96,26 @@ def sign_on_exact_lines(key: str) -> float:
     gait = published.exact or published.gait
     R = residuals(gait.angles(gait.sample_times(401)), _VEHICLE).R
     return 0.0 if np.abs(R).min() < _ZERO or np.ptp(np.sign(R)) else float(np.sign(R[0]))
+
+
+def conditioning_of_blue(exact: bool = False) -> float:
+    """The smallest singular value of tau, as a share of the largest, of ch. 6's gait 1.
+
+    The largest share over a period, with the printed angles or on the exact lines.
+    """
+    published = PUBLISHED_GAITS["ch06_gait_1"]
+    gait = (published.exact if exact else None) or published.gait
+    values = singular_values(gait.angles(gait.sample_times(401)), _VEHICLE)
+    return float((values[:, 2] / values[:, 0]).max())
+
+
+def remainder_of_blue() -> str:
+    """The largest of R, R_phi, R_theta and the conditioning on the exact lines, in words."""
+    gait = PUBLISHED_GAITS["ch06_gait_1"].exact
+    assert gait is not None
+    parts = residuals(gait.angles(gait.sample_times(401)), _VEHICLE)
+    remainder = max(conditioning_of_blue(exact=True), float(np.abs(parts).max()))
+    return "below 1e-9" if remainder < _ZERO else f"{remainder:.0e}"
 
 
 def _as_published(
@@ -144,10 +140,22 @@ def sign_as_published(key: str, offset: float, formulas: list[str]) -> float:
     return _as_published(key, offset, formulas)[1]
 
 
+def margin_as_published(key: str, offset: float, formulas: list[str], bias: float = 1.0) -> float:
+    """Smallest margin (rad) of a blue gait with the printed offset and formulas.
+
+    Args:
+        key: Key of `PUBLISHED_GAITS`.
+        offset: The printed offset of blue, rad.
+        formulas: The printed R, R_phi and R_theta.
+        bias: Factor on the last two angles.
+    """
+    return _as_published(key, offset, formulas, bias)[0]
+
+
 def is_more_robust_as_published(key: str, offset: float, formulas: list[str]) -> bool:
     """Whether a gait beats its biased twin with the printed offset and formulas."""
     bias = PUBLISHED_GAITS[key].bias or 1.0
-    own, twin = (_as_published(key, offset, formulas, eta)[0] for eta in (1.0, bias))
+    own, twin = (margin_as_published(key, offset, formulas, eta) for eta in (1.0, bias))
     return own > twin
 
 
@@ -159,7 +167,7 @@ def _greater_advantage_over_99(margin: Callable[[float], float]) -> bool:
 
 def advantage_as_published(key: str, offset: float, formulas: list[str]) -> bool:
     """`_greater_advantage_over_99` with the printed offset and formulas."""
-    return _greater_advantage_over_99(lambda bias: _as_published(key, offset, formulas, bias)[0])
+    return _greater_advantage_over_99(lambda bias: margin_as_published(key, offset, formulas, bias))
 
 
 def advantage_on_exact_lines(key: str) -> bool:
@@ -169,22 +177,6 @@ def advantage_on_exact_lines(key: str) -> bool:
     return _greater_advantage_over_99(
         lambda bias: max(0.0, smallest_margin(exact.biased(bias), _VEHICLE))
     )
-
-
-def is_more_robust_than(key: str, other: str) -> bool:
-    """Whether a gait has the larger margin on the exact lines."""
-    return gait_margin(key, "margin_exact") > gait_margin(other, "margin_exact")
-
-
-def red_beats_blue_as_published(red: str, blue: str, offset: float, formulas: list[str]) -> bool:
-    """Whether a red gait has a larger margin than a blue one as printed.
-
-    Args:
-        red, blue: Keys of `PUBLISHED_GAITS`.
-        offset: The printed offset of blue, rad.
-        formulas: The printed R, R_phi and R_theta.
-    """
-    return gait_margin(red) > _as_published(blue, offset, formulas)[0]
 
 
 def partial_scaling_can_harm(keys: list[str]) -> bool:

@@ -5,6 +5,7 @@ from math import asin, cos, inf, pi, sin
 import numpy as np
 
 from tiltsim.report.measures.flown import Flown
+from tiltsim_controllers.tilt_car.cycles import drift_rate, orbit
 from tiltsim_controllers.tilt_car.vehicle import (
     THESIS_CAR,
     acceleration,
@@ -103,9 +104,17 @@ def fourth_derivative_is_right() -> bool:
     return bool(np.abs(printed - exact).max() < 1e-5 * np.abs(exact).max())
 
 
-def lean(flights: Flown, as_share: bool = False) -> float:
-    """Angle (rad) from the middle of the thrusts to the center, or over their half angle."""
-    _, across = thrust_map(THESIS_CAR) @ (float(flights[0]["final_input_split"]), 0.0)
+def first_drift_rate() -> float:
+    """The drift (rad/s) on ch. 10's circle from the aligned state."""
+    return drift_rate(0.0, orbit(_RADIUS, _OMEGA), THESIS_CAR)
+
+
+def lean(split: float, as_share: bool = False) -> float:
+    """Angle (rad) from the middle of the thrusts to the center, or over their half angle.
+
+    ``split`` is the difference of the squared rotor speeds, rad^2/s^2.
+    """
+    _, across = thrust_map(THESIS_CAR) @ (split, 0.0)
     angle = abs(asin(across / (_RADIUS * _OMEGA**2)))
     return angle / THESIS_CAR.half_angle if as_share else angle
 

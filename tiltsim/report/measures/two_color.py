@@ -129,6 +129,11 @@ def _positive_points() -> set[tuple[int, int]]:
     }
 
 
+def positive_points(below: bool = False) -> float:
+    """The number of grid points that have a root with R > 0: all, or below the diagonal."""
+    return float(sum(not below or j < i for i, j in _positive_points()))
+
+
 def at_most_one_positive_root() -> bool:
     """Whether no grid point has two roots with R > 0."""
     return sum(root.R > _ZERO for root in _inside()) == len(_positive_points())

@@ -23,9 +23,8 @@ from tiltsim.closed_loop.limits import (
     horizontal_error,
 )
 from tiltsim.closed_loop.loop import VehicleKind
-from tiltsim.models.hover import hover_speeds
 from tiltsim.models.parts import ExtraActuators, Pod, RotorLimits, TiltServo, Visuals
-from tiltsim.models.rotor_table import Multirotor
+from tiltsim.models.rotor_table import Multirotor, hover_speeds
 from tiltsim.scenario.interaction import objects_of
 from tiltsim.scenario.linearizing_controllers import AttitudeForceController
 from tiltsim.scenario.scenario import FlightPlan, Scenario

@@ -8,7 +8,13 @@ from tiltsim.closed_loop.loop import ClosedLoop, Sizes
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.scenario import Scenario
 from tiltsim_controllers.mathematics.scalar import Values
-from tiltsim_controllers.vehicle.body import BODY_FIELDS, Body, body_of, principal_body
+from tiltsim_controllers.vehicle.body import (
+    BODY_FIELDS,
+    ROTATION_NAMES,
+    Body,
+    body_of,
+    principal_body,
+)
 from tiltsim_controllers.vehicle.craft import craft_parameters, craft_record
 from tiltsim_controllers.vehicle.parameters import Vehicle
 
@@ -57,6 +63,12 @@ class Layout(NamedTuple):
         """Names of fields or columns: one a tilt where the kind begins with alpha, else a rotor."""
         count = self.tilts if kind.startswith(("alpha", "tilt")) else self.rotors
         return tuple(f"{kind}_{i}" for i in range(1, count + 1))
+
+    @property
+    def motion(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
+        """Names of the coordinates of ``qpos`` and ``qvel``, see `ClosedLoop`."""
+        places = (*BODY_FIELDS[:3], *ROTATION_NAMES, *self.names("alpha"))
+        return places, (*BODY_FIELDS[3:6], *BODY_FIELDS[9:], *self.names("alpha_rate"))
 
     @property
     def observed_fields(self) -> tuple[str, ...]:

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from itertools import islice
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -102,6 +102,7 @@ DETAILED: Final = 2  # vehicles with a separate panel; all have a row in the pan
 WIDE: Final = 9  # letters of a controller's name that fit above its column
 ALL: Final = "all tasks"
 
+Point = tuple[float, float]  # errors along x and y, m
 Cells = dict[str, dict[str, tuple[float | None, float | None]]]
 """Scores with default and tuned gains, by row and controller."""
 
@@ -178,40 +179,24 @@ def _draw(axes: Any, cells: Cells, names: Sequence[str]) -> None:
     axes.tick_params(length=0)
 
 
-class SetpointErrors(NamedTuple):
-    """Steady errors of one controller with several gaits."""
-
-    label: str
-    names: Sequence[str]
-    points: Sequence[tuple[float, float]]  # (x, y), m
-    published: Sequence[tuple[float, float]]  # m
-
-
-class PeriodErrors(NamedTuple):
-    """Largest errors by the gait's period; None for flights that terminated early."""
-
-    label: str
-    periods: Sequence[float]  # s
-    errors: Sequence[float | None]  # m
-
-
 @style.paper_style()
-def setpoint_figure(families: Sequence[SetpointErrors]) -> Figure:
-    """Steady position errors, reference minus actual, with the published values.
+def setpoint_figure(families: Mapping[str, tuple[Mapping[str, Point], Sequence[Point]]]) -> Figure:
+    """Steady position errors, reference minus actual, by title and name, and published ones.
 
     One panel per family, each with its own scale, so that every point has room for its name.
     """
     figure = style.new_figure(4.2 * len(families), 4.3)
     row = figure.subplots(1, len(families), squeeze=False)[0]
-    for axes, family, color in zip(row, families, (style.RED, style.BLUE), strict=False):
+    colors = (style.RED, style.BLUE)
+    for axes, (title, (points, published)), color in zip(row, families.items(), colors):
         style.zero_lines(axes)
-        published, points = zip(*family.published, strict=True), zip(*family.points, strict=True)
-        axes.plot(*published, "s", ms=10, mfc="none", mec=style.INK, label="published")
-        axes.plot(*points, "o", ms=4.5, color=color, label="measured")
-        for name, point in zip(family.names, family.points, strict=True):
+        look: dict[str, Any] = {"ms": 10, "mfc": "none", "mec": style.INK}
+        axes.plot(*zip(*published, strict=True), "s", **look, label="published")
+        axes.plot(*zip(*points.values(), strict=True), "o", ms=4.5, color=color, label="measured")
+        for name, point in points.items():
             text = axes.annotate(name, point, (7, 5), textcoords="offset points")
             text.set(size="small", color=color)
-        axes.set(xlabel="error along x (m)", ylabel="error along y (m)", title=family.label)
+        axes.set(xlabel="error along x (m)", ylabel="error along y (m)", title=title)
         axes.set_aspect("equal", adjustable="datalim")
         axes.margins(0.14)
     row[0].legend(loc="upper right")
@@ -219,27 +204,27 @@ def setpoint_figure(families: Sequence[SetpointErrors]) -> Figure:
 
 
 @style.paper_style()
-def period_figure(panels: Sequence[tuple[str, Sequence[PeriodErrors]]]) -> Figure:
+def period_figure(panels: Mapping[str, Mapping[str, Mapping[float, float | None]]]) -> Figure:
     """Largest error after 20 s by period, on a logarithmic scale that all panels share.
 
-    ``panels`` are titles with their series. A cross at the upper edge marks a flight that
-    terminated early.
+    Errors (m) by title, label and period (s). A cross at the upper edge marks a flight that
+    terminated early, whose error is None.
     """
     figure = style.new_figure(2.5 * len(panels) + 0.9, 3.0)
     row = figure.subplots(1, len(panels), sharey=True, squeeze=False)[0]
     looks = [(style.RED, "o-"), (style.BLUE, "s-"), (style.RED, "o:"), (style.BLUE, "s:")]
     terminated = False
-    for axes, (title, series) in zip(row, panels, strict=True):
-        for family, (color, look) in zip(series, looks, strict=False):
-            pairs = [*zip(family.periods, family.errors, strict=False)]
-            flown = zip(*((period, error) for period, error in pairs if error is not None))
+    for axes, (title, series) in zip(row, panels.items(), strict=True):
+        for (label, errors), (color, look) in zip(series.items(), looks, strict=False):
+            flown = zip(*((period, error) for period, error in errors.items() if error is not None))
             fill = "white" if ":" in look else color
-            axes.plot(*flown, look, color=color, ms=4.5, mfc=fill, label=family.label)
-            ended = [period for period, error in pairs if error is None]
+            axes.plot(*flown, look, color=color, ms=4.5, mfc=fill, label=label)
+            ended = [period for period, error in errors.items() if error is None]
             cross = {"color": color, "ms": 8, "mew": 2.0, "transform": axes.get_xaxis_transform()}
             axes.plot(ended, [0.96] * len(ended), "x", **cross)
             terminated |= bool(ended)
-        axes.set(title=title, xlabel="period (s)", yscale="log", xticks=series[0].periods)
+            axes.set_xticks([*errors])
+        axes.set(title=title, xlabel="period (s)", yscale="log")
         axes.margins(x=0.12, y=0.12)
     row[0].set_ylabel("largest error after 20 s (m)")
     if terminated:

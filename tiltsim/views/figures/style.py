@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 import matplotlib
-from cycler import cycler
 from matplotlib import rc_context, rcParams
 from matplotlib import style as styles
 from matplotlib.axes import Axes
@@ -71,37 +70,7 @@ FORMATS: Final = (".png", ".svg", ".pdf")  # suffixes of figure files
 SINGULAR: Final = RED  # curves of singular attitudes and of singular tilt angles, in every figure
 UNREACHABLE: Final = "#F3D3C3"
 """The shade of attitudes that are singular, nearly so or beyond a singularity, in all figures."""
-_SETTINGS: Final = {
-    "font.family": ["sans-serif"],
-    "font.sans-serif": ["DejaVu Sans"],
-    "font.size": 9.0,
-    "figure.titlesize": "large",
-    "figure.titleweight": "bold",
-    "axes.titlesize": "medium",
-    "axes.labelsize": "medium",
-    "axes.edgecolor": INK,
-    "axes.linewidth": 0.7,
-    "axes.labelcolor": INK,
-    "axes.titlelocation": "left",
-    "axes.axisbelow": True,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "grid.color": "#D9D9D9",
-    "grid.linewidth": 0.5,
-    "xtick.color": INK,
-    "ytick.color": INK,
-    "xtick.labelsize": "small",
-    "ytick.labelsize": "small",
-    "legend.fontsize": "small",
-    "legend.title_fontsize": "small",
-    "legend.frameon": False,
-    "lines.linewidth": 1.4,
-    "figure.dpi": 100.0,
-    "savefig.dpi": 160.0,
-    "svg.hashsalt": "tiltsim",
-    "pdf.fonttype": 42,
-}
+_SETTINGS: Final = Path(__file__).with_name("paper.mplstyle")
 _GLYPHS: Final = "DejaVu Sans"
 """The font, part of matplotlib, of letters that the chosen ones lack, such as subscripts."""
 PRINT_DPI: Final = 300.0
@@ -179,7 +148,7 @@ def paper_style(file: Path | None = None, size: Size | None = None) -> Iterator[
             yield
             return
         own = {} if file is None else _style_of(file)
-        common = {**_SETTINGS, "axes.prop_cycle": cycler(color=CYCLE)}
+        common = dict(matplotlib.rc_params_from_file(_SETTINGS, use_default_template=False))
         common |= {} if size is None else {"savefig.dpi": PRINT_DPI}
         for key in _users_settings(common):
             del common[key]

@@ -6,7 +6,7 @@ follows a gait and the thrusts are commanded (ch. 10, Sec. 5; ch. 11).
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, ClassVar, Final
 
 import numpy as np
 
@@ -22,6 +22,9 @@ from tiltsim_controllers.mathematics.scalar import Floats, Vector
 from tiltsim_controllers.references.trajectories import reference_motion
 from tiltsim_controllers.tilt_car import integrating, planned_direction
 from tiltsim_controllers.tilt_car.vehicle import TiltCar, acceleration, counter_yaw_per_tilt
+
+PLANE: Final = ("x", "y", "vx", "vy")
+"""Position and velocity, m and m/s."""
 
 DEMANDED: Final = ("demanded_x", "demanded_y")
 """Signals: the acceleration (m/s^2) whose direction the thrusts are to bracket."""
@@ -70,6 +73,9 @@ class CarFunctions(VehicleFunctions):
         state = xp.hstack([v.motion, v.yaw, v.alpha, v.speeds])
         return Seen(time, state, states=v.states, recorded=True)
 
+    state_names: ClassVar[Any] = PLANE
+    input_names: ClassVar[Any] = ("squared_speed_1", "squared_speed_2")
+
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the columns of `references`."""
@@ -104,6 +110,7 @@ class CarFunctions(VehicleFunctions):
             inputs_size,
             tuple(f"law_speed_{rotor}" for rotor in ROTORS if states > 1),
             model="tilt_car",
+            motion=(("x", "y", "yaw", "alpha"), ("vx", "vy", "r", "alpha_rate")),
             sizes=Sizes(qpos=4, qvel=4, act=2 + states, ctrl=5 + states),
             initial_activations=activations,
             controller_states=states,
@@ -152,6 +159,8 @@ class _Integrating(CarFunctions):
     """
 
     twice: bool
+    state_names: ClassVar[Any] = (*PLANE, "alpha", "rotor_speed_1", "rotor_speed_2")
+    input_names: ClassVar[Any] = ("rotor_acceleration_1", "rotor_acceleration_2", "alpha_rate")
 
     def law_speeds(self, speeds: Any, parameters: Any) -> Any:
         """Rotor speeds as the law has them: below zero only without anti-windup."""
@@ -375,3 +384,10 @@ PLANNED_DIRECTION: Final = _Planned(
 ``switch_1`` and ``switch_2`` are ``p`` and ``q`` of ch. 11's switch matrix (Eqs. 22-24), 0 where a
 rotor's thrust is saturated at zero; ``wanted_square_i`` is the demand without that limit.
 """
+
+LOOPS: Final = {
+    "tilt_car_third_derivative": THIRD_DERIVATIVE,
+    "tilt_car_fourth_derivative": FOURTH_DERIVATIVE,
+    "tilt_car_planned_direction": PLANNED_DIRECTION,
+}
+"""The loops by the names of their laws."""
