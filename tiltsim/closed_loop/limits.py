@@ -16,10 +16,8 @@ SINGULAR: Final = 1e-9
 WITHIN_LIMITS: Final = 0
 HORIZONTAL_ERROR: Final = 1
 ALTITUDE_ERROR: Final = 2
-BODY_RATE: Final = 3
-"""The code of p; q and r have the next ones."""
-ROTOR_SPEED: Final = 6
-"""The code of the first rotor; the other rotors have the next ones."""
+BODY_RATE: Final = 3  # the code of p; q and r have the next ones
+ROTOR_SPEED: Final = 6  # the code of the first rotor; the other rotors have the next ones
 VEHICLE: Final = 100
 """The step from the codes of one vehicle to the codes of the next, where there are several."""
 

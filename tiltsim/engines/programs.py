@@ -29,8 +29,7 @@ from tiltsim_controllers.references.trajectories import ReferenceParameters
 KEPT: Final = 64
 """Programs of each kind that are kept; each closed loop, gait type and decoupler has its own."""
 
-SIDES: Final = 17 * (1 + MAX_COMPANIONS)
-"""Largest number of sign checks of a loop."""
+SIDES: Final = 17 * (1 + MAX_COMPANIONS)  # largest number of sign checks of a loop
 
 
 class RecorderHead(NamedTuple):

@@ -41,8 +41,7 @@ FACTORS: Final = tuple(
 
 CONJUGATE: Final = np.array([1.0, -1.0, -1.0, -1.0])
 
-TINY: Final = 1e-12
-"""Velocity (m/s) at which the drag of a vehicle at rest still has a derivative."""
+TINY: Final = 1e-12  # velocity (m/s) at which the drag of a vehicle at rest still has a derivative
 
 
 class LoggedVehicle:

@@ -93,8 +93,7 @@ def build_model(
     return model
 
 
-OVERLAP: Final = 1e-4
-"""Depth (m) from which shapes count as lying in each other."""
+OVERLAP: Final = 1e-4  # depth (m) from which shapes count as lying in each other
 
 
 def check_start(scenario: Scenario, model: mujoco.MjModel, data: mujoco.MjData) -> None:

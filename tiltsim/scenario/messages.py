@@ -32,8 +32,7 @@ class InvalidValueError(ValueError):
 ALIKE: Final = 0.85
 """Similarity from which the words of two names make them close, whatever else they have."""
 
-MAX_OTHERS: Final = 5
-"""Most keys with further mistakes that are named."""
+MAX_OTHERS: Final = 5  # most keys with further mistakes that are named
 
 _PLAIN_TYPES: Final = {
     "float_type": "must be a number",

@@ -38,8 +38,7 @@ from tiltsim.system.files import digest, is_file
 from tiltsim.system.text import error_text, short_repr
 from tiltsim_controllers.mathematics.scalar import Values
 
-VARIABLE: Final = "TILTSIM_TRUST"
-"""Environment variable that, set to 1, stands for ``--trust``."""
+VARIABLE: Final = "TILTSIM_TRUST"  # environment variable that, set to 1, stands for ``--trust``
 
 
 def is_trusted(option: bool) -> bool:

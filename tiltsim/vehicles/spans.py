@@ -13,9 +13,7 @@ import numpy.typing as npt
 from tiltsim.scenario.metric_names import METRICS
 from tiltsim_controllers.mathematics.scalar import Floats
 
-SETTLED: Final = 20.0
-"""Time (s) from which on the supremum of the position error is taken."""
-
+SETTLED: Final = 20.0  # time (s) from which on the supremum of the position error is taken
 _ROUNDING: Final = 1e-9  # relative: of a time over a time step, of a speed at its limit
 
 

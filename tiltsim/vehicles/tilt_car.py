@@ -53,8 +53,7 @@ OBSERVED_FIELDS: Final = (
 )
 """A sample of any tilt-car after its time: both discs and the rotor speeds."""
 
-SPEED_1, SPEED_2 = 8, 9
-"""Where in a sample the rotor speeds lie."""
+SPEED_1, SPEED_2 = 8, 9  # where in a sample the rotor speeds lie
 
 COLUMNS: Final = {
     "time": Quantity("time", "s"),

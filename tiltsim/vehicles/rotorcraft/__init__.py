@@ -228,8 +228,5 @@ EXTRA_COLUMNS: Final = {
 }
 """Columns of controllers that can become singular."""
 
-ROTORCRAFT: Final = rotorcraft_kind(CROSS, tuple(EXTRA_COLUMNS))
-"""Tiltrotor and quadrotor."""
-
-COLUMNS: Final = ROTORCRAFT.columns
-"""The columns of every flight of tiltrotor and quadrotor."""
+ROTORCRAFT: Final = rotorcraft_kind(CROSS, tuple(EXTRA_COLUMNS))  # tiltrotor and quadrotor
+COLUMNS: Final = ROTORCRAFT.columns  # the columns of every flight of tiltrotor and quadrotor

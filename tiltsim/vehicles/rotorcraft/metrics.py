@@ -29,9 +29,7 @@ from tiltsim_controllers.vehicle.body import TILT_FIELDS
 from tiltsim_controllers.vehicle.parameters import Vehicle
 
 SETTLED_ALTITUDE: Final = 0.005  # m
-
-BAND: Final = (0.025, 0.975)
-"""Ends of the 95 % band of a distribution."""
+BAND: Final = (0.025, 0.975)  # ends of the 95 % band of a distribution
 
 SETTLED_FORCE: Final = 1.0
 """s after the full force is commanded, from where on the error of the force counts."""
