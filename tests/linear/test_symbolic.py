@@ -16,7 +16,7 @@ from tests.laws.test_multirotor import document
 from tests.simulation.test_batch import EXACT, GAITS
 from tiltsim.errors import InputError, TiltsimError
 from tiltsim.laws.assembling import assemble
-from tiltsim.plants.equations_plant import EquationsPlant
+from tiltsim.plants.plant import EquationsPlant
 from tiltsim.scenario.loading import merge
 from tiltsim_controllers.vehicle.parameters import PRESETS
 
