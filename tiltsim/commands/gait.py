@@ -78,12 +78,13 @@ def run(
         return 0
     loaded = None
     if scenario is not None:
+        from tiltsim.models.rotor_table import Multirotor
         from tiltsim.scenario.loading import load_scenario
 
         loaded = load_scenario(scenario)
         if gait.vehicle is not None:
             raise InputError("--vehicle: the scenario defines its own vehicle; remove one of them")
-        if loaded.vehicle.model == "multirotor":
+        if isinstance(loaded.vehicle.resolve(), Multirotor):
             return _run_multirotor(scenario, loaded, gait, figure, json=json)
     selected = _select(gait) if loaded is None else _of_scenario(str(scenario), loaded)
     report = gait_report(selected.gait, selected.vehicle, roll=gait.roll, pitch=gait.pitch)

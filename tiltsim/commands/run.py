@@ -140,7 +140,7 @@ def _warnings(scenario: Scenario) -> Iterator[str]:
     if own is None:
         return
     if own.unmodeled_properties and not scenario.controller.is_external:
-        diagonal = "" if table.model == "multirotor" else " and a diagonal inertia"
+        diagonal = " and a diagonal inertia" if isinstance(vehicle, Vehicle) else ""
         yield (
             f"vehicle.mjcf: the {scenario.controller.law} controller assumes the center of mass at "
             f"the body's origin{diagonal}; not modeled: {own.unmodeled_properties}"

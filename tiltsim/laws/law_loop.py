@@ -126,7 +126,7 @@ def _step_of(flown: FlownLaw) -> Callable[..., Step]:
     rotors, tilts = flown.layout.places
     own, layout, commanded = len(flown.states), flown.layout.tilt_of_rotor, flown.commanded
     per_newton, coefficients = ROTOR_FLOATS * rotors, 2 * ROTOR_FLOATS * rotors
-    is_cross = flown.layout.model != "multirotor"
+    is_cross = flown.layout.cross != ""
 
     def step(seen: Seen, known: Any, knots: Any) -> Step:
         # An array that outlives a trace would keep its precision in the next one of JAX.
@@ -326,8 +326,7 @@ def airframe_of(plan: FlightPlan) -> Airframe:
         scenario.initial.velocity,
         scenario.initial.attitude,
         scenario.initial.angular_velocity,
-        # The thesis's equations omit the gyroscopic torque but for the quadrotor's.
-        float(simulation.plant != "thesis" or table.model == "quadrotor"),
+        scenario.gyroscopic,
         simulation.timestep,
         simulation.control_timestep,
         simulation.latency_steps,

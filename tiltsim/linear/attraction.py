@@ -296,7 +296,7 @@ def _is_near(away: Floats) -> bool:
 def _acceptable(scenario: Scenario, roll: Floats, pitch: Floats) -> NDArray[np.bool_] | None:
     """Whether attitudes are acceptable at all times, shape (pitch, roll)."""
     vehicle = scenario.vehicle.resolve()
-    if scenario.vehicle.model != "tiltrotor" or not isinstance(vehicle, Vehicle):
+    if not scenario.vehicle.has_tilting_rotors or not isinstance(vehicle, Vehicle):
         return None
     gait = assemble(scenario).gait
     times = np.arange(INSTANTS) / INSTANTS * (gait.period or 0.0)

@@ -22,7 +22,7 @@ from tiltsim.plants.command import Command, Observation, Reference
 from tiltsim.plants.mujoco_plant import MujocoPlant
 from tiltsim.scenario.controller import PythonController
 from tiltsim.scenario.scenario import Scenario
-from tiltsim.vehicles.rotorcraft.layout import layout_of
+from tiltsim.vehicles.rotorcraft.layout import is_fixed_cross, layout_of
 from tiltsim.vehicles.rotorcraft.others import FELT, others_of
 from tiltsim_controllers.code.arrays import as_arrays
 from tiltsim_controllers.mathematics.attitude import euler_angles
@@ -199,9 +199,9 @@ class BuiltInController:
 
 
 def _command(assembly: Assembly, loop: ClosedLoop, ctrl: Values) -> Command:
-    """The command by a controller's controls; the quadrotor's laws command thrusts."""
+    """The command by a controller's controls; rotors on a fixed cross make thrusts."""
     layout = layout_of(loop)
-    if loop.model == "quadrotor":
+    if is_fixed_cross(loop):
         coefficients = np.array(assembly.scenario.any_rotorcraft.thrust_coefficients)
         return Command(thrusts=coefficients * np.array(ctrl[: layout.rotors]))
     rates = ctrl[layout.acceleration_1 : layout.further_rates]

@@ -15,7 +15,7 @@ from typing import Any, ClassVar, Literal, TypeVar
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.controller_table import ControllerTable, ReferenceKind
 from tiltsim.scenario.reference import Reference
-from tiltsim.scenario.rotorcraft import TiltServoTable
+from tiltsim.scenario.rotorcraft import ROTORCRAFT, TiltServoTable
 from tiltsim.scenario.table import Positive, default
 from tiltsim_controllers.analysis.stability import ErrorLoop, linear_loop
 from tiltsim_controllers.code.arrays import xp as xp
@@ -97,7 +97,7 @@ class Airframe:
 class LawTable(ControllerTable):
     """The common part of the tables of laws, wherever the function comes from."""
 
-    vehicle_models = ("tiltrotor", "quadrotor", "multirotor")
+    vehicle_models = ROTORCRAFT
     reference_kinds: ClassVar[tuple[ReferenceKind, ...]] = ("position",)
     rotors_have_speeds = True
     damps_swing = True
