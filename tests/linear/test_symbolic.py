@@ -65,14 +65,14 @@ WITH_MARGIN["omni"] = MULTIROTORS["turning over"]
 
 
 @pytest.mark.parametrize("name", WITH_MARGIN)
-def test_the_margin_is_that_of_the_flight(name):
+def test_the_margin_is_the_column_of_the_flight(name):
     scenario = tiltsim.parse_scenario(merge(BRIEF, WITH_MARGIN[name]))
     model, flight = tiltsim.symbolic(scenario), tiltsim.simulate(scenario)
     plant, found = EquationsPlant(assemble(scenario), "python"), []
     times = flight["time"][:4]
     for time in times:
         plant.advance(round((time - plant.time) / scenario.simulation.timestep))
-        state, held = np.split(plant._now, [len(model.initial)])
+        state, held = np.split(plant.state[1:], [len(model.initial)])
         found.append([float(f(time, state, held)[0]) for f in (model.margin, model.signs)])
     margins, determinants = np.array(found).T
     logged = flight["singularity_margin"][:4]

@@ -58,9 +58,8 @@ def run(
     The limited league has rotor limits, lag, latency, noise and model errors, and baselines with
     observers and mixers; in the unlimited one all that fit, also of packages, fly without; in the
     one of interaction vehicles push, open a door, land and carry loads. Scores: 100 for no error,
-    50 for a root mean square error of 0.1 m or 0.1 rad of yaw (steps: a quarter of the step), of
-    0.5 N of a push, or 0.1 rad of swing in the end; 0 for a vehicle that stays where it began or
-    never touches, and for an early end, - where a task refuses the controller.
+    50 for an rms error of 0.1 m, 0.1 rad of yaw, a quarter of a step, 0.5 N of a push, or a last
+    swing of 0.1 rad; 0 for an idle vehicle and an early end, - where a task refuses the controller.
 
     Args:
         out (DIR): folder for arena.csv, arena.json, arena.png and arena.md (default: arena)
