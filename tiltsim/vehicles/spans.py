@@ -21,16 +21,12 @@ _ROUNDING: Final = 1e-9  # relative: of a time over a time step, of a speed at i
 def in_last_second(time: Floats, timestep: float) -> npt.NDArray[np.bool_]:
     """The samples of the last second, both ends included; ``time`` and ``timestep`` in s."""
     steps = np.rint(time / timestep)
-    within: npt.NDArray[np.bool_] = steps[-1] - steps <= (1.0 + _ROUNDING) / timestep
-    return within
+    return steps[-1] - steps <= (1.0 + _ROUNDING) / timestep
 
 
 def when_settled(time: Floats, timestep: float) -> npt.NDArray[np.bool_]:
     """The samples from `SETTLED` on; ``time`` and ``timestep`` in s."""
-    settled: npt.NDArray[np.bool_] = (
-        np.rint(time / timestep) >= (1.0 - _ROUNDING) * SETTLED / timestep
-    )
-    return settled
+    return np.rint(time / timestep) >= (1.0 - _ROUNDING) * SETTLED / timestep
 
 
 def mean_of(column: Floats, span: npt.NDArray[np.bool_]) -> Any:
