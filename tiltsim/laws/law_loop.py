@@ -14,6 +14,7 @@ from typing import Any, Final, NamedTuple
 from tiltsim.closed_loop.loop import ClosedLoop
 from tiltsim.errors import TiltsimError
 from tiltsim.laws.law import Law, body_of_vehicle, tilts_in_states, vehicle_of
+from tiltsim.laws.layers.actuation import sensor_parameters
 from tiltsim.laws.rotor_loop import RotorLayout, margins_of, rotor_loop
 from tiltsim.models.cross import as_multirotor
 from tiltsim.scenario.law_controller import Airframe, LawController, LawTable
@@ -316,7 +317,8 @@ def airframe_of(plan: FlightPlan) -> Airframe:
     scenario, simulation = plan.scenario, plan.scenario.simulation
     table = scenario.any_rotorcraft
     vehicle, tilting = table.resolve(), table.has_tilting_rotors
-    speeds = initial_rotor_speeds(plan)
+    speeds, sensors = initial_rotor_speeds(plan), sensor_parameters(scenario)
+    root = max(sensors.period, simulation.control_timestep) ** 0.5
     return Airframe(
         as_multirotor(vehicle, tilting=tilting),
         plan.gait,
@@ -334,4 +336,5 @@ def airframe_of(plan: FlightPlan) -> Airframe:
         table.rotor_time_constant,
         table.tilt_servo,
         scenario.reference,
+        (sensors.velocity.noise * root, sensors.body_rates.noise * root),
     )

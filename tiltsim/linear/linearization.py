@@ -265,8 +265,7 @@ def symbolic(scenario: Scenario | str | PathLike[str] | Mapping[str, Any]) -> Sy
         )
     optional_package("casadi", "tiltsim.symbolic", "'tiltsim[casadi]'")
     assembly = assemble(scenario)
-    equations, setup = assembly.loop.equations, assembly.setup
-    assert equations is not None  # mujoco is refused
+    equations, setup = assembly.loop.required_equations, assembly.setup
     initial = tuple(map(float, equations.initial(assembly, setup)))
     moved = *setup, scenario.disturbance_acceleration
 

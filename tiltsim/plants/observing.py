@@ -143,12 +143,14 @@ class _Law:
         bare = replace(assembly, loop=loop, setup=self.setup)
         self._step = control_step(bare, self.setup.userdata.tolist(), "controls")
 
-    def controls(self, time: float, qpos: Values, qvel: Values, act: Values) -> list[float]:
-        """Its controls at a time (s), where a step begins; the forces felt are last in ``act``."""
-        now = Header(timestep=time, evaluations=1.0)  # whose next evaluation is now
-        own = self.loop.sizes.act
-        vectors = (now, qpos, qvel, act[:own], (), act[own:], ())
-        return list(self._step(*(list(map(float, vector)) for vector in vectors)))
+    def controls(self, time: float, *state: Sequence[float]) -> Values:
+        """Its controls at a time (s), where a step begins, by qpos, qvel and act.
+
+        The forces felt are last in act.
+        """
+        now, own = Header(timestep=time, evaluations=1.0), self.loop.sizes.act
+        qpos, qvel, act = (list(map(float, vector)) for vector in state)
+        return tuple(self._step(now, qpos, qvel, act[:own], (), act[own:], ()))
 
 
 _law = lru_cache(maxsize=KEPT)(_Law)

@@ -69,6 +69,8 @@ class Airframe:
         rotor_time_constant: Time constant of the rotors' lag, s; None for no lag.
         tilt_servo: The servos of its tilts.
         reference: The flight's ``[reference]`` table.
+        noise: Standard deviations of measured velocities (m/s) and body rates (rad/s), in the mean
+            of a second.
     """
 
     vehicle: Multirotor
@@ -87,6 +89,7 @@ class Airframe:
     rotor_time_constant: float | None
     tilt_servo: TiltServoTable
     reference: Reference
+    noise: tuple[float, float]
 
     @property
     def rotors(self) -> int:
@@ -153,8 +156,7 @@ class LawController(LawTable):
     def law_parameters(self, airframe: Airframe) -> tuple[Any, ...]:
         """The law's parameters, a NamedTuple of floats and tuples: by default its own keys."""
         record = record_of(type(self), _not_read())
-        made: tuple[Any, ...] = record(*(number_of(self, name) for name in record._fields))
-        return made
+        return record(*(number_of(self, name) for name in record._fields))
 
     def law_table(self, airframe: Airframe) -> Values:
         """Any number of further floats: ``observed.table``."""
