@@ -109,7 +109,8 @@ def rotor_metrics(columns: Mapping[str, Floats], vehicle: AnyVehicleTable) -> di
     """
     speeds = speeds_along_spin(columns, vehicle)
     low, high = vehicle.rotor_range
-    limited = (at_upper_limit(speeds, high) | at_lower_limit(speeds, low)).any(axis=0)
+    reached = at_upper_limit(speeds, high) | at_lower_limit(speeds, low)
+    limited: npt.NDArray[np.bool_] = np.any(reached, axis=0)
     first, last = first_and_last(limited)
     names = [name for name in columns if name.startswith("alpha_rate")]
     rates = [np.abs(columns[name]).max(axis=-1) for name in names]
