@@ -1,5 +1,7 @@
 """Handling of SIGINT and SIGTERM, so that neither interrupts nor results are lost."""
 
+from __future__ import annotations
+
 import signal
 import sys
 import threading
