@@ -221,7 +221,7 @@ def test_gates_of_few_components(degrees):
         assert chi_square_quantile(share, degrees) == pytest.approx(expected, rel=0.05)
 
 
-@pytest.mark.slow
+@pytest.mark.slow(longest=True)
 def test_fifty_seeds_are_consistent():
     """Averages over 50 flights are within the 95 % bands of their chi-square distributions."""
     base, signs = tiltsim.load_scenario("beyond/estimator"), np.random.default_rng(1)
