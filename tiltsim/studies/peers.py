@@ -149,6 +149,8 @@ class Peer:
 class _Flyer:
     """The work of a peer's process: to describe it, which prepares it, and then to fly."""
 
+    _fly: Callable[[], None]
+
     def __init__(self, name: str, devices: int) -> None:
         self._name, self._devices = name, devices
 
