@@ -99,14 +99,18 @@ def trusted(tables):
 
 @cache
 def fitting(law, vehicle):
-    """A scenario of a law and vehicle, with the first gait and reference that suit; or a line."""
+    """A scenario of a law and vehicle, with the first gait and reference that suit; or a line.
+
+    A law that does not claim the vehicle is tried with all references alone.
+    """
     model, why = VEHICLES[vehicle], []
     controller = {"law": law}
     if issubclass(CONTROLLERS[law], OwnFunctionController):
         rotors = TypeAdapter(VehicleUnion).validate_python(model).rotor_count
         controller["function"] = f"{FOLDER[0] / law}_{rotors}.py:law"
     tables = {"vehicle": model, "controller": controller, "simulation": SHORT}
-    for reference, gait in product(kinds("reference"), kinds("gait")):
+    claimed = model["model"] in CONTROLLERS[law].vehicle_models
+    for reference, gait in product(kinds("reference"), kinds("gait") if claimed else [{}]):
         scenario, line = attempt(trusted, tables | reference | gait)
         if scenario:
             return scenario
@@ -146,14 +150,15 @@ def one_of_each(groups):
 
 FITTING = claimed(FEW)
 EACH_LAW = one_of_each([pair for pair in FITTING if pair[0] == law] for law in dict(FITTING))
-PAIRS = [
-    pytest.param(*pair, marks=[] if pair in EACH_LAW else pytest.mark.slow)
-    for pair in claimed(VEHICLES)
-]
-each_pair = pytest.mark.parametrize(("law", "vehicle"), PAIRS)
 OTHERS = [vehicle for vehicle in VEHICLES if vehicle not in FEW]
 DRAWN = FITTING + one_of_each(claimed([vehicle]) for vehicle in OTHERS)
 """All models with every law, and each other vehicle with one law."""
+
+RENDERED = EACH_LAW + DRAWN[len(FITTING) :]
+"""Each law and each other vehicle once."""
+
+PAIRS = [pytest.param(*pair, marks=[] if pair in EACH_LAW else pytest.mark.slow) for pair in DRAWN]
+each_pair = pytest.mark.parametrize(("law", "vehicle"), PAIRS)
 
 
 def test_every_law_flies_all_that_it_claims_and_nothing_else():
@@ -309,7 +314,7 @@ def test_every_flight_can_be_used(law, vehicle, tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("law", "vehicle"), DRAWN)
+@pytest.mark.parametrize(("law", "vehicle"), RENDERED)
 def test_every_flight_can_be_rendered(law, vehicle, tmp_path):
     if fits(law, vehicle):
         for use in SLOW_USES_OF_FLIGHTS.values():
@@ -321,7 +326,8 @@ def test_every_flight_can_be_rendered(law, vehicle, tmp_path):
 def test_every_flight_becomes_a_log_unless_it_stays_in_a_plane(law, vehicle, tmp_path):
     if fits(law, vehicle):
         _, line = attempt(through_a_log, flown(law, vehicle), tmp_path)
-        assert ("moves in a plane; choose csv" in line) == ("tilt_car" in vehicle), line
+        refused = "moves in a plane; choose csv" in line
+        assert refused == fitting(law, vehicle).vehicle.is_planar, line
 
 
 @each_pair
@@ -330,28 +336,41 @@ def test_every_scenario_can_be_used_or_is_refused_in_a_line(law, vehicle):
         scenario = fitting(law, vehicle)
         lines = {name: attempt(use, scenario)[1] for name, use in USES_OF_SCENARIOS.items()}
         assert not any(lines[name] for name in ("load_scenario", "parse_scenario", "fly"))
-        plant = PLANTS[claimed(VEHICLES).index((law, vehicle)) % len(PLANTS)]
+        plant = PLANTS[DRAWN.index((law, vehicle)) % len(PLANTS)]
         attempt(on(plant, USES_OF_SCENARIOS["simulate"]), scenario)
         attempt(on("thesis", tiltsim.symbolic), scenario)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("vehicle", OTHERS)
+def test_every_vehicle_is_flown_by_every_law_of_its_model(vehicle):
+    """The pairs whose uses are not tested: on the plants in turn."""
+    for law, _, plant in in_turn(claimed([vehicle])):
+        if fits(law, vehicle):
+            attempt(on(plant, USES_OF_SCENARIOS["simulate"]), fitting(law, vehicle))
 
 
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:.* is short:RuntimeWarning")  # for a region of attraction
 @pytest.mark.parametrize(("law", "vehicle", "plant"), in_turn(claimed(FEW)))
 def test_every_scenario_can_be_analyzed_or_is_refused_in_a_line(law, vehicle, plant):
+    """On MuJoCo all but the slow uses are tested above."""
     if fits(law, vehicle):
-        for use in (USES_OF_SCENARIOS | SLOW_USES_OF_SCENARIOS).values():
+        uses = SLOW_USES_OF_SCENARIOS | (USES_OF_SCENARIOS if plant != "mujoco" else {})
+        for use in uses.values():
             attempt(on(plant, use), fitting(law, vehicle))
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("engine", ENGINES)
-@pytest.mark.parametrize(("law", "vehicle"), dict(reversed(claimed(FEW))).items())
-def test_every_engine_flies_every_law_or_refuses_it_in_a_line(law, vehicle, engine):
-    plant = "thesis" if engine == "jax" else "mujoco"
-    change = {"simulation.engine": engine, "simulation.plant": plant}
+@pytest.mark.parametrize(("law", "vehicle"), dict(reversed(FITTING)).items())
+def test_every_engine_flies_every_law_or_refuses_it_in_a_line(law, vehicle):
+    """JAX without compiling, which takes long: tests/arrays/test_engine.py compares its steps."""
     if fits(law, vehicle):
-        attempt(lambda: tiltsim.simulate(fitting(law, vehicle).replace(change)).metrics())
+        for engine in ENGINES:
+            plant = "thesis" if engine == "jax" else "mujoco"
+            change = {"simulation.engine": engine, "simulation.plant": plant}
+            use = SLOW_USES_OF_SCENARIOS["vectorized"] if engine == "jax" else tiltsim.simulate
+            attempt(lambda use=use, change=change: use(fitting(law, vehicle).replace(change)))
 
 
 # --- tables and their keys ---------------------------------------------------------------------
@@ -379,13 +398,13 @@ def companions(document):
     return {"simulation.integrator": "implicitfast", **touched}
 
 
-def changes(table, key=None):
-    """The example of a table, and of one of its keys, as values by dotted key."""
+def changes(table, keys=()):
+    """The examples of a table and of some of its keys, as values by dotted key."""
     document = at = tomllib.loads(table.toml)
     for place in table.places[0]:
         at = at.setdefault(place.name, {})
         at = at[0] if isinstance(at, list) else at
-    if key is not None:
+    for key in keys:
         at[key.name] = tomllib.loads(f"value = {key.example}")["value"]
     needed = dict(leaves(document)) | companions(document)
     if [step.name for step in table.places[0]][:1] == ["sensors"] and len(table.places[0]) > 1:
@@ -395,18 +414,12 @@ def changes(table, key=None):
     return {key: needed[key] for key in needed.keys() - {"controller.function", "vehicle.mjcf"}}
 
 
-LAYERS = {
-    table.addresses()[-1]: changes(table)
+FLOWN = {
+    table.addresses()[-1]: table
     for table in TABLES
     if table.places[0] and table.places[0][0].name not in NOT_FLOWN
 }
-KEYS = {
-    f"{table.addresses()[-1]}.{key.name}": changes(table, key)
-    for table in TABLES
-    if table.addresses()[-1] in LAYERS
-    for key in table.keys
-    if key.example
-}
+LAYERS = {address: changes(table) for address, table in FLOWN.items()}
 
 
 def concerns(change, law, vehicle):
@@ -436,30 +449,50 @@ def test_every_table_is_flown_by_some_law(layer):
     raise AssertionError("no law takes the example of this table")
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(("law", "vehicle", "plant"), in_turn(FITTING))
-def test_every_pair_takes_every_table_or_refuses_it_in_a_line(law, vehicle, plant, tmp_path):
-    drawn = set()
-    for change in LAYERS.values():
-        flight, _ = attempt(fly, law, vehicle, change, plant)
-        if flight is None:
-            continue
-        flight.metrics()
-        columns = frozenset(flight.units)
-        if plant == "mujoco" and columns not in drawn:  # equal columns have equal panels
-            drawn.add(columns)
-            for use in ("plot", "view", "video"):
-                USES_OF_FLIGHTS[use](flight, tmp_path)
+def together(layer):
+    """The keys of a table in few groups, each of which some pair takes at once."""
+
+    def taken(keys):
+        change = changes(FLOWN[layer], keys)
+        return any(
+            concerns(change, *pair) and attempt(fitting(*pair).replace, change)[0]
+            for pair in FITTING
+        )
+
+    groups = [[]]
+    for key in FLOWN[layer].keys:
+        if key.example:
+            joined = next((group for group in groups if taken([*group, key])), None)
+            if joined is None:
+                groups.append(joined := [])
+            joined.append(key)
+    return [changes(FLOWN[layer], keys) for keys in groups]
+
+
+COLUMNS_DRAWN = set()
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("law", dict(FITTING))
-def test_every_law_takes_every_key_or_refuses_it_in_a_line(law):
-    """Its vehicles, and the plants, take the keys in turn."""
-    for number, change in enumerate(KEYS.values()):
-        pairs = [pair for pair in FITTING if pair[0] == law and concerns(change, *pair)]
-        if pairs:
+@pytest.mark.parametrize("layer", LAYERS)
+def test_every_law_takes_every_table_and_key_or_refuses_it_in_a_line(layer, tmp_path):
+    """Its vehicles, and the plants, take the groups of keys in turn, or else the table alone."""
+    number = [*LAYERS].index(layer)
+    for change in together(layer):
+        for law in dict(FITTING):
+            number += 1
+            pairs = [pair for pair in FITTING if pair[0] == law and concerns(change, *pair)]
+            if not pairs:
+                continue
             turn, place = divmod(number, len(pairs))
-            flight, _ = attempt(fly, *pairs[place], change, PLANTS[turn % len(PLANTS)])
-            if flight is not None:
-                flight.metrics()
+            for example in (change, LAYERS[layer]):
+                flight, _ = attempt(fly, *pairs[place], example, PLANTS[turn % len(PLANTS)])
+                if flight is not None:
+                    break
+            else:
+                continue
+            flight.metrics()
+            added = frozenset(flight.units) - frozenset(flown(*pairs[place]).units)
+            if added not in COLUMNS_DRAWN:  # equal columns have equal panels
+                COLUMNS_DRAWN.add(added)
+                for use in ("plot", "view", "video"):
+                    USES_OF_FLIGHTS[use](flight, tmp_path)

@@ -18,7 +18,7 @@ from tiltsim.closed_loop.limits import (
 from tiltsim.vehicles import rotorcraft, tilt_car
 from tiltsim_controllers.references.trajectories import REFERENCE_TYPES, ReferenceParameters
 
-REFERENCE = ReferenceParameters(REFERENCE_TYPES["line"], 1.0, 2.0, 3.0, 0.5, -0.5, 0.25)
+REFERENCE = ReferenceParameters(REFERENCE_TYPES["line"], (1.0, 2.0, 3.0), (0.5, -0.5, 0.25))
 TIME = 2.0
 ON_TRACK = {"x": 2.0, "y": 1.0, "z": 3.5}
 BOUNDS = {
@@ -37,7 +37,7 @@ BOUNDS = {
 }
 VEHICLES = {
     "rotorcraft": (rotorcraft.ROTORCRAFT.observed_fields, rotorcraft.ROTORCRAFT.limit_exceeded),
-    "tilt_car": (tilt_car.OBSERVED_FIELDS, tilt_car.tilt_car_limit_exceeded),
+    "tilt_car": (tilt_car.OBSERVED_FIELDS, tilt_car.TILT_CAR.limit_exceeded),
 }
 
 

@@ -255,7 +255,8 @@ class Batch:
         state = reference + 3
         knots = knots if self._knots is None else self._knots
         kernel = kernel_of(self.course, numbers[:parameters], knots, numbers[reference:state])
-        return kernel, numbers[state:], ReferenceParameters(*numbers[parameters:reference])
+        own_reference = unflatten(ReferenceParameters, numbers[parameters:reference])
+        return kernel, numbers[state:], own_reference
 
     def _record(self, row: Any, knots: Any) -> Recording:
         kernel, state, reference = self._kernel(row, knots)

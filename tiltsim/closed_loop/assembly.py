@@ -20,18 +20,12 @@ class Assembly(FlightPlan):
 
     `tiltsim.laws.assembling.assemble` builds it; plants, engines, the termination monitor, flights,
     metrics and views read it.
-
-    Attributes:
-        loop: The controller around the vehicle, with all layers.
-        setup: Inputs of the control step other than the state.
-        follows_position: Whether the controller follows the reference's horizontal position.
-        traced: Whether the loop can be traced; else it runs as plain Python.
     """
 
-    loop: ClosedLoop
-    setup: ControlSetup
-    follows_position: bool
-    traced: bool = True
+    loop: ClosedLoop  # the controller around the vehicle, with all layers
+    setup: ControlSetup  # inputs of the control step other than the state
+    follows_position: bool  # whether the controller follows the reference's horizontal position
+    traced: bool = True  # whether the loop can be traced; else it runs as plain Python
 
     def sign_check_values(self, time: float, values: Vector) -> Values:
         """The numbers of `ClosedLoop.sign_check_values`, from a sample."""
@@ -73,8 +67,7 @@ def _places(record: type[tuple[Any, ...]]) -> tuple[int, ...]:
     return tuple(place for place, name in enumerate(names) if name in CHOICES)
 
 
-Choices = tuple[tuple[int, float], ...]
-"""Places in a flattened record, and the numbers there."""
+Choices = tuple[tuple[int, float], ...]  # places in a flattened record, and the numbers there
 
 
 def choices_of(record: tuple[Any, ...]) -> Choices:

@@ -55,30 +55,26 @@ class ControlSetup(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class VehicleKind:
-    """Common properties of all vehicles of a kind, and their construction in MuJoCo.
+    """Common properties of all vehicles of a kind, and their construction in MuJoCo."""
 
-    Attributes:
-        observed_fields: Fields of a sample after the time.
-        columns: Columns of every flight, their labels and units, in the order of the file.
-        thrusts: ``(columns so far, scenario) -> columns``: the rotors' thrusts, N.
-        compile: ``(scenario, law_states, extra_actuators, userdata_size, visuals) -> model``.
-            Raises `ValueError` where MuJoCo cannot build it.
-        initial_motion: ``(plan) -> qpos, qvel`` at time zero.
-        limit_exceeded: Function ``(time, values, reference, knots, follows_position) ->
-            code`` of the first limit of `tiltsim.closed_loop.limits` that a sample exceeds;
-            ``values`` begin with the observed fields.
-        metrics: ``(columns, scenario, follows_position) -> metrics``, without the metrics that all
-            kinds share. Columns have shape (..., N), the time (N,); numbers of the scenario may be
-            arrays (..., 1); metrics have shape (...) and are NaN where a flight has none.
-    """
-
-    observed_fields: tuple[str, ...]
+    observed_fields: tuple[str, ...]  # fields of a sample after the time
     columns: Mapping[str, Quantity]
+    """Columns of every flight, their labels and units, in the order of the file."""
     thrusts: Callable[[Mapping[str, Floats], Scenario], dict[str, Floats]]
+    """``(columns so far, scenario) -> columns``: the rotors' thrusts, N."""
     compile: Callable[[Scenario, int, tuple[ExtraActuators, ...], int, Visuals], mujoco.MjModel]
+    """``(scenario, law_states, extra_actuators, userdata_size, visuals) -> model``. Raises
+    `ValueError` where MuJoCo cannot build it."""
     initial_motion: Callable[[FlightPlan], tuple[Vector, Vector]]
+    """``(plan) -> qpos, qvel`` at time zero."""
     limit_exceeded: Callable[..., Any]
+    """Function ``(time, values, reference, knots, follows_position) -> code`` of the first limit
+    of `tiltsim.closed_loop.limits` that a sample exceeds; ``values`` begin with the observed
+    fields."""
     metrics: Callable[[Mapping[str, Floats], Scenario, bool], dict[str, Any]]
+    """``(columns, scenario, follows_position) -> metrics``, without the metrics that all kinds
+    share. Columns have shape (..., N), the time (N,); numbers of the scenario may be arrays
+    (..., 1); metrics have shape (...) and are NaN where a flight has none."""
 
     @property
     def rotors(self) -> tuple[int, ...]:
@@ -88,34 +84,29 @@ class VehicleKind:
 
 @dataclass(frozen=True, eq=False)
 class Equations:
-    """A controller on equations of motion: as the thesis prints them, or of a rigid body.
-
-    Attributes:
-        inputs: Function ``(time, state, parameters, knots) -> inputs``: the controller.
-        inputs_size: Number of inputs.
-        rates: Function ``(time, state, inputs, parameters, knots, disturbance) ->
-            derivative`` of the state; the disturbance is an acceleration (m/s^2, world).
-        initial: ``(plan, setup) -> state`` at time zero.
-        observe: Function ``(time, state, inputs, parameters, knots) -> values`` of the
-            loop's `sample_fields` after the time; ``inputs`` are in force at that time.
-        project_onto_limits: Function ``(state, parameters) -> state`` for the end of each
-            step: puts back what has passed a limit. None where there are no limits.
-        tilts: Function ``(time, state, parameters, knots) -> tilt angles`` (rad), where
-            they follow the plan exactly.
-        states: Names of the coordinates of the vehicle's state, which begins the state: three for
-            a rotation.
-        input_names: Names of the first inputs; empty where they are the controls of the model.
-    """
+    """A controller on equations of motion: as the thesis prints them, or of a rigid body."""
 
     inputs: Callable[..., Values]
-    inputs_size: int
+    """Function ``(time, state, parameters, knots) -> inputs``: the controller."""
+    inputs_size: int  # number of inputs
     rates: Callable[..., Values]
-    initial: Callable[[FlightPlan, ControlSetup], Vector]
+    """Function ``(time, state, inputs, parameters, knots, disturbance) -> derivative`` of the
+    state; the disturbance is an acceleration (m/s^2, world)."""
+    initial: Callable[[FlightPlan, ControlSetup], Vector]  # ``(plan, setup) -> state`` at time zero
     observe: Callable[..., Values]
+    """Function ``(time, state, inputs, parameters, knots) -> values`` of the loop's
+    `sample_fields` after the time; ``inputs`` are in force at that time."""
     project_onto_limits: Callable[..., Vector] | None = None
+    """Function ``(state, parameters) -> state`` for the end of each step: puts back what has
+    passed a limit. None where there are no limits."""
     tilts: Callable[..., Values] | None = None
+    """Function ``(time, state, parameters, knots) -> tilt angles`` (rad), where they follow the
+    plan exactly."""
     states: tuple[str, ...] = ()
+    """Names of the coordinates of the vehicle's state, which begins the state: three for a
+    rotation."""
     input_names: tuple[str, ...] = ()
+    """Names of the first inputs; empty where they are the controls of the model."""
 
 
 def _held_controls(time: Any, qpos: Any, qvel: Any, act: Any, ctrl: Any, parameters: Any) -> Any:
@@ -130,80 +121,62 @@ def nothing_singular(time: Any, values: Any, parameters: Any, knots: Any) -> tup
 
 @dataclass(frozen=True, eq=False)
 class ClosedLoop:
-    """A controller around the model of a vehicle; a layer makes one such record of another.
+    """A controller around the model of a vehicle; a layer makes one such record of another."""
 
-    Attributes:
-        kind: The kind of the vehicle.
-        parameters: Record at the head of `userdata`; its first field is ``signature``. The knots of
-            gait and reference follow it.
-        setup: ``(plan, signature) -> ControlSetup``.
-        model: Name of the MJCF model.
-        sizes: Lengths of its vectors, the controller's own states among the activations.
-        motion: Names of the coordinates of ``qpos`` and ``qvel``, three for a rotation.
-        initial_activations: ``(plan, setup) -> act`` at time zero.
-        controls: Function ``(time, qpos, qvel, act, parameters, knots) -> ctrl``: the whole control
-            step.
-        observe: Function ``(qpos, qvel, act, ctrl) -> values`` of the kind's fields and ``fields``.
-        derive: ``(samples by field, setup) -> columns``: references, determinant, margin and the
-            columns in ``further_units``.
-        hold: Function ``(time, qpos, qvel, act, ctrl, parameters) -> ctrl``: the controls between
-            the samples of a held controller.
-        fields: Fields of a sample in addition to the fields of the vehicle's kind.
-        further_units: Columns of a flight in addition to the columns of the vehicle's kind, with
-            their units.
-        observe_reads_controls: Whether ``observe`` needs the controls in force.
-        sign_check_values: Function ``(time, values, parameters, knots) -> numbers``, from the time
-            (s) of a sample and its ``values`` as ``observe`` returns them. They have to keep their
-            signs: where one is zero, the controller is singular.
-        causes: ``(sample by field, setup) -> texts``: why the flight ends where each of these
-            reaches zero.
-        controller_states: Number of activations that are states of the controller.
-        spins: Signs of the rotor speeds, one per rotor of a rotorcraft.
-        tilt_of_rotor: The number, from 0, of each rotor's tilt, -1 for a fixed one; empty for
-            vehicles whose rotors lie on a cross.
-        extra_actuators: Actuators that layers around the controller append to the model, innermost
-            first.
-        commands_thrusts: Whether the controller commands thrusts, not rates of the rotor speeds:
-            these activations are then idle.
-        equations: This controller on the thesis's equations; None where it is supported in MuJoCo
-            only or, inside a layer, by `tiltsim.laws.layers.on_equations`.
-        follows_position: Whether a scenario has the controller follow the reference's horizontal
-            position.
-        uses_gait: Whether the scenario's gait has a part in the flight.
-        within: The loop that a layer of `tiltsim.laws.layers` goes around; None for a controller
-            itself, its supervisor and allocation included.
-        with_latency: The controller as it flies with a latency of its commands; None if it is the
-            same.
-        traced: Whether the controller can be traced; else it runs as plain Python.
-    """
-
-    kind: VehicleKind
+    kind: VehicleKind  # the kind of the vehicle
     parameters: type[tuple[Any, ...]]
-    setup: Callable[[FlightPlan, float], ControlSetup]
-    model: str
-    sizes: Sizes
+    """Record at the head of `userdata`; its first field is ``signature``. The knots of gait and
+    reference follow it."""
+    setup: Callable[[FlightPlan, float], ControlSetup]  # ``(plan, signature) -> ControlSetup``
+    model: str  # name of the MJCF model
+    sizes: Sizes  # lengths of its vectors, the controller's own states among the activations
     initial_activations: Callable[[FlightPlan, ControlSetup], Vector]
+    """``(plan, setup) -> act`` at time zero."""
     controls: Callable[..., Values]
+    """Function ``(time, qpos, qvel, act, parameters, knots) -> ctrl``: the whole control step."""
     observe: Callable[..., Values]
+    """Function ``(qpos, qvel, act, ctrl) -> values`` of the kind's fields and ``fields``."""
     derive: Callable[[Mapping[str, Floats], ControlSetup], dict[str, Floats]]
+    """``(samples by field, setup) -> columns``: references, determinant, margin and the columns in
+    ``further_units``."""
     motion: tuple[tuple[str, ...], tuple[str, ...]] = ((), ())
+    """Names of the coordinates of ``qpos`` and ``qvel``, three for a rotation."""
     hold: Callable[..., Values] = _held_controls
+    """Function ``(time, qpos, qvel, act, ctrl, parameters) -> ctrl``: the controls between the
+    samples of a held controller."""
     fields: tuple[str, ...] = ()
+    """Fields of a sample in addition to the fields of the vehicle's kind."""
     further_units: Mapping[str, str] = field(default_factory=dict)
-    observe_reads_controls: bool = False
+    """Columns of a flight in addition to the columns of the vehicle's kind, with their units."""
+    observe_reads_controls: bool = False  # whether ``observe`` needs the controls in force
     sign_check_values: Callable[..., Values] = nothing_singular
+    """Function ``(time, values, parameters, knots) -> numbers``, from the time (s) of a sample and
+    its ``values`` as ``observe`` returns them. They have to keep their signs: where one is
+    zero, the controller is singular."""
     causes: Callable[[Mapping[str, float], ControlSetup], tuple[str, ...]] = lambda *_: ("",)
-    controller_states: int = 0
-    spins: Values = ()
+    """``(sample by field, setup) -> texts``: why the flight ends where each of these is zero."""
+    controller_states: int = 0  # number of activations that are states of the controller
+    spins: Values = ()  # signs of the rotor speeds, one per rotor of a rotorcraft
     tilt_of_rotor: tuple[int, ...] = ()
+    """The number, from 0, of each rotor's tilt, -1 for a fixed one; empty for vehicles whose
+    rotors lie on a cross."""
     extra_actuators: tuple[ExtraActuators, ...] = ()
+    """Actuators that layers around the controller append to the model, innermost first."""
     commands_thrusts: bool = False
+    """Whether the controller commands thrusts, not rates of the rotor speeds: these activations
+    are then idle."""
     equations: Equations | None = None
+    """This controller on the thesis's equations; None where it is supported in MuJoCo only or,
+    inside a layer, by `tiltsim.laws.layers.on_equations`."""
     follows_position: Callable[[Scenario], bool] = lambda _scenario: True
-    uses_gait: bool = True
+    """Whether a scenario has the controller follow the reference's horizontal position."""
+    uses_gait: bool = True  # whether the scenario's gait has a part in the flight
     within: ClosedLoop | None = None
+    """The loop that a layer of `tiltsim.laws.layers` goes around; None for a controller itself,
+    its supervisor and allocation included."""
     with_latency: Callable[[], ClosedLoop] | None = None
-    traced: bool = True
+    """The controller as it flies with a latency of its commands; None if it is the same."""
+    traced: bool = True  # whether the controller can be traced; else it runs as plain Python
 
     @property
     def is_traceable(self) -> bool:

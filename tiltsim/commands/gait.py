@@ -70,14 +70,16 @@ def run(
         print(json_text([asdict(row) for row in rows]) if json else list_text(rows))
         return 0
     _check_options(scenario, gait, figure)
-    loaded = None
+    loaded, of_any_rotors = None, gait.mjcf is not None
     if scenario is not None:
+        from tiltsim.models.rotor_table import Multirotor
         from tiltsim.scenario.loading import load_scenario
 
         loaded = load_scenario(scenario)
         if gait.vehicle is not None:
             raise InputError("--vehicle: the scenario defines its own vehicle; remove one of them")
-    if gait.mjcf is not None or (loaded is not None and loaded.vehicle.model == "multirotor"):
+        of_any_rotors = isinstance(loaded.vehicle.resolve(), Multirotor)
+    if of_any_rotors:
         analysis = _of_multirotor(scenario, loaded, gait, figure)
     elif figure.kind == "determinant":
         analysis = _of_determinant(gait, figure)

@@ -29,8 +29,7 @@ from tiltsim_controllers.references.trajectories import ReferenceParameters
 KEPT: Final = 64
 """Programs of each kind that are kept; each closed loop, gait type and decoupler has its own."""
 
-SIDES: Final = 17 * (1 + MAX_COMPANIONS)
-"""Largest number of sign checks of a loop."""
+SIDES: Final = 17 * (1 + MAX_COMPANIONS)  # largest number of sign checks of a loop
 
 
 class RecorderHead(NamedTuple):
@@ -51,15 +50,10 @@ REFERENCE: Final = HEAD_SIZE - record_size(ReferenceParameters)
 
 
 class LoopFunction(NamedTuple):
-    """A function of vectors.
+    """A function of vectors."""
 
-    Attributes:
-        call: Returns numbers, arrays and tuples of them.
-        sizes: Sizes of its vectors, by name; ``user`` are parameters and knots.
-    """
-
-    call: Callable[..., Any]
-    sizes: dict[str, int]
+    call: Callable[..., Any]  # returns numbers, arrays and tuples of them
+    sizes: dict[str, int]  # sizes of its vectors, by name; ``user`` are parameters and knots
 
     def traced(self) -> Program:
         """Its program."""

@@ -79,21 +79,13 @@ def _checks_program(key: ProgramKey) -> Program:
 
 
 class Row(NamedTuple):
-    """A function ``(time, state, parameters, knots) -> values`` and its tracing arguments.
-
-    Attributes:
-        function: The function.
-        record: Type of the parameters.
-        choices: Parameters that are constants.
-        state: Number of states.
-        user: Number of parameters and knots.
-    """
+    """A function ``(time, state, parameters, knots) -> values`` and its tracing arguments."""
 
     function: Callable[..., Values]
-    record: type[tuple[Any, ...]]
-    choices: Choices
-    state: int
-    user: int
+    record: type[tuple[Any, ...]]  # type of the parameters
+    choices: Choices  # parameters that are constants
+    state: int  # number of states
+    user: int  # number of parameters and knots
 
 
 def _flights(setup: ControlSetup, samples: int) -> Iterator[tuple[slice, ControlSetup]]:

@@ -29,21 +29,14 @@ from tiltsim_controllers.mathematics.scalar import Floats, Triple, Values
 
 
 class Layout(NamedTuple):
-    """Flights with equal layouts can fly side by side.
+    """Flights with equal layouts can fly side by side."""
 
-    Attributes:
-        key: Key of their programs.
-        states: Number of states.
-        solver: See `tiltsim.equations.solvers.SOLVERS`.
-        held: Whether the controller is sampled and held.
-        functions: Sines and their inverses of several lanes: exact or quick.
-    """
-
-    key: ProgramKey
-    states: int
-    solver: str
-    held: bool
+    key: ProgramKey  # key of their programs
+    states: int  # number of states
+    solver: str  # see `tiltsim.equations.solvers.SOLVERS`
+    held: bool  # whether the controller is sampled and held
     functions: Literal["exact", "quick"] = "exact"
+    """Sines and their inverses of several lanes: exact or quick."""
 
     @property
     def equations(self) -> Equations:
@@ -59,23 +52,14 @@ class Layout(NamedTuple):
 
 
 class Integrated(NamedTuple):
-    """A flight whose equations are integrated.
+    """A flight whose equations are integrated."""
 
-    Attributes:
-        layout: Layout of its programs.
-        timestep: s.
-        control_steps: Steps for which the inputs are held; 0: evaluated at every stage.
-        user: Parameters and knots, see `tiltsim.closed_loop.loop.ControlSetup.userdata`.
-        disturbance: m/s^2, world axes.
-        traced: See `tiltsim.closed_loop.assembly.Assembly`.
-    """
-
-    layout: Layout
-    timestep: float
-    control_steps: int
-    user: Floats
-    disturbance: Triple
-    traced: bool
+    layout: Layout  # layout of its programs
+    timestep: float  # s
+    control_steps: int  # steps for which the inputs are held; 0: evaluated at every stage
+    user: Floats  # parameters and knots, see `tiltsim.closed_loop.loop.ControlSetup.userdata`
+    disturbance: Triple  # m/s^2, world axes
+    traced: bool  # see `tiltsim.closed_loop.assembly.Assembly`
 
     @property
     def settings(self) -> tuple[float, ...]:

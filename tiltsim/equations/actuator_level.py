@@ -20,6 +20,7 @@ from tiltsim.scenario.scenario import FlightPlan, Scenario
 from tiltsim.vehicles.rotorcraft import initial_tilts
 from tiltsim.vehicles.rotorcraft.layout import (
     Layout,
+    is_fixed_cross,
     layout_of,
     rotors_record,
     tilt_of_rotor,
@@ -89,21 +90,14 @@ class Motion(NamedTuple):
 
 
 class Attitude(NamedTuple):
-    """Representation of the attitude in a state, as functions of arrays.
+    """Representation of the attitude in a state, as functions of arrays."""
 
-    Attributes:
-        size: Number of entries.
-        rotation: ``(attitude)``: body to world, shape (3, 3).
-        quaternion: ``(attitude)``: scalar first, shape (4,).
-        rates: ``(attitude, omega)``: its time derivative at body rates (rad/s).
-        of_euler: ``(angles)``: from roll, pitch and yaw, rad.
-    """
-
-    size: int
-    rotation: Callable[[Any], Any]
-    quaternion: Callable[[Any], Any]
+    size: int  # number of entries
+    rotation: Callable[[Any], Any]  # ``(attitude)``: body to world, shape (3, 3)
+    quaternion: Callable[[Any], Any]  # ``(attitude)``: scalar first, shape (4,)
     rates: Callable[[Any, Any], Any]
-    of_euler: Callable[[Any], Any]
+    """``(attitude, omega)``: its time derivative at body rates (rad/s)."""
+    of_euler: Callable[[Any], Any]  # ``(angles)``: from roll, pitch and yaw, rad
 
 
 def _matrix(attitude: Any) -> Any:
@@ -179,30 +173,23 @@ class ActuatorPlant(NamedTuple):
     """A vehicle whose state is its motion, followed by MuJoCo's activations.
 
     Its functions are traceable; ``mechanics`` is a `mechanics_record`.
-
-    Attributes:
-        motion: Number of entries of the state before the activations.
-        names: Names of their coordinates, see `Equations.states`.
-        qpos, qvel: ``(state)``: MuJoCo's vectors.
-        rates: ``(state, ctrl, loads, mechanics, disturbance)``: time derivative of the motion.
-            ``loads`` are force (N) and torque (N m) on the body, body axes, and torques (N m) about
-            the hinges, without rotors and weight; the disturbance is in m/s^2, world axes.
-        project_onto_limits: ``(state, mechanics) -> state`` within limits of rotors and tilts; None
-            where there are no limits.
-        initial: ``(plan)``: the motion at time zero.
-        mechanics: The type of the parameters.
-        finish: ``(state, mechanics) -> state``: corrections at the end of a step; None for none.
     """
 
-    motion: int
-    names: tuple[str, ...]
-    qpos: Callable[[Any], Any]
-    qvel: Callable[[Any], Any]
+    motion: int  # number of entries of the state before the activations
+    names: tuple[str, ...]  # names of their coordinates, see `Equations.states`
+    qpos: Callable[[Any], Any]  # ``(state)``: MuJoCo's vector
+    qvel: Callable[[Any], Any]  # ``(state)``: MuJoCo's vector
     rates: Callable[..., Any]
+    """``(state, ctrl, loads, mechanics, disturbance)``: time derivative of the motion. ``loads``
+    are force (N) and torque (N m) on the body, body axes, and torques (N m) about the hinges,
+    without rotors and weight; the disturbance is in m/s^2, world axes."""
     project_onto_limits: Callable[[Any, Any], Any] | None
-    initial: Callable[[FlightPlan], Values]
-    mechanics: Any
+    """``(state, mechanics) -> state`` within limits of rotors and tilts; None where there are no
+    limits."""
+    initial: Callable[[FlightPlan], Values]  # ``(plan)``: the motion at time zero
+    mechanics: Any  # the type of the parameters
     finish: Callable[[Any, Any], Any] | None = None
+    """``(state, mechanics) -> state``: corrections at the end of a step; None for none."""
 
 
 def servo_accelerations(
@@ -339,16 +326,16 @@ def plant_of(
 
 def actuator_plant(loop: ClosedLoop) -> ActuatorPlant:
     """The thesis's equations (ch. 2, Eq. 15; ch. 3, Eqs. 1-7) of a model."""
-    is_quadrotor = loop.model == "quadrotor"
-    attitude = EULER if is_quadrotor else MATRIX
+    fixed = is_fixed_cross(loop)
+    attitude = EULER if fixed else MATRIX
     return plant_of(
         attitude,
         as_printed(attitude, layout_of(loop).tilts),
         tilt_of_rotor(loop),
         loop.spins,
         rotors_record(loop),
-        gyroscopic=float(is_quadrotor),
-        has_limits=not is_quadrotor,  # whose rotors make any thrust
+        gyroscopic=float(fixed),
+        has_limits=not fixed,  # whose rotors make any thrust
     )
 
 

@@ -54,18 +54,14 @@ def _rk4(state: Any, step: Any, rates: Any) -> Any:
 
 
 class Solver(NamedTuple):
-    """An explicit method, each stage of which begins at the rates of the one before.
+    """An explicit method, each stage of which begins at the rates of the one before."""
 
-    Attributes:
-        nodes: Times of the stages after the first, in time steps.
-        combined: ``(state, timestep, rates of the stages) -> state`` at the end of a step.
-        sees_events: Whether the first stage is just after the beginning of a step and the last just
-            before its end, as in MuJoCo; see `tiltsim.closed_loop.userdata.evaluation_time`.
-    """
-
-    nodes: tuple[float, ...]
+    nodes: tuple[float, ...]  # times of the stages after the first, in time steps
     combined: Callable[..., Any]
+    """``(state, timestep, rates of the stages) -> state`` at the end of a step."""
     sees_events: bool = False
+    """Whether the first stage is just after the beginning of a step and the last just before its
+    end, as in MuJoCo; see `tiltsim.closed_loop.userdata.evaluation_time`."""
 
 
 SOLVERS: Final = {

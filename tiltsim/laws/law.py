@@ -42,54 +42,45 @@ def tilts_in_states(first: int, tilts: int) -> Tilts:
 
 @dataclass(frozen=True, eq=False)
 class Law:
-    """A control law.
-
-    Attributes:
-        step: The law, a function of arrays ``(seen, parameters, knots) -> Step``.
-        parameters: Type of its record. It has ``reference``; ``gait`` where the tilts follow it;
-            and ``vehicle``, with ``rotors`` as the index of the rotors' table in the knots, see
-            `tiltsim_controllers.vehicle.rotors.airframe`.
-        own: ``(plan) -> values by name`` of parameters other than keys, where `parameters_of` does
-            not know them.
-        tables: ``(plan) -> numbers`` that follow the knots of gait and reference.
-        states: Names of the controller's states, part of a sample, and their units.
-        initial: ``(plan) -> states`` at time zero; None for zeros.
-        signals: Names of the first signals of a step, columns of a flight: roll, pitch and yaw that
-            it tracks, and any more. None for the attitude of the reference.
-        units: Columns of a flight other than the states and the columns of its kind, with units;
-            also the fields of a sample beside the states.
-        tilts: See `Tilts`; None for `tilts_of_gait`.
-        uses_gait: Whether the gait has a part in the flight.
-        records_commands: Whether the commands of the tilt servos are part of a sample.
-        columns: Its columns among `tiltsim.vehicles.rotorcraft.EXTRA_COLUMNS`.
-        margins: See `Margins`.
-        signs: Function of arrays ``(seen, parameters, knots)``: numbers that keep their sign until
-            the law becomes singular. None for a law that is singular nowhere.
-        causes: ``(sample by field, setup) -> texts``: why a flight ends where each reaches zero.
-        measured: Whether it sees the plant's angular acceleration, of
-            `tiltsim.laws.layers.instruments`.
-        feels: Whether it sees the contact force and the swing of a load, behind ``act``.
-        follows_position: See `tiltsim.closed_loop.loop.ClosedLoop`.
-    """
+    """A control law."""
 
     step: Callable[[Seen, Any, Any], Step]
+    """The law, a function of arrays ``(seen, parameters, knots) -> Step``."""
     parameters: Any
+    """Type of its record. It has ``reference``; ``gait`` where the tilts follow it; and
+    ``vehicle``, with ``rotors`` as the index of the rotors' table in the knots, see
+    `tiltsim_controllers.vehicle.rotors.airframe`."""
     own: Callable[[FlightPlan], dict[str, Any]] = lambda _plan: {}
+    """``(plan) -> values by name`` of parameters other than keys, where `parameters_of` does not
+    know them."""
     tables: Callable[[FlightPlan], Values] = lambda _plan: ()
+    """``(plan) -> numbers`` that follow the knots of gait and reference."""
     states: Mapping[str, str] = field(default_factory=dict)
+    """Names of the controller's states, part of a sample, and their units."""
     initial: Callable[[FlightPlan], Values] | None = None
+    """``(plan) -> states`` at time zero; None for zeros."""
     signals: tuple[str, ...] | None = None
+    """Names of the first signals of a step, columns of a flight: roll, pitch and yaw that it
+    tracks, and any more. None for the attitude of the reference."""
     units: Mapping[str, str] = field(default_factory=dict)
-    tilts: Tilts | None = None
-    uses_gait: bool = True
-    records_commands: bool = False
+    """Columns of a flight other than the states and the columns of its kind, with units; also the
+    fields of a sample beside the states."""
+    tilts: Tilts | None = None  # see `Tilts`; None for `tilts_of_gait`
+    uses_gait: bool = True  # whether the gait has a part in the flight
+    records_commands: bool = False  # whether the commands of the tilt servos are part of a sample
     columns: tuple[str, ...] = ("singularity_margin",)
-    margins: Margins = lambda _samples, _setup: {}
+    """Its columns among `tiltsim.vehicles.rotorcraft.EXTRA_COLUMNS`."""
+    margins: Margins = lambda _samples, _setup: {}  # see `Margins`
     signs: Callable[[Seen, Any, Any], Any] | None = None
+    """Function of arrays ``(seen, parameters, knots)``: numbers that keep their sign until the law
+    becomes singular. None for a law that is singular nowhere."""
     causes: Callable[[Mapping[str, float], ControlSetup], tuple[str, ...]] = lambda *_: ("",)
+    """``(sample by field, setup) -> texts``: why a flight ends where each reaches zero."""
     measured: bool = False
-    feels: bool = False
+    """Whether it sees the plant's angular acceleration, of `tiltsim.laws.layers.instruments`."""
+    feels: bool = False  # whether it sees the contact force and the swing of a load, behind ``act``
     follows_position: Callable[[Scenario], bool] = lambda _scenario: True
+    """See `tiltsim.closed_loop.loop.ClosedLoop`."""
 
     def initial_states(self, plan: FlightPlan) -> Values:
         """Its states at time zero."""
@@ -114,7 +105,7 @@ def body_of_vehicle(vehicle: Multirotor) -> Body:
 def _limits(plan: FlightPlan, horizon: float) -> RotorRange:
     vehicle = plan.scenario.any_rotorcraft
     low, high = vehicle.speeds_along_spin
-    if vehicle.model == "tiltrotor" and vehicle.min_rotor_speed is None:
+    if vehicle.cross and vehicle.min_rotor_speed is None:
         low = 0.0  # its rotors do not reverse
     return RotorRange(low, high, horizon)
 

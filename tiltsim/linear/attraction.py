@@ -51,31 +51,21 @@ ANGLES: Final = ("roll", "pitch", "yaw")
 
 @dataclass(frozen=True, eq=False)
 class Attraction:
-    """A map of the initial states that come back.
-
-    Attributes:
-        scenario: The scenario.
-        axes: Names of the two initial quantities.
-        edges: Cell edges along each axis, SI units, shape (cells + 1,) each.
-        returned: Whether flights from the corners of the cells come back, shape (cells + 1, cells +
-            1): by the second, then by the first axis. Corners that were not flown lie in cells
-            whose corners agree.
-        flights: Number of flights, without the undisturbed one.
-        engine: Engine that flew them.
-        slowest: The slowest mode of the linear analysis, if there is one.
-        acceptable: Whether the attitudes at the corners are on the side of level attitude of the
-            gait's singular attitudes, at all times; None unless the axes are roll and pitch of a
-            tiltrotor.
-    """
+    """A map of the initial states that come back."""
 
     scenario: Scenario
-    axes: tuple[str, str]
-    edges: tuple[Floats, Floats]
+    axes: tuple[str, str]  # names of the two initial quantities
+    edges: tuple[Floats, Floats]  # cell edges along each axis, SI units, shape (cells + 1,) each
     returned: NDArray[np.bool_]
-    flights: int
-    engine: str | None
-    slowest: SlowestMode | None
+    """Whether flights from the corners of the cells come back, shape (cells + 1, cells + 1): by
+    the second, then by the first axis. Corners that were not flown lie in cells whose corners
+    agree."""
+    flights: int  # number of flights, without the undisturbed one
+    engine: str | None  # engine that flew them
+    slowest: SlowestMode | None  # the slowest mode of the linear analysis, if there is one
     acceptable: NDArray[np.bool_] | None
+    """Whether the attitudes at the corners are on the side of level attitude of the gait's
+    singular attitudes, at all times; None unless the axes are roll and pitch of a tiltrotor."""
 
     @property
     def share(self) -> Floats:
@@ -306,7 +296,7 @@ def _is_near(away: Floats) -> bool:
 def _acceptable(scenario: Scenario, roll: Floats, pitch: Floats) -> NDArray[np.bool_] | None:
     """Whether attitudes are acceptable at all times, shape (pitch, roll)."""
     vehicle = scenario.vehicle.resolve()
-    if scenario.vehicle.model != "tiltrotor" or not isinstance(vehicle, Vehicle):
+    if not scenario.vehicle.has_tilting_rotors or not isinstance(vehicle, Vehicle):
         return None
     gait = assemble(scenario).gait
     times = np.arange(INSTANTS) / INSTANTS * (gait.period or 0.0)

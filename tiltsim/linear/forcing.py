@@ -23,20 +23,14 @@ PERIODIC: Final = {trajectories.CIRCLE, trajectories.LISSAJOUS}
 
 
 class Forcing(NamedTuple):
-    """The dependence of a closed loop on time.
+    """The dependence of a closed loop on time."""
 
-    Attributes:
-        period: s; None if only the motion of the frame depends on time.
-        velocity, acceleration: Motion of a frame in which the reference repeats, at time zero, m/s
-        and m/s^2, world axes.
-        start: Time (s) from which this holds: faults have happened and are known, gusts and
-            pushes have passed, the commanded attitude is reached.
-    """
-
-    period: float | None
-    velocity: Triple
-    acceleration: Triple
+    period: float | None  # s; None if only the motion of the frame depends on time
+    velocity: Triple  # m/s, world axes, of a frame in which the reference repeats, at time zero
+    acceleration: Triple  # m/s^2
     start: float
+    """Time (s) from which this holds: faults have happened and are known, gusts and pushes have
+    passed, the commanded attitude is reached."""
 
     def motion(self, names: Sequence[str], start: float, end: float) -> Floats:
         """Motion of the frame from one time (s) to another, in coordinates of these names."""
@@ -60,7 +54,7 @@ def forcing_of(assembly: Assembly) -> Forcing:
     periods = _periods(reference)
     if assembly.loop.uses_gait and assembly.gait.period is not None:
         periods.append(assembly.gait.period)
-    velocity, acceleration = _line(reference)
+    velocity, acceleration = reference.velocity, reference.acceleration
     gust = None if scenario.air is None else scenario.air.gust
     passed = 0.0 if gust is None else gust.start + 2.0 * gust.rise + gust.duration
     events = [passed, *(fault.time for fault in scenario.fault)]
@@ -85,7 +79,7 @@ def _refusals(assembly: Assembly) -> Iterator[str]:
             f'reference.type = "{scenario.reference.type}": the flight is neither at rest nor '
             "periodic; choose setpoint, line, circle or lissajous"
         )
-    velocity, acceleration = _line(assembly.reference)
+    velocity, acceleration = assembly.reference.velocity, assembly.reference.acceleration
     if air is not None and any(acceleration) and (any(air.drag.linear) or any(air.drag.area)):
         yield (
             f"reference.acceleration = {list(acceleration)}: with air.drag the flight is neither "
@@ -108,23 +102,11 @@ def _refusals(assembly: Assembly) -> Iterator[str]:
         )
 
 
-def _line(reference: trajectories.ReferenceParameters) -> tuple[Triple, Triple]:
-    """Velocity (m/s) and acceleration (m/s^2) of a line; zero for other references."""
-    if reference.type != trajectories.LINE:
-        return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-    velocity = reference.velocity_x, reference.velocity_y, reference.velocity_z
-    return velocity, (reference.acceleration_x, reference.acceleration_y, reference.acceleration_z)
-
-
 def _periods(reference: trajectories.ReferenceParameters) -> list[float]:
     """The periods (s) of a reference."""
     rates = [reference.angular_frequency] if reference.type == trajectories.CIRCLE else []
     if reference.type == trajectories.LISSAJOUS:
-        rates = [
-            getattr(reference, f"frequency_{axis}")
-            for axis in "xyz"
-            if getattr(reference, f"amplitude_{axis}")
-        ]
+        rates = [w for w, size in zip(reference.frequency, reference.amplitude) if size]
     return [2.0 * pi / abs(rate) for rate in rates if rate]
 
 

@@ -55,32 +55,21 @@ class Linearization:
     vector of a small turn in body axes. The inputs are added to the controller's commands to the
     vehicle, so ``u = feedback x + disturbance`` closes the loop. For a sampled controller it is the
     system from one sample to the next, ``x[k+1] = A x[k] + B u[k]``.
-
-    Attributes:
-        A: Dynamics of the closed loop, or of the vehicle alone, shape (states, states).
-        B: Shape (states, inputs).
-        C: Shape (outputs, states).
-        D: Shape (outputs, inputs).
-        feedback: The controller, shape (inputs, states): commands of the vehicle's inputs.
-        states, inputs, outputs: Their names and units.
-        timestep: Sample time, s; None in continuous time.
-        state: The states at rest by name: the turn of a rotation is from level attitude.
-        command: The inputs at rest by name.
-        loop: ``"closed"`` or ``"open"``.
     """
 
-    A: Floats
-    B: Floats
-    C: Floats
-    D: Floats
-    feedback: Floats
-    states: tuple[Signal, ...]
-    inputs: tuple[Signal, ...]
-    outputs: tuple[Signal, ...]
-    timestep: float | None
+    A: Floats  # dynamics of the closed loop, or of the vehicle alone, shape (states, states)
+    B: Floats  # shape (states, inputs)
+    C: Floats  # shape (outputs, states)
+    D: Floats  # shape (outputs, inputs)
+    feedback: Floats  # the controller, shape (inputs, states): commands of the vehicle's inputs
+    states: tuple[Signal, ...]  # names and units
+    inputs: tuple[Signal, ...]  # names and units
+    outputs: tuple[Signal, ...]  # names and units
+    timestep: float | None  # sample time, s; None in continuous time
     state: dict[str, float]
-    command: dict[str, float]
-    loop: str
+    """The states at rest by name: the turn of a rotation is from level attitude."""
+    command: dict[str, float]  # the inputs at rest by name
+    loop: str  # ``"closed"`` or ``"open"``
 
     @property
     def poles(self) -> Floats:
@@ -192,28 +181,18 @@ def _level(found: Equilibrium) -> Floats:
 
 
 class Symbolic(NamedTuple):
-    """CasADi functions of a scenario on equations of motion; its numbers are constants.
+    """CasADi functions of a scenario on equations of motion; its numbers are constants."""
 
-    Attributes:
-        dynamics: ``(time, state, inputs) -> rates``: the vehicle, whatever its inputs.
-        controller: ``(time, state) -> inputs``.
-        closed_loop: ``(time, state) -> rates``.
-        sample: ``(time, state) -> sample``: the fields of a recorded sample after its time.
-        initial: State at time zero.
-        states: Names of the state's entries; a rotation has four of a quaternion, or nine of its
-            matrix, rows first.
-        inputs: Names of the inputs' entries; empty for one that changes nothing.
-        fields: Names of the sample's entries.
-    """
-
-    dynamics: Any
-    controller: Any
-    closed_loop: Any
-    sample: Any
-    initial: tuple[float, ...]
+    dynamics: Any  # ``(time, state, inputs) -> rates``: the vehicle, whatever its inputs
+    controller: Any  # ``(time, state) -> inputs``
+    closed_loop: Any  # ``(time, state) -> rates``
+    sample: Any  # ``(time, state) -> sample``: the fields of a recorded sample after its time
+    initial: tuple[float, ...]  # state at time zero
     states: tuple[str, ...]
-    inputs: tuple[str, ...]
-    fields: tuple[str, ...]
+    """Names of the state's entries; a rotation has four of a quaternion, or nine of its matrix,
+    rows first."""
+    inputs: tuple[str, ...]  # names of the inputs' entries; empty for one that changes nothing
+    fields: tuple[str, ...]  # names of the sample's entries
 
 
 def _input_names(assembly: Assembly, size: int) -> tuple[str, ...]:

@@ -39,26 +39,18 @@ REGULAR: Final = 1e12  # condition of a matrix whose inverse is more than roundi
 
 @dataclass(frozen=True)
 class Margin:
-    """Stability margins of a loop broken at one place.
+    """Stability margins of a loop broken at one place."""
 
-    Attributes:
-        place: An input, a measured state, or all inputs together.
-        gain: Factors of the loop's gain between which it stays stable; 0 and infinity without
-            limit.
-        phase: Smallest lag or lead at which it becomes unstable, rad; infinite if none does.
-        delay: Smallest further delay at which it becomes unstable, s.
-        frequency: Frequency of the smallest phase margin, rad/s; nan if there is none.
-        disk: Largest alpha of the disk of factors ``(1 + alpha d / 2) / (1 - alpha d / 2)``, any
-            complex ``|d| < 1``; 2 and more: any phase. At all inputs together d is any matrix
-            smaller than 1, so the disk holds for independent factors, which may bear more.
-    """
-
-    place: str
+    place: str  # an input, a measured state, or all inputs together
     gain: tuple[float, float]
-    phase: float
-    delay: float
-    frequency: float
+    """Factors of the loop's gain between which it stays stable; 0 and infinity without limit."""
+    phase: float  # smallest lag or lead at which it becomes unstable, rad; infinite if none does
+    delay: float  # smallest further delay at which it becomes unstable, s
+    frequency: float  # frequency of the smallest phase margin, rad/s; nan if there is none
     disk: float
+    """Largest alpha of the disk of factors ``(1 + alpha d / 2) / (1 - alpha d / 2)``, any complex
+    ``|d| < 1``; 2 and more: any phase. At all inputs together d is any matrix smaller than 1,
+    so the disk holds for independent factors, which may bear more."""
 
     @property
     def disk_gain(self) -> float:

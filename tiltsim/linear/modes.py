@@ -32,29 +32,22 @@ KINDS: Final = {
     "rotor": "rotors",
     "speed": "rotors",
     "tilt": "actuators",
-    "layer": "actuators",
-    "law": "controller",
+    "state": "controller",
+    "estimation": "estimator",
+    "instruments": "instruments",
 }
 """Names of modes by the kind of their states."""
 
 
 @dataclass(frozen=True)
 class Mode:
-    """A pole, or a pair or group of equal ones.
+    """A pole, or a pair or group of equal ones."""
 
-    Attributes:
-        name: By the states that take the largest part.
-        frequency: Magnitude of the pole, rad/s.
-        damping: Ratio, 1 for a stable real pole, negative where it grows.
-        states: Names, the largest part first.
-        count: Number of poles, a pair counted as two.
-    """
-
-    name: str
-    frequency: float
-    damping: float
-    states: tuple[str, ...]
-    count: int
+    name: str  # by the states that take the largest part
+    frequency: float  # magnitude of the pole, rad/s
+    damping: float  # ratio, 1 for a stable real pole, negative where it grows
+    states: tuple[str, ...]  # names, the largest part first
+    count: int  # number of poles, a pair counted as two
 
     @property
     def growth_rate(self) -> float:

@@ -63,16 +63,12 @@ CENTRAL: Final = Stencil((0.02,), (25.0,), (0.0,), (1.0,), AVERAGED.smooth)
 
 
 class Derivative(NamedTuple):
-    """The derivative of a function of a vector at a point.
+    """The derivative of a function of a vector at a point."""
 
-    Attributes:
-        matrix: Shape (values, entries).
-        corners: Whether a value has a corner along an entry there, so that its derivative is the
-            mean of both sides; the same shape.
-    """
-
-    matrix: Floats
+    matrix: Floats  # shape (values, entries)
     corners: NDArray[np.bool_]
+    """Whether a value has a corner along an entry there, so that its derivative is the mean of
+    both sides; the same shape."""
 
 
 def steps_at(values: Floats) -> Floats:

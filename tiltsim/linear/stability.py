@@ -31,41 +31,32 @@ ON_AXIS: Final = 1e-6  # multipliers with a smaller imaginary part are real
 
 @dataclass(frozen=True, eq=False)
 class Stability:
-    """Whether small disturbances of a rest point or of a periodic orbit die out.
+    """Whether small disturbances of a rest point or of a periodic orbit die out."""
 
-    Attributes:
-        kind: ``"rest"`` or ``"orbit"``.
-        period: Period of the orbit, s; None at rest.
-        residual: Largest entry of the rates (rest) or of the change over a period, SI units.
-        stable: Whether small disturbances stay small.
-        neutral: Number of poles at zero or multipliers of one: states that stay where they are put.
-        poles: Poles at rest, rad/s, complex, from fastest growth to fastest decay; ``log(mu) /
-            control_timestep`` for a sampled controller. None for an orbit.
-        multipliers: Floquet multipliers of an orbit, complex, the largest first; None at rest.
-        modes: In the same order, but for states that are forgotten within a period or sample.
-        states: Names of the coordinates.
-        matrix: The linear system, shape (states, states): rates by coordinates, or the coordinates
-            after a control sample or period by the coordinates before it.
-        equilibrium: The state itself.
-        left_out: Names of states that nothing holds and that no other depends on, x and y of a
-            vehicle that drifts: they are not analyzed.
-        corners: Names of states whose rates have a corner there, at a limit or at the edge of a
-            dead zone: the matrix is the mean of both sides, and poles say little.
-    """
-
-    kind: str
-    period: float | None
-    residual: float
-    stable: bool
+    kind: str  # ``"rest"`` or ``"orbit"``
+    period: float | None  # period of the orbit, s; None at rest
+    residual: float  # largest entry of the rates (rest) or of the change over a period, SI units
+    stable: bool  # whether small disturbances stay small
     neutral: int
+    """Number of poles at zero or multipliers of one: states that stay where they are put."""
     poles: Floats | None
+    """Poles at rest, rad/s, complex, from fastest growth to fastest decay; ``log(mu) /
+    control_timestep`` for a sampled controller. None for an orbit."""
     multipliers: Floats | None
+    """Floquet multipliers of an orbit, complex, the largest first; None at rest."""
     modes: tuple[Mode, ...]
-    states: tuple[str, ...]
+    """In the same order, but for states that are forgotten within a period or sample."""
+    states: tuple[str, ...]  # names of the coordinates
     matrix: Floats
-    equilibrium: Equilibrium
+    """The linear system, shape (states, states): rates by coordinates, or the coordinates after a
+    control sample or period by the coordinates before it."""
+    equilibrium: Equilibrium  # the state itself
     left_out: tuple[str, ...] = ()
+    """Names of states that nothing holds and that no other depends on, x and y of a vehicle that
+    drifts: they are not analyzed."""
     corners: tuple[str, ...] = ()
+    """Names of states whose rates have a corner there, at a limit or at the edge of a dead zone:
+    the matrix is the mean of both sides, and poles say little."""
 
     @property
     def growth(self) -> float:

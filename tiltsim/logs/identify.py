@@ -23,6 +23,7 @@ from tiltsim.logs.reading import read_log
 from tiltsim.logs.windows import INITIAL, MEASURED, Problem, windows_of
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.scenario import Scenario
+from tiltsim.scenario.vehicle import VEHICLES
 from tiltsim.system.arguments import is_finite
 from tiltsim.system.text import html_table, short_repr
 from tiltsim_controllers.mathematics.scalar import Floats
@@ -39,37 +40,23 @@ FLOORS: Final = {**dict.fromkeys(MEASURED, 1e-6), "rotor_speeds": 1e-3, "tilt_an
 
 @dataclass(frozen=True)
 class Estimate:
-    """Parameters found in a log.
+    """Parameters found in a log."""
 
-    Attributes:
-        values: By key; entries of vectors as ``vehicle.inertia[0]``.
-        sigma: Their standard deviations, from the noise; from the residuals if these are larger.
-        units: Their units.
-        correlation: Correlation of the values, shape (n, n), in their order.
-        chi2: Squared residuals over their noise, per degree of freedom; 1 for a true model.
-        chi2_band: Where chi2 of a true model lies with 95 % probability.
-        autocorrelation: Correlation of neighboring residuals; near 0 for a true model.
-        warnings: One line each.
-        windows: Windows of the log that were used.
-        noise: Standard deviations of the measured vectors.
-        residuals: Measured minus predicted, in their noise, shape (windows, samples, channels).
-        nominal: Their values in the scenario.
-        model: ``vehicle.model`` of the scenario.
-    """
-
-    values: dict[str, float]
+    values: dict[str, float]  # by key; entries of vectors as ``vehicle.inertia[0]``
     sigma: dict[str, float]
-    units: dict[str, str]
-    correlation: Floats
-    chi2: float
-    chi2_band: tuple[float, float]
-    autocorrelation: float
-    warnings: tuple[str, ...]
-    windows: int
-    noise: dict[str, float]
+    """Their standard deviations, from the noise; from the residuals if these are larger."""
+    units: dict[str, str]  # their units
+    correlation: Floats  # correlation of the values, shape (n, n), in their order
+    chi2: float  # squared residuals over their noise, per degree of freedom; 1 for a true model
+    chi2_band: tuple[float, float]  # where chi2 of a true model lies with 95 % probability
+    autocorrelation: float  # correlation of neighboring residuals; near 0 for a true model
+    warnings: tuple[str, ...]  # one line each
+    windows: int  # windows of the log that were used
+    noise: dict[str, float]  # standard deviations of the measured vectors
     residuals: Floats
-    nominal: dict[str, float]
-    model: str
+    """Measured minus predicted, in their noise, shape (windows, samples, channels)."""
+    nominal: dict[str, float]  # their values in the scenario
+    model: str  # ``vehicle.model`` of the scenario
 
     def report(self) -> dict[str, Any]:
         """Everything but the residuals, for JSON."""
@@ -82,10 +69,11 @@ class Estimate:
         The numbers of a vehicle from an MJCF file stand there; they become factors of model_error.
         """
         found: dict[str, Any] = {}
+        keys = VEHICLES[self.model].model_fields
         for name, value in self.values.items():
             key, _, entry = name.partition("[")
             error = key.replace("vehicle.", "model_error.")
-            if self.model == "multirotor" and error in FACTORS:
+            if error in FACTORS and key.removeprefix("vehicle.") not in keys:
                 key, value = error, value / self.nominal[name]
             if key != "vehicle.center_of_mass":  # no key of a scenario
                 found[key] = [*found.get(key, []), value] if entry else value
@@ -102,17 +90,12 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Replay:
-    """How far a model leaves a log within a window, from the measured state at its beginning.
-
-    Attributes:
-        channels: The measured columns; attitude stands for small turns about the body axes.
-        time: Times of the samples, s, shape (windows, samples).
-        mismatch: Measured minus predicted, in units, shape (windows, samples, channels).
-    """
+    """How far a model leaves a log within a window, from the measured state at its beginning."""
 
     channels: tuple[str, ...]
-    time: Floats
-    mismatch: Floats
+    """The measured columns; attitude stands for small turns about the body axes."""
+    time: Floats  # times of the samples, s, shape (windows, samples)
+    mismatch: Floats  # measured minus predicted, in units, shape (windows, samples, channels)
 
     @property
     def rms(self) -> dict[str, float]:

@@ -26,19 +26,12 @@ from tiltsim_controllers.vehicle.rotors import Rotors, TiltOfRotor, rotors_in, t
 
 
 class Parameter(NamedTuple):
-    """A number or vector that a log may tell.
+    """A number or vector that a log may tell."""
 
-    Attributes:
-        field: The model's number.
-        unit: Its unit.
-        nominal: Its value in the scenario, shape (n,).
-        scale: A change that counts as large, in the unit, shape (n,).
-    """
-
-    field: str
-    unit: str
-    nominal: Floats
-    scale: Floats
+    field: str  # the model's number
+    unit: str  # its unit
+    nominal: Floats  # its value in the scenario, shape (n,)
+    scale: Floats  # a change that counts as large, in the unit, shape (n,)
 
 
 FACTORS: Final = tuple(
@@ -48,8 +41,7 @@ FACTORS: Final = tuple(
 
 CONJUGATE: Final = np.array([1.0, -1.0, -1.0, -1.0])
 
-TINY: Final = 1e-12
-"""Velocity (m/s) at which the drag of a vehicle at rest still has a derivative."""
+TINY: Final = 1e-12  # velocity (m/s) at which the drag of a vehicle at rest still has a derivative
 
 
 class LoggedVehicle:

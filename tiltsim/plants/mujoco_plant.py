@@ -93,8 +93,7 @@ def build_model(
     return model
 
 
-OVERLAP: Final = 1e-4
-"""Depth (m) from which shapes count as lying in each other."""
+OVERLAP: Final = 1e-4  # depth (m) from which shapes count as lying in each other
 
 
 def check_start(scenario: Scenario, model: mujoco.MjModel, data: mujoco.MjData) -> None:
@@ -141,10 +140,13 @@ def _touched_rotor(model: mujoco.MjModel, data: mujoco.MjData, prefix: str) -> s
 
 
 def _name(model: mujoco.MjModel, geom: int) -> str:
-    name = model.geom(geom).name or "a shape of the vehicle"
+    """A geom by its body, as scenarios name it."""
+    name = model.body(model.geom_bodyid[geom]).name
     if name.startswith("object_"):
         return f"object {name.removeprefix('object_')}"
-    return name.removesuffix("_collision")
+    if name.endswith("_vehicle"):
+        return f"companion {name.removesuffix('_vehicle')}"
+    return {"world": "the ground", "vehicle": "the vehicle"}.get(name, name)
 
 
 class MujocoPlant(Plant):

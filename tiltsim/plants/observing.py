@@ -1,12 +1,17 @@
 """Observations of a rotorcraft in MuJoCo, and built-in controllers as functions of them."""
 
 from collections.abc import Sequence
+from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 
 from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.closed_loop.loop import ClosedLoop
+from tiltsim.closed_loop.userdata import Header
 from tiltsim.engines.base import vectors_of
+from tiltsim.engines.control import control_step
+from tiltsim.engines.programs import KEPT
 from tiltsim.errors import InputError
 from tiltsim.laws.assembling import assemble
 from tiltsim.laws.layers.actuation import measured, sensor_parameters
@@ -17,7 +22,7 @@ from tiltsim.plants.command import Command, Observation, Reference
 from tiltsim.plants.mujoco_plant import MujocoPlant
 from tiltsim.scenario.controller import PythonController
 from tiltsim.scenario.scenario import Scenario
-from tiltsim.vehicles.rotorcraft.layout import layout_of
+from tiltsim.vehicles.rotorcraft.layout import is_fixed_cross, layout_of
 from tiltsim.vehicles.rotorcraft.others import FELT, others_of
 from tiltsim_controllers.code.arrays import as_arrays
 from tiltsim_controllers.mathematics.attitude import euler_angles
@@ -122,8 +127,33 @@ def built_in_command(assembly: Assembly, plant: MujocoPlant) -> Command:
             own, behind = within.sizes, act[loop.sizes.act :]
             qpos, qvel, act = qpos[: own.qpos], qvel[: own.qvel], [*act[: own.act], *behind]
         loop, parameters = within, inner
-    ctrl = loop.controls(time, qpos, qvel, act, parameters, knots)
-    return _command(assembly, loop, ctrl)
+    return _command(assembly, loop, _law(assembly).controls(plant.time, qpos, qvel, act))
+
+
+class _Law:
+    """The controller of a flight without the layers around it."""
+
+    def __init__(self, assembly: Assembly) -> None:
+        loop, parameters = assembly.loop, assembly.setup.parameters
+        while loop.within is not None:
+            loop, parameters = loop.within, parameters.inner
+        if assembly.scenario.controller.measures_angular_acceleration:  # behind the velocities
+            loop = replace(loop, sizes=loop.sizes._replace(qvel=loop.sizes.qvel + 3))
+        self.loop, self.setup = loop, assembly.setup._replace(parameters=parameters)
+        bare = replace(assembly, loop=loop, setup=self.setup)
+        self._step = control_step(bare, self.setup.userdata.tolist(), "controls")
+
+    def controls(self, time: float, *state: Sequence[float]) -> Values:
+        """Its controls at a time (s), where a step begins, by qpos, qvel and act.
+
+        The forces felt are last in act.
+        """
+        now, own = Header(timestep=time, evaluations=1.0), self.loop.sizes.act
+        qpos, qvel, act = (list(map(float, vector)) for vector in state)
+        return tuple(self._step(now, qpos, qvel, act[:own], (), act[own:], ()))
+
+
+_law = lru_cache(maxsize=KEPT)(_Law)
 
 
 class BuiltInController:
@@ -148,26 +178,21 @@ class BuiltInController:
         if not observed or controller.is_external or feeds_back:
             raise InputError("controller: must be a built-in one that needs observations only")
         self._assembly = assembly = assemble(scenario)
-        loop, parameters = assembly.loop, assembly.setup.parameters
-        while loop.within is not None:
-            loop, parameters = loop.within, parameters.inner
-        self._loop, self._parameters = loop, parameters
-        setup = assembly.setup._replace(parameters=parameters)
-        initial = loop.initial_activations(assembly, setup)
+        self._law = _Law(assembly)
+        loop = self._law.loop
+        initial = loop.initial_activations(assembly, self._law.setup)
         self._states = list(initial[layout_of(loop).rotors :])
         self._period = simulation.control_timestep or simulation.timestep
 
     def __call__(self, seen: Observation) -> Command:
         """Its command, before latency, servos and motors: see `built_in_command`."""
-        loop, knots = self._loop, self._assembly.setup.knots
+        loop = self._law.loop
         qpos, qvel = [*seen.position, *seen.quaternion], [*seen.velocity, *seen.body_rates]
         if layout_of(loop).tilts:
             qpos, qvel = [*qpos, *seen.tilt_angles], [*qvel, *seen.tilt_rates]
         speeds = flip_by_spin(seen.rotor_speeds.tolist(), loop.spins)
-        felt = np.concatenate([seen.contact_force, seen.contact_force, seen.swing, np.zeros(6)])
-        act = [*speeds, *self._states, *felt]
-        vectors = list(map(float, qpos)), list(map(float, qvel)), act
-        ctrl = loop.controls(seen.time, *vectors, self._parameters, knots)
+        felt = [*seen.contact_force, *seen.contact_force, *seen.swing, *[0.0] * 6]
+        ctrl = self._law.controls(seen.time, qpos, qvel, [*speeds, *self._states, *felt])
         rates = ctrl[len(ctrl) - len(self._states) :]
         self._states = [
             state + self._period * rate for state, rate in zip(self._states, rates, strict=True)
@@ -176,9 +201,9 @@ class BuiltInController:
 
 
 def _command(assembly: Assembly, loop: ClosedLoop, ctrl: Values) -> Command:
-    """The command by a controller's controls; the quadrotor's laws command thrusts."""
+    """The command by a controller's controls; rotors on a fixed cross make thrusts."""
     layout = layout_of(loop)
-    if loop.model == "quadrotor":
+    if is_fixed_cross(loop):
         coefficients = np.array(assembly.scenario.any_rotorcraft.thrust_coefficients)
         return Command(thrusts=coefficients * np.array(ctrl[: layout.rotors]))
     rates = ctrl[layout.acceleration_1 : layout.further_rates]

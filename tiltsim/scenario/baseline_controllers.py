@@ -45,8 +45,7 @@ from tiltsim_controllers.vehicle.rotors import (
     table_per_newton,
 )
 
-FASTEST: Final = 1e6
-"""rad/s, in place of no limit."""
+FASTEST: Final = 1e6  # rad/s, in place of no limit
 
 
 def require_no_pose(scenario: Any) -> None:

@@ -11,8 +11,8 @@ from tiltsim.scenario.companion import check_companions
 from tiltsim.scenario.controller import CONTROLLERS, laws_for
 from tiltsim.scenario.expectation import NAME
 from tiltsim.scenario.gait import TableGait
-from tiltsim.scenario.instruments import check_instruments
-from tiltsim.scenario.interaction import check_objects
+from tiltsim.scenario.instruments import instrument_refusals
+from tiltsim.scenario.interaction import object_refusals
 from tiltsim.scenario.linearizing_controllers import (
     AttitudeAltitudeController,
     AttitudeForceController,
@@ -21,8 +21,9 @@ from tiltsim.scenario.linearizing_controllers import (
 )
 from tiltsim.scenario.messages import InvalidValueError, choose
 from tiltsim.scenario.reference import WaypointReference
-from tiltsim.scenario.rotorcraft import MultirotorTable, Refusals, RotorcraftTable
+from tiltsim.scenario.rotorcraft import MultirotorTable, RotorcraftTable
 from tiltsim.scenario.scenario_tables import ScenarioTables
+from tiltsim.scenario.table import Refusals
 from tiltsim.scenario.vehicle import (
     ModelErrorTable,
     PodTable,
@@ -58,8 +59,8 @@ def _refusals(scenario: ScenarioTables) -> Refusals:
             yield "simulation.duration", reason
     yield from _rotor_limits(scenario)
     yield from _ground(scenario)
-    check_instruments(scenario)
-    check_objects(scenario)
+    yield from instrument_refusals(scenario)
+    yield from object_refusals(scenario)
     for expectation in scenario.expect:
         name = expectation.claim
         if re.match(NAME, name) and name not in scenario.claim:

@@ -12,6 +12,7 @@ from tiltsim.scenario.table import (
     Angles3,
     NonNegative,
     Positive,
+    Refusals,
     Table,
     Vector3,
     default,
@@ -261,51 +262,39 @@ class InstrumentTables(Table):
         return {name: table for name, table in found.items() if table is not None}
 
 
-def check_instruments(scenario: Any) -> None:
-    """Refuse instruments that a flight cannot read, naming the key."""
-    found, simulation = scenario.sensors.instruments, scenario.simulation
-    if scenario.controller.estimator is not None:
-        _check_estimator(scenario)
+def instrument_refusals(scenario: Any) -> Refusals:
+    """Instruments that a flight cannot read, and an estimator that lacks some."""
+    found, sensors, controller = scenario.sensors.instruments, scenario.sensors, scenario.controller
+    planar, step = scenario.vehicle.is_planar, scenario.simulation.control_timestep
+    if controller.estimator is not None:
+        key = "controller.estimator"
+        if controller.is_external or planar:
+            yield key, "needs a law of a rotorcraft other than python; remove it"
+        if "imu" not in found or not {"mocap", "gps"} & {*found}:
+            yield key, "needs [sensors.imu], and [sensors.mocap] or [sensors.gps]"
+        if sensors.have_errors:
+            yield key, "reads instruments; remove noise and bias keys of [sensors] itself"
     if not found:
         return
-    first, step = f"sensors.{next(iter(found))}", simulation.control_timestep
-    reasons = {
-        f"the {scenario.vehicle.model} has no instruments; remove it": scenario.vehicle.is_planar,
-        "a Python controller observes the state, not readings; choose controller.law = "
-        '"numpy", or remove it': scenario.controller.is_external,
-        "does not sense contacts; remove it, or [ground], [[object]], [tool], [payload] and "
-        "[[companion]]": scenario.has_contacts,
-    }
-    for reason, present in reasons.items():
-        if present:
-            raise scenario.mistake(first, reason)
+    first = f"sensors.{next(iter(found))}"
+    if planar:
+        yield first, f"the {scenario.vehicle.model} has no instruments; remove it"
+    if controller.is_external:
+        choice = 'choose controller.law = "numpy", or remove it'
+        yield first, f"a Python controller observes the state, not readings; {choice}"
+    if scenario.has_contacts:
+        others = "[ground], [[object]], [tool], [payload] and [[companion]]"
+        yield first, f"does not sense contacts; remove it, or {others}"
     if step == 0.0:
         reason = f"[{first}] is read at control steps; must be above 0"
-        raise scenario.mistake("simulation.control_timestep", reason)
+        yield "simulation.control_timestep", reason
     for name, table in found.items():
-        if table.period(step) < step * (1.0 - 1e-9):
+        period = table.period(step)
+        if period < step * (1.0 - 1e-9):
             reason = f"at most {1.0 / step:g}, one reading each simulation.control_timestep"
-            raise scenario.mistake(f"sensors.{name}.rate", reason)
-        if table.delay > MOST_UNDER_WAY * table.period(step):
-            reason = (
-                f"at most {MOST_UNDER_WAY} readings late, {MOST_UNDER_WAY * table.period(step):g}"
-            )
-            raise scenario.mistake(f"sensors.{name}.delay", reason)
-    imu = scenario.sensors.imu
-    if imu is not None and any(imu.position) and scenario.controller.commands_tilts:
+            yield f"sensors.{name}.rate", reason
+        if table.delay > (latest := MOST_UNDER_WAY * period):
+            yield f"sensors.{name}.delay", f"at most {MOST_UNDER_WAY} readings late, {latest:g}"
+    if sensors.imu is not None and any(sensors.imu.position) and controller.commands_tilts:
         reason = "must be zero for a law that commands the tilts, which turn the body themselves"
-        raise scenario.mistake("sensors.imu.position", reason)
-
-
-def _check_estimator(scenario: Any) -> None:
-    """Refuse an estimator without the instruments that it needs."""
-    found, sensors = scenario.sensors.instruments, scenario.sensors
-    if scenario.controller.is_external or scenario.vehicle.is_planar:
-        reason = "needs a law of a rotorcraft other than python; remove it"
-        raise scenario.mistake("controller.estimator", reason)
-    if "imu" not in found or not {"mocap", "gps"} & {*found}:
-        reason = "needs [sensors.imu], and [sensors.mocap] or [sensors.gps]"
-        raise scenario.mistake("controller.estimator", reason)
-    if sensors.have_errors:
-        reason = "reads instruments; remove noise and bias keys of [sensors] itself"
-        raise scenario.mistake("controller.estimator", reason)
+        yield "sensors.imu.position", reason

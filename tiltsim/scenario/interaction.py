@@ -10,7 +10,7 @@ from tiltsim.models.cables import Cable
 from tiltsim.models.mjcf_editing import MAX_BYTES
 from tiltsim.models.objects import Body, Load, Objects, Tool
 from tiltsim.scenario.messages import choose
-from tiltsim.scenario.table import Table, default
+from tiltsim.scenario.table import Refusals, Table, default
 from tiltsim.system.files import is_file
 
 SIZES: Final = {"wall": 2, "box": 3, "sphere": 1, "mesh": 1}
@@ -109,77 +109,68 @@ def objects_of(scenario: Any) -> Objects | None:
     return Objects(scenario.object, scenario.tool, scenario.payload, scenario.cable)
 
 
-def _check_cables(scenario: Any) -> None:
-    objects = {table.name: table.joint for table in scenario.object}
-    vehicles = ["", *(table.name for table in scenario.companion)]
-    names = [table.name for table in scenario.cable] + ["cable"] * (scenario.payload is not None)
-    for table in scenario.cable:
-        if names.count(table.name) > 1 or table.name in (*RESERVED, *objects, *vehicles):
-            raise table.mistake("name", "is taken; choose another")
-        if objects.get(table.object) != "free":
-            free = [name for name, joint in objects.items() if joint == "free"]
-            reason = choose(table.object, free) if free else "there is no free [[object]]"
-            raise table.mistake("object", reason)
-        if table.vehicle not in vehicles:
-            others = vehicles[1:]
-            reason = choose(table.vehicle, others) if others else "there is no [[companion]]"
-            raise table.mistake("vehicle", reason)
-
-
-def _check_swing_damping(scenario: Any) -> None:
-    """Refuse to damp the swing where the law does not follow a reference that accelerates."""
-    controller, reason = scenario.controller, ""
-    if not controller.damps_swing:
-        able = "choose full_pose, vectoring, geometric, pid, indi or numpy"
-        reason = f"the {controller.law} law does not follow a reference's acceleration; {able}"
-    elif scenario.reference.kind == "attitude_altitude":
-        reason = "needs a reference of position"
-    if reason:
-        raise scenario.payload.mistake("swing_damping", reason)
-
-
-def check_objects(scenario: Any) -> None:
-    """Refuse objects, tools and loads where nothing could fly with them, or push them."""
-    _check_cables(scenario)
+def object_refusals(scenario: Any) -> Refusals:
+    """Objects, tools and loads where nothing could fly with them, or push them."""
+    yield from _cable_refusals(scenario)
+    controller, vehicle = scenario.controller, scenario.vehicle
     if scenario.reference.type == "push":
         scenario.reference.after_gait((), scenario)
-        controller = scenario.controller
         if controller.position_stiffness is None and not controller.is_external:
             able = (
                 "choose full_pose, vectoring with position_bandwidth, geometric with tilts = free, "
                 "numpy with push_stiffness, or python"
             )
-            reason = f"the {controller.law} law cannot push; {able}"
-            raise scenario.mistake("reference.type", reason)
+            yield "reference.type", f"the {controller.law} law cannot push; {able}"
         scenario.reference.check_impedance(scenario)
     damps = scenario.payload is not None and scenario.payload.swing_damping
-    if damps and not scenario.controller.is_external:
-        _check_swing_damping(scenario)
+    if damps and not controller.is_external:
+        if not controller.damps_swing:
+            able = "choose full_pose, vectoring, geometric, pid, indi or numpy"
+            reason = f"the {controller.law} law does not follow a reference's acceleration; {able}"
+            yield "payload.swing_damping", reason
+        if scenario.reference.kind == "attitude_altitude":
+            yield "payload.swing_damping", "needs a reference of position"
     keys = ("object", "tool", "payload", "companion")
     key = next((name for name in keys if getattr(scenario, name)), None)
     if key is None:
         return
-    if scenario.vehicle.is_planar:
-        raise scenario.mistake("vehicle.model", f"[{key}] is for rotorcraft only; remove it")
-    plant = f"its equations have no contacts and no [{key}]; use mujoco"
-    scenario.require("simulation.plant", "mujoco", plant)
+    if vehicle.is_planar:
+        yield "vehicle.model", f"[{key}] is for rotorcraft only; remove it"
+    if scenario.simulation.plant != "mujoco":
+        reason = f"its equations have no contacts and no [{key}]; use mujoco"
+        yield "simulation.plant", reason
     if scenario.simulation.integrator != "implicitfast":
-        raise scenario.mistake(
-            "simulation.integrator",
-            f'must be "implicitfast" with [{key}]: the others gain energy at contacts and cables',
-        )
-    if scenario.controller.measures_angular_acceleration:
+        reason = f'must be "implicitfast" with [{key}]: the others gain energy at contacts and'
+        yield "simulation.integrator", f"{reason} cables"
+    if controller.measures_angular_acceleration:
         reason = f"does not know the forces of [{key}]; choose model"
-        raise scenario.mistake("controller.angular_acceleration", reason)
+        yield "controller.angular_acceleration", reason
     names = [table.name for table in scenario.object]
+    least = 2.0 * scenario.simulation.timestep
     for table in scenario.object:
         if names.count(table.name) > 1:
-            raise table.mistake("name", "there are two of this name")
-        if table.softness < 2.0 * scenario.simulation.timestep:
-            least = 2.0 * scenario.simulation.timestep
-            raise table.mistake("softness", f"must be at least two time steps, {least:g}")
+            yield "object.name", "there are two of this name", table.name
+        if table.softness < least:
+            yield "object.softness", f"must be at least two time steps, {least:g}", table.softness
     file = scenario.any_rotorcraft.user_vehicle
     bare = scenario.tool is None and file is not None and not file.has_contact_geoms
     if scenario.object and bare:
         reason = "add a [tool], or name geoms that end in 'collision'"
-        raise scenario.mistake("object", f"nothing of vehicle.mjcf can touch it: {reason}")
+        yield "object", f"nothing of vehicle.mjcf can touch it: {reason}"
+
+
+def _cable_refusals(scenario: Any) -> Refusals:
+    objects = {table.name: table.joint for table in scenario.object}
+    vehicles = ["", *(table.name for table in scenario.companion)]
+    names = [table.name for table in scenario.cable] + ["cable"] * (scenario.payload is not None)
+    free = [name for name, joint in objects.items() if joint == "free"]
+    for table in scenario.cable:
+        if names.count(table.name) > 1 or table.name in (*RESERVED, *objects, *vehicles):
+            yield "cable.name", "is taken; choose another", table.name
+        if table.object not in free:
+            reason = choose(table.object, free) if free else "there is no free [[object]]"
+            yield "cable.object", reason, table.object
+        if table.vehicle not in vehicles:
+            others = vehicles[1:]
+            reason = choose(table.vehicle, others) if others else "there is no [[companion]]"
+            yield "cable.vehicle", reason, table.vehicle

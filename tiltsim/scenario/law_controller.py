@@ -15,7 +15,7 @@ from typing import Any, ClassVar, Literal, TypeVar
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.controller_table import ControllerTable, ReferenceKind
 from tiltsim.scenario.reference import Reference
-from tiltsim.scenario.rotorcraft import TiltServoTable
+from tiltsim.scenario.rotorcraft import ROTORCRAFT, TiltServoTable
 from tiltsim.scenario.table import Positive, default
 from tiltsim_controllers.analysis.stability import ErrorLoop, linear_loop
 from tiltsim_controllers.code.arrays import xp as xp
@@ -69,6 +69,8 @@ class Airframe:
         rotor_time_constant: Time constant of the rotors' lag, s; None for no lag.
         tilt_servo: The servos of its tilts.
         reference: The flight's ``[reference]`` table.
+        noise: Standard deviations of measured velocities (m/s) and body rates (rad/s), in the mean
+            of a second.
     """
 
     vehicle: Multirotor
@@ -87,6 +89,7 @@ class Airframe:
     rotor_time_constant: float | None
     tilt_servo: TiltServoTable
     reference: Reference
+    noise: tuple[float, float]
 
     @property
     def rotors(self) -> int:
@@ -97,7 +100,7 @@ class Airframe:
 class LawTable(ControllerTable):
     """The common part of the tables of laws, wherever the function comes from."""
 
-    vehicle_models = ("tiltrotor", "quadrotor", "multirotor")
+    vehicle_models = ROTORCRAFT
     reference_kinds: ClassVar[tuple[ReferenceKind, ...]] = ("position",)
     rotors_have_speeds = True
     damps_swing = True

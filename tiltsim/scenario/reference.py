@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from functools import lru_cache
 from itertools import pairwise
 from math import acos, cos, pi
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
@@ -32,7 +32,7 @@ from tiltsim.scenario.time_table import (
     reference_columns_among,
     rows_with_angles,
 )
-from tiltsim_controllers.mathematics.scalar import Triple, Values
+from tiltsim_controllers.mathematics.scalar import Values
 from tiltsim_controllers.references.trajectories import (
     POSES,
     ReferenceParameters,
@@ -83,6 +83,11 @@ class LissajousReference(PositionReference):
     angular_frequency: Vector3 = required("along x, y and z [rad/s]", [0.5, 1.0, 0.0])
     phase: Angles3 = default(ZEROS, "at time zero [rad]", [1.5708, 0.0, 0.0])
 
+    def _motion(self) -> dict[str, Any]:
+        motion = super()._motion()
+        motion["frequency"] = motion.pop("angular_frequency")
+        return motion
+
 
 class FigureEightReference(PositionReference):
     """A horizontal figure eight, from its crossing toward +x and +y; a 1:2 lissajous."""
@@ -93,12 +98,12 @@ class FigureEightReference(PositionReference):
     width: Positive = required("along y [m]", 2.0)
     angular_frequency: Positive = required("2 pi over the time once around [rad/s]", 0.5)
 
-    def _motion(self) -> dict[str, float | Triple]:
+    def _motion(self) -> dict[str, Any]:
         once = self.angular_frequency
         return {
             "position": self.position,
             "amplitude": (0.5 * self.length, 0.5 * self.width, 0.0),
-            "angular_frequency": (once, 2.0 * once, 0.0),
+            "frequency": (once, 2.0 * once, 0.0),
         }
 
 
@@ -116,7 +121,7 @@ class WaypointReference(PositionReference):
         "one per point, from 0; after the last the reference rests [s]", [0.0, 5.0]
     )
 
-    def _motion(self) -> dict[str, float | Triple]:
+    def _motion(self) -> dict[str, Any]:
         return {"segments": float(len(self.times))}
 
     @property
@@ -187,7 +192,7 @@ class TableReference(PositionReference, TimeTable):
     def parameters(self) -> ReferenceParameters:
         return super().parameters._replace(**{"type": POSES} if self.turns else {})
 
-    def _motion(self) -> dict[str, float | Triple]:
+    def _motion(self) -> dict[str, Any]:
         return {"segments": float(len(self.table))}
 
     @property
@@ -252,8 +257,8 @@ class AttitudeAltitudeReference(ReferenceTable):
     def kind(self) -> ReferenceKind:
         return "attitude_altitude"
 
-    def _motion(self) -> dict[str, float | Triple]:
-        return {"z": self.altitude}
+    def _motion(self) -> dict[str, Any]:
+        return {"position": (0.0, 0.0, self.altitude)}
 
 
 Reference = Annotated[

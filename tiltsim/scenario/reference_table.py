@@ -39,9 +39,6 @@ from tiltsim_controllers.references.trajectories import (
 
 Tilt = Annotated[float, Field(gt=-pi / 2, lt=pi / 2)]
 
-_PREFIXES: Final = {"position": "", "angular_frequency": "frequency_"}
-"""Beginnings of the fields of `ReferenceParameters` that hold a vector, unless they are its key."""
-
 
 class ReferenceTable(Table, ABC):
     """The keys and properties of every reference."""
@@ -55,19 +52,16 @@ class ReferenceTable(Table, ABC):
 
     @property
     def parameters(self) -> ReferenceParameters:
-        """The record that the law reads: keys by their names, vectors by their components."""
+        """The record that the law reads: keys by their names."""
         given = dict(self)
-        fields = {angle: given[angle] for angle in ("roll", "pitch", "yaw")}
-        fields["acceleration_feedforward"] = float(self.adds_acceleration)
-        for key, value in self._motion().items():
-            if isinstance(value, tuple):
-                prefix = _PREFIXES.get(key, f"{key}_")
-                fields |= {f"{prefix}{axis}": n for axis, n in zip("xyz", value, strict=True)}
-            else:
-                fields[key] = value
-        return ReferenceParameters(REFERENCE_TYPES[given["type"]], **fields)
+        return ReferenceParameters(
+            REFERENCE_TYPES[given["type"]],
+            **self._motion(),
+            **{angle: given[angle] for angle in ("roll", "pitch", "yaw")},
+            acceleration_feedforward=float(self.adds_acceleration),
+        )
 
-    def _motion(self) -> dict[str, float | Triple]:
+    def _motion(self) -> dict[str, Any]:
         """The parameters of the motion: by default all keys of the reference's own type."""
         shared = PositionReference.model_fields
         return {key: value for key, value in self if key not in shared}
@@ -135,8 +129,7 @@ class PositionReference(ReferenceTable):
         return "position" if self.roll == self.pitch == 0.0 else "pose"
 
 
-SPEEDING_UP: Final = 1.0
-"""s, to the speed of the approach; less where the object is near."""
+SPEEDING_UP: Final = 1.0  # s, to the speed of the approach; less where the object is near
 
 FROM_REST: Final = (0.0, 1.0, -3.0, 2.5, 0.0, 0.0, 0.0, 0.0)
 """A motion from rest to the speed 1 in the time 1, without a jerk at either end."""
@@ -289,7 +282,7 @@ class PushReference(PositionReference):
         further[:, 0] += first
         return [*rows, *further]
 
-    def _motion(self) -> dict[str, float | Triple]:
+    def _motion(self) -> dict[str, Any]:
         return {}
 
     @property

@@ -42,6 +42,10 @@ Limit = Annotated[float, Field(allow_inf_nan=True)]
 Range = Annotated[tuple[Limit, Limit], Field(strict=False)]
 
 
+Refusals = Iterator[tuple[str, str] | tuple[str, str, object]]
+"""Key and reason of each refusal, and a value where it is not the key's."""
+
+
 def example(**keys: Any) -> ConfigDict:
     """The configuration of a table with an example, for tables without required keys."""
     return ConfigDict(json_schema_extra={"examples": [keys]})

@@ -94,6 +94,7 @@ class VectoringController(Vectoring, FailureAwareController, TiltingTable, LawCo
             (servo.natural_frequency, servo.damping_ratio),
             (servo.max_rate or inf, servo.max_angle or inf),
             held_gain(self.tilt_rate_gain, airframe.control_timestep),
+            airframe.noise,
         )
         found = design(self, craft, timing, self.resolve_failure())
         reference, cone = airframe.reference, min(found[0].cone, LARGEST_LEAN)

@@ -15,9 +15,9 @@ from tiltsim.scenario import rotorcraft
 from tiltsim.scenario.gait import FixedGait
 from tiltsim.scenario.kinds import KINDS, tables_of
 from tiltsim.scenario.messages import InvalidValueError
-from tiltsim.scenario.rotorcraft import AnyVehicleTable, Refusals, RotorcraftTable, TiltServoTable
+from tiltsim.scenario.rotorcraft import AnyVehicleTable, RotorcraftTable, TiltServoTable
 from tiltsim.scenario.simulation_table import InitialTable
-from tiltsim.scenario.table import NotTiny, Positive, Table, default, example
+from tiltsim.scenario.table import NotTiny, Positive, Refusals, Table, default, example
 from tiltsim_controllers.mathematics.scalar import Values
 from tiltsim_controllers.vehicle.parameters import PRESETS, Vehicle
 
@@ -105,6 +105,10 @@ class VehicleTable(RotorcraftTable):
     @property
     def tilt_count(self) -> int:
         return 4 if self.model == "tiltrotor" else 0
+
+    @property
+    def cross(self) -> str:
+        return self.model
 
     @property
     def hinge_inertias(self) -> Values:

@@ -22,8 +22,7 @@ from tiltsim.simulation.simulate import TerminationMonitor, simulate_assembly
 from tiltsim_controllers.mathematics.records import flatten, record_size
 from tiltsim_controllers.mathematics.scalar import Floats
 
-MEMORY: Final = 256 * 2**20
-"""Bytes of the samples of all rows that fly together."""
+MEMORY: Final = 256 * 2**20  # bytes of the samples of all rows that fly together
 
 ROUND_ROWS: Final = 1024
 """Large numbers of rows are multiples of it; it also fits the caches of a core."""

@@ -77,30 +77,21 @@ OWN_KEYS: Final = {"omni_octorotor": {"controller.norm": "thrust"}}
 
 @dataclass(frozen=True)
 class Vehicle:
-    """A vehicle of the arena.
+    """A vehicle of the arena."""
 
-    Attributes:
-        tasks: Addresses of its tasks.
-        overrides: Values by dotted key that put this vehicle into the tasks.
-    """
-
-    tasks: tuple[str, ...]
-    overrides: Mapping[str, Any]
+    tasks: tuple[str, ...]  # addresses of its tasks
+    overrides: Mapping[str, Any]  # values by dotted key that put this vehicle into the tasks
 
 
 @dataclass(frozen=True)
 class Standing:
-    """The scores of one controller on the tasks of one vehicle.
+    """The scores of one controller on the tasks of one vehicle."""
 
-    Attributes:
-        controller: Its law, or `GIVEN`.
-        scores: By task, 0 to 100; None where the controller does not fit the task.
-        tuned: Scores with tuned gains; equal to `scores` where there are none.
-    """
-
-    controller: str
+    controller: str  # its law, or `GIVEN`
     scores: Mapping[str, float | None]
+    """By task, 0 to 100; None where the controller does not fit the task."""
     tuned: Mapping[str, float | None]
+    """Scores with tuned gains; equal to `scores` where there are none."""
 
     @property
     def total(self) -> float:
@@ -192,17 +183,11 @@ def fitting(vehicle: Vehicle) -> list[str]:
 
 
 class Match(NamedTuple):
-    """A flight of the arena.
+    """A flight of the arena."""
 
-    Attributes:
-        vehicle: Name.
-        place: Columns of its row: kind of gains, world and seed.
-        entry: Controller and task.
-    """
-
-    vehicle: str
-    place: Mapping[str, Any]
-    entry: Entry
+    vehicle: str  # name
+    place: Mapping[str, Any]  # columns of its row: kind of gains, world and seed
+    entry: Entry  # controller and task
 
 
 def matches(

@@ -32,18 +32,13 @@ WITHIN: Final = 1.0
 
 @dataclass(frozen=True)
 class Search:
-    """A value at which a controller is tried, in ever larger steps away from the true one.
+    """A value at which a controller is tried, in ever larger steps away from the true one."""
 
-    Attributes:
-        key: Key of the scenario; the values of the latency are control periods.
-        start, stop, step, tolerance: See `tiltsim.sweeps.chunks.boundary`.
-    """
-
-    key: str
-    start: float
-    stop: float
-    step: float
-    tolerance: float
+    key: str  # key of the scenario; the values of the latency are control periods
+    start: float  # see `tiltsim.sweeps.chunks.boundary`
+    stop: float  # see `tiltsim.sweeps.chunks.boundary`
+    step: float  # see `tiltsim.sweeps.chunks.boundary`
+    tolerance: float  # see `tiltsim.sweeps.chunks.boundary`
 
 
 SEARCHES: Final = {
@@ -81,35 +76,23 @@ SCALES: Final = ("idle_position_error", "idle_yaw_error", "peak_rotor_speed")
 
 @dataclass(frozen=True)
 class Compared:
-    """One controller on one scenario.
+    """One controller on one scenario."""
 
-    Attributes:
-        row: The row that ``tiltsim compare --json`` prints.
-        time, error: Times of the samples, s, and distances from the reference, m, shape (N,).
-    """
-
-    row: dict[str, Any]
-    time: Floats
-    error: Floats
+    row: dict[str, Any]  # the row that ``tiltsim compare --json`` prints
+    time: Floats  # times of the samples, s, shape (N,)
+    error: Floats  # distances from the reference, m, shape (N,)
 
 
 @dataclass(frozen=True, eq=False)
 class Entry:
-    """One controller on one scenario, to be flown.
+    """One controller on one scenario, to be flown."""
 
-    Attributes:
-        address: Address of the scenario.
-        name: Name of the controller in the results.
-        table: Its keys in place of the scenario's ``[controller]``; empty for the scenario's own.
-        overrides: Further values by dotted key.
-        trusted: Whether to execute Python code that the flight names.
-    """
-
-    address: str
-    name: str
+    address: str  # address of the scenario
+    name: str  # name of the controller in the results
     table: Mapping[str, Any]
-    overrides: Mapping[str, Any]
-    trusted: bool = False
+    """Its keys in place of the scenario's ``[controller]``; empty for the scenario's own."""
+    overrides: Mapping[str, Any]  # further values by dotted key
+    trusted: bool = False  # whether to execute Python code that the flight names
 
     def scenario(self) -> Scenario:
         """The scenario under this controller. Raises InputError if it refuses the controller."""

@@ -9,17 +9,14 @@ STEP: Final = 0.25
 
 
 class Aim(NamedTuple):
-    """The errors that count in a task.
-
-    Attributes:
-        halves: Errors that alone halve the score, beside `HALF` or in place of its values: m, rad
-            and N, by measures of a row of ``compare``.
-        contact: Time (s) for which the vehicle has to touch an object; less is a share of the
-            score, so that a vehicle that never touches has none.
-    """
+    """The errors that count in a task."""
 
     halves: Mapping[str, float] = {}
+    """Errors that alone halve the score, beside `HALF` or in place of its values: m, rad and N, by
+    measures of a row of ``compare``."""
     contact: float = 0.0
+    """Time (s) for which the vehicle has to touch an object; less is a share of the score, so that
+    a vehicle that never touches has none."""
 
 
 HALF: Final = {"position_error": 0.1, "yaw_error": 0.1}

@@ -69,22 +69,14 @@ Path = tuple[str | int, ...]
 
 @dataclass(frozen=True)
 class Tuned:
-    """The result of a search for a controller of a vehicle.
+    """The result of a search for a controller of a vehicle."""
 
-    Attributes:
-        of: The controller's table before, empty for the tasks' own controller.
-        table: The keys of ``[controller]`` with the best gains.
-        factors: Factors on the default gains, by knob.
-        default_score, tuned_score: Means over the tuning tasks.
-        flights: Number of flights, at most the budget.
-    """
-
-    of: dict[str, Any]
-    table: dict[str, Any]
-    factors: dict[str, float]
-    default_score: float
-    tuned_score: float
-    flights: int
+    of: dict[str, Any]  # the controller's table before, empty for the tasks' own controller
+    table: dict[str, Any]  # the keys of ``[controller]`` with the best gains
+    factors: dict[str, float]  # factors on the default gains, by knob
+    default_score: float  # means over the tuning tasks
+    tuned_score: float  # means over the tuning tasks
+    flights: int  # number of flights, at most the budget
 
 
 class Search(NamedTuple):

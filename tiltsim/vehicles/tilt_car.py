@@ -7,30 +7,20 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from tiltsim.closed_loop.limits import (
-    HORIZONTAL_ERROR,
-    MAX_POSITION_ERROR,
-    MAX_ROTOR_SPEED,
-    ROTOR_SPEED,
-    first_limit,
-    horizontal_error,
-)
+from tiltsim.closed_loop.limits import limit_exceeded_of
 from tiltsim.closed_loop.loop import VehicleKind
 from tiltsim.models.parts import ExtraActuators, TiltServo, Visuals
 from tiltsim.scenario.scenario import FlightPlan, Scenario
 from tiltsim.system.text import Quantity
 from tiltsim.vehicles.spans import (
-    at_lower_limit,
     horizontal_error_metrics,
     in_last_second,
     mean_of,
     position_error,
-    saturation_metrics,
+    rotor_metrics,
     with_columns_metrics,
 )
-from tiltsim_controllers.code.arrays import traceable
 from tiltsim_controllers.mathematics.scalar import Floats, Vector
-from tiltsim_controllers.references.trajectories import ReferenceParameters
 from tiltsim_controllers.tilt_car.vehicle import counter_yaw_per_tilt
 
 if TYPE_CHECKING:
@@ -52,9 +42,6 @@ OBSERVED_FIELDS: Final = (
     "rotor_speed_2",
 )
 """A sample of any tilt-car after its time: both discs and the rotor speeds."""
-
-SPEED_1, SPEED_2 = 8, 9
-"""Where in a sample the rotor speeds lie."""
 
 COLUMNS: Final = {
     "time": Quantity("time", "s"),
@@ -82,17 +69,6 @@ COLUMNS: Final = {
 direction of the acceleration that the law wants or the reference has, each written as the angle
 nearest to ``direction``. ``input_split`` is ``omega_1^2 - omega_2^2``.
 """
-
-
-@traceable
-def tilt_car_limit_exceeded(
-    time: Any, values: Any, reference: ReferenceParameters, knots: Any, follows_position: Any
-) -> Any:
-    """The code of the first limit that a sample of the car exceeds, see `VehicleKind`."""
-    away = follows_position * horizontal_error(time, values, reference, knots)
-    spinning = enumerate(abs(values[SPEED_1 : SPEED_2 + 1]) > MAX_ROTOR_SPEED)
-    rotors = ((too_fast, ROTOR_SPEED + rotor) for rotor, too_fast in spinning)
-    return first_limit([(away > MAX_POSITION_ERROR, HORIZONTAL_ERROR), *rotors])
 
 
 def _thrusts(columns: Mapping[str, Floats], scenario: Scenario) -> dict[str, Floats]:
@@ -148,20 +124,16 @@ def tilt_car_metrics(
     timestep = scenario.simulation.timestep
     last_second = in_last_second(columns["time"], timestep)
     errors = {axis: columns[f"{axis}_ref"] - columns[axis] for axis in ("x", "y")}
-    speeds = np.array([columns["rotor_speed_1"], columns["rotor_speed_2"]])
     metrics = {
-        f"final_position_error_{axis}": mean_of(e, last_second) for axis, e in errors.items()
+        **position_error(*errors.values()),
+        **horizontal_error_metrics(columns, timestep),
+        **rotor_metrics(columns, scenario.vehicle),
+        "final_input_split": mean_of(columns["input_split"], last_second),
+        "final_yaw": mean_of(columns["yaw"], last_second),
     }
-    metrics |= position_error(*errors.values())
-    metrics |= horizontal_error_metrics(columns, timestep)
-    metrics |= {f"max_abs_error_{axis}": np.abs(e).max(axis=-1) for axis, e in errors.items()}
-    metrics["final_input_split"] = mean_of(columns["input_split"], last_second)
-    metrics["final_yaw"] = mean_of(columns["yaw"], last_second)
-    metrics["min_rotor_speed"] = speeds.min(axis=(0, -1))
-    metrics["max_rotor_speed"] = speeds.max(axis=(0, -1))
-    metrics["max_tilt_rate"] = np.abs(columns["alpha_rate"]).max(axis=-1)
-    # A thrust cannot pull: at rest a rotor is at its limit.
-    metrics |= saturation_metrics(columns["time"], at_lower_limit(speeds, 0.0))
+    for axis, error in errors.items():
+        metrics[f"final_position_error_{axis}"] = mean_of(error, last_second)
+        metrics[f"max_abs_error_{axis}"] = np.abs(error).max(axis=-1)
     return with_columns_metrics(metrics, columns)
 
 
@@ -171,7 +143,7 @@ TILT_CAR: Final = VehicleKind(
     thrusts=_thrusts,
     compile=_compile,
     initial_motion=_initial_motion,
-    limit_exceeded=tilt_car_limit_exceeded,
+    limit_exceeded=limit_exceeded_of(OBSERVED_FIELDS),
     metrics=tilt_car_metrics,
 )
 """The tilt-car."""

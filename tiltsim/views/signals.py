@@ -55,37 +55,22 @@ class Level(NamedTuple):
 
 @dataclass(frozen=True)
 class Signals:
-    """Signals of one unit, which share a panel.
+    """Signals of one unit, which share a panel."""
 
-    Attributes:
-        name: Name of the panel, and of its entity in Rerun, see `path`.
-        title, unit: Title of the panel and its unit.
-        lines, levels: Lines over time and horizontal lines.
-        bounds: Columns of the lowest and highest admissible value.
-        compared: Signals that Rerun compares between flights, one plot each.
-        detail: Description of the lines, between title and unit.
-        floor: Smallest range of the axis; 0 for the default in `FLOORS`.
-        settling: Time (s) at the start that the range ignores.
-        latest: Part (s) of flights more than twice as long that pages show; 0 for all.
-        moves: Whether it moves with the gait.
-        on_request: Whether pages show it only on request.
-        plotted: Whether the first tab of Rerun's plots has it.
-    """
-
-    name: str
-    title: str
-    unit: str
-    lines: Sequence[Signal]
-    levels: Sequence[Level] = ()
-    bounds: Sequence[str] = ()
-    compared: Sequence[Signal] = ()
-    detail: str = ""
-    floor: float = 0.0
-    settling: float = 0.0
-    latest: float = 0.0
-    moves: bool = False
-    on_request: bool = False
-    plotted: bool = True
+    name: str  # name of the panel, and of its entity in Rerun, see `path`
+    title: str  # title of the panel
+    unit: str  # unit of its axis
+    lines: Sequence[Signal]  # lines over time
+    levels: Sequence[Level] = ()  # horizontal lines
+    bounds: Sequence[str] = ()  # columns of the lowest and highest admissible value
+    compared: Sequence[Signal] = ()  # signals that Rerun compares between flights, one plot each
+    detail: str = ""  # description of the lines, between title and unit
+    floor: float = 0.0  # smallest range of the axis; 0 for the default in `FLOORS`
+    settling: float = 0.0  # time (s) at the start that the range ignores
+    latest: float = 0.0  # part (s) of flights more than twice as long that pages show; 0 for all
+    moves: bool = False  # whether it moves with the gait
+    on_request: bool = False  # whether pages show it only on request
+    plotted: bool = True  # whether the first tab of Rerun's plots has it
 
     @property
     def path(self) -> str:
@@ -209,9 +194,8 @@ def _chosen(assembly: Assembly) -> Iterator[Signals]:
     if "direction" in units:
         yield from _direction(assembly)
     elif rotors := assembly.loop.kind.rotors:
-        craft = scenario.any_rotorcraft
-        limits = {"min": craft.min_rotor_speed, "max": craft.max_rotor_speed}
-        levels = [Level(name, f"{name} limit", at) for name, at in limits.items() if at is not None]
+        limits = zip(("min", "max"), scenario.vehicle.rotor_range, strict=True)
+        levels = [Level(name, f"{name} limit", at) for name, at in limits if at is not None]
         lines = [Signal(f"rotor_{i}", f"{i}", partial(along_spin, rotor=i)) for i in rotors]
         slowest = [Signal("slowest", "Slowest rotor and limits", along_spin)]
         about: dict[str, Any] = {"detail": "along the spin", "floor": 20.0, "moves": True}
@@ -286,7 +270,7 @@ def squared_speed(flight: Flight, rotor: int) -> Floats:
 
 def along_spin(flight: Flight, rotor: int = 0) -> Floats:
     """The speed of a rotor, or else of the slowest one, along its spin, rad/s."""
-    speeds = np.array(flight.scenario.any_rotorcraft.spins) * flight["rotor_speeds"]
+    speeds = np.array(flight.scenario.vehicle.spins) * flight["rotor_speeds"]
     return np.asarray(speeds[:, rotor - 1] if rotor else speeds.min(axis=1))
 
 

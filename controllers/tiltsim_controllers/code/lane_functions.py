@@ -223,15 +223,10 @@ def _sides(name: str, x: InputVector, leg: Callable[[Number], Double]) -> tuple[
 
 
 class LaneFunctions(NamedTuple):
-    """Functions that are computed together.
+    """Functions that are computed together."""
 
-    Attributes:
-        names: Names of the C library's functions.
-        largest_error: Bound of the C library's error, in units in the last place.
-    """
-
-    names: tuple[str, ...]
-    largest_error: float
+    names: tuple[str, ...]  # names of the C library's functions
+    largest_error: float  # bound of the C library's error, in units in the last place
 
 
 PROGRAMS: Final = {

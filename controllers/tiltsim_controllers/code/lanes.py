@@ -17,16 +17,13 @@ LaneMath = Literal["library", "exact", "quick"]
 
 @dataclass(frozen=True)
 class Lanes:
-    """Lanes of the vectors in LLVM text; one lane stands for plain numbers.
-
-    Attributes:
-        count: Number of lanes. Entry i of lane k of a vector lies at i * count + k.
-        functions: Sines and their inverses: the C library's, one lane at a time; or
-            `tiltsim_controllers.code.lane_functions`, with equal bits or quick ones.
-    """
+    """Lanes of the vectors in LLVM text; one lane stands for plain numbers."""
 
     count: int = 1
+    """Number of lanes. Entry i of lane k of a vector lies at i * count + k."""
     functions: LaneMath = "library"
+    """Sines and their inverses: the C library's, one lane at a time; or
+    `tiltsim_controllers.code.lane_functions`, with equal bits or quick ones."""
 
     @property
     def number(self) -> str:

@@ -45,20 +45,16 @@ def uniform(seed: float, channel: float, index: float) -> float:
 
 
 class Operation(NamedTuple):
-    """One operation on numbers.
-
-    Attributes:
-        ufunc: NumPy's function, by which arrays of traced numbers find it; None without one.
-        python: Expression in Python; ``{}`` stands for an argument.
-        llvm: Instruction, in which ``{T}`` is the type of numbers and ``{B}`` the type of
-            conditions; the name of an intrinsic; or else the name of a function of the C library.
-        value: The operation on floats. It returns the result of IEEE 754 where Python raises.
-    """
+    """One operation on numbers."""
 
     ufunc: np.ufunc | None
-    python: str
+    """NumPy's function, by which arrays of traced numbers find it; None without one."""
+    python: str  # expression in Python; ``{}`` stands for an argument
     llvm: str
+    """Instruction, in which ``{T}`` is the type of numbers and ``{B}`` the type of conditions; the
+    name of an intrinsic; or else the name of a function of the C library."""
     value: Callable[..., Any]
+    """The operation on floats. It returns the result of IEEE 754 where Python raises."""
 
 
 def _ieee(python: Callable[..., Any], ufunc: np.ufunc) -> Callable[..., float]:

@@ -18,15 +18,10 @@ class Input(NamedTuple):
 
 
 class Program(NamedTuple):
-    """A traced function.
+    """A traced function."""
 
-    Attributes:
-        inputs: Its arguments.
-        block: Its operations; their results are the program's, in order.
-    """
-
-    inputs: tuple[Input, ...]
-    block: Block
+    inputs: tuple[Input, ...]  # its arguments
+    block: Block  # its operations; their results are the program's, in order
 
     def __len__(self) -> int:
         """Number of operations."""

@@ -20,17 +20,7 @@ Number = Any
 
 
 class Expr:
-    """A number that is unknown while a function is traced.
-
-    Attributes:
-        op: Its operation: a name of `OPERATIONS`; "in" for an input; "take" for an entry of a
-            vector; "branch", "loop", "get" and "phi" for blocks, see
-            `tiltsim_controllers.code.arrays`.
-        args: Arguments of the operation: symbolic numbers, floats or bools.
-        number: Its place in the graph.
-        blocks: Operations within it.
-        place: File and line of the code that made it.
-    """
+    """A number that is unknown while a function is traced."""
 
     __slots__ = ("args", "blocks", "number", "op", "place")
     __array_ufunc__ = None  # NumPy leaves operators to this class

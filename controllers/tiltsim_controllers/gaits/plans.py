@@ -44,20 +44,13 @@ _AFTER: Final = 1.0 + 2.0**-52
 
 @dataclass(frozen=True)
 class Gait:
-    """A gait ready to be flown.
+    """A gait ready to be flown."""
 
-    Attributes:
-        name: Name of the gait.
-        parameters, knots: Arguments of `planned_tilts`.
-        source: Where it comes from.
-        tilts: Number of tilt angles.
-    """
-
-    name: str
-    parameters: GaitParameters
-    knots: tuple[float, ...] = NO_KNOTS
-    source: str = ""
-    tilts: int = 4
+    name: str  # name of the gait
+    parameters: GaitParameters  # first argument of `planned_tilts`
+    knots: tuple[float, ...] = NO_KNOTS  # its table data
+    source: str = ""  # where it comes from
+    tilts: int = 4  # number of tilt angles
 
     @property
     def is_constant(self) -> bool:

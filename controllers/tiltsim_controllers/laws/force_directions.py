@@ -21,19 +21,12 @@ SIDE = (0.0, 1.0, 0.0)
 
 
 class Factors(NamedTuple):
-    """Orthogonal factors of the decoupling matrix of N rotors and D components of force.
+    """Orthogonal factors of the decoupling matrix of N rotors and D components of force."""
 
-    Attributes:
-        axes: Directions of the force, body axes, shape (D, 3).
-        rows: The force along them per unknown, shape (D, N).
-        units: Orthonormal rows that span the torque, then also these, 3 + D of shape (N,).
-        direction: See this module, body axes, shape (3,).
-    """
-
-    axes: Any
-    rows: Any
-    units: Any
-    direction: Any
+    axes: Any  # directions of the force, body axes, shape (D, 3)
+    rows: Any  # the force along them per unknown, shape (D, N)
+    units: Any  # orthonormal rows that span the torque, then also these, 3 + D of shape (N,)
+    direction: Any  # see this module, body axes, shape (3,)
 
 
 def unit_vector(vector: Any) -> Any:

@@ -89,21 +89,13 @@ SIGNALS: Final = ("roll_ref", "pitch_ref", "yaw_ref", NULL_PART)
 
 
 class Present(NamedTuple):
-    """The vehicle as the law sees it.
+    """The vehicle as the law sees it."""
 
-    Attributes:
-        state: State of the vehicle.
-        rotation: Body to world, shape (3, 3).
-        omega_rate: Rates of the body rates, rad/s^2, shape (3,).
-        specific: Force per mass, m/s^2, body axes, with its rate by the motion of the pods.
-        direction: The ``direction`` of `force_directions`, moving or not.
-    """
-
-    state: RotorcraftState
-    rotation: Any
-    omega_rate: Any
-    specific: Moving
-    direction: Any
+    state: RotorcraftState  # state of the vehicle
+    rotation: Any  # body to world, shape (3, 3)
+    omega_rate: Any  # rates of the body rates, rad/s^2, shape (3,)
+    specific: Moving  # force per mass, m/s^2, body axes, with its rate by the motion of the pods
+    direction: Any  # the ``direction`` of `force_directions`, moving or not
 
 
 def _target(time: Any, parameters: Any, knots: Any) -> tuple[Moving, Moving, Moving]:

@@ -163,15 +163,10 @@ def turned(time: Any, angle: Any, duration: Any) -> Any:
 
 
 class Tracking(NamedTuple):
-    """Motion to track, world axes.
+    """Motion to track, world axes."""
 
-    Attributes:
-        error: Position error, m.
-        acceleration: Acceleration of the reference, m/s^2, as far as the law passes it on.
-    """
-
-    error: Moving
-    acceleration: Moving
+    error: Moving  # position error, m
+    acceleration: Moving  # acceleration of the reference, m/s^2, as far as the law passes it on
 
 
 def tracking(now: RotorcraftState, reference: Any, specific: Any, parameters: Any) -> Tracking:

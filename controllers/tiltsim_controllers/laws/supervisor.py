@@ -132,19 +132,12 @@ def turned_along(up: Any, start: Any, end: Any) -> Any:
 
 
 class Supervised(NamedTuple):
-    """A supervisor in a flight: how far a vehicle is from its thresholds.
+    """A supervisor in a flight: how far a vehicle is from its thresholds."""
 
-    Attributes:
-        assess: See `Supervision`.
-        supervisor: Thresholds.
-        vehicle: Parameters of the vehicle.
-        knots: Table data of the flight.
-    """
-
-    assess: Callable[..., tuple[Any, Any, Any]]
-    supervisor: Supervisor
-    vehicle: Any
-    knots: Any
+    assess: Callable[..., tuple[Any, Any, Any]]  # see `Supervision`
+    supervisor: Supervisor  # thresholds
+    vehicle: Any  # parameters of the vehicle
+    knots: Any  # table data of the flight
 
     def look(self, tilts: Any, up: Any) -> tuple[Any, Any]:
         """Clearance, and the direction in which the vehicle hovers."""
@@ -209,20 +202,16 @@ class Supervision(NamedTuple):
 
     ``vehicle`` holds the parameters that ``assess`` needs beside the ``knots``. Tilt angles, shape
     (M,), roll and pitch are in rad.
-
-    Attributes:
-        tilt_count: M.
-        watched: ``(time, parameters)``: the ``vehicle``, from the parameters of a law.
-        assess: ``(tilts, up, vehicle, knots)``: margin (rad), determinant (`UNTILTED` at best), and
-            the direction (body axes, of any length and sense) that keeps its attitude in hover;
-            ``up`` is world up in body axes.
-        way_back: The gait to which the tilts can return.
     """
 
-    tilt_count: int
+    tilt_count: int  # M
     watched: Callable[..., Any]
+    """``(time, parameters)``: the ``vehicle``, from the parameters of a law."""
     assess: Callable[..., tuple[Any, Any, Any]]
-    way_back: WayBack = NO_WAY_BACK
+    """``(tilts, up, vehicle, knots)``: margin (rad), determinant (`UNTILTED` at best), and the
+    direction (body axes, of any length and sense) that keeps its attitude in hover; ``up`` is
+    world up in body axes."""
+    way_back: WayBack = NO_WAY_BACK  # the gait to which the tilts can return
 
     @traceable
     def gait_scale(

@@ -18,17 +18,11 @@ from tiltsim_controllers.mathematics.linear import cross as plain_cross
 
 @dataclass(frozen=True, slots=True)
 class Moving:
-    """A number, vector or matrix that moves.
+    """A number, vector or matrix that moves."""
 
-    Attributes:
-        value: At this time.
-        rate: Its time derivative.
-        acceleration: The second one.
-    """
-
-    value: Any
-    rate: Any
-    acceleration: Any
+    value: Any  # at this time
+    rate: Any  # its time derivative
+    acceleration: Any  # the second one
 
     __array_ufunc__ = None  # arrays leave operators to this class
 

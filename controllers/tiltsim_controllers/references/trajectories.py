@@ -15,8 +15,11 @@ from typing import Any, Final, NamedTuple
 from tiltsim_controllers.code.arrays import is_known, traceable, xp
 from tiltsim_controllers.gaits.motion import NO_KNOTS
 from tiltsim_controllers.mathematics.attitude import wrapped
+from tiltsim_controllers.mathematics.records import Vector3
 from tiltsim_controllers.mathematics.scalar import Values
 from tiltsim_controllers.mathematics.splines import piece_at, polynomial_derivatives, spline_knots
+
+_ZEROS: Final = (0.0, 0.0, 0.0)
 
 COEFFICIENTS: Final = 8
 """Coefficients of a polynomial of degree seven, highest power first."""
@@ -107,32 +110,20 @@ class ReferenceParameters(NamedTuple):
     """Parameters of a reference; each type reads the fields it needs."""
 
     type: float
-    x: float = 0.0  # m: set-point, start of the line, center of circle and lissajous
-    y: float = 0.0
-    z: float = 0.0
-    velocity_x: float = 0.0  # m/s, line
-    velocity_y: float = 0.0
-    velocity_z: float = 0.0
+    position: Vector3 = _ZEROS  # m: set-point, start of the line, center of circle and lissajous
+    velocity: Vector3 = _ZEROS  # m/s, line
+    acceleration: Vector3 = _ZEROS  # m/s^2, line
     radius: float = 0.0  # m, circle
     angular_frequency: float = 0.0  # rad/s, circle
+    amplitude: Vector3 = _ZEROS  # m, lissajous
+    frequency: Vector3 = _ZEROS  # rad/s, lissajous
+    phase: Vector3 = _ZEROS  # rad, lissajous
+    segments: float = 0.0  # number of segments in the knots, waypoints and table
+    offset: float = 0.0  # index of their first knot, waypoints
     roll: float = 0.0  # rad, all types but poses
     pitch: float = 0.0
     yaw: float = 0.0
     acceleration_feedforward: float = 0.0  # 1 or 0: whether the controller gets the acceleration
-    amplitude_x: float = 0.0  # m, lissajous
-    amplitude_y: float = 0.0
-    amplitude_z: float = 0.0
-    frequency_x: float = 0.0  # rad/s, lissajous
-    frequency_y: float = 0.0
-    frequency_z: float = 0.0
-    phase_x: float = 0.0  # rad, lissajous
-    phase_y: float = 0.0
-    phase_z: float = 0.0
-    segments: float = 0.0  # number of segments in the knots, waypoints and table
-    offset: float = 0.0  # index of their first knot, waypoints
-    acceleration_x: float = 0.0  # m/s^2, line
-    acceleration_y: float = 0.0
-    acceleration_z: float = 0.0
 
 
 def reference_motion(time: Any, reference: ReferenceParameters, knots: Any = NO_KNOTS) -> Any:
@@ -152,7 +143,7 @@ def reference_motion(time: Any, reference: ReferenceParameters, knots: Any = NO_
         return waypoint_motion(time, r.segments, r.offset, knots)
     if r.type == POSES:
         return waypoint_motion(time, r.segments, r.offset, knots, 6)[:, :3]
-    start, rest = xp.array([r.x, r.y, r.z]), xp.zeros(3)
+    start, rest = xp.array(r.position), xp.zeros(3)
     if r.type == SETPOINT:
         return xp.array([start, rest, rest, rest, rest])
     if r.type in (CIRCLE, LISSAJOUS):
@@ -161,9 +152,7 @@ def reference_motion(time: Any, reference: ReferenceParameters, knots: Any = NO_
             turning, phase = xp.array([r.angular_frequency] * 3), xp.zeros(3)
             quarter = xp.array([1.0, 0.0, 0.0])  # x is a cosine
         else:
-            amplitude = xp.array([r.amplitude_x, r.amplitude_y, r.amplitude_z])
-            turning = xp.array([r.frequency_x, r.frequency_y, r.frequency_z])
-            phase = xp.array([r.phase_x, r.phase_y, r.phase_z])
+            amplitude, turning, phase = map(xp.array, (r.amplitude, r.frequency, r.phase))
             quarter = rest
         sine, cosine = xp.sin(turning * time + phase), xp.cos(turning * time + phase)
         along = amplitude * (quarter * cosine + (1.0 - quarter) * sine)
@@ -172,8 +161,7 @@ def reference_motion(time: Any, reference: ReferenceParameters, knots: Any = NO_
         return xp.array(
             [start + along, across, -square * along, -square * across, square * square * along]
         )
-    velocity = xp.array([r.velocity_x, r.velocity_y, r.velocity_z])
-    acceleration = xp.array([r.acceleration_x, r.acceleration_y, r.acceleration_z])
+    velocity, acceleration = xp.array(r.velocity), xp.array(r.acceleration)
     position = start + velocity * time + acceleration * (0.5 * time * time)
     return xp.array([position, velocity + acceleration * time, acceleration, rest, rest])
 

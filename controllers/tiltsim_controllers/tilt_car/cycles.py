@@ -105,19 +105,12 @@ STEPS = 64
 
 @dataclass(frozen=True)
 class Swing:
-    """A penguin swing under the controller of ch. 11.
+    """A penguin swing under the controller of ch. 11."""
 
-    Attributes:
-        half_angle: ``theta``, rad
-        half_period: ``T / 2``, s
-        gains: of the controller
-        reference_acceleration: along x, m/s^2
-    """
-
-    half_angle: float
-    half_period: float
+    half_angle: float  # ``theta``, rad
+    half_period: float  # ``T / 2``, s
     gains: Any  # of `planned_direction`
-    reference_acceleration: float = 1.0
+    reference_acceleration: float = 1.0  # along x, m/s^2
 
     @property
     def direction(self) -> float:
@@ -251,19 +244,13 @@ def lyapunov_growth(swing: Swing, state: Pair) -> float:
 
 @dataclass(frozen=True)
 class LyapunovBound:
-    """Proposition 7 in numbers.
-
-    Attributes:
-        critical: ``L_critical``: the largest candidate from which the next half period may still
-            raise it.
-        largest_gain: the largest growth over a half period; the chapter rounds it up to 3/4 (Eq.
-            71).
-        at: the state of ``L_critical``
-    """
+    """Proposition 7 in numbers."""
 
     critical: float
+    """``L_critical``: the largest candidate from which the next half period may still raise it."""
     largest_gain: float
-    at: Pair
+    """The largest growth over a half period; the chapter rounds it up to 3/4 (Eq. 71)."""
+    at: Pair  # the state of ``L_critical``
 
     @property
     def published(self) -> float:

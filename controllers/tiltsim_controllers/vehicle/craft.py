@@ -47,29 +47,18 @@ from tiltsim_controllers.vehicle.rotors import (
 
 
 class Craft(NamedTuple):
-    """A rigid body with N rotors, on M tilting pods or fixed, in body axes.
+    """A rigid body with N rotors, on M tilting pods or fixed, in body axes."""
 
-    Attributes:
-        body: Mass and inertia.
-        rotors: Their forces and torques.
-        places: From the center of mass, m, constant, cosine and sine of the tilt angle: shape
-            (3, 3, N).
-        axes: Thrust axes, as ``places``, dimensionless.
-        thrusts: Coefficients K_f, N s^2/rad^2, shape (N,).
-        along_hinges: Components of the thrust axes along their hinges, equal at all tilts, shape
-            (N,).
-        hinge_loads: See `Rotor.hinge_load`, shape (N,).
-        hinges: Unit vectors along the hinges, shape (M, 3).
-    """
-
-    body: Body
-    rotors: Rotors
+    body: Body  # mass and inertia
+    rotors: Rotors  # their forces and torques
     places: Any
-    axes: Any
-    thrusts: Any
+    """From the center of mass, m, constant, cosine and sine of the tilt angle: shape (3, 3, N)."""
+    axes: Any  # thrust axes, as ``places``, dimensionless
+    thrusts: Any  # coefficients K_f, N s^2/rad^2, shape (N,)
     along_hinges: Any
-    hinge_loads: Any
-    hinges: Any
+    """Components of the thrust axes along their hinges, equal at all tilts, shape (N,)."""
+    hinge_loads: Any  # see `Rotor.hinge_load`, shape (N,)
+    hinges: Any  # unit vectors along the hinges, shape (M, 3)
 
 
 @cache

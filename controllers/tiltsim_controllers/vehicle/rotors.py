@@ -157,20 +157,13 @@ def force_and_torque(table: Sequence[float], tilts: ArrayLike = ()) -> tuple[Flo
 
 
 class Rotors(NamedTuple):
-    """The rotors of a vehicle, N of them on M tilting pods or fixed.
+    """The rotors of a vehicle, N of them on M tilting pods or fixed."""
 
-    Attributes:
-        tilt_of_rotor: The number of each rotor's tilt, from 0; -1 for a fixed rotor.
-        spins: Signs of the speeds with which they push along their axes, shape (N,).
-        constant, cosine, sine: Force (N) and torque (N m) in body axes per unit of ``w``
-            ((rad/s)^2), shape (6, N) each.
-    """
-
-    tilt_of_rotor: TiltOfRotor
-    spins: Any
-    constant: Any
-    cosine: Any
-    sine: Any
+    tilt_of_rotor: TiltOfRotor  # the number of each rotor's tilt, from 0; -1 for a fixed rotor
+    spins: Any  # signs of the speeds with which they push along their axes, shape (N,)
+    constant: Any  # force (N) and torque (N m), body axes, per unit of ``w`` ((rad/s)^2), (6, N)
+    cosine: Any  # likewise, times the cosine of the tilt, shape (6, N)
+    sine: Any  # likewise, times its sine, shape (6, N)
 
     def masked(self, works: Any) -> Rotors:
         """Rotors with their force and torque multiplied by 1 or 0, shape (N,)."""

@@ -29,7 +29,6 @@ from tiltsim_controllers.vehicle.parameters import PRESETS, SPIN, drag_ratio
 AR_DRONE = PRESETS["ar_drone_2"]
 STATES = 25  # random states for each combination
 TIME = 3.7
-ACCELERATIONS = ("acceleration_x", "acceleration_y", "acceleration_z")
 POSITION_DECOUPLERS = ("conventional", "modified", "exact")
 
 
@@ -101,12 +100,10 @@ def random_case(seed, decoupling, decoupler):
         gait=GaitParameters(FIXED),
         reference=ReferenceParameters(
             REFERENCE_TYPES[kind],
-            *spread(3, 0.05),
-            *spread(3, 0.05),
+            *map(tuple, (spread(3, 0.05), spread(3, 0.05), spread(3, 0.2))),
             *random.uniform(0.1, 0.3, 2),
-            *spread(3, 0.4),
+            **dict(zip(("roll", "pitch", "yaw"), spread(3, 0.4))),
             acceleration_feedforward=float(random.integers(2)),
-            **dict(zip(ACCELERATIONS, spread(3, 0.2))),
         ),
         supervisor=Supervisor(),
         limits=RotorRange(),
@@ -127,15 +124,14 @@ def random_case(seed, decoupling, decoupler):
 
 def reference_motion(reference):
     """Position, velocity, acceleration to track: ch. 4, Eqs. (42)-(44)."""
-    centre = np.array([reference.x, reference.y, reference.z])
+    centre = np.array(reference.position)
     if reference.type == REFERENCE_TYPES["circle"]:
         rate, radius = reference.angular_frequency, reference.radius
         turn = rotation(0, 0, rate * TIME)
         out = turn @ [radius, 0, 0]
         passed_on = reference.acceleration_feedforward
         return centre + out, rate * turn @ [0, radius, 0], -passed_on * rate**2 * out
-    velocity = np.array([reference.velocity_x, reference.velocity_y, reference.velocity_z])
-    steady = np.array([getattr(reference, name) for name in ACCELERATIONS])
+    velocity, steady = np.array(reference.velocity), np.array(reference.acceleration)
     position = centre + velocity * TIME + 0.5 * steady * TIME**2
     return position, velocity + steady * TIME, reference.acceleration_feedforward * steady
 
@@ -223,7 +219,7 @@ def test_hover_at_the_setpoint_needs_no_rotor_acceleration(decoupling, decoupler
         vehicle=AR_DRONE,
         gains=GAIN_SETS["ch04"],
         gait=GaitParameters(FIXED),
-        reference=ReferenceParameters(REFERENCE_TYPES["setpoint"], 1.0, 2.0, 3.0, yaw=0.3),
+        reference=ReferenceParameters(REFERENCE_TYPES["setpoint"], (1.0, 2.0, 3.0), yaw=0.3),
         supervisor=Supervisor(),
         limits=RotorRange(),
         decoupler=DECOUPLERS[decoupler],

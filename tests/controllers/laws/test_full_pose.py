@@ -365,7 +365,7 @@ def test_machine_code_gives_the_same_inputs(weight):
 # --- any rotors --------------------------------------------------------------------------------
 
 ON_CIRCLE = ReferenceParameters(
-    CIRCLE, x=0.3, y=-0.2, z=0.1, radius=2.0, angular_frequency=0.5, yaw=0.4
+    CIRCLE, (0.3, -0.2, 0.1), radius=2.0, angular_frequency=0.5, yaw=0.4
 )
 
 

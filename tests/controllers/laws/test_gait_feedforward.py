@@ -157,7 +157,9 @@ def test_body_jerk_is_the_second_derivative_of_the_body_rates():
 GAINS, INTEGRAL = gains_from_poles(
     Poles(20.0, 0.8), Poles(10.0), Poles(8.0, 1.0, 0.5), Poles(1.5, 0.9, 0.4)
 )
-HOVER = ReferenceParameters(REFERENCE_TYPES["attitude_altitude"], z=0.1, roll=0.05, yaw=-0.1)
+HOVER = ReferenceParameters(
+    REFERENCE_TYPES["attitude_altitude"], (0.0, 0.0, 0.1), roll=0.05, yaw=-0.1
+)
 
 
 def parameters(**changed):
@@ -242,11 +244,11 @@ def demanded(state, law, integral_z):
     desired = (law.reference.roll, law.reference.pitch, law.reference.yaw)
     attitude = [
         k3 * (desired[i] - state[6 + i]) - k2 * rates[i] - k1 * now[i]
-        for i, (k1, k2, k3) in enumerate((gains[0:3], gains[3:6], gains[6:9]))
+        for i, (k1, k2, k3) in enumerate(gains.attitude.T)
     ]
-    k1, k2, k3 = gains[9:12]
+    k1, k2, k3 = gains.altitude
     climb = (
-        k3 * (law.reference.z - state[2])
+        k3 * (law.reference.position[2] - state[2])
         - k2 * state[5]
         - k1 * now[3]
         + law.integral.altitude * integral_z
@@ -277,7 +279,7 @@ def test_each_term_of_the_linearization_is_needed_for_that(term):
 
 
 def test_hover_on_the_reference_needs_nothing():
-    law = parameters(reference=ReferenceParameters(REFERENCE_TYPES["setpoint"], 1.0, 2.0, 3.0))
+    law = parameters(reference=ReferenceParameters(REFERENCE_TYPES["setpoint"], (1.0, 2.0, 3.0)))
     law = law._replace(decoupler=DECOUPLERS["exact"])
     speeds = [VEHICLE.hover_rotor_speed * sign for sign in SPIN]
     state = (1.0, 2.0, 3.0, *[0.0] * 13, *speeds)

@@ -56,7 +56,7 @@ from tiltsim_controllers.vehicle.rotors import (
 )
 
 ON_CIRCLE = ReferenceParameters(
-    CIRCLE, x=0.3, y=-0.2, z=0.1, radius=2.0, angular_frequency=0.5, yaw=0.4,
+    CIRCLE, (0.3, -0.2, 0.1), radius=2.0, angular_frequency=0.5, yaw=0.4,
     acceleration_feedforward=1.0,
 )  # fmt: skip
 AS_PUBLISHED = FeedforwardTerms(0.0, 0.0, 1.0, 0.0, 0.0, 0.0)

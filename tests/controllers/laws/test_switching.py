@@ -37,7 +37,7 @@ def parameters(extension, roll=0.01, pitch=0.0, gains="ch02"):
     """Sec. 5's set-up; ``pitch`` is ch. 2's, of the other sign here."""
     reference = ReferenceParameters(
         REFERENCE_TYPES["circle"],
-        *(1.0, 0.0, 0.0),
+        (1.0, 0.0, 0.0),
         radius=-1.0,
         angular_frequency=-1 / 20,
         roll=roll,
@@ -73,7 +73,7 @@ def outputs_rates(state, inputs):
 def test_the_outputs_move_as_appendix_b_demands():
     random = np.random.default_rng(1)
     reference = ReferenceParameters(
-        REFERENCE_TYPES["attitude_altitude"], z=0.4, roll=0.2, pitch=-0.1, yaw=0.3
+        REFERENCE_TYPES["attitude_altitude"], (0.0, 0.0, 0.4), roll=0.2, pitch=-0.1, yaw=0.3
     )
     target = np.array([0.2, -0.1, 0.3, 0.4])
     for _ in range(CASES):
@@ -138,7 +138,10 @@ def test_each_law_flies_in_its_zone(extension):
 
 
 RISING_AND_FALLING = ReferenceParameters(
-    REFERENCE_TYPES["lissajous"], amplitude_z=0.5, frequency_z=2.0, phase_z=1.0
+    REFERENCE_TYPES["lissajous"],
+    amplitude=(0.0, 0.0, 0.5),
+    frequency=(0.0, 0.0, 2.0),
+    phase=(0.0, 0.0, 1.0),
 )
 
 

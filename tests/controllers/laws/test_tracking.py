@@ -35,29 +35,19 @@ GAIT = keyframes(
 )
 PATH = ReferenceParameters(
     REFERENCE_TYPES["lissajous"],
-    x=0.2,
-    y=-0.1,
-    z=0.3,
+    (0.2, -0.1, 0.3),
     yaw=0.2,
-    amplitude_x=0.8,
-    amplitude_y=0.6,
-    amplitude_z=0.3,
-    frequency_x=1.1,
-    frequency_y=1.4,
-    frequency_z=0.9,
-    phase_x=0.3,
-    phase_y=1.2,
-    phase_z=-0.5,
+    amplitude=(0.8, 0.6, 0.3),
+    frequency=(1.1, 1.4, 0.9),
+    phase=(0.3, 1.2, -0.5),
 )
 
 
 def reference(t, order):
     """A derivative of the reference's position."""
-    amplitude = np.array([PATH.amplitude_x, PATH.amplitude_y, PATH.amplitude_z])
-    frequency = np.array([PATH.frequency_x, PATH.frequency_y, PATH.frequency_z])
-    phase = np.array([PATH.phase_x, PATH.phase_y, PATH.phase_z])
+    amplitude, frequency, phase = map(np.array, (PATH.amplitude, PATH.frequency, PATH.phase))
     wave = amplitude * frequency**order * np.sin(frequency * t + phase + order * np.pi / 2)
-    return wave + (np.array([PATH.x, PATH.y, PATH.z]) if order == 0 else 0.0)
+    return wave + (np.array(PATH.position) if order == 0 else 0.0)
 
 
 def direction(t):

@@ -34,7 +34,7 @@ CASES = 20
 
 # x = 1 - cos(t/20), y = -sin(t/20) in ch. 2's axes; y has the other sign in ours.
 CIRCLE = ReferenceParameters(
-    REFERENCE_TYPES["circle"], 1.0, 0.0, 0.0, radius=-1.0, angular_frequency=-1 / 20
+    REFERENCE_TYPES["circle"], (1.0, 0.0, 0.0), radius=-1.0, angular_frequency=-1 / 20
 )
 START = (*[0.0] * 6, 0.5, -0.5, 0.0, 0.0, 0.0, 0.0, WEIGHT, 0.0)  # (0.5, 0.5, 0) in ch. 2's axes
 
@@ -208,7 +208,9 @@ def test_inputs_are_nan_where_the_matrix_is_singular(change):
 def test_the_reference_derivatives_are_derivatives():
     for kind in ("circle", "line", "setpoint"):
         reference = ReferenceParameters(
-            REFERENCE_TYPES[kind], 0.3, -0.2, 1.0, 0.5, 0.1, -0.3, radius=2.0, angular_frequency=0.7
+            *(REFERENCE_TYPES[kind], (0.3, -0.2, 1.0), (0.5, 0.1, -0.3)),
+            radius=2.0,
+            angular_frequency=0.7,
         )
         h = 1e-4
         before, now, after = (reference_motion(1.3 + k * h, reference) for k in (-1, 0, 1))

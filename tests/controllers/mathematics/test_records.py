@@ -49,10 +49,10 @@ def numbered(record_type):
 
 def assert_reads_alike(struct, record):
     for name, value in zip(record._fields, record, strict=True):
-        if isinstance(value, tuple):
+        if hasattr(value, "_fields"):
             assert_reads_alike(struct[name], value)
         else:
-            assert struct[name] == value
+            np.testing.assert_array_equal(struct[name], value)
 
 
 def test_flatten_yields_the_floats_in_the_order_of_declaration():

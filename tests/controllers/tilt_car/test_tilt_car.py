@@ -32,7 +32,7 @@ from tiltsim_controllers.tilt_car.vehicle import (
 )
 
 CAR = TiltCar(1.3, 0.0012, 0.0007, 0.45, 0.0008)
-CIRCLE_10 = ReferenceParameters(CIRCLE, 10.0, radius=-10.0, angular_frequency=1.0)
+CIRCLE_10 = ReferenceParameters(CIRCLE, (10.0, 0.0, 0.0), radius=-10.0, angular_frequency=1.0)
 
 angles = st.floats(-4.0, 4.0)
 speeds = st.floats(5.0, 300.0)
@@ -242,7 +242,7 @@ def test_the_printed_tilt_column_lacks_the_yaws_answer():
 
 # --- planned direction -------------------------------------------------------------------------
 
-LINE_1 = ReferenceParameters(LINE, acceleration_x=1.0)
+LINE_1 = ReferenceParameters(LINE, acceleration=(1.0, 0.0, 0.0))
 LAW = planned.Parameters(THESIS_CAR, GaitParameters(FIXED), LINE_1, planned.GAIN_SETS["ch11"])
 
 

@@ -132,7 +132,7 @@ def switch_matrix_is_the_limit() -> bool:
     rng = np.random.default_rng(12)
     state = (0.0, 0.0, 0.0, 0.0, 0.0)
     for alpha, x, y in rng.uniform(-2.0, 2.0, (200, 3)).tolist():
-        line = ReferenceParameters(LINE, x, y)
+        line = ReferenceParameters(LINE, (x, y, 0.0))
         law = Parameters(THESIS_CAR, GaitParameters(FIXED), line, _GAINS)
         at = (*state, alpha, 0.0, 0.0)
         squares = np.array(demanded_squared_speeds(0.0, at, law))

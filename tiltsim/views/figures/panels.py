@@ -50,21 +50,15 @@ ESTIMATED: Final = ("position", "velocity", "attitude")  # vectors whose errors 
 
 @dataclass(frozen=True)
 class Panel:
-    """A part of a figure of flights.
-
-    Attributes:
-        draw: ``(axes, shown)``: draws the flights, one or several, and labels the axes.
-        over_time: Whether its x axis is the time; else it is a square.
-        signals: Signals over time, which set the limits of both axes; without them, `draw` does.
-        needs: A column that the flights must have.
-        on_request: Whether it is only drawn on request.
-    """
+    """A part of a figure of flights."""
 
     draw: Callable[[Axes, Sequence[Shown]], None]
-    over_time: bool = True
+    """``(axes, shown)``: draws the flights, one or several, and labels the axes."""
+    over_time: bool = True  # whether its x axis is the time; else it is a square
     signals: Signals | None = None
-    needs: str = "time"
-    on_request: bool = False
+    """Signals over time, which set the limits of both axes; without them, `draw` does."""
+    needs: str = "time"  # a column that the flights must have
+    on_request: bool = False  # whether it is only drawn on request
 
 
 def panels_of(flights: Sequence[Flight]) -> dict[str, Panel]:
