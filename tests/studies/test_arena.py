@@ -177,6 +177,8 @@ def flown(entries, **_):
         (["--seed", "2"], "--seed: only with --tune"),
         (["--league", "interaction", "--tune", "9"], "--tune: not in the league of interaction"),
         (["--vehicles", ","], "--vehicles ,: name one at least"),
+        (["--tasks", "loop"], "--tasks loop: choose circle, "),
+        (["--tasks", "slide"], "--tasks slide: choose circle, "),
         (["--controllers", ""], "--controllers '': name one at least"),
     ],
 )
@@ -231,6 +233,18 @@ def test_the_command_writes_data_page_and_figure(tmp_path, capsys, monkeypatch):
     assert main(["arena", *chosen, "--gains", str(gains), "--out", str(second), "--json"]) == 0
     again = json.loads(capsys.readouterr().out)
     assert again["vehicles"] == printed["vehicles"]
+
+
+@pytest.mark.parametrize(
+    ("league", "names", "addresses"),
+    [
+        ("limited", ["wind", "step"], ["arena/limited#step", "arena/limited#wind"]),
+        ("interaction", ["door", "slide"], ["interaction/push#slide", "interaction/door"]),
+    ],
+)
+def test_named_tasks_alone_are_flown(league, names, addresses):
+    chosen = arena.chosen_vehicles(["tilt_hexarotor"], league, names)
+    assert [one.tasks for one in chosen.values()] == [tuple(addresses)]
 
 
 def test_an_unknown_vehicle_is_refused():

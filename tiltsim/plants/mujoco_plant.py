@@ -246,12 +246,6 @@ class MujocoPlant(Plant):
             switch(self.model, self._cables, begin * self._assembly.scenario.simulation.timestep)
             mujoco.mj_step(self.model, self.data, nstep=end - begin)
 
-    def record(self, samples: int, steps: int) -> Floats | None:
-        """Natively, all but the last sample come from the callback."""
-        if self.engine == "native":
-            return self._record_natively(samples, steps)
-        return super().record(samples, steps)
-
     @property
     def evaluation_time(self) -> float:
         """Time (s) for the next evaluation of the control step."""

@@ -156,8 +156,7 @@ class LawController(LawTable):
     def law_parameters(self, airframe: Airframe) -> tuple[Any, ...]:
         """The law's parameters, a NamedTuple of floats and tuples: by default its own keys."""
         record = record_of(type(self), _not_read())
-        made: tuple[Any, ...] = record(*(number_of(self, name) for name in record._fields))
-        return made
+        return record(*(number_of(self, name) for name in record._fields))
 
     def law_table(self, airframe: Airframe) -> Values:
         """Any number of further floats: ``observed.table``."""

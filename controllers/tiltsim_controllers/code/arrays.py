@@ -239,8 +239,7 @@ def repeat(
             results, _ = flatten(tuple(body(test.parameters[0], *now)))
             inner.results = [as_real(value) for value in results]
     node = graph.add("loop", [as_real(count), *map(as_real, leaves)], (test, inner))
-    made: tuple[Any, ...] = build([graph.add("get", [node, i]) for i in range(len(leaves))])
-    return made
+    return build([graph.add("get", [node, i]) for i in range(len(leaves))])
 
 
 Function = TypeVar("Function", bound=Callable[..., Any])

@@ -47,14 +47,12 @@ def paths_of(record_type: type[tuple[Any, ...]]) -> Iterator[str]:
 
 def unflatten(record_type: type[Record], values: Iterable[float]) -> Record:
     """Rebuild a record of type ``record_type`` from its floats; the inverse of `flatten`."""
-    record: Record = _take(record_type, iter(values))
-    return record
+    return _take(record_type, iter(values))
 
 
 def make_record_type(name: str, **fields: type) -> Any:
     """Create a record type with these fields, for records of types known only at run time."""
-    made: Any = NamedTuple(name, list(fields.items()))  # type: ignore[misc]
-    return made
+    return NamedTuple(name, list(fields.items()))
 
 
 def changed_record(record: Any, **fields: type) -> Any:
