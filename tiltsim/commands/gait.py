@@ -121,7 +121,7 @@ def _check_options(scenario: str | None, gait: GaitOptions, figure: GaitFigure) 
 
 
 def _of_determinant(gait: GaitOptions, figure: GaitFigure) -> Analysis:
-    """Of the restrictions of ch. 3, without a gait."""
+    """The analysis of the restrictions of ch. 3, without a gait."""
     from tiltsim.commands.gait_text import determinant_text
     from tiltsim.studies.gait_analysis import determinant_report
 
@@ -132,7 +132,7 @@ def _of_determinant(gait: GaitOptions, figure: GaitFigure) -> Analysis:
 
 
 def _of_gait(selected: SelectedGait, gait: GaitOptions, figure: GaitFigure) -> Analysis:
-    """Of the thesis's vehicle."""
+    """The analysis of a gait of four rotors."""
     from tiltsim.commands.gait_text import gait_text
     from tiltsim.studies.gait_analysis import fault_report, gait_report
 
@@ -241,7 +241,7 @@ def _draw(selected: SelectedGait, options: GaitFigure) -> Figure:
 def _of_multirotor(
     address: str | None, scenario: Scenario | None, options: GaitOptions, figure: GaitFigure
 ) -> Analysis:
-    """Of the file of ``--mjcf``, without a scenario, or of the scenario's vehicle."""
+    """The analysis of the file of ``--mjcf``, without a scenario, or of its vehicle."""
     from tiltsim.commands.gait_text import multirotor_text
     from tiltsim.models.rotor_table import Multirotor
     from tiltsim.studies import multirotor_analysis as study
