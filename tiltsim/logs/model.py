@@ -4,8 +4,6 @@ Forces and torques, Euler's equation and drag are the functions of the vehicles'
 (`tiltsim_controllers.vehicle`), whose parameters are numbers to be found here.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, Final, NamedTuple
 

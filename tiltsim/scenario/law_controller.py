@@ -4,8 +4,6 @@ A package adds one by a subclass of `LawController`, which the entry-point group
 ``tiltsim.controllers`` names; see docs/controller_package.md.
 """
 
-from __future__ import annotations
-
 from abc import abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass

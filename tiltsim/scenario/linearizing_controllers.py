@@ -244,7 +244,7 @@ class AttitudeForceController(AttitudeForce, GaitFollowingController, FailureAwa
 
 def _gait_angles(vehicle: Multirotor, gait: Gait) -> Floats:
     times = gait.sample_times()
-    return gait.angles(times).reshape(len(times), vehicle.tilts)
+    return gait.angles(times)[:, : vehicle.tilts]
 
 
 def _torque_free_forces(vehicle: Multirotor, gait: Gait, lost: int | None) -> TorqueFreeForces:
