@@ -255,6 +255,49 @@ def test_modules_for_any_number_of_rotors_do_not_know_four():
     assert not [module for module in importing if module.startswith(general)]
 
 
+KINDS = [path.stem for path in sorted((ROOT / "scenario" / "kinds").glob("[a-z]*.py"))]
+MODELS = {*KINDS, "multirotor", "quadrotor", "tiltrotor"}
+
+ABOUT_A_KIND = {
+    # declarations: tables, models, loops and laws of rotorcraft
+    *("tiltsim.scenario.vehicle", "tiltsim.scenario.rotorcraft", "tiltsim.models.rotorcraft"),
+    *("tiltsim.scenario.linearizing_controllers", "tiltsim.laws.linearizing"),
+    *("tiltsim.laws.quadrotor", "tiltsim.models.vehicle_parts"),
+    # of rotorcraft alone, or of the thesis's chapters and vehicles
+    *("tiltsim.models.starters", "tiltsim.studies.multirotor_analysis", "tiltsim.studies.arena"),
+    *("tiltsim.commands.gait", "tiltsim.commands.thesis", "tiltsim.views.figures.vehicle_drawing"),
+    *("tiltsim.report.findings", "tiltsim.report.content"),
+    *("tiltsim.report.measures", "tiltsim.report.measures.penguin"),
+    "tiltsim.report.measures.slips",
+    "tiltsim.folders",  # has a folder of this name
+    "tiltsim.commands.look",  # panels in a text of help
+}
+"""Modules that may name a kind of vehicle, apart from the files of a kind itself."""
+
+
+def naming(text, tree):
+    """Kinds that a module names: by files anywhere in the text, by models as a whole string."""
+    spelled = {kind: re.compile(kind.replace("_", "[-_ ]?"), re.IGNORECASE) for kind in KINDS}
+    strings = {node.value for node in ast.walk(tree) if isinstance(node, ast.Constant)}
+    return {kind for kind, name in spelled.items() if name.search(text)} | strings & MODELS
+
+
+def test_shared_modules_name_no_kind_of_vehicle():
+    """They ask the vehicle's table and the loop, and a new kind has its files alone."""
+    found = {
+        module
+        for module, file in FILES.items()
+        if naming(file.read_text("utf-8"), trees()[module])
+        and not any(kind in module for kind in KINDS)
+    }
+    assert found == ABOUT_A_KIND
+
+
+def test_a_kind_that_a_shared_module_names_is_noticed():
+    for text in ('is_fixed = vehicle.model == "quadrotor"\n', "# as of the tilt-car\n"):
+        assert naming(text, ast.parse(text)), text
+
+
 def test_every_public_definition_has_a_docstring():
     assert [module for module, tree in trees().items() if not ast.get_docstring(tree)] == []
     bare = [

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
+from math import inf, nan
 
 import numpy as np
 import pytest
 
 import tiltsim
 from tiltsim.cli import main
-from tiltsim.commands.stability import parse_sweep
+from tiltsim.commands.stability import MARGINS, parse_sweep
+from tiltsim.commands.text import table
 from tiltsim.linear.attraction import Attraction
+from tiltsim.linear.margins import Margin
 from tiltsim.linear.stability import sweep_stability
 from tiltsim.views.figures.stability import (
     attraction_figure,
@@ -96,6 +100,13 @@ def test_a_sweep_without_a_range_goes_from_half_to_twice():
     assert (key, len(values)) == ("vehicle.mass", 16)
     assert values[0] == pytest.approx(0.2)
     assert values[-1] == pytest.approx(0.8)
+
+
+def test_a_margin_without_limit_is_a_word():
+    unlimited = Margin("thrust", (0.0, inf), inf, inf, nan, 2.0)
+    (row,) = table(MARGINS, [unlimited]).splitlines()[1:]
+    words = ["thrust", "0 to any", "any: no crossover", "-", "any", "2.000", "x any, 90.0 deg"]
+    assert re.split(" {2,}", row) == words
 
 
 @pytest.mark.parametrize(

@@ -133,6 +133,14 @@ def test_run_quiet_prints_nothing(capsys):
     assert capsys.readouterr() == ("", "")
 
 
+def test_only_values_that_differ_from_the_file_s_are_called_changed(capsys):
+    same = ["--set", "reference.type=setpoint"]
+    assert main(["run", SETPOINT, *SHORT, *same]) == 0
+    printed = capsys.readouterr().out
+    assert "  changed: simulation.duration = 0.2\n" in printed
+    assert "reference.type" not in printed
+
+
 def test_a_changed_flight_of_the_library_is_not_judged(tmp_path, capsys):
     assert main(["run", SETPOINT, *SHORT, "--out", str(tmp_path)]) == 0
     printed = capsys.readouterr().out

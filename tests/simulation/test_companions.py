@@ -199,7 +199,9 @@ def test_companions_are_refused_where_they_cannot_fly(changes, line):
 
 
 def test_vehicles_that_overlap_at_the_start_are_refused():
-    with pytest.raises(tiltsim.InputError, match=r"overlap by .* at the start"):
+    with pytest.raises(
+        tiltsim.InputError, match=r"companion wing and the vehicle overlap by .* at the start"
+    ):
         tiltsim.simulate(together(WING | {"offset": [0.05, 0.0, 0.0]}))
 
 

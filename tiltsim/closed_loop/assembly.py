@@ -67,8 +67,7 @@ def _places(record: type[tuple[Any, ...]]) -> tuple[int, ...]:
     return tuple(place for place, name in enumerate(names) if name in CHOICES)
 
 
-Choices = tuple[tuple[int, float], ...]
-"""Places in a flattened record, and the numbers there."""
+Choices = tuple[tuple[int, float], ...]  # places in a flattened record, and the numbers there
 
 
 def choices_of(record: tuple[Any, ...]) -> Choices:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from tiltsim.commands.options import Overrides, Silent, refuse_both
 from tiltsim.commands.text import print_line, show_progress, table, viewing, warn
+from tiltsim.errors import InputError
 from tiltsim.exit_codes import DONE, EXPECTATION_FAILED, INTERRUPTED, VEHICLE_LOST
 from tiltsim.system.interrupts import defer_interrupts
 from tiltsim.system.text import printable
@@ -68,7 +69,7 @@ def run(
 
     refuse_both(judge=judge, no_judge=no_judge)
     refuse_both(live=live, connect=connect)
-    changes: dict[str, Any] = dict(overrides)
+    changes = dict(overrides)
     loaded = load_scenario(scenario, changes, controller=controller, trusted=True)
     expecting, judged = loaded, judge
     if judge is no_judge:
@@ -102,15 +103,28 @@ def run(
     metrics = flight.metrics()
     verdicts = check_expectations(expecting, metrics)
     if not quiet:
-        if flight.end.kind == "completed" and metrics["min_rotor_speed"] < 0.0:
-            speed = metrics["min_rotor_speed"]
+        if flight.end.kind == "completed" and (speed := metrics["min_rotor_speed"]) < 0.0:
             warn(f"a rotor stopped and reversed (min_rotor_speed = {speed:.4g} rad/s)")
+        changes = _differing(changes, scenario, loaded)
         changes |= {} if controller is None else {"controller": controller}
         print(summary(flight, verdicts, judged=judged, changes=changes))
         for kind, path in (("flight", out), ("recording", rerun)):
             if path is not None:
                 print_line(f"{kind} written to {viewing(path)}")
     return _exit_code(flight, verdicts if judged else (), quiet=quiet)
+
+
+def _differing(changes: dict[str, Any], path: str, scenario: Scenario) -> dict[str, Any]:
+    """The changes of a scenario whose values differ from the file's."""
+    from tiltsim.scenario.documents import value_at
+    from tiltsim.scenario.loading import load_scenario
+
+    try:
+        before = load_scenario(path, trusted=True).model_dump() if changes else {}
+    except InputError:  # the base of a family or an incomplete file, which the changes complete
+        return changes
+    after = scenario.model_dump()
+    return {k: v for k, v in changes.items() if value_at(before, k) != value_at(after, k)}
 
 
 def _exit_code(flight: Flight, verdicts: Sequence[Verdict], *, quiet: bool) -> int:
@@ -140,7 +154,7 @@ def _warnings(scenario: Scenario) -> Iterator[str]:
     if own is None:
         return
     if own.unmodeled_properties and not scenario.controller.is_external:
-        diagonal = "" if table.model == "multirotor" else " and a diagonal inertia"
+        diagonal = " and a diagonal inertia" if isinstance(vehicle, Vehicle) else ""
         yield (
             f"vehicle.mjcf: the {scenario.controller.law} controller assumes the center of mass at "
             f"the body's origin{diagonal}; not modeled: {own.unmodeled_properties}"

@@ -31,15 +31,21 @@ SHORT_KEYS: Final = {"period": "gait.period", "amplitude": "gait.amplitude"}
 POINTS: Final = 16
 MOST_POINTS: Final = 1000
 
+
+def _limit(value: float, form: str, without: str = "any") -> str:
+    """A number, or the words for one without limit."""
+    return number(value, form) if isfinite(value) else without
+
+
 MARGINS: Final[Columns] = {
     "broken at": (lambda margin: margin.place, ""),
-    "gain": (lambda m: f"{number(m.gain[0], '.3g')} to {number(m.gain[1], '.4g')}", ""),
-    "phase (deg)": (lambda margin: degrees(margin.phase), ".1f"),
-    "at (rad/s)": (lambda margin: margin.frequency, ".4g"),
-    "delay (s)": (lambda margin: margin.delay, ".4g"),
+    "gain": (lambda m: f"{number(m.gain[0], '.3g')} to {_limit(m.gain[1], '.4g')}", ""),
+    "phase (deg)": (lambda m: _limit(degrees(m.phase), ".1f", "any: no crossover"), ""),
+    "at (rad/s)": (lambda m: m.frequency if isfinite(m.frequency) else None, ".4g"),
+    "delay (s)": (lambda margin: _limit(margin.delay, ".4g"), ""),
     "disk": (lambda margin: margin.disk, ".3f"),
     "any gain, phase": (
-        lambda m: f"x {number(m.disk_gain, '.3g')}, {number(degrees(m.disk_phase), '.1f')} deg",
+        lambda m: f"x {_limit(m.disk_gain, '.3g')}, {number(degrees(m.disk_phase), '.1f')} deg",
         "",
     ),
 }
@@ -91,7 +97,7 @@ def run_stability(
     from tiltsim.linear.stability import stability
 
     with show_progress(shown=not quiet) as progress:
-        progress.begin("flights over a period or sample")
+        progress.begin("search for the state that returns, flights so far")
         found = stability(scenarios[0], progress=progress.move)
     report, text = found.report(), stability_text(found)
     system: Linearization | None = None

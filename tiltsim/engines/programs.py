@@ -29,8 +29,7 @@ from tiltsim_controllers.references.trajectories import ReferenceParameters
 KEPT: Final = 64
 """Programs of each kind that are kept; each closed loop, gait type and decoupler has its own."""
 
-SIDES: Final = 17 * (1 + MAX_COMPANIONS)
-"""Largest number of sign checks of a loop."""
+SIDES: Final = 17 * (1 + MAX_COMPANIONS)  # largest number of sign checks of a loop
 
 
 class RecorderHead(NamedTuple):
@@ -146,8 +145,7 @@ class LoopPrograms:
             solver: See `tiltsim.equations.solvers.SOLVERS`.
             held: Whether the controller is sampled and held.
         """
-        equations = self._loop.equations
-        assert equations is not None  # other loops do not fly on equations
+        equations = self._loop.required_equations
         step, size = make_step(equations, solver), states + equations.inputs_size
 
         def stepped(samples: bool) -> Callable[..., Any]:

@@ -20,6 +20,7 @@ from tiltsim.scenario.scenario import FlightPlan, Scenario
 from tiltsim.vehicles.rotorcraft import initial_tilts
 from tiltsim.vehicles.rotorcraft.layout import (
     Layout,
+    is_fixed_cross,
     layout_of,
     rotors_record,
     tilt_of_rotor,
@@ -325,16 +326,16 @@ def plant_of(
 
 def actuator_plant(loop: ClosedLoop) -> ActuatorPlant:
     """The thesis's equations (ch. 2, Eq. 15; ch. 3, Eqs. 1-7) of a model."""
-    is_quadrotor = loop.model == "quadrotor"
-    attitude = EULER if is_quadrotor else MATRIX
+    fixed = is_fixed_cross(loop)
+    attitude = EULER if fixed else MATRIX
     return plant_of(
         attitude,
         as_printed(attitude, layout_of(loop).tilts),
         tilt_of_rotor(loop),
         loop.spins,
         rotors_record(loop),
-        gyroscopic=float(is_quadrotor),
-        has_limits=not is_quadrotor,  # whose rotors make any thrust
+        gyroscopic=float(fixed),
+        has_limits=not fixed,  # whose rotors make any thrust
     )
 
 

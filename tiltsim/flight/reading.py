@@ -25,8 +25,7 @@ from tiltsim_controllers.mathematics.scalar import Floats
 if TYPE_CHECKING:
     import pyarrow
 
-LATEST: Final = 1e9
-"""Latest time (s) of a flight, as of a scenario."""
+LATEST: Final = 1e9  # latest time (s) of a flight, as of a scenario
 
 
 def load_flight(path: str | PathLike[str]) -> Flight:

@@ -81,11 +81,12 @@ def loop_of(
     # The thesis's equations have no torque but the model's, as long as all is ideal.
     as_printed = plant == "thesis" and scenario.has_ideal_actuators_in_still_air
     measured = not as_printed and controller.measures_angular_acceleration
+    any_layout = isinstance(scenario.vehicle.resolve(), Multirotor)
     if external:
         loop = commanded_loop(scenario)
     elif isinstance(controller, LawTable):
         loop = loop_of_law(scenario, recorded=recorded)
-    elif scenario.vehicle.model == "multirotor" or controller.law == "attitude_altitude":
+    elif any_layout or controller.law == "attitude_altitude":
         loop = _linearizing_loop(scenario, measured)
     else:
         loop = LOOPS[controller.loop_name]

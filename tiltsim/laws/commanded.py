@@ -132,6 +132,6 @@ def commanded_loop(scenario: Scenario) -> ClosedLoop:
     if isinstance(vehicle, Multirotor):
         return _multirotor(layout_of_vehicle(vehicle))
     columns = (*EXTRA_COLUMNS,) if scenario.rotorcraft.has_standard_layout else ()
-    if scenario.vehicle.model == "tiltrotor":
+    if scenario.vehicle.has_tilting_rotors:
         return _commanded_loop(TILTROTOR, Vehicle, columns, singularity_columns)
     return _commanded_loop(QUADROTOR, Vehicle, columns, upright_columns)

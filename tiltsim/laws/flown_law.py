@@ -91,7 +91,7 @@ def _flown_law(plan: FlightPlan, table: LawController | None, *, recorded: bool)
     elif not recorded:
         function = _without_parameters(load_law(scenario))
     return FlownLaw(
-        layout_of_vehicle(airframe.vehicle, scenario.vehicle.model),
+        layout_of_vehicle(airframe.vehicle, scenario.any_rotorcraft.cross),
         function,
         type(parameters),
         tuple(states.items()),

@@ -105,7 +105,7 @@ def body_of_vehicle(vehicle: Multirotor) -> Body:
 def _limits(plan: FlightPlan, horizon: float) -> RotorRange:
     vehicle = plan.scenario.any_rotorcraft
     low, high = vehicle.speeds_along_spin
-    if vehicle.model == "tiltrotor" and vehicle.min_rotor_speed is None:
+    if vehicle.cross and vehicle.min_rotor_speed is None:
         low = 0.0  # its rotors do not reverse
     return RotorRange(low, high, horizon)
 

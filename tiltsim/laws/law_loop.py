@@ -14,6 +14,7 @@ from typing import Any, Final, NamedTuple
 from tiltsim.closed_loop.loop import ClosedLoop
 from tiltsim.errors import TiltsimError
 from tiltsim.laws.law import Law, body_of_vehicle, tilts_in_states, vehicle_of
+from tiltsim.laws.layers.actuation import sensor_parameters
 from tiltsim.laws.rotor_loop import RotorLayout, margins_of, rotor_loop
 from tiltsim.models.cross import as_multirotor
 from tiltsim.scenario.law_controller import Airframe, LawController, LawTable
@@ -126,7 +127,7 @@ def _step_of(flown: FlownLaw) -> Callable[..., Step]:
     rotors, tilts = flown.layout.places
     own, layout, commanded = len(flown.states), flown.layout.tilt_of_rotor, flown.commanded
     per_newton, coefficients = ROTOR_FLOATS * rotors, 2 * ROTOR_FLOATS * rotors
-    is_cross = flown.layout.model != "multirotor"
+    is_cross = flown.layout.cross != ""
 
     def step(seen: Seen, known: Any, knots: Any) -> Step:
         # An array that outlives a trace would keep its precision in the next one of JAX.
@@ -316,7 +317,8 @@ def airframe_of(plan: FlightPlan) -> Airframe:
     scenario, simulation = plan.scenario, plan.scenario.simulation
     table = scenario.any_rotorcraft
     vehicle, tilting = table.resolve(), table.has_tilting_rotors
-    speeds = initial_rotor_speeds(plan)
+    speeds, sensors = initial_rotor_speeds(plan), sensor_parameters(scenario)
+    root = max(sensors.period, simulation.control_timestep) ** 0.5
     return Airframe(
         as_multirotor(vehicle, tilting=tilting),
         plan.gait,
@@ -326,8 +328,7 @@ def airframe_of(plan: FlightPlan) -> Airframe:
         scenario.initial.velocity,
         scenario.initial.attitude,
         scenario.initial.angular_velocity,
-        # The thesis's equations omit the gyroscopic torque but for the quadrotor's.
-        float(simulation.plant != "thesis" or table.model == "quadrotor"),
+        scenario.gyroscopic,
         simulation.timestep,
         simulation.control_timestep,
         simulation.latency_steps,
@@ -335,4 +336,5 @@ def airframe_of(plan: FlightPlan) -> Airframe:
         table.rotor_time_constant,
         table.tilt_servo,
         scenario.reference,
+        (sensors.velocity.noise * root, sensors.body_rates.noise * root),
     )

@@ -76,7 +76,7 @@ def _tracking_loop(
 ) -> ClosedLoop:
     """The loop of a law whose tilts follow a gait; ``turning`` rotors must not come to a stop."""
     measured, strategy, limited = options
-    stops = rotor_stops(turning, REVERSING if layout.model == "multirotor" else "")
+    stops = rotor_stops(turning, "" if layout.cross else REVERSING)
 
     def causes(sample: Mapping[str, float], setup: ControlSetup) -> tuple[str, ...]:
         failure = getattr(setup.parameters.law, "failure", UNHARMED)
@@ -263,7 +263,7 @@ def full_pose_loop(layout: RotorLayout) -> ClosedLoop:
     stops = rotor_stops(places.rotors)
     parts: dict[str, Any] = {"margins": margins_of(layout), "tables": _rotor_tables}
     record = full_pose.Parameters
-    if layout.model != "multirotor":
+    if layout.cross:
         parts = {"margins": _tiltrotor_margins, "columns": (*EXTRA_COLUMNS,)}
         record = changed_record(record, vehicle=Vehicle)
     law = Law(

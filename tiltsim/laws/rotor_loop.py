@@ -44,7 +44,7 @@ class RotorLayout(NamedTuple):
 
     tilt_of_rotor: tuple[int, ...]  # from 0; -1 for a fixed rotor
     spins: Values
-    model: str = "multirotor"  # ``vehicle.model``; of others the layout is known
+    cross: str = ""  # ``vehicle.model`` of rotors on a cross, whose layout it is
 
     @property
     def places(self) -> Places:
@@ -54,20 +54,20 @@ class RotorLayout(NamedTuple):
     @property
     def shown(self) -> Places:
         """Places in a sample, which may have tilts that are idle."""
-        return self.places if self.model == "multirotor" else CROSS
+        return CROSS if self.cross else self.places
 
     @property
     def name(self) -> str:
         """For files and models."""
-        if self.model != "multirotor":
-            return self.model
+        if self.cross:
+            return self.cross
         tilts = "_".join(str(tilt) if tilt >= 0 else "f" for tilt in self.tilt_of_rotor)
         return f"multirotor_{tilts}_{''.join('p' if spin > 0.0 else 'm' for spin in self.spins)}"
 
 
-def layout_of_vehicle(vehicle: Multirotor, model: str = "multirotor") -> RotorLayout:
+def layout_of_vehicle(vehicle: Multirotor, cross: str = "") -> RotorLayout:
     """The layout of a vehicle."""
-    return RotorLayout(vehicle.tilt_of_rotor, vehicle.spins, model)
+    return RotorLayout(vehicle.tilt_of_rotor, vehicle.spins, cross)
 
 
 def table_of(places: Places, setup: ControlSetup) -> Values:
@@ -253,7 +253,7 @@ class RotorFunctions(VehicleFunctions):
         """
         N, _, S = self.sizes
         body, rotors = airframe_of(parameters.law, knots, self.layout.tilt_of_rotor)
-        gyroscopic = float(self.layout.model == "quadrotor")
+        gyroscopic = float(self.layout.cross != "" and not self.layout.places.tilts)
         tilts = self.equation_tilts(time, state, parameters, knots)
         moved = equations_of_motion(state, tilts, inputs, body, rotors, disturbance, gyroscopic)
         return xp.hstack([moved, inputs[N : N + S]])
@@ -292,7 +292,7 @@ def rotor_loop(
         ),
         controller_states=len(law.states),
         spins=layout.spins,
-        tilt_of_rotor=layout.tilt_of_rotor if layout.model == "multirotor" else (),
+        tilt_of_rotor=() if layout.cross else layout.tilt_of_rotor,
         commands_thrusts=functions.commands_thrusts,
         observe_reads_controls=functions.commands_thrusts,
     )

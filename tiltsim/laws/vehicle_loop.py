@@ -43,27 +43,22 @@ class VehicleFunctions:
     """The functions of arrays by which a law moves a kind of vehicle.
 
     In MuJoCo and on the equations of motion, ``parameters`` are a record with the law's own as
-    ``law``, and ``knots`` the table data of a flight. A kind of vehicle has ``controls`` and
-    ``observe`` of `ClosedLoop`, the ``equation_...`` functions of `Equations`, and:
-
-    Attributes:
-        law: The law.
-        in_sample: ``(time, values)``: the vehicle as the law sees it, from the fields of a sample.
-        references: ``(time, values, parameters, knots)``: references and signals of a sample.
-        names: Their names, which are columns.
-        initial_state: ``(plan)``: the state of the equations at time zero.
-        state_names, input_names: See `Equations`.
+    ``law``, and ``knots`` the table data of a flight. ``controls`` and ``observe`` are fields of
+    `ClosedLoop`, the ``equation_...`` functions of `Equations`.
     """
 
     law: Law
     controls: ClassVar[Callable[..., Any]]
     observe: ClassVar[Callable[..., Any]]
     in_sample: ClassVar[Callable[..., Seen]]
+    """``(time, values)``: the vehicle as the law sees it, from the fields of a sample."""
     references: ClassVar[Callable[..., Any]]
-    names: ClassVar[Any]
+    """``(time, values, parameters, knots)``: references and signals of a sample."""
+    names: ClassVar[Any]  # their names, which are columns
     initial_state: ClassVar[Callable[..., Vector]]
-    state_names: ClassVar[Any]
-    input_names: ClassVar[Any]
+    """``(plan)``: the state of the equations at time zero."""
+    state_names: ClassVar[Any]  # see `Equations`
+    input_names: ClassVar[Any]  # see `Equations`
     equation_inputs: ClassVar[Callable[..., Any]]
     equation_rates: ClassVar[Callable[..., Any]]
     observe_equations: ClassVar[Callable[..., Any]]

@@ -1,7 +1,5 @@
 """The region of attraction of a flight: a map over two numbers of its initial state."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -71,16 +69,14 @@ class Attraction:
     def share(self) -> Floats:
         """Share of the corners of each cell that come back, shape (cells, cells)."""
         back = self.returned.astype(float)
-        share: Floats = 0.25 * (back[1:, 1:] + back[:-1, 1:] + back[1:, :-1] + back[:-1, :-1])
-        return share
+        return 0.25 * (back[1:, 1:] + back[:-1, 1:] + back[1:, :-1] + back[:-1, :-1])
 
     @property
     def _areas(self) -> Floats:
         """Share of the map's area that each corner represents, shape (cells + 1, cells + 1)."""
         sides = np.ones(len(self.returned))
         sides[[0, -1]] = 0.5
-        areas: Floats = np.outer(sides, sides) / (len(sides) - 1) ** 2
-        return areas
+        return np.outer(sides, sides) / (len(sides) - 1) ** 2
 
     def report(self) -> dict[str, Any]:
         """Entries of the JSON report: shares of the map's area."""
@@ -296,7 +292,7 @@ def _is_near(away: Floats) -> bool:
 def _acceptable(scenario: Scenario, roll: Floats, pitch: Floats) -> NDArray[np.bool_] | None:
     """Whether attitudes are acceptable at all times, shape (pitch, roll)."""
     vehicle = scenario.vehicle.resolve()
-    if scenario.vehicle.model != "tiltrotor" or not isinstance(vehicle, Vehicle):
+    if not scenario.vehicle.has_tilting_rotors or not isinstance(vehicle, Vehicle):
         return None
     gait = assemble(scenario).gait
     times = np.arange(INSTANTS) / INSTANTS * (gait.period or 0.0)

@@ -116,8 +116,7 @@ def _turned(rotation: Floats, vector: Floats) -> Floats:
     turn = np.array((np.cos(half), *(0.5 * np.sinc(half / np.pi) * vector)))
     turned = quaternion_product(_quaternion(rotation), turn)
     if len(rotation) == MATRIX:
-        matrix: Floats = rotation_of_quaternion(turned).ravel()
-        return matrix
+        return rotation_of_quaternion(turned).ravel()
     return turned
 
 
@@ -157,12 +156,10 @@ def activation_names(loop: ClosedLoop) -> tuple[str, ...]:
     inner = loop
     while inner.within is not None:
         inner = inner.within
-    names, own = inner.fields, loop.controller_states
-    if len(names) != own:
-        names = numbered("law", own)
+    own = loop.controller_states
     rotors = loop.sizes.act - own - sum(extra.states for extra in loop.extra_actuators)
     layers: list[str] = []
-    for index, extra in enumerate(loop.extra_actuators):
+    for extra in loop.extra_actuators:
         if extra.begins_with_rotor_speeds:
             layers += numbered("speed_command", rotors)
             tilts = numbered("tilt_command", extra.memories - rotors)
@@ -170,8 +167,8 @@ def activation_names(loop: ClosedLoop) -> tuple[str, ...]:
             places = (extra.states - rotors) // extra.memories
             layers += [f"{name}_late_{place + 1}" for place in range(places) for name in sent]
         else:
-            layers += numbered(f"layer_{index}_state", extra.states)
-    return (*numbered("rotor_speed", rotors), *names, *layers)
+            layers += extra.names
+    return (*numbered("rotor_speed", rotors), *inner.fields[:own], *layers)
 
 
 def mujoco_coordinates(loop: ClosedLoop) -> Coordinates:
@@ -188,13 +185,11 @@ def equation_coordinates(assembly: Assembly, size: int) -> Coordinates:
     loop = assembly.loop
     if assembly.scenario.simulation.plant != "thesis":
         return mujoco_coordinates(loop)
-    assert loop.equations is not None
-    names = loop.equations.states
+    names = loop.required_equations.states
     if loop.within is not None:
         names = (*names, *activation_names(loop))
     further = size - len(names) - (MATRIX - 3 if ROTATION_NAMES[0] in names else 0)
-    own = loop.fields if len(loop.fields) == further else numbered("law", further)
-    return _coordinates((*names, *own), loop, MATRIX)
+    return _coordinates((*names, *loop.fields[:further]), loop, MATRIX)
 
 
 def _coordinates(names: tuple[str, ...], loop: ClosedLoop, rotation: int) -> Coordinates:
@@ -272,6 +267,10 @@ class Pendulum(NamedTuple):
         arm, moving = self._attached(qpos, qvel)
         angles, rates, _ = _swinging(load - qpos[:3] - arm, speed - moving, np.zeros(3))
         return np.concatenate((qpos, angles)), np.concatenate((qvel, rates))
+
+    def distance(self, qpos: Floats, qvel: Floats) -> float:
+        """The load's distance (m) from the attachment, by the motion in MuJoCo."""
+        return float(np.linalg.norm(qpos[FREE[0]][:3] - qpos[:3] - self._attached(qpos, qvel)[0]))
 
     def accelerations(self, model: Any, data: Any) -> tuple[Floats, float]:
         """Accelerations of the vehicle and the angles, and the tension (N), from free ones."""

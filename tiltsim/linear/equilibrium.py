@@ -15,14 +15,13 @@ from tiltsim.laws.assembling import assemble
 from tiltsim.linear import newton
 from tiltsim.linear.coordinates import PLANE
 from tiltsim.linear.forcing import Forcing, forcing_of
-from tiltsim.linear.motion import LONG, Motion, make_motion
+from tiltsim.linear.motion import LONG, SETTLING_TIME, Motion, make_motion
 from tiltsim.plants.plant import MIN_STEPS_TO_COMPILE
 from tiltsim.scenario.scenario import Scenario
 from tiltsim_controllers.mathematics.scalar import Floats
 
 REST: Final = 1e-6  # largest rate, in SI units, that counts as rest; solutions end far below
 ORBIT: Final = 1e-7  # largest difference after a period, in SI units, that counts as periodic
-SETTLING_TIME: Final = 40.0  # s, flown at most to approach an orbit or a rest point
 RETURNS: Final = 10
 """Periods, flown at most to approach a long orbit: a derivative takes two for each state."""
 
@@ -33,6 +32,7 @@ MOST_STEPS: Final = 200_000
 """Longest orbit: some 250 flights over it take a quarter of an hour with compiled steps."""
 
 FLIGHTS: Final = 150  # over a period, that an orbit takes to find
+SAMPLES: Final = 1000  # flown, that a rest point of a sampled controller takes
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,7 +145,7 @@ def equilibrium_of(
                 f"{forcing.period:g} s, {steps} steps of simulation.timestep = "
                 f"{simulation.timestep:g}; an orbit has at most {MOST_STEPS}"
             )
-    flights = FLIGHTS if forcing.period is not None else 1
+    flights = FLIGHTS if forcing.period is not None else SAMPLES
     settling = ceil(min(SETTLING_TIME, simulation.duration) / simulation.timestep)
     motion = make_motion(scenario, _engine(scenario, max(settling, flights * steps)), late)
     step = ceil(forcing.start / simulation.timestep - 1e-9)
@@ -238,11 +238,11 @@ class _Search:
         return root
 
     def _starts(self, near: Floats | None) -> Iterator[Floats]:
-        """States to start from: first of a rest point that no event precedes the initial one."""
+        """States to start from: at rest in continuous time from the start, the initial one."""
         initial = self.motion.initial
         if near is not None:
             yield near
-        at_once = self.forcing.period is None and self.step == 0
+        at_once = self.forcing.period is None and self.step == 0 and self.steps == 0
         if at_once:
             yield initial
         yield self._settled()

@@ -32,8 +32,9 @@ KINDS: Final = {
     "rotor": "rotors",
     "speed": "rotors",
     "tilt": "actuators",
-    "layer": "actuators",
-    "law": "controller",
+    "state": "controller",
+    "estimation": "estimator",
+    "instruments": "instruments",
 }
 """Names of modes by the kind of their states."""
 

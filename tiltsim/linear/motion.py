@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import cached_property
+from math import ceil
 from typing import Any, Final
 
 import numpy as np
@@ -34,6 +35,7 @@ from tiltsim_controllers.mathematics.scalar import Floats, Values
 LONG: Final = 1000
 """Steps, from which on a flight is long: worth a thread, and a derivative of fewer evaluations."""
 
+SETTLING_TIME: Final = 40.0  # s, flown at most to approach an orbit or a rest point
 THREADS: Final = os.cpu_count() or 1
 ROWS_PER_THREAD: Final = 4  # flights of a thread between reports of progress
 
@@ -74,10 +76,7 @@ class Motion(ABC):
         return assemble(self.scenario, self._as_flown)
 
     def _adapted(self, loop: ClosedLoop) -> ClosedLoop:
-        """A controller without layers, to whose inputs of the vehicle the offsets are added.
-
-        It is not traced: offsets are not parameters.
-        """
+        """A loop without layers whose commands get the offsets, which no trace would see change."""
         loop = self._as_flown(loop)
         equations = loop.equations
         if equations is not None:
@@ -181,9 +180,7 @@ class EquationMotion(Motion):
 
     @cached_property
     def _equations(self) -> Equations:
-        equations = self.assembly.loop.equations
-        assert equations is not None  # only plants with equations are moved so
-        return equations
+        return self.assembly.loop.required_equations
 
     @cached_property
     def _plant(self) -> EquationsPlant:
@@ -218,9 +215,8 @@ class EquationMotion(Motion):
         return state if project is None else np.array(project(state.tolist(), parameters))
 
     def flown(self, step: int, state: Floats, steps: int) -> Floats:
-        return self._flown_by(
-            self._varied if self.offsets.any() else self._plant, step, state, steps
-        )
+        plant = self._varied if self.offsets.any() else self._plant
+        return self._flown_by(plant, step, state, steps)
 
     def _flown_by(self, plant: EquationsPlant, step: int, state: Floats, steps: int) -> Floats:
         held = self._equations.inputs_size
@@ -253,9 +249,8 @@ class MujocoMotion(Motion):
         return None if load is None or load.rigid else Pendulum(load.length, load.attachment)
 
     def _names(self) -> tuple[coordinates.Coordinates, tuple[coordinates.Input, ...]]:
-        return coordinates.mujoco_coordinates(self.assembly.loop), coordinates.control_inputs(
-            self.assembly
-        )
+        loop = self.assembly.loop
+        return coordinates.mujoco_coordinates(loop), coordinates.control_inputs(self.assembly)
 
     @cached_property
     def _varied(self) -> MujocoPlant:
@@ -291,10 +286,21 @@ class MujocoMotion(Motion):
         sizes, swing = self.assembly.loop.sizes, 0 if self._load is None else 2
         return np.split(state, (sizes.qpos + swing, sizes.qpos + sizes.qvel + 2 * swing))
 
-    def _placed(self, state: Floats) -> list[Floats]:
-        """MuJoCo's `qpos`, `qvel` and `act`."""
-        qpos, qvel, act = self._split(state)
-        return [qpos, qvel, act] if self._load is None else [*self._load.placed(qpos, qvel), act]
+    def _placed(self, state: Floats, load: Pendulum | None = None) -> list[Floats]:
+        """MuJoCo's `qpos`, `qvel` and `act`, with the load on its cable or on another."""
+        (*motion, act), load = self._split(state), load or self._load
+        return [*(motion if load is None else load.placed(*motion)), act]
+
+    @cached_property
+    def _stretched(self) -> Pendulum | None:
+        """The load on its cable as stretched after a flight, which is then steady if at rest."""
+        if self._load is None:
+            return None
+        plant = self._plant
+        plant.state = self._whole
+        plant.advance(ceil(SETTLING_TIME / self.scenario.simulation.timestep))
+        length = self._load.distance(plant.data.qpos, plant.data.qvel)
+        return self._load if plant.fault() else self._load._replace(length=length)
 
     def _seen(self, state: Floats, tension: float = 0.0) -> list[list[float]]:
         """Arguments of the functions of the loop: the vehicle's `qpos` and `qvel`, and `act`."""
@@ -358,7 +364,7 @@ class MujocoMotion(Motion):
     def _whole_at(self, step: int, state: Floats) -> Floats:
         """An integration state after ``step`` physics steps."""
         whole = self._whole.copy()
-        whole[self._part] = np.concatenate(self._placed(state))
+        whole[self._part] = np.concatenate(self._placed(state, self._stretched))
         header = whole[self._varied.header_offset :][:HEADER_SIZE]
         header[EVALUATIONS] = step * header[EVALUATIONS_PER_STEP]
         return whole

@@ -6,8 +6,6 @@ reference. In ULog it is the topic ``tiltsim_sample`` with all columns as double
 topics of position, velocity, attitude and body rates in PX4's frames (world NED, body FRD).
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator
 from os import PathLike

@@ -5,8 +5,6 @@ state of each window is found with them (multiple shooting), and eliminated from
 equations.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
@@ -23,6 +21,7 @@ from tiltsim.logs.reading import read_log
 from tiltsim.logs.windows import INITIAL, MEASURED, Problem, windows_of
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.scenario import Scenario
+from tiltsim.scenario.vehicle import VEHICLES
 from tiltsim.system.arguments import is_finite
 from tiltsim.system.text import html_table, short_repr
 from tiltsim_controllers.mathematics.scalar import Floats
@@ -68,10 +67,11 @@ class Estimate:
         The numbers of a vehicle from an MJCF file stand there; they become factors of model_error.
         """
         found: dict[str, Any] = {}
+        keys = VEHICLES[self.model].model_fields
         for name, value in self.values.items():
             key, _, entry = name.partition("[")
             error = key.replace("vehicle.", "model_error.")
-            if self.model == "multirotor" and error in FACTORS:
+            if error in FACTORS and key.removeprefix("vehicle.") not in keys:
                 key, value = error, value / self.nominal[name]
             if key != "vehicle.center_of_mass":  # no key of a scenario
                 found[key] = [*found.get(key, []), value] if entry else value

@@ -4,8 +4,6 @@ Forces and torques, Euler's equation and drag are the functions of the vehicles'
 (`tiltsim_controllers.vehicle`), whose parameters are numbers to be found here.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, Final, NamedTuple
 
@@ -41,8 +39,7 @@ FACTORS: Final = tuple(
 
 CONJUGATE: Final = np.array([1.0, -1.0, -1.0, -1.0])
 
-TINY: Final = 1e-12
-"""Velocity (m/s) at which the drag of a vehicle at rest still has a derivative."""
+TINY: Final = 1e-12  # velocity (m/s) at which the drag of a vehicle at rest still has a derivative
 
 
 class LoggedVehicle:

@@ -1,7 +1,5 @@
 """Windows of a log, over which its vehicle's model is flown, and least squares over them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from functools import cache
 from typing import Any, Final, NamedTuple
@@ -19,8 +17,7 @@ from tiltsim.system.text import short_repr
 from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.vehicle.rotors import TiltOfRotor, tilts_of
 
-LONGEST_STEP: Final = 0.005
-"""Longest step (s) of the integration between two samples."""
+LONGEST_STEP: Final = 0.005  # longest step (s) of the integration between two samples
 
 MEASURED: Final = ("position", "velocity", "attitude", "body_rates")
 """Vectors of a log that a model predicts, in the order of the residuals; attitude as an error."""
@@ -40,8 +37,7 @@ INITIAL: Final = 12
 """Numbers of a window's initial state: position, velocity, small turn, body rates."""
 
 
-MOST_STEPS: Final = 30
-"""Gauss-Newton steps; a log with enough motion needs five."""
+MOST_STEPS: Final = 30  # Gauss-Newton steps; a log with enough motion needs five
 
 
 class Windows(NamedTuple):

@@ -40,8 +40,7 @@ PLATE_THICKNESS: Final = 0.004  # m
 COORDINATES: Final = {"fixed": 0, "hinged": 1, "free": 7}
 """Numbers in ``qpos`` of an object, by its joint."""
 
-SLOWER: Final = 50.0
-"""Time constant of friction over the contact's; see `_add_pairs`."""
+SLOWER: Final = 50.0  # time constant of friction over the contact's; see `_add_pairs`
 
 FIRMER: Final = 500.0
 """MuJoCo's ``impratio``: it makes up for that, so that pressed things do not creep."""

@@ -1,7 +1,5 @@
 """Parts and options that models of vehicles are compiled from; a scenario's tables fill them in."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from math import inf
@@ -28,6 +26,7 @@ class ExtraActuators(NamedTuple):
     wrench: bool = False  # force (N) and torque (N m) on the body, six, in body axes
     hinge_torques: int = 0  # number of tilt hinges with a torque, N m
     begins_with_rotor_speeds: bool = False  # these states keep within the rotors' limits
+    names: tuple[str, ...] = ()  # of the states
 
     @property
     def controls(self) -> int:

@@ -215,8 +215,7 @@ def _least_inputs(force: Floats, torque: Floats, desired: Floats) -> Floats:
     sizes = np.abs(force).max(), np.abs(torque).max()
     rows = np.vstack([force / sizes[0], torque / sizes[1]])
     values = np.concatenate([desired / sizes[0], np.zeros(3)])
-    inputs: Floats = np.linalg.pinv(rows, rcond=TOLERANCE) @ values
-    return inputs
+    return np.linalg.pinv(rows, rcond=TOLERANCE) @ values
 
 
 def _within(inputs: Floats, lower: Floats, upper: Floats) -> bool:

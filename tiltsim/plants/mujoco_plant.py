@@ -1,7 +1,5 @@
 """MuJoCo as the plant: the model that a flight integrates, its start and its steps."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import cache, partial
 from itertools import pairwise
@@ -93,8 +91,7 @@ def build_model(
     return model
 
 
-OVERLAP: Final = 1e-4
-"""Depth (m) from which shapes count as lying in each other."""
+OVERLAP: Final = 1e-4  # depth (m) from which shapes count as lying in each other
 
 
 def check_start(scenario: Scenario, model: mujoco.MjModel, data: mujoco.MjData) -> None:
@@ -141,10 +138,13 @@ def _touched_rotor(model: mujoco.MjModel, data: mujoco.MjData, prefix: str) -> s
 
 
 def _name(model: mujoco.MjModel, geom: int) -> str:
-    name = model.geom(geom).name or "a shape of the vehicle"
+    """A geom by its body, as scenarios name it."""
+    name = model.body(model.geom_bodyid[geom]).name
     if name.startswith("object_"):
         return f"object {name.removeprefix('object_')}"
-    return name.removesuffix("_collision")
+    if name.endswith("_vehicle"):
+        return f"companion {name.removesuffix('_vehicle')}"
+    return {"world": "the ground", "vehicle": "the vehicle"}.get(name, name)
 
 
 class MujocoPlant(Plant):
@@ -243,12 +243,6 @@ class MujocoPlant(Plant):
         for begin, end in pairwise((first, *inside, first + steps)):
             switch(self.model, self._cables, begin * self._assembly.scenario.simulation.timestep)
             mujoco.mj_step(self.model, self.data, nstep=end - begin)
-
-    def record(self, samples: int, steps: int) -> Floats | None:
-        """Natively, all but the last sample come from the callback."""
-        if self.engine == "native":
-            return self._record_natively(samples, steps)
-        return super().record(samples, steps)
 
     @property
     def evaluation_time(self) -> float:

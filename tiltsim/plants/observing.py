@@ -22,7 +22,7 @@ from tiltsim.plants.command import Command, Observation, Reference
 from tiltsim.plants.mujoco_plant import MujocoPlant
 from tiltsim.scenario.controller import PythonController
 from tiltsim.scenario.scenario import Scenario
-from tiltsim.vehicles.rotorcraft.layout import layout_of
+from tiltsim.vehicles.rotorcraft.layout import is_fixed_cross, layout_of
 from tiltsim.vehicles.rotorcraft.others import FELT, others_of
 from tiltsim_controllers.code.arrays import as_arrays
 from tiltsim_controllers.mathematics.attitude import euler_angles
@@ -143,12 +143,14 @@ class _Law:
         bare = replace(assembly, loop=loop, setup=self.setup)
         self._step = control_step(bare, self.setup.userdata.tolist(), "controls")
 
-    def controls(self, time: float, qpos: Values, qvel: Values, act: Values) -> list[float]:
-        """Its controls at a time (s), where a step begins; the forces felt are last in ``act``."""
-        now = Header(timestep=time, evaluations=1.0)  # whose next evaluation is now
-        own = self.loop.sizes.act
-        vectors = (now, qpos, qvel, act[:own], (), act[own:], ())
-        return list(self._step(*(list(map(float, vector)) for vector in vectors)))
+    def controls(self, time: float, *state: Sequence[float]) -> Values:
+        """Its controls at a time (s), where a step begins, by qpos, qvel and act.
+
+        The forces felt are last in act.
+        """
+        now, own = Header(timestep=time, evaluations=1.0), self.loop.sizes.act
+        qpos, qvel, act = (list(map(float, vector)) for vector in state)
+        return tuple(self._step(now, qpos, qvel, act[:own], (), act[own:], ()))
 
 
 _law = lru_cache(maxsize=KEPT)(_Law)
@@ -199,9 +201,9 @@ class BuiltInController:
 
 
 def _command(assembly: Assembly, loop: ClosedLoop, ctrl: Values) -> Command:
-    """The command by a controller's controls; the quadrotor's laws command thrusts."""
+    """The command by a controller's controls; rotors on a fixed cross make thrusts."""
     layout = layout_of(loop)
-    if loop.model == "quadrotor":
+    if is_fixed_cross(loop):
         coefficients = np.array(assembly.scenario.any_rotorcraft.thrust_coefficients)
         return Command(thrusts=coefficients * np.array(ctrl[: layout.rotors]))
     rates = ctrl[layout.acceleration_1 : layout.further_rates]

@@ -45,8 +45,7 @@ from tiltsim_controllers.vehicle.rotors import (
     table_per_newton,
 )
 
-FASTEST: Final = 1e6
-"""rad/s, in place of no limit."""
+FASTEST: Final = 1e6  # rad/s, in place of no limit
 
 
 def require_no_pose(scenario: Any) -> None:
@@ -103,10 +102,7 @@ class CompensatingController(Compensating, LawController):
             tuple(k * speed * abs(speed) for k in airframe.vehicle.thrust_coefficients)
             for speed in np.clip(airframe.speed_limits, -FASTEST, FASTEST).tolist()
         )
-        made: tuple[Any, ...] = record_of_limits(type(own), airframe.rotors)(
-            own, self.observer, *thrusts
-        )
-        return made
+        return record_of_limits(type(own), airframe.rotors)(own, self.observer, *thrusts)
 
     def plain_parameters(self, airframe: Airframe) -> tuple[Any, ...]:
         """The parameters of the law itself."""

@@ -5,8 +5,6 @@ law and its table, a `tiltsim.LawController`. An entry that cannot be used is le
 warning, so that a broken package does not stop flights that do not need it.
 """
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Container
 from contextlib import suppress
@@ -24,6 +22,7 @@ from tiltsim.scenario.controller_table import ControllerTable
 from tiltsim.scenario.kinds import KINDS, tables_of
 from tiltsim.scenario.law_controller import LawController, TiltingTable
 from tiltsim.scenario.messages import InvalidValueError
+from tiltsim.scenario.rotorcraft import ROTORCRAFT
 from tiltsim.scenario.table import Positive, default, example, required
 from tiltsim.system.interrupts import defer_interrupts
 from tiltsim.system.text import error_text, printable
@@ -145,7 +144,7 @@ class OwnFunctionController(ControllerTable):
 class PythonController(OwnFunctionController):
     """A user's own controller in Python; see `tiltsim.plants.commanded_plant`."""
 
-    vehicle_models = ("tiltrotor", "quadrotor", "multirotor")
+    vehicle_models = ROTORCRAFT
     reference_kinds = ("position", "pose", "attitude_altitude")
     is_external = True
     rotors_have_speeds = True

@@ -4,8 +4,6 @@ A package adds one by a subclass of `LawController`, which the entry-point group
 ``tiltsim.controllers`` names; see docs/controller_package.md.
 """
 
-from __future__ import annotations
-
 from abc import abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -15,7 +13,7 @@ from typing import Any, ClassVar, Literal, TypeVar
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.controller_table import ControllerTable, ReferenceKind
 from tiltsim.scenario.reference import Reference
-from tiltsim.scenario.rotorcraft import TiltServoTable
+from tiltsim.scenario.rotorcraft import ROTORCRAFT, TiltServoTable
 from tiltsim.scenario.table import Positive, default
 from tiltsim_controllers.analysis.stability import ErrorLoop, linear_loop
 from tiltsim_controllers.code.arrays import xp as xp
@@ -69,6 +67,8 @@ class Airframe:
         rotor_time_constant: Time constant of the rotors' lag, s; None for no lag.
         tilt_servo: The servos of its tilts.
         reference: The flight's ``[reference]`` table.
+        noise: Standard deviations of measured velocities (m/s) and body rates (rad/s), in the mean
+            of a second.
     """
 
     vehicle: Multirotor
@@ -87,6 +87,7 @@ class Airframe:
     rotor_time_constant: float | None
     tilt_servo: TiltServoTable
     reference: Reference
+    noise: tuple[float, float]
 
     @property
     def rotors(self) -> int:
@@ -97,7 +98,7 @@ class Airframe:
 class LawTable(ControllerTable):
     """The common part of the tables of laws, wherever the function comes from."""
 
-    vehicle_models = ("tiltrotor", "quadrotor", "multirotor")
+    vehicle_models = ROTORCRAFT
     reference_kinds: ClassVar[tuple[ReferenceKind, ...]] = ("position",)
     rotors_have_speeds = True
     damps_swing = True
@@ -153,8 +154,7 @@ class LawController(LawTable):
     def law_parameters(self, airframe: Airframe) -> tuple[Any, ...]:
         """The law's parameters, a NamedTuple of floats and tuples: by default its own keys."""
         record = record_of(type(self), _not_read())
-        made: tuple[Any, ...] = record(*(number_of(self, name) for name in record._fields))
-        return made
+        return record(*(number_of(self, name) for name in record._fields))
 
     def law_table(self, airframe: Airframe) -> Values:
         """Any number of further floats: ``observed.table``."""

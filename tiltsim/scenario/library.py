@@ -11,17 +11,10 @@ from tiltsim.resources import shipped_folder
 from tiltsim.scenario.messages import did_you_mean
 from tiltsim.system.files import is_file, is_folder
 
-MAX_FILE_SIZE: Final = 4 * 2**20
-"""Bytes of a text file."""
-
-MAX_DEPTH: Final = 64
-"""Tables and lists in one another, and steps of a dotted key."""
-
-MAX_VALUES: Final = 200_000
-"""Values of a document; entries of lists count one by one."""
-
-MAX_ROWS: Final = 10_000
-"""Rows of a table of a reference or a gait."""
+MAX_FILE_SIZE: Final = 4 * 2**20  # bytes of a text file
+MAX_DEPTH: Final = 64  # tables and lists in one another, and steps of a dotted key
+MAX_VALUES: Final = 200_000  # values of a document; entries of lists count one by one
+MAX_ROWS: Final = 10_000  # rows of a table of a reference or a gait
 
 
 def read_text(path: Path) -> str:

@@ -32,8 +32,10 @@ class InvalidValueError(ValueError):
 ALIKE: Final = 0.85
 """Similarity from which the words of two names make them close, whatever else they have."""
 
-MAX_OTHERS: Final = 5
-"""Most keys with further mistakes that are named."""
+CLOSE: Final = 0.6  # similarity from which names are close, ...
+SHORT, CLOSE_SHORT = 4, 0.5  # ... and from which shorter ones are, whose letters count for more
+
+MAX_OTHERS: Final = 5  # most keys with further mistakes that are named
 
 _PLAIN_TYPES: Final = {
     "float_type": "must be a number",
@@ -69,7 +71,8 @@ def did_you_mean(name: object, names: Iterable[str]) -> str:
     """A suggestion of the closest of some names; empty if none is close."""
     given = shortened(name if isinstance(name, str) else short_repr(name))
     names = list(names)
-    close = get_close_matches(given, names, n=max(1, len(names)))
+    cutoff = CLOSE if len(given) > SHORT else CLOSE_SHORT
+    close = get_close_matches(given, names, max(1, len(names)), cutoff)
     close += [known for known in names if _shared_words(given, known) > ALIKE]
     # Among close names, final_position_error_x shares more words with final_eror_x than final_roll.
     best = max(close, key=lambda known: _shared_words(given, known), default="")
@@ -277,13 +280,19 @@ def _known_keys(root: Node, location: tuple[Any, ...], key: str, missing: Sequen
     names = sorted(table.properties)
     others = [one for one in union.tables if one is not union and name in one.properties]
     kinds = dict.fromkeys(kind for option in others for kind in option.kinds)
-    elsewhere = [found for found in root.dotted_keys() if found.rpartition(".")[2] == name]
+    within = "." + re.sub(r"\[\d+\]", "", key)
+    elsewhere = [
+        found
+        for found in root.dotted_keys()
+        if found.rpartition(".")[2] == name and f".{found}." not in within
+    ]
+    alike = [known for known in names if _shared_words(known, name) > ALIKE]
     if kinds and names:
         hint = f"only for {table.tag} {', '.join(kinds)}; "
-    elif elsewhere:
+    elif elsewhere and not did_you_mean(name, alike):
         hint = f"did you mean {' or '.join(elsewhere[:3])}? "
     else:
-        hint = did_you_mean(name, names)
+        hint = did_you_mean(name, alike) or did_you_mean(name, names)
         if not hint and len(missing) == 1:
             hint = f"did you mean {missing[0]}? "
     return f"{hint}known: {', '.join(names)}"

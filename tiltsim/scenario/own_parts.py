@@ -33,13 +33,13 @@ from tiltsim.scenario.time_table import (
     reference_columns_among,
     rows_of_columns,
 )
+from tiltsim.scenario.vehicle import VEHICLES
 from tiltsim.system.arguments import is_finite, real_array, true_or_false
 from tiltsim.system.files import digest, is_file
 from tiltsim.system.text import error_text, short_repr
 from tiltsim_controllers.mathematics.scalar import Values
 
-VARIABLE: Final = "TILTSIM_TRUST"
-"""Environment variable that, set to 1, stands for ``--trust``."""
+VARIABLE: Final = "TILTSIM_TRUST"  # environment variable that, set to 1, stands for ``--trust``
 
 
 def is_trusted(option: bool) -> bool:
@@ -193,7 +193,7 @@ def replace_tables(document: dict[str, Any], given: Mapping[str, object]) -> Non
     for name in filter(given.__contains__, COLUMNS):
         old, kept = document.get(name), KEPT_KEYS if name == "reference" else ()
         stays = {key: old[key] for key in kept if key in old} if isinstance(old, dict) else {}
-        document[name] = _table(name, given[name], _is_multirotor(document)) | stays
+        document[name] = _table(name, given[name], _has_any_tilts(document)) | stays
 
 
 def given_parts(**parts: object) -> dict[str, object]:
@@ -263,7 +263,7 @@ def sample_functions(document: Mapping[str, Any], own: Mapping[str, Any]) -> Non
         rows = table.get("rows") if isinstance(table, Mapping) else None
         if isinstance(rows, list) and (not rows or rows[-1][0] != span):
             size = len(COLUMNS[name]) - 1
-            if name == "gait" and _is_multirotor(document):
+            if name == "gait" and _has_any_tilts(document):
                 found = _size_of(own[name])
                 size = found if 1 <= found <= MAX_ROTORS else size
             if name == "reference" and (given := _size_of(own[name])) + 1 in WIDTHS:
@@ -271,10 +271,11 @@ def sample_functions(document: Mapping[str, Any], own: Mapping[str, Any]) -> Non
             rows[:] = _samples(name, own[name], size, span)
 
 
-def _is_multirotor(document: Mapping[str, Any]) -> bool:
+def _has_any_tilts(document: Mapping[str, Any]) -> bool:
     """Whether the number of tilts of a gait is its vehicle's."""
     vehicle = document.get("vehicle")
-    return isinstance(vehicle, Mapping) and vehicle.get("model") == "multirotor"
+    model = vehicle.get("model") if isinstance(vehicle, Mapping) else None
+    return isinstance(model, str) and model in VEHICLES and VEHICLES[model].any_tilts
 
 
 def _size_of(function: Callable[[float], Any]) -> int:

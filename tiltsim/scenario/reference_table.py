@@ -3,8 +3,6 @@
 A push is a motion up to an object, a force on it, and a path along it.
 """
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from itertools import pairwise
 from math import acos, cos, pi
@@ -129,8 +127,7 @@ class PositionReference(ReferenceTable):
         return "position" if self.roll == self.pitch == 0.0 else "pose"
 
 
-SPEEDING_UP: Final = 1.0
-"""s, to the speed of the approach; less where the object is near."""
+SPEEDING_UP: Final = 1.0  # s, to the speed of the approach; less where the object is near
 
 FROM_REST: Final = (0.0, 1.0, -3.0, 2.5, 0.0, 0.0, 0.0, 0.0)
 """A motion from rest to the speed 1 in the time 1, without a jerk at either end."""

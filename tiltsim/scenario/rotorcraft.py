@@ -24,6 +24,9 @@ from tiltsim_controllers.mathematics.scalar import Values
 from tiltsim_controllers.vehicle.parameters import Vehicle
 from tiltsim_controllers.vehicle.rotors import Rotor
 
+ROTORCRAFT: Final = ("tiltrotor", "quadrotor", "multirotor")
+"""The models of all vehicles that fly."""
+
 SPATIAL_KEYS: Final = ("position", "velocity", "acceleration", "amplitude")
 """Keys of references that hold a vector in the world."""
 
@@ -67,6 +70,7 @@ class AnyVehicleTable(Table, ABC):
     table_name = "vehicle"
     is_planar: ClassVar[bool] = False  # moves on a plane, without gravity, air or ground
     has_actuators: ClassVar[bool] = False  # which may lag, have limits and fail
+    any_tilts: ClassVar[bool] = False  # a gait has the tilts of the vehicle's file
 
     model: str
     if TYPE_CHECKING:
@@ -91,6 +95,16 @@ class AnyVehicleTable(Table, ABC):
     def resolve(self) -> Any:
         """The physical parameters."""
 
+    @property
+    def spins(self) -> Values:
+        """Signs of the rotor speeds."""
+        return (1.0,) * self.rotor_count
+
+    @property
+    @abstractmethod
+    def rotor_range(self) -> tuple[float | None, float | None]:
+        """Smallest and largest speed (rad/s) of a rotor along its spin; None without limit."""
+
     def refusals(self, _scenario: Any) -> Refusals:
         """Contradictions to a scenario of this vehicle: keys, reasons, and values not their own."""
         yield from ()
@@ -100,6 +114,11 @@ class PlanarTable(AnyVehicleTable, ABC):
     """A vehicle that moves in the plane of x and y, whose laws control these two."""
 
     is_planar = True
+
+    @property
+    def rotor_range(self) -> tuple[float | None, float | None]:
+        """Thrusts push and cannot pull."""
+        return 0.0, None
 
     def refusals(self, scenario: Any) -> Refusals:
         """Motion out of the plane, references of yaw, and gaits that the law does not follow."""
@@ -163,8 +182,16 @@ class RotorcraftTable(AnyVehicleTable, ABC):
         return as_multirotor(self.resolve(), tilting=self.has_tilting_rotors).rotors
 
     @property
+    def cross(self) -> str:
+        """The model of four rotors on a cross, each on its own hinge or fixed; empty for others."""
+        return ""
+
+    @property
+    def rotor_range(self) -> tuple[float | None, float | None]:
+        return self.min_rotor_speed, self.max_rotor_speed
+
+    @property
     def spins(self) -> Values:
-        """Signs of the rotor speeds."""
         return tuple(rotor.spin for rotor in self.rotors)
 
     @property
@@ -237,6 +264,8 @@ class MultirotorTable(RotorcraftTable):
     """Any number of rotors, each anywhere, fixed or on a hinge, described by an MJCF file alone."""
 
     model_config = example(model="multirotor", mjcf="mjcf/hexarotor.xml")
+
+    any_tilts = True
 
     model: Literal["multirotor"] = required(
         "2 to 16 rotors at any places, with any thrust axes, fixed or tilted about hinges of any "

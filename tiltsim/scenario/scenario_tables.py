@@ -212,6 +212,15 @@ class ScenarioTables(WithAutopilot):
         return isinstance(self.vehicle, RotorcraftTable) and self.vehicle.rotor_inertia > 0.0
 
     @property
+    def gyroscopic(self) -> float:
+        """Factor of the gyroscopic torque: the thesis's equations have a vehicle's without hinges.
+
+        That is ch. 2's; ch. 3's equations omit it.
+        """
+        fixed = not self.vehicle.has_actuators
+        return float(self.simulation.plant != "thesis" or fixed)
+
+    @property
     def has_ideal_actuators_in_still_air(self) -> bool:
         """Whether pods and rotors follow their commands, and nothing else acts, as in the thesis.
 

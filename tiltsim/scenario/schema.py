@@ -15,11 +15,8 @@ if TYPE_CHECKING:
 
     from pydantic import BaseModel
 
-TAG_KEYS: Final = ("type", "law", "model")
-"""Keys whose value decides which other keys a table has."""
-
-_UNIT: Final = re.compile(r"(.*) \[([^]]+)\]", re.DOTALL)
-"""A description that ends with a unit."""
+TAG_KEYS: Final = ("type", "law", "model")  # keys whose value decides which other keys a table has
+_UNIT: Final = re.compile(r"(.*) \[([^]]+)\]", re.DOTALL)  # a description that ends with a unit
 
 
 @dataclass(frozen=True)

@@ -26,8 +26,7 @@ from tiltsim.scenario.table import (
 MAX_STEPS: Final = 100_000_000
 """Largest number of physics steps of a flight, more than a day at one millisecond."""
 
-DEFAULT_ROTOR_SPEED: Final = 300.0
-"""rad/s, of the thesis's flights at time zero."""
+DEFAULT_ROTOR_SPEED: Final = 300.0  # rad/s, of the thesis's flights at time zero
 
 PlantName = Literal["mujoco", "thesis", "rigid_body"]
 
@@ -183,8 +182,7 @@ class InitialTable(Table):
 CONTROLLER: Final = {"law": "python", "function": "autopilot"}
 """The controller of a scenario with an autopilot."""
 
-CHANNELS: Final = 32
-"""Most outputs of a firmware."""
+CHANNELS: Final = 32  # most outputs of a firmware
 
 _OUTPUT: Final = re.compile(r"(rotor|along|across)_([1-9]\d?)")
 

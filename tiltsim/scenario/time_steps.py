@@ -43,8 +43,7 @@ On the real axis RK4 turns unstable at 2.78; at a damping ratio of 0.3 or more i
 MAX_ODE3_SERVO_STEP: Final = 2.45
 """Limit for ode3, unstable from 2.51 on; at less damping: `MAX_UNDAMPED_SERVO_STEP`."""
 
-MAX_UNDAMPED_SERVO_STEP: Final = 1.7
-"""ode3 turns unstable at 1.73 on the imaginary axis."""
+MAX_UNDAMPED_SERVO_STEP: Final = 1.7  # ode3 turns unstable at 1.73 on the imaginary axis
 
 MAX_EULER_STEP: Final = 1.9
 """Largest product of timestep and a rotor's pole where MuJoCo integrates activations by Euler."""

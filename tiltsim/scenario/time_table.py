@@ -66,23 +66,15 @@ def gait_columns(tilts: int) -> tuple[str, ...]:
 
 GAIT_COLUMNS: Final = gait_columns(4)
 
-SHORTEST_STEP: Final = 1e-4
-"""Seconds between the rows of any table."""
-
-NORM_TOLERANCE: Final = 0.01
-"""By which the norm of a quaternion may differ from one."""
+SHORTEST_STEP: Final = 1e-4  # seconds between the rows of any table
+NORM_TOLERANCE: Final = 0.01  # by which the norm of a quaternion may differ from one
 
 LARGEST_STEP: Final = 0.3
 """Change of roll or yaw (rad) from row to row up to which they may turn at any rate."""
 
-FASTER: Final = 5.0
-"""Times the turn of the vehicle that roll or yaw may turn by beyond this."""
-
-SEPARATORS: Final = ",;\t "
-"""Characters that may separate the columns of a CSV file."""
-
-_NUMBERS: Final = ("double", "float", "int64", "int32")
-"""Types of columns of a Parquet file."""
+FASTER: Final = 5.0  # times the turn of the vehicle that roll or yaw may turn by beyond this
+SEPARATORS: Final = ",;\t "  # characters that may separate the columns of a CSV file
+_NUMBERS: Final = ("double", "float", "int64", "int32")  # types of columns of a Parquet file
 
 
 class TimeTable(Table):
@@ -168,8 +160,7 @@ def _column(name: str, given: Any) -> list[float]:
         raise InputError(f"column {name} must be numbers: {error}") from None
     if column.ndim != 1:
         raise InputError(f"column {name} = {short_repr(given)}: must be a list of numbers")
-    values: list[float] = column.tolist()
-    return values
+    return column.tolist()
 
 
 ColumnsAmong = Callable[[Sequence[str]], Sequence[str]]

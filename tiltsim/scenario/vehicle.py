@@ -107,6 +107,10 @@ class VehicleTable(RotorcraftTable):
         return 4 if self.model == "tiltrotor" else 0
 
     @property
+    def cross(self) -> str:
+        return self.model
+
+    @property
     def hinge_inertias(self) -> Values:
         user_vehicle, shipped = self.user_vehicle, SERVO_ARMATURE + self.pod.inertia
         of_file = () if user_vehicle is None else user_vehicle.hinge_inertias

@@ -27,8 +27,7 @@ from tiltsim.system.arguments import Report, check_progress, reported, true_or_f
 from tiltsim.system.processes import ProcessDiedError, in_order, in_processes
 from tiltsim.system.text import short_repr
 
-PARTS: Final = 4
-"""Parts of the scenarios that each process gets in turn."""
+PARTS: Final = 4  # parts of the scenarios that each process gets in turn
 
 _START: Final[dict[str, Any]] = {
     "object": {"__all__": {"velocity"}},
@@ -36,8 +35,7 @@ _START: Final[dict[str, Any]] = {
 }
 """Keys of things beside the vehicle that are no part of its model."""
 
-WINDOW: Final = 2048
-"""Number of scenarios that are grouped into batches at a time."""
+WINDOW: Final = 2048  # number of scenarios that are grouped into batches at a time
 
 Result = TypeVar("Result")
 

@@ -33,14 +33,12 @@ from tiltsim_controllers.mathematics.scalar import Floats
 ROWS_PER_THREAD: Final = 24
 """Rows of a batch: enough that no thread waits long for the last one of a call."""
 
-MEMORY: Final = 256 * 2**20
-"""Bytes of the samples of all flights that are not finished."""
+MEMORY: Final = 256 * 2**20  # bytes of the samples of all flights that are not finished
 
 CALL_TIME: Final = 0.25
 """Wall time (s) of machine code between checks of the flights and the keyboard."""
 
-FEWEST_STEPS: Final = 1024
-"""Steps of the first call of lanes, and at least of others."""
+FEWEST_STEPS: Final = 1024  # steps of the first call of lanes, and at least of others
 
 Result = TypeVar("Result")
 

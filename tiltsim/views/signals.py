@@ -194,9 +194,8 @@ def _chosen(assembly: Assembly) -> Iterator[Signals]:
     if "direction" in units:
         yield from _direction(assembly)
     elif rotors := assembly.loop.kind.rotors:
-        craft = scenario.any_rotorcraft
-        limits = {"min": craft.min_rotor_speed, "max": craft.max_rotor_speed}
-        levels = [Level(name, f"{name} limit", at) for name, at in limits.items() if at is not None]
+        limits = zip(("min", "max"), scenario.vehicle.rotor_range, strict=True)
+        levels = [Level(name, f"{name} limit", at) for name, at in limits if at is not None]
         lines = [Signal(f"rotor_{i}", f"{i}", partial(along_spin, rotor=i)) for i in rotors]
         slowest = [Signal("slowest", "Slowest rotor and limits", along_spin)]
         about: dict[str, Any] = {"detail": "along the spin", "floor": 20.0, "moves": True}
@@ -271,7 +270,7 @@ def squared_speed(flight: Flight, rotor: int) -> Floats:
 
 def along_spin(flight: Flight, rotor: int = 0) -> Floats:
     """The speed of a rotor, or else of the slowest one, along its spin, rad/s."""
-    speeds = np.array(flight.scenario.any_rotorcraft.spins) * flight["rotor_speeds"]
+    speeds = np.array(flight.scenario.vehicle.spins) * flight["rotor_speeds"]
     return np.asarray(speeds[:, rotor - 1] if rotor else speeds.min(axis=1))
 
 

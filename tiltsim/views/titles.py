@@ -201,12 +201,10 @@ def conditions(piece: Flight) -> dict[str, npt.NDArray[np.bool_]]:
         found["switched to yaw-position control"] = ~inside
     if "contact_time" in columns:
         found["touches an object"] = np.diff(columns["contact_time"], prepend=np.inf) > 0.0
-    craft = None if scenario.vehicle.is_planar else scenario.any_rotorcraft
-    highest, lowest = (craft.max_rotor_speed, craft.min_rotor_speed) if craft else (None, 0.0)
+    lowest, highest = scenario.vehicle.rotor_range
     for rotor in piece.assembly.loop.kind.rotors:
-        speed = columns[f"rotor_speed_{rotor}"]
-        if craft is not None:
-            speed = craft.spins[rotor - 1] * speed
+        speed = scenario.vehicle.spins[rotor - 1] * columns[f"rotor_speed_{rotor}"]
+        if not scenario.vehicle.is_planar:
             found[f"rotor {rotor} reversed"] = speed <= 0.0
         for limit, reached in ((highest, at_upper_limit), (lowest, at_lower_limit)):
             if limit is not None:

@@ -284,7 +284,7 @@ def read_motion(plan: FlightPlan, loop: ClosedLoop) -> Any:
         mechanics=mechanics(plan),
         least_thrust=least,
         greatest_thrust=greatest,
-        gyroscopic=float(plant != "thesis" or scenario.vehicle.model == "quadrotor"),
+        gyroscopic=scenario.gyroscopic,
         pod_inertias=pods,
         turning=body_less(scenario, carried),
     )

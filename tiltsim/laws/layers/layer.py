@@ -75,6 +75,9 @@ def wrap_loop(inner: ClosedLoop, layer: Layer) -> ClosedLoop:
         inner=inner.parameters,
     )
     added = layer.actuators or ExtraActuators(states=len(layer.fields))
+    unnamed = range(1, added.states - len(layer.fields) + 1)
+    kind = layer.parameters.__name__.lower()
+    added = added._replace(names=(*layer.fields, *(f"{kind}_state_{i}" for i in unnamed)))
     sizes = inner.sizes._replace(
         act=inner.sizes.act + added.states, ctrl=inner.sizes.ctrl + added.controls
     )

@@ -82,6 +82,11 @@ def layout_of(loop: ClosedLoop) -> Layout:
     return Layout(len(loop.spins), loop.sizes.qpos - TILT_1)
 
 
+def is_fixed_cross(loop: ClosedLoop) -> bool:
+    """Whether its rotors are on a cross without hinges and make any thrust at once, as in ch. 2."""
+    return not loop.tilt_of_rotor and not layout_of(loop).tilts
+
+
 def tilt_of_rotor(loop: ClosedLoop) -> tuple[int, ...]:
     """The number, from 0, of each rotor's tilt; -1: fixed."""
     rotors, tilts = layout_of(loop)
