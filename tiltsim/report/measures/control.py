@@ -1,7 +1,6 @@
 """The alleged singular zone, gains and decouplers, and rotor limits (ch. 2, 4, 5 and 9)."""
 
 from collections.abc import Sequence
-from math import comb
 from typing import Final
 
 import numpy as np
@@ -17,7 +16,6 @@ from tiltsim_controllers.analysis.singularity import (
     normalized_determinant,
     published_determinant,
     published_singular_curve,
-    rank,
     world_up,
 )
 from tiltsim_controllers.analysis.stability import is_hurwitz, third_order_loop
@@ -34,6 +32,11 @@ _QUADROTOR: Final = PRESETS["ar_drone_2_unrounded"]
 _HOVER: Final = _QUADROTOR.mass * _QUADROTOR.gravity
 _SINGULAR: Final = 1e-9
 _LIMITS: Final = published_speed_limits(_VEHICLE)
+
+
+def exact_determinant(roll: float, pitch: float, thrust: float = _HOVER) -> float:
+    """The exact determinant at an attitude (rad) and thrust (N), over its value in level hover."""
+    return float(normalized_determinant(roll, pitch, thrust, _QUADROTOR))
 
 
 def exact_on_published_curve() -> Floats:
@@ -65,16 +68,6 @@ def eq_43_as_printed() -> bool:
         matrix = [[first, sp * cf, cp], [second, -cp * cf, sp], [0.0, sf, st]]
         worst = max(worst, abs(np.linalg.det(matrix) - published_determinant(phi, theta)))
     return bool(worst < 1e-12)
-
-
-def level_determinant() -> float:
-    """The exact determinant at level attitude, over its value in hover."""
-    return float(normalized_determinant(0.0, 0.0, _HOVER, _QUADROTOR))
-
-
-def singular_without_thrust() -> bool:
-    """Whether the exact determinant is 0 at zero thrust."""
-    return float(normalized_determinant(0.3, 0.2, 0.0, _QUADROTOR)) == 0.0
 
 
 def quadrotor_gains_are_stable(law: str) -> bool:
@@ -111,25 +104,10 @@ def zone_holds_the_curve() -> bool:
     return bool(inside.all())
 
 
-def choices_of_six(picked: Sequence[int]) -> tuple[float, ...]:
-    """In how many ways each number of outputs can be picked out of six."""
-    return tuple(float(comb(6, number)) for number in picked)
-
-
 def routh_holds(rows: Sequence[str]) -> bool:
     """Whether ch. 4's gains satisfy Routh's condition as printed, without another loop gain."""
     loops = GAIN_SETS["ch04"].loops
     return all(third_order_loop("", loops[row], 1.0).stable for row in rows)
-
-
-def roll_gain(number: int) -> float:
-    """A gain of ch. 4's roll loop, 1 to 3."""
-    return float(GAIN_SETS["ch04"].loops["roll"][number - 1])
-
-
-def position_gains_are_positive() -> bool:
-    """Whether both gains of ch. 4's position loop are positive."""
-    return min(GAIN_SETS["ch04"].position) > 0.0
 
 
 def decouplers_agree_without_tilt() -> bool:
@@ -140,62 +118,34 @@ def decouplers_agree_without_tilt() -> bool:
     return max(abs(modified - conventional) for modified, conventional in pair) < 1e-12
 
 
-def weight() -> float:
-    """Mass times gravity, N."""
-    return _VEHICLE.mass * _VEHICLE.gravity
-
-
-def _angles(number: int, *, exact: bool = False) -> list[float]:
+def gait_angles(number: int, *, exact: bool = False) -> list[float]:
+    """Tilt angles (rad) of a gait of ch. 9, as printed or on the exact lines."""
     published = PUBLISHED_GAITS[f"ch09_gait_{number}"]
     gait = (published.exact or published.gait) if exact else published.gait
     return [float(angle) for angle in gait.angles(np.array([0.0]))[0]]
 
 
-def _torques(number: int, thrust: float | None = None, *, exact: bool = False) -> AttainableSet:
-    angles = _angles(number, exact=exact)
+def torques(number: int, thrust: float | None = None, *, exact: bool = False) -> AttainableSet:
+    """Roll and pitch torques and thrusts of a gait without yaw torque, at a vertical thrust (N)."""
+    angles = gait_angles(number, exact=exact)
     return attainable_torque_thrust(angles, _VEHICLE, _LIMITS, vertical_thrust=thrust)
-
-
-def has_solution(number: int, thrust: float | None = None) -> bool:
-    """Whether a gait has torques and thrusts without yaw torque, at a vertical thrust (N)."""
-    return not _torques(number, thrust).is_empty
-
-
-def largest_thrust(number: int) -> float:
-    """The largest vertical thrust of a gait without yaw torque, N."""
-    return float(_torques(number).upper[2])
-
-
-def least_thrust(number: int) -> float:
-    """The least vertical thrust of a gait without yaw torque, N."""
-    return float(_torques(number).lower[2])
-
-
-def speed_limit(which: str) -> float:
-    """The ``least`` or ``largest`` rotor speed of ch. 9, rad/s."""
-    return _LIMITS[which == "largest"]
 
 
 def torques_are_coupled(number: int) -> bool:
     """Whether for one thrust in the middle the torques on the exact lines are on a line."""
-    thrusts = _torques(number, exact=True)
+    thrusts = torques(number, exact=True)
     middle = 0.5 * float(thrusts.lower[2] + thrusts.upper[2])
-    return _torques(number, middle, exact=True).dimension <= 1
-
-
-def has_full_rank(number: int, exact: bool) -> bool:
-    """Whether the torque matrix of a gait, on the exact lines or as printed, has rank 3."""
-    return bool(rank(_angles(number, exact=exact), _VEHICLE) == 3)
+    return torques(number, middle, exact=True).dimension <= 1
 
 
 def accelerations(number: int) -> tuple[float, ...]:
     """Attainable accelerations in body axes, m/s^2: least along x and y, largest along x and y."""
-    reached = attainable_accelerations(_angles(number), _VEHICLE, _LIMITS)
+    reached = attainable_accelerations(gait_angles(number), _VEHICLE, _LIMITS)
     return (*reached.lower.tolist(), *reached.upper.tolist())
 
 
 def accelerations_are_a_rectangle(number: int) -> bool:
     """Whether their set has four corners, with two values along each axis."""
-    corners = attainable_accelerations(_angles(number), _VEHICLE, _LIMITS).vertices
+    corners = attainable_accelerations(gait_angles(number), _VEHICLE, _LIMITS).vertices
     spans = [np.unique(np.round(axis, 9)) for axis in corners.T]
     return len(corners) == 4 and all(len(span) == 2 for span in spans)

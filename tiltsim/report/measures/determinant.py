@@ -186,11 +186,6 @@ def eight_inputs_have_full_rank() -> bool:
     return True
 
 
-def hover_rotor_speed() -> float:
-    """Speed (rad/s) at which four untilted rotors carry the weight."""
-    return _VEHICLE.hover_rotor_speed
-
-
 def shrunk_gaits_are_regular() -> bool:
     """Ch. 5, Eq. (18): as a gait shrinks, the determinant goes to 4 cos(roll) cos(pitch)."""
     roll, pitch = np.meshgrid(np.linspace(-1.5, 1.5, 61), np.linspace(-1.5, 1.5, 61))

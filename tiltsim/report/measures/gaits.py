@@ -47,19 +47,6 @@ def scaling_costs_side_force(gait: str) -> bool:
     return all(first > second for first, second in pairwise(shares))
 
 
-def beats_its_biased_twin(key: str) -> bool:
-    """Whether a published gait, on the exact lines, is more robust than its biased twin.
-
-    ``key`` of the gait in `PUBLISHED_GAITS`.
-    """
-    return bool(robustness(PUBLISHED_GAITS[key]).claim_holds)
-
-
-def gait_margin(key: str, of: str = "margin") -> float:
-    """Smallest margin (rad) of a gait, by a field of its `robustness`."""
-    return float(getattr(robustness(PUBLISHED_GAITS[key]), of))
-
-
 def angles_as_printed(key: str, offset: float) -> Floats:
     """A gait of `PUBLISHED_GAITS` with the printed P and offset, over a period, shape (N, 4)."""
     gait = PUBLISHED_GAITS[key].gait
@@ -181,7 +168,8 @@ def advantage_on_exact_lines(key: str) -> bool:
 
 def partial_scaling_can_harm(keys: list[str]) -> bool:
     """Whether a gait's biased twin has a smaller margin than the gait."""
-    return any(gait_margin(key, "margin_biased") < gait_margin(key) for key in keys)
+    found = [robustness(PUBLISHED_GAITS[key]) for key in keys]
+    return any(one.margin_biased < one.margin for one in found if one.margin_biased is not None)
 
 
 def printed_angles_lie_on_the_lines(key: str) -> bool:
