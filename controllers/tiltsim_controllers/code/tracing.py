@@ -128,25 +128,17 @@ def apply(op: str, *args: Any) -> Any:
         args: Numbers and arrays of shapes that broadcast.
     """
     for value in args:
-        if isinstance(value, _SEVERAL):
+        if isinstance(value, (np.ndarray, list, tuple)):
             break
     else:
-        return _function(op)(*args)
+        return COMPOSED[op](*args) if op in COMPOSED else make(op, *args)
     boxed = [np.array(a, object) if isinstance(a, Expr) else _plain(a) for a in args]
     return as_array(_on_arrays(op, len(args))(*boxed))
 
 
-_SEVERAL: Final = (np.ndarray, list, tuple)
-
-
-@cache
-def _function(op: str) -> Callable[..., Number]:
-    return COMPOSED.get(op) or partial(make, op)
-
-
 @cache
 def _on_arrays(op: str, arguments: int) -> np.ufunc:
-    return np.frompyfunc(_function(op), arguments, 1)
+    return np.frompyfunc(COMPOSED.get(op) or partial(make, op), arguments, 1)
 
 
 class Block:
@@ -226,10 +218,7 @@ class Graph:
 
 def _identity(value: Any) -> Any:
     """Equal for equal arguments of an operation; 0.0 is not -0.0."""
-    return value.number if isinstance(value, Expr) else _packed(value)
-
-
-_packed: Final = struct.Struct("d").pack
+    return value.number if isinstance(value, Expr) else struct.pack("d", value)
 
 
 _current: ContextVar[Graph | None] = ContextVar("graph", default=None)
@@ -265,10 +254,7 @@ def make(op: str, *args: Any) -> Number:
         op: Name of an entry of `OPERATIONS`.
         args: Floats, bools and symbolic numbers.
     """
-    for value in args:
-        if isinstance(value, Expr):
-            break
-    else:
+    if Expr not in map(type, args):
         return OPERATIONS[op].value(*map(_number, args))
     graph = graph_in_use()
     if op == "where":
