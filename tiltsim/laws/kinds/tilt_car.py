@@ -23,8 +23,7 @@ from tiltsim_controllers.references.trajectories import reference_motion
 from tiltsim_controllers.tilt_car import integrating, planned_direction
 from tiltsim_controllers.tilt_car.vehicle import TiltCar, acceleration, counter_yaw_per_tilt
 
-PLANE: Final = ("x", "y", "vx", "vy")
-"""Position and velocity, m and m/s."""
+PLANE: Final = ("x", "y", "vx", "vy")  # position and velocity, m and m/s
 
 DEMANDED: Final = ("demanded_x", "demanded_y")
 """Signals: the acceleration (m/s^2) whose direction the thrusts are to bracket."""
