@@ -66,7 +66,7 @@ class GaitTable(Table, ABC):
     bias: Factor = default(1.0, "eta, multiplies alpha_3 and alpha_4 (ch. 6) [-]", 0.8)
 
     def plan(self, vehicle: Any) -> PlannedGait:
-        """The gait for a vehicle's parameters. Raises ValueError if the numbers do not define one."""
+        """The gait for a vehicle's parameters. Raises ValueError if these numbers make none."""
         needed = vehicle.tilts
         if self.tilts not in {None, needed}:
             raise ValueError(f"has {self.tilts} tilt angles; the vehicle has {needed}")

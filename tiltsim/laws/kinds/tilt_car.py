@@ -116,10 +116,8 @@ class CarFunctions(VehicleFunctions):
 
 def direction_columns(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
     """Directions of the thrusts and of the demanded acceleration, and the split of the inputs."""
-    direction, half_angle = (
-        samples["yaw"] + samples["alpha"],
-        setup.parameters.law.vehicle.half_angle,
-    )
+    half_angle = setup.parameters.law.vehicle.half_angle
+    direction = samples["yaw"] + samples["alpha"]
     demanded = np.arctan2(samples["demanded_y"], samples["demanded_x"])
     away = demanded - direction
     return {
