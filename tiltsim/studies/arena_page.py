@@ -11,8 +11,7 @@ from tiltsim.studies.comparison import CONTACTS, refusal
 from tiltsim.studies.scores import HALF, INTERACTION, errors_of, task_of
 from tiltsim.system.text import in_words
 
-Rows = Mapping[str, Sequence[Mapping[str, Any]]]
-"""Rows of flights, by vehicle."""
+Rows = Mapping[str, Sequence[Mapping[str, Any]]]  # rows of flights, by vehicle
 
 UNITS: Final = {
     "position_error": "m",
@@ -125,8 +124,7 @@ def shown(value: float | None) -> str:
     return "-" if value is None else f"{value:.0f}"
 
 
-TIE: Final = 0.5
-"""Difference of scores below which two controllers tie."""
+TIE: Final = 0.5  # difference of scores below which two controllers tie
 
 DISTURBED: Final = ("circle", "figure_eight", "gust", "wind", "weak_rotor")
 """Tasks in which errors come from a disturbance or a moving reference alone."""
