@@ -1,6 +1,7 @@
 """Flights in JAX agree with the other engines."""
 
 import sys
+from itertools import cycle
 
 import numpy as np
 import pytest
@@ -22,14 +23,14 @@ needs_jax = pytest.mark.skipif(
 )
 EVERY = {
     **{law: {**tables, "disturbance": GUST} for law, tables in LAWS.items()},
-    **{f"gait {n}": {"gait": {"type": n, **t}, "controller": EXACT} for n, t in GAITS.items()},
     **{f"gait {n}": {**CAR, "gait": {"type": n, **t}} for n, t in CAR_GAITS.items()},
     **{
-        f"reference {n}": {
-            "reference": {"type": n, **t},
-            "controller": {**EXACT, "decoupler": "none" if "altitude" in n else "exact"},
+        f"gait {gait}, reference {reference}": {
+            "gait": {"type": gait, **GAITS[gait]},
+            "reference": {"type": reference, **REFERENCES[reference]},
+            "controller": {**EXACT, "decoupler": "none" if "altitude" in reference else "exact"},
         }
-        for n, t in REFERENCES.items()
+        for gait, reference in zip(GAITS, cycle(REFERENCES))
     },
     **{f"supervisor {n}": tables for n, tables in SUPERVISED.items()},
     **BASELINES,

@@ -37,7 +37,7 @@ BOUNDS = {
 }
 VEHICLES = {
     "rotorcraft": (rotorcraft.ROTORCRAFT.observed_fields, rotorcraft.ROTORCRAFT.limit_exceeded),
-    "tilt_car": (tilt_car.OBSERVED_FIELDS, tilt_car.tilt_car_limit_exceeded),
+    "tilt_car": (tilt_car.OBSERVED_FIELDS, tilt_car.TILT_CAR.limit_exceeded),
 }
 
 

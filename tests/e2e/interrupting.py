@@ -118,9 +118,9 @@ class Interrupting:
         self._sweeps = 0
         self.counts = Counter()
         self.slowest = 0.0
-        self._run(self._start(fresh=True))  # fills the cache of native code
-        self._expected = (self._out / "sweep.parquet").read_bytes()
+        # The first one fills the cache of native code.
         self._seconds = {fresh: self._run(self._start(fresh=fresh)) for fresh in (True, False)}
+        self._expected = (self._out / "sweep.parquet").read_bytes()
 
     def _start(self, *, fresh, continued=False):
         if not continued:

@@ -248,7 +248,7 @@ def offset_flight(name, step, changes):
     """A set-point flight from a small offset, with physics and control steps of a length."""
     offset = {"initial.position": [0, 0, 0], "initial.velocity": [0, 0, 0.01]}
     steps = {"simulation.timestep": step, "simulation.control_timestep": step}
-    leaning = {"initial.attitude": [0.01, -0.01, 0.01], "simulation.engine": "python"}
+    leaning = {"initial.attitude": [0.01, -0.01, 0.01], "simulation.engine": "native"}
     return tiltsim.load_scenario(name, {**offset, **steps, **leaning, **changes})
 
 

@@ -377,7 +377,10 @@ def test_a_rotor_just_below_its_limit_is_not_slowed_by_it():
     assert distance(tiltsim.stability(limited(361.39)).poles, expected) < 1e-6
 
 
-@pytest.mark.parametrize("plant", ["rigid_body", "mujoco"])
+LIMITED_ON = [pytest.param("rigid_body", marks=pytest.mark.slow), "mujoco"]
+
+
+@pytest.mark.parametrize("plant", LIMITED_ON)
 def test_a_rotor_at_its_limit_has_no_linear_system(plant):
     state = tiltsim.linearize(limited(None, plant)).state
     speed = max(abs(value) for name, value in state.items() if name.startswith("rotor")) + 1e-7
@@ -390,7 +393,7 @@ def test_a_rotor_at_its_limit_has_no_linear_system(plant):
         tiltsim.linearize(limited(speed, plant))
 
 
-@pytest.mark.parametrize("plant", ["rigid_body", "mujoco"])
+@pytest.mark.parametrize("plant", LIMITED_ON)
 def test_no_rest_point_lies_beyond_a_limit(plant):
     """It misses hover by 1e-4 rad/s."""
     with pytest.raises(tiltsim.InputError, match="found no rest point"):

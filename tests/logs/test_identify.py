@@ -21,6 +21,7 @@ def scenario():
     return tiltsim.load_scenario("arena/multirotor#figure_eight").replace(
         {
             "simulation.plant": "rigid_body",
+            "simulation.engine": "native",  # compiled once for all
             "simulation.duration": 5.0,
             "simulation.timestep": 0.002,
             "simulation.record_timestep": 0.01,

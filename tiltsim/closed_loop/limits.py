@@ -1,9 +1,10 @@
 """Limits beyond which a vehicle has diverged, so wide that none returns from there."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from functools import cache
 from typing import Any, Final
 
-from tiltsim_controllers.code.arrays import xp
+from tiltsim_controllers.code.arrays import traceable, xp
 from tiltsim_controllers.references.trajectories import ReferenceParameters, position_reference
 
 MAX_POSITION_ERROR: Final = 1e4  # m
@@ -49,3 +50,28 @@ def first_limit(exceeded: Iterable[tuple[Any, int]]) -> Any:
     for is_exceeded, code in reversed([*exceeded]):
         found = xp.where(is_exceeded, float(code), found)
     return found
+
+
+@cache
+def limit_exceeded_of(fields: tuple[str, ...]) -> Callable[..., Any]:
+    """Function of a sample with these fields; see `VehicleKind.limit_exceeded`."""
+    speeds = [place for place, name in enumerate(fields) if name.startswith("rotor_speed_")]
+    rates = [fields.index(name) for name in "pqr"] if "p" in fields else []
+
+    @traceable
+    def limit_exceeded(
+        time: Any, values: Any, reference: ReferenceParameters, knots: Any, follows_position: Any
+    ) -> Any:
+        away = follows_position * horizontal_error(time, values, reference, knots)
+        found = [(away > MAX_POSITION_ERROR, HORIZONTAL_ERROR)]
+        if "z" in fields:
+            height = altitude_error(time, values, reference, knots)
+            found += [(height > MAX_POSITION_ERROR, ALTITUDE_ERROR)]
+        for places, limit, code in (
+            (rates, MAX_BODY_RATE, BODY_RATE),
+            (speeds, MAX_ROTOR_SPEED, ROTOR_SPEED),
+        ):
+            found += [(abs(values[at]) > limit, code + i) for i, at in enumerate(places)]
+        return first_limit(found)
+
+    return limit_exceeded

@@ -84,7 +84,7 @@ class Observer:
         motion = np.array(reference_derivatives(time, reference, knots)[:9])
         angles, rates = np.zeros((2, self._tilts))
         if self._tilting:
-            angles, rates = self._assembly.gait.angles(time), self._assembly.gait.rates(time)
+            angles, rates, _ = np.array(self._assembly.gait.jets(time)).T
         return Reference(
             position=motion[:3],
             velocity=motion[3:6],
@@ -143,12 +143,14 @@ class _Law:
         bare = replace(assembly, loop=loop, setup=self.setup)
         self._step = control_step(bare, self.setup.userdata.tolist(), "controls")
 
-    def controls(self, time: float, qpos: Values, qvel: Values, act: Values) -> list[float]:
-        """Its controls at a time (s), where a step begins; the forces felt are last in ``act``."""
-        now = Header(timestep=time, evaluations=1.0)  # whose next evaluation is now
-        own = self.loop.sizes.act
-        vectors = (now, qpos, qvel, act[:own], (), act[own:], ())
-        return list(self._step(*(list(map(float, vector)) for vector in vectors)))
+    def controls(self, time: float, *state: Sequence[float]) -> Values:
+        """Its controls at a time (s), where a step begins, by qpos, qvel and act.
+
+        The forces felt are last in act.
+        """
+        now, own = Header(timestep=time, evaluations=1.0), self.loop.sizes.act
+        qpos, qvel, act = (list(map(float, vector)) for vector in state)
+        return tuple(self._step(now, qpos, qvel, act[:own], (), act[own:], ()))
 
 
 _law = lru_cache(maxsize=KEPT)(_Law)

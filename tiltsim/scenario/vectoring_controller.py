@@ -1,7 +1,5 @@
 """The ``[controller]`` table of the law for every rotorcraft."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from math import hypot, inf
 from typing import Any, ClassVar
@@ -94,6 +92,7 @@ class VectoringController(Vectoring, FailureAwareController, TiltingTable, LawCo
             (servo.natural_frequency, servo.damping_ratio),
             (servo.max_rate or inf, servo.max_angle or inf),
             held_gain(self.tilt_rate_gain, airframe.control_timestep),
+            airframe.noise,
         )
         found = design(self, craft, timing, self.resolve_failure())
         reference, cone = airframe.reference, min(found[0].cone, LARGEST_LEAN)

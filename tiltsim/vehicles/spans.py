@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tiltsim.scenario.metric_names import METRICS
+from tiltsim.scenario.rotorcraft import AnyVehicleTable
 from tiltsim_controllers.mathematics.scalar import Floats
 
 SETTLED: Final = 20.0  # time (s) from which on the supremum of the position error is taken
@@ -20,16 +21,12 @@ _ROUNDING: Final = 1e-9  # relative: of a time over a time step, of a speed at i
 def in_last_second(time: Floats, timestep: float) -> npt.NDArray[np.bool_]:
     """The samples of the last second, both ends included; ``time`` and ``timestep`` in s."""
     steps = np.rint(time / timestep)
-    within: npt.NDArray[np.bool_] = steps[-1] - steps <= (1.0 + _ROUNDING) / timestep
-    return within
+    return steps[-1] - steps <= (1.0 + _ROUNDING) / timestep
 
 
 def when_settled(time: Floats, timestep: float) -> npt.NDArray[np.bool_]:
     """The samples from `SETTLED` on; ``time`` and ``timestep`` in s."""
-    settled: npt.NDArray[np.bool_] = (
-        np.rint(time / timestep) >= (1.0 - _ROUNDING) * SETTLED / timestep
-    )
-    return settled
+    return np.rint(time / timestep) >= (1.0 - _ROUNDING) * SETTLED / timestep
 
 
 def mean_of(column: Floats, span: npt.NDArray[np.bool_]) -> Any:
@@ -99,17 +96,31 @@ def at_lower_limit(speeds: Floats, limit: Any) -> npt.NDArray[np.bool_]:
     return speeds <= (-np.inf if limit is None else limit * (1.0 + _ROUNDING))
 
 
-def saturation_metrics(time: Floats, saturated: npt.NDArray[np.bool_]) -> dict[str, Any]:
-    """Share of the samples with a rotor at its limit, and the first and last of them, or NaN.
+def speeds_along_spin(columns: Mapping[str, Floats], vehicle: AnyVehicleTable) -> Floats:
+    """Rotor speeds along their spins, rad/s, shape (rotors, ..., N)."""
+    signs = enumerate(vehicle.spins, start=1)
+    return np.array([sign * columns[f"rotor_speed_{i}"] for i, sign in signs])
 
-    ``time`` in s, shape (N,); ``saturated`` of shape (rotors, ..., N).
+
+def rotor_metrics(columns: Mapping[str, Floats], vehicle: AnyVehicleTable) -> dict[str, Any]:
+    """Ranges of rotor speeds and tilt rates; share of samples with a rotor at its limit, and when.
+
+    The first and last of these samples are NaN where there is none.
     """
-    limited: npt.NDArray[np.bool_] = np.any(saturated, axis=0)
+    speeds = speeds_along_spin(columns, vehicle)
+    low, high = vehicle.rotor_range
+    reached = at_upper_limit(speeds, high) | at_lower_limit(speeds, low)
+    limited: npt.NDArray[np.bool_] = np.any(reached, axis=0)
     first, last = first_and_last(limited)
+    names = [name for name in columns if name.startswith("alpha_rate")]
+    rates = [np.abs(columns[name]).max(axis=-1) for name in names]
     return {
+        "min_rotor_speed": speeds.min(axis=(0, -1)),
+        "max_rotor_speed": speeds.max(axis=(0, -1)),
+        "max_tilt_rate": largest(rates) if rates else np.zeros(speeds.shape[1:-1]),
         "saturated_fraction": limited.mean(axis=-1),
-        "first_saturation_time": time_of(time, first),
-        "last_saturation_time": time_of(time, last),
+        "first_saturation_time": time_of(columns["time"], first),
+        "last_saturation_time": time_of(columns["time"], last),
     }
 
 

@@ -7,7 +7,7 @@ limits leave, and the side force that needs no lean from a linear program.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import atan, cos, exp
+from math import atan, cos, exp, inf
 from typing import Any, Final
 
 import numpy as np
@@ -56,6 +56,10 @@ SIDE_OBSERVER: Final = 0.6
 """Bandwidth of the observer of side force over the position's."""
 TORQUE_OBSERVER: Final = 40.0
 """1/s: the fastest observers of torque and of the excess of thrust."""
+OBSERVER_DAMPING: Final = 0.5, 1.0
+"""Damping ratio of the observers of force and torque; more would pass more noise."""
+ROUGHNESS: Final = 0.5, 1.4, 2.1
+"""How far a disturbance walks in a second: side force and thrust (m/s^2), torque (rad/s^2)."""
 TRACKING: Final = 250.0
 """1/s: how fast the wrench follows its demand where rotors have no lag."""
 REACH: Final = 10.0
@@ -76,6 +80,7 @@ class Timing:
         servo: Natural frequency (rad/s) and damping ratio of the tilt servos.
         servo_limits: Largest rate (rad/s) and angle (rad) of these, infinite without limits.
         tilt_gain: 1/s, of the loop that moves the commanded tilts.
+        noise: Deviations of velocities (m/s) and body rates (rad/s), in the mean of a second.
     """
 
     period: float
@@ -85,6 +90,7 @@ class Timing:
     servo: tuple[float, float]
     servo_limits: tuple[float, float]
     tilt_gain: float
+    noise: tuple[float, float]
 
 
 def _servo_step(servo: tuple[float, float], period: float) -> tuple[Values, Values]:
@@ -116,30 +122,48 @@ def _rotor_step(timing: Timing, lag: float) -> dict[str, float]:
     }
 
 
-def _observers(factor: float, bandwidths: Values, period: float) -> dict[str, Any]:
-    """Gains of the observers, which have double poles; without them all measurements are taken.
+def _observers(
+    factor: float, bandwidths: Values, noise: tuple[float, float], period: float
+) -> dict[str, Any]:
+    """Gains of the observers; without them all measurements are taken.
 
     Args:
         factor: Multiplies the bandwidths; 0 for no observers.
-        bandwidths: The observers' of side force, thrust and torque, and the bandwidth of yaw, 1/s.
+        bandwidths: Estimates of side force, thrust and torque follow at these; last, yaw's, 1/s.
+        noise: See `Timing`.
         period: s, between calls.
     """
     if factor == 0.0:
         trusts = dict.fromkeys(("position_trust", "velocity_trust", "rate_trust"), (1.0,) * 3)
         none = {"force_gain": 0.0, "excess_gain": 0.0, "torque_gain": (0.0,) * 3}
         return {**trusts, "attitude_trust": 1.0, **none}
-    side, rise, torque, yaw = (2.0 * factor * bandwidth * period for bandwidth in bandwidths)
-    pushing = side, side, rise
-    turning = torque, torque, min(torque, 2.0 * yaw)
+
+    def steps(fastest: float, roughness: float, noise: float) -> float:
+        # The best estimate of a disturbance that walks has this natural frequency.
+        best = (roughness / noise) ** 0.5 if noise > 0.0 else inf
+        return factor * min(2.0 * fastest, best) * period
+
+    noises = noise[0], noise[0], noise[1]
+    side, rise, torque = map(steps, bandwidths, ROUGHNESS, noises)
+    turning = torque, torque, min(torque, 4.0 * factor * bandwidths[3] * period)
+    pushes = [_correction(pole, OBSERVER_DAMPING[0]) for pole in (side, side, rise)]
+    turns = [_correction(pole, OBSERVER_DAMPING[1]) for pole in turning]
     return {
-        "position_trust": tuple(1.0 - exp(-pole) for pole in pushing),
-        "velocity_trust": tuple(1.0 - exp(-2.0 * pole) for pole in pushing),
+        "position_trust": (1.0 - exp(-side), 1.0 - exp(-side), 1.0 - exp(-rise)),
+        "velocity_trust": tuple(trust for trust, _ in pushes),
         "attitude_trust": 1.0 - exp(-torque),
-        "rate_trust": tuple(1.0 - exp(-2.0 * pole) for pole in turning),
-        "force_gain": (1.0 - exp(-side)) ** 2 / period,
-        "excess_gain": (1.0 - exp(-rise)) ** 2 / period,
-        "torque_gain": tuple((1.0 - exp(-pole)) ** 2 / period for pole in turning),
+        "rate_trust": tuple(trust for trust, _ in turns),
+        "force_gain": pushes[0][1] / period,
+        "excess_gain": pushes[2][1] / period,
+        "torque_gain": tuple(gain / period for _, gain in turns),
     }
+
+
+def _correction(pole: float, damping: float) -> tuple[float, float]:
+    """Shares of its error by which a call corrects a speed, and its change in a period."""
+    root = np.exp(pole * complex(-damping, (1.0 - damping**2) ** 0.5))
+    trust = 2.0 - 2.0 * float(root.real)
+    return trust, float(abs(root)) ** 2 - 1.0 + trust
 
 
 def _across(craft: Craft) -> float:
@@ -181,7 +205,7 @@ def ability(keys: Vectoring, craft: Craft, left: float, *, harmed: bool = False)
         yaw_angular=yaw_angular,
         side_softness=3e-4 if craft.works.sum() >= 6 else 1.0,
         # The tilts have made the torque that they can; a harmed vehicle has little of it to give.
-        yaw_softness=1e-4 if craft.commanded or harmed else 3e-13,
+        yaw_softness=1e-4 if craft.commanded or harmed else 1e-12,
     )
 
 
@@ -228,7 +252,7 @@ def design(
         attitude_damping=0.9,
         reversal=lag + h if lag else 0.0,
         share=1.0 - exp(-tracking * h),
-        **_observers(keys.observer, following, h),
+        **_observers(keys.observer, following, timing.noise, h),
         hover=craft.hover,
         lever=max(0.02, float(craft.levers.mean())),
         failure=failure,

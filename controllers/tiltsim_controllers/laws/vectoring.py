@@ -170,7 +170,7 @@ def _allocated(known: Known, ahead: Ahead, goal: Any, usable: Any) -> tuple[Any,
     # A gait's tilts change the wrench by themselves, which the thrusts make good.
     made = rows @ thrusts if free else unit * known.wrench(ahead.speeds, ahead.tilts)
     target = made + p.share * (unit * goal - made)
-    softness = xp.array([side, side, 1e-11, 3e-12, 3e-12, p.yaw_softness])
+    softness = xp.array([side, side, 1e-12, 1e-14, 1e-14, p.yaw_softness])
     none = 1e9 * (1.0 - p.bounded)
     found = bounded_least_squares(
         rows, target, softness, xp.ones(count), start, low - none, high + none

@@ -2,26 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
 from math import inf
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from tiltsim.closed_loop.limits import (
-    ALTITUDE_ERROR,
-    BODY_RATE,
-    HORIZONTAL_ERROR,
-    MAX_BODY_RATE,
-    MAX_POSITION_ERROR,
-    MAX_ROTOR_SPEED,
-    ROTOR_SPEED,
-    altitude_error,
-    first_limit,
-    horizontal_error,
-)
+from tiltsim.closed_loop.limits import limit_exceeded_of
 from tiltsim.closed_loop.loop import VehicleKind
 from tiltsim.models.parts import ExtraActuators, Pod, RotorLimits, TiltServo, Visuals
 from tiltsim.models.rotor_table import Multirotor, hover_speeds
@@ -32,11 +21,9 @@ from tiltsim.scenario.vehicle import VehicleTable
 from tiltsim.system.text import Quantity, subscript
 from tiltsim.vehicles.rotorcraft.layout import CROSS, Layout
 from tiltsim.vehicles.rotorcraft.metrics import rotorcraft_metrics
-from tiltsim_controllers.code.arrays import traceable, xp
+from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.mathematics.attitude import quaternion_of_euler
 from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector
-from tiltsim_controllers.references.trajectories import ReferenceParameters
-from tiltsim_controllers.vehicle.body import P
 
 if TYPE_CHECKING:
     import mujoco
@@ -68,31 +55,6 @@ def rotorcraft_columns(layout: Layout) -> dict[str, Quantity]:
         **{f"{axis}_ref": Quantity(f"reference {axis}", "m") for axis in "xyz"},
         **{f"{angle}_ref": Quantity(f"reference {angle}", "rad") for angle in angles},
     }
-
-
-@cache
-def limit_exceeded_of(layout: Layout) -> Callable[..., Any]:
-    """Function for the first limit that a sample exceeds; see `VehicleKind.limit_exceeded`."""
-    first, rotors = layout.speed_1, layout.rotors
-
-    @traceable
-    def limit_exceeded(
-        time: Any, values: Any, reference: ReferenceParameters, knots: Any, follows_position: Any
-    ) -> Any:
-        away = follows_position * horizontal_error(time, values, reference, knots)
-        height = altitude_error(time, values, reference, knots)
-        turning = abs(values[P : P + 3]) > MAX_BODY_RATE
-        spinning = abs(values[first : first + rotors]) > MAX_ROTOR_SPEED
-        return first_limit(
-            [
-                (away > MAX_POSITION_ERROR, HORIZONTAL_ERROR),
-                (height > MAX_POSITION_ERROR, ALTITUDE_ERROR),
-                *((too_fast, BODY_RATE + axis) for axis, too_fast in enumerate(turning)),
-                *((too_fast, ROTOR_SPEED + rotor) for rotor, too_fast in enumerate(spinning)),
-            ]
-        )
-
-    return limit_exceeded
 
 
 def rotor_thrusts(columns: Mapping[str, Floats], scenario: Scenario) -> dict[str, Floats]:
@@ -215,7 +177,7 @@ def rotorcraft_kind(layout: Layout, extra_columns: tuple[str, ...] = ()) -> Vehi
         thrusts=rotor_thrusts,
         compile=_compile,
         initial_motion=initial_motion,
-        limit_exceeded=limit_exceeded_of(layout),
+        limit_exceeded=limit_exceeded_of(layout.observed_fields),
         metrics=rotorcraft_metrics,
     )
 

@@ -9,15 +9,14 @@ from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.vehicles.rotorcraft.others import SWING
 from tiltsim.vehicles.spans import (
-    at_lower_limit,
-    at_upper_limit,
     first_and_last,
     horizontal_error_metrics,
     in_last_second,
     largest,
     mean_of,
     position_error,
-    saturation_metrics,
+    rotor_metrics,
+    speeds_along_spin,
     time_of,
     when_settled,
     with_columns_metrics,
@@ -40,26 +39,17 @@ def rotorcraft_metrics(
 ) -> dict[str, Any]:
     """See `tiltsim.closed_loop.loop.VehicleKind.metrics`."""
     time = columns["time"]
-    limits = scenario.any_rotorcraft
-    signs = enumerate(limits.spins, start=1)
-    spins = np.array([sign * columns[f"rotor_speed_{i}"] for i, sign in signs])
-    saturated = at_upper_limit(spins, limits.max_rotor_speed)
-    saturated |= at_lower_limit(spins, limits.min_rotor_speed)
-    names = [name for name in columns if name.startswith("alpha_rate_")]
-    rates = [np.abs(columns[name]).max(axis=-1) for name in names]
+    vehicle = scenario.vehicle
     own = {
         **_position_metrics(columns, scenario, follows_position),
         **_attitude_metrics(columns, scenario),
-        "min_rotor_speed": spins.min(axis=(0, -1)),
-        "max_rotor_speed": spins.max(axis=(0, -1)),
-        "rms_rotor_acceleration": _rms_change(time, spins),
+        **rotor_metrics(columns, vehicle),
+        "rms_rotor_acceleration": _rms_change(time, speeds_along_spin(columns, vehicle)),
         **_altitude_metrics(time, columns["z_ref"] - columns["z"]),
         **_singular_zone_metrics(columns),
-        "max_tilt_rate": largest(rates) if rates else np.zeros(spins.shape[1:-1]),
-        **_singularity_metrics(columns, limits.resolve()),
+        **_singularity_metrics(columns, vehicle.resolve()),
         **_contact_metrics(columns, in_last_second(time, scenario.simulation.timestep)),
         **_estimate_metrics(columns),
-        **saturation_metrics(time, saturated),
     }
     return with_columns_metrics(own, columns)
 
