@@ -283,7 +283,7 @@ def test_the_first_vehicle_gives_the_command_that_it_gives_alone(objects):
     assert commanded.any()
 
 
-def test_every_vehicle_is_a_flight_of_its_own_with_its_metrics(tmp_path):
+def test_every_vehicle_has_its_flight_and_metrics(tmp_path):
     """A companion far away has the columns and metrics of its scenario flown alone."""
     scenario = together(QUAD, WING | {"changes": {"tool": STICK}})
     flight = tiltsim.simulate(scenario)
