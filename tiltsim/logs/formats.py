@@ -18,7 +18,6 @@ import numpy as np
 from tiltsim.errors import InputError
 from tiltsim.flight.flight import Flight
 from tiltsim.logs.log import Log
-from tiltsim.models.cross import as_multirotor
 from tiltsim.system.files import prepare_file, replacing
 from tiltsim.system.public import optional_package
 from tiltsim.system.text import short_repr
@@ -80,9 +79,7 @@ def export(
         elif chosen == "ulog":
             write_ulog(log, temporary)
         else:
-            table = flight.scenario.any_rotorcraft
-            vehicle = as_multirotor(table.resolve(), tilting=table.has_tilting_rotors)
-            places = np.array([rotor.place for rotor in vehicle.rotors])
+            places = np.array([rotor.place for rotor in flight.scenario.any_rotorcraft.rotors])
             write_mcap(log, temporary, places)
 
 
