@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from tiltsim_controllers.analysis.attainable import (
     AttainableSet,
@@ -34,27 +35,25 @@ _SINGULAR: Final = 1e-9
 _LIMITS: Final = published_speed_limits(_VEHICLE)
 
 
-def exact_determinant(roll: float, pitch: float, thrust: float = _HOVER) -> float:
-    """The exact determinant at an attitude (rad) and thrust (N), over its value in level hover."""
-    return float(normalized_determinant(roll, pitch, thrust, _QUADROTOR))
+def attitudes(limit: float, count: int) -> Floats:
+    """Roll and pitch (rad) up to a limit either way, shape (2, count, count)."""
+    return np.array(np.meshgrid(*[np.linspace(-limit, limit, count)] * 2))
+
+
+def exact_determinant(roll: ArrayLike, pitch: ArrayLike, thrust: float = _HOVER) -> Floats:
+    """The exact determinant at attitudes (rad) and a thrust (N), over its value in level hover."""
+    return normalized_determinant(np.asarray(roll), np.asarray(pitch), thrust, _QUADROTOR)
 
 
 def exact_on_published_curve() -> Floats:
     """The exact determinant on S = 0, over its value in level hover."""
-    return normalized_determinant(*published_singular_curve(), _HOVER, _QUADROTOR)
+    return exact_determinant(*published_singular_curve())
 
 
 def rightmost_root() -> complex:
     """The root with the largest real part of ch. 2's position loop."""
     roots = np.roots((1.0, *yaw_position.GAIN_SETS["ch02"].position))
     return complex(roots[np.argmax(roots.real)])
-
-
-def exact_zero_within_90_degrees() -> bool:
-    """Whether the exact determinant vanishes or changes its sign within 90 degrees."""
-    angles = np.linspace(-np.pi / 2, np.pi / 2, 301)[1:-1]
-    roll, pitch = np.meshgrid(angles, angles)
-    return bool((normalized_determinant(roll, pitch, _HOVER, _QUADROTOR) <= 0.0).any())
 
 
 def eq_43_as_printed() -> bool:
@@ -90,11 +89,9 @@ def attitude_altitude_is_singular() -> bool:
 
 def axis_has_no_influence(roll_sign: float, pitch_sign: float) -> bool:
     """Whether the exact determinant stays the same if body axes are reversed."""
-    angles = np.linspace(-1.5, 1.5, 61)
-    roll, pitch = np.meshgrid(angles, angles)
-    exact = normalized_determinant(roll, pitch, _HOVER, _QUADROTOR)
-    flipped = normalized_determinant(roll_sign * roll, pitch_sign * pitch, _HOVER, _QUADROTOR)
-    return bool(np.abs(exact - flipped).max() < _SINGULAR)
+    roll, pitch = attitudes(1.5, 61)
+    flipped = exact_determinant(roll_sign * roll, pitch_sign * pitch)
+    return bool(np.abs(exact_determinant(roll, pitch) - flipped).max() < _SINGULAR)
 
 
 def zone_holds_the_curve() -> bool:
