@@ -11,9 +11,8 @@ import pytest
 from tiltsim.cli import main
 from tiltsim.errors import InputError
 from tiltsim.studies import arena, tuning
-from tiltsim.studies.arena_page import arena_page
+from tiltsim.studies.arena_page import arena_page, league_page, league_table
 from tiltsim.studies.comparison import Compared, Entry, compare_one, controller_tables
-from tiltsim.studies.league_page import league_page, league_table
 from tiltsim.studies.multirotor_analysis import FEW_ROTORS, FLEET
 from tiltsim.studies.scores import AIMS, INTERACTION, STEP, score
 from tiltsim.views.figures.comparisons import arena_figure, panels_of

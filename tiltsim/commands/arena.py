@@ -141,8 +141,7 @@ def _written(
 ) -> str:
     """Write page, table and picture of a league into a folder; returns the page."""
     from tiltsim.studies.arena import standings
-    from tiltsim.studies.arena_page import arena_page
-    from tiltsim.studies.league_page import by_world, league_page, league_table
+    from tiltsim.studies.arena_page import arena_page, by_world, league_page, league_table
     from tiltsim.views.figures import style
     from tiltsim.views.figures.comparisons import arena_figure, panels_of, tasks_of, vehicles_of
 

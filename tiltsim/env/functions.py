@@ -4,8 +4,6 @@
 differentiates through their episodes. `tiltsim.env.VectorEnv` is made of them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from operator import attrgetter
 from typing import Any, Final, NamedTuple

@@ -1,7 +1,5 @@
 """The region of attraction of a flight: a map over two numbers of its initial state."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Stability of rest points and periodic orbits, over values of a key, and their slowest mode."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from itertools import pairwise

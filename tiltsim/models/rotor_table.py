@@ -18,6 +18,7 @@ from tiltsim_controllers.analysis.torque_free import (
     torque_free_forces,
 )
 from tiltsim_controllers.mathematics.scalar import Floats, Triple, Values
+from tiltsim_controllers.vehicle.body import Body, body_of
 from tiltsim_controllers.vehicle.rotors import Rotor, force_and_torque
 
 if TYPE_CHECKING:
@@ -39,6 +40,11 @@ class Multirotor:
     def table(self) -> Values:
         """Table of the rotors; see `tiltsim_controllers.vehicle.rotors`."""
         return tuple(entry for rotor in self.rotors for entry in rotor.entries)
+
+    @property
+    def body(self) -> Body:
+        """The vehicle without its rotors."""
+        return body_of(self.mass, np.reshape(self.inertia, (3, 3)), self.gravity)
 
     @property
     def tilt_of_rotor(self) -> tuple[int, ...]:

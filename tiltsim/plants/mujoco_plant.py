@@ -1,7 +1,5 @@
 """MuJoCo as the plant: the model that a flight integrates, its start and its steps."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import cache, partial
 from itertools import pairwise

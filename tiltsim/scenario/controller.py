@@ -5,8 +5,6 @@ law and its table, a `tiltsim.LawController`. An entry that cannot be used is le
 warning, so that a broken package does not stop flights that do not need it.
 """
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Container
 from contextlib import suppress

@@ -1,7 +1,5 @@
 """Reading scenarios: files, variants and overrides merged into one `Scenario`; and writing them."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import suppress
 from os import PathLike, fsdecode

@@ -23,8 +23,7 @@ FOLDER: Final = "arena"
 BASELINES: Final = ("geometric", "pid", "indi", "lqr")
 """Laws of the literature, with which the other laws are compared."""
 
-OURS: Final = "vectoring"
-"""The law that flies the limited league with its default setting."""
+OURS: Final = "vectoring"  # the law that flies the limited league with its default setting
 
 MULTIROTOR: Final = "multirotor"
 """The file whose tasks the fleet flies, each vehicle in place of the file's own."""
@@ -49,8 +48,7 @@ TOUCHING: Final = ("tilt_hexarotor", "tilt_octorotor")
 TOUCHES: Final = {"position_bandwidth": 4.0, "attitude_bandwidth": 12.0}
 """Keys of `vectoring` and `geometric` there; with its observer `geometric` chatters along walls."""
 
-REVERSING: Final = ("omni_octorotor",)
-"""Vehicles whose rotors are built to reverse."""
+REVERSING: Final = ("omni_octorotor",)  # vehicles whose rotors are built to reverse
 
 SERVO: Final = {"natural_frequency": 60.0, "damping_ratio": 0.8, "max_rate": 8.0}
 """Tilt servos of the limited league: 60 degrees in about 0.15 s."""

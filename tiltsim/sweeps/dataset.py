@@ -1,7 +1,5 @@
 """The results of a sweep: its folder, and their columns."""
 
-from __future__ import annotations
-
 import re
 from collections import Counter
 from collections.abc import Iterator, Mapping

@@ -3,8 +3,6 @@
 Side force that needs no lean, and the poses that it holds, come from linear programs.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product

@@ -3,8 +3,6 @@
 `xp` is NumPy for both, followed by control flow, look-ups and `traceable`.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable, Sequence
 from functools import wraps

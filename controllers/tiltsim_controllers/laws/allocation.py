@@ -24,8 +24,6 @@ let go again where its multiplier says so.
 `bounded_least_squares` is for demands that rotors and tilts meet together as their limits allow.
 """
 
-from __future__ import annotations
-
 from math import inf
 from typing import Any, Final, NamedTuple
 

@@ -6,8 +6,6 @@ state. Through `record_dtype` the same numbers are a struct whose fields native 
 same names.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from functools import cache
 from itertools import islice

@@ -23,8 +23,7 @@ from tiltsim_controllers.references.trajectories import reference_motion
 from tiltsim_controllers.tilt_car import integrating, planned_direction
 from tiltsim_controllers.tilt_car.vehicle import TiltCar, acceleration, counter_yaw_per_tilt
 
-PLANE: Final = ("x", "y", "vx", "vy")
-"""Position and velocity, m and m/s."""
+PLANE: Final = ("x", "y", "vx", "vy")  # position and velocity, m and m/s
 
 DEMANDED: Final = ("demanded_x", "demanded_y")
 """Signals: the acceleration (m/s^2) whose direction the thrusts are to bracket."""
@@ -266,20 +265,7 @@ def _integrating(
     return _Integrating(law, twice).car_loop(1 + len(states), 3, commands_thrusts=False)
 
 
-THIRD_DERIVATIVE: Final = _integrating(_third, integrating.ThirdParameters, {}, twice=False)
-"""Third-derivative feedback linearization of the tilt-car (ch. 10, Sec. 3.1)."""
-
-FOURTH_DERIVATIVE: Final = _integrating(
-    _fourth,
-    integrating.FourthParameters,
-    {"alpha_ref_rate": "rad/s", **{f"rotor_acceleration_{rotor}": "rad/s^2" for rotor in ROTORS}},
-    twice=True,
-)
-"""Fourth-derivative feedback linearization of the tilt-car (ch. 10, Sec. 6.1).
-
-``law_speed_i`` are the rotor speeds that the controller integrates; the true ones are never below
-zero.
-"""
+# --- the law of a planned direction ----------------------------------------------------------
 
 
 SQUARES: Final = tuple(f"wanted_square_{rotor}" for rotor in ROTORS)
@@ -365,29 +351,35 @@ def _columns(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Fl
     return {**direction_columns(samples, setup), **switches, "lyapunov": lyapunov}
 
 
-PLANNED_DIRECTION: Final = _Planned(
-    Law(
-        _step,
-        planned_direction.Parameters,
-        _car,
-        signals=(*DEMANDED, *SQUARES, "alpha_ref"),
-        units={
-            **dict.fromkeys(SQUARES, "rad^2/s^2"),
-            **{f"switch_{rotor}": "1" for rotor in ROTORS},
-            "lyapunov": "m^2/s^2",
-        },
-        margins=_columns,
-    )
-).car_loop(0, 2, commands_thrusts=True)
-"""The tilt-car with a planned direction of its thrusts (ch. 10, Sec. 5; ch. 11).
+_PLANNED: Final = Law(
+    _step,
+    planned_direction.Parameters,
+    _car,
+    signals=(*DEMANDED, *SQUARES, "alpha_ref"),
+    units={
+        **dict.fromkeys(SQUARES, "rad^2/s^2"),
+        **{f"switch_{rotor}": "1" for rotor in ROTORS},
+        "lyapunov": "m^2/s^2",
+    },
+    margins=_columns,
+)
 
-``switch_1`` and ``switch_2`` are ``p`` and ``q`` of ch. 11's switch matrix (Eqs. 22-24), 0 where a
-rotor's thrust is saturated at zero; ``wanted_square_i`` is the demand without that limit.
-"""
+_DERIVATIVES: Final = {f"rotor_acceleration_{rotor}": "rad/s^2" for rotor in ROTORS}
 
 LOOPS: Final = {
-    "tilt_car_third_derivative": THIRD_DERIVATIVE,
-    "tilt_car_fourth_derivative": FOURTH_DERIVATIVE,
-    "tilt_car_planned_direction": PLANNED_DIRECTION,
+    "tilt_car_third_derivative": _integrating(_third, integrating.ThirdParameters, {}, twice=False),
+    "tilt_car_fourth_derivative": _integrating(
+        _fourth,
+        integrating.FourthParameters,
+        {"alpha_ref_rate": "rad/s", **_DERIVATIVES},
+        twice=True,
+    ),
+    "tilt_car_planned_direction": _Planned(_PLANNED).car_loop(0, 2, commands_thrusts=True),
 }
-"""The loops by the names of their laws."""
+"""The loops by the names of their laws.
+
+``law_speed_i`` are the rotor speeds that the law of the fourth derivative integrates; the true ones
+are never below zero. ``switch_1`` and ``switch_2`` are ``p`` and ``q`` of ch. 11's switch matrix
+(Eqs. 22-24), 0 where a rotor's thrust is saturated at zero; ``wanted_square_i`` is the demand
+without that limit.
+"""
