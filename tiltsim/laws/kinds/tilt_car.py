@@ -34,13 +34,9 @@ def initial_motion(scenario: Scenario) -> tuple[float, ...]:
     return (*scenario.initial.position[:2], *scenario.initial.velocity[:2])
 
 
-def _car(plan: FlightPlan) -> dict[str, Any]:
-    return {"car": plan.scenario.vehicle.resolve()}
-
-
 def yaw(alpha: Any, parameters: Any) -> Any:
     """Yaw (rad) at a tilt angle (rad); Eq. (2)."""
-    return parameters.heading - counter_yaw_per_tilt(parameters.law.car) * alpha
+    return parameters.heading - counter_yaw_per_tilt(parameters.law.vehicle) * alpha
 
 
 def motion_rates(motion: Any, direction: Any, squares: Any, car: TiltCar, disturbance: Any) -> Any:
@@ -120,7 +116,8 @@ class CarFunctions(VehicleFunctions):
 
 def direction_columns(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
     """Directions of the thrusts and of the demanded acceleration, and the split of the inputs."""
-    direction, half_angle = samples["yaw"] + samples["alpha"], setup.parameters.law.car.half_angle
+    half_angle = setup.parameters.law.vehicle.half_angle
+    direction = samples["yaw"] + samples["alpha"]
     demanded = np.arctan2(samples["demanded_y"], samples["demanded_x"])
     away = demanded - direction
     return {
@@ -212,7 +209,7 @@ class _Integrating(CarFunctions):
         """The thesis's equations with the inputs integrated."""
         direction, speeds = yaw(state[4], parameters) + state[4], state[5:7]
         squares = _running(speeds) ** 2
-        motion = motion_rates(state[:4], direction, squares, parameters.law.car, disturbance)
+        motion = motion_rates(state[:4], direction, squares, parameters.law.vehicle, disturbance)
         if not self.twice:
             return xp.hstack([motion, inputs[2:3], _limited_rates(speeds, inputs[:2])])
         limited = _limited_rates(speeds, state[8:10])
@@ -225,7 +222,7 @@ class _Integrating(CarFunctions):
         seen = self.in_equations(time, state, parameters)
         v = parts(seen.state, motion=4, yaw=1, alpha=1, speeds=2)
         tilt_rate = seen.states[1:2] if self.twice else inputs[2:3]
-        yaw_rate = -counter_yaw_per_tilt(parameters.law.car) * tilt_rate
+        yaw_rate = -counter_yaw_per_tilt(parameters.law.vehicle) * tilt_rate
         sample = [v.motion, v.yaw, yaw_rate, v.alpha, tilt_rate, _running(v.speeds), seen.states]
         return xp.hstack([*sample, v.speeds[: 2 * self.twice]])
 
@@ -251,7 +248,6 @@ def _integrating(
     law = Law(
         step,
         record,
-        _car,
         states={"alpha_ref": "rad", **states},
         initial=lambda plan: (initial_tilt(plan)[0], *(0.0,) * len(states)),
         signals=DEMANDED,
@@ -316,13 +312,13 @@ class _Planned(CarFunctions):
     ) -> Any:
         """The thesis's equations with a tilt that follows the gait exactly."""
         seen = self.in_equations(time, state, parameters, knots).state
-        return motion_rates(state, seen[4] + seen[5], inputs, parameters.law.car, disturbance)
+        return motion_rates(state, seen[4] + seen[5], inputs, parameters.law.vehicle, disturbance)
 
     def observe_equations(
         self, time: Any, state: Any, inputs: Any, parameters: Any, knots: Any
     ) -> Any:
         tilt, tilt_rate = _tilt(time, parameters.law, knots)
-        yaw_rate = -counter_yaw_per_tilt(parameters.law.car) * tilt_rate
+        yaw_rate = -counter_yaw_per_tilt(parameters.law.vehicle) * tilt_rate
         discs = xp.array([yaw(tilt, parameters), yaw_rate, tilt, tilt_rate])
         return xp.hstack([state[:4], discs, _speeds_of_squares(inputs)])
 
@@ -354,7 +350,6 @@ def _columns(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Fl
 _PLANNED: Final = Law(
     _step,
     planned_direction.Parameters,
-    _car,
     signals=(*DEMANDED, *SQUARES, "alpha_ref"),
     units={
         **dict.fromkeys(SQUARES, "rad^2/s^2"),
