@@ -371,7 +371,7 @@ def test_the_page_of_the_limited_league_says_who_wins_by_how_much_and_where_not(
     assert "wins 1 of 2 tasks" in lines[4]
     assert lines[5].startswith("On curves, in wind and with a weak rotor the best baseline's error")
     assert " is 6.7 times as large" in lines[5]
-    assert lines[6] == "It loses, by vehicles and points: `step` on 1, by up to 1.0."
+    assert lines[6] == "Lost tasks, vehicles and points: `step` with 1, by up to 1.0."
     assert "| `circle` | 0.015 / 0.100 `pid` 50 |" in lines
     assert "| `pid` | 500 | 0.50 | 10.0 % | 0 of 4 |" in lines
     assert "## With an exact model" in lines

@@ -224,8 +224,8 @@ def _verdict(every: Mapping[str, Sequence[Standing]], flown: Rows) -> Iterator[s
             f"On curves, in wind and with a weak rotor the best baseline's error is "
             f"{median(ratios):.1f} times as large (median; {min(ratios):.1f} to {max(ratios):.1f})."
         )
-    where = (f"`{task}` on {len(by)}, by up to {max(by):.1f}" for task, by in lost.items())
-    yield f"It loses, by vehicles and points: {'; '.join(where)}." if lost else "It loses nowhere."
+    where = (f"`{task}` with {len(by)}, by up to {max(by):.1f}" for task, by in lost.items())
+    yield f"Lost tasks, vehicles and points: {'; '.join(where)}." if lost else "It loses nowhere."
     yield ""
 
 

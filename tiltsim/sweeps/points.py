@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from copy import deepcopy
 from functools import cache, cached_property
 from math import prod
-from typing import Any, Final, NamedTuple, cast
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from pydantic import BaseModel, ValidationError
@@ -303,32 +303,24 @@ class SweepPoints:
 
     @cached_property
     def _draws(self) -> Floats:
-        """Values of the drawn axes, shape (samples, axes)."""
+        """Values of the drawn axes, shape (samples, axes); equal for equal seeds."""
         assert self.sweep.sample is not None
-        return _draw_samples(self._drawn, self.sweep.sample)
+        columns = []
+        for axis, column in zip(self._drawn, _unit_points(self.sweep.sample, len(self._drawn)).T):
+            if isinstance(axis, tables.UniformAxis):
+                columns.append(axis.low + (axis.high - axis.low) * column)
+            else:
+                from scipy.special import ndtri
+
+                inside = np.clip(column, 2.0**-54, 1.0 - 2.0**-53)
+                columns.append(axis.mean + axis.standard_deviation * ndtri(inside))
+        return np.stack(columns, axis=-1)
 
 
 def _of_one_type(values: Sequence[Any]) -> Sequence[Any]:
     """Integers mixed with floats as floats; other values unchanged."""
     mixed = all(map(is_number, values)) and any(isinstance(value, float) for value in values)
     return [float(value) for value in values] if mixed else values
-
-
-def _draw_samples(
-    axes: Sequence[tables.UniformAxis | tables.NormalAxis], sample: tables.SampleTable
-) -> Floats:
-    """Values of drawn axes, shape (samples, axes); equal for equal seeds."""
-    unit = _unit_points(sample, len(axes))
-    columns = []
-    for axis, column in zip(axes, unit.T, strict=True):
-        if isinstance(axis, tables.UniformAxis):
-            columns.append(axis.low + (axis.high - axis.low) * column)
-        else:
-            from scipy.special import ndtri
-
-            inside = np.clip(column, 2.0**-54, 1.0 - 2.0**-53)
-            columns.append(axis.mean + axis.standard_deviation * ndtri(inside))
-    return cast(Floats, np.stack(columns, axis=-1))
 
 
 def _unit_points(sample: tables.SampleTable, dimensions: int) -> Floats:
