@@ -41,7 +41,7 @@ def tables_of(base: type[T], key: str, modules: Iterable[str]) -> dict[str, type
 
 
 def union_of(tables: Mapping[str, type[Table]], key: str, default: str) -> Any:
-    """Tables as one type, told apart by the value of a key, which may be left out for a default."""
+    """Tables as one type, by the values of a key, which may be left out for a default."""
     tags = {table: name for name, table in reversed([*tables.items()])}
 
     def tag(value: Any) -> str:
