@@ -1,7 +1,5 @@
 """The console script, and ``python -m tiltsim``."""
 
-from __future__ import annotations
-
 import os
 import sys
 

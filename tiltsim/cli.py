@@ -144,8 +144,7 @@ def command(name: str) -> Callable[..., int]:
     """The function of a command, from its module."""
     shared = next((module for module, names in SHARED.items() if name in names), None)
     module = import_module(f"tiltsim.commands.{shared or name}")
-    run: Callable[..., int] = getattr(module, f"run_{name}" if shared else "run")
-    return run
+    return getattr(module, f"run_{name}" if shared else "run")
 
 
 OPENGL_USERS: Final = ("mujoco", "dm_control._render")

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 import os
+import runpy
 import subprocess
 import sys
 
 import numpy as np
 import pytest
 
+import tiltsim
 from tests.docs.pages import ROOT
 
 FILE = """
@@ -111,3 +113,19 @@ def test_the_command_line_knows_the_law(folder):
 def test_a_package_flies_in_batches_natively_as_in_python(folder):
     done = run(folder, "-c", PYTHON)
     assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:the law .* cannot be compiled")
+def test_the_predictive_package_flies_a_step_within_the_limits():
+    """From rest to 0.99 m away; with a plan that is not improved, the vehicle would stay."""
+    pytest.importorskip("casadi")
+    module = runpy.run_path(str(ROOT / "examples/predictive_package/tiltsim_predictive.py"))
+    law = module["PredictiveController"]()
+    changes = {"simulation.duration": 1.0, "controller.rotor_bandwidth": 400.0}
+    scenario = tiltsim.load_scenario("arena/limited#step", changes, controller=law)
+    flight = tiltsim.simulate(scenario)
+    off = np.linalg.norm(flight["position"] - flight["reference_position"], axis=1)
+    assert flight.end.kind == "completed"
+    assert off[-1] < 0.12
+    assert 800.0 < np.abs(flight["rotor_speeds"]).max() <= 838.0  # it brakes at the limits

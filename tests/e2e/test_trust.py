@@ -136,7 +136,7 @@ def run(here, *command):
     )
 
 
-@pytest.mark.slow
+@pytest.mark.slow(longest=True)
 def test_no_command_executes_what_it_reads(folders, tmp_path):
     here, program = folders
     done = run(here, program / "walk.py")

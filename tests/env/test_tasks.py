@@ -120,7 +120,7 @@ def test_zero_actions_lose_the_vehicle_with_the_stated_score(task):
     assert max(scores) < 0.25 * stated(task)[2][0]
 
 
-@pytest.mark.slow(longest=True)
+@pytest.mark.slow
 def test_the_page_states_the_scores_that_its_command_prints():
     """For one task: the tests above fly the others."""
     assert table(["Hover"]) in PAGE

@@ -14,8 +14,8 @@ import tiltsim
 from tests.controllers.tilt_car.lean import lean_after, lean_of, restored_lean
 from tests.flights import flight as screen_flight
 from tiltsim.cli import main
-from tiltsim.models.tilt_car import TiltCarSpec, compile_tilt_car
 from tiltsim.resources import shipped_folder
+from tiltsim.vehicles.tilt_car import TiltCarSpec, compile_tilt_car
 from tiltsim.views.figures.plot import plot
 from tiltsim.views.replay import thrust_sites, visible_model
 from tiltsim.views.rerun.recording import save_recording

@@ -12,7 +12,7 @@ from tiltsim.studies.benchmark import compiled_time_per_call
 from tiltsim_controllers.analysis.vectoring_design import TRACKING
 from tiltsim_controllers.analysis.vectoring_limits import Craft, side_slope
 from tiltsim_controllers.laws.vectoring_steps import braked, turn_by
-from tiltsim_controllers.vehicle.rotors import table_per_newton
+from tiltsim_controllers.vehicle.rotors import force_and_torque, table_per_newton
 
 LAG = {"rotor_time_constant": 0.03, "min_rotor_speed": 60.0, "max_rotor_speed": 838.0}
 LATE = {"timestep": 0.002, "control_timestep": 0.004, "control_latency": 0.008}
@@ -277,20 +277,31 @@ def design_of(vehicle, controller, **gait):
     return assembly_of(vehicle, controller, **gait).setup.parameters.law.own
 
 
-def first_accelerations(vehicle, controller, timestep=0.002, **gait):
-    """Rotor accelerations (rad/s^2) at time zero."""
-    assembly = assembly_of(vehicle, controller, timestep, **gait)
+def first_accelerations(vehicle, controller, timestep=0.002, own=None, **tables):
+    """Rotor accelerations (rad/s^2) at time zero, with changed parameters of the law."""
+    assembly = assembly_of(vehicle, controller, timestep, **tables)
     loop, setup = assembly.loop, assembly.setup
     state = (*loop.kind.initial_motion(assembly), loop.initial_activations(assembly, setup))
-    controls = loop.controls(0.0, *state, setup.parameters, setup.knots)
+    known = setup.parameters
+    if own:
+        known = known._replace(law=known.law._replace(own=known.law.own._replace(**own)))
+    controls = loop.controls(0.0, *state, known, setup.knots)
     rotors = len(SPEEDS[vehicle])
-    first = rotors + (rotors if gait else 0)  # tilts, one for each rotor, come before
+    first = rotors + max(loop.tilt_of_rotor) + 1  # tilts come before
     return np.array(controls[first : first + rotors])
+
+
+def limit_of_periods(vehicle, **tables):
+    """Rotor accelerations (rad/s^2) of the plain law as its period goes to zero."""
+    periods = np.array([1.0, 2.0, 4.0, 8.0])
+    found = [first_accelerations(vehicle, PLAIN, 1e-6 * each, **tables) for each in periods]
+    return np.linalg.solve(np.vander(periods, increasing=True), found)[0]
 
 
 SPEEDS = {
     "quadrotor": [300.0, 310.0, 330.0, 305.0],
     "tilt_hexarotor": [540.0, 550.0, 530.0, 545.0, 535.0, 552.0],
+    "omni_octorotor": [310.0, 320.0, 300.0, 330.0, 305.0, 315.0, 325.0, 308.0],
 }
 PLAIN = {
     **{"law": "vectoring", "observer": 0.0, "prediction": False, "restoring": 0.0},
@@ -307,9 +318,7 @@ def test_without_limits_and_observers_the_law_is_feedback_linearization(vehicle,
 
     The pods of the hexarotor move, whose rates the thrusts make good.
     """
-    periods = np.array([1.0, 2.0, 4.0, 8.0])
-    found = [first_accelerations(vehicle, PLAIN, 1e-6 * period, **gait) for period in periods]
-    limit = np.linalg.solve(np.vander(periods, increasing=True), found)[0]
+    limit = limit_of_periods(vehicle, **gait)
     known = design_of(vehicle, PLAIN, **gait)
     yaw = known.yaw
     height = [C, C * 2.0 * known.rise_damping * known.rise, C * known.rise**2]
@@ -323,6 +332,35 @@ def test_without_limits_and_observers_the_law_is_feedback_linearization(vehicle,
         **{"dimension": 1, "norm": "thrust", "restoring": 0.0},
     }
     expected = first_accelerations(vehicle, exact, **gait)
+    np.testing.assert_allclose(limit, expected, rtol=0.0, atol=1e-9 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("rates", [[0.0, 0.0, 0.0], [0.2, -0.3, 0.1]])
+def test_with_hard_side_force_the_law_is_full_pose_but_for_the_turning_force(rates):
+    """Its force turns with the body, where `full_pose` adds ``-omega x F`` to hold it in space.
+
+    Side force is made hard, height and yaw get the gains of the other axes, and the body points
+    where it shall: of an attitude error the one law takes the angle, the other one a sine.
+    """
+    vehicle = "omni_octorotor"
+    moving = {
+        "reference": {"type": "setpoint", "position": [0.02, -0.01, 0.015]},
+        "initial": {
+            **{"velocity": [0.02, 0.03, -0.02], "angular_velocity": rates},
+            "rotor_speed": SPEEDS[vehicle],
+        },
+    }
+    alike = {"rise": 2.0, "rise_damping": 1.0, "yaw": A, "side_softness": 1e-12}
+    limit = limit_of_periods(vehicle, own=alike, **moving)
+    gains = {"position": [C, C * 4.0, C * 4.0], "attitude": [C, C * 1.8 * A, C * A * A]}
+    pose = {"law": "full_pose", "gains": gains}
+    expected = first_accelerations(vehicle, pose, **moving)
+    airframe = tiltsim.airframe(tables(vehicle, 1.0)).vehicle
+    rows = np.vstack(force_and_torque(airframe.table))
+    speeds = airframe.spins * np.array(SPEEDS[vehicle])
+    turning = np.cross(rates, rows[:3] @ (speeds * abs(speeds)))
+    change = np.linalg.pinv(rows) @ [*turning, 0.0, 0.0, 0.0]
+    expected = expected + airframe.spins * change / (2.0 * abs(speeds))
     np.testing.assert_allclose(limit, expected, rtol=0.0, atol=1e-9 * np.abs(expected).max())
 
 

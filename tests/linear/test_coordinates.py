@@ -16,6 +16,7 @@ from tiltsim.linear.coordinates import (
     Coordinates,
     equation_coordinates,
     equation_inputs,
+    mujoco_coordinates,
 )
 from tiltsim.resources import shipped_folder
 from tiltsim_controllers.mathematics.attitude import rotation_of_quaternion
@@ -94,3 +95,16 @@ def test_a_quadrotor_under_a_law_of_rotor_speeds_has_their_states_on_the_thesis_
     assert [found.names.index(f"rotor_speed_{rotor}") for rotor in (1, 4)] == [12, 15]
     names = [name for name, *_ in equation_inputs(assembly)]
     assert names == [f"rotor_acceleration_{rotor}" for rotor in (1, 2, 3, 4)]
+
+
+def test_states_of_laws_and_layers_have_the_names_of_their_signals():
+    """In MuJoCo's order; states that no signal shows are numbered behind the layer's name."""
+    loop = assemble(load_scenario("interaction/carry#held")).loop
+    names = mujoco_coordinates(loop).names
+    own = names.index("rotor_speed_6") + 1
+    assert names[own] == "state_modeled_position_x"
+    assert names[-4:] == loop.fields[loop.controller_states :][:4]
+    assert names[own : own + loop.controller_states] == loop.fields[: loop.controller_states]
+    filtered = assemble(load_scenario("beyond/estimator")).loop
+    assert mujoco_coordinates(filtered).names[-1].startswith(("estimation_state_", "instruments_"))
+    assert len({*mujoco_coordinates(filtered).names}) == mujoco_coordinates(filtered).size

@@ -252,6 +252,7 @@ def test_a_long_orbit_takes_one_derivative():
     assert abs(found.multipliers[0]) == pytest.approx(np.exp(altitude * found.period), rel=1e-4)
 
 
+@pytest.mark.slow
 def test_scenarios_that_do_not_return_are_refused():
     """A gait that reaches singular attitudes."""
     lost = gait("trot_continuous").replace({"gait.amplitude": 1.5})

@@ -12,9 +12,11 @@ import pytest
 import tiltsim
 from tests.arrays.flown_scenarios import MULTIROTORS
 from tests.laws.test_laws import LAWS
+from tests.laws.test_multirotor import document
 from tests.simulation.test_batch import EXACT, GAITS
 from tiltsim.errors import InputError, TiltsimError
 from tiltsim.laws.assembling import assemble
+from tiltsim.plants.plant import EquationsPlant
 from tiltsim.scenario.loading import merge
 from tiltsim_controllers.vehicle.parameters import PRESETS
 
@@ -53,6 +55,40 @@ def test_symbolic_closed_loops_agree_with_python(name):
     assert len(model.fields) == len(sample)
     assert len({*model.states}) == len(model.initial)
     assert len(model.inputs) == len(inputs)
+
+
+BRIEF = {"simulation": {"plant": "thesis", "engine": "python", "duration": 0.03}}
+WITH_MARGIN = {name: LOOPS[name] for name in ("full_pose", "gait walk", "multirotor", "rigid body")}
+WITH_MARGIN["quadrotor"] = LAWS["yaw_position"]
+WITH_MARGIN["leaning"] = merge(MULTIROTORS["leaning"], {"initial": {"attitude": [0.3, 0.2, 0]}})
+WITH_MARGIN["omni"] = MULTIROTORS["turning over"]
+
+
+@pytest.mark.parametrize("name", WITH_MARGIN)
+def test_the_margin_is_the_column_of_the_flight(name):
+    scenario = tiltsim.parse_scenario(merge(BRIEF, WITH_MARGIN[name]))
+    model, flight = tiltsim.symbolic(scenario), tiltsim.simulate(scenario)
+    plant, found = EquationsPlant(assemble(scenario), "python"), []
+    times = flight["time"][:4]
+    for time in times:
+        plant.advance(round((time - plant.time) / scenario.simulation.timestep))
+        state, held = np.split(plant.state[1:], [len(model.initial)])
+        found.append([float(f(time, state, held)[0]) for f in (model.margin, model.signs)])
+    margins, determinants = np.array(found).T
+    logged = flight["singularity_margin"][:4]
+    np.testing.assert_allclose(np.sin(margins), np.sin(logged), rtol=0.0, atol=1e-12)
+    # Near a right angle the arc sine turns a rounding of 1e-16 into 1e-8 rad.
+    assert np.abs(margins - logged)[logged < 1.57].max(initial=0.0) < 1e-9
+    if name in ("gait walk", "rigid body"):
+        np.testing.assert_allclose(determinants, flight["determinant"][:4], rtol=0.0, atol=1e-9)
+
+
+def test_only_vehicles_with_a_margin_have_one():
+    for tables in (
+        LOOPS["tilt_car_planned_direction"],
+        document("tricopter", controller={"law": "geometric", "tilts": "free"}),
+    ):
+        assert tiltsim.symbolic(merge(tables, THESIS)).margin is None
 
 
 def test_names_say_where_states_and_inputs_are():

@@ -16,12 +16,13 @@ from tests.models.test_user_vehicle import (
     edited,
     write,
 )
-from tiltsim.models import mjcf_editing, rotorcraft, tilt_car
+from tiltsim.models import mjcf_editing, rotorcraft
 from tiltsim.models.parts import ExtraActuators, Ground, Pod, RotorLimits, TiltServo
 from tiltsim.models.rotorcraft import RotorcraftSpec, compile_model
-from tiltsim.models.tilt_car import TiltCarSpec, compile_tilt_car
 from tiltsim.models.user_vehicle import read_user_vehicle
 from tiltsim.resources import shipped_folder
+from tiltsim.vehicles import tilt_car
+from tiltsim.vehicles.tilt_car import TiltCarSpec, compile_tilt_car
 from tiltsim_controllers.tilt_car.vehicle import THESIS_CAR
 from tiltsim_controllers.vehicle.parameters import PRESETS
 

@@ -67,6 +67,7 @@ def test_flights_of_claims_are_in_the_library():
         assert set(claim.flights) <= library, claim.id
 
 
+@pytest.mark.slow
 def test_chapter_5_is_flown_with_the_swings_that_its_claims_use(scenarios):
     flown = [scenario for scenario in scenarios if "ch05" in scenario.address]
     assert {scenario.gait.type for scenario in flown} == set(SWINGS)

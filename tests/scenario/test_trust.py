@@ -53,6 +53,7 @@ def ran(folder):
     return (folder / "ran").exists()
 
 
+@pytest.mark.slow
 def test_check_executes_code_only_with_trust(folder, capsys, monkeypatch):
     assert main(["check", str(folder)]) == 2
     printed = capsys.readouterr().out

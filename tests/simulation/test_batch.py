@@ -210,6 +210,7 @@ def test_flights_end_early_on_the_same_step_with_the_same_cause(plant):
     assert ends[0] == ends[1], "recording must not matter"
 
 
+@pytest.mark.slow
 def test_a_row_that_ends_early_makes_room_for_the_next():
     """More flights than rows, an hour each, if they did not diverge in the first second."""
     many = [scenario(UPSIDE_DOWN, duration=3600.0, record_timestep=1.0)] * (ROWS_PER_THREAD + 4)

@@ -47,6 +47,7 @@ def test_one_cable_takes_the_load_before_the_other_releases_it():
     assert time[-1] == pytest.approx(0.3)
 
 
+@pytest.mark.slow
 def test_the_tension_is_the_force_on_the_load_by_newtons_law():
     simulation = tiltsim.Simulation(handed(FIRST, SECOND))
     mass, speeds, pulls = 0.1, [simulation.data.qvel[-6:-3].copy()], []

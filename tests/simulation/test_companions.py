@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import json
+
 import mujoco
 import numpy as np
 import pytest
 
 import tiltsim
 from tests.refusals import refusal
+from tiltsim.commands.run import summary
 from tiltsim.laws.assembling import assemble
 from tiltsim.logs.model import LoggedVehicle
 from tiltsim.plants.mujoco_plant import flight_model
@@ -278,3 +281,31 @@ def test_the_first_vehicle_gives_the_command_that_it_gives_alone(objects):
     commanded, expected = among.command().rotor_accelerations, alone.command().rotor_accelerations
     np.testing.assert_array_equal(commanded, expected)
     assert commanded.any()
+
+
+def test_every_vehicle_has_its_flight_and_metrics(tmp_path):
+    """A companion far away has the columns and metrics of its scenario flown alone."""
+    scenario = together(QUAD, WING | {"changes": {"tool": STICK}})
+    flight = tiltsim.simulate(scenario)
+    assert [*flight.vehicles] == ["first vehicle", "quad", "wing"]
+    assert flight.vehicles["first vehicle"] is flight
+    quad, alone = flight.vehicles["quad"], tiltsim.simulate(scenario.companions[0])
+    assert_equal(quad, alone, "")
+    clock = {"realtime_factor": 1.0}
+    assert quad.metrics() | clock == alone.metrics() | clock
+    flight.save(tmp_path)
+    saved = json.loads((tmp_path / "metrics.json").read_text())["vehicles"]
+    assert saved["quad"] | clock == quad.metrics() | clock
+    lines = summary(flight, [], judged=False, changes={}).splitlines()
+    (row,) = (line for line in lines if "max_abs_pitch" in line)
+    largest = (np.abs(flight[f"{prefix}pitch"]).max() for prefix in ("", "quad_", "wing_"))
+    assert [float(text) for text in row.split()[1:4]] == pytest.approx([*largest], rel=1e-5)
+
+
+def test_a_page_has_a_line_of_every_vehicle_and_panels_of_one_on_request():
+    flight = tiltsim.simulate(together(QUAD, WING))
+    pitch = next(axes for axes in flight.plot().axes if axes.get_ylabel() == "pitch (rad)")
+    drawn = [line.get_ydata().tobytes() for line in pitch.lines]
+    for prefix in ("", "quad_", "wing_"):
+        assert flight[f"{prefix}pitch"].tobytes() in drawn
+    assert len(flight.plot(panels="quad_position").axes) == 1

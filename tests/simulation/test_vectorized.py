@@ -28,6 +28,7 @@ def _double_precision():
         yield
 
 
+@pytest.mark.slow
 def test_the_flight_agrees_with_the_engine_and_consists_of_steps():
     scenario = tiltsim.parse_scenario({**LAWS["tilt_car_planned_direction"], **THESIS})
     flown = tiltsim.vectorized(scenario)

@@ -11,9 +11,8 @@ import pytest
 from tiltsim.cli import main
 from tiltsim.errors import InputError
 from tiltsim.studies import arena, tuning
-from tiltsim.studies.arena_page import arena_page
+from tiltsim.studies.arena_page import arena_page, league_page, league_table
 from tiltsim.studies.comparison import Compared, Entry, compare_one, controller_tables
-from tiltsim.studies.league_page import league_page, league_table
 from tiltsim.studies.multirotor_analysis import FEW_ROTORS, FLEET
 from tiltsim.studies.scores import AIMS, INTERACTION, STEP, score
 from tiltsim.views.figures.comparisons import arena_figure, panels_of
@@ -178,6 +177,8 @@ def flown(entries, **_):
         (["--seed", "2"], "--seed: only with --tune"),
         (["--league", "interaction", "--tune", "9"], "--tune: not in the league of interaction"),
         (["--vehicles", ","], "--vehicles ,: name one at least"),
+        (["--tasks", "loop"], "--tasks loop: choose circle, "),
+        (["--tasks", "slide"], "--tasks slide: choose circle, "),
         (["--controllers", ""], "--controllers '': name one at least"),
     ],
 )
@@ -232,6 +233,18 @@ def test_the_command_writes_data_page_and_figure(tmp_path, capsys, monkeypatch):
     assert main(["arena", *chosen, "--gains", str(gains), "--out", str(second), "--json"]) == 0
     again = json.loads(capsys.readouterr().out)
     assert again["vehicles"] == printed["vehicles"]
+
+
+@pytest.mark.parametrize(
+    ("league", "names", "addresses"),
+    [
+        ("limited", ["wind", "step"], ["arena/limited#step", "arena/limited#wind"]),
+        ("interaction", ["door", "slide"], ["interaction/push#slide", "interaction/door"]),
+    ],
+)
+def test_named_tasks_alone_are_flown(league, names, addresses):
+    chosen = arena.chosen_vehicles(["tilt_hexarotor"], league, names)
+    assert [one.tasks for one in chosen.values()] == [tuple(addresses)]
 
 
 def test_an_unknown_vehicle_is_refused():
@@ -358,7 +371,7 @@ def test_the_page_of_the_limited_league_says_who_wins_by_how_much_and_where_not(
     assert "wins 1 of 2 tasks" in lines[4]
     assert lines[5].startswith("On curves, in wind and with a weak rotor the best baseline's error")
     assert " is 6.7 times as large" in lines[5]
-    assert lines[6] == "It loses, by vehicles and points: `step` on 1, by up to 1.0."
+    assert lines[6] == "Lost tasks, vehicles and points: `step` with 1, by up to 1.0."
     assert "| `circle` | 0.015 / 0.100 `pid` 50 |" in lines
     assert "| `pid` | 500 | 0.50 | 10.0 % | 0 of 4 |" in lines
     assert "## With an exact model" in lines

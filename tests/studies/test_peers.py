@@ -6,6 +6,7 @@ import pytest
 
 from tiltsim.errors import InputError
 from tiltsim.studies import peers
+from tiltsim.system.processes import begin
 
 
 def test_an_absent_peer_is_one_line(monkeypatch):
@@ -18,24 +19,27 @@ def test_an_absent_peer_is_one_line(monkeypatch):
 def test_a_failing_peer_is_reported(monkeypatch):
     monkeypatch.setattr(peers, "find_spec", lambda name: name)
     monkeypatch.setitem(peers.PEERS, "json", peers.PeerCase(None, 1, 1))  # not known in its process
-    with pytest.raises(InputError, match="--peer json: it failed"), peers.running("json"):
+    with pytest.raises(InputError, match="--peer json: it failed: KeyError"), peers.running("json"):
         pass
 
 
-def test_a_peer_of_an_interrupted_benchmark_is_silent(monkeypatch, capfd, tmp_path):
-    waiting = tmp_path / "python"
-    waiting.write_text("#!/bin/sh\nexec sleep 60\n")
-    waiting.chmod(0o755)
+def test_a_peer_of_an_interrupted_benchmark_ends_in_silence(monkeypatch, capfd):
+    begun = []
 
-    def interrupted(_peer):
+    def recorded(work):
+        begun.append(begin(work))
+        return begun[0]
+
+    def interrupted(_peer, _request):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(peers, "find_spec", lambda name: name)
-    monkeypatch.setitem(peers.PEERS, "json", peers.PeerCase(None, 1, 1))
+    monkeypatch.setattr(peers, "begin", recorded)
     monkeypatch.setattr(peers.Peer, "_answer", interrupted)
-    monkeypatch.setattr(peers.sys, "executable", str(waiting))
-    with pytest.raises(KeyboardInterrupt), peers.running("json"):
+    with pytest.raises(KeyboardInterrupt), peers.running("rotorpy"):
         pass
+    [(process, _)] = begun
+    assert not process.is_alive()
     assert capfd.readouterr().err == ""
 
 

@@ -69,8 +69,7 @@ class Kernel:
         import jax
         import jax.numpy as jnp
 
-        loop, equations = course.loop, course.loop.equations
-        assert equations is not None  # other loops do not fly on equations
+        loop, equations = course.loop, course.loop.required_equations
         self._jax, self._numpy, self.course, self.setup = jax, jnp, course, setup
         run = InJax(course.dtype)
         self._step = run(make_step(equations, course.solver))
@@ -311,14 +310,12 @@ def _compiled_steps(
         now = jax.lax.fori_loop(0, steps, lambda _, now: kernel.step(now), now)
         return jnp.stack([*now.state, *now.held])
 
-    compiled: Callable[[int, Floats, int], Any] = jax.jit(many)
-    return compiled
+    return jax.jit(many)
 
 
 def _split(course: Course, numbers: Any) -> tuple[Any, Any]:
     """State and held inputs."""
-    assert course.loop.equations is not None
-    size = len(numbers) - course.loop.equations.inputs_size
+    size = len(numbers) - course.loop.required_equations.inputs_size
     return numbers[:size], numbers[size:]
 
 

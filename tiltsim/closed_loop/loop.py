@@ -179,6 +179,12 @@ class ClosedLoop:
     traced: bool = True  # whether the controller can be traced; else it runs as plain Python
 
     @property
+    def required_equations(self) -> Equations:
+        """Its `equations`; other loops are refused where equations are integrated."""
+        assert self.equations is not None
+        return self.equations
+
+    @property
     def is_traceable(self) -> bool:
         """Whether it can be traced with all its layers."""
         return self.traced and (self.within is None or self.within.is_traceable)

@@ -44,6 +44,7 @@ def run(
     own: OwnControllers = (),
     league: Literal["limited", "unlimited", "interaction"] = "limited",
     vehicles: Names = (),
+    tasks: Names = (),
     tune: Count = None,
     seed: Count = None,
     gains: Path | None = None,
@@ -55,18 +56,17 @@ def run(
     """Fly fixed tasks under every controller that fits, and score them.
 
     The limited league has rotor limits, lag, latency, noise and model errors, and baselines with
-    observers and mixers; in the unlimited one all controllers that fit, also of packages, fly
-    without. In the one of interaction vehicles push, open a door, land and carry loads. Scores:
-    100 for no error, 50 for a root mean square error of 0.1 m or 0.1 rad of yaw (steps: a quarter
-    of the step), of 0.5 N of a push, or 0.1 rad of swing in the end; 0 for a vehicle that stays
-    where it began or never touches, and if the flight ends early, - if the task refuses the
-    controller.
+    observers and mixers; in the unlimited one all that fit, also of packages, fly without; in the
+    one of interaction vehicles push, open a door, land and carry loads. Scores: 100 for no error,
+    50 for an rms error of 0.1 m, 0.1 rad of yaw, a quarter of a step, 0.5 N of a push, or a last
+    swing of 0.1 rad; 0 for an idle vehicle and an early end, - where a task refuses the controller.
 
     Args:
         out (DIR): folder for arena.csv, arena.json, arena.png and arena.md (default: arena)
         controllers: laws, or given, the scenarios' own; default without --controller: all that fit
         league: limited, unlimited or interaction (default: limited)
         vehicles: default: all
+        tasks: names such as circle; default: all
         tune (N): first search each controller's gains with at most N flights on other tasks, and
             write them to limited_gains.json or tuned_gains.json
         seed (S): seed of that search (default: 1)
@@ -89,7 +89,7 @@ def run(
     if tune is not None and league not in GAINS_FILE:
         raise InputError(f"--tune: not in the league of {league}, which has no tuning tasks")
     given = chosen_controllers(controllers, own)
-    chosen = chosen_vehicles(vehicles, league)
+    chosen = chosen_vehicles(vehicles, league, tasks)
     tables = _tables(chosen, given, league)
     prepare_folder(out)
     rows: dict[str, list[dict[str, Any]]] = {name: [] for name in chosen}
@@ -141,8 +141,7 @@ def _written(
 ) -> str:
     """Write page, table and picture of a league into a folder; returns the page."""
     from tiltsim.studies.arena import standings
-    from tiltsim.studies.arena_page import arena_page
-    from tiltsim.studies.league_page import by_world, league_page, league_table
+    from tiltsim.studies.arena_page import arena_page, by_world, league_page, league_table
     from tiltsim.views.figures import style
     from tiltsim.views.figures.comparisons import arena_figure, panels_of, tasks_of, vehicles_of
 

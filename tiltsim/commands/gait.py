@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import asdict, replace
 from functools import partial
-from typing import TYPE_CHECKING, Annotated, Final, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, Final, NamedTuple, TypeAlias
 
 from tiltsim.commands.declaring import Option, mistakes_in
 from tiltsim.commands.gait_options import DEFAULT_VEHICLE, GaitFigure, GaitOptions, parse_vehicle
@@ -14,6 +14,8 @@ from tiltsim.errors import InputError
 from tiltsim.views import figures
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from matplotlib.figure import Figure
 
     from tiltsim.models.rotor_table import Multirotor
@@ -23,6 +25,10 @@ if TYPE_CHECKING:
 
 MULTIROTOR_FIGURES: Final = ("roll_pitch", "attainable")  # ``--figure`` for any multirotor
 OPPOSITE_SPEED_RATIO: Final = 0.7  # in fault reports: speed of the rotor opposite a failed one
+
+
+Analysis: TypeAlias = "tuple[Callable[[], Figure], dict[str, Any], str]"
+"""An analysis to show: how to draw it, its report, and its text."""
 
 
 class SelectedGait(NamedTuple):
@@ -52,10 +58,10 @@ def run(
         scenario (SCENARIO): take gait and vehicle from a scenario
         list_gaits: list the thesis's gaits and their robustness claims
     """
-    from tiltsim.commands.gait_text import determinant_text, gait_text, list_text
-    from tiltsim.studies.gait_analysis import determinant_report, fault_report, gait_report
+    from tiltsim.commands.gait_text import list_text
 
     if list_gaits:
+        from tiltsim.commands.gait_text import list_text
         from tiltsim_controllers.analysis.published_gaits import robustness_table
 
         if scenario is not None or gait != GaitOptions() or figure != GaitFigure():
@@ -63,20 +69,8 @@ def run(
         rows = robustness_table()
         print(json_text([asdict(row) for row in rows]) if json else list_text(rows))
         return 0
-    if gait.mjcf is not None:
-        return _run_multirotor(scenario, None, gait, figure, json=json)
     _check_options(scenario, gait, figure)
-    if figure.kind == "determinant":
-        vehicle, case = gait.vehicle or parse_vehicle(DEFAULT_VEHICLE), figure.case or "equal"
-        report = determinant_report(case, vehicle)
-        figure.show(
-            lambda: figures.vehicles.determinant_figure(case, vehicle),
-            report,
-            determinant_text(report),
-            json=json,
-        )
-        return 0
-    loaded = None
+    loaded, of_any_rotors = None, gait.mjcf is not None
     if scenario is not None:
         from tiltsim.models.rotor_table import Multirotor
         from tiltsim.scenario.loading import load_scenario
@@ -84,24 +78,33 @@ def run(
         loaded = load_scenario(scenario)
         if gait.vehicle is not None:
             raise InputError("--vehicle: the scenario defines its own vehicle; remove one of them")
-        if isinstance(loaded.vehicle.resolve(), Multirotor):
-            return _run_multirotor(scenario, loaded, gait, figure, json=json)
-    selected = _select(gait) if loaded is None else _of_scenario(str(scenario), loaded)
-    report = gait_report(selected.gait, selected.vehicle, roll=gait.roll, pitch=gait.pitch)
-    if gait.faults:
-        a1, a2, a3, a4 = selected.gait.angles(0.0).tolist()
-        opposite_speed = OPPOSITE_SPEED_RATIO * selected.vehicle.hover_rotor_speed
-        report["faults"] = fault_report((a1, a2, a3, a4), selected.vehicle, opposite_speed)
-    if figure.kind == "attainable":
-        report["warnings"] += _attainable_warnings(selected, figure)
-    figure.show(partial(_draw, selected, figure), report, gait_text(report), json=json)
+        of_any_rotors = isinstance(loaded.vehicle.resolve(), Multirotor)
+    if of_any_rotors:
+        analysis = _of_multirotor(scenario, loaded, gait, figure)
+    elif figure.kind == "determinant":
+        analysis = _of_determinant(gait, figure)
+    else:
+        analysis = _of_gait(_select(gait) if loaded is None else _of_scenario(loaded), gait, figure)
+    figure.show(*analysis, json=json)
     return 0
 
 
 def _check_options(scenario: str | None, gait: GaitOptions, figure: GaitFigure) -> None:
     """Refuse incompatible options, and files that cannot be written."""
-    given = [scenario, gait.angles, gait.published, gait.balance]
-    count = sum(one is not None for one in given)
+    if gait.mjcf is not None:
+        of_four_rotors = {
+            "SCENARIO": scenario,
+            "--published": gait.published,
+            "--vehicle": gait.vehicle,
+            "--case": figure.case,
+        }
+        for option, value in of_four_rotors.items():
+            if value is not None:
+                raise InputError(f"--mjcf: cannot be combined with {option}")
+        if gait.angles is not None and gait.balance is not None:
+            raise InputError("--mjcf: give either --angles or --balance")
+        return
+    count = sum(one is not None for one in (scenario, gait.angles, gait.published, gait.balance))
     if figure.kind == "determinant":
         if count:
             raise InputError("--figure determinant: takes --case instead of a gait")
@@ -115,6 +118,32 @@ def _check_options(scenario: str | None, gait: GaitOptions, figure: GaitFigure) 
     if figure.speed_limits is not None and figure.kind != "attainable":
         raise InputError("--speed-limits: needs --figure attainable")
     figure.check_kind()
+
+
+def _of_determinant(gait: GaitOptions, figure: GaitFigure) -> Analysis:
+    """The analysis of the restrictions of ch. 3, without a gait."""
+    from tiltsim.commands.gait_text import determinant_text
+    from tiltsim.studies.gait_analysis import determinant_report
+
+    vehicle, case = gait.vehicle or parse_vehicle(DEFAULT_VEHICLE), figure.case or "equal"
+    report = determinant_report(case, vehicle)
+    draw = partial(figures.vehicles.determinant_figure, case, vehicle)
+    return draw, report, determinant_text(report)
+
+
+def _of_gait(selected: SelectedGait, gait: GaitOptions, figure: GaitFigure) -> Analysis:
+    """The analysis of a gait of four rotors."""
+    from tiltsim.commands.gait_text import gait_text
+    from tiltsim.studies.gait_analysis import fault_report, gait_report
+
+    report = gait_report(selected.gait, selected.vehicle, roll=gait.roll, pitch=gait.pitch)
+    if gait.faults:
+        a1, a2, a3, a4 = selected.gait.angles(0.0).tolist()
+        opposite_speed = OPPOSITE_SPEED_RATIO * selected.vehicle.hover_rotor_speed
+        report["faults"] = fault_report((a1, a2, a3, a4), selected.vehicle, opposite_speed)
+    if figure.kind == "attainable":
+        report["warnings"] += _attainable_warnings(selected, figure)
+    return partial(_draw, selected, figure), report, gait_text(report)
 
 
 def _select(options: GaitOptions) -> SelectedGait:
@@ -143,19 +172,19 @@ def _select(options: GaitOptions) -> SelectedGait:
     return SelectedGait(published.gait, vehicle, title, published.biased, twin_title)
 
 
-def _of_scenario(address: str, scenario: Scenario) -> SelectedGait:
+def _of_scenario(scenario: Scenario) -> SelectedGait:
     """The gait and the vehicle of a scenario, and its gait without bias."""
     from tiltsim_controllers.vehicle.parameters import Vehicle
 
-    vehicle = scenario.vehicle.resolve()
+    vehicle, at = scenario.vehicle.resolve(), scenario.address
     if not isinstance(vehicle, Vehicle):
         raise InputError(
-            f"{address}: vehicle.model = {scenario.vehicle.model!r}: does not have a gait of four "
+            f"{at}: vehicle.model = {scenario.vehicle.model!r}: does not have a gait of four "
             "tilt angles"
         )
     if not scenario.rotorcraft.has_standard_layout:
         raise InputError(
-            f"{address}: vehicle.mjcf = {scenario.rotorcraft.mjcf!r}: its rotors are not on four "
+            f"{at}: vehicle.mjcf = {scenario.rotorcraft.mjcf!r}: its rotors are not on four "
             "equal arms at right angles, which the analysis assumes"
         )
     gait = replace(scenario.gait.plan(vehicle), source=scenario.source)
@@ -209,26 +238,22 @@ def _draw(selected: SelectedGait, options: GaitFigure) -> Figure:
     return figures.gaits.gait_figure(chosen, vehicle, tuple(options.panels))
 
 
-def _run_multirotor(
-    address: str | None,
-    scenario: Scenario | None,
-    options: GaitOptions,
-    figure: GaitFigure,
-    *,
-    json: bool,
-) -> int:
-    """Analyze the file of ``--mjcf``, without a scenario, or the scenario's vehicle."""
+def _of_multirotor(
+    address: str | None, scenario: Scenario | None, options: GaitOptions, figure: GaitFigure
+) -> Analysis:
+    """The analysis of the file of ``--mjcf``, without a scenario, or of its vehicle."""
     from tiltsim.commands.gait_text import multirotor_text
     from tiltsim.models.rotor_table import Multirotor
-    from tiltsim.studies.multirotor_analysis import (
-        balance_report,
-        multirotor_report,
-        period_report,
-        tilted_rotors,
-    )
+    from tiltsim.studies import multirotor_analysis as study
 
-    _check_multirotor_options(address, options, figure)
-    limits, balance, gait = figure.speed_limits, None, None
+    kind = figure.kind or MULTIROTOR_FIGURES[0]
+    if kind not in MULTIROTOR_FIGURES:
+        choices = " or ".join(MULTIROTOR_FIGURES)
+        raise InputError(f"--figure {kind}: of a multirotor, choose {choices}")
+    figure.check_kind()
+    if figure.panels:
+        raise InputError("--panels: this figure has no panels to choose from")
+    limits, more, gait = figure.speed_limits, {}, None
     if scenario is not None:
         resolved = scenario.vehicle.resolve()
         assert isinstance(resolved, Multirotor)
@@ -239,51 +264,20 @@ def _run_multirotor(
         angles = _tilt_angles(options, vehicle)
         if options.balance is not None:
             with mistakes_in(f"--balance {options.acceleration}"):
-                balance = balance_report(vehicle, options.balance, limits)
-            angles = tuple(balance["angles"])
+                more["balance"] = study.balance_report(vehicle, options.balance, limits)
+            angles = tuple(more["balance"]["angles"])
     roll, pitch = options.roll or 0.0, options.pitch or 0.0
-    report = {
-        "vehicle": options.mjcf or address,
-        **multirotor_report(
-            vehicle, angles, limits=limits, roll=roll, pitch=pitch, faults=options.faults
-        ),
-    }
-    if balance is not None:
-        report["balance"] = balance
+    about: Any = {"limits": limits, "roll": roll, "pitch": pitch, "faults": options.faults}
+    report = {"vehicle": options.mjcf or address}
+    report |= study.multirotor_report(vehicle, angles, **about) | more
     if gait is not None and not gait.is_constant:
-        report |= period_report(vehicle, gait, roll, pitch)
+        report |= study.period_report(vehicle, gait, roll, pitch)
 
     def draw() -> Figure:
-        rotors = tilted_rotors(vehicle, angles, limits)
-        return figures.vehicles.multirotor_figure(rotors, figure.kind or MULTIROTOR_FIGURES[0])
+        rotors = study.tilted_rotors(vehicle, angles, limits)
+        return figures.vehicles.multirotor_figure(rotors, kind)
 
-    figure.show(draw, report, multirotor_text(report), json=json)
-    return 0
-
-
-def _check_multirotor_options(
-    address: str | None, options: GaitOptions, figure: GaitFigure
-) -> None:
-    """Refuse options of the thesis's vehicle, and files that cannot be written."""
-    of_four_rotors = {
-        "SCENARIO": address,
-        "--published": options.published,
-        "--vehicle": options.vehicle,
-        "--case": figure.case,
-    }
-    for option, value in of_four_rotors.items():
-        if options.mjcf is not None and value is not None:
-            raise InputError(f"--mjcf: cannot be combined with {option}")
-    if options.angles is not None and options.balance is not None:
-        raise InputError("--mjcf: give either --angles or --balance")
-    kind = figure.kind
-    if kind is not None and kind not in MULTIROTOR_FIGURES:
-        raise InputError(
-            f"--figure {kind}: of a multirotor, choose {' or '.join(MULTIROTOR_FIGURES)}"
-        )
-    figure.check_kind()
-    if figure.panels:
-        raise InputError("--panels: this figure has no panels to choose from")
+    return draw, report, multirotor_text(report)
 
 
 def _read_multirotor(path: str) -> Multirotor:

@@ -1,7 +1,5 @@
 """``tiltsim export``, ``import``, ``replay`` and ``identify``: logs, and flights as logs."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 

@@ -245,11 +245,15 @@ def summary(
         lines += ["", *(f"  {line}" for line in expectation_lines(verdicts, judged=judged))]
     shown = [name for name in metrics if name not in _IN_HEADER]
     width = max(map(len, shown))
-    lines.append("")
-    lines += [
-        f"  {name:<{width}}  {_shown(metrics[name]):>12} {METRICS[name].unit}".rstrip()
-        for name in shown
-    ]
+    of_each = {name: one.metrics() for name, one in flight.vehicles.items()}
+    heads = "".join(f"  {name:>12}" for name in of_each)
+    lines.append("" if len(of_each) == 1 else f"\n  {'':<{width}}{heads}")
+    for name in shown:
+        cells = "".join(
+            f"  {_shown(own[name]) if name in own else '-':>{max(12, len(vehicle))}}"
+            for vehicle, own in of_each.items()
+        )
+        lines.append(f"  {name:<{width}}{cells} {METRICS[name].unit}".rstrip())
     return "\n".join(lines)
 
 

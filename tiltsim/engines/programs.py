@@ -145,8 +145,7 @@ class LoopPrograms:
             solver: See `tiltsim.equations.solvers.SOLVERS`.
             held: Whether the controller is sampled and held.
         """
-        equations = self._loop.equations
-        assert equations is not None  # other loops do not fly on equations
+        equations = self._loop.required_equations
         step, size = make_step(equations, solver), states + equations.inputs_size
 
         def stepped(samples: bool) -> Callable[..., Any]:

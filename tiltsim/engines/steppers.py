@@ -41,9 +41,7 @@ class Layout(NamedTuple):
     @property
     def equations(self) -> Equations:
         """The equations of the loop."""
-        equations = self.key.loop.equations
-        assert equations is not None  # other loops do not fly on equations
-        return equations
+        return self.key.loop.required_equations
 
     @property
     def size(self) -> int:

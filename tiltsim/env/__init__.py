@@ -4,8 +4,6 @@
 Where Gymnasium is installed, importing this package registers the tasks of `tiltsim.env.tasks`.
 """
 
-from __future__ import annotations
-
 from typing import TYPE_CHECKING, Any
 
 from tiltsim.env.environment import Environment, TiltrotorEnv

@@ -5,8 +5,6 @@
 prints the table of docs/environment.md.
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable, Iterable
 from typing import Any, Final

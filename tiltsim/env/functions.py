@@ -4,8 +4,6 @@
 differentiates through their episodes. `tiltsim.env.VectorEnv` is made of them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from operator import attrgetter
 from typing import Any, Final, NamedTuple
@@ -111,8 +109,7 @@ class EnvFunctions:
         # A command is written to the speeds, or to the speeds that they follow with a lag.
         lags = rotorcraft.rotor_time_constant is not None
         self._commanded = self._act + self._rotors * lags
-        equations = loop.equations
-        assert equations is not None
+        equations = loop.required_equations
         run = InJax(precision)
         self._advance = run(make_implicitfast_step(equations, self._tilts))
         self._inputs, self._sample = run(equations.inputs), run(equations.observe)

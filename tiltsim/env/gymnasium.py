@@ -5,8 +5,6 @@ and ``tiltsim/Tiltrotor-v0``, a `TiltrotorEnv` with its defaults; ``gymnasium.ma
 arguments of `GymnasiumEnv` in place of a task's own.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

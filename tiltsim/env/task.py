@@ -1,7 +1,5 @@
 """The task of an episode: its scenario, arrays, reward and termination."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from math import dist, pi
 from operator import attrgetter

@@ -3,8 +3,6 @@
 The controller of their scenarios is the built-in one that policies are compared with.
 """
 
-from __future__ import annotations
-
 from importlib.util import find_spec
 from math import pi
 from typing import Any, Final

@@ -1,7 +1,5 @@
 """Many environments at once as a `gymnasium.vector.VectorEnv`, in JAX; needs both extras."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from contextlib import AbstractContextManager, nullcontext
 from functools import partial

@@ -76,8 +76,7 @@ def equations_of_motion(state: Any, inputs: Any, vehicle: Vehicle, disturbance: 
     acceleration, turning = accelerations(
         principal_body(vehicle), rotation_matrix(attitude), omega, wrench, disturbance, 1.0
     )
-    rates: Values = xp.hstack([velocity, acceleration, euler_rates(attitude, omega), turning])
-    return rates
+    return xp.hstack([velocity, acceleration, euler_rates(attitude, omega), turning])
 
 
 def initial_extended_state(scenario: Scenario) -> Values:

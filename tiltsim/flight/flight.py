@@ -25,7 +25,7 @@ from tiltsim.flight.writing import write_flight
 from tiltsim.laws.assembling import assemble
 from tiltsim.models.vehicle_parts import MAX_ROTORS
 from tiltsim.scenario.messages import did_you_mean
-from tiltsim.scenario.metric_names import unit_of
+from tiltsim.scenario.metric_names import WALL_CLOCK_METRICS, unit_of
 from tiltsim.system.public import optional_package, public
 from tiltsim.system.text import html_table, short_repr, shortened, valid_unicode
 from tiltsim_controllers.mathematics.scalar import Floats
@@ -54,6 +54,10 @@ VECTORS: Final = {
     "reference_tilt_angles": _each_rotor("alpha_ref"),
 }
 """Vectors by name and their components; a vehicle in a plane has some of them."""
+
+
+FIRST: Final = "first vehicle"
+"""Name of the vehicle of the scenario itself among `Flight.vehicles`."""
 
 
 def components(name: str, columns: Iterable[str]) -> list[str]:
@@ -207,6 +211,22 @@ class Flight(ColumnsOverTime):
         return {name: known[name] for name in self.units}
 
     @cached_property
+    def vehicles(self) -> dict[str, Flight]:
+        """The vehicles of this world by name: this flight as `FIRST`, and every companion's.
+
+        A companion's flight has the columns and metrics of a vehicle alone, without a prefix.
+        """
+        fields = [*self.assembly.loop.sample_fields]
+        found = {FIRST: self}
+        names = (table.name for table in self.scenario.companion)
+        for name, own in zip(names, self.scenario.companions, strict=True):
+            assembly = assemble(own, recorded=True)
+            wanted = ("time", *(f"{name}_{field}" for field in assembly.loop.sample_fields[1:]))
+            samples = self.samples[:, [fields.index(column) for column in wanted]]
+            found[name] = Flight(assembly, samples, self.end, self.engine, self.wall_time)
+        return found
+
+    @cached_property
     def _metrics(self) -> Metrics:
         with _overflow_ignored():
             known = self.shared_metrics()
@@ -279,7 +299,14 @@ class Flight(ColumnsOverTime):
         """
         if not isinstance(folder, str | PathLike):
             raise InputError(f"folder = {short_repr(folder)}: must be the name of a folder")
-        write_flight(Path(folder), self.to_arrow(), self.metrics(), self.scenario)
+        metrics: dict[str, Any] = dict(self.metrics())
+        others = {name: one.metrics() for name, one in self.vehicles.items() if name != FIRST}
+        if others:
+            metrics["vehicles"] = {
+                name: {key: value for key, value in own.items() if key not in WALL_CLOCK_METRICS}
+                for name, own in others.items()
+            }
+        write_flight(Path(folder), self.to_arrow(), metrics, self.scenario)
 
 
 def as_flights(flights: Flight | Sequence[Flight]) -> list[Flight]:

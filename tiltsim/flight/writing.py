@@ -62,7 +62,7 @@ def prepare_flight_folder(folder: Path, scenario: Scenario) -> None:
 
 
 def write_flight(
-    folder: Path, table: pyarrow.Table, metrics: Mapping[str, float | bool], scenario: Scenario
+    folder: Path, table: pyarrow.Table, metrics: Mapping[str, Any], scenario: Scenario
 ) -> None:
     """Write a flight into a folder; each file appears whole or not at all.
 
@@ -151,6 +151,6 @@ def _foreign(file: Path) -> InputError:
     )
 
 
-def metrics_json(metrics: Mapping[str, float | bool]) -> str:
+def metrics_json(metrics: Mapping[str, Any]) -> str:
     """Metrics as a flat JSON object in the order of `METRICS`, with all their digits."""
     return json.dumps(dict(metrics), indent=2, allow_nan=False) + "\n"

@@ -4,8 +4,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
-import numpy as np
-
 from tiltsim.closed_loop.loop import ControlSetup
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.scenario import FlightPlan, Scenario
@@ -18,7 +16,7 @@ from tiltsim_controllers.laws.multirotor_steps import INTEGRAL_FIELDS
 from tiltsim_controllers.laws.observed import Seen, Step
 from tiltsim_controllers.laws.supervisor import HOLD, Supervision
 from tiltsim_controllers.mathematics.scalar import Floats, Values
-from tiltsim_controllers.vehicle.body import PITCH, ROLL, Body, body_of
+from tiltsim_controllers.vehicle.body import PITCH, ROLL
 
 Margins = Callable[[Mapping[str, Floats], ControlSetup], dict[str, Floats]]
 """``(samples by field, with the columns of references, setup) -> columns``."""
@@ -94,12 +92,7 @@ INTEGRALS: Final = dict.fromkeys(INTEGRAL_FIELDS, "m s")
 def vehicle_of(plan: FlightPlan) -> Any:
     """The vehicle that a law knows: of a multirotor the rigid body."""
     vehicle = plan.scenario.vehicle.resolve()
-    return body_of_vehicle(vehicle) if isinstance(vehicle, Multirotor) else vehicle
-
-
-def body_of_vehicle(vehicle: Multirotor) -> Body:
-    """The rigid body that a law knows of a multirotor."""
-    return body_of(vehicle.mass, np.reshape(vehicle.inertia, (3, 3)), vehicle.gravity)
+    return vehicle.body if isinstance(vehicle, Multirotor) else vehicle
 
 
 def _limits(plan: FlightPlan, horizon: float) -> RotorRange:

@@ -13,10 +13,9 @@ from typing import Any, Final, NamedTuple
 
 from tiltsim.closed_loop.loop import ClosedLoop
 from tiltsim.errors import TiltsimError
-from tiltsim.laws.law import Law, body_of_vehicle, tilts_in_states, vehicle_of
+from tiltsim.laws.law import Law, tilts_in_states, vehicle_of
 from tiltsim.laws.layers.actuation import sensor_parameters
 from tiltsim.laws.rotor_loop import RotorLayout, margins_of, rotor_loop
-from tiltsim.models.cross import as_multirotor
 from tiltsim.scenario.law_controller import Airframe, LawController, LawTable
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.scenario import FlightPlan, Scenario, plan_flight
@@ -229,7 +228,7 @@ def _own_of(find: Find) -> Callable[[FlightPlan], dict[str, Any]]:
         assert isinstance(controller, LawTable)
         step, vehicle = airframe.control_timestep, vehicle_of(plan)
         return {
-            "vehicle": body_of_vehicle(airframe.vehicle),
+            "vehicle": airframe.vehicle.body,
             "cross": vehicle if isinstance(vehicle, Vehicle) else _NO_CROSS,
             "gyroscopic": airframe.gyroscopic,
             "rotor_gain": held_gain(controller.rotor_bandwidth, step),
@@ -316,13 +315,12 @@ def airframe_of(plan: FlightPlan) -> Airframe:
     """The airframe of a planned flight."""
     scenario, simulation = plan.scenario, plan.scenario.simulation
     table = scenario.any_rotorcraft
-    vehicle, tilting = table.resolve(), table.has_tilting_rotors
     speeds, sensors = initial_rotor_speeds(plan), sensor_parameters(scenario)
     root = max(sensors.period, simulation.control_timestep) ** 0.5
     return Airframe(
-        as_multirotor(vehicle, tilting=tilting),
+        table.multirotor,
         plan.gait,
-        initial_tilts(plan)[0] if tilting else (),
+        initial_tilts(plan)[0] if table.has_tilting_rotors else (),
         tuple(spin * speed for spin, speed in zip(table.spins, speeds, strict=True)),
         scenario.initial.position,
         scenario.initial.velocity,

@@ -19,7 +19,7 @@ from tiltsim.laws.vehicle_loop import VehicleFunctions, parts, servo_lead
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.scenario import FlightPlan
 from tiltsim.vehicles.rotorcraft import initial_rotor_speeds, rotorcraft_kind
-from tiltsim.vehicles.rotorcraft.layout import CROSS, Layout
+from tiltsim.vehicles.rotorcraft.layout import CROSS
 from tiltsim.vehicles.rotorcraft.layout import Layout as Places
 from tiltsim.vehicles.rotorcraft.others import FELT, FELT_SIZE
 from tiltsim_controllers.analysis.singularity import world_up
@@ -272,7 +272,7 @@ def rotor_loop(
     """The closed loop of a control law with all vehicles of a layout.
 
     Args:
-        layout: Layout of the vehicles.
+        layout: Places of the vehicles.
         law: The law.
         functions: How the inputs of the law move a vehicle.
     """
@@ -310,7 +310,7 @@ CONDITION: Final = "decoupling_condition"
 
 
 def torque_free_columns(
-    layout: Layout,
+    layout: Places,
     table: Vector,
     samples: Mapping[str, Floats],
     dimension: int | None = None,
@@ -319,7 +319,7 @@ def torque_free_columns(
     """Angle (rad) to the nearest singular attitude, and how well the decoupling matrix inverts.
 
     Args:
-        layout: Layout of the vehicle.
+        layout: Places of the vehicle.
         table: Table of its rotors.
         samples: By field.
         dimension: How many components of force the controller controls; None for a controller

@@ -1,7 +1,5 @@
 """The region of attraction of a flight: a map over two numbers of its initial state."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -71,16 +69,14 @@ class Attraction:
     def share(self) -> Floats:
         """Share of the corners of each cell that come back, shape (cells, cells)."""
         back = self.returned.astype(float)
-        share: Floats = 0.25 * (back[1:, 1:] + back[:-1, 1:] + back[1:, :-1] + back[:-1, :-1])
-        return share
+        return 0.25 * (back[1:, 1:] + back[:-1, 1:] + back[1:, :-1] + back[:-1, :-1])
 
     @property
     def _areas(self) -> Floats:
         """Share of the map's area that each corner represents, shape (cells + 1, cells + 1)."""
         sides = np.ones(len(self.returned))
         sides[[0, -1]] = 0.5
-        areas: Floats = np.outer(sides, sides) / (len(sides) - 1) ** 2
-        return areas
+        return np.outer(sides, sides) / (len(sides) - 1) ** 2
 
     def report(self) -> dict[str, Any]:
         """Entries of the JSON report: shares of the map's area."""

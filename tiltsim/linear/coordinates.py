@@ -116,8 +116,7 @@ def _turned(rotation: Floats, vector: Floats) -> Floats:
     turn = np.array((np.cos(half), *(0.5 * np.sinc(half / np.pi) * vector)))
     turned = quaternion_product(_quaternion(rotation), turn)
     if len(rotation) == MATRIX:
-        matrix: Floats = rotation_of_quaternion(turned).ravel()
-        return matrix
+        return rotation_of_quaternion(turned).ravel()
     return turned
 
 
@@ -186,8 +185,7 @@ def equation_coordinates(assembly: Assembly, size: int) -> Coordinates:
     loop = assembly.loop
     if assembly.scenario.simulation.plant != "thesis":
         return mujoco_coordinates(loop)
-    assert loop.equations is not None
-    names = loop.equations.states
+    names = loop.required_equations.states
     if loop.within is not None:
         names = (*names, *activation_names(loop))
     further = size - len(names) - (MATRIX - 3 if ROTATION_NAMES[0] in names else 0)

@@ -12,6 +12,7 @@ import numpy as np
 from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.errors import InputError, TiltsimError
 from tiltsim.laws.assembling import assemble
+from tiltsim.laws.law_loop import airframe
 from tiltsim.linear.coordinates import (
     QUATERNION,
     ROTOR_INPUT,
@@ -22,14 +23,20 @@ from tiltsim.linear.coordinates import (
 )
 from tiltsim.linear.equilibrium import Equilibrium, equilibrium_of
 from tiltsim.linear.newton import derivative_at, jacobian, steps_at
+from tiltsim.models.rotor_table import Multirotor
+from tiltsim.scenario.linearizing_controllers import force_dimension, upper_side
 from tiltsim.scenario.loading import load_scenario
+from tiltsim.scenario.rotorcraft import RotorcraftTable
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.system.public import optional_package
 from tiltsim.system.text import short_repr
+from tiltsim.vehicles.rotorcraft import FEWEST_WITH_MARGIN
 from tiltsim_controllers.code.arrays import program_of, xp
 from tiltsim_controllers.code.casadi_function import casadi_function
 from tiltsim_controllers.code.messages import TraceError
-from tiltsim_controllers.mathematics.scalar import Floats
+from tiltsim_controllers.laws.supervised_vehicles import Watched, multirotor_supervision_of
+from tiltsim_controllers.mathematics.attitude import rotation_matrix
+from tiltsim_controllers.mathematics.scalar import Floats, Triple
 
 INPUT_SCALE: Final = 100.0
 """Rotor accelerations (rad/s^2) are of this order, and their steps in differences; others of 1."""
@@ -187,6 +194,15 @@ class Symbolic(NamedTuple):
     controller: Any  # ``(time, state) -> inputs``
     closed_loop: Any  # ``(time, state) -> rates``
     sample: Any  # ``(time, state) -> sample``: the fields of a recorded sample after its time
+    margin: Any
+    """``(time, state, inputs) -> margin``: the angle (rad) of world up to the nearest direction in
+    which the rotors, without torque, have no lift: the column `singularity_margin`, by the
+    components of force that the vehicle has all over its planned gait, no rotor lost. None without
+    four rotors or lift at zero torque."""
+    signs: Any
+    """``(time, state, inputs) -> signs``: numbers of which none may reach zero in a flight, where
+    the controller is singular: first the determinant of its decoupling matrix, then, where they
+    count, the rotor speeds; 1 if it is singular nowhere."""
     initial: tuple[float, ...]  # state at time zero
     states: tuple[str, ...]
     """Names of the state's entries; a rotation has four of a quaternion, or nine of its matrix,
@@ -202,6 +218,34 @@ def _input_names(assembly: Assembly, size: int) -> tuple[str, ...]:
         scaled = found.per_unit != 1.0
         names[found.place] = found.name.replace("thrust", "squared_speed" if scaled else "thrust")
     return tuple(names)
+
+
+class _Side(NamedTuple):
+    """Singular directions of a vehicle: its rotors, its components of force, and its upper side."""
+
+    vehicle: Multirotor
+    dimension: int
+    upper: Triple
+
+
+def _upper_side(scenario: Scenario) -> _Side | None:
+    """For `_margin`; None where no attitude has a margin."""
+    if not isinstance(scenario.vehicle, RotorcraftTable):
+        return None
+    craft = airframe(scenario)
+    dimension = force_dimension(craft.vehicle, craft.gait)[0]
+    if craft.rotors < FEWEST_WITH_MARGIN or not dimension:
+        return None
+    return _Side(craft.vehicle, dimension, upper_side(craft.vehicle, craft.gait))
+
+
+def _margin(side: _Side, seen: Mapping[str, Any]) -> Any:
+    """Angle (rad) to the nearest singular attitude, from the fields of a sample."""
+    vehicle, watched = side.vehicle, Watched(per_volume=1.0, side=side.upper)
+    up = rotation_matrix(xp.array([seen[name] for name in ("roll", "pitch", "yaw")]))[2]
+    tilts = xp.array([seen[f"alpha_{tilt + 1}"] for tilt in range(vehicle.tilts)])
+    supervision = multirotor_supervision_of(vehicle.tilt_of_rotor, side.dimension)
+    return supervision.assess(tilts, up, watched, xp.array(vehicle.table))[0]
 
 
 def symbolic(scenario: Scenario | str | PathLike[str] | Mapping[str, Any]) -> Symbolic:
@@ -221,8 +265,7 @@ def symbolic(scenario: Scenario | str | PathLike[str] | Mapping[str, Any]) -> Sy
         )
     optional_package("casadi", "tiltsim.symbolic", "'tiltsim[casadi]'")
     assembly = assemble(scenario)
-    equations, setup = assembly.loop.equations, assembly.setup
-    assert equations is not None  # mujoco is refused
+    equations, setup = assembly.loop.required_equations, assembly.setup
     initial = tuple(map(float, equations.initial(assembly, setup)))
     moved = *setup, scenario.disturbance_acceleration
 
@@ -238,6 +281,17 @@ def symbolic(scenario: Scenario | str | PathLike[str] | Mapping[str, Any]) -> Sy
     def sample(time: Any, state: Any) -> Any:
         return equations.observe(time[0], state, xp.array(controller(time, state)), *setup)
 
+    def signs(time: Any, state: Any, inputs: Any) -> Any:
+        seen = equations.observe(time[0], state, inputs, *setup)
+        return xp.array(assembly.loop.sign_check_values(time[0], xp.array(seen), *setup))
+
+    fields, side = assembly.loop.sample_fields[1:], _upper_side(scenario)
+
+    def margin(time: Any, state: Any, inputs: Any) -> Any:
+        assert side is not None
+        seen = dict(zip(fields, equations.observe(time[0], state, inputs, *setup), strict=True))
+        return xp.array([_margin(side, seen)])
+
     sizes = {"time": 1, "state": len(initial)}
 
     def function(traced: Callable[..., Any], result: str, **more: int) -> Any:
@@ -252,8 +306,10 @@ def symbolic(scenario: Scenario | str | PathLike[str] | Mapping[str, Any]) -> Sy
         function(controller, "inputs"),
         function(closed_loop, "rates"),
         function(sample, "sample"),
+        function(margin, "margin", inputs=equations.inputs_size) if side else None,
+        function(signs, "signs", inputs=equations.inputs_size),
         initial,
         entry_names(equation_coordinates(assembly, len(initial))),
         _input_names(assembly, equations.inputs_size),
-        assembly.loop.sample_fields[1:],
+        fields,
     )

@@ -5,8 +5,6 @@ at a measured state. At all inputs together, a common gain or delay acts on the 
 loop's transfer matrix: ``det(I + g exp(-i w tau) L(i w)) = 0`` where one of them is -1.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from math import atan, inf, isfinite, pi

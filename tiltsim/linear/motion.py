@@ -180,9 +180,7 @@ class EquationMotion(Motion):
 
     @cached_property
     def _equations(self) -> Equations:
-        equations = self.assembly.loop.equations
-        assert equations is not None  # only plants with equations are moved so
-        return equations
+        return self.assembly.loop.required_equations
 
     @cached_property
     def _plant(self) -> EquationsPlant:

@@ -1,7 +1,5 @@
 """Stability of rest points and periodic orbits, over values of a key, and their slowest mode."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
@@ -248,7 +246,8 @@ def slowest_mode(scenario: Scenario) -> SlowestMode | None:
     for flights that are neither at rest nor periodic or that take more than `MOST_STEPS` a period.
     """
     assembly = assemble(scenario)
-    without = {*KINDS.values()} if assembly.follows_position else {*KINDS.values(), "x", "y"}
+    of_layers = (name for extra in assembly.loop.extra_actuators for name in extra.names)
+    without = {*KINDS.values(), *of_layers, *(() if assembly.follows_position else ("x", "y"))}
     try:
         period = forcing_of(assembly).period or 0.0
         if period > MOST_STEPS * scenario.simulation.timestep:

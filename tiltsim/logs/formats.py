@@ -6,8 +6,6 @@ reference. In ULog it is the topic ``tiltsim_sample`` with all columns as double
 topics of position, velocity, attitude and body rates in PX4's frames (world NED, body FRD).
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator
 from os import PathLike
@@ -20,7 +18,6 @@ import numpy as np
 from tiltsim.errors import InputError
 from tiltsim.flight.flight import Flight
 from tiltsim.logs.log import Log
-from tiltsim.models.cross import as_multirotor
 from tiltsim.system.files import prepare_file, replacing
 from tiltsim.system.public import optional_package
 from tiltsim.system.text import short_repr
@@ -82,9 +79,7 @@ def export(
         elif chosen == "ulog":
             write_ulog(log, temporary)
         else:
-            table = flight.scenario.any_rotorcraft
-            vehicle = as_multirotor(table.resolve(), tilting=table.has_tilting_rotors)
-            places = np.array([rotor.place for rotor in vehicle.rotors])
+            places = np.array([rotor.place for rotor in flight.scenario.any_rotorcraft.rotors])
             write_mcap(log, temporary, places)
 
 

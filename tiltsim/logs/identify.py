@@ -5,8 +5,6 @@ state of each window is found with them (multiple shooting), and eliminated from
 equations.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike

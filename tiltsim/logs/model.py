@@ -4,15 +4,12 @@ Forces and torques, Euler's equation and drag are the functions of the vehicles'
 (`tiltsim_controllers.vehicle`), whose parameters are numbers to be found here.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from tiltsim.errors import InputError
-from tiltsim.models.cross import as_multirotor
 from tiltsim.scenario.messages import choose
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.system.text import short_repr
@@ -58,9 +55,7 @@ class LoggedVehicle:
         scenario.require_rotorcraft("identify")
         scenario.require_alone("identify")
         table = scenario.any_rotorcraft
-        tilting = table.has_tilting_rotors
-        assumed = as_multirotor(table.resolve(), tilting=tilting)
-        vehicle = self.vehicle = scenario.model_error.apply_to_rotors(assumed)
+        vehicle = self.vehicle = scenario.model_error.apply_to_rotors(table.multirotor)
         drag, servo = scenario.air.drag, table.tilt_servo
         mean = np.array([np.mean(vehicle.thrust_coefficients)])
         torque = np.array([np.mean([rotor.drag for rotor in vehicle.rotors])])

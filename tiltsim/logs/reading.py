@@ -3,8 +3,6 @@
 Maps from the signals of a log to tiltsim's columns are TOML files, or the map of PX4's topics.
 """
 
-from __future__ import annotations
-
 import csv
 from os import PathLike
 from pathlib import Path

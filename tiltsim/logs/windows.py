@@ -1,7 +1,5 @@
 """Windows of a log, over which its vehicle's model is flown, and least squares over them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from functools import cache
 from typing import Any, Final, NamedTuple

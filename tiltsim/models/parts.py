@@ -1,7 +1,5 @@
 """Parts and options that models of vehicles are compiled from; a scenario's tables fill them in."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from math import inf

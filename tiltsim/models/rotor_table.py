@@ -18,6 +18,7 @@ from tiltsim_controllers.analysis.torque_free import (
     torque_free_forces,
 )
 from tiltsim_controllers.mathematics.scalar import Floats, Triple, Values
+from tiltsim_controllers.vehicle.body import Body, body_of
 from tiltsim_controllers.vehicle.rotors import Rotor, force_and_torque
 
 if TYPE_CHECKING:
@@ -39,6 +40,11 @@ class Multirotor:
     def table(self) -> Values:
         """Table of the rotors; see `tiltsim_controllers.vehicle.rotors`."""
         return tuple(entry for rotor in self.rotors for entry in rotor.entries)
+
+    @property
+    def body(self) -> Body:
+        """The vehicle without its rotors."""
+        return body_of(self.mass, np.reshape(self.inertia, (3, 3)), self.gravity)
 
     @property
     def tilt_of_rotor(self) -> tuple[int, ...]:
@@ -215,8 +221,7 @@ def _least_inputs(force: Floats, torque: Floats, desired: Floats) -> Floats:
     sizes = np.abs(force).max(), np.abs(torque).max()
     rows = np.vstack([force / sizes[0], torque / sizes[1]])
     values = np.concatenate([desired / sizes[0], np.zeros(3)])
-    inputs: Floats = np.linalg.pinv(rows, rcond=TOLERANCE) @ values
-    return inputs
+    return np.linalg.pinv(rows, rcond=TOLERANCE) @ values
 
 
 def _within(inputs: Floats, lower: Floats, upper: Floats) -> bool:

@@ -172,6 +172,8 @@ def _read(path: str, model: str, _version: object) -> UserVehicle:
         if model in CROSSES
         else (_multirotor(pose, parts, whole.mass, inertia, gravity, center), "")
     )
+    geoms = [compiled.geom(g).name for g in range(compiled.ngeom)]
+    touches = "ground" in geoms and any(name.endswith("collision") for name in geoms)
     tilts = [compiled.joint(f"tilt_{i}").dofadr[0] for i in range(1, parts.tilts + 1)]
     return UserVehicle(
         path=path,
@@ -187,7 +189,7 @@ def _read(path: str, model: str, _version: object) -> UserVehicle:
         center=center,
         radius=max(float(np.linalg.norm(pose.point(data.site(s).xpos))) for s in parts.sites),
         products=(float(inertia[0, 1]), float(inertia[0, 2]), float(inertia[1, 2])),
-        has_contact_geoms=_has_contact_geoms(compiled),
+        has_contact_geoms=touches,
         obstacles=_obstacles(compiled),
     )
 
@@ -224,11 +226,6 @@ def _pods_are_balanced(pose: VehiclePose, tilts: int, bodies: list[int], untilte
         if max(moved, np.abs(turned.inertia - untilted.inertia).max()) > tolerance:
             return False
     return True
-
-
-def _has_contact_geoms(compiled: mujoco.MjModel) -> bool:
-    names = [compiled.geom(g).name for g in range(compiled.ngeom)]
-    return "ground" in names and any(name.endswith("collision") for name in names)
 
 
 def _obstacles(compiled: mujoco.MjModel) -> tuple[str, ...]:

@@ -6,7 +6,6 @@ from typing import Any, Final
 import numpy as np
 
 from tiltsim.errors import InputError
-from tiltsim.models.cross import as_multirotor
 from tiltsim.plants.autopilot_links import LINKS, Link, Readings
 from tiltsim.plants.command import Command, ControllerError, Observation
 from tiltsim.scenario.scenario import Scenario
@@ -30,7 +29,7 @@ class Mixer:
 
     def __init__(self, scenario: Scenario) -> None:
         vehicle = scenario.any_rotorcraft
-        self.vehicle = as_multirotor(vehicle.resolve(), tilting=vehicle.has_tilting_rotors)
+        self.vehicle = vehicle.multirotor
         rotors, tilts = len(self.vehicle.rotors), self.vehicle.tilts
         table: Any = scenario.autopilot
         names = table.outputs or tuple(f"rotor_{i}" for i in range(1, rotors + 1))

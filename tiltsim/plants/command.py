@@ -1,7 +1,5 @@
 """Observations and commands of a user's own controller, and of vehicles commanded from outside."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields
 from math import isfinite, pi

@@ -1,7 +1,5 @@
 """MuJoCo as the plant: the model that a flight integrates, its start and its steps."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import cache, partial
 from itertools import pairwise
@@ -245,12 +243,6 @@ class MujocoPlant(Plant):
         for begin, end in pairwise((first, *inside, first + steps)):
             switch(self.model, self._cables, begin * self._assembly.scenario.simulation.timestep)
             mujoco.mj_step(self.model, self.data, nstep=end - begin)
-
-    def record(self, samples: int, steps: int) -> Floats | None:
-        """Natively, all but the last sample come from the callback."""
-        if self.engine == "native":
-            return self._record_natively(samples, steps)
-        return super().record(samples, steps)
 
     @property
     def evaluation_time(self) -> float:

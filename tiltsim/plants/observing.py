@@ -84,7 +84,7 @@ class Observer:
         motion = np.array(reference_derivatives(time, reference, knots)[:9])
         angles, rates = np.zeros((2, self._tilts))
         if self._tilting:
-            angles, rates = self._assembly.gait.angles(time), self._assembly.gait.rates(time)
+            angles, rates, _ = np.array(self._assembly.gait.jets(time)).T
         return Reference(
             position=motion[:3],
             velocity=motion[3:6],

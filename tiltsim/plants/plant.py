@@ -39,11 +39,16 @@ class Plant(Protocol):
         None where a sample or the physics engine shows that the flight ended on the way; the state
         of the plant is then undefined.
         """
+        if self.engine == "native":
+            return self._record_natively(samples, steps)
         rows = []
         for _ in range(samples):
             self.advance(steps)
             rows.append(take_sample(self))
         return None if self.fault() else np.array(rows)
+
+    def _record_natively(self, samples: int, steps: int) -> Floats | None:
+        """`record` on the native engine."""
 
     def observe(self) -> tuple[float, ...]:
         """The present values of a sample's fields after the time: `ClosedLoop.sample_fields`."""
@@ -97,9 +102,8 @@ def with_engine(scenario: Scenario, engine: EngineName) -> Scenario:
 
 def initial_state(assembly: Assembly) -> list[float]:
     """The state at time zero of a flight whose loop has equations."""
-    equations = assembly.loop.equations
-    assert equations is not None  # other scenarios are refused
-    return [*map(float, equations.initial(assembly, assembly.setup))]
+    initial = assembly.loop.required_equations.initial(assembly, assembly.setup)
+    return [*map(float, initial)]
 
 
 def layout_of(assembly: Assembly, states: int) -> Layout:
@@ -136,10 +140,9 @@ class EquationsPlant(Plant):
 
     def __init__(self, assembly: Assembly, engine: EngineName | None = None) -> None:
         scenario, loop, setup = assembly.scenario, assembly.loop, assembly.setup
-        assert loop.equations is not None  # other scenarios are refused
         self._assembly = assembly
         start = initial_state(assembly)
-        self.state = np.array([0.0, *start, *(0.0,) * loop.equations.inputs_size])
+        self.state = np.array([0.0, *start, *(0.0,) * loop.required_equations.inputs_size])
         self.engine: EngineName = choose_engine(assembly, engine)
         self._timestep = scenario.simulation.timestep
         flight = integrated(assembly, layout_of(assembly, len(start)))
@@ -165,11 +168,6 @@ class EquationsPlant(Plant):
     def advance(self, steps: int) -> None:
         now = self._stepper.advance(self._step_index, self.state[1:], steps)
         self.state = np.array([self._step_index + steps, *now])
-
-    def record(self, samples: int, steps: int) -> Floats | None:
-        if self.engine == "native":
-            return self._record_natively(samples, steps)
-        return super().record(samples, steps)
 
     def _record_natively(self, samples: int, steps: int) -> Floats | None:
         checked = self._assembly.sign_check_values(self.time, self.observe())

@@ -26,8 +26,7 @@ from tiltsim.report.flights import (
 from tiltsim.report.statement import Origin, Statement, origins_of
 from tiltsim.scenario.scenario import Scenario
 
-COMPUTED: Final = "computed"
-"""Name of the cell of a row without flights."""
+COMPUTED: Final = "computed"  # name of the cell of a row without flights
 
 
 @dataclass(frozen=True)

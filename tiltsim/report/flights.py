@@ -14,7 +14,7 @@ import hashlib
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from functools import cache, partial
+from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import Final, Literal, TypeVar
@@ -76,13 +76,6 @@ class ReportEntry:
     plants: dict[Plant, Scenario | Unsupported]
 
 
-@dataclass(frozen=True)
-class _Task:
-    address: str
-    plant: Plant
-    key: str
-
-
 def report_entries(addresses: list[str]) -> list[ReportEntry]:
     """Load scenarios for both plants. Raises `InputError` if one is invalid or names code."""
     entries = []
@@ -126,36 +119,33 @@ def fly(
     """
     folder.mkdir(parents=True, exist_ok=True)
     flights: dict[tuple[str, Plant], FlightRecord | Unsupported] = {}
-    missing: dict[_Task, Scenario] = {}
+    missing: list[tuple[int, str, Plant, Path]] = []
     for entry in entries:
         for plant, scenario in entry.plants.items():
             if isinstance(scenario, Unsupported):
                 flights[entry.address, plant] = scenario
                 continue
-            key = flight_key(scenario)
-            record = read_record(folder, key)
-            if record is None:
-                missing[_Task(entry.address, plant, key)] = scenario
-            else:
+            file = folder / f"{flight_key(scenario)}.json"
+            if (record := read_record(file)) is not None:
                 flights[entry.address, plant] = record
+            else:
+                missing.append((scenario.simulation.steps, entry.address, plant, file))
     total = len(entries) * len(PLANTS)
     progress(len(flights), total)
     # The longest first, so that no process ends up alone with one of them.
-    tasks = sorted(missing, key=lambda task: -missing[task].simulation.steps)
-    jobs = min(jobs, len(tasks))
-    work = partial(_fly_one, folder=folder)
-    for task, record in results(work, tasks, jobs, lambda t: f"{t.address} on the {t.plant} plant"):
-        flights[task.address, task.plant] = record
+    tasks = [(address, plant, file) for _, address, plant, file in sorted(missing, reverse=True)]
+    for _, record in results(_fly_one, tasks, jobs, lambda t: f"{t[0]} on the {t[1]} plant"):
+        flights[record.address, record.plant] = record
         progress(len(flights), total)
     return flights
 
 
-def _fly_one(task: _Task, folder: Path) -> FlightRecord:
+def _fly_one(task: tuple[str, Plant, Path]) -> FlightRecord:
     from tiltsim.simulation.simulate import simulate_to_end
 
-    flight = simulate_to_end(variant_for(task.address, task.plant))
-    record = make_record(task.address, task.plant, flight)
-    store(folder / f"{task.key}.json", json.dumps(asdict(record), indent=1).encode())
+    address, plant, file = task
+    record = make_record(address, plant, simulate_to_end(variant_for(address, plant)))
+    store(file, json.dumps(asdict(record), indent=1).encode())
     return record
 
 
@@ -175,10 +165,10 @@ def make_record(address: str, plant: Plant, flight: Flight) -> FlightRecord:
     return FlightRecord(address, plant, metrics, flight.end.kind, flight.end.time, flight.end.cause)
 
 
-def read_record(folder: Path, key: str) -> FlightRecord | None:
+def read_record(file: Path) -> FlightRecord | None:
     """A stored record, None if there is none that can be read."""
     try:
-        return FlightRecord(**json.loads((folder / f"{key}.json").read_bytes()))
+        return FlightRecord(**json.loads(file.read_bytes()))
     except (OSError, ValueError, TypeError):
         return None
 

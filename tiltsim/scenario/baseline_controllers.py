@@ -102,10 +102,7 @@ class CompensatingController(Compensating, LawController):
             tuple(k * speed * abs(speed) for k in airframe.vehicle.thrust_coefficients)
             for speed in np.clip(airframe.speed_limits, -FASTEST, FASTEST).tolist()
         )
-        made: tuple[Any, ...] = record_of_limits(type(own), airframe.rotors)(
-            own, self.observer, *thrusts
-        )
-        return made
+        return record_of_limits(type(own), airframe.rotors)(own, self.observer, *thrusts)
 
     def plain_parameters(self, airframe: Airframe) -> tuple[Any, ...]:
         """The parameters of the law itself."""

@@ -4,8 +4,6 @@ Each names a scenario whose vehicle, controller, gait and reference it takes, or
 file that it is in. Time steps, ground and objects are the file's.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Annotated, Any, Final
 

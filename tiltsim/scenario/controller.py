@@ -5,23 +5,19 @@ law and its table, a `tiltsim.LawController`. An entry that cannot be used is le
 warning, so that a broken package does not stop flights that do not need it.
 """
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Container
 from contextlib import suppress
-from functools import reduce
 from importlib.metadata import Distribution, EntryPoint, distributions, entry_points
 from inspect import isabstract
-from operator import or_
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, get_args
 
-from pydantic import Discriminator, Field, Tag, model_validator
+from pydantic import Field, model_validator
 
 from tiltsim.scenario import baseline_controllers, linearizing_controllers, vectoring_controller
 from tiltsim.scenario.controller_table import ControllerTable
-from tiltsim.scenario.kinds import KINDS, tables_of
+from tiltsim.scenario.kinds import KINDS, tables_of, union_of
 from tiltsim.scenario.law_controller import LawController, TiltingTable
 from tiltsim.scenario.messages import InvalidValueError
 from tiltsim.scenario.rotorcraft import ROTORCRAFT
@@ -189,13 +185,6 @@ class NumpyController(OwnFunctionController, TiltingTable):
         return self.push_stiffness
 
 
-def _law(value: Any) -> str:
-    if isinstance(value, ControllerTable):
-        return value.law
-    law = value.get("law", DEFAULT_LAW) if isinstance(value, dict) else DEFAULT_LAW
-    return law if isinstance(law, str) else ""
-
-
 _MODULES: Final = (
     linearizing_controllers.__name__,
     baseline_controllers.__name__,
@@ -212,8 +201,7 @@ CONTROLLERS: Final = _BUILT_IN | installed_controllers(_BUILT_IN)
 if TYPE_CHECKING:
     Controller = ControllerTable
 else:
-    tagged = (Annotated[table, Tag(law)] for law, table in CONTROLLERS.items())
-    Controller = Annotated[reduce(or_, tagged), Discriminator(_law)]
+    Controller = union_of(CONTROLLERS, "law", DEFAULT_LAW)
 """The ``[controller]`` table, discriminated by its law."""
 
 

@@ -4,7 +4,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from functools import lru_cache
 from math import pi
-from typing import TYPE_CHECKING, Annotated, ClassVar, Final, Literal, Protocol
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Final, Literal
 
 from pydantic import Field
 
@@ -51,14 +51,6 @@ COLOR: Final = (
 """The two colors of ch. 6, for descriptions."""
 
 
-class AnyVehicle(Protocol):
-    """The parameters of a vehicle of any kind."""
-
-    @property
-    def tilts(self) -> int:
-        """The number of tilt angles that a gait plans."""
-
-
 class GaitTable(Table, ABC):
     """The keys of every gait: a common scale, and a bias on the two rear angles."""
 
@@ -73,8 +65,8 @@ class GaitTable(Table, ABC):
     )
     bias: Factor = default(1.0, "eta, multiplies alpha_3 and alpha_4 (ch. 6) [-]", 0.8)
 
-    def plan(self, vehicle: AnyVehicle) -> PlannedGait:
-        """The gait for a vehicle. Raises ValueError if the numbers do not define one."""
+    def plan(self, vehicle: Any) -> PlannedGait:
+        """The gait for a vehicle's parameters. Raises ValueError if these numbers make none."""
         needed = vehicle.tilts
         if self.tilts not in {None, needed}:
             raise ValueError(f"has {self.tilts} tilt angles; the vehicle has {needed}")
@@ -88,7 +80,7 @@ class GaitTable(Table, ABC):
         return 4
 
     @abstractmethod
-    def _unscaled(self, vehicle: AnyVehicle) -> PlannedGait:
+    def _unscaled(self, vehicle: Any) -> PlannedGait:
         """The gait before scale and bias."""
 
     @property
@@ -115,7 +107,7 @@ class FixedGait(GaitTable):
         some = any(not is_known(angle) or angle for angle in self.angles)
         return len(self.angles) if some else None
 
-    def _unscaled(self, vehicle: AnyVehicle) -> PlannedGait:
+    def _unscaled(self, vehicle: Any) -> PlannedGait:
         if self.tilts is None:
             return plans.fixed((0.0,) * vehicle.tilts)
         return plans.fixed(self.angles)
@@ -137,7 +129,7 @@ class TrotGait(GaitTable):
     )
     period: Period = required("T, of the whole cycle [s]", 2.0)
 
-    def _unscaled(self, vehicle: AnyVehicle) -> PlannedGait:
+    def _unscaled(self, vehicle: Any) -> PlannedGait:
         trot = plans.instant_trot if self.type == "trot_instant" else plans.continuous_trot
         return trot(self.amplitude, self.period)
 
@@ -155,7 +147,7 @@ class CatGait(GaitTable):
     lean: Angle = default(0.0, "mean angle of the legs, forward, toward +x and +y [rad]", 0.5)
     period: Period = required("T, of one stride [s]", 1.0)
 
-    def _unscaled(self, vehicle: AnyVehicle) -> PlannedGait:
+    def _unscaled(self, vehicle: Any) -> PlannedGait:
         return plans.cat(self.type, self.amplitude, self.period, self.lean)
 
 
@@ -180,7 +172,7 @@ class WaypointGait(GaitTable):
     def tilts(self) -> int:
         return len(self.angles[0])
 
-    def _unscaled(self, vehicle: AnyVehicle) -> PlannedGait:
+    def _unscaled(self, vehicle: Any) -> PlannedGait:
         return plans.waypoints(self.angles, self.period, self.phases, self.tilts)
 
 
@@ -235,7 +227,7 @@ class TableGait(GaitTable, TimeTable):
     def tilts(self) -> int:
         return len(self.table[0]) - 1
 
-    def _unscaled(self, vehicle: AnyVehicle) -> PlannedGait:
+    def _unscaled(self, vehicle: Any) -> PlannedGait:
         return _table_gait(self.table, self.repeat)
 
     @property
@@ -302,7 +294,7 @@ class TwoColorGait(GaitTable):
             return Circle(self.color, self.centre, self.radius)
         return Polyline(tuple(Leg(leg.color, leg.vertices) for leg in self.path))
 
-    def _unscaled(self, vehicle: AnyVehicle) -> PlannedGait:
+    def _unscaled(self, vehicle: Any) -> PlannedGait:
         if not isinstance(vehicle, Vehicle):
             raise ValueError("is a gait of the tiltrotor")
         return four_angle_gait(self.curve, self.period, vehicle)

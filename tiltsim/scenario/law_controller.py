@@ -4,8 +4,6 @@ A package adds one by a subclass of `LawController`, which the entry-point group
 ``tiltsim.controllers`` names; see docs/controller_package.md.
 """
 
-from __future__ import annotations
-
 from abc import abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -49,47 +47,29 @@ def is_law(controller: object) -> bool:
 
 @dataclass(frozen=True)
 class Airframe:
-    """The data that a controller has when a flight is planned.
+    """The data that a controller has when a flight is planned."""
 
-    Attributes:
-        vehicle: All about it, its rotors as a table.
-        gait: Gait of its tilts.
-        initial_tilts: Its tilt angles at time zero, rad.
-        initial_speeds: Its rotor speeds at time zero, rad/s along the spin.
-        initial_position: Its position at time zero, m.
-        initial_velocity: Its velocity at time zero, m/s, world axes.
-        initial_attitude: Its roll, pitch and yaw at time zero, rad.
-        initial_body_rates: Its body rates at time zero, rad/s.
-        gyroscopic: 1 where the plant has gyroscopic torque, else 0.
-        timestep: Step of the integration, s.
-        control_timestep: Period of control samples, s; 0 if continuous.
-        latency: Control samples from a reading to its command.
-        speed_limits: Lowest and highest rotor speeds that the plant enforces, rad/s along the
-            spin; infinite without limits.
-        rotor_time_constant: Time constant of the rotors' lag, s; None for no lag.
-        tilt_servo: The servos of its tilts.
-        reference: The flight's ``[reference]`` table.
-        noise: Standard deviations of measured velocities (m/s) and body rates (rad/s), in the mean
-            of a second.
-    """
-
-    vehicle: Multirotor
-    gait: Gait
-    initial_tilts: Values
-    initial_speeds: Values
-    initial_position: Triple
-    initial_velocity: Triple
-    initial_attitude: Triple
-    initial_body_rates: Triple
-    gyroscopic: float
-    timestep: float
-    control_timestep: float
-    latency: int
+    vehicle: Multirotor  # all about it, its rotors as a table
+    gait: Gait  # gait of its tilts
+    initial_tilts: Values  # its tilt angles at time zero, rad
+    initial_speeds: Values  # its rotor speeds at time zero, rad/s along the spin
+    initial_position: Triple  # its position at time zero, m
+    initial_velocity: Triple  # its velocity at time zero, m/s, world axes
+    initial_attitude: Triple  # its roll, pitch and yaw at time zero, rad
+    initial_body_rates: Triple  # its body rates at time zero, rad/s
+    gyroscopic: float  # 1 where the plant has gyroscopic torque, else 0
+    timestep: float  # step of the integration, s
+    control_timestep: float  # period of control samples, s; 0 if continuous
+    latency: int  # control samples from a reading to its command
     speed_limits: tuple[float, float]
-    rotor_time_constant: float | None
-    tilt_servo: TiltServoTable
-    reference: Reference
+    """Lowest and highest rotor speeds that the plant enforces, rad/s along the spin; infinite
+    without limits."""
+    rotor_time_constant: float | None  # time constant of the rotors' lag, s; None for no lag
+    tilt_servo: TiltServoTable  # the servos of its tilts
+    reference: Reference  # the flight's ``[reference]`` table
     noise: tuple[float, float]
+    """Standard deviations of measured velocities (m/s) and body rates (rad/s), in the mean of a
+    second."""
 
     @property
     def rotors(self) -> int:
@@ -156,8 +136,7 @@ class LawController(LawTable):
     def law_parameters(self, airframe: Airframe) -> tuple[Any, ...]:
         """The law's parameters, a NamedTuple of floats and tuples: by default its own keys."""
         record = record_of(type(self), _not_read())
-        made: tuple[Any, ...] = record(*(number_of(self, name) for name in record._fields))
-        return made
+        return record(*(number_of(self, name) for name in record._fields))
 
     def law_table(self, airframe: Airframe) -> Values:
         """Any number of further floats: ``observed.table``."""

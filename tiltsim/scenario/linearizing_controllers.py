@@ -108,8 +108,7 @@ class FullPoseController(FullPose, FailureAwareController):
     @property
     def position_stiffness(self) -> float:  # type: ignore[override]
         on_acceleration, _, on_position = self.resolve_gains().position
-        stiffness: float = on_position / on_acceleration
-        return stiffness
+        return on_position / on_acceleration
 
     def check_outputs(self, scenario: Any, gait: Gait) -> None:
         """Refuse a failed rotor that is not there, and inputs that do not move six outputs."""
@@ -245,7 +244,7 @@ class AttitudeForceController(AttitudeForce, GaitFollowingController, FailureAwa
 
 def _gait_angles(vehicle: Multirotor, gait: Gait) -> Floats:
     times = gait.sample_times()
-    return gait.angles(times).reshape(len(times), vehicle.tilts)
+    return gait.angles(times)[:, : vehicle.tilts]
 
 
 def _torque_free_forces(vehicle: Multirotor, gait: Gait, lost: int | None) -> TorqueFreeForces:

@@ -1,7 +1,5 @@
 """Reading scenarios: files, variants and overrides merged into one `Scenario`; and writing them."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import suppress
 from os import PathLike, fsdecode
@@ -256,7 +254,9 @@ def apply_overrides(
     Raises:
         InputError: If a key does not exist, or one would replace the table or list of another.
     """
-    given = _kinds_first(plain(overrides))  # a copy, as entries of lists are set in it
+    # A copy, as entries of lists are set in it; kinds first, since a new one empties its table.
+    items = plain(overrides).items()
+    given = sorted(items, key=lambda item: item[0].rpartition(".")[2] not in KIND_KEYS)
     refuse_replaced(given, address)
     return [key for key, value in given if _override(address, document, key, value)]
 
@@ -314,11 +314,6 @@ def _select_variant(file: Path, document: dict[str, Any], name: str) -> dict[str
     wrong = [value for value in expectations if not isinstance(value, list)]
     merged["expect"] = wrong[0] if wrong else [*expectations[0], *expectations[1]]
     return merged
-
-
-def _kinds_first(overrides: Mapping[str, Any]) -> list[tuple[str, Any]]:
-    """Overrides, kind keys first, since a new kind empties its table."""
-    return sorted(overrides.items(), key=lambda item: item[0].rpartition(".")[2] not in KIND_KEYS)
 
 
 def _override(address: str, document: dict[str, Any], key: str, value: object) -> bool:

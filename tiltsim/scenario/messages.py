@@ -33,7 +33,7 @@ ALIKE: Final = 0.85
 """Similarity from which the words of two names make them close, whatever else they have."""
 
 CLOSE: Final = 0.6  # similarity from which names are close, ...
-SHORT, CLOSE_SHORT = 4, 0.5  # ... and from which shorter ones are, whose letters count for more
+SHORT, CLOSE_SHORT = 4, 0.55  # ... and from which shorter ones are, whose letters count for more
 
 MAX_OTHERS: Final = 5  # most keys with further mistakes that are named
 

@@ -3,8 +3,6 @@
 A push is a motion up to an object, a force on it, and a path along it.
 """
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from itertools import pairwise
 from math import acos, cos, pi

@@ -177,9 +177,14 @@ class RotorcraftTable(AnyVehicleTable, ABC):
     def resolve(self) -> Vehicle | Multirotor: ...
 
     @property
+    def multirotor(self) -> Multirotor:
+        """The physical parameters by rotors."""
+        return as_multirotor(self.resolve(), tilting=self.has_tilting_rotors)
+
+    @property
     def rotors(self) -> tuple[Rotor, ...]:
         """Places, axes, coefficients and tilts of the rotors."""
-        return as_multirotor(self.resolve(), tilting=self.has_tilting_rotors).rotors
+        return self.multirotor.rotors
 
     @property
     def cross(self) -> str:
@@ -192,12 +197,12 @@ class RotorcraftTable(AnyVehicleTable, ABC):
 
     @property
     def spins(self) -> Values:
-        return tuple(rotor.spin for rotor in self.rotors)
+        return self.multirotor.spins
 
     @property
     def thrust_coefficients(self) -> Values:
         """K_f of each rotor, N s^2/rad^2."""
-        return tuple(rotor.thrust for rotor in self.rotors)
+        return self.multirotor.thrust_coefficients
 
     def tilt_of_rotor(self, rotor: int) -> int:
         """The number, from 0, of the tilt of a rotor, whose number is from 1; -1: fixed."""

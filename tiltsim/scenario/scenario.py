@@ -78,8 +78,7 @@ class Scenario(ScenarioTables):
             InputError: In one line: the key, the value and the allowed values.
         """
         check_keys("changes", changes)
-        changed: Scenario = public("load_scenario")(self, changes)
-        return changed
+        return public("load_scenario")(self, changes)
 
     def __repr__(self) -> str:
         """Address and title, in one line."""

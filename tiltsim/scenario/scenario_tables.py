@@ -213,12 +213,8 @@ class ScenarioTables(WithAutopilot):
 
     @property
     def gyroscopic(self) -> float:
-        """Factor of the gyroscopic torque: the thesis's equations have a vehicle's without hinges.
-
-        That is ch. 2's; ch. 3's equations omit it.
-        """
-        fixed = not self.vehicle.has_actuators
-        return float(self.simulation.plant != "thesis" or fixed)
+        """Factor of the gyroscopic torque, which the thesis's equations of ch. 3 omit."""
+        return float(self.simulation.plant != "thesis" or not self.vehicle.has_actuators)
 
     @property
     def has_ideal_actuators_in_still_air(self) -> bool:

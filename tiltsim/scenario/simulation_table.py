@@ -128,13 +128,10 @@ class SimulationTable(Table):
                 raise self.mistake(key, f"longer than the flight, {self.duration} s")
             if round(steps) < 1 or abs(steps - round(steps)) > 1e-6 * steps:
                 raise self.mistake(key, f"must be a multiple of timestep = {self.timestep}")
-        self._check_integrator()
-        self._check_latency()
-
-    def _check_integrator(self) -> None:
         allowed = INTEGRATORS.get(self.plant)
         if allowed is not None and self.integrator not in allowed:
             raise self.mistake("integrator", f"on the {self.plant} plant: {', '.join(allowed)}")
+        self._check_latency()
 
     def _check_latency(self) -> None:
         latency, period = self.control_latency, self.control_timestep

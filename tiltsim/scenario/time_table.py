@@ -160,8 +160,7 @@ def _column(name: str, given: Any) -> list[float]:
         raise InputError(f"column {name} must be numbers: {error}") from None
     if column.ndim != 1:
         raise InputError(f"column {name} = {short_repr(given)}: must be a list of numbers")
-    values: list[float] = column.tolist()
-    return values
+    return column.tolist()
 
 
 ColumnsAmong = Callable[[Sequence[str]], Sequence[str]]

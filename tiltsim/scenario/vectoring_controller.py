@@ -1,7 +1,5 @@
 """The ``[controller]`` table of the law for every rotorcraft."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from math import hypot, inf
 from typing import Any, ClassVar

@@ -1,19 +1,17 @@
 """The tables of a scenario that describe the vehicle: ``[vehicle]`` and ``[model_error]``."""
 
 from dataclasses import replace
-from functools import reduce
 from math import sqrt
-from operator import or_
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 import numpy as np
-from pydantic import Discriminator, Field, Tag
+from pydantic import Field
 
 from tiltsim.models.parts import SERVO_ARMATURE, Pod
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario import rotorcraft
 from tiltsim.scenario.gait import FixedGait
-from tiltsim.scenario.kinds import KINDS, tables_of
+from tiltsim.scenario.kinds import KINDS, tables_of, union_of
 from tiltsim.scenario.messages import InvalidValueError
 from tiltsim.scenario.rotorcraft import AnyVehicleTable, RotorcraftTable, TiltServoTable
 from tiltsim.scenario.simulation_table import InitialTable
@@ -171,24 +169,10 @@ VEHICLES: Final = tables_of(
 )
 """The tables of all vehicles by their models."""
 
-_TAGS: Final = {table: model for model, table in reversed(VEHICLES.items())}
-
-
-def _tag(value: Any) -> str:
-    if isinstance(value, AnyVehicleTable):
-        return _TAGS[type(value)]
-    default = VehicleTable.model_fields["model"].default
-    model = value.get("model", default) if isinstance(value, dict) else default
-    if not isinstance(model, str):
-        return ""
-    return _TAGS[VEHICLES[model]] if model in VEHICLES else model
-
-
 if TYPE_CHECKING:
     VehicleUnion = AnyVehicleTable
 else:
-    tagged = (Annotated[table, Tag(_TAGS[table])] for table in dict.fromkeys(VEHICLES.values()))
-    VehicleUnion = Annotated[reduce(or_, tagged), Discriminator(_tag)]
+    VehicleUnion = union_of(VEHICLES, "model", "tiltrotor")
 """The ``[vehicle]`` table, discriminated by its model."""
 
 ScaleFactor = Annotated[float, Field(ge=0.01, le=100.0)]

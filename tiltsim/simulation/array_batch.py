@@ -16,7 +16,6 @@ from tiltsim.arrays.flying import Batch, Recording, compile_batch, course_of, do
 from tiltsim.arrays.jax_programs import require_jax
 from tiltsim.closed_loop.assembly import Assembly, program_key
 from tiltsim.flight.flight import METRICS_ROWS, Flight, completed_flights
-from tiltsim.flight.metrics import End
 from tiltsim.plants.plant import initial_state
 from tiltsim.simulation.simulate import TerminationMonitor, simulate_assembly
 from tiltsim_controllers.mathematics.records import flatten, record_size
@@ -30,20 +29,10 @@ ROUND_ROWS: Final = 1024
 Result = TypeVar("Result")
 
 
-class _Sound:
-    """A plant that reports no fault, for the `TerminationMonitor`."""
-
-    engine = "jax"
-
-    def fault(self) -> str:
-        return ""
-
-
 def numbers_of(assembly: Assembly) -> tuple[float, ...]:
     """Inputs of `tiltsim.arrays.flying.Batch` from a flight, without knots."""
     return (
-        *flatten(assembly.setup.parameters),
-        *map(float, assembly.reference),
+        *flatten((assembly.setup.parameters, assembly.reference)),
         *assembly.scenario.disturbance_acceleration,
         *initial_state(assembly),
     )
@@ -160,24 +149,17 @@ class ArrayBatch(Generic[Result]):
     ) -> Flight:
         """The flight of a row that ended early; ``closer`` are its samples by step at the end."""
         assembly, course = self._assemblies[index], self._course
-        monitor, sound = TerminationMonitor(assembly), _Sound()
-        end = monitor.check(sound, samples[0])  # type: ignore[arg-type]
+        monitor = TerminationMonitor(assembly)
+        end = monitor.check(None, samples[0])
         count = 1 if end else max(1, int(np.count_nonzero(recording.alive[row])))
         kept = list(samples[:count])
         if end is None:
             closer = closer[row].copy()
-            closer[:, 0] = (
-                recording.last.index[row] + 1 + np.arange(len(closer))
-            ) * course.timestep
-            end = next(filter(None, (self._end(monitor, s, kept) for s in closer)), None)
+            steps = recording.last.index[row] + 1 + np.arange(len(closer))
+            closer[:, 0] = steps * course.timestep
+            ends = ((monitor.check(None, sample), sample) for sample in closer)
+            end, last = next((found for found in ends if found[0] is not None), (None, closer[0]))
             if end is None:  # rounding: the limit is reached later
                 return simulate_assembly(assembly)
+            kept += [last] if np.isfinite(last).all() else []
         return Flight(assembly, np.array(kept), end, "jax", seconds)
-
-    @staticmethod
-    def _end(monitor: TerminationMonitor, sample: Floats, kept: list[Floats]) -> End | None:
-        """The end that a sample implies, which is kept if it is finite."""
-        end = monitor.check(_Sound(), sample)  # type: ignore[arg-type]
-        if end is not None and np.isfinite(sample).all():
-            kept.append(sample)
-        return end

@@ -49,12 +49,15 @@ class TerminationMonitor:
         self._follows_position = assembly.follows_position
         self._sides: dict[int, float] = {}
 
-    def check(self, plant: Plant, sample: Floats) -> End | None:
-        """The termination that a sample, shape (fields,), of the plant's present state implies."""
+    def check(self, plant: Plant | None, sample: Floats) -> End | None:
+        """The termination that a sample, shape (fields,), implies.
+
+        It is of the plant's present state; None for a flight on arrays, which reports no fault.
+        """
         state = dict(zip(self._loop.sample_fields, sample.tolist(), strict=True))
         time = state["time"]
         finite = all(map(isfinite, state.values()))
-        fault = plant.fault()
+        fault = "" if plant is None else plant.fault()
         if fault:
             singular = (
                 self._check_signs(time, state, self._checks(plant, state)) if finite else None
@@ -68,10 +71,10 @@ class TerminationMonitor:
             time, state, checks
         )
 
-    def _checks(self, plant: Plant, state: dict[str, float]) -> Values:
+    def _checks(self, plant: Plant | None, state: dict[str, float]) -> Values:
         """The code of the limit that a sample exceeds, and the numbers whose signs are checked."""
         time, *values = state.values()
-        if plant.engine == "python" and self._assembly.traced:
+        if plant is not None and plant.engine == "python" and self._assembly.traced:
             return self._traced_checks(time, tuple(values))
         limits = self._reference, self._knots, self._follows_position
         code = self._loop.kind.limit_exceeded(time, values, *limits)

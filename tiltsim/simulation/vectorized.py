@@ -130,8 +130,7 @@ class ArrayPlan:
 
     def _plan(self, tree: Mapping[str, Any]) -> PlannedFlight:
         """The plan with its numbers replaced by the numbers of a tree, which are not checked."""
-        loop, equations = self._loop, self._loop.equations
-        assert equations is not None  # or flights on arrays are none of it
+        loop, equations = self._loop, self._loop.required_equations
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # pydantic expects no symbolic numbers
             scenario = replaced(self._full, tree)

@@ -1,6 +1,6 @@
 """The arena: fixed tasks for every vehicle, flown by every controller, and their scores."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from statistics import mean
@@ -15,7 +15,7 @@ from tiltsim.scenario.messages import choose
 from tiltsim.studies.checking import collect
 from tiltsim.studies.comparison import GIVEN, Entry, controller_tables, fly_entries
 from tiltsim.studies.multirotor_analysis import FEW_ROTORS, FLEET, fleet_file
-from tiltsim.studies.scores import INTERACTION, score, task_of
+from tiltsim.studies.scores import INTERACTION, score, task_at, task_of
 
 FOLDER: Final = "arena"
 """Folder of the library with one file for each vehicle and one variant for each task."""
@@ -23,8 +23,7 @@ FOLDER: Final = "arena"
 BASELINES: Final = ("geometric", "pid", "indi", "lqr")
 """Laws of the literature, with which the other laws are compared."""
 
-OURS: Final = "vectoring"
-"""The law that flies the limited league with its default setting."""
+OURS: Final = "vectoring"  # the law that flies the limited league with its default setting
 
 MULTIROTOR: Final = "multirotor"
 """The file whose tasks the fleet flies, each vehicle in place of the file's own."""
@@ -49,8 +48,7 @@ TOUCHING: Final = ("tilt_hexarotor", "tilt_octorotor")
 TOUCHES: Final = {"position_bandwidth": 4.0, "attitude_bandwidth": 12.0}
 """Keys of `vectoring` and `geometric` there; with its observer `geometric` chatters along walls."""
 
-REVERSING: Final = ("omni_octorotor",)
-"""Vehicles whose rotors are built to reverse."""
+REVERSING: Final = ("omni_octorotor",)  # vehicles whose rotors are built to reverse
 
 SERVO: Final = {"natural_frequency": 60.0, "damping_ratio": 0.8, "max_rate": 8.0}
 """Tilt servos of the limited league: 60 degrees in about 0.15 s."""
@@ -158,13 +156,29 @@ def tables_of(vehicle: Vehicle, league: str) -> dict[str, Mapping[str, Any]]:
     return {"vectoring": own, **flown, "geometric_free": {**flown["geometric"], **free}}
 
 
-def chosen_vehicles(names: Sequence[str], league: str) -> dict[str, Vehicle]:
-    """The named vehicles of a league, or all. Raises InputError if one does not exist."""
+def chosen_vehicles(
+    names: Sequence[str], league: str, tasks: Sequence[str] = ()
+) -> dict[str, Vehicle]:
+    """The named vehicles of a league with the named tasks, or all, without vehicles that have none.
+
+    Raises InputError if a vehicle does not exist, or a task for none of them.
+    """
     known = vehicles(league)
+    _require("vehicles", names, known)
+    chosen = {name: known[name] for name in known if name in names or not names}
+    _require("tasks", tasks, {task_at(address) for one in chosen.values() for address in one.tasks})
+    left = {
+        name: tuple(at for at in one.tasks if not tasks or task_at(at) in tasks)
+        for name, one in chosen.items()
+    }
+    return {name: replace(chosen[name], tasks=flown) for name, flown in left.items() if flown}
+
+
+def _require(option: str, names: Iterable[str], known: Collection[str]) -> None:
+    """Refuse a name that is not known."""
     for name in names:
         if name not in known:
-            raise InputError(f"--vehicles {name}: {choose(name, sorted(known))}")
-    return {name: vehicle for name, vehicle in known.items() if name in names or not names}
+            raise InputError(f"--{option} {name}: {choose(name, sorted(known))}")
 
 
 def fitting(vehicle: Vehicle) -> list[str]:

@@ -132,8 +132,7 @@ class TimedBatch:
             for stepper, state, heads in starts:
                 stepper.index[:], stepper.now[:], stepper.heads[:] = 0.0, state, heads
                 stepper.advance(self.steps)
-            last: Floats = samples[0, -1]
-            return last
+            return samples[0, -1]
 
         return fly
 

@@ -1,16 +1,17 @@
 """Other simulators of quadrotors, each timed in a separate process."""
 
-import json
 import os
-import subprocess
-import sys
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from importlib.util import find_spec
+from multiprocessing.connection import Connection
+from multiprocessing.process import BaseProcess
 from time import perf_counter, process_time
 from typing import Any, Final, NamedTuple
 
 from tiltsim.errors import InputError
+from tiltsim.system.processes import answer, begin, give
 
 Description = dict[str, Any]
 Timing = Sequence[float]  # seconds on the clock, and of all processor cores
@@ -116,25 +117,22 @@ PEERS: Final = {
 class Peer:
     """A peer in a separate process, which flies on request; see `running`."""
 
-    def __init__(self, name: str, process: subprocess.Popen[str]) -> None:
-        assert process.stdin is not None
-        assert process.stdout is not None
+    def __init__(self, name: str, process: BaseProcess, connection: Connection) -> None:
         self.name, self.case = name, PEERS[name]
-        self._requests, self._answers = process.stdin, process.stdout
+        self._process, self._connection = process, connection
         self.timings: list[Timing] = []
-        self.description: Description = self._answer()
+        self.description: Description = self._answer("describe")
 
-    def _answer(self) -> Any:
-        line = self._answers.readline()
-        if not line:
-            raise InputError(f"--peer {self.name}: it failed; its message is above")
-        return json.loads(line)
+    def _answer(self, request: str) -> Any:
+        give(self._connection, request)
+        future = answer(self._connection, self._process)
+        if (error := future.exception()) is not None:
+            raise InputError(f"--peer {self.name}: it failed: {error!r}") from error
+        return future.result()
 
     def time(self) -> None:
         """Fly once."""
-        self._requests.write("fly\n")
-        self._requests.flush()
-        self.timings.append(self._answer())
+        self.timings.append(self._answer("fly"))
 
     def row(self) -> dict[str, Any]:
         """A row as in ``tiltsim bench --json``."""
@@ -148,37 +146,35 @@ class Peer:
         }
 
 
+class _Flyer:
+    """The work of a peer's process: to describe it, which prepares it, and then to fly."""
+
+    _fly: Callable[[], None]
+
+    def __init__(self, name: str, devices: int) -> None:
+        self._name, self._devices = name, devices
+
+    def __call__(self, request: str) -> Description | Timing:
+        if request == "fly":
+            return timed(self._fly)
+        os.dup2(2, 1)  # text that the peer prints is no result
+        warnings.simplefilter("ignore")
+        # Without the option of our command line, which makes crazyflow slower.
+        flags = f"--xla_force_host_platform_device_count={self._devices}"
+        os.environ |= {"SCIPY_ARRAY_API": "1", "XLA_FLAGS": flags}
+        case = PEERS[self._name]
+        description, self._fly = case.setup(case.vehicles, case.steps)
+        return description
+
+
 @contextmanager
 def running(name: str, devices: int = 1) -> Iterator[Peer]:
     """A peer, ready to fly. Raises `InputError` if it is not installed or fails."""
     if find_spec(name) is None:
         raise InputError(f"--peer {name}: not installed; python -m pip install {name}")
-    # Without the option of our command line, which makes crazyflow slower.
-    flags = f"--xla_force_host_platform_device_count={devices}"
-    with subprocess.Popen(
-        [sys.executable, "-W", "ignore", "-m", __name__, name],
-        env=os.environ | {"SCIPY_ARRAY_API": "1", "XLA_FLAGS": flags},
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        text=True,
-        start_new_session=True,  # keeps Ctrl-C from it
-    ) as process:
-        try:
-            yield Peer(name, process)
-        finally:
-            process.kill()
-
-
-def _serve(name: str) -> None:
-    """Fly whenever a line comes in; print the timing."""
-    answers = os.fdopen(os.dup(1), "w")
-    os.dup2(2, 1)  # text that the peer prints is no answer
-    case = PEERS[name]
-    description, fly = case.setup(case.vehicles, case.steps)
-    print(json.dumps(description), file=answers, flush=True)
-    for _ in sys.stdin:
-        print(json.dumps(timed(fly)), file=answers, flush=True)
-
-
-if __name__ == "__main__":
-    _serve(sys.argv[1])
+    process, connection = begin(_Flyer(name, devices))
+    try:
+        yield Peer(name, process, connection)
+    finally:
+        process.kill()
+        process.join()

@@ -89,6 +89,11 @@ def _share(errors: Mapping[str, float], halves: Mapping[str, float]) -> float:
 
 
 def task_of(row: Mapping[str, Any]) -> str:
-    """Name of the task of a row: its variant, or its file where that has none."""
-    file, _, variant = str(row["scenario"]).partition("#")
+    """Name of the task of a row."""
+    return task_at(str(row["scenario"]))
+
+
+def task_at(address: str) -> str:
+    """Name of the task at an address: its variant, or its file where that has none."""
+    file, _, variant = address.partition("#")
     return variant or file.rpartition("/")[2]

@@ -30,9 +30,7 @@ from tiltsim.studies.scores import score
 from tiltsim.system.processes import in_processes
 from tiltsim_controllers.mathematics.scalar import Floats
 
-FACTORS: Final = (0.25, 4.0)
-"""Bounds of the factors on default gains."""
-
+FACTORS: Final = (0.25, 4.0)  # bounds of the factors on default gains
 AMPLITUDE: Final = (1.5, 1.0, 0.4)  # m
 FREQUENCY: Final = (0.8, 1.2, 0.6)  # rad/s
 
@@ -55,8 +53,7 @@ TASKS: Final[Mapping[str, Mapping[str, Any]]] = {
 }
 """Tasks of the arena by name, and the keys that differ in tuning; a vehicle may lack some."""
 
-DURATION: Final = 5.0
-"""s, of every flight."""
+DURATION: Final = 5.0  # s, of every flight
 
 NOT_TUNED: Final = ("rotor_bandwidth", "tilt_bandwidth", "max_speed", "max_acceleration")
 """Numbers of the baselines and of laws of packages that describe actuators or limits."""

@@ -1,7 +1,5 @@
 """The results of a sweep: its folder, and their columns."""
 
-from __future__ import annotations
-
 import re
 from collections import Counter
 from collections.abc import Iterator, Mapping
@@ -78,17 +76,13 @@ class SweepFolder:
                     f"{self.path}: made by another version of tiltsim: {file.name} "
                     f"differs in column {min(differing)}; choose another folder, or delete this one"
                 )
-        self.is_joined = self._has_dataset()
-
-    def _flight_file(self, index: int) -> Path:
-        return self.path / FLIGHTS / f"{index:07d}.parquet"
-
-    def _has_dataset(self) -> bool:
         if self.dataset.exists():
             with suppress(UnreadableError):
                 read_rows(self.dataset, self._points, range(len(self._points)), scenarios=False)
-                return True
-        return False
+                self.is_joined = True
+
+    def _flight_file(self, index: int) -> Path:
+        return self.path / FLIGHTS / f"{index:07d}.parquet"
 
     def finished(self) -> set[int]:
         """Numbers of the chunks on disk."""

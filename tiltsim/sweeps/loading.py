@@ -203,8 +203,7 @@ def _scenario(
         _locate(document, folder, f"{address}: scenario")
         apply_overrides(document, values, f"{address}: scenario")
         scenario = parse_scenario(document, f"{address}: scenario")
-    base: dict[str, Any] = without_none(scenario.model_dump(mode="json", exclude=UNUSED))
-    return base
+    return without_none(scenario.model_dump(mode="json", exclude=UNUSED))
 
 
 def check_points(points: SweepPoints) -> list[Scenario]:

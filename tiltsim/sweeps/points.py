@@ -1,10 +1,10 @@
 """The points of a sweep: which there are, in which order, and which scenario each one flies."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from copy import deepcopy
 from functools import cache, cached_property
 from math import prod
-from typing import Any, Final, NamedTuple, cast
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from pydantic import BaseModel, ValidationError
@@ -33,53 +33,24 @@ class _Known(NamedTuple):
     scenario: Scenario
 
 
-class SimilarScenarios:
-    """Makes scenarios from documents; one of each kind is made in full.
-
-    Args:
-        address: Name of the documents in messages.
-    """
-
-    def __init__(self, address: str) -> None:
-        self._address = address
-        self._known: dict[object, _Known] = {}
-
-    def scenario(
-        self, kind: object, values: Mapping[str, Any], document: Callable[[], Document]
-    ) -> Scenario:
-        """A scenario, from values by dotted key. Raises `InputError` if it is not valid.
-
-        ``kind`` is equal for documents in which only ``values`` differ.
-        """
-        known = self._known.get(kind)
-        if known is not None:
-            changes = _changes(known.values, values)
-            similar = None if changes is None else _similar(known, changes)
-            if similar is not None:
-                return similar
-        made = document()
-        scenario = parse_scenario(made, self._address)
-        self._known.setdefault(kind, _Known(values, made, scenario))
-        return scenario
-
-
-def _changes(before: Mapping[str, Any], now: Mapping[str, Any]) -> dict[str, Any] | None:
-    """The values that changed; None if one is no number or list of numbers as before."""
-    # 0.0 equals -0.0 and 1, but a flight's scenario is the one that its row names.
-    changed = {key: value for key, value in now.items() if repr(value) != repr(before.get(key))}
-    if before.keys() != now.keys():
-        return None
-    return changed if all(_alike(before[key], value) for key, value in changed.items()) else None
-
-
 def _alike(first: Any, second: Any) -> bool:
     if isinstance(first, list) and isinstance(second, list):
         return len(first) == len(second) and all(map(_alike, first, second))
     return type(first) is type(second) and is_number(first)
 
 
-def _similar(known: _Known, changes: Mapping[str, Any]) -> Scenario | None:
-    """A known scenario with other numbers; None if it is not valid, or its tables have no keys."""
+def _similar(known: _Known, values: Mapping[str, Any]) -> Scenario | None:
+    """A known scenario with other values by key.
+
+    None if one is no number or list of numbers as before, its table has no keys, or the scenario is
+    not valid.
+    """
+    if known.values.keys() != values.keys():
+        return None
+    # 0.0 equals -0.0 and 1, but a flight's scenario is the one that its row names.
+    changes = {k: value for k, value in values.items() if repr(value) != repr(known.values[k])}
+    if not all(_alike(known.values[key], value) for key, value in changes.items()):
+        return None
     changed: Document = {}
     for key, value in changes.items():
         name, *path = _split(key)
@@ -120,7 +91,7 @@ class SweepPoints:
     def __init__(self, definition: SweepDefinition) -> None:
         self.definition = definition
         self.sweep = tables.Sweep.model_validate(definition.sweep)
-        self._scenarios = SimilarScenarios(definition.address)
+        self._known: dict[object, _Known] = {}  # one scenario of each kind, made in full
         self._check_count()
         self._groups = self._make_groups()
         axes = self.sweep.axis
@@ -239,7 +210,13 @@ class SweepPoints:
         """The scenario for values of the axes. Raises `InputError` if it is not valid."""
         given = self._given(values)
         kind = tuple(values[axis.key] for axis in self.cases)
-        return self._scenarios.scenario(kind, given, lambda: self.document(values))
+        similar = _similar(self._known[kind], given) if kind in self._known else None
+        if similar is not None:
+            return similar
+        document = self.document(values)
+        scenario = parse_scenario(document, self.definition.address)
+        self._known.setdefault(kind, _Known(given, document, scenario))
+        return scenario
 
     def place(self, axis: tables.AxisTable, values: Sequence[Any]) -> dict[str, Any]:
         """The values that an axis sets, by key, from one value for each of its targets."""
@@ -326,32 +303,24 @@ class SweepPoints:
 
     @cached_property
     def _draws(self) -> Floats:
-        """Values of the drawn axes, shape (samples, axes)."""
+        """Values of the drawn axes, shape (samples, axes); equal for equal seeds."""
         assert self.sweep.sample is not None
-        return _draw_samples(self._drawn, self.sweep.sample)
+        columns = []
+        for axis, column in zip(self._drawn, _unit_points(self.sweep.sample, len(self._drawn)).T):
+            if isinstance(axis, tables.UniformAxis):
+                columns.append(axis.low + (axis.high - axis.low) * column)
+            else:
+                from scipy.special import ndtri
+
+                inside = np.clip(column, 2.0**-54, 1.0 - 2.0**-53)
+                columns.append(axis.mean + axis.standard_deviation * ndtri(inside))
+        return np.stack(columns, axis=-1)
 
 
 def _of_one_type(values: Sequence[Any]) -> Sequence[Any]:
     """Integers mixed with floats as floats; other values unchanged."""
     mixed = all(map(is_number, values)) and any(isinstance(value, float) for value in values)
     return [float(value) for value in values] if mixed else values
-
-
-def _draw_samples(
-    axes: Sequence[tables.UniformAxis | tables.NormalAxis], sample: tables.SampleTable
-) -> Floats:
-    """Values of drawn axes, shape (samples, axes); equal for equal seeds."""
-    unit = _unit_points(sample, len(axes))
-    columns = []
-    for axis, column in zip(axes, unit.T, strict=True):
-        if isinstance(axis, tables.UniformAxis):
-            columns.append(axis.low + (axis.high - axis.low) * column)
-        else:
-            from scipy.special import ndtri
-
-            inside = np.clip(column, 2.0**-54, 1.0 - 2.0**-53)
-            columns.append(axis.mean + axis.standard_deviation * ndtri(inside))
-    return cast(Floats, np.stack(columns, axis=-1))
 
 
 def _unit_points(sample: tables.SampleTable, dimensions: int) -> Floats:

@@ -1,7 +1,5 @@
 """Running a sweep in one call, in this process, in several, or on a Dask cluster."""
 
-from __future__ import annotations
-
 import hashlib
 import logging
 import re

@@ -21,16 +21,12 @@ _ROUNDING: Final = 1e-9  # relative: of a time over a time step, of a speed at i
 def in_last_second(time: Floats, timestep: float) -> npt.NDArray[np.bool_]:
     """The samples of the last second, both ends included; ``time`` and ``timestep`` in s."""
     steps = np.rint(time / timestep)
-    within: npt.NDArray[np.bool_] = steps[-1] - steps <= (1.0 + _ROUNDING) / timestep
-    return within
+    return steps[-1] - steps <= (1.0 + _ROUNDING) / timestep
 
 
 def when_settled(time: Floats, timestep: float) -> npt.NDArray[np.bool_]:
     """The samples from `SETTLED` on; ``time`` and ``timestep`` in s."""
-    settled: npt.NDArray[np.bool_] = (
-        np.rint(time / timestep) >= (1.0 - _ROUNDING) * SETTLED / timestep
-    )
-    return settled
+    return np.rint(time / timestep) >= (1.0 - _ROUNDING) * SETTLED / timestep
 
 
 def mean_of(column: Floats, span: npt.NDArray[np.bool_]) -> Any:
@@ -113,7 +109,8 @@ def rotor_metrics(columns: Mapping[str, Floats], vehicle: AnyVehicleTable) -> di
     """
     speeds = speeds_along_spin(columns, vehicle)
     low, high = vehicle.rotor_range
-    limited = (at_upper_limit(speeds, high) | at_lower_limit(speeds, low)).any(axis=0)
+    reached = at_upper_limit(speeds, high) | at_lower_limit(speeds, low)
+    limited: npt.NDArray[np.bool_] = np.any(reached, axis=0)
     first, last = first_and_last(limited)
     names = [name for name in columns if name.startswith("alpha_rate")]
     rates = [np.abs(columns[name]).max(axis=-1) for name in names]

@@ -32,6 +32,10 @@ AXES: Final = "xyz"
 ANGLES: Final = ("roll", "pitch", "yaw")
 
 
+OF_OBJECTS: Final = ("contact_force", "push_force", "cable_tension", "swing")
+"""Panels of columns that objects and loads add."""
+
+
 class Signal(NamedTuple):
     """A line of a panel."""
 
@@ -221,7 +225,7 @@ def _chosen(assembly: Assembly) -> Iterator[Signals]:
         lines = [Signal("candidate", "candidate", "lyapunov")]
         title = "Lyapunov candidate, ½ ė² + ½ K e², along y"
         yield Signals("lyapunov", title, "m^2/s^2", lines, floor=1e-6, moves=True)
-    for name in ("contact_force", "push_force", "cable_tension", "swing"):
+    for name in OF_OBJECTS:
         columns = [each for each in (name, *(f"{name}_{axis}" for axis in AXES)) if each in units]
         if columns:
             panel = vector_signals(assembly, name, columns)

@@ -21,8 +21,7 @@ from tiltsim.vehicles.spans import at_lower_limit, at_upper_limit
 from tiltsim.views.attitude_plane import SUPERVISION_THRESHOLD, margin_threshold
 
 MIN_WORDS: Final = 4  # words that titles must share to make a common title
-ABBREVIATIONS: Final = ("indi", "lqr", "pid")
-"""Names of laws that are none in words."""
+ABBREVIATIONS: Final = ("indi", "lqr", "pid")  # names of laws that are none in words
 
 _MARKS: Final = ",:;."
 

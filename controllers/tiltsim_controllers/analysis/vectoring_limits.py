@@ -3,8 +3,6 @@
 Side force that needs no lean, and the poses that it holds, come from linear programs.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
@@ -35,33 +33,20 @@ DIRECTIONS: Final = 8
 
 @dataclass(frozen=True)
 class Craft:
-    """A vehicle as the design sees it, N rotors with M tilts.
+    """A vehicle as the design sees it, N rotors with M tilts."""
 
-    Attributes:
-        table: Table of the rotors, per newton.
-        mass, gravity: kg, m/s^2.
-        inertia: kg m^2, shape (3, 3).
-        thrust: N s^2/rad^2, shape (N,).
-        slowest, fastest: rad/s, along the spin, shape (N,).
-        tilts: At the start, rad, shape (M,).
-        commanded: Whether the law commands the tilts.
-        moving: Whether a gait moves them.
-        levers: m, of the rotors from the center of mass, shape (N,).
-        works: 1 for a rotor that works, else 0, shape (N,).
-    """
-
-    table: Values
-    mass: float
-    gravity: float
-    inertia: Floats
-    thrust: Floats
-    slowest: Floats
-    fastest: Floats
-    tilts: Floats
-    commanded: bool
-    moving: bool
-    levers: Floats
-    works: Floats
+    table: Values  # table of the rotors, per newton
+    mass: float  # kg
+    gravity: float  # m/s^2
+    inertia: Floats  # kg m^2, shape (3, 3)
+    thrust: Floats  # K_f, N s^2/rad^2, shape (N,)
+    slowest: Floats  # least speeds, rad/s, along the spin, shape (N,)
+    fastest: Floats  # largest ones, rad/s, along the spin, shape (N,)
+    tilts: Floats  # at the start, rad, shape (M,)
+    commanded: bool  # whether the law commands the tilts
+    moving: bool  # whether a gait moves them
+    levers: Floats  # m, of the rotors from the center of mass, shape (N,)
+    works: Floats  # 1 for a rotor that works, else 0, shape (N,)
 
     @property
     def hover(self) -> float:

@@ -3,8 +3,6 @@
 `xp` is NumPy for both, followed by control flow, look-ups and `traceable`.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable, Sequence
 from functools import wraps
@@ -239,8 +237,7 @@ def repeat(
             results, _ = flatten(tuple(body(test.parameters[0], *now)))
             inner.results = [as_real(value) for value in results]
     node = graph.add("loop", [as_real(count), *map(as_real, leaves)], (test, inner))
-    made: tuple[Any, ...] = build([graph.add("get", [node, i]) for i in range(len(leaves))])
-    return made
+    return build([graph.add("get", [node, i]) for i in range(len(leaves))])
 
 
 Function = TypeVar("Function", bound=Callable[..., Any])

@@ -1,7 +1,5 @@
 """Programs as functions of CasADi."""
 
-from __future__ import annotations
-
 import math
 import operator
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """Programs as functions of JAX: operations on numbers, which XLA joins into few loops."""
 
-from __future__ import annotations
-
 import operator
 import sys
 from collections.abc import Callable, Sequence

@@ -1,7 +1,5 @@
 """Vehicles side by side in machine code: one SIMD register holds a number of each."""
 
-from __future__ import annotations
-
 import re
 import struct
 from dataclasses import dataclass

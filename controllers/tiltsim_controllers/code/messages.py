@@ -1,7 +1,5 @@
 """Errors of traced code, which name the line that is wrong."""
 
-from __future__ import annotations
-
 import linecache
 import sys
 from pathlib import Path

@@ -7,8 +7,6 @@ as easy as 1, 2, 3", 2011). The hash is the 32-bit multiply-and-shift permutatio
 constants ("Prospecting for hash functions", 2018).
 """
 
-from __future__ import annotations
-
 import math
 import operator
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """Programs as Python source."""
 
-from __future__ import annotations
-
 import linecache
 import math
 from collections import Counter

@@ -7,7 +7,7 @@ import struct
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
-from functools import partial
+from functools import cache, partial
 from typing import Any, Final, NoReturn
 
 import numpy as np
@@ -127,11 +127,18 @@ def apply(op: str, *args: Any) -> Any:
         op: Name of an entry of `OPERATIONS` or `COMPOSED`.
         args: Numbers and arrays of shapes that broadcast.
     """
-    function = COMPOSED.get(op) or partial(make, op)
-    if not any(isinstance(a, np.ndarray | list | tuple) for a in args):
-        return function(*args)
+    for value in args:
+        if isinstance(value, (np.ndarray, list, tuple)):
+            break
+    else:
+        return COMPOSED[op](*args) if op in COMPOSED else make(op, *args)
     boxed = [np.array(a, object) if isinstance(a, Expr) else _plain(a) for a in args]
-    return as_array(np.frompyfunc(function, len(args), 1)(*boxed))
+    return as_array(_on_arrays(op, len(args))(*boxed))
+
+
+@cache
+def _on_arrays(op: str, arguments: int) -> np.ufunc:
+    return np.frompyfunc(COMPOSED.get(op) or partial(make, op), arguments, 1)
 
 
 class Block:
@@ -247,7 +254,7 @@ def make(op: str, *args: Any) -> Number:
         op: Name of an entry of `OPERATIONS`.
         args: Floats, bools and symbolic numbers.
     """
-    if not any(isinstance(a, Expr) for a in args):
+    if Expr not in map(type, args):
         return OPERATIONS[op].value(*map(_number, args))
     graph = graph_in_use()
     if op == "where":
@@ -260,6 +267,8 @@ def make(op: str, *args: Any) -> Number:
 
 
 def _number(value: Any) -> float | bool:
+    if type(value) is float:
+        return value
     if isinstance(value, bool | np.bool_):
         return bool(value)
     try:
@@ -282,9 +291,9 @@ def as_condition(value: Any) -> Number:
 
 def as_real(value: Any) -> Number:
     """A condition as 1.0 or 0.0; other numbers as they are."""
-    if not isinstance(value, Expr):
-        return float(_number(value))
-    return make("where", value, 1.0, 0.0) if is_condition(value) else value
+    if isinstance(value, Expr):
+        return make("where", value, 1.0, 0.0) if is_condition(value) else value
+    return value if type(value) is float else float(_number(value))
 
 
 def _where(graph: Graph, condition: Any, yes: Any, no: Any) -> Number:
@@ -324,6 +333,8 @@ def _folded(op: str, x: Number, y: Number = None) -> Number | None:
     """
     if op == "neg":
         return x.args[0] if _is_negative(x) else None
+    if isinstance(x, Expr) and isinstance(y, Expr) and "neg" not in (x.op, y.op):
+        return None
     a, b = (None if isinstance(value, Expr) else value for value in (x, y))
     if op == "add" and 0.0 in (a, b):
         return y if a == 0.0 else x

@@ -24,8 +24,6 @@ let go again where its multiplier says so.
 `bounded_least_squares` is for demands that rotors and tilts meet together as their limits allow.
 """
 
-from __future__ import annotations
-
 from math import inf
 from typing import Any, Final, NamedTuple
 
@@ -102,20 +100,13 @@ def _is_at(place: Any, count: int) -> Any:
 
 
 class _Objective(NamedTuple):
-    """The four levels of the allocation, of which each keeps the results of those before it.
+    """The four levels of the allocation, of which each keeps the results of those before it."""
 
-    Attributes:
-        requested: Requested accelerations, rad/s^2, shape (N,).
-        across: Row that keeps the direction of the roll and pitch torque, shape (N,).
-        rows: Rows of roll and pitch, yaw, and lift, shape (3, N).
-        low, high: Limits of the accelerations, rad/s^2, shape (N,).
-    """
-
-    requested: Any
-    across: Any
-    rows: Any
-    low: Any
-    high: Any
+    requested: Any  # requested accelerations, rad/s^2, shape (N,)
+    across: Any  # row that keeps the direction of the roll and pitch torque, shape (N,)
+    rows: Any  # rows of roll and pitch, yaw, and lift, shape (3, N)
+    low: Any  # lower limits of the accelerations, rad/s^2, shape (N,)
+    high: Any  # upper limits of the accelerations, rad/s^2, shape (N,)
 
     def gradient(self, level: Any, now: Any) -> tuple[Any, Any, Any]:
         """The gradient of a level, the gap that it closes, and the rows that it keeps."""

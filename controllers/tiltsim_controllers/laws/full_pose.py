@@ -125,8 +125,7 @@ def force_balanced_tilt_weight(vehicle: Any) -> float:
 
     The vehicle has a ``hover_rotor_speed``, rad/s.
     """
-    weight: float = vehicle.hover_rotor_speed**2
-    return weight
+    return vehicle.hover_rotor_speed**2
 
 
 def input_matrix(rotors: Rotors, tilts: Any, w: Any, weight: Any = 1.0) -> Any:

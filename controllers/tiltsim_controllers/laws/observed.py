@@ -93,23 +93,16 @@ class Command:
     A controller in plain Python is called at the control samples; its command takes effect after
     the scenario's latency, speeds then at once, or with the rotors' lag. The speeds commanded by a
     law are approached with the lag ``controller.rotor_bandwidth``.
-
-    Attributes:
-        thrusts: (N,), N, along each rotor's axis; they set its speed.
-        rotor_speeds: (N,), rad/s, positive along each rotor's spin.
-        rotor_accelerations: (N,), rad/s^2, likewise, held until the next sample.
-        tilt_angles: (M,), rad, from -pi to pi, for the tilt servos; default: the planned gait. A
-            vehicle whose rotors are fixed has none.
-        rates: (S,), of a law's states, per second; plain Python has none.
-        discrete: (D,), a law's discrete states from this control sample on.
     """
 
-    thrusts: Any = None
-    rotor_speeds: Any = None
-    rotor_accelerations: Any = None
+    thrusts: Any = None  # (N,), N, along each rotor's axis; they set its speed
+    rotor_speeds: Any = None  # (N,), rad/s, positive along each rotor's spin
+    rotor_accelerations: Any = None  # (N,), rad/s^2, likewise, held until the next sample
     tilt_angles: Any = None
-    rates: Any = None
-    discrete: Any = None
+    """(M,), rad, from -pi to pi, for the tilt servos; default: the planned gait. A vehicle whose
+    rotors are fixed has none."""
+    rates: Any = None  # (S,), of a law's states, per second; plain Python has none
+    discrete: Any = None  # (D,), a law's discrete states from this control sample on
 
 
 class Failure(NamedTuple):

@@ -1,7 +1,5 @@
 """Steps of `vectoring`: motion ahead, demanded acceleration, direction of the force, attitude."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 from tiltsim_controllers.code.arrays import xp

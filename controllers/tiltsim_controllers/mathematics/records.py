@@ -6,8 +6,6 @@ state. Through `record_dtype` the same numbers are a struct whose fields native 
 same names.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from functools import cache
 from itertools import islice
@@ -47,14 +45,12 @@ def paths_of(record_type: type[tuple[Any, ...]]) -> Iterator[str]:
 
 def unflatten(record_type: type[Record], values: Iterable[float]) -> Record:
     """Rebuild a record of type ``record_type`` from its floats; the inverse of `flatten`."""
-    record: Record = _take(record_type, iter(values))
-    return record
+    return _take(record_type, iter(values))
 
 
 def make_record_type(name: str, **fields: type) -> Any:
     """Create a record type with these fields, for records of types known only at run time."""
-    made: Any = NamedTuple(name, list(fields.items()))  # type: ignore[misc]
-    return made
+    return NamedTuple(name, list(fields.items()))
 
 
 def changed_record(record: Any, **fields: type) -> Any:

@@ -92,8 +92,8 @@ class FourthDerivative(Keys):
     )
 
 
-ThirdParameters = record_of(ThirdDerivative, car=TiltCar, reference=ReferenceParameters)
-FourthParameters = record_of(FourthDerivative, car=TiltCar, reference=ReferenceParameters)
+ThirdParameters = record_of(ThirdDerivative, vehicle=TiltCar, reference=ReferenceParameters)
+FourthParameters = record_of(FourthDerivative, vehicle=TiltCar, reference=ReferenceParameters)
 
 PUBLISHED: Final = choice(FourthDerivative, "decoupling", "published")
 
@@ -178,10 +178,10 @@ def third_derivative_inputs(time: Any, state: Any, p: Any) -> Any:
         state: `tiltsim_controllers.tilt_car.vehicle.STATE_FIELDS`, shape (8,).
         p: `ThirdParameters`.
     """
-    speeds, matrix = state[6:8], input_matrix(state[6:8], p.car)
-    pushed = thrust_map(p.car) @ (speeds * speeds)
+    speeds, matrix = state[6:8], input_matrix(state[6:8], p.vehicle)
+    pushed = thrust_map(p.vehicle) @ (speeds * speeds)
     lean = xp.arctan2(pushed[1], pushed[0])
-    restoring = restoring_inputs(lean, p.restoring_rate, matrix, p.car)
+    restoring = restoring_inputs(lean, p.restoring_rate, matrix, p.vehicle)
     return minimum_norm(matrix, _demanded(time, state, p, [pushed])) + restoring
 
 
@@ -193,8 +193,8 @@ def fourth_derivative_inputs(time: Any, state: Any, p: Any) -> Any:
         state: See `body_derivatives`.
         p: `FourthParameters`.
     """
-    pushed, moved, drift = body_derivatives(state, p.car)
-    matrix = input_matrix(state[6:8], p.car)
+    pushed, moved, drift = body_derivatives(state, p.vehicle)
+    matrix = input_matrix(state[6:8], p.vehicle)
     if p.decoupling == PUBLISHED:
         matrix = xp.hstack([matrix[:, :2], xp.array([[-pushed[1]], [pushed[0]]])])
     return minimum_norm(matrix, _demanded(time, state, p, [pushed, moved]) - drift)

@@ -58,7 +58,7 @@ class PlannedDirection(Keys):
 
 
 Parameters = record_of(
-    PlannedDirection, car=TiltCar, gait=GaitParameters, reference=ReferenceParameters
+    PlannedDirection, vehicle=TiltCar, gait=GaitParameters, reference=ReferenceParameters
 )
 
 
@@ -85,7 +85,7 @@ def demanded_squared_speeds(time: Any, state: Any, p: Any) -> Any:
     Arguments as for `demanded_acceleration`; shape (2,).
     """
     to_body = rotation(state[4] + state[5]).T
-    return squared_speeds(to_body @ demanded_acceleration(time, state, p), p.car)
+    return squared_speeds(to_body @ demanded_acceleration(time, state, p), p.vehicle)
 
 
 def planned_direction_inputs(time: Any, state: Any, p: Any) -> Any:

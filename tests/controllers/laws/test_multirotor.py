@@ -201,6 +201,7 @@ def test_a_hexarotor_with_canted_rotors_flies_a_circle_level():
     assert np.abs(flight.up[:, :2]).max() < 1e-12
 
 
+@pytest.mark.slow
 def test_a_vehicle_stays_level_in_a_side_wind_which_its_integrators_cancel():
     law, knots = parameters_of(CANTED)
     flight = fly(CANTED, law, knots, 3.0, wind=(0.0, 1.0, 0.0))

@@ -80,6 +80,7 @@ def test_errors_stay_within_four_deviations(name):
     assert 0.8 < metrics["nis"] < 1.2
 
 
+@pytest.mark.slow
 def test_a_delay_is_fused_at_the_time_of_the_measurement():
     """Moving at 1 m/s, a reading that is 30 ms old and taken for a new one would be 30 mm off."""
     sensors = {"imu": IMU, "mocap": {**MOCAP, "delay": 0.03, "position_noise": 1e-3}}
@@ -221,7 +222,7 @@ def test_gates_of_few_components(degrees):
         assert chi_square_quantile(share, degrees) == pytest.approx(expected, rel=0.05)
 
 
-@pytest.mark.slow
+@pytest.mark.slow(longest=True)
 def test_fifty_seeds_are_consistent():
     """Averages over 50 flights are within the 95 % bands of their chi-square distributions."""
     base, signs = tiltsim.load_scenario("beyond/estimator"), np.random.default_rng(1)

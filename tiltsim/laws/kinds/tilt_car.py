@@ -23,8 +23,7 @@ from tiltsim_controllers.references.trajectories import reference_motion
 from tiltsim_controllers.tilt_car import integrating, planned_direction
 from tiltsim_controllers.tilt_car.vehicle import TiltCar, acceleration, counter_yaw_per_tilt
 
-PLANE: Final = ("x", "y", "vx", "vy")
-"""Position and velocity, m and m/s."""
+PLANE: Final = ("x", "y", "vx", "vy")  # position and velocity, m and m/s
 
 DEMANDED: Final = ("demanded_x", "demanded_y")
 """Signals: the acceleration (m/s^2) whose direction the thrusts are to bracket."""
@@ -35,13 +34,9 @@ def initial_motion(scenario: Scenario) -> tuple[float, ...]:
     return (*scenario.initial.position[:2], *scenario.initial.velocity[:2])
 
 
-def _car(plan: FlightPlan) -> dict[str, Any]:
-    return {"car": plan.scenario.vehicle.resolve()}
-
-
 def yaw(alpha: Any, parameters: Any) -> Any:
     """Yaw (rad) at a tilt angle (rad); Eq. (2)."""
-    return parameters.heading - counter_yaw_per_tilt(parameters.law.car) * alpha
+    return parameters.heading - counter_yaw_per_tilt(parameters.law.vehicle) * alpha
 
 
 def motion_rates(motion: Any, direction: Any, squares: Any, car: TiltCar, disturbance: Any) -> Any:
@@ -121,7 +116,8 @@ class CarFunctions(VehicleFunctions):
 
 def direction_columns(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
     """Directions of the thrusts and of the demanded acceleration, and the split of the inputs."""
-    direction, half_angle = samples["yaw"] + samples["alpha"], setup.parameters.law.car.half_angle
+    half_angle = setup.parameters.law.vehicle.half_angle
+    direction = samples["yaw"] + samples["alpha"]
     demanded = np.arctan2(samples["demanded_y"], samples["demanded_x"])
     away = demanded - direction
     return {
@@ -213,7 +209,7 @@ class _Integrating(CarFunctions):
         """The thesis's equations with the inputs integrated."""
         direction, speeds = yaw(state[4], parameters) + state[4], state[5:7]
         squares = _running(speeds) ** 2
-        motion = motion_rates(state[:4], direction, squares, parameters.law.car, disturbance)
+        motion = motion_rates(state[:4], direction, squares, parameters.law.vehicle, disturbance)
         if not self.twice:
             return xp.hstack([motion, inputs[2:3], _limited_rates(speeds, inputs[:2])])
         limited = _limited_rates(speeds, state[8:10])
@@ -226,7 +222,7 @@ class _Integrating(CarFunctions):
         seen = self.in_equations(time, state, parameters)
         v = parts(seen.state, motion=4, yaw=1, alpha=1, speeds=2)
         tilt_rate = seen.states[1:2] if self.twice else inputs[2:3]
-        yaw_rate = -counter_yaw_per_tilt(parameters.law.car) * tilt_rate
+        yaw_rate = -counter_yaw_per_tilt(parameters.law.vehicle) * tilt_rate
         sample = [v.motion, v.yaw, yaw_rate, v.alpha, tilt_rate, _running(v.speeds), seen.states]
         return xp.hstack([*sample, v.speeds[: 2 * self.twice]])
 
@@ -252,7 +248,6 @@ def _integrating(
     law = Law(
         step,
         record,
-        _car,
         states={"alpha_ref": "rad", **states},
         initial=lambda plan: (initial_tilt(plan)[0], *(0.0,) * len(states)),
         signals=DEMANDED,
@@ -266,20 +261,7 @@ def _integrating(
     return _Integrating(law, twice).car_loop(1 + len(states), 3, commands_thrusts=False)
 
 
-THIRD_DERIVATIVE: Final = _integrating(_third, integrating.ThirdParameters, {}, twice=False)
-"""Third-derivative feedback linearization of the tilt-car (ch. 10, Sec. 3.1)."""
-
-FOURTH_DERIVATIVE: Final = _integrating(
-    _fourth,
-    integrating.FourthParameters,
-    {"alpha_ref_rate": "rad/s", **{f"rotor_acceleration_{rotor}": "rad/s^2" for rotor in ROTORS}},
-    twice=True,
-)
-"""Fourth-derivative feedback linearization of the tilt-car (ch. 10, Sec. 6.1).
-
-``law_speed_i`` are the rotor speeds that the controller integrates; the true ones are never below
-zero.
-"""
+# --- the law of a planned direction ----------------------------------------------------------
 
 
 SQUARES: Final = tuple(f"wanted_square_{rotor}" for rotor in ROTORS)
@@ -330,13 +312,13 @@ class _Planned(CarFunctions):
     ) -> Any:
         """The thesis's equations with a tilt that follows the gait exactly."""
         seen = self.in_equations(time, state, parameters, knots).state
-        return motion_rates(state, seen[4] + seen[5], inputs, parameters.law.car, disturbance)
+        return motion_rates(state, seen[4] + seen[5], inputs, parameters.law.vehicle, disturbance)
 
     def observe_equations(
         self, time: Any, state: Any, inputs: Any, parameters: Any, knots: Any
     ) -> Any:
         tilt, tilt_rate = _tilt(time, parameters.law, knots)
-        yaw_rate = -counter_yaw_per_tilt(parameters.law.car) * tilt_rate
+        yaw_rate = -counter_yaw_per_tilt(parameters.law.vehicle) * tilt_rate
         discs = xp.array([yaw(tilt, parameters), yaw_rate, tilt, tilt_rate])
         return xp.hstack([state[:4], discs, _speeds_of_squares(inputs)])
 
@@ -365,29 +347,34 @@ def _columns(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Fl
     return {**direction_columns(samples, setup), **switches, "lyapunov": lyapunov}
 
 
-PLANNED_DIRECTION: Final = _Planned(
-    Law(
-        _step,
-        planned_direction.Parameters,
-        _car,
-        signals=(*DEMANDED, *SQUARES, "alpha_ref"),
-        units={
-            **dict.fromkeys(SQUARES, "rad^2/s^2"),
-            **{f"switch_{rotor}": "1" for rotor in ROTORS},
-            "lyapunov": "m^2/s^2",
-        },
-        margins=_columns,
-    )
-).car_loop(0, 2, commands_thrusts=True)
-"""The tilt-car with a planned direction of its thrusts (ch. 10, Sec. 5; ch. 11).
+_PLANNED: Final = Law(
+    _step,
+    planned_direction.Parameters,
+    signals=(*DEMANDED, *SQUARES, "alpha_ref"),
+    units={
+        **dict.fromkeys(SQUARES, "rad^2/s^2"),
+        **{f"switch_{rotor}": "1" for rotor in ROTORS},
+        "lyapunov": "m^2/s^2",
+    },
+    margins=_columns,
+)
 
-``switch_1`` and ``switch_2`` are ``p`` and ``q`` of ch. 11's switch matrix (Eqs. 22-24), 0 where a
-rotor's thrust is saturated at zero; ``wanted_square_i`` is the demand without that limit.
-"""
+_DERIVATIVES: Final = {f"rotor_acceleration_{rotor}": "rad/s^2" for rotor in ROTORS}
 
 LOOPS: Final = {
-    "tilt_car_third_derivative": THIRD_DERIVATIVE,
-    "tilt_car_fourth_derivative": FOURTH_DERIVATIVE,
-    "tilt_car_planned_direction": PLANNED_DIRECTION,
+    "tilt_car_third_derivative": _integrating(_third, integrating.ThirdParameters, {}, twice=False),
+    "tilt_car_fourth_derivative": _integrating(
+        _fourth,
+        integrating.FourthParameters,
+        {"alpha_ref_rate": "rad/s", **_DERIVATIVES},
+        twice=True,
+    ),
+    "tilt_car_planned_direction": _Planned(_PLANNED).car_loop(0, 2, commands_thrusts=True),
 }
-"""The loops by the names of their laws."""
+"""The loops by the names of their laws.
+
+``law_speed_i`` are the rotor speeds that the law of the fourth derivative integrates; the true ones
+are never below zero. ``switch_1`` and ``switch_2`` are ``p`` and ``q`` of ch. 11's switch matrix
+(Eqs. 22-24), 0 where a rotor's thrust is saturated at zero; ``wanted_square_i`` is the demand
+without that limit.
+"""

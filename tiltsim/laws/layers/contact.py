@@ -6,9 +6,10 @@ see objects' coordinates and readings behind ``act``, and the laws within see `F
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache, partial
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from tiltsim.laws.layers.layer import Layer, Samples, wrap_loop
 from tiltsim.models.cables import CABLE_READING
 from tiltsim.models.objects import COORDINATES, FORCE
 from tiltsim.models.parts import ExtraActuators
+from tiltsim.scenario.scenario import FlightPlan, Scenario
 from tiltsim.vehicles.rotorcraft.others import CONTACT_FORCE, FELT, SWING, Others
 from tiltsim_controllers.code.arrays import traceable, xp
 from tiltsim_controllers.mathematics.attitude import (
@@ -25,16 +27,9 @@ from tiltsim_controllers.mathematics.attitude import (
     rotation_of_quaternion,
 )
 from tiltsim_controllers.mathematics.records import Vector3
-from tiltsim_controllers.mathematics.scalar import Values
+from tiltsim_controllers.mathematics.scalar import Floats, Values
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from tiltsim.scenario.scenario import FlightPlan, Scenario
-    from tiltsim_controllers.mathematics.scalar import Floats
-
-FILTER: Final = 60.0
-"""rad/s, bandwidth in which a force loop sees the contact force."""
+FILTER: Final = 60.0  # rad/s, bandwidth in which a force loop sees the contact force
 
 
 PUSH_COLUMNS: Final = ("push_force", "push_force_ref")

@@ -72,16 +72,13 @@ DEVIATIONS: Final = {
 CONSISTENCY: Final = {"nees": "1", "nis": "1", "nis_count": "1"}
 
 LEAST_VARIANCE: Final = 1e-12
-LEAST_GYRO_BIAS: Final = 1e-3
-"""rad/s: the filter's least deviation of the gyro's bias at the start."""
-LEAST_FORCE_BIAS: Final = 1e-2
-"""m/s^2, likewise of the accelerometer's."""
+LEAST_GYRO_BIAS: Final = 1e-3  # rad/s: the filter's least deviation of the gyro's bias at the start
+LEAST_FORCE_BIAS: Final = 1e-2  # m/s^2, likewise of the accelerometer's
 
 MOST_PREDICTED: Final = 12
 """Integrations of the predictor; where more readings wait, it takes means of some of them."""
 
-CHANNEL: Final = 7000.0
-"""First channel of the draws of the errors at the start."""
+CHANNEL: Final = 7000.0  # first channel of the draws of the errors at the start
 
 
 class Fusion(NamedTuple):

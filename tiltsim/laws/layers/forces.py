@@ -305,7 +305,6 @@ def _momentum_equations(equations: Equations, loop: ClosedLoop) -> Equations:
         inner = ControlSetup(setup.parameters.inner, setup.knots)
         own = (*equations.initial(plan, inner),)
         angles = tilts(0.0, own, inner.parameters, inner.knots)
-        start: Vector = with_spin(own, angles, setup.parameters.layer, 1.0)
-        return start
+        return with_spin(own, angles, setup.parameters.layer, 1.0)
 
     return replace(equations, inputs=inputs, rates=rates, observe=observe, initial=initial)

@@ -25,42 +25,37 @@ class Layer:
     Where a function is None, the loop within goes on unchanged. Functions have the layer's own
     parameters as ``own``, and the loop within as a function ``within(qpos, qvel, act) -> ctrl``,
     or ``within(act)`` between samples.
-
-    Attributes:
-        parameters: The type of the layer's parameters.
-        read: ``(plan) -> parameters``.
-        controls: Traceable function ``(within, time, qpos, qvel, act, own, knots) -> ctrl``; see
-            `ClosedLoop`.
-        hold: Traceable function ``(within, time, qpos, act, ctrl, own) -> ctrl``, likewise.
-        adds: Traceable function ``(time, qpos, qvel, act, ctrl, own) -> further controls``, which
-            follow the controls ``ctrl`` of the loop within, also while these are held.
-        actuators: Appended to the actuators of the model; by default a state for each field.
-        initial_activations: ``(plan, own, inner activations) -> activations`` of these actuators at
-            time zero; None for zeros.
-        derive: ``(samples by field, setup) -> further columns``.
-        fields: Fields of a sample with their units: the first activations of these actuators.
-        remembered: Further fields: the first controls of these actuators after the rates of their
-            activations.
-        units: Columns of a flight that the layer derives, with their units.
-        equations: See `ClosedLoop`; for the parameters of the whole. The equations of the loop
-            within are not used: they do not know the layer.
-        of_controller: Whether it is part of the controller, as a supervisor is: the loop around it
-            counts as a controller's own loop, and has none ``within``.
     """
 
-    parameters: type[tuple[Any, ...]]
-    read: Callable[[FlightPlan], Any]
+    parameters: type[tuple[Any, ...]]  # the type of the layer's parameters
+    read: Callable[[FlightPlan], Any]  # ``(plan) -> parameters``
     controls: Callable[..., Values] | None = None
+    """Traceable function ``(within, time, qpos, qvel, act, own, knots) -> ctrl``; see
+    `ClosedLoop`."""
     hold: Callable[..., Values] | None = None
+    """Traceable function ``(within, time, qpos, act, ctrl, own) -> ctrl``, likewise."""
     adds: Callable[..., Values] | None = None
+    """Traceable function ``(time, qpos, qvel, act, ctrl, own) -> further controls``, which follow
+    the controls ``ctrl`` of the loop within, also while these are held."""
     actuators: ExtraActuators | None = None
+    """Appended to the actuators of the model; by default a state for each field."""
     initial_activations: Callable[[FlightPlan, Any, Vector], Vector] | None = None
+    """``(plan, own, inner activations) -> activations`` of these actuators at time zero; None for
+    zeros."""
     derive: Callable[[Samples, ControlSetup], dict[str, Floats]] = lambda _samples, _setup: {}
+    """``(samples by field, setup) -> further columns``."""
     fields: Mapping[str, str] = field(default_factory=dict)
+    """Fields of a sample with their units: the first activations of these actuators."""
     remembered: Mapping[str, str] = field(default_factory=dict)
+    """Further fields: the first controls of these actuators after rates of activations."""
     units: Mapping[str, str] = field(default_factory=dict)
+    """Columns of a flight that the layer derives, with their units."""
     equations: Equations | None = None
+    """See `ClosedLoop`; for the parameters of the whole. The equations of the loop within are not
+    used: they do not know the layer."""
     of_controller: bool = False
+    """Whether it is part of the controller, as a supervisor is: the loop around it counts as a
+    controller's own loop, and has none ``within``."""
 
 
 def wrap_loop(inner: ClosedLoop, layer: Layer) -> ClosedLoop:

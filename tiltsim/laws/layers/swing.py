@@ -4,27 +4,23 @@ from __future__ import annotations
 
 from functools import cache
 from math import sqrt
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
+from tiltsim.closed_loop.loop import ClosedLoop
 from tiltsim.laws.layers.layer import Layer, wrap_loop
+from tiltsim.scenario.scenario import FlightPlan
 from tiltsim.vehicles.rotorcraft.others import FELT
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.references.trajectories import ReferenceParameters, reference_motion
 
-if TYPE_CHECKING:
-    from tiltsim.closed_loop.loop import ClosedLoop
-    from tiltsim.scenario.scenario import FlightPlan
-
 SHIFTS: Final = ("swing_shift_x", "swing_shift_y")
 """How far the vehicle goes after its load, away from its reference, m."""
 
-FILTER: Final = 60.0
-"""rad/s, bandwidth in which it sees the swing."""
+FILTER: Final = 60.0  # rad/s, bandwidth in which it sees the swing
 
 STATES: Final = ("filtered_swing_x", "filtered_swing_y")
 
-RETURN: Final = 0.25
-"""Rate at which it comes back, over the frequency of the swing."""
+RETURN: Final = 0.25  # rate at which it comes back, over the frequency of the swing
 
 
 class SwingDamping(NamedTuple):

@@ -18,8 +18,6 @@ Braces also stand for the words of the file's table ``[shared]``, of ``shared.to
 numbers of ``thresholds.toml``; ``{a,b}`` in an address for both.
 """
 
-from __future__ import annotations
-
 import re
 import tomllib
 from collections.abc import Iterator, Mapping

@@ -6,8 +6,6 @@ The texts, in the TOML files of this folder, contain no measured number: express
 `tiltsim.report.measures.evaluate`, compute them when the report is made.
 """
 
-from __future__ import annotations
-
 import re
 import tomllib
 from collections.abc import Mapping, Sequence

@@ -1,10 +1,10 @@
 """The alleged singular zone, gains and decouplers, and rotor limits (ch. 2, 4, 5 and 9)."""
 
 from collections.abc import Sequence
-from math import comb
 from typing import Final
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from tiltsim_controllers.analysis.attainable import (
     AttainableSet,
@@ -17,7 +17,6 @@ from tiltsim_controllers.analysis.singularity import (
     normalized_determinant,
     published_determinant,
     published_singular_curve,
-    rank,
     world_up,
 )
 from tiltsim_controllers.analysis.stability import is_hurwitz, third_order_loop
@@ -36,22 +35,25 @@ _SINGULAR: Final = 1e-9
 _LIMITS: Final = published_speed_limits(_VEHICLE)
 
 
+def attitudes(limit: float, count: int) -> Floats:
+    """Roll and pitch (rad) up to a limit either way, shape (2, count, count)."""
+    return np.array(np.meshgrid(*[np.linspace(-limit, limit, count)] * 2))
+
+
+def exact_determinant(roll: ArrayLike, pitch: ArrayLike, thrust: float = _HOVER) -> Floats:
+    """The exact determinant at attitudes (rad) and a thrust (N), over its value in level hover."""
+    return normalized_determinant(np.asarray(roll), np.asarray(pitch), thrust, _QUADROTOR)
+
+
 def exact_on_published_curve() -> Floats:
     """The exact determinant on S = 0, over its value in level hover."""
-    return normalized_determinant(*published_singular_curve(), _HOVER, _QUADROTOR)
+    return exact_determinant(*published_singular_curve())
 
 
 def rightmost_root() -> complex:
     """The root with the largest real part of ch. 2's position loop."""
     roots = np.roots((1.0, *yaw_position.GAIN_SETS["ch02"].position))
     return complex(roots[np.argmax(roots.real)])
-
-
-def exact_zero_within_90_degrees() -> bool:
-    """Whether the exact determinant vanishes or changes its sign within 90 degrees."""
-    angles = np.linspace(-np.pi / 2, np.pi / 2, 301)[1:-1]
-    roll, pitch = np.meshgrid(angles, angles)
-    return bool((normalized_determinant(roll, pitch, _HOVER, _QUADROTOR) <= 0.0).any())
 
 
 def eq_43_as_printed() -> bool:
@@ -65,16 +67,6 @@ def eq_43_as_printed() -> bool:
         matrix = [[first, sp * cf, cp], [second, -cp * cf, sp], [0.0, sf, st]]
         worst = max(worst, abs(np.linalg.det(matrix) - published_determinant(phi, theta)))
     return bool(worst < 1e-12)
-
-
-def level_determinant() -> float:
-    """The exact determinant at level attitude, over its value in hover."""
-    return float(normalized_determinant(0.0, 0.0, _HOVER, _QUADROTOR))
-
-
-def singular_without_thrust() -> bool:
-    """Whether the exact determinant is 0 at zero thrust."""
-    return float(normalized_determinant(0.3, 0.2, 0.0, _QUADROTOR)) == 0.0
 
 
 def quadrotor_gains_are_stable(law: str) -> bool:
@@ -97,11 +89,9 @@ def attitude_altitude_is_singular() -> bool:
 
 def axis_has_no_influence(roll_sign: float, pitch_sign: float) -> bool:
     """Whether the exact determinant stays the same if body axes are reversed."""
-    angles = np.linspace(-1.5, 1.5, 61)
-    roll, pitch = np.meshgrid(angles, angles)
-    exact = normalized_determinant(roll, pitch, _HOVER, _QUADROTOR)
-    flipped = normalized_determinant(roll_sign * roll, pitch_sign * pitch, _HOVER, _QUADROTOR)
-    return bool(np.abs(exact - flipped).max() < _SINGULAR)
+    roll, pitch = attitudes(1.5, 61)
+    flipped = exact_determinant(roll_sign * roll, pitch_sign * pitch)
+    return bool(np.abs(exact_determinant(roll, pitch) - flipped).max() < _SINGULAR)
 
 
 def zone_holds_the_curve() -> bool:
@@ -111,25 +101,10 @@ def zone_holds_the_curve() -> bool:
     return bool(inside.all())
 
 
-def choices_of_six(picked: Sequence[int]) -> tuple[float, ...]:
-    """In how many ways each number of outputs can be picked out of six."""
-    return tuple(float(comb(6, number)) for number in picked)
-
-
 def routh_holds(rows: Sequence[str]) -> bool:
     """Whether ch. 4's gains satisfy Routh's condition as printed, without another loop gain."""
     loops = GAIN_SETS["ch04"].loops
     return all(third_order_loop("", loops[row], 1.0).stable for row in rows)
-
-
-def roll_gain(number: int) -> float:
-    """A gain of ch. 4's roll loop, 1 to 3."""
-    return float(GAIN_SETS["ch04"].loops["roll"][number - 1])
-
-
-def position_gains_are_positive() -> bool:
-    """Whether both gains of ch. 4's position loop are positive."""
-    return min(GAIN_SETS["ch04"].position) > 0.0
 
 
 def decouplers_agree_without_tilt() -> bool:
@@ -140,62 +115,34 @@ def decouplers_agree_without_tilt() -> bool:
     return max(abs(modified - conventional) for modified, conventional in pair) < 1e-12
 
 
-def weight() -> float:
-    """Mass times gravity, N."""
-    return _VEHICLE.mass * _VEHICLE.gravity
-
-
-def _angles(number: int, *, exact: bool = False) -> list[float]:
+def gait_angles(number: int, *, exact: bool = False) -> list[float]:
+    """Tilt angles (rad) of a gait of ch. 9, as printed or on the exact lines."""
     published = PUBLISHED_GAITS[f"ch09_gait_{number}"]
     gait = (published.exact or published.gait) if exact else published.gait
     return [float(angle) for angle in gait.angles(np.array([0.0]))[0]]
 
 
-def _torques(number: int, thrust: float | None = None, *, exact: bool = False) -> AttainableSet:
-    angles = _angles(number, exact=exact)
+def torques(number: int, thrust: float | None = None, *, exact: bool = False) -> AttainableSet:
+    """Roll and pitch torques and thrusts of a gait without yaw torque, at a vertical thrust (N)."""
+    angles = gait_angles(number, exact=exact)
     return attainable_torque_thrust(angles, _VEHICLE, _LIMITS, vertical_thrust=thrust)
-
-
-def has_solution(number: int, thrust: float | None = None) -> bool:
-    """Whether a gait has torques and thrusts without yaw torque, at a vertical thrust (N)."""
-    return not _torques(number, thrust).is_empty
-
-
-def largest_thrust(number: int) -> float:
-    """The largest vertical thrust of a gait without yaw torque, N."""
-    return float(_torques(number).upper[2])
-
-
-def least_thrust(number: int) -> float:
-    """The least vertical thrust of a gait without yaw torque, N."""
-    return float(_torques(number).lower[2])
-
-
-def speed_limit(which: str) -> float:
-    """The ``least`` or ``largest`` rotor speed of ch. 9, rad/s."""
-    return _LIMITS[which == "largest"]
 
 
 def torques_are_coupled(number: int) -> bool:
     """Whether for one thrust in the middle the torques on the exact lines are on a line."""
-    thrusts = _torques(number, exact=True)
+    thrusts = torques(number, exact=True)
     middle = 0.5 * float(thrusts.lower[2] + thrusts.upper[2])
-    return _torques(number, middle, exact=True).dimension <= 1
-
-
-def has_full_rank(number: int, exact: bool) -> bool:
-    """Whether the torque matrix of a gait, on the exact lines or as printed, has rank 3."""
-    return bool(rank(_angles(number, exact=exact), _VEHICLE) == 3)
+    return torques(number, middle, exact=True).dimension <= 1
 
 
 def accelerations(number: int) -> tuple[float, ...]:
     """Attainable accelerations in body axes, m/s^2: least along x and y, largest along x and y."""
-    reached = attainable_accelerations(_angles(number), _VEHICLE, _LIMITS)
+    reached = attainable_accelerations(gait_angles(number), _VEHICLE, _LIMITS)
     return (*reached.lower.tolist(), *reached.upper.tolist())
 
 
 def accelerations_are_a_rectangle(number: int) -> bool:
     """Whether their set has four corners, with two values along each axis."""
-    corners = attainable_accelerations(_angles(number), _VEHICLE, _LIMITS).vertices
+    corners = attainable_accelerations(gait_angles(number), _VEHICLE, _LIMITS).vertices
     spans = [np.unique(np.round(axis, 9)) for axis in corners.T]
     return len(corners) == 4 and all(len(span) == 2 for span in spans)

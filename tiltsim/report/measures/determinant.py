@@ -4,7 +4,7 @@ import re
 from collections.abc import Sequence
 from functools import cache
 from itertools import product
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -131,13 +131,6 @@ def switching_crosses(case: str) -> bool:
     return True
 
 
-def untilted_is_regular() -> bool:
-    """Whether the determinant is positive up to 1.55 rad of roll and pitch without tilt."""
-    angles = np.linspace(-1.55, 1.55, 101)
-    roll, pitch = np.meshgrid(angles, angles)
-    return bool((determinant(np.zeros(4), roll, pitch, _VEHICLE) > 0.0).all())
-
-
 def return_to_no_tilt_is_regular() -> bool:
     """Whether R stays positive while any gait of the triangle shrinks to no tilt (ch. 3)."""
     share = np.array([(i, j, 20 - i - j) for i in range(21) for j in range(21 - i)]) / 20.0
@@ -186,34 +179,21 @@ def eight_inputs_have_full_rank() -> bool:
     return True
 
 
-def hover_rotor_speed() -> float:
-    """Speed (rad/s) at which four untilted rotors carry the weight."""
-    return _VEHICLE.hover_rotor_speed
-
-
 def shrunk_gaits_are_regular() -> bool:
     """Ch. 5, Eq. (18): as a gait shrinks, the determinant goes to 4 cos(roll) cos(pitch)."""
-    roll, pitch = np.meshgrid(np.linspace(-1.5, 1.5, 61), np.linspace(-1.5, 1.5, 61))
+    roll, pitch = np.meshgrid(*[np.linspace(-1.5, 1.5, 61)] * 2)
     limit = determinant(np.zeros(4), roll, pitch, _VEHICLE)
     agrees = bool(np.abs(limit - 4.0 * np.cos(roll) * np.cos(pitch)).max() < 1e-9)
     return agrees and bool((limit > 0.0).all())
 
 
-def _trot_residuals() -> tuple[Floats, Floats]:
-    """Angles rho up to the largest, and R of the trot at them."""
-    rho = np.linspace(-0.65, 0.65, 131)
-    return rho, residuals(np.stack([-rho, -rho, rho, rho], axis=-1), _VEHICLE).R
+TROT: Final = np.linspace(-0.65, 0.65, 131)
+"""Angles of the trot, up to the largest, rad."""
 
 
-def trot_has_the_printed_determinant() -> bool:
-    """Ch. 4, Eq. (25): R is 4 cos² rho."""
-    rho, R = _trot_residuals()
-    return bool(np.abs(R - 4.0 * np.cos(rho) ** 2).max() < 1e-9)
-
-
-def trot_is_regular() -> bool:
-    """Whether R is positive for every angle of the trot."""
-    return bool((_trot_residuals()[1] > 0.0).all())
+def trot_residuals() -> Floats:
+    """R of the trot at the angles `TROT`, shape (N,)."""
+    return residuals(np.stack([-TROT, -TROT, TROT, TROT], axis=-1), _VEHICLE).R
 
 
 def only_three_parameters_matter() -> bool:

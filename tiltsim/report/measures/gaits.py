@@ -47,23 +47,22 @@ def scaling_costs_side_force(gait: str) -> bool:
     return all(first > second for first, second in pairwise(shares))
 
 
-def beats_its_biased_twin(key: str) -> bool:
-    """Whether a published gait, on the exact lines, is more robust than its biased twin.
+def angles_of(key: str, exact: bool = False) -> Floats:
+    """Tilt angles (rad) of a gait over a period, as printed or on the exact lines, shape (N, 4)."""
+    published = PUBLISHED_GAITS[key]
+    gait = (published.exact if exact else None) or published.gait
+    return gait.angles(gait.sample_times(401))
 
-    ``key`` of the gait in `PUBLISHED_GAITS`.
-    """
-    return bool(robustness(PUBLISHED_GAITS[key]).claim_holds)
 
-
-def gait_margin(key: str, of: str = "margin") -> float:
-    """Smallest margin (rad) of a gait, by a field of its `robustness`."""
-    return float(getattr(robustness(PUBLISHED_GAITS[key]), of))
+def sign_of(values: Floats) -> float:
+    """1, -1, or 0 where values are zero or change their sign."""
+    one_sided = np.abs(values).min() >= _ZERO and np.ptp(np.sign(values)) == 0
+    return float(np.sign(values[0])) if one_sided else 0.0
 
 
 def angles_as_printed(key: str, offset: float) -> Floats:
     """A gait of `PUBLISHED_GAITS` with the printed P and offset, over a period, shape (N, 4)."""
-    gait = PUBLISHED_GAITS[key].gait
-    first, second, third, _ = gait.angles(gait.sample_times(401)).T
+    first, second, third, _ = angles_of(key).T
     blue = np.abs(third - first) > 1e-12
     aside = 0.5 * offset - delta(_VEHICLE)  # so that a path through P passes the printed one
     first, second = first + aside, second - aside
@@ -84,36 +83,18 @@ def printed_margin(key: str, offset: float, bias: float = 1.0) -> float:
     return float(margin_over_gait(angles, _VEHICLE).min())
 
 
-def printed_is_regular(key: str, offset: float) -> bool:
-    """Whether R of a gait with the printed P and offset keeps its sign and never vanishes."""
-    R = residuals(angles_as_printed(key, offset), _VEHICLE).R
-    return bool((R > 0.0).all() or (R < 0.0).all())
-
-
-def sign_on_exact_lines(key: str) -> float:
-    """1, -1, or 0 where R is zero or changes sign over the gait on the exact lines."""
-    published = PUBLISHED_GAITS[key]
-    gait = published.exact or published.gait
-    R = residuals(gait.angles(gait.sample_times(401)), _VEHICLE).R
-    return 0.0 if np.abs(R).min() < _ZERO or np.ptp(np.sign(R)) else float(np.sign(R[0]))
-
-
 def conditioning_of_blue(exact: bool = False) -> float:
     """The smallest singular value of tau, as a share of the largest, of ch. 6's gait 1.
 
     The largest share over a period, with the printed angles or on the exact lines.
     """
-    published = PUBLISHED_GAITS["ch06_gait_1"]
-    gait = (published.exact if exact else None) or published.gait
-    values = singular_values(gait.angles(gait.sample_times(401)), _VEHICLE)
+    values = singular_values(angles_of("ch06_gait_1", exact), _VEHICLE)
     return float((values[:, 2] / values[:, 0]).max())
 
 
 def remainder_of_blue() -> str:
     """The largest of R, R_phi, R_theta and the conditioning on the exact lines, in words."""
-    gait = PUBLISHED_GAITS["ch06_gait_1"].exact
-    assert gait is not None
-    parts = residuals(gait.angles(gait.sample_times(401)), _VEHICLE)
+    parts = residuals(angles_of("ch06_gait_1", exact=True), _VEHICLE)
     remainder = max(conditioning_of_blue(exact=True), float(np.abs(parts).max()))
     return "below 1e-9" if remainder < _ZERO else f"{remainder:.0e}"
 
@@ -126,8 +107,7 @@ def _as_published(
     The offset is the printed one, the formulas are the printed R, R_phi and R_theta. A margin is
     negative where R has another sign than at the start.
     """
-    gait = PUBLISHED_GAITS[key].gait
-    angles = gait.angles(gait.sample_times(401))
+    angles = angles_of(key)
     angles[:, 2], angles[:, 3] = offset - angles[:, 0], -offset - angles[:, 1]
     angles[:, 2:] *= bias
     R, R_phi, R_theta = (value_of_terms(formula, angles) for formula in formulas)
@@ -181,7 +161,8 @@ def advantage_on_exact_lines(key: str) -> bool:
 
 def partial_scaling_can_harm(keys: list[str]) -> bool:
     """Whether a gait's biased twin has a smaller margin than the gait."""
-    return any(gait_margin(key, "margin_biased") < gait_margin(key) for key in keys)
+    found = [robustness(PUBLISHED_GAITS[key]) for key in keys]
+    return any(one.margin_biased < one.margin for one in found if one.margin_biased is not None)
 
 
 def printed_angles_lie_on_the_lines(key: str) -> bool:

@@ -18,24 +18,18 @@ from tiltsim_controllers.tilt_car.cycles import (
     lyapunov,
     lyapunov_bound,
     lyapunov_growth,
-    multipliers,
 )
+from tiltsim_controllers.tilt_car.planned_direction import GAIN_SETS as PENGUIN_GAINS
 from tiltsim_controllers.tilt_car.planned_direction import (
-    GAIN_SETS,
     Parameters,
     demanded_squared_speeds,
     planned_direction_inputs,
 )
 from tiltsim_controllers.tilt_car.vehicle import THESIS_CAR, squared_speeds
 
-_GAINS: Final = GAIN_SETS["ch11"]
+_GAINS: Final = PENGUIN_GAINS["ch11"]
 SWING: Final = Swing(half_angle=pi / 6, half_period=1.0, gains=_GAINS)
 _SQRT_3: Final = sqrt(3.0)
-
-
-def can_push_straight_ahead(swing: float) -> bool:
-    """Whether the reference's direction lies between the thrusts, pi/6 from their middle."""
-    return abs(swing) <= SWING.half_angle
 
 
 @cache
@@ -106,23 +100,13 @@ def switch_line() -> float:
     return high
 
 
-def is_asymptotically_stable() -> bool:
-    """Whether errors vanish: whether the limit cycle is the origin."""
-    return max(map(abs, limit_cycle(SWING))) < 1e-9
-
-
-def limit_cycle_is_stable() -> bool:
-    """Prop. 2: whether a disturbed limit cycle comes back."""
-    return bool(np.abs(multipliers(SWING, limit_cycle(SWING))).max() < 1.0)
-
-
 def grows_by_three_quarters_at_most(state: Pair) -> bool:
     """Remark 10: the candidate over half a period."""
     return lyapunov_growth(SWING, state) <= 0.75 + 1e-12
 
 
 @cache
-def _bound() -> LyapunovBound:
+def bound() -> LyapunovBound:
     """L_critical of Eq. (76) and the largest growth, Eq. (71)."""
     return lyapunov_bound(SWING, points=33)
 
@@ -222,16 +206,6 @@ def inputs_repeat_after_a_period() -> bool:
     again = half_period(SWING, (-half[0], -half[1])).end
     back = max(abs(-a - b) for a, b in zip(again, start, strict=True))
     return back < 1e-9 and min(half) < 0.0 < min(start)
-
-
-def largest_growth() -> float:
-    """The candidate's largest growth over half a period, m^2/s^2."""
-    return _bound().largest_gain
-
-
-def published_bound() -> float:
-    """Prop. 7: L_critical + 3/4, the bound of the candidate, m^2/s^2."""
-    return _bound().published
 
 
 def candidates_fall_as_printed() -> bool:

@@ -5,7 +5,6 @@ from math import asin, cos, inf, pi, sin
 import numpy as np
 
 from tiltsim.report.measures.flown import Flown
-from tiltsim_controllers.tilt_car.cycles import drift_rate, orbit
 from tiltsim_controllers.tilt_car.vehicle import (
     THESIS_CAR,
     acceleration,
@@ -31,21 +30,17 @@ def thrusts_can_be_inverted() -> bool:
     return bool(abs(np.linalg.det(matrix)) > 1e-9)
 
 
-def _rank(speed_1: float, speed_2: float, *, tilting: bool) -> int:
+def rank_of_inputs(speed_1: float, speed_2: float, *, tilting: bool = False) -> int:
+    """The rank of the columns of the rotors at speeds (rad/s), and of the tilt if ``tilting``."""
     columns = input_matrix(np.array([speed_1, speed_2]), THESIS_CAR)
     return int(np.linalg.matrix_rank(columns if tilting else columns[:, :2]))
 
 
 def full_rank_needs_both(tilting: bool) -> bool:
     """Whether the rank is full where both rotors turn, and only there."""
-    both = _rank(200.0, 150.0, tilting=tilting) == 2
-    one = _rank(200.0, 0.0, tilting=tilting) == 2 or _rank(0.0, 200.0, tilting=tilting) == 2
-    return both and not one
-
-
-def full_rank_if_both_turn() -> bool:
-    """Eq. (28), read as: rank 2 of the two columns of the rotors when neither is at rest."""
-    return _rank(200.0, 150.0, tilting=False) == 2
+    speeds = ((200.0, 150.0), (200.0, 0.0), (0.0, 200.0))
+    full = [rank_of_inputs(*pair, tilting=tilting) == 2 for pair in speeds]
+    return full == [True, False, False]
 
 
 def thrust_points_to_the_center() -> bool:
@@ -102,11 +97,6 @@ def fourth_derivative_is_right() -> bool:
     )
     exact = (at(step) - 2.0 * at(0.0) + at(-step)) / step**2
     return bool(np.abs(printed - exact).max() < 1e-5 * np.abs(exact).max())
-
-
-def first_drift_rate() -> float:
-    """The drift (rad/s) on ch. 10's circle from the aligned state."""
-    return drift_rate(0.0, orbit(_RADIUS, _OMEGA), THESIS_CAR)
 
 
 def lean(split: float, as_share: bool = False) -> float:

@@ -2,13 +2,12 @@
 
 from collections.abc import Callable
 from functools import cache
-from math import atan, pi
+from math import pi
 from typing import Final
 
 import numpy as np
 
 from tiltsim.report.measures.determinant import terms_hold, value_of_terms
-from tiltsim_controllers.analysis.published_gaits import PATHS
 from tiltsim_controllers.analysis.singularity import residuals
 from tiltsim_controllers.analysis.two_color_map import (
     Root,
@@ -19,17 +18,9 @@ from tiltsim_controllers.analysis.two_color_map import (
     point_p,
     red_residual,
     region,
-    root_classes,
     root_counts,
 )
-from tiltsim_controllers.analysis.two_color_planner import (
-    Circle,
-    Leg,
-    Path,
-    Polyline,
-    check_path,
-    rectangle,
-)
+from tiltsim_controllers.analysis.two_color_planner import Circle, Leg, Path, Polyline
 from tiltsim_controllers.gaits.colors import colored_angles
 from tiltsim_controllers.vehicle.parameters import PRESETS, drag_ratio
 
@@ -37,12 +28,12 @@ _VEHICLE: Final = PRESETS["ar_drone_2"]
 _ZERO: Final = 1e-9
 _P: Final = point_p(_VEHICLE)
 _TRIANGLE: Final = (_P, (0.7, -0.25), (0.25, -0.7), _P)
-_GAITS: Final[dict[str, Path]] = {
-    "Gait 1": Polyline((Leg("red", _TRIANGLE), Leg("blue", _TRIANGLE))),
-    "Gait 2": Circle("red", (0.5, -0.5), 0.3),
-    "Gait 3": Circle("blue", (0.5, -0.5), 0.3),
-}
-"""The gaits of ch. 8, Sec. 4."""
+
+
+def gait_of_chapter_8(number: int) -> Path:
+    """The gaits of ch. 8, Sec. 4."""
+    gait_1 = Polyline((Leg("red", _TRIANGLE), Leg("blue", _TRIANGLE)))
+    return (gait_1, Circle("red", (0.5, -0.5), 0.3), Circle("blue", (0.5, -0.5), 0.3))[number - 1]
 
 
 @cache
@@ -59,7 +50,8 @@ def _inside() -> list[Root]:
     return [root for cell in _cells() for root in cell]
 
 
-def _classes(chosen: Callable[[Root], bool] = lambda root: True) -> set[str]:
+def classes(chosen: Callable[[Root], bool] = lambda root: True) -> set[str]:
+    """The classes by planes, such as "(+,-)", of the roots inside, or of some of them."""
     return {f"({root.plane_3},{root.plane_4})" for root in _inside() if chosen(root)}
 
 
@@ -85,19 +77,9 @@ def roots_lie_on_two_planes() -> bool:
     )
 
 
-def number_of_classes() -> float:
-    """The classes of roots by their planes."""
-    return float(len(root_classes(_grid())))
-
-
-def some_root_mixes_planes() -> bool:
-    """Whether a root is (+,-) or (-,+)."""
-    return bool(_classes() & {"(+,-)", "(-,+)"})
-
-
 def positive_roots_have_no_minus() -> bool:
     """Whether no root with R > 0 lies on a minus plane."""
-    return not any("-" in name for name in _classes(lambda root: root.R > _ZERO))
+    return not any("-" in name for name in classes(lambda root: root.R > _ZERO))
 
 
 def _is_negative(root: Root, offset: float, level: str) -> bool:
@@ -112,7 +94,7 @@ def _is_negative(root: Root, offset: float, level: str) -> bool:
 
 def all_classes_are_negative(offset: float = 0.0, level: str = "") -> bool:
     """Whether all seven classes occur among the roots with R < 0, exactly or as printed."""
-    return len(_classes(lambda root: _is_negative(root, offset, level))) == 7
+    return len(classes(lambda root: _is_negative(root, offset, level))) == 7
 
 
 def some_point_has_two_negative_roots(offset: float = 0.0, level: str = "") -> bool:
@@ -179,11 +161,6 @@ def planes_intersect() -> bool:
     return max(apart) < 1e-12
 
 
-def one_color_is_accepted(color: str) -> bool:
-    """Whether the planner accepts a rectangle in this color."""
-    return check_path(rectangle((0.2, 0.8), (-0.8, -0.2), color), _VEHICLE).accepted
-
-
 def one_root_of_each_color() -> bool:
     """At 200 random (α₁, α₂) off the lines through P: the roots are one red, one blue."""
     rng, offset = np.random.default_rng(7), 2.0 * delta(_VEHICLE)
@@ -217,26 +194,6 @@ def l_divides_in_two() -> bool:
     return True
 
 
-def offset_over(half: int, vehicle: str = "ar_drone_2") -> float:
-    """2 delta over ``half``, rad: 1 for the offset of blue, 2 for P."""
-    return 2.0 * delta(PRESETS[vehicle]) / half
-
-
-def printed_offset_over(half: int, side: float, drag: float) -> float:
-    """`offset_over` from the printed coefficients ``side`` and ``drag`` of R_φ and R_θ."""
-    return atan(side / drag) / half
-
-
-def p_lies_below(vehicle: str = "ar_drone_2") -> bool:
-    """Whether P, in closed form, lies in S_D."""
-    return region(*point_p(PRESETS[vehicle]), PRESETS[vehicle]) == "S_D"
-
-
-def red_residual_at(p: float, vehicle: str = "ar_drone_2") -> float:
-    """R at (p, -p) on red."""
-    return float(red_residual(p, -p, PRESETS[vehicle]))
-
-
 def coefficients_vanish_as_printed(offset: float, with_roll: str, with_pitch: str) -> bool:
     """Whether the printed R_φ and R_θ vanish on blue with the printed offset."""
     first, second = np.random.default_rng(0).uniform(-1.0, 1.0, (200, 2)).T
@@ -258,16 +215,6 @@ def coefficients_vanish(color: str) -> bool:
         if max(abs(float(values.R_phi)), abs(float(values.R_theta))) > 1e-12:
             return False
     return True
-
-
-def example_is_accepted(name: str) -> bool:
-    """Whether the planner accepts an example of ch. 8."""
-    return check_path(PATHS[name], _VEHICLE).accepted
-
-
-def needs_the_generalized_theorem(name: str) -> bool:
-    """Whether a gait of ch. 8 follows the generalized theorem, but not the first one."""
-    return check_path(_GAITS[name], _VEHICLE).theorem == "generalized"
 
 
 def _colors_apart(first: float, second: float, offset: float) -> float:

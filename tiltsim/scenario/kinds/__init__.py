@@ -4,10 +4,14 @@ All files of this folder are found by themselves; no other file names what they 
 """
 
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from functools import reduce
 from importlib import import_module
+from operator import or_
 from pkgutil import iter_modules
-from typing import Final, TypeVar, get_args
+from typing import Annotated, Any, Final, TypeVar, get_args
+
+from pydantic import Discriminator, Tag
 
 from tiltsim.scenario.table import Table
 
@@ -34,3 +38,16 @@ def tables_of(base: type[T], key: str, modules: Iterable[str]) -> dict[str, type
         if isinstance(table, type) and issubclass(table, base) and table.__module__ == module
         for name in get_args(table.model_fields[key].annotation if key in table.model_fields else 0)
     }
+
+
+def union_of(tables: Mapping[str, type[Table]], key: str, default: str) -> Any:
+    """Tables as one type, by the values of a key, which may be left out for a default."""
+    tags = {table: name for name, table in reversed([*tables.items()])}
+
+    def tag(value: Any) -> str:
+        given = value.get(key, default) if isinstance(value, dict) else getattr(value, key, default)
+        name = given if isinstance(given, str) else ""
+        return tags[tables[name]] if name in tables else name
+
+    tagged = (Annotated[table, Tag(tags[table])] for table in dict.fromkeys(tables.values()))
+    return Annotated[reduce(or_, tagged), Discriminator(tag)]

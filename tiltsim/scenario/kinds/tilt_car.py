@@ -2,12 +2,12 @@
 
 from abc import abstractmethod
 from math import pi
-from typing import Annotated, Final, Literal
+from typing import Annotated, Any, Final, Literal
 
 from pydantic import Field
 
 from tiltsim.scenario.controller_table import ControllerTable
-from tiltsim.scenario.gait import AnyVehicle, GaitTable
+from tiltsim.scenario.gait import GaitTable
 from tiltsim.scenario.rotorcraft import PlanarTable, ServoTable
 from tiltsim.scenario.table import Angle, Period, Positive, default, required
 from tiltsim_controllers.gaits import plans
@@ -59,7 +59,7 @@ class TiltCarGait(GaitTable):
     def tilts(self) -> None:
         return None
 
-    def _unscaled(self, vehicle: AnyVehicle) -> PlannedGait:
+    def _unscaled(self, vehicle: Any) -> PlannedGait:
         if not isinstance(vehicle, TiltCar):
             number = "four" if vehicle.tilts == 4 else vehicle.tilts
             raise ValueError(f"is a gait of the tilt_car; this vehicle has {number} tilt angles")

@@ -111,8 +111,7 @@ def true_rotors(scenario: Scenario) -> Any:
     vehicle = scenario.true_vehicle
     if not isinstance(vehicle, Multirotor):
         return vehicle
-    body = body_of(vehicle.mass, np.reshape(vehicle.inertia, (3, 3)), vehicle.gravity)
-    return craft_parameters(body, vehicle.rotors)
+    return craft_parameters(vehicle.body, vehicle.rotors)
 
 
 def body_less(scenario: Scenario, inertias: Values) -> Body:

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from math import cos, sin
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from tiltsim.models.cables import CABLE_READING
 from tiltsim.models.objects import CONTACT_READING, COORDINATES, FORCE
 from tiltsim.scenario.interaction import objects_of
+from tiltsim.scenario.scenario import FlightPlan, Scenario
 from tiltsim_controllers.mathematics.attitude import rotation_matrix
-
-if TYPE_CHECKING:
-    from tiltsim.scenario.scenario import FlightPlan, Scenario
-    from tiltsim_controllers.mathematics.scalar import Values, Vector
+from tiltsim_controllers.mathematics.scalar import Values, Vector
 
 CONTACT_FORCE: Final = ("contact_force_x", "contact_force_y", "contact_force_z")
 

@@ -1,7 +1,5 @@
 """Flights in one panel over time: a line each, or the median and quantiles of many."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any, Final, NamedTuple
 from warnings import catch_warnings, simplefilter

@@ -198,8 +198,7 @@ def wrap(text: Text, width: float) -> None:
     text.set_text("\n".join(lines))
 
 
-CLOSE: Final = 0.93
-"""Share of a panel's width that title and legend may fill side by side."""
+CLOSE: Final = 0.93  # share of a panel's width that title and legend may fill side by side
 
 
 def place_legends(page: Page) -> None:

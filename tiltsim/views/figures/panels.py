@@ -41,6 +41,7 @@ NARROW: Final = 8.0  # ratio of a path's extents above which its axes have diffe
 INSTANTS: Final = 120  # whose unreachable attitudes the roll-pitch plane shows
 SETTLED: Final = 0.01  # share of the largest error below which errors have settled
 SHORT: Final = 0.1  # share of a flight below which only the time until then is shown
+LEVEL: Final = 1e-6  # rad, range of a constant margin
 ROUNDING: Final = 1e-9  # m, below which errors are rounding
 ORDER: Final = ("position_error", "altitude", "margin", "attitude", "tilt_angles")
 """The first panels of a page."""
@@ -129,8 +130,9 @@ def _signals(axes: Axes, shown: Sequence[Shown], signals: Signals) -> None:
     looks = style.rotor_lines(len(lines)) if numbered else style.AXIS_LINES
     if signals.path == "position_error":
         style.zero_lines(axes, "x")
+    said = f"{signals.title.lower()} " if len(shown) == 1 else ""  # above the panel
     for line, look in zip(lines, looks, strict=False):
-        axes.plot(time, line.of(flight), label=line.label, **look)
+        axes.plot(time, line.of(flight), label=line.label.removeprefix(said), **look)
     # References of tilt angles would cover the angles that follow them.
     references = [line.reference for line in lines if line.reference in flight.units]
     for number, name in enumerate([] if numbered else references):
@@ -189,9 +191,10 @@ def _margins(axes: Axes, shown: Sequence[Shown]) -> None:
             axes.fill_between(flight["time"], 0.0, 1.0, where=active, **look)
         closest = int(np.argmin(np.abs(margin)))
         least = abs(margin[closest])
-        dot: dict[str, Any] = {"color": style.SINGULAR, "ms": 5, "zorder": 5}
-        text = f"minimum, {least:.2f}"
-        axes.plot(flight["time"][closest], least, "o", **dot, clip_on=False, label=text)
+        dot: dict[str, Any] = {"color": style.SINGULAR, "ms": 5, "zorder": 5, "clip_on": False}
+        if np.ptp(margin) > LEVEL:  # else it is nowhere closest
+            text = f"minimum, {least:.2f}"
+            axes.plot(flight["time"][closest], least, "o", **dot, label=text)
         axes.set_title("Singularity margin")
     style.angle_axis(axes, "y", pi / 2)
     axes.set_ylim(0.0, pi / 2 * 1.03)
@@ -278,7 +281,8 @@ def _attitude_plane(axes: Axes, shown: Sequence[Shown]) -> None:
     if np.isfinite(curve).any():
         axes.plot(*curve.T, color=style.SINGULAR, lw=1.8, label="singular")
         there = attitude_plane.nearest_singular(n[[closest]], attitude[[closest]])[0]
-        text = f"minimum margin, at {flight['time'][closest]:.2f} s"
+        when = f", at {flight['time'][closest]:.2f} s" if np.ptp(margin) > LEVEL else ""
+        text = f"minimum margin{when}"
         axes.plot(*np.stack([here, there]).T, color=style.INK, lw=1.0, ls="--", label=text)
     axes.plot(*here, "o", color=style.SINGULAR, ms=5, zorder=5)
     if share.any():

@@ -19,7 +19,7 @@ from tiltsim.system.text import short_repr
 from tiltsim.views.figures import layout, style
 from tiltsim.views.figures.flight_lines import MOST_LINES, Shown
 from tiltsim.views.figures.panels import Panel, column_panel, panels_of, set_scale, signals_panel
-from tiltsim.views.signals import stems, vector_signals
+from tiltsim.views.signals import OF_OBJECTS, stems, vector_signals
 from tiltsim.views.titles import common_title, describe_controller, describe_gait, flight_names
 
 LARGEST: Final = 1e100
@@ -72,7 +72,7 @@ def draw_flights(
     panels: Sequence[str],
     title: str | None,
 ) -> Figure:
-    """The figure of `plot`, in the style and size of the context.
+    """The figure of `plot`, in the style and size of the context: a line for every vehicle.
 
     Args:
         flights: One or several.
@@ -81,6 +81,14 @@ def draw_flights(
         panels: Names; empty for all that suit the flights.
         title: Instead of the scenarios' title; empty for none.
     """
+    of_objects: dict[str, Panel] = {}
+    if len(flights) == 1 and flights[0].scenario.companion:
+        (first,), together = flights, flights[0].vehicles
+        alone = panels_of([first])
+        of_objects = {name: alone[name] for name in OF_OBJECTS if name in alone and not panels}
+        if {*panels} <= panels_of([*together.values()]).keys():
+            names, flights = [*together], [*together.values()]
+            title = first.scenario.title or first.scenario.address if title is None else title
     clipped = [np.clip(flight.samples, -LARGEST, LARGEST) for flight in flights]
     flights = [
         flight if np.array_equal(samples, flight.samples) else replace(flight, samples=samples)
@@ -95,7 +103,9 @@ def draw_flights(
     elif len(flights) > MOST_LINES:
         looks = [{"color": style.BLUE, "alpha": 0.3, "lw": 0.6, "marker": ""}] * len(flights)
     shown = [Shown(*one) for one in zip(flights, names, looks, strict=True)]
-    chosen = _chosen(flights, panels)
+    chosen = _chosen(flights, panels) | of_objects
+    if of_objects:  # squares stand last
+        chosen = dict(sorted(chosen.items(), key=lambda item: not item[1].over_time))
     heading = partial(_heading, shown, title)
     return layout.fitting(lambda: _page(shown, chosen, heading, others))
 
