@@ -37,12 +37,12 @@ def interval_of(rotors):
         inertia, force, torque = known[5:14].reshape(3, 3), known[14:17], known[17:20]
         rows, k = known[20 : 20 + 6 * rotors].reshape(6, rotors), known[20 + 6 * rotors :]
         left = xp.exp(-h / lag)
-        speeds, wanted = state[PAST:], UNIT * command
-        mean = wanted + (speeds - wanted) * (lag / h * (1.0 - left))
+        speeds, commanded = state[PAST:], UNIT * command
+        mean = commanded + (speeds - commanded) * (lag / h * (1.0 - left))
         frame = Frame(mass, gravity, inertia, gyroscopic, force, torque)
         now = Motion(state[:3], state[3:6], state[6:15].reshape(3, 3), state[15:18])
         then = moved(now, rows @ (k * mean * abs(mean)), frame, h)
-        reached = wanted + left * (speeds - wanted)
+        reached = commanded + left * (speeds - commanded)
         return xp.hstack([then[0], then[1], then[2].ravel(), then[3], reached])
 
     def costs(state, command, aim, known):

@@ -221,8 +221,8 @@ class Flight(ColumnsOverTime):
         names = (table.name for table in self.scenario.companion)
         for name, own in zip(names, self.scenario.companions, strict=True):
             assembly = assemble(own, recorded=True)
-            wanted = ("time", *(f"{name}_{field}" for field in assembly.loop.sample_fields[1:]))
-            samples = self.samples[:, [fields.index(column) for column in wanted]]
+            needed = ("time", *(f"{name}_{field}" for field in assembly.loop.sample_fields[1:]))
+            samples = self.samples[:, [fields.index(column) for column in needed]]
             found[name] = Flight(assembly, samples, self.end, self.engine, self.wall_time)
         return found
 
