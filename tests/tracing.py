@@ -16,8 +16,8 @@ from importlib.machinery import SourceFileLoader
 import pytest
 
 OURS = {"tiltsim", "tiltsim_controllers", "tests"}
-BEGINNING = 0.15  # CPU s of every fixture and every test, the first time
-AGAIN = 0.03  # with other parameters
+BEGINNING = 0.25  # CPU s of every fixture and every test, the first time
+AGAIN = 0.04  # with other parameters
 
 
 class TracedBeginnings:
