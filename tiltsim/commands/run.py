@@ -82,8 +82,7 @@ def run(
         prepare_file("--rerun", rerun, (".rrd",))
     for warning in () if quiet else _warnings(loaded):
         warn(warning)
-    if not quiet:  # the flight may be written over the scenario's file
-        changes = _differing(changes, scenario, loaded)
+    changes = {} if quiet else _differing(changes, scenario, loaded)  # --out may replace its file
 
     with ExitStack() as stack:
         if rerun is not None:
