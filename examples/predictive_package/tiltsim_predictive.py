@@ -88,7 +88,7 @@ def improved(state, plan, aims, known, limits):
         moves = A @ moves
         moves[:, own] += B
         state = then[:, 0]
-    low, high = (np.repeat(limit / UNIT, count) - plan.ravel() for limit in limits)
+    low, high = (np.tile(limit / UNIT, count) - plan.ravel() for limit in limits)
     change = program(size)(h=hessian, g=gradient, lbx=low, ubx=high)["x"]
     return plan + np.array(change).reshape(plan.shape)
 

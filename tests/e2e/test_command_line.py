@@ -141,6 +141,13 @@ def test_only_values_that_differ_from_the_file_s_are_called_changed(capsys):
     assert "reference.type" not in printed
 
 
+def test_changes_are_named_though_the_flight_replaces_its_scenario(tmp_path, capsys):
+    assert main(["run", SETPOINT, *SHORT, "--out", str(tmp_path), "--quiet"]) == 0
+    shorter = ["--set", "simulation.duration=0.1", "--out", str(tmp_path)]
+    assert main(["run", str(tmp_path / "scenario.toml"), *shorter]) == 0
+    assert "  changed: simulation.duration = 0.1\n" in capsys.readouterr().out
+
+
 def test_a_changed_flight_of_the_library_is_not_judged(tmp_path, capsys):
     assert main(["run", SETPOINT, *SHORT, "--out", str(tmp_path)]) == 0
     printed = capsys.readouterr().out

@@ -8,6 +8,8 @@ import pytest
 
 import tiltsim
 from tests.flights import TILT_CAR
+from tiltsim.laws.assembling import assemble
+from tiltsim.vehicles.rotorcraft.layout import layout_of
 
 TROT = {
     "simulation": {"duration": 0.02, "control_timestep": 0.002, "record_timestep": 0.01},
@@ -103,6 +105,17 @@ def test_the_built_in_command_as_a_custom_controller_flies_the_same_flight(layer
     assert own.end.kind == "completed", own.end.cause
     for name in ("position", "attitude", "tilt_angles", "rotor_speeds"):
         assert_same(own[name], ours[name])
+
+
+def test_the_built_in_command_on_an_estimate_is_the_loops():
+    estimated = tiltsim.load_scenario("beyond/estimator", {"simulation.engine": "python"})
+    simulation = tiltsim.Simulation(estimated)
+    simulation.step(4)
+    command = simulation.command()
+    simulation.step()  # with controls from the same sample
+    layout = layout_of(assemble(estimated).loop)
+    ctrl = simulation.data.ctrl[layout.acceleration_1 : layout.further_rates]
+    assert_same(command.rotor_accelerations, np.multiply(estimated.vehicle.spins, ctrl))
 
 
 def test_the_quadrotors_command_is_its_thrusts():

@@ -58,8 +58,6 @@ def run(
         scenario (SCENARIO): take gait and vehicle from a scenario
         list_gaits: list the thesis's gaits and their robustness claims
     """
-    from tiltsim.commands.gait_text import list_text
-
     if list_gaits:
         from tiltsim.commands.gait_text import list_text
         from tiltsim_controllers.analysis.published_gaits import robustness_table

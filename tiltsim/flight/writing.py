@@ -152,5 +152,5 @@ def _foreign(file: Path) -> InputError:
 
 
 def metrics_json(metrics: Mapping[str, Any]) -> str:
-    """Metrics as a flat JSON object in the order of `METRICS`, with all their digits."""
+    """Metrics as a JSON object in the order of `METRICS`, with all their digits."""
     return json.dumps(dict(metrics), indent=2, allow_nan=False) + "\n"

@@ -272,7 +272,7 @@ def rotor_loop(
     """The closed loop of a control law with all vehicles of a layout.
 
     Args:
-        layout: Places of the vehicles.
+        layout: Layout of the vehicles.
         law: The law.
         functions: How the inputs of the law move a vehicle.
     """

@@ -16,7 +16,7 @@ from tiltsim.errors import InputError
 from tiltsim.laws.assembling import assemble
 from tiltsim.laws.layers.actuation import measured, sensor_parameters
 from tiltsim.laws.layers.contact import commanded_force, felt_among, push_of
-from tiltsim.laws.layers.instruments import plant_acceleration_of
+from tiltsim.laws.layers.instruments import instruments_of, plant_acceleration_of
 from tiltsim.laws.layers.on_equations import read_actuators
 from tiltsim.plants.command import Command, Observation, Reference
 from tiltsim.plants.mujoco_plant import MujocoPlant
@@ -118,6 +118,9 @@ def built_in_command(assembly: Assembly, plant: MujocoPlant) -> Command:
             loads = read_actuators(within)[1](ctrl)
             turning = plant_acceleration_of(within)
             qvel = (*qvel, *turning(qpos, qvel, ctrl, loads, layer)[3:])
+        elif hasattr(layer, "control_period"):  # of instruments, whose readings end the controls
+            ctrl = loop.controls(time, qpos, qvel, act, parameters, knots)
+            qvel = (*qvel, *ctrl[len(ctrl) - _readings(assembly.scenario) :])
         elif hasattr(layer, "sensors"):  # of actuation: a record for the number of rotors
             qpos, qvel = measured(time, qpos, qvel, layer.sensors)
         elif hasattr(layer, "timestep"):  # of objects
@@ -130,6 +133,11 @@ def built_in_command(assembly: Assembly, plant: MujocoPlant) -> Command:
     return _command(assembly, loop, _law(assembly).controls(plant.time, qpos, qvel, act))
 
 
+def _readings(scenario: Scenario) -> int:
+    """The number of readings of the instruments, which stand behind the velocities."""
+    return sum(len(each.columns) for each in instruments_of(scenario))
+
+
 class _Law:
     """The controller of a flight without the layers around it."""
 
@@ -137,8 +145,10 @@ class _Law:
         loop, parameters = assembly.loop, assembly.setup.parameters
         while loop.within is not None:
             loop, parameters = loop.within, parameters.inner
-        if assembly.scenario.controller.measures_angular_acceleration:  # behind the velocities
-            loop = replace(loop, sizes=loop.sizes._replace(qvel=loop.sizes.qvel + 3))
+        scenario = assembly.scenario
+        behind = 3 * scenario.controller.measures_angular_acceleration + _readings(scenario)
+        if behind:  # the velocities
+            loop = replace(loop, sizes=loop.sizes._replace(qvel=loop.sizes.qvel + behind))
         self.loop, self.setup = loop, assembly.setup._replace(parameters=parameters)
         bare = replace(assembly, loop=loop, setup=self.setup)
         self._step = control_step(bare, self.setup.userdata.tolist(), "controls")
@@ -166,15 +176,16 @@ class BuiltInController:
         scenario: With a built-in controller.
 
     Raises:
-        InputError: If the controller is a custom one or feeds back a state that is not observed, or
-            its vehicle is no rotorcraft.
+        InputError: If the controller is a custom one, feeds back a state that is not observed or
+            has instruments, or its vehicle is no rotorcraft.
     """
 
     def __init__(self, scenario: Scenario) -> None:
         controller, simulation = scenario.controller, scenario.simulation
         observed = scenario.vehicle.model in PythonController.vehicle_models
         felt = scenario.reference.type != "push" or len(scenario.object) == 1
-        feeds_back = controller.measures_angular_acceleration or not felt
+        measures = controller.measures_angular_acceleration or scenario.sensors.instruments
+        feeds_back = measures or not felt
         if not observed or controller.is_external or feeds_back:
             raise InputError("controller: must be a built-in one that needs observations only")
         self._assembly = assembly = assemble(scenario)

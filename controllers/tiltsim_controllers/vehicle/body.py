@@ -12,8 +12,7 @@ from tiltsim_controllers.mathematics.linear import cross
 from tiltsim_controllers.mathematics.records import Matrix3, Vector3
 from tiltsim_controllers.vehicle.parameters import Vehicle
 
-ROLL, PITCH, P = 6, 7, 9
-"""Places in `BODY_FIELDS`."""
+ROLL, PITCH = 6, 7  # places in `BODY_FIELDS`
 
 ROTORS: Final = (1, 2, 3, 4)
 """Numbers of the rotors of tiltrotor and quadrotor."""
