@@ -281,11 +281,16 @@ def test_a_built_in_controller_commands_on_an_observation_what_it_does_in_its_pl
 
 
 @pytest.mark.parametrize(
-    "controller", [{"angular_acceleration": "measured"}, {"law": "python", "function": "mine"}]
+    "scenario",
+    [
+        {"controller": {"angular_acceleration": "measured"}},
+        {"controller": {"law": "python", "function": "mine"}},
+        "beyond/estimator",
+    ],
 )
-def test_controllers_that_need_more_than_observations_are_refused(controller):
+def test_controllers_that_need_more_than_observations_are_refused(scenario):
     with pytest.raises(InputError, match="needs observations only"):
-        BuiltInController(tiltsim.load_scenario({"controller": controller}))
+        BuiltInController(tiltsim.load_scenario(scenario))
 
 
 # --- pictures ------------------------------------------------------------------------------------

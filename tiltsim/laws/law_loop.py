@@ -304,7 +304,7 @@ def airframe(scenario: Scenario | str | PathLike[str] | Mapping[str, Any]) -> Ai
         scenario: Anything that `tiltsim.load_scenario` takes, of a rotorcraft.
 
     Raises:
-        InputError: If it is not valid, or of no rotorcraft.
+        InputError: If it is not valid, or its vehicle is no rotorcraft.
     """
     loaded = load_scenario(scenario)
     loaded.require_rotorcraft("airframe")

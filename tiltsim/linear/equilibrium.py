@@ -238,7 +238,7 @@ class _Search:
         return root
 
     def _starts(self, near: Floats | None) -> Iterator[Floats]:
-        """States to start from: at rest in continuous time from the start, the initial one."""
+        """States to start from: the initial one first, if it may be at rest in continuous time."""
         initial = self.motion.initial
         if near is not None:
             yield near

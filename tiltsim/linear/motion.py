@@ -76,7 +76,7 @@ class Motion(ABC):
         return assemble(self.scenario, self._as_flown)
 
     def _adapted(self, loop: ClosedLoop) -> ClosedLoop:
-        """A loop without layers whose commands get the offsets, which no trace would see change."""
+        """A loop without layers, with offsets of its commands, whose changes a trace would miss."""
         loop = self._as_flown(loop)
         equations = loop.equations
         if equations is not None:

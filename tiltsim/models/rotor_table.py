@@ -43,7 +43,7 @@ class Multirotor:
 
     @property
     def body(self) -> Body:
-        """The vehicle without its rotors."""
+        """Mass, inertia and gravity of the whole vehicle."""
         return body_of(self.mass, np.reshape(self.inertia, (3, 3)), self.gravity)
 
     @property

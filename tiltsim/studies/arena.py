@@ -161,7 +161,7 @@ def chosen_vehicles(
 ) -> dict[str, Vehicle]:
     """The named vehicles of a league with the named tasks, or all, without vehicles that have none.
 
-    Raises InputError if a vehicle does not exist, or none of them has a task of a name.
+    Raises InputError if a vehicle does not exist, or no chosen one has a task of that name.
     """
     known = vehicles(league)
     _require("vehicles", names, known)

@@ -57,8 +57,8 @@ SIDE_OBSERVER: Final = 0.6
 TORQUE_OBSERVER: Final = 40.0
 """1/s: the fastest observers of torque and of the excess of thrust."""
 OBSERVER_DAMPING: Final = 0.5, 1.0
-"""Damping ratio of the observers of force with noise, of which more would pass more, and without;
-more of it steadies pushes along walls and loads that change from cable to cable."""
+"""Damping ratios of the observers of force: with sensor noise, of which a larger one would pass
+more, and without noise, where it steadies pushes along walls and loads on slack cables."""
 ROUGHNESS: Final = 0.5, 1.4, 2.1
 """How far a disturbance walks in a second: side force and thrust (m/s^2), torque (rad/s^2)."""
 TRACKING: Final = 250.0

@@ -1,6 +1,6 @@
 """Closed loops of the kinds of vehicles in `tiltsim.scenario.kinds`.
 
-All files of this folder are found by themselves; each lists its loops in ``LOOPS``.
+All files of this folder are discovered at import; each lists its loops in ``LOOPS``.
 """
 
 from importlib import import_module

@@ -1,6 +1,6 @@
 """Kinds of vehicles: each file here declares one, with the tables of its vehicle, gaits and laws.
 
-All files of this folder are found by themselves; no other file names what they declare.
+All files of this folder are discovered at import; no other file names their declarations.
 """
 
 import sys
