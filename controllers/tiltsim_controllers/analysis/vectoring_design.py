@@ -194,14 +194,23 @@ def ability(keys: Vectoring, craft: Craft, left: float, *, harmed: bool = False)
     attitude, given = keys.attitude_bandwidth or fastest, keys.position_bandwidth
     cone, sizes = pose_cone(craft, rows, slope), np.square(rows[3:]).sum(axis=1)
     yaw_size = float(2.0 * sizes[2] / sizes[:2].sum())
-    lean = atan(0.6 * _across(craft) / craft.gravity)
+    most = direct = _across(craft)
+    lean = atan(0.6 * most / craft.gravity)
+    lean_time = LEAN[0] / attitude + LEAN[1] * (lean / angular) ** 0.5
+    across, near = min(FASTEST[2], share * attitude, AGILE_POSITION * angular**0.5), 1e-9
+    if cone == pi and (side := slope * craft.gravity) < most:
+        # A lean pays once it shortens a way from rest to rest by more than the time that it takes.
+        across, direct = RISE[0] * attitude, side
+        near = (lean_time / (2.0 * (side**-0.5 - most**-0.5))) ** 2
     return Ability(
         axis=tuple(free_axis(rows).tolist()),
         slope=slope,
         cone=cone,
-        position=given or min(FASTEST[2], share * attitude, AGILE_POSITION * angular**0.5),
+        position=given or across,
         rise=RISE[0] * (given / POSITION_SHARE if given else min(FASTEST[3] / RISE[0], attitude)),
-        lean_time=LEAN[0] / attitude + LEAN[1] * (lean / angular) ** 0.5,
+        direct=direct,
+        near=near,
+        lean_time=lean_time,
         attitude=attitude,
         yaw=min(FASTEST[1], attitude, (yaw_angular / ERROR) ** 0.5),
         angular=angular,

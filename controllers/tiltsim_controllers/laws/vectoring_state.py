@@ -27,6 +27,8 @@ class Ability(NamedTuple):
     cone: float
     position: float
     rise: float
+    direct: float
+    near: float
     lean_time: float
     attitude: float
     yaw: float
@@ -60,6 +62,8 @@ class Parameters(NamedTuple):
     descent: float  # m/s^2, likewise downward
     greatest: float  # m/s^2, of the rotors
     lift: float  # N, the greatest along the axis
+    direct: float  # m/s^2, likewise across, by side force alone
+    near: float  # m, within which side force alone is faster
     lean_time: float  # s, until a braking begins
     attitude: float  # rad/s
     attitude_damping: float

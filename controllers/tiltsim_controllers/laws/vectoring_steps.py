@@ -120,9 +120,14 @@ def demanded(error: Moving, jerk_error: Any, ahead: Moving, frame: Frame, p: Any
         speed = braked(size, stiffness, 0.6 * braking, delay) / size
         return 2.0 * damping * bandwidth * (speed * error[axes] + slope[axes])
 
-    across = feedback(slice(0, 2), p.position, p.damping, p.acceleration, p.lean_time)
+    # Side force alone is faster over a short way than to lean, push and lean back.
+    way = value_of(error)[:2]
+    leans = xp.clip(xp.sqrt(way @ way + TINY) / p.near - 1.0, 0.0, 1.0)
+    push = p.direct + leans * (p.acceleration - p.direct)
+    delay = p.reversal + leans * (p.lean_time - p.reversal)
+    across = feedback(slice(0, 2), p.position, p.damping, push, delay)
     upward = feedback(slice(2, 3), p.rise, p.rise_damping, p.descent, p.reversal)
-    side, rise = _within(across, p.acceleration), _clipped(upward[0], -p.descent, p.ascent)
+    side, rise = _within(across, push), _clipped(upward[0], -p.descent, p.ascent)
     target = ahead + stacked(side[0], side[1], rise) - frame.force
     lift = _clipped(target[2] + frame.gravity, 0.2 * frame.gravity, p.greatest)
     # No more side force than leaves the lift, and no lean beyond 60 degrees.
