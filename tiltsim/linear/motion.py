@@ -13,6 +13,7 @@ from functools import cached_property
 from math import ceil
 from typing import Any, Final
 
+import mujoco
 import numpy as np
 
 from tiltsim.closed_loop.assembly import Assembly, program_key
@@ -23,7 +24,7 @@ from tiltsim.engines.control import control_callback
 from tiltsim.engines.programs import LoopPrograms
 from tiltsim.laws.assembling import assemble
 from tiltsim.linear import coordinates
-from tiltsim.linear.coordinates import Pendulum
+from tiltsim.linear.hanging import Hanging, hung_in
 from tiltsim.models.objects import FORCE
 from tiltsim.plants.mujoco_plant import MujocoPlant
 from tiltsim.plants.plant import EquationsPlant
@@ -35,6 +36,14 @@ from tiltsim_controllers.mathematics.scalar import Floats, Values
 LONG: Final = 1000
 """Steps, from which on a flight is long: worth a thread, and a derivative of fewer evaluations."""
 
+SLACK: Final = 1e-9  # N
+
+RECORDS: Final = "among_state"
+"""Beginning of the names of the largest contact force and the time in contact so far."""
+
+READINGS: Final = 3
+"""Evaluations in which a controller finds the contact force that it makes."""
+
 SETTLING_TIME: Final = 40.0  # s, flown at most to approach an orbit or a rest point
 THREADS: Final = os.cpu_count() or 1
 ROWS_PER_THREAD: Final = 4  # flights of a thread between reports of progress
@@ -44,9 +53,13 @@ class Motion(ABC):
     """A closed loop on its plant.
 
     Attributes:
-        assembly: The flight; its controller adds the offsets to its commands to the vehicle.
+        assembly: The flight; its controllers add the offsets to their commands to the vehicles.
+        vehicles: The flight of each vehicle by the beginning of the names of its columns.
+        aside: Names of coordinates on which nothing depends: turns of what hangs, and records.
+        hung: Objects that hang on cables.
+        prefixes: Beginnings of the names of companions' and objects' coordinates.
         coordinates: Coordinates of its state.
-        inputs: Names of the vehicle's inputs.
+        inputs: Names of the vehicles' inputs.
         offsets: Offsets of the inputs, shape (inputs,); zero unless they are varied.
 
     Args:
@@ -56,14 +69,19 @@ class Motion(ABC):
     """
 
     def __init__(self, scenario: Scenario, engine: EngineName | None, late: bool = False) -> None:
-        scenario.require_alone("linear analysis", loaded=True)
         self.scenario, self.engine, self._late = scenario, engine, late
-        self._commanded: Values = ()
+        self._commanded: list[Values] = []  # of each vehicle
         self._inputs: tuple[coordinates.Input, ...] = ()
         self.offsets = np.zeros(0)
         self.assembly = assemble(scenario, self._adapted)
+        self.vehicles = coordinates.vehicles_of(self.assembly, self._as_flown)
+        self.prefixes = coordinates.prefixes_of(scenario)
+        self.hung = hung_in(scenario)
         self.coordinates, self._inputs = self._names()
         self.inputs = tuple(each.name for each in self._inputs)
+        turning = (name for each in self.hung for name in each.turning)
+        records = (name for name in self.coordinates.names if name.startswith(RECORDS))
+        self.aside = (*turning, *records)
         self.offsets = np.zeros(len(self._inputs))
 
     def _as_flown(self, loop: ClosedLoop) -> ClosedLoop:
@@ -77,11 +95,12 @@ class Motion(ABC):
 
     def _adapted(self, loop: ClosedLoop) -> ClosedLoop:
         """A loop without layers, with offsets of its commands, whose changes a trace would miss."""
-        loop = self._as_flown(loop)
+        loop, number = self._as_flown(loop), len(self._commanded)
+        self._commanded.append(())
         equations = loop.equations
         if equations is not None:
-            equations = replace(equations, inputs=self._with_offsets(equations.inputs))
-        controls = self._with_offsets(loop.controls)
+            equations = replace(equations, inputs=self._with_offsets(equations.inputs, number))
+        controls = self._with_offsets(loop.controls, number)
         return replace(loop, controls=controls, equations=equations, traced=False)
 
     def _evaluated(self, function: Callable[..., Any], **sizes: int) -> Callable[..., Values]:
@@ -108,14 +127,15 @@ class Motion(ABC):
         run = python_function(program, fixed={"user": flown.setup.userdata.tolist()})
         return lambda *given: run(*given, self.offsets.tolist())
 
-    def _with_offsets(self, function: Callable[..., Values]) -> Callable[..., Values]:
+    def _with_offsets(self, function: Callable[..., Values], vehicle: int) -> Callable[..., Values]:
         """A control step that adds the offsets and remembers the commands without them."""
 
         def step(*args: Any) -> Values:
-            self._commanded = function(*args)
-            values = list(self._commanded)
+            self._commanded[vehicle] = function(*args)
+            values = list(self._commanded[vehicle])
             for each, added in zip(self._inputs, self.offsets.tolist(), strict=True):
-                values[each.place] = values[each.place] + added * each.per_unit
+                if each.vehicle == vehicle:
+                    values[each.place] = values[each.place] + added * each.per_unit
             return tuple(values)
 
         return step
@@ -123,11 +143,24 @@ class Motion(ABC):
     def commanded(self, time: float, state: Floats) -> Floats:
         """The inputs that the controller commands, shape (inputs,)."""
         self.observed(time, state)
-        return np.array([self._commanded[each.place] / each.per_unit for each in self._inputs])
+        commanded = ((self._commanded[each.vehicle][each.place], each) for each in self._inputs)
+        return np.array([value / each.per_unit for value, each in commanded])
 
     @abstractmethod
     def _names(self) -> tuple[coordinates.Coordinates, tuple[coordinates.Input, ...]]:
         """The coordinates, and the inputs."""
+
+    def why_not_held(self, time: float, state: Floats) -> str:
+        """Why a state at rest is none of objects on taut cables alone; empty if it is."""
+        return ""
+
+    def placed(self, state: Floats) -> Floats:
+        """The state with the objects that hang where their cables are as long as they are."""
+        return state
+
+    def swings(self, state: Floats) -> Floats:
+        """Angles of the cables and their rates, in the order of ``hung``."""
+        return np.zeros(0)
 
     @property
     @abstractmethod
@@ -241,16 +274,20 @@ class EquationMotion(Motion):
 
 
 class MujocoMotion(Motion):
-    """In MuJoCo; a state is `qpos`, `qvel` and `act`, the angles of a load behind the former."""
-
-    @cached_property
-    def _load(self) -> Pendulum | None:
-        load = self.scenario.payload
-        return None if load is None or load.rigid else Pendulum(load.length, load.attachment)
+    """In MuJoCo; a state is `qpos`, `qvel` and `act`, of hung objects relative to a vehicle."""
 
     def _names(self) -> tuple[coordinates.Coordinates, tuple[coordinates.Input, ...]]:
-        loop = self.assembly.loop
-        return coordinates.mujoco_coordinates(loop), coordinates.control_inputs(self.assembly)
+        found = coordinates.mujoco_coordinates(self.assembly.loop, self.vehicles, self.scenario)
+        inputs = [
+            each._replace(name=prefix + each.name, vehicle=number)
+            for number, (prefix, own) in enumerate(self.vehicles.items())
+            for each in coordinates.control_inputs(own)
+        ]
+        return found, tuple(inputs)
+
+    @cached_property
+    def _hanging(self) -> Hanging:
+        return Hanging(self._varied.model, self.hung)
 
     @cached_property
     def _varied(self) -> MujocoPlant:
@@ -276,39 +313,68 @@ class MujocoMotion(Motion):
 
     def _read(self, whole: Floats) -> Floats:
         """The state of an integration state."""
-        model = self._varied.model
-        qpos, qvel, act = np.split(whole[self._part], (model.nq, model.nq + model.nv))
-        if self._load is not None:
-            qpos, qvel = self._load.angles(qpos, qvel)
-        return np.concatenate((qpos, qvel, act))
+        return self.placed(self._hanging.moved(whole[self._part], self._hanging.of_state, -1.0))
 
     def _split(self, state: Floats) -> list[Floats]:
-        sizes, swing = self.assembly.loop.sizes, 0 if self._load is None else 2
-        return np.split(state, (sizes.qpos + swing, sizes.qpos + sizes.qvel + 2 * swing))
+        model = self._varied.model
+        return np.split(state, (model.nq, model.nq + model.nv))
 
-    def _placed(self, state: Floats, load: Pendulum | None = None) -> list[Floats]:
-        """MuJoCo's `qpos`, `qvel` and `act`, with the load on its cable or on another."""
-        (*motion, act), load = self._split(state), load or self._load
-        return [*(motion if load is None else load.placed(*motion)), act]
+    def _set(self, state: Floats, lengths: Floats | None = None) -> Any:
+        """MuJoCo's data with a state, the objects on cables of given lengths (m) or their own."""
+        data = self._varied.data
+        whole = self._hanging.moved(state, self._hanging.of_state, 1.0)
+        data.qpos[:], data.qvel[:], data.act[:] = self._split(whole)
+        self._hanging.place(data, self._hanging.lengths if lengths is None else lengths)
+        return data
+
+    def placed(self, state: Floats) -> Floats:
+        return self._hanging.moved(self._whole_part(state), self._hanging.of_state, -1.0)
+
+    def _whole_part(self, state: Floats, lengths: Floats | None = None) -> Floats:
+        """MuJoCo's `qpos`, `qvel` and `act` of a state; see `_set`."""
+        data = self._set(state, lengths)
+        return np.concatenate((data.qpos, data.qvel, data.act))
+
+    def swings(self, state: Floats) -> Floats:
+        return self._hanging.swings(self._set(state))
+
+    def why_not_held(self, time: float, state: Floats) -> str:
+        data, tensions, _, _ = self._forward(time, state)
+        touching = self._varied.model.geom_bodyid[data.contact.geom]
+        for name, tension in zip(self._hanging.names, tensions, strict=True):
+            if tension <= SLACK:
+                return f"{name} is slack at rest: let it end, or shorten it"
+        for each, body in zip(self.hung, self._hanging.bodies, strict=True):
+            if body in touching:
+                return f"{each.prefix[:-1]} hangs and touches something at rest; part them"
+        return ""
 
     @cached_property
-    def _stretched(self) -> Pendulum | None:
-        """The load on its cable as stretched after a flight, which is then steady if at rest."""
-        if self._load is None:
+    def _stretched(self) -> Floats | None:
+        """Lengths (m) of stretched cables, after a flight, which is then steady if at rest."""
+        if not self.hung:
             return None
         plant = self._plant
         plant.state = self._whole
         plant.advance(ceil(SETTLING_TIME / self.scenario.simulation.timestep))
-        length = self._load.distance(plant.data.qpos, plant.data.qvel)
-        return self._load if plant.fault() else self._load._replace(length=length)
+        return None if plant.fault() else self._hanging.distances(plant.data)
 
-    def _seen(self, state: Floats, tension: float = 0.0) -> list[list[float]]:
-        """Arguments of the functions of the loop: the vehicle's `qpos` and `qvel`, and `act`."""
-        sizes, (qpos, qvel, act) = self.assembly.loop.sizes, self._placed(state)
-        history = np.zeros(sizes.history)
-        history[FORCE : FORCE + 1] = tension
-        behind = (*act, *qpos[sizes.qpos :], *history)
-        return [qpos[: sizes.qpos].tolist(), qvel[: sizes.qvel].tolist(), [*map(float, behind)]]
+    def _seen(self, readings: Floats) -> list[list[float]]:
+        """Arguments of the functions of the loop: the vehicles' `qpos` and `qvel`, and `act`."""
+        sizes, data = self.assembly.loop.sizes, self._varied.data
+        act = np.concatenate((data.act, data.qpos[sizes.qpos :], readings))
+        return [each.tolist() for each in (data.qpos[: sizes.qpos], data.qvel[: sizes.qvel], act)]
+
+    def _readings(self, tensions: Floats) -> Floats:
+        """The memories of the sensors of contact forces and tensions (N), as of this instant."""
+        model, data = self._varied.model, self._varied.data
+        found = np.zeros(model.nhistory)
+        for sensor in np.flatnonzero(model.sensor_history[:, 0]):
+            first, size = model.sensor_historyadr[sensor] + FORCE, model.sensor_dim[sensor]
+            found[first : first + size] = data.sensordata[model.sensor_adr[sensor] :][:size]
+            if model.sensor_objtype[sensor] == mujoco.mjtObj.mjOBJ_TENDON:
+                found[first] = tensions[self._hanging.tendons == model.sensor_objid[sensor]].sum()
+        return found
 
     @cached_property
     def _all_controls(self) -> Callable[..., Values]:
@@ -317,33 +383,43 @@ class MujocoMotion(Motion):
 
         def controls(setup: Any, time: Any, *parts: Any) -> Any:
             values = loop.controls(time[0], *parts, *setup)
-            return (*values, *self._commanded)
+            return (*values, *(each for own in self._commanded for each in own))
 
         qpos, qvel, act, _, *behind = loop.sizes
         return self._evaluated(controls, time=1, qpos=qpos, qvel=qvel, act=act + sum(behind))
 
-    def _controls(self, time: float, state: Floats) -> Values:
-        values, count = self._all_controls((time,), *self._seen(state)), self._varied.model.nu
-        self._commanded = values[count:]
-        return values[:count]
+    def _controls(self, time: float, readings: Floats) -> Values:
+        values, first = self._all_controls((time,), *self._seen(readings)), self._varied.model.nu
+        for number, own in enumerate(self._commanded):
+            self._commanded[number] = values[first : first + len(own)]
+            first += len(own)
+        return values[: self._varied.model.nu]
 
     def rates(self, time: float, state: Floats) -> Floats:
-        accelerations, _ = self._forward(time, state)
-        return np.concatenate((self._split(state)[1], accelerations, self._varied.data.act_dot))
+        data, _, accelerations, _ = self._forward(time, state)
+        rates = np.concatenate((data.qvel, accelerations, data.act_dot))
+        return self._hanging.moved(rates, self._hanging.of_rates, -1.0)
 
-    def _forward(self, time: float, state: Floats) -> tuple[Floats, float]:
-        """Accelerations of the coordinates, and the tension of a cable, N."""
-        import mujoco
+    def _forward(self, time: float, state: Floats) -> tuple[Any, Floats, Floats, Floats]:
+        """MuJoCo's data, tensions of the cables (N), accelerations, and readings of the sensors.
 
-        model, data = self._varied.model, self._varied.data
-        data.qpos[:], data.qvel[:], data.act[:] = self._placed(state)
-        data.ctrl[:] = self._controls(time, state)
-        limited = model.tendon_limited.copy()
-        model.tendon_limited[:] = 0  # `Pendulum` holds the load instead
-        with control_callback(None):
-            mujoco.mj_forward(model, data)
-        model.tendon_limited[:] = limited
-        return (data.qacc, 0.0) if self._load is None else self._load.accelerations(model, data)
+        A controller reads the contact forces of the last step, in the limit those of this instant.
+        """
+        model, data = self._varied.model, self._set(state)
+        limited, tensions = model.tendon_limited.copy(), np.zeros(len(self._hanging.tendons))
+        data.qacc_warmstart[:] = 0.0
+        readings = np.zeros(model.nhistory)
+        for _ in range(READINGS):
+            data.ctrl[:] = self._controls(time, readings)
+            model.tendon_limited[:] = 0  # `Hanging` holds the objects instead
+            with control_callback(None):
+                mujoco.mj_forward(model, data)
+            model.tendon_limited[:] = limited
+            before, readings = readings, self._readings(tensions)
+            if np.allclose(readings, before, rtol=0.0, atol=1e-12):
+                break
+        accelerations, tensions = self._hanging.hold(data)
+        return data, tensions, accelerations, self._readings(tensions)
 
     def limited(self, state: Floats) -> Floats:
         model, parts = self._varied.model, self._split(state)
@@ -364,7 +440,11 @@ class MujocoMotion(Motion):
     def _whole_at(self, step: int, state: Floats) -> Floats:
         """An integration state after ``step`` physics steps."""
         whole = self._whole.copy()
-        whole[self._part] = np.concatenate(self._placed(state, self._stretched))
+        whole[self._part] = self._whole_part(state, self._stretched)
+        if self.scenario.object:
+            readings = self._forward(step * self.scenario.simulation.timestep, state)[3]
+            memory = whole[self._part.stop :][: len(readings)]
+            memory[readings != 0.0] = readings[readings != 0.0]
         header = whole[self._varied.header_offset :][:HEADER_SIZE]
         header[EVALUATIONS] = step * header[EVALUATIONS_PER_STEP]
         return whole
@@ -387,9 +467,8 @@ class MujocoMotion(Motion):
         return Batch(self._plant.model, ROWS_PER_THREAD * THREADS, THREADS)
 
     def observed(self, time: float, state: Floats) -> Floats:
-        tension = 0.0 if self._load is None else self._forward(time, state)[1]
-        controls = self._controls(time, state)
-        return np.array(self.assembly.loop.observe(*self._seen(state, tension), controls))
+        data, _, _, readings = self._forward(time, state)
+        return np.array(self.assembly.loop.observe(*self._seen(readings), data.ctrl.tolist()))
 
 
 def make_motion(scenario: Scenario, engine: EngineName | None = None, late: bool = False) -> Motion:
