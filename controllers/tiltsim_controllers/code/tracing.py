@@ -46,7 +46,10 @@ class Expr:
         )
 
     def __float__(self) -> NoReturn:
-        refuse("a traced number has no value yet", "use xp.sin instead of math.sin")
+        refuse(
+            "a traced number has no value yet",
+            "write xp.sin instead of math.sin, and xp.array of all entries instead of a[0] = b",
+        )
 
     def __index__(self) -> NoReturn:
         refuse("a traced number is no index", "write take(values, index)")
