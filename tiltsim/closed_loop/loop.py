@@ -174,6 +174,9 @@ class ClosedLoop:
     within: ClosedLoop | None = None
     """The loop that a layer of `tiltsim.laws.layers` goes around; None for a controller itself,
     its supervisor and allocation included."""
+    sees: Callable[..., Any] = lambda _time, qpos, qvel, act, *_: (qpos, qvel, act)
+    """Function ``(time, qpos, qvel, act, parameters, knots) -> qpos, qvel, act`` that the loop
+    ``within`` sees."""
     with_latency: Callable[[], ClosedLoop] | None = None
     """The controller as it flies with a latency of its commands; None if it is the same."""
     traced: bool = True  # whether the controller can be traced; else it runs as plain Python

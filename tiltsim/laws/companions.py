@@ -196,6 +196,10 @@ class Several:
         wrenches = [xp.hstack([z * force, xp.zeros(3)]) for z, force in zip(up, forces)]
         return xp.hstack([part for both in zip(controls, wrenches) for part in both])
 
+    def sees(self, _time: Any, qpos: Any, qvel: Any, act: Any, *_setup: Any) -> Any:
+        """See `ClosedLoop`; the first vehicle also sees what lies behind all activations."""
+        return next(self._states(qpos, qvel, act))
+
     def observe(self, qpos: Any, qvel: Any, act: Any, ctrl: Any) -> Any:
         """See `ClosedLoop`."""
         found = zip(self._loops, self._states(qpos, qvel, act), self._controls_of(ctrl))
@@ -331,5 +335,6 @@ class Several:
             observe_reads_controls=any(loop.observe_reads_controls for loop in self._loops),
             equations=None,
             within=first,  # for its controller
+            sees=self.sees,
             traced=all(loop.is_traceable for loop in self._loops),
         )

@@ -16,8 +16,7 @@ from tiltsim.errors import InputError
 from tiltsim.laws.assembling import assemble
 from tiltsim.laws.layers.actuation import measured, sensor_parameters
 from tiltsim.laws.layers.contact import commanded_force, felt_among, push_of
-from tiltsim.laws.layers.instruments import instruments_of, plant_acceleration_of
-from tiltsim.laws.layers.on_equations import read_actuators
+from tiltsim.laws.layers.instruments import instruments_of
 from tiltsim.plants.command import Command, Observation, Reference
 from tiltsim.plants.mujoco_plant import MujocoPlant
 from tiltsim.scenario.controller import PythonController
@@ -108,28 +107,10 @@ def built_in_command(assembly: Assembly, plant: MujocoPlant) -> Command:
     """
     loop, parameters, knots = assembly.loop, assembly.setup.parameters, assembly.setup.knots
     time, data = plant.evaluation_time, plant.data
-    qpos: Sequence[float]
-    qvel: Sequence[float]
     qpos, qvel, act = vectors_of(loop, data).joined()
     while loop.within is not None:
-        layer, within, inner = parameters.layer, loop.within, parameters.inner
-        if hasattr(layer, "pod_inertias"):  # of measured acceleration: a record for the model
-            ctrl = within.controls(time, qpos, (*qvel, 0.0, 0.0, 0.0), act, inner, knots)
-            loads = read_actuators(within)[1](ctrl)
-            turning = plant_acceleration_of(within)
-            qvel = (*qvel, *turning(qpos, qvel, ctrl, loads, layer)[3:])
-        elif hasattr(layer, "control_period"):  # of instruments, whose readings end the controls
-            ctrl = loop.controls(time, qpos, qvel, act, parameters, knots)
-            qvel = (*qvel, *ctrl[len(ctrl) - _readings(assembly.scenario) :])
-        elif hasattr(layer, "sensors"):  # of actuation: a record for the number of rotors
-            qpos, qvel = measured(time, qpos, qvel, layer.sensors)
-        elif hasattr(layer, "timestep"):  # of objects
-            felt = felt_among(others_of(assembly.scenario))(qpos, act, layer.attachment)
-            act = [*act[: within.sizes.act], *felt]
-        elif hasattr(layer, "downwash"):  # of companions, whose state follows this vehicle's
-            own, behind = within.sizes, act[loop.sizes.act :]
-            qpos, qvel, act = qpos[: own.qpos], qvel[: own.qvel], [*act[: own.act], *behind]
-        loop, parameters = within, inner
+        qpos, qvel, act = loop.sees(time, qpos, qvel, act, parameters, knots)
+        loop, parameters = loop.within, parameters.inner
     return _command(assembly, loop, _law(assembly).controls(plant.time, qpos, qvel, act))
 
 

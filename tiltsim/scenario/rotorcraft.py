@@ -24,9 +24,6 @@ from tiltsim_controllers.mathematics.scalar import Values
 from tiltsim_controllers.vehicle.parameters import Vehicle
 from tiltsim_controllers.vehicle.rotors import Rotor
 
-ROTORCRAFT: Final = ("tiltrotor", "quadrotor", "multirotor")
-"""The models of all vehicles that fly."""
-
 SPATIAL_KEYS: Final = ("position", "velocity", "acceleration", "amplitude")
 """Keys of references that hold a vector in the world."""
 

@@ -14,7 +14,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup
-from tiltsim.laws.layers.layer import Layer, Samples, wrap_loop
+from tiltsim.laws.layers.layer import Layer, PlantState, Samples, wrap_loop
 from tiltsim.models.cables import CABLE_READING
 from tiltsim.models.objects import COORDINATES, FORCE
 from tiltsim.models.parts import ExtraActuators
@@ -89,9 +89,8 @@ def with_force_loop(loop: ClosedLoop) -> ClosedLoop:
     """
     first = loop.sizes.act
 
-    def controls(
-        within: Any, time: Any, qpos: Any, qvel: Any, act: Any, own: Any, knots: Any
-    ) -> Any:
+    def controls(within: Any, time: Any, state: PlantState, own: Any, knots: Any) -> Any:
+        qpos, _, act = state
         direction, commanded = xp.array(own.push.direction), commanded_force(time, own.push)
         filtered, integral = act[first], act[first + 1]
         error = commanded - filtered
@@ -99,7 +98,7 @@ def with_force_loop(loop: ClosedLoop) -> ClosedLoop:
         place = qpos[:3] - force / own.stiffness * direction
         measured = act[FELT.push_force] @ direction
         rates = xp.hstack([FILTER * (measured - filtered), own.gain * error])
-        return xp.hstack([within(xp.hstack([place, qpos[3:]]), qvel, act), rates])
+        return xp.hstack([within(state._replace(qpos=xp.hstack([place, qpos[3:]]))), rates])
 
     layer = Layer(
         ForceLoop,
@@ -120,9 +119,8 @@ def with_impedance(loop: ClosedLoop) -> ClosedLoop:
     """
     first = loop.sizes.act
 
-    def controls(
-        within: Any, time: Any, qpos: Any, qvel: Any, act: Any, own: Any, knots: Any
-    ) -> Any:
+    def controls(within: Any, time: Any, state: PlantState, own: Any, knots: Any) -> Any:
+        qpos, qvel, act = state
         direction, commanded = xp.array(own.push.direction), commanded_force(time, own.push)
         filtered, shift, speed = act[first], act[first + 1], act[first + 2]
         along = shift + own.ahead * commanded
@@ -130,7 +128,8 @@ def with_impedance(loop: ClosedLoop) -> ClosedLoop:
         moving = xp.hstack([qvel[:3] - speed * direction, qvel[3:]])
         force = commanded - filtered - own.damping * speed - own.stiffness * shift
         following = FILTER * (act[FELT.push_force] @ direction - filtered)
-        return xp.hstack([within(place, moving, act), following, speed, force / own.mass])
+        ctrl = within(PlantState(place, moving, act))
+        return xp.hstack([ctrl, following, speed, force / own.mass])
 
     layer = Layer(
         Impedance,
@@ -178,16 +177,17 @@ def with_objects(loop: ClosedLoop, others: Others) -> ClosedLoop:
     accumulated, observed = _accumulated(others, size, readings), _observed(others, size, readings)
     felt = felt_among(others)
 
-    def seen(qpos: Any, act: Any, own: Among) -> Any:
+    def act_seen(qpos: Any, act: Any, own: Among) -> Any:
         return xp.hstack([act[:size], felt(qpos, act, own.attachment)])
 
-    def controls(
-        within: Any, time: Any, qpos: Any, qvel: Any, act: Any, own: Any, knots: Any
-    ) -> Any:
-        return xp.hstack([within(qpos, qvel, seen(qpos, act, own)), accumulated(act, own)])
+    def sees(_within: Any, _time: Any, state: PlantState, own: Among) -> PlantState:
+        return state._replace(act=act_seen(state.qpos, state.act, own))
+
+    def adds(_time: Any, _qpos: Any, _qvel: Any, act: Any, _ctrl: Any, own: Among) -> Any:
+        return accumulated(act, own)
 
     def hold(within: Any, time: Any, qpos: Any, act: Any, ctrl: Any, own: Any) -> Any:
-        return xp.hstack([within(seen(qpos, act, own)), accumulated(act, own)])
+        return xp.hstack([within(act_seen(qpos, act, own)), accumulated(act, own)])
 
     @traceable
     def observe(qpos: Any, qvel: Any, act: Any, ctrl: Any) -> Any:
@@ -196,7 +196,8 @@ def with_objects(loop: ClosedLoop, others: Others) -> ClosedLoop:
     layer = Layer(
         Among,
         _among,
-        controls=controls,
+        sees=sees,
+        adds=adds,
         hold=hold,
         actuators=ExtraActuators(states=states),
         units={

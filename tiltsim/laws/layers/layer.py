@@ -6,7 +6,7 @@ within. `wrap_loop` is the one place where that is put together.
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Equations
 from tiltsim.models.parts import ExtraActuators
@@ -18,20 +18,29 @@ from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector
 Samples = Mapping[str, Floats]
 
 
+class PlantState(NamedTuple):
+    """MuJoCo's vectors as a loop sees them."""
+
+    qpos: Any
+    qvel: Any
+    act: Any
+
+
 @dataclass(frozen=True, eq=False)
 class Layer:
     """The parts of a layer, which it adds to a closed loop or replaces in it.
 
     Where a function is None, the loop within goes on unchanged. Functions have the layer's own
-    parameters as ``own``, and the loop within as a function ``within(qpos, qvel, act) -> ctrl``,
-    or ``within(act)`` between samples.
+    parameters as ``own``, and the loop within as a function ``within(state) -> ctrl`` of a
+    `PlantState`, or ``within(act)`` between samples.
     """
 
     parameters: type[tuple[Any, ...]]  # the type of the layer's parameters
     read: Callable[[FlightPlan], Any]  # ``(plan) -> parameters``
+    sees: Callable[..., PlantState] | None = None
+    """Traceable function ``(within, time, state, own) -> state`` that the loop within sees."""
     controls: Callable[..., Values] | None = None
-    """Traceable function ``(within, time, qpos, qvel, act, own, knots) -> ctrl``; see
-    `ClosedLoop`."""
+    """Traceable function ``(within, time, state, own, knots) -> ctrl``; see `ClosedLoop`."""
     hold: Callable[..., Values] | None = None
     """Traceable function ``(within, time, qpos, act, ctrl, own) -> ctrl``, likewise."""
     adds: Callable[..., Values] | None = None
@@ -114,15 +123,23 @@ def _functions_within(inner: ClosedLoop, layer: Layer, first: int) -> dict[str, 
     end = act_size + len(layer.fields)
     adds = layer.adds or (lambda *_: xp.zeros(0))
 
+    def within_at(time: Any, parameters: Any, knots: Any) -> Callable[[PlantState], Any]:
+        return lambda state: inner.controls(time, *state, parameters.inner, knots)
+
+    @traceable
+    def sees(time: Any, qpos: Any, qvel: Any, act: Any, parameters: Any, knots: Any) -> Any:
+        state = PlantState(qpos, qvel, act)
+        if layer.sees is None:
+            return state
+        return layer.sees(within_at(time, parameters, knots), time, state, parameters.layer)
+
     @traceable
     def controls(time: Any, qpos: Any, qvel: Any, act: Any, parameters: Any, knots: Any) -> Any:
-        def within(qpos: Any, qvel: Any, act: Any) -> Any:
-            return inner.controls(time, qpos, qvel, act, parameters.inner, knots)
-
+        within, own = within_at(time, parameters, knots), parameters.layer
         if layer.controls:
-            return layer.controls(within, time, qpos, qvel, act, parameters.layer, knots)
-        ctrl = within(qpos, qvel, act)
-        return xp.hstack([ctrl, adds(time, qpos, qvel, act, ctrl, parameters.layer)])
+            return layer.controls(within, time, PlantState(qpos, qvel, act), own, knots)
+        ctrl = within(sees(time, qpos, qvel, act, parameters, knots))
+        return xp.hstack([ctrl, adds(time, qpos, qvel, act, ctrl, own)])
 
     @traceable
     def hold(time: Any, qpos: Any, qvel: Any, act: Any, ctrl: Any, parameters: Any) -> Any:
@@ -147,6 +164,7 @@ def _functions_within(inner: ClosedLoop, layer: Layer, first: int) -> dict[str, 
         return inner.sign_check_values(time, values, parameters.inner, knots)
 
     return {
+        "sees": sees,
         "controls": controls,
         "hold": hold,
         "observe": observe,

@@ -7,7 +7,7 @@ from math import sqrt
 from typing import Any, Final, NamedTuple
 
 from tiltsim.closed_loop.loop import ClosedLoop
-from tiltsim.laws.layers.layer import Layer, wrap_loop
+from tiltsim.laws.layers.layer import Layer, PlantState, wrap_loop
 from tiltsim.scenario.scenario import FlightPlan
 from tiltsim.vehicles.rotorcraft.others import FELT
 from tiltsim_controllers.code.arrays import xp
@@ -66,9 +66,8 @@ def with_swing_damping(loop: ClosedLoop) -> ClosedLoop:
     """
     sizes, first = loop.sizes, loop.sizes.act
 
-    def controls(
-        within: Any, time: Any, qpos: Any, qvel: Any, act: Any, own: Any, knots: Any
-    ) -> Any:
+    def controls(within: Any, time: Any, state: PlantState, own: Any, knots: Any) -> Any:
+        qpos, qvel, act = state
         shift, filtered = act[first : first + 2], act[first + 2 : first + 4]
         hanging_back = reference_motion(time, own.reference, knots)[2][:2] / own.gravity
         displacement = own.length * (act[FELT.swing] + hanging_back)
@@ -80,7 +79,7 @@ def with_swing_damping(loop: ClosedLoop) -> ClosedLoop:
             seen = act
             qpos = xp.hstack([qpos[:2] - shift, qpos[2:]])
             qvel = xp.hstack([qvel[:2] - rate, qvel[2:]])
-        return xp.hstack([within(qpos, qvel, seen), rate, following])
+        return xp.hstack([within(PlantState(qpos, qvel, seen)), rate, following])
 
     layer = Layer(
         SwingDamping,
