@@ -167,7 +167,7 @@ class ClosedLoop:
     are then idle."""
     equations: Equations | None = None
     """This controller on the thesis's equations; None where it is supported in MuJoCo only or,
-    inside a layer, by `tiltsim.laws.layers.on_equations`."""
+    inside a layer, by `tiltsim.laws.layers.layer`."""
     follows_position: Callable[[Scenario], bool] = lambda _scenario: True
     """Whether a scenario has the controller follow the reference's horizontal position."""
     uses_gait: bool = True  # whether the scenario's gait has a part in the flight

@@ -17,12 +17,11 @@ from typing import Any, Final
 import numpy as np
 
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup
+from tiltsim.laws.law import servo_lead
 from tiltsim.laws.layers.layer import Layer, PlantState, Samples, wrap_loop
-from tiltsim.laws.vehicle_loop import servo_lead
 from tiltsim.models.parts import ExtraActuators
 from tiltsim.scenario.scenario import FlightPlan, Scenario
-from tiltsim.vehicles.rotorcraft import initial_tilts
-from tiltsim.vehicles.rotorcraft.layout import QW, TILT_1, layout_of
+from tiltsim.vehicles.rotorcraft import QW, TILT_1, initial_tilts, layout_of
 from tiltsim_controllers.code.arrays import traceable, xp
 from tiltsim_controllers.mathematics.records import make_record_type
 from tiltsim_controllers.mathematics.scalar import Floats, Vector

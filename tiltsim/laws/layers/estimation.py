@@ -13,13 +13,13 @@ from typing import Any, Final, NamedTuple, get_type_hints
 import numpy as np
 
 from tiltsim.closed_loop.loop import ClosedLoop
+from tiltsim.laws.law import parts
 from tiltsim.laws.layers.actuation import along_line
 from tiltsim.laws.layers.instruments import Instrument
 from tiltsim.laws.layers.layer import Layer, PlantState, wrap_loop
-from tiltsim.laws.vehicle_loop import parts
 from tiltsim.models.parts import ExtraActuators
 from tiltsim.scenario.scenario import FlightPlan
-from tiltsim.vehicles.rotorcraft.layout import QW, TILT_1, TILT_RATE_1
+from tiltsim.vehicles.rotorcraft import QW, TILT_1, TILT_RATE_1
 from tiltsim_controllers.code.arrays import branch, normal, xp
 from tiltsim_controllers.laws import estimator as filters
 from tiltsim_controllers.laws.estimator import Estimate, ImuNoise, Outcome, Reading

@@ -19,17 +19,16 @@ import numpy as np
 
 from tiltsim.closed_loop.loop import ClosedLoop
 from tiltsim.equations.actuator_level import mechanics, mechanics_record, servo_accelerations
-from tiltsim.laws.layers.layer import Layer, PlantState, wrap_loop
-from tiltsim.laws.layers.on_equations import read_actuators
+from tiltsim.laws.layers.layer import Layer, PlantState, read_actuators, wrap_loop
 from tiltsim.models.parts import ExtraActuators
 from tiltsim.scenario.scenario import FlightPlan, Scenario
-from tiltsim.vehicles.rotorcraft import rotor_limits
-from tiltsim.vehicles.rotorcraft.layout import (
+from tiltsim.vehicles.rotorcraft import (
     QW,
     TILT_1,
     TILT_RATE_1,
     body_less,
     layout_of,
+    rotor_limits,
     rotors_record,
     tilt_of_rotor,
 )
