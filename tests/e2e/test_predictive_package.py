@@ -77,7 +77,7 @@ def test_rotors_climb_within_limits_and_tilts_push_aside(package):
 
 
 @pytest.mark.slow
-def test_its_wheel_flies_a_step_within_the_limits(tmp_path):
+def test_the_installed_wheel_flies_a_step_within_the_limits(tmp_path):
     """From rest to 0.99 m away; with a plan that is not improved, the vehicles would stay."""
     installed("predictive_package", tmp_path)
     done = run(tmp_path, "-c", FLIGHTS)
