@@ -323,7 +323,7 @@ def misspelt(observed):
     [
         (three_thrusts, r"the law returned thrusts of shape \(3,\); expected shape \(4,\)"),
         (no_numbers, "returned thrusts = .*; expected 4 numbers"),
-        (no_command, r"returned array\(.*; a tiltsim.Command, as in tiltsim.Command\(thrusts="),
+        (no_command, r"returned array\(.*; expected .*, as in tiltsim.Command\(thrusts="),
         (nothing_for_rotors, "returned nothing for the rotors; expected one of thrusts"),
         (of_two, "TypeError: .*missing 1 required positional argument"),
         (tilting, "returned tilt_angles; needs controller.tilts = free"),
