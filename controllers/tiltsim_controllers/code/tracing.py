@@ -47,8 +47,7 @@ class Expr:
 
     def __float__(self) -> NoReturn:
         refuse(
-            "a traced number has no value yet",
-            "write xp.sin instead of math.sin, and xp.array of all entries instead of a[0] = b",
+            "a traced number has no value yet", "write xp.sin, not math.sin; xp.array, not a[0] = b"
         )
 
     def __index__(self) -> NoReturn:
