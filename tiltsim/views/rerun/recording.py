@@ -3,6 +3,7 @@
 import hashlib
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import cycle
 from pathlib import Path
 from typing import Final
 
@@ -11,7 +12,8 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from tiltsim.closed_loop.assembly import Assembly
-from tiltsim.flight.flight import Flight
+from tiltsim.flight.flight import Flight, vehicle_assemblies, vehicles_named
+from tiltsim.flight.metrics import End
 from tiltsim.system.files import replacing
 from tiltsim.system.text import Quantity
 from tiltsim.views.attitude_plane import MOVING_TRAIL_TIME, curve_is_constant
@@ -26,9 +28,9 @@ from tiltsim.views.replay import (
 )
 from tiltsim.views.rerun import require_rerun
 from tiltsim.views.rerun.flight_recorder import BOUND, FlightRecorder, plotted_lines
-from tiltsim.views.rerun.scene import REFERENCE_POINTS, ground_height
+from tiltsim.views.rerun.scene import REFERENCE_POINTS, Scene, ground_height
 from tiltsim.views.rerun.timeline import FLIGHTS, TIMELINE
-from tiltsim.views.signals import Signals, range_of
+from tiltsim.views.signals import OF_WORLD, Signals, range_of
 from tiltsim.views.titles import common_title, flight_names
 from tiltsim_controllers.mathematics.scalar import Floats
 
@@ -43,6 +45,7 @@ OVERVIEW: Final = 1.35  # distance of the overview camera, in lengths of the sce
 LETTER: Final = 0.0155  # width of a letter of a legend, as a share of a plot
 MAX_LEGEND: Final = 0.34  # share of a plot before the flight, where legends cover no curve
 MAIN: Final = "Main signals"
+TOGETHER: Final = "All vehicles"
 AFTER: Final = 0.06  # time after the flight, as a share of it, for the label of its end
 EDGE: Final = 0.06  # of a range, beyond either end, for the labels there
 AROUND: Final = 2.2  # height of a plot beside its legend, in lines of the legend
@@ -59,8 +62,9 @@ def flight_blueprint(
         flights: Flights whose values set the ranges of the axes; without them, the viewer does.
         live: Whether the viewer follows the latest time instead of playing from the start.
     """
-    trajectory, events = _trajectory_view(recorders, flights), _events_view()
-    vehicles = [_vehicle_view(one) for one in recorders]
+    scenes = [(one, one.scene) for one in recorders if one.scene is not None]
+    trajectory, events = _trajectory_view(scenes, recorders, flights), _events_view()
+    vehicles = [_vehicle_view(*one, alone=len(scenes) == 1) for one in scenes]
     planes = [_plane_view(one) for one in recorders if one.plane is not None]
     below = rrb.Horizontal(trajectory, events, column_shares=[4, 5])
     if len(recorders) > 1:
@@ -90,39 +94,43 @@ def _end_of(recorders: Sequence[FlightRecorder], flights: Sequence[Flight]) -> f
     return max((float(flight["time"][-1]) for flight in flights), default=planned)
 
 
-def _vehicle_view(one: FlightRecorder) -> rrb.View:
+def _vehicle_view(one: FlightRecorder, scene: Scene, *, alone: bool) -> rrb.View:
     """The vehicle at close range; the camera moves with it but does not rotate."""
-    radius = seen_radius(one.scenario, one.model)
-    arrows = f"thrust arrows: {100.0 * thrust_scale(one.model):g} cm per newton"
+    radius = seen_radius(one.scenario, scene.model)
+    arrows = f"thrust arrows: {100.0 * thrust_scale(scene.model):g} cm per newton"
     pose = camera_of(one.scenario)
     eye = NEARER * radius * pose.distance * pose.away
     return rrb.Spatial3DView(
-        origin=one.scene.camera,
-        contents=[f"{one.scene.root}/**"],
-        name=one.name or f"Vehicle ({arrows})",
+        origin=scene.camera,
+        contents=[f"{scene.root}/**"],
+        name=f"Vehicle{'s' * bool(one.name)} ({arrows})" if alone else one.name,
         eye_controls=_eye(eye, np.array([0.0, 0.0, 0.1 * radius])),
         background=BACKGROUND,
         line_grid=False,
-        overrides=_trails([one]),
+        overrides=_trails([scene]),
     )
 
 
-def _trajectory_view(recorders: Sequence[FlightRecorder], flights: Sequence[Flight]) -> rrb.View:
+def _trajectory_view(
+    scenes: Sequence[tuple[FlightRecorder, Scene]],
+    recorders: Sequence[FlightRecorder],
+    flights: Sequence[Flight],
+) -> rrb.View:
     """The complete paths of all vehicles and references."""
     contents = []
-    for one in recorders:
-        contents += [*one.scene.trails, f"{one.scene.root}/reference/**"]
-        contents += [f"{one.scene.root}/{each.name}_vehicle/**" for each in one.scenario.companion]
-        contents += [f"{one.scene.vehicle}/**", f"{one.scene.camera}/**"]
-    first = recorders[0]
+    for one, scene in scenes:
+        contents += [*scene.trails, f"{scene.root}/reference/**"]
+        contents += [f"{scene.root}/{each.name}_vehicle/**" for each in one.scenario.companion]
+        contents += [f"{scene.vehicle}/**", f"{scene.camera}/**"]
+    first, scene = scenes[0]
     paths = [reference_path(first.assembly, _end_of(recorders, flights), REFERENCE_POINTS)]
     tracks = [positions(f.columns, p) for f in flights for p in prefixes(f.scenario)]
     known = np.concatenate([*paths, *tracks])
     low, high = np.quantile(known, 0.02, axis=0), np.quantile(known, 0.98, axis=0)
-    size = max(float((high - low).max()), 6.0 * vehicle_radius(first.model))
+    size = max(float((high - low).max()), 6.0 * vehicle_radius(scene.model))
     middle, above = 0.5 * (low + high), np.array([0.0, 0.0, 1.0])
     away = above if first.scenario.vehicle.is_planar else camera_of(first.scenario).away
-    plane = rr.encodings.Plane3D(normal=(0.0, 0.0, 1.0), distance=ground_height(first.model))
+    plane = rr.encodings.Plane3D(normal=(0.0, 0.0, 1.0), distance=ground_height(scene.model))
     return rrb.Spatial3DView(
         origin="world",
         contents=contents,
@@ -130,7 +138,7 @@ def _trajectory_view(recorders: Sequence[FlightRecorder], flights: Sequence[Flig
         eye_controls=_eye(middle + OVERVIEW * size * away, middle),
         background=BACKGROUND,
         line_grid=rrb.LineGrid3D(visible=True, spacing=1.0, plane=plane),
-        overrides=_trails(recorders),
+        overrides=_trails([scene for _, scene in scenes]),
     )
 
 
@@ -172,27 +180,46 @@ def _events_view() -> rrb.View:
 
 
 def _plots(recorders: Sequence[FlightRecorder], flights: Sequence[Flight]) -> rrb.Container:
-    """The plots of the time series; for several flights, of the compared signals.
+    """The plots of the time series; for several flights or vehicles, of the compared signals.
 
-    Only the first plot of a comparison has a legend: colors are the same in all plots.
+    Only the first plot of a comparison has a legend: colors are the same in all plots. Vehicles
+    that fly together have tabs of their own behind it.
     """
-    signals = recorders[0].signals.values()
-    labels = [line.labels[0] for each in signals if each.plotted for line in plotted_lines(each)]
-    labels = [one.name for one in recorders] if len(recorders) > 1 else labels
-    share = min(MAX_LEGEND, 0.08 + LETTER * max(map(len, labels)))
+    if len(recorders) == 1:
+        return rrb.Tabs(*_tabs(recorders[0], flights, _end_of(recorders, flights)))
     end = _end_of(recorders, flights)
-    times = -share / (1.0 - share) * end, (1.0 + AFTER) * end
-    if len(recorders) > 1:
-        return rrb.Vertical(*_compared(recorders, flights, times))
+    compared = _compared(recorders, flights, _times([one.name for one in recorders], end))
+    if not recorders[0].details:
+        return rrb.Vertical(*compared)
+    own: list[list[Flight]] = [[flight] for flight in flights] or [[] for _ in recorders]
+    alone = zip(recorders, own, strict=True)
+    tabs = (rrb.Tabs(*_tabs(one, shown, end), name=one.name) for one, shown in alone)
+    return rrb.Tabs(rrb.Vertical(*compared, name=TOGETHER), *tabs)
+
+
+def _times(labels: Sequence[str], end: float) -> tuple[float, float]:
+    """The times (s) that plots show: before the flight, their legend has its place."""
+    share = min(MAX_LEGEND, 0.08 + LETTER * max(map(len, labels)))
+    return -share / (1.0 - share) * end, (1.0 + AFTER) * end
+
+
+def _tabs(
+    one: FlightRecorder, flights: Sequence[Flight], end: float
+) -> tuple[rrb.Container, rrb.Container]:
+    """The plots of one vehicle: its main signals, and all others."""
+    signals, root = one.signals.values(), one.details
+    lines = {each.name: plotted_lines(each, root) for each in signals}
+    labels = [line.labels[0] for each in signals if each.plotted for line in lines[each.name]]
+    times = _times(labels, end)
 
     def plot(panel: Signals, title: str, *, legend: bool = False) -> rrb.View:
         limits = range_of([(panel, flight) for flight in flights]) if flights else None
-        return _plot(title, [f"{panel.path}/**"], limits, times, legend=legend)
+        return _plot(title, [f"{root}{panel.path}/**"], limits, times, legend=legend)
 
     rows: list[rrb.View | rrb.Container] = []
     heights, bare, others = [], [], []
     for each in signals:
-        entries = {text for line in plotted_lines(each) for text in line.labels}
+        entries = {text for line in lines[each.name] for text in line.labels}
         if not each.plotted:
             others.append(plot(each, each.text, legend=len(entries) > 1))
         elif len(entries) < 2:
@@ -206,10 +233,9 @@ def _plots(recorders: Sequence[FlightRecorder], flights: Sequence[Flight]) -> rr
             heights.append(AROUND + len(entries) + len(each.levels))
             bare = []
     rows += [plot(each, each.text) for each in bare]
-    return rrb.Tabs(
-        rrb.Vertical(*rows, row_shares=[*heights, *[4.0] * len(bare)], name=MAIN),
-        rrb.Grid(*others, grid_columns=2, name="All other signals"),
-    )
+    shares = [*heights, *[4.0] * len(bare)]
+    main = rrb.Vertical(*rows, row_shares=shares, name=MAIN)
+    return main, rrb.Grid(*others, grid_columns=2, name="All other signals")
 
 
 def _compared(
@@ -229,6 +255,11 @@ def _compared(
         shown = [(panel, flights[number]) for number, panel in panels.items() if flights]
         limits = range_of(shown) if shown else None
         yield _plot(first.text, paths, limits, times, legend=place == 0)
+    one, world = recorders[0], flights[:1]
+    for panel in one.signals.values():
+        if one.details and panel.name in OF_WORLD:
+            limits = range_of([(panel, flight) for flight in world]) if world else None
+            yield _plot(panel.text, [f"{one.details}{panel.path}/**"], limits, times)
 
 
 def _plot(
@@ -251,8 +282,8 @@ def _plot(
     )
 
 
-def _trails(recorders: Sequence[FlightRecorder]) -> dict[str, rrb.VisibleTimeRanges]:
-    return {trail: _from_the_start() for one in recorders for trail in one.scene.trails}
+def _trails(scenes: Sequence[Scene]) -> dict[str, rrb.VisibleTimeRanges]:
+    return {trail: _from_the_start() for scene in scenes for trail in scene.trails}
 
 
 def _from_the_start() -> rrb.VisibleTimeRanges:
@@ -273,6 +304,7 @@ class Recording:
     Args:
         assemblies: One per flight.
         names: Names of several flights, by default `flight_names`.
+        vehicle: The one that the flights are of, if others flew with it.
         salt: Distinguishes recordings of equal scenarios, which the viewer would merge.
         batching: When Rerun flushes rows; None for its default.
 
@@ -284,41 +316,67 @@ class Recording:
         self,
         assemblies: Sequence[Assembly],
         names: Sequence[str] = (),
+        vehicle: str = "",
         *,
         salt: str = "",
         batching: rr.ChunkBatcherConfig | None = None,
     ) -> None:
         require_rerun()
         scenarios = [assembly.scenario for assembly in assemblies]
-        content = "\n".join([*(scenario.model_dump_json() for scenario in scenarios), *names, salt])
+        texts = (scenario.model_dump_json() for scenario in scenarios)
+        content = "\n".join([*texts, *names, *filter(None, [vehicle]), salt])
         name = f"{APPLICATION}-{hashlib.sha256(content.encode()).hexdigest()[:16]}"
         options = {"send_properties": False, "batcher_config": batching}
         self.stream = rr.RecordingStream(APPLICATION, recording_id=name, **options)
         self.stream.set_log_time_enabled(False)
         names = (names or flight_names(scenarios)) if len(scenarios) > 1 else [""]
-        title = ": ".join(filter(None, (common_title(scenarios), " / ".join(names))))
+        title = ": ".join(filter(None, (common_title(scenarios), " / ".join(names), vehicle)))
         self.stream.send_recording_name(title or scenarios[0].address or "flight")
-        self.recorders = [
-            FlightRecorder(self.stream, assembly, name, FLIGHTS[index % len(FLIGHTS)], index == 0)
-            for index, (assembly, name) in enumerate(zip(assemblies, names, strict=True))
-        ]
+        self._together, several = False, dict(zip(names, assemblies, strict=True))
+        if len(assemblies) == 1 and scenarios[0].companion and not vehicle:
+            self._together, several = True, vehicle_assemblies(assemblies[0])
+        self.recorders = []
+        for number, (name, assembly) in enumerate(several.items()):
+            count = 1 + len(assembly.scenario.companion)
+            colors = [FLIGHTS[(number + i * self._together) % len(FLIGHTS)] for i in range(count)]
+            about = (self.stream, assembly, name, colors, number == 0)
+            self.recorders.append(FlightRecorder(*about, together=self._together))
+
+    def of_recorders(self, flights: Sequence[Flight]) -> Sequence[Flight]:
+        """The flight of each recorder: these, or the vehicles' of a single one."""
+        return [*flights[0].vehicles.values()] if self._together else flights
+
+    def draw_references(self, end: float) -> None:
+        """Log the references of all flights up to a time (s)."""
+        for recorder in self.recorders:
+            recorder.draw_references(end)
+
+    def append(self, pieces: Sequence[Flight]) -> None:
+        """Log the next piece of every flight."""
+        for recorder, piece in zip(self.recorders, self.of_recorders(pieces), strict=True):
+            recorder.append(piece)
+
+    def finish(self, ends: Sequence[End]) -> None:
+        """Log how the flights ended."""
+        for recorder, end in zip(self.recorders, cycle(ends), strict=False):
+            recorder.finish(end)
 
     def write(self, flights: Sequence[Flight]) -> None:
         """Write complete flights, one per assembly."""
-        end = max(float(flight["time"][-1]) for flight in flights)
-        for recorder, flight in zip(self.recorders, flights, strict=True):
-            recorder.draw_references(end)
-            recorder.append(flight)
-            recorder.finish(flight.end)
+        self.draw_references(max(float(flight["time"][-1]) for flight in flights))
+        self.append(flights)
+        self.finish([flight.end for flight in flights])
 
 
 class RecordingFile(Recording):
     """A recording of complete flights for a file; equal flights give equal files."""
 
-    def __init__(self, assemblies: Sequence[Assembly], names: Sequence[str] = ()) -> None:
+    def __init__(
+        self, assemblies: Sequence[Assembly], names: Sequence[str] = (), vehicle: str = ""
+    ) -> None:
         # Flushed by row and byte counts only: timed flushes would make no two files equal.
         batching = rr.ChunkBatcherConfig(flush_tick=FLUSH_INTERVAL)
-        super().__init__(assemblies, names, batching=batching)
+        super().__init__(assemblies, names, vehicle, batching=batching)
         self._content = self.stream.memory_recording()  # as Rerun does not report a full disk
 
     def save(self, flights: Sequence[Flight], path: Path) -> None:
@@ -327,7 +385,7 @@ class RecordingFile(Recording):
         Raises:
             InputError: If the file cannot be written.
         """
-        blueprint = flight_blueprint(self.recorders, flights)
+        blueprint = flight_blueprint(self.recorders, self.of_recorders(flights))
         self.stream.send_blueprint(blueprint, make_active=False, make_default=True)
         self.write(flights)
         content = self._content.drain_as_bytes()
@@ -336,6 +394,10 @@ class RecordingFile(Recording):
             temporary.write_bytes(content)
 
 
-def save_recording(flights: Sequence[Flight], path: Path, names: Sequence[str] = ()) -> None:
-    """Write flights into one recording file; see `RecordingFile`."""
-    RecordingFile([flight.assembly for flight in flights], names).save(flights, path)
+def save_recording(
+    flights: Sequence[Flight], path: Path, names: Sequence[str] = (), vehicle: str = ""
+) -> None:
+    """Write flights, or the flights of one vehicle in them, into one file; see `RecordingFile`."""
+    flights = vehicles_named(vehicle, flights)
+    assemblies = [flight.assembly for flight in flights]
+    RecordingFile(assemblies, names, vehicle).save(flights, path)
