@@ -30,7 +30,6 @@ from tiltsim.models.user_vehicle import UserVehicle
 from tiltsim.resources import shipped_folder
 from tiltsim.system.files import one_thread_at_a_time
 from tiltsim.system.hooks import mujoco_hooks
-from tiltsim_controllers.mathematics.scalar import Values
 from tiltsim_controllers.vehicle.body import ROTORS
 from tiltsim_controllers.vehicle.parameters import PRESETS, SPIN, Vehicle
 
@@ -56,11 +55,6 @@ class RotorcraftSpec(ModelSpec):
     number: int = -1  # from 0, among vehicles that touch each other; -1 for one alone
     user_vehicle: UserVehicle | None = None
     """A user's file in place of the shipped one; its geoms may have mass and are always kept."""
-
-    @property
-    def spins(self) -> Values:
-        """Signs of the rotor speeds."""
-        return SPIN if isinstance(self.vehicle, Vehicle) else self.vehicle.spins
 
     @property
     def tilts(self) -> int:
@@ -239,7 +233,7 @@ def _scale_lengths(root: Any, arm_length: float) -> None:
 def _limit_rotors(root: Any, spec: RotorcraftSpec) -> None:
     thrust_range = spec.rotor_limits.thrust_range
     if thrust_range is not None:
-        for i in range(1, len(spec.spins) + 1):
+        for i in range(1, len(spec.vehicle.spins) + 1):
             thrust = root.find("actuator", f"thrust_{i}")
             thrust.ctrlrange, thrust.ctrllimited = thrust_range, "true"
     _limit_speeds(root, "rotor_speed", spec)
@@ -247,7 +241,7 @@ def _limit_rotors(root: Any, spec: RotorcraftSpec) -> None:
 
 def _limit_speeds(root: Any, name: str, spec: RotorcraftSpec) -> None:
     """Keep the activations ``name_1``, ``name_2``, ... within the limits of the rotors' speeds."""
-    for i, spin in enumerate(spec.spins, start=1):
+    for i, spin in enumerate(spec.vehicle.spins, start=1):
         speed_range = spec.rotor_limits.speed_range(spin)
         if speed_range is not None:
             rotor = root.find("actuator", f"{name}_{i}")

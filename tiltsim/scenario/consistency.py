@@ -223,6 +223,8 @@ def _gait(scenario: ScenarioTables) -> Refusals:
     key = f"gait.{size}"
     try:
         gait = table.plan(scenario.vehicle.resolve())
+    except InvalidValueError:  # of another key than its size
+        raise
     except ValueError as error:
         raise InvalidValueError(key, value, str(error)) from None
     limit = scenario.vehicle.tilt_servo.angle_limit

@@ -20,8 +20,8 @@ from tiltsim.scenario.controller_table import ControllerTable
 from tiltsim.scenario.kinds import KINDS, tables_of, union_of
 from tiltsim.scenario.law_controller import LawController, TiltingTable
 from tiltsim.scenario.messages import InvalidValueError
-from tiltsim.scenario.rotorcraft import ROTORCRAFT
 from tiltsim.scenario.table import Positive, default, example, required
+from tiltsim.scenario.vehicle import ROTORCRAFT
 from tiltsim.system.interrupts import defer_interrupts
 from tiltsim.system.text import error_text, printable
 

@@ -19,7 +19,7 @@ from tiltsim.scenario.scenario import FlightPlan, Scenario
 from tiltsim.system.files import one_thread_at_a_time
 from tiltsim.system.hooks import mujoco_hooks
 from tiltsim.system.text import Quantity
-from tiltsim.vehicles.spans import (
+from tiltsim.vehicles.metrics import (
     horizontal_error_metrics,
     in_last_second,
     mean_of,
