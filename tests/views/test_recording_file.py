@@ -297,7 +297,7 @@ def test_a_port_without_a_viewer_is_an_error_of_one_line():
         require_viewer(f"rerun+http://127.0.0.1:{free_port()}/proxy")
 
 
-def test_vehicles_of_a_flight_have_plots_of_their_own(tmp_path):
+def test_vehicles_of_a_flight_have_separate_plots(tmp_path):
     companion = {"name": "wing", "offset": [2.0, 0.3, 0.0]}
     changes = {"simulation.duration": 0.1, "simulation.integrator": "implicitfast", "expect": []}
     scenario = load_scenario("fleet/hexarotor#hover", changes | {"companion": [companion]})

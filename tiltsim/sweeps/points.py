@@ -132,7 +132,7 @@ class SweepPoints:
 
     @property
     def metrics(self) -> tuple[str, ...]:
-        """The metrics that the dataset holds, by default those of every vehicle."""
+        """The metrics that the dataset holds, by default every vehicle's."""
         if self.sweep.metrics is not None:
             return self.sweep.metrics
         prefixes = ("", *(f"{name}." for name in self.vehicles))

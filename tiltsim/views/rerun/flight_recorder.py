@@ -148,7 +148,7 @@ class FlightRecorder:
         ]
         if together or not name:
             self._lines += [line for one in panels for line in plotted_lines(one, self.details)]
-        # The entities of levels: in a comparison those of the first flight.
+        # The entities of levels: in a comparison the first flight's.
         roots = {f"{part}/".lstrip("/")} if first else set()
         self._level_roots = sorted(roots | {self.details} if together else roots)
         self._recording = recording

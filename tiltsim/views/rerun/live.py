@@ -39,13 +39,13 @@ class LiveStream:
     def __init__(self, scenario: Scenario, url: str | None = None) -> None:
         require_viewer(url)
         # After the check, as Rerun takes a second to load.
-        from tiltsim.views.rerun.recording import Recording, flight_blueprint
+        from tiltsim.views.rerun.recording import Recording
 
         self._assembly = assemble(scenario, recorded=True)
         # A unique name: a viewer would merge two flights of one scenario into one recording.
         recording = Recording([self._assembly], salt=uuid4().hex)
         self._recording, self._stream = recording, recording.stream
-        attach_viewer(self._stream, url, flight_blueprint(recording.recorders, live=True))
+        attach_viewer(self._stream, url, recording.blueprint(live=True))
         self._samples: SimpleQueue[Floats] = SimpleQueue()
         self._end: End | None = None
         self._over = Event()

@@ -66,12 +66,12 @@ def _inline_viewer(flights: Sequence[Flight], vehicle: str) -> Any:
         optional_package("rerun_notebook", "Rerun in a notebook", "'rerun-sdk[notebook]'")
     from rerun.notebook import Viewer
 
-    from tiltsim.views.rerun.recording import Recording, flight_blueprint
+    from tiltsim.views.rerun.recording import Recording
 
     flights = vehicles_named(vehicle, flights)
     recording = Recording([flight.assembly for flight in flights], vehicle=vehicle)
-    blueprint = flight_blueprint(recording.recorders, recording.of_recorders(flights))
-    widget = Viewer(recording=recording.stream, blueprint=blueprint, width="auto")
+    views = recording.blueprint(flights)
+    widget = Viewer(recording=recording.stream, blueprint=views, width="auto")
     recording.write(flights)
     recording.stream.flush()
     return widget
@@ -80,20 +80,23 @@ def _inline_viewer(flights: Sequence[Flight], vehicle: str) -> Any:
 def view_flights(
     flights: Sequence[Flight], url: str | None = None, names: Sequence[str] = (), vehicle: str = ""
 ) -> None:
-    """Show a flight, or several for a comparison, in the viewer at a URL; None opens a viewer.
+    """Show a flight, or several for a comparison, in a viewer.
 
-    ``names`` name several flights, by default by `flight_names`; ``vehicle`` is the only one shown.
+    Args:
+        flights: One or several.
+        url: The viewer's address; None opens one.
+        names: Names of several flights, by default `flight_names`.
+        vehicle: The only one that is shown; empty for all.
 
     Raises:
         InputError: If no viewer listens at the address, or there is no screen to open one on.
     """
-    from tiltsim.views.rerun.recording import Recording, flight_blueprint
+    from tiltsim.views.rerun.recording import Recording
 
     flights = vehicles_named(vehicle, flights)
     require_viewer(url)
     recording = Recording([flight.assembly for flight in flights], names, vehicle)
-    blueprint = flight_blueprint(recording.recorders, recording.of_recorders(flights))
-    attach_viewer(recording.stream, url, blueprint)
+    attach_viewer(recording.stream, url, recording.blueprint(flights))
     recording.write(flights)
     recording.stream.disconnect()
 
