@@ -9,7 +9,7 @@ import pytest
 
 import tiltsim
 from tiltsim.linear.equilibrium import equilibrium_of
-from tiltsim.linear.motion import make_motion
+from tiltsim.linear.mujoco_motion import make_motion
 
 MASS, LENGTH = 0.1, 0.8
 ALONE = {

@@ -15,7 +15,7 @@ from tiltsim.laws.assembling import assemble
 from tiltsim.linear.coordinates import vehicles_of
 from tiltsim.linear.equilibrium import equilibrium_of
 from tiltsim.linear.forcing import forcing_of
-from tiltsim.linear.motion import make_motion
+from tiltsim.linear.mujoco_motion import make_motion
 from tiltsim.linear.newton import derivative_at
 from tiltsim.linear.stability import Point, crossings, stability_at, sweep_stability
 from tiltsim_controllers.tilt_car.cycles import Swing, limit_cycle, multipliers

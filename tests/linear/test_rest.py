@@ -11,7 +11,7 @@ import tiltsim
 from tiltsim.commands.stability import stability_text
 from tiltsim.linear.equilibrium import equilibrium_of
 from tiltsim.linear.modes import exponents, is_stable, modes_of, spectrum
-from tiltsim.linear.motion import make_motion
+from tiltsim.linear.mujoco_motion import make_motion
 from tiltsim.linear.newton import ERROR, derivative_at
 from tiltsim_controllers.analysis.stability import error_loops
 

@@ -15,7 +15,8 @@ from tiltsim.laws.assembling import assemble
 from tiltsim.linear import newton
 from tiltsim.linear.coordinates import PLANE, parted, vehicles_of
 from tiltsim.linear.forcing import Forcing, forcing_of
-from tiltsim.linear.motion import LONG, SETTLING_TIME, Motion, make_motion
+from tiltsim.linear.motion import LONG, Motion
+from tiltsim.linear.mujoco_motion import SETTLING_TIME, make_motion
 from tiltsim.plants.plant import MIN_STEPS_TO_COMPILE
 from tiltsim.scenario.scenario import Scenario
 from tiltsim_controllers.mathematics.scalar import Floats
