@@ -50,7 +50,7 @@ TWO_CABLES = HEXAROTOR | {
 
 
 def apart(some, others):
-    """Largest distance (rad/s) from a pole to the nearest of as many others, either way."""
+    """Largest distance (rad/s) from a pole to the nearest of the others, either way."""
     assert len(some) == len(others)
     distances = np.abs(np.subtract.outer(some, others))
     return max(distances.min(axis=0).max(), distances.min(axis=1).max())

@@ -102,7 +102,7 @@ class Coordinates(NamedTuple):
         return self._joined(lambda _, rates: rates, _turn_rates, *parts)
 
     def level(self, state: Floats) -> Floats:
-        """The state of which all coordinates are zero, with as many entries as another."""
+        """The state of which all coordinates are zero, with the size of another."""
         eye = np.eye(3).ravel() if self.rotation == MATRIX else np.eye(1, QUATERNION)[0]
         parts = self._parts(np.zeros(len(state)), self.rotation)
         return np.concatenate([eye if at % 2 else part for at, part in enumerate(parts)])

@@ -162,7 +162,7 @@ class Equilibrium:
 
 
 def independent(rows: Floats) -> list[int]:
-    """Indices of as many independent rows as there are, the largest first chosen, in order."""
+    """Indices of a largest set of independent rows, in order."""
     left, chosen = rows.copy(), []
     while len(left) and (sizes := np.linalg.norm(left, axis=1)).max() > INDEPENDENT:
         chosen.append(int(sizes.argmax()))

@@ -33,7 +33,7 @@ class Forcing(NamedTuple):
 
     period: float | None  # s; None if only the motion of the frames depends on time
     frames: Mapping[str, Frame]
-    """Of each vehicle, by the beginning of its names."""
+    """One for each vehicle, by the beginning of its names."""
     start: float
     """Time (s) from which this holds: faults have happened and are known, gusts and pushes have
     passed, the commanded attitude is reached, paths have ended and cables hold."""
