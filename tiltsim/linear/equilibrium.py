@@ -91,7 +91,7 @@ class Equilibrium:
     def _minimal(self) -> tuple[tuple[str, ...], Floats, Floats]:
         """Names of the coordinates, their rows by the plant's, and the columns that move them.
 
-        Hung objects have the angles of their first cable and their rates, but for those that
+        Hung objects have the angles of their first cable and their rates, but for angles that
         further cables determine: of these the most independent ones are taken.
         """
         motion, state = self.motion, self.root.state

@@ -43,7 +43,7 @@ class Motion(ABC):
     Attributes:
         assembly: The flight; its controllers add the offsets to their commands to the vehicles.
         vehicles: The flight of each vehicle by the beginning of the names of its columns.
-        aside: Names of coordinates on which nothing depends: turns of what hangs, and records.
+        aside: Names of coordinates on which nothing depends: turns of hung objects, and records.
         hung: Objects that hang on cables.
         prefixes: Beginnings of the names of companions' and objects' coordinates.
         coordinates: Coordinates of its state.
