@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any, Final
 
 from tiltsim.commands.options import Overrides, Silent, refuse_both
 from tiltsim.commands.text import print_line, show_progress, table, viewing, warn
-from tiltsim.errors import InputError
 from tiltsim.exit_codes import DONE, EXPECTATION_FAILED, INTERRUPTED, VEHICLE_LOST
 from tiltsim.system.interrupts import defer_interrupts
 from tiltsim.system.text import printable
@@ -115,9 +114,7 @@ def run(
     return _exit_code(flight, verdicts if judged else (), quiet=quiet)
 
 
-def _differing(
-    changes: dict[str, Any], before: Scenario | None, after: Scenario
-) -> dict[str, Any]:
+def _differing(changes: dict[str, Any], before: Scenario | None, after: Scenario) -> dict[str, Any]:
     """The changes of a scenario whose values differ from the file's; all where it has no values."""
     from tiltsim.scenario.documents import value_at
 

@@ -3,9 +3,11 @@
 A check yields what it refuses: a key and the reason, and a value where it is not the key's own.
 """
 
+from __future__ import annotations
+
 import re
 from math import pi
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from tiltsim.scenario.companion import check_companions
 from tiltsim.scenario.controller import CONTROLLERS, laws_for
@@ -22,7 +24,6 @@ from tiltsim.scenario.linearizing_controllers import (
 from tiltsim.scenario.messages import InvalidValueError, choose
 from tiltsim.scenario.reference import WaypointReference
 from tiltsim.scenario.rotorcraft import MultirotorTable, RotorcraftTable
-from tiltsim.scenario.scenario_tables import ScenarioTables
 from tiltsim.scenario.table import Refusals
 from tiltsim.scenario.vehicle import (
     ModelErrorTable,
@@ -31,11 +32,14 @@ from tiltsim.scenario.vehicle import (
     require_physical_inertia,
 )
 
+if TYPE_CHECKING:
+    from tiltsim.scenario.scenario import Scenario
+
 MAX_KNOTS: Final = 1500
 """Numbers of a gait and a reference together, except tables, which have a separate limit."""
 
 
-def check_consistency(scenario: ScenarioTables) -> None:
+def check_consistency(scenario: Scenario) -> None:
     """Refuse a scenario whose tables contradict each other.
 
     Raises `InvalidValueError` for the first contradiction, with the key and the allowed values.
@@ -44,7 +48,7 @@ def check_consistency(scenario: ScenarioTables) -> None:
         raise InvalidValueError(key, value[0], reason) if value else scenario.mistake(key, reason)
 
 
-def _refusals(scenario: ScenarioTables) -> Refusals:
+def _refusals(scenario: Scenario) -> Refusals:
     yield from _law(scenario)
     yield from _actuators(scenario)
     yield from _model_error(scenario)
@@ -71,7 +75,7 @@ def _refusals(scenario: ScenarioTables) -> Refusals:
     check_companions(scenario)
 
 
-def _engine(scenario: ScenarioTables) -> Refusals:
+def _engine(scenario: Scenario) -> Refusals:
     simulation = scenario.simulation
     on_mujoco, in_jax = simulation.plant == "mujoco", simulation.engine == "jax"
     if in_jax and on_mujoco:
@@ -83,7 +87,7 @@ def _engine(scenario: ScenarioTables) -> Refusals:
         yield "simulation.batch_functions", 'needs simulation.plant = "thesis" or "rigid_body"'
 
 
-def _plant(scenario: ScenarioTables) -> Refusals:
+def _plant(scenario: Scenario) -> Refusals:
     """Vehicles that a plant of equations other than the thesis's cannot be."""
     vehicle, plant = scenario.vehicle, scenario.simulation.plant
     if plant in ("mujoco", "thesis"):
@@ -99,7 +103,7 @@ def _plant(scenario: ScenarioTables) -> Refusals:
         yield "simulation.plant", reason
 
 
-def _law(scenario: ScenarioTables) -> Refusals:
+def _law(scenario: Scenario) -> Refusals:
     controller, vehicle = scenario.controller, scenario.vehicle
     if vehicle.model not in controller.vehicle_models:
         able = f"controls the {' or '.join(controller.vehicle_models)}, and vehicle.model = "
@@ -121,7 +125,7 @@ def _law(scenario: ScenarioTables) -> Refusals:
     yield from vehicle.refusals(scenario)
 
 
-def _actuators(scenario: ScenarioTables) -> Refusals:
+def _actuators(scenario: Scenario) -> Refusals:
     vehicle, rotors = scenario.vehicle, scenario.vehicle.rotor_count
     if scenario.has_air and vehicle.is_planar:
         yield "vehicle.model", "aerodynamic effects are not supported; remove [air]"
@@ -149,7 +153,7 @@ def _actuators(scenario: ScenarioTables) -> Refusals:
         yield "controller.allocation", reason
 
 
-def _measured_acceleration(scenario: ScenarioTables) -> Refusals:
+def _measured_acceleration(scenario: Scenario) -> Refusals:
     """Vehicles whose angular acceleration is not known before the controls."""
     vehicle = scenario.vehicle
     reason = 'not supported with controller.angular_acceleration = "measured"'
@@ -164,7 +168,7 @@ def _measured_acceleration(scenario: ScenarioTables) -> Refusals:
         scenario.require("vehicle.rotor_inertia", 0.0, lag)
 
 
-def _layout(scenario: ScenarioTables) -> Refusals:
+def _layout(scenario: Scenario) -> Refusals:
     file, controller = scenario.any_rotorcraft.user_vehicle, scenario.controller
     if file is None or not file.layout_mismatch:
         return
@@ -175,7 +179,7 @@ def _layout(scenario: ScenarioTables) -> Refusals:
     scenario.require("vehicle.rotor_inertia", 0.0, reason)
 
 
-def _model_error(scenario: ScenarioTables) -> Refusals:
+def _model_error(scenario: Scenario) -> Refusals:
     error = scenario.model_error
     if error == ModelErrorTable():
         return
@@ -188,7 +192,7 @@ def _model_error(scenario: ScenarioTables) -> Refusals:
     require_physical_inertia("model_error.inertia", list(error.inertia), vehicle.moments)
 
 
-def _reference(scenario: ScenarioTables) -> Refusals:
+def _reference(scenario: Scenario) -> Refusals:
     controller, reference = scenario.controller, scenario.reference
     law, kinds = f"the {controller.law} law", {*controller.reference_kinds}
     if "pose" in kinds:
@@ -215,7 +219,7 @@ def _reference(scenario: ScenarioTables) -> Refusals:
         check_decoupler(scenario, controller.decoupler)
 
 
-def _gait(scenario: ScenarioTables) -> Refusals:
+def _gait(scenario: Scenario) -> Refusals:
     table, controller = scenario.gait, scenario.controller
     size, value = table.size
     key = f"gait.{size}"
@@ -243,7 +247,7 @@ def _gait(scenario: ScenarioTables) -> Refusals:
         yield "gait.type", f"the {controller.law} law commands the tilts itself; {give}"
 
 
-def _ground(scenario: ScenarioTables) -> Refusals:
+def _ground(scenario: Scenario) -> Refusals:
     ground = scenario.ground
     if ground is None:
         return
@@ -259,7 +263,7 @@ def _ground(scenario: ScenarioTables) -> Refusals:
         yield "initial.position", f"below ground.height = {ground.height}"
 
 
-def _rotor_limits(scenario: ScenarioTables) -> Refusals:
+def _rotor_limits(scenario: Scenario) -> Refusals:
     vehicle, initial = scenario.vehicle, scenario.initial
     if not isinstance(vehicle, RotorcraftTable):
         return

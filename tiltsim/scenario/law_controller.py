@@ -183,5 +183,7 @@ class TiltingTable(LawTable):
 @cache
 def _not_read(table: type[LawController]) -> frozenset[str]:
     """Keys of a table that its law does not read: of the bases that it has."""
-    bases = (base for base in (LawController, TiltingTable, Compensating) if issubclass(table, base))
+    bases = (
+        base for base in (LawController, TiltingTable, Compensating) if issubclass(table, base)
+    )
     return frozenset(key for base in bases for key in base.model_fields)

@@ -34,8 +34,7 @@ from tiltsim.scenario.own_parts import (
     sample_functions,
     with_trust,
 )
-from tiltsim.scenario.scenario import Scenario, Variant
-from tiltsim.scenario.scenario_tables import DESCRIPTIVE
+from tiltsim.scenario.scenario import DESCRIPTIVE, Scenario, Variant
 from tiltsim.scenario.table import in_one_line
 from tiltsim.system.text import short_repr, shortened, valid_unicode
 
@@ -157,7 +156,7 @@ def _document(source: object, *, with_base: bool) -> tuple[dict[str, Any], str]:
 
 
 def as_in_file(path: str | Path) -> Scenario | None:
-    """The scenario of a file without changes; None for one that only changes complete, as a base."""
+    """The scenario of a file without changes; None if only changes complete it, as a base."""
     with suppress(InputError):
         return load_scenario(path, trusted=True)
     return None
