@@ -11,9 +11,8 @@ from pydantic import BaseModel
 from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.closed_loop.loop import ControlSetup
 from tiltsim.errors import InputError
-from tiltsim.scenario.expectation import Expectation
 from tiltsim.scenario.messages import did_you_mean
-from tiltsim.scenario.metric_names import METRICS
+from tiltsim.scenario.metric_names import METRICS, Expectation
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.system.text import short_repr
 from tiltsim_controllers.mathematics.records import unflatten

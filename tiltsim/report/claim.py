@@ -14,8 +14,7 @@ from numpy.typing import ArrayLike
 
 from tiltsim.flight.metrics import Verdict
 from tiltsim.report.statement import CHAPTER, Described, Origin, Statement, origins_of, slug
-from tiltsim.scenario.expectation import Expectation
-from tiltsim.scenario.metric_names import METRICS
+from tiltsim.scenario.metric_names import METRICS, Expectation
 from tiltsim.scenario.scenario import Scenario
 
 Value: TypeAlias = "float | bool | tuple[float, ...]"

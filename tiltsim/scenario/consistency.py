@@ -9,12 +9,10 @@ import re
 from math import pi
 from typing import TYPE_CHECKING, Final
 
-from tiltsim.scenario.companion import check_companions
 from tiltsim.scenario.controller import CONTROLLERS, laws_for
-from tiltsim.scenario.expectation import NAME
 from tiltsim.scenario.gait import TableGait
 from tiltsim.scenario.instruments import instrument_refusals
-from tiltsim.scenario.interaction import object_refusals
+from tiltsim.scenario.interaction import check_companions, object_refusals
 from tiltsim.scenario.linearizing_controllers import (
     AttitudeAltitudeController,
     AttitudeForceController,
@@ -22,6 +20,7 @@ from tiltsim.scenario.linearizing_controllers import (
     check_decoupler,
 )
 from tiltsim.scenario.messages import InvalidValueError, choose
+from tiltsim.scenario.metric_names import NAME
 from tiltsim.scenario.reference import WaypointReference
 from tiltsim.scenario.rotorcraft import MultirotorTable, RotorcraftTable
 from tiltsim.scenario.table import Refusals

@@ -16,16 +16,23 @@ from tiltsim.errors import InputError
 from tiltsim.models.cross import as_multirotor
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario import gait
-from tiltsim.scenario.companion import CompanionTable, DownwashTable, companions_of
 from tiltsim.scenario.consistency import check_consistency
 from tiltsim.scenario.controller import Controller
 from tiltsim.scenario.documents import check_keys, leaves
-from tiltsim.scenario.expectation import ClaimName, ClaimTable, Expectation, Origin
 from tiltsim.scenario.gait import FixedGait, GaitTable
-from tiltsim.scenario.interaction import CableTable, ObjectTable, PayloadTable, ToolTable
+from tiltsim.scenario.interaction import (
+    CableTable,
+    CompanionTable,
+    DownwashTable,
+    ObjectTable,
+    PayloadTable,
+    ToolTable,
+    companions_of,
+)
 from tiltsim.scenario.kinds import KINDS, tables_of
 from tiltsim.scenario.linearizing_controllers import AttitudeAltitudeController
 from tiltsim.scenario.messages import show
+from tiltsim.scenario.metric_names import ClaimName, ClaimTable, Expectation, Origin
 from tiltsim.scenario.reference import Reference, SetpointReference
 from tiltsim.scenario.rotorcraft import MultirotorTable, RotorcraftTable, TiltServoTable
 from tiltsim.scenario.simulation_table import (

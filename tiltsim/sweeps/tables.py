@@ -7,10 +7,9 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, field_validator
 
 from tiltsim.scenario.documents import leaves
-from tiltsim.scenario.expectation import Expectation
 from tiltsim.scenario.library import MAX_VALUES
 from tiltsim.scenario.messages import InvalidValueError, choose
-from tiltsim.scenario.metric_names import METRICS, WALL_CLOCK_METRICS
+from tiltsim.scenario.metric_names import METRICS, WALL_CLOCK_METRICS, Expectation
 from tiltsim.scenario.table import Many, Positive, Table, default, example, required
 from tiltsim_controllers.mathematics.scalar import clipped
 
