@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import tiltsim
-from tiltsim.scenario.scenario import Scenario
 
 ADDRESS = "ch04_tracking/setpoint#rho_065_modified"
 
@@ -25,10 +24,3 @@ class Unreadable:
 
     def __array__(self, *_args, **_options):
         raise ValueError("two\nlines")
-
-
-class Unrelated(Scenario):
-    """Tables of a scenario, each valid, whether or not they contradict each other."""
-
-    def require_consistency(self):
-        """Nothing is required."""

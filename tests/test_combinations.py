@@ -23,7 +23,7 @@ from tiltsim.commands.key_tables import key_tables
 from tiltsim.errors import TiltsimError
 from tiltsim.scenario.controller import CONTROLLERS, OwnFunctionController
 from tiltsim.scenario.documents import leaves
-from tiltsim.scenario.scenario import DESCRIPTIVE
+from tiltsim.scenario.scenario_tables import DESCRIPTIVE
 from tiltsim.scenario.simulation_table import SimulationTable
 from tiltsim.scenario.vehicle import VehicleUnion
 from tiltsim.studies.multirotor_analysis import FLEET, fleet_file

@@ -8,10 +8,10 @@ from typing import Annotated
 import pytest
 from pydantic import ConfigDict, TypeAdapter
 
-from tests.arguments import Unrelated
 from tiltsim.cli import main
 from tiltsim.commands.files import scenario_schema, sweep_schema
 from tiltsim.commands.key_tables import key_tables
+from tiltsim.scenario.scenario_tables import ScenarioTables
 from tiltsim.scenario.schema import TAG_KEYS, Node
 from tiltsim.scenario.table import Table
 
@@ -110,7 +110,7 @@ def test_every_example_of_a_table_is_valid():
     for table in TABLES[1:]:
         document = tomllib.loads(table.toml)
         document.pop("variant", None)
-        Unrelated.model_validate(document)
+        ScenarioTables.model_validate(document)
 
 
 def test_keys_of_one_table(capsys):

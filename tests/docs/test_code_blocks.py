@@ -13,7 +13,6 @@ from functools import cache
 import pytest
 
 import tiltsim
-from tests.arguments import Unrelated
 from tests.docs.pages import NOTEBOOKS, PAGES, ROOT, blocks, code
 from tests.docs.shell import commands
 from tiltsim.cli import build_parser, main
@@ -21,6 +20,7 @@ from tiltsim.errors import InputError
 from tiltsim.exit_codes import DONE, EXPECTATION_FAILED, VEHICLE_LOST
 from tiltsim.logs.reading import LogMap
 from tiltsim.scenario.loading import find_scenario_file
+from tiltsim.scenario.scenario_tables import ScenarioTables
 from tiltsim.studies.checking import collect
 from tiltsim.sweeps.loading import load_sweep
 from tiltsim.sweeps.tables import Sweep
@@ -122,7 +122,7 @@ def check_toml(text, folder):
         table = folder / document["gait"]["file"]
         table.write_text("time,alpha_1,alpha_2,alpha_3,alpha_4\n0,0,0,0,0\n1,0,0,0,0\n")
         document["gait"]["file"] = str(table)
-    Unrelated.model_validate(document)
+    ScenarioTables.model_validate(document)
     if "title" in document:
         tiltsim.parse_scenario(document)
 

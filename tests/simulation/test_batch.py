@@ -22,7 +22,7 @@ from tiltsim.laws.assembling import LOOPS, assemble, loop_of
 from tiltsim.plants.mujoco_plant import MujocoPlant, flight_model, model_cache_key
 from tiltsim.resources import shipped_folder
 from tiltsim.scenario.loading import merge
-from tiltsim.scenario.scenario import Gait
+from tiltsim.scenario.scenario_tables import Gait
 from tiltsim.simulation import batch
 from tiltsim.simulation.batch import fly
 from tiltsim.simulation.native_batch import ROWS_PER_THREAD

@@ -212,7 +212,8 @@ def scenario_schema() -> dict[str, Any]:
 
     A variant lists only the differences from the base, so that only its name is required.
     """
-    from tiltsim.scenario.scenario import DESCRIPTIVE, Scenario, Variant
+    from tiltsim.scenario.scenario import Scenario, Variant
+    from tiltsim.scenario.scenario_tables import DESCRIPTIVE
 
     schema = Scenario.model_json_schema()
     schema["title"] = "tiltsim scenario"

@@ -28,7 +28,8 @@ from tiltsim.models.cables import switch
 from tiltsim.models.parts import Visuals
 from tiltsim.plants.plant import Plant, choose_engine
 from tiltsim.scenario.interaction import objects_of
-from tiltsim.scenario.scenario import DESCRIPTIVE, Scenario
+from tiltsim.scenario.scenario import Scenario
+from tiltsim.scenario.scenario_tables import DESCRIPTIVE
 from tiltsim.vehicles.rotorcraft.others import motion_at_start
 from tiltsim_controllers.mathematics.scalar import Floats
 

@@ -28,7 +28,8 @@ from tiltsim.resources import shipped_folder
 from tiltsim.scenario.loading import load_scenario, named_files
 from tiltsim.scenario.metric_names import METRICS, WALL_CLOCK_METRICS
 from tiltsim.scenario.own_parts import require_trust
-from tiltsim.scenario.scenario import DESCRIPTIVE, Scenario
+from tiltsim.scenario.scenario import Scenario
+from tiltsim.scenario.scenario_tables import DESCRIPTIVE
 from tiltsim.system.files import replacing
 from tiltsim.system.processes import in_processes
 

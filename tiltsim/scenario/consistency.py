@@ -3,11 +3,9 @@
 A check yields what it refuses: a key and the reason, and a value where it is not the key's own.
 """
 
-from __future__ import annotations
-
 import re
 from math import pi
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from tiltsim.scenario.controller import CONTROLLERS, laws_for
 from tiltsim.scenario.gait import TableGait
@@ -23,6 +21,7 @@ from tiltsim.scenario.messages import InvalidValueError, choose
 from tiltsim.scenario.metric_names import NAME
 from tiltsim.scenario.reference import WaypointReference
 from tiltsim.scenario.rotorcraft import MultirotorTable, RotorcraftTable
+from tiltsim.scenario.scenario_tables import ScenarioTables
 from tiltsim.scenario.table import Refusals
 from tiltsim.scenario.vehicle import (
     ModelErrorTable,
@@ -31,14 +30,11 @@ from tiltsim.scenario.vehicle import (
     require_physical_inertia,
 )
 
-if TYPE_CHECKING:
-    from tiltsim.scenario.scenario import Scenario
-
 MAX_KNOTS: Final = 1500
 """Numbers of a gait and a reference together, except tables, which have a separate limit."""
 
 
-def check_consistency(scenario: Scenario) -> None:
+def check_consistency(scenario: ScenarioTables) -> None:
     """Refuse a scenario whose tables contradict each other.
 
     Raises `InvalidValueError` for the first contradiction, with the key and the allowed values.
@@ -47,7 +43,7 @@ def check_consistency(scenario: Scenario) -> None:
         raise InvalidValueError(key, value[0], reason) if value else scenario.mistake(key, reason)
 
 
-def _refusals(scenario: Scenario) -> Refusals:
+def _refusals(scenario: ScenarioTables) -> Refusals:
     yield from _law(scenario)
     yield from _actuators(scenario)
     yield from _model_error(scenario)
@@ -74,7 +70,7 @@ def _refusals(scenario: Scenario) -> Refusals:
     check_companions(scenario)
 
 
-def _engine(scenario: Scenario) -> Refusals:
+def _engine(scenario: ScenarioTables) -> Refusals:
     simulation = scenario.simulation
     on_mujoco, in_jax = simulation.plant == "mujoco", simulation.engine == "jax"
     if in_jax and on_mujoco:
@@ -86,7 +82,7 @@ def _engine(scenario: Scenario) -> Refusals:
         yield "simulation.batch_functions", 'needs simulation.plant = "thesis" or "rigid_body"'
 
 
-def _plant(scenario: Scenario) -> Refusals:
+def _plant(scenario: ScenarioTables) -> Refusals:
     """Vehicles that a plant of equations other than the thesis's cannot be."""
     vehicle, plant = scenario.vehicle, scenario.simulation.plant
     if plant in ("mujoco", "thesis"):
@@ -102,7 +98,7 @@ def _plant(scenario: Scenario) -> Refusals:
         yield "simulation.plant", reason
 
 
-def _law(scenario: Scenario) -> Refusals:
+def _law(scenario: ScenarioTables) -> Refusals:
     controller, vehicle = scenario.controller, scenario.vehicle
     if vehicle.model not in controller.vehicle_models:
         able = f"controls the {' or '.join(controller.vehicle_models)}, and vehicle.model = "
@@ -124,7 +120,7 @@ def _law(scenario: Scenario) -> Refusals:
     yield from vehicle.refusals(scenario)
 
 
-def _actuators(scenario: Scenario) -> Refusals:
+def _actuators(scenario: ScenarioTables) -> Refusals:
     vehicle, rotors = scenario.vehicle, scenario.vehicle.rotor_count
     if scenario.has_air and vehicle.is_planar:
         yield "vehicle.model", "aerodynamic effects are not supported; remove [air]"
@@ -152,7 +148,7 @@ def _actuators(scenario: Scenario) -> Refusals:
         yield "controller.allocation", reason
 
 
-def _measured_acceleration(scenario: Scenario) -> Refusals:
+def _measured_acceleration(scenario: ScenarioTables) -> Refusals:
     """Vehicles whose angular acceleration is not known before the controls."""
     vehicle = scenario.vehicle
     reason = 'not supported with controller.angular_acceleration = "measured"'
@@ -167,7 +163,7 @@ def _measured_acceleration(scenario: Scenario) -> Refusals:
         scenario.require("vehicle.rotor_inertia", 0.0, lag)
 
 
-def _layout(scenario: Scenario) -> Refusals:
+def _layout(scenario: ScenarioTables) -> Refusals:
     file, controller = scenario.any_rotorcraft.user_vehicle, scenario.controller
     if file is None or not file.layout_mismatch:
         return
@@ -178,7 +174,7 @@ def _layout(scenario: Scenario) -> Refusals:
     scenario.require("vehicle.rotor_inertia", 0.0, reason)
 
 
-def _model_error(scenario: Scenario) -> Refusals:
+def _model_error(scenario: ScenarioTables) -> Refusals:
     error = scenario.model_error
     if error == ModelErrorTable():
         return
@@ -191,7 +187,7 @@ def _model_error(scenario: Scenario) -> Refusals:
     require_physical_inertia("model_error.inertia", list(error.inertia), vehicle.moments)
 
 
-def _reference(scenario: Scenario) -> Refusals:
+def _reference(scenario: ScenarioTables) -> Refusals:
     controller, reference = scenario.controller, scenario.reference
     law, kinds = f"the {controller.law} law", {*controller.reference_kinds}
     if "pose" in kinds:
@@ -218,7 +214,7 @@ def _reference(scenario: Scenario) -> Refusals:
         check_decoupler(scenario, controller.decoupler)
 
 
-def _gait(scenario: Scenario) -> Refusals:
+def _gait(scenario: ScenarioTables) -> Refusals:
     table, controller = scenario.gait, scenario.controller
     size, value = table.size
     key = f"gait.{size}"
@@ -246,7 +242,7 @@ def _gait(scenario: Scenario) -> Refusals:
         yield "gait.type", f"the {controller.law} law commands the tilts itself; {give}"
 
 
-def _ground(scenario: Scenario) -> Refusals:
+def _ground(scenario: ScenarioTables) -> Refusals:
     ground = scenario.ground
     if ground is None:
         return
@@ -262,7 +258,7 @@ def _ground(scenario: Scenario) -> Refusals:
         yield "initial.position", f"below ground.height = {ground.height}"
 
 
-def _rotor_limits(scenario: Scenario) -> Refusals:
+def _rotor_limits(scenario: ScenarioTables) -> Refusals:
     vehicle, initial = scenario.vehicle, scenario.initial
     if not isinstance(vehicle, RotorcraftTable):
         return

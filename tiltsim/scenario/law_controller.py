@@ -183,7 +183,5 @@ class TiltingTable(LawTable):
 @cache
 def _not_read(table: type[LawController]) -> frozenset[str]:
     """Keys of a table that its law does not read: of the bases that it has."""
-    bases = (
-        base for base in (LawController, TiltingTable, Compensating) if issubclass(table, base)
-    )
+    bases = {LawController, TiltingTable, Compensating} & {*table.mro()}
     return frozenset(key for base in bases for key in base.model_fields)

@@ -34,7 +34,8 @@ from tiltsim.scenario.own_parts import (
     sample_functions,
     with_trust,
 )
-from tiltsim.scenario.scenario import DESCRIPTIVE, Scenario, Variant
+from tiltsim.scenario.scenario import Scenario, Variant
+from tiltsim.scenario.scenario_tables import DESCRIPTIVE
 from tiltsim.scenario.table import in_one_line
 from tiltsim.system.text import short_repr, shortened, valid_unicode
 

@@ -1,9 +1,7 @@
 """Checks that the integrators can follow a scenario's servos, rotors, supervisor and law."""
 
-from __future__ import annotations
-
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -12,6 +10,7 @@ from tiltsim.scenario.controller_table import GaitFollowingController
 from tiltsim.scenario.linearizing_controllers import AttitudeForceController
 from tiltsim.scenario.messages import InvalidValueError
 from tiltsim.scenario.rotorcraft import RotorcraftTable
+from tiltsim.scenario.scenario_tables import ScenarioTables
 from tiltsim.scenario.simulation_table import SimulationTable
 from tiltsim_controllers.analysis.singularity import hover_rotor_speeds
 from tiltsim_controllers.analysis.stability import (
@@ -25,9 +24,6 @@ from tiltsim_controllers.laws.supervisor import LAG
 from tiltsim_controllers.mathematics.scalar import Floats, Values
 from tiltsim_controllers.vehicle.cross import cross_table
 from tiltsim_controllers.vehicle.parameters import Vehicle
-
-if TYPE_CHECKING:
-    from tiltsim.scenario.scenario import Scenario
 
 MAX_LOOP_STEP: Final = 2.5
 """Largest product of timestep and closed-loop pole; RK4 turns unstable at 2.78, ode3 at 2.51."""
@@ -53,7 +49,7 @@ MAX_EULER_STEP: Final = 1.9
 """Largest product of timestep and a rotor's pole where MuJoCo integrates activations by Euler."""
 
 
-def check_time_steps(scenario: Scenario) -> None:
+def check_time_steps(scenario: ScenarioTables) -> None:
     """Refuse servos, supervisors and laws that a scenario's time steps make unstable.
 
     Raises `InvalidValueError`, also for gains that are unstable at any step.
@@ -64,7 +60,7 @@ def check_time_steps(scenario: Scenario) -> None:
     _check_stability(scenario)
 
 
-def _check_servo(scenario: Scenario) -> None:
+def _check_servo(scenario: ScenarioTables) -> None:
     servo, timestep = scenario.vehicle.tilt_servo, scenario.simulation.timestep
     # The fastest pole of the servo must stay where explicit integration is stable.
     fastest = servo.natural_frequency * max(1.0, 2.0 * servo.damping_ratio)
@@ -82,7 +78,7 @@ def _check_servo(scenario: Scenario) -> None:
         )
 
 
-def _check_rotors(scenario: Scenario) -> None:
+def _check_rotors(scenario: ScenarioTables) -> None:
     """Refuse a lag of the rotors that is too short for the integrator."""
     vehicle, simulation = scenario.vehicle, scenario.simulation
     if not isinstance(vehicle, RotorcraftTable) or vehicle.rotor_time_constant is None:
@@ -107,7 +103,7 @@ def _largest_rotor_step(simulation: SimulationTable) -> float:
     return MAX_EULER_STEP if by_euler else _largest_servo_step(simulation)
 
 
-def _reaction_gains(scenario: Scenario, controller: GaitFollowingController) -> Floats:
+def _reaction_gains(scenario: ScenarioTables, controller: GaitFollowingController) -> Floats:
     """The `reaction_gains` of level hovers with the tilts of a scenario's gait."""
     assumed, limits = scenario.vehicle.resolve(), (-np.inf, np.inf)
     gait = scenario.gait.plan(assumed)
@@ -133,7 +129,7 @@ def _reaction_gains(scenario: Scenario, controller: GaitFollowingController) -> 
     )
 
 
-def _check_measured_reaction(scenario: Scenario, vehicle: RotorcraftTable) -> None:
+def _check_measured_reaction(scenario: ScenarioTables, vehicle: RotorcraftTable) -> None:
     """Refuse rotors whose reaction, measured and fed back, makes a loop that is unstable."""
     lag, simulation = vehicle.rotor_time_constant, scenario.simulation
     controller = scenario.controller
@@ -163,7 +159,7 @@ def _check_measured_reaction(scenario: Scenario, vehicle: RotorcraftTable) -> No
         )
 
 
-def _check_supervisor(scenario: Scenario) -> None:
+def _check_supervisor(scenario: ScenarioTables) -> None:
     """Refuse a supervisor that cannot keep its thresholds, or is sampled too slowly for its lag."""
     supervisor = scenario.controller.supervision
     if supervisor is None:
@@ -179,7 +175,7 @@ def _check_supervisor(scenario: Scenario) -> None:
         )
 
 
-def _check_stability(scenario: Scenario) -> None:
+def _check_stability(scenario: ScenarioTables) -> None:
     controller = scenario.controller
     if controller.allow_unstable:
         return
@@ -194,7 +190,7 @@ def _check_stability(scenario: Scenario) -> None:
         _check_speed(scenario, loop)
 
 
-def _check_speed(scenario: Scenario, loop: ErrorLoop) -> None:
+def _check_speed(scenario: ScenarioTables, loop: ErrorLoop) -> None:
     """Refuse a loop whose fastest pole the time steps cannot follow.
 
     The published decoupling matrix speeds the attitude loops up some 700 times, so that
@@ -221,7 +217,7 @@ def _fastest_pole(polynomial: Values) -> float:
     return float(np.abs(np.roots(polynomial)).max())
 
 
-def _check_weight(scenario: Scenario) -> None:
+def _check_weight(scenario: ScenarioTables) -> None:
     """Refuse a mass, such as one in grams, that no rotors carry; loops are as fast as rotors."""
     vehicle = scenario.vehicle.resolve()
     if isinstance(vehicle, Vehicle) and vehicle.hover_rotor_speed > MAX_HOVER_SPEED:

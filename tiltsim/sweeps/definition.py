@@ -11,7 +11,7 @@ from tiltsim.errors import InputError
 from tiltsim.scenario.library import check_limits
 from tiltsim.scenario.loading import parse_scenario, without_none
 from tiltsim.scenario.messages import show
-from tiltsim.scenario.scenario import DESCRIPTIVE
+from tiltsim.scenario.scenario_tables import DESCRIPTIVE
 from tiltsim.sweeps.tables import Sweep
 from tiltsim.system.files import digest, file_digests
 

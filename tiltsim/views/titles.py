@@ -14,7 +14,8 @@ from tiltsim.flight.metrics import End
 from tiltsim.laws.law import SUPERVISION
 from tiltsim.scenario.documents import leaves
 from tiltsim.scenario.linearizing_controllers import AttitudeAltitudeController
-from tiltsim.scenario.scenario import DESCRIPTIVE, Scenario
+from tiltsim.scenario.scenario import Scenario
+from tiltsim.scenario.scenario_tables import DESCRIPTIVE
 from tiltsim.system.text import in_words, valid_unicode
 from tiltsim.vehicles.spans import at_lower_limit, at_upper_limit
 from tiltsim.views.attitude_plane import SUPERVISION_THRESHOLD, margin_threshold
