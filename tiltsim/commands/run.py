@@ -82,8 +82,6 @@ def run(
         prepare_file("--rerun", rerun, (".rrd",))
     for warning in () if quiet else _warnings(loaded):
         warn(warning)
-    changes = {} if quiet else _differing(changes, in_file, loaded)
-
     with ExitStack() as stack:
         if rerun is not None:
             from tiltsim.views.rerun.live import RecordingProcess
@@ -106,6 +104,7 @@ def run(
     if not quiet:
         if flight.end.kind == "completed" and (speed := metrics["min_rotor_speed"]) < 0.0:
             warn(f"a rotor stopped and reversed (min_rotor_speed = {speed:.4g} rad/s)")
+        changes = _differing(changes, in_file, loaded)
         changes |= {} if controller is None else {"controller": controller}
         print(summary(flight, verdicts, judged=judged, changes=changes))
         for kind, path in (("flight", out), ("recording", rerun)):

@@ -1,4 +1,4 @@
-"""What a vehicle shares its world with: objects, tools, loads, cables and further vehicles.
+"""The tables of a shared world: objects, a tool, a load, cables and further vehicles.
 
 A ``[[companion]]`` names a scenario whose vehicle, controller, gait and reference it takes, or
 takes them from the file that it is in. Time steps, ground and objects are the file's.
