@@ -8,7 +8,7 @@ import pytest
 
 from tiltsim.commands.run import expectation_lines
 from tiltsim.flight.metrics import Verdict, check_expectations
-from tiltsim.scenario.metric_names import Expectation
+from tiltsim.scenario.expectation import Expectation
 from tiltsim.scenario.scenario import Scenario
 
 

@@ -275,8 +275,9 @@ def solving(observed):
 @pytest.mark.parametrize("plant", ["mujoco", "thesis"])
 def test_a_law_that_cannot_be_traced_flies_as_plain_python(law, message, plant):
     tables = {"simulation": {"duration": 0.05, "plant": plant, "engine": "native"}}
-    with pytest.warns(RuntimeWarning, match=message):
+    with pytest.warns(RuntimeWarning, match=message) as shown:
         plain = tiltsim.simulate(tables, controller=law)
+    assert [warning.filename for warning in shown] == [__file__]
     compiled = tiltsim.simulate(tables, controller=by_thrusts)
     np.testing.assert_allclose(plain.samples, compiled.samples, rtol=1e-9, atol=1e-12)
 
@@ -338,7 +339,7 @@ def misspelt(observed):
     [
         (three_thrusts, r"the law returned thrusts of shape \(3,\); expected shape \(4,\)"),
         (no_numbers, "returned thrusts = .*; expected 4 numbers"),
-        (no_command, r"returned array\(.*; expected a tiltsim.Command"),
+        (no_command, r"returned array\(.*; expected .*, as in tiltsim.Command\(thrusts="),
         (nothing_for_rotors, "returned nothing for the rotors; expected one of thrusts"),
         (of_two, "TypeError: .*missing 1 required positional argument"),
         (tilting, "returned tilt_angles; needs controller.tilts = free"),

@@ -204,6 +204,14 @@ def test_a_sampled_controller_gives_a_system_in_discrete_time():
     assert tiltsim.stability(sampled).poles.real.max() < 1e-3
 
 
+def test_results_are_one_line_in_python_and_a_table_in_a_notebook():
+    found = tiltsim.stability(SETPOINT)
+    assert repr(found) == "<Stability of a rest point: stable, 0 neutral of 24 states>"
+    assert found._repr_html_().count("<tr>") == 1 + len(found.modes)
+    system = tiltsim.linearize(SETPOINT)
+    assert repr(system).startswith("<Linearization, closed loop, continuous: 24 states, ")
+
+
 def test_neutral_states_are_counted_but_do_not_grow():
     """A hexarotor's rotors have two combinations that move nothing."""
     found = tiltsim.stability("fleet/hexarotor#hover")

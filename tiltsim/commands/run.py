@@ -219,7 +219,7 @@ def summary(
         changes: Keys of the scenario that the command line changed, and their values.
     """
     from tiltsim.scenario.messages import show
-    from tiltsim.scenario.metric_names import METRICS
+    from tiltsim.scenario.metric_names import unit_of
 
     scenario, metrics = flight.scenario, flight.metrics()
     lines = [printable(scenario.title or scenario.address or "scenario")]
@@ -249,7 +249,7 @@ def summary(
             f"  {_shown(own[name]) if name in own else '-':>{max(12, len(vehicle))}}"
             for vehicle, own in of_each.items()
         )
-        lines.append(f"  {name:<{width}}{cells} {METRICS[name].unit}".rstrip())
+        lines.append(f"  {name:<{width}}{cells} {unit_of(name)}".rstrip())
     return "\n".join(lines)
 
 

@@ -23,7 +23,7 @@ from tiltsim.scenario.scenario import Scenario
 from tiltsim.simulation.batch import fly_each
 from tiltsim.system.arguments import check_function, is_number
 from tiltsim.system.text import short_repr
-from tiltsim.vehicles.spans import in_last_second
+from tiltsim.vehicles.metrics import in_last_second
 from tiltsim_controllers.analysis.singularity import determinant
 from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.vehicle.parameters import Vehicle

@@ -78,6 +78,12 @@ class Linearization:
     command: dict[str, float]  # the inputs at rest by name
     loop: str  # ``"closed"`` or ``"open"``
 
+    def __repr__(self) -> str:
+        """Sizes and time, in one line."""
+        time = "continuous" if self.timestep is None else f"every {self.timestep:g} s"
+        sizes = (f"{len(getattr(self, kind))} {kind}" for kind in ("states", "inputs", "outputs"))
+        return f"<Linearization, {self.loop} loop, {time}: {', '.join(sizes)}>"
+
     @property
     def poles(self) -> Floats:
         """Eigenvalues of A, complex."""

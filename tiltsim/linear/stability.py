@@ -18,7 +18,7 @@ from tiltsim.linear.newton import ERROR
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.system.arguments import check_function
-from tiltsim.system.text import short_repr
+from tiltsim.system.text import html_table, short_repr
 from tiltsim_controllers.mathematics.scalar import Floats
 
 RESOLVED: Final = 1e-8
@@ -55,6 +55,25 @@ class Stability:
     corners: tuple[str, ...] = ()
     """Names of states whose rates have a corner there, at a limit or at the edge of a dead zone:
     the matrix is the mean of both sides, and poles say little."""
+
+    def __repr__(self) -> str:
+        """The verdict, in one line."""
+        return f"<Stability of {self._verdict}>"
+
+    def _repr_html_(self) -> str:
+        """The verdict and the modes, as a table for notebooks."""
+        columns = ("mode", "frequency, rad/s", "damping", "count", "states")
+        rows = [
+            (m.name, f"{m.frequency:.5g}", f"{m.damping:.4f}", m.count, ", ".join(m.states[:6]))
+            for m in self.modes
+        ]
+        return html_table("Stability", [self._verdict], rows, columns)
+
+    @property
+    def _verdict(self) -> str:
+        kind = "a rest point" if self.period is None else f"an orbit of {self.period:g} s"
+        verdict = "stable" if self.stable else "unstable"
+        return f"{kind}: {verdict}, {self.neutral} neutral of {len(self.states)} states"
 
     @property
     def growth(self) -> float:

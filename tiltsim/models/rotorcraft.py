@@ -30,7 +30,6 @@ from tiltsim.models.user_vehicle import UserVehicle
 from tiltsim.resources import shipped_folder
 from tiltsim.system.files import one_thread_at_a_time
 from tiltsim.system.hooks import mujoco_hooks
-from tiltsim_controllers.mathematics.scalar import Values
 from tiltsim_controllers.vehicle.body import ROTORS
 from tiltsim_controllers.vehicle.parameters import PRESETS, SPIN, Vehicle
 
@@ -56,11 +55,6 @@ class RotorcraftSpec(ModelSpec):
     number: int = -1  # from 0, among vehicles that touch each other; -1 for one alone
     user_vehicle: UserVehicle | None = None
     """A user's file in place of the shipped one; its geoms may have mass and are always kept."""
-
-    @property
-    def spins(self) -> Values:
-        """Signs of the rotor speeds."""
-        return SPIN if isinstance(self.vehicle, Vehicle) else self.vehicle.spins
 
     @property
     def tilts(self) -> int:
@@ -147,11 +141,23 @@ def _set_parameters(tree: MjSpecTree, spec: RotorcraftSpec) -> None:
 
 
 @lru_cache(maxsize=64)  # dm_control takes a hundred times longer than MuJoCo's compiler
+def _vehicle(model: str, own: UserVehicle | None, arm_length: float, pod: Pod) -> mujoco.MjSpec:
+    """A shipped vehicle with these arms and pods, or a user's as it is."""
+    shipped = shipped_folder("mjcf") / f"{model}.xml"
+    root = mjcf_editing.parse_mjcf(shipped if own is None else Path(own.path))
+    if own is None:
+        _scale_lengths(root, arm_length)
+        if model == "tiltrotor":
+            _set_pods(root, pod)
+    return mjcf_editing.spec_of(root)
+
+
+@lru_cache(maxsize=64)
 def _compose(spec: RotorcraftSpec) -> tuple[mujoco.MjSpec, mujoco.MjSpec]:
     """The complete vehicle, and one without visuals, or the complete one where they act."""
     vehicle, servo, user_vehicle = spec.vehicle, spec.tilt_servo, spec.user_vehicle
-    shipped = shipped_folder("mjcf") / f"{spec.model}.xml"
-    root = mjcf_editing.parse_mjcf(shipped if user_vehicle is None else Path(user_vehicle.path))
+    arm_length = vehicle.arm_length if isinstance(vehicle, Vehicle) else 0.0
+    root = MjSpecTree(_vehicle(spec.model, user_vehicle, arm_length, spec.pod).copy())
     contacts = spec.ground is not None or spec.objects is not None or spec.number >= 0
 
     root.option.timestep = spec.timestep
@@ -159,19 +165,13 @@ def _compose(spec: RotorcraftSpec) -> tuple[mujoco.MjSpec, mujoco.MjSpec]:
     root.option.flag.contact = "enable" if contacts else "disable"
     root.option.flag.constraint = "enable" if contacts or spec.has_stops else "disable"
 
-    if user_vehicle is None and isinstance(vehicle, Vehicle):
-        _scale_lengths(root, vehicle.arm_length)
-        _set_pods(root, spec)
     hinges = [f"tilt_{i}" for i in range(1, spec.tilts + 1)]
     if isinstance(vehicle, Vehicle):
         _set_keyframes(root, vehicle, len(hinges))
     _limit_rotors(root, spec)
     if hinges:
-        if user_vehicle is None:
-            for hinge in hinges:
-                root.find("joint", hinge).armature = SERVO_ARMATURE
-            inertias = tuple(spec.pod.inertia + SERVO_ARMATURE for _ in hinges)
-        else:
+        inertias = (spec.pod.inertia + SERVO_ARMATURE,) * len(hinges)
+        if user_vehicle is not None:
             inertias = user_vehicle.hinge_inertias
         mjcf_editing.set_servos(root, hinges, servo, inertias)
     mjcf_editing.add_states(root, "law", spec.law_states)
@@ -188,15 +188,15 @@ def _compose(spec: RotorcraftSpec) -> tuple[mujoco.MjSpec, mujoco.MjSpec]:
         touchable(root, ground=spec.ground is not None, number=spec.number)
     if spec.ground is not None:
         _set_ground(root, spec.ground)
-    complete = mjcf_editing.spec_of(root)
+    complete = root.spec.copy()
     if user_vehicle is not None and spec.model != "multirotor":
         return complete, complete
     mjcf_editing.remove_visuals(root, contacts=contacts)
-    bare = mjcf_editing.spec_of(root)
+    bare = root.spec
     return complete, bare if user_vehicle is None or _moves_alike(complete, bare) else complete
 
 
-def _center_site(root: Any, spec: RotorcraftSpec) -> str:
+def _center_site(root: MjSpecTree, spec: RotorcraftSpec) -> str:
     """The name of a site in the center of mass, along the body's axes, added if necessary."""
     if spec.user_vehicle is None or isinstance(spec.vehicle, Vehicle):
         return "imu"
@@ -236,30 +236,30 @@ def _scale_lengths(root: Any, arm_length: float) -> None:
                 setattr(element, name, length * ratio)
 
 
-def _limit_rotors(root: Any, spec: RotorcraftSpec) -> None:
+def _limit_rotors(root: MjSpecTree, spec: RotorcraftSpec) -> None:
     thrust_range = spec.rotor_limits.thrust_range
     if thrust_range is not None:
-        for i in range(1, len(spec.spins) + 1):
+        for i in range(1, len(spec.vehicle.spins) + 1):
             thrust = root.find("actuator", f"thrust_{i}")
             thrust.ctrlrange, thrust.ctrllimited = thrust_range, "true"
     _limit_speeds(root, "rotor_speed", spec)
 
 
-def _limit_speeds(root: Any, name: str, spec: RotorcraftSpec) -> None:
+def _limit_speeds(root: MjSpecTree, name: str, spec: RotorcraftSpec) -> None:
     """Keep the activations ``name_1``, ``name_2``, ... within the limits of the rotors' speeds."""
-    for i, spin in enumerate(spec.spins, start=1):
+    for i, spin in enumerate(spec.vehicle.spins, start=1):
         speed_range = spec.rotor_limits.speed_range(spin)
         if speed_range is not None:
             rotor = root.find("actuator", f"{name}_{i}")
             rotor.actrange, rotor.actlimited = speed_range, "true"
 
 
-def _set_pods(root: Any, spec: RotorcraftSpec) -> None:
-    if spec.tilts:
-        for i in ROTORS:
-            inertial = root.find("body", f"pod_{i}").inertial
-            inertial.mass = spec.pod.mass
-            inertial.diaginertia = [spec.pod.inertia] * 3
+def _set_pods(root: Any, pod: Pod) -> None:
+    for i in ROTORS:
+        root.find("joint", f"tilt_{i}").armature = SERVO_ARMATURE
+        inertial = root.find("body", f"pod_{i}").inertial
+        inertial.mass = pod.mass
+        inertial.diaginertia = [pod.inertia] * 3
 
 
 def _body_inertia(spec: RotorcraftSpec, vehicle: Vehicle) -> tuple[float, list[float]]:
@@ -282,7 +282,7 @@ def _body_inertia(spec: RotorcraftSpec, vehicle: Vehicle) -> tuple[float, list[f
     return mass, moments
 
 
-def _set_ground(root: Any, ground: Ground) -> None:
+def _set_ground(root: MjSpecTree, ground: Ground) -> None:
     """Let the vehicle's collision shapes touch the ground."""
     plane = root.find("geom", "ground")
     plane.pos = (0.0, 0.0, ground.height)
@@ -291,7 +291,7 @@ def _set_ground(root: Any, ground: Ground) -> None:
     plane.conaffinity = 1
 
 
-def _set_keyframes(root: Any, vehicle: Vehicle, hinges: int) -> None:
+def _set_keyframes(root: MjSpecTree, vehicle: Vehicle, hinges: int) -> None:
     """Let the rotors of an upright, untilted vehicle turn at the speeds of the keyframes."""
     for name, speed in (("hover", vehicle.hover_rotor_speed), ("start", START_SPEED)):
         key = root.find("key", name)

@@ -38,7 +38,7 @@ digits, which another row of the statement tests. A value that the thesis does n
     case = "x"                    # if a flight has several rows of the claim
     published = -0.38             # the printed value
 
-`tiltsim.scenario.metric_names`, with `Expectation` and `ClaimTable`, describes the
+`tiltsim.scenario.expectation`, with `Expectation` and `ClaimTable`, describes the
 keys. Rows are labeled with the titles of their variants. With a boolean metric, ``published`` is
 compared with the metric; with any other, true or false states whether the value is within
 ``holds``, where the sentence is true, which is not the narrow range around our own value. A number

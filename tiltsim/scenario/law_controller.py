@@ -13,8 +13,9 @@ from typing import Any, ClassVar, Literal, TypeVar
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.controller_table import ControllerTable, ReferenceKind
 from tiltsim.scenario.reference import Reference
-from tiltsim.scenario.rotorcraft import ROTORCRAFT, TiltServoTable
+from tiltsim.scenario.rotorcraft import TiltServoTable
 from tiltsim.scenario.table import Positive, default
+from tiltsim.scenario.vehicle import ROTORCRAFT
 from tiltsim_controllers.analysis.stability import ErrorLoop, linear_loop
 from tiltsim_controllers.code.arrays import xp as xp
 from tiltsim_controllers.gaits.plans import Gait

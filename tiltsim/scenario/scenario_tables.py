@@ -1,36 +1,28 @@
 """The tables of a scenario together, and properties that follow from several of them."""
 
-from collections.abc import Mapping
 from functools import reduce
 from operator import or_
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
-from pydantic import Field, PrivateAttr, model_validator
+from pydantic import Field, PrivateAttr
 
 from tiltsim.errors import InputError
-from tiltsim.models.cross import as_multirotor
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario import gait
+from tiltsim.scenario.companion import CompanionTable, DownwashTable
 from tiltsim.scenario.controller import Controller
+from tiltsim.scenario.expectation import ClaimName, ClaimTable, Expectation, Origin
 from tiltsim.scenario.gait import FixedGait, GaitTable
-from tiltsim.scenario.interaction import (
-    CableTable,
-    CompanionTable,
-    DownwashTable,
-    ObjectTable,
-    PayloadTable,
-    ToolTable,
-)
+from tiltsim.scenario.interaction import CableTable, ObjectTable, PayloadTable, ToolTable
 from tiltsim.scenario.kinds import KINDS, tables_of
 from tiltsim.scenario.linearizing_controllers import AttitudeAltitudeController
-from tiltsim.scenario.metric_names import ClaimName, ClaimTable, Expectation, Origin
 from tiltsim.scenario.reference import Reference, SetpointReference
 from tiltsim.scenario.rotorcraft import MultirotorTable, RotorcraftTable, TiltServoTable
 from tiltsim.scenario.simulation_table import (
     AutopilotTable,
     InitialTable,
     SimulationTable,
-    with_controller,
+    WithAutopilot,
 )
 from tiltsim.scenario.surroundings import (
     Acceleration,
@@ -42,10 +34,9 @@ from tiltsim.scenario.surroundings import (
     SensorTable,
     Torque,
 )
-from tiltsim.scenario.table import Many, Table, default
+from tiltsim.scenario.table import Many, default
 from tiltsim.scenario.time_table import TimeTable
 from tiltsim.scenario.vehicle import ModelErrorTable, VehicleTable, VehicleUnion
-from tiltsim_controllers.mathematics.scalar import Values
 from tiltsim_controllers.vehicle.parameters import Vehicle
 
 GAITS: Final = tables_of(
@@ -65,7 +56,7 @@ DESCRIPTIVE: Final = ("title", "source", "without", "ours", "claim", "expect")
 """Keys that describe and judge a flight, and change nothing in it."""
 
 
-class ScenarioTables(Table):
+class ScenarioTables(WithAutopilot):
     """One flight, fully specified; `tiltsim.scenario.scenario.Scenario` adds the checks."""
 
     title: str = default("", "one line about the flight", "My first flight")
@@ -120,11 +111,6 @@ class ScenarioTables(Table):
     _address: str = PrivateAttr("")
     _own: dict[str, Any] = PrivateAttr({})  # parts given in Python, by name
     _trusted: bool = PrivateAttr(False)  # see `tiltsim.scenario.own_parts`
-
-    @model_validator(mode="before")
-    @classmethod
-    def _with_controller(cls, value: Any) -> Any:
-        return with_controller(value) if isinstance(value, Mapping) else value
 
     @property
     def address(self) -> str:
@@ -232,7 +218,7 @@ class ScenarioTables(Table):
     def has_ideal_actuators_in_still_air(self) -> bool:
         """Whether pods and rotors follow their commands, and nothing else acts, as in the thesis.
 
-        Otherwise `tiltsim.laws.layers.on_equations` wraps the controller for the thesis plant.
+        Otherwise `tiltsim.laws.layers.layer` wraps the controller for the thesis plant.
         """
         vehicle = self.vehicle
         if not isinstance(vehicle, RotorcraftTable):
@@ -268,11 +254,6 @@ class ScenarioTables(Table):
         if isinstance(self.vehicle, MultirotorTable):
             return self.model_error.apply_to_rotors(self.vehicle.resolve())
         return self.true_rotorcraft
-
-    @property
-    def true_thrust_coefficients(self) -> Values:
-        """K_f (N s^2/rad^2) of each rotor of any simulated rotorcraft."""
-        return as_multirotor(self.true_vehicle, tilting=False).thrust_coefficients
 
     @property
     def true_rotorcraft(self) -> Vehicle:

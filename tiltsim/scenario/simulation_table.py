@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from itertools import pairwise
 from typing import Annotated, Any, Final, Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from tiltsim.scenario.messages import InvalidValueError
 from tiltsim.scenario.table import (
@@ -269,3 +269,12 @@ def with_controller(document: Mapping[str, Any]) -> Mapping[str, Any]:
             )
         changed["simulation"] = {"timestep": step, **simulation, "control_timestep": step}
     return changed
+
+
+class WithAutopilot(Table):
+    """A document in which an autopilot may take the controller's place."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _with_controller(cls, value: Any) -> Any:
+        return with_controller(value) if isinstance(value, Mapping) else value
