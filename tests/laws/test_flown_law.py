@@ -194,10 +194,26 @@ class Climb(tiltsim.LawController):
         )
 
 
+class Namesake(Climb):
+    """Keys that are called like keys of tables of the library which this one has not."""
+
+    observer: float = Field(2.0, description="factor on the gains [-]")
+    tilts: float = Field(3.0, description="likewise [-]")
+    mixer: Literal["halved", "whole"] = Field("whole", description="part of the thrust")
+
+
 UP = {
     "reference": {"type": "setpoint", "position": [0.0, 0.0, 0.5]},
     "simulation": {"duration": 0.2, "control_timestep": 0.01},
 }
+
+
+def test_a_law_reads_keys_that_are_called_like_keys_of_other_tables():
+    read = Namesake(law="numpy", share=1.5).law_parameters(None)
+    assert read._asdict() == {
+        "gains": (4.0, 4.0), "share": 1.5, "observer": 2.0, "tilts": 3.0, "mixer": 1.0
+    }  # fmt: skip
+    assert not {"rotor_bandwidth", "estimator", "allow_unstable"} & {*read._fields}
 
 
 def test_a_class_has_keys_and_states():
