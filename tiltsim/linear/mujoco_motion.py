@@ -157,7 +157,7 @@ class MujocoMotion(Motion):
     def _forward(self, time: float, state: Floats) -> tuple[Any, Floats, Floats, Floats]:
         """MuJoCo's data, tensions of the cables (N), accelerations, and readings of the sensors.
 
-        A controller reads the contact forces of the last step, in the limit the forces of this instant.
+        A controller reads the forces of the last step, here of this instant.
         """
         model, data = self._varied.model, self._set(state)
         limited, tensions = model.tendon_limited.copy(), np.zeros(len(self._hanging.tendons))
