@@ -150,6 +150,8 @@ def commanded_loop(scenario: Scenario) -> ClosedLoop:
     return _commanded_loop(TILTROTOR if vehicle.has_tilting_rotors else QUADROTOR, columns)
 
 
+# --- under laws ----------------------------------------------------------------------------------
+
 LOOPS: Final[dict[str, ClosedLoop]] = {
     "attitude_altitude": tiltrotor_loop("attitude_altitude", False, "", False),
     # the same law with gait_rate_feedforward = true
