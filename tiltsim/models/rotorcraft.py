@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Final, cast
 import numpy as np
 
 from tiltsim.models import mjcf_editing
+from tiltsim.models.cross import as_multirotor
 from tiltsim.models.mjspec_tree import MjSpecTree
 from tiltsim.models.objects import Objects, add_companion, add_objects, touchable
 from tiltsim.models.parts import (
@@ -129,14 +130,9 @@ def _set_parameters(tree: MjSpecTree, spec: RotorcraftSpec) -> None:
         inertial = tree.find("body", "vehicle").inertial
         inertial.mass, inertial.diaginertia = _body_inertia(spec, vehicle)
     if isinstance(vehicle, Vehicle):
-        gears = [(vehicle.thrust_coefficient, vehicle.drag_coefficient, spin) for spin in SPIN]
         _set_keyframes(tree, vehicle, spec.tilts)
-    elif user is not None and vehicle != user.vehicle:
-        gears = [(rotor.thrust, rotor.drag, rotor.spin) for rotor in vehicle.rotors]
-    else:
-        gears = []
-    for i, (thrust, drag, spin) in enumerate(gears, start=1):
-        gear = (0.0, 0.0, thrust, 0.0, 0.0, -spin * drag)
+    for i, rotor in enumerate(as_multirotor(vehicle, tilting=False).rotors, start=1):
+        gear = (0.0, 0.0, rotor.thrust, 0.0, 0.0, -rotor.spin * rotor.drag)
         tree.find("actuator", f"thrust_{i}").gear = gear
 
 
