@@ -89,12 +89,14 @@ def both_ways(monkeypatch):
         models = []
         for installed in (find_spec, lambda _: None):
             monkeypatch.setattr(mjcf_editing, "find_spec", installed)
+            rotorcraft._vehicle.cache_clear()
             rotorcraft._compose.cache_clear()
             tilt_car._compose.cache_clear()
             models.append([compile_it(spec, visuals=visuals) for visuals in (True, False)])
         return models
 
     yield compose
+    rotorcraft._vehicle.cache_clear()
     rotorcraft._compose.cache_clear()
     tilt_car._compose.cache_clear()
 

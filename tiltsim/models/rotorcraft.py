@@ -137,11 +137,23 @@ def _set_parameters(tree: MjSpecTree, spec: RotorcraftSpec) -> None:
 
 
 @lru_cache(maxsize=64)  # dm_control takes a hundred times longer than MuJoCo's compiler
+def _vehicle(model: str, own: UserVehicle | None, arm_length: float, pod: Pod) -> mujoco.MjSpec:
+    """A shipped vehicle with these arms and pods, or a user's as it is."""
+    shipped = shipped_folder("mjcf") / f"{model}.xml"
+    root = mjcf_editing.parse_mjcf(shipped if own is None else Path(own.path))
+    if own is None:
+        _scale_lengths(root, arm_length)
+        if model == "tiltrotor":
+            _set_pods(root, pod)
+    return mjcf_editing.spec_of(root)
+
+
+@lru_cache(maxsize=64)
 def _compose(spec: RotorcraftSpec) -> tuple[mujoco.MjSpec, mujoco.MjSpec]:
     """The complete vehicle, and one without visuals, or the complete one where they act."""
     vehicle, servo, user_vehicle = spec.vehicle, spec.tilt_servo, spec.user_vehicle
-    shipped = shipped_folder("mjcf") / f"{spec.model}.xml"
-    root = mjcf_editing.parse_mjcf(shipped if user_vehicle is None else Path(user_vehicle.path))
+    arm_length = vehicle.arm_length if isinstance(vehicle, Vehicle) else 0.0
+    root = MjSpecTree(_vehicle(spec.model, user_vehicle, arm_length, spec.pod).copy())
     contacts = spec.ground is not None or spec.objects is not None or spec.number >= 0
 
     root.option.timestep = spec.timestep
@@ -149,19 +161,13 @@ def _compose(spec: RotorcraftSpec) -> tuple[mujoco.MjSpec, mujoco.MjSpec]:
     root.option.flag.contact = "enable" if contacts else "disable"
     root.option.flag.constraint = "enable" if contacts or spec.has_stops else "disable"
 
-    if user_vehicle is None and isinstance(vehicle, Vehicle):
-        _scale_lengths(root, vehicle.arm_length)
-        _set_pods(root, spec)
     hinges = [f"tilt_{i}" for i in range(1, spec.tilts + 1)]
     if isinstance(vehicle, Vehicle):
         _set_keyframes(root, vehicle, len(hinges))
     _limit_rotors(root, spec)
     if hinges:
-        if user_vehicle is None:
-            for hinge in hinges:
-                root.find("joint", hinge).armature = SERVO_ARMATURE
-            inertias = tuple(spec.pod.inertia + SERVO_ARMATURE for _ in hinges)
-        else:
+        inertias = (spec.pod.inertia + SERVO_ARMATURE,) * len(hinges)
+        if user_vehicle is not None:
             inertias = user_vehicle.hinge_inertias
         mjcf_editing.set_servos(root, hinges, servo, inertias)
     mjcf_editing.add_states(root, "law", spec.law_states)
@@ -178,15 +184,15 @@ def _compose(spec: RotorcraftSpec) -> tuple[mujoco.MjSpec, mujoco.MjSpec]:
         touchable(root, ground=spec.ground is not None, number=spec.number)
     if spec.ground is not None:
         _set_ground(root, spec.ground)
-    complete = mjcf_editing.spec_of(root)
+    complete = root.spec.copy()
     if user_vehicle is not None and spec.model != "multirotor":
         return complete, complete
     mjcf_editing.remove_visuals(root, contacts=contacts)
-    bare = mjcf_editing.spec_of(root)
+    bare = root.spec
     return complete, bare if user_vehicle is None or _moves_alike(complete, bare) else complete
 
 
-def _center_site(root: Any, spec: RotorcraftSpec) -> str:
+def _center_site(root: MjSpecTree, spec: RotorcraftSpec) -> str:
     """The name of a site in the center of mass, along the body's axes, added if necessary."""
     if spec.user_vehicle is None or isinstance(spec.vehicle, Vehicle):
         return "imu"
@@ -226,7 +232,7 @@ def _scale_lengths(root: Any, arm_length: float) -> None:
                 setattr(element, name, length * ratio)
 
 
-def _limit_rotors(root: Any, spec: RotorcraftSpec) -> None:
+def _limit_rotors(root: MjSpecTree, spec: RotorcraftSpec) -> None:
     thrust_range = spec.rotor_limits.thrust_range
     if thrust_range is not None:
         for i in range(1, len(spec.vehicle.spins) + 1):
@@ -235,7 +241,7 @@ def _limit_rotors(root: Any, spec: RotorcraftSpec) -> None:
     _limit_speeds(root, "rotor_speed", spec)
 
 
-def _limit_speeds(root: Any, name: str, spec: RotorcraftSpec) -> None:
+def _limit_speeds(root: MjSpecTree, name: str, spec: RotorcraftSpec) -> None:
     """Keep the activations ``name_1``, ``name_2``, ... within the limits of the rotors' speeds."""
     for i, spin in enumerate(spec.vehicle.spins, start=1):
         speed_range = spec.rotor_limits.speed_range(spin)
@@ -244,12 +250,12 @@ def _limit_speeds(root: Any, name: str, spec: RotorcraftSpec) -> None:
             rotor.actrange, rotor.actlimited = speed_range, "true"
 
 
-def _set_pods(root: Any, spec: RotorcraftSpec) -> None:
-    if spec.tilts:
-        for i in ROTORS:
-            inertial = root.find("body", f"pod_{i}").inertial
-            inertial.mass = spec.pod.mass
-            inertial.diaginertia = [spec.pod.inertia] * 3
+def _set_pods(root: Any, pod: Pod) -> None:
+    for i in ROTORS:
+        root.find("joint", f"tilt_{i}").armature = SERVO_ARMATURE
+        inertial = root.find("body", f"pod_{i}").inertial
+        inertial.mass = pod.mass
+        inertial.diaginertia = [pod.inertia] * 3
 
 
 def _body_inertia(spec: RotorcraftSpec, vehicle: Vehicle) -> tuple[float, list[float]]:
@@ -272,7 +278,7 @@ def _body_inertia(spec: RotorcraftSpec, vehicle: Vehicle) -> tuple[float, list[f
     return mass, moments
 
 
-def _set_ground(root: Any, ground: Ground) -> None:
+def _set_ground(root: MjSpecTree, ground: Ground) -> None:
     """Let the vehicle's collision shapes touch the ground."""
     plane = root.find("geom", "ground")
     plane.pos = (0.0, 0.0, ground.height)
@@ -281,7 +287,7 @@ def _set_ground(root: Any, ground: Ground) -> None:
     plane.conaffinity = 1
 
 
-def _set_keyframes(root: Any, vehicle: Vehicle, hinges: int) -> None:
+def _set_keyframes(root: MjSpecTree, vehicle: Vehicle, hinges: int) -> None:
     """Let the rotors of an upright, untilted vehicle turn at the speeds of the keyframes."""
     for name, speed in (("hover", vehicle.hover_rotor_speed), ("start", START_SPEED)):
         key = root.find("key", name)

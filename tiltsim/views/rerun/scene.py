@@ -38,25 +38,23 @@ class Scene:
     Args:
         recording: The recording to write to.
         assembly: The assembly of the flight.
-        model: The vehicle's model, visual geometry included.
         root: The entity of the scene.
-        color: The flight's color.
-        name: The label of the vehicle in a comparison; empty for a single flight.
+        colors: The color of each vehicle.
+        name: The label of the first vehicle, where there are several; empty for one alone.
     """
 
     def __init__(
         self,
         recording: rr.RecordingStream,
         assembly: Assembly,
-        model: mujoco.MjModel,
         root: str,
-        color: Color,
+        colors: Sequence[Color],
         name: str = "",
     ) -> None:
         self._recording = recording
         self._assembly = assembly
-        self._model = model
-        self._color = color
+        self.model = self._model = model = replay.visible_model(assembly)
+        self._colors = colors
         self.root = root
         self.camera = f"{root}/camera"  # moves with the vehicle but does not rotate
         self._floor = f"{root}/floor"  # moves with the vehicle in whole cells
@@ -86,10 +84,16 @@ class Scene:
         cable = rr.LineStrips3D.from_fields(colors=[timeline.GREY], radii=[TRAIL_WIDTH])
         for tendon in range(model.ntendon):
             self._log(f"{self.root}/{model.tendon(tendon).name}", cable)
-        trail = rr.LineStrips3D.from_fields(colors=[self._color], radii=[TRAIL_WIDTH])
-        for path in self.trails:
-            self._log(path, trail)
-        look: dict[str, Any] = {"colors": [timeline.YELLOW]}
+        look: dict[str, Any]
+        names = (name, *(table.name for table in self._assembly.scenario.companion))
+        for prefix, color, own in zip(self._trails, self._colors, names, strict=True):
+            trail = rr.LineStrips3D.from_fields(colors=[color], radii=[TRAIL_WIDTH])
+            self._log(f"{self.root}/{prefix}trail", trail)
+            place = f"{self.root}/{prefix}vehicle" if prefix else self.camera
+            look = {"radii": [DOT], "colors": [color], "labels": [own] if name else None}
+            dot = rr.Points3D([(0.0, 0.0, 0.0)], **look, show_labels=True)
+            self._log(f"{place}/dot", dot)
+        look = {"colors": [timeline.YELLOW]}
         look["radii"] = [0.02 * replay.vehicle_radius(model)]
         for site in self._thrust:
             arrow = rr.Arrows3D.from_fields(origins=[model.site_pos[site]], **look)
@@ -100,8 +104,6 @@ class Scene:
         lines = [[(c, -half, height), (c, half, height)] for c in offsets]
         lines += [[(-half, c, height), (half, c, height)] for c in offsets]
         self._log(self._floor, rr.LineStrips3D(lines, colors=[timeline.FAINT], radii=[-0.5]))
-        look = {"radii": [DOT], "colors": [self._color], "labels": [name] if name else None}
-        self._log(f"{self.camera}/dot", rr.Points3D([(0.0, 0.0, 0.0)], **look, show_labels=True))
 
     def append(self, piece: Flight) -> None:
         """Log the next piece of the flight."""
