@@ -141,7 +141,7 @@ class OwnFunctionController(ControllerTable):
 class PythonController(OwnFunctionController):
     """A user's own controller in Python; see `tiltsim.plants.commanded_plant`."""
 
-    vehicle_models = EveryRotorcraft()  # type: ignore[assignment]
+    vehicle_models = EveryRotorcraft()
     reference_kinds = ("position", "pose", "attitude_altitude")
     is_external = True
     rotors_have_speeds = True

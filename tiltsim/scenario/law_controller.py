@@ -89,7 +89,7 @@ class EveryRotorcraft:
 class LawTable(ControllerTable):
     """The common part of the tables of laws, wherever the function comes from."""
 
-    vehicle_models = EveryRotorcraft()  # type: ignore[assignment]
+    vehicle_models = EveryRotorcraft()
     reference_kinds: ClassVar[tuple[ReferenceKind, ...]] = ("position",)
     rotors_have_speeds = True
     damps_swing = True
@@ -192,5 +192,5 @@ class TiltingTable(LawTable):
 @cache
 def _not_read(table: type[LawController]) -> frozenset[str]:
     """Keys of a table that its law does not read: of the bases that it has."""
-    bases = {LawController, TiltingTable, Compensating} & {*table.mro()}
+    bases: set[Any] = {LawController, TiltingTable, Compensating} & {*table.mro()}
     return frozenset(key for base in bases for key in base.model_fields)
