@@ -12,9 +12,9 @@ from tiltsim.flight.flight import Flight
 from tiltsim.system.text import Quantity
 from tiltsim.views.attitude_plane import MOVING_TRAIL_TIME, curve_is_constant
 from tiltsim.views.replay import (
+    by_prefix,
     camera_of,
     positions,
-    prefixes,
     reference_path,
     seen_radius,
     thrust_scale,
@@ -104,14 +104,9 @@ def _trajectory_view(
     flights: Sequence[Flight],
 ) -> rrb.View:
     """The complete paths of all vehicles and references."""
-    contents = []
-    for one, scene in scenes:
-        contents += [*scene.trails, f"{scene.root}/reference/**"]
-        contents += [f"{scene.root}/{each.name}_vehicle/**" for each in one.scenario.companion]
-        contents += [f"{scene.vehicle}/**", f"{scene.camera}/**"]
     first, scene = scenes[0]
     paths = [reference_path(first.assembly, _end_of(recorders, flights), REFERENCE_POINTS)]
-    tracks = [positions(f.columns, p) for f in flights for p in prefixes(f.scenario)]
+    tracks = [positions(one.columns, p) for one in flights for p in by_prefix(one.assembly)]
     known = np.concatenate([*paths, *tracks])
     low, high = np.quantile(known, 0.02, axis=0), np.quantile(known, 0.98, axis=0)
     size = max(float((high - low).max()), 6.0 * vehicle_radius(scene.model))
@@ -120,7 +115,7 @@ def _trajectory_view(
     plane = rr.encodings.Plane3D(normal=(0.0, 0.0, 1.0), distance=ground_height(scene.model))
     return rrb.Spatial3DView(
         origin="world",
-        contents=contents,
+        contents=[path for _, each in scenes for path in each.paths],
         name="Trajectory and reference",
         eye_controls=_eye(middle + OVERVIEW * size * away, middle),
         background=BACKGROUND,
