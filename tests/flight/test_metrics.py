@@ -349,7 +349,9 @@ def test_the_page_on_metrics_names_all_of_them_with_their_units():
 
 def test_editors_complete_the_metrics_of_expectations():
     metric = scenario_schema()["$defs"]["Expectation"]["properties"]["metric"]
-    assert metric["enum"] == list(METRICS)
+    own, companions = metric["anyOf"]
+    assert own["enum"] == list(METRICS)
+    assert re.match(companions["pattern"], "wing.duration")
 
 
 def test_units_belong_to_the_metrics():

@@ -190,7 +190,10 @@ def _accelerations(command: Command, gain: Any, k: Any, speeds: Any) -> Any:
     The gain of the speed errors is in 1/s, ``k`` in N s^2, speeds in rad/s, shape (N,).
     """
     if not isinstance(command, Command):
-        raise LawError(f"returned {short_repr(command)}; expected a tiltsim.Command")
+        raise LawError(
+            f"returned {short_repr(command)}; expected a tiltsim.Command, as in "
+            "tiltsim.Command(thrusts=...)"
+        )
     given = [name for name in ROTOR_COMMANDS if getattr(command, name) is not None]
     if len(given) != 1:
         what = " and ".join(given) if given else "nothing for the rotors"

@@ -123,7 +123,10 @@ def check_command(command: object, layout: Layout) -> CheckedCommand:
             turn, or any to a vehicle without servos.
     """
     if not isinstance(command, Command):
-        raise ControllerError(f"returned {short_repr(command)}; expected a tiltsim.Command")
+        raise ControllerError(
+            f"returned {short_repr(command)}; expected a tiltsim.Command, as in "
+            "tiltsim.Command(thrusts=...)"
+        )
     for name in ("rates", "discrete"):
         if getattr(command, name) is not None:
             raise ControllerError(f"returned {name}; only a law, marked @tiltsim.law, has states")

@@ -88,8 +88,18 @@ def closest_in_library(path: str | Path) -> str:
     return did_you_mean(Path(path).with_suffix("").as_posix(), names)
 
 
+_OTHER_FILES: Final = {
+    ".xml": "a vehicle, for the key vehicle.mjcf of a scenario, as tiltsim new writes it",
+    ".parquet": "a flight; its scenario is scenario.toml beside it",
+    ".py": "Python; name a controller with --controller FILE.py:NAME or controller=",
+}
+"""Hints at what a file that is given in place of a scenario is, by its ending."""
+
+
 def read_toml(path: Path) -> dict[str, Any]:
     """The document in a TOML file. Raises `InputError` with the file and the reason."""
+    if hint := _OTHER_FILES.get(path.suffix):
+        raise InputError(f"{path}: not a TOML file: {hint}")
     try:
         document = tomllib.loads(read_text(path))
     except (ValueError, RecursionError) as error:  # TOMLDecodeError is a ValueError

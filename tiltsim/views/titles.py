@@ -149,7 +149,7 @@ class EventDetector:
     def opening(self) -> list[Event]:
         """The scenario; its gait, controller and plant."""
         scenario = self._assembly.scenario
-        title = scenario.title or scenario.address or "flight"
+        title = scenario.title or scenario.address
         about = [describe_gait(self._assembly), describe_controller(scenario)]
         texts = [title, *map(", ".join, about), f"{scenario.simulation.plant} plant"]
         return [Event(0.0, "INFO", text) for text in texts if text]

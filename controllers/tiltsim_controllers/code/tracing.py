@@ -47,7 +47,7 @@ class Expr:
         )
 
     def __float__(self) -> NoReturn:
-        refuse("a traced number has no value yet", "use xp.sin instead of math.sin")
+        refuse("a traced number has no value yet", "use xp.sin for math.sin, xp.array for a[0] = x")
 
     def __index__(self) -> NoReturn:
         refuse("a traced number is no index", "write take(values, index)")
