@@ -73,7 +73,7 @@ _Minors = dict[tuple[int, ...], Any]
 
 
 def _minor(matrix: Any, columns: tuple[int, ...], known: _Minors) -> Any:
-    """The determinant of these columns of as many last rows, by expansion along the first."""
+    """The determinant of these columns of the last rows, by expansion along the first of them."""
     if not columns:
         return 1.0
     if columns not in known:
