@@ -77,7 +77,7 @@ def loop_of(
 
     Args:
         scenario: The scenario to fly.
-        adapted: May change the controller before layers go around it.
+        adapted: May change each controller, the first vehicle's first, before layers go around it.
         recorded: See `assemble`.
     """
     controller, external = scenario.controller, scenario.controller.is_external
@@ -117,7 +117,7 @@ def loop_of(
         loop = with_objects(loop, others_of(scenario))
     if scenario.companion:
         vehicles, names = (scenario, *scenario.companions), (t.name for t in scenario.companion)
-        loops = loop, *(loop_of(each, recorded=recorded) for each in vehicles[1:])
+        loops = loop, *(loop_of(each, adapted, recorded=recorded) for each in vehicles[1:])
         found = zip(("", *names), loops, map(plan_flight, vehicles), strict=True)
         return with_companions(
             tuple(Member(n, own, len(own.setup(plan, 0.0).knots)) for n, own, plan in found),

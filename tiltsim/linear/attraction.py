@@ -188,9 +188,6 @@ def _check(scenario: Scenario, axes: tuple[str, str], coarse: int, refinements: 
             "most"
         )
     scenario.require_rotorcraft("attraction")
-    if scenario.companion:
-        where = scenario.address or "scenario"
-        raise InputError(f"{where}: companion: attraction takes one vehicle; remove [[companion]]")
 
 
 def _edges(axis: str, given: tuple[float, float] | None, cells: int) -> Floats:

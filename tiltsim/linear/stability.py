@@ -11,9 +11,10 @@ import numpy as np
 
 from tiltsim.errors import InputError
 from tiltsim.laws.assembling import assemble
+from tiltsim.linear.coordinates import vehicles_of
 from tiltsim.linear.equilibrium import Equilibrium, equilibrium_of
 from tiltsim.linear.forcing import forcing_of
-from tiltsim.linear.modes import KINDS, Mode, exponents, is_stable, modes_of, spectrum
+from tiltsim.linear.modes import KINDS, Mode, exponents, is_stable, labeled, modes_of, spectrum
 from tiltsim.linear.newton import ERROR
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.scenario import Scenario
@@ -133,7 +134,7 @@ def stability_at(found: Equilibrium) -> Stability:
     eigenvalues = eigenvalues[np.argsort(-np.abs(eigenvalues), kind="stable")]
     poles = exponents(eigenvalues, timestep)
     finite = poles[np.isfinite(poles)]
-    modes = modes_of(matrix, found.names, timestep, error)
+    modes = modes_of(matrix, found.names, timestep, error, found.motion.prefixes)
     if found.is_orbit and timestep is not None:
         fastest = log(RESOLVED) / timestep
         modes = tuple(mode for mode in modes if mode.growth_rate > fastest)
@@ -264,11 +265,18 @@ def slowest_mode(scenario: Scenario) -> SlowestMode | None:
     Horizontal motion counts if the law follows the reference's. None without a decaying mode, and
     for flights that are neither at rest nor periodic or that take more than `MOST_STEPS` a period.
     """
-    assembly = assemble(scenario)
-    of_layers = (name for extra in assembly.loop.extra_actuators for name in extra.names)
-    without = {*KINDS.values(), *of_layers, *(() if assembly.follows_position else ("x", "y"))}
+    vehicles = vehicles_of(assemble(scenario))
+    without = {
+        labeled(prefix, name)
+        for prefix, each in vehicles.items()
+        for name in (
+            *KINDS.values(),
+            *(name for extra in each.loop.extra_actuators for name in extra.names),
+            *(() if each.follows_position else ("x", "y")),
+        )
+    }
     try:
-        period = forcing_of(assembly).period or 0.0
+        period = forcing_of(vehicles).period or 0.0
         if period > MOST_STEPS * scenario.simulation.timestep:
             return None
         modes = stability(scenario).modes
