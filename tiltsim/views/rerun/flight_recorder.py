@@ -164,7 +164,7 @@ class FlightRecorder:
     def draw_references(self, end: float) -> None:
         """Log the path of the reference and the levels of the plots up to a time (s)."""
         if self.scene is not None:
-            self.scene.draw_reference(end)
+            self.scene.draw_references(end)
         levels = [(panel.path, level) for panel in self.signals.values() for level in panel.levels]
         for root, (panel, level) in product(self._level_roots, levels):
             path = f"{root}{panel}/{level.name}"
