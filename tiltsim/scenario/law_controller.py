@@ -78,7 +78,7 @@ class Airframe:
 
 
 class EveryRotorcraft:
-    """The models of all vehicles that fly, found when a class is asked: kinds are discovered."""
+    """The models of all vehicles that fly, found at each access: kinds are discovered."""
 
     def __get__(self, _table: object, _type: object = None) -> tuple[str, ...]:
         from tiltsim.scenario.vehicle import VEHICLES
