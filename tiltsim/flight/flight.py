@@ -270,7 +270,8 @@ class Flight(ColumnsOverTime):
         scenario, end = self.scenario, self.end
         how = f"{end.kind} at {end.time:g} s" + (f": {end.cause}" if end.cause else "")
         size = f"{len(self)} samples of {len(self.units)} columns"
-        rows = [(name, f"{value:.6g}", unit_of(name)) for name, value in self.metrics().items()]
+        metrics = self.metrics().of_all_vehicles().items()
+        rows = [(name, f"{value:.6g}", unit_of(name)) for name, value in metrics]
         lines = [scenario.address, how, size]
         return html_table(scenario.title or "Flight", lines, rows, ("metric", "value", "unit"))
 

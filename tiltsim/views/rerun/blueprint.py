@@ -10,16 +10,8 @@ import rerun.blueprint as rrb
 
 from tiltsim.flight.flight import Flight
 from tiltsim.system.text import Quantity
+from tiltsim.views import replay
 from tiltsim.views.attitude_plane import MOVING_TRAIL_TIME, curve_is_constant
-from tiltsim.views.replay import (
-    camera_of,
-    positions,
-    prefixes,
-    reference_path,
-    seen_radius,
-    thrust_scale,
-    vehicle_radius,
-)
 from tiltsim.views.rerun.flight_recorder import BOUND, FlightRecorder, plotted_lines
 from tiltsim.views.rerun.scene import REFERENCE_POINTS, Scene, ground_height
 from tiltsim.views.rerun.timeline import TIMELINE
@@ -83,9 +75,9 @@ def _end_of(recorders: Sequence[FlightRecorder], flights: Sequence[Flight]) -> f
 
 def _vehicle_view(one: FlightRecorder, scene: Scene, *, alone: bool) -> rrb.View:
     """The vehicle at close range; the camera moves with it but does not rotate."""
-    radius = seen_radius(one.scenario, scene.model)
-    arrows = f"thrust arrows: {100.0 * thrust_scale(scene.model):g} cm per newton"
-    pose = camera_of(one.scenario)
+    radius = replay.seen_radius(one.scenario, scene.model)
+    arrows = f"thrust arrows: {100.0 * replay.thrust_scale(scene.model):g} cm per newton"
+    pose = replay.camera_of(one.scenario)
     eye = NEARER * radius * pose.distance * pose.away
     return rrb.Spatial3DView(
         origin=scene.camera,
@@ -104,23 +96,20 @@ def _trajectory_view(
     flights: Sequence[Flight],
 ) -> rrb.View:
     """The complete paths of all vehicles and references."""
-    contents = []
-    for one, scene in scenes:
-        contents += [*scene.trails, f"{scene.root}/reference/**"]
-        contents += [f"{scene.root}/{each.name}_vehicle/**" for each in one.scenario.companion]
-        contents += [f"{scene.vehicle}/**", f"{scene.camera}/**"]
     first, scene = scenes[0]
-    paths = [reference_path(first.assembly, _end_of(recorders, flights), REFERENCE_POINTS)]
-    tracks = [positions(f.columns, p) for f in flights for p in prefixes(f.scenario)]
+    paths = [replay.reference_path(first.assembly, _end_of(recorders, flights), REFERENCE_POINTS)]
+    tracks = [
+        replay.positions(one.columns, p) for one in flights for p in replay.by_prefix(one.assembly)
+    ]
     known = np.concatenate([*paths, *tracks])
     low, high = np.quantile(known, 0.02, axis=0), np.quantile(known, 0.98, axis=0)
-    size = max(float((high - low).max()), 6.0 * vehicle_radius(scene.model))
+    size = max(float((high - low).max()), 6.0 * replay.vehicle_radius(scene.model))
     middle, above = 0.5 * (low + high), np.array([0.0, 0.0, 1.0])
-    away = above if first.scenario.vehicle.is_planar else camera_of(first.scenario).away
+    away = above if first.scenario.vehicle.is_planar else replay.camera_of(first.scenario).away
     plane = rr.encodings.Plane3D(normal=(0.0, 0.0, 1.0), distance=ground_height(scene.model))
     return rrb.Spatial3DView(
         origin="world",
-        contents=contents,
+        contents=[path for _, each in scenes for path in each.paths],
         name="Trajectory and reference",
         eye_controls=_eye(middle + OVERVIEW * size * away, middle),
         background=BACKGROUND,
@@ -195,9 +184,8 @@ def _tabs(
 ) -> tuple[rrb.Container, rrb.Container]:
     """The plots of one vehicle: its main signals, and all others."""
     signals, root = one.signals.values(), one.details
-    lines = {each.name: plotted_lines(each, root) for each in signals}
-    labels = [line.labels[0] for each in signals if each.plotted for line in lines[each.name]]
-    times = _times(labels, end)
+    labels = {each.name: [line.label for line in plotted_lines(each)] for each in signals}
+    times = _times([text for each in signals if each.plotted for text in labels[each.name]], end)
 
     def plot(panel: Signals, title: str, *, legend: bool = False) -> rrb.View:
         limits = range_of([(panel, flight) for flight in flights]) if flights else None
@@ -206,7 +194,7 @@ def _tabs(
     rows: list[rrb.View | rrb.Container] = []
     heights, bare, others = [], [], []
     for each in signals:
-        entries = {text for line in lines[each.name] for text in line.labels}
+        entries = {*labels[each.name]}
         if not each.plotted:
             others.append(plot(each, each.text, legend=len(entries) > 1))
         elif len(entries) < 2:

@@ -62,11 +62,12 @@ class Recording:
         names = (names or flight_names(scenarios)) if len(scenarios) > 1 else [""]
         title = ": ".join(filter(None, (common_title(scenarios), " / ".join(names), vehicle)))
         self.stream.send_recording_name(title or scenarios[0].address or "flight")
-        self._together, several = False, dict(zip(names, assemblies, strict=True))
-        if len(assemblies) == 1 and scenarios[0].companion and not vehicle:
-            self._together, several = True, vehicle_assemblies(assemblies[0])
+        several = [*zip(names, assemblies, strict=True)]
+        self._together = len(several) == 1 and bool(scenarios[0].companion) and not vehicle
+        if self._together:
+            several = [*vehicle_assemblies(assemblies[0]).items()]
         self.recorders = []
-        for number, (name, assembly) in enumerate(several.items()):
+        for number, (name, assembly) in enumerate(several):
             count = 1 + len(assembly.scenario.companion)
             colors = [FLIGHTS[(number + i * self._together) % len(FLIGHTS)] for i in range(count)]
             about = (self.stream, assembly, name, colors, number == 0)
