@@ -184,5 +184,5 @@ class TiltingTable(LawTable):
 @cache
 def _not_read(table: type[LawController]) -> frozenset[str]:
     """Keys of a table that its law does not read: of the bases that it has."""
-    bases = {LawController, TiltingTable, Compensating} & {*table.mro()}
-    return frozenset(key for base in bases for key in base.model_fields)
+    bases = LawController, TiltingTable, Compensating
+    return frozenset(key for base in bases if issubclass(table, base) for key in base.model_fields)
