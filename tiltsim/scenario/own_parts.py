@@ -227,7 +227,7 @@ def _marks_law(function: str) -> bool:
     file, _, name = function.rpartition(":")
     try:
         module = ast.parse(Path(file).read_bytes() if is_file(file) else b"")
-    except (OSError, ValueError, SyntaxError, RecursionError):  # is told when it is executed
+    except (OSError, ValueError, SyntaxError, RecursionError):  # its execution reports it
         return False
     marks = (
         ast.unparse(mark).rpartition(".")[2]
