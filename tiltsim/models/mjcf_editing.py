@@ -106,11 +106,11 @@ def spec_of(root: Any) -> mujoco.MjSpec:
     return mujoco.MjSpec.from_string(text, assets=root.get_assets())
 
 
-def remove_visuals(root: MjSpecTree, *, contacts: bool) -> None:
+def remove_visuals(root: MjSpecTree, *, contacts: bool, kept: Sequence[str] = ()) -> None:
     """Remove all that is only drawn or measured: geoms, cameras, lights, sensors and their sites.
 
-    ``contacts`` keeps the geoms that take part in contacts. The shipped vehicles have neither
-    springs nor dampers, so that MuJoCo need not look for them.
+    ``contacts`` keeps the geoms that take part in contacts, ``kept`` sites by name. The shipped
+    vehicles have neither springs nor dampers, so that MuJoCo need not look for them.
     """
     root.option.flag.spring = root.option.flag.damper = "disable"
     for geom in root.find_all("geom"):
@@ -119,7 +119,7 @@ def remove_visuals(root: MjSpecTree, *, contacts: bool) -> None:
     for kind in ("camera", "light", "sensor"):
         for element in root.find_all(kind):
             element.remove()
-    acted_on = {actuator.site for actuator in root.find_all("actuator")}
+    acted_on = {*kept, *(actuator.site for actuator in root.find_all("actuator"))}
     for site in root.find_all("site"):
         if site.name not in acted_on:
             site.remove()

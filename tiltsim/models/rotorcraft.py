@@ -9,11 +9,12 @@ from __future__ import annotations
 from dataclasses import KW_ONLY, dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, cast
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, cast
 
 import numpy as np
 
 from tiltsim.models import mjcf_editing
+from tiltsim.models.cross import as_multirotor
 from tiltsim.models.mjspec_tree import MjSpecTree
 from tiltsim.models.objects import Objects, add_companion, add_objects, touchable
 from tiltsim.models.parts import (
@@ -68,6 +69,26 @@ class RotorcraftSpec(ModelSpec):
         """Whether the hinges have stops."""
         return self.tilts > 0 and self.tilt_servo.max_angle is not None
 
+    @property
+    def as_read(self) -> _AsRead:
+        """The vehicle without the parts of a flight."""
+        return _AsRead(
+            self.model,
+            self.user_vehicle,
+            self.vehicle.arm_length if isinstance(self.vehicle, Vehicle) else 0.0,
+            self.pod,
+        )
+
+    @property
+    def touches(self) -> bool:
+        """Whether there is something to touch."""
+        return self.ground is not None or self.objects is not None or self.number >= 0
+
+    @property
+    def wrench(self) -> bool:
+        """Whether some layer acts on the body."""
+        return any(extra.wrench for extra in self.extra_actuators)
+
 
 @one_thread_at_a_time
 def compile_model(spec: RotorcraftSpec, *, visuals: Visuals = True) -> mujoco.MjModel:
@@ -89,10 +110,9 @@ def compile_model(spec: RotorcraftSpec, *, visuals: Visuals = True) -> mujoco.Mj
         ValueError: If the pods are too heavy for the vehicle.
     """
     vehicles = [spec, *(companion for _, companion in spec.companions)]
-    composed = [_compose(_structure(one)) for one in vehicles]
     # One that is kept complete may have springs and dampers, which no bare model has.
-    whole = visuals or any(complete is bare for complete, bare in composed)
-    trees = [MjSpecTree(each[0 if whole else 1].copy()) for each in composed]
+    whole = bool(visuals) or any(_bare_of(_structure(one)) is None for one in vehicles)
+    trees = [MjSpecTree(_compose(_structure(one), whole).copy()) for one in vehicles]
     for tree, one in zip(trees, vehicles, strict=True):
         _set_parameters(tree, one)
     world = trees[0].spec
@@ -129,41 +149,59 @@ def _set_parameters(tree: MjSpecTree, spec: RotorcraftSpec) -> None:
         inertial = tree.find("body", "vehicle").inertial
         inertial.mass, inertial.diaginertia = _body_inertia(spec, vehicle)
     if isinstance(vehicle, Vehicle):
-        gears = [(vehicle.thrust_coefficient, vehicle.drag_coefficient, spin) for spin in SPIN]
         _set_keyframes(tree, vehicle, spec.tilts)
-    elif user is not None and vehicle != user.vehicle:
-        gears = [(rotor.thrust, rotor.drag, rotor.spin) for rotor in vehicle.rotors]
-    else:
-        gears = []
-    for i, (thrust, drag, spin) in enumerate(gears, start=1):
-        gear = (0.0, 0.0, thrust, 0.0, 0.0, -spin * drag)
+    for i, rotor in enumerate(as_multirotor(vehicle, tilting=False).rotors, start=1):
+        gear = (0.0, 0.0, rotor.thrust, 0.0, 0.0, -rotor.spin * rotor.drag)
         tree.find("actuator", f"thrust_{i}").gear = gear
 
 
+class _AsRead(NamedTuple):
+    """All that decides how a file is read."""
+
+    model: str
+    user_vehicle: UserVehicle | None
+    arm_length: float
+    pod: Pod
+
+
 @lru_cache(maxsize=64)  # dm_control takes a hundred times longer than MuJoCo's compiler
-def _vehicle(model: str, own: UserVehicle | None, arm_length: float, pod: Pod) -> mujoco.MjSpec:
+def _complete(read: _AsRead) -> mujoco.MjSpec:
     """A shipped vehicle with these arms and pods, or a user's as it is."""
-    shipped = shipped_folder("mjcf") / f"{model}.xml"
+    own = read.user_vehicle
+    shipped = shipped_folder("mjcf") / f"{read.model}.xml"
     root = mjcf_editing.parse_mjcf(shipped if own is None else Path(own.path))
     if own is None:
-        _scale_lengths(root, arm_length)
-        if model == "tiltrotor":
-            _set_pods(root, pod)
+        _scale_lengths(root, read.arm_length)
+        if read.model == "tiltrotor":
+            _set_pods(root, read.pod)
     return mjcf_editing.spec_of(root)
 
 
 @lru_cache(maxsize=64)
-def _compose(spec: RotorcraftSpec) -> tuple[mujoco.MjSpec, mujoco.MjSpec]:
-    """The complete vehicle, and one without visuals, or the complete one where they act."""
-    vehicle, servo, user_vehicle = spec.vehicle, spec.tilt_servo, spec.user_vehicle
-    arm_length = vehicle.arm_length if isinstance(vehicle, Vehicle) else 0.0
-    root = MjSpecTree(_vehicle(spec.model, user_vehicle, arm_length, spec.pod).copy())
-    contacts = spec.ground is not None or spec.objects is not None or spec.number >= 0
+def _bare(read: _AsRead, contacts: bool, wrench: bool) -> mujoco.MjSpec | None:
+    """It without visuals; None where they act."""
+    complete = _complete(read)
+    if read.user_vehicle is not None and read.model != "multirotor":
+        return None
+    root = MjSpecTree(complete.copy())
+    mjcf_editing.remove_visuals(root, contacts=contacts, kept=["imu"] * wrench)
+    return root.spec if read.user_vehicle is None or _moves_alike(complete, root.spec) else None
 
+
+def _bare_of(spec: RotorcraftSpec) -> mujoco.MjSpec | None:
+    return _bare(spec.as_read, spec.touches, spec.wrench)
+
+
+@lru_cache(maxsize=64)
+def _compose(spec: RotorcraftSpec, whole: bool) -> mujoco.MjSpec:
+    """The vehicle with all parts of a flight, complete or without visuals."""
+    vehicle, servo, user_vehicle = spec.vehicle, spec.tilt_servo, spec.user_vehicle
+    bare = None if whole else _bare_of(spec)
+    root = MjSpecTree((_complete(spec.as_read) if bare is None else bare).copy())
     root.option.timestep = spec.timestep
     root.option.integrator = spec.integrator
-    root.option.flag.contact = "enable" if contacts else "disable"
-    root.option.flag.constraint = "enable" if contacts or spec.has_stops else "disable"
+    root.option.flag.contact = "enable" if spec.touches else "disable"
+    root.option.flag.constraint = "enable" if spec.touches or spec.has_stops else "disable"
 
     hinges = [f"tilt_{i}" for i in range(1, spec.tilts + 1)]
     if isinstance(vehicle, Vehicle):
@@ -184,16 +222,11 @@ def _compose(spec: RotorcraftSpec) -> tuple[mujoco.MjSpec, mujoco.MjSpec]:
         if extra.wrench:
             mjcf_editing.add_wrench(root, f"layer_{index}", center)
         mjcf_editing.add_hinge_torques(root, f"layer_{index}", extra.hinge_torques)
-    if contacts:
+    if spec.touches:
         touchable(root, ground=spec.ground is not None, number=spec.number)
     if spec.ground is not None:
         _set_ground(root, spec.ground)
-    complete = root.spec.copy()
-    if user_vehicle is not None and spec.model != "multirotor":
-        return complete, complete
-    mjcf_editing.remove_visuals(root, contacts=contacts)
-    bare = root.spec
-    return complete, bare if user_vehicle is None or _moves_alike(complete, bare) else complete
+    return root.spec
 
 
 def _center_site(root: MjSpecTree, spec: RotorcraftSpec) -> str:
@@ -201,7 +234,7 @@ def _center_site(root: MjSpecTree, spec: RotorcraftSpec) -> str:
     if spec.user_vehicle is None or isinstance(spec.vehicle, Vehicle):
         return "imu"
     name = "layer_center"
-    if any(extra.wrench for extra in spec.extra_actuators):
+    if spec.wrench:
         root.find("body", "vehicle").add("site", name=name, pos=spec.user_vehicle.center)
     return name
 

@@ -184,9 +184,8 @@ def _tabs(
 ) -> tuple[rrb.Container, rrb.Container]:
     """The plots of one vehicle: its main signals, and all others."""
     signals, root = one.signals.values(), one.details
-    lines = {each.name: plotted_lines(each, root) for each in signals}
-    labels = [line.labels[0] for each in signals if each.plotted for line in lines[each.name]]
-    times = _times(labels, end)
+    labels = {each.name: [line.label for line in plotted_lines(each)] for each in signals}
+    times = _times([text for each in signals if each.plotted for text in labels[each.name]], end)
 
     def plot(panel: Signals, title: str, *, legend: bool = False) -> rrb.View:
         limits = range_of([(panel, flight) for flight in flights]) if flights else None
@@ -195,7 +194,7 @@ def _tabs(
     rows: list[rrb.View | rrb.Container] = []
     heights, bare, others = [], [], []
     for each in signals:
-        entries = {text for line in lines[each.name] for text in line.labels}
+        entries = {*labels[each.name]}
         if not each.plotted:
             others.append(plot(each, each.text, legend=len(entries) > 1))
         elif len(entries) < 2:
