@@ -1,8 +1,9 @@
 """MJCF as a tree on `mujoco.MjSpec`, with the interface of dm_control's tree.
 
-It has the part of that interface that the models here use, so the same functions edit either tree;
-attributes have MJCF's names and values. One difference remains: MuJoCo copies defaults into the
-elements when it reads a file. Edits must therefore address elements, never default classes.
+It has the part of that interface that the models here use, so the same functions scale either tree;
+this one alone is given the parts of a flight. Attributes have MJCF's names and values. One
+difference remains: MuJoCo copies defaults into the elements when it reads a file. Edits must
+therefore address elements, never default classes.
 """
 
 from __future__ import annotations
