@@ -30,11 +30,13 @@ TOTAL_SHARE: Final = 0.9
 """Share of the greatest thrusts that is demanded in all."""
 DELAY_MARGIN: Final = 0.22
 """Attitude bandwidth times the delay that is left."""
-POSITION_SHARE: Final = 0.45
+POSITION_SHARE: Final = 0.55
 """Bandwidth of the position across over the attitude's, ..."""
+DAMPING: Final = 0.85
+"""Damping ratio of the position across."""
 SIDEWAYS_POSITION: Final = 0.5
 """... and where the push of torques limits attitude."""
-AGILE_POSITION: Final = 0.75
+AGILE_POSITION: Final = 0.9
 """The largest one over the root of the angular acceleration."""
 RISE: Final = 0.6, 1.4
 """Bandwidth of height over the attitude's, and damping ratio: no lean delays it."""
@@ -258,7 +260,7 @@ def design(
         predicts=float(keys.prediction),
         bounded=float(keys.bounded),
         **able._asdict(),
-        damping=1.0,
+        damping=DAMPING,
         rise_damping=RISE[1],
         acceleration=_across(craft),
         ascent=VERTICAL[0],

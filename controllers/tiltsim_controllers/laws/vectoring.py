@@ -25,7 +25,14 @@ from tiltsim_controllers.laws.vectoring_state import (
     served,
     servo_doubts,
 )
-from tiltsim_controllers.laws.vectoring_steps import TINY, demanded, pointing, turning, upward
+from tiltsim_controllers.laws.vectoring_steps import (
+    TINY,
+    aligned,
+    demanded,
+    pointing,
+    turning,
+    upward,
+)
 from tiltsim_controllers.mathematics.linear import cross
 from tiltsim_controllers.mathematics.moving import Moving, value_of, where
 from tiltsim_controllers.vehicle.rotors import by_tilt, moving_wrench_map, wrench_map, wrench_slope
@@ -121,7 +128,12 @@ def _demand(known: Known, ahead: Ahead) -> Any:
     axis = where(p.slope > 0.0, up, own)
     x, y, z = up.value
     left = p.cone - xp.arctan2(xp.sqrt(x * x + y * y + TINY), z)
-    slope = xp.clip(xp.tan(xp.clip(left, 0.0, 1.5)), 0.0, p.slope)
+    # Tilts that push sideways leave little to turn by, so a vehicle that is turned away leans.
+    heading, yaw = now.rotation[:, 0], pose.value[2]
+    x, y = heading[0], heading[1]
+    off = xp.arctan2(y * xp.cos(yaw) - x * xp.sin(yaw), x * xp.cos(yaw) + y * xp.sin(yaw))
+    most = xp.where(p.cone > 2.0, p.slope, aligned(abs(off)) * p.slope)
+    slope = xp.clip(xp.tan(xp.clip(left, 0.0, 1.5)), 0.0, most)
     unit = xp.where(p.cone > 2.0, axis.value, value_of(own))
     made = known.wrench(ahead.speeds, ahead.tilts)[:3]
     # A torque that pushes sideways is no motion to be led along where the vehicle only leans: fed
