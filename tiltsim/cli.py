@@ -62,9 +62,11 @@ exit codes: 0 done, 1 an expectation failed, 2 invalid input, 3 vehicle lost"""
 """The end of ``tiltsim --help``; a command is ``run`` of the module of its name, or of `SHARED`."""
 
 SHARED: Final = {
-    "files": ("new", "list", "autopilot", "schema"),
+    "compare": ("compare", "arena"),
+    "files": ("new", "list", "fleet", "autopilot", "schema"),
     "look": ("view", "plot", "video"),
     "logs": ("export", "import", "replay", "identify"),
+    "many": ("check", "sweep", "bench"),
     "stability": ("stability", "attraction"),
     "thesis": ("map", "singularity", "concepts", "report"),
 }

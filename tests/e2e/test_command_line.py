@@ -22,7 +22,7 @@ import pytest
 from tiltsim.cli import main
 from tiltsim.commands import run as run_command
 from tiltsim.commands.text import Progress
-from tiltsim.scenario.loading import is_changed_from_library, load_scenario
+from tiltsim.scenario.loading import as_in_file, is_changed_from_library, load_scenario
 from tiltsim.scenario.metric_names import METRICS
 from tiltsim.studies import benchmark
 from tiltsim.vehicles.rotorcraft import COLUMNS
@@ -182,13 +182,14 @@ def test_no_judge_forbids_the_verdict(expecting, capsys):
     ],
 )
 def test_a_flight_of_the_library_is_as_shipped_on_any_plant(path, overrides, changed):
-    assert is_changed_from_library(path, load_scenario(path, overrides)) is changed
+    scenario = load_scenario(path, overrides)
+    assert is_changed_from_library(path, scenario, as_in_file(path)) is changed
 
 
 def test_a_custom_flight_is_always_judged(expecting):
     path = expecting(1.0)
     changed = load_scenario(path, {"simulation.duration": 0.1})
-    assert not is_changed_from_library(path, changed)
+    assert not is_changed_from_library(path, changed, as_in_file(path))
 
 
 def test_run_quiet_prints_failed_expectations(expecting, capsys):

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import json
 import os
-import runpy
 import subprocess
 import sys
 
 import numpy as np
 import pytest
 
-import tiltsim
 from tests.docs.pages import ROOT
 
 FILE = """
@@ -66,19 +64,23 @@ print(json.dumps(found))
 """Commands one after the other in one process: separate ones would each import all of tiltsim."""
 
 
+def installed(name, folder):
+    """Build the wheel of an example package, and install it for the processes of `run`."""
+    pytest.importorskip("hatchling", reason="builds without network need the build backend")
+    pip = [sys.executable, "-m", "pip", "--quiet", "--disable-pip-version-check"]
+    options = ["--no-deps", "--no-index", "--no-build-isolation"]
+    wheel = [*pip, "wheel", *options, "--wheel-dir", str(folder), str(ROOT / "examples" / name)]
+    subprocess.run(wheel, check=True, cwd=folder)
+    (built,) = folder.glob("*.whl")
+    target = [*pip, "install", *options[:2], "--target", str(folder / "site"), str(built)]
+    subprocess.run(target, check=True, cwd=folder)
+
+
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     """A folder with a scenario, and the package installed for the processes of `run`."""
-    pytest.importorskip("hatchling", reason="builds without network need the build backend")
     folder = tmp_path_factory.mktemp("package")
-    package = ROOT / "examples" / "controller_package"
-    pip = [sys.executable, "-m", "pip", "--quiet", "--disable-pip-version-check"]
-    options = ["--no-deps", "--no-build-isolation"]
-    wheel = [*pip, "wheel", *options, "--wheel-dir", str(folder), str(package)]
-    subprocess.run(wheel, check=True, cwd=folder)
-    (built,) = folder.glob("*.whl")
-    target = [*pip, "install", "--no-deps", "--target", str(folder / "site"), str(built)]
-    subprocess.run(target, check=True, cwd=folder)
+    installed("controller_package", folder)
     (folder / "steady.toml").write_text(FILE, encoding="utf-8")
     return folder
 
@@ -113,19 +115,3 @@ def test_the_command_line_knows_the_law(folder):
 def test_a_package_flies_in_batches_natively_as_in_python(folder):
     done = run(folder, "-c", PYTHON)
     assert done.returncode == 0, done.stderr
-
-
-@pytest.mark.slow
-@pytest.mark.filterwarnings("ignore:the law .* cannot be compiled")
-def test_the_predictive_package_flies_a_step_within_the_limits():
-    """From rest to 0.99 m away; with a plan that is not improved, the vehicle would stay."""
-    pytest.importorskip("casadi")
-    module = runpy.run_path(str(ROOT / "examples/predictive_package/tiltsim_predictive.py"))
-    law = module["PredictiveController"]()
-    changes = {"simulation.duration": 1.0, "controller.rotor_bandwidth": 400.0}
-    scenario = tiltsim.load_scenario("arena/limited#step", changes, controller=law)
-    flight = tiltsim.simulate(scenario)
-    off = np.linalg.norm(flight["position"] - flight["reference_position"], axis=1)
-    assert flight.end.kind == "completed"
-    assert off[-1] < 0.12
-    assert 800.0 < np.abs(flight["rotor_speeds"]).max() <= 838.0  # it brakes at the limits

@@ -17,8 +17,8 @@ from tiltsim.flight.flight import Flight
 from tiltsim.flight.metrics import End
 from tiltsim.scenario.loading import load_scenario, parse_scenario
 from tiltsim.scenario.metric_names import BOOLEAN_METRICS, METRICS
+from tiltsim.vehicles.metrics import in_last_second, when_settled
 from tiltsim.vehicles.rotorcraft import COLUMNS
-from tiltsim.vehicles.spans import in_last_second, when_settled
 
 R = 2.423e-7 / (0.1785 * 8.048e-6)  # K_m / (L K_f), ch. 3
 HOVER = {f"rotor_speed_{i}": sign * 360.0 for i, sign in zip((1, 2, 3, 4), (-1, 1, -1, 1))}
@@ -349,7 +349,9 @@ def test_the_page_on_metrics_names_all_of_them_with_their_units():
 
 def test_editors_complete_the_metrics_of_expectations():
     metric = scenario_schema()["$defs"]["Expectation"]["properties"]["metric"]
-    assert metric["enum"] == list(METRICS)
+    own, companions = metric["anyOf"]
+    assert own["enum"] == list(METRICS)
+    assert re.match(companions["pattern"], "wing.duration")
 
 
 def test_units_belong_to_the_metrics():

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import time
+from contextlib import suppress
+
 import mujoco
 import pytest
 
@@ -30,3 +33,24 @@ def test_prints_of_native_code_and_stray_files_are_mistakes(monkeypatch):
     (mistake,) = fuzz(2, 0)
     assert "input 0 (warns): native code prints 'WARNING: Nan, Inf or huge value" in mistake
     assert mistake.endswith("; wrote MUJOCO_LOG.TXT")
+
+
+def test_an_error_that_compiled_code_makes_of_an_interrupt_is_no_mistake(monkeypatch):
+    """As NumPy's comparison of structured arrays does."""
+
+    def fails():
+        raise TypeError("Cannot compare structured arrays")
+
+    def fails_when_interrupted():
+        with suppress(KeyboardInterrupt):
+            time.sleep(20.0)
+        fails()
+
+    def any_command(_random, folder):
+        return fails_when_interrupted if folder.name == "0" else fails
+
+    monkeypatch.setattr(running, "KINDS", (any_command,))
+    monkeypatch.setattr(running, "ENOUGH", 0.05)
+    (mistake,) = fuzz(2, 0)
+    assert "input 1 (any_command)" in mistake
+    assert mistake.endswith("TypeError: Cannot compare structured arrays\n")

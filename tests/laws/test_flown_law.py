@@ -194,10 +194,26 @@ class Climb(tiltsim.LawController):
         )
 
 
+class Namesake(Climb):
+    """Keys that are called like keys of tables of the library which this one has not."""
+
+    observer: float = Field(2.0, description="factor on the gains [-]")
+    tilts: float = Field(3.0, description="likewise [-]")
+    mixer: Literal["halved", "whole"] = Field("whole", description="part of the thrust")
+
+
 UP = {
     "reference": {"type": "setpoint", "position": [0.0, 0.0, 0.5]},
     "simulation": {"duration": 0.2, "control_timestep": 0.01},
 }
+
+
+def test_a_law_reads_keys_that_are_called_like_keys_of_other_tables():
+    read = Namesake(law="numpy", share=1.5).law_parameters(None)
+    assert read._asdict() == {
+        "gains": (4.0, 4.0), "share": 1.5, "observer": 2.0, "tilts": 3.0, "mixer": 1.0
+    }  # fmt: skip
+    assert not {"rotor_bandwidth", "estimator", "allow_unstable"} & {*read._fields}
 
 
 def test_a_class_has_keys_and_states():
@@ -259,8 +275,9 @@ def solving(observed):
 @pytest.mark.parametrize("plant", ["mujoco", "thesis"])
 def test_a_law_that_cannot_be_traced_flies_as_plain_python(law, message, plant):
     tables = {"simulation": {"duration": 0.05, "plant": plant, "engine": "native"}}
-    with pytest.warns(RuntimeWarning, match=message):
+    with pytest.warns(RuntimeWarning, match=message) as shown:
         plain = tiltsim.simulate(tables, controller=law)
+    assert [warning.filename for warning in shown] == [__file__]
     compiled = tiltsim.simulate(tables, controller=by_thrusts)
     np.testing.assert_allclose(plain.samples, compiled.samples, rtol=1e-9, atol=1e-12)
 
@@ -322,7 +339,7 @@ def misspelt(observed):
     [
         (three_thrusts, r"the law returned thrusts of shape \(3,\); expected shape \(4,\)"),
         (no_numbers, "returned thrusts = .*; expected 4 numbers"),
-        (no_command, r"returned array\(.*; expected a tiltsim.Command"),
+        (no_command, r"returned array\(.*; expected .*, as in tiltsim.Command\(thrusts="),
         (nothing_for_rotors, "returned nothing for the rotors; expected one of thrusts"),
         (of_two, "TypeError: .*missing 1 required positional argument"),
         (tilting, "returned tilt_angles; needs controller.tilts = free"),

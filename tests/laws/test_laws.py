@@ -429,7 +429,7 @@ MISTAKES = {
     ),
     "a tilt-car's gait for a tiltrotor": (
         {"gait": {"type": "penguin_small"}},
-        "is a gait of the tilt_car; this vehicle has four tilt angles",
+        'gait.type = "penguin_small": is a gait of the tilt_car; this vehicle has four tilt angles',
     ),
     "a tiltrotor's gait for a tilt-car": (
         {**LAWS["tilt_car_planned_direction"], "gait": {"type": "fixed"}},

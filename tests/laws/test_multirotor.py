@@ -17,7 +17,7 @@ from tiltsim.models.rotor_table import hover_speeds
 from tiltsim.resources import shipped_folder
 from tiltsim.scenario.loading import merge
 from tiltsim.simulation.simulate import make_plant
-from tiltsim.vehicles.rotorcraft.layout import Layout
+from tiltsim.vehicles.rotorcraft import Layout
 from tiltsim_controllers.analysis.singularity import world_up
 from tiltsim_controllers.analysis.torque_free import (
     hover_direction,

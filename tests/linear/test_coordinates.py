@@ -14,9 +14,11 @@ from tiltsim.linear.coordinates import (
     QUATERNION,
     ROTATION_NAMES,
     Coordinates,
+    Input,
     equation_coordinates,
     equation_inputs,
     mujoco_coordinates,
+    vehicles_of,
 )
 from tiltsim.resources import shipped_folder
 from tiltsim_controllers.mathematics.attitude import rotation_of_quaternion
@@ -27,7 +29,7 @@ NAMES = ("x", *ROTATION_NAMES, "speed")
 def random_states(entries, count):
     """Coordinates, states with a rotation of ``entries`` numbers, and vectors of coordinates."""
     generator = np.random.default_rng(7)
-    coordinates = Coordinates(NAMES, ("",) * len(NAMES), entries, 1)
+    coordinates = Coordinates(NAMES, ("",) * len(NAMES), entries, (1,))
     for _ in range(count):
         quaternion = generator.normal(size=4)
         quaternion /= np.linalg.norm(quaternion)
@@ -83,7 +85,7 @@ def test_a_vehicle_with_fewer_tilts_than_rotors_has_one_rate_per_tilt(tmp_path):
     names = equation_inputs(assembly)
     rates = [f"alpha_rate_{arm}" for arm in range(1, 6)]
     expected = [f"rotor_acceleration_{rotor}" for rotor in range(1, 7)] + rates
-    assert names == tuple((name, index, 1.0) for index, name in enumerate(expected))
+    assert names == tuple(Input(name, index) for index, name in enumerate(expected))
 
 
 def test_a_quadrotor_under_a_law_of_rotor_speeds_has_their_states_on_the_thesis_equations():
@@ -99,12 +101,17 @@ def test_a_quadrotor_under_a_law_of_rotor_speeds_has_their_states_on_the_thesis_
 
 def test_states_of_laws_and_layers_have_the_names_of_their_signals():
     """In MuJoCo's order; states that no signal shows are numbered behind the layer's name."""
-    loop = assemble(load_scenario("interaction/carry#held")).loop
-    names = mujoco_coordinates(loop).names
+
+    def names_of(address):
+        assembly = assemble(load_scenario(address))
+        found = mujoco_coordinates(assembly.loop, vehicles_of(assembly), assembly.scenario)
+        return assembly.loop, found.names
+
+    loop, names = names_of("interaction/carry#held")
     own = names.index("rotor_speed_6") + 1
     assert names[own] == "state_modeled_position_x"
     assert names[-4:] == loop.fields[loop.controller_states :][:4]
     assert names[own : own + loop.controller_states] == loop.fields[: loop.controller_states]
-    filtered = assemble(load_scenario("beyond/estimator")).loop
-    assert mujoco_coordinates(filtered).names[-1].startswith(("estimation_state_", "instruments_"))
-    assert len({*mujoco_coordinates(filtered).names}) == mujoco_coordinates(filtered).size
+    _, filtered = names_of("beyond/estimator")
+    assert filtered[-1].startswith(("estimation_state_", "instruments_"))
+    assert len({*filtered}) == len(filtered)

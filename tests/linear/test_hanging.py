@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import tiltsim
-from tiltsim.linear.coordinates import Pendulum
 from tiltsim.linear.equilibrium import equilibrium_of
+from tiltsim.linear.mujoco_motion import make_motion
 
 MASS, LENGTH = 0.1, 0.8
 ALONE = {
@@ -52,16 +52,24 @@ def test_a_load_below_a_vehicle_that_nothing_holds_swings_about_the_common_cente
     assert sample["payload_z"] == pytest.approx(sample["z"] - LENGTH)
 
 
-def test_angles_and_places_of_a_load_are_the_reverse_of_each_other():
-    draw = np.random.default_rng(1).uniform
-    pendulum = Pendulum(LENGTH, (0.1, -0.2, -0.3))
-    turn = draw(-1.0, 1.0, 4)
-    qpos = np.concatenate((draw(-1.0, 1.0, 3), turn / np.linalg.norm(turn), draw(-1.0, 1.0, 4)))
-    qvel = draw(-1.0, 1.0, 10)
-    placed = pendulum.placed(qpos, qvel)
-    assert [len(each) for each in placed] == [16, 14]
-    for found, given in zip(pendulum.angles(*placed), (qpos, qvel), strict=True):
-        np.testing.assert_allclose(found, given, atol=1e-12)
+def test_a_load_that_is_put_back_on_its_cable_keeps_its_swing():
+    """Which has the rates that a short step gives it."""
+    motion = make_motion(tiltsim.parse_scenario(FREE))
+    names = motion.coordinates.names
+    by = np.random.default_rng(1).uniform(-0.3, 0.3, len(names))
+    moved = motion.coordinates.moved(motion.initial, by)
+    placed = motion.placed(moved)
+    motion.placed(placed)  # sets MuJoCo's data
+    first = names.index("payload_x") + 1  # the vehicle's rotation has four entries
+    assert np.linalg.norm(placed[first : first + 3]) == pytest.approx(LENGTH, abs=1e-15)
+    np.testing.assert_allclose(motion.placed(placed), placed, atol=1e-15)
+    x, y, z = moved[first : first + 3]
+    swings = motion.swings(moved)
+    np.testing.assert_allclose(swings[:2], (np.arctan2(x, -z), np.arctan2(y, -z)), atol=1e-14)
+    step = 1e-6 * np.concatenate((motion.rates(0.0, placed)[: names.index("vx")], np.zeros(20)))
+    ends = (motion.coordinates.moved(placed, sign * step) for sign in (1.0, -1.0))
+    ahead, behind = (motion.swings(end)[:2] for end in ends)
+    np.testing.assert_allclose((ahead - behind) / 2e-6, swings[2:], atol=1e-7)
 
 
 @pytest.mark.slow

@@ -12,9 +12,10 @@ import tiltsim
 from tests.linear.test_rest import SETPOINT, distance
 from tiltsim.commands.stability import stability_text
 from tiltsim.laws.assembling import assemble
+from tiltsim.linear.coordinates import vehicles_of
 from tiltsim.linear.equilibrium import equilibrium_of
 from tiltsim.linear.forcing import forcing_of
-from tiltsim.linear.motion import make_motion
+from tiltsim.linear.mujoco_motion import make_motion
 from tiltsim.linear.newton import derivative_at
 from tiltsim.linear.stability import Point, crossings, stability_at, sweep_stability
 from tiltsim_controllers.tilt_car.cycles import Swing, limit_cycle, multipliers
@@ -71,6 +72,7 @@ def test_modes_lost_in_the_rounding_of_a_period_are_not_listed():
         names=("z", "alpha_1"),
         is_orbit=True,
         root=SimpleNamespace(residual=0.0),
+        motion=SimpleNamespace(prefixes=()),
         left_out=(),
         corners=(),
     )
@@ -171,7 +173,7 @@ def test_a_flight_repeats_when_gait_and_circle_share_a_period():
     circle = {"reference.type": "circle", "reference.radius": 0.1}
     turning = {"reference.angular_frequency": 2.0 * np.pi / 0.3}
     scenario = gait("trot_continuous", **circle, **turning)
-    assert forcing_of(assemble(scenario)).period == pytest.approx(0.3)
+    assert forcing_of(vehicles_of(assemble(scenario))).period == pytest.approx(0.3)
     with pytest.raises(tiltsim.InputError, match="no common multiple"):
         tiltsim.stability(scenario.replace({"gait.period": 0.1 * 2.0**0.5}))
 

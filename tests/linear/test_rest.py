@@ -11,7 +11,7 @@ import tiltsim
 from tiltsim.commands.stability import stability_text
 from tiltsim.linear.equilibrium import equilibrium_of
 from tiltsim.linear.modes import exponents, is_stable, modes_of, spectrum
-from tiltsim.linear.motion import make_motion
+from tiltsim.linear.mujoco_motion import make_motion
 from tiltsim.linear.newton import ERROR, derivative_at
 from tiltsim_controllers.analysis.stability import error_loops
 
@@ -204,6 +204,14 @@ def test_a_sampled_controller_gives_a_system_in_discrete_time():
     assert tiltsim.stability(sampled).poles.real.max() < 1e-3
 
 
+def test_results_are_one_line_in_python_and_a_table_in_a_notebook():
+    found = tiltsim.stability(SETPOINT)
+    assert repr(found) == "<Stability of a rest point: stable, 0 neutral of 24 states>"
+    assert found._repr_html_().count("<tr>") == 1 + len(found.modes)
+    system = tiltsim.linearize(SETPOINT)
+    assert repr(system).startswith("<Linearization, closed loop, continuous: 24 states, ")
+
+
 def test_neutral_states_are_counted_but_do_not_grow():
     """A hexarotor's rotors have two combinations that move nothing."""
     found = tiltsim.stability("fleet/hexarotor#hover")
@@ -309,15 +317,21 @@ REFUSED = {
         {"gait.type": "trot_continuous", "gait.amplitude": 0.5, "gait.period": 2.0},
         "period of 2 s",
     ),
-    "way-points": (
-        {
-            "reference.type": "waypoints",
-            "reference.positions": [[0, 0, 0], [1, 0, 0]],
-            "reference.times": [0.0, 2.0],
-        },
-        'reference.type = "waypoints": the flight is neither at rest nor periodic',
-    ),
 }
+
+
+def test_a_path_ends_at_a_set_point():
+    there = {"reference.type": "setpoint", "reference.position": [0.3, 0.0, 0.0]}
+    rows = [[0.1 * step, 0.1 * step, 0.0, 0.0] for step in range(4)]
+    path = {"reference.type": "table", "reference.rows": rows}
+    found, expected = (
+        tiltsim.stability(tiltsim.load_scenario(SETPOINT, THESIS | changes))
+        for changes in (path, there)
+    )
+    assert found.equilibrium.time == pytest.approx(0.3, abs=2e-3)
+    rests = [each.equilibrium.root.state[0] for each in (found, expected)]
+    assert rests[0] == pytest.approx(rests[1], abs=1e-6)
+    assert distance(found.poles, expected.poles) < 1e-8
 
 
 @pytest.mark.parametrize("case", REFUSED)

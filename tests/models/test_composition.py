@@ -80,6 +80,12 @@ def fields(owner):
 _ = write  # a fixture
 
 
+def clear_caches():
+    for composed in (rotorcraft._complete, rotorcraft._bare, rotorcraft._compose):
+        composed.cache_clear()
+    tilt_car._compose.cache_clear()
+
+
 @pytest.fixture
 def both_ways(monkeypatch):
     """A spec's model by either way, in full and, of a shipped vehicle, without visuals."""
@@ -89,14 +95,12 @@ def both_ways(monkeypatch):
         models = []
         for installed in (find_spec, lambda _: None):
             monkeypatch.setattr(mjcf_editing, "find_spec", installed)
-            rotorcraft._compose.cache_clear()
-            tilt_car._compose.cache_clear()
+            clear_caches()
             models.append([compile_it(spec, visuals=visuals) for visuals in (True, False)])
         return models
 
     yield compose
-    rotorcraft._compose.cache_clear()
-    tilt_car._compose.cache_clear()
+    clear_caches()
 
 
 def differences(pairs):

@@ -19,11 +19,10 @@ from tiltsim.closed_loop.userdata import evaluation_time
 from tiltsim.errors import InputError
 from tiltsim.flight.reading import load_flight
 from tiltsim.laws.assembling import assemble, loop_of
-from tiltsim.plants.command import Command, check_command
+from tiltsim.plants.command import BuiltInController, Command, check_command
 from tiltsim.plants.commanded_plant import CommandedPlant
-from tiltsim.plants.observing import BuiltInController
 from tiltsim.studies.multirotor_analysis import fleet_file
-from tiltsim.vehicles.rotorcraft.layout import CROSS
+from tiltsim.vehicles.rotorcraft import CROSS
 from tiltsim_controllers.laws.attitude_altitude import Parameters, attitude_altitude
 from tiltsim_controllers.laws.observed import Seen
 from tiltsim_controllers.mathematics.attitude import euler_angles

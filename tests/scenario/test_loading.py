@@ -14,6 +14,7 @@ from tiltsim.errors import InputError
 from tiltsim.scenario.documents import parse_override
 from tiltsim.scenario.library import library_entries
 from tiltsim.scenario.loading import load_scenario, merge, parse_scenario, scenario_toml
+from tiltsim.scenario.messages import did_you_mean
 from tiltsim.scenario.metric_names import METRICS
 from tiltsim.studies.checking import collect
 
@@ -427,6 +428,23 @@ def test_a_file_that_is_not_toml_says_where(write):
     path = write("title = 'a'\ngait = = 3")
     assert refusal(path).startswith(f"{path}: not valid TOML: ")
     assert "line 2, column 8" in refusal(path)
+
+
+@pytest.mark.parametrize(
+    ("name", "hint"),
+    [("a.xml", "vehicle.mjcf"), ("a.parquet", "scenario.toml"), ("a.py", "FILE.py:NAME")],
+)
+def test_a_file_of_another_kind_says_where_it_belongs(tmp_path, name, hint):
+    path = tmp_path / name
+    path.write_bytes(b"PAR1\xff")
+    message = refusal(path)
+    assert message.startswith(f"{path}: not a TOML file: ")
+    assert hint in message
+
+
+def test_a_key_without_its_table_is_found_among_dotted_names():
+    names = ["vehicle.center_of_mass", "vehicle.mass", "model_error.mass"]
+    assert did_you_mean("mass", names) == "did you mean vehicle.mass? "
 
 
 # --- variants ----------------------------------------------------------------------------------

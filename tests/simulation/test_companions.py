@@ -11,9 +11,11 @@ import pytest
 import tiltsim
 from tests.refusals import refusal
 from tiltsim.commands.run import summary
+from tiltsim.flight.metrics import check_expectations
 from tiltsim.laws.assembling import assemble
 from tiltsim.logs.model import LoggedVehicle
 from tiltsim.plants.mujoco_plant import flight_model
+from tiltsim.views.figures.sweep import sweep_figure
 
 HOVER = "fleet/hexarotor#hover"
 SIMULATION = {"duration": 0.3, "integrator": "implicitfast", "engine": "python"}
@@ -296,6 +298,9 @@ def test_every_vehicle_has_its_flight_and_metrics(tmp_path):
     flight.save(tmp_path)
     saved = json.loads((tmp_path / "metrics.json").read_text())["vehicles"]
     assert saved["quad"] | clock == quad.metrics() | clock
+    assert flight.metrics()["quad.max_abs_pitch"] == quad.metrics()["max_abs_pitch"]
+    with pytest.raises(tiltsim.InputError, match=r"'qud.duration': .* did you mean quad\?"):
+        flight.metrics()["qud.duration"]
     lines = summary(flight, [], judged=False, changes={}).splitlines()
     (row,) = (line for line in lines if "max_abs_pitch" in line)
     largest = (np.abs(flight[f"{prefix}pitch"]).max() for prefix in ("", "quad_", "wing_"))
@@ -309,3 +314,67 @@ def test_a_page_has_a_line_of_every_vehicle_and_panels_of_one_on_request():
     for prefix in ("", "quad_", "wing_"):
         assert flight[f"{prefix}pitch"].tobytes() in drawn
     assert len(flight.plot(panels="quad_position").axes) == 1
+    (alone,) = flight.plot(panels="pitch", vehicle="quad").axes
+    np.testing.assert_array_equal(alone.lines[0].get_ydata(), flight["quad_pitch"])
+    line = refusal(flight.plot, vehicle="qad")
+    assert "vehicle 'qad'" in line
+    assert "did you mean quad? choose first vehicle, quad, wing" in line
+
+
+def test_expectations_judge_every_vehicle_by_its_name():
+    bounds = [{"metric": "quad.max_abs_pitch", "min": 1e-6}, {"metric": "quad.duration", "max": 0}]
+    scenario = together(QUAD).replace({"expect": bounds})
+    flight = tiltsim.simulate(scenario)
+    pitch, duration = check_expectations(scenario, flight.metrics())
+    assert pitch.measured == np.abs(flight["quad_pitch"]).max()
+    assert (pitch.holds, duration.holds) == (True, False)
+
+
+@pytest.mark.parametrize(
+    ("companions", "metric", "line"),
+    [
+        ([QUAD], "qad.duration", "no vehicle qad; did you mean quad? choose quad"),
+        ([QUAD], "quad.duraton", "did you mean duration?"),
+        ([], "quad.duration", "no vehicle quad; there is no [[companion]]"),
+    ],
+)
+def test_an_expectation_on_no_vehicle_is_refused_in_one_line(companions, metric, line):
+    bound = {"expect": [{"metric": metric, "max": 1.0}]}
+    said = refusal(together(*companions).replace, bound)
+    assert f'expect.metric = "{metric}": {line}' in said
+
+
+def test_a_sweep_has_columns_of_every_vehicle():
+    document = {
+        "scenario": together(QUAD).model_dump(mode="json", exclude_none=True),
+        "set": {"simulation.duration": 0.02},
+        "axis": [{"type": "list", "key": "initial.velocity[0]", "values": [0.0, 0.1]}],
+        "metrics": ["max_abs_pitch", "quad.max_abs_pitch"],
+        "plot": {"metrics": ["quad.max_abs_pitch"]},
+    }
+    results = tiltsim.sweep(document)
+    flight = tiltsim.simulate(together(QUAD, **{"simulation.duration": 0.02}))
+    expected = np.abs(flight["quad_pitch"]).max()
+    assert results["quad.max_abs_pitch"].tolist() == [expected] * 2
+    drawn = {axes.get_ylabel() for axes in sweep_figure(results).axes}
+    assert drawn == {"quad: largest pitch (rad)"}
+    wrong = document | {"metrics": ["wing.max_abs_pitch"], "plot": {}}
+    line = refusal(tiltsim.sweep, wrong)
+    assert 'metrics = "wing.max_abs_pitch": no vehicle wing; choose quad' in line
+
+
+def test_tensions_have_a_panel_and_contacts_the_colors_of_vehicles():
+    changes = {"simulation.duration": 0.05, "simulation.engine": "python", "expect": []}
+    changes |= {"controller": {"law": "full_pose"}}
+    flight = tiltsim.simulate(tiltsim.load_scenario("interaction/handover", changes))
+    panels = {axes.get_title(loc="left"): axes for axes in flight.plot().axes}
+    looks = {
+        name: [(line.get_color(), line.get_ydata()) for line in panels[name].lines]
+        for name in ("Contact force", "Cable tension")
+    }
+    for (_, values), cable in zip(looks["Cable tension"], ("first", "second"), strict=True):
+        np.testing.assert_array_equal(values, flight[f"{cable}_cable_tension"])
+    contacts = [color for color, _ in looks["Contact force"]]
+    vehicles = flight.plot(panels="position_error").axes[0].lines
+    assert contacts == [line.get_color() for line in vehicles]
+    assert not {*contacts} & {color for color, _ in looks["Cable tension"]}

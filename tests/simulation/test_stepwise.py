@@ -9,7 +9,7 @@ import pytest
 import tiltsim
 from tests.flights import TILT_CAR
 from tiltsim.laws.assembling import assemble
-from tiltsim.vehicles.rotorcraft.layout import layout_of
+from tiltsim.vehicles.rotorcraft import layout_of
 
 TROT = {
     "simulation": {"duration": 0.02, "control_timestep": 0.002, "record_timestep": 0.01},

@@ -14,7 +14,8 @@ from tiltsim.flight.metrics import End
 from tiltsim.laws.assembling import assemble
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.views.attitude_plane import MOVING_TRAIL_TIME
-from tiltsim.views.rerun.recording import Recording, flight_blueprint
+from tiltsim.views.rerun.blueprint import flight_blueprint
+from tiltsim.views.rerun.recording import Recording
 from tiltsim.views.signals import signals_of
 
 

@@ -335,10 +335,13 @@ def test_keys_have_the_units_of_their_descriptions(key, text):
 
 def test_columns_of_a_sweep_have_the_labels_of_its_plot_table():
     plot_table = PlotTable(labels={"wind": "wind speed (m/s)"})
-    results = SimpleNamespace(points=SimpleNamespace(sweep=SimpleNamespace(plot=plot_table)))
-    names = ("wind", "gait.period", "max_abs_roll")
-    labels = [label_of(results, name) for name in names]
-    assert labels == ["wind speed (m/s)", "gait period (s)", "largest roll (rad)"]
+    results = SimpleNamespace(sweep=SimpleNamespace(plot=plot_table))
+    results.metrics = ("max_abs_roll", "wing.max_abs_roll")
+    names = ("wind", "gait.period", "simulation.duration", *results.metrics)
+    labels = [label_of(SimpleNamespace(points=results), name) for name in names]
+    roll = "largest roll (rad)"
+    assert labels[:3] == ["wind speed (m/s)", "gait period (s)", "duration (s)"]
+    assert labels[3:] == [roll, f"wing: {roll}"]
 
 
 def test_a_map_of_rounding_errors_has_one_shade():

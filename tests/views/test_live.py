@@ -23,13 +23,13 @@ class BlockedRecorder:
     def draw_references(self, _until):
         pass
 
-    def append(self, _piece):
+    def append(self, _pieces):
         if self.error:
             raise self.error
         self.released.wait(300.0)
         self.continued = True
 
-    def finish(self, _end):
+    def finish(self, _ends):
         pass
 
 
@@ -48,7 +48,7 @@ def stream_to(recorder, url, monkeypatch, farewell=30.0):
     monkeypatch.setattr(live, "attach_viewer", lambda *_: None)
     monkeypatch.setattr(live, "SHUTDOWN_TIMEOUT", farewell)
     stream = LiveStream(flight("fixed").scenario, url)
-    monkeypatch.setattr(stream, "_recorder", recorder)
+    monkeypatch.setattr(stream, "_recording", recorder)
     return stream
 
 
@@ -76,8 +76,8 @@ def test_all_samples_reach_the_recorder_in_order(listener, monkeypatch):
     pieces = []
 
     class Taker(BlockedRecorder):
-        def append(self, piece):
-            pieces.append(piece.samples)
+        def append(self, latest):
+            pieces.extend(piece.samples for piece in latest)
 
     with stream_to(Taker(), listener, monkeypatch) as stream:
         this = simulate(flight("fixed").scenario, stream)

@@ -16,6 +16,7 @@ from tests.views.viewer_shot import free_port
 from tiltsim.cli import main
 from tiltsim.errors import InputError
 from tiltsim.flight.reading import load_flight
+from tiltsim.scenario.loading import load_scenario
 from tiltsim.simulation.simulate import simulate
 from tiltsim.views.rerun.recording import Recording, save_recording
 from tiltsim.views.rerun.timeline import TIMELINE
@@ -294,3 +295,23 @@ def test_disabled_rerun_is_an_error_of_one_line(how, tmp_path, monkeypatch, capf
 def test_a_port_without_a_viewer_is_an_error_of_one_line():
     with pytest.raises(InputError, match="no viewer listens there"):
         require_viewer(f"rerun+http://127.0.0.1:{free_port()}/proxy")
+
+
+def test_vehicles_of_a_flight_have_separate_plots(tmp_path):
+    companion = {"name": "wing", "offset": [2.0, 0.3, 0.0]}
+    changes = {"simulation.duration": 0.1, "simulation.integrator": "implicitfast", "expect": []}
+    scenario = load_scenario("fleet/hexarotor#hover", changes | {"companion": [companion]})
+    flight = simulate(scenario)
+    save_recording([flight], tmp_path / "both.rrd")
+    found = entities(tmp_path / "both.rrd")
+    for name, prefix in (("first\\ vehicle", ""), ("wing", "wing_")):
+        for root in (f"/{name}/attitude/pitch", f"/{name}/signals/attitude/pitch"):
+            np.testing.assert_array_equal(
+                scalars(tmp_path / "both.rrd", root)[1], flight[f"{prefix}pitch"]
+            )
+    assert not any(path.startswith("/first\\ vehicle/signals/wing") for path in found)
+    save_recording([flight], tmp_path / "wing.rrd", vehicle="wing")
+    alone = scalars(tmp_path / "wing.rrd", "/attitude/pitch")[1]
+    np.testing.assert_array_equal(alone, flight["wing_pitch"])
+    with pytest.raises(InputError, match="choose first vehicle, wing"):
+        save_recording([flight], tmp_path / "none.rrd", vehicle="none")

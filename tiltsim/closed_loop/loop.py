@@ -167,13 +167,16 @@ class ClosedLoop:
     are then idle."""
     equations: Equations | None = None
     """This controller on the thesis's equations; None where it is supported in MuJoCo only or,
-    inside a layer, by `tiltsim.laws.layers.on_equations`."""
+    inside a layer, by `tiltsim.laws.layers.layer`."""
     follows_position: Callable[[Scenario], bool] = lambda _scenario: True
     """Whether a scenario has the controller follow the reference's horizontal position."""
     uses_gait: bool = True  # whether the scenario's gait has a part in the flight
     within: ClosedLoop | None = None
     """The loop that a layer of `tiltsim.laws.layers` goes around; None for a controller itself,
     its supervisor and allocation included."""
+    sees: Callable[..., Any] = lambda _time, qpos, qvel, act, *_: (qpos, qvel, act)
+    """Function ``(time, qpos, qvel, act, parameters, knots) -> qpos, qvel, act`` that the loop
+    ``within`` sees."""
     with_latency: Callable[[], ClosedLoop] | None = None
     """The controller as it flies with a latency of its commands; None if it is the same."""
     traced: bool = True  # whether the controller can be traced; else it runs as plain Python

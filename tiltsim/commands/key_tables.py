@@ -4,7 +4,7 @@ import json
 import re
 from collections import Counter
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import product
 from math import pi
 from textwrap import fill, indent
@@ -66,8 +66,8 @@ class Key:
     values: str  # type and allowed values
     unit: str  # "-" if it has numbers without a unit; empty if it has none
     default: str  # "required", or empty if there is none
-    example: str  # empty for tables, which have their own
     meaning: str
+    example: str = field(compare=False)  # empty for tables, which have their own
 
 
 @dataclass(frozen=True)
@@ -138,8 +138,8 @@ def _key(name: str, node: Node, required: bool) -> Key:
         _values(node),
         unit,
         "required" if required else shown,
-        _written(_example(node)),
         meaning,
+        _written(_example(node)),
     )
 
 
@@ -250,16 +250,15 @@ def page(tables: Sequence[KeyTable]) -> str:
         if shared:
             parts += ["", "Keys that several of the following tables have:", ""]
             parts += map(_item, shared)
-        above = {replace(key, example="") for key in (*document.keys, *shared)}
+        above = {*document.keys, *shared}
         parts += [line for table in own for line in _section(table, above)]
     return "\n".join(parts) + "\n"
 
 
 def shared_keys(tables: Sequence[KeyTable]) -> list[Key]:
     """The keys that at least two of the tables have, whatever their examples."""
-    first = {replace(key, example=""): key for table in tables[::-1] for key in table.keys}
-    counts = Counter(replace(key, example="") for table in tables for key in table.keys)
-    return [first[key] for key, count in counts.items() if count > 1]
+    counts = Counter(key for table in tables for key in table.keys)
+    return [key for key, count in counts.items() if count > 1]
 
 
 def description(tables: Sequence[KeyTable], address: str) -> str:
@@ -294,7 +293,7 @@ def _section(table: KeyTable, above: Collection[Key]) -> list[str]:
     place = table.places[0]
     title = ["", f"### {_title(table)}"] if len(place) > 1 or place[0].tags else []
     toml = ["```toml", *table.toml.splitlines(), "```"]
-    known = [key for key in table.keys if replace(key, example="") in above]
+    known = [key for key in table.keys if key in above]
     own = [key for key in table.keys if key not in known and not _is_only_kind(key)]
     others = ", ".join(f"`{key.name}`" for key in known)
     items = [*map(_item, own), *([f"- Also {others}."] if others else [])]

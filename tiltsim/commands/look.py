@@ -26,7 +26,11 @@ if TYPE_CHECKING:
 
 
 def run_view(
-    paths: tuple[Path, ...], *, rerun: Path | None = None, connect: str | None = None
+    paths: tuple[Path, ...],
+    *,
+    rerun: Path | None = None,
+    connect: str | None = None,
+    vehicle: str = "",
 ) -> int:
     """Show a flight in the Rerun viewer, or several in one recording for comparison.
 
@@ -36,6 +40,7 @@ def run_view(
         paths (PATH): folders of results, flight.parquet files, or .rrd recordings
         rerun (FILE.rrd): save a recording instead of opening the viewer
         connect (URL): show it in a viewer that is already open
+        vehicle (NAME): the only one to show of flights with several (default: all)
     """
     from tiltsim.errors import InputError
     from tiltsim.flight.reading import load_flight
@@ -45,7 +50,7 @@ def run_view(
     refuse_both(rerun=rerun, connect=connect)
     recordings = [path for path in paths if path.suffix.lower() == ".rrd"]
     if recordings:
-        if len(recordings) < len(paths) or rerun or connect:
+        if len(recordings) < len(paths) or rerun or connect or vehicle:
             raise InputError(
                 f"{recordings[0]}: a recording can only be opened; to compare, save or connect, "
                 "give the folders of the flights"
@@ -64,11 +69,11 @@ def run_view(
     if rerun is None:
         from tiltsim.views.rerun.viewer import view_flights
 
-        view_flights(flights, connect, names)
+        view_flights(flights, connect, names, vehicle)
     else:
         from tiltsim.views.rerun.recording import save_recording
 
-        save_recording(flights, rerun, names)
+        save_recording(flights, rerun, names, vehicle)
         print_line(f"recording written to {viewing(rerun)}")
     return 0
 
@@ -79,6 +84,7 @@ def run_plot(
     metrics: Annotated[tuple[str, ...], Option("--metric")] = (),
     out: Path | None = None,
     panels: Names = (),
+    vehicle: str = "",
     figure: FigureOptions,
 ) -> int:
     """Draw a flight on one page, several in the same axes, logs beside flights, or a sweep.
@@ -100,6 +106,7 @@ def run_plot(
         out (FILE): PNG, SVG or PDF, or a folder (default: flight.png, flights.png or sweep.png
             beside the first flight)
         panels: the panels to draw, in this order
+        vehicle (NAME): the only one to draw of flights with several (default: all)
     """
     from tiltsim.errors import InputError
     from tiltsim.logs.log import is_log
@@ -137,7 +144,7 @@ def run_plot(
             shown = [path.name for path in flights]
             return figures.logs.logs_figure(logs, shown, figure.title)
         drawn = figures.plot.draw_flights
-        return drawn(loaded, names, texts, panels=panels, title=figure.title)
+        return drawn(loaded, names, texts, panels=panels, title=figure.title, vehicle=vehicle)
 
     file = file_in(out, first, "sweep.png" if sweep else "flights.png" if others else "flight.png")
     prepare_figure("--out", file)

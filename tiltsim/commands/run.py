@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any, Final
 
 from tiltsim.commands.options import Overrides, Silent, refuse_both
 from tiltsim.commands.text import print_line, show_progress, table, viewing, warn
-from tiltsim.errors import InputError
 from tiltsim.exit_codes import DONE, EXPECTATION_FAILED, INTERRUPTED, VEHICLE_LOST
 from tiltsim.system.interrupts import defer_interrupts
 from tiltsim.system.text import printable
@@ -64,17 +63,18 @@ def run(
     """
     from tiltsim.flight.metrics import check_expectations
     from tiltsim.flight.writing import prepare_flight_folder
-    from tiltsim.scenario.loading import is_changed_from_library, load_scenario
+    from tiltsim.scenario.loading import as_in_file, is_changed_from_library, load_scenario
     from tiltsim.system.files import prepare_file
 
     refuse_both(judge=judge, no_judge=no_judge)
     refuse_both(live=live, connect=connect)
     changes = dict(overrides)
     loaded = load_scenario(scenario, changes, controller=controller, trusted=True)
+    in_file = as_in_file(scenario) if changes or controller is not None else loaded
     expecting, judged = loaded, judge
     if judge is no_judge:
         own_bounds = any(key.startswith("expect") for key in changes)
-        judged = own_bounds or not is_changed_from_library(scenario, loaded)
+        judged = own_bounds or not is_changed_from_library(scenario, loaded, in_file)
         loaded = loaded if judged else loaded.model_copy(update={"expect": ()})
     if out is not None:
         prepare_flight_folder(out, loaded)
@@ -82,8 +82,6 @@ def run(
         prepare_file("--rerun", rerun, (".rrd",))
     for warning in () if quiet else _warnings(loaded):
         warn(warning)
-    changes = {} if quiet else _differing(changes, scenario, loaded)  # --out may replace its file
-
     with ExitStack() as stack:
         if rerun is not None:
             from tiltsim.views.rerun.live import RecordingProcess
@@ -106,6 +104,7 @@ def run(
     if not quiet:
         if flight.end.kind == "completed" and (speed := metrics["min_rotor_speed"]) < 0.0:
             warn(f"a rotor stopped and reversed (min_rotor_speed = {speed:.4g} rad/s)")
+        changes = _differing(changes, in_file, loaded)
         changes |= {} if controller is None else {"controller": controller}
         print(summary(flight, verdicts, judged=judged, changes=changes))
         for kind, path in (("flight", out), ("recording", rerun)):
@@ -114,17 +113,14 @@ def run(
     return _exit_code(flight, verdicts if judged else (), quiet=quiet)
 
 
-def _differing(changes: dict[str, Any], path: str, scenario: Scenario) -> dict[str, Any]:
-    """The changes of a scenario whose values differ from the file's."""
+def _differing(changes: dict[str, Any], before: Scenario | None, after: Scenario) -> dict[str, Any]:
+    """The changes of a scenario whose values differ from the file's; all where it has no values."""
     from tiltsim.scenario.documents import value_at
-    from tiltsim.scenario.loading import load_scenario
 
-    try:
-        before = load_scenario(path, trusted=True).model_dump() if changes else {}
-    except InputError:  # the base of a family or an incomplete file, which the changes complete
+    if before is None or not changes:
         return changes
-    after = scenario.model_dump()
-    return {k: v for k, v in changes.items() if value_at(before, k) != value_at(after, k)}
+    old, new = before.model_dump(), after.model_dump()
+    return {k: v for k, v in changes.items() if value_at(old, k) != value_at(new, k)}
 
 
 def _exit_code(flight: Flight, verdicts: Sequence[Verdict], *, quiet: bool) -> int:
@@ -223,7 +219,7 @@ def summary(
         changes: Keys of the scenario that the command line changed, and their values.
     """
     from tiltsim.scenario.messages import show
-    from tiltsim.scenario.metric_names import METRICS
+    from tiltsim.scenario.metric_names import unit_of
 
     scenario, metrics = flight.scenario, flight.metrics()
     lines = [printable(scenario.title or scenario.address or "scenario")]
@@ -253,7 +249,7 @@ def summary(
             f"  {_shown(own[name]) if name in own else '-':>{max(12, len(vehicle))}}"
             for vehicle, own in of_each.items()
         )
-        lines.append(f"  {name:<{width}}{cells} {METRICS[name].unit}".rstrip())
+        lines.append(f"  {name:<{width}}{cells} {unit_of(name)}".rstrip())
     return "\n".join(lines)
 
 

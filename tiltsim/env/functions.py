@@ -19,7 +19,7 @@ from tiltsim.equations.solvers import make_implicitfast_step
 from tiltsim.errors import InputError
 from tiltsim.laws.assembling import loop_of
 from tiltsim.laws.commanded import commanded_parameters, with_command
-from tiltsim.laws.layers.on_equations import on_equations
+from tiltsim.laws.layers.layer import on_equations
 from tiltsim.plants.command import Observation, Reference
 from tiltsim.scenario.documents import split_key, value_at, with_value
 from tiltsim.scenario.scenario import Scenario
@@ -27,7 +27,7 @@ from tiltsim.scenario.surroundings import SensorTable
 from tiltsim.scenario.vehicle import PodTable, VehicleTable
 from tiltsim.simulation.vectorized import ArrayPlan, PlannedFlight
 from tiltsim.system.text import short_repr
-from tiltsim.vehicles.rotorcraft.layout import QW, TILT_1, TILT_RATE_1
+from tiltsim.vehicles.rotorcraft import QW, TILT_1, TILT_RATE_1
 from tiltsim_controllers.mathematics.attitude import euler_angles, rotation_of_quaternion
 from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.references.trajectories import attitude_reference, reference_derivatives

@@ -17,9 +17,9 @@ import numpy as np
 from tiltsim.closed_loop.loop import ClosedLoop
 from tiltsim.models.parts import WRENCH_SIZE
 from tiltsim.scenario.scenario import FlightPlan, Scenario
-from tiltsim.vehicles.rotorcraft import initial_tilts
-from tiltsim.vehicles.rotorcraft.layout import (
+from tiltsim.vehicles.rotorcraft import (
     Layout,
+    initial_tilts,
     is_fixed_cross,
     layout_of,
     rotors_record,

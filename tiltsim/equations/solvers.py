@@ -21,7 +21,6 @@ from tiltsim_controllers.mathematics.attitude import quaternion_product
 from tiltsim_controllers.mathematics.linear import cross
 from tiltsim_controllers.mathematics.scalar import Triple
 from tiltsim_controllers.vehicle.body import Body, inertia_matrix, joined
-from tiltsim_controllers.vehicle.craft import body_in
 
 
 class Integration(NamedTuple):
@@ -156,7 +155,7 @@ def make_implicitfast_step(equations: Equations, tilts: int) -> Callable[..., An
         now, change = layout.split(state), layout.split(rates)
         turning = change.omega
         if tilts == 0:
-            turning = turning_at_the_end(body_in(mechanics.vehicle), now.omega, turning, timestep)
+            turning = turning_at_the_end(mechanics.vehicle.body, now.omega, turning, timestep)
         damping = 1.0 + 2.0 * mechanics.servo_damping * mechanics.servo_frequency * timestep
         velocity, omega = now.velocity + timestep * change.velocity, now.omega + timestep * turning
         tilt_rates = now.tilt_rates + timestep * change.tilt_rates / damping

@@ -12,7 +12,7 @@ from tiltsim.scenario.scenario import Scenario
 from tiltsim_controllers.code.arrays import traceable, xp
 from tiltsim_controllers.mathematics.attitude import euler_of_rotation, euler_rates, rotation_matrix
 from tiltsim_controllers.mathematics.scalar import Values, Vector
-from tiltsim_controllers.vehicle.body import Body, accelerations, principal_body, rigid_state
+from tiltsim_controllers.vehicle.body import Body, accelerations, rigid_state
 from tiltsim_controllers.vehicle.cross import cross_table
 from tiltsim_controllers.vehicle.parameters import Vehicle
 from tiltsim_controllers.vehicle.rotors import Rotors, TiltOfRotor, airframe, rotors_in
@@ -50,7 +50,7 @@ def airframe_of(law: Any, knots: Any, layout: TiltOfRotor) -> tuple[Body, Rotors
         drag_coefficient=vehicle.drag_coefficient / torque,
         gravity=vehicle.gravity,
     )
-    return principal_body(scaled), rotors_in(xp.array(cross_table(scaled, tilting=True)), 0, layout)
+    return scaled.body, rotors_in(xp.array(cross_table(scaled, tilting=True)), 0, layout)
 
 
 def initial_state(scenario: Scenario, rotor_speeds: Vector) -> Values:
@@ -74,7 +74,7 @@ def equations_of_motion(state: Any, inputs: Any, vehicle: Vehicle, disturbance: 
     velocity, attitude, omega = state[3:6], state[6:9], state[9:12]
     wrench = xp.hstack([0.0, 0.0, inputs[:4]])
     acceleration, turning = accelerations(
-        principal_body(vehicle), rotation_matrix(attitude), omega, wrench, disturbance, 1.0
+        vehicle.body, rotation_matrix(attitude), omega, wrench, disturbance, 1.0
     )
     return xp.hstack([velocity, acceleration, euler_rates(attitude, omega), turning])
 

@@ -24,7 +24,7 @@ from tiltsim.flight.metrics import End, Metrics, compute_metrics, metrics_of_row
 from tiltsim.flight.writing import write_flight
 from tiltsim.laws.assembling import assemble
 from tiltsim.models.vehicle_parts import MAX_ROTORS
-from tiltsim.scenario.messages import did_you_mean
+from tiltsim.scenario.messages import choose, did_you_mean
 from tiltsim.scenario.metric_names import WALL_CLOCK_METRICS, unit_of
 from tiltsim.system.public import optional_package, public
 from tiltsim.system.text import html_table, short_repr, shortened, valid_unicode
@@ -217,10 +217,9 @@ class Flight(ColumnsOverTime):
         A companion's flight has the columns and metrics of a vehicle alone, without a prefix.
         """
         fields = [*self.assembly.loop.sample_fields]
-        found = {FIRST: self}
-        names = (table.name for table in self.scenario.companion)
-        for name, own in zip(names, self.scenario.companions, strict=True):
-            assembly = assemble(own, recorded=True)
+        (first, _), *others = vehicle_assemblies(self.assembly).items()
+        found = {first: self}
+        for name, assembly in others:
             needed = ("time", *(f"{name}_{field}" for field in assembly.loop.sample_fields[1:]))
             samples = self.samples[:, [fields.index(column) for column in needed]]
             found[name] = Flight(assembly, samples, self.end, self.engine, self.wall_time)
@@ -232,11 +231,15 @@ class Flight(ColumnsOverTime):
             known = self.shared_metrics()
             if known is None:
                 known = compute_metrics(self.columns, self.assembly, self.end, self.wall_time)
-            return known
+            others = {name: one._metrics for name, one in self.vehicles.items() if name != FIRST}
+            return Metrics(known, others)
 
     def metrics(self) -> Metrics:
-        """The metrics of the flight by name; see `tiltsim.scenario.metric_names.METRICS`."""
-        return Metrics(self._metrics)
+        """The metrics of the flight by name; see `tiltsim.scenario.metric_names.METRICS`.
+
+        A companion's are found by its name and theirs, such as ``wing.max_rotor_speed``.
+        """
+        return Metrics(self._metrics, self._metrics.vehicles)
 
     def plot(self, panels: str | Sequence[str] = (), **options: Any) -> Any:
         """A matplotlib Figure of this flight; see `tiltsim.plot` for the options."""
@@ -267,7 +270,8 @@ class Flight(ColumnsOverTime):
         scenario, end = self.scenario, self.end
         how = f"{end.kind} at {end.time:g} s" + (f": {end.cause}" if end.cause else "")
         size = f"{len(self)} samples of {len(self.units)} columns"
-        rows = [(name, f"{value:.6g}", unit_of(name)) for name, value in self.metrics().items()]
+        metrics = self.metrics().of_all_vehicles().items()
+        rows = [(name, f"{value:.6g}", unit_of(name)) for name, value in metrics]
         lines = [scenario.address, how, size]
         return html_table(scenario.title or "Flight", lines, rows, ("metric", "value", "unit"))
 
@@ -300,13 +304,33 @@ class Flight(ColumnsOverTime):
         if not isinstance(folder, str | PathLike):
             raise InputError(f"folder = {short_repr(folder)}: must be the name of a folder")
         metrics: dict[str, Any] = dict(self.metrics())
-        others = {name: one.metrics() for name, one in self.vehicles.items() if name != FIRST}
-        if others:
+        if others := self.metrics().vehicles:
             metrics["vehicles"] = {
                 name: {key: value for key, value in own.items() if key not in WALL_CLOCK_METRICS}
                 for name, own in others.items()
             }
         write_flight(Path(folder), self.to_arrow(), metrics, self.scenario)
+
+
+def vehicle_assemblies(assembly: Assembly) -> dict[str, Assembly]:
+    """The assembly of each vehicle of a world by its name, the first one's as `FIRST`."""
+    names = (table.name for table in assembly.scenario.companion)
+    others = (assemble(own, recorded=True) for own in assembly.scenario.companions)
+    return {FIRST: assembly, **dict(zip(names, others, strict=True))}
+
+
+def vehicles_named(vehicle: str, flights: Sequence[Flight]) -> list[Flight]:
+    """The flight of the vehicle with this name in every one of some flights; all if it is empty.
+
+    Raises:
+        InputError: If one has no vehicle of the name.
+    """
+    for flight in flights if vehicle else ():
+        if vehicle not in flight.vehicles:
+            name = flight.scenario.address or "the flight"
+            known = choose(vehicle, flight.vehicles)
+            raise InputError(f"vehicle {short_repr(vehicle)}: not in {name}; {known}")
+    return [flight.vehicles[vehicle] if vehicle else flight for flight in flights]
 
 
 def as_flights(flights: Flight | Sequence[Flight]) -> list[Flight]:

@@ -1,9 +1,12 @@
 """A flight in numbers: its end, its metrics, and verdicts on its scenario's expectations."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite, isnan
-from typing import Any, Literal, NoReturn
+from types import MappingProxyType
+from typing import Any, Literal
 
 import numpy as np
 from pydantic import BaseModel
@@ -12,7 +15,7 @@ from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.closed_loop.loop import ControlSetup
 from tiltsim.errors import InputError
 from tiltsim.scenario.expectation import Expectation
-from tiltsim.scenario.messages import did_you_mean
+from tiltsim.scenario.messages import choose, did_you_mean
 from tiltsim.scenario.metric_names import METRICS
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.system.text import short_repr
@@ -44,10 +47,40 @@ class UnknownMetricError(InputError, KeyError):
 
 
 class Metrics(dict[str, float | bool]):
-    """Metrics by name. Others raise `UnknownMetricError`."""
+    """Metrics by name, a companion's as ``wing.duration``. Others raise `UnknownMetricError`.
 
-    def __missing__(self, name: object) -> NoReturn:
-        hint = f"{did_you_mean(name, self)}see [*metrics]"
+    Args:
+        known: Metrics of the first vehicle.
+        vehicles: Metrics of the companions by their names.
+    """
+
+    def __init__(
+        self,
+        known: Mapping[str, float | bool] = MappingProxyType({}),
+        vehicles: Mapping[str, Metrics] = MappingProxyType({}),
+    ) -> None:
+        super().__init__(known)
+        self.vehicles = dict(vehicles)
+
+    def get(self, name: str, default: Any = None) -> Any:
+        """A metric, or another value where the flight does not have it."""
+        try:
+            return self[name]
+        except UnknownMetricError:
+            return default
+
+    def of_all_vehicles(self) -> dict[str, float | bool]:
+        """The metrics with the companions', such as ``wing.duration``."""
+        others = self.vehicles.items()
+        return self | {f"{name}.{key}": value for name, own in others for key, value in own.items()}
+
+    def __missing__(self, name: object) -> float | bool:
+        vehicle, dot, own = name.partition(".") if isinstance(name, str) else ("", "", "")
+        if dot and vehicle in self.vehicles:
+            return self.vehicles[vehicle][own]
+        hint = f"{did_you_mean(own or name, self)}see [*metrics]"
+        if dot and self.vehicles:
+            hint = choose(vehicle, self.vehicles)
         if isinstance(name, str) and name in METRICS:
             hint = "it has no value, or none that is finite"
         raise UnknownMetricError(f"{short_repr(name)}: no metric of this flight; {hint}")

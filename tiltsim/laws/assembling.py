@@ -11,7 +11,12 @@ from tiltsim.laws.companions import Member, with_companions
 from tiltsim.laws.flown_law import loop_of_law
 from tiltsim.laws.kinds import LOOPS_OF_KINDS
 from tiltsim.laws.layers.actuation import with_actuation
-from tiltsim.laws.layers.contact import with_force_loop, with_impedance, with_objects
+from tiltsim.laws.layers.contact import (
+    with_force_loop,
+    with_impedance,
+    with_objects,
+    with_swing_damping,
+)
 from tiltsim.laws.layers.estimation import Fusion, with_estimator
 from tiltsim.laws.layers.forces import with_air, with_loads, with_rotor_inertia
 from tiltsim.laws.layers.instruments import (
@@ -19,8 +24,7 @@ from tiltsim.laws.layers.instruments import (
     with_instruments,
     with_measured_acceleration,
 )
-from tiltsim.laws.layers.on_equations import on_equations
-from tiltsim.laws.layers.swing import with_swing_damping
+from tiltsim.laws.layers.layer import on_equations
 from tiltsim.laws.linearizing import TILTROTOR, full_pose_loop, multirotor_loop, tiltrotor_loop
 from tiltsim.laws.quadrotor import QUADROTOR_ATTITUDE_ALTITUDE, SWITCHING, YAW_POSITION
 from tiltsim.laws.rotor_loop import layout_of_vehicle
@@ -73,7 +77,7 @@ def loop_of(
 
     Args:
         scenario: The scenario to fly.
-        adapted: May change the controller before layers go around it.
+        adapted: May change each controller, the first vehicle's first, before layers go around it.
         recorded: See `assemble`.
     """
     controller, external = scenario.controller, scenario.controller.is_external
@@ -113,7 +117,7 @@ def loop_of(
         loop = with_objects(loop, others_of(scenario))
     if scenario.companion:
         vehicles, names = (scenario, *scenario.companions), (t.name for t in scenario.companion)
-        loops = loop, *(loop_of(each, recorded=recorded) for each in vehicles[1:])
+        loops = loop, *(loop_of(each, adapted, recorded=recorded) for each in vehicles[1:])
         found = zip(("", *names), loops, map(plan_flight, vehicles), strict=True)
         return with_companions(
             tuple(Member(n, own, len(own.setup(plan, 0.0).knots)) for n, own, plan in found),

@@ -4,18 +4,16 @@ The control law is to hold a command; layers treat it as any controller's comman
 of all vehicles are states here, so that commands may be speeds, thrusts or accelerations.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from functools import cache
 from typing import Any
 
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup
-from tiltsim.laws.law import Law
+from tiltsim.laws.law import Law, servo_lead
 from tiltsim.laws.linearizing import TILTROTOR, singularity_columns
 from tiltsim.laws.quadrotor import LAYOUT as QUADROTOR
 from tiltsim.laws.quadrotor import upright_columns
-from tiltsim.laws.rotor_loop import RotorLayout, layout_of_vehicle, rotor_loop, torque_free_columns
-from tiltsim.laws.vehicle_loop import servo_lead
-from tiltsim.models.rotor_table import Multirotor
+from tiltsim.laws.rotor_loop import RotorLayout, layout_of_vehicle, margins_of, rotor_loop
 from tiltsim.scenario.scenario import FlightPlan, Scenario
 from tiltsim.vehicles.rotorcraft import EXTRA_COLUMNS
 from tiltsim_controllers.code.arrays import xp
@@ -24,11 +22,8 @@ from tiltsim_controllers.laws.observed import Step
 from tiltsim_controllers.mathematics.records import make_record_type, vector_of
 from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector
 from tiltsim_controllers.references.trajectories import ReferenceParameters
+from tiltsim_controllers.vehicle.body import Body
 from tiltsim_controllers.vehicle.parameters import Vehicle
-from tiltsim_controllers.vehicle.rotors import ROTOR_FLOATS
-
-Singularity = Callable[[Mapping[str, Floats], Any], dict[str, Floats]]
-"""``(samples, vehicle) -> columns``: how close a vehicle is to a singular attitude."""
 
 
 def commanded_parameters(parameters: Any) -> Any:
@@ -66,10 +61,8 @@ def planned_servo_commands(
 
 
 @cache
-def _commanded_loop(
-    layout: RotorLayout, vehicle: Any, columns: tuple[str, ...], singularity: Singularity
-) -> ClosedLoop:
-    """The loop of the vehicles of a layout, with a type of parameters and columns of a margin."""
+def _commanded_loop(layout: RotorLayout, columns: tuple[str, ...]) -> ClosedLoop:
+    """The loop of the vehicles of a layout, with columns among `EXTRA_COLUMNS`."""
     rotors, tilts = layout.places
     planned, sent = layout.places.names("alpha_ref"), layout.places.names("tilt_command")
     command = make_record_type(
@@ -79,29 +72,30 @@ def _commanded_loop(
     )
     record = make_record_type(
         "CommandedParameters",
-        vehicle=vehicle,
+        vehicle=Vehicle if layout.cross else Body,
+        rotors=float,  # where in the knots the table of the rotors begins
         gait=GaitParameters,
         reference=ReferenceParameters,
         command=command,  # which the plant replaces in its copy of the record
     )
+    on_cross = singularity_columns if tilts else upright_columns
 
     def margins(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
         commands = {column: samples[name] for column, name in zip(planned, sent, strict=True)}
-        return {**commands, **singularity(samples, setup.parameters.law.vehicle)}
+        if layout.cross:
+            return {**commands, **on_cross(samples, setup.parameters.law.vehicle)}
+        return {**commands, **margins_of(layout)(samples, setup)}
 
-    def own(plan: FlightPlan) -> dict[str, Any]:
-        table = plan.scenario.any_rotorcraft
-        lead, flown = servo_lead(table.tilt_servo), table.resolve()
+    def held(plan: FlightPlan) -> dict[str, Any]:
+        lead = servo_lead(plan.scenario.any_rotorcraft.tilt_servo)
         commands = planned_servo_commands(0.0, tilts, plan.gait.parameters, plan.knots, lead)
-        return {
-            "vehicle": vehicle(flown.table) if isinstance(flown, Multirotor) else flown,
-            "command": command(commands, (0.0,) * rotors),
-        }
+        return {"command": command(commands, (0.0,) * rotors)}
 
     law = Law(
         lambda _seen, p, _knots: Step(p.command.accelerations),
         record,
-        own,
+        held,
+        lambda plan: plan.scenario.any_rotorcraft.multirotor.table,
         tilts=lambda _seen, _rates, p, _knots: xp.stack([p.command.tilts, xp.zeros(tilts)], 1),
         units=dict.fromkeys(sent, "rad"),
         records_commands=True,
@@ -112,26 +106,13 @@ def _commanded_loop(
     return rotor_loop(layout, law)
 
 
-@cache
-def _multirotor(layout: RotorLayout) -> ClosedLoop:
-    places = layout.places
-    table = make_record_type("Rotors", table=vector_of(ROTOR_FLOATS * places.rotors))
-
-    def singularity(samples: Mapping[str, Floats], rotors: Any) -> dict[str, Floats]:
-        return torque_free_columns(places, rotors.table, samples)
-
-    return _commanded_loop(layout, table, ("singularity_margin",), singularity)
-
-
 def commanded_loop(scenario: Scenario) -> ClosedLoop:
     """The loop of a scenario's rotorcraft under commands, without layers.
 
     A user's vehicle without the four equal arms has no columns of singularity.
     """
-    vehicle = scenario.vehicle.resolve()
-    if isinstance(vehicle, Multirotor):
-        return _multirotor(layout_of_vehicle(vehicle))
+    vehicle = scenario.any_rotorcraft
+    if not vehicle.cross:
+        return _commanded_loop(layout_of_vehicle(vehicle.multirotor), ("singularity_margin",))
     columns = (*EXTRA_COLUMNS,) if scenario.rotorcraft.has_standard_layout else ()
-    if scenario.vehicle.has_tilting_rotors:
-        return _commanded_loop(TILTROTOR, Vehicle, columns, singularity_columns)
-    return _commanded_loop(QUADROTOR, Vehicle, columns, upright_columns)
+    return _commanded_loop(TILTROTOR if vehicle.has_tilting_rotors else QUADROTOR, columns)

@@ -19,9 +19,8 @@ from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Sizes
 from tiltsim.engines.sample_evaluation import evaluate_over_samples
 from tiltsim.models.parts import ExtraActuators, Visuals
 from tiltsim.scenario.scenario import FlightPlan, Scenario, plan_flight
-from tiltsim.vehicles.rotorcraft import model_spec
-from tiltsim.vehicles.rotorcraft.layout import QW, TILT_1
-from tiltsim.vehicles.spans import position_error
+from tiltsim.vehicles.metrics import position_error
+from tiltsim.vehicles.rotorcraft import QW, TILT_1, model_spec
 from tiltsim_controllers.code.arrays import traceable, xp
 from tiltsim_controllers.mathematics.attitude import rotation_of_quaternion
 from tiltsim_controllers.mathematics.records import make_record_type
@@ -196,6 +195,10 @@ class Several:
         wrenches = [xp.hstack([z * force, xp.zeros(3)]) for z, force in zip(up, forces)]
         return xp.hstack([part for both in zip(controls, wrenches) for part in both])
 
+    def sees(self, time: Any, qpos: Any, qvel: Any, act: Any, parameters: Any, knots: Any) -> Any:
+        """See `ClosedLoop`; the first vehicle also sees what lies behind all activations."""
+        return next(self._states(qpos, qvel, act))
+
     def observe(self, qpos: Any, qvel: Any, act: Any, ctrl: Any) -> Any:
         """See `ClosedLoop`."""
         found = zip(self._loops, self._states(qpos, qvel, act), self._controls_of(ctrl))
@@ -331,5 +334,6 @@ class Several:
             observe_reads_controls=any(loop.observe_reads_controls for loop in self._loops),
             equations=None,
             within=first,  # for its controller
+            sees=self.sees,
             traced=all(loop.is_traceable for loop in self._loops),
         )

@@ -1,6 +1,5 @@
 """Laws of scenarios, built-in, from packages or from users, checked before flights."""
 
-import warnings
 from collections.abc import Callable
 from functools import cache
 from typing import Any
@@ -19,6 +18,7 @@ from tiltsim.scenario.law_controller import LawController
 from tiltsim.scenario.messages import InvalidValueError, one_line_message
 from tiltsim.scenario.own_parts import load_law, users_line
 from tiltsim.scenario.scenario import FlightPlan, Scenario, plan_flight
+from tiltsim.system.arguments import warn_user
 from tiltsim.system.text import error_text
 from tiltsim.vehicles.rotorcraft import initial_tilts
 from tiltsim_controllers.code.messages import TraceError
@@ -163,7 +163,7 @@ def _require_python(scenario: Scenario, refusal: str) -> None:
     if scenario.simulation.engine == "jax":
         start = f"{scenario.address or 'scenario'}: simulation.engine"
         raise InputError(f'{start} = "jax": {text}')
-    warnings.warn(f"{text}; it flies as plain Python", RuntimeWarning, stacklevel=4)
+    warn_user(f"{text}; it flies as plain Python")
 
 
 def _try_once(loop: ClosedLoop, plan: FlightPlan, setup: ControlSetup) -> None:

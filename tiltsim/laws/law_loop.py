@@ -190,7 +190,10 @@ def _accelerations(command: Command, gain: Any, k: Any, speeds: Any) -> Any:
     The gain of the speed errors is in 1/s, ``k`` in N s^2, speeds in rad/s, shape (N,).
     """
     if not isinstance(command, Command):
-        raise LawError(f"returned {short_repr(command)}; expected a tiltsim.Command")
+        raise LawError(
+            f"returned {short_repr(command)}; expected a tiltsim.Command, as in "
+            "tiltsim.Command(thrusts=...)"
+        )
     given = [name for name in ROTOR_COMMANDS if getattr(command, name) is not None]
     if len(given) != 1:
         what = " and ".join(given) if given else "nothing for the rotors"
@@ -220,48 +223,36 @@ def _state_rates(flown: FlownLaw, command: Command, states: Any, known: Any) -> 
     return rates, moving
 
 
-def _own_of(find: Find) -> Callable[[FlightPlan], dict[str, Any]]:
+def _own(find: Find, plan: FlightPlan) -> dict[str, Any]:
     """`Law.own` of a law that is found for each flight."""
-
-    def own(plan: FlightPlan) -> dict[str, Any]:
-        airframe, table, controller = airframe_of(plan), find(plan), plan.scenario.controller
-        assert isinstance(controller, LawTable)
-        step, vehicle = airframe.control_timestep, vehicle_of(plan)
-        return {
-            "vehicle": airframe.vehicle.body,
-            "cross": vehicle if isinstance(vehicle, Vehicle) else _NO_CROSS,
-            "gyroscopic": airframe.gyroscopic,
-            "rotor_gain": held_gain(controller.rotor_bandwidth, step),
-            "tilt_gain": held_gain(controller.tilt_rate_gain, step),
-            "control_period": step,
-            "own": table.law_parameters(airframe) if table else NO_PARAMETERS,
-        }
-
-    return own
+    airframe, table, controller = airframe_of(plan), find(plan), plan.scenario.controller
+    assert isinstance(controller, LawTable)
+    step, vehicle = airframe.control_timestep, vehicle_of(plan)
+    return {
+        "vehicle": airframe.vehicle.body,
+        "cross": vehicle if isinstance(vehicle, Vehicle) else _NO_CROSS,
+        "gyroscopic": airframe.gyroscopic,
+        "rotor_gain": held_gain(controller.rotor_bandwidth, step),
+        "tilt_gain": held_gain(controller.tilt_rate_gain, step),
+        "control_period": step,
+        "own": table.law_parameters(airframe) if table else NO_PARAMETERS,
+    }
 
 
-def _tables_of(find: Find) -> Callable[[FlightPlan], Values]:
+def _tables(find: Find, plan: FlightPlan) -> Values:
     """`Law.tables`: of the rotors, of these per newton, their coefficients, and the law's own."""
-
-    def tables(plan: FlightPlan) -> Values:
-        airframe, table = airframe_of(plan), find(plan)
-        rotors, coefficients = airframe.vehicle.table, airframe.vehicle.thrust_coefficients
-        own = table.law_table(airframe) if table else ()
-        return (*rotors, *table_per_newton(rotors, coefficients), *coefficients, *own)
-
-    return tables
+    airframe, table = airframe_of(plan), find(plan)
+    rotors, coefficients = airframe.vehicle.table, airframe.vehicle.thrust_coefficients
+    own = table.law_table(airframe) if table else ()
+    return (*rotors, *table_per_newton(rotors, coefficients), *coefficients, *own)
 
 
-def _initial_of(flown: FlownLaw, find: Find) -> Callable[[FlightPlan], Values]:
+def _initial(flown: FlownLaw, find: Find, plan: FlightPlan) -> Values:
     """`Law.initial`: of the law, of the tilts that it commands, of a model of the rotors."""
-
-    def initial(plan: FlightPlan) -> Values:
-        airframe, table = airframe_of(plan), find(plan)
-        own = table.initial_states(airframe) if table else (0.0,) * flown.commanded.start
-        tilts = airframe.initial_tilts if flown.tilts else ()
-        return (*own, *tilts, *(airframe.initial_speeds if flown.models_rotors else ()))
-
-    return initial
+    airframe, table = airframe_of(plan), find(plan)
+    own = table.initial_states(airframe) if table else (0.0,) * flown.commanded.start
+    tilts = airframe.initial_tilts if flown.tilts else ()
+    return (*own, *tilts, *(airframe.initial_speeds if flown.models_rotors else ()))
 
 
 @cache
@@ -273,15 +264,15 @@ def law_loop(flown: FlownLaw, find: Find) -> ClosedLoop:
     law = Law(
         _step_of(flown),
         record_of(flown.parameters),
-        _own_of(find),
-        _tables_of(find),
+        partial(_own, find),
+        partial(_tables, find),
         states={
             **dict(flown.states),
             **dict(flown.discrete),
             **dict.fromkeys(commands, "rad"),
             **dict.fromkeys(modelled, "rad/s"),
         },
-        initial=_initial_of(flown, find),
+        initial=partial(_initial, flown, find),
         margins=margins_of(flown.layout),
         tilts=tilts_in_states(first, flown.layout.places.tilts) if flown.tilts else None,
         uses_gait=not flown.tilts,

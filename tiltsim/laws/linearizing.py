@@ -21,7 +21,6 @@ from tiltsim.laws.rotor_loop import (
     rotor_stops,
     singular_attitude,
 )
-from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.linearizing_controllers import AttitudeForceController, upper_side
 from tiltsim.scenario.scenario import FlightPlan
 from tiltsim.vehicles.rotorcraft import EXTRA_COLUMNS, initial_tilts
@@ -165,9 +164,9 @@ def tiltrotor_loop(name: str, measured: bool, strategy: str, limited: bool) -> C
 
 def _attitude_force(plan: FlightPlan) -> dict[str, Any]:
     """Parameters of the law of attitude and force."""
-    gait, controller, vehicle = plan.gait, plan.scenario.controller, plan.scenario.vehicle.resolve()
+    gait, vehicle = plan.gait, plan.scenario.any_rotorcraft.multirotor
+    controller = plan.scenario.controller
     assert isinstance(controller, AttitudeForceController)
-    assert isinstance(vehicle, Multirotor)
     dimension = controller.resolve_force(vehicle, gait).dimension
     side, lost = upper_side(vehicle, gait), controller.failed_rotor
     side_without = side if lost is None else upper_side(vehicle, gait, lost)
@@ -190,9 +189,7 @@ def _attitude_force(plan: FlightPlan) -> dict[str, Any]:
 def _rotor_tables(plan: FlightPlan) -> Values:
     """The table of the rotors, and for a supervisor the one without a failed rotor."""
     controller: Any = plan.scenario.controller
-    vehicle, lost = plan.scenario.vehicle.resolve(), controller.failed_rotor
-    assert isinstance(vehicle, Multirotor)
-    table = vehicle.table
+    table, lost = plan.scenario.any_rotorcraft.multirotor.table, controller.failed_rotor
     if controller.supervision is None or lost is None:
         return table
     return (*table, *without_rotor(table, lost))

@@ -14,13 +14,11 @@ import numpy as np
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup
 from tiltsim.equations.actuator_level import MATRIX, as_printed
 from tiltsim.equations.thesis import airframe_of, body_fields, initial_state
-from tiltsim.laws.law import Law, Margins, Tilts, tilts_of_gait
-from tiltsim.laws.vehicle_loop import VehicleFunctions, parts, servo_lead
+from tiltsim.laws.law import Law, Margins, Tilts, VehicleFunctions, parts, servo_lead, tilts_of_gait
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.scenario import FlightPlan
-from tiltsim.vehicles.rotorcraft import initial_rotor_speeds, rotorcraft_kind
-from tiltsim.vehicles.rotorcraft.layout import CROSS
-from tiltsim.vehicles.rotorcraft.layout import Layout as Places
+from tiltsim.vehicles.rotorcraft import CROSS, initial_rotor_speeds, rotorcraft_kind
+from tiltsim.vehicles.rotorcraft import Layout as Places
 from tiltsim.vehicles.rotorcraft.others import FELT, FELT_SIZE
 from tiltsim_controllers.analysis.singularity import world_up
 from tiltsim_controllers.analysis.torque_free import (

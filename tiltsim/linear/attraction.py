@@ -23,7 +23,7 @@ from tiltsim.scenario.scenario import Scenario
 from tiltsim.simulation.batch import fly_each
 from tiltsim.system.arguments import check_function, is_number
 from tiltsim.system.text import short_repr
-from tiltsim.vehicles.spans import in_last_second
+from tiltsim.vehicles.metrics import in_last_second
 from tiltsim_controllers.analysis.singularity import determinant
 from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.vehicle.parameters import Vehicle
@@ -188,9 +188,6 @@ def _check(scenario: Scenario, axes: tuple[str, str], coarse: int, refinements: 
             "most"
         )
     scenario.require_rotorcraft("attraction")
-    if scenario.companion:
-        where = scenario.address or "scenario"
-        raise InputError(f"{where}: companion: attraction takes one vehicle; remove [[companion]]")
 
 
 def _edges(axis: str, given: tuple[float, float] | None, cells: int) -> Floats:

@@ -1,23 +1,25 @@
-"""Minimal coordinates of a plant's state, three for a rotation, and names and units of inputs.
+"""Coordinates of a plant's state, three for a rotation, and names and units of inputs.
 
-A load on a taut cable is a pendulum, two angles and their rates. In flights a stiff tendon holds
-it, which may also rise: a step of a difference would make it slack. Here the tension is the
-multiplier that keeps the length.
+The names of a companion's, as of its columns, begin with its own.
 """
 
-from typing import Any, Final, NamedTuple
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.closed_loop.loop import ClosedLoop
+from tiltsim.laws.assembling import assemble
+from tiltsim.scenario.scenario import Scenario
 from tiltsim.vehicles.rotorcraft.others import SWING
 from tiltsim_controllers.mathematics.attitude import (
     quaternion_of_rotation,
     quaternion_product,
     rotation_of_quaternion,
 )
-from tiltsim_controllers.mathematics.scalar import Floats, Triple
+from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.vehicle.body import BODY_FIELDS, ROTATION_NAMES
 
 MATRIX: Final = 9
@@ -28,11 +30,14 @@ VELOCITY: Final = BODY_FIELDS[3:6]
 BODY_RATES: Final = BODY_FIELDS[9:]
 PLANE: Final = ("x", "y", "vx", "vy")
 SWING_RATES: Final = ("swing_rate_x", "swing_rate_y")
+LOAD: Final = "payload_"
+"""Beginning of the names of a load's coordinates."""
+
 UNITS: Final = {
     **dict.fromkeys(POSITION, "m"),
     **dict.fromkeys(VELOCITY, "m/s"),
-    **dict.fromkeys((*ROTATION_NAMES, "roll", "pitch", "yaw"), "rad"),
-    **dict.fromkeys((*BODY_RATES, *SWING_RATES), "rad/s"),
+    **dict.fromkeys((*ROTATION_NAMES, "roll", "pitch", "yaw", *SWING, "angle"), "rad"),
+    **dict.fromkeys((*BODY_RATES, *SWING_RATES, "angle_rate"), "rad/s"),
     **dict.fromkeys(("squared_speed_1", "squared_speed_2"), "rad^2/s^2"),
     "force": "N",
     **dict.fromkeys(("torque_x", "torque_y", "torque_z"), "N m"),
@@ -49,48 +54,58 @@ KINDS: Final = {
 """Units of numbered quantities."""
 
 
+Pairwise = Callable[[Floats, Floats], Floats]
+
+
 class Coordinates(NamedTuple):
     """Minimal coordinates of the states near a given one.
 
-    A state is a vector of numbers in which a rotation from body to world, if there is one, takes
-    nine entries (rows first) or four (a quaternion). Its coordinates relative to another state are
-    the differences of the numbers, and for the rotation the vector, in body axes, of the turn from
-    the other state's rotation.
+    A state is a vector of numbers in which every rotation from body to world takes nine entries
+    (rows first) or four (a quaternion). Its coordinates relative to another state are
+    the differences of the numbers, and for a rotation the vector, in body axes, of the turn from
+    the other state's.
     """
 
     names: tuple[str, ...]  # of the coordinates
     units: tuple[str, ...]
-    rotation: int = 0  # entries of the rotation; 0 without one
-    first: int = 3  # index of its first entry
+    rotation: int = 0  # entries of a rotation; 0 without one
+    turns: tuple[int, ...] = ()  # index of the first coordinate of each rotation
 
     @property
     def size(self) -> int:
         """Number of coordinates."""
         return len(self.names)
 
+    def _parts(self, vector: Floats, entries: int) -> list[Floats]:
+        """Numbers and rotations by turns, of a vector in which rotations have these entries."""
+        firsts = (at + number * (entries - 3) for number, at in enumerate(self.turns))
+        return np.split(vector, [place for at in firsts for place in (at, at + entries)])
+
+    def _joined(self, numbers: Pairwise, rotations: Pairwise, *pair: Iterable[Floats]) -> Floats:
+        """A function of two vectors, part by part."""
+        parts = enumerate(zip(*pair, strict=True))
+        return np.concatenate([(numbers, rotations)[at % 2](*both) for at, both in parts])
+
     def moved(self, state: Floats, by: Floats) -> Floats:
         """The state with the coordinates ``by`` relative to another."""
-        if not self.rotation:
-            return state + by
-        first, after = self.first, self.first + self.rotation
-        turned = _turned(state[first:after], by[first : first + 3])
-        return np.concatenate((state[:first] + by[:first], turned, state[after:] + by[first + 3 :]))
+        parts = self._parts(state, self.rotation), self._parts(by, 3)
+        return self._joined(lambda one, more: one + more, _turned, *parts)
 
     def between(self, start: Floats, end: Floats) -> Floats:
         """The coordinates of the state ``end`` relative to ``start``."""
-        if not self.rotation:
-            return end - start
-        first, after = self.first, self.first + self.rotation
-        turn = _turn(start[first:after], end[first:after])
-        return np.concatenate((end[:first] - start[:first], turn, end[after:] - start[after:]))
+        parts = (self._parts(state, self.rotation) for state in (start, end))
+        return self._joined(lambda one, other: other - one, _turn, *parts)
 
     def rates(self, state: Floats, derivative: Floats) -> Floats:
         """The rates of the coordinates relative to a state, from the derivative of its numbers."""
-        if not self.rotation:
-            return derivative
-        first, after = self.first, self.first + self.rotation
-        rates = _turn_rates(state[first:after], derivative[first:after])
-        return np.concatenate((derivative[:first], rates, derivative[after:]))
+        parts = (self._parts(vector, self.rotation) for vector in (state, derivative))
+        return self._joined(lambda _, rates: rates, _turn_rates, *parts)
+
+    def level(self, state: Floats) -> Floats:
+        """The state of which all coordinates are zero, with the size of another."""
+        eye = np.eye(3).ravel() if self.rotation == MATRIX else np.eye(1, QUATERNION)[0]
+        parts = self._parts(np.zeros(len(state)), self.rotation)
+        return np.concatenate([eye if at % 2 else part for at, part in enumerate(parts)])
 
 
 def _turn_rates(rotation: Floats, derivative: Floats) -> Floats:
@@ -130,10 +145,42 @@ def _turn(start: Floats, end: Floats) -> Floats:
     return np.asarray(2.0 * turn[1:] / np.sinc(half / np.pi))
 
 
-def unit_of(name: str, loop: ClosedLoop) -> str:
+def vehicles_of(
+    assembly: Assembly, adapted: Callable[[ClosedLoop], ClosedLoop] = lambda loop: loop
+) -> dict[str, Assembly]:
+    """The flight of each vehicle by the beginning of the names of its columns, ``""`` first.
+
+    Args:
+        assembly: The flight.
+        adapted: See `tiltsim.laws.assembling.assemble`; for the companions.
+    """
+    scenario = assembly.scenario
+    if not scenario.companion:
+        return {"": assembly}
+    assert assembly.loop.within is not None  # the first vehicle's
+    first = replace(assembly, loop=assembly.loop.within)
+    flown = zip(scenario.companion, scenario.companions, strict=True)
+    return {"": first, **{f"{table.name}_": assemble(own, adapted) for table, own in flown}}
+
+
+def prefixes_of(scenario: Scenario) -> tuple[str, ...]:
+    """Beginnings of the names of companions' and objects' coordinates."""
+    companions = (f"{table.name}_" for table in scenario.companion)
+    objects = (f"{table.name}_" for table in scenario.object)
+    return (*companions, *objects, *([LOAD] if scenario.payload else []))
+
+
+def parted(name: str, prefixes: Iterable[str]) -> tuple[str, str]:
+    """The beginning of a name, empty for the first vehicle's, and the name without it."""
+    prefix = max((each for each in prefixes if name.startswith(each)), key=len, default="")
+    return prefix, name.removeprefix(prefix)
+
+
+def unit_of(name: str, loop: ClosedLoop, prefixes: Iterable[str] = ()) -> str:
     """The unit of a state, input or output; empty where it is not known."""
-    known = UNITS.get(name) or loop.units.get(name)
-    kinds = (unit for kind, unit in KINDS.items() if name.startswith(kind))
+    _, bare = parted(name, prefixes)
+    known = UNITS.get(bare) or loop.units.get(name) or loop.units.get(bare)
+    kinds = (unit for kind, unit in KINDS.items() if bare.startswith(kind))
     return known or next(kinds, "")
 
 
@@ -171,20 +218,35 @@ def activation_names(loop: ClosedLoop) -> tuple[str, ...]:
     return (*numbered("rotor_speed", rotors), *inner.fields[:own], *layers)
 
 
-def mujoco_coordinates(loop: ClosedLoop) -> Coordinates:
-    """Coordinates of `qpos`, `qvel` and `act`."""
-    places, speeds = loop.motion
-    swing, swinging = (SWING, SWING_RATES) if loop.sizes.others else ((), ())
-    return _coordinates(
-        (*places, *swing, *speeds, *swinging, *activation_names(loop)), loop, QUATERNION
-    )
+def mujoco_coordinates(
+    loop: ClosedLoop, vehicles: Mapping[str, Assembly], scenario: Scenario
+) -> Coordinates:
+    """Coordinates of `qpos`, `qvel` and `act`: the vehicles', then the objects' and the load's."""
+    places: list[str] = []
+    speeds: list[str] = []
+    activations: list[str] = []
+    for prefix, own in vehicles.items():
+        parts = (*own.loop.motion, activation_names(own.loop))
+        for names, found in zip((places, speeds, activations), parts, strict=True):
+            names += [prefix + name for name in found]
+    moving = [(f"{table.name}_", table.joint) for table in scenario.object]
+    if scenario.payload is not None and not scenario.payload.rigid:
+        moving.append((LOAD, "free"))
+    for prefix, joint in moving:
+        if joint == "free":
+            places += [prefix + name for name in (*POSITION, *ROTATION_NAMES)]
+            speeds += [prefix + name for name in (*VELOCITY, *BODY_RATES)]
+        elif joint == "hinged":
+            places, speeds = [*places, f"{prefix}angle"], [*speeds, f"{prefix}angle_rate"]
+    every = (*places, *speeds, *activations)
+    return _coordinates(every, loop, QUATERNION, prefixes_of(scenario))
 
 
 def equation_coordinates(assembly: Assembly, size: int) -> Coordinates:
     """Coordinates of a state of the equations of this size; a rigid body has MuJoCo's."""
     loop = assembly.loop
     if assembly.scenario.simulation.plant != "thesis":
-        return mujoco_coordinates(loop)
+        return mujoco_coordinates(loop, {"": assembly}, assembly.scenario)
     names = loop.required_equations.states
     if loop.within is not None:
         names = (*names, *activation_names(loop))
@@ -192,29 +254,33 @@ def equation_coordinates(assembly: Assembly, size: int) -> Coordinates:
     return _coordinates((*names, *loop.fields[:further]), loop, MATRIX)
 
 
-def _coordinates(names: tuple[str, ...], loop: ClosedLoop, rotation: int) -> Coordinates:
-    """The coordinates of these names; a rotation among them has ``rotation`` entries."""
-    rotation = rotation if ROTATION_NAMES[0] in names else 0
-    first = names.index(ROTATION_NAMES[0]) if rotation else 0
-    return Coordinates(names, tuple(unit_of(name, loop) for name in names), rotation, first)
+def _coordinates(
+    names: tuple[str, ...], loop: ClosedLoop, rotation: int, prefixes: Iterable[str] = ()
+) -> Coordinates:
+    """The coordinates of these names; rotations among them have ``rotation`` entries."""
+    turns = tuple(at for at, name in enumerate(names) if name.endswith(ROTATION_NAMES[0]))
+    units = tuple(unit_of(name, loop, prefixes) for name in names)
+    return Coordinates(names, units, rotation if turns else 0, turns)
 
 
 def entry_names(found: Coordinates) -> tuple[str, ...]:
-    """Names of the entries of a state: the coordinates', and a name for each of its rotation."""
-    names, first = found.names, found.first
+    """Names of the entries of a vehicle's state, one for each of its rotation."""
+    names = found.names
     if not found.rotation:
         return names
+    (first,) = found.turns
     parts = "wxyz" if found.rotation == QUATERNION else [f"{i}{j}" for i in "123" for j in "123"]
     kind = "quaternion" if found.rotation == QUATERNION else "rotation"
     return (*names[:first], *(f"{kind}_{part}" for part in parts), *names[first + 3 :])
 
 
 class Input(NamedTuple):
-    """An input of the vehicle, as a controller commands it."""
+    """An input of a vehicle, as its controller commands it."""
 
     name: str
-    place: int  # among the controls of the model or the inputs of the equations
+    place: int  # among the controls of the vehicle's model or the inputs of its equations
     per_unit: float = 1.0  # of these, a unit of the input
+    vehicle: int = 0  # its number
 
 
 def control_inputs(assembly: Assembly) -> tuple[Input, ...]:
@@ -236,73 +302,3 @@ def equation_inputs(assembly: Assembly) -> tuple[Input, ...]:
     if equations is None or not equations.input_names:
         return control_inputs(assembly)
     return tuple(Input(name, index) for index, name in enumerate(equations.input_names))
-
-
-FREE: tuple[slice, slice] = (slice(-7, None), slice(-6, None))
-"""Where the load's free joint is in ``qpos`` and ``qvel``."""
-
-
-class Pendulum(NamedTuple):
-    """A load on a cable below a vehicle, whose free joint is the first of ``qpos``."""
-
-    length: float  # m, of the cable
-    attachment: Triple  # m, body axes
-
-    def placed(self, qpos: Floats, qvel: Floats) -> tuple[Floats, Floats]:
-        """The motion in MuJoCo of a vehicle with angles (rad) and their rates behind it."""
-        qpos, angles, qvel, rates = qpos[:-2], qpos[-2:], qvel[:-2], qvel[-2:]
-        arm, moving = self._attached(qpos, qvel)
-        hanging = np.array((*np.tan(angles), -1.0))
-        hanging *= self.length / np.linalg.norm(hanging)
-        x, y, z = hanging
-        rows = np.array(((-z, 0.0, x), (0.0, -z, y), hanging))  # of the angles' rates and length
-        moving = moving + np.linalg.solve(rows, (*(rates * (hanging[:2] ** 2 + z * z)), 0.0))
-        place = (*(qpos[:3] + arm + hanging), 1.0, 0.0, 0.0, 0.0)
-        return np.concatenate((qpos, place)), np.concatenate((qvel, moving, np.zeros(3)))
-
-    def angles(self, qpos: Floats, qvel: Floats) -> tuple[Floats, Floats]:
-        """The reverse of `placed`, for any length."""
-        load, speed = qpos[FREE[0]][:3], qvel[FREE[1]][:3]
-        qpos, qvel = qpos[: FREE[0].start], qvel[: FREE[1].start]
-        arm, moving = self._attached(qpos, qvel)
-        angles, rates, _ = _swinging(load - qpos[:3] - arm, speed - moving, np.zeros(3))
-        return np.concatenate((qpos, angles)), np.concatenate((qvel, rates))
-
-    def distance(self, qpos: Floats, qvel: Floats) -> float:
-        """The load's distance (m) from the attachment, by the motion in MuJoCo."""
-        return float(np.linalg.norm(qpos[FREE[0]][:3] - qpos[:3] - self._attached(qpos, qvel)[0]))
-
-    def accelerations(self, model: Any, data: Any) -> tuple[Floats, float]:
-        """Accelerations of the vehicle and the angles, and the tension (N), from free ones."""
-        import mujoco
-
-        turn, rates = rotation_of_quaternion(data.qpos[3:7]), data.qvel[3:6]
-        arm, moving = self._attached(data.qpos, data.qvel)
-        hanging = data.qpos[FREE[0]][:3] - data.qpos[:3] - arm
-        speed, unit = data.qvel[FREE[1]][:3] - moving, hanging / self.length
-        turning = turn @ np.cross(rates, np.cross(rates, self.attachment))
-        row, change = np.zeros((1, model.nv)), np.zeros((1, model.nv))
-        row[0, :3], row[0, FREE[1]][:3] = -unit, unit
-        row[0, 3:6] = -np.cross(self.attachment, turn.T @ unit)
-        mujoco.mj_solveM(model, data, change, row)
-        excess = row[0] @ data.qacc - unit @ turning + speed @ speed / self.length
-        tension = float(excess / (row[0] @ change[0]))
-        qacc = data.qacc - tension * change[0]
-        attached = qacc[:3] + turn @ np.cross(qacc[3:6], self.attachment) + turning
-        _, _, swinging = _swinging(hanging, speed, qacc[FREE[1]][:3] - attached)
-        return np.concatenate((qacc[: FREE[1].start], swinging)), tension
-
-    def _attached(self, qpos: Floats, qvel: Floats) -> tuple[Floats, Floats]:
-        """The attachment from the vehicle's place (m), and its velocity (m/s), world axes."""
-        turn = rotation_of_quaternion(qpos[3:7] / np.linalg.norm(qpos[3:7]))
-        spinning = turn @ np.cross(qvel[3:6], self.attachment)
-        return turn @ np.array(self.attachment), qvel[:3] + spinning
-
-
-def _swinging(hanging: Floats, speed: Floats, acceleration: Floats) -> tuple[Floats, ...]:
-    """Angles (rad) of a vector from straight down toward +x and +y, and two derivatives."""
-    (u, w), (du, dw), (ddu, ddw) = ((v[:2], -v[2]) for v in (hanging, speed, acceleration))
-    square = u * u + w * w
-    rates = (du * w - u * dw) / square
-    second = (ddu * w - u * ddw - 2.0 * rates * (u * du + w * dw)) / square
-    return np.arctan2(u, w), rates, second

@@ -13,9 +13,10 @@ from tiltsim.engines.base import EngineName
 from tiltsim.errors import InputError
 from tiltsim.laws.assembling import assemble
 from tiltsim.linear import newton
-from tiltsim.linear.coordinates import PLANE
+from tiltsim.linear.coordinates import PLANE, parted, vehicles_of
 from tiltsim.linear.forcing import Forcing, forcing_of
-from tiltsim.linear.motion import LONG, SETTLING_TIME, Motion, make_motion
+from tiltsim.linear.motion import LONG, Motion
+from tiltsim.linear.mujoco_motion import SETTLING_TIME, make_motion
 from tiltsim.plants.plant import MIN_STEPS_TO_COMPILE
 from tiltsim.scenario.scenario import Scenario
 from tiltsim_controllers.mathematics.scalar import Floats
@@ -30,6 +31,8 @@ SETTLED: Final = 1e-9
 
 MOST_STEPS: Final = 200_000
 """Longest orbit: some 250 flights over it take a quarter of an hour with compiled steps."""
+
+INDEPENDENT: Final = 1e-6  # part of an angle (rad) that no other coordinate determines
 
 FLIGHTS: Final = 150  # over a period, that an orbit takes to find
 SAMPLES: Final = 1000  # flown, that a rest point of a sampled controller takes
@@ -68,20 +71,63 @@ class Equilibrium:
 
     @cached_property
     def kept(self) -> Any:
-        """Indices of the coordinates that are not left out and that something depends on.
+        """Indices of the plant's coordinates that are kept as they are.
 
-        An integral without a gain is dropped; a position is kept even if no law follows it.
+        They are not left out, no cable binds them, and something depends on them: an integral
+        without a gain is dropped; a position is kept even if no law follows it.
         """
-        names, derivative = self.motion.coordinates.names, self.root.derivative
-        used = [name in "xyz" or column.any() for name, column in zip(names, derivative.T)]
-        return np.flatnonzero(np.array(used) & ~np.isin(names, self.left_out))
+        motion, derivative = self.motion, self.root.derivative
+        names = motion.coordinates.names
+        used = [
+            parted(name, motion.prefixes)[1] in (*"xyz", "angle") or column.any()
+            for name, column in zip(names, derivative.T, strict=True)
+        ]
+        bound = {name for each in motion.hung for name in each.places}
+        return np.flatnonzero(
+            np.array(used) & ~np.isin(names, (*self.left_out, *motion.aside, *bound))
+        )
+
+    @cached_property
+    def _minimal(self) -> tuple[tuple[str, ...], Floats, Floats]:
+        """Names of the coordinates, their rows by the plant's, and the columns that move them.
+
+        Hung objects have the angles of their first cable and their rates, but for angles that
+        further cables determine: of these the most independent ones are taken.
+        """
+        motion, state = self.motion, self.root.state
+        coordinates = motion.coordinates
+        rows = np.eye(coordinates.size)[self.kept]
+        names = [coordinates.names[index] for index in self.kept]
+        if not motion.hung:
+            return tuple(names), rows, rows.T
+        possible = newton.derivative_at(
+            lambda at: coordinates.between(state, motion.placed(at)), coordinates, state
+        )
+        swings = newton.derivative_at(motion.swings, coordinates, state) @ possible
+        moved = rows @ possible
+        further = swings - swings @ np.linalg.pinv(moved) @ moved
+        chosen = independent(further)
+        labels = [name for each in motion.hung for name in each.swings]
+        rows = np.vstack((rows, swings[chosen]))
+        names += [labels[index] for index in chosen]
+        return tuple(names), rows, possible @ np.linalg.pinv(rows @ possible)
+
+    @property
+    def values(self) -> Floats:
+        """The coordinates, of the plant's from level at the origin, shape (coordinates,)."""
+        coordinates, state = self.motion.coordinates, self.root.state
+        swings = self.motion.swings(state)
+        labels = [name for each in self.motion.hung for name in each.swings]
+        found = dict(zip(labels, swings, strict=True))
+        found |= zip(coordinates.names, coordinates.between(coordinates.level(state), state))
+        return np.array([found[name] for name in self.names])
 
     @property
     def corners(self) -> tuple[str, ...]:
         """Names of the coordinates kept that are at a limit, or whose rates have a corner there."""
         rates = self.root.corners[np.ix_(self.kept, self.kept)].any(axis=1)
-        found = zip(self.names, self._at_limits[self.kept] | rates, strict=True)
-        return tuple(name for name, corner in found if corner)
+        corner = self.kept[self._at_limits[self.kept] | rates]
+        return tuple(self.motion.coordinates.names[index] for index in corner)
 
     @property
     def _at_limits(self) -> NDArray[np.bool_]:
@@ -96,13 +142,33 @@ class Equilibrium:
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the coordinates kept."""
-        return tuple(self.motion.coordinates.names[index] for index in self.kept)
+        return self._minimal[0]
 
     @property
     def matrix(self) -> Floats:
         """The linear system: rates by coordinates, or in discrete time the state by the last."""
-        change: Floats = self.root.derivative[np.ix_(self.kept, self.kept)]
+        change = self.rows @ self.root.derivative @ self.columns
         return change if not self.steps else change + np.eye(len(change))
+
+    @property
+    def rows(self) -> Floats:
+        """The coordinates by the plant's, shape (coordinates, plant's)."""
+        return self._minimal[1]
+
+    @property
+    def columns(self) -> Floats:
+        """The plant's coordinates by these, shape (plant's, coordinates)."""
+        return self._minimal[2]
+
+
+def independent(rows: Floats) -> list[int]:
+    """Indices of a largest set of independent rows, in order."""
+    left, chosen = rows.copy(), []
+    while len(left) and (sizes := np.linalg.norm(left, axis=1)).max() > INDEPENDENT:
+        chosen.append(int(sizes.argmax()))
+        unit = left[chosen[-1]] / sizes.max()
+        left = left - np.outer(left @ unit, unit)
+    return sorted(chosen)
 
 
 def equilibrium_of(
@@ -126,7 +192,7 @@ def equilibrium_of(
     Raises:
         InputError: If it has none, or if its orbit takes more than `MOST_STEPS`.
     """
-    forcing = forcing_of(assemble(scenario))
+    forcing = forcing_of(vehicles_of(assemble(scenario)))
     if forcing.period is not None:
         if at_rest:
             raise InputError(
@@ -172,7 +238,7 @@ def _in_whole_steps(scenario: Scenario, period: float) -> Scenario:
     simulation = scenario.simulation
     whole = simulation.control_timestep or simulation.timestep
     count = ceil(period / whole - 1e-6)
-    keys = ("timestep", "control_timestep", "control_latency")
+    keys = ("timestep", "control_timestep", "control_latency", "duration")
     shorter = {key: getattr(simulation, key) * period / (count * whole) for key in keys}
     changed = simulation.model_copy(update=shorter)
     return scenario.model_copy(update={"simulation": changed})
@@ -201,23 +267,31 @@ class _Search:
         Where no law holds x and y, a vehicle that drifts rests in its other coordinates: in air in
         all but these, for its airspeed becomes steady, else in all but these and their rates.
         """
-        assembly = self.motion.assembly
+        assembly, aside = self.motion.assembly, self.motion.aside
         tolerance = ORBIT if self.forcing.period is not None else REST
-        drifting = ("x", "y") if assembly.scenario.has_air else PLANE
-        best = None
-        for left_out in ((),) if assembly.follows_position else ((), drifting):
-            self._held = ~np.isin(self.motion.coordinates.names, left_out)
+        drifting = tuple(
+            prefix + name
+            for prefix, each in self.motion.vehicles.items()
+            if not each.follows_position
+            for name in (PLANE[:2] if each.scenario.has_air else PLANE)
+        )
+        best, unheld = None, ""
+        for left_out in ((), drifting) if drifting else ((),):
+            self._held = ~np.isin(self.motion.coordinates.names, (*left_out, *aside))
             for state in self._starts(near):
                 root = self._solve(state, tolerance)
-                if root is not None and root.residual <= tolerance and self._is_apart(root):
+                if root is None:
+                    continue
+                reason = self.motion.why_not_held(self._start, root.state)
+                if not reason and root.residual <= tolerance and self._is_apart(root):
                     return root, left_out
-                if root is not None and (best is None or root.residual < best.residual):
-                    best = root
+                if best is None or root.residual < best.residual:
+                    best, unheld = root, reason
         address = assembly.scenario.address or "scenario"
         what = "rest point" if self.forcing.period is None else "periodic orbit"
         left = "" if best is None else f" (the best leaves {best.residual:.2g}, in SI units)"
-        drifts = "" if assembly.follows_position else ", also without x and y, which nothing holds"
-        raise InputError(f"{address}: found no {what} near its flight{drifts}{left}")
+        drifts = "" if not drifting else ", also without x and y, which nothing holds"
+        raise InputError(f"{address}: {unheld or f'found no {what} near its flight{drifts}{left}'}")
 
     def _is_apart(self, root: newton.Root) -> bool:
         """Whether no other coordinate depends on those left out."""

@@ -14,11 +14,11 @@ from tiltsim.errors import InputError, TiltsimError
 from tiltsim.laws.assembling import assemble
 from tiltsim.laws.law_loop import airframe
 from tiltsim.linear.coordinates import (
-    QUATERNION,
     ROTOR_INPUT,
     entry_names,
     equation_coordinates,
     equation_inputs,
+    parted,
     unit_of,
 )
 from tiltsim.linear.equilibrium import Equilibrium, equilibrium_of
@@ -47,6 +47,12 @@ class Signal(NamedTuple):
 
     name: str
     unit: str
+    prefix: str = ""  # of the name of a companion's or object's; empty for the first vehicle's
+
+    @property
+    def bare(self) -> str:
+        """The name without the prefix."""
+        return self.name.removeprefix(self.prefix)
 
     @property
     def text(self) -> str:
@@ -77,6 +83,12 @@ class Linearization:
     """The states at rest by name: the turn of a rotation is from level attitude."""
     command: dict[str, float]  # the inputs at rest by name
     loop: str  # ``"closed"`` or ``"open"``
+
+    def __repr__(self) -> str:
+        """Sizes and time, in one line."""
+        time = "continuous" if self.timestep is None else f"every {self.timestep:g} s"
+        sizes = (f"{len(getattr(self, kind))} {kind}" for kind in ("states", "inputs", "outputs"))
+        return f"<Linearization, {self.loop} loop, {time}: {', '.join(sizes)}>"
 
     @property
     def poles(self) -> Floats:
@@ -147,44 +159,32 @@ def linearization_at(found: Equilibrium) -> Linearization:
 
     coordinates = motion.coordinates
     count = coordinates.size
-    driven = [name.startswith(ROTOR_INPUT) for name in motion.inputs]
+    driven = [ROTOR_INPUT in name for name in motion.inputs]
     scales = np.where(driven, INPUT_SCALE, 1.0) * steps_at(np.zeros(len(driven)))
     by_input = jacobian(lambda each: map(varied, each), scales).matrix
     observed = derivative_at(lambda at: motion.observed(time, at), coordinates, state)
     feedback = derivative_at(lambda at: motion.commanded(time, at), coordinates, state)
-    level = coordinates.between(_level(found), state)
     names = found.names
     fields = closed_loop.sample_fields[1:]
 
     def signals(of: tuple[str, ...]) -> tuple[Signal, ...]:
-        return tuple(Signal(name, unit_of(name, closed_loop)) for name in of)
+        known = motion.prefixes
+        return tuple(Signal(n, unit_of(n, closed_loop, known), parted(n, known)[0]) for n in of)
 
     return Linearization(
         A=found.matrix,
-        B=by_input[:count][found.kept],
-        C=observed[:, found.kept],
+        B=found.rows @ by_input[:count],
+        C=observed @ found.columns,
         D=by_input[count:],
-        feedback=feedback[:, found.kept],
+        feedback=feedback @ found.columns,
         states=signals(names),
         inputs=signals(motion.inputs),
         outputs=signals(fields),
         timestep=found.timestep,
-        state=dict(zip(names, level[found.kept].tolist(), strict=True)),
+        state=dict(zip(names, found.values.tolist(), strict=True)),
         command=dict(zip(motion.inputs, motion.commanded(time, state).tolist(), strict=True)),
         loop="closed",
     )
-
-
-def _level(found: Equilibrium) -> Floats:
-    """The state whose coordinates are all zero: level at the origin."""
-    coordinates = found.motion.coordinates
-    state = np.zeros(len(found.root.state))
-    first = coordinates.first
-    if coordinates.rotation == QUATERNION:
-        state[first] = 1.0
-    elif coordinates.rotation:
-        state[[first, first + 4, first + 8]] = 1.0
-    return state
 
 
 class Symbolic(NamedTuple):

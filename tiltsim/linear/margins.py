@@ -104,7 +104,7 @@ class BrokenLoop:
 def broken_loops(system: Linearization) -> Iterator[BrokenLoop]:
     """The closed loop of a linear system, broken at all inputs, each input, each measured state."""
     gains, b, timestep = system.feedback, system.B, system.timestep
-    memory = [i for i, signal in enumerate(system.states) if not is_of_vehicle(signal.name)]
+    memory = [i for i, signal in enumerate(system.states) if not is_of_vehicle(signal.bare)]
     driven = [index for index in range(len(gains)) if np.abs(gains[index]).max() > 0.0]
     if driven:
         these, rows = b[:, driven], gains[driven]
@@ -113,14 +113,13 @@ def broken_loops(system: Linearization) -> Iterator[BrokenLoop]:
         column, row = b[:, [index]], gains[[index]]
         yield BrokenLoop(system.inputs[index].name, system.A - column @ row, column, row, timestep)
     for index, signal in enumerate(system.states):
-        name = signal.name
-        measured = name in BODY_FIELDS or name.startswith("rotation_")
+        measured = signal.bare in BODY_FIELDS or signal.bare.startswith("rotation_")
         if measured and np.abs(gains[:, index]).max() > 0.0:
             column = b @ gains[:, [index]]
             column[memory] = system.A[np.ix_(memory, [index])]
             row = np.zeros((1, len(system.states)))
             row[0, index] = 1.0
-            yield BrokenLoop(name, system.A - column @ row, column, row, timestep)
+            yield BrokenLoop(signal.name, system.A - column @ row, column, row, timestep)
 
 
 def frequency_grid(system: Linearization) -> Floats:

@@ -6,6 +6,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from tiltsim.linear.coordinates import parted
 from tiltsim_controllers.mathematics.scalar import Floats
 
 EQUAL: Final = 1e-4
@@ -110,7 +111,11 @@ def is_stable(matrix: Floats, poles: Floats, timestep: float | None) -> bool:
 
 
 def modes_of(
-    matrix: Floats, names: Sequence[str], timestep: float | None, error: float = 0.0
+    matrix: Floats,
+    names: Sequence[str],
+    timestep: float | None,
+    error: float = 0.0,
+    prefixes: Sequence[str] = (),
 ) -> tuple[Mode, ...]:
     """The modes of a system, sorted from fastest growth to fastest decay.
 
@@ -119,6 +124,7 @@ def modes_of(
         names: Names of its states.
         timestep: s; None in continuous time.
         error: See `spectrum`.
+        prefixes: Beginnings of the names of companions' and objects' states.
     """
     eigenvalues, vectors, left = spectrum(matrix, error)
     poles = exponents(eigenvalues, timestep)
@@ -136,17 +142,27 @@ def modes_of(
         part = np.abs(np.einsum("ik,ki->i", vectors[:, group], left[group]))
         # The logarithm of a negative real eigenvalue is complex, yet it has no partner.
         count = sum(2 if eigenvalues[i].imag > 0.0 else 1 for i in group)
-        found.append(_mode(pole, part, names, count))
+        found.append(_mode(pole, part, names, count, prefixes))
     return tuple(found)
 
 
-def _mode(pole: complex, part: Floats, names: Sequence[str], count: int) -> Mode:
+def labeled(prefix: str, word: str) -> str:
+    """A word for a motion of the vehicle or object whose names begin with a prefix."""
+    return f"{prefix[:-1]} {word}" if prefix else word
+
+
+def _mode(
+    pole: complex, part: Floats, names: Sequence[str], count: int, prefixes: Sequence[str]
+) -> Mode:
     order = [int(i) for i in np.argsort(-part, kind="stable") if part[i] >= SHARE * part.max()]
     states = tuple(names[i] for i in order)
-    words = [WORDS.get(name) or KINDS.get(name.partition("_")[0], name) for name in states]
+    words = [
+        (prefix, WORDS.get(name) or KINDS.get(name.partition("_")[0], name))
+        for prefix, name in (parted(state, prefixes) for state in states)
+    ]
     # Rotors take part in all motions that they make: they name a mode only where they are alone.
-    moving = [word for word in dict.fromkeys(words) if word not in KINDS.values()]
-    name = ", ".join(moving[:3] or words[:1])
+    moving = [each for each in dict.fromkeys(words) if each[1] not in KINDS.values()]
+    name = ", ".join(labeled(*each) for each in moving[:3] or words[:1])
     frequency = float(abs(pole))
     if frequency <= NEUTRAL:
         return Mode(name, 0.0, 0.0, states, count)

@@ -10,22 +10,17 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import cached_property
-from math import ceil
 from typing import Any, Final
 
 import numpy as np
 
 from tiltsim.closed_loop.assembly import Assembly, program_key
 from tiltsim.closed_loop.loop import ClosedLoop, Equations
-from tiltsim.closed_loop.userdata import EVALUATIONS, EVALUATIONS_PER_STEP, HEADER_SIZE
 from tiltsim.engines.base import EngineName
-from tiltsim.engines.control import control_callback
 from tiltsim.engines.programs import LoopPrograms
 from tiltsim.laws.assembling import assemble
 from tiltsim.linear import coordinates
-from tiltsim.linear.coordinates import Pendulum
-from tiltsim.models.objects import FORCE
-from tiltsim.plants.mujoco_plant import MujocoPlant
+from tiltsim.linear.hanging import hung_in
 from tiltsim.plants.plant import EquationsPlant
 from tiltsim.scenario.scenario import Scenario
 from tiltsim_controllers.code.arrays import program_of, xp
@@ -35,18 +30,24 @@ from tiltsim_controllers.mathematics.scalar import Floats, Values
 LONG: Final = 1000
 """Steps, from which on a flight is long: worth a thread, and a derivative of fewer evaluations."""
 
-SETTLING_TIME: Final = 40.0  # s, flown at most to approach an orbit or a rest point
 THREADS: Final = os.cpu_count() or 1
 ROWS_PER_THREAD: Final = 4  # flights of a thread between reports of progress
+
+RECORDS: Final = "among_state"
+"""Beginning of the names of the largest contact force and the time in contact so far."""
 
 
 class Motion(ABC):
     """A closed loop on its plant.
 
     Attributes:
-        assembly: The flight; its controller adds the offsets to its commands to the vehicle.
+        assembly: The flight; its controllers add the offsets to their commands to the vehicles.
+        vehicles: The flight of each vehicle by the beginning of the names of its columns.
+        aside: Names of coordinates on which nothing depends: turns of hung objects, and records.
+        hung: Objects that hang on cables.
+        prefixes: Beginnings of the names of companions' and objects' coordinates.
         coordinates: Coordinates of its state.
-        inputs: Names of the vehicle's inputs.
+        inputs: Names of the vehicles' inputs.
         offsets: Offsets of the inputs, shape (inputs,); zero unless they are varied.
 
     Args:
@@ -56,14 +57,19 @@ class Motion(ABC):
     """
 
     def __init__(self, scenario: Scenario, engine: EngineName | None, late: bool = False) -> None:
-        scenario.require_alone("linear analysis", loaded=True)
         self.scenario, self.engine, self._late = scenario, engine, late
-        self._commanded: Values = ()
+        self._commanded: list[Values] = []  # of each vehicle
         self._inputs: tuple[coordinates.Input, ...] = ()
         self.offsets = np.zeros(0)
         self.assembly = assemble(scenario, self._adapted)
+        self.vehicles = coordinates.vehicles_of(self.assembly, self._as_flown)
+        self.prefixes = coordinates.prefixes_of(scenario)
+        self.hung = hung_in(scenario)
         self.coordinates, self._inputs = self._names()
         self.inputs = tuple(each.name for each in self._inputs)
+        turning = (name for each in self.hung for name in each.turning)
+        records = (name for name in self.coordinates.names if name.startswith(RECORDS))
+        self.aside = (*turning, *records)
         self.offsets = np.zeros(len(self._inputs))
 
     def _as_flown(self, loop: ClosedLoop) -> ClosedLoop:
@@ -77,11 +83,12 @@ class Motion(ABC):
 
     def _adapted(self, loop: ClosedLoop) -> ClosedLoop:
         """A loop without layers, with offsets of its commands, whose changes a trace would miss."""
-        loop = self._as_flown(loop)
+        loop, number = self._as_flown(loop), len(self._commanded)
+        self._commanded.append(())
         equations = loop.equations
         if equations is not None:
-            equations = replace(equations, inputs=self._with_offsets(equations.inputs))
-        controls = self._with_offsets(loop.controls)
+            equations = replace(equations, inputs=self._with_offsets(equations.inputs, number))
+        controls = self._with_offsets(loop.controls, number)
         return replace(loop, controls=controls, equations=equations, traced=False)
 
     def _evaluated(self, function: Callable[..., Any], **sizes: int) -> Callable[..., Values]:
@@ -108,14 +115,15 @@ class Motion(ABC):
         run = python_function(program, fixed={"user": flown.setup.userdata.tolist()})
         return lambda *given: run(*given, self.offsets.tolist())
 
-    def _with_offsets(self, function: Callable[..., Values]) -> Callable[..., Values]:
+    def _with_offsets(self, function: Callable[..., Values], vehicle: int) -> Callable[..., Values]:
         """A control step that adds the offsets and remembers the commands without them."""
 
         def step(*args: Any) -> Values:
-            self._commanded = function(*args)
-            values = list(self._commanded)
+            self._commanded[vehicle] = function(*args)
+            values = list(self._commanded[vehicle])
             for each, added in zip(self._inputs, self.offsets.tolist(), strict=True):
-                values[each.place] = values[each.place] + added * each.per_unit
+                if each.vehicle == vehicle:
+                    values[each.place] = values[each.place] + added * each.per_unit
             return tuple(values)
 
         return step
@@ -123,11 +131,24 @@ class Motion(ABC):
     def commanded(self, time: float, state: Floats) -> Floats:
         """The inputs that the controller commands, shape (inputs,)."""
         self.observed(time, state)
-        return np.array([self._commanded[each.place] / each.per_unit for each in self._inputs])
+        commanded = ((self._commanded[each.vehicle][each.place], each) for each in self._inputs)
+        return np.array([value / each.per_unit for value, each in commanded])
 
     @abstractmethod
     def _names(self) -> tuple[coordinates.Coordinates, tuple[coordinates.Input, ...]]:
         """The coordinates, and the inputs."""
+
+    def why_not_held(self, time: float, state: Floats) -> str:
+        """Why a state at rest is none of objects on taut cables alone; empty if it is."""
+        return ""
+
+    def placed(self, state: Floats) -> Floats:
+        """The state with the objects that hang where their cables are as long as they are."""
+        return state
+
+    def swings(self, state: Floats) -> Floats:
+        """Angles of the cables and their rates, in the order of ``hung``."""
+        return np.zeros(0)
 
     @property
     @abstractmethod
@@ -238,161 +259,3 @@ class EquationMotion(Motion):
         values, setup = state.tolist(), self.assembly.setup
         inputs = self._equations.inputs(time, values, *setup)
         return np.array(self._equations.observe(time, values, inputs, *setup))
-
-
-class MujocoMotion(Motion):
-    """In MuJoCo; a state is `qpos`, `qvel` and `act`, the angles of a load behind the former."""
-
-    @cached_property
-    def _load(self) -> Pendulum | None:
-        load = self.scenario.payload
-        return None if load is None or load.rigid else Pendulum(load.length, load.attachment)
-
-    def _names(self) -> tuple[coordinates.Coordinates, tuple[coordinates.Input, ...]]:
-        loop = self.assembly.loop
-        return coordinates.mujoco_coordinates(loop), coordinates.control_inputs(self.assembly)
-
-    @cached_property
-    def _varied(self) -> MujocoPlant:
-        return MujocoPlant(self.assembly, engine="python")
-
-    @cached_property
-    def _plant(self) -> MujocoPlant:
-        return MujocoPlant(self._flown_assembly, self._varied.model, self.engine)
-
-    @cached_property
-    def _whole(self) -> Floats:
-        """An integration state: time, `qpos`, `qvel`, `act` and more."""
-        return self._varied.state
-
-    @cached_property
-    def initial(self) -> Floats:
-        return self._read(self._whole)
-
-    @property
-    def _part(self) -> slice:
-        model = self._varied.model
-        return slice(1, 1 + model.nq + model.nv + model.na)
-
-    def _read(self, whole: Floats) -> Floats:
-        """The state of an integration state."""
-        model = self._varied.model
-        qpos, qvel, act = np.split(whole[self._part], (model.nq, model.nq + model.nv))
-        if self._load is not None:
-            qpos, qvel = self._load.angles(qpos, qvel)
-        return np.concatenate((qpos, qvel, act))
-
-    def _split(self, state: Floats) -> list[Floats]:
-        sizes, swing = self.assembly.loop.sizes, 0 if self._load is None else 2
-        return np.split(state, (sizes.qpos + swing, sizes.qpos + sizes.qvel + 2 * swing))
-
-    def _placed(self, state: Floats, load: Pendulum | None = None) -> list[Floats]:
-        """MuJoCo's `qpos`, `qvel` and `act`, with the load on its cable or on another."""
-        (*motion, act), load = self._split(state), load or self._load
-        return [*(motion if load is None else load.placed(*motion)), act]
-
-    @cached_property
-    def _stretched(self) -> Pendulum | None:
-        """The load on its cable as stretched after a flight, which is then steady if at rest."""
-        if self._load is None:
-            return None
-        plant = self._plant
-        plant.state = self._whole
-        plant.advance(ceil(SETTLING_TIME / self.scenario.simulation.timestep))
-        length = self._load.distance(plant.data.qpos, plant.data.qvel)
-        return self._load if plant.fault() else self._load._replace(length=length)
-
-    def _seen(self, state: Floats, tension: float = 0.0) -> list[list[float]]:
-        """Arguments of the functions of the loop: the vehicle's `qpos` and `qvel`, and `act`."""
-        sizes, (qpos, qvel, act) = self.assembly.loop.sizes, self._placed(state)
-        history = np.zeros(sizes.history)
-        history[FORCE : FORCE + 1] = tension
-        behind = (*act, *qpos[sizes.qpos :], *history)
-        return [qpos[: sizes.qpos].tolist(), qvel[: sizes.qvel].tolist(), [*map(float, behind)]]
-
-    @cached_property
-    def _all_controls(self) -> Callable[..., Values]:
-        """The controls at a time and state, and the controller's commands without offsets."""
-        loop = self.assembly.loop
-
-        def controls(setup: Any, time: Any, *parts: Any) -> Any:
-            values = loop.controls(time[0], *parts, *setup)
-            return (*values, *self._commanded)
-
-        qpos, qvel, act, _, *behind = loop.sizes
-        return self._evaluated(controls, time=1, qpos=qpos, qvel=qvel, act=act + sum(behind))
-
-    def _controls(self, time: float, state: Floats) -> Values:
-        values, count = self._all_controls((time,), *self._seen(state)), self._varied.model.nu
-        self._commanded = values[count:]
-        return values[:count]
-
-    def rates(self, time: float, state: Floats) -> Floats:
-        accelerations, _ = self._forward(time, state)
-        return np.concatenate((self._split(state)[1], accelerations, self._varied.data.act_dot))
-
-    def _forward(self, time: float, state: Floats) -> tuple[Floats, float]:
-        """Accelerations of the coordinates, and the tension of a cable, N."""
-        import mujoco
-
-        model, data = self._varied.model, self._varied.data
-        data.qpos[:], data.qvel[:], data.act[:] = self._placed(state)
-        data.ctrl[:] = self._controls(time, state)
-        limited = model.tendon_limited.copy()
-        model.tendon_limited[:] = 0  # `Pendulum` holds the load instead
-        with control_callback(None):
-            mujoco.mj_forward(model, data)
-        model.tendon_limited[:] = limited
-        return (data.qacc, 0.0) if self._load is None else self._load.accelerations(model, data)
-
-    def limited(self, state: Floats) -> Floats:
-        model, parts = self._varied.model, self._split(state)
-        own = model.actuator_actadr[model.actuator_actlimited > 0]
-        low, high = model.actuator_actrange[model.actuator_actlimited > 0].T
-        activations = parts[-1].copy()
-        activations[own] = np.clip(activations[own], low, high)
-        return np.concatenate((*parts[:-1], activations))
-
-    def flown(self, step: int, state: Floats, steps: int) -> Floats:
-        plant = self._varied if self.offsets.any() else self._plant
-        plant.state = self._whole_at(step, state)
-        plant.advance(steps)
-        if plant.fault():  # MuJoCo has reset the state
-            return np.full(len(state), np.nan)
-        return self._read(plant.state)
-
-    def _whole_at(self, step: int, state: Floats) -> Floats:
-        """An integration state after ``step`` physics steps."""
-        whole = self._whole.copy()
-        whole[self._part] = np.concatenate(self._placed(state, self._stretched))
-        header = whole[self._varied.header_offset :][:HEADER_SIZE]
-        header[EVALUATIONS] = step * header[EVALUATIONS_PER_STEP]
-        return whole
-
-    def _together(self, step: int, states: Sequence[Floats], steps: int) -> list[Floats]:
-        batch, places = self._batch, np.arange(len(states), dtype=np.int32)
-        for place, state in enumerate(states):
-            batch.state[place] = self._whole_at(step, state)
-        batch.warning[:] = 0
-        with control_callback(self._plant.callback):
-            batch.rollout(steps, record=(), ids=places)
-        lost = batch.warning[places].reshape(len(states), -1).any(axis=1)
-        ends = [self._read(whole) for whole in batch.state[places]]
-        return [np.full(len(end), np.nan) if fell else end for end, fell in zip(ends, lost)]
-
-    @cached_property
-    def _batch(self) -> Any:
-        from mujoco.batch import Batch
-
-        return Batch(self._plant.model, ROWS_PER_THREAD * THREADS, THREADS)
-
-    def observed(self, time: float, state: Floats) -> Floats:
-        tension = 0.0 if self._load is None else self._forward(time, state)[1]
-        controls = self._controls(time, state)
-        return np.array(self.assembly.loop.observe(*self._seen(state, tension), controls))
-
-
-def make_motion(scenario: Scenario, engine: EngineName | None = None, late: bool = False) -> Motion:
-    """The motion of a scenario on the plant that it requests; see `Motion`."""
-    kind = MujocoMotion if scenario.simulation.plant == "mujoco" else EquationMotion
-    return kind(scenario, engine, late)

@@ -171,10 +171,9 @@ def _is_near(coordinates: Coordinates, start: Floats, end: Floats) -> bool:
 
 def coordinate_steps(coordinates: Coordinates, state: Floats) -> Floats:
     """Steps of the differences; a turn is of order one whatever the attitude."""
-    values = state
-    if coordinates.rotation:
-        first, after = coordinates.first, coordinates.first + coordinates.rotation
-        values = np.concatenate((state[:first], np.zeros(3), state[after:]))
+    values = coordinates.between(coordinates.level(state), state)
+    turning = np.array(coordinates.turns, dtype=int)[:, None] + np.arange(3)
+    values[turning] = 0.0
     return steps_at(values)
 
 

@@ -11,14 +11,15 @@ import numpy as np
 
 from tiltsim.errors import InputError
 from tiltsim.laws.assembling import assemble
+from tiltsim.linear.coordinates import vehicles_of
 from tiltsim.linear.equilibrium import Equilibrium, equilibrium_of
 from tiltsim.linear.forcing import forcing_of
-from tiltsim.linear.modes import KINDS, Mode, exponents, is_stable, modes_of, spectrum
+from tiltsim.linear.modes import KINDS, Mode, exponents, is_stable, labeled, modes_of, spectrum
 from tiltsim.linear.newton import ERROR
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.system.arguments import check_function
-from tiltsim.system.text import short_repr
+from tiltsim.system.text import html_table, short_repr
 from tiltsim_controllers.mathematics.scalar import Floats
 
 RESOLVED: Final = 1e-8
@@ -55,6 +56,25 @@ class Stability:
     corners: tuple[str, ...] = ()
     """Names of states whose rates have a corner there, at a limit or at the edge of a dead zone:
     the matrix is the mean of both sides, and poles say little."""
+
+    def __repr__(self) -> str:
+        """The verdict, in one line."""
+        return f"<Stability of {self._verdict}>"
+
+    def _repr_html_(self) -> str:
+        """The verdict and the modes, as a table for notebooks."""
+        columns = ("mode", "frequency, rad/s", "damping", "count", "states")
+        rows = [
+            (m.name, f"{m.frequency:.5g}", f"{m.damping:.4f}", m.count, ", ".join(m.states[:6]))
+            for m in self.modes
+        ]
+        return html_table("Stability", [self._verdict], rows, columns)
+
+    @property
+    def _verdict(self) -> str:
+        kind = "a rest point" if self.period is None else f"an orbit of {self.period:g} s"
+        verdict = "stable" if self.stable else "unstable"
+        return f"{kind}: {verdict}, {self.neutral} neutral of {len(self.states)} states"
 
     @property
     def growth(self) -> float:
@@ -114,7 +134,7 @@ def stability_at(found: Equilibrium) -> Stability:
     eigenvalues = eigenvalues[np.argsort(-np.abs(eigenvalues), kind="stable")]
     poles = exponents(eigenvalues, timestep)
     finite = poles[np.isfinite(poles)]
-    modes = modes_of(matrix, found.names, timestep, error)
+    modes = modes_of(matrix, found.names, timestep, error, found.motion.prefixes)
     if found.is_orbit and timestep is not None:
         fastest = log(RESOLVED) / timestep
         modes = tuple(mode for mode in modes if mode.growth_rate > fastest)
@@ -245,11 +265,18 @@ def slowest_mode(scenario: Scenario) -> SlowestMode | None:
     Horizontal motion counts if the law follows the reference's. None without a decaying mode, and
     for flights that are neither at rest nor periodic or that take more than `MOST_STEPS` a period.
     """
-    assembly = assemble(scenario)
-    of_layers = (name for extra in assembly.loop.extra_actuators for name in extra.names)
-    without = {*KINDS.values(), *of_layers, *(() if assembly.follows_position else ("x", "y"))}
+    vehicles = vehicles_of(assemble(scenario))
+    without = {
+        labeled(prefix, name)
+        for prefix, each in vehicles.items()
+        for name in (
+            *KINDS.values(),
+            *(name for extra in each.loop.extra_actuators for name in extra.names),
+            *(() if each.follows_position else ("x", "y")),
+        )
+    }
     try:
-        period = forcing_of(assembly).period or 0.0
+        period = forcing_of(vehicles).period or 0.0
         if period > MOST_STEPS * scenario.simulation.timestep:
             return None
         modes = stability(scenario).modes

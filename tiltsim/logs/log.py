@@ -21,8 +21,7 @@ from tiltsim.flight.writing import FLIGHT
 from tiltsim.models.vehicle_parts import MAX_ROTORS
 from tiltsim.system.files import is_file, is_folder, prepare_folder, replacing
 from tiltsim.system.parquet import open_parquet, parquet_bytes
-from tiltsim.vehicles.rotorcraft import rotorcraft_columns
-from tiltsim.vehicles.rotorcraft.layout import Layout
+from tiltsim.vehicles.rotorcraft import Layout, rotorcraft_columns
 from tiltsim_controllers.mathematics.scalar import Floats
 
 if TYPE_CHECKING:

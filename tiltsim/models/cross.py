@@ -2,8 +2,6 @@
 
 from math import inf
 
-import numpy as np
-
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim_controllers.vehicle.cross import ARMS
 from tiltsim_controllers.vehicle.parameters import SPIN, Vehicle
@@ -30,11 +28,10 @@ def as_multirotor(
         rotor = Rotor(place, (0.0, 0.0, 1.0), *coefficients, spin)
         hinged = rotor._replace(tilt=tilt, hinge=place, hinge_axis=arm)
         rotors.append(hinged if tilting else rotor)
-    inertia = np.diag((vehicle.inertia_xx, vehicle.inertia_yy, vehicle.inertia_zz))
     return Multirotor(
         mass=vehicle.mass,
         gravity=vehicle.gravity,
-        inertia=tuple(inertia.ravel().tolist()),
+        inertia=vehicle.body.inertia,
         rotors=tuple(rotors),
         speed_ranges=tuple(
             (-inf if reverses or spin < 0.0 else 0.0, inf if reverses or spin > 0.0 else 0.0)

@@ -20,6 +20,8 @@ from tiltsim.system.files import is_file, is_folder
 if TYPE_CHECKING:
     import mujoco
 
+    from tiltsim.models.mjspec_tree import MjSpecTree
+
 _PLAIN: Final = {
     "gear": [1.0, 0.0, 0.0, 0.0, 0.0, 0.0],
     "dyntype": "none",
@@ -29,6 +31,8 @@ _PLAIN: Final = {
     "ctrllimited": "false",
     "actlimited": "false",
     "forcelimited": "false",
+    "ctrlrange": [0.0, 0.0],
+    "forcerange": [0.0, 0.0],
 }
 """An actuator whose force is its control, whatever a user's file has as default."""
 MAX_BYTES: Final = 4 * 2**20  # size of the file and all files that it includes, together
@@ -90,40 +94,39 @@ def _with_inclusions(path: Path) -> bytes:
 
 
 def spec_of(root: Any) -> mujoco.MjSpec:
-    """MuJoCo's own form of a tree as it is now, whatever is edited afterwards."""
+    """A tree of `parse_mjcf` in MuJoCo's own form, which is edited and copied much faster."""
     import mujoco
 
     from tiltsim.models.mjspec_tree import MjSpecTree
 
     if isinstance(root, MjSpecTree):
-        return root.spec.copy()
+        return root.spec
     unnamed = r' name="//unnamed_[^"]*"'  # dm_control's names of unnamed elements
     text = re.sub(unnamed, "", root.to_xml_string())
     return mujoco.MjSpec.from_string(text, assets=root.get_assets())
 
 
-def remove_visuals(root: Any, *, contacts: bool) -> None:
+def remove_visuals(root: MjSpecTree, *, contacts: bool, kept: Sequence[str] = ()) -> None:
     """Remove all that is only drawn or measured: geoms, cameras, lights, sensors and their sites.
 
-    ``contacts`` keeps the geoms that take part in contacts. The shipped vehicles have neither
-    springs nor dampers, so that MuJoCo need not look for them.
+    ``contacts`` keeps the geoms that take part in contacts, ``kept`` sites by name. The shipped
+    vehicles have neither springs nor dampers, so that MuJoCo need not look for them.
     """
     root.option.flag.spring = root.option.flag.damper = "disable"
     for geom in root.find_all("geom"):
-        if not contacts or not (geom.name or "").endswith(("collision", "ground")):
+        if not contacts or not geom.name.endswith(("collision", "ground")):
             geom.remove()
     for kind in ("camera", "light", "sensor"):
         for element in root.find_all(kind):
             element.remove()
-    sites = [actuator.site for actuator in root.find_all("actuator")]
-    acted_on = {getattr(site, "name", site) for site in sites}
+    acted_on = {*kept, *(actuator.site for actuator in root.find_all("actuator"))}
     for site in root.find_all("site"):
         if site.name not in acted_on:
             site.remove()
 
 
 def set_servos(
-    root: Any, names: Sequence[str], servo: TiltServo, inertias: Sequence[float]
+    root: MjSpecTree, names: Sequence[str], servo: TiltServo, inertias: Sequence[float]
 ) -> None:
     """Give hinges and their actuators, position servos of the same names, a servo's behavior.
 
@@ -137,19 +140,15 @@ def set_servos(
         joint, actuator = root.find("joint", name), root.find("actuator", name)
         kp = inertia * servo.natural_frequency**2
         kv = 2.0 * inertia * servo.damping_ratio * servo.natural_frequency
-        if actuator.tag == "position":
-            actuator.kp, actuator.kv = kp, kv
-            actuator.dampratio = actuator.inheritrange = None
-        else:
-            actuator.gaintype = "fixed"
-            actuator.gainprm, actuator.biasprm = [kp, 0.0, 0.0], [0.0, -kp, -kv]
+        actuator.gaintype = "fixed"
+        actuator.gainprm, actuator.biasprm = [kp, 0.0, 0.0], [0.0, -kp, -kv]
         joint.range = actuator.ctrlrange = (0.0, 0.0)
         joint.limited = actuator.ctrllimited = "false"
         if servo.max_angle is not None:
             _set_stop(root, joint, actuator, servo.max_angle)
 
 
-def _set_stop(root: Any, joint: Any, actuator: Any, max_angle: float) -> None:
+def _set_stop(root: MjSpecTree, joint: Any, actuator: Any, max_angle: float) -> None:
     """Limit a hinge and the command of its servo to plus and minus an angle (rad)."""
     in_file = max_angle if root.compiler.angle == "radian" else degrees(max_angle)
     joint.range, actuator.ctrlrange = (-in_file, in_file), (-max_angle, max_angle)
@@ -159,13 +158,13 @@ def _set_stop(root: Any, joint: Any, actuator: Any, max_angle: float) -> None:
     joint.solimplimit = (0.99, 0.99, 0.001, 0.5, 2.0)
 
 
-def add_states(root: Any, name: str, count: int) -> None:
+def add_states(root: MjSpecTree, name: str, count: int) -> None:
     """Append integrators ``name_1``, ... that act on nothing; in the keyframes they are zero."""
     add_memories(root, name, count, dyntype="integrator")
     _extend_keyframes(root, "act", count)
 
 
-def add_memories(root: Any, name: str, count: int, **attributes: str) -> None:
+def add_memories(root: MjSpecTree, name: str, count: int, **attributes: str) -> None:
     """Append actuators ``name_1``, ... without gain, whose controls hold a sampled law's output."""
     vehicle = root.find("body", "vehicle")
     # Acting on a joint costs MuJoCo least.
@@ -174,25 +173,25 @@ def add_memories(root: Any, name: str, count: int, **attributes: str) -> None:
         _add_actuator(root, f"{name}_{index}", joint=joint, gainprm=[0.0], **attributes)
 
 
-def add_wrench(root: Any, name: str, site: str) -> None:
+def add_wrench(root: MjSpecTree, name: str, site: str) -> None:
     """Append a force and a torque at a site, along its axes."""
     axes = [f"{kind}_{axis}" for kind in ("force", "torque") for axis in "xyz"]
     for axis, gear in zip(axes, np.eye(6).tolist(), strict=True):
         _add_actuator(root, f"{name}_{axis}", site=site, gear=gear)
 
 
-def add_hinge_torques(root: Any, name: str, hinges: int) -> None:
+def add_hinge_torques(root: MjSpecTree, name: str, hinges: int) -> None:
     """Append a torque about each of the first ``hinges`` tilt hinges."""
     for i in range(1, hinges + 1):
         _add_actuator(root, f"{name}_hinge_{i}", joint=f"tilt_{i}")
 
 
-def _add_actuator(root: Any, name: str, **attributes: Any) -> None:
+def _add_actuator(root: MjSpecTree, name: str, **attributes: Any) -> None:
     root.actuator.add("general", name=name, **(_PLAIN | attributes))
     _extend_keyframes(root, "ctrl", 1)
 
 
-def _extend_keyframes(root: Any, vector: str, count: int) -> None:
+def _extend_keyframes(root: MjSpecTree, vector: str, count: int) -> None:
     for key in root.find_all("key"):
         values = getattr(key, vector)
         if values is not None:  # else MuJoCo takes zeros for all

@@ -34,8 +34,6 @@ _ENUMERATIONS: Final[dict[str, tuple[Any, str]]] = {
 class _Element:
     """An element, whose attributes read and write MuJoCo's own."""
 
-    tag = ""
-
     def __init__(self, spec: mujoco.MjSpec, own: Any) -> None:
         self.__dict__.update(spec=spec, own=own)
 
@@ -129,8 +127,6 @@ class _Body(_Element):
 
 
 class _Actuator(_Element):
-    tag = "general"  # MuJoCo turns all kinds into it
-
     def __setattr__(self, name: str, value: Any) -> None:
         super().__setattr__(name, value)
         if name == "ctrlrange":

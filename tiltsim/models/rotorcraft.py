@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import KW_ONLY, dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, cast
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, cast
 
 import numpy as np
 
@@ -30,7 +30,6 @@ from tiltsim.models.user_vehicle import UserVehicle
 from tiltsim.resources import shipped_folder
 from tiltsim.system.files import one_thread_at_a_time
 from tiltsim.system.hooks import mujoco_hooks
-from tiltsim_controllers.mathematics.scalar import Values
 from tiltsim_controllers.vehicle.body import ROTORS
 from tiltsim_controllers.vehicle.parameters import PRESETS, SPIN, Vehicle
 
@@ -58,11 +57,6 @@ class RotorcraftSpec(ModelSpec):
     """A user's file in place of the shipped one; its geoms may have mass and are always kept."""
 
     @property
-    def spins(self) -> Values:
-        """Signs of the rotor speeds."""
-        return SPIN if isinstance(self.vehicle, Vehicle) else self.vehicle.spins
-
-    @property
     def tilts(self) -> int:
         """Number of tilt hinges."""
         if isinstance(self.vehicle, Multirotor):
@@ -73,6 +67,26 @@ class RotorcraftSpec(ModelSpec):
     def has_stops(self) -> bool:
         """Whether the hinges have stops."""
         return self.tilts > 0 and self.tilt_servo.max_angle is not None
+
+    @property
+    def as_read(self) -> _AsRead:
+        """The vehicle without the parts of a flight."""
+        return _AsRead(
+            self.model,
+            self.user_vehicle,
+            self.vehicle.arm_length if isinstance(self.vehicle, Vehicle) else 0.0,
+            self.pod,
+        )
+
+    @property
+    def touches(self) -> bool:
+        """Whether there is something to touch."""
+        return self.ground is not None or self.objects is not None or self.number >= 0
+
+    @property
+    def wrench(self) -> bool:
+        """Whether some layer acts on the body."""
+        return any(extra.wrench for extra in self.extra_actuators)
 
 
 @one_thread_at_a_time
@@ -95,10 +109,9 @@ def compile_model(spec: RotorcraftSpec, *, visuals: Visuals = True) -> mujoco.Mj
         ValueError: If the pods are too heavy for the vehicle.
     """
     vehicles = [spec, *(companion for _, companion in spec.companions)]
-    composed = [_compose(_structure(one)) for one in vehicles]
     # One that is kept complete may have springs and dampers, which no bare model has.
-    whole = visuals or any(complete is bare for complete, bare in composed)
-    trees = [MjSpecTree(each[0 if whole else 1].copy()) for each in composed]
+    whole = bool(visuals) or any(_bare_of(_structure(one)) is None for one in vehicles)
+    trees = [MjSpecTree(_compose(_structure(one), whole).copy()) for one in vehicles]
     for tree, one in zip(trees, vehicles, strict=True):
         _set_parameters(tree, one)
     world = trees[0].spec
@@ -146,32 +159,61 @@ def _set_parameters(tree: MjSpecTree, spec: RotorcraftSpec) -> None:
         tree.find("actuator", f"thrust_{i}").gear = gear
 
 
-@lru_cache(maxsize=64)  # dm_control takes a hundred times longer than MuJoCo's compiler
-def _compose(spec: RotorcraftSpec) -> tuple[mujoco.MjSpec, mujoco.MjSpec]:
-    """The complete vehicle, and one without visuals, or the complete one where they act."""
-    vehicle, servo, user_vehicle = spec.vehicle, spec.tilt_servo, spec.user_vehicle
-    shipped = shipped_folder("mjcf") / f"{spec.model}.xml"
-    root = mjcf_editing.parse_mjcf(shipped if user_vehicle is None else Path(user_vehicle.path))
-    contacts = spec.ground is not None or spec.objects is not None or spec.number >= 0
+class _AsRead(NamedTuple):
+    """All that decides how a file is read."""
 
+    model: str
+    user_vehicle: UserVehicle | None
+    arm_length: float
+    pod: Pod
+
+
+@lru_cache(maxsize=64)  # dm_control takes a hundred times longer than MuJoCo's compiler
+def _complete(read: _AsRead) -> mujoco.MjSpec:
+    """A shipped vehicle with these arms and pods, or a user's as it is."""
+    own = read.user_vehicle
+    shipped = shipped_folder("mjcf") / f"{read.model}.xml"
+    root = mjcf_editing.parse_mjcf(shipped if own is None else Path(own.path))
+    if own is None:
+        _scale_lengths(root, read.arm_length)
+        if read.model == "tiltrotor":
+            _set_pods(root, read.pod)
+    return mjcf_editing.spec_of(root)
+
+
+@lru_cache(maxsize=64)
+def _bare(read: _AsRead, contacts: bool, wrench: bool) -> mujoco.MjSpec | None:
+    """It without visuals; None where they act."""
+    complete = _complete(read)
+    if read.user_vehicle is not None and read.model != "multirotor":
+        return None
+    root = MjSpecTree(complete.copy())
+    mjcf_editing.remove_visuals(root, contacts=contacts, kept=["imu"] * wrench)
+    return root.spec if read.user_vehicle is None or _moves_alike(complete, root.spec) else None
+
+
+def _bare_of(spec: RotorcraftSpec) -> mujoco.MjSpec | None:
+    return _bare(spec.as_read, spec.touches, spec.wrench)
+
+
+@lru_cache(maxsize=64)
+def _compose(spec: RotorcraftSpec, whole: bool) -> mujoco.MjSpec:
+    """The vehicle with all parts of a flight, complete or without visuals."""
+    vehicle, servo, user_vehicle = spec.vehicle, spec.tilt_servo, spec.user_vehicle
+    bare = None if whole else _bare_of(spec)
+    root = MjSpecTree((_complete(spec.as_read) if bare is None else bare).copy())
     root.option.timestep = spec.timestep
     root.option.integrator = spec.integrator
-    root.option.flag.contact = "enable" if contacts else "disable"
-    root.option.flag.constraint = "enable" if contacts or spec.has_stops else "disable"
+    root.option.flag.contact = "enable" if spec.touches else "disable"
+    root.option.flag.constraint = "enable" if spec.touches or spec.has_stops else "disable"
 
-    if user_vehicle is None and isinstance(vehicle, Vehicle):
-        _scale_lengths(root, vehicle.arm_length)
-        _set_pods(root, spec)
     hinges = [f"tilt_{i}" for i in range(1, spec.tilts + 1)]
     if isinstance(vehicle, Vehicle):
         _set_keyframes(root, vehicle, len(hinges))
     _limit_rotors(root, spec)
     if hinges:
-        if user_vehicle is None:
-            for hinge in hinges:
-                root.find("joint", hinge).armature = SERVO_ARMATURE
-            inertias = tuple(spec.pod.inertia + SERVO_ARMATURE for _ in hinges)
-        else:
+        inertias = (spec.pod.inertia + SERVO_ARMATURE,) * len(hinges)
+        if user_vehicle is not None:
             inertias = user_vehicle.hinge_inertias
         mjcf_editing.set_servos(root, hinges, servo, inertias)
     mjcf_editing.add_states(root, "law", spec.law_states)
@@ -184,24 +226,19 @@ def _compose(spec: RotorcraftSpec) -> tuple[mujoco.MjSpec, mujoco.MjSpec]:
         if extra.wrench:
             mjcf_editing.add_wrench(root, f"layer_{index}", center)
         mjcf_editing.add_hinge_torques(root, f"layer_{index}", extra.hinge_torques)
-    if contacts:
+    if spec.touches:
         touchable(root, ground=spec.ground is not None, number=spec.number)
     if spec.ground is not None:
         _set_ground(root, spec.ground)
-    complete = mjcf_editing.spec_of(root)
-    if user_vehicle is not None and spec.model != "multirotor":
-        return complete, complete
-    mjcf_editing.remove_visuals(root, contacts=contacts)
-    bare = mjcf_editing.spec_of(root)
-    return complete, bare if user_vehicle is None or _moves_alike(complete, bare) else complete
+    return root.spec
 
 
-def _center_site(root: Any, spec: RotorcraftSpec) -> str:
+def _center_site(root: MjSpecTree, spec: RotorcraftSpec) -> str:
     """The name of a site in the center of mass, along the body's axes, added if necessary."""
     if spec.user_vehicle is None or isinstance(spec.vehicle, Vehicle):
         return "imu"
     name = "layer_center"
-    if any(extra.wrench for extra in spec.extra_actuators):
+    if spec.wrench:
         root.find("body", "vehicle").add("site", name=name, pos=spec.user_vehicle.center)
     return name
 
@@ -236,30 +273,30 @@ def _scale_lengths(root: Any, arm_length: float) -> None:
                 setattr(element, name, length * ratio)
 
 
-def _limit_rotors(root: Any, spec: RotorcraftSpec) -> None:
+def _limit_rotors(root: MjSpecTree, spec: RotorcraftSpec) -> None:
     thrust_range = spec.rotor_limits.thrust_range
     if thrust_range is not None:
-        for i in range(1, len(spec.spins) + 1):
+        for i in range(1, len(spec.vehicle.spins) + 1):
             thrust = root.find("actuator", f"thrust_{i}")
             thrust.ctrlrange, thrust.ctrllimited = thrust_range, "true"
     _limit_speeds(root, "rotor_speed", spec)
 
 
-def _limit_speeds(root: Any, name: str, spec: RotorcraftSpec) -> None:
+def _limit_speeds(root: MjSpecTree, name: str, spec: RotorcraftSpec) -> None:
     """Keep the activations ``name_1``, ``name_2``, ... within the limits of the rotors' speeds."""
-    for i, spin in enumerate(spec.spins, start=1):
+    for i, spin in enumerate(spec.vehicle.spins, start=1):
         speed_range = spec.rotor_limits.speed_range(spin)
         if speed_range is not None:
             rotor = root.find("actuator", f"{name}_{i}")
             rotor.actrange, rotor.actlimited = speed_range, "true"
 
 
-def _set_pods(root: Any, spec: RotorcraftSpec) -> None:
-    if spec.tilts:
-        for i in ROTORS:
-            inertial = root.find("body", f"pod_{i}").inertial
-            inertial.mass = spec.pod.mass
-            inertial.diaginertia = [spec.pod.inertia] * 3
+def _set_pods(root: Any, pod: Pod) -> None:
+    for i in ROTORS:
+        root.find("joint", f"tilt_{i}").armature = SERVO_ARMATURE
+        inertial = root.find("body", f"pod_{i}").inertial
+        inertial.mass = pod.mass
+        inertial.diaginertia = [pod.inertia] * 3
 
 
 def _body_inertia(spec: RotorcraftSpec, vehicle: Vehicle) -> tuple[float, list[float]]:
@@ -282,7 +319,7 @@ def _body_inertia(spec: RotorcraftSpec, vehicle: Vehicle) -> tuple[float, list[f
     return mass, moments
 
 
-def _set_ground(root: Any, ground: Ground) -> None:
+def _set_ground(root: MjSpecTree, ground: Ground) -> None:
     """Let the vehicle's collision shapes touch the ground."""
     plane = root.find("geom", "ground")
     plane.pos = (0.0, 0.0, ground.height)
@@ -291,7 +328,7 @@ def _set_ground(root: Any, ground: Ground) -> None:
     plane.conaffinity = 1
 
 
-def _set_keyframes(root: Any, vehicle: Vehicle, hinges: int) -> None:
+def _set_keyframes(root: MjSpecTree, vehicle: Vehicle, hinges: int) -> None:
     """Let the rotors of an upright, untilted vehicle turn at the speeds of the keyframes."""
     for name, speed in (("hover", vehicle.hover_rotor_speed), ("start", START_SPEED)):
         key = root.find("key", name)

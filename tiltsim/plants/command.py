@@ -1,20 +1,38 @@
 """Observations and commands of a user's own controller, and of vehicles commanded from outside."""
 
-from collections.abc import Callable
-from dataclasses import dataclass, field, fields
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, fields, replace
+from functools import lru_cache
 from math import isfinite, pi
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tiltsim.errors import TiltsimError
+from tiltsim.closed_loop.assembly import Assembly
+from tiltsim.closed_loop.loop import ClosedLoop
+from tiltsim.closed_loop.userdata import Header
+from tiltsim.engines.base import vectors_of
+from tiltsim.engines.control import control_step
+from tiltsim.engines.programs import KEPT
+from tiltsim.errors import InputError, TiltsimError
+from tiltsim.laws.assembling import assemble
+from tiltsim.laws.layers.actuation import measured, sensor_parameters
+from tiltsim.laws.layers.contact import commanded_force, felt_among, push_of
+from tiltsim.laws.layers.instruments import instruments_of
 from tiltsim.models.rotor_table import Multirotor
+from tiltsim.plants.mujoco_plant import MujocoPlant
+from tiltsim.scenario.controller import PythonController
+from tiltsim.scenario.scenario import Scenario
 from tiltsim.system.text import short_repr
-from tiltsim.vehicles.rotorcraft.layout import Layout
+from tiltsim.vehicles.rotorcraft import Layout, is_fixed_cross, layout_of
+from tiltsim.vehicles.rotorcraft.others import FELT, others_of
+from tiltsim_controllers.code.arrays import as_arrays
 from tiltsim_controllers.laws.observed import ROTOR_COMMANDS
 from tiltsim_controllers.laws.observed import Command as Command
+from tiltsim_controllers.mathematics.attitude import euler_angles
 from tiltsim_controllers.mathematics.scalar import Floats, Values
+from tiltsim_controllers.references.trajectories import attitude_reference, reference_derivatives
 from tiltsim_controllers.vehicle.parameters import Vehicle
 
 
@@ -105,7 +123,10 @@ def check_command(command: object, layout: Layout) -> CheckedCommand:
             turn, or any to a vehicle without servos.
     """
     if not isinstance(command, Command):
-        raise ControllerError(f"returned {short_repr(command)}; expected a tiltsim.Command")
+        raise ControllerError(
+            f"returned {short_repr(command)}; expected a tiltsim.Command, as in "
+            "tiltsim.Command(thrusts=...)"
+        )
     for name in ("rates", "discrete"):
         if getattr(command, name) is not None:
             raise ControllerError(f"returned {name}; only a law, marked @tiltsim.law, has states")
@@ -142,3 +163,179 @@ def _checked(name: str, value: Any, size: int) -> Values:
         if not isfinite(number):
             raise ControllerError(f"returned {name}[{index}] = {number}; must be finite")
     return values
+
+
+class Observer:
+    """Makes the observations of one flight. Raises TypeError for a vehicle that is no rotorcraft.
+
+    Args:
+        assembly: The flight.
+    """
+
+    def __init__(self, assembly: Assembly) -> None:
+        vehicle = assembly.scenario.any_rotorcraft
+        self._vehicle, self._tilting = vehicle.resolve(), vehicle.has_tilting_rotors
+        self._tilts, self._spins = self._vehicle.tilts, np.array(vehicle.spins)
+        scenario = assembly.scenario
+        self._felt = felt_among(others_of(scenario)) if scenario.has_objects else None
+        self._push = push_of(scenario)
+        self._attachment = scenario.payload.attachment if scenario.payload else (0.0, 0.0, 0.0)
+        self._assembly, self._sensors = assembly, as_arrays(sensor_parameters(assembly.scenario))
+
+    def observe(self, plant: MujocoPlant, rotor_speeds: Sequence[float]) -> Observation:
+        """The plant's present state as a controller sees it, through the scenario's sensors.
+
+        ``rotor_speeds`` are signed, one for each rotor, rad/s.
+        """
+        time, data = plant.evaluation_time, plant.data
+        qpos, qvel = measured(time, data.qpos, data.qvel, self._sensors)
+        tilts, tilt_rates = qpos[7 : 7 + self._tilts], qvel[6 : 6 + self._tilts]
+        return Observation(
+            time=plant.time,
+            position=qpos[:3].copy(),
+            velocity=qvel[:3].copy(),
+            attitude=euler_angles(qpos[3:7]),
+            quaternion=qpos[3:7].copy(),
+            body_rates=qvel[3:6].copy(),
+            tilt_angles=tilts.copy() if self._tilting else np.zeros(self._tilts),
+            tilt_rates=tilt_rates.copy() if self._tilting else np.zeros(self._tilts),
+            rotor_speeds=self._spins * rotor_speeds,
+            reference=self._reference(time),
+            vehicle=self._vehicle,
+            reference_at=self._reference,
+            **self._felt_by(plant),
+        )
+
+    def _felt_by(self, plant: MujocoPlant) -> dict[str, Floats]:
+        """Force of contacts and swing of a load."""
+        if self._felt is None:
+            return {}
+        qpos, _, act = vectors_of(self._assembly.loop, plant.data).joined()
+        felt = np.array(self._felt(qpos, act, self._attachment))
+        return {"contact_force": felt[FELT.contact_force], "swing": felt[FELT.swing]}
+
+    def _reference(self, time: float) -> Reference:
+        knots, reference = self._assembly.knots, self._assembly.reference
+        motion = np.array(reference_derivatives(time, reference, knots)[:9])
+        angles, rates = np.zeros((2, self._tilts))
+        if self._tilting:
+            angles, rates, _ = np.array(self._assembly.gait.jets(time)).T
+        return Reference(
+            position=motion[:3],
+            velocity=motion[3:6],
+            acceleration=motion[6:],
+            attitude=np.array(attitude_reference(time, reference, knots)),
+            tilt_angles=angles.copy(),
+            tilt_rates=rates.copy(),
+            force=commanded_force(time, self._push) * np.array(self._push.direction),
+        )
+
+
+def flip_by_spin(values: Sequence[float], spins: Sequence[float]) -> Values:
+    """Speeds along the spin from signed ones, and back."""
+    return tuple(spin * value for spin, value in zip(spins, values, strict=True))
+
+
+def built_in_command(assembly: Assembly, plant: MujocoPlant) -> Command:
+    """The command of a rotorcraft's built-in controller now, before latency, servos and motors.
+
+    It goes inward through the layers of the loop, to the inputs of the controller itself.
+    """
+    loop, parameters, knots = assembly.loop, assembly.setup.parameters, assembly.setup.knots
+    time, data = plant.evaluation_time, plant.data
+    qpos, qvel, act = vectors_of(loop, data).joined()
+    while loop.within is not None:
+        qpos, qvel, act = loop.sees(time, qpos, qvel, act, parameters, knots)
+        loop, parameters = loop.within, parameters.inner
+    return _command(assembly, loop, _law(assembly).controls(plant.time, qpos, qvel, act))
+
+
+def _readings(scenario: Scenario) -> int:
+    """The number of readings of the instruments, which stand behind the velocities."""
+    return sum(len(each.columns) for each in instruments_of(scenario))
+
+
+class _Law:
+    """The controller of a flight without the layers around it."""
+
+    def __init__(self, assembly: Assembly) -> None:
+        loop, parameters = assembly.loop, assembly.setup.parameters
+        while loop.within is not None:
+            loop, parameters = loop.within, parameters.inner
+        scenario = assembly.scenario
+        behind = 3 * scenario.controller.measures_angular_acceleration + _readings(scenario)
+        if behind:  # the velocities
+            loop = replace(loop, sizes=loop.sizes._replace(qvel=loop.sizes.qvel + behind))
+        self.loop, self.setup = loop, assembly.setup._replace(parameters=parameters)
+        bare = replace(assembly, loop=loop, setup=self.setup)
+        self._step = control_step(bare, self.setup.userdata.tolist(), "controls")
+
+    def controls(self, time: float, *state: Sequence[float]) -> Values:
+        """Its controls at a time (s), where a step begins, by qpos, qvel and act.
+
+        The forces felt are last in act.
+        """
+        now, own = Header(timestep=time, evaluations=1.0), self.loop.sizes.act
+        qpos, qvel, act = (list(map(float, vector)) for vector in state)
+        return tuple(self._step(now, qpos, qvel, act[:own], (), act[own:], ()))
+
+
+_law = lru_cache(maxsize=KEPT)(_Law)
+
+
+class BuiltInController:
+    """The built-in controller of a rotorcraft's scenario, as a function of an observation.
+
+    It integrates its own states, and its supervisor's, over ``simulation.control_timestep``. The
+    force on the object that it pushes is the contact force: there must be no other object.
+
+    Args:
+        scenario: With a built-in controller.
+
+    Raises:
+        InputError: If the controller is a custom one, feeds back a state that is not observed or
+            has instruments, or its vehicle is no rotorcraft.
+    """
+
+    def __init__(self, scenario: Scenario) -> None:
+        controller, simulation = scenario.controller, scenario.simulation
+        observed = scenario.vehicle.model in PythonController.vehicle_models
+        felt = scenario.reference.type != "push" or len(scenario.object) == 1
+        measures = controller.measures_angular_acceleration or scenario.sensors.instruments
+        feeds_back = measures or not felt
+        if not observed or controller.is_external or feeds_back:
+            raise InputError("controller: must be a built-in one that needs observations only")
+        self._assembly = assembly = assemble(scenario)
+        self._law = _Law(assembly)
+        loop = self._law.loop
+        initial = loop.initial_activations(assembly, self._law.setup)
+        self._states = list(initial[layout_of(loop).rotors :])
+        self._period = simulation.control_timestep or simulation.timestep
+
+    def __call__(self, seen: Observation) -> Command:
+        """Its command, before latency, servos and motors: see `built_in_command`."""
+        loop = self._law.loop
+        qpos, qvel = [*seen.position, *seen.quaternion], [*seen.velocity, *seen.body_rates]
+        if layout_of(loop).tilts:
+            qpos, qvel = [*qpos, *seen.tilt_angles], [*qvel, *seen.tilt_rates]
+        speeds = flip_by_spin(seen.rotor_speeds.tolist(), loop.spins)
+        felt = [*seen.contact_force, *seen.contact_force, *seen.swing, *[0.0] * 6]
+        ctrl = self._law.controls(seen.time, qpos, qvel, [*speeds, *self._states, *felt])
+        rates = ctrl[len(ctrl) - len(self._states) :]
+        self._states = [
+            state + self._period * rate for state, rate in zip(self._states, rates, strict=True)
+        ]
+        return _command(self._assembly, loop, ctrl)
+
+
+def _command(assembly: Assembly, loop: ClosedLoop, ctrl: Values) -> Command:
+    """The command by a controller's controls; rotors on a fixed cross make thrusts."""
+    layout = layout_of(loop)
+    if is_fixed_cross(loop):
+        coefficients = np.array(assembly.scenario.any_rotorcraft.thrust_coefficients)
+        return Command(thrusts=coefficients * np.array(ctrl[: layout.rotors]))
+    rates = ctrl[layout.acceleration_1 : layout.further_rates]
+    return Command(
+        rotor_accelerations=np.array(flip_by_spin(rates, loop.spins)),
+        tilt_angles=np.array(ctrl[: layout.tilts]) if layout.tilts else None,
+    )

@@ -19,22 +19,23 @@ from tiltsim.engines.base import vectors_of
 from tiltsim.engines.control import control_callback, control_program, control_step
 from tiltsim.errors import InputError
 from tiltsim.laws.commanded import commanded_parameters, planned_servo_commands, with_command
-from tiltsim.laws.vehicle_loop import servo_lead
+from tiltsim.laws.law import servo_lead
 from tiltsim.plants.autopilot import FirmwareController
 from tiltsim.plants.command import (
     CheckedCommand,
     Controller,
     ControllerError,
     Observation,
+    Observer,
     check_command,
+    flip_by_spin,
 )
 from tiltsim.plants.mujoco_plant import MujocoPlant
-from tiltsim.plants.observing import Observer, flip_by_spin
 from tiltsim.scenario.controller import PythonController
 from tiltsim.scenario.law_controller import is_law
 from tiltsim.scenario.own_parts import describe, load_function
 from tiltsim.scenario.scenario import Scenario
-from tiltsim.vehicles.rotorcraft.layout import TILT_1, Layout, layout_of, tilt_of_rotor, true_rotors
+from tiltsim.vehicles.rotorcraft import TILT_1, Layout, layout_of, tilt_of_rotor, true_rotors
 from tiltsim_controllers.code.arrays import as_arrays
 from tiltsim_controllers.code.python_source import python_function
 from tiltsim_controllers.mathematics.records import flatten

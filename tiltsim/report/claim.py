@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from tiltsim.flight.metrics import Verdict
 from tiltsim.report.statement import CHAPTER, Described, Origin, Statement, origins_of, slug
 from tiltsim.scenario.expectation import Expectation
-from tiltsim.scenario.metric_names import METRICS
+from tiltsim.scenario.metric_names import metric_of, unit_of
 from tiltsim.scenario.scenario import Scenario
 
 Value: TypeAlias = "float | bool | tuple[float, ...]"
@@ -252,7 +252,7 @@ def scenario_claims(scenario: Scenario) -> list[Claim]:
             key=slug(f"{_short(scenario.address)} {case}"),
             where=scenario.source,
             published=expectation.published,
-            unit=METRICS[expectation.metric].unit,
+            unit=unit_of(expectation.metric),
             tolerance=expectation.published_tolerance,
             in_kind=expectation.in_kind,
             why=expectation.why,
@@ -282,7 +282,7 @@ def _statement(scenario: Scenario, expectation: Expectation) -> Statement:
     table = scenario.claim.get(expectation.claim)
     if table is not None:
         return Statement.of_table(expectation.claim, source=scenario.source, **table.model_dump())
-    measured = METRICS[expectation.metric].described.capitalize()
+    measured = metric_of(expectation.metric).described.capitalize()
     words = expectation.claim or measured
     chapter = CHAPTER.match(scenario.source)
     assert chapter is not None

@@ -16,7 +16,7 @@ from tiltsim.report.findings import ERRORS, FINDINGS, Finding, PublishedError
 from tiltsim.report.flights import Comparison, Flights, ReportEntry
 from tiltsim.report.pictures import Drawing, Picture
 from tiltsim.report.statement import Origin, Statement
-from tiltsim.scenario.metric_names import METRICS
+from tiltsim.scenario.metric_names import metric_of
 from tiltsim.scenario.scenario import Scenario
 
 TITLE: Final = "Reproduction report"
@@ -230,7 +230,7 @@ def criterion_text(claim: Claim) -> str:
         parts.append(f"tolerance {tolerances} {claim.unit}".rstrip())
     elif bound is not None and bound.equals is None:
         low, high = bound.holds or (bound.min, bound.max)
-        parts.append(_range_text(METRICS[bound.metric].described, low, high, claim.unit))
+        parts.append(_range_text(metric_of(bound.metric).described, low, high, claim.unit))
     if claim.in_kind is not None:
         parts.append("qualitatively: " + _range_text("value", *claim.in_kind, claim.unit))
     return "; ".join(parts) + "."

@@ -26,7 +26,7 @@ from tiltsim.folders import FLYING
 from tiltsim.report.statement import CHAPTER
 from tiltsim.resources import shipped_folder
 from tiltsim.scenario.loading import load_scenario, named_files
-from tiltsim.scenario.metric_names import METRICS, WALL_CLOCK_METRICS
+from tiltsim.scenario.metric_names import WALL_CLOCK_METRICS, unit_of
 from tiltsim.scenario.own_parts import require_trust
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.scenario.scenario_tables import DESCRIPTIVE
@@ -158,9 +158,9 @@ def make_record(address: str, plant: Plant, flight: Flight) -> FlightRecord:
     ended_early = flight.end.kind != "completed"
     metrics = {
         name: value
-        for name, value in flight.metrics().items()
-        if name not in WALL_CLOCK_METRICS
-        and not (ended_early and name.startswith(_NEED_COMPLETION))
+        for name, value in flight.metrics().of_all_vehicles().items()
+        if (own := name.rpartition(".")[2]) not in WALL_CLOCK_METRICS
+        and not (ended_early and own.startswith(_NEED_COMPLETION))
     }
     return FlightRecord(address, plant, metrics, flight.end.kind, flight.end.time, flight.end.cause)
 
@@ -263,7 +263,7 @@ class Comparison:
     @property
     def quantity(self) -> str:
         """Name and unit of the metric, as text."""
-        unit = METRICS[self.metric].unit
+        unit = unit_of(self.metric)
         return self.metric.replace("_", " ") + (f", {unit}" if unit else "")
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from functools import lru_cache
 from math import inf
-from typing import Any, ClassVar, Final, NamedTuple
+from typing import Any, ClassVar, Final
 
 import numpy as np
 
@@ -46,15 +46,6 @@ from tiltsim_controllers.vehicle.rotors import (
 )
 
 FASTEST: Final = 1e6  # rad/s, in place of no limit
-
-
-def require_no_pose(scenario: Any) -> None:
-    """Refuse a reference of roll and pitch, of which the position disposes."""
-    reference = scenario.reference
-    for key in ("roll", "pitch"):
-        if getattr(reference, key):
-            reason = "is an output of the law with controller.tilts = free only"
-            raise InvalidValueError(f"reference.{key}", getattr(reference, key), reason)
 
 
 class CompensatingController(Compensating, LawController):
@@ -139,7 +130,9 @@ class GeometricController(Geometric, TiltingTable, CompensatingController):
     def check_scenario(self, scenario: Any) -> None:
         super().check_scenario(scenario)
         if self._leans(scenario.vehicle):
-            require_no_pose(scenario)
+            reason = "is an output of the law with controller.tilts = free only"
+            for key in ("reference.roll", "reference.pitch"):
+                scenario.require(key, 0.0, reason)
 
     def records_attitude(self, scenario: Any) -> bool:
         return super().records_attitude(scenario) and not self._leans(scenario.vehicle)
@@ -221,13 +214,6 @@ class IndiController(Indi, CompensatingController):
         return (*filtered, *thrusts, *(0.0,) * airframe.rotors)
 
 
-class Weights(NamedTuple):
-    """Acceptable deviations."""
-
-    errors: Values  # of each state
-    thrust_change: float  # relative to the thrust in hover
-
-
 class LqrController(Lqr, CompensatingController):
     """The linear-quadratic regulator about hover, or about the orbit of a moving gait."""
 
@@ -253,18 +239,16 @@ class LqrController(Lqr, CompensatingController):
 
     def solution(self, airframe: Airframe) -> Regulator:
         """The orbit of the gait, or hover, and the regulator about it."""
+        errors = (self.position_error, self.velocity_error, self.attitude_error, self.rate_error)
         return _regulator_of(
             airframe.vehicle,
             airframe.gait,
             airframe.initial_tilts,
             airframe.gyroscopic,
             1.0 / (1.0 / self.rotor_bandwidth + (airframe.rotor_time_constant or 0.0)),
-            self._weights(airframe.rotors),
+            (*np.repeat(errors, 3).tolist(), *(inf,) * airframe.rotors),
+            self.thrust_change,
         )
-
-    def _weights(self, rotors: int) -> Weights:
-        errors = (self.position_error, self.velocity_error, self.attitude_error, self.rate_error)
-        return Weights((*np.repeat(errors, 3).tolist(), *(inf,) * rotors), self.thrust_change)
 
     def plain_function(self, airframe: Airframe) -> Callable[..., Any]:
         return lqr_along if self.observer else self.control
@@ -295,7 +279,13 @@ def _hover(
 
 @lru_cache(maxsize=64)
 def _regulator_of(
-    vehicle: Multirotor, gait: Gait, tilts: Values, gyroscopic: float, lag: float, weights: Weights
+    vehicle: Multirotor,
+    gait: Gait,
+    tilts: Values,
+    gyroscopic: float,
+    lag: float,
+    errors: Values,
+    thrust_change: float,
 ) -> Regulator:
     """The regulator about the orbit of a gait, kept because a flight needs it several times."""
     moves = not gait.is_constant
@@ -319,11 +309,7 @@ def _regulator_of(
     design = regulator_about_orbit if moves else regulator_about_hover
     try:
         return design(
-            known,
-            np.array(lean),
-            np.array(thrusts),
-            np.array(weights.errors, float),
-            float(weights.thrust_change),
+            known, np.array(lean), np.array(thrusts), np.array(errors, float), float(thrust_change)
         )
     except (ValueError, np.linalg.LinAlgError) as error:
         reason = "found no orbit of the gait about which it can regulate"

@@ -12,7 +12,7 @@ from tiltsim.scenario.controller import CONTROLLERS, laws_for
 from tiltsim.scenario.expectation import NAME
 from tiltsim.scenario.gait import TableGait
 from tiltsim.scenario.instruments import instrument_refusals
-from tiltsim.scenario.interaction import object_refusals
+from tiltsim.scenario.interaction import object_refusals, unknown_vehicle
 from tiltsim.scenario.linearizing_controllers import (
     AttitudeAltitudeController,
     AttitudeForceController,
@@ -62,7 +62,9 @@ def _refusals(scenario: ScenarioTables) -> Refusals:
     yield from instrument_refusals(scenario)
     yield from object_refusals(scenario)
     for expectation in scenario.expect:
-        name = expectation.claim
+        name, (vehicle, _, _) = expectation.claim, expectation.metric.rpartition(".")
+        if reason := unknown_vehicle(vehicle, [table.name for table in scenario.companion]):
+            yield "expect.metric", f"no vehicle {vehicle}; {reason}", expectation.metric
         if re.match(NAME, name) and name not in scenario.claim:
             yield "expect.claim", "no such table; " + choose(name, scenario.claim), name
     yield from _engine(scenario)
@@ -221,6 +223,8 @@ def _gait(scenario: ScenarioTables) -> Refusals:
     key = f"gait.{size}"
     try:
         gait = table.plan(scenario.vehicle.resolve())
+    except InvalidValueError:  # of another key than its size
+        raise
     except ValueError as error:
         raise InvalidValueError(key, value, str(error)) from None
     limit = scenario.vehicle.tilt_servo.angle_limit

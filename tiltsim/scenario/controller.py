@@ -5,7 +5,6 @@ law and its table, a `tiltsim.LawController`. An entry that cannot be used is le
 warning, so that a broken package does not stop flights that do not need it.
 """
 
-import warnings
 from collections.abc import Container
 from contextlib import suppress
 from importlib.metadata import Distribution, EntryPoint, distributions, entry_points
@@ -20,8 +19,9 @@ from tiltsim.scenario.controller_table import ControllerTable
 from tiltsim.scenario.kinds import KINDS, tables_of, union_of
 from tiltsim.scenario.law_controller import LawController, TiltingTable
 from tiltsim.scenario.messages import InvalidValueError
-from tiltsim.scenario.rotorcraft import ROTORCRAFT
 from tiltsim.scenario.table import Positive, default, example, required
+from tiltsim.scenario.vehicle import ROTORCRAFT
+from tiltsim.system.arguments import warn_user
 from tiltsim.system.interrupts import defer_interrupts
 from tiltsim.system.text import error_text, printable
 
@@ -77,7 +77,7 @@ def _warn(text: str) -> None:
     from multiprocessing import parent_process  # costs start-up time
 
     if parent_process() is None:
-        warnings.warn(printable(text), RuntimeWarning, stacklevel=3)
+        warn_user(printable(text))
 
 
 def _loaded(entry: EntryPoint, built_in: Container[str]) -> type[ControllerTable] | str:

@@ -3,7 +3,7 @@
 from math import atan, pi
 from typing import Annotated, Any, ClassVar, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.table import Many, NonNegative, Positive, Table, default, example
@@ -71,8 +71,7 @@ class SupervisorTable(Table):
         "needs strategy return_to_red [rad]",
     )
 
-    @model_validator(mode="after")
-    def _check(self) -> Self:
+    def _check_values(self) -> None:
         for keys, strategies in (
             (("horizon",), ("hold", "return_to_red")),
             (("max_tilt_rate", "clearance"), ("return_to_red",)),
@@ -80,7 +79,6 @@ class SupervisorTable(Table):
             if self.strategy not in strategies:
                 needs = f"needs controller.supervisor.strategy = {' or '.join(strategies)}"
                 self.require_defaults(keys, needs)
-        return self
 
     def resolve(self, vehicle: Vehicle | Multirotor) -> Supervisor:
         """The supervisor's parameters for a vehicle.

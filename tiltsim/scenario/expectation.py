@@ -5,7 +5,7 @@ from typing import Annotated, Final, Literal
 from pydantic import Field
 
 from tiltsim.scenario.messages import choose
-from tiltsim.scenario.metric_names import BOOLEAN_METRICS, METRICS
+from tiltsim.scenario.metric_names import METRICS, is_boolean, is_metric
 from tiltsim.scenario.simulation_table import PlantName
 from tiltsim.scenario.table import NonNegative, Range, Table, default, example, required
 
@@ -54,8 +54,11 @@ class Expectation(Table):
 
     # An editor completes the names; the message on an unknown one is ours.
     metric: str = Field(
-        description="a number that summarizes the flight; docs/metrics.md defines them all",
-        json_schema_extra={"enum": list(METRICS)},
+        description="a number that summarizes the flight; docs/metrics.md defines them all; a "
+        "companion's after its name and a dot, such as wing.max_rotor_speed",
+        json_schema_extra={
+            "anyOf": [{"enum": list(METRICS)}, {"type": "string", "pattern": r"^\w+\.\w+$"}]
+        },
     )
     claim: str = default(
         "", "name of the [claim.NAME] table with the thesis's statement, or a sentence", "your-name"
@@ -95,9 +98,9 @@ class Expectation(Table):
     )
 
     def _check_values(self) -> None:
-        if self.metric not in METRICS:
-            raise self.mistake("metric", choose(self.metric, METRICS))
-        boolean = self.metric in BOOLEAN_METRICS
+        if not is_metric(self.metric):
+            raise self.mistake("metric", choose(self.metric.rpartition(".")[2], METRICS))
+        boolean = is_boolean(self.metric)
         bounded = self.min is not None or self.max is not None
         if boolean and (bounded or self.equals is None):
             raise self.mistake("metric", "is true or false: give equals only")

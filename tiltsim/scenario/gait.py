@@ -296,7 +296,7 @@ class TwoColorGait(GaitTable):
 
     def _unscaled(self, vehicle: Any) -> PlannedGait:
         if not isinstance(vehicle, Vehicle):
-            raise ValueError("is a gait of the tiltrotor")
+            raise self.mistake("type", "is a gait of the tiltrotor")
         return four_angle_gait(self.curve, self.period, vehicle)
 
     @property

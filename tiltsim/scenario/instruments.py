@@ -81,6 +81,15 @@ class InstrumentTable(Table):
         return Errors(*(tuple(np.hstack(each).tolist()) for each in zip(*every, strict=True)))
 
 
+_OF_PART: Final = (
+    "accelerometer_noise_density",
+    "gyro_noise_density",
+    "accelerometer_resolution",
+    "gyro_resolution",
+)
+"""Keys of an IMU that its part decides."""
+
+
 class ImuTable(InstrumentTable):
     """Accelerometer and gyro; readings are in body axes."""
 
@@ -91,29 +100,14 @@ class ImuTable(InstrumentTable):
         **{f"imu_acceleration_{axis}": "m/s^2" for axis in "xyz"},
         **{f"imu_rate_{axis}": "rad/s" for axis in "xyz"},
     }
-    presets: ClassVar[Mapping[str, Mapping[str, float]]] = {
-        "bmi088": {
-            "accelerometer_noise_density": 190e-6 * G,
-            "gyro_noise_density": radians(0.014),
-            "accelerometer_resolution": G / 5460.0,
-            "gyro_resolution": radians(1.0 / 32.768),
-        },
-        "icm_20948": {
-            "accelerometer_noise_density": 230e-6 * G,
-            "gyro_noise_density": radians(0.015),
-            "accelerometer_resolution": G / 8192.0,
-            "gyro_resolution": radians(1.0 / 32.8),
-        },
-        "mpu_6050": {
-            "accelerometer_noise_density": 400e-6 * G,
-            "gyro_noise_density": radians(0.005),
-            "accelerometer_resolution": G / 8192.0,
-            "gyro_resolution": radians(1.0 / 32.8),
-        },
+    presets: ClassVar[Mapping[str, tuple[float, float, float, float]]] = {
+        "bmi088": (190e-6 * G, radians(0.014), G / 5460.0, radians(1.0 / 32.768)),
+        "icm_20948": (230e-6 * G, radians(0.015), G / 8192.0, radians(1.0 / 32.8)),
+        "mpu_6050": (400e-6 * G, radians(0.005), G / 8192.0, radians(1.0 / 32.8)),
     }
-    """Nominal densities of the data sheets BST-BMI088-DS001, DS-000189 (ICM-20948) and
-    PS-MPU-6000A-00, taken for all axes and ranges; resolutions of the ranges +-6 g, +-4 g and
-    +-4 g, and of +-1000 deg/s.
+    """Values of `_OF_PART`. Nominal densities of the data sheets BST-BMI088-DS001, DS-000189
+    (ICM-20948) and PS-MPU-6000A-00, taken for all axes and ranges; resolutions of the ranges +-6 g,
+    +-4 g and +-4 g, and of +-1000 deg/s.
     """
 
     preset: Literal["bmi088", "icm_20948", "mpu_6050"] | None = default(
@@ -138,7 +132,7 @@ class ImuTable(InstrumentTable):
     @classmethod
     def _of_preset(cls, given: Any) -> Any:
         preset = cls.presets.get(str(given.get("preset"))) if isinstance(given, dict) else None
-        return {**preset, **given} if preset else given
+        return {**dict(zip(_OF_PART, preset)), **given} if preset else given
 
 
 class MocapTable(InstrumentTable):

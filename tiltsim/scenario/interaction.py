@@ -1,5 +1,6 @@
 """The tables of objects, of a tool and of a load: ``[[object]]``, ``[tool]``, ``[payload]``."""
 
+from collections.abc import Sequence
 from math import pi
 from pathlib import Path
 from typing import Annotated, Any, Final
@@ -159,6 +160,13 @@ def object_refusals(scenario: Any) -> Refusals:
         yield "object", f"nothing of vehicle.mjcf can touch it: {reason}"
 
 
+def unknown_vehicle(name: str, companions: Sequence[str]) -> str:
+    """The vehicles there are, if none has this name; empty if one has, or it is the first's, ""."""
+    if not name or name in companions:
+        return ""
+    return choose(name, companions) if companions else "there is no [[companion]]"
+
+
 def _cable_refusals(scenario: Any) -> Refusals:
     objects = {table.name: table.joint for table in scenario.object}
     vehicles = ["", *(table.name for table in scenario.companion)]
@@ -170,7 +178,5 @@ def _cable_refusals(scenario: Any) -> Refusals:
         if table.object not in free:
             reason = choose(table.object, free) if free else "there is no free [[object]]"
             yield "cable.object", reason, table.object
-        if table.vehicle not in vehicles:
-            others = vehicles[1:]
-            reason = choose(table.vehicle, others) if others else "there is no [[companion]]"
+        if reason := unknown_vehicle(table.vehicle, vehicles[1:]):
             yield "cable.vehicle", reason, table.vehicle

@@ -13,8 +13,9 @@ from typing import Any, ClassVar, Literal, TypeVar
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.controller_table import ControllerTable, ReferenceKind
 from tiltsim.scenario.reference import Reference
-from tiltsim.scenario.rotorcraft import ROTORCRAFT, TiltServoTable
+from tiltsim.scenario.rotorcraft import TiltServoTable
 from tiltsim.scenario.table import Positive, default
+from tiltsim.scenario.vehicle import ROTORCRAFT
 from tiltsim_controllers.analysis.stability import ErrorLoop, linear_loop
 from tiltsim_controllers.code.arrays import xp as xp
 from tiltsim_controllers.gaits.plans import Gait
@@ -135,7 +136,7 @@ class LawController(LawTable):
 
     def law_parameters(self, airframe: Airframe) -> tuple[Any, ...]:
         """The law's parameters, a NamedTuple of floats and tuples: by default its own keys."""
-        record = record_of(type(self), _not_read())
+        record = record_of(type(self), _not_read(type(self)))
         return record(*(number_of(self, name) for name in record._fields))
 
     def law_table(self, airframe: Airframe) -> Values:
@@ -181,7 +182,7 @@ class TiltingTable(LawTable):
 
 
 @cache
-def _not_read() -> frozenset[str]:
-    """Keys of the tables of laws that a law does not read."""
-    tables = LawController, TiltingTable, Compensating
-    return frozenset(key for table in tables for key in table.model_fields)
+def _not_read(table: type[LawController]) -> frozenset[str]:
+    """Keys of a table that its law does not read: of the bases that it has."""
+    bases = {LawController, TiltingTable, Compensating} & {*table.mro()}
+    return frozenset(key for base in bases for key in base.model_fields)

@@ -88,8 +88,18 @@ def closest_in_library(path: str | Path) -> str:
     return did_you_mean(Path(path).with_suffix("").as_posix(), names)
 
 
+_OTHER_FILES: Final = {
+    ".xml": "a vehicle, for the key vehicle.mjcf of a scenario, as tiltsim new writes it",
+    ".parquet": "a flight; its scenario is scenario.toml beside it",
+    ".py": "Python; name a controller with --controller FILE.py:NAME or controller=",
+}
+"""Hints at what a file that is given in place of a scenario is, by its ending."""
+
+
 def read_toml(path: Path) -> dict[str, Any]:
     """The document in a TOML file. Raises `InputError` with the file and the reason."""
+    if hint := _OTHER_FILES.get(path.suffix):
+        raise InputError(f"{path}: not a TOML file: {hint}")
     try:
         document = tomllib.loads(read_text(path))
     except (ValueError, RecursionError) as error:  # TOMLDecodeError is a ValueError
@@ -169,38 +179,33 @@ def selected_entries(name: str, document: Mapping[str, Any], word: str) -> list[
         document: Its content; only a valid file is certain to have the right types.
         word: Plain text, without wildcards; the case of its letters does not matter.
     """
-    title, source = str(document.get("title", "")), str(document.get("source", ""))
-    family = Entry(name, title, source)
-    variants = document.get("variant", [])
-    entries = [
-        Entry(
-            f"{name}#{variant['name']}",
-            str(variant.get("title") or f"{title}: {_differences(document, variant)}"),
-            str(variant.get("source", source)),
-        )
-        for variant in variants
-    ]
+    family, members = _entries(name, document)
     whole = family.contains(word)
-    return [entry for entry in entries or [family] if whole or entry.contains(word)]
+    listed = members or [(family, family)]
+    return [entry for entry, _ in listed if whole or entry.contains(word)]
 
 
 def library_families(word: str = "") -> Iterator[Family]:
     """The files of the library with the variants that a word selects; '' selects all."""
     for name, document in _documents():
-        selected = {entry.address for entry in selected_entries(name, document, word)}
-        if not selected:
-            continue
-        title, source = document.get("title", ""), document.get("source", "")
-        members = tuple(
-            Entry(
-                f"#{variant['name']}",
-                variant.get("title", "") or _differences(document, variant),
-                _shorter(variant.get("source", source), source),
-            )
-            for variant in document.get("variant", [])
-            if f"{name}#{variant['name']}" in selected
-        )
-        yield Family(Entry(name, title, source), members)
+        family, members = _entries(name, document)
+        whole = family.contains(word)
+        chosen = tuple(short for entry, short in members if whole or entry.contains(word))
+        if whole or chosen:
+            yield Family(family, chosen)
+
+
+def _entries(name: str, document: Mapping[str, Any]) -> tuple[Entry, list[tuple[Entry, Entry]]]:
+    """A file, and its variants: each by itself, and as a member below the file."""
+    title, source = str(document.get("title", "")), str(document.get("source", ""))
+    members = []
+    for variant in document.get("variant", []):
+        own, differences = variant.get("title"), _differences(document, variant)
+        place = str(variant.get("source", source))
+        at, short = f"#{variant['name']}", _shorter(place, source)
+        alone = Entry(name + at, str(own or f"{title}: {differences}"), place)
+        members.append((alone, Entry(at, str(own or differences), short)))
+    return Entry(name, title, source), members
 
 
 def _documents() -> Iterator[tuple[str, dict[str, Any]]]:

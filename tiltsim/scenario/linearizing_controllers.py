@@ -1,8 +1,6 @@
 """The ``[controller]`` tables of feedback linearization: tiltrotor, quadrotor, multirotor."""
 
-from typing import Any, Final, Self
-
-from pydantic import model_validator
+from typing import Any, Final
 
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.controller_table import (
@@ -56,19 +54,17 @@ class AttitudeAltitudeController(AttitudeAltitude, GaitFollowingController):
     vehicle_models = ("tiltrotor",)
     reference_kinds = ("position", "attitude_altitude")
 
-    @model_validator(mode="after")
-    def _check(self) -> Self:
+    def _check_values(self) -> None:
         if not self.gait_rate_feedforward:
             needs = "needs controller.gait_rate_feedforward = true"
             self.require_defaults(_RATE_KEYS, needs)
             if any(self.resolve_integral_gains()):
                 raise self.mistake("gains", f"integral action {needs}")
-            return self
+            return
         for key, choices in (("decoupling", ("exact",)), ("decoupler", ("exact", "none"))):
             if getattr(self, key) not in choices:
                 needs = f"gait_rate_feedforward = true needs {' or '.join(choices)}"
                 raise self.mistake(key, needs)
-        return self
 
     def error_loops(self, vehicle: Vehicle) -> list[ErrorLoop]:
         if self.gait_rate_feedforward:
@@ -137,13 +133,11 @@ class SwitchingController(Switching, ControllerTable):
     reference_kinds = ("pose",)
     loop_gains = ("gains", "attitude_gains")
 
-    @model_validator(mode="after")
-    def _check(self) -> Self:
+    def _check_values(self) -> None:
         for key in ("roll", "pitch"):
             low, high = getattr(self.zone, key)
             if low > high:
                 raise self.mistake(f"zone.{key}", "the first must not exceed the second")
-        return self
 
 
 class QuadrotorAttitudeAltitudeController(QuadrotorAttitudeAltitude, ControllerTable):
@@ -163,11 +157,9 @@ class AttitudeForceController(AttitudeForce, GaitFollowingController, FailureAwa
     reference_kinds = ("position", "pose", "attitude_altitude")
     follows_turns = True
 
-    @model_validator(mode="after")
-    def _check(self) -> Self:
+    def _check_values(self) -> None:
         if self.norm == "speed":
             self.require_defaults(("slowest_rotor",), 'needs controller.norm = "thrust"')
-        return self
 
     def resolve_force(self, vehicle: Multirotor, gait: Gait) -> Form:
         """The form of the law, whose components of force are checked over the gait."""

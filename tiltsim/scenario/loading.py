@@ -156,19 +156,23 @@ def _document(source: object, *, with_base: bool) -> tuple[dict[str, Any], str]:
     return document, address
 
 
-def is_changed_from_library(path: str | Path, scenario: Scenario) -> bool:
+def as_in_file(path: str | Path) -> Scenario | None:
+    """The scenario of a file without changes; None if only changes complete it, as a base."""
+    with suppress(InputError):
+        return load_scenario(path, trusted=True)
+    return None
+
+
+def is_changed_from_library(path: str | Path, scenario: Scenario, in_file: Scenario | None) -> bool:
     """Whether a scenario read from a path is one of the library, but not flown as it is there.
 
-    Plant and engine may differ, and keys that only describe and judge the flight.
+    Plant and engine may differ, and keys that only describe and judge the flight. ``in_file`` is
+    the result of `as_in_file`.
     """
     file = find_scenario_file(str(path).partition("#")[0])
     if library_name(file) == str(file):
         return False
-    try:
-        shipped = load_scenario(path)
-    except InputError:  # the base of a family, which is no flight of the library
-        return True
-    return _flown(scenario) != _flown(shipped)
+    return in_file is None or _flown(scenario) != _flown(in_file)
 
 
 def _flown(scenario: Scenario) -> dict[str, Any]:

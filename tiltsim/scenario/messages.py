@@ -68,14 +68,15 @@ def show(value: object) -> str:
 
 
 def did_you_mean(name: object, names: Iterable[str]) -> str:
-    """A suggestion of the closest of some names; empty if none is close."""
+    """A suggestion of the closest of some names, also by the end of a dotted one; or empty."""
     given = shortened(name if isinstance(name, str) else short_repr(name))
     names = list(names)
     cutoff = CLOSE if len(given) > SHORT else CLOSE_SHORT
     close = get_close_matches(given, names, max(1, len(names)), cutoff)
     close += [known for known in names if _shared_words(given, known) > ALIKE]
     # Among close names, final_position_error_x shares more words with final_eror_x than final_roll.
-    best = max(close, key=lambda known: _shared_words(given, known), default="")
+    alike = max(close, key=lambda known: _shared_words(given, known), default="")
+    best = next((known for known in names if known.endswith(f".{given}")), alike)
     return f"did you mean {best}? " if best else ""
 
 

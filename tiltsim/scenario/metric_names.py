@@ -223,9 +223,35 @@ METRICS: Final = {
 WALL_CLOCK_METRICS: Final = frozenset({"realtime_factor"})
 """Metrics that depend on the computer; they differ between equal flights."""
 
+KEPT_METRICS: Final = tuple(name for name in METRICS if name not in WALL_CLOCK_METRICS)
+"""The others, which the results of sweeps hold."""
+
 BOOLEAN_METRICS: Final = frozenset({"diverged"})
+
+
+def is_metric(name: str) -> bool:
+    """Whether a name is a metric's; a companion's follows the vehicle's name and a dot."""
+    return name.rpartition(".")[2] in METRICS
+
+
+def metric_of(name: str) -> Metric:
+    """The metric of a name such as ``max_rotor_speed`` or ``wing.max_rotor_speed``.
+
+    Raises:
+        KeyError: If there is none.
+    """
+    vehicle, _, own = name.rpartition(".")
+    found, words = METRICS[own], f"{vehicle}: "
+    if not vehicle:
+        return found
+    return found._replace(label=words + found.label, meaning=words + found.meaning)
+
+
+def is_boolean(name: str) -> bool:
+    """Whether a metric, of any vehicle, is true or false."""
+    return name.rpartition(".")[2] in BOOLEAN_METRICS
 
 
 def unit_of(metric: str) -> str:
     """The unit of a metric; empty for dimensionless ones."""
-    return METRICS[metric].unit
+    return metric_of(metric).unit

@@ -71,8 +71,8 @@ class ReferenceTable(Table, ABC):
 
     @property
     def adds_acceleration(self) -> bool:
-        """Whether ``acceleration_feedforward`` is set."""
-        return False
+        """Whether the reference has ``acceleration_feedforward``, and it is set."""
+        return getattr(self, "acceleration_feedforward", False)
 
     @property
     def turns(self) -> bool:
@@ -113,10 +113,6 @@ class PositionReference(ReferenceTable):
         "include it",
     )
     type: str
-
-    @property
-    def adds_acceleration(self) -> bool:
-        return self.acceleration_feedforward
 
     @property
     def lean(self) -> float:

@@ -24,9 +24,6 @@ from tiltsim_controllers.mathematics.scalar import Values
 from tiltsim_controllers.vehicle.parameters import Vehicle
 from tiltsim_controllers.vehicle.rotors import Rotor
 
-ROTORCRAFT: Final = ("tiltrotor", "quadrotor", "multirotor")
-"""The models of all vehicles that fly."""
-
 SPATIAL_KEYS: Final = ("position", "velocity", "acceleration", "amplitude")
 """Keys of references that hold a vector in the world."""
 
@@ -197,12 +194,12 @@ class RotorcraftTable(AnyVehicleTable, ABC):
 
     @property
     def spins(self) -> Values:
-        return self.multirotor.spins
+        return self.resolve().spins
 
     @property
     def thrust_coefficients(self) -> Values:
         """K_f of each rotor, N s^2/rad^2."""
-        return self.multirotor.thrust_coefficients
+        return self.resolve().thrust_coefficients
 
     def tilt_of_rotor(self, rotor: int) -> int:
         """The number, from 0, of the tilt of a rotor, whose number is from 1; -1: fixed."""
@@ -221,9 +218,7 @@ class RotorcraftTable(AnyVehicleTable, ABC):
     @property
     def hinge_deflections(self) -> Values:
         """Angles (rad) by which thrust and drag at hover turn the hinges against their servos."""
-        vehicle, stiffness = self.resolve(), self.tilt_servo.natural_frequency**2
-        if isinstance(vehicle, Vehicle):
-            return (0.0,) * self.tilt_count
+        vehicle, stiffness = self.multirotor, self.tilt_servo.natural_frequency**2
         torques, square = [0.0] * self.tilt_count, vehicle.hover_rotor_speed**2
         for rotor in vehicle.rotors:
             if rotor.tilt >= 0:

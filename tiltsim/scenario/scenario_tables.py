@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 from pydantic import Field, PrivateAttr
 
 from tiltsim.errors import InputError
-from tiltsim.models.cross import as_multirotor
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario import gait
 from tiltsim.scenario.companion import CompanionTable, DownwashTable
@@ -38,7 +37,6 @@ from tiltsim.scenario.surroundings import (
 from tiltsim.scenario.table import Many, default
 from tiltsim.scenario.time_table import TimeTable
 from tiltsim.scenario.vehicle import ModelErrorTable, VehicleTable, VehicleUnion
-from tiltsim_controllers.mathematics.scalar import Values
 from tiltsim_controllers.vehicle.parameters import Vehicle
 
 GAITS: Final = tables_of(
@@ -220,7 +218,7 @@ class ScenarioTables(WithAutopilot):
     def has_ideal_actuators_in_still_air(self) -> bool:
         """Whether pods and rotors follow their commands, and nothing else acts, as in the thesis.
 
-        Otherwise `tiltsim.laws.layers.on_equations` wraps the controller for the thesis plant.
+        Otherwise `tiltsim.laws.layers.layer` wraps the controller for the thesis plant.
         """
         vehicle = self.vehicle
         if not isinstance(vehicle, RotorcraftTable):
@@ -256,11 +254,6 @@ class ScenarioTables(WithAutopilot):
         if isinstance(self.vehicle, MultirotorTable):
             return self.model_error.apply_to_rotors(self.vehicle.resolve())
         return self.true_rotorcraft
-
-    @property
-    def true_thrust_coefficients(self) -> Values:
-        """K_f (N s^2/rad^2) of each rotor of any simulated rotorcraft."""
-        return as_multirotor(self.true_vehicle, tilting=False).thrust_coefficients
 
     @property
     def true_rotorcraft(self) -> Vehicle:

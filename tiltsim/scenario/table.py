@@ -85,17 +85,15 @@ class Table(BaseModel):
 
     def __setattr__(self, name: str, value: Any) -> None:
         """Refuse to change a key, in words that help."""
-        if name.startswith("_"):
-            super().__setattr__(name, value)
-            return
-        raise self._frozen(f"{name} = {short_repr(value)}")
+        if not name.startswith("_"):
+            raise self._frozen(f"{name} = {short_repr(value)}")
+        super().__setattr__(name, value)
 
     def __delattr__(self, name: str) -> None:
         """Refuse to delete a key, in words that help."""
-        if name.startswith("_"):
-            super().__delattr__(name)
-            return
-        raise self._frozen(name)
+        if not name.startswith("_"):
+            raise self._frozen(name)
+        super().__delattr__(name)
 
     def _frozen(self, what: str) -> InputError:
         """The error of a change of a key."""

@@ -169,6 +169,11 @@ VEHICLES: Final = tables_of(
 )
 """The tables of all vehicles by their models."""
 
+ROTORCRAFT: Final = tuple(
+    model for model, table in VEHICLES.items() if issubclass(table, RotorcraftTable)
+)
+"""The models of all vehicles that fly."""
+
 if TYPE_CHECKING:
     VehicleUnion = AnyVehicleTable
 else:

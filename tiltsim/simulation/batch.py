@@ -9,7 +9,6 @@ from functools import partial
 from itertools import count
 from os import PathLike
 from typing import Any, Final, TypeVar
-from warnings import warn
 
 from tiltsim.closed_loop.assembly import Assembly, program_key
 from tiltsim.errors import InputError
@@ -23,7 +22,14 @@ from tiltsim.scenario.scenario import Scenario
 from tiltsim.scenario.vehicle import VehicleTable
 from tiltsim.simulation.native_batch import LaneBatch, NativeBatch, lanes_for
 from tiltsim.simulation.simulate import simulate_assembly
-from tiltsim.system.arguments import Report, check_progress, reported, true_or_false, whole_number
+from tiltsim.system.arguments import (
+    Report,
+    check_progress,
+    reported,
+    true_or_false,
+    warn_user,
+    whole_number,
+)
 from tiltsim.system.processes import ProcessDiedError, in_order, in_processes
 from tiltsim.system.text import short_repr
 
@@ -182,7 +188,7 @@ def _with_progress(
         for place, result in enumerate(results, start=1):
             if result.has_failed and not warned:
                 warned = True
-                warn(f"flight {place}: {result.end.message}", RuntimeWarning, stacklevel=2)
+                warn_user(f"flight {place}: {result.end.message}")
             yield result
 
 

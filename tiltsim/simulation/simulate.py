@@ -6,7 +6,6 @@ from math import copysign, isfinite
 from os import PathLike
 from time import perf_counter
 from typing import Any, Final
-from warnings import warn
 
 import mujoco
 import numpy as np
@@ -35,7 +34,7 @@ from tiltsim.plants.mujoco_plant import MujocoPlant
 from tiltsim.plants.plant import EquationsPlant, Plant, take_sample
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.scenario import Scenario
-from tiltsim.system.arguments import Report, reported
+from tiltsim.system.arguments import Report, reported, warn_user
 from tiltsim.system.text import short_repr
 from tiltsim_controllers.mathematics.scalar import Floats, Values
 
@@ -185,7 +184,7 @@ def simulate(
     with reported(progress, "flight", scenario.simulation.duration) as report:
         flight = simulate_assembly(assemble(scenario), observer, report=report)
     if flight.end.kind == "failed" and scenario.own_controller is not None:
-        warn(flight.end.message, RuntimeWarning, stacklevel=2)
+        warn_user(flight.end.message)
     return flight
 
 

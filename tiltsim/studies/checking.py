@@ -219,7 +219,8 @@ def check_one(loaded: tuple[str, Scenario]) -> CheckResult:
     )
     if flight.end.kind != "completed" and not may_end_early:
         status, message = "lost", flight.end.message
-    return CheckResult(address, status, message, verdicts, perf_counter() - start, metrics)
+    seconds, found = perf_counter() - start, metrics.of_all_vehicles()
+    return CheckResult(address, status, message, verdicts, seconds, found)
 
 
 def _number(value: float | bool | None) -> str:

@@ -21,7 +21,7 @@ from tiltsim.simulation.simulate import simulate_to_end
 from tiltsim.studies.benchmark import compiled_time_per_call, time_per_call
 from tiltsim.sweeps.chunks import boundary
 from tiltsim.system.processes import in_order, in_processes
-from tiltsim.vehicles.spans import in_last_second
+from tiltsim.vehicles.metrics import in_last_second
 from tiltsim_controllers.mathematics.scalar import Floats
 
 GIVEN: Final = "given"  # in place of a law: the scenario's own controller

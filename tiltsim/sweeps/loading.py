@@ -12,6 +12,7 @@ from typing import Any, Final
 
 from tiltsim.errors import InputError
 from tiltsim.scenario.documents import check_keys, leaves, plain
+from tiltsim.scenario.interaction import unknown_vehicle
 from tiltsim.scenario.library import find_scenario_file, library_name, read_toml
 from tiltsim.scenario.loading import (
     FILE_KEYS,
@@ -263,6 +264,14 @@ def _check_names(points: SweepPoints) -> None:
             raise definition.mistake(key, rule, str(error)) from None
     targets = [key for axis in sweep.axis for key in axis.targets]
     targets += [sweep.bisect.key] if sweep.bisect is not None else []
+    bounds = () if sweep.bisect is None else sweep.bisect.holds
+    used = [("metrics", name) for name in sweep.metrics or ()]
+    used += [("plot.metrics", name) for name in sweep.plot.metrics]
+    used += [("bisect.holds.metric", bound.metric) for bound in bounds]
+    for key, name in used:
+        vehicle = name.rpartition(".")[0]
+        if reason := unknown_vehicle(vehicle, points.vehicles):
+            raise definition.mistake(key, name, f"no vehicle {vehicle}; {reason}")
     taken = {*RESERVED, *METRICS, *(f"{name}_version" for name in VERSIONS)}
     for key in (*targets, *sweep.derive):
         if key in taken:

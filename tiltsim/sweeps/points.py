@@ -13,7 +13,7 @@ from tiltsim.errors import InputError
 from tiltsim.scenario.documents import merge, split_key, value_at, with_value
 from tiltsim.scenario.loading import apply_overrides, parse_scenario
 from tiltsim.scenario.messages import InvalidValueError, show
-from tiltsim.scenario.metric_names import METRICS, WALL_CLOCK_METRICS
+from tiltsim.scenario.metric_names import KEPT_METRICS
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.scenario.vehicle import MOMENTS, VehicleTable
 from tiltsim.sweeps import tables
@@ -132,9 +132,20 @@ class SweepPoints:
 
     @property
     def metrics(self) -> tuple[str, ...]:
-        """The metrics that the dataset holds."""
-        everything = tuple(name for name in METRICS if name not in WALL_CLOCK_METRICS)
-        return self.sweep.metrics if self.sweep.metrics is not None else everything
+        """The metrics that the dataset holds, by default every vehicle's."""
+        if self.sweep.metrics is not None:
+            return self.sweep.metrics
+        prefixes = ("", *(f"{name}." for name in self.vehicles))
+        return tuple(prefix + name for prefix in prefixes for name in KEPT_METRICS)
+
+    @cached_property
+    def vehicles(self) -> tuple[str, ...]:
+        """The names of the companions in the base scenario and in cases."""
+        documents = [self.definition.base, *(d for a in self.cases for d in a.cases.values())]
+        lists = [one.get("companion") for one in documents]
+        tables = [each for one in lists if isinstance(one, list) for each in one]
+        names = (str(each.get("name")) for each in tables if isinstance(each, dict))
+        return tuple(dict.fromkeys(names))
 
     @cached_property
     def columns(self) -> tuple[str, ...]:

@@ -14,7 +14,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from tiltsim.errors import InputError
-from tiltsim.scenario.metric_names import BOOLEAN_METRICS
+from tiltsim.scenario.metric_names import is_boolean
 from tiltsim.sweeps.definition import VERSIONS, SweepDefinition
 from tiltsim.sweeps.points import SweepPoints
 from tiltsim.system.parquet import UnreadableError, open_parquet
@@ -49,7 +49,7 @@ def schema(points: SweepPoints) -> pa.Schema:
         pa.field("cause", pa.string(), nullable=False),
     ]
     for name in points.metrics:
-        fields.append(pa.field(name, pa.bool_() if name in BOOLEAN_METRICS else pa.float64()))
+        fields.append(pa.field(name, pa.bool_() if is_boolean(name) else pa.float64()))
     names = ("scenario", *(f"{name}_version" for name in VERSIONS))
     fields += [pa.field(name, pa.string(), nullable=False) for name in names]
     return pa.schema(fields, metadata={"sweep": points.definition.to_json()})

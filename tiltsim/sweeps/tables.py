@@ -10,7 +10,7 @@ from tiltsim.scenario.documents import leaves
 from tiltsim.scenario.expectation import Expectation
 from tiltsim.scenario.library import MAX_VALUES
 from tiltsim.scenario.messages import InvalidValueError, choose
-from tiltsim.scenario.metric_names import METRICS, WALL_CLOCK_METRICS
+from tiltsim.scenario.metric_names import KEPT_METRICS, METRICS, is_metric
 from tiltsim.scenario.table import Many, Positive, Table, default, example, required
 from tiltsim_controllers.mathematics.scalar import clipped
 
@@ -294,12 +294,12 @@ class Sweep(Table):
 
     def _check_values(self) -> None:
         for metric in self.metrics or ():
-            if metric in WALL_CLOCK_METRICS or metric not in METRICS:
-                allowed = [name for name in METRICS if name not in WALL_CLOCK_METRICS]
-                raise InvalidValueError("metrics", metric, choose(metric, allowed))
+            own = metric.rpartition(".")[2]
+            if own not in KEPT_METRICS:
+                raise InvalidValueError("metrics", metric, choose(own, KEPT_METRICS))
         for metric in self.plot.metrics:
-            kept = METRICS if self.metrics is None else self.metrics
-            if metric not in kept:
+            if not is_metric(metric) or metric not in (self.metrics or (metric,)):
+                kept = METRICS if self.metrics is None else self.metrics
                 reason = f"is not in the dataset; {choose(metric, kept)}"
                 raise InvalidValueError("plot.metrics", metric, reason)
         if not self.axis and self.bisect is None:

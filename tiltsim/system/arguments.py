@@ -1,6 +1,7 @@
 """Checks of arguments, and reports of progress to a caller."""
 
 import sys
+import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from numbers import Real
@@ -17,6 +18,9 @@ from tiltsim_controllers.mathematics.scalar import Floats
 
 MOST: Final = 2**31 - 1
 """Largest whole number that compiled code takes, as a number of steps for example."""
+
+
+OURS: Final = ("tiltsim.", "tiltsim_controllers.")  # beginnings of the names of modules
 
 
 def is_number(value: object) -> TypeGuard[int | float]:
@@ -122,3 +126,11 @@ def _seldom(report: Report, total: float) -> Report:
             report(done)
 
     return move
+
+
+def warn_user(text: str) -> None:
+    """Show a `RuntimeWarning` at the nearest line of a caller outside of this project."""
+    frame, level = sys._getframe(1), 2
+    while frame.f_back is not None and frame.f_globals.get("__name__", "").startswith(OURS):
+        frame, level = frame.f_back, level + 1
+    warnings.warn(text, RuntimeWarning, stacklevel=level)

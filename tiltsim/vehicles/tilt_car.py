@@ -13,13 +13,14 @@ import numpy as np
 from tiltsim.closed_loop.limits import limit_exceeded_of
 from tiltsim.closed_loop.loop import VehicleKind
 from tiltsim.models import mjcf_editing
+from tiltsim.models.mjspec_tree import MjSpecTree
 from tiltsim.models.parts import ExtraActuators, ModelSpec, TiltServo, Visuals
 from tiltsim.resources import shipped_folder
 from tiltsim.scenario.scenario import FlightPlan, Scenario
 from tiltsim.system.files import one_thread_at_a_time
 from tiltsim.system.hooks import mujoco_hooks
 from tiltsim.system.text import Quantity
-from tiltsim.vehicles.spans import (
+from tiltsim.vehicles.metrics import (
     horizontal_error_metrics,
     in_last_second,
     mean_of,
@@ -99,14 +100,15 @@ def compile_tilt_car(spec: TiltCarSpec, *, visuals: bool = True) -> mujoco.MjMod
 @lru_cache(maxsize=16)
 def _compose(spec: TiltCarSpec) -> tuple[mujoco.MjSpec, mujoco.MjSpec]:
     """The complete car, and the car without visuals."""
-    root, car = mjcf_editing.parse_mjcf(shipped_folder("mjcf") / "tilt_car.xml"), spec.car
+    parsed, car = mjcf_editing.parse_mjcf(shipped_folder("mjcf") / "tilt_car.xml"), spec.car
+    _set_inertia(parsed, car)
+    _set_thrusts(parsed, car)
+    root = MjSpecTree(mjcf_editing.spec_of(parsed))
     root.option.timestep = spec.timestep
     root.option.integrator = spec.integrator
     root.option.flag.contact = "disable"
     root.option.flag.constraint = "disable"
     root.size.nuserdata = spec.userdata_size
-    _set_inertia(root, car)
-    _set_thrusts(root, car)
     # The inertia that the hinge feels while both discs are free to turn.
     inertia = car.top_inertia * car.bottom_inertia / (car.top_inertia + car.bottom_inertia)
     mjcf_editing.set_servos(root, ["tilt"], replace(spec.tilt_servo, max_angle=None), [inertia])
@@ -118,9 +120,9 @@ def _compose(spec: TiltCarSpec) -> tuple[mujoco.MjSpec, mujoco.MjSpec]:
     start.act = [START_SPEED] * 2
     start.ctrl = [0.0, START_SPEED**2, START_SPEED**2, 0.0, 0.0]
     mjcf_editing.add_states(root, "law", spec.law_states)
-    complete = mjcf_editing.spec_of(root)
+    complete = root.spec.copy()
     mjcf_editing.remove_visuals(root, contacts=False)
-    return complete, mjcf_editing.spec_of(root)
+    return complete, root.spec
 
 
 def _set_inertia(root: Any, car: TiltCar) -> None:

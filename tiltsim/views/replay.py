@@ -15,6 +15,7 @@ import mujoco
 import numpy as np
 
 from tiltsim.closed_loop.assembly import Assembly
+from tiltsim.flight.flight import vehicle_assemblies
 from tiltsim.plants.mujoco_plant import build_model
 from tiltsim.resources import shipped_folder
 from tiltsim.scenario.scenario import Scenario
@@ -203,9 +204,10 @@ def positions(columns: Columns, prefix: str = "", suffix: str = "") -> Floats:
     return np.stack([columns.get(f"{prefix}{axis}{suffix}", zero) for axis in "xyz"], axis=1)
 
 
-def prefixes(scenario: Scenario) -> list[str]:
-    """The beginnings of the names of the columns of each vehicle, the first one's empty."""
-    return ["", *(f"{each.name}_" for each in scenario.companion)]
+def by_prefix(assembly: Assembly) -> dict[str, Assembly]:
+    """The assembly of each vehicle by the beginning of the names of its columns."""
+    (_, first), *others = vehicle_assemblies(assembly).items()
+    return {"": first, **{f"{name}_": own for name, own in others}}
 
 
 def reference_path(assembly: Assembly, end: float, points: int) -> Floats:

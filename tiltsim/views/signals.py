@@ -15,7 +15,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from tiltsim.closed_loop.assembly import Assembly
-from tiltsim.flight.flight import VECTORS, Flight, components
+from tiltsim.flight.flight import FIRST, VECTORS, Flight, components
 from tiltsim.laws.law import SUPERVISION
 from tiltsim.scenario.vehicle import VehicleTable
 from tiltsim.system.text import Quantity, in_words, subscript
@@ -32,8 +32,11 @@ AXES: Final = "xyz"
 ANGLES: Final = ("roll", "pitch", "yaw")
 
 
-OF_OBJECTS: Final = ("contact_force", "push_force", "cable_tension", "swing")
-"""Panels of columns that objects and loads add."""
+CONTACT: Final = "contact_force"
+TENSION: Final = "cable_tension"
+OF_OBJECTS: Final = (CONTACT, "push_force", TENSION, "swing")
+OF_WORLD: Final = (f"{CONTACT}s", *OF_OBJECTS[1:])
+"""Panels of columns that objects and loads add; and of these beside panels of several vehicles."""
 
 
 class Signal(NamedTuple):
@@ -75,6 +78,7 @@ class Signals:
     moves: bool = False  # whether it moves with the gait
     on_request: bool = False  # whether pages show it only on request
     plotted: bool = True  # whether the first tab of Rerun's plots has it
+    of_vehicles: bool = False  # whether each line is a vehicle's, in its color
 
     @property
     def path(self) -> str:
@@ -139,12 +143,10 @@ def signals_of(assembly: Assembly) -> dict[str, Signals]:
     drawn: set[Any] = {"time"}
     for panel in chosen.values():
         drawn |= {*panel.bounds}.union(*((line.values, line.reference) for line in panel.lines))
-    tilting = assembly.scenario.vehicle.has_tilting_rotors
-    left = {
-        column
-        for column in assembly.loop.units
-        if column not in drawn and (tilting or not column.startswith("alpha"))
-    }
+    # The columns of companions are their own flights'.
+    hidden = [f"{table.name}_" for table in assembly.scenario.companion]
+    hidden += [] if assembly.scenario.vehicle.has_tilting_rotors else ["alpha"]
+    left = {name for name in assembly.loop.units if not name.startswith((*hidden,))} - drawn
     others = {
         name: vector_signals(assembly, name, columns)
         for name, columns in stems(assembly.loop.units).items()
@@ -225,11 +227,19 @@ def _chosen(assembly: Assembly) -> Iterator[Signals]:
         lines = [Signal("candidate", "candidate", "lyapunov")]
         title = "Lyapunov candidate, ½ ė² + ½ K e², along y"
         yield Signals("lyapunov", title, "m^2/s^2", lines, floor=1e-6, moves=True)
+    cables = [f"{table.name}_tension" for table in scenario.cable]
     for name in OF_OBJECTS:
-        columns = [each for each in (name, *(f"{name}_{axis}" for axis in AXES)) if each in units]
+        own = (name, *(f"{name}_{axis}" for axis in AXES))
+        columns = [each for each in (*own, *cables * (name == TENSION)) if each in units]
         if columns:
             panel = vector_signals(assembly, name, columns)
-            yield replace(panel, moves=False, on_request=False, plotted=True)
+            about = {"moves": False, "on_request": False, "plotted": True}
+            yield replace(panel, title=in_words(name).capitalize(), **about)
+    if scenario.companion and f"{CONTACT}_x" in units:
+        vehicles = (FIRST, ""), *((table.name, f"{table.name}_") for table in scenario.companion)
+        lines = [Signal(name, name, partial(contact, prefix=prefix)) for name, prefix in vehicles]
+        about = {"on_request": True, "plotted": False, "of_vehicles": True}
+        yield Signals(f"{CONTACT}s", "Contact force", "N", lines, **about)
 
 
 def _direction(assembly: Assembly) -> Iterator[Signals]:
@@ -265,6 +275,12 @@ def error(flight: Flight, axis: str) -> Floats:
 def distance(flight: Flight, axes: Sequence[str]) -> Floats:
     """The norm of the position error along some axes, m."""
     return np.asarray(np.linalg.norm([error(flight, axis) for axis in axes], axis=0))
+
+
+def contact(flight: Flight, prefix: str) -> Floats:
+    """The norm of the force on objects (N) of the vehicle whose columns have a prefix."""
+    force = [flight[f"{prefix}{CONTACT}_{axis}"] for axis in AXES]
+    return np.asarray(np.linalg.norm(force, axis=0))
 
 
 def squared_speed(flight: Flight, rotor: int) -> Floats:

@@ -17,7 +17,7 @@ from tiltsim.scenario.linearizing_controllers import AttitudeAltitudeController
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.scenario.scenario_tables import DESCRIPTIVE
 from tiltsim.system.text import in_words, valid_unicode
-from tiltsim.vehicles.spans import at_lower_limit, at_upper_limit
+from tiltsim.vehicles.metrics import at_lower_limit, at_upper_limit
 from tiltsim.views.attitude_plane import SUPERVISION_THRESHOLD, margin_threshold
 
 MIN_WORDS: Final = 4  # words that titles must share to make a common title
@@ -149,7 +149,7 @@ class EventDetector:
     def opening(self) -> list[Event]:
         """The scenario; its gait, controller and plant."""
         scenario = self._assembly.scenario
-        title = scenario.title or scenario.address or "flight"
+        title = scenario.title or scenario.address
         about = [describe_gait(self._assembly), describe_controller(scenario)]
         texts = [title, *map(", ".join, about), f"{scenario.simulation.plant} plant"]
         return [Event(0.0, "INFO", text) for text in texts if text]

@@ -102,7 +102,9 @@ def _remove_unused(block: Block) -> None:
     needed: set[int] = set()
 
     def need(values: Sequence[Any]) -> None:
-        needed.update(value.number for value in values if isinstance(value, Expr))
+        for value in values:
+            if type(value) is Expr:
+                needed.add(value.number)
 
     def visit(block: Block) -> None:
         need(block.results)
@@ -125,7 +127,7 @@ def _check_scopes(block: Block, before: set[int]) -> None:
 
     def check(values: Sequence[Any]) -> None:
         for value in values:
-            if isinstance(value, Expr) and value.number not in known:
+            if type(value) is Expr and value.number not in known:
                 file, line = value.place
                 text = linecache.getline(file, line).strip()
                 raise TraceError(

@@ -22,7 +22,7 @@ Number = Any
 class Expr:
     """A number that is unknown while a function is traced."""
 
-    __slots__ = ("args", "blocks", "number", "op", "place")
+    __slots__ = ("args", "blocks", "is_condition", "number", "op", "place")
     __array_ufunc__ = None  # NumPy leaves operators to this class
 
     def __init__(
@@ -35,6 +35,7 @@ class Expr:
     ) -> None:
         self.op, self.args, self.number = op, args, number
         self.blocks, self.place = blocks, place
+        self.is_condition = op in CONDITIONS or (op == "where" and is_condition(args[1]))
 
     def __repr__(self) -> str:
         return f"<{self.op} at {self.place[0]}:{self.place[1]}>"
@@ -46,7 +47,7 @@ class Expr:
         )
 
     def __float__(self) -> NoReturn:
-        refuse("a traced number has no value yet", "use xp.sin instead of math.sin")
+        refuse("a traced number has no value yet", "use xp.sin for math.sin, xp.array for a[0] = x")
 
     def __index__(self) -> NoReturn:
         refuse("a traced number is no index", "write take(values, index)")
@@ -75,7 +76,7 @@ class Expr:
 
 def _binary(op: str, *, swapped: bool = False) -> Callable[[Expr, Any], Any]:
     def operator(self: Expr, other: Any) -> Any:
-        if not isinstance(other, Expr) and getattr(other, "__array_ufunc__", self) is None:
+        if type(other) not in (float, Expr) and getattr(other, "__array_ufunc__", self) is None:
             return NotImplemented  # a class that has operators with numbers
         return apply(op, other, self) if swapped else apply(op, self, other)
 
@@ -128,7 +129,7 @@ def apply(op: str, *args: Any) -> Any:
         args: Numbers and arrays of shapes that broadcast.
     """
     for value in args:
-        if isinstance(value, (np.ndarray, list, tuple)):
+        if type(value) not in (float, Expr) and isinstance(value, (np.ndarray, list, tuple)):
             break
     else:
         return COMPOSED[op](*args) if op in COMPOSED else make(op, *args)
@@ -195,16 +196,12 @@ class Graph:
 
     def known(self, op: str, args: Sequence[Any]) -> Expr:
         """The equal operation before it, or a new one."""
-        key = (op, *map(_identity, args))
+        key = (op, *[a.number if type(a) is Expr else _PACK(a) for a in args])
         for scope in reversed(self.scopes):
-            if key in scope.known:
-                return scope.known[key]
+            found = scope.known.get(key)
+            if found is not None:
+                return found
         return self.add(op, args, key=key)
-
-    def extend(self, block: Block) -> None:
-        """Append the operations of a block to the innermost one."""
-        self.scopes[-1].operations += block.operations
-        self.scopes[-1].known |= block.known
 
     @contextmanager
     def block(self) -> Iterator[Block]:
@@ -216,9 +213,8 @@ class Graph:
             self.scopes.pop()
 
 
-def _identity(value: Any) -> Any:
-    """Equal for equal arguments of an operation; 0.0 is not -0.0."""
-    return value.number if isinstance(value, Expr) else struct.pack("d", value)
+_PACK: Final = struct.Struct("d").pack
+"""Equal for equal numbers; 0.0 is not -0.0."""
 
 
 _current: ContextVar[Graph | None] = ContextVar("graph", default=None)
@@ -256,12 +252,12 @@ def make(op: str, *args: Any) -> Number:
     """
     if Expr not in map(type, args):
         return OPERATIONS[op].value(*map(_number, args))
-    graph = graph_in_use()
+    graph = _current.get() or graph_in_use()
     if op == "where":
         return _where(graph, *args)
-    if op in ("and", "or", "not"):
+    if op in _LOGICAL:
         return _logical(graph, op, *map(as_condition, args))
-    values = [as_real(a) for a in args]
+    values = [a if type(a) is Expr and not a.is_condition else as_real(a) for a in args]
     folded = _folded(op, *values) if op in _FOLDED else None
     return graph.known(op, values) if folded is None else folded
 
@@ -279,9 +275,7 @@ def _number(value: Any) -> float | bool:
 
 def is_condition(value: Any) -> bool:
     """Whether a number is true or false."""
-    if isinstance(value, Expr):
-        return value.op in CONDITIONS or (value.op == "where" and is_condition(value.args[1]))
-    return isinstance(value, bool | np.bool_)
+    return value.is_condition if type(value) is Expr else isinstance(value, bool | np.bool_)
 
 
 def as_condition(value: Any) -> Number:
@@ -291,8 +285,8 @@ def as_condition(value: Any) -> Number:
 
 def as_real(value: Any) -> Number:
     """A condition as 1.0 or 0.0; other numbers as they are."""
-    if isinstance(value, Expr):
-        return make("where", value, 1.0, 0.0) if is_condition(value) else value
+    if type(value) is Expr:
+        return make("where", value, 1.0, 0.0) if value.is_condition else value
     return value if type(value) is float else float(_number(value))
 
 
@@ -302,7 +296,7 @@ def _where(graph: Graph, condition: Any, yes: Any, no: Any) -> Number:
         return yes if condition else no
     if not (is_condition(yes) and is_condition(no)):
         yes, no = as_real(yes), as_real(no)
-    if yes is no or _identity(yes) == _identity(no):
+    if yes is no or (Expr not in (type(yes), type(no)) and _PACK(yes) == _PACK(no)):
         return yes
     return graph.known("where", [condition, yes, no])
 
@@ -319,9 +313,10 @@ def _logical(graph: Graph, op: str, *args: Number) -> Number:
 
 
 def _is_negative(value: Number) -> bool:
-    return isinstance(value, Expr) and value.op == "neg"
+    return type(value) is Expr and value.op == "neg"
 
 
+_LOGICAL: Final = frozenset({"and", "or", "not"})
 _FOLDED: Final = frozenset({"add", "sub", "mul", "div", "neg", "pow"})
 
 
@@ -333,9 +328,9 @@ def _folded(op: str, x: Number, y: Number = None) -> Number | None:
     """
     if op == "neg":
         return x.args[0] if _is_negative(x) else None
-    if isinstance(x, Expr) and isinstance(y, Expr) and "neg" not in (x.op, y.op):
+    a, b = None if type(x) is Expr else x, None if type(y) is Expr else y
+    if a is b is None and "neg" not in (x.op, y.op):
         return None
-    a, b = (None if isinstance(value, Expr) else value for value in (x, y))
     if op == "add" and 0.0 in (a, b):
         return y if a == 0.0 else x
     if op in ("add", "sub") and _is_negative(y):

@@ -57,18 +57,36 @@ def determinant(matrix: Any) -> Any:
     """
     if _is_plain(matrix):
         return np.linalg.det(matrix)
-    return matrix[0] @ kernel(matrix[1:]) if len(matrix) else 1.0
+    return _minor(matrix, tuple(range(len(matrix))), {})
 
 
 def kernel(matrix: Any) -> Any:
     """The vector across the rows of a matrix (M - 1, M), as long as the volume that they span."""
     columns = np.arange(matrix.shape[1])
-    others = [np.delete(columns, j) for j in columns]
-    signs = (-1.0) ** columns
     if _is_plain(matrix):
-        return signs * np.linalg.det(matrix[:, others].swapaxes(0, 1))
-    minors = [determinant(matrix[:, kept]) for kept in others]
-    return xp.array([sign * minor for sign, minor in zip(signs.tolist(), minors)])
+        others = [np.delete(columns, j) for j in columns]
+        return (-1.0) ** columns * np.linalg.det(matrix[:, others].swapaxes(0, 1))
+    return _across(matrix, tuple(columns.tolist()), {})
+
+
+_Minors = dict[tuple[int, ...], Any]
+
+
+def _minor(matrix: Any, columns: tuple[int, ...], known: _Minors) -> Any:
+    """The determinant of these columns of the last rows, by expansion along the first of them."""
+    if not columns:
+        return 1.0
+    if columns not in known:
+        row = matrix[len(matrix) - len(columns)][np.array(columns)]
+        known[columns] = row @ _across(matrix, columns, known)
+    return known[columns]
+
+
+def _across(matrix: Any, columns: tuple[int, ...], known: _Minors) -> Any:
+    """The kernel of these columns of the last rows, one fewer."""
+    others = (columns[:j] + columns[j + 1 :] for j in range(len(columns)))
+    minors = [_minor(matrix, kept, known) for kept in others]
+    return xp.array([(-1.0) ** j * minor for j, minor in enumerate(minors)])
 
 
 def solved(matrix: Any, desired: Any) -> Any:

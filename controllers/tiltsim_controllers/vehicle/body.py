@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.mathematics.linear import cross
 from tiltsim_controllers.mathematics.records import Matrix3, Vector3
-from tiltsim_controllers.vehicle.parameters import Vehicle
 
 ROLL, PITCH = 6, 7  # places in `BODY_FIELDS`
 
@@ -73,14 +72,6 @@ def body_of(mass: float, inertia: ArrayLike, gravity: float) -> Body:
     matrix = np.asarray(inertia, float)
     symmetric = (np.triu(m) + np.triu(m, 1).T for m in (matrix, np.linalg.inv(matrix)))
     return Body(mass, gravity, *(tuple(m.ravel().tolist()) for m in symmetric))
-
-
-def principal_body(vehicle: Vehicle) -> Body:
-    """The body of a vehicle whose principal axes are the body axes."""
-    x, y, z = vehicle.moments
-    inertia = (x, 0.0, 0.0, 0.0, y, 0.0, 0.0, 0.0, z)
-    inverse = (1.0 / x, 0.0, 0.0, 0.0, 1.0 / y, 0.0, 0.0, 0.0, 1.0 / z)
-    return Body(vehicle.mass, vehicle.gravity, inertia, inverse)
 
 
 def inertia_matrix(body: Any) -> Any:

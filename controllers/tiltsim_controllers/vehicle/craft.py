@@ -26,7 +26,6 @@ from tiltsim_controllers.vehicle.body import (
     RigidState,
     accelerations,
     joined,
-    principal_body,
     rigid_state,
     rotation_rate,
 )
@@ -102,11 +101,6 @@ def _flat(array: Any) -> Values:
     return tuple(array.ravel().tolist())
 
 
-def body_in(parameters: Any) -> Body:
-    """The body of a vehicle; see `craft_of`."""
-    return principal_body(parameters) if isinstance(parameters, Vehicle) else parameters.body
-
-
 def craft_of(parameters: Any, tilt_of_rotor: TiltOfRotor) -> Craft:
     """A vehicle from its parameters.
 
@@ -118,7 +112,7 @@ def craft_of(parameters: Any, tilt_of_rotor: TiltOfRotor) -> Craft:
     if isinstance(parameters, Vehicle):
         return _on_cross(parameters, tilt_of_rotor)
     return Craft(
-        body_in(parameters),
+        parameters.body,
         rotors_in(parameters.effects, 0, tilt_of_rotor),
         parameters.places.reshape(3, 3, rotors),
         parameters.axes.reshape(3, 3, rotors),
@@ -136,7 +130,7 @@ def _on_cross(vehicle: Vehicle, tilt_of_rotor: TiltOfRotor) -> Craft:
     axes = [none, upright, cross(arms, upright)] if tilting else [upright, none, none]
     table = cross_table(vehicle, tilting=tilting)
     return Craft(
-        body_in(vehicle),
+        vehicle.body,
         rotors_in(table, 0, tilt_of_rotor),
         xp.array([vehicle.arm_length * arms, none, none]),
         np.array(axes),

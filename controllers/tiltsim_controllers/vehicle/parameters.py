@@ -2,6 +2,9 @@
 
 from typing import Any, Final, NamedTuple
 
+from tiltsim_controllers.mathematics.scalar import Values
+from tiltsim_controllers.vehicle.body import Body
+
 
 class Vehicle(NamedTuple):
     """A rotorcraft with four arms (thesis symbols in brackets).
@@ -22,6 +25,24 @@ class Vehicle(NamedTuple):
     def moments(self) -> tuple[float, ...]:
         """Principal moments of inertia, kg m^2."""
         return self[1:4]
+
+    @property
+    def body(self) -> Body:
+        """Mass, inertia and gravity; the principal axes are the body axes."""
+        x, y, z = self.moments
+        inertia = (x, 0.0, 0.0, 0.0, y, 0.0, 0.0, 0.0, z)
+        inverse = (1.0 / x, 0.0, 0.0, 0.0, 1.0 / y, 0.0, 0.0, 0.0, 1.0 / z)
+        return Body(self.mass, self.gravity, inertia, inverse)
+
+    @property
+    def spins(self) -> Values:
+        """Signs of the rotor speeds at positive thrust."""
+        return SPIN
+
+    @property
+    def thrust_coefficients(self) -> Values:
+        """K_f of each rotor, N s^2/rad^2."""
+        return (self.thrust_coefficient,) * len(SPIN)
 
     @property
     def tilts(self) -> int:

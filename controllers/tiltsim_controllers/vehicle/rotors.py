@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike
 from tiltsim_controllers.code.arrays import take_span, xp
 from tiltsim_controllers.mathematics.moving import Moving, cosine, sine
 from tiltsim_controllers.mathematics.scalar import Floats, Triple, Values
-from tiltsim_controllers.vehicle.body import Body, principal_body
+from tiltsim_controllers.vehicle.body import Body
 from tiltsim_controllers.vehicle.cross import cross_table
 
 ROTOR_FLOATS: Final = 20
@@ -213,7 +213,7 @@ def airframe(parameters: Any, knots: Any, tilt_of_rotor: TiltOfRotor) -> tuple[B
         drag_coefficient=unit * vehicle.drag_coefficient,
     )
     table = cross_table(scaled, tilting=tilts_of(tilt_of_rotor) > 0)
-    return principal_body(scaled), rotors_in(table, 0, tilt_of_rotor)
+    return scaled.body, rotors_in(table, 0, tilt_of_rotor)
 
 
 def of_rotors(rotors: Rotors, values: Any) -> Any:

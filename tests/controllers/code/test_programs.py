@@ -140,6 +140,10 @@ def plain(x):
     return [math.sin(x[0])]
 
 
+def filled(x):
+    np.zeros(2)[0] = x[0]
+
+
 def whole(x):
     return [TABLE[x[0]]]
 
@@ -149,6 +153,7 @@ def whole(x):
     [
         (truth, "`return [x[0] if x[0] > 1.0 else x[1]]`: a traced number has no truth value yet;"),
         (plain, "`return [math.sin(x[0])]`: a traced number has no value yet; use xp.sin"),
+        (filled, "`np.zeros(2)[0] = x[0]`: a traced number has no value yet; use xp.sin"),
         (whole, "`return [TABLE[x[0]]]`: a traced number is no index; write take"),
     ],
 )

@@ -15,7 +15,7 @@ from tiltsim.plants.commanded_plant import CommandedPlant
 from tiltsim.plants.mujoco_plant import build_model
 from tiltsim.simulation.simulate import make_plant
 from tiltsim.studies.multirotor_analysis import fleet_file
-from tiltsim.vehicles.rotorcraft.layout import Layout
+from tiltsim.vehicles.rotorcraft import Layout
 
 INERTIA = 3e-5  # kg m^2, of a rotor
 STORM = {

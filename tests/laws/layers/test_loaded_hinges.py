@@ -13,7 +13,7 @@ from tiltsim.cli import main
 from tiltsim.laws.assembling import assemble
 from tiltsim.plants.command import Command, check_command
 from tiltsim.plants.commanded_plant import CommandedPlant
-from tiltsim.vehicles.rotorcraft.layout import Layout
+from tiltsim.vehicles.rotorcraft import Layout
 
 MOTION = ("position", "attitude", "tilt_angles")
 LAG = {"rotor_time_constant": 0.05}

@@ -27,7 +27,7 @@ from tiltsim.equations.actuator_level import actuator_plant
 from tiltsim.errors import InputError
 from tiltsim.laws.assembling import LOOPS, assemble, loop_of
 from tiltsim.laws.layers.instruments import plant_acceleration_of
-from tiltsim.laws.layers.on_equations import read_actuators
+from tiltsim.laws.layers.layer import read_actuators
 from tiltsim.models.rotor_table import hover_speeds
 from tiltsim.plants.plant import initial_state
 from tiltsim.resources import shipped_folder

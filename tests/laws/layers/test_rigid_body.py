@@ -26,8 +26,8 @@ from tiltsim.errors import InputError
 from tiltsim.laws.assembling import assemble
 from tiltsim.scenario.loading import merge
 from tiltsim.simulation.simulate import make_plant
-from tiltsim.vehicles.rotorcraft.layout import QW
-from tiltsim_controllers.vehicle.body import body_of, principal_body
+from tiltsim.vehicles.rotorcraft import QW
+from tiltsim_controllers.vehicle.body import body_of
 from tiltsim_controllers.vehicle.cross import cross_table
 from tiltsim_controllers.vehicle.parameters import PRESETS, SPIN
 from tiltsim_controllers.vehicle.rotors import rotor_entries
@@ -160,7 +160,7 @@ def test_a_cross_has_the_table_of_its_rotors(tilting):
 
 def test_principal_moments_are_a_matrix():
     whole = body_of(VEHICLE.mass, np.diag(VEHICLE[1:4]), VEHICLE.gravity)
-    for found, expected in zip(principal_body(VEHICLE), whole, strict=True):
+    for found, expected in zip(VEHICLE.body, whole, strict=True):
         assert found == pytest.approx(expected, rel=1e-15)
 
 

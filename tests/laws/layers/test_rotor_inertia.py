@@ -16,7 +16,7 @@ from tiltsim.plants.mujoco_plant import build_model
 from tiltsim.resources import shipped_folder
 from tiltsim.scenario.loading import merge
 from tiltsim.simulation.simulate import make_plant
-from tiltsim.vehicles.rotorcraft.layout import Layout
+from tiltsim.vehicles.rotorcraft import Layout
 from tiltsim_controllers.vehicle.craft import accelerations_within_limits
 from tiltsim_controllers.vehicle.parameters import PRESETS
 

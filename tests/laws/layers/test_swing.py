@@ -7,7 +7,7 @@ import pytest
 
 import tiltsim
 from tests.refusals import refusal
-from tiltsim.laws.layers.swing import RETURN, shift_gains
+from tiltsim.laws.layers.contact import RETURN, shift_gains
 
 HANGING = {
     "simulation.duration": 4.0,

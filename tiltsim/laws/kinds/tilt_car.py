@@ -11,8 +11,7 @@ from typing import Any, ClassVar, Final
 import numpy as np
 
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Sizes
-from tiltsim.laws.law import Law
-from tiltsim.laws.vehicle_loop import VehicleFunctions, parts, servo_lead
+from tiltsim.laws.law import Law, VehicleFunctions, parts, servo_lead
 from tiltsim.scenario.scenario import FlightPlan, Scenario
 from tiltsim.vehicles.tilt_car import ROTORS, TILT_CAR, initial_tilt
 from tiltsim_controllers.code.arrays import xp

@@ -17,12 +17,11 @@ from typing import Any, Final
 import numpy as np
 
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup
-from tiltsim.laws.layers.layer import Layer, Samples, wrap_loop
-from tiltsim.laws.vehicle_loop import servo_lead
+from tiltsim.laws.law import servo_lead
+from tiltsim.laws.layers.layer import Layer, PlantState, Samples, wrap_loop
 from tiltsim.models.parts import ExtraActuators
 from tiltsim.scenario.scenario import FlightPlan, Scenario
-from tiltsim.vehicles.rotorcraft import initial_tilts
-from tiltsim.vehicles.rotorcraft.layout import QW, TILT_1, layout_of
+from tiltsim.vehicles.rotorcraft import QW, TILT_1, initial_tilts, layout_of
 from tiltsim_controllers.code.arrays import traceable, xp
 from tiltsim_controllers.mathematics.records import make_record_type
 from tiltsim_controllers.mathematics.scalar import Floats, Vector
@@ -126,10 +125,12 @@ def with_actuation(loop: ClosedLoop, latency_steps: int, external: bool = False)
         head = driven(time, qpos[TILT_1:], act[:rotors], act[asked], commands, spins, actuation)
         return xp.hstack([head, ctrl[states], commands[tilts:], rates, commands])
 
-    def controls(
-        within: Any, time: Any, qpos: Any, qvel: Any, act: Any, own: Any, knots: Any
-    ) -> Any:
-        ctrl = within(*measured(time, qpos, qvel, own.sensors), act)
+    def sees(_within: Any, time: Any, state: PlantState, own: Any) -> PlantState:
+        return PlantState(*measured(time, state.qpos, state.qvel, own.sensors), state.act)
+
+    def controls(within: Any, time: Any, state: PlantState, own: Any, knots: Any) -> Any:
+        qpos, _, act = state
+        ctrl = within(sees(within, time, state, own))
         commands = xp.hstack([ctrl[:tilts], ctrl[layout.accelerations]])
         rates = xp.zeros(under_way)  # the plant moves the line of external commands
         if not external:
@@ -149,6 +150,7 @@ def with_actuation(loop: ClosedLoop, latency_steps: int, external: bool = False)
     layer = Layer(
         actuation_record(rotors),
         _actuation,
+        sees=sees,
         controls=controls,
         hold=hold,
         actuators=ExtraActuators(

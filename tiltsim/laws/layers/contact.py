@@ -1,4 +1,4 @@
-"""Objects around the loop: their columns, the peak of the contact force, and a law that pushes.
+"""Objects around the loop: their columns, and laws that push them or damp the swing of a load.
 
 The force of a step is a reading of a sensor that MuJoCo keeps in its state. Functions of the loop
 see objects' coordinates and readings behind ``act``, and the laws within see `Felt` in their place.
@@ -9,12 +9,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache, partial
+from math import sqrt
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup
-from tiltsim.laws.layers.layer import Layer, Samples, wrap_loop
+from tiltsim.laws.layers.layer import Layer, PlantState, Samples, wrap_loop
 from tiltsim.models.cables import CABLE_READING
 from tiltsim.models.objects import COORDINATES, FORCE
 from tiltsim.models.parts import ExtraActuators
@@ -28,9 +29,9 @@ from tiltsim_controllers.mathematics.attitude import (
 )
 from tiltsim_controllers.mathematics.records import Vector3
 from tiltsim_controllers.mathematics.scalar import Floats, Values
+from tiltsim_controllers.references.trajectories import ReferenceParameters, reference_motion
 
-FILTER: Final = 60.0  # rad/s, bandwidth in which a force loop sees the contact force
-
+FILTER: Final = 60.0  # rad/s, bandwidth in which laws see the contact force and a swing
 
 PUSH_COLUMNS: Final = ("push_force", "push_force_ref")
 """The force along the direction of a push, and its command, N."""
@@ -89,9 +90,8 @@ def with_force_loop(loop: ClosedLoop) -> ClosedLoop:
     """
     first = loop.sizes.act
 
-    def controls(
-        within: Any, time: Any, qpos: Any, qvel: Any, act: Any, own: Any, knots: Any
-    ) -> Any:
+    def controls(within: Any, time: Any, state: PlantState, own: Any, knots: Any) -> Any:
+        qpos, _, act = state
         direction, commanded = xp.array(own.push.direction), commanded_force(time, own.push)
         filtered, integral = act[first], act[first + 1]
         error = commanded - filtered
@@ -99,7 +99,7 @@ def with_force_loop(loop: ClosedLoop) -> ClosedLoop:
         place = qpos[:3] - force / own.stiffness * direction
         measured = act[FELT.push_force] @ direction
         rates = xp.hstack([FILTER * (measured - filtered), own.gain * error])
-        return xp.hstack([within(xp.hstack([place, qpos[3:]]), qvel, act), rates])
+        return xp.hstack([within(state._replace(qpos=xp.hstack([place, qpos[3:]]))), rates])
 
     layer = Layer(
         ForceLoop,
@@ -120,9 +120,8 @@ def with_impedance(loop: ClosedLoop) -> ClosedLoop:
     """
     first = loop.sizes.act
 
-    def controls(
-        within: Any, time: Any, qpos: Any, qvel: Any, act: Any, own: Any, knots: Any
-    ) -> Any:
+    def controls(within: Any, time: Any, state: PlantState, own: Any, knots: Any) -> Any:
+        qpos, qvel, act = state
         direction, commanded = xp.array(own.push.direction), commanded_force(time, own.push)
         filtered, shift, speed = act[first], act[first + 1], act[first + 2]
         along = shift + own.ahead * commanded
@@ -130,7 +129,8 @@ def with_impedance(loop: ClosedLoop) -> ClosedLoop:
         moving = xp.hstack([qvel[:3] - speed * direction, qvel[3:]])
         force = commanded - filtered - own.damping * speed - own.stiffness * shift
         following = FILTER * (act[FELT.push_force] @ direction - filtered)
-        return xp.hstack([within(place, moving, act), following, speed, force / own.mass])
+        ctrl = within(PlantState(place, moving, act))
+        return xp.hstack([ctrl, following, speed, force / own.mass])
 
     layer = Layer(
         Impedance,
@@ -178,16 +178,17 @@ def with_objects(loop: ClosedLoop, others: Others) -> ClosedLoop:
     accumulated, observed = _accumulated(others, size, readings), _observed(others, size, readings)
     felt = felt_among(others)
 
-    def seen(qpos: Any, act: Any, own: Among) -> Any:
+    def act_seen(qpos: Any, act: Any, own: Among) -> Any:
         return xp.hstack([act[:size], felt(qpos, act, own.attachment)])
 
-    def controls(
-        within: Any, time: Any, qpos: Any, qvel: Any, act: Any, own: Any, knots: Any
-    ) -> Any:
-        return xp.hstack([within(qpos, qvel, seen(qpos, act, own)), accumulated(act, own)])
+    def sees(_within: Any, _time: Any, state: PlantState, own: Among) -> PlantState:
+        return state._replace(act=act_seen(state.qpos, state.act, own))
+
+    def adds(_time: Any, _qpos: Any, _qvel: Any, act: Any, _ctrl: Any, own: Among) -> Any:
+        return accumulated(act, own)
 
     def hold(within: Any, time: Any, qpos: Any, act: Any, ctrl: Any, own: Any) -> Any:
-        return xp.hstack([within(seen(qpos, act, own)), accumulated(act, own)])
+        return xp.hstack([within(act_seen(qpos, act, own)), accumulated(act, own)])
 
     @traceable
     def observe(qpos: Any, qvel: Any, act: Any, ctrl: Any) -> Any:
@@ -196,7 +197,8 @@ def with_objects(loop: ClosedLoop, others: Others) -> ClosedLoop:
     layer = Layer(
         Among,
         _among,
-        controls=controls,
+        sees=sees,
+        adds=adds,
         hold=hold,
         actuators=ExtraActuators(states=states),
         units={
@@ -311,3 +313,81 @@ def _observed(others: Others, size: int, readings: int) -> Callable[..., Values]
         return xp.hstack(parts) if parts else act[:0]
 
     return observed
+
+
+# --- a law that damps the swing of a load ------------------------------------------------------
+
+SHIFTS: Final = ("swing_shift_x", "swing_shift_y")
+"""How far the vehicle goes after its load, away from its reference, m."""
+
+FILTERED_SWING: Final = ("filtered_swing_x", "filtered_swing_y")
+
+RETURN: Final = 0.25  # rate at which it comes back, over the frequency of the swing
+
+
+class SwingDamping(NamedTuple):
+    """Parameters of the layer."""
+
+    reference: ReferenceParameters
+    length: float  # m, of the cable
+    gravity: float  # m/s^2
+    gain: float  # 1/s, from the load's displacement to the speed of the shift
+    decay: float  # 1/s, of the shift
+
+
+def shift_gains(frequency: float, damping: float) -> tuple[float, float]:
+    """Gain and decay (1/s) of a shift that gives a pendulum a damping ratio.
+
+    A load at the displacement s from below a place that shifts by d obeys ``s'' = -w^2 s - d''``.
+    With ``d' = gain s - decay d`` its poles are a pair of the damping ratio, of the frequency v,
+    and a real one at ``RETURN v``.
+
+    Args:
+        frequency: w of the pendulum, rad/s.
+        damping: Its damping ratio to be.
+    """
+    slower = frequency / sqrt(1.0 + 2.0 * damping * RETURN)
+    decay = RETURN * slower**3 / frequency**2
+    return slower * (RETURN + 2.0 * damping) - decay, decay
+
+
+def _swing_damping(plan: FlightPlan) -> SwingDamping:
+    load, gravity = plan.scenario.payload, plan.scenario.any_rotorcraft.resolve().gravity
+    assert load is not None  # else there is no such layer
+    gains = shift_gains(sqrt(gravity / load.length), load.swing_damping)
+    return SwingDamping(plan.reference, load.length, gravity, *gains)
+
+
+@cache
+def with_swing_damping(loop: ClosedLoop) -> ClosedLoop:
+    """A law of position whose reference goes after the swinging load.
+
+    Only the part of the swing counts that the reference's own acceleration does not explain: a load
+    hangs back by that acceleration over gravity's. A law that does not read `Felt` sees the vehicle
+    displaced in place of its reference.
+    """
+    sizes, first = loop.sizes, loop.sizes.act
+
+    def controls(within: Any, time: Any, state: PlantState, own: Any, knots: Any) -> Any:
+        qpos, qvel, act = state
+        shift, filtered = act[first : first + 2], act[first + 2 : first + 4]
+        hanging_back = reference_motion(time, own.reference, knots)[2][:2] / own.gravity
+        displacement = own.length * (act[FELT.swing] + hanging_back)
+        following = FILTER * (displacement - filtered)
+        rate = own.gain * filtered - own.decay * shift
+        if sizes.history:
+            seen = xp.hstack([act[:-6], shift, rate, own.gain * following - own.decay * rate])
+        else:
+            seen = act
+            qpos = xp.hstack([qpos[:2] - shift, qpos[2:]])
+            qvel = xp.hstack([qvel[:2] - rate, qvel[2:]])
+        return xp.hstack([within(PlantState(qpos, qvel, seen)), rate, following])
+
+    layer = Layer(
+        SwingDamping,
+        _swing_damping,
+        controls=controls,
+        fields=dict.fromkeys((*SHIFTS, *FILTERED_SWING), "m"),
+        of_controller=True,
+    )
+    return wrap_loop(loop, layer)

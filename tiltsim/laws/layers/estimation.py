@@ -13,13 +13,13 @@ from typing import Any, Final, NamedTuple, get_type_hints
 import numpy as np
 
 from tiltsim.closed_loop.loop import ClosedLoop
+from tiltsim.laws.law import parts
 from tiltsim.laws.layers.actuation import along_line
 from tiltsim.laws.layers.instruments import Instrument
-from tiltsim.laws.layers.layer import Layer, wrap_loop
-from tiltsim.laws.vehicle_loop import parts
+from tiltsim.laws.layers.layer import Layer, PlantState, wrap_loop
 from tiltsim.models.parts import ExtraActuators
 from tiltsim.scenario.scenario import FlightPlan
-from tiltsim.vehicles.rotorcraft.layout import QW, TILT_1, TILT_RATE_1
+from tiltsim.vehicles.rotorcraft import QW, TILT_1, TILT_RATE_1
 from tiltsim_controllers.code.arrays import branch, normal, xp
 from tiltsim_controllers.laws import estimator as filters
 from tiltsim_controllers.laws.estimator import Estimate, ImuNoise, Outcome, Reading
@@ -272,7 +272,8 @@ def with_estimator(loop: ClosedLoop, fusion: Fusion) -> ClosedLoop:
     states, gyro = sum(fusion.sizes.values()), fusion.imu.first + 3
     fields = {**ESTIMATED, **DEVIATIONS, **CONSISTENCY, **dict.fromkeys(fusion.innovations, "1")}
 
-    def controls(within: Any, time: Any, qpos: Any, qvel: Any, act: Any, p: Any, knots: Any) -> Any:
+    def controls(within: Any, time: Any, state: PlantState, p: Any, knots: Any) -> Any:
+        qpos, qvel, act = state
         size = len(qvel) - fusion.readings
         readings, before = qvel[size:], act[first : first + states]
         _, present, rates = _filtered(time, readings, before, fusion, p)
@@ -280,16 +281,17 @@ def with_estimator(loop: ClosedLoop, fusion: Fusion) -> ClosedLoop:
         omega = readings[gyro : gyro + 3] - present.gyro_bias
         position = present.position - rotation @ p.place
         velocity = present.velocity - rotation @ cross(omega, p.place)
-        seen = (
+        seen = PlantState(
             xp.hstack([position, present.quaternion, qpos[TILT_1:]]),
             xp.hstack([velocity, omega, qvel[TILT_RATE_1:size]]),
+            act,
         )
         after = parts(before + p.control_timestep * rates, **fusion.sizes)
         estimated = [position, velocity, euler_angles(present.quaternion), omega]
         variances = xp.array([present.covariance[i * (i + 3) // 2] for i in range(filters.ERRORS)])
         consistency = [_nees(present, qpos, qvel, p.place), *after.nis, *after.innovations]
         shown = [*estimated, present.gyro_bias, present.force_bias, xp.sqrt(variances)]
-        return xp.hstack([within(*seen, act), rates, *shown, *consistency])
+        return xp.hstack([within(seen), rates, *shown, *consistency])
 
     layer = Layer(
         _record(fusion),

@@ -24,7 +24,7 @@ from tiltsim.laws.layers.layer import Layer, Samples, wrap_loop
 from tiltsim.models.parts import ExtraActuators
 from tiltsim.scenario.scenario import FlightPlan
 from tiltsim.scenario.surroundings import Force, Torque
-from tiltsim.vehicles.rotorcraft.layout import (
+from tiltsim.vehicles.rotorcraft import (
     QW,
     TILT_1,
     TILT_RATE_1,

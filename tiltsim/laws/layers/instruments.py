@@ -19,17 +19,16 @@ import numpy as np
 
 from tiltsim.closed_loop.loop import ClosedLoop
 from tiltsim.equations.actuator_level import mechanics, mechanics_record, servo_accelerations
-from tiltsim.laws.layers.layer import Layer, wrap_loop
-from tiltsim.laws.layers.on_equations import read_actuators
+from tiltsim.laws.layers.layer import Layer, PlantState, read_actuators, wrap_loop
 from tiltsim.models.parts import ExtraActuators
 from tiltsim.scenario.scenario import FlightPlan, Scenario
-from tiltsim.vehicles.rotorcraft import rotor_limits
-from tiltsim.vehicles.rotorcraft.layout import (
+from tiltsim.vehicles.rotorcraft import (
     QW,
     TILT_1,
     TILT_RATE_1,
     body_less,
     layout_of,
+    rotor_limits,
     rotors_record,
     tilt_of_rotor,
 )
@@ -105,12 +104,12 @@ def with_instruments(loop: ClosedLoop, carried: tuple[Instrument, ...]) -> Close
         **{each.name: instruments.instrument_record(each.errors) for each in carried},
     )
 
-    def controls(
-        within: Any, time: Any, qpos: Any, qvel: Any, act: Any, own: Any, knots: Any
-    ) -> Any:
+    def read(within: Any, time: Any, state: PlantState, own: Any) -> tuple[PlantState, Any, Any]:
+        """The state with readings, rates of the memory, and the readings."""
+        qpos, qvel, act = state
         memory = act[first : first + states]
         # Forces of the air and of loads are among the controls, and depend on no reading.
-        ctrl = within(qpos, xp.hstack([qvel, xp.zeros(len(columns))]), act)
+        ctrl = within(state._replace(qvel=xp.hstack([qvel, xp.zeros(len(columns))])))
         moved = acceleration(qpos, qvel, ctrl, loads(ctrl), own.motion)
         readings, kept = [], []
         for each in carried:
@@ -120,11 +119,16 @@ def with_instruments(loop: ClosedLoop, carried: tuple[Instrument, ...]) -> Close
             readings.append(seen)
             kept.append((after - remembered) / own.control_period)
         seen = xp.hstack(readings)
-        return xp.hstack([within(qpos, xp.hstack([qvel, seen]), act), *kept, seen])
+        return state._replace(qvel=xp.hstack([qvel, seen])), kept, seen
+
+    def controls(within: Any, time: Any, state: PlantState, own: Any, knots: Any) -> Any:
+        state, kept, seen = read(within, time, state, own)
+        return xp.hstack([within(state), *kept, seen])
 
     layer = Layer(
         record,
         lambda plan: _parameters(plan, record, loop, carried),
+        sees=lambda *given: read(*given)[0],
         controls=controls,
         actuators=ExtraActuators(states=states, memories=len(columns)),
         remembered=columns,
@@ -299,12 +303,11 @@ def with_measured_acceleration(loop: ClosedLoop) -> ClosedLoop:
     _, loads = read_actuators(loop)
     plant_acceleration = plant_acceleration_of(loop)
 
-    def controls(
-        within: Any, time: Any, qpos: Any, qvel: Any, act: Any, own: Any, knots: Any
-    ) -> Any:
-        ctrl = within(qpos, xp.hstack([qvel, xp.zeros(3)]), act)
+    def sees(within: Any, _time: Any, state: PlantState, own: Any) -> PlantState:
+        qpos, qvel, _ = state
+        ctrl = within(state._replace(qvel=xp.hstack([qvel, xp.zeros(3)])))
         measured = plant_acceleration(qpos, qvel, ctrl, loads(ctrl), own)[3:]
-        return within(qpos, xp.hstack([qvel, measured]), act)
+        return state._replace(qvel=xp.hstack([qvel, measured]))
 
-    layer = Layer(motion_record(loop), lambda plan: read_motion(plan, loop), controls=controls)
+    layer = Layer(motion_record(loop), lambda plan: read_motion(plan, loop), sees=sees)
     return wrap_loop(loop, layer)

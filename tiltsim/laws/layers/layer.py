@@ -2,15 +2,25 @@
 
 A layer has its own parameters and states and replaces some functions; the rest stays as in the loop
 within. `wrap_loop` is the one place where that is put together.
+
+`on_equations` puts any loop of a rotorcraft, with any layers, on equations of motion. The controls
+are the same function of time, `qpos`, `qvel` and `act` as in MuJoCo, with the same sensors, noise
+and latency. Only the plant on which they act differs: the thesis's vehicle or a rigid body, both of
+`tiltsim.equations.actuator_level`.
 """
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
+from functools import cache
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Equations
-from tiltsim.models.parts import ExtraActuators
+from tiltsim.equations.actuator_level import ActuatorPlant, limit_speeds_of, mechanics
+from tiltsim.models.parts import WRENCH_SIZE, ExtraActuators
 from tiltsim.scenario.scenario import FlightPlan
+from tiltsim.vehicles.rotorcraft import layout_of
 from tiltsim_controllers.code.arrays import traceable, xp
 from tiltsim_controllers.mathematics.records import make_record_type
 from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector
@@ -18,20 +28,29 @@ from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector
 Samples = Mapping[str, Floats]
 
 
+class PlantState(NamedTuple):
+    """MuJoCo's vectors as a loop sees them."""
+
+    qpos: Any
+    qvel: Any
+    act: Any
+
+
 @dataclass(frozen=True, eq=False)
 class Layer:
     """The parts of a layer, which it adds to a closed loop or replaces in it.
 
     Where a function is None, the loop within goes on unchanged. Functions have the layer's own
-    parameters as ``own``, and the loop within as a function ``within(qpos, qvel, act) -> ctrl``,
-    or ``within(act)`` between samples.
+    parameters as ``own``, and the loop within as a function ``within(state) -> ctrl`` of a
+    `PlantState`, or ``within(act)`` between samples.
     """
 
     parameters: type[tuple[Any, ...]]  # the type of the layer's parameters
     read: Callable[[FlightPlan], Any]  # ``(plan) -> parameters``
+    sees: Callable[..., PlantState] | None = None
+    """Traceable function ``(within, time, state, own) -> state`` that the loop within sees."""
     controls: Callable[..., Values] | None = None
-    """Traceable function ``(within, time, qpos, qvel, act, own, knots) -> ctrl``; see
-    `ClosedLoop`."""
+    """Traceable function ``(within, time, state, own, knots) -> ctrl``; see `ClosedLoop`."""
     hold: Callable[..., Values] | None = None
     """Traceable function ``(within, time, qpos, act, ctrl, own) -> ctrl``, likewise."""
     adds: Callable[..., Values] | None = None
@@ -114,15 +133,23 @@ def _functions_within(inner: ClosedLoop, layer: Layer, first: int) -> dict[str, 
     end = act_size + len(layer.fields)
     adds = layer.adds or (lambda *_: xp.zeros(0))
 
+    def within_at(time: Any, parameters: Any, knots: Any) -> Callable[[PlantState], Any]:
+        return lambda state: inner.controls(time, *state, parameters.inner, knots)
+
+    @traceable
+    def sees(time: Any, qpos: Any, qvel: Any, act: Any, parameters: Any, knots: Any) -> Any:
+        state = PlantState(qpos, qvel, act)
+        if layer.sees is None:
+            return state
+        return layer.sees(within_at(time, parameters, knots), time, state, parameters.layer)
+
     @traceable
     def controls(time: Any, qpos: Any, qvel: Any, act: Any, parameters: Any, knots: Any) -> Any:
-        def within(qpos: Any, qvel: Any, act: Any) -> Any:
-            return inner.controls(time, qpos, qvel, act, parameters.inner, knots)
-
+        within, own = within_at(time, parameters, knots), parameters.layer
         if layer.controls:
-            return layer.controls(within, time, qpos, qvel, act, parameters.layer, knots)
-        ctrl = within(qpos, qvel, act)
-        return xp.hstack([ctrl, adds(time, qpos, qvel, act, ctrl, parameters.layer)])
+            return layer.controls(within, time, PlantState(qpos, qvel, act), own, knots)
+        ctrl = within(sees(time, qpos, qvel, act, parameters, knots))
+        return xp.hstack([ctrl, adds(time, qpos, qvel, act, ctrl, own)])
 
     @traceable
     def hold(time: Any, qpos: Any, qvel: Any, act: Any, ctrl: Any, parameters: Any) -> Any:
@@ -147,8 +174,119 @@ def _functions_within(inner: ClosedLoop, layer: Layer, first: int) -> dict[str, 
         return inner.sign_check_values(time, values, parameters.inner, knots)
 
     return {
+        "sees": sees,
         "controls": controls,
         "hold": hold,
         "observe": observe,
         "sign_check_values": sign_check_values,
     }
+
+
+# --- on equations of motion --------------------------------------------------------------------
+
+
+@cache
+def read_actuators(loop: ClosedLoop) -> tuple[Callable[..., Any], Callable[..., Any]]:
+    """Functions of a model's controls, except thrusts and servos.
+
+    Returns:
+        ``rates(ctrl)`` of the activations, in their order, and ``loads(ctrl)``: force and torque on
+        the body, then torques about the hinges; see `ActuatorPlant.rates`.
+    """
+    layout = layout_of(loop)
+    own = ExtraActuators(states=layout.rotors + loop.controller_states)
+    first, wrenches, hinges = layout.acceleration_1, [], []
+    states: list[slice] = []
+    for this in (own, *loop.extra_actuators):
+        states.append(slice(first, first + this.states))
+        force = first + this.states + this.memories
+        hinge = force + WRENCH_SIZE * this.wrench
+        wrenches += [slice(force, hinge)] if this.wrench else []
+        hinges += [slice(hinge, hinge + layout.tilts)] if this.hinge_torques else []
+        first += this.controls
+
+    def rates(ctrl: Any) -> Any:
+        return xp.hstack([ctrl[part] for part in states])
+
+    def loads(ctrl: Any) -> Any:
+        wrench = sum((ctrl[part] for part in wrenches), np.zeros(WRENCH_SIZE))
+        torques = sum((ctrl[part] for part in hinges), np.zeros(layout.tilts))
+        return xp.hstack([wrench, torques])
+
+    return rates, loads
+
+
+def _projection(plant: ActuatorPlant, loop: ClosedLoop) -> Callable[..., Any]:
+    """Function ``(state, mechanics) -> state`` with motion and speed commands within limits."""
+    first = plant.motion + len(loop.spins) + loop.controller_states
+    projections = [plant.project_onto_limits] if plant.project_onto_limits else []
+    for this in loop.extra_actuators:
+        if this.begins_with_rotor_speeds:
+            projections += [limit_speeds_of(loop.spins, first)]
+        first += this.states
+
+    def project(state: Any, mechanics: Any) -> Any:
+        for projection in projections:
+            state = projection(state, mechanics)
+        return state
+
+    return project
+
+
+@cache
+def on_equations(loop: ClosedLoop, plant: ActuatorPlant) -> ClosedLoop:
+    """A loop with equations in which its controls act on a plant.
+
+    Their inputs are the controls, their state is the vehicle's motion followed by the activations.
+    """
+    first, qpos_of, qvel_of = plant.motion, plant.qpos, plant.qvel
+    motion_rates, finish = plant.rates, plant.finish
+    activation_rates, loads = read_actuators(loop)
+    project_motion = _projection(plant, loop)
+
+    @traceable
+    def equation_inputs(time: Any, state: Any, parameters: Any, knots: Any) -> Any:
+        return loop.controls(
+            time, qpos_of(state), qvel_of(state), state[first:], parameters.inner, knots
+        )
+
+    def controls_in_force(time: Any, state: Any, inputs: Any, parameters: Any) -> Any:
+        return loop.hold(
+            time, qpos_of(state), qvel_of(state), state[first:], inputs, parameters.inner
+        )
+
+    @traceable
+    def equation_rates(
+        time: Any, state: Any, inputs: Any, parameters: Any, knots: Any, disturbance: Any
+    ) -> Any:
+        # A stage may pass a rotor's limit by up to one step.
+        state = project_motion(state, parameters.layer)
+        ctrl = controls_in_force(time, state, inputs, parameters)
+        moved = motion_rates(state, ctrl, loads(ctrl), parameters.layer, disturbance)
+        return xp.hstack([moved, activation_rates(ctrl)])
+
+    @traceable
+    def observe_equations(time: Any, state: Any, inputs: Any, parameters: Any, knots: Any) -> Any:
+        ctrl = controls_in_force(time, state, inputs, parameters)
+        return loop.observe(qpos_of(state), qvel_of(state), state[first:], ctrl)
+
+    @traceable
+    def project_onto_limits(state: Any, parameters: Any) -> Any:
+        if finish is not None:
+            state = finish(state, parameters.layer)
+        return project_motion(state, parameters.layer)
+
+    def initial(plan: FlightPlan, setup: ControlSetup) -> Vector:
+        inner = ControlSetup(setup.parameters.inner, setup.knots)
+        return (*plant.initial(plan), *loop.initial_activations(plan, inner))
+
+    equations = Equations(
+        inputs=equation_inputs,
+        inputs_size=loop.sizes.ctrl,
+        rates=equation_rates,
+        initial=initial,
+        observe=observe_equations,
+        project_onto_limits=project_onto_limits,
+        states=plant.names,
+    )
+    return wrap_loop(loop, Layer(plant.mechanics, mechanics, equations=equations))

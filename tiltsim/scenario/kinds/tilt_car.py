@@ -62,7 +62,8 @@ class TiltCarGait(GaitTable):
     def _unscaled(self, vehicle: Any) -> PlannedGait:
         if not isinstance(vehicle, TiltCar):
             number = "four" if vehicle.tilts == 4 else vehicle.tilts
-            raise ValueError(f"is a gait of the tilt_car; this vehicle has {number} tilt angles")
+            reason = f"is a gait of the tilt_car; this vehicle has {number} tilt angles"
+            raise self.mistake("type", reason)
         # The bottom disc counter-rotates, so that the tilt exceeds the thrusts' rotation.
         return self._tilt(1.0 / turn_per_tilt(vehicle))
 

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy.stats import binomtest, spearmanr
 
-from tiltsim.scenario.metric_names import METRICS
+from tiltsim.scenario.metric_names import metric_of
 from tiltsim.scenario.schema import quantity_of_key
 from tiltsim.sweeps.dataset import Column, SweepResults
 from tiltsim.sweeps.tables import GridAxis, NormalAxis, UniformAxis
@@ -61,8 +61,8 @@ def label_of(results: SweepResults, name: str) -> str:
     own = results.points.sweep.plot.labels.get(name)
     if own is not None:
         return verbatim(own)
-    if name in METRICS:
-        return METRICS[name].quantity.text
+    if name in results.points.metrics:
+        return metric_of(name).quantity.text
     known = quantity_of_key(name)
     # Errors of a model without a unit are factors.
     factor = name.startswith("model_error.") and known.unit in {"", "1"}

@@ -14,7 +14,7 @@ from matplotlib.text import Text
 
 from tiltsim.errors import InputError
 from tiltsim.scenario.messages import did_you_mean
-from tiltsim.scenario.metric_names import METRICS
+from tiltsim.scenario.metric_names import is_metric, metric_of
 from tiltsim.views.figures import style
 
 HEADING: Final = "heading"  # identifies the title of a figure
@@ -267,7 +267,7 @@ def relabel(
         return
     texts = [text for text in _texts(figure) if text.get_text()]
     for name, new in labels.items():
-        old = METRICS[name].label if name in METRICS else style.verbatim(name)
+        old = metric_of(name).label if is_metric(name) else style.verbatim(name)
         if panels and name in panels and not any(_says(text, old) for text in texts):
             axes = panels[name]
             old = _said(axes._left_title) or _said(axes.yaxis.label)  # type: ignore[attr-defined]

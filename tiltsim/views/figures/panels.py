@@ -127,12 +127,15 @@ def _signals(axes: Axes, shown: Sequence[Shown], signals: Signals) -> None:
     flight = shown[0].flight
     time, lines = flight["time"], signals.lines
     numbered = len(lines) > 3 or lines[0].name[-1:].isdigit()
-    looks = style.rotor_lines(len(lines)) if numbered else style.AXIS_LINES
+    looks: Sequence[Any] = style.rotor_lines(len(lines)) if numbered else style.AXIS_LINES
+    if len(shown) > 1:
+        looks = [one.look for one in shown] if signals.of_vehicles else style.WORLD_LINES
     if signals.path == "position_error":
         style.zero_lines(axes, "x")
     said = f"{signals.title.lower()} " if len(shown) == 1 else ""  # above the panel
     for line, look in zip(lines, looks, strict=False):
-        axes.plot(time, line.of(flight), label=line.label.removeprefix(said), **look)
+        label = "" if "marker" in look else line.label.removeprefix(said)
+        axes.plot(time, line.of(flight), label=label, **look)
     # References of tilt angles would cover the angles that follow them.
     references = [line.reference for line in lines if line.reference in flight.units]
     for number, name in enumerate([] if numbered else references):

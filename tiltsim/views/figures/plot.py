@@ -13,13 +13,13 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from tiltsim.errors import InputError
-from tiltsim.flight.flight import VECTORS, Flight, as_flights, components
+from tiltsim.flight.flight import VECTORS, Flight, as_flights, components, vehicles_named
 from tiltsim.scenario.messages import choose
 from tiltsim.system.text import short_repr
 from tiltsim.views.figures import layout, style
 from tiltsim.views.figures.flight_lines import MOST_LINES, Shown
 from tiltsim.views.figures.panels import Panel, column_panel, panels_of, set_scale, signals_panel
-from tiltsim.views.signals import OF_OBJECTS, stems, vector_signals
+from tiltsim.views.signals import OF_WORLD, stems, vector_signals
 from tiltsim.views.titles import common_title, describe_controller, describe_gait, flight_names
 
 LARGEST: Final = 1e100
@@ -36,6 +36,7 @@ def plot(
     size: str | tuple[float, float] | None = None,
     title: str | None = None,
     labels: Sequence[str] | Mapping[str, str] | None = None,
+    vehicle: str = "",
 ) -> Figure:
     """One flight on a page, several in the same axes, or quantiles of more than seven.
 
@@ -49,6 +50,8 @@ def plot(
         title: Instead of the scenarios' title; empty for none.
         labels: Names of the flights in their order, the title if there is only one flight; or, as a
             dict, new texts by present names or texts of the figure.
+        vehicle: The only one to draw of flights with several, a name in `Flight.vehicles`; default:
+            all.
 
     Raises:
         InputError: If an argument is wrong, or the size is too small.
@@ -61,7 +64,7 @@ def plot(
         raise InputError(f"title = {short_repr(title)}: must be text")
     names, texts = _names_and_texts(flights, labels)
     with style.paper_style(size=style.parse_size("size", size)):
-        return draw_flights(flights, names, texts, panels=panels, title=title)
+        return draw_flights(flights, names, texts, panels=panels, title=title, vehicle=vehicle)
 
 
 def draw_flights(
@@ -71,6 +74,7 @@ def draw_flights(
     *,
     panels: Sequence[str],
     title: str | None,
+    vehicle: str = "",
 ) -> Figure:
     """The figure of `plot`, in the style and size of the context: a line for every vehicle.
 
@@ -80,15 +84,23 @@ def draw_flights(
         texts: Texts instead of these names and of other texts of the figure.
         panels: Names; empty for all that suit the flights.
         title: Instead of the scenarios' title; empty for none.
+        vehicle: The only one that is drawn; empty for all.
     """
-    of_objects: dict[str, Panel] = {}
-    if len(flights) == 1 and flights[0].scenario.companion:
-        (first,), together = flights, flights[0].vehicles
-        alone = panels_of([first])
-        of_objects = {name: alone[name] for name in OF_OBJECTS if name in alone and not panels}
-        if {*panels} <= panels_of([*together.values()]).keys():
-            names, flights = [*together], [*together.values()]
-            title = first.scenario.title or first.scenario.address if title is None else title
+    scenarios = [flight.scenario for flight in flights]
+    world: dict[str, Panel] = {}
+    flights = vehicles_named(vehicle, flights)
+    if vehicle and title is None:
+        title = f"{common_title(scenarios)}: {vehicle}".removeprefix(": ")
+        names, title = ([title], None) if len(flights) == 1 else (names, title)
+    together = [] if vehicle or len(flights) > 1 else [*flights[0].vehicles.values()]
+    if len(together) > 1:
+        alone, shared = panels_of(flights), panels_of(together)
+        world = {name: alone[name] for name in OF_WORLD if name in alone}
+        if not {*panels} <= shared.keys() | world.keys():
+            world = {}
+        else:
+            names, flights = [*flights[0].vehicles], together
+            title = scenarios[0].title or scenarios[0].address if title is None else title
     clipped = [np.clip(flight.samples, -LARGEST, LARGEST) for flight in flights]
     flights = [
         flight if np.array_equal(samples, flight.samples) else replace(flight, samples=samples)
@@ -103,9 +115,7 @@ def draw_flights(
     elif len(flights) > MOST_LINES:
         looks = [{"color": style.BLUE, "alpha": 0.3, "lw": 0.6, "marker": ""}] * len(flights)
     shown = [Shown(*one) for one in zip(flights, names, looks, strict=True)]
-    chosen = _chosen(flights, panels) | of_objects
-    if of_objects:  # squares stand last
-        chosen = dict(sorted(chosen.items(), key=lambda item: not item[1].over_time))
+    chosen = _chosen(flights, panels, world)
     heading = partial(_heading, shown, title)
     return layout.fitting(lambda: _page(shown, chosen, heading, others))
 
@@ -159,11 +169,15 @@ def _names_and_texts(
     return (names, dict(labels)) if isinstance(labels, Mapping) else (texts, {})
 
 
-def _chosen(flights: Sequence[Flight], names: Sequence[str]) -> dict[str, Panel]:
-    """The panels to draw, by name."""
-    available = panels_of(flights)
+def _chosen(
+    flights: Sequence[Flight], names: Sequence[str], world: dict[str, Panel]
+) -> dict[str, Panel]:
+    """The panels to draw, by name; ``world`` are panels of no vehicle."""
+    available = panels_of(flights) | world
     if not names:
-        return {name: panel for name, panel in available.items() if not panel.on_request}
+        default = [one for one in available.items() if one[0] in world or not one[1].on_request]
+        # Squares stand last.
+        return dict(sorted(default, key=lambda item: bool(world) and not item[1].over_time))
     columns = dict.fromkeys(column for flight in flights for column in flight.units)
     companions = (one.name for flight in flights for one in flight.scenario.companion)
     prefixes = ("", *(f"{name}_" for name in companions))

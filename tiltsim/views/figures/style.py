@@ -66,6 +66,12 @@ AXIS_LINES: Final[tuple[dict[str, Any], ...]] = (
     {"color": GREEN, "ls": (0, (5, 1.2, 1, 1.2)), "lw": 1.4},
 )
 """Styles of the lines of x, y, z, or roll, pitch, yaw, in one panel."""
+WORLD_LINES: Final[tuple[dict[str, Any], ...]] = (
+    {"color": INK, "ls": "-", "lw": 1.2},
+    {"color": GREY, "ls": (0, (5, 1.2)), "lw": 1.4},
+    *({"color": INK, "ls": dashes, "lw": 1.2} for dashes in DASHES[2:]),
+)
+"""Styles of lines that belong to no vehicle, beside lines in the colors of vehicles."""
 FORMATS: Final = (".png", ".svg", ".pdf")  # suffixes of figure files
 SINGULAR: Final = RED  # curves of singular attitudes and of singular tilt angles, in every figure
 UNREACHABLE: Final = "#F3D3C3"

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from tiltsim.errors import InputError
 from tiltsim.scenario.messages import choose
-from tiltsim.scenario.metric_names import METRICS
+from tiltsim.scenario.metric_names import is_metric, unit_of
 from tiltsim.sweeps.dataset import Column, SweepResults
 from tiltsim.sweeps.tables import GridAxis, SampledAxis
 from tiltsim.views.figures import style
@@ -90,7 +90,7 @@ def _least_range(metric: str, values: Column) -> tuple[float, float, bool]:
     known = values[~np.isnan(values)]
     if not known.size:
         return 0.0, 1.0, False
-    least = FLOORS.get(METRICS[metric].unit, SMALLEST) if metric in METRICS else 0.0
+    least = FLOORS.get(unit_of(metric), SMALLEST) if is_metric(metric) else 0.0
     if np.ptp(known) < least:
         low, high, _ = scale([known], [False], least)
         return low, high, bool(np.ptp(known) > 1e-6 * least)

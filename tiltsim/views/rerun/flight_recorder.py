@@ -5,6 +5,8 @@ the sign of pitch reversed.
 """
 
 import re
+from collections.abc import Sequence
+from itertools import product
 from math import pi
 from typing import Any, Final, NamedTuple
 
@@ -25,7 +27,6 @@ from tiltsim.views.attitude_plane import (
     torque_free_directions,
     unreachable_pitch,
 )
-from tiltsim.views.replay import visible_model
 from tiltsim.views.rerun import timeline
 from tiltsim.views.rerun.scene import Scene
 from tiltsim.views.rerun.timeline import Color, Ticks, Trail, dimmed, send_rows
@@ -65,23 +66,25 @@ class Line(NamedTuple):
     width: float = MEASURED_WIDTH
 
 
-def plotted_lines(panel: Signals) -> list[Line]:
-    """The lines of a panel of one flight, each with its reference, and the bounds.
+def plotted_lines(panel: Signals, root: str) -> list[Line]:
+    """The lines of a panel of one flight below an entity, each with its reference, and the bounds.
 
     Panels of the second tab have all their lines in one entity, which keeps recordings small.
     """
     found: list[Line] = []
     many = len(panel.lines) > len(AXIS_COLORS) or panel.lines[0].name[-1:].isdigit()
-    colors = MANY_COLORS if many or panel.levels or panel.bounds else AXIS_COLORS
+    hues = MANY_COLORS if many or panel.levels or panel.bounds else AXIS_COLORS
+    colors: Sequence[Color] = timeline.FLIGHTS if panel.of_vehicles else hues
 
     def add(name: str, line: Signal, label: str, color: Color, width: float) -> None:
-        path = f"{panel.path}/{name}" if panel.plotted else panel.path
+        path = f"{root}{panel.path}/{name}" if panel.plotted else f"{root}{panel.path}"
         found.append(Line(path, [label], [color], [line], width))
 
     for number, line in enumerate(panel.lines):
         color = colors[number % len(colors)]
         width = MANY_WIDTHS[min(number, len(MANY_WIDTHS) - 1)] if many else MEASURED_WIDTH
-        vector = len(panel.lines) > 1 and not panel.plotted  # whose title says the rest
+        # The title of a vector says the rest.
+        vector = len(panel.lines) > 1 and not (panel.plotted or panel.of_vehicles)
         label = re.findall(r"\d+$|.$", line.name)[0] if vector else line.label
         add(line.name, line, label, color, width)
         if line.reference:
@@ -94,7 +97,7 @@ def plotted_lines(panel: Signals) -> list[Line]:
         return found
     columns = zip(*((*one.labels, *one.colors, *one.signals) for one in found), strict=True)
     labels, shades, signals = ([*column] for column in columns)
-    return [Line(panel.path, labels, shades, signals, REFERENCE_WIDTH)]
+    return [Line(f"{root}{panel.path}", labels, shades, signals, REFERENCE_WIDTH)]
 
 
 class FlightRecorder:
@@ -106,9 +109,10 @@ class FlightRecorder:
     Args:
         recording: The recording to write to.
         assembly: The assembly of the flight.
-        name: The flight's name in a comparison; empty for a single flight.
-        color: The flight's color.
+        name: The flight's name among several, or the vehicle's; empty for a single one.
+        colors: The flight's color, and its companions'.
         first: Whether it also draws the entities that all flights share.
+        together: Whether it is one vehicle of a flight with several, in the scene of the first.
     """
 
     def __init__(
@@ -116,46 +120,54 @@ class FlightRecorder:
         recording: rr.RecordingStream,
         assembly: Assembly,
         name: str,
-        color: Color,
+        colors: Sequence[Color],
         first: bool,
+        *,
+        together: bool = False,
     ) -> None:
+        color = colors[0]
         part = rr.escape_entity_path_part(name) if name else ""
         suffix = f"/{part}" if name else ""
         self.name = name
         self.part = part
         self.scenario = assembly.scenario
         self.assembly = assembly
-        self.model = visible_model(assembly)
         self.signals = signals_of(assembly)
-        self.scene = Scene(recording, assembly, self.model, f"world{suffix}", color, name)
+        self.details = f"{part}/signals/" if together else ""
+        self.scene: Scene | None = None
+        if first or not together:
+            self.scene = Scene(recording, assembly, f"world{suffix}", colors, name)
         self.plane = None
         if has_attitude_plane(assembly):
             self.plane = AttitudePlane(recording, self.scenario, f"plane{suffix}", color)
-        if name:
-            self._lines = [
-                Line(f"{part}/{panel.path}/{line.name}", [name], [color], [line])
-                for panel in self.signals.values()
-                for line in panel.compared
-            ]
-        else:
-            self._lines = [line for each in self.signals.values() for line in plotted_lines(each)]
+        panels = [*self.signals.values()]
+        self._lines = [
+            Line(f"{part}/{panel.path}/{line.name}", [name], [color], [line])
+            for panel in (panels if name else ())
+            for line in panel.compared
+        ]
+        if together or not name:
+            self._lines += [line for one in panels for line in plotted_lines(one, self.details)]
+        # The entities of levels: in a comparison the first flight's.
+        roots = {f"{part}/".lstrip("/")} if first else set()
+        self._level_roots = sorted(roots | {self.details} if together else roots)
         self._recording = recording
-        self._first = first
         self._events = EventDetector(assembly)
         self._event_path = f"events{suffix}"
         for path, labels, colors, _, width in self._lines:
             self._log_style(path, labels, colors, width)
         self._log_events(self._events.opening())
-        if self.scene.not_drawn:
+        if self.scene is not None and self.scene.not_drawn:
             text = f"not drawn, because Rerun has no such shape: {', '.join(self.scene.not_drawn)}"
             self._log_events([Event(0.0, "WARN", text)])
 
     def draw_references(self, end: float) -> None:
         """Log the path of the reference and the levels of the plots up to a time (s)."""
-        self.scene.draw_reference(end)
+        if self.scene is not None:
+            self.scene.draw_references(end)
         levels = [(panel.path, level) for panel in self.signals.values() for level in panel.levels]
-        for panel, level in levels if self._first else []:
-            path = f"{self.part}/{panel}/{level.name}".lstrip("/")
+        for root, (panel, level) in product(self._level_roots, levels):
+            path = f"{root}{panel}/{level.name}"
             color = timeline.RED if level.value else timeline.GREY
             self._log_style(path, [level.label], [color], LEVEL_WIDTH)
             row = rr.Scalars.columns(scalars=[level.value, level.value])
@@ -163,7 +175,8 @@ class FlightRecorder:
 
     def append(self, piece: Flight) -> None:
         """Log the next piece of the flight."""
-        self.scene.append(piece)
+        if self.scene is not None:
+            self.scene.append(piece)
         if self.plane is not None:
             self.plane.append(piece)
         for line in self._lines:

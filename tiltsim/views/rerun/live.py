@@ -39,13 +39,13 @@ class LiveStream:
     def __init__(self, scenario: Scenario, url: str | None = None) -> None:
         require_viewer(url)
         # After the check, as Rerun takes a second to load.
-        from tiltsim.views.rerun.recording import Recording, flight_blueprint
+        from tiltsim.views.rerun.recording import Recording
 
         self._assembly = assemble(scenario, recorded=True)
         # A unique name: a viewer would merge two flights of one scenario into one recording.
         recording = Recording([self._assembly], salt=uuid4().hex)
-        (self._recorder,), self._stream = recording.recorders, recording.stream
-        attach_viewer(self._stream, url, flight_blueprint(recording.recorders, live=True))
+        self._recording, self._stream = recording, recording.stream
+        attach_viewer(self._stream, url, recording.blueprint(live=True))
         self._samples: SimpleQueue[Floats] = SimpleQueue()
         self._end: End | None = None
         self._over = Event()
@@ -74,12 +74,12 @@ class LiveStream:
 
     def _send_all(self) -> None:
         try:
-            self._recorder.draw_references(self._assembly.scenario.simulation.duration)
+            self._recording.draw_references(self._assembly.scenario.simulation.duration)
             while not self._over.wait(SEND_INTERVAL):
                 self._send_queued()
             self._send_queued()
             if self._end is not None:
-                self._recorder.finish(self._end)
+                self._recording.finish([self._end])
             self._stream.disconnect()
         except Exception as error:  # the flight continues regardless of viewer errors
             sys.stderr.write(f"tiltsim: live view ended: {printable(error)}\n")
@@ -95,7 +95,7 @@ class LiveStream:
         if samples:
             now = float(samples[-1][0])
             piece = Flight(self._assembly, np.array(samples), End("completed", now), "python", 0.0)
-            self._recorder.append(piece)
+            self._recording.append([piece])
 
 
 def _abandon_connection() -> None:

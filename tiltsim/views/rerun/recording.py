@@ -1,267 +1,28 @@
-"""Recordings of complete flights, and the blueprint: the views of the viewer and their layout."""
+"""Recordings of complete flights."""
 
 import hashlib
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
+from itertools import cycle
 from pathlib import Path
 from typing import Final
 
-import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
 from tiltsim.closed_loop.assembly import Assembly
-from tiltsim.flight.flight import Flight
+from tiltsim.flight.flight import Flight, vehicle_assemblies, vehicles_named
+from tiltsim.flight.metrics import End
 from tiltsim.system.files import replacing
-from tiltsim.system.text import Quantity
-from tiltsim.views.attitude_plane import MOVING_TRAIL_TIME, curve_is_constant
-from tiltsim.views.replay import (
-    camera_of,
-    positions,
-    prefixes,
-    reference_path,
-    seen_radius,
-    thrust_scale,
-    vehicle_radius,
-)
 from tiltsim.views.rerun import require_rerun
-from tiltsim.views.rerun.flight_recorder import BOUND, FlightRecorder, plotted_lines
-from tiltsim.views.rerun.scene import REFERENCE_POINTS, ground_height
-from tiltsim.views.rerun.timeline import FLIGHTS, TIMELINE
-from tiltsim.views.signals import Signals, range_of
+from tiltsim.views.rerun.blueprint import flight_blueprint
+from tiltsim.views.rerun.flight_recorder import FlightRecorder
+from tiltsim.views.rerun.timeline import FLIGHTS
 from tiltsim.views.titles import common_title, flight_names
-from tiltsim_controllers.mathematics.scalar import Floats
 
 APPLICATION: Final = "tiltsim"
 
 FLUSH_INTERVAL: Final = 3600.0
 """Time (s) between timed flushes of a saved recording: in effect none."""
-
-ALONE: Final = "Attitude (shaded: unreachable)"
-NEARER: Final = 0.75  # than in videos, whose frames are larger
-OVERVIEW: Final = 1.35  # distance of the overview camera, in lengths of the scene that it shows
-LETTER: Final = 0.0155  # width of a letter of a legend, as a share of a plot
-MAX_LEGEND: Final = 0.34  # share of a plot before the flight, where legends cover no curve
-MAIN: Final = "Main signals"
-AFTER: Final = 0.06  # time after the flight, as a share of it, for the label of its end
-EDGE: Final = 0.06  # of a range, beyond either end, for the labels there
-AROUND: Final = 2.2  # height of a plot beside its legend, in lines of the legend
-BACKGROUND: Final = (38, 48, 60)
-
-
-def flight_blueprint(
-    recorders: Sequence[FlightRecorder], flights: Sequence[Flight] = (), *, live: bool = False
-) -> rrb.Blueprint:
-    """Vehicle, trajectory, roll-pitch plane and events on the left, time series on the right.
-
-    Args:
-        recorders: One per flight.
-        flights: Flights whose values set the ranges of the axes; without them, the viewer does.
-        live: Whether the viewer follows the latest time instead of playing from the start.
-    """
-    trajectory, events = _trajectory_view(recorders, flights), _events_view()
-    vehicles = [_vehicle_view(one) for one in recorders]
-    planes = [_plane_view(one) for one in recorders if one.plane is not None]
-    below = rrb.Horizontal(trajectory, events, column_shares=[4, 5])
-    if len(recorders) > 1:
-        # Each flight has its own vehicle and curve; together they would cover each other.
-        rows = [rrb.Horizontal(*views) for views in (vehicles, planes) if views]
-        left = rrb.Vertical(*rows, below)
-    elif planes:
-        views = rrb.Horizontal(*vehicles, *planes, column_shares=[5, 4])
-        left = rrb.Vertical(views, below, row_shares=[11, 8])
-    else:
-        views = rrb.Horizontal(*vehicles, trajectory, column_shares=[1, 1])
-        left = rrb.Vertical(views, events, row_shares=[11, 4])
-    return rrb.Blueprint(
-        rrb.Horizontal(left, _plots(recorders, flights), column_shares=[13, 8]),
-        rrb.BlueprintPanel(state="collapsed"),
-        rrb.SelectionPanel(state="collapsed"),
-        rrb.TimePanel(
-            timeline=TIMELINE, state="collapsed", play_state="following" if live else "playing"
-        ),
-        auto_views=False,
-    )
-
-
-def _end_of(recorders: Sequence[FlightRecorder], flights: Sequence[Flight]) -> float:
-    """The end (s) of the longest flight; planned, before they are flown."""
-    planned = recorders[0].scenario.simulation.duration
-    return max((float(flight["time"][-1]) for flight in flights), default=planned)
-
-
-def _vehicle_view(one: FlightRecorder) -> rrb.View:
-    """The vehicle at close range; the camera moves with it but does not rotate."""
-    radius = seen_radius(one.scenario, one.model)
-    arrows = f"thrust arrows: {100.0 * thrust_scale(one.model):g} cm per newton"
-    pose = camera_of(one.scenario)
-    eye = NEARER * radius * pose.distance * pose.away
-    return rrb.Spatial3DView(
-        origin=one.scene.camera,
-        contents=[f"{one.scene.root}/**"],
-        name=one.name or f"Vehicle ({arrows})",
-        eye_controls=_eye(eye, np.array([0.0, 0.0, 0.1 * radius])),
-        background=BACKGROUND,
-        line_grid=False,
-        overrides=_trails([one]),
-    )
-
-
-def _trajectory_view(recorders: Sequence[FlightRecorder], flights: Sequence[Flight]) -> rrb.View:
-    """The complete paths of all vehicles and references."""
-    contents = []
-    for one in recorders:
-        contents += [*one.scene.trails, f"{one.scene.root}/reference/**"]
-        contents += [f"{one.scene.root}/{each.name}_vehicle/**" for each in one.scenario.companion]
-        contents += [f"{one.scene.vehicle}/**", f"{one.scene.camera}/**"]
-    first = recorders[0]
-    paths = [reference_path(first.assembly, _end_of(recorders, flights), REFERENCE_POINTS)]
-    tracks = [positions(f.columns, p) for f in flights for p in prefixes(f.scenario)]
-    known = np.concatenate([*paths, *tracks])
-    low, high = np.quantile(known, 0.02, axis=0), np.quantile(known, 0.98, axis=0)
-    size = max(float((high - low).max()), 6.0 * vehicle_radius(first.model))
-    middle, above = 0.5 * (low + high), np.array([0.0, 0.0, 1.0])
-    away = above if first.scenario.vehicle.is_planar else camera_of(first.scenario).away
-    plane = rr.encodings.Plane3D(normal=(0.0, 0.0, 1.0), distance=ground_height(first.model))
-    return rrb.Spatial3DView(
-        origin="world",
-        contents=contents,
-        name="Trajectory and reference",
-        eye_controls=_eye(middle + OVERVIEW * size * away, middle),
-        background=BACKGROUND,
-        line_grid=rrb.LineGrid3D(visible=True, spacing=1.0, plane=plane),
-        overrides=_trails(recorders),
-    )
-
-
-def _eye(position: Floats, target: Floats) -> rrb.EyeControls3D:
-    steep = abs(float((target - position)[2])) > 0.99 * float(np.linalg.norm(target - position))
-    return rrb.EyeControls3D(
-        position=position.tolist(),
-        look_target=target.tolist(),
-        eye_up=(0.0, 1.0, 0.0) if steep else (0.0, 0.0, 1.0),
-    )
-
-
-def _plane_view(one: FlightRecorder) -> rrb.View:
-    assert one.plane is not None
-    root = one.plane.root
-    # Where the curve moves, only the latest attitudes, to which it applies.
-    trail = _from_the_start()
-    if not curve_is_constant(one.scenario):
-        start = rr.TimeRangeBoundary.cursor_relative(seconds=-MOVING_TRAIL_TIME)
-        end = rr.TimeRangeBoundary.cursor_relative()
-        trail = rrb.VisibleTimeRanges(timeline=TIMELINE, start=start, end=end)
-    return rrb.Spatial2DView(
-        origin=root,
-        name=one.name or ALONE,
-        visual_bounds=rrb.VisualBounds2D(x_range=(-BOUND, BOUND), y_range=(-BOUND, BOUND)),
-        overrides={f"{root}/trail": trail},
-    )
-
-
-def _events_view() -> rrb.View:
-    return rrb.TextLogView(
-        origin="events",
-        name="Events",
-        columns=rrb.TextLogColumns(
-            timeline_columns=[TIMELINE],
-            text_log_columns=["Body"],  # the color shows the level
-        ),
-    )
-
-
-def _plots(recorders: Sequence[FlightRecorder], flights: Sequence[Flight]) -> rrb.Container:
-    """The plots of the time series; for several flights, of the compared signals.
-
-    Only the first plot of a comparison has a legend: colors are the same in all plots.
-    """
-    signals = recorders[0].signals.values()
-    labels = [line.labels[0] for each in signals if each.plotted for line in plotted_lines(each)]
-    labels = [one.name for one in recorders] if len(recorders) > 1 else labels
-    share = min(MAX_LEGEND, 0.08 + LETTER * max(map(len, labels)))
-    end = _end_of(recorders, flights)
-    times = -share / (1.0 - share) * end, (1.0 + AFTER) * end
-    if len(recorders) > 1:
-        return rrb.Vertical(*_compared(recorders, flights, times))
-
-    def plot(panel: Signals, title: str, *, legend: bool = False) -> rrb.View:
-        limits = range_of([(panel, flight) for flight in flights]) if flights else None
-        return _plot(title, [f"{panel.path}/**"], limits, times, legend=legend)
-
-    rows: list[rrb.View | rrb.Container] = []
-    heights, bare, others = [], [], []
-    for each in signals:
-        entries = {text for line in plotted_lines(each) for text in line.labels}
-        if not each.plotted:
-            others.append(plot(each, each.text, legend=len(entries) > 1))
-        elif len(entries) < 2:
-            bare.append(each)
-        else:
-            # The next legend needs the height: plots without one stand beside it, named by lines.
-            names = [Quantity(one.lines[0].label.capitalize(), one.unit).text for one in bare]
-            narrow = map(plot, bare, names)
-            view = plot(each, each.text, legend=True)
-            rows.append(rrb.Horizontal(*narrow, view) if bare else view)
-            heights.append(AROUND + len(entries) + len(each.levels))
-            bare = []
-    rows += [plot(each, each.text) for each in bare]
-    return rrb.Tabs(
-        rrb.Vertical(*rows, row_shares=[*heights, *[4.0] * len(bare)], name=MAIN),
-        rrb.Grid(*others, grid_columns=2, name="All other signals"),
-    )
-
-
-def _compared(
-    recorders: Sequence[FlightRecorder], flights: Sequence[Flight], times: tuple[float, float]
-) -> Iterator[rrb.View]:
-    """A plot of each compared signal, with one line per flight."""
-    found: dict[tuple[str, str], dict[int, Signals]] = {}
-    for number, one in enumerate(recorders):
-        for panel in one.signals.values():
-            for line in panel.compared:
-                alone = replace(panel, title=line.label, detail="", lines=[line], bounds=())
-                found.setdefault((panel.path, line.name), {})[number] = alone
-    for place, ((path, name), panels) in enumerate(found.items()):
-        first = next(iter(panels.values()))
-        paths = [f"{recorders[number].part}/{path}/{name}" for number in panels]
-        paths += [f"{recorders[0].part}/{path}/{each.name}" for each in first.levels]
-        shown = [(panel, flights[number]) for number, panel in panels.items() if flights]
-        limits = range_of(shown) if shown else None
-        yield _plot(first.text, paths, limits, times, legend=place == 0)
-
-
-def _plot(
-    title: str,
-    contents: list[str],
-    limits: tuple[float, float] | None,
-    times: tuple[float, float],
-    *,
-    legend: bool = True,
-) -> rrb.View:
-    shown = (rr.TimeRangeBoundary.absolute(seconds=time) for time in times)
-    edge = 0.0 if limits is None else EDGE * (limits[1] - limits[0])
-    return rrb.TimeSeriesView(
-        origin="/",
-        contents=contents,
-        name=title,
-        axis_x=rrb.TimeAxis(view_range=rr.encodings.TimeRange(*shown)),
-        axis_y=limits and rrb.ScalarAxis(range=(limits[0] - edge, limits[1] + edge)),
-        plot_legend=rrb.PlotLegend("LeftTop", visible=legend),
-    )
-
-
-def _trails(recorders: Sequence[FlightRecorder]) -> dict[str, rrb.VisibleTimeRanges]:
-    return {trail: _from_the_start() for one in recorders for trail in one.scene.trails}
-
-
-def _from_the_start() -> rrb.VisibleTimeRanges:
-    """Show everything logged so far, not just the latest segment."""
-    return rrb.VisibleTimeRanges(
-        timeline=TIMELINE,
-        start=rr.TimeRangeBoundary.infinite(),
-        end=rr.TimeRangeBoundary.cursor_relative(),
-    )
 
 
 class Recording:
@@ -273,6 +34,7 @@ class Recording:
     Args:
         assemblies: One per flight.
         names: Names of several flights, by default `flight_names`.
+        vehicle: The one that the flights are of, if others flew with it.
         salt: Distinguishes recordings of equal scenarios, which the viewer would merge.
         batching: When Rerun flushes rows; None for its default.
 
@@ -284,41 +46,77 @@ class Recording:
         self,
         assemblies: Sequence[Assembly],
         names: Sequence[str] = (),
+        vehicle: str = "",
         *,
         salt: str = "",
         batching: rr.ChunkBatcherConfig | None = None,
     ) -> None:
         require_rerun()
         scenarios = [assembly.scenario for assembly in assemblies]
-        content = "\n".join([*(scenario.model_dump_json() for scenario in scenarios), *names, salt])
+        texts = (scenario.model_dump_json() for scenario in scenarios)
+        content = "\n".join([*texts, *names, *filter(None, [vehicle]), salt])
         name = f"{APPLICATION}-{hashlib.sha256(content.encode()).hexdigest()[:16]}"
         options = {"send_properties": False, "batcher_config": batching}
         self.stream = rr.RecordingStream(APPLICATION, recording_id=name, **options)
         self.stream.set_log_time_enabled(False)
         names = (names or flight_names(scenarios)) if len(scenarios) > 1 else [""]
-        title = ": ".join(filter(None, (common_title(scenarios), " / ".join(names))))
+        title = ": ".join(filter(None, (common_title(scenarios), " / ".join(names), vehicle)))
         self.stream.send_recording_name(title or scenarios[0].address or "flight")
-        self.recorders = [
-            FlightRecorder(self.stream, assembly, name, FLIGHTS[index % len(FLIGHTS)], index == 0)
-            for index, (assembly, name) in enumerate(zip(assemblies, names, strict=True))
-        ]
+        several = [*zip(names, assemblies, strict=True)]
+        self._together = len(several) == 1 and bool(scenarios[0].companion) and not vehicle
+        if self._together:
+            several = [*vehicle_assemblies(assemblies[0]).items()]
+        self.recorders = []
+        for number, (name, assembly) in enumerate(several):
+            count = 1 + len(assembly.scenario.companion)
+            colors = [FLIGHTS[(number + i * self._together) % len(FLIGHTS)] for i in range(count)]
+            about = (self.stream, assembly, name, colors, number == 0)
+            self.recorders.append(FlightRecorder(*about, together=self._together))
+
+    def _of_recorders(self, flights: Sequence[Flight]) -> Sequence[Flight]:
+        """The flight of each recorder: these, or the vehicles' of a single one."""
+        return [*flights[0].vehicles.values()] if self._together and flights else flights
+
+    def blueprint(self, flights: Sequence[Flight] = (), *, live: bool = False) -> rrb.Blueprint:
+        """The views of the viewer; see `flight_blueprint`.
+
+        Args:
+            flights: One per assembly.
+            live: See there.
+        """
+        return flight_blueprint(self.recorders, self._of_recorders(flights), live=live)
+
+    def draw_references(self, end: float) -> None:
+        """Log the references of all flights up to a time (s)."""
+        for recorder in self.recorders:
+            recorder.draw_references(end)
+
+    def append(self, pieces: Sequence[Flight]) -> None:
+        """Log the next piece of every flight."""
+        for recorder, piece in zip(self.recorders, self._of_recorders(pieces), strict=True):
+            recorder.append(piece)
+
+    def finish(self, ends: Sequence[End]) -> None:
+        """Log how the flights ended."""
+        for recorder, end in zip(self.recorders, cycle(ends), strict=False):
+            recorder.finish(end)
 
     def write(self, flights: Sequence[Flight]) -> None:
         """Write complete flights, one per assembly."""
-        end = max(float(flight["time"][-1]) for flight in flights)
-        for recorder, flight in zip(self.recorders, flights, strict=True):
-            recorder.draw_references(end)
-            recorder.append(flight)
-            recorder.finish(flight.end)
+        self.draw_references(max(float(flight["time"][-1]) for flight in flights))
+        self.append(flights)
+        self.finish([flight.end for flight in flights])
 
 
 class RecordingFile(Recording):
     """A recording of complete flights for a file; equal flights give equal files."""
 
-    def __init__(self, assemblies: Sequence[Assembly], names: Sequence[str] = ()) -> None:
+    def __init__(
+        self, assemblies: Sequence[Assembly], names: Sequence[str] = (), vehicle: str = ""
+    ) -> None:
         # Flushed by row and byte counts only: timed flushes would make no two files equal.
         batching = rr.ChunkBatcherConfig(flush_tick=FLUSH_INTERVAL)
-        super().__init__(assemblies, names, batching=batching)
+        super().__init__(assemblies, names, vehicle, batching=batching)
         self._content = self.stream.memory_recording()  # as Rerun does not report a full disk
 
     def save(self, flights: Sequence[Flight], path: Path) -> None:
@@ -327,8 +125,7 @@ class RecordingFile(Recording):
         Raises:
             InputError: If the file cannot be written.
         """
-        blueprint = flight_blueprint(self.recorders, flights)
-        self.stream.send_blueprint(blueprint, make_active=False, make_default=True)
+        self.stream.send_blueprint(self.blueprint(flights), make_active=False, make_default=True)
         self.write(flights)
         content = self._content.drain_as_bytes()
         self.stream.disconnect()
@@ -336,6 +133,17 @@ class RecordingFile(Recording):
             temporary.write_bytes(content)
 
 
-def save_recording(flights: Sequence[Flight], path: Path, names: Sequence[str] = ()) -> None:
-    """Write flights into one recording file; see `RecordingFile`."""
-    RecordingFile([flight.assembly for flight in flights], names).save(flights, path)
+def save_recording(
+    flights: Sequence[Flight], path: Path, names: Sequence[str] = (), vehicle: str = ""
+) -> None:
+    """Write flights into one file; see `RecordingFile`.
+
+    Args:
+        flights: One or several.
+        path: The file.
+        names: Names of several, by default `flight_names`.
+        vehicle: The only one that is shown; empty for all.
+    """
+    flights = vehicles_named(vehicle, flights)
+    assemblies = [flight.assembly for flight in flights]
+    RecordingFile(assemblies, names, vehicle).save(flights, path)

@@ -1,6 +1,6 @@
 """The 3D scene: the moving vehicle with its thrust arrows, the reference, and their trails."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, Final
 
 import mujoco
@@ -38,36 +38,42 @@ class Scene:
     Args:
         recording: The recording to write to.
         assembly: The assembly of the flight.
-        model: The vehicle's model, visual geometry included.
         root: The entity of the scene.
-        color: The flight's color.
-        name: The label of the vehicle in a comparison; empty for a single flight.
+        colors: The color of each vehicle.
+        name: The label of the first vehicle, where there are several; empty for one alone.
     """
 
     def __init__(
         self,
         recording: rr.RecordingStream,
         assembly: Assembly,
-        model: mujoco.MjModel,
         root: str,
-        color: Color,
+        colors: Sequence[Color],
         name: str = "",
     ) -> None:
         self._recording = recording
-        self._assembly = assembly
-        self._model = model
-        self._color = color
+        self._vehicles = replay.by_prefix(assembly)
+        self.model = self._model = model = replay.visible_model(assembly)
+        self._colors = colors
         self.root = root
         self.camera = f"{root}/camera"  # moves with the vehicle but does not rotate
         self._floor = f"{root}/floor"  # moves with the vehicle in whole cells
         self._paths = body_paths(model, root)
         self.vehicle = self._paths[replay.first_free_body(model)]
-        self._trails = {p: Trail(TRAIL_INTERVAL) for p in replay.prefixes(assembly.scenario)}
+        self._trails = {prefix: Trail(TRAIL_INTERVAL) for prefix in self._vehicles}
         self._thrust = replay.thrust_sites(model)
         self._thrust_scale = replay.thrust_scale(model)
         self._floor_cell: Floats | None = None
         self.not_drawn = log_geometry(recording, model, root)  # geoms that Rerun cannot draw
         self._log_styles(name)
+
+    @property
+    def paths(self) -> list[str]:
+        """Entities of the moving vehicles with their trails and references."""
+        prefixes = [*self._vehicles]
+        bodies = [self.vehicle, *(f"{self.root}/{prefix}vehicle" for prefix in prefixes[1:])]
+        references = (f"{self.root}/{prefix}reference" for prefix in prefixes)
+        return [*self.trails, *(f"{path}/**" for path in (*references, *bodies, self.camera))]
 
     @property
     def trails(self) -> list[str]:
@@ -86,10 +92,16 @@ class Scene:
         cable = rr.LineStrips3D.from_fields(colors=[timeline.GREY], radii=[TRAIL_WIDTH])
         for tendon in range(model.ntendon):
             self._log(f"{self.root}/{model.tendon(tendon).name}", cable)
-        trail = rr.LineStrips3D.from_fields(colors=[self._color], radii=[TRAIL_WIDTH])
-        for path in self.trails:
-            self._log(path, trail)
-        look: dict[str, Any] = {"colors": [timeline.YELLOW]}
+        look: dict[str, Any]
+        for prefix, color in zip(self._trails, self._colors, strict=True):
+            own = prefix.removesuffix("_") or name
+            trail = rr.LineStrips3D.from_fields(colors=[color], radii=[TRAIL_WIDTH])
+            self._log(f"{self.root}/{prefix}trail", trail)
+            place = f"{self.root}/{prefix}vehicle" if prefix else self.camera
+            look = {"radii": [DOT], "colors": [color], "labels": [own] if name else None}
+            dot = rr.Points3D([(0.0, 0.0, 0.0)], **look, show_labels=True)
+            self._log(f"{place}/dot", dot)
+        look = {"colors": [timeline.YELLOW]}
         look["radii"] = [0.02 * replay.vehicle_radius(model)]
         for site in self._thrust:
             arrow = rr.Arrows3D.from_fields(origins=[model.site_pos[site]], **look)
@@ -100,8 +112,6 @@ class Scene:
         lines = [[(c, -half, height), (c, half, height)] for c in offsets]
         lines += [[(-half, c, height), (half, c, height)] for c in offsets]
         self._log(self._floor, rr.LineStrips3D(lines, colors=[timeline.FAINT], radii=[-0.5]))
-        look = {"radii": [DOT], "colors": [self._color], "labels": [name] if name else None}
-        self._log(f"{self.camera}/dot", rr.Points3D([(0.0, 0.0, 0.0)], **look, show_labels=True))
 
     def append(self, piece: Flight) -> None:
         """Log the next piece of the flight."""
@@ -138,10 +148,10 @@ class Scene:
         move = rr.Transform3D.columns(translation=cells[moved].astype(np.float32))
         send_rows(self._recording, self._floor, time[moved], move)
         self._floor_cell = cells[-1]
-        if self._assembly.follows_position:
-            reference = replay.positions(columns, suffix="_ref")
+        for path, prefix, _ in self._followed():
+            reference = replay.positions(columns, prefix, "_ref")
             point = rr.Points3D.columns(positions=reference.astype(np.float32))
-            send_rows(self._recording, f"{self.root}/reference/now", time, point)
+            send_rows(self._recording, f"{path}/now", time, point)
 
     def _log(self, path: str, *archetypes: Any) -> None:
         self._recording.log(path, *archetypes, static=True)
@@ -152,16 +162,21 @@ class Scene:
         # Several on one body are named after their columns, such as thrust_1.
         return f"{self._paths[body]}/{'thrust' if alone else self._thrust[site]}"
 
-    def draw_reference(self, end: float) -> None:
-        """Log the path of the reference up to a time (s), if the controller follows a position."""
-        if not self._assembly.follows_position:
-            return
-        path = replay.reference_path(self._assembly, end, REFERENCE_POINTS)
-        now = rr.Points3D.from_fields(colors=[timeline.WHITE], radii=[DOT])
-        self._log(f"{self.root}/reference/now", now)
-        if np.ptp(path, axis=0).max() > 0.0:
-            line = rr.LineStrips3D([path], colors=[timeline.GREY], radii=[REFERENCE_WIDTH])
-            self._log(f"{self.root}/reference/path", line)
+    def _followed(self) -> Iterator[tuple[str, str, Assembly]]:
+        """Entity, prefix and assembly of each vehicle that follows a position."""
+        for prefix, own in self._vehicles.items():
+            if own.follows_position:
+                yield f"{self.root}/{prefix}reference", prefix, own
+
+    def draw_references(self, end: float) -> None:
+        """Log the paths of the references of positions up to a time (s)."""
+        for path, _, own in self._followed():
+            points = replay.reference_path(own, end, REFERENCE_POINTS)
+            now = rr.Points3D.from_fields(colors=[timeline.WHITE], radii=[DOT])
+            self._log(f"{path}/now", now)
+            if np.ptp(points, axis=0).max() > 0.0:
+                line = rr.LineStrips3D([points], colors=[timeline.GREY], radii=[REFERENCE_WIDTH])
+                self._log(f"{path}/path", line)
 
 
 def xyzw(quaternion: npt.ArrayLike) -> npt.NDArray[np.float32]:

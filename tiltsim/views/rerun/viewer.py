@@ -15,7 +15,7 @@ from time import monotonic, sleep
 from typing import TYPE_CHECKING, Any, Final
 
 from tiltsim.errors import InputError
-from tiltsim.flight.flight import Flight, as_flights
+from tiltsim.flight.flight import Flight, as_flights, vehicles_named
 from tiltsim.system.public import optional_package
 from tiltsim.system.text import short_repr
 from tiltsim.views.rerun import DEFAULT_URL, require_viewer, viewer_listens
@@ -29,7 +29,7 @@ START_TIME: Final = 20.0  # time (s) that the viewer may take to start
 SETTLING: Final = 1.0  # time (s) within which a viewer without a usable screen ends
 
 
-def view(flights: Flight | Sequence[Flight], *, url: str | None = None) -> Any:
+def view(flights: Flight | Sequence[Flight], *, url: str | None = None, vehicle: str = "") -> Any:
     """Show a flight, or several in comparison, in Rerun.
 
     Args:
@@ -38,6 +38,8 @@ def view(flights: Flight | Sequence[Flight], *, url: str | None = None) -> Any:
             a notebook the viewer is part of the cell, and served to the browser by this machine
             unless the environment variable RERUN_NOTEBOOK_ASSET says otherwise; elsewhere one is
             opened.
+        vehicle: The only one to show of flights with several, a name in `Flight.vehicles`; default:
+            all.
 
     Returns:
         In a notebook, Rerun's widget, with which the cell has to end. Else None.
@@ -49,14 +51,14 @@ def view(flights: Flight | Sequence[Flight], *, url: str | None = None) -> Any:
     shown = as_flights(flights)
     ipython = sys.modules.get("IPython")  # the kernel of a notebook displays widgets
     if url is None and ipython is not None and hasattr(ipython.get_ipython(), "kernel"):
-        return _inline_viewer(shown)
+        return _inline_viewer(shown, vehicle)
     if url is not None and not isinstance(url, str):
         raise InputError(f"url = {short_repr(url)}: must be text, such as {DEFAULT_URL}")
-    view_flights(shown, url)
+    view_flights(shown, url, vehicle=vehicle)
     return None
 
 
-def _inline_viewer(flights: Sequence[Flight]) -> Any:
+def _inline_viewer(flights: Sequence[Flight], vehicle: str) -> Any:
     """Rerun's widget for notebooks, which has got the flights."""
     # The browser gets the viewer from this machine: by default it would be from Rerun's website.
     os.environ.setdefault("RERUN_NOTEBOOK_ASSET", "serve-local")
@@ -64,31 +66,37 @@ def _inline_viewer(flights: Sequence[Flight]) -> Any:
         optional_package("rerun_notebook", "Rerun in a notebook", "'rerun-sdk[notebook]'")
     from rerun.notebook import Viewer
 
-    from tiltsim.views.rerun.recording import Recording, flight_blueprint
+    from tiltsim.views.rerun.recording import Recording
 
-    recording = Recording([flight.assembly for flight in flights])
-    blueprint = flight_blueprint(recording.recorders, flights)
-    widget = Viewer(recording=recording.stream, blueprint=blueprint, width="auto")
+    flights = vehicles_named(vehicle, flights)
+    recording = Recording([flight.assembly for flight in flights], vehicle=vehicle)
+    views = recording.blueprint(flights)
+    widget = Viewer(recording=recording.stream, blueprint=views, width="auto")
     recording.write(flights)
     recording.stream.flush()
     return widget
 
 
 def view_flights(
-    flights: Sequence[Flight], url: str | None = None, names: Sequence[str] = ()
+    flights: Sequence[Flight], url: str | None = None, names: Sequence[str] = (), vehicle: str = ""
 ) -> None:
-    """Show a flight, or several for a comparison, in the viewer at a URL; None opens a viewer.
+    """Show a flight, or several for a comparison, in a viewer.
 
-    ``names`` name several flights, by default by `flight_names`.
+    Args:
+        flights: One or several.
+        url: The viewer's address; None opens one.
+        names: Names of several flights, by default `flight_names`.
+        vehicle: The only one that is shown; empty for all.
 
     Raises:
         InputError: If no viewer listens at the address, or there is no screen to open one on.
     """
-    from tiltsim.views.rerun.recording import Recording, flight_blueprint
+    from tiltsim.views.rerun.recording import Recording
 
+    flights = vehicles_named(vehicle, flights)
     require_viewer(url)
-    recording = Recording([flight.assembly for flight in flights], names)
-    attach_viewer(recording.stream, url, flight_blueprint(recording.recorders, flights))
+    recording = Recording([flight.assembly for flight in flights], names, vehicle)
+    attach_viewer(recording.stream, url, recording.blueprint(flights))
     recording.write(flights)
     recording.stream.disconnect()
 

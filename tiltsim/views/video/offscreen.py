@@ -108,7 +108,7 @@ class Canvas:
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._context)
         self._frame = mujoco.MjrRect(0, 0, width, height)
         self._options = mujoco.MjvOption()
-        self.scene = mujoco.MjvScene(model, maxgeom=5000)
+        self.scene = mujoco.MjvScene(model, maxgeom=10000)
         for flag in (mujoco.mjtRndFlag.mjRND_SHADOW, mujoco.mjtRndFlag.mjRND_REFLECTION):
             self.scene.flags[flag] = shadows
 

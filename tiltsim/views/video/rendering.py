@@ -104,14 +104,14 @@ class FlightRenderer:
         """Render this flight of the same vehicle from now on."""
         self._flight = flight
         self._qpos = replay.joint_positions(self._model, flight.columns)
-        self._reference: Floats | None = None
-        if flight.assembly.follows_position:
-            path = replay.reference_path(
-                flight.assembly, float(flight["time"][-1]), REFERENCE_POINTS
-            )
-            self._reference = path if np.ptp(path, axis=0).max() > 0.0 else path[:1]
-        self._targets = replay.positions(flight.columns, suffix="_ref")
-        self._position = replay.positions(flight.columns)
+        vehicles = replay.by_prefix(flight.assembly)
+        followed = {prefix: own for prefix, own in vehicles.items() if own.follows_position}
+        self._references, end = [], float(flight["time"][-1])
+        for own in followed.values():
+            path = replay.reference_path(own, end, REFERENCE_POINTS)
+            self._references.append(path if np.ptp(path, axis=0).max() > 0.0 else path[:1])
+        self._targets = [replay.positions(flight.columns, prefix, "_ref") for prefix in followed]
+        self._positions = [replay.positions(flight.columns, prefix) for prefix in vehicles]
         self._overlay = Overlay(flight, self._video.height)
         self._cables = flight.scenario.cable
         self._camera = mujoco.MjvCamera()
@@ -137,15 +137,14 @@ class FlightRenderer:
             start, axis = data.site_xpos[site], data.site_xmat[site].reshape(3, 3)[:, 2]
             end = start + axis * self._arrow_scale * self._flight[column][sample]
             self._connect(ARROW, 0.035 * self._radius, start, end, (*THRUST_COLOR, 1.0))
-        if self._reference is not None:
-            color = (*REFERENCE_COLOR, 0.6)
-            for start, end in pairwise(self._reference):
-                self._connect(LINE, 0.012 * self._radius, start, end, color)
-            size, color = np.full(3, 0.07 * self._radius), (*REFERENCE_COLOR, 0.9)
-            geom = self._new_geom(mujoco.mjtGeom.mjGEOM_SPHERE, color)
+        for path, target in zip(self._references, self._targets, strict=True):
+            for start, end in pairwise(path):
+                self._connect(LINE, 0.012 * self._radius, start, end, (*REFERENCE_COLOR, 0.6))
+            geom = self._new_geom(mujoco.mjtGeom.mjGEOM_SPHERE, (*REFERENCE_COLOR, 0.9))
             if geom is not None:
-                geom.size, geom.pos = size, self._targets[sample]
-        self._add_trail(sample)
+                geom.size, geom.pos = np.full(3, 0.07 * self._radius), target[sample]
+        for position in self._positions:
+            self._add_trail(position, sample)
         names, values = self._table(sample)
         image = np.ascontiguousarray(self.canvas.draw(names, values, self._overlay.caption))
         self._overlay.paint(image, sample)
@@ -156,18 +155,18 @@ class FlightRenderer:
             "time": f"{self._flight['time'][sample]:.1f} s{self._speed}",
             **self._overlay.rows(sample),
         }
-        if self._reference is not None:
-            error = self._targets[sample] - self._position[sample]
+        if self._flight.assembly.follows_position:
+            error = self._targets[0][sample] - self._positions[0][sample]
             rows["position error"] = f"{np.linalg.norm(error):.3f} m"
         return "\n".join(rows), "\n".join(rows.values())
 
-    def _add_trail(self, sample: int) -> None:
+    def _add_trail(self, position: Floats, sample: int) -> None:
         time = self._flight["time"]
         now = time[sample]
         steps = np.arange(max(0.0, now - TRAIL_TIME), now, TRAIL_INTERVAL) / TRAIL_INTERVAL
         # Points at fixed times, so that the trail does not shimmer.
         samples = np.searchsorted(time, np.ceil(steps) * TRAIL_INTERVAL)
-        points = self._position[np.append(samples[samples < sample], sample)]
+        points = position[np.append(samples[samples < sample], sample)]
         shades = np.linspace(0.15, 0.95, len(points))
         for (start, end), shade in zip(pairwise(points), shades, strict=False):
             self._connect(LINE, 0.02 * self._radius, start, end, (*TRAIL_COLOR, shade))
