@@ -7,7 +7,7 @@ limits leave, and the side force that needs no lean from a linear program.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import atan, cos, exp, inf, pi
+from math import atan, exp, inf, pi
 from typing import Any, Final
 
 import numpy as np
@@ -266,7 +266,6 @@ def design(
         ascent=VERTICAL[0],
         descent=VERTICAL[1],
         greatest=TOTAL_SHARE * greatest,
-        lift=float(high.sum()) * (cos(keys.max_tilt) if craft.commanded else 1.0),
         attitude_damping=0.9,
         reversal=lag + h if lag else 0.0,
         share=1.0 - exp(-tracking * h),

@@ -27,8 +27,8 @@ SIDE_SHARE: Final = 0.65
 """Share of the greatest thrusts that side force may take."""
 SERVO_ANGLE: Final = 0.3
 """rad: the tilt by which braking counts about an axis that only tilts turn."""
-TILT_SHARE: Final = 0.9, 0.9
-"""Shares of the range of tilts for side force, besides yaw, and for the pose that is held."""
+TILT_SHARE: Final = 0.9
+"""Share of the range of tilts that side force may take, as yaw needs some."""
 SLOPE_SHARE: Final = 0.8
 """Share of the side force of hover that counts on."""
 DIRECTIONS: Final = 8
@@ -89,13 +89,12 @@ def preferred_tilts(craft: Craft) -> Floats:
     return max((craft.tilts, np.zeros(len(craft.tilts))), key=margin)
 
 
-def side_slope(craft: Craft, rows: Floats, tilt_share: float = TILT_SHARE[0]) -> float:
+def side_slope(craft: Craft, rows: Floats) -> float:
     """Side force per lift that level hover has in every direction within the limits.
 
     Args:
         craft: The vehicle.
         rows: Force and torque per newton, shape (6, N).
-        tilt_share: Share of the range of tilts that it may take.
     """
     if craft.moving:
         return 0.0
@@ -105,7 +104,7 @@ def side_slope(craft: Craft, rows: Floats, tilt_share: float = TILT_SHARE[0]) ->
     low, most = craft.limits[0], np.minimum(SIDE_SHARE * craft.limits[1], 2.4 * craft.hover)
     if craft.commanded:
         # A rotor that tilts within a range pushes like two rotors at its ends.
-        preferred, most_tilt = preferred_tilts(craft), tilt_share * craft.tilt_range
+        preferred, most_tilt = preferred_tilts(craft), TILT_SHARE * craft.tilt_range
         rows = np.hstack([craft.wrench(preferred + tilt) for tilt in (-most_tilt, most_tilt)])
         low, most = np.zeros(rows.shape[1]), np.tile(most, 2)
     return SLOPE_SHARE * least_force(craft, rows, sides, weight, (low, most)) / weight
@@ -125,7 +124,7 @@ def pose_cone(craft: Craft, rows: Floats, slope: float) -> float:
     holds_all = slope > 0.0 and not craft.commanded
     if holds_all and least_force(craft, rows, units, 0.0, (craft.limits[0], most)) > weight:
         return pi
-    return atan(side_slope(craft, rows, TILT_SHARE[1]) / SLOPE_SHARE if craft.commanded else slope)
+    return atan(slope / SLOPE_SHARE if craft.commanded else slope)
 
 
 def least_force(

@@ -17,6 +17,8 @@ from tiltsim_controllers.mathematics.moving import (
 )
 
 TINY = 1e-24
+LEAST_PUSH: Final = 0.25
+"""Acceleration of the feedback over the one in hover where nothing is spare."""
 UNALIGNED: Final = 0.1, 0.3
 """rad, the errors up to which an attitude is aligned, and from which it is not at all."""
 
@@ -126,6 +128,10 @@ def demanded(error: Moving, jerk_error: Any, ahead: Moving, frame: Frame, p: Any
     way = value_of(error)[:2]
     leans = xp.clip(xp.sqrt(way @ way + TINY) / p.near - 1.0, 0.0, 1.0)
     push = p.direct + leans * (p.acceleration - p.direct)
+    # The feedback has the share of what reference and disturbance leave that it has in hover.
+    rest = value_of(ahead - frame.force)
+    spare = _across(rest[2] + frame.gravity, p) - xp.sqrt(rest[:2] @ rest[:2] + TINY)
+    push = push * xp.clip(spare / _across(frame.gravity, p), LEAST_PUSH, 1.0)
     delay = p.reversal + leans * (p.lean_time - p.reversal)
     across = feedback(slice(0, 2), p.position, p.damping, push, delay)
     upward = feedback(slice(2, 3), p.rise, p.rise_damping, p.descent, p.reversal)
@@ -139,9 +145,14 @@ def demanded(error: Moving, jerk_error: Any, ahead: Moving, frame: Frame, p: Any
     lift = _clipped(target[2] + frame.gravity, 0.2 * frame.gravity, p.greatest)
     # No more side force than leaves the lift, and no lean beyond 60 degrees.
     up = lift.value
-    left = xp.sqrt(xp.maximum(p.greatest * p.greatest - up * up, 0.04 * p.greatest * p.greatest))
-    side = _within(target[:2], xp.minimum(left, 1.7 * up))
+    side = _within(target[:2], xp.minimum(_across(up, p), 1.7 * up))
     return stacked(side[0], side[1], lift)
+
+
+def _across(lift: Any, p: Any) -> Any:
+    """Greatest acceleration (m/s^2) across that leaves a lift per mass (m/s^2)."""
+    left = xp.maximum(p.greatest * p.greatest - lift * lift, 0.04 * p.greatest * p.greatest)
+    return xp.sqrt(left)
 
 
 def _within(vector: Moving, limit: Any) -> Moving:
