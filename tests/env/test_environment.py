@@ -507,6 +507,8 @@ def test_gymnasium_refuses_steps_outside_of_an_episode_and_actions_of_other_shap
     for action in (0.0, [0.0], np.zeros(4)):
         with pytest.raises(ValueError, match=r"expected \(8,\)"):
             env.step(action)
+    with pytest.raises(ValueError, match="complex128: must be real numbers"):
+        env.step(np.full(8, 1.0j))
     env.step(np.full(8, 5.0))  # clipped
 
 

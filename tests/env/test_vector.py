@@ -13,8 +13,7 @@ from tiltsim.env.functions import loop_on_equations
 from tiltsim.env.tasks import TASKS
 from tiltsim.equations.solvers import make_implicitfast_step
 from tiltsim.errors import InputError
-from tiltsim.laws.assembling import assemble
-from tiltsim.laws.commanded import with_command
+from tiltsim.laws.assembling import assemble, with_command
 
 SPINNING = {"attitude": [0.2, -0.1, 0.5], "velocity": [1.0, 0.3, -0.2]} | {
     "angular_velocity": [1.0, -2.0, 0.5],

@@ -78,6 +78,16 @@ def test_the_page_shows_a_function_that_reaches_its_target(hover):
     assert flight["position"][-1] == pytest.approx(TARGET["position"], abs=2e-3)
 
 
+def test_a_marked_function_of_a_file_is_flown_as_a_law(hover):
+    tables = document(hover, 0.1)
+    other = {**tables, "controller": {"law": "attitude_altitude"}}
+    given = tiltsim.simulate(other, controller=f"{hover}:hover")
+    np.testing.assert_array_equal(given.samples, tiltsim.simulate(tables).samples)
+    tables["controller"]["law"] = "python"
+    with pytest.raises(tiltsim.InputError, match=r'law of arrays; .* controller.law = "numpy"'):
+        tiltsim.simulate(tables)
+
+
 def test_an_edited_file_is_another_compiled_law(hover, tmp_path):
     edited = tmp_path / "my_law.py"
     edited.write_text(hover.read_text().replace("* (body.gravity", "* 1.04 * (body.gravity"))

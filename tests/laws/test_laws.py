@@ -17,7 +17,10 @@ from tiltsim.laws.assembling import LOOPS, assemble, loop_of
 from tiltsim.models.cross import as_multirotor
 from tiltsim.models.rotorcraft import RotorcraftSpec, compile_model
 from tiltsim.plants.mujoco_plant import MujocoPlant
+from tiltsim.scenario.controller import laws_for
 from tiltsim.scenario.loading import merge
+from tiltsim.scenario.rotorcraft import MultirotorTable
+from tiltsim.scenario.vehicle import VEHICLES
 from tiltsim.simulation.simulate import make_plant
 from tiltsim.studies.multirotor_analysis import balance_report
 from tiltsim_controllers.analysis.singularity import (
@@ -467,8 +470,8 @@ MISTAKES = {
         "reference.radius = 0.0: must not be 0",
     ),
     "unknown disturbance": (
-        {"disturbance": [{"type": "earthquake", "value": [1.0, 0.0, 0.0]}]},
-        'disturbance[0].type = "earthquake": choose acceleration',
+        {"disturbance": [{"type": "gust", "value": [1.0, 0.0, 0.0]}]},
+        'disturbance[0].type = "gust": did you mean air.gust? choose acceleration',
     ),
     "zone turned round": (
         {**LAWS["switching"], "controller": {"law": "switching", "zone": {"roll": [0.2, -0.2]}}},
@@ -552,3 +555,15 @@ def test_a_flight_reads_back_with_the_laws_own_states(law, tmp_path):
     again = load_flight(tmp_path)
     np.testing.assert_array_equal(again.samples, flight.samples)
     assert again.scenario == flight.scenario
+
+
+def test_laws_for_all_rotorcraft_fly_a_new_kind_of_them(monkeypatch):
+    """And laws of particular vehicles do not."""
+
+    class Blimp(MultirotorTable):
+        pass
+
+    monkeypatch.setitem(VEHICLES, "blimp", Blimp)
+    assert {"geometric", "lqr", "python", "numpy"} <= {*laws_for("blimp")}
+    assert not {"attitude_altitude", "tilt_car_third_derivative"} & {*laws_for("blimp")}
+    assert not {"geometric", "python"} & {*laws_for("tilt_car")}

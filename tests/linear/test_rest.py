@@ -423,6 +423,7 @@ def test_the_attitude_of_a_vehicle_that_drifts_sideways_rests():
     found = tiltsim.stability(scenario)
     assert found.left_out == ("x", "y", "vx", "vy")
     assert found.report()["left_out"] == list(found.left_out)
+    assert "nothing holds them: x, y, vx, vy" in found._repr_html_()
     assert "left out  x, y, vx, vy: nothing holds them" in stability_text(found)
     assert not set(found.states) & set(found.left_out)
     assert found.stable

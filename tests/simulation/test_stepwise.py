@@ -202,5 +202,5 @@ def test_a_tilt_car_steps_without_observations():
     simulation.step(10)
     assert len(simulation.flight()) == 2
     for method in (simulation.observation, simulation.command):
-        with pytest.raises(tiltsim.TiltsimError, match="not supported for the tilt_car"):
+        with pytest.raises(tiltsim.TiltsimError, match="takes rotorcraft only"):
             method()

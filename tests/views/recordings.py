@@ -40,6 +40,7 @@ def rows(path, entity, component):
     return np.array(times)[order] * 1e-9, [values[index] for index in order]
 
 
-def scalars(path, entity):
+def scalars(path, entity, number=0):
+    """Times (s) and values of one line of a plot."""
     times, values = rows(path, entity, "Scalars:scalars")
-    return times, np.array(values)[:, 0]
+    return times, np.array(values)[:, number]

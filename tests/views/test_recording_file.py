@@ -24,13 +24,13 @@ from tiltsim.views.rerun.viewer import require_viewer
 from tiltsim.views.signals import signals_of
 
 SERIES = {
-    "/attitude/roll": "roll",
-    "/attitude/pitch_ref": "pitch_ref",
-    "/tilt_angles/alpha_3": "alpha_3",
-    "/tilt_angles/alpha_ref_3": "alpha_ref_3",
-    "/rotor_speeds/rotor_2": "rotor_speed_2",
-    "/singularity/margin": "singularity_margin",
+    ("/attitude", 0): "roll",
+    ("/tilt_angles", 4): "alpha_3",
+    ("/tilt_angles", 5): "alpha_ref_3",
+    ("/rotor_speeds", 1): "rotor_speed_2",
+    ("/singularity", 0): "singularity_margin",
 }
+"""Columns by the entities of plots and their number in it."""
 
 
 def error_axes(this):
@@ -54,10 +54,17 @@ def test_a_recording_has_all_entities_and_one_timeline(recorded):
     assert [entry.application_id for entry in reader.recordings()] == ["tiltsim"]
     assert len(reader.blueprints()) == 1
     assert [index.name for index in reader.store().schema().index_columns()] == [TIMELINE]
-    expected = {*SERIES, "/events", "/plane/attitude", "/plane/margin", "/plane/trail"}
+    expected = {
+        "/attitude",
+        "/tilt_angles",
+        "/position_error",
+        "/events",
+        "/plane/attitude",
+        "/plane/margin",
+        "/plane/trail",
+    }
     expected |= {"/world/vehicle", "/world/camera", "/world/trail", "/plane/forbidden"}
     expected |= {f"/world/vehicle/pod_{i}/thrust" for i in (1, 2, 3, 4)}
-    expected |= {f"/position_error/{axis}" for axis in error_axes(this)}
     for panel in signals_of(this.assembly).values():
         expected |= {f"/{panel.path}/{level.name}" for level in panel.levels}
     if this.scenario.controller.decoupler != "none":
@@ -67,19 +74,19 @@ def test_a_recording_has_all_entities_and_one_timeline(recorded):
 
 def test_time_series_agree_with_the_parquet_file(recorded):
     path, this = recorded
-    for entity, column in SERIES.items():
-        times, values = scalars(path, entity)
+    for place, column in SERIES.items():
+        times, values = scalars(path, *place)
         np.testing.assert_allclose(times, this["time"], atol=1e-9)
         np.testing.assert_array_equal(values, this[column])
-    for axis in error_axes(this):
-        _, values = scalars(path, f"/position_error/{axis}")
+    for number, axis in enumerate(error_axes(this)):
+        _, values = scalars(path, "/position_error", number)
         np.testing.assert_array_equal(values, this[f"{axis}_ref"] - this[axis])
 
 
 def test_a_supervisor_is_drawn_with_its_threshold(tmp_path):
     path, this = tmp_path / "flight.rrd", flight("supervised")
     save_recording([this], path)
-    _, values = scalars(path, "/singularity/supervision")
+    _, values = scalars(path, "/singularity", 1)
     np.testing.assert_array_equal(values, this["supervision"])
     _, levels = scalars(path, "/singularity/threshold")
     assert set(levels) == {0.9}
@@ -184,7 +191,7 @@ def test_a_flight_in_pieces_is_recorded_like_a_complete_one(tmp_path):
         ("/plane/curve", "LineStrips2D:strips"),
         ("/plane/trail", "LineStrips2D:strips"),
         ("/world/floor", "Transform3D:translation"),
-        ("/singularity/margin", "Scalars:scalars"),
+        ("/singularity", "Scalars:scalars"),
         ("/events", "TextLog:text"),
     ):
         expected, found = rows(whole, entity, component), rows(pieces, entity, component)
@@ -299,19 +306,19 @@ def test_a_port_without_a_viewer_is_an_error_of_one_line():
 
 def test_vehicles_of_a_flight_have_separate_plots(tmp_path):
     companion = {"name": "wing", "offset": [2.0, 0.3, 0.0]}
+    companion["changes"] = {"initial": {"attitude": [0.1, 0.05, 0.0]}}
     changes = {"simulation.duration": 0.1, "simulation.integrator": "implicitfast", "expect": []}
     scenario = load_scenario("fleet/hexarotor#hover", changes | {"companion": [companion]})
     flight = simulate(scenario)
     save_recording([flight], tmp_path / "both.rrd")
     found = entities(tmp_path / "both.rrd")
     for name, prefix in (("first\\ vehicle", ""), ("wing", "wing_")):
-        for root in (f"/{name}/attitude/pitch", f"/{name}/signals/attitude/pitch"):
-            np.testing.assert_array_equal(
-                scalars(tmp_path / "both.rrd", root)[1], flight[f"{prefix}pitch"]
-            )
+        for place in ((f"/{name}/attitude/pitch",), (f"/{name}/signals/attitude", 2)):
+            values = scalars(tmp_path / "both.rrd", *place)[1]
+            np.testing.assert_array_equal(values, flight[f"{prefix}pitch"])
     assert not any(path.startswith("/first\\ vehicle/signals/wing") for path in found)
     save_recording([flight], tmp_path / "wing.rrd", vehicle="wing")
-    alone = scalars(tmp_path / "wing.rrd", "/attitude/pitch")[1]
+    alone = scalars(tmp_path / "wing.rrd", "/attitude", 2)[1]
     np.testing.assert_array_equal(alone, flight["wing_pitch"])
     with pytest.raises(InputError, match="choose first vehicle, wing"):
         save_recording([flight], tmp_path / "none.rrd", vehicle="none")

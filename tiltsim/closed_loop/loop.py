@@ -157,9 +157,9 @@ class ClosedLoop:
     """``(sample by field, setup) -> texts``: why the flight ends where each of these is zero."""
     controller_states: int = 0  # number of activations that are states of the controller
     spins: Values = ()  # signs of the rotor speeds, one per rotor of a rotorcraft
-    tilt_of_rotor: tuple[int, ...] = ()
-    """The number, from 0, of each rotor's tilt, -1 for a fixed one; empty for vehicles whose
-    rotors lie on a cross."""
+    tilt_of_rotor: tuple[int, ...] = ()  # number, from 0, of each one's tilt; -1 for a fixed one
+    vehicle_record: Any = None
+    """Type of the parameters of a rotorcraft, see `tiltsim.vehicles.rotorcraft.true_rotors`."""
     extra_actuators: tuple[ExtraActuators, ...] = ()
     """Actuators that layers around the controller append to the model, innermost first."""
     commands_thrusts: bool = False

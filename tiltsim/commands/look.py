@@ -120,6 +120,8 @@ def run_plot(
         )
     if metrics and sweep is None:
         raise InputError(f"--metric {metrics[0]}: {first} is not the folder of a sweep")
+    if vehicle and (sweep is not None or any(map(is_log, flights))):
+        raise InputError(f"--vehicle {vehicle}: for flights alone, not for sweeps and logs")
     logs: list[Log] = []
     if sweep is not None:
         results = load_results(sweep)

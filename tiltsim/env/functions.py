@@ -17,8 +17,7 @@ from tiltsim.env.task import Task
 from tiltsim.equations.actuator_level import rigid_body
 from tiltsim.equations.solvers import make_implicitfast_step
 from tiltsim.errors import InputError
-from tiltsim.laws.assembling import loop_of
-from tiltsim.laws.commanded import commanded_parameters, with_command
+from tiltsim.laws.assembling import commanded_parameters, loop_of, with_command
 from tiltsim.laws.layers.layer import on_equations
 from tiltsim.plants.command import Observation, Reference
 from tiltsim.scenario.documents import split_key, value_at, with_value
@@ -38,7 +37,8 @@ LEAST_THRUST: Final = 1e-30  # N; a root has no derivative at zero
 
 def loop_on_equations(scenario: Scenario) -> ClosedLoop:
     """The loop of a rotorcraft under commands, as a rigid body."""
-    return on_equations(loop_of(scenario), rigid_body(scenario))
+    loop = loop_of(scenario)
+    return on_equations(loop, rigid_body(loop, scenario.any_rotorcraft))
 
 
 class Episode(NamedTuple):

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tiltsim.env.environment import Environment, TiltrotorEnv
+from tiltsim.env.task import real_action
 from tiltsim.errors import InputError
 from tiltsim.plants.command import Command
 from tiltsim.system.text import short_repr
@@ -99,7 +100,7 @@ class GymnasiumEnv(gymnasium.Env):  # type: ignore[misc]
         """Hold an action for one control step; ``info["cause"]`` explains a termination."""
         if not self._flying:
             raise RuntimeError("the episode has ended: call reset()")
-        array = np.asarray(action, dtype=np.float64)
+        array = real_action(action)
         if array.shape != self._middle.shape:
             raise ValueError(f"action of shape {array.shape}; expected {self._middle.shape}")
         step = self.env.step(self._middle + self._half * array)

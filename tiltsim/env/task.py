@@ -108,15 +108,20 @@ def action_spec(scenario: Scenario, max_tilt_angle: float | None = None) -> spec
     return specs.BoundedArray((len(low),), np.float64, low, high, name)
 
 
+def real_action(action: npt.ArrayLike) -> Floats:
+    """An action as an array. Raises ValueError for other entries than real numbers."""
+    try:
+        return real_array(action)
+    except TypeError as error:
+        raise ValueError(f"action {error}: must be real numbers") from None
+
+
 def clip_action(action: npt.ArrayLike, spec: specs.BoundedArray) -> Floats:
     """An action within its bounds.
 
     Raises ValueError for a wrong shape, a non-finite entry, or other entries than real numbers.
     """
-    try:
-        array = real_array(action)
-    except TypeError as error:
-        raise ValueError(f"action {error}: must be real numbers") from None
+    array = real_action(action)
     if array.shape != spec.shape:
         raise ValueError(f"action of shape {array.shape}; expected {spec.shape} ({spec.name})")
     if not np.isfinite(array).all():

@@ -16,14 +16,13 @@ import numpy as np
 
 from tiltsim.closed_loop.loop import ClosedLoop
 from tiltsim.models.parts import WRENCH_SIZE
-from tiltsim.scenario.scenario import FlightPlan, Scenario
+from tiltsim.scenario.rotorcraft import RotorcraftTable
+from tiltsim.scenario.scenario import FlightPlan
 from tiltsim.vehicles.rotorcraft import (
     Layout,
     initial_tilts,
     is_fixed_cross,
     layout_of,
-    rotors_record,
-    tilt_of_rotor,
     true_rotors,
 )
 from tiltsim_controllers.code.arrays import xp
@@ -331,24 +330,22 @@ def actuator_plant(loop: ClosedLoop) -> ActuatorPlant:
     return plant_of(
         attitude,
         as_printed(attitude, layout_of(loop).tilts),
-        tilt_of_rotor(loop),
+        loop.tilt_of_rotor,
         loop.spins,
-        rotors_record(loop),
+        loop.vehicle_record,
         gyroscopic=float(fixed),
         has_limits=not fixed,  # whose rotors make any thrust
     )
 
 
-def rigid_body(scenario: Scenario) -> ActuatorPlant:
-    """The rigid body of a scenario's rotorcraft."""
-    vehicle = scenario.any_rotorcraft
-    record: Any = type(true_rotors(scenario))
+def rigid_body(loop: ClosedLoop, vehicle: RotorcraftTable) -> ActuatorPlant:
+    """The rigid body of a model, the limits of whose rotors and tilts a scenario's table has."""
     return plant_of(
         QUATERNION,
-        as_in_mujoco(vehicle.tilt_count if scenario.vehicle.has_tilting_rotors else 0),
-        tuple(map(vehicle.tilt_of_rotor, range(1, vehicle.rotor_count + 1))),
-        vehicle.spins,
-        record,
+        as_in_mujoco(layout_of(loop).tilts),
+        loop.tilt_of_rotor,
+        loop.spins,
+        loop.vehicle_record,
         gyroscopic=1.0,
         has_limits=vehicle.has_rotor_limits or vehicle.tilt_servo.max_angle is not None,
     )

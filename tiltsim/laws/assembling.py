@@ -1,15 +1,16 @@
-"""Which closed loop a scenario has, and its `Assembly`."""
+"""Which closed loop a scenario has, under a law or under commands from outside; its `Assembly`."""
 
-from collections.abc import Callable
-from typing import Final
+from collections.abc import Callable, Mapping
+from functools import cache
+from typing import Any, Final
 
 from tiltsim.closed_loop.assembly import Assembly
-from tiltsim.closed_loop.loop import ClosedLoop
-from tiltsim.equations.actuator_level import ActuatorPlant, actuator_plant, rigid_body
-from tiltsim.laws.commanded import commanded_loop
+from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup
+from tiltsim.equations.actuator_level import actuator_plant, rigid_body
 from tiltsim.laws.companions import Member, with_companions
 from tiltsim.laws.flown_law import loop_of_law
 from tiltsim.laws.kinds import LOOPS_OF_KINDS
+from tiltsim.laws.law import Law, servo_lead
 from tiltsim.laws.layers.actuation import with_actuation
 from tiltsim.laws.layers.contact import (
     with_force_loop,
@@ -25,15 +26,131 @@ from tiltsim.laws.layers.instruments import (
     with_measured_acceleration,
 )
 from tiltsim.laws.layers.layer import on_equations
-from tiltsim.laws.linearizing import TILTROTOR, full_pose_loop, multirotor_loop, tiltrotor_loop
-from tiltsim.laws.quadrotor import QUADROTOR_ATTITUDE_ALTITUDE, SWITCHING, YAW_POSITION
-from tiltsim.laws.rotor_loop import layout_of_vehicle
+from tiltsim.laws.linearizing import (
+    TILTROTOR,
+    full_pose_loop,
+    multirotor_loop,
+    singularity_columns,
+    tiltrotor_loop,
+)
+from tiltsim.laws.quadrotor import LAYOUT as QUADROTOR
+from tiltsim.laws.quadrotor import (
+    QUADROTOR_ATTITUDE_ALTITUDE,
+    SWITCHING,
+    YAW_POSITION,
+    upright_columns,
+)
+from tiltsim.laws.rotor_loop import RotorLayout, layout_of_vehicle, margins_of, rotor_loop
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.law_controller import LawTable
 from tiltsim.scenario.linearizing_controllers import AttitudeForceController
-from tiltsim.scenario.scenario import Scenario, plan_flight
+from tiltsim.scenario.scenario import FlightPlan, Scenario, plan_flight
 from tiltsim.system.files import one_thread_at_a_time
+from tiltsim.vehicles.rotorcraft import EXTRA_COLUMNS
 from tiltsim.vehicles.rotorcraft.others import others_of
+from tiltsim_controllers.code.arrays import xp
+from tiltsim_controllers.gaits.motion import GaitParameters, planned_tilts
+from tiltsim_controllers.laws.observed import Step
+from tiltsim_controllers.mathematics.records import make_record_type, vector_of
+from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector
+from tiltsim_controllers.references.trajectories import ReferenceParameters
+from tiltsim_controllers.vehicle.body import Body
+from tiltsim_controllers.vehicle.parameters import Vehicle
+
+
+def commanded_parameters(parameters: Any) -> Any:
+    """The parameters of the vehicle under commands, within the parameters of its layers."""
+    inner = getattr(parameters, "inner", None)
+    return parameters.law if inner is None else commanded_parameters(inner)
+
+
+def with_command(parameters: Any, command: Values) -> Any:
+    """Parameters of a vehicle under commands, within any layers, with this command.
+
+    ``command`` are tilt angles (rad), then accelerations of the rotors (rad/s^2).
+    """
+    if hasattr(parameters, "inner"):
+        return parameters._replace(inner=with_command(parameters.inner, command))
+    law = parameters.law
+    tilts = len(law.command.tilts)
+    held = type(law.command)(command[:tilts], command[tilts:])
+    return parameters._replace(law=law._replace(command=held))
+
+
+def planned_servo_commands(
+    time: float, tilts: int, gait: GaitParameters, knots: Vector, lead: float
+) -> Values:
+    """Commands (rad) of tilt servos, ahead of a gait by their lag.
+
+    Args:
+        time: s.
+        tilts: Number of tilts.
+        gait, knots: The gait and its table data.
+        lead: Lag of the servos, s.
+    """
+    planned = planned_tilts(time, gait, tuple(knots), tilts)
+    return tuple(angle + lead * rate for angle, rate, _ in planned)
+
+
+@cache
+def _commanded_loop(layout: RotorLayout, columns: tuple[str, ...]) -> ClosedLoop:
+    """The loop of the vehicles of a layout, with columns among `EXTRA_COLUMNS`."""
+    rotors, tilts = layout.places
+    planned, sent = layout.places.names("alpha_ref"), layout.places.names("tilt_command")
+    command = make_record_type(
+        "HeldCommand",
+        tilts=vector_of(tilts),  # rad, for the servos
+        accelerations=vector_of(rotors),  # rad/s^2, of the rotors, with their signs
+    )
+    record = make_record_type(
+        "CommandedParameters",
+        vehicle=Vehicle if layout.cross else Body,
+        rotors=float,  # where in the knots the table of the rotors begins
+        gait=GaitParameters,
+        reference=ReferenceParameters,
+        command=command,  # which the plant replaces in its copy of the record
+    )
+    on_cross = singularity_columns if tilts else upright_columns
+
+    def margins(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Floats]:
+        commands = {column: samples[name] for column, name in zip(planned, sent, strict=True)}
+        if layout.cross:
+            return {**commands, **on_cross(samples, setup.parameters.law.vehicle)}
+        return {**commands, **margins_of(layout)(samples, setup)}
+
+    def held(plan: FlightPlan) -> dict[str, Any]:
+        lead = servo_lead(plan.scenario.any_rotorcraft.tilt_servo)
+        commands = planned_servo_commands(0.0, tilts, plan.gait.parameters, plan.knots, lead)
+        return {"command": command(commands, (0.0,) * rotors)}
+
+    law = Law(
+        lambda _seen, p, _knots: Step(p.command.accelerations),
+        record,
+        held,
+        lambda plan: plan.scenario.any_rotorcraft.multirotor.table,
+        tilts=lambda _seen, _rates, p, _knots: xp.stack([p.command.tilts, xp.zeros(tilts)], 1),
+        units=dict.fromkeys(sent, "rad"),
+        records_commands=True,
+        columns=columns,
+        margins=margins,
+        follows_position=lambda scenario: scenario.reference.kind != "attitude_altitude",
+    )
+    return rotor_loop(layout, law)
+
+
+def commanded_loop(scenario: Scenario) -> ClosedLoop:
+    """The loop of a scenario's rotorcraft under commands, without layers.
+
+    A user's vehicle without the four equal arms has no columns of singularity.
+    """
+    vehicle = scenario.any_rotorcraft
+    if not vehicle.cross:
+        return _commanded_loop(layout_of_vehicle(vehicle.multirotor), ("singularity_margin",))
+    columns = (*EXTRA_COLUMNS,) if scenario.rotorcraft.has_standard_layout else ()
+    return _commanded_loop(TILTROTOR if vehicle.has_tilting_rotors else QUADROTOR, columns)
+
+
+# --- under laws ----------------------------------------------------------------------------------
 
 LOOPS: Final[dict[str, ClosedLoop]] = {
     "attitude_altitude": tiltrotor_loop("attitude_altitude", False, "", False),
@@ -125,14 +242,9 @@ def loop_of(
         )
     if plant == "mujoco" or as_printed:
         return loop
-    return on_equations(loop, _plant_of(scenario, loop))
-
-
-def _plant_of(scenario: Scenario, loop: ClosedLoop) -> ActuatorPlant:
-    """The equations on which the controls of MuJoCo's model act."""
-    if scenario.simulation.plant == "rigid_body":
-        return rigid_body(scenario)
-    return actuator_plant(loop)
+    if plant == "thesis":
+        return on_equations(loop, actuator_plant(loop))
+    return on_equations(loop, rigid_body(loop, scenario.any_rotorcraft))
 
 
 def assemble(

@@ -218,6 +218,9 @@ def supervised(law: Law, supervision: Supervision, strategy: str) -> Law:
     )
 
 
+# --- closed loops with any kind of vehicle -----------------------------------------------------
+
+
 def servo_lead(servo: ServoTable) -> float:
     """Lag (s) of a tilt servo behind a command of constant rate, ``2 zeta / omega_n``."""
     return 2.0 * servo.damping_ratio / servo.natural_frequency

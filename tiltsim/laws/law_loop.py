@@ -35,6 +35,7 @@ from tiltsim_controllers.references.trajectories import (
 )
 from tiltsim_controllers.vehicle.actuators import held_gain
 from tiltsim_controllers.vehicle.body import Body, inertia_matrix, state_of
+from tiltsim_controllers.vehicle.cross import speed_along_spin
 from tiltsim_controllers.vehicle.parameters import Vehicle
 from tiltsim_controllers.vehicle.rotors import ROTOR_FLOATS, rotors_in, table_per_newton, wrench_map
 
@@ -95,11 +96,6 @@ def record_of(parameters: type[tuple[Any, ...]]) -> Any:
         control_period=float,  # s, between samples; 0: continuous
         own=parameters,
     )
-
-
-def _signed_root(value: Any) -> Any:
-    """The number whose product with its own size is the value."""
-    return xp.copysign(xp.sqrt(abs(value)), value)
 
 
 def _vector(command: Command, name: str, size: int) -> Any:
@@ -201,7 +197,7 @@ def _accelerations(command: Command, gain: Any, k: Any, speeds: Any) -> Any:
     values = _vector(command, given[0], len(k))
     if given[0] == "rotor_accelerations":
         return values
-    return gain * ((_signed_root(values / k) if given[0] == "thrusts" else values) - speeds)
+    return gain * ((speed_along_spin(values / k) if given[0] == "thrusts" else values) - speeds)
 
 
 def _state_rates(flown: FlownLaw, command: Command, states: Any, known: Any) -> tuple[Any, Any]:

@@ -33,7 +33,8 @@ from tiltsim_controllers.mathematics.attitude import euler_angles
 from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector
 from tiltsim_controllers.references.trajectories import reference_attitude, reference_motion
 from tiltsim_controllers.vehicle.body import BODY_FIELDS, BODY_STATES
-from tiltsim_controllers.vehicle.craft import equations_of_motion
+from tiltsim_controllers.vehicle.craft import craft_record, equations_of_motion
+from tiltsim_controllers.vehicle.parameters import Vehicle
 from tiltsim_controllers.vehicle.rotors import ROTOR_FLOATS, force_and_torque
 
 
@@ -290,7 +291,8 @@ def rotor_loop(
         ),
         controller_states=len(law.states),
         spins=layout.spins,
-        tilt_of_rotor=() if layout.cross else layout.tilt_of_rotor,
+        tilt_of_rotor=layout.tilt_of_rotor,
+        vehicle_record=Vehicle if layout.cross else craft_record(*places),
         commands_thrusts=functions.commands_thrusts,
         observe_reads_controls=functions.commands_thrusts,
     )

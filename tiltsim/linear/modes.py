@@ -154,7 +154,8 @@ def labeled(prefix: str, word: str) -> str:
 def _mode(
     pole: complex, part: Floats, names: Sequence[str], count: int, prefixes: Sequence[str]
 ) -> Mode:
-    order = [int(i) for i in np.argsort(-part, kind="stable") if part[i] >= SHARE * part.max()]
+    share = np.round(part / part.max(), 6)  # equal ones keep their order
+    order = [int(i) for i in np.argsort(-share, kind="stable") if share[i] >= SHARE]
     states = tuple(names[i] for i in order)
     words = [
         (prefix, WORDS.get(name) or KINDS.get(name.partition("_")[0], name))

@@ -68,7 +68,15 @@ class Stability:
             (m.name, f"{m.frequency:.5g}", f"{m.damping:.4f}", m.count, ", ".join(m.states[:6]))
             for m in self.modes
         ]
-        return html_table("Stability", [self._verdict], rows, columns)
+        notes = [
+            text + ", ".join(names)
+            for text, names in (
+                ("left out, since nothing holds them: ", self.left_out),
+                ("at a corner, so that poles say little: ", self.corners),
+            )
+            if names
+        ]
+        return html_table("Stability", [self._verdict, *notes], rows, columns)
 
     @property
     def _verdict(self) -> str:

@@ -55,7 +55,7 @@ class LoggedVehicle:
         scenario.require_rotorcraft("identify")
         scenario.require_alone("identify")
         table = scenario.any_rotorcraft
-        vehicle = self.vehicle = scenario.model_error.apply_to_rotors(table.multirotor)
+        vehicle = self.vehicle = scenario.model_error.apply(table.multirotor)
         drag, servo = scenario.air.drag, table.tilt_servo
         mean = np.array([np.mean(vehicle.thrust_coefficients)])
         torque = np.array([np.mean([rotor.drag for rotor in vehicle.rotors])])

@@ -14,27 +14,12 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from tiltsim.models.parts import TiltServo
+from tiltsim.models.parts import ModelSpec, TiltServo
 from tiltsim.system.files import is_file, is_folder
 
 if TYPE_CHECKING:
     import mujoco
 
-    from tiltsim.models.mjspec_tree import MjSpecTree
-
-_PLAIN: Final = {
-    "gear": [1.0, 0.0, 0.0, 0.0, 0.0, 0.0],
-    "dyntype": "none",
-    "gaintype": "fixed",
-    "gainprm": [1.0],
-    "biastype": "none",
-    "ctrllimited": "false",
-    "actlimited": "false",
-    "forcelimited": "false",
-    "ctrlrange": [0.0, 0.0],
-    "forcerange": [0.0, 0.0],
-}
-"""An actuator whose force is its control, whatever a user's file has as default."""
 MAX_BYTES: Final = 4 * 2**20  # size of the file and all files that it includes, together
 MAX_ELEMENTS: Final = 2_000
 """XML elements, with included files and each replica counted.
@@ -106,95 +91,133 @@ def spec_of(root: Any) -> mujoco.MjSpec:
     return mujoco.MjSpec.from_string(text, assets=root.get_assets())
 
 
-def remove_visuals(root: MjSpecTree, *, contacts: bool, kept: Sequence[str] = ()) -> None:
+def set_integration(spec: mujoco.MjSpec, options: ModelSpec) -> None:
+    """Set the time step, the integrator and the room for user data."""
+    import mujoco
+
+    spec.option.timestep, spec.nuserdata = options.timestep, options.userdata_size
+    integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{options.integrator.upper()}")
+    spec.option.integrator = integrator
+
+
+def set_flags(spec: mujoco.MjSpec, **flags: bool) -> None:
+    """Enable or disable parts of MuJoCo's physics, by their names in ``<flag>``."""
+    import mujoco
+
+    for name, enabled in flags.items():
+        bit = int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{name.upper()}"))
+        spec.option.disableflags = spec.option.disableflags & ~bit | bit * (not enabled)
+
+
+def remove_visuals(spec: mujoco.MjSpec, *, contacts: bool, kept: Iterable[str] = ()) -> None:
     """Remove all that is only drawn or measured: geoms, cameras, lights, sensors and their sites.
 
-    ``contacts`` keeps the geoms that take part in contacts, ``kept`` sites by name. The shipped
-    vehicles have neither springs nor dampers, so that MuJoCo need not look for them.
+    ``contacts`` keeps the geoms that take part in contacts, ``kept`` are sites that stay. The
+    shipped vehicles have neither springs nor dampers, so that MuJoCo need not look for them.
     """
-    root.option.flag.spring = root.option.flag.damper = "disable"
-    for geom in root.find_all("geom"):
-        if not contacts or not geom.name.endswith(("collision", "ground")):
-            geom.remove()
-    for kind in ("camera", "light", "sensor"):
-        for element in root.find_all(kind):
-            element.remove()
-    acted_on = {*kept, *(actuator.site for actuator in root.find_all("actuator"))}
-    for site in root.find_all("site"):
-        if site.name not in acted_on:
-            site.remove()
+    import mujoco
+
+    set_flags(spec, spring=False, damper=False)
+    acting = (a for a in spec.actuators if a.trntype == mujoco.mjtTrn.mjTRN_SITE)
+    kept = {*kept, *(actuator.target for actuator in acting)}
+    touching = ("collision", "ground") if contacts else ()
+    drawn = (geom for geom in spec.geoms if not geom.name.endswith(touching))
+    sites = (site for site in spec.sites if site.name not in kept)
+    for element in (*drawn, *spec.cameras, *spec.lights, *spec.sensors, *sites):
+        spec.delete(element)
 
 
 def set_servos(
-    root: MjSpecTree, names: Sequence[str], servo: TiltServo, inertias: Sequence[float]
+    spec: mujoco.MjSpec, names: Sequence[str], servo: TiltServo, inertias: Sequence[float]
 ) -> None:
     """Give hinges and their actuators, position servos of the same names, a servo's behavior.
 
     Args:
-        root: The tree.
+        spec: The vehicle.
         names: Names of the hinges.
         servo: Natural frequency, damping and stops.
         inertias: About each hinge, kg m^2.
     """
+    import mujoco
+
+    limited, angle = mujoco.mjtLimited.mjLIMITED_FALSE, 0.0
+    if servo.max_angle is not None:
+        limited, angle = mujoco.mjtLimited.mjLIMITED_TRUE, servo.max_angle
+    in_file = degrees(angle) if spec.compiler.degree else angle
     for name, inertia in zip(names, inertias, strict=True):
-        joint, actuator = root.find("joint", name), root.find("actuator", name)
+        joint, actuator = spec.joint(name), spec.actuator(name)
         kp = inertia * servo.natural_frequency**2
         kv = 2.0 * inertia * servo.damping_ratio * servo.natural_frequency
-        actuator.gaintype = "fixed"
-        actuator.gainprm, actuator.biasprm = [kp, 0.0, 0.0], [0.0, -kp, -kv]
-        joint.range = actuator.ctrlrange = (0.0, 0.0)
-        joint.limited = actuator.ctrllimited = "false"
+        actuator.gaintype = mujoco.mjtGain.mjGAIN_FIXED
+        actuator.gainprm[:3], actuator.biasprm[:3] = (kp, 0.0, 0.0), (0.0, -kp, -kv)
+        joint.range, actuator.ctrlrange = (0.0 - in_file, in_file), (0.0 - angle, angle)
+        actuator.inheritrange = 0.0  # its own range, not the joint's
+        joint.limited = actuator.ctrllimited = limited
         if servo.max_angle is not None:
-            _set_stop(root, joint, actuator, servo.max_angle)
+            # As stiff as MuJoCo allows: its usual stop is softer than the servo and does nothing.
+            joint.solref_limit = (2.0 * spec.option.timestep, 1.0)
+            joint.solimp_limit = (0.99, 0.99, 0.001, 0.5, 2.0)
 
 
-def _set_stop(root: MjSpecTree, joint: Any, actuator: Any, max_angle: float) -> None:
-    """Limit a hinge and the command of its servo to plus and minus an angle (rad)."""
-    in_file = max_angle if root.compiler.angle == "radian" else degrees(max_angle)
-    joint.range, actuator.ctrlrange = (-in_file, in_file), (-max_angle, max_angle)
-    joint.limited = actuator.ctrllimited = "true"
-    # As stiff as MuJoCo allows: its usual stop is softer than the servo and would do nothing.
-    joint.solreflimit = (2.0 * root.option.timestep, 1.0)
-    joint.solimplimit = (0.99, 0.99, 0.001, 0.5, 2.0)
-
-
-def add_states(root: MjSpecTree, name: str, count: int) -> None:
+def add_states(spec: mujoco.MjSpec, name: str, count: int) -> None:
     """Append integrators ``name_1``, ... that act on nothing; in the keyframes they are zero."""
-    add_memories(root, name, count, dyntype="integrator")
-    _extend_keyframes(root, "act", count)
+    import mujoco
+
+    add_memories(spec, name, count, dyntype=mujoco.mjtDyn.mjDYN_INTEGRATOR)
+    _extend_keyframes(spec, "act", count)
 
 
-def add_memories(root: MjSpecTree, name: str, count: int, **attributes: str) -> None:
+def add_memories(spec: mujoco.MjSpec, name: str, count: int, **attributes: Any) -> None:
     """Append actuators ``name_1``, ... without gain, whose controls hold a sampled law's output."""
-    vehicle = root.find("body", "vehicle")
-    # Acting on a joint costs MuJoCo least.
-    joint = vehicle.find_all("joint", immediate_children_only=True)[-1]
+    joint = spec.body("vehicle").joints[-1].name  # acting on a joint costs MuJoCo least
     for index in range(1, count + 1):
-        _add_actuator(root, f"{name}_{index}", joint=joint, gainprm=[0.0], **attributes)
+        _add_actuator(spec, f"{name}_{index}", joint, gain=0.0, **attributes)
 
 
-def add_wrench(root: MjSpecTree, name: str, site: str) -> None:
+def add_wrench(spec: mujoco.MjSpec, name: str, site: str) -> None:
     """Append a force and a torque at a site, along its axes."""
+    import mujoco
+
     axes = [f"{kind}_{axis}" for kind in ("force", "torque") for axis in "xyz"]
     for axis, gear in zip(axes, np.eye(6).tolist(), strict=True):
-        _add_actuator(root, f"{name}_{axis}", site=site, gear=gear)
+        at_site = mujoco.mjtTrn.mjTRN_SITE
+        _add_actuator(spec, f"{name}_{axis}", site, gear=gear, trntype=at_site)
 
 
-def add_hinge_torques(root: MjSpecTree, name: str, hinges: int) -> None:
+def add_hinge_torques(spec: mujoco.MjSpec, name: str, hinges: int) -> None:
     """Append a torque about each of the first ``hinges`` tilt hinges."""
     for i in range(1, hinges + 1):
-        _add_actuator(root, f"{name}_hinge_{i}", joint=f"tilt_{i}")
+        _add_actuator(spec, f"{name}_hinge_{i}", f"tilt_{i}")
 
 
-def _add_actuator(root: MjSpecTree, name: str, **attributes: Any) -> None:
-    root.actuator.add("general", name=name, **(_PLAIN | attributes))
-    _extend_keyframes(root, "ctrl", 1)
+def _add_actuator(
+    spec: mujoco.MjSpec, name: str, target: str, gain: float = 1.0, **attributes: Any
+) -> None:
+    """An actuator whose force is its control times a gain, whatever a file has as default."""
+    import mujoco
+
+    free = mujoco.mjtLimited.mjLIMITED_FALSE
+    plain = {
+        "trntype": mujoco.mjtTrn.mjTRN_JOINT,
+        "gear": [1.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+        "dyntype": mujoco.mjtDyn.mjDYN_NONE,
+        "gaintype": mujoco.mjtGain.mjGAIN_FIXED,
+        "biastype": mujoco.mjtBias.mjBIAS_NONE,
+        **dict.fromkeys(("ctrllimited", "actlimited", "forcelimited"), free),
+        **dict.fromkeys(("ctrlrange", "forcerange"), (0.0, 0.0)),
+        "inheritrange": 0.0,
+    }
+    actuator = spec.add_actuator(name=name, target=target)
+    for attribute, value in (plain | attributes).items():
+        setattr(actuator, attribute, value)
+    actuator.gainprm[0] = gain
+    _extend_keyframes(spec, "ctrl", 1)
 
 
-def _extend_keyframes(root: MjSpecTree, vector: str, count: int) -> None:
-    for key in root.find_all("key"):
-        values = getattr(key, vector)
-        if values is not None:  # else MuJoCo takes zeros for all
+def _extend_keyframes(spec: mujoco.MjSpec, vector: str, count: int) -> None:
+    for key in spec.keys:
+        values = list(getattr(key, vector))
+        if values:  # else MuJoCo takes zeros for all
             setattr(key, vector, [*values, *[0.0] * count])
 
 

@@ -165,20 +165,22 @@ class Objects:
         return self.load is not None and not self.load.rigid
 
 
-def touchable(root: Any, *, ground: bool, number: int = -1) -> None:
+def touchable(root: mujoco.MjSpec, *, ground: bool, number: int = -1) -> None:
     """Let the vehicle's collision shapes touch other things, but not each other.
 
     Args:
-        root: The vehicle as a tree.
+        root: The vehicle.
         ground: Whether its ground can be touched.
         number: Its number among vehicles that touch each other; -1 for one alone.
     """
-    root.option.cone = "elliptic"  # a pyramid holds 29 % less along its diagonals
+    import mujoco
+
+    root.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC  # a pyramid holds 29 % less diagonally
     root.option.impratio = 10.0  # friction ten times as stiff as the contact: it creeps less
-    plane = root.find("geom", "ground")
+    plane = root.geom("ground")
     if plane is not None and not ground:
         plane.contype = plane.conaffinity = 0
-    for geom in root.find("body", "vehicle").find_all("geom"):
+    for geom in root.body("vehicle").find_all("geom"):
         if (geom.name or "").endswith("collision"):
             geom.contype = 1 if number < 0 else 1 | 2 << number  # a bit for all after it
             if number > 0:

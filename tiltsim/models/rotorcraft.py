@@ -9,12 +9,13 @@ from __future__ import annotations
 from dataclasses import KW_ONLY, dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, NamedTuple, cast
+from typing import Any, Final, NamedTuple, cast
 
+import mujoco
 import numpy as np
 
 from tiltsim.models import mjcf_editing
-from tiltsim.models.mjspec_tree import MjSpecTree
+from tiltsim.models.cross import as_multirotor
 from tiltsim.models.objects import Objects, add_companion, add_objects, touchable
 from tiltsim.models.parts import (
     SERVO_ARMATURE,
@@ -33,10 +34,8 @@ from tiltsim.system.hooks import mujoco_hooks
 from tiltsim_controllers.vehicle.body import ROTORS
 from tiltsim_controllers.vehicle.parameters import PRESETS, SPIN, Vehicle
 
-if TYPE_CHECKING:
-    import mujoco
-
 START_SPEED: Final = 300.0  # rotor speed (rad/s) of the keyframe ``start``
+LIMITED: Final = mujoco.mjtLimited.mjLIMITED_TRUE
 
 
 @dataclass(frozen=True)
@@ -111,14 +110,13 @@ def compile_model(spec: RotorcraftSpec, *, visuals: Visuals = True) -> mujoco.Mj
     vehicles = [spec, *(companion for _, companion in spec.companions)]
     # One that is kept complete may have springs and dampers, which no bare model has.
     whole = bool(visuals) or any(_bare_of(_structure(one)) is None for one in vehicles)
-    trees = [MjSpecTree(_compose(_structure(one), whole).copy()) for one in vehicles]
-    for tree, one in zip(trees, vehicles, strict=True):
-        _set_parameters(tree, one)
-    world = trees[0].spec
-    for (name, one), companion in zip(spec.companions, trees[1:], strict=True):
+    world, *others = (_compose(_structure(one), whole).copy() for one in vehicles)
+    for own, one in zip((world, *others), vehicles, strict=True):
+        _set_parameters(own, one)
+    for (name, one), companion in zip(spec.companions, others, strict=True):
         if one.objects is not None:
-            add_objects(companion.spec, one.objects)
-        add_companion(world, name, companion.spec)
+            add_objects(companion, one.objects)
+        add_companion(world, name, companion)
     if spec.objects is not None:
         add_objects(world, spec.objects, [name for name, _ in spec.companions])
     if callable(visuals):
@@ -137,26 +135,21 @@ def _structure(spec: RotorcraftSpec) -> RotorcraftSpec:
     return replace(spec, vehicle=vehicle, userdata_size=0, companions=())
 
 
-def _set_parameters(tree: MjSpecTree, spec: RotorcraftSpec) -> None:
+def _set_parameters(own: mujoco.MjSpec, spec: RotorcraftSpec) -> None:
     """Give a composed vehicle its mass, inertia, coefficients, gravity and room for user data."""
     vehicle, user = spec.vehicle, spec.user_vehicle
-    tree.option.gravity = (0.0, 0.0, -vehicle.gravity)
-    tree.size.nuserdata = spec.userdata_size
+    own.option.gravity = (0.0, 0.0, -vehicle.gravity)
+    own.nuserdata = spec.userdata_size
     if user is not None:
-        user.set_inertia(tree, vehicle)
+        user.set_inertia(own, vehicle)
     elif isinstance(vehicle, Vehicle):
-        inertial = tree.find("body", "vehicle").inertial
-        inertial.mass, inertial.diaginertia = _body_inertia(spec, vehicle)
+        body = own.body("vehicle")
+        body.mass, body.inertia = _body_inertia(spec, vehicle)
     if isinstance(vehicle, Vehicle):
-        gears = [(vehicle.thrust_coefficient, vehicle.drag_coefficient, spin) for spin in SPIN]
-        _set_keyframes(tree, vehicle, spec.tilts)
-    elif user is not None and vehicle != user.vehicle:
-        gears = [(rotor.thrust, rotor.drag, rotor.spin) for rotor in vehicle.rotors]
-    else:
-        gears = []
-    for i, (thrust, drag, spin) in enumerate(gears, start=1):
-        gear = (0.0, 0.0, thrust, 0.0, 0.0, -spin * drag)
-        tree.find("actuator", f"thrust_{i}").gear = gear
+        _set_keyframes(own, vehicle, spec.tilts)
+    for i, rotor in enumerate(as_multirotor(vehicle, tilting=False).rotors, start=1):
+        gear = (0.0, 0.0, rotor.thrust, 0.0, 0.0, -rotor.spin * rotor.drag)
+        own.actuator(f"thrust_{i}").gear = gear
 
 
 class _AsRead(NamedTuple):
@@ -187,9 +180,9 @@ def _bare(read: _AsRead, contacts: bool, wrench: bool) -> mujoco.MjSpec | None:
     complete = _complete(read)
     if read.user_vehicle is not None and read.model != "multirotor":
         return None
-    root = MjSpecTree(complete.copy())
-    mjcf_editing.remove_visuals(root, contacts=contacts, kept=["imu"] * wrench)
-    return root.spec if read.user_vehicle is None or _moves_alike(complete, root.spec) else None
+    bare = complete.copy()
+    mjcf_editing.remove_visuals(bare, contacts=contacts, kept=["imu"] * wrench)
+    return bare if read.user_vehicle is None or _moves_alike(complete, bare) else None
 
 
 def _bare_of(spec: RotorcraftSpec) -> mujoco.MjSpec | None:
@@ -201,11 +194,10 @@ def _compose(spec: RotorcraftSpec, whole: bool) -> mujoco.MjSpec:
     """The vehicle with all parts of a flight, complete or without visuals."""
     vehicle, servo, user_vehicle = spec.vehicle, spec.tilt_servo, spec.user_vehicle
     bare = None if whole else _bare_of(spec)
-    root = MjSpecTree((_complete(spec.as_read) if bare is None else bare).copy())
-    root.option.timestep = spec.timestep
-    root.option.integrator = spec.integrator
-    root.option.flag.contact = "enable" if spec.touches else "disable"
-    root.option.flag.constraint = "enable" if spec.touches or spec.has_stops else "disable"
+    root = (_complete(spec.as_read) if bare is None else bare).copy()
+    mjcf_editing.set_integration(root, spec)
+    constraint = spec.touches or spec.has_stops
+    mjcf_editing.set_flags(root, contact=spec.touches, constraint=constraint)
 
     hinges = [f"tilt_{i}" for i in range(1, spec.tilts + 1)]
     if isinstance(vehicle, Vehicle):
@@ -230,16 +222,16 @@ def _compose(spec: RotorcraftSpec, whole: bool) -> mujoco.MjSpec:
         touchable(root, ground=spec.ground is not None, number=spec.number)
     if spec.ground is not None:
         _set_ground(root, spec.ground)
-    return root.spec
+    return root
 
 
-def _center_site(root: MjSpecTree, spec: RotorcraftSpec) -> str:
+def _center_site(root: mujoco.MjSpec, spec: RotorcraftSpec) -> str:
     """The name of a site in the center of mass, along the body's axes, added if necessary."""
     if spec.user_vehicle is None or isinstance(spec.vehicle, Vehicle):
         return "imu"
     name = "layer_center"
     if spec.wrench:
-        root.find("body", "vehicle").add("site", name=name, pos=spec.user_vehicle.center)
+        root.body("vehicle").add_site(name=name, pos=spec.user_vehicle.center)
     return name
 
 
@@ -273,22 +265,23 @@ def _scale_lengths(root: Any, arm_length: float) -> None:
                 setattr(element, name, length * ratio)
 
 
-def _limit_rotors(root: MjSpecTree, spec: RotorcraftSpec) -> None:
+def _limit_rotors(root: mujoco.MjSpec, spec: RotorcraftSpec) -> None:
     thrust_range = spec.rotor_limits.thrust_range
     if thrust_range is not None:
         for i in range(1, len(spec.vehicle.spins) + 1):
-            thrust = root.find("actuator", f"thrust_{i}")
-            thrust.ctrlrange, thrust.ctrllimited = thrust_range, "true"
+            thrust = root.actuator(f"thrust_{i}")
+            thrust.ctrlrange, thrust.ctrllimited = thrust_range, LIMITED
+            thrust.inheritrange = 0.0
     _limit_speeds(root, "rotor_speed", spec)
 
 
-def _limit_speeds(root: MjSpecTree, name: str, spec: RotorcraftSpec) -> None:
+def _limit_speeds(root: mujoco.MjSpec, name: str, spec: RotorcraftSpec) -> None:
     """Keep the activations ``name_1``, ``name_2``, ... within the limits of the rotors' speeds."""
     for i, spin in enumerate(spec.vehicle.spins, start=1):
         speed_range = spec.rotor_limits.speed_range(spin)
         if speed_range is not None:
-            rotor = root.find("actuator", f"{name}_{i}")
-            rotor.actrange, rotor.actlimited = speed_range, "true"
+            rotor = root.actuator(f"{name}_{i}")
+            rotor.actrange, rotor.actlimited = speed_range, LIMITED
 
 
 def _set_pods(root: Any, pod: Pod) -> None:
@@ -319,22 +312,21 @@ def _body_inertia(spec: RotorcraftSpec, vehicle: Vehicle) -> tuple[float, list[f
     return mass, moments
 
 
-def _set_ground(root: MjSpecTree, ground: Ground) -> None:
+def _set_ground(root: mujoco.MjSpec, ground: Ground) -> None:
     """Let the vehicle's collision shapes touch the ground."""
-    plane = root.find("geom", "ground")
+    plane = root.geom("ground")
     plane.pos = (0.0, 0.0, ground.height)
     plane.friction = (ground.friction, 0.005, 0.0001)
     plane.priority = 1  # its friction counts, not the larger of the two
     plane.conaffinity = 1
 
 
-def _set_keyframes(root: MjSpecTree, vehicle: Vehicle, hinges: int) -> None:
+def _set_keyframes(root: mujoco.MjSpec, vehicle: Vehicle, hinges: int) -> None:
     """Let the rotors of an upright, untilted vehicle turn at the speeds of the keyframes."""
     for name, speed in (("hover", vehicle.hover_rotor_speed), ("start", START_SPEED)):
-        key = root.find("key", name)
+        key = root.key(name)
         if key is not None:
-            act = [] if key.act is None else key.act
-            ctrl = [0.0] * hinges if key.ctrl is None else key.ctrl
+            act, ctrl = list(key.act), list(key.ctrl) or [0.0] * hinges
             key.act = [*(spin * speed for spin in SPIN), *act[4:]]
             # thrusts, then rates of the rotor speeds
             key.ctrl = [*ctrl[:hinges], *[speed**2] * 4, *[0.0] * 4, *ctrl[hinges + 8 :]]

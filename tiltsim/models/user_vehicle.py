@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -81,12 +81,14 @@ class UserVehicle:
             found.append(f"its products of inertia (xy, xz, yz) = {products} kg m^2")
         return " and ".join(found)
 
-    def set_inertia(self, root: Any, vehicle: Vehicle | Multirotor) -> None:
-        """Set mass and moments of inertia of the whole vehicle by changing its body in a tree.
+    def set_inertia(self, spec: mujoco.MjSpec, vehicle: Vehicle | Multirotor) -> None:
+        """Set mass and moments of inertia of the whole vehicle by changing its body.
 
         Center of mass and products of inertia stay the file's. Raises ValueError if no body could
         have the mass and moments that remain for it.
         """
+        import mujoco
+
         about_center = self._inertia_about_center(vehicle)
         unchanged = np.array_equal(about_center, self._inertia_about_center(self.vehicle))
         if unchanged and vehicle.mass == self.vehicle.mass:
@@ -108,16 +110,12 @@ class UserVehicle:
                 f"would have the principal moments {', '.join(f'{m:.4g}' for m in moments)} "
                 "kg m^2; all must be above 0, and none larger than the sum of the other two"
             )
-        body = root.find("body", "vehicle")
-        if body.inertial is not None:
-            body.inertial.remove()
-        xx, yy, zz = np.diag(inertia)
-        body.add(
-            "inertial",
-            pos=center,
-            mass=mass,
-            fullinertia=(xx, yy, zz, inertia[0, 1], inertia[0, 2], inertia[1, 2]),
-        )
+        body, (xx, yy, zz) = spec.body("vehicle"), np.diag(inertia)
+        body.explicitinertial, body.mass, body.ipos = True, mass, center
+        # In place of principal moments and their axes, if the file has any.
+        body.inertia, body.iquat = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)
+        body.ialt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
+        body.fullinertia = (xx, yy, zz, inertia[0, 1], inertia[0, 2], inertia[1, 2])
 
     def _inertia_about_center(self, vehicle: Vehicle | Multirotor) -> Floats:
         """The inertia matrix of parameters, with the file's products where they have none."""

@@ -165,6 +165,9 @@ def _checked(name: str, value: Any, size: int) -> Values:
     return values
 
 
+# --- observations of a plant, and built-in controllers as functions of them ----------------------
+
+
 class Observer:
     """Makes the observations of one flight. Raises TypeError for a vehicle that is no rotorcraft.
 

@@ -18,7 +18,7 @@ from tiltsim.closed_loop.userdata import EVALUATIONS, HEADER_SIZE
 from tiltsim.engines.base import vectors_of
 from tiltsim.engines.control import control_callback, control_program, control_step
 from tiltsim.errors import InputError
-from tiltsim.laws.commanded import commanded_parameters, planned_servo_commands, with_command
+from tiltsim.laws.assembling import commanded_parameters, planned_servo_commands, with_command
 from tiltsim.laws.law import servo_lead
 from tiltsim.plants.autopilot import FirmwareController
 from tiltsim.plants.command import (
@@ -35,7 +35,7 @@ from tiltsim.scenario.controller import PythonController
 from tiltsim.scenario.law_controller import is_law
 from tiltsim.scenario.own_parts import describe, load_function
 from tiltsim.scenario.scenario import Scenario
-from tiltsim.vehicles.rotorcraft import TILT_1, Layout, layout_of, tilt_of_rotor, true_rotors
+from tiltsim.vehicles.rotorcraft import TILT_1, Layout, layout_of, true_rotors
 from tiltsim_controllers.code.arrays import as_arrays
 from tiltsim_controllers.code.python_source import python_function
 from tiltsim_controllers.mathematics.records import flatten
@@ -71,7 +71,7 @@ class CommandedPlant(MujocoPlant):
         self._lagging = vehicle.rotor_time_constant is not None
         self._rotor_inertia = vehicle.rotor_inertia
         own = as_arrays(true_rotors(assembly.scenario))
-        self._craft = craft_of(own, tilt_of_rotor(self._loop))
+        self._craft = craft_of(own, self._loop.tilt_of_rotor)
         first = rotors if self._lagging else 0
         self._speeds = slice(first, first + rotors)
         # The delay line in ``act``, the newest command first; without latency it is empty. A

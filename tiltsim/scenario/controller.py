@@ -17,10 +17,9 @@ from pydantic import Field, model_validator
 from tiltsim.scenario import baseline_controllers, linearizing_controllers, vectoring_controller
 from tiltsim.scenario.controller_table import ControllerTable
 from tiltsim.scenario.kinds import KINDS, tables_of, union_of
-from tiltsim.scenario.law_controller import LawController, TiltingTable
+from tiltsim.scenario.law_controller import EveryRotorcraft, LawController, TiltingTable
 from tiltsim.scenario.messages import InvalidValueError
 from tiltsim.scenario.table import Positive, default, example, required
-from tiltsim.scenario.vehicle import ROTORCRAFT
 from tiltsim.system.arguments import warn_user
 from tiltsim.system.interrupts import defer_interrupts
 from tiltsim.system.text import error_text, printable
@@ -142,7 +141,7 @@ class OwnFunctionController(ControllerTable):
 class PythonController(OwnFunctionController):
     """A user's own controller in Python; see `tiltsim.plants.commanded_plant`."""
 
-    vehicle_models = ROTORCRAFT
+    vehicle_models = EveryRotorcraft()
     reference_kinds = ("position", "pose", "attitude_altitude")
     is_external = True
     rotors_have_speeds = True

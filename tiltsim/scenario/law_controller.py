@@ -13,9 +13,8 @@ from typing import Any, ClassVar, Literal, TypeVar
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.controller_table import ControllerTable, ReferenceKind
 from tiltsim.scenario.reference import Reference
-from tiltsim.scenario.rotorcraft import TiltServoTable
+from tiltsim.scenario.rotorcraft import RotorcraftTable, TiltServoTable
 from tiltsim.scenario.table import Positive, default
-from tiltsim.scenario.vehicle import ROTORCRAFT
 from tiltsim_controllers.analysis.stability import ErrorLoop, linear_loop
 from tiltsim_controllers.code.arrays import xp as xp
 from tiltsim_controllers.gaits.plans import Gait
@@ -78,10 +77,19 @@ class Airframe:
         return len(self.vehicle.spins)
 
 
+class EveryRotorcraft:
+    """The models of all vehicles that fly, found at each access: kinds are discovered."""
+
+    def __get__(self, _table: object, _type: object = None) -> tuple[str, ...]:
+        from tiltsim.scenario.vehicle import VEHICLES
+
+        return tuple(name for name, kind in VEHICLES.items() if issubclass(kind, RotorcraftTable))
+
+
 class LawTable(ControllerTable):
     """The common part of the tables of laws, wherever the function comes from."""
 
-    vehicle_models = ROTORCRAFT
+    vehicle_models = EveryRotorcraft()
     reference_kinds: ClassVar[tuple[ReferenceKind, ...]] = ("position",)
     rotors_have_speeds = True
     damps_swing = True
@@ -184,5 +192,5 @@ class TiltingTable(LawTable):
 @cache
 def _not_read(table: type[LawController]) -> frozenset[str]:
     """Keys of a table that its law does not read: of the bases that it has."""
-    bases = {LawController, TiltingTable, Compensating} & {*table.mro()}
+    bases: set[Any] = {LawController, TiltingTable, Compensating} & {*table.mro()}
     return frozenset(key for base in bases for key in base.model_fields)

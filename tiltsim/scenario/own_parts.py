@@ -4,6 +4,7 @@ The permission to execute code is a property of the scenario and goes with it, a
 processes. Reading a scenario gives none.
 """
 
+import ast
 import importlib.util
 import os
 import sys
@@ -208,7 +209,8 @@ def given_parts(**parts: object) -> dict[str, object]:
 def controller_table(controller: object) -> dict[str, Any]:
     """The table of a scenario for a controller given in Python; see `tiltsim.load_scenario`."""
     if not is_law(controller):
-        return {"law": "python", "function": controller_name(controller)}
+        law = "numpy" if isinstance(controller, str) and _marks_law(controller) else "python"
+        return {"law": law, "function": controller_name(controller)}
     keys: dict[str, Any] = {}
     if isinstance(controller, LawController):
         keys = controller.model_dump(mode="json", exclude_unset=True, exclude={"law"})
@@ -218,6 +220,22 @@ def controller_table(controller: object) -> dict[str, Any]:
         table |= {"states": controller.states, "discrete_states": controller.discrete_states}
     table |= {name: keys.pop(name) for name in [*keys] if name in NumpyController.model_fields}
     return table | {"parameters": keys}
+
+
+def _marks_law(function: str) -> bool:
+    """Whether ``FILE.py:NAME`` is a function marked ``@tiltsim.law``; the file is not executed."""
+    file, _, name = function.rpartition(":")
+    try:
+        module = ast.parse(Path(file).read_bytes() if is_file(file) else b"")
+    except (OSError, ValueError, SyntaxError, RecursionError):  # its execution reports it
+        return False
+    marks = (
+        ast.unparse(mark).rpartition(".")[2]
+        for node in module.body
+        if isinstance(node, ast.FunctionDef) and node.name == name
+        for mark in node.decorator_list
+    )
+    return "law" in marks
 
 
 def drop_what_own_controllers_ignore(

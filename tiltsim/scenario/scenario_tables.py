@@ -17,7 +17,7 @@ from tiltsim.scenario.interaction import CableTable, ObjectTable, PayloadTable, 
 from tiltsim.scenario.kinds import KINDS, tables_of
 from tiltsim.scenario.linearizing_controllers import AttitudeAltitudeController
 from tiltsim.scenario.reference import Reference, SetpointReference
-from tiltsim.scenario.rotorcraft import MultirotorTable, RotorcraftTable, TiltServoTable
+from tiltsim.scenario.rotorcraft import RotorcraftTable, TiltServoTable
 from tiltsim.scenario.simulation_table import (
     AutopilotTable,
     InitialTable,
@@ -138,16 +138,11 @@ class ScenarioTables(WithAutopilot):
         """Whether the model has more in it than the vehicle and the ground."""
         return bool(self.object) or self.tool is not None or self.payload is not None
 
-    def require_alone(self, analysis: str, *, loaded: bool = False) -> None:
-        """Refuse others, and unless ``loaded`` tool and load, for an analysis.
-
-        Raises:
-            InputError: It begins with the name of the analysis.
-        """
-        others: dict[str, Any] = {"[[object]]": self.object, "[[companion]]": self.companion}
-        if not loaded:
-            others |= {"[tool]": self.tool, "[payload]": self.payload}
-        found = ", ".join(name for name, tables in others.items() if tables)
+    def require_alone(self, analysis: str) -> None:
+        """Refuse all others for an analysis. Raises `InputError` with its name."""
+        tables = ("object", "companion", "tool", "payload")
+        brackets = {"object": "[[object]]", "companion": "[[companion]]"}
+        found = ", ".join(brackets.get(key, f"[{key}]") for key in tables if getattr(self, key))
         if found:
             where = self.address or "scenario"
             raise InputError(f"{where}: {analysis} takes a vehicle alone; remove {found}")
@@ -155,8 +150,8 @@ class ScenarioTables(WithAutopilot):
     def require_rotorcraft(self, analysis: str) -> None:
         """Refuse a vehicle in a plane for an analysis. Raises `InputError` with its name."""
         if self.vehicle.is_planar:
-            where = self.address or "scenario"
-            raise InputError(f"{where}: vehicle.model: {analysis} takes rotorcraft only")
+            given = f'{self.address or "scenario"}: vehicle.model = "{self.vehicle.model}"'
+            raise InputError(f"{given}: {analysis} takes rotorcraft only")
 
     @property
     def time_tables(self) -> dict[str, TimeTable]:
@@ -250,12 +245,5 @@ class ScenarioTables(WithAutopilot):
 
     @property
     def true_vehicle(self) -> Vehicle | Multirotor:
-        """The parameters of any simulated rotorcraft."""
-        if isinstance(self.vehicle, MultirotorTable):
-            return self.model_error.apply_to_rotors(self.vehicle.resolve())
-        return self.true_rotorcraft
-
-    @property
-    def true_rotorcraft(self) -> Vehicle:
-        """The simulated vehicle; the controller assumes ``rotorcraft.resolve()``."""
-        return self.model_error.apply(self.rotorcraft.resolve())
+        """The parameters of any simulated rotorcraft; the controller assumes its table's."""
+        return self.model_error.apply(self.any_rotorcraft.resolve())

@@ -169,11 +169,6 @@ VEHICLES: Final = tables_of(
 )
 """The tables of all vehicles by their models."""
 
-ROTORCRAFT: Final = tuple(
-    model for model, table in VEHICLES.items() if issubclass(table, RotorcraftTable)
-)
-"""The models of all vehicles that fly."""
-
 if TYPE_CHECKING:
     VehicleUnion = AnyVehicleTable
 else:
@@ -198,8 +193,16 @@ class ModelErrorTable(Table):
     thrust_coefficient: ScaleFactor = default(1.0, "factor on every rotor's thrust [-]", 0.9)
     drag_coefficient: ScaleFactor = default(1.0, "factor on every rotor's torque [-]", 0.9)
 
-    def apply_to_rotors(self, vehicle: Multirotor) -> Multirotor:
-        """The simulated multirotor; products of inertia get the mean factor of their axes."""
+    def apply(self, vehicle: Vehicle | Multirotor) -> Any:
+        """The simulated vehicle, where the controller assumes ``vehicle``.
+
+        Products of inertia of a multirotor get the mean factor of their axes.
+        """
+        if isinstance(vehicle, Vehicle):
+            factors = self.model_dump(exclude={"inertia"})
+            factors |= zip(MOMENTS, self.inertia, strict=True)
+            known = vehicle._asdict()
+            return vehicle._replace(**{key: factor * known[key] for key, factor in factors.items()})
         scale = np.sqrt(self.inertia)
         inertia = np.reshape(vehicle.inertia, (3, 3)) * np.outer(scale, scale)
         return replace(
@@ -214,10 +217,3 @@ class ModelErrorTable(Table):
                 for rotor in vehicle.rotors
             ),
         )
-
-    def apply(self, vehicle: Vehicle) -> Vehicle:
-        """The simulated vehicle, where the controller assumes ``vehicle``."""
-        factors = self.model_dump(exclude={"inertia"})
-        factors |= zip(MOMENTS, self.inertia, strict=True)
-        known = vehicle._asdict()
-        return vehicle._replace(**{key: factor * known[key] for key, factor in factors.items()})

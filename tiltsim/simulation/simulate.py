@@ -217,22 +217,17 @@ def simulate_to_end(scenario: Scenario) -> Flight:
 
 
 def simulate_assembly(
-    assembly: Assembly,
-    observer: Observer | None = None,
-    *,
-    engine: EngineName | None = None,
-    report: Report = lambda time: None,
+    assembly: Assembly, observer: Observer | None = None, *, report: Report = lambda time: None
 ) -> Flight:
     """`simulate` for a flight that is assembled already.
 
     Args:
         assembly: The flight.
         observer: See `simulate`.
-        engine: Engine in place of the scenario's.
         report: Called with the simulated time (s) after every chunk of samples.
     """
     simulation = assembly.scenario.simulation
-    plant = make_plant(assembly, engine)
+    plant = make_plant(assembly)
     monitor = TerminationMonitor(assembly)
     samples: list[Floats] = []
 

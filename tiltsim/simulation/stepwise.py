@@ -151,7 +151,7 @@ class Simulation:
 
         Raises `InputError` for vehicles in a plane, which have none.
         """
-        self._require_rotorcraft("observation")
+        self.scenario.require_rotorcraft("observation")
         values = dict(zip(self._assembly.loop.sample_fields[1:], self._plant.observe()))
         speeds = [values[f"rotor_speed_{rotor}"] for rotor in self._assembly.loop.kind.rotors]
         return Observer(self._assembly).observe(self._plant, speeds)
@@ -162,7 +162,7 @@ class Simulation:
         Rotor accelerations and tilt angles; thrusts for the quadrotor. Raises `InputError` for
         vehicles in a plane, and if the scenario has a custom controller.
         """
-        self._require_rotorcraft("command")
+        self.scenario.require_rotorcraft("command")
         if self.scenario.controller.is_external:
             raise InputError("command: the controller is your own; call it with observation()")
         return built_in_command(self._assembly, self._plant)
@@ -176,7 +176,3 @@ class Simulation:
             end = End("interrupted", self.time, "the simulation has not ended")
         samples = np.array(self._samples)
         return Flight(self._assembly, samples, end, self._plant.engine, self._wall_time)
-
-    def _require_rotorcraft(self, name: str) -> None:
-        if self.scenario.vehicle.is_planar:
-            raise InputError(f"{name}: not supported for the {self.scenario.vehicle.model}")

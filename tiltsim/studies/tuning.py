@@ -28,6 +28,7 @@ from tiltsim.studies.arena import Vehicle, entry_of
 from tiltsim.studies.comparison import Entry, compare_one
 from tiltsim.studies.scores import score
 from tiltsim.system.processes import in_processes
+from tiltsim.system.text import error_text
 from tiltsim_controllers.mathematics.scalar import Floats
 
 FACTORS: Final = (0.25, 4.0)  # bounds of the factors on default gains
@@ -302,5 +303,8 @@ def read_tuning(file: FilePath) -> dict[str, Any]:
     except FileNotFoundError:
         raise InputError(f"{file}: no such file") from None
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        raise InputError(f"{file}: not a file of tuned gains ({type(error).__name__})") from None
+        raise InputError(
+            f"{file}: not a file of tuned gains ({error_text(error)}); tiltsim arena --tune "
+            "writes one"
+        ) from None
     return dict(text)

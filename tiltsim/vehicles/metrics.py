@@ -144,6 +144,8 @@ def horizontal_error_metrics(columns: Mapping[str, Floats], timestep: float) -> 
     }
 
 
+# --- rotorcraft ----------------------------------------------------------------------------------
+
 SETTLED_ALTITUDE: Final = 0.005  # m
 BAND: Final = (0.025, 0.975)  # ends of the 95 % band of a distribution
 

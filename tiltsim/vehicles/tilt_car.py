@@ -6,14 +6,14 @@ from collections.abc import Mapping
 from dataclasses import KW_ONLY, dataclass, replace
 from functools import lru_cache
 from math import cos, sin
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
+import mujoco
 import numpy as np
 
 from tiltsim.closed_loop.limits import limit_exceeded_of
 from tiltsim.closed_loop.loop import VehicleKind
 from tiltsim.models import mjcf_editing
-from tiltsim.models.mjspec_tree import MjSpecTree
 from tiltsim.models.parts import ExtraActuators, ModelSpec, TiltServo, Visuals
 from tiltsim.resources import shipped_folder
 from tiltsim.scenario.scenario import FlightPlan, Scenario
@@ -30,10 +30,6 @@ from tiltsim.vehicles.metrics import (
 )
 from tiltsim_controllers.mathematics.scalar import Floats, Vector
 from tiltsim_controllers.tilt_car.vehicle import TiltCar, counter_yaw_per_tilt
-
-if TYPE_CHECKING:
-    import mujoco
-
 
 ROTORS: Final = (1, 2)
 
@@ -103,26 +99,23 @@ def _compose(spec: TiltCarSpec) -> tuple[mujoco.MjSpec, mujoco.MjSpec]:
     parsed, car = mjcf_editing.parse_mjcf(shipped_folder("mjcf") / "tilt_car.xml"), spec.car
     _set_inertia(parsed, car)
     _set_thrusts(parsed, car)
-    root = MjSpecTree(mjcf_editing.spec_of(parsed))
-    root.option.timestep = spec.timestep
-    root.option.integrator = spec.integrator
-    root.option.flag.contact = "disable"
-    root.option.flag.constraint = "disable"
-    root.size.nuserdata = spec.userdata_size
+    root = mjcf_editing.spec_of(parsed)
+    mjcf_editing.set_integration(root, spec)
+    mjcf_editing.set_flags(root, contact=False, constraint=False)
     # The inertia that the hinge feels while both discs are free to turn.
     inertia = car.top_inertia * car.bottom_inertia / (car.top_inertia + car.bottom_inertia)
     mjcf_editing.set_servos(root, ["tilt"], replace(spec.tilt_servo, max_angle=None), [inertia])
     if not spec.rotor_floor:
         for rotor in ROTORS:
-            speed = root.find("actuator", f"rotor_speed_{rotor}")
-            speed.actrange, speed.actlimited = (0.0, 0.0), "false"
-    start = root.find("key", "start")
+            speed = root.actuator(f"rotor_speed_{rotor}")
+            speed.actrange, speed.actlimited = (0.0, 0.0), mujoco.mjtLimited.mjLIMITED_FALSE
+    start = root.key("start")
     start.act = [START_SPEED] * 2
     start.ctrl = [0.0, START_SPEED**2, START_SPEED**2, 0.0, 0.0]
     mjcf_editing.add_states(root, "law", spec.law_states)
-    complete = root.spec.copy()
+    complete = root.copy()
     mjcf_editing.remove_visuals(root, contacts=False)
-    return complete, root.spec
+    return complete, root
 
 
 def _set_inertia(root: Any, car: TiltCar) -> None:

@@ -9,24 +9,16 @@ from functools import cache
 from typing import Any, Final
 
 from tiltsim_controllers.code.arrays import traceable
-from tiltsim_controllers.gaits.motion import (
-    FIXED,
-    NO_KNOTS,
-    GaitParameters,
-    anticipated_tilts,
-    planned_tilts,
-)
-from tiltsim_controllers.laws.allocation import RotorRange, limited_accelerations
+from tiltsim_controllers.gaits.motion import FIXED, NO_KNOTS, anticipated_tilts, planned_tilts
+from tiltsim_controllers.laws.allocation import limited_accelerations
 from tiltsim_controllers.laws.attitude_altitude import LAYOUT, OPTIONS, AttitudeAltitude
 from tiltsim_controllers.laws.feedback import NONE
-from tiltsim_controllers.laws.gains import Gains, IntegralGains
 from tiltsim_controllers.laws.keys import record_of
 from tiltsim_controllers.laws.multirotor import attitude_force, present_wrench
-from tiltsim_controllers.laws.multirotor_steps import FeedforwardTerms, Form
+from tiltsim_controllers.laws.multirotor_steps import WITH_GAIT, Form
 from tiltsim_controllers.laws.observed import Seen, Step
 from tiltsim_controllers.laws.supervised_vehicles import SUPERVISION, multirotor_supervision_of
-from tiltsim_controllers.laws.supervisor import Supervision, Supervisor, gait_time
-from tiltsim_controllers.references.trajectories import ReferenceParameters
+from tiltsim_controllers.laws.supervisor import Supervision, gait_time
 from tiltsim_controllers.vehicle.body import PITCH, ROLL, state_of
 from tiltsim_controllers.vehicle.parameters import Vehicle
 from tiltsim_controllers.vehicle.rotors import TiltOfRotor, airframe, tilts_of
@@ -35,16 +27,7 @@ Parameters = record_of(
     AttitudeAltitude,
     OPTIONS,
     vehicle=Vehicle,
-    gains=Gains,
-    integral=IntegralGains,
-    max_acceleration=float,  # m/s^2 of the feedback, horizontally; integrators stop there
-    max_angular_acceleration=float,  # rad/s^2, desired, per axis
-    anticipation=float,  # s before and after a corner of the gait in which the body turns
-    terms=FeedforwardTerms,
-    gait=GaitParameters,
-    reference=ReferenceParameters,
-    supervisor=Supervisor,
-    limits=RotorRange,  # of prioritized allocation
+    **WITH_GAIT,
     rotor_inertia=float,  # kg m^2, of a rotor about its axis, as far as it is known
     attitude_error=float,  # `EULER_ANGLES`
     slowest_rotor=float,  # rad/s, 0: a rotor at rest has no acceleration that helps

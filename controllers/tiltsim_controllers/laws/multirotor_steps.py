@@ -125,24 +125,29 @@ class AttitudeForce(Keys):
     )
 
 
+WITH_GAIT: Final[dict[str, Any]] = {
+    "gains": Gains,
+    "integral": IntegralGains,
+    "max_acceleration": float,  # m/s^2 of the feedback, horizontally; integrators stop there
+    "max_angular_acceleration": float,  # rad/s^2, desired, per axis
+    "anticipation": float,  # s before and after a corner of the gait in which the body turns
+    "terms": FeedforwardTerms,
+    "gait": GaitParameters,
+    "reference": ReferenceParameters,
+    "supervisor": Supervisor,
+    "limits": RotorRange,  # of prioritized allocation
+}
+"""Parameters that every law with feed-forward of a gait has beside its keys."""
+
 Parameters = record_of(
     AttitudeForce,
     frozenset({"law", "dimension", "norm"}),  # see `Form`
     vehicle=Body,
-    gains=Gains,
-    integral=IntegralGains,
+    **WITH_GAIT,
     side_integral=float,  # 1/s^4, with the side gains
-    max_acceleration=float,  # m/s^2 of the feedback, horizontally; integrators stop there
-    max_angular_acceleration=float,  # rad/s^2, desired, per axis
-    anticipation=float,  # s before and after a corner of the gait in which the body turns
-    terms=FeedforwardTerms,
-    gait=GaitParameters,
-    reference=ReferenceParameters,
     rotors=float,  # where in the knots the table of the rotors begins
     restoring=float,  # 1/s, rate toward the least power or sum of w^2
     failure=Failure,
-    limits=RotorRange,  # of prioritized allocation
-    supervisor=Supervisor,
     watched=Watched,
     watched_without=Watched,  # once the failed rotor is known
     upper_side=vector_of(3),  # body axes, of the force with which it lifts, if it has two; else 0

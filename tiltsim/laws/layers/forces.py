@@ -16,29 +16,18 @@ from functools import cache
 from math import inf
 from typing import Any, Final
 
-import numpy as np
-
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Equations
-from tiltsim.engines.sample_evaluation import evaluate_over_samples
-from tiltsim.laws.layers.layer import Layer, Samples, wrap_loop
+from tiltsim.laws.layers.layer import Layer, wrap_loop
 from tiltsim.models.parts import ExtraActuators
 from tiltsim.scenario.scenario import FlightPlan
 from tiltsim.scenario.surroundings import Force, Torque
-from tiltsim.vehicles.rotorcraft import (
-    QW,
-    TILT_1,
-    TILT_RATE_1,
-    layout_of,
-    rotors_record,
-    tilt_of_rotor,
-    true_rotors,
-)
+from tiltsim.vehicles.rotorcraft import QW, TILT_1, TILT_RATE_1, layout_of, true_rotors
 from tiltsim_controllers.code.arrays import branch, traceable, xp
 from tiltsim_controllers.code.tracing import make
 from tiltsim_controllers.mathematics.attitude import rotation_matrix, rotation_of_quaternion
 from tiltsim_controllers.mathematics.linear import cross
 from tiltsim_controllers.mathematics.records import make_record_type
-from tiltsim_controllers.mathematics.scalar import Floats, Vector
+from tiltsim_controllers.mathematics.scalar import Vector
 from tiltsim_controllers.vehicle.air import (
     DRYDEN_STATES,
     Air,
@@ -107,8 +96,8 @@ def air_wrench(
 @cache
 def with_air(loop: ClosedLoop) -> ClosedLoop:
     """A loop in air with wind, turbulence, gusts, drag and ground effect."""
-    layout, first, rotors = layout_of(loop), loop.sizes.act, tilt_of_rotor(loop)
-    record = make_record_type("Surroundings", air=Air, vehicle=rotors_record(loop))
+    layout, first, rotors = layout_of(loop), loop.sizes.act, loop.tilt_of_rotor
+    record = make_record_type("Surroundings", air=Air, vehicle=loop.vehicle_record)
 
     def forces(time: Any, qpos: Any, qvel: Any, act: Any, ctrl: Any, layer: Any) -> Any:
         states = act[first : first + DRYDEN_STATES]
@@ -122,24 +111,12 @@ def with_air(loop: ClosedLoop) -> ClosedLoop:
         adds=forces,
         actuators=ExtraActuators(states=DRYDEN_STATES, wrench=True),
         initial_activations=lambda _plan, air, _inner: stationary_states(air.air.turbulence),
-        derive=_air_columns,
+        columns=lambda time, states, own: air_velocity(time, states, own.air),
+        columns_from=DRYDEN_FIELDS,
         fields=dict.fromkeys(DRYDEN_FIELDS, "1/s^0.5"),
         units=dict.fromkeys(AIR_COLUMNS, "m/s"),
     )
     return wrap_loop(loop, layer)
-
-
-def _air_columns(samples: Samples, setup: ControlSetup) -> dict[str, Floats]:
-    air = ControlSetup(setup.parameters.layer.air)
-    states = np.stack([samples[name] for name in DRYDEN_FIELDS], axis=-1)
-    velocity = evaluate_over_samples(_velocity, 3, samples["time"], states, air)
-    return dict(zip(AIR_COLUMNS, velocity.T, strict=True))
-
-
-@traceable
-def _velocity(time: Any, states: Any, air: Air, knots: Any) -> Any:
-    """`air_velocity` of a sample."""
-    return air_velocity(time, states, air)
 
 
 def _air(plan: FlightPlan) -> Air:
@@ -183,7 +160,8 @@ def with_loads(loop: ClosedLoop, count: int) -> ClosedLoop:
         lambda plan: record(*map(_load, plan.scenario.loads)),
         adds=forces,
         actuators=ExtraActuators(wrench=True),
-        derive=_load_columns,
+        columns=lambda time, attitude, own: wrench_of_loads(time, rotation_matrix(attitude), own),
+        columns_from=("roll", "pitch", "yaw"),
         units={name: "N" if "force" in name else "N m" for name in LOAD_COLUMNS},
     )
     return wrap_loop(loop, layer)
@@ -197,28 +175,15 @@ def _load(table: Force | Torque) -> Load:
     return load._replace(force=table.value, point=table.point)
 
 
-def _load_columns(samples: Samples, setup: ControlSetup) -> dict[str, Floats]:
-    attitude = np.stack([samples[name] for name in ("roll", "pitch", "yaw")], axis=-1)
-    loads = ControlSetup(setup.parameters.layer)
-    wrenches = evaluate_over_samples(_acting, 6, samples["time"], attitude, loads)
-    return dict(zip(LOAD_COLUMNS, wrenches.T, strict=True))
-
-
-@traceable
-def _acting(time: Any, attitude: Any, loads: Any, knots: Any) -> Any:
-    """Force and torque of a sample, body axes."""
-    return wrench_of_loads(time, rotation_matrix(attitude), loads)
-
-
 @cache
 def with_rotor_inertia(loop: ClosedLoop) -> ClosedLoop:
     """A loop whose rotors have spin inertia."""
     layout, equations = layout_of(loop), loop.equations
-    (rotors, tilts), tilted = layout, tilt_of_rotor(loop)
+    (rotors, tilts), tilted = layout, loop.tilt_of_rotor
     record = make_record_type(
         "SpinningRotors",
         inertia=float,  # kg m^2, of one rotor about its axis
-        vehicle=rotors_record(loop),  # the true one, not the controller's
+        vehicle=loop.vehicle_record,  # the true one, not the controller's
         slowest=float,  # rad/s, of a rotor along its spin
         fastest=float,
     )
@@ -259,7 +224,7 @@ def _momentum_equations(equations: Equations, loop: ClosedLoop) -> Equations:
     At their body rates the body alone would have the total angular momentum.
     """
     inner_inputs, inner_rates, inner_observe = equations.inputs, equations.rates, equations.observe
-    tilts, tilted, rotors = equations.tilts, tilt_of_rotor(loop), len(loop.spins)
+    tilts, tilted, rotors = equations.tilts, loop.tilt_of_rotor, len(loop.spins)
     assert tilts is not None  # other vehicles are refused
 
     @traceable

@@ -22,16 +22,7 @@ from tiltsim.equations.actuator_level import mechanics, mechanics_record, servo_
 from tiltsim.laws.layers.layer import Layer, PlantState, read_actuators, wrap_loop
 from tiltsim.models.parts import ExtraActuators
 from tiltsim.scenario.scenario import FlightPlan, Scenario
-from tiltsim.vehicles.rotorcraft import (
-    QW,
-    TILT_1,
-    TILT_RATE_1,
-    body_less,
-    layout_of,
-    rotor_limits,
-    rotors_record,
-    tilt_of_rotor,
-)
+from tiltsim.vehicles.rotorcraft import QW, TILT_1, TILT_RATE_1, body_less, layout_of, rotor_limits
 from tiltsim_controllers.code.arrays import traceable, xp
 from tiltsim_controllers.mathematics.attitude import rotation_matrix, rotation_of_quaternion
 from tiltsim_controllers.mathematics.linear import cross
@@ -233,7 +224,7 @@ def motion_record(loop: ClosedLoop) -> Any:
     tilts = layout_of(loop).tilts
     return make_record_type(
         "Motion",
-        mechanics=mechanics_record(rotors_record(loop), tilts),
+        mechanics=mechanics_record(loop.vehicle_record, tilts),
         least_thrust=float,  # (rad/s)^2, limits of the thrusts' controls
         greatest_thrust=float,
         gyroscopic=float,  # factor of this torque, 0 of tilting vehicles on the thesis plant
@@ -253,7 +244,7 @@ def plant_acceleration_of(loop: ClosedLoop) -> Callable[..., Any]:
     for each hinge with the servo's armature ``A`` ``(J + A) alpha_i'' + J a_i . omega' = servo
     torque``. Impacts on stops or ground are left out.
     """
-    layout, tilted = layout_of(loop), tilt_of_rotor(loop)
+    layout, tilted = layout_of(loop), loop.tilt_of_rotor
 
     @traceable
     def plant_acceleration(qpos: Any, qvel: Any, ctrl: Any, loads: Any, motion: Any) -> Any:

@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup, Equations
+from tiltsim.engines.sample_evaluation import evaluate_over_samples
 from tiltsim.equations.actuator_level import ActuatorPlant, limit_speeds_of, mechanics
 from tiltsim.models.parts import WRENCH_SIZE, ExtraActuators
 from tiltsim.scenario.scenario import FlightPlan
@@ -63,6 +64,10 @@ class Layer:
     zeros."""
     derive: Callable[[Samples, ControlSetup], dict[str, Floats]] = lambda _samples, _setup: {}
     """``(samples by field, setup) -> further columns``."""
+    columns: Callable[..., Values] | None = None
+    """Traceable function ``(time, values, own) -> columns`` of `units`, in place of ``derive``,
+    from the values of the fields ``columns_from`` of a sample."""
+    columns_from: tuple[str, ...] = ()
     fields: Mapping[str, str] = field(default_factory=dict)
     """Fields of a sample with their units: the first activations of these actuators."""
     remembered: Mapping[str, str] = field(default_factory=dict)
@@ -103,6 +108,19 @@ def wrap_loop(inner: ClosedLoop, layer: Layer) -> ClosedLoop:
     def within(setup: ControlSetup) -> ControlSetup:
         return ControlSetup(setup.parameters.inner, setup.knots)
 
+    @traceable
+    def columns(time: Any, values: Any, own: Any, knots: Any) -> Any:
+        assert layer.columns is not None
+        return layer.columns(time, values, own)
+
+    def derive(samples: Samples, setup: ControlSetup) -> dict[str, Floats]:
+        if layer.columns is None:
+            return layer.derive(samples, setup)
+        values = np.stack([samples[name] for name in layer.columns_from], axis=-1)
+        own = ControlSetup(setup.parameters.layer)
+        rows = evaluate_over_samples(columns, len(layer.units), samples["time"], values, own)
+        return dict(zip(layer.units, rows.T, strict=True))
+
     def initial_activations(plan: FlightPlan, setup: ControlSetup) -> Vector:
         before = inner.initial_activations(plan, within(setup))
         if layer.initial_activations is None:
@@ -117,7 +135,7 @@ def wrap_loop(inner: ClosedLoop, layer: Layer) -> ClosedLoop:
         sizes=sizes,
         initial_activations=initial_activations,
         extra_actuators=(*inner.extra_actuators, *([added] if any(added) else ())),
-        derive=lambda s, own: {**inner.derive(s, within(own)), **layer.derive(s, own)},
+        derive=lambda s, own: {**inner.derive(s, within(own)), **derive(s, own)},
         fields=(*inner.fields, *layer.fields, *layer.remembered),
         further_units={**inner.further_units, **layer.units, **layer.fields, **layer.remembered},
         observe_reads_controls=inner.observe_reads_controls or bool(layer.remembered),

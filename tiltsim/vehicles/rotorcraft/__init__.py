@@ -27,7 +27,7 @@ from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.mathematics.attitude import quaternion_of_euler
 from tiltsim_controllers.mathematics.scalar import Floats, Values, Vector
 from tiltsim_controllers.vehicle.body import BODY_FIELDS, ROTATION_NAMES, Body, body_of
-from tiltsim_controllers.vehicle.craft import craft_parameters, craft_record
+from tiltsim_controllers.vehicle.craft import craft_parameters
 from tiltsim_controllers.vehicle.parameters import Vehicle
 
 if TYPE_CHECKING:
@@ -102,23 +102,11 @@ def layout_of(loop: ClosedLoop) -> Layout:
 
 def is_fixed_cross(loop: ClosedLoop) -> bool:
     """Whether its rotors are on a cross without hinges and make any thrust at once, as in ch. 2."""
-    return not loop.tilt_of_rotor and not layout_of(loop).tilts
-
-
-def tilt_of_rotor(loop: ClosedLoop) -> tuple[int, ...]:
-    """The number, from 0, of each rotor's tilt; -1: fixed."""
-    rotors, tilts = layout_of(loop)
-    on_cross = tuple(range(rotors)) if tilts else (-1,) * rotors
-    return loop.tilt_of_rotor or on_cross
+    return loop.vehicle_record is Vehicle and not layout_of(loop).tilts
 
 
 CROSS: Final = Layout(4, 4)
 """Tiltrotor and quadrotor, whose samples are alike; see `tiltsim_controllers.vehicle.body`."""
-
-
-def rotors_record(loop: ClosedLoop) -> Any:
-    """The type of the parameters of a model's vehicle; see `true_rotors`."""
-    return craft_record(*layout_of(loop)) if loop.tilt_of_rotor else Vehicle
 
 
 def true_rotors(scenario: Scenario) -> Any:

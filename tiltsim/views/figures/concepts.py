@@ -168,7 +168,8 @@ def gait_figure() -> Figure:
 def decoupler_figure(flights: Mapping[str, Flight]) -> Figure:
     """The response of each decoupler, given by its name, at the set point (0, 0)."""
     first = next(iter(flights.values()))
-    vehicle, tilts = first.scenario.true_rotorcraft, first.assembly.gait.angles(0.0)
+    vehicle: Any = first.scenario.true_vehicle  # a tiltrotor
+    tilts = first.assembly.gait.angles(0.0)
     n = torque_free_direction(tilts, vehicle)
     figure = _new_figure(5.6)
     above, below = figure.subfigures(2, 1, height_ratios=[1.0, 1.2])

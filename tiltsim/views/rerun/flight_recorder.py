@@ -5,7 +5,7 @@ the sign of pitch reversed.
 """
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from itertools import product
 from math import pi
 from typing import Any, Final, NamedTuple
@@ -57,47 +57,31 @@ _EVENT_COLORS: Final = {"INFO": timeline.GREY, "WARN": timeline.AMBER, "ERROR": 
 
 
 class Line(NamedTuple):
-    """An entity of a plot, with one line or several."""
+    """A line of a plot."""
 
-    path: str
-    labels: list[str]
-    colors: list[Color]
-    signals: list[Signal]
+    label: str
+    signal: Signal
+    color: Color
     width: float = MEASURED_WIDTH
 
 
-def plotted_lines(panel: Signals, root: str) -> list[Line]:
-    """The lines of a panel of one flight below an entity, each with its reference, and the bounds.
-
-    Panels of the second tab have all their lines in one entity, which keeps recordings small.
-    """
-    found: list[Line] = []
+def plotted_lines(panel: Signals) -> Iterator[Line]:
+    """The lines of a panel of one flight, each followed by its reference, and the bounds."""
     many = len(panel.lines) > len(AXIS_COLORS) or panel.lines[0].name[-1:].isdigit()
     hues = MANY_COLORS if many or panel.levels or panel.bounds else AXIS_COLORS
     colors: Sequence[Color] = timeline.FLIGHTS if panel.of_vehicles else hues
-
-    def add(name: str, line: Signal, label: str, color: Color, width: float) -> None:
-        path = f"{root}{panel.path}/{name}" if panel.plotted else f"{root}{panel.path}"
-        found.append(Line(path, [label], [color], [line], width))
-
+    # The title of a vector says the rest.
+    vector = len(panel.lines) > 1 and not (panel.plotted or panel.of_vehicles)
     for number, line in enumerate(panel.lines):
         color = colors[number % len(colors)]
         width = MANY_WIDTHS[min(number, len(MANY_WIDTHS) - 1)] if many else MEASURED_WIDTH
-        # The title of a vector says the rest.
-        vector = len(panel.lines) > 1 and not (panel.plotted or panel.of_vehicles)
         label = re.findall(r"\d+$|.$", line.name)[0] if vector else line.label
-        add(line.name, line, label, color, width)
+        yield Line(label, line, color, width if panel.plotted else REFERENCE_WIDTH)
         if line.reference:
             reference = Signal("", "", line.reference)
-            add(line.reference, reference, "reference", dimmed(color), REFERENCE_WIDTH)
+            yield Line("reference", reference, dimmed(color), REFERENCE_WIDTH)
     for bound in panel.bounds:
-        name, color = bound.rpartition("_")[2], dimmed(timeline.AMBER)
-        add(name, Signal("", "", bound), "bound", color, REFERENCE_WIDTH)
-    if panel.plotted:
-        return found
-    columns = zip(*((*one.labels, *one.colors, *one.signals) for one in found), strict=True)
-    labels, shades, signals = ([*column] for column in columns)
-    return [Line(f"{root}{panel.path}", labels, shades, signals, REFERENCE_WIDTH)]
+        yield Line("bound", Signal("", "", bound), dimmed(timeline.AMBER), REFERENCE_WIDTH)
 
 
 class FlightRecorder:
@@ -140,22 +124,21 @@ class FlightRecorder:
         self.plane = None
         if has_attitude_plane(assembly):
             self.plane = AttitudePlane(recording, self.scenario, f"plane{suffix}", color)
-        panels = [*self.signals.values()]
-        self._lines = [
-            Line(f"{part}/{panel.path}/{line.name}", [name], [color], [line])
-            for panel in (panels if name else ())
-            for line in panel.compared
-        ]
-        if together or not name:
-            self._lines += [line for one in panels for line in plotted_lines(one, self.details)]
+        self._plots: dict[str, list[Line]] = {}  # by their entities
+        for panel in self.signals.values():
+            for line in panel.compared if name else ():
+                self._plots[f"{part}/{panel.path}/{line.name}"] = [Line(name, line, color)]
+            if together or not name:
+                self._plots[f"{self.details}{panel.path}"] = [*plotted_lines(panel)]
         # The entities of levels: in a comparison the first flight's.
         roots = {f"{part}/".lstrip("/")} if first else set()
         self._level_roots = sorted(roots | {self.details} if together else roots)
         self._recording = recording
         self._events = EventDetector(assembly)
         self._event_path = f"events{suffix}"
-        for path, labels, colors, _, width in self._lines:
-            self._log_style(path, labels, colors, width)
+        for path, lines in self._plots.items():
+            labels, _, hues, widths = zip(*lines, strict=True)
+            self._log_style(path, labels, hues, widths)
         self._log_events(self._events.opening())
         if self.scene is not None and self.scene.not_drawn:
             text = f"not drawn, because Rerun has no such shape: {', '.join(self.scene.not_drawn)}"
@@ -169,7 +152,7 @@ class FlightRecorder:
         for root, (panel, level) in product(self._level_roots, levels):
             path = f"{root}{panel}/{level.name}"
             color = timeline.RED if level.value else timeline.GREY
-            self._log_style(path, [level.label], [color], LEVEL_WIDTH)
+            self._log_style(path, [level.label], [color], [LEVEL_WIDTH])
             row = rr.Scalars.columns(scalars=[level.value, level.value])
             send_rows(self._recording, path, np.array([0.0, end]), row)
 
@@ -179,19 +162,20 @@ class FlightRecorder:
             self.scene.append(piece)
         if self.plane is not None:
             self.plane.append(piece)
-        for line in self._lines:
-            values = np.stack([signal.of(piece) for signal in line.signals], axis=1)
-            rows = rr.Scalars.columns(scalars=values.ravel())
-            rows = rows.partition([len(line.signals)] * len(piece))
-            send_rows(self._recording, line.path, piece["time"], rows)
+        for path, lines in self._plots.items():
+            values = np.stack([line.signal.of(piece) for line in lines], axis=1)
+            rows = rr.Scalars.columns(scalars=values.ravel()).partition([len(lines)] * len(piece))
+            send_rows(self._recording, path, piece["time"], rows)
         self._log_events(self._events.observe(piece))
 
     def finish(self, end: End) -> None:
         """Log how the flight ended."""
         self._log_events(self._events.closing(end))
 
-    def _log_style(self, path: str, labels: list[str], colors: list[Color], width: float) -> None:
-        style = rr.SeriesLines(names=labels, colors=colors, widths=[width] * len(labels))
+    def _log_style(
+        self, path: str, labels: Sequence[str], colors: Sequence[Color], widths: Sequence[float]
+    ) -> None:
+        style = rr.SeriesLines(names=labels, colors=colors, widths=widths)
         self._recording.log(path, style, static=True)
 
     def _log_events(self, events: list[Event]) -> None:
