@@ -267,8 +267,7 @@ ABOUT_A_KIND = {
     *("tiltsim.models.starters", "tiltsim.studies.multirotor_analysis", "tiltsim.studies.arena"),
     *("tiltsim.commands.gait", "tiltsim.commands.thesis", "tiltsim.views.figures.vehicle_drawing"),
     *("tiltsim.report.findings", "tiltsim.report.content"),
-    *("tiltsim.report.measures", "tiltsim.report.measures.penguin"),
-    "tiltsim.report.measures.slips",
+    *("tiltsim.report.measures", "tiltsim.report.measures.slips"),
     "tiltsim.folders",  # has a folder of this name
     "tiltsim.commands.look",  # panels in a text of help
 }

@@ -470,8 +470,8 @@ MISTAKES = {
         "reference.radius = 0.0: must not be 0",
     ),
     "unknown disturbance": (
-        {"disturbance": [{"type": "earthquake", "value": [1.0, 0.0, 0.0]}]},
-        'disturbance[0].type = "earthquake": choose acceleration',
+        {"disturbance": [{"type": "gust", "value": [1.0, 0.0, 0.0]}]},
+        'disturbance[0].type = "gust": did you mean air.gust? choose acceleration',
     ),
     "zone turned round": (
         {**LAWS["switching"], "controller": {"law": "switching", "zone": {"roll": [0.2, -0.2]}}},

@@ -12,6 +12,7 @@ from pyulog import ULog
 
 import tiltsim
 from tests.flights import flight
+from tiltsim.cli import main
 from tiltsim.logs.log import Log
 
 SUFFIXES = ("mcap", "ulg", "csv")
@@ -25,6 +26,12 @@ def exported(tmp_path_factory):
     for suffix in SUFFIXES:
         tiltsim.export(flown, folder / f"flight.{suffix}")
     return folder
+
+
+def test_a_missing_folder_is_named_with_its_option(exported, tmp_path, capsys):
+    out = tmp_path / "missing" / "flight.csv"
+    assert main(["export", str(exported / "flight"), "--out", str(out)]) == 2
+    assert capsys.readouterr().err == f"tiltsim: --out {out}: its folder does not exist\n"
 
 
 @pytest.mark.parametrize("suffix", SUFFIXES)

@@ -140,16 +140,8 @@ def test_vectors_of_a_companion_are_panels_and_hints():
     assert "'reference': choose reference_position, " in begun
 
 
-@pytest.mark.parametrize(
-    ("analysis", "words"),
-    [
-        (tiltsim.attraction, "attraction takes one vehicle; remove [[companion]]"),
-        (lambda first: LoggedVehicle(first), "identify takes a vehicle alone"),
-        (tiltsim.stability, "linear analysis takes a vehicle alone"),
-    ],
-)
-def test_an_analysis_of_one_vehicle_refuses_companions(analysis, words):
-    assert words in refusal(analysis, together(WING))
+def test_identification_refuses_companions():
+    assert "identify takes a vehicle alone" in refusal(LoggedVehicle, together(WING))
 
 
 def test_a_companion_that_is_lost_ends_the_flight_by_its_name():

@@ -88,6 +88,16 @@ def test_scenarios_are_read_once_and_invalid_ones_reported_before_any_is_flown(
     assert len(read) == 2
 
 
+def test_a_metric_without_a_value_fails_with_the_reason(tmp_path):
+    expected = '[[expect]]\nmetric = "sup_position_error_after_20s"\nmax = 0.1\n'
+    (tmp_path / "short.toml").write_text(f"[simulation]\nduration = 0.01\n{expected}")
+    (result,) = check_all(collect([str(tmp_path)]), 1, {})
+    assert result.status == "failed"
+    assert result.message == (
+        "sup_position_error_after_20s = flight shorter than 20 s, expected <= 0.1"
+    )
+
+
 def test_the_most_severe_exit_code_is_returned():
     def code(*statuses):
         return exit_code([CheckResult(status, status, "") for status in statuses])

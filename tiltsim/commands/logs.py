@@ -35,10 +35,12 @@ def run_export(
     """
     from tiltsim.flight.reading import load_flight
     from tiltsim.logs.formats import FORMATS, export
+    from tiltsim.system.files import prepare_file
 
     loaded = load_flight(flight)
     name = f"flight{FORMATS[format or 'mcap']}"
     file = file_in(out, flight, name)
+    prepare_file("--out", file)
     export(loaded, file, format)
     if not quiet:
         print_line(f"{len(loaded)} samples of {len(loaded.units)} columns written to {file}")

@@ -130,7 +130,7 @@ def _exit_code(flight: Flight, verdicts: Sequence[Verdict], *, quiet: bool) -> i
         return VEHICLE_LOST
     failed = [verdict for verdict in verdicts if not verdict.holds]
     for verdict in failed if quiet else ():
-        measured = f"measured {_measured(verdict)}, expected {verdict.bounds}"
+        measured = f"measured {verdict.measured_text}, expected {verdict.bounds}"
         print_line(f"tiltsim: FAILED {verdict.expectation.metric}: {measured}", error=True)
     return EXPECTATION_FAILED if failed else DONE
 
@@ -260,15 +260,6 @@ def _shown(value: float) -> str:
     return f"{value:.6g}" if abs(value) >= SOLVER_ERROR else f"{value:.0e}"
 
 
-def _measured(verdict: Verdict) -> str:
-    value, metric = verdict.measured, verdict.expectation.metric
-    if isinstance(value, bool):
-        return str(value).lower()
-    if value is not None:
-        return f"{value:.6g}"
-    return "flight shorter than 20 s" if metric.endswith("after_20s") else "no value"
-
-
 def _published(verdict: Verdict) -> str:
     expectation = verdict.expectation
     value = expectation.published
@@ -286,7 +277,7 @@ def expectation_lines(verdicts: Sequence[Verdict], *, judged: bool) -> list[str]
     columns = {
         "": (lambda verdict: "ok" if verdict.holds else "FAILED", ""),
         "expected" if judged else "compared": (lambda verdict: verdict.expectation.metric, ""),
-        "measured": (_measured, ""),
+        "measured": (lambda verdict: verdict.measured_text, ""),
         "published": (_published, ""),
         "bounds": (lambda verdict: verdict.bounds, ""),
     }

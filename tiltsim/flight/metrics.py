@@ -201,6 +201,15 @@ class Verdict:
         return expected.max is None or value <= expected.max
 
     @property
+    def measured_text(self) -> str:
+        """The measured value as text, or why there is none."""
+        value = self.measured
+        if value is None:
+            is_late = self.expectation.metric.endswith("after_20s")
+            return "flight shorter than 20 s" if is_late else "no value"
+        return str(value).lower() if isinstance(value, bool) else f"{value:.6g}"
+
+    @property
     def bounds(self) -> str:
         """The bounds as text, such as ``-0.4 .. -0.36``."""
         low, high, equals = self.expectation.min, self.expectation.max, self.expectation.equals

@@ -1,15 +1,7 @@
 """The reproduction report: the claims of the thesis compared with measured values.
 
-A **statement** (`tiltsim.report.statement.Statement`) is one thing that the thesis says, with
-
-* ``id``: the anchor on the page, "ch4-period"; never changed once published;
-* ``source``: chapter, section, equation or figure;
-* ``text``: the statement in one sentence of ours;
-* ``thesis``: the words that make it, quoted in “ ” or paraphrased, or a description of the figure;
-* ``criterion``: conditions of reproduction and of failure, in words; tolerances and ranges of
-  the row are added by themselves;
-* ``note``: information that a reader needs to judge it, whatever the verdict;
-* ``missing``: information that the text omits, if it is therefore not testable.
+A **statement** (`tiltsim.report.statement.Statement`, whose fields are the keys of its table) is
+one thing that the thesis says. Its ``id`` is the anchor on the page, never changed once published.
 
 A **row** (`tiltsim.report.claim.Claim`) is one case of a statement. Its id is the statement's id
 and its label; ids that are gone are in ``withdrawn.toml``. `Origin` names the parts that do not
@@ -18,10 +10,9 @@ in statements and rows for their computations. Where the flight is ours the publ
 as implied. A row that holds because parameters were chosen so (``fitted``) is no evidence, and none
 against the thesis if it fails.
 
-A row that does not hold names its ``fault`` if a proof says why: ``refuted`` (the statement is
-false), ``misprint`` (of a formula or number), both with the ``error`` that it belongs to in the
-list of errors (`tiltsim.report.findings`, ``errors.toml``); or ``rounding``: true of the printed
-digits, which another row of the statement tests. A value that the thesis does not claim is no row.
+A row that does not hold names its ``fault`` if a proof says why, see
+`tiltsim.report.claim.ClaimVerdict`; one that is refuted or misprinted also the ``error`` that it
+belongs to in the list of errors. A value that the thesis does not claim is no row.
 
 **One flight is enough.** The row is in the scenario file::
 

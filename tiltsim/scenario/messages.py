@@ -207,7 +207,8 @@ def _describe(
         allowed = ", ".join(tags)
         if tag not in value:
             return f"{key}.{tag}: missing; choose {allowed}"
-        return f"{key}.{tag} = {show(value[tag])}: {choose(value[tag], tags)}"
+        hint = did_you_mean(value[tag], tags) or _elsewhere(schema_of(schema), value[tag])
+        return f"{key}.{tag} = {show(value[tag])}: {hint}choose {allowed}"
     if kind == "literal_error":
         expected = context["expected"].replace("'", "")
         return f"{key} = {show(value)}: choose {'false' if expected == 'False' else expected}"
@@ -282,21 +283,27 @@ def _known_keys(root: Node, location: tuple[Any, ...], key: str, missing: Sequen
     others = [one for one in union.tables if one is not union and name in one.properties]
     kinds = dict.fromkeys(kind for option in others for kind in option.kinds)
     within = "." + re.sub(r"\[\d+\]", "", key)
-    elsewhere = [
-        found
-        for found in root.dotted_keys()
-        if found.rpartition(".")[2] == name and f".{found}." not in within
-    ]
+    elsewhere = _elsewhere(root, name, within)
     alike = [known for known in names if _shared_words(known, name) > ALIKE]
     if kinds and names:
         hint = f"only for {table.tag} {', '.join(kinds)}; "
     elif elsewhere and not did_you_mean(name, alike):
-        hint = f"did you mean {' or '.join(elsewhere[:3])}? "
+        hint = elsewhere
     else:
         hint = did_you_mean(name, alike) or did_you_mean(name, names)
         if not hint and len(missing) == 1:
             hint = f"did you mean {missing[0]}? "
     return f"{hint}known: {', '.join(names)}"
+
+
+def _elsewhere(root: Node, name: object, within: str = "") -> str:
+    """A suggestion of keys of a name in other tables, but for a key; empty if there are none."""
+    found = [
+        known
+        for known in root.dotted_keys()
+        if known.rpartition(".")[2] == name and f".{known}." not in within
+    ]
+    return f"did you mean {' or '.join(found[:3])}? " if found else ""
 
 
 def _entries(node: Node) -> str:

@@ -138,16 +138,11 @@ class ScenarioTables(WithAutopilot):
         """Whether the model has more in it than the vehicle and the ground."""
         return bool(self.object) or self.tool is not None or self.payload is not None
 
-    def require_alone(self, analysis: str, *, loaded: bool = False) -> None:
-        """Refuse others, and unless ``loaded`` tool and load, for an analysis.
-
-        Raises:
-            InputError: It begins with the name of the analysis.
-        """
-        others: dict[str, Any] = {"[[object]]": self.object, "[[companion]]": self.companion}
-        if not loaded:
-            others |= {"[tool]": self.tool, "[payload]": self.payload}
-        found = ", ".join(name for name, tables in others.items() if tables)
+    def require_alone(self, analysis: str) -> None:
+        """Refuse all others for an analysis. Raises `InputError` with its name."""
+        tables = ("object", "companion", "tool", "payload")
+        brackets = {"object": "[[object]]", "companion": "[[companion]]"}
+        found = ", ".join(brackets.get(key, f"[{key}]") for key in tables if getattr(self, key))
         if found:
             where = self.address or "scenario"
             raise InputError(f"{where}: {analysis} takes a vehicle alone; remove {found}")

@@ -215,18 +215,12 @@ def check_one(loaded: tuple[str, Scenario]) -> CheckResult:
     failed = [v for v in verdicts if not v.holds]
     status: Status = "failed" if failed else "passed"
     message = "; ".join(
-        f"{v.expectation.metric} = {_number(v.measured)}, expected {v.bounds}" for v in failed
+        f"{v.expectation.metric} = {v.measured_text}, expected {v.bounds}" for v in failed
     )
     if flight.end.kind != "completed" and not may_end_early:
         status, message = "lost", flight.end.message
     seconds, found = perf_counter() - start, metrics.of_all_vehicles()
     return CheckResult(address, status, message, verdicts, seconds, found)
-
-
-def _number(value: float | bool | None) -> str:
-    if value is None:
-        return "missing"
-    return str(value).lower() if isinstance(value, bool) else f"{value:.6g}"
 
 
 def check_all(

@@ -312,7 +312,7 @@ def _eq_66(mended: bool) -> float:
 
 def _eq_72(mended: bool) -> float:
     """States with a falling candidate at which Eq. (72), or its opposite, is violated."""
-    from tiltsim.report.measures.penguin import falling_states
+    from tiltsim.report.measures.tilt_car import falling_states
 
     pairs = falling_states()
     wrong = [(now < later) == mended for now, later in pairs]

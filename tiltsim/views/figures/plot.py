@@ -91,16 +91,16 @@ def draw_flights(
     flights = vehicles_named(vehicle, flights)
     if vehicle and title is None:
         title = f"{common_title(scenarios)}: {vehicle}".removeprefix(": ")
-        names, title = ([title], None) if len(flights) == 1 else (names, title)
+        names, title = ([names[0] or title], None) if len(flights) == 1 else (names, title)
     together = [] if vehicle or len(flights) > 1 else [*flights[0].vehicles.values()]
     if len(together) > 1:
         alone, shared = panels_of(flights), panels_of(together)
         world = {name: alone[name] for name in OF_WORLD if name in alone}
-        if not {*panels} <= shared.keys() | world.keys():
-            world = {}
-        else:
+        if {*panels} <= shared.keys() | world.keys():
             names, flights = [*flights[0].vehicles], together
             title = scenarios[0].title or scenarios[0].address if title is None else title
+        else:
+            world = {}
     clipped = [np.clip(flight.samples, -LARGEST, LARGEST) for flight in flights]
     flights = [
         flight if np.array_equal(samples, flight.samples) else replace(flight, samples=samples)

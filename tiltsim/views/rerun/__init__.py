@@ -14,11 +14,11 @@ Entities of a recording, each below the flight's own name where there are severa
 
 import os
 import socket
-import sys
 from typing import Final
 from urllib.parse import urlsplit
 
 from tiltsim.errors import InputError
+from tiltsim.views.video import has_display
 
 DEFAULT_URL: Final = "rerun+http://127.0.0.1:9876/proxy"  # default address of a viewer
 CONNECT_TIMEOUT: Final = 2.0  # s
@@ -46,7 +46,7 @@ def require_viewer(url: str | None) -> None:
         if not viewer_listens(url):
             text = f"address {url}: no viewer listens there; start one with the command rerun"
             raise InputError(text)
-    elif sys.platform == "linux" and not {"DISPLAY", "WAYLAND_DISPLAY"} & set(os.environ):
+    elif not has_display():
         raise InputError(
             "no screen to open the Rerun viewer on (DISPLAY and WAYLAND_DISPLAY are not set); "
             "save a recording with --rerun FILE.rrd, or --connect to a viewer on another machine"

@@ -42,7 +42,9 @@ def flight_blueprint(
         live: Whether the viewer follows the latest time instead of playing from the start.
     """
     scenes = [(one, one.scene) for one in recorders if one.scene is not None]
-    trajectory, events = _trajectory_view(scenes, recorders, flights), _events_view()
+    planned = recorders[0].scenario.simulation.duration
+    end = max((float(flight["time"][-1]) for flight in flights), default=planned)
+    trajectory, events = _trajectory_view(scenes, flights, end), _events_view()
     vehicles = [_vehicle_view(*one, alone=len(scenes) == 1) for one in scenes]
     planes = [_plane_view(one) for one in recorders if one.plane is not None]
     below = rrb.Horizontal(trajectory, events, column_shares=[4, 5])
@@ -57,7 +59,7 @@ def flight_blueprint(
         views = rrb.Horizontal(*vehicles, trajectory, column_shares=[1, 1])
         left = rrb.Vertical(views, events, row_shares=[11, 4])
     return rrb.Blueprint(
-        rrb.Horizontal(left, _plots(recorders, flights), column_shares=[13, 8]),
+        rrb.Horizontal(left, _plots(recorders, flights, end), column_shares=[13, 8]),
         rrb.BlueprintPanel(state="collapsed"),
         rrb.SelectionPanel(state="collapsed"),
         rrb.TimePanel(
@@ -65,12 +67,6 @@ def flight_blueprint(
         ),
         auto_views=False,
     )
-
-
-def _end_of(recorders: Sequence[FlightRecorder], flights: Sequence[Flight]) -> float:
-    """The end (s) of the longest flight; planned, before they are flown."""
-    planned = recorders[0].scenario.simulation.duration
-    return max((float(flight["time"][-1]) for flight in flights), default=planned)
 
 
 def _vehicle_view(one: FlightRecorder, scene: Scene, *, alone: bool) -> rrb.View:
@@ -91,13 +87,11 @@ def _vehicle_view(one: FlightRecorder, scene: Scene, *, alone: bool) -> rrb.View
 
 
 def _trajectory_view(
-    scenes: Sequence[tuple[FlightRecorder, Scene]],
-    recorders: Sequence[FlightRecorder],
-    flights: Sequence[Flight],
+    scenes: Sequence[tuple[FlightRecorder, Scene]], flights: Sequence[Flight], end: float
 ) -> rrb.View:
     """The complete paths of all vehicles and references."""
     first, scene = scenes[0]
-    paths = [replay.reference_path(first.assembly, _end_of(recorders, flights), REFERENCE_POINTS)]
+    paths = [replay.reference_path(first.assembly, end, REFERENCE_POINTS)]
     tracks = [
         replay.positions(one.columns, p) for one in flights for p in replay.by_prefix(one.assembly)
     ]
@@ -155,15 +149,16 @@ def _events_view() -> rrb.View:
     )
 
 
-def _plots(recorders: Sequence[FlightRecorder], flights: Sequence[Flight]) -> rrb.Container:
+def _plots(
+    recorders: Sequence[FlightRecorder], flights: Sequence[Flight], end: float
+) -> rrb.Container:
     """The plots of the time series; for several flights or vehicles, of the compared signals.
 
     Only the first plot of a comparison has a legend: colors are the same in all plots. Vehicles
     that fly together have separate tabs behind it.
     """
     if len(recorders) == 1:
-        return rrb.Tabs(*_tabs(recorders[0], flights, _end_of(recorders, flights)))
-    end = _end_of(recorders, flights)
+        return rrb.Tabs(*_tabs(recorders[0], flights, end))
     compared = _compared(recorders, flights, _times([one.name for one in recorders], end))
     if not recorders[0].details:
         return rrb.Vertical(*compared)

@@ -53,7 +53,7 @@ class Scene:
     ) -> None:
         self._recording = recording
         self._vehicles = replay.by_prefix(assembly)
-        self.model = self._model = model = replay.visible_model(assembly)
+        self.model = model = replay.visible_model(assembly)
         self._colors = colors
         self.root = root
         self.camera = f"{root}/camera"  # moves with the vehicle but does not rotate
@@ -82,7 +82,7 @@ class Scene:
 
     def _log_styles(self, name: str) -> None:
         """Log static parts, and the looks of moving ones; ``name`` is the vehicle's label."""
-        model = self._model
+        model = self.model
         self._log(self.root.partition("/")[0], rr.ViewCoordinates.RIGHT_HAND_Z_UP)
         for body in range(1, model.nbody):
             if not model.body_dofnum[body]:
@@ -115,7 +115,7 @@ class Scene:
 
     def append(self, piece: Flight) -> None:
         """Log the next piece of the flight."""
-        model, columns, time = self._model, piece.columns, piece["time"]
+        model, columns, time = self.model, piece.columns, piece["time"]
         world = replay.world_poses(model, replay.joint_positions(model, columns))
         local = replay.poses_in_parents(model, world)
         for body in range(1, model.nbody):
@@ -157,8 +157,8 @@ class Scene:
         self._recording.log(path, *archetypes, static=True)
 
     def _thrust_path(self, site: int) -> str:
-        body = self._model.site_bodyid[site]
-        alone = [self._model.site_bodyid[other] for other in self._thrust].count(body) == 1
+        body = self.model.site_bodyid[site]
+        alone = [self.model.site_bodyid[other] for other in self._thrust].count(body) == 1
         # Several on one body are named after their columns, such as thrust_1.
         return f"{self._paths[body]}/{'thrust' if alone else self._thrust[site]}"
 
