@@ -88,6 +88,7 @@ def test_a_margin_of_a_vehicle_is_its_margin_alone():
     assert {"wing_z", "wing_rotor_acceleration_1"} <= {*among}
 
 
+@pytest.mark.slow
 def test_an_object_on_a_cable_has_the_poles_of_a_load():
     load = {"mass": 0.1, "length": 1.0, "attachment": [0.0, 0.0, 0.0]}
     cable = {"name": "sling", "object": "parcel", "length": 1.0}
@@ -108,7 +109,11 @@ WALL["friction"] = 0.0
     ("objects", "reason"),
     [
         ([PARCEL | {"floating": True}], "sling is slack at rest: let it end, or shorten it"),
-        ([BALL, WALL], "parcel hangs and touches something at rest; part them"),
+        pytest.param(
+            [BALL, WALL],
+            "parcel hangs and touches something at rest; part them",
+            marks=pytest.mark.slow,
+        ),
     ],
 )
 def test_an_object_that_its_cable_alone_does_not_hold_is_refused(objects, reason):
