@@ -128,7 +128,7 @@ def demanded(error: Moving, jerk_error: Any, ahead: Moving, frame: Frame, p: Any
     way = value_of(error)[:2]
     leans = xp.clip(xp.sqrt(way @ way + TINY) / p.near - 1.0, 0.0, 1.0)
     push = p.direct + leans * (p.acceleration - p.direct)
-    # The feedback has the share of what reference and disturbance leave that it has in hover.
+    # Reference and disturbance leave a part of the push across, and the feedback a share of it.
     rest = value_of(ahead - frame.force)
     spare = _across(rest[2] + frame.gravity, p) - xp.sqrt(rest[:2] @ rest[:2] + TINY)
     push = push * xp.clip(spare / _across(frame.gravity, p), LEAST_PUSH, 1.0)
