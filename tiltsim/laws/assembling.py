@@ -179,14 +179,10 @@ def _linearizing_loop(scenario: Scenario, measured: bool) -> ClosedLoop:
     return multirotor_loop(layout, form, *options)
 
 
-def _unchanged(loop: ClosedLoop) -> ClosedLoop:
-    return loop
-
-
 @one_thread_at_a_time
 def loop_of(
     scenario: Scenario,
-    adapted: Callable[[ClosedLoop], ClosedLoop] = _unchanged,
+    adapted: Callable[[ClosedLoop], ClosedLoop] = lambda loop: loop,
     *,
     recorded: bool = False,
 ) -> ClosedLoop:
@@ -249,7 +245,7 @@ def loop_of(
 
 def assemble(
     scenario: Scenario,
-    adapted: Callable[[ClosedLoop], ClosedLoop] = _unchanged,
+    adapted: Callable[[ClosedLoop], ClosedLoop] = lambda loop: loop,
     *,
     recorded: bool = False,
 ) -> Assembly:

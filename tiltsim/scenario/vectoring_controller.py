@@ -79,6 +79,7 @@ class VectoringController(Vectoring, FailureAwareController, TiltingTable, LawCo
             fastest,
             np.array(airframe.initial_tilts),
             self.commands_tilts and len(airframe.initial_tilts) > 0,
+            min(self.max_tilt, servo.max_angle or inf),
             len(airframe.initial_tilts) > 0 and not airframe.gait.is_constant,
             np.array([hypot(*rotor.place) for rotor in vehicle.rotors]),
             np.ones(len(thrust)),

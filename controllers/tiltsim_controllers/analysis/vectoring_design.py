@@ -7,7 +7,7 @@ limits leave, and the side force that needs no lean from a linear program.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import atan, cos, exp, inf, pi
+from math import atan, exp, inf, pi
 from typing import Any, Final
 
 import numpy as np
@@ -30,11 +30,13 @@ TOTAL_SHARE: Final = 0.9
 """Share of the greatest thrusts that is demanded in all."""
 DELAY_MARGIN: Final = 0.22
 """Attitude bandwidth times the delay that is left."""
-POSITION_SHARE: Final = 0.45
+POSITION_SHARE: Final = 0.55
 """Bandwidth of the position across over the attitude's, ..."""
+DAMPING: Final = 0.85
+"""Damping ratio of the position across."""
 SIDEWAYS_POSITION: Final = 0.5
 """... and where the push of torques limits attitude."""
-AGILE_POSITION: Final = 0.75
+AGILE_POSITION: Final = 0.9
 """The largest one over the root of the angular acceleration."""
 RISE: Final = 0.6, 1.4
 """Bandwidth of height over the attitude's, and damping ratio: no lean delays it."""
@@ -258,13 +260,12 @@ def design(
         predicts=float(keys.prediction),
         bounded=float(keys.bounded),
         **able._asdict(),
-        damping=1.0,
+        damping=DAMPING,
         rise_damping=RISE[1],
         acceleration=_across(craft),
         ascent=VERTICAL[0],
         descent=VERTICAL[1],
         greatest=TOTAL_SHARE * greatest,
-        lift=float(high.sum()) * (cos(keys.max_tilt) if craft.commanded else 1.0),
         attitude_damping=0.9,
         reversal=lag + h if lag else 0.0,
         share=1.0 - exp(-tracking * h),

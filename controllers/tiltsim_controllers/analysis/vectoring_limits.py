@@ -27,6 +27,10 @@ SIDE_SHARE: Final = 0.65
 """Share of the greatest thrusts that side force may take."""
 SERVO_ANGLE: Final = 0.3
 """rad: the tilt by which braking counts about an axis that only tilts turn."""
+TILT_SHARE: Final = 0.9
+"""Share of the range of tilts that side force may take, as yaw needs some."""
+SLOPE_SHARE: Final = 0.8
+"""Share of the side force of hover that counts on."""
 DIRECTIONS: Final = 8
 """Directions of side force in the linear programs."""
 
@@ -44,6 +48,7 @@ class Craft:
     fastest: Floats  # largest ones, rad/s, along the spin, shape (N,)
     tilts: Floats  # at the start, rad, shape (M,)
     commanded: bool  # whether the law commands the tilts
+    tilt_range: float  # rad, of these, from the preferred ones
     moving: bool  # whether a gait moves them
     levers: Floats  # m, of the rotors from the center of mass, shape (N,)
     works: Floats  # 1 for a rotor that works, else 0, shape (N,)
@@ -93,13 +98,16 @@ def side_slope(craft: Craft, rows: Floats) -> float:
     """
     if craft.moving:
         return 0.0
-    if craft.commanded:
-        return 0.5 if craft.outputs(craft.tilts) == 6 else 0.0
     weight = craft.mass * craft.gravity
     angles = 2.0 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
     sides = [np.array([np.cos(angle), np.sin(angle), 0.0]) for angle in angles]
-    most = np.minimum(SIDE_SHARE * craft.limits[1], 2.4 * craft.hover)
-    return 0.8 * least_force(craft, rows, sides, weight, most) / weight
+    low, most = craft.limits[0], np.minimum(SIDE_SHARE * craft.limits[1], 2.4 * craft.hover)
+    if craft.commanded:
+        # A rotor that tilts within a range pushes like two rotors at its ends.
+        preferred, most_tilt = preferred_tilts(craft), TILT_SHARE * craft.tilt_range
+        rows = np.hstack([craft.wrench(preferred + tilt) for tilt in (-most_tilt, most_tilt)])
+        low, most = np.zeros(rows.shape[1]), np.tile(most, 2)
+    return SLOPE_SHARE * least_force(craft, rows, sides, weight, (low, most)) / weight
 
 
 def pose_cone(craft: Craft, rows: Floats, slope: float) -> float:
@@ -114,13 +122,13 @@ def pose_cone(craft: Craft, rows: Floats, slope: float) -> float:
     ways = [np.array(way) for way in product((-1.0, 0.0, 1.0), repeat=3) if any(way)]
     units = [way / np.linalg.norm(way) for way in ways]
     holds_all = slope > 0.0 and not craft.commanded
-    if holds_all and least_force(craft, rows, units, 0.0, most) > weight:
+    if holds_all and least_force(craft, rows, units, 0.0, (craft.limits[0], most)) > weight:
         return pi
-    return atan(slope)
+    return atan(slope / SLOPE_SHARE if craft.commanded else slope)
 
 
 def least_force(
-    craft: Craft, rows: Floats, ways: Sequence[Floats], lift: float, most: Floats
+    craft: Craft, rows: Floats, ways: Sequence[Floats], lift: float, limits: tuple[Floats, Floats]
 ) -> float:
     """The least over some directions of the greatest force (N) without torque; 0 for none.
 
@@ -129,17 +137,17 @@ def least_force(
         rows: Force and torque per newton, shape (6, N).
         ways: Unit vectors of the directions, body axes.
         lift: N, that the rotors make as well, along z.
-        most: Greatest thrusts, N, shape (N,).
+        limits: Least and greatest thrusts, N, shape (N,) each.
     """
     from scipy.optimize import linprog  # a third of a second to import
 
     if np.linalg.matrix_rank(rows, tol=1e-6) < 6:
         return 0.0
-    bounds = [*zip(craft.limits[0], most, strict=True), (0, None)]
+    bounds = [*zip(*limits, strict=True), (0, None)]
     forces = []
     for way in ways:
         found = linprog(
-            np.array([*np.zeros(len(most)), -1.0]),
+            np.array([*np.zeros(rows.shape[1]), -1.0]),
             A_eq=np.column_stack([rows, [*-way, 0.0, 0.0, 0.0]]),
             b_eq=lift * np.eye(6)[2],
             bounds=bounds,

@@ -25,7 +25,14 @@ from tiltsim_controllers.laws.vectoring_state import (
     served,
     servo_doubts,
 )
-from tiltsim_controllers.laws.vectoring_steps import TINY, demanded, pointing, turning, upward
+from tiltsim_controllers.laws.vectoring_steps import (
+    TINY,
+    aligned,
+    demanded,
+    pointing,
+    turning,
+    upward,
+)
 from tiltsim_controllers.mathematics.linear import cross
 from tiltsim_controllers.mathematics.moving import Moving, value_of, where
 from tiltsim_controllers.vehicle.rotors import by_tilt, moving_wrench_map, wrench_map, wrench_slope
@@ -121,7 +128,13 @@ def _demand(known: Known, ahead: Ahead) -> Any:
     axis = where(p.slope > 0.0, up, own)
     x, y, z = up.value
     left = p.cone - xp.arctan2(xp.sqrt(x * x + y * y + TINY), z)
-    slope = xp.clip(xp.tan(xp.clip(left, 0.0, 1.5)), 0.0, p.slope)
+    most = p.slope
+    if len(seen.tilt_commands):
+        # Tilts that push sideways leave little to turn by; a vehicle that is turned away leans.
+        x, y, yaw = now.rotation[0, 0], now.rotation[1, 0], pose.value[2]
+        off = xp.arctan2(y * xp.cos(yaw) - x * xp.sin(yaw), x * xp.cos(yaw) + y * xp.sin(yaw))
+        most = aligned(abs(off)) * most
+    slope = xp.clip(xp.tan(xp.clip(left, 0.0, 1.5)), 0.0, most)
     unit = xp.where(p.cone > 2.0, axis.value, value_of(own))
     made = known.wrench(ahead.speeds, ahead.tilts)[:3]
     # A torque that pushes sideways is no motion to be led along where the vehicle only leans: fed
@@ -146,7 +159,10 @@ def _demand(known: Known, ahead: Ahead) -> Any:
     across = F - along * unit
     size, most = xp.sqrt(across @ across + 1e-24), 1.25 * p.slope * frame.mass * frame.gravity
     across = across * xp.where(size > most, most / size, 1.0)
-    return xp.hstack([xp.clip(along, 0.0, p.lift) * unit + across, torque])
+    pushes = unit @ wrench_map(seen.rotors, ahead.tilts)[:3]
+    low, high = (pushes * known.thrusts(speeds) for speeds in (known.slowest, known.fastest))
+    lift = xp.maximum(low, high).sum()
+    return xp.hstack([xp.clip(along, 0.0, lift) * unit + across, torque])
 
 
 def _allocated(known: Known, ahead: Ahead, goal: Any, usable: Any) -> tuple[Any, Any]:
@@ -202,7 +218,7 @@ def _with_tilts(
     found = bounded_least_squares(
         xp.hstack([pushing, leaning]),
         target,
-        xp.array([1e-4, 1e-4, 1e-8, 1e-10, 1e-10, 1e-6]),
+        xp.array([1e-4, 1e-4, 1e-8, 1e-10, 1e-10, 1e-8]),
         xp.ones(count + len(command)),
         xp.hstack([(1.0 - p.pull) * thrusts, p.pull * usable * way]),
         xp.hstack([low, lower]),

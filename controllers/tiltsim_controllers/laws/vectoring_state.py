@@ -61,7 +61,6 @@ class Parameters(NamedTuple):
     ascent: float  # m/s^2, likewise upward
     descent: float  # m/s^2, likewise downward
     greatest: float  # m/s^2, of the rotors
-    lift: float  # N, the greatest along the axis
     direct: float  # m/s^2, likewise across, by side force alone
     near: float  # m, within which side force alone is faster
     lean_time: float  # s, until a braking begins
@@ -262,7 +261,7 @@ def observer_rates(known: Known) -> Any:
         then.omega - memory.omega,
         p.force_gain * (slip - along * push),
         p.torque_gain * (seen.body_rates - memory.omega),
-        xp.array([xp.clip(memory.excess + p.excess_gain * along, -0.3, 0.6) - memory.excess]),
+        xp.array([xp.clip(memory.excess + p.excess_gain * along, -0.5, 0.6) - memory.excess]),
     ]
     return xp.hstack(change) / p.period
 

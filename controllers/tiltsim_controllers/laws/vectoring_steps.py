@@ -1,6 +1,6 @@
 """Steps of `vectoring`: motion ahead, demanded acceleration, direction of the force, attitude."""
 
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.laws.feedback import body_rate_matrix, exact_decoupler
@@ -17,6 +17,10 @@ from tiltsim_controllers.mathematics.moving import (
 )
 
 TINY = 1e-24
+LEAST_PUSH: Final = 0.25
+"""Acceleration of the feedback over the one in hover where nothing is spare."""
+UNALIGNED: Final = 0.1, 0.3
+"""rad, the errors up to which an attitude is aligned, and from which it is not at all."""
 
 
 class Motion(NamedTuple):
@@ -124,17 +128,31 @@ def demanded(error: Moving, jerk_error: Any, ahead: Moving, frame: Frame, p: Any
     way = value_of(error)[:2]
     leans = xp.clip(xp.sqrt(way @ way + TINY) / p.near - 1.0, 0.0, 1.0)
     push = p.direct + leans * (p.acceleration - p.direct)
+    # Reference and disturbance leave a part of the push across, and the feedback a share of it.
+    rest = value_of(ahead - frame.force)
+    spare = _across(rest[2] + frame.gravity, p) - xp.sqrt(rest[:2] @ rest[:2] + TINY)
+    push = push * xp.clip(spare / _across(frame.gravity, p), LEAST_PUSH, 1.0)
     delay = p.reversal + leans * (p.lean_time - p.reversal)
     across = feedback(slice(0, 2), p.position, p.damping, push, delay)
     upward = feedback(slice(2, 3), p.rise, p.rise_damping, p.descent, p.reversal)
-    side, rise = _within(across, push), _clipped(upward[0], -p.descent, p.ascent)
+    # A motion away has to stop before any way back begins; more push stops it, as far as there is
+    # time to lean back.
+    apart = way @ value_of(slope)[:2] / xp.sqrt(way @ way + TINY) - 0.5 * p.lean_time * push
+    stopping = xp.clip(2.0 * p.damping * p.position * apart, 0.0, push)
+    side = _within(across, push + stopping)
+    rise = _clipped(upward[0], -p.descent, p.ascent)
     target = ahead + stacked(side[0], side[1], rise) - frame.force
     lift = _clipped(target[2] + frame.gravity, 0.2 * frame.gravity, p.greatest)
     # No more side force than leaves the lift, and no lean beyond 60 degrees.
     up = lift.value
-    left = xp.sqrt(xp.maximum(p.greatest * p.greatest - up * up, 0.04 * p.greatest * p.greatest))
-    side = _within(target[:2], xp.minimum(left, 1.7 * up))
+    side = _within(target[:2], xp.minimum(_across(up, p), 1.7 * up))
     return stacked(side[0], side[1], lift)
+
+
+def _across(lift: Any, p: Any) -> Any:
+    """Greatest acceleration (m/s^2) across that leaves a lift per mass (m/s^2)."""
+    left = xp.maximum(p.greatest * p.greatest - lift * lift, 0.04 * p.greatest * p.greatest)
+    return xp.sqrt(left)
 
 
 def _within(vector: Moving, limit: Any) -> Moving:
@@ -182,6 +200,11 @@ def pointing(force: Moving, axis: Any, yaw: Moving, slope: Any) -> tuple[Any, An
     return rotation_matrix(angles.value), omega.value, omega.rate
 
 
+def aligned(angle: Any) -> Any:
+    """How far an attitude is aligned, 1 to 0, at an error (rad) of its lean or yaw."""
+    return xp.clip((UNALIGNED[1] - angle) / (UNALIGNED[1] - UNALIGNED[0]), 0.0, 1.0)
+
+
 def turning(now: Motion, desired: Any, rates: Any, second: Any, p: Any) -> Any:
     """Angular acceleration (rad/s^2, body axes) toward a moving attitude, shape (3,).
 
@@ -203,7 +226,9 @@ def turning(now: Motion, desired: Any, rates: Any, second: Any, p: Any) -> Any:
     gain_yaw = p.yaw / (2.0 * p.attitude_damping)
     lean = braked(angle, gain, 0.6 * p.angular, p.reversal) * way
     spin = braked(abs(yaw), gain_yaw, 0.6 * p.yaw_angular, p.reversal) * xp.copysign(1.0, yaw)
-    led = error @ rates
+    # A yaw rate of the desired attitude belongs to its lean; at another one it turns the nose.
+    leading = xp.hstack([1.0, 1.0, aligned(angle)])
+    led = leading * (error @ rates)
     # No faster toward a lean than the vehicle can stop, should the lean stop.
     aim = lean + led
     fast = norm(aim[:2] + xp.array([TINY, 0.0]))
@@ -211,7 +236,7 @@ def turning(now: Motion, desired: Any, rates: Any, second: Any, p: Any) -> Any:
     gap = xp.array([slower, slower, 1.0]) * aim + spin * xp.array([0.0, 0.0, 1.0]) - now.omega
     damping = 2.0 * p.attitude_damping * xp.array([p.attitude, p.attitude, p.yaw])
     limits = p.angular, p.yaw_angular
-    ahead = _shared(error @ second - cross(now.omega, led), 0.5, limits)
+    ahead = _shared(leading * (error @ second - cross(now.omega, led)), 0.5, limits)
     return ahead + _shared(damping * gap, 1.0, limits)
 
 
