@@ -136,5 +136,6 @@ def test_rounding_at_vertical_pitch_does_not_leave_the_domain(sign):
 def test_the_matrix_of_a_quaternion_turns_vectors_as_it_does(q):
     expected = matrix_of_quaternion(q)
     np.testing.assert_allclose(rotation_of_quaternion(q), expected, rtol=0, atol=1e-15)
+    assume(abs(expected[2, 0]) < 1.0 - 1e-12)  # else rounding makes roll and yaw
     angles = rotation_matrix(euler_of_rotation(expected))
     np.testing.assert_allclose(angles, expected, rtol=0, atol=1e-7)
