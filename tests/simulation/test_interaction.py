@@ -267,12 +267,6 @@ def test_the_built_in_command_among_objects_is_the_loop_s():
     np.testing.assert_allclose(commanded, np.array(layout.spins) * sent, rtol=1e-9)
 
 
-def test_linear_analysis_refuses_objects():
-    hovering = tiltsim.load_scenario(PUSH, FREE)
-    for analysis in (tiltsim.linearize, tiltsim.stability):
-        assert "takes a vehicle alone; remove [[object]]" in refusal(analysis, hovering)
-
-
 def test_a_push_of_a_custom_controller_has_its_columns_and_metric():
     def resting(_observation):
         return tiltsim.Command(thrusts=[4.0] * 6)
