@@ -23,7 +23,7 @@ from tiltsim.scenario.loading import parse_scenario
 from tiltsim.scenario.metric_names import METRICS, Metric
 from tiltsim.simulation import batch
 from tiltsim.simulation.simulate import simulate
-from tiltsim.sweeps import chunks, running
+from tiltsim.sweeps import chunks, points, running
 from tiltsim.sweeps.chunks import ChunkWork, fly_points
 from tiltsim.sweeps.dataset import load_results, open_sweep_folder
 from tiltsim.sweeps.loading import load_sweep
@@ -372,6 +372,7 @@ def test_parts_with_other_columns_are_refused(tmp_path, monkeypatch):
     definition = load_sweep(short_sweep(tmp_path / "sweep.toml"))
     run_sweep(definition, tmp_path / "out")
     monkeypatch.setitem(METRICS, "a_metric_of_tomorrow", Metric("use", "m", "of no use"))
+    monkeypatch.setattr(points, "KEPT_METRICS", (*points.KEPT_METRICS, "a_metric_of_tomorrow"))
     with pytest.raises(
         InputError, match=r"made by another version of tiltsim: .* a_metric_of_tomorrow"
     ):

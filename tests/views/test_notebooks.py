@@ -49,7 +49,7 @@ def test_a_notebook_shows_the_viewer_in_the_cell(in_a_notebook, widgets, monkeyp
 
 def test_an_address_names_an_open_viewer_even_in_a_notebook(in_a_notebook, monkeypatch):
     shown = []
-    monkeypatch.setattr(viewer, "view_flights", lambda flights, url: shown.append((flights, url)))
+    monkeypatch.setattr(viewer, "view_flights", lambda *given, **named: shown.append(given))
     assert flight("fixed").view(url="rerun+http://here:9876/proxy") is None
     assert shown == [([flight("fixed")], "rerun+http://here:9876/proxy")]
 
