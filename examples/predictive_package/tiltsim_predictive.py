@@ -58,7 +58,8 @@ def interval_of(layout):
     def costs(state, command, aim, known):
         """Residuals, of which the sum of squares is least."""
         then = after(state, command, known)
-        yaw = then[9] * xp.cos(aim[6]) - then[6] * xp.sin(aim[6])  # nose across its direction
+        nose, way = then[6:12:3], xp.array([xp.cos(aim[6]), xp.sin(aim[6])])
+        yaw = xp.arctan2(nose[1] * way[0] - nose[0] * way[1], nose @ way)
         rate = (kinds(UNIT, 1.0) * command - state[PAST:]) / kinds(known[1], known[2])
         errors = [aim[7] * (then[:3] - aim[:3]), aim[8] * (then[3:6] - aim[3:6])]
         turn = [xp.array([2.0 * yaw]), 0.1 * then[12:14], 0.12 * then[15:18]]

@@ -76,6 +76,18 @@ def test_rotors_climb_within_limits_and_tilts_push_aside(package):
     assert better[0, -1] < 2.5  # and brakes before the end of the plan
 
 
+def test_the_farther_the_nose_is_turned_away_the_more_it_costs(package):
+    """Its sine alone cost nothing at half a turn, so that yaw steps ended there."""
+    state, plan, aims, known, *_ = hovering(package, 0)
+    known[0], found = 0.05, []
+    for angle in (0.5, 1.5, 3.0):
+        turned = [[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]]
+        state[6:15] = np.ravel(turned)
+        costs = package["interval_of"]((-1, -1))(state, plan[:, 0], aims[:, 0], known)[1]
+        found.append(float(costs[6]) / 2.0 / 0.05**0.5)
+    assert found == pytest.approx([0.5, 1.5, 3.0])
+
+
 @pytest.mark.slow
 def test_the_installed_wheel_flies_a_step_within_the_limits(tmp_path):
     """From rest to 0.99 m away; with a plan that is not improved, the vehicles would stay."""
