@@ -30,6 +30,8 @@ TOTAL_SHARE: Final = 0.9
 """Share of the greatest thrusts that is demanded in all."""
 DELAY_MARGIN: Final = 0.22
 """Attitude bandwidth times the delay that is left."""
+SERVO_SHARE: Final = 1.6
+"""The largest one over the greatest rate of the servos, which no prediction knows."""
 POSITION_SHARE: Final = 0.55
 """Bandwidth of the position across over the attitude's, ..."""
 DAMPING: Final = 0.85
@@ -246,6 +248,8 @@ def design(
     sample = h * timing.sampled
     # The prediction removes most of the delay; its error grows with the delay.
     left = 1.0 / tracking + (0.6 * sample + 0.25 * latency if keys.prediction else sample + latency)
+    if craft.commanded:
+        left = max(left, DELAY_MARGIN / (SERVO_SHARE * timing.servo_limits[0]))
     delay = 1.5 * sample + 1.0 / tracking + latency
     works = 1.0 * (np.arange(1, len(craft.thrust) + 1) != failure.rotor)
     able = ability(keys, craft, left)
