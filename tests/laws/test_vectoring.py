@@ -470,6 +470,18 @@ def test_only_canted_rotors_have_side_force_without_leaning():
     assert side_slope(craft("cant_hexarotor", moving=True), rows) == 0.0
 
 
+def test_attitude_is_no_faster_than_its_servos():
+    """No prediction knows their greatest rate: with 8 rad/s, heavy vehicles wandered on curves."""
+    found = []
+    for fastest in (5.0, 50.0, None):
+        changed = tables("tilt_octorotor", 1.0)
+        changed["vehicle"]["tilt_servo"] = {"max_rate": fastest} if fastest else {}
+        law = tiltsim.load_scenario(changed).controller
+        found.append(law.law_parameters(tiltsim.airframe(changed)).attitude)
+    assert found[0] == pytest.approx(1.6 * 5.0)
+    assert found[0] < found[1] == found[2]
+
+
 def test_side_force_of_tilts_stays_within_their_range():
     """No more than all rotors have at the tilts that it may take."""
     slopes = []

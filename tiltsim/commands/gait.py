@@ -110,8 +110,8 @@ def _check_options(scenario: str | None, gait: GaitOptions, figure: GaitFigure) 
             raise InputError("--figure determinant: is drawn at level attitude")
     elif count != 1:
         raise InputError(
-            "gait: give SCENARIO, --angles A1,A2,A3,A4, --published NAME, --balance AX,AY,AZ "
-            "or --mjcf FILE"
+            "gait: give one of SCENARIO, --angles A1,A2,A3,A4, --published NAME, "
+            "--balance AX,AY,AZ or --mjcf FILE"
         )
     if figure.speed_limits is not None and figure.kind != "attainable":
         raise InputError("--speed-limits: needs --figure attainable")
