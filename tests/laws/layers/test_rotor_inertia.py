@@ -305,3 +305,23 @@ def test_the_feedforward_law_knows_the_inertia_on_request():
     np.testing.assert_array_equal(plain.samples, knowing.samples)
     with pytest.raises(InputError, match=r"rotor_inertia_feedforward.*needs controller.gait_rate"):
         scenario(known)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("gait", "stiff", "errors"),
+    [
+        ("continuous", True, (0.152, 0.129)),
+        ("continuous", False, (0.145, 0.112)),
+        ("instant", False, (0.219, 0.148)),
+    ],
+)
+def test_gyroscopic_torque_of_spinning_rotors_deflects_their_pods(gait, stiff, errors):
+    """Errors of ch. 4's circle that an independent model found too; softer servos give way."""
+    servo = {"vehicle.tilt_servo.natural_frequency": 3000.0, "simulation.timestep": 4e-4}
+    found = []
+    for inertia in (6e-6, 2.03e-5):
+        changes = {"vehicle.rotor_inertia": inertia, **(servo if stiff else {})}
+        circle = tiltsim.load_scenario(f"ch04_tracking/circle#{gait}_t1_modified", changes)
+        found.append(tiltsim.simulate(circle).metrics()["sup_position_error_after_20s"])
+    assert found == pytest.approx(errors, abs=1.2e-3)
