@@ -317,7 +317,7 @@ def test_the_feedforward_law_knows_the_inertia_on_request():
     ],
 )
 def test_gyroscopic_torque_of_spinning_rotors_deflects_their_pods(gait, stiff, errors):
-    """Errors of ch. 4's circle that an independent model found too; softer servos give way."""
+    """Errors of ch. 4's circle, which an independent model also found; softer servos give way."""
     servo = {"vehicle.tilt_servo.natural_frequency": 3000.0, "simulation.timestep": 4e-4}
     found = []
     for inertia in (6e-6, 2.03e-5):
