@@ -31,7 +31,7 @@ TOTAL_SHARE: Final = 0.9
 DELAY_MARGIN: Final = 0.22
 """Attitude bandwidth times the delay that is left."""
 SERVO_SHARE: Final = 1.6
-"""The largest one over the greatest rate of the servos, which no prediction knows."""
+"""The largest attitude bandwidth over the greatest rate of servos, which is not predicted."""
 POSITION_SHARE: Final = 0.55
 """Bandwidth of the position across over the attitude's, ..."""
 DAMPING: Final = 0.85

@@ -28,9 +28,9 @@ SIDE_SHARE: Final = 0.65
 SERVO_ANGLE: Final = 0.3
 """rad: the tilt by which braking counts about an axis that only tilts turn."""
 TILT_SHARE: Final = 0.9
-"""Share of the range of tilts that side force may take, as yaw needs some."""
+"""Share of the range of tilts that side force may take; the rest is left for yaw."""
 SLOPE_SHARE: Final = 0.8
-"""Share of the side force of hover that counts on."""
+"""Share of the greatest side force in hover on which the law relies."""
 DIRECTIONS: Final = 8
 """Directions of side force in the linear programs."""
 
