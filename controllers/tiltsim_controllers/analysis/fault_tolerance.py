@@ -126,7 +126,7 @@ def three_rotor_hover(lost: int, vehicle: Vehicle, *, opposite_speed: float) -> 
     return _hover(_quad(tilts), _quad(speeds), vehicle, lost)
 
 
-def fixed_tilt_imbalance(tilts: Quad, lost: int, vehicle: Vehicle) -> float:
+def fixed_tilt_imbalance(tilts: Quad | Floats, lost: int, vehicle: Vehicle) -> float:
     """Deviation (rad) of fixed tilts from hover without a rotor: ``a_i + a_k -+ 2 delta``.
 
     ``i`` and ``k`` are the neighbors of the rotor ``lost``. Zero where they hover alone, with the
@@ -134,7 +134,7 @@ def fixed_tilt_imbalance(tilts: Quad, lost: int, vehicle: Vehicle) -> float:
     """
     delta = atan(drag_ratio(vehicle))
     beside = tilts[lost % 4] + tilts[(lost + 2) % 4]
-    return beside - 2.0 * SPIN[lost - 1] * delta
+    return float(beside - 2.0 * SPIN[lost - 1] * delta)
 
 
 def minimum_hover_speed(
