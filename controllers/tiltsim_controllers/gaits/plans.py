@@ -320,10 +320,8 @@ def keyframes(
 def table(times: Sequence[float], angles: Sequence[Sequence[float]], *, repeats: bool) -> Gait:
     """A gait through the rows of a table along a cubic spline, whose acceleration is continuous.
 
-    Args:
-        times: s, from 0 and increasing, at least 2
-        angles: the tilt angles at each, rad
-        repeats: whether the gait starts over after the last row, smoothly, or holds it
+    Times (s) increase from 0; angles (rad) have a row each, at least 2. A gait that repeats starts
+    over after the last row, smoothly; else it holds it.
 
     Raises:
         ValueError: If a gait that repeats does not end where it begins.
@@ -341,7 +339,13 @@ def table(times: Sequence[float], angles: Sequence[Sequence[float]], *, repeats:
 
 
 def harmonic(knots: Sequence[float], period: float, name: str, source: str = "") -> Gait:
-    """A harmonic motion: mean, cosine and sine (rad) of each tilt, one after the other."""
+    """A harmonic motion about the means of the tilts.
+
+    Args:
+        knots: mean, cosine and sine (rad) of each tilt, one after the other
+        period: s
+        name, source: name and origin of the gait
+    """
     parameters = GaitParameters(HARMONIC, period=_positive(period))
     return Gait(name, parameters, tuple(knots), source, len(knots) // 3)
 
