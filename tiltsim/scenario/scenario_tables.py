@@ -9,11 +9,17 @@ from pydantic import Field, PrivateAttr
 from tiltsim.errors import InputError
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario import gait
-from tiltsim.scenario.companion import CompanionTable, DownwashTable
 from tiltsim.scenario.controller import Controller
 from tiltsim.scenario.expectation import ClaimName, ClaimTable, Expectation, Origin
 from tiltsim.scenario.gait import FixedGait, GaitTable
-from tiltsim.scenario.interaction import CableTable, ObjectTable, PayloadTable, ToolTable
+from tiltsim.scenario.interaction import (
+    CableTable,
+    CompanionTable,
+    DownwashTable,
+    ObjectTable,
+    PayloadTable,
+    ToolTable,
+)
 from tiltsim.scenario.kinds import KINDS, tables_of
 from tiltsim.scenario.linearizing_controllers import AttitudeAltitudeController
 from tiltsim.scenario.reference import Reference, SetpointReference
