@@ -16,10 +16,9 @@ from tests.system.test_files import HEX
 from tiltsim.errors import InputError
 from tiltsim.scenario.loading import parse_scenario
 from tiltsim.simulation.simulate import simulate
-from tiltsim.sweeps.dataset import load_results, open_sweep_folder, read_definition
+from tiltsim.sweeps.dataset import load_results, open_sweep_folder, read_definition, read_rows
 from tiltsim.sweeps.loading import load_sweep
 from tiltsim.sweeps.points import SweepPoints
-from tiltsim.sweeps.rows import read_rows
 from tiltsim.sweeps.running import run_sweep
 
 
