@@ -239,16 +239,6 @@ def test_a_flipped_bit_is_refused_or_changes_nothing(copy, name, flips):
         assert found == whole
 
 
-def test_an_old_definition_may_no_longer_be_valid(copy):
-    """Only what decides the rows is compared: the base, not the scenario that it was made from."""
-    definition, folder = copy
-    document = json.loads((folder / "sweep.json").read_text())
-    del document["sha256"], document["files"]  # as of an earlier version
-    document["sweep"]["scenario"]["gait"]["type"] = "\ud800"
-    (folder / "sweep.json").write_text(json.dumps(document))
-    run_sweep(definition, folder)
-
-
 def test_a_sweep_whose_file_name_is_not_utf_8_is_flown_and_read(tmp_path):
     folder = tmp_path / os.fsdecode(b"\xff")
     folder.mkdir()
