@@ -88,13 +88,10 @@ def _hover(tilts: Quad, rotor_speeds: Quad, vehicle: Vehicle, lost: int | None) 
 
 
 def three_rotor_hover(lost: int, vehicle: Vehicle, *, opposite_speed: float) -> Hover:
-    """The hover without a rotor in which its two neighbors share the weight evenly.
+    """The hover without a rotor, 1 to 4, in which its two neighbors share the weight evenly.
 
-    Args:
-        lost: the lost rotor, 1 to 4
-        vehicle: the tiltrotor
-        opposite_speed: Speed of the rotor opposite the lost one, rad/s; it determines the authority
-            over the torque that only this rotor produces. At 0 the other two hover alone.
+    The ``opposite_speed`` (rad/s) of the rotor opposite the lost one determines the authority over
+    the torque that only this rotor produces. At 0 the other two hover alone.
 
     Raises:
         ValueError: If there is no such rotor, or the opposite rotor alone would outweigh the
