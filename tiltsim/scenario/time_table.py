@@ -1,7 +1,7 @@
 """Tables over time, of references and gaits: in a file, in the scenario, or of other libraries."""
 
 import csv
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from math import isfinite
 from pathlib import Path
 from typing import Any, ClassVar, Final, Self
@@ -15,7 +15,7 @@ from tiltsim.scenario.table import Table, default
 from tiltsim.system.arguments import real_array
 from tiltsim.system.files import exists, is_file
 from tiltsim.system.parquet import open_parquet
-from tiltsim.system.text import short_repr
+from tiltsim.system.text import printable, short_repr
 from tiltsim_controllers.mathematics.attitude import euler_angles
 from tiltsim_controllers.mathematics.scalar import Values
 
@@ -176,27 +176,42 @@ def _read_rows(file: Path, columns_among: ColumnsAmong) -> list[Values]:
         return _read_parquet(file, columns_among)
     if file.suffix.lower() != ".csv":
         raise InputError("must end with .csv or .parquet")
-    head, *lines = _fields(read_text(file))
+    head, *lines = csv_fields(file, SEPARATORS) or [[]]
+    if not head:
+        raise InputError("is empty")
     columns = columns_among(head)
     _check_names(head, columns)
     _check_count(len(lines))
-    places = [head.index(name) for name in columns]
-    rows = []
+    order = [head.index(name) for name in columns]
+    return [tuple(row[place] for place in order) for row in csv_rows(head, lines)]
+
+
+def csv_fields(file: Path, separators: str = ",") -> list[list[str]]:
+    """Fields of the lines of a CSV file; the first line shows which of some separators it has."""
+    lines = [line.strip() for line in read_text(file).splitlines() if line.strip()]
+    separator = next((mark for mark in separators if lines and mark in lines[0]), ",")
+    rows = csv.reader(lines, delimiter=separator, skipinitialspace=True)
+    return [[field.strip() for field in row] for row in rows]
+
+
+def csv_rows(
+    head: Sequence[str], lines: Sequence[Sequence[str]], empty: str = ""
+) -> Iterator[Values]:
+    """The numbers of the lines of a CSV file below its head; ``empty`` stands for no field.
+
+    Raises `InputError` for the first line of another length, and the first field that is no number.
+    """
     for number, line in enumerate(lines, start=1):
         if len(line) != len(head):
             raise InputError(f"row {number}: {len(line)} values in {len(head)} columns")
-        rows.append(tuple(_number(line[place], number, head[place]) for place in places))
-    return rows
-
-
-def _fields(text: str) -> list[list[str]]:
-    """Fields of the lines of a CSV file; the first line shows the separator."""
-    lines = [line.strip() for line in text.splitlines() if line.strip()]
-    if not lines:
-        raise InputError("is empty")
-    separator = next((mark for mark in SEPARATORS if mark in lines[0]), ",")
-    rows = csv.reader(lines, delimiter=separator, skipinitialspace=True)
-    return [[field.strip() for field in row] for row in rows]
+        row = []
+        for name, text in zip(head, line):
+            try:
+                row.append(float(text or empty))
+            except ValueError:
+                where = f"row {number}, column {printable(name)}"
+                raise InputError(f"{where} = {short_repr(text)}: no number") from None
+        yield tuple(row)
 
 
 def _read_parquet(file: Path, columns_among: ColumnsAmong) -> list[Values]:
@@ -224,13 +239,6 @@ def _check_names(names: Sequence[str], columns: Sequence[str]) -> None:
             may = may if columns == REFERENCE_COLUMNS else ""
             needed = ", ".join(columns)
             raise InputError(f"column {short_repr(name)} is unknown; needs {needed}{may}")
-
-
-def _number(text: str, row: int, column: str) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        raise InputError(f"row {row}, column {column} = {short_repr(text)}: no number") from None
 
 
 def _check_count(rows: int) -> None:

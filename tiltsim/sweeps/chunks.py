@@ -19,9 +19,9 @@ from tiltsim.plants.plant import with_engine
 from tiltsim.scenario.own_parts import require_trust, with_trust
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.simulation.batch import fly
-from tiltsim.sweeps.definition import SweepDefinition
+from tiltsim.sweeps.definition import SweepDefinition, installed_versions
 from tiltsim.sweeps.points import SweepPoints
-from tiltsim.sweeps.rows import installed_versions, rows_to_table
+from tiltsim.sweeps.rows import rows_to_table
 from tiltsim.system.parquet import parquet_bytes
 from tiltsim.system.text import valid_unicode
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cache
+from importlib.metadata import version
 from typing import Any, Final
 
 from tiltsim.errors import InputError
@@ -20,6 +22,12 @@ VERSIONS: Final = ("tiltsim", "mujoco", "numpy", "scipy")
 
 COSMETIC: Final = (*DESCRIPTIVE, "plot")  # keys of a sweep file that change no flight
 UNUSED: Final = {"expect", "claim"}  # tables of a scenario that have no effect in a sweep of it
+
+
+@cache
+def installed_versions() -> dict[str, str]:
+    """Versions of the packages that rows depend on."""
+    return {name: version(name) for name in VERSIONS}
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,6 @@ wherever and whenever it is flown.
 
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -15,15 +14,9 @@ import pyarrow.compute as pc
 
 from tiltsim.errors import InputError
 from tiltsim.scenario.metric_names import is_boolean
-from tiltsim.sweeps.definition import VERSIONS, SweepDefinition
+from tiltsim.sweeps.definition import VERSIONS, SweepDefinition, installed_versions
 from tiltsim.sweeps.points import SweepPoints
 from tiltsim.system.parquet import UnreadableError, open_parquet
-
-
-@lru_cache(maxsize=1)
-def installed_versions() -> dict[str, str]:
-    """Versions of the packages that rows depend on."""
-    return {name: version(name) for name in VERSIONS}
 
 
 def rows_to_table(points: SweepPoints, rows: Sequence[Mapping[str, Any]]) -> pa.Table:

@@ -99,14 +99,10 @@ PUBLISHED: Final = choice(FourthDerivative, "decoupling", "published")
 
 
 def minimum_norm(matrix: Any, desired: Any) -> Any:
-    """The shortest inputs for the desired outputs, ``Delta^T (Delta Delta^T)^-1`` (Eq. 12).
+    """The shortest inputs for the desired outputs (2,), ``Delta^T (Delta Delta^T)^-1`` (Eq. 12).
 
-    NaN where the matrix is rank-deficient: with both rotors at rest. With one rotor at rest it is
-    not, contrary to ch. 10: the tilt turns the other thrust.
-
-    Args:
-        matrix: `input_matrix`, shape (2, 3).
-        desired: Shape (2,).
+    NaN where `input_matrix` is rank-deficient: with both rotors at rest. With one rotor at rest it
+    is not, contrary to ch. 10: the tilt turns the other thrust.
     """
     (xx, xy), (_, yy) = gram = matrix @ matrix.T
     determinant = xx * yy - xy * xy
@@ -142,12 +138,9 @@ def body_derivatives(state: Any, car: TiltCar) -> Any:
     """Acceleration, jerk and drift ``M_P`` in the frame of the thrusts' bisector, shape (3, 2).
 
     Eq. (21) without its terms in the second derivatives of the inputs, written with the turn rate
-    of the bisector, ``(1 - I_T / I_B) alpha'``, for the products of ``J_psi`` and ``J_alpha``.
-
-    Args:
-        state: `tiltsim_controllers.tilt_car.vehicle.STATE_FIELDS`, then the controller's own tilt
-            rate (rad/s) and rotor accelerations (rad/s^2), shape (11,).
-        car: The vehicle.
+    of the bisector, ``(1 - I_T / I_B) alpha'``, for the products of ``J_psi`` and ``J_alpha``. The
+    state has `tiltsim_controllers.tilt_car.vehicle.STATE_FIELDS`, then the controller's own tilt
+    rate (rad/s) and rotor accelerations (rad/s^2), shape (11,).
     """
     speeds, tilt_rate, rates = state[6:8], state[8], state[9:11]
     turn = turn_per_tilt(car) * tilt_rate * xp.array([[0.0, -1.0], [1.0, 0.0]])
@@ -173,10 +166,7 @@ def _demanded(time: Any, state: Any, p: Any, derivatives: Sequence[Any]) -> Any:
 def third_derivative_inputs(time: Any, state: Any, p: Any) -> Any:
     """Rates of the rotor speeds (rad/s^2) and of the tilt angle (rad/s), shape (3,); Eq. (14).
 
-    Args:
-        time: s
-        state: `tiltsim_controllers.tilt_car.vehicle.STATE_FIELDS`, shape (8,).
-        p: `ThirdParameters`.
+    The state has `tiltsim_controllers.tilt_car.vehicle.STATE_FIELDS`, shape (8,).
     """
     speeds, matrix = state[6:8], input_matrix(state[6:8], p.vehicle)
     pushed = thrust_map(p.vehicle) @ (speeds * speeds)
@@ -188,10 +178,7 @@ def third_derivative_inputs(time: Any, state: Any, p: Any) -> Any:
 def fourth_derivative_inputs(time: Any, state: Any, p: Any) -> Any:
     """Second derivatives of rotor speeds (rad/s^3) and tilt angle (rad/s^2), (3,); Eq. (29).
 
-    Args:
-        time: s
-        state: See `body_derivatives`.
-        p: `FourthParameters`.
+    The state is as for `body_derivatives`.
     """
     pushed, moved, drift = body_derivatives(state, p.vehicle)
     matrix = input_matrix(state[6:8], p.vehicle)

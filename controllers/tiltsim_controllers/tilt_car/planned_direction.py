@@ -63,15 +63,9 @@ Parameters = record_of(
 
 
 def demanded_acceleration(time: Any, state: Any, p: Any) -> Any:
-    """The desired acceleration (m/s^2, world), ch. 10, Eq. (20); ch. 11, Eqs. (9), (10).
+    """The desired acceleration (m/s^2, world), (2,); ch. 10, Eq. (20); ch. 11, Eqs. (9), (10).
 
-    Args:
-        time: s
-        state: Begins with `tiltsim_controllers.tilt_car.vehicle.STATE_FIELDS`.
-        p: `Parameters`.
-
-    Returns:
-        Shape (2,).
+    The state begins with `tiltsim_controllers.tilt_car.vehicle.STATE_FIELDS`.
     """
     on_velocity, on_position = xp.array([p.gains.x, p.gains.y]).T
     position, velocity, acceleration = reference_motion(time, p.reference)[:3, :2]
