@@ -74,15 +74,9 @@ def _refusals(scenario: ScenarioTables) -> Refusals:
 
 
 def _engine(scenario: ScenarioTables) -> Refusals:
-    simulation = scenario.simulation
-    on_mujoco, in_jax = simulation.plant == "mujoco", simulation.engine == "jax"
-    if in_jax and on_mujoco:
+    if scenario.simulation.engine == "jax" and scenario.simulation.plant == "mujoco":
         reason = 'simulation.engine = "jax" is supported on the plants thesis and rigid_body'
         yield "simulation.plant", reason
-    if not in_jax and simulation.precision != "float64":
-        yield "simulation.precision", 'needs simulation.engine = "jax"'
-    if on_mujoco and simulation.batch_functions == "quick":
-        yield "simulation.batch_functions", 'needs simulation.plant = "thesis" or "rigid_body"'
 
 
 def _plant(scenario: ScenarioTables) -> Refusals:

@@ -34,6 +34,10 @@ class SupervisorTable(Table):
 
     model_config = example(strategy="hold", min_margin=0.3)
     table_name = "controller.supervisor"
+    only_with: ClassVar = {
+        ("horizon",): ("strategy", "hold", "return_to_red"),
+        ("max_tilt_rate", "clearance"): ("strategy", "return_to_red"),
+    }
 
     strategy: Literal["scale", "hold", "return_to_red"] = default(
         "scale",
@@ -70,15 +74,6 @@ class SupervisorTable(Table):
         "distance on red from angles at which two rotors stop, below delta = atan(K_m / (L K_f)); "
         "needs strategy return_to_red [rad]",
     )
-
-    def _check_values(self) -> None:
-        for keys, strategies in (
-            (("horizon",), ("hold", "return_to_red")),
-            (("max_tilt_rate", "clearance"), ("return_to_red",)),
-        ):
-            if self.strategy not in strategies:
-                needs = f"needs controller.supervisor.strategy = {' or '.join(strategies)}"
-                self.require_defaults(keys, needs)
 
     def resolve(self, vehicle: Vehicle | Multirotor) -> Supervisor:
         """The supervisor's parameters for a vehicle.

@@ -1,6 +1,6 @@
 """The ``[controller]`` tables of feedback linearization: tiltrotor, quadrotor, multirotor."""
 
-from typing import Any, Final
+from typing import Any, ClassVar
 
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.controller_table import (
@@ -53,13 +53,16 @@ class AttitudeAltitudeController(AttitudeAltitude, GaitFollowingController):
 
     vehicle_models = ("tiltrotor",)
     reference_kinds = ("position", "attitude_altitude")
+    only_with: ClassVar = {
+        ("leave_out", "anticipation", "rotor_inertia_feedforward"): ("gait_rate_feedforward", True),
+        ("max_acceleration", "max_angular_acceleration"): ("gait_rate_feedforward", True),
+    }
 
     def _check_values(self) -> None:
         if not self.gait_rate_feedforward:
-            needs = "needs controller.gait_rate_feedforward = true"
-            self.require_defaults(_RATE_KEYS, needs)
             if any(self.resolve_integral_gains()):
-                raise self.mistake("gains", f"integral action {needs}")
+                needs = "integral action needs controller.gait_rate_feedforward = true"
+                raise self.mistake("gains", needs)
             return
         for key, choices in (("decoupling", ("exact",)), ("decoupler", ("exact", "none"))):
             if getattr(self, key) not in choices:
@@ -79,16 +82,6 @@ class AttitudeAltitudeController(AttitudeAltitude, GaitFollowingController):
     @property
     def omits_reference_acceleration(self) -> bool:  # type: ignore[override]
         return not self.gait_rate_feedforward
-
-
-_RATE_KEYS: Final = (
-    "leave_out",
-    "anticipation",
-    "max_acceleration",
-    "max_angular_acceleration",
-    "rotor_inertia_feedforward",
-)
-"""Keys of `AttitudeAltitudeController` that only gait_rate_feedforward reads."""
 
 
 class FullPoseController(FullPose, FailureAwareController):
@@ -156,10 +149,7 @@ class AttitudeForceController(AttitudeForce, GaitFollowingController, FailureAwa
     vehicle_models = ("multirotor",)
     reference_kinds = ("position", "pose", "attitude_altitude")
     follows_turns = True
-
-    def _check_values(self) -> None:
-        if self.norm == "speed":
-            self.require_defaults(("slowest_rotor",), 'needs controller.norm = "thrust"')
+    only_with: ClassVar = {("slowest_rotor",): ("norm", "thrust")}
 
     def resolve_force(self, vehicle: Multirotor, gait: Gait) -> Form:
         """The form of the law, whose components of force are checked over the gait."""
