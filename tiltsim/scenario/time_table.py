@@ -86,7 +86,7 @@ class TimeTable(Table):
 
     @classmethod
     def columns_of_width(cls, width: int) -> tuple[str, ...]:
-        """The columns of rows with ``width`` numbers; `columns` if it may not have so many."""
+        """The columns of rows with ``width`` numbers; `columns` where no table has that width."""
         return cls.columns
 
     def ends_before(self, time: float) -> bool:
