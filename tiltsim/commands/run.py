@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from tiltsim.commands.options import Overrides, Silent, refuse_both
 from tiltsim.commands.text import print_line, show_progress, table, viewing, warn
-from tiltsim.exit_codes import DONE, EXPECTATION_FAILED, INTERRUPTED, VEHICLE_LOST
+from tiltsim.errors import DONE, EXPECTATION_FAILED, INTERRUPTED, VEHICLE_LOST
 from tiltsim.system.interrupts import defer_interrupts
 from tiltsim.system.text import printable
 
