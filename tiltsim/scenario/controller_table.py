@@ -19,7 +19,7 @@ from tiltsim_controllers.laws.gains import (
     PolePlacementTable,
 )
 from tiltsim_controllers.laws.keys import GainSets, number_of, table_of
-from tiltsim_controllers.laws.multirotor_steps import FeedforwardTerms
+from tiltsim_controllers.laws.multirotor_keys import FeedforwardTerms
 from tiltsim_controllers.laws.observed import Failure
 from tiltsim_controllers.laws.supervised_vehicles import untilted_volume
 from tiltsim_controllers.laws.supervisor import STRATEGIES, UNTILTED, Supervisor

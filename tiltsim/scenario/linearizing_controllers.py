@@ -28,7 +28,7 @@ from tiltsim_controllers.laws.attitude_altitude import (
     AttitudeAltitude,
 )
 from tiltsim_controllers.laws.full_pose import FullPose, pose_rank
-from tiltsim_controllers.laws.multirotor_steps import RESTORING, AttitudeForce, Form
+from tiltsim_controllers.laws.multirotor_keys import RESTORING, AttitudeForce, Form
 from tiltsim_controllers.laws.quadrotor_attitude_altitude import QuadrotorAttitudeAltitude
 from tiltsim_controllers.laws.switching import Switching
 from tiltsim_controllers.laws.yaw_position import YawPosition
