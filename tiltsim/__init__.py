@@ -41,93 +41,51 @@ if TYPE_CHECKING:
     from tiltsim.views.video.making import video
 
 _HOMES = {
-    "Airframe": "scenario.law_controller",
-    "Command": "scenario.law_controller",
-    "End": "flight.metrics",
-    "Estimate": "logs.identify",
-    "Flight": "flight.flight",
-    "InputError": "errors",
-    "LawController": "scenario.law_controller",
-    "Log": "logs.log",
-    "Observation": "plants.command",
-    "Observed": "scenario.law_controller",
-    "Replay": "logs.identify",
-    "Scenario": "scenario.scenario",
-    "Simulation": "simulation.stepwise",
-    "TiltsimError": "errors",
-    "airframe": "laws.law_loop",
-    "attraction": "linear.attraction",
-    "export": "logs.formats",
-    "fly": "simulation.batch",
-    "identify": "logs.identify",
-    "law": "scenario.law_controller",
-    "linearize": "linear.linearization",
-    "load_flight": "flight.reading",
-    "load_scenario": "scenario.loading",
-    "margins": "linear.margins",
-    "parse_scenario": "scenario.loading",
-    "read_log": "logs.reading",
-    "replay": "logs.identify",
-    "simulate": "simulation.simulate",
-    "plot": "views.figures.plot",
-    "show_progress": "commands.text",  # for progress=True
-    "stability": "linear.stability",
-    "sweep": "sweeps.running",
-    "symbolic": "linear.linearization",
-    "vectorized": "simulation.vectorized",
-    "video": "views.video.making",
-    "view": "views.rerun.viewer",
-    "xp": "scenario.law_controller",
+    "commands.text": "show_progress",  # for progress=True
+    "errors": "InputError TiltsimError",
+    "flight.flight": "Flight",
+    "flight.metrics": "End",
+    "flight.reading": "load_flight",
+    "laws.law_loop": "airframe",
+    "linear.attraction": "attraction",
+    "linear.linearization": "linearize symbolic",
+    "linear.margins": "margins",
+    "linear.stability": "stability",
+    "logs.formats": "export",
+    "logs.identify": "Estimate Replay identify replay",
+    "logs.log": "Log",
+    "logs.reading": "read_log",
+    "plants.command": "Observation",
+    "scenario.law_controller": "Airframe Command LawController Observed law xp",
+    "scenario.loading": "load_scenario parse_scenario",
+    "scenario.scenario": "Scenario",
+    "simulation.batch": "fly",
+    "simulation.simulate": "simulate",
+    "simulation.stepwise": "Simulation",
+    "simulation.vectorized": "vectorized",
+    "sweeps.running": "sweep",
+    "views.figures.plot": "plot",
+    "views.rerun.viewer": "view",
+    "views.video.making": "video",
 }
+_HOME = {name: home for home, names in _HOMES.items() for name in names.split()}
 
-__all__ = [
-    "Airframe",
-    "Command",
-    "End",
-    "Estimate",
-    "Flight",
-    "InputError",
-    "LawController",
-    "Log",
-    "Observation",
-    "Observed",
-    "Replay",
-    "Scenario",
-    "Simulation",
-    "TiltsimError",
-    "airframe",
-    "attraction",
-    "export",
-    "fly",
-    "identify",
-    "law",
-    "linearize",
-    "load_flight",
-    "load_scenario",
-    "margins",
-    "parse_scenario",
-    "plot",
-    "read_log",
-    "replay",
-    "simulate",
-    "stability",
-    "sweep",
-    "symbolic",
-    "vectorized",
-    "video",
-    "view",
-    "xp",
-]
+__all__ = ["InputError", "Scenario", "TiltsimError", "load_scenario", "parse_scenario"]
+__all__ += ["End", "Flight", "Simulation", "fly", "load_flight", "simulate", "sweep", "vectorized"]
+__all__ += ["Airframe", "Command", "LawController", "Observation", "Observed", "airframe", "law"]
+__all__ += ["attraction", "linearize", "margins", "stability", "symbolic", "xp"]
+__all__ += ["Estimate", "Log", "Replay", "export", "identify", "read_log", "replay"]
+__all__ += ["plot", "video", "view"]
 
 
 def __getattr__(name: str) -> Any:
     """Load a public name on first use."""
-    if name not in _HOMES:
+    if name not in _HOME:
         raise AttributeError(f"module 'tiltsim' has no attribute {name!r}")
     from importlib import import_module
 
-    return getattr(import_module(f"tiltsim.{_HOMES[name]}"), name)
+    return getattr(import_module(f"tiltsim.{_HOME[name]}"), name)
 
 
 def __dir__() -> list[str]:
-    return sorted([*globals(), *_HOMES])
+    return sorted([*globals(), *_HOME])

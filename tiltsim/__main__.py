@@ -14,7 +14,7 @@ def main() -> int:
 
         return command_line()
     except KeyboardInterrupt:
-        from tiltsim.exit_codes import INTERRUPTED
+        from tiltsim.errors import INTERRUPTED
 
         print("tiltsim: interrupted", file=sys.stderr)
         return INTERRUPTED

@@ -15,8 +15,7 @@ from typing import Any, Final, NoReturn
 
 from tiltsim.arrays.xla_flags import let_xla_merge_loops
 from tiltsim.commands.declaring import call, declare
-from tiltsim.errors import InputError
-from tiltsim.exit_codes import DONE, INTERRUPTED, INVALID_INPUT, TERMINATED
+from tiltsim.errors import DONE, INTERRUPTED, INVALID_INPUT, TERMINATED, InputError
 from tiltsim.system.interrupts import terminations_as_interrupts, was_interrupted
 from tiltsim.system.text import printable, without_long_words
 

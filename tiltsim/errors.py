@@ -1,6 +1,14 @@
-"""Exceptions with one-line messages."""
+"""Exceptions with one-line messages, and the exit codes of every command."""
 
 from collections.abc import Iterable
+from typing import Final
+
+DONE: Final = 0
+EXPECTATION_FAILED: Final = 1
+INVALID_INPUT: Final = 2
+VEHICLE_LOST: Final = 3
+INTERRUPTED: Final = 130
+TERMINATED: Final = 143
 
 
 class TiltsimError(Exception):

@@ -33,7 +33,7 @@ FLYING: Final = (
 SHOWING: Final = ("logs", "linear", "sweeps", "studies", "views", "env", "report", "commands")
 """Folders of `tiltsim` that use flights; none of them changes one."""
 
-FOUNDATION: Final = ("errors", "exit_codes", "resources", "folders")
+FOUNDATION: Final = ("errors", "resources", "folders")
 """Modules directly in `tiltsim` that every folder may import."""
 
 ENTRANCE: Final = ("cli", "__main__", "__init__")

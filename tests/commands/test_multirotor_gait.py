@@ -122,7 +122,7 @@ def test_the_summary_is_readable(capsys):
     text = capsys.readouterr().out
     assert "moves 4 of attitude and lift, 6 of pose\n" in text
     assert "balanced rotor speeds" in text
-    assert "level, controllable, at 0, " in text
+    assert "level, controllable, up to 678.7 rad/s, at 0, " in text
 
 
 @pytest.mark.parametrize(

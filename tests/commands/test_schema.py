@@ -116,16 +116,16 @@ def test_every_example_of_a_table_is_valid():
 def test_keys_of_one_table(capsys):
     assert main(["schema", "gait.walk"]) == 0
     text = capsys.readouterr().out
-    assert "  amplitude: number, -pi to pi; rad; required\n      swing of a leg" in text
-    assert '  [gait]\n  type = "walk"\n' in text
+    assert "- `amplitude` (-pi to pi [rad], required): swing of a leg" in text
+    assert '\n[gait]\ntype = "walk"\n' in text
     assert main(["schema", "[gait]"]) == 0
     kinds = capsys.readouterr().out
-    assert "gait.fixed\n" in kinds
-    assert "gait.trot_instant, gait.trot_continuous\n" in kinds
+    assert "- gait.fixed: " in kinds
+    assert "- gait.trot_instant, gait.trot_continuous: " in kinds
     assert "amplitude" not in kinds
     assert main(["schema", "gait.amplitude"]) == 0
-    assert capsys.readouterr().out.count("  amplitude: ") == 3
+    assert capsys.readouterr().out.count("- `amplitude` (") == 3
     assert main(["schema", "title"]) == 0
-    assert "title: text" in capsys.readouterr().out
+    assert "`title` (text" in capsys.readouterr().out
     assert main(["schema", "gait.wlk"]) == 2
     assert "did you mean gait.walk?" in capsys.readouterr().err

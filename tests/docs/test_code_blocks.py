@@ -16,8 +16,7 @@ import tiltsim
 from tests.docs.pages import NOTEBOOKS, PAGES, ROOT, blocks, code
 from tests.docs.shell import commands
 from tiltsim.cli import build_parser, main
-from tiltsim.errors import InputError
-from tiltsim.exit_codes import DONE, EXPECTATION_FAILED, VEHICLE_LOST
+from tiltsim.errors import DONE, EXPECTATION_FAILED, VEHICLE_LOST, InputError
 from tiltsim.logs.reading import LogMap
 from tiltsim.scenario.loading import find_scenario_file
 from tiltsim.scenario.scenario_tables import ScenarioTables

@@ -8,7 +8,7 @@ import pytest
 import tiltsim
 from tiltsim.models.starters import STARTERS, THRUST, Starter, starter_mjcf
 
-SPARE = 1.3
+SPARE = 1.15
 """Least true thrust at the limits over the true weight."""
 
 
@@ -72,10 +72,14 @@ def test_no_drawn_vehicle_is_lost(seed, monkeypatch, tmp_path):
             **drawn_world(random, vehicle, str(file)),
             "controller": {"law": "vectoring", **free},
             "reference": {"type": "circle", "radius": radius, "angular_frequency": turn},
-            "initial": {"position": [radius, 0.1, -0.1], "velocity": [0.0, radius * turn, 0.0]},
+            "initial": {
+                "position": [radius, 0.1, -0.1],
+                "velocity": [0.0, radius * turn, 0.0],
+                "attitude": [0.8, -0.4, 0.5],
+            },
         }
     )
     assert flight.end.kind == "completed", flight.end
     error = np.linalg.norm(flight["reference_position"] - flight["position"], axis=1)
-    assert error.max() < 0.5, vehicle.title
+    assert error.max() < 1.1, vehicle.title
     assert error[flight["time"] > 4.0].max() < 0.05, vehicle.title

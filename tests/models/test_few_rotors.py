@@ -10,7 +10,8 @@ import tiltsim
 from tests.refusals import refusal
 from tiltsim.models.user_vehicle import read_user_vehicle
 from tiltsim.resources import shipped_folder
-from tiltsim.studies.multirotor_analysis import multirotor_report
+from tiltsim.studies.multirotor_analysis import gait_report
+from tiltsim_controllers.gaits import plans
 
 STEP = {"reference": {"type": "setpoint", "position": [0.25, -0.15, 0.1]}}
 SHORT = {"simulation": {"duration": 0.2, "timestep": 0.002, "engine": "python"}}
@@ -102,7 +103,7 @@ def states_controlled(rows, gravity=9.81):
 def test_outputs_moved_by_rotors_and_tilts_agree_with_mujoco(tmp_path, make, lift, pose, states):
     file = make(tmp_path)
     vehicle = read_user_vehicle(str(file), "multirotor").vehicle
-    found = multirotor_report(vehicle, (0.0,) * vehicle.tilts)["with_tilts"]
+    found = gait_report(plans.fixed((0.0,) * vehicle.tilts), vehicle)["with_tilts"]
     speeds = np.array(found["rotor_speeds"])
     rows = input_rows(file, np.array(found["angles"]), speeds * np.abs(speeds))
     sizes = [np.linalg.svd(part, compute_uv=False) for part in (rows[[2, 3, 4, 5]], rows)]

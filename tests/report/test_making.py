@@ -16,7 +16,7 @@ import pytest
 from PIL import Image
 
 from tiltsim.cli import main
-from tiltsim.exit_codes import EXPECTATION_FAILED, INVALID_INPUT
+from tiltsim.errors import EXPECTATION_FAILED, INVALID_INPUT
 from tiltsim.report import flights
 from tiltsim.report.claim import ClaimVerdict, scenario_claims
 from tiltsim.report.claim_rows import Cell, Criterion, Row, count

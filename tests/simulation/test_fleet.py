@@ -12,8 +12,9 @@ import pytest
 import tiltsim
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.models.user_vehicle import read_user_vehicle
-from tiltsim.studies.multirotor_analysis import fleet_file, multirotor_report, tilted_rotors
+from tiltsim.studies.multirotor_analysis import fleet_file, gait_report, tilted_rotors
 from tiltsim_controllers.analysis.hover import rotor_losses
+from tiltsim_controllers.gaits import plans
 
 ASIDE = (0.03, -0.02, 0.02)
 """Where the flights begin, m."""
@@ -107,7 +108,7 @@ def test_planar_hexarotor_cannot_be_controlled_without_a_rotor(name, tmp_path):
 def test_tilting_hexarotor_hovers_level_with_other_tilts_without_a_rotor(tmp_path):
     """Its side force, of tilts of 0.01 rad, is too weak to control with: it leans instead."""
     vehicle = read_user_vehicle(str(fleet_file("tilt_hexarotor")), "multirotor").vehicle
-    report = multirotor_report(vehicle, (0.0,) * 6, faults=True)
+    report = gait_report(plans.fixed((0.0,) * 6), vehicle, faults=True)
     tilts = report["faults"][0]["free_tilts"]["angles"]
     assert report["faults"][0]["free_tilts"]["controllable"]
     flight = flown("tilt_hexarotor", 1, tmp_path, tilts[1:], dimension=1, position=ASIDE)

@@ -11,8 +11,7 @@ import pytest
 import tiltsim
 from tiltsim.cli import main
 from tiltsim.commands.compare import chosen_controllers
-from tiltsim.errors import InputError
-from tiltsim.exit_codes import INTERRUPTED
+from tiltsim.errors import INTERRUPTED, InputError
 from tiltsim.studies.benchmark import compiled_time_per_call
 from tiltsim.studies.comparison import (
     MEASURES,

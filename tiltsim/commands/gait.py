@@ -19,12 +19,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from tiltsim.models.rotor_table import Multirotor
-    from tiltsim.scenario.scenario import Scenario
     from tiltsim_controllers.gaits.plans import Gait
     from tiltsim_controllers.vehicle.parameters import Vehicle
 
 MULTIROTOR_FIGURES: Final = ("roll_pitch", "attainable")  # ``--figure`` for any multirotor
-OPPOSITE_SPEED_RATIO: Final = 0.7  # in fault reports: speed of the rotor opposite a failed one
 
 
 Analysis: TypeAlias = "tuple[Callable[[], Figure], dict[str, Any], str]"
@@ -35,10 +33,11 @@ class SelectedGait(NamedTuple):
     """The gait to analyze, its vehicle, and the gait to compare it with, if any."""
 
     gait: Gait
-    vehicle: Vehicle
+    vehicle: Vehicle | Multirotor
     title: str = "gait"
     twin: Gait | None = None
     twin_title: str = ""
+    shown: tuple[tuple[str, Any], ...] = ()  # further entries of the report
 
 
 def run(
@@ -68,21 +67,12 @@ def run(
         print(json_text([asdict(row) for row in rows]) if json else list_text(rows))
         return 0
     _check_options(scenario, gait, figure)
-    loaded, of_any_rotors = None, gait.mjcf is not None
-    if scenario is not None:
-        from tiltsim.models.rotor_table import Multirotor
-        from tiltsim.scenario.loading import load_scenario
-
-        loaded = load_scenario(scenario)
-        if gait.vehicle is not None:
-            raise InputError("--vehicle: the scenario defines its own vehicle; remove one of them")
-        of_any_rotors = isinstance(loaded.vehicle.resolve(), Multirotor)
-    if of_any_rotors:
-        analysis = _of_multirotor(scenario, loaded, gait, figure)
-    elif figure.kind == "determinant":
+    if figure.kind == "determinant":
         analysis = _of_determinant(gait, figure)
     else:
-        analysis = _of_gait(_select(gait) if loaded is None else _of_scenario(loaded), gait, figure)
+        limits = figure.speed_limits
+        chosen = _select(gait, limits) if scenario is None else _of_scenario(scenario, gait)
+        analysis = _of_gait(chosen, gait, figure)
     figure.show(*analysis, json=json)
     return 0
 
@@ -113,8 +103,6 @@ def _check_options(scenario: str | None, gait: GaitOptions, figure: GaitFigure) 
             "gait: give one of SCENARIO, --angles A1,A2,A3,A4, --published NAME, "
             "--balance AX,AY,AZ or --mjcf FILE"
         )
-    if figure.speed_limits is not None and figure.kind != "attainable":
-        raise InputError("--speed-limits: needs --figure attainable")
     figure.check_kind()
 
 
@@ -129,37 +117,49 @@ def _of_determinant(gait: GaitOptions, figure: GaitFigure) -> Analysis:
     return draw, report, determinant_text(report)
 
 
-def _of_gait(selected: SelectedGait, gait: GaitOptions, figure: GaitFigure) -> Analysis:
-    """The analysis of a gait of four rotors."""
+def _of_gait(chosen: SelectedGait, gait: GaitOptions, figure: GaitFigure) -> Analysis:
+    """The analysis of a gait of any vehicle."""
     from tiltsim.commands.gait_text import gait_text
-    from tiltsim.studies.gait_analysis import fault_report, gait_report
+    from tiltsim.models.rotor_table import Multirotor
+    from tiltsim.studies.multirotor_analysis import gait_report
 
-    report = gait_report(selected.gait, selected.vehicle, roll=gait.roll, pitch=gait.pitch)
-    if gait.faults:
-        a1, a2, a3, a4 = selected.gait.angles(0.0).tolist()
-        opposite_speed = OPPOSITE_SPEED_RATIO * selected.vehicle.hover_rotor_speed
-        report["faults"] = fault_report((a1, a2, a3, a4), selected.vehicle, opposite_speed)
-    if figure.kind == "attainable":
-        report["warnings"] += _attainable_warnings(selected, figure)
-    return partial(_draw, selected, figure), report, gait_text(report)
+    figure.check_kind()
+    planned, vehicle = chosen.gait, chosen.vehicle
+    if isinstance(vehicle, Multirotor):
+        if figure.kind not in (None, *MULTIROTOR_FIGURES):
+            choices = " or ".join(MULTIROTOR_FIGURES)
+            raise InputError(f"--figure {figure.kind}: of a multirotor, choose {choices}")
+        if figure.panels:
+            raise InputError("--panels: this figure has no panels to choose from")
+    attitude = gait.roll or 0.0, gait.pitch or 0.0
+    about: Any = {"limits": figure.speed_limits, "attitude": attitude, "faults": gait.faults}
+    report = dict(chosen.shown) | gait_report(planned, vehicle, **about)
+    if figure.kind == "attainable" and not isinstance(vehicle, Multirotor):
+        report["warnings"] += _attainable_warnings(planned, vehicle, figure)
+    return partial(_draw, chosen, figure), report, gait_text(report)
 
 
-def _select(options: GaitOptions) -> SelectedGait:
+def _select(options: GaitOptions, limits: tuple[float, float] | None) -> SelectedGait:
     """The gait and the vehicle that the options select. Raises `InputError` if one is unknown."""
     from tiltsim.models.cross import as_multirotor
     from tiltsim.studies.multirotor_analysis import balance_report
     from tiltsim_controllers.analysis.published_gaits import PUBLISHED_GAITS
     from tiltsim_controllers.gaits import plans
 
-    vehicle = options.vehicle or parse_vehicle(DEFAULT_VEHICLE)
-    if options.angles is not None:
-        return SelectedGait(plans.fixed(options.read_angles(4)), vehicle)
+    vehicle: Vehicle | Multirotor = options.vehicle or parse_vehicle(DEFAULT_VEHICLE)
+    shown: dict[str, Any] = {}
+    if options.mjcf is not None:
+        vehicle, shown = _read_multirotor(options.mjcf), {"vehicle": options.mjcf}
     if options.balance is not None:
         with mistakes_in(f"--balance {options.acceleration}"):
-            rotors = as_multirotor(vehicle, tilting=True, reverses=False)
-            fixed = plans.fixed(balance_report(rotors, options.balance)["angles"])
+            craft = as_multirotor(vehicle, tilting=True, reverses=False)
+            shown["balance"] = balance_report(craft, options.balance, limits)
         source = f"balances {options.acceleration} m/s^2 at level attitude"
-        return SelectedGait(replace(fixed, source=source), vehicle)
+        balanced = plans.fixed(shown["balance"]["angles"], source=source)
+        return SelectedGait(balanced, vehicle, shown=tuple(shown.items()))
+    if options.published is None:
+        gait = plans.fixed(_tilt_angles(options, vehicle))
+        return SelectedGait(gait, vehicle, shown=tuple(shown.items()))
     if options.published not in PUBLISHED_GAITS:
         raise InputError(
             f"--published {options.published}: unknown; choose {', '.join(PUBLISHED_GAITS)}"
@@ -170,35 +170,41 @@ def _select(options: GaitOptions) -> SelectedGait:
     return SelectedGait(published.gait, vehicle, title, published.biased, twin_title)
 
 
-def _of_scenario(scenario: Scenario) -> SelectedGait:
+def _of_scenario(address: str, options: GaitOptions) -> SelectedGait:
     """The gait and the vehicle of a scenario, and its gait without bias."""
+    from tiltsim.models.rotor_table import Multirotor
+    from tiltsim.scenario.loading import load_scenario
     from tiltsim_controllers.vehicle.parameters import Vehicle
 
+    scenario = load_scenario(address)
+    if options.vehicle is not None:
+        raise InputError("--vehicle: the scenario defines its own vehicle; remove one of them")
     vehicle, at = scenario.vehicle.resolve(), scenario.address
-    if not isinstance(vehicle, Vehicle):
+    if not isinstance(vehicle, Vehicle | Multirotor):
         raise InputError(
-            f"{at}: vehicle.model = {scenario.vehicle.model!r}: does not have a gait of four "
-            "tilt angles"
+            f"{at}: vehicle.model = {scenario.vehicle.model!r}: does not have a gait of four tilt "
+            "angles"
         )
+    gait = replace(scenario.gait.plan(vehicle), source=scenario.source)
+    if isinstance(vehicle, Multirotor):
+        return SelectedGait(gait, vehicle, shown=(("vehicle", address),))
     if not scenario.rotorcraft.has_standard_layout:
         raise InputError(
             f"{at}: vehicle.mjcf = {scenario.rotorcraft.mjcf!r}: its rotors are not on four "
             "equal arms at right angles, which the analysis assumes"
         )
-    gait = replace(scenario.gait.plan(vehicle), source=scenario.source)
     if scenario.gait.bias == 1.0:
         return SelectedGait(gait, vehicle, gait.name)
     unbiased = scenario.gait.model_copy(update={"bias": 1.0}).plan(vehicle)
     return SelectedGait(gait, vehicle, gait.name, unbiased, "without bias")
 
 
-def _attainable_warnings(selected: SelectedGait, figure: GaitFigure) -> list[str]:
+def _attainable_warnings(gait: Gait, vehicle: Vehicle, figure: GaitFigure) -> list[str]:
     """A warning if the attainable figure is empty."""
     from tiltsim_controllers.analysis.attainable import attainable_torque_thrust
 
-    low, high = _speed_limits(selected, figure)
-    angles = selected.gait.angles(0.0)
-    if not attainable_torque_thrust(angles, selected.vehicle, (low, high)).is_empty:
+    low, high = _speed_limits(vehicle, figure)
+    if not attainable_torque_thrust(gait.angles(0.0), vehicle, (low, high)).is_empty:
         return []
     return [
         f"nothing is attainable: no rotor speeds from {low:.2f} to {high:.2f} rad/s hover without "
@@ -206,16 +212,22 @@ def _attainable_warnings(selected: SelectedGait, figure: GaitFigure) -> list[str
     ]
 
 
-def _speed_limits(selected: SelectedGait, figure: GaitFigure) -> tuple[float, float]:
+def _speed_limits(vehicle: Vehicle, figure: GaitFigure) -> tuple[float, float]:
     """Minimum and maximum rotor speed (rad/s) of the attainable figure."""
     from tiltsim_controllers.analysis.attainable import published_speed_limits
 
-    return figure.speed_limits or published_speed_limits(selected.vehicle)
+    return figure.speed_limits or published_speed_limits(vehicle)
 
 
 def _draw(selected: SelectedGait, options: GaitFigure) -> Figure:
     """The ``--figure`` of a gait, by default its roll-pitch diagram."""
+    from tiltsim.models.rotor_table import Multirotor
+    from tiltsim.studies.multirotor_analysis import tilted_rotors
+
     chosen, vehicle = selected.gait, selected.vehicle
+    if isinstance(vehicle, Multirotor):
+        rotors = tilted_rotors(vehicle, chosen.angles(0.0), options.speed_limits)
+        return figures.vehicles.multirotor_figure(rotors, options.kind or MULTIROTOR_FIGURES[0])
     compared = [(selected.title, chosen)]
     if selected.twin is not None:
         compared.append((selected.twin_title, selected.twin))
@@ -225,7 +237,7 @@ def _draw(selected: SelectedGait, options: GaitFigure) -> Figure:
         case "attainable":
             if not chosen.is_constant:
                 raise InputError(f"--figure attainable: {chosen.name} moves; give fixed angles")
-            limits = _speed_limits(selected, options)
+            limits = _speed_limits(vehicle, options)
             return figures.vehicles.attainable_figure(chosen, vehicle, limits)
         case "comparison":
             if len(compared) == 1:
@@ -234,48 +246,6 @@ def _draw(selected: SelectedGait, options: GaitFigure) -> Figure:
         case "margin":
             return figures.gaits.margin_figure(compared, vehicle)
     return figures.gaits.gait_figure(chosen, vehicle, tuple(options.panels))
-
-
-def _of_multirotor(
-    address: str | None, scenario: Scenario | None, options: GaitOptions, figure: GaitFigure
-) -> Analysis:
-    """The analysis of the file of ``--mjcf``, without a scenario, or of its vehicle."""
-    from tiltsim.commands.gait_text import multirotor_text
-    from tiltsim.models.rotor_table import Multirotor
-    from tiltsim.studies import multirotor_analysis as study
-
-    kind = figure.kind or MULTIROTOR_FIGURES[0]
-    if kind not in MULTIROTOR_FIGURES:
-        choices = " or ".join(MULTIROTOR_FIGURES)
-        raise InputError(f"--figure {kind}: of a multirotor, choose {choices}")
-    figure.check_kind()
-    if figure.panels:
-        raise InputError("--panels: this figure has no panels to choose from")
-    limits, more, gait = figure.speed_limits, {}, None
-    if scenario is not None:
-        resolved = scenario.vehicle.resolve()
-        assert isinstance(resolved, Multirotor)
-        vehicle, gait = resolved, scenario.gait.plan(resolved)
-        angles = tuple(gait.angles(0.0).tolist())
-    else:
-        vehicle = _read_multirotor(str(options.mjcf))
-        angles = _tilt_angles(options, vehicle)
-        if options.balance is not None:
-            with mistakes_in(f"--balance {options.acceleration}"):
-                more["balance"] = study.balance_report(vehicle, options.balance, limits)
-            angles = tuple(more["balance"]["angles"])
-    roll, pitch = options.roll or 0.0, options.pitch or 0.0
-    about: Any = {"limits": limits, "roll": roll, "pitch": pitch, "faults": options.faults}
-    report = {"vehicle": options.mjcf or address}
-    report |= study.multirotor_report(vehicle, angles, **about) | more
-    if gait is not None and not gait.is_constant:
-        report |= study.period_report(vehicle, gait, roll, pitch)
-
-    def draw() -> Figure:
-        rotors = study.tilted_rotors(vehicle, angles, limits)
-        return figures.vehicles.multirotor_figure(rotors, kind)
-
-    return draw, report, multirotor_text(report)
 
 
 def _read_multirotor(path: str) -> Multirotor:
@@ -288,8 +258,8 @@ def _read_multirotor(path: str) -> Multirotor:
     return vehicle
 
 
-def _tilt_angles(options: GaitOptions, vehicle: Multirotor) -> tuple[float, ...]:
-    """One angle (rad) for each hinge of the file; all zero by default."""
+def _tilt_angles(options: GaitOptions, vehicle: Vehicle | Multirotor) -> tuple[float, ...]:
+    """One angle (rad) for each hinge; all zero by default."""
     text = options.angles
     if text is None:
         return (0.0,) * vehicle.tilts

@@ -178,8 +178,8 @@ class GaitFigure(PlotOptions):
             surfaces and zero curves (ch. 3), without a gait; faults: rotor speeds that hover needs
             after a rotor loss, for any gait
         case: for --figure determinant: relation of alpha_1 and alpha_3 (default: equal)
-        speed_limits (MIN,MAX): rotor speeds in rad/s: for --figure attainable (default: as in
-            ch. 9), and with --mjcf (default: as in the file)
+        speed_limits (MIN,MAX): rotor speeds in rad/s of hovers and attainable sets (default: as in
+            the file; in the figure of the thesis's vehicle as in ch. 9)
         panels: the panels to draw, in this order
     """
 

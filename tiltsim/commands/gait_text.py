@@ -1,4 +1,4 @@
-"""The reports of ``tiltsim gait`` as text: of a gait, of all gaits, of a multirotor."""
+"""The reports of ``tiltsim gait`` as text: of a gait, and of all gaits of the thesis."""
 
 from collections.abc import Sequence
 from typing import Any, Final
@@ -58,80 +58,55 @@ def determinant_text(report: dict[str, Any]) -> str:
 
 def gait_text(report: dict[str, Any]) -> str:
     """The analysis in aligned lines; a moving gait's values at time zero and their worst case."""
-    direction = report["torque_free_direction"]
-    at_start = " at the gait's start" if "time" in report else ""
-    rows = [
-        (
-            "gait",
-            printable(report["gait"] + (f" ({report['source']})" if report["source"] else "")),
-        ),
-        ("vehicle", vehicle_text(report["vehicle"])),
-        ("tilt angles", numbers(report["angles"]) + " rad"),
-        ("rank of tau", str(report["rank"])),
-        ("singular values", numbers(report["singular_values"]) + " of tau / (L K_f)"),
-        ("R, R_phi, R_theta", numbers([report["R"], report["R_phi"], report["R_theta"]])),
-        ("torque-free force", "along " + numbers(direction) if direction else "none"),
-        ("singularity margin", f"{number(report['singularity_margin'])} rad{at_start}"),
-        (
-            "acceptable share",
-            f"{100.0 * report['acceptable_share']:.2f} % of the roll-pitch square",
-        ),
-        ("singular attitudes", CURVES[report["unacceptable_attitudes"]["kind"]]),
-    ]
-    if "determinant" in report:
-        attitude = f"roll {number(report['roll'])}, pitch {number(report['pitch'])} rad"
-        rows.insert(8, ("determinant", f"{number(report['determinant'])} at {attitude}"))
-    if report["hover_rotor_speeds"] is not None:
-        speeds = numbers(report["hover_rotor_speeds"])
-        rows.append(("hover rotor speeds", f"{speeds} rad/s along the spins"))
-    if "time" in report:
-        rate = "jumps" if report["max_rate"] is None else f"{report['max_rate']:.6g} rad/s"
-        rows += [
-            ("period", f"{report['period']:g} s; the values above hold at t = 0"),
-            ("maximum tilt angle", f"{report['amplitude']:.6g} rad"),
-            ("maximum tilt rate", rate),
-            ("minimum rank", str(report["min_rank"])),
-            ("minimum margin", f"{number(report['min_singularity_margin'])} rad over the period"),
-            ("", "its sign is relative to the gait's start: negative once R has changed sign"),
-        ]
-    rows += [_loss_row(loss) for loss in report.get("faults", {}).get("rotor_loss", [])]
-    return "\n".join([*aligned(rows), *(f"warning: {text}" for text in report["warnings"])])
-
-
-def _loss_row(loss: dict[str, Any]) -> tuple[str, str]:
-    """How the vehicle hovers after the loss of a rotor."""
-    fixed = (
-        "these tilt angles hover, but cannot be controlled"
-        if loss["hovers_with_fixed_tilts"]
-        else f"these tilt angles are {number(loss['fixed_tilts_miss'])} rad away from a hover"
-    )
-    angles = numbers(loss["free_tilts"]["angles"])
-    return (
-        f"without rotor {loss['rotor']}",
-        f"{fixed}; other angles hover with rotors that reach {loss['least_speed']:.4g} rad/s, such "
-        f"as {angles} rad",
-    )
-
-
-def multirotor_text(report: dict[str, Any]) -> str:
-    """The analysis in aligned lines."""
-    direction, hover = report["torque_free_direction"], report["hover"]
+    direction, on_cross, moves = report["torque_free_direction"], "R" in report, "time" in report
     attitude = f"roll {number(report['roll'])}, pitch {number(report['pitch'])} rad"
+    unit = "tau / (L K_f)" if on_cross else "tau, by its largest column"
+    source = f" ({report['source']})" if report["source"] else ""
     rows = [
-        ("vehicle", printable(report["vehicle"])),
+        ("gait", printable(report["gait"] + source)),
+        ("vehicle", printable(vehicle_text(report["vehicle"]))),
         ("rotors, tilt hinges", f"{report['rotors']}, {report['tilts']}"),
         ("tilt angles", numbers(report["angles"]) + " rad" if report["angles"] else "none"),
         ("rank of tau", str(report["rank"])),
-        ("singular values", numbers(report["singular_values"]) + " of tau, by its largest column"),
+        ("singular values", f"{numbers(report['singular_values'])} of {unit}"),
         ("torque-free forces", f"of dimension {report['torque_free_dimension']}"),
         ("", "nearest to the z axis: " + numbers(direction) if direction else "none upward"),
         ("singular attitudes", SETS[report["singular_attitudes"]]),
-        ("singularity margin", f"{number(report['singularity_margin'])} rad at {attitude}"),
-        *_period_rows(report),
-        ("hover", "none" if hover is None else _hover_text(hover)),
     ]
-    if hover is not None:
-        rows.append(("hover rotor speeds", numbers(hover["rotor_speeds"]) + " rad/s along spins"))
+    if on_cross:
+        residuals = [report[name] for name in ("R", "R_phi", "R_theta")]
+        share = f"{100.0 * report['acceptable_share']:.2f} % of the roll-pitch square"
+        rows += [
+            ("", CURVES[report["unacceptable_attitudes"]["kind"]]),
+            ("acceptable share", share),
+            ("R, R_phi, R_theta", numbers(residuals)),
+            ("determinant", f"{number(report['determinant'])} at {attitude}"),
+        ]
+    margin = f"{number(report['singularity_margin'])} rad at {attitude}"
+    rows.append(("singularity margin", margin + (", at the gait's start" if moves else "")))
+    if moves:
+        rate = "jumps" if report["max_rate"] is None else f"{report['max_rate']:.6g} rad/s"
+        worst = f"{report['min_rank']}; dimension {report['min_torque_free_dimension']} or more"
+        rows += [
+            ("period", f"{report['period']:g} s; the other values hold at t = 0"),
+            ("maximum tilt angle", f"{report['amplitude']:.6g} rad"),
+            ("maximum tilt rate", rate),
+            ("minimum rank", worst),
+            ("minimum margin", f"{number(report['min_singularity_margin'])} rad over the period"),
+        ]
+        if on_cross:
+            sign = "its sign is relative to the gait's start: negative once R has changed sign"
+            rows.append(("", sign))
+    rows += _hover_rows(report)
+    return "\n".join([*aligned(rows), *(f"warning: {text}" for text in report["warnings"])])
+
+
+def _hover_rows(report: dict[str, Any]) -> list[tuple[str, str]]:
+    """Hover and attainable sets, also without a rotor."""
+    rows = [("hover", _hover_text(report["hover"]))]
+    if report["hover_rotor_speeds"] is not None:
+        speeds = f"{numbers(report['hover_rotor_speeds'])} rad/s along the spins"
+        rows.append(("hover rotor speeds", speeds))
     if (tilting := report.get("with_tilts")) is not None:
         moved = f"{tilting['attitude_and_lift']} of attitude and lift, {tilting['pose']} of pose"
         rows.append(("with tilts as inputs", f"level hover at {numbers(tilting['angles'])} rad"))
@@ -140,7 +115,7 @@ def multirotor_text(report: dict[str, Any]) -> str:
         share = f"{100.0 * report['side_force_share']:.4g} % of the weight in every direction"
         rows.append(("level side force", share))
     if "balance" in report:
-        speeds = numbers(report["balance"]["rotor_speeds"]) + " rad/s along spins"
+        speeds = f"{numbers(report['balance']['rotor_speeds'])} rad/s along the spins"
         rows.append(("balanced rotor speeds", speeds))
     for name, unit in (("forces", "N without torque"), ("torques", "N m at hover lift")):
         extent = (report["attainable"] or {}).get(name)
@@ -151,30 +126,20 @@ def multirotor_text(report: dict[str, Any]) -> str:
             )
             rows.append((f"attainable {name}", f"{ranges} {unit} (x, y, z)"))
     for loss in report.get("faults", ()):
-        hover = loss["hover"]
-        text = "no hover" if hover is None else _hover_text(hover)
-        rows.append((f"without rotor {loss['rotor']}", text))
-        if loss["free_tilts"] is not None:
-            control = _control(loss["free_tilts"])
-            rows.append(("", f"level, {control}, at {numbers(loss['free_tilts']['angles'])} rad"))
-    return "\n".join([*aligned(rows), *(f"warning: {text}" for text in report["warnings"])])
+        rows.append((f"without rotor {loss['rotor']}", _hover_text(loss["hover"])))
+        if (free := loss["free_tilts"]) is not None:
+            rows.append(("", f"{_hover_text(free)}, at {numbers(free['angles'])} rad"))
+        if "least_speed" in loss:
+            rows += [
+                ("", f"at least {loss['least_speed']:.4g} rad/s at any tilt angles"),
+                ("", f"a hover of two is {number(loss['fixed_tilts_miss'])} rad from these angles"),
+            ]
+    return rows
 
 
-def _period_rows(report: dict[str, Any]) -> list[tuple[str, str]]:
-    """The worst instant of a moving gait; its other values are taken at time zero."""
-    if "time" not in report:
-        return []
-    margin = number(report["min_singularity_margin"])
-    return [
-        ("over the gait", f"dimension {report['min_torque_free_dimension']} or more"),
-        ("", f"margin {margin} rad or more; all else at t = 0"),
-    ]
-
-
-def _hover_text(hover: dict[str, Any]) -> str:
+def _hover_text(hover: dict[str, Any] | None) -> str:
+    if hover is None:
+        return "none at these tilt angles"
     level = "level" if hover["lean"] < 1e-6 else f"leaning by {number(hover['lean'], '.4g')} rad"
-    return f"{level}, {_control(hover)}, up to {hover['max_rotor_speed']:.4g} rad/s"
-
-
-def _control(hover: dict[str, Any]) -> str:
-    return "controllable" if hover["controllable"] else "not controllable"
+    control = "controllable" if hover["controllable"] else "not controllable"
+    return f"{level}, {control}, up to {hover['max_rotor_speed']:.4g} rad/s"

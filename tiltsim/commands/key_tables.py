@@ -7,7 +7,6 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
 from math import pi
-from textwrap import fill, indent
 from typing import Any, Final, NamedTuple
 
 from tiltsim.commands.text import markdown_table
@@ -269,13 +268,13 @@ def description(tables: Sequence[KeyTable], address: str) -> str:
     plain = address.replace("[", "").replace("]", "")
     found = [table for table in tables if plain and plain in table.addresses()]
     if len(found) > FEW:
-        lines = [f"{_narrow(table)}\n{_body(_plain(table.meaning))}" for table in found]
+        lines = [f"- {_narrow(table)}: {_plain(table.meaning)}" for table in found]
         return "\n".join([*lines, "\ntiltsim schema ADDRESS prints the keys of one of these"])
     if found:
-        return "\n\n".join(map(_text, found))
+        return "\n".join(line for table in found for line in _section(table)).strip()
     above, _, name = plain.rpartition(".")
     keys = [
-        f"{_narrow(table) or 'before all tables'}\n{_key_text(key)}"
+        f"{_narrow(table) or 'before all tables'}\n{_item(key)}"
         for table in tables
         if above in table.addresses()
         for key in table.keys
@@ -288,8 +287,8 @@ def description(tables: Sequence[KeyTable], address: str) -> str:
     return "\n".join(keys)
 
 
-def _section(table: KeyTable, above: Collection[Key]) -> list[str]:
-    """Lines of the page about one table, with only the names of keys that stand above."""
+def _section(table: KeyTable, above: Collection[Key] = ()) -> list[str]:
+    """Lines about one table, with only the names of keys that stand above."""
     place = table.places[0]
     title = ["", f"### {_title(table)}"] if len(place) > 1 or place[0].tags else []
     toml = ["```toml", *table.toml.splitlines(), "```"]
@@ -341,26 +340,6 @@ def _item(key: Key) -> str:
     example = f"; example `{key.example}`" if plain else ""
     values = BOUNDED.sub("", key.values).replace("list of 3 ", "3 ")
     return f"- `{key.name}` ({values}{unit}{default}): {key.meaning}{example}"
-
-
-def _text(table: KeyTable) -> str:
-    """A table, its keys and an example for the terminal."""
-    parts = [_title(table).replace("`", ""), fill(_plain(table.meaning), 88), ""]
-    parts += [*map(_key_text, table.keys), "\nfor example:\n"]
-    return "\n".join([*parts, indent(table.toml.rstrip(), "  ")])
-
-
-def _key_text(key: Key) -> str:
-    unit = "dimensionless" if key.unit == "-" else key.unit
-    default = key.default and (
-        key.default if key.default == "required" else f"default {key.default}"
-    )
-    facts = "; ".join(filter(None, (key.values, unit, default)))
-    return f"  {key.name}: {facts}\n{_body(key.meaning)}"
-
-
-def _body(text: str) -> str:
-    return fill(text, 88, initial_indent=" " * 6, subsequent_indent=" " * 6)
 
 
 def _plain(docstring: str) -> str:

@@ -21,8 +21,7 @@ from tiltsim.commands.text import (
     tally,
     write_text,
 )
-from tiltsim.errors import InputError
-from tiltsim.exit_codes import INTERRUPTED
+from tiltsim.errors import INTERRUPTED, InputError
 from tiltsim.system.interrupts import defer_interrupts
 
 if TYPE_CHECKING:

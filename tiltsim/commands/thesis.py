@@ -18,8 +18,7 @@ from tiltsim.commands.gait_options import (
 )
 from tiltsim.commands.options import CORES, Jobs, Json, PlotOptions, Quiet, Trust, refuse_both
 from tiltsim.commands.text import aligned, print_line, show_progress, tally
-from tiltsim.errors import InputError
-from tiltsim.exit_codes import DONE, EXPECTATION_FAILED
+from tiltsim.errors import DONE, EXPECTATION_FAILED, InputError
 from tiltsim.views import figures
 
 if TYPE_CHECKING:

@@ -18,7 +18,7 @@ from tiltsim.closed_loop.userdata import (
 )
 from tiltsim.engines.base import Vectors
 from tiltsim.equations.solvers import Integration, make_step
-from tiltsim.scenario.companion import MAX_COMPANIONS
+from tiltsim.scenario.interaction import MAX_COMPANIONS
 from tiltsim_controllers.code.arrays import as_arrays, program_of, xp
 from tiltsim_controllers.code.arrays import flatten as flattened
 from tiltsim_controllers.code.program import Program

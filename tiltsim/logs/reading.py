@@ -3,7 +3,6 @@
 Maps from the signals of a log to tiltsim's columns are TOML files, or the map of PX4's topics.
 """
 
-import csv
 from os import PathLike
 from pathlib import Path
 from typing import Final, Literal
@@ -18,9 +17,10 @@ from tiltsim.flight.reading import flight_file
 from tiltsim.logs import formats
 from tiltsim.logs.formats import Signals
 from tiltsim.logs.log import LOG_SUFFIXES, UNITS, Log
-from tiltsim.scenario.library import read_text, read_toml
+from tiltsim.scenario.library import read_toml
 from tiltsim.scenario.messages import choose, did_you_mean
 from tiltsim.scenario.table import NotTiny, Table, default, in_one_line, required
+from tiltsim.scenario.time_table import csv_fields, csv_rows
 from tiltsim.system.files import is_file, is_folder
 from tiltsim.system.parquet import open_parquet
 from tiltsim.system.text import printable, short_repr
@@ -298,10 +298,10 @@ def _defects(columns: dict[str, Floats]) -> list[str]:
 
 def _read_csv(file: Path, *, needs_time: bool) -> Signals:
     """The columns of a CSV file; empty fields are NaN."""
-    rows = [row for row in csv.reader(read_text(file).splitlines()) if row]
+    rows = csv_fields(file)
     if len(rows) < 2:
         raise InputError(f"{file}: {len(rows)} rows; needs a line of names and numbers below it")
-    names = [name.strip() for name in rows[0]]
+    names, *lines = rows
     if "time" not in names:
         found = short_repr(names)
         raise InputError(f"{file}: no column time (s); separate columns by commas; found {found}")
@@ -311,16 +311,10 @@ def _read_csv(file: Path, *, needs_time: bool) -> Signals:
     if needs_time and not {*names} & {*UNITS} - {"time"}:
         found = short_repr(names)
         raise InputError(f"{file}: no column of tiltsim's; give a map (--map FILE); found {found}")
-    table = np.empty((len(rows) - 1, len(names)))
-    for number, row in enumerate(rows[1:], start=1):
-        if len(row) != len(names):
-            raise InputError(f"{file}: row {number}: {len(row)} values in {len(names)} columns")
-        for place, text in enumerate(row):
-            try:
-                table[number - 1, place] = float(text) if text.strip() else np.nan
-            except ValueError:
-                where = f"row {number}, column {printable(names[place])}"
-                raise InputError(f"{file}: {where} = {short_repr(text)}: no number") from None
+    try:
+        table = np.array([*csv_rows(names, lines, "nan")])
+    except InputError as error:
+        raise InputError(f"{file}: {error}") from None
     time = table[:, names.index("time")]
     return {name: (time, table[:, place].copy()) for place, name in enumerate(names)}
 

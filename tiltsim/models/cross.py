@@ -13,10 +13,7 @@ def as_multirotor(
 ) -> Multirotor:
     """A vehicle with four equal arms at right angles, by its rotors; a multirotor as it is.
 
-    Args:
-        vehicle: The vehicle.
-        tilting: Whether its rotors tilt about the arms.
-        reverses: Whether they may turn against their spins.
+    They may tilt about the arms, and reverse, that is turn against their spins.
     """
     if isinstance(vehicle, Multirotor):
         return vehicle

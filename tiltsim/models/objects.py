@@ -166,12 +166,9 @@ class Objects:
 
 
 def touchable(root: mujoco.MjSpec, *, ground: bool, number: int = -1) -> None:
-    """Let the vehicle's collision shapes touch other things, but not each other.
+    """Let the vehicle's collision shapes touch other things and maybe the ground, not each other.
 
-    Args:
-        root: The vehicle.
-        ground: Whether its ground can be touched.
-        number: Its number among vehicles that touch each other; -1 for one alone.
+    The number is its own among the vehicles that touch each other; -1 for one alone.
     """
     import mujoco
 
@@ -188,12 +185,10 @@ def touchable(root: mujoco.MjSpec, *, ground: bool, number: int = -1) -> None:
 
 
 def add_companion(spec: mujoco.MjSpec, name: str, companion: mujoco.MjSpec) -> None:
-    """Add a further vehicle. Keyframes, which have only one of them, are removed.
+    """Add a further vehicle, whose name begins the names of its parts.
 
-    Args:
-        spec: The first vehicle.
-        name: The other's name, which begins the names of its parts.
-        companion: The other, of which ground, lights and cameras stay behind.
+    Keyframes, which have only one of them, are removed; ground, lights and cameras of the other
+    stay behind.
     """
     remove_keys(spec)
     remove_keys(companion)
@@ -214,10 +209,7 @@ def remove_keys(spec: mujoco.MjSpec) -> None:
 def add_objects(spec: mujoco.MjSpec, objects: Objects, companions: Sequence[str] = ()) -> None:
     """Add objects, tool and load to a vehicle. Its keyframes, which lack them, are removed.
 
-    Args:
-        spec: The vehicle.
-        objects: All that is added.
-        companions: Names of further vehicles, which touch the objects as well.
+    Companions, by name, touch the objects as well.
     """
     remove_keys(spec)
     spec.option.impratio, spec.option.tolerance = FIRMER, 1e-12  # forces without noise
@@ -364,12 +356,9 @@ def _add_force_sensor(spec: mujoco.MjSpec, vehicle: str, name: str) -> None:
 
 
 def distance_ahead(body: Body, point: Floats, direction: Floats) -> float | None:
-    """Distance (m) from a point to an object at its initial place; None if it is not ahead.
+    """Distance (m) from a point along a unit vector to an object at its initial place, or None.
 
-    Args:
-        body: The object.
-        point: m, world, shape (3,).
-        direction: Unit vector, world, shape (3,).
+    Point and vector are in the world, shape (3,); None is for an object that is not ahead.
     """
     turn = rotation_of_quaternion(np.array(body.quaternion))
     begin, along = turn.T @ (point - body.position), turn.T @ direction

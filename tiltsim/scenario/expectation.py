@@ -5,7 +5,7 @@ from typing import Annotated, Final, Literal
 from pydantic import Field
 
 from tiltsim.scenario.messages import choose
-from tiltsim.scenario.metric_names import METRICS, is_boolean, is_metric
+from tiltsim.scenario.metric_names import METRICS, is_boolean, is_metric, split_metric
 from tiltsim.scenario.simulation_table import PlantName
 from tiltsim.scenario.table import NonNegative, Range, Table, default, example, required
 
@@ -99,7 +99,7 @@ class Expectation(Table):
 
     def _check_values(self) -> None:
         if not is_metric(self.metric):
-            raise self.mistake("metric", choose(self.metric.rpartition(".")[2], METRICS))
+            raise self.mistake("metric", choose(split_metric(self.metric)[1], METRICS))
         boolean = is_boolean(self.metric)
         bounded = self.min is not None or self.max is not None
         if boolean and (bounded or self.equals is None):

@@ -159,17 +159,17 @@ class Family(NamedTuple):
     """A file of the library, and its variants."""
 
     entry: Entry
-    members: tuple[Entry, ...]  # "#name", title or changed keys, source if it differs
+    variants: tuple[Entry, ...]  # each by itself
+    members: tuple[Entry, ...]  # below the file: "#name", title or changed keys, source if other
+
+    @property
+    def scenarios(self) -> tuple[Entry, ...]:
+        """The variants; the file itself if it has none."""
+        return self.variants or (self.entry,)
 
 
-def library_entries(word: str = "") -> Iterator[Entry]:
-    """Every scenario of the library that a word selects, variants included; '' selects all."""
-    for name, document in _documents():
-        yield from selected_entries(name, document, word)
-
-
-def selected_entries(name: str, document: Mapping[str, Any], word: str) -> list[Entry]:
-    """The scenarios of a file that a word selects.
+def selected_family(name: str, document: Mapping[str, Any], word: str) -> Family | None:
+    """A file and the variants that a word selects; None if it selects nothing.
 
     A word in the file's own address, title or source selects all variants; any other word selects
     the variants that contain it.
@@ -179,38 +179,31 @@ def selected_entries(name: str, document: Mapping[str, Any], word: str) -> list[
         document: Its content; only a valid file is certain to have the right types.
         word: Plain text, without wildcards; the case of its letters does not matter.
     """
-    family, members = _entries(name, document)
-    whole = family.contains(word)
-    listed = members or [(family, family)]
-    return [entry for entry, _ in listed if whole or entry.contains(word)]
+    title, source = str(document.get("title", "")), str(document.get("source", ""))
+    file = Entry(name, title, source)
+    variants, members = [], []
+    for variant in document.get("variant", []):
+        own, differences = variant.get("title"), _differences(document, variant)
+        at, place = f"#{variant['name']}", str(variant.get("source", source))
+        alone = Entry(name + at, str(own or f"{title}: {differences}"), place)
+        if file.contains(word) or alone.contains(word):
+            variants.append(alone)
+            members.append(Entry(at, str(own or differences), _shorter(place, source)))
+    found = Family(file, tuple(variants), tuple(members))
+    return found if variants or file.contains(word) else None
 
 
 def library_families(word: str = "") -> Iterator[Family]:
     """The files of the library with the variants that a word selects; '' selects all."""
-    for name, document in _documents():
-        family, members = _entries(name, document)
-        whole = family.contains(word)
-        chosen = tuple(short for entry, short in members if whole or entry.contains(word))
-        if whole or chosen:
-            yield Family(family, chosen)
-
-
-def _entries(name: str, document: Mapping[str, Any]) -> tuple[Entry, list[tuple[Entry, Entry]]]:
-    """A file, and its variants: each by itself, and as a member below the file."""
-    title, source = str(document.get("title", "")), str(document.get("source", ""))
-    members = []
-    for variant in document.get("variant", []):
-        own, differences = variant.get("title"), _differences(document, variant)
-        place = str(variant.get("source", source))
-        at, short = f"#{variant['name']}", _shorter(place, source)
-        alone = Entry(name + at, str(own or f"{title}: {differences}"), place)
-        members.append((alone, Entry(at, str(own or differences), short)))
-    return Entry(name, title, source), members
-
-
-def _documents() -> Iterator[tuple[str, dict[str, Any]]]:
     for path in scenario_files(shipped_folder("scenarios")):
-        yield library_name(path), read_toml(path)
+        if family := selected_family(library_name(path), read_toml(path), word):
+            yield family
+
+
+def library_entries(word: str = "") -> Iterator[Entry]:
+    """Every scenario of the library that a word selects, variants included; '' selects all."""
+    for family in library_families(word):
+        yield from family.scenarios
 
 
 def _differences(document: Mapping[str, Any], variant: Mapping[str, Any]) -> str:

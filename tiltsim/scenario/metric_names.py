@@ -229,9 +229,15 @@ KEPT_METRICS: Final = tuple(name for name in METRICS if name not in WALL_CLOCK_M
 BOOLEAN_METRICS: Final = frozenset({"diverged"})
 
 
+def split_metric(name: str) -> tuple[str, str]:
+    """The vehicle and its metric in a name: a companion's name, empty for the first vehicle."""
+    vehicle, _, own = name.rpartition(".")
+    return vehicle, own
+
+
 def is_metric(name: str) -> bool:
     """Whether a name is a metric's; a companion's follows the vehicle's name and a dot."""
-    return name.rpartition(".")[2] in METRICS
+    return split_metric(name)[1] in METRICS
 
 
 def metric_of(name: str) -> Metric:
@@ -240,7 +246,7 @@ def metric_of(name: str) -> Metric:
     Raises:
         KeyError: If there is none.
     """
-    vehicle, _, own = name.rpartition(".")
+    vehicle, own = split_metric(name)
     found, words = METRICS[own], f"{vehicle}: "
     if not vehicle:
         return found
@@ -249,7 +255,7 @@ def metric_of(name: str) -> Metric:
 
 def is_boolean(name: str) -> bool:
     """Whether a metric, of any vehicle, is true or false."""
-    return name.rpartition(".")[2] in BOOLEAN_METRICS
+    return split_metric(name)[1] in BOOLEAN_METRICS
 
 
 def unit_of(metric: str) -> str:

@@ -13,9 +13,9 @@ from typing import Annotated, Any, Self
 from pydantic import ConfigDict, Field
 
 from tiltsim.errors import InputError
-from tiltsim.scenario.companion import companions_of
 from tiltsim.scenario.consistency import check_consistency
 from tiltsim.scenario.documents import check_keys, leaves
+from tiltsim.scenario.interaction import companions_of
 from tiltsim.scenario.messages import show
 from tiltsim.scenario.scenario_tables import DESCRIPTIVE, ScenarioTables
 from tiltsim.scenario.table import Table, in_one_line, required

@@ -4,16 +4,22 @@ from functools import reduce
 from operator import or_
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
-from pydantic import Field, PrivateAttr
+from pydantic import Field, PrivateAttr, model_validator
 
 from tiltsim.errors import InputError
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario import gait
-from tiltsim.scenario.companion import CompanionTable, DownwashTable
 from tiltsim.scenario.controller import Controller
 from tiltsim.scenario.expectation import ClaimName, ClaimTable, Expectation, Origin
 from tiltsim.scenario.gait import FixedGait, GaitTable
-from tiltsim.scenario.interaction import CableTable, ObjectTable, PayloadTable, ToolTable
+from tiltsim.scenario.interaction import (
+    CableTable,
+    CompanionTable,
+    DownwashTable,
+    ObjectTable,
+    PayloadTable,
+    ToolTable,
+)
 from tiltsim.scenario.kinds import KINDS, tables_of
 from tiltsim.scenario.linearizing_controllers import AttitudeAltitudeController
 from tiltsim.scenario.reference import Reference, SetpointReference
@@ -22,7 +28,7 @@ from tiltsim.scenario.simulation_table import (
     AutopilotTable,
     InitialTable,
     SimulationTable,
-    WithAutopilot,
+    with_controller,
 )
 from tiltsim.scenario.surroundings import (
     Acceleration,
@@ -34,7 +40,7 @@ from tiltsim.scenario.surroundings import (
     SensorTable,
     Torque,
 )
-from tiltsim.scenario.table import Many, default
+from tiltsim.scenario.table import Many, Table, default
 from tiltsim.scenario.time_table import TimeTable
 from tiltsim.scenario.vehicle import ModelErrorTable, VehicleTable, VehicleUnion
 from tiltsim_controllers.vehicle.parameters import Vehicle
@@ -56,7 +62,7 @@ DESCRIPTIVE: Final = ("title", "source", "without", "ours", "claim", "expect")
 """Keys that describe and judge a flight, and change nothing in it."""
 
 
-class ScenarioTables(WithAutopilot):
+class ScenarioTables(Table):
     """One flight, fully specified; `tiltsim.scenario.scenario.Scenario` adds the checks."""
 
     title: str = default("", "one line about the flight", "My first flight")
@@ -108,6 +114,7 @@ class ScenarioTables(WithAutopilot):
     )
     claim: dict[ClaimName, ClaimTable] = default({}, "statements of the source")
 
+    _with_controller = model_validator(mode="before")(with_controller)
     _address: str = PrivateAttr("")
     _own: dict[str, Any] = PrivateAttr({})  # parts given in Python, by name
     _trusted: bool = PrivateAttr(False)  # see `tiltsim.scenario.own_parts`

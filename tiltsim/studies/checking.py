@@ -9,8 +9,7 @@ from time import perf_counter
 from typing import Any, Final, Literal, get_args
 from xml.etree import ElementTree
 
-from tiltsim.errors import InputError
-from tiltsim.exit_codes import DONE, EXPECTATION_FAILED, INVALID_INPUT, VEHICLE_LOST
+from tiltsim.errors import DONE, EXPECTATION_FAILED, INVALID_INPUT, VEHICLE_LOST, InputError
 from tiltsim.flight.metrics import Verdict, check_expectations
 from tiltsim.laws.assembling import loop_of
 from tiltsim.resources import shipped_folder
@@ -19,7 +18,7 @@ from tiltsim.scenario.library import (
     library_name,
     read_toml,
     scenario_files,
-    selected_entries,
+    selected_family,
 )
 from tiltsim.scenario.loading import load_scenario, variant_names
 from tiltsim.scenario.own_parts import require_trust
@@ -147,7 +146,7 @@ def _add_case(suite: ElementTree.Element, result: CheckResult) -> None:
 def collect(paths: Iterable[str], word: str = "") -> list[str]:
     """Addresses of all scenarios under files and folders, families expanded into variants.
 
-    A path that does not exist is looked up in the library; ``word`` selects as `selected_entries`
+    A path that does not exist is looked up in the library; ``word`` selects as `selected_family`
     does. Raises `InputError` if a path is nowhere, a folder has no scenario, or none is selected.
     """
     addresses: list[str] = []
@@ -175,7 +174,8 @@ def _selected(file: Path, base: str, word: str) -> list[str]:
         variant_names(file, document)
     except InputError:
         document = {}  # the file is checked like the others, and reported as invalid
-    return [entry.address for entry in selected_entries(base, document, word)]
+    family = selected_family(base, document, word)
+    return [entry.address for entry in family.scenarios] if family else []
 
 
 def shard(addresses: list[str], number: int, count: int) -> list[str]:

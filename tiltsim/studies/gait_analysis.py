@@ -1,34 +1,27 @@
-"""Analyses of gaits and of the Two Color Map, as plain dicts ready for JSON.
+"""Closed forms of gaits on the cross, and the Two Color Map, as plain dicts ready for JSON.
 
 Angles are in rad, everything else in SI units; NaN becomes null.
 """
 
-from math import isfinite
+from math import acos, cos
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tiltsim.models.cross import as_multirotor
-from tiltsim.studies.multirotor_analysis import tilted_rotors
 from tiltsim_controllers.analysis import fault_tolerance, two_color_map
-from tiltsim_controllers.analysis.hover import rotor_losses
 from tiltsim_controllers.analysis.published_gaits import DETERMINANT_CASES, TRIANGLE
 from tiltsim_controllers.analysis.singularity import (
     acceptable_share,
     determinant,
-    force_matrix,
     hover_rotor_speeds,
     margin_over_gait,
     rank,
     residuals,
     singular_values,
-    singularity_margin,
     torque_free_direction,
-    torque_matrix,
     unacceptable_attitudes,
 )
-from tiltsim_controllers.analysis.torque_free import SINGULAR_ATTITUDES, torque_free_forces
 from tiltsim_controllers.analysis.two_color_planner import Path, check_path
 from tiltsim_controllers.gaits.plans import Gait
 from tiltsim_controllers.mathematics.scalar import Floats, Quad
@@ -41,68 +34,51 @@ NEARLY_SINGULAR: Final = 1e-3
 Blue gaits with angles rounded as in the thesis stay below 3e-4, nonsingular gaits above 1e-2.
 """
 
+OPPOSITE_SPEED_RATIO: Final = 0.7
+"""Speed of the rotor opposite a lost one, as a share of the hover speed."""
+
 REST_TOLERANCE: Final = 1e-6
 """Fraction of the fastest rotor's speed below which a rotor counts as at rest."""
 
 
-def gait_report(
-    gait: Gait, vehicle: Vehicle, *, roll: float | None = None, pitch: float | None = None
-) -> dict[str, Any]:
-    """The singularities of a gait (``tiltsim gait --json``).
+def closed_forms(
+    angles: Floats, vehicle: Vehicle, attitude: tuple[float, float]
+) -> dict[str, Floats]:
+    """The closed forms of ch. 3 and 6 for tilt angles (rad) of shape (4,), or (N, 4) in order.
 
-    Args:
-        gait: Tilt angles over time.
-        vehicle: Their vehicle.
-        roll, pitch: Attitude of the margins and the determinant, rad; without either, margins at
-            level.
-
-    Returns:
-        Values at time zero. A moving gait adds ``time``, a table of arrays over one period, and
-        ``min_singularity_margin`` over it. Fixed angles have ``hover_rotor_speeds`` (rad/s, along
-        the spins), null if they cannot hover.
+    ``attitude`` is roll and pitch of determinant and margin, rad.
     """
-    at_attitude = roll is not None or pitch is not None
-    roll, pitch = roll or 0.0, pitch or 0.0
+    margin = margin_over_gait(np.atleast_2d(angles), vehicle, *attitude)
+    return {
+        **residuals(angles, vehicle)._asdict(),
+        "determinant": determinant(angles, *attitude, vehicle),
+        "singular_values": singular_values(angles, vehicle),
+        "torque_free_direction": torque_free_direction(angles, vehicle),
+        "singularity_margin": margin.reshape(angles.shape[:-1]),
+    }
+
+
+def cross_report(gait: Gait, vehicle: Vehicle) -> dict[str, Any]:
+    """The part of a report that holds for the thesis's vehicle alone, at the gait's start.
+
+    Fixed angles have ``hover_rotor_speeds`` (rad/s, along the spins), null if they cannot hover;
+    rotors that would have to turn backwards have negative ones, and a warning.
+    """
     start = gait.angles(0.0)
-    report: dict[str, Any] = {
-        "gait": gait.name,
-        "source": gait.source,
+    curve = unacceptable_attitudes(start, vehicle)
+    speeds = hover_rotor_speeds(start, vehicle) if gait.is_constant else None
+    return {
         "vehicle": vehicle_name(vehicle),
         "drag_ratio": drag_ratio(vehicle),
-        **_instant(start, vehicle, roll, pitch),
         "acceptable_share": acceptable_share(start, vehicle),
+        "unacceptable_attitudes": {
+            "kind": curve.kind,
+            "roll": curve.roll.tolist(),
+            "pitch": curve.pitch.tolist(),
+        },
+        "hover_rotor_speeds": speeds,
+        "warnings": gait_warnings(gait, vehicle) + _backward_rotors(speeds),
     }
-    curve = unacceptable_attitudes(start, vehicle)
-    report["unacceptable_attitudes"] = {
-        "kind": curve.kind,
-        "roll": curve.roll.tolist(),
-        "pitch": curve.pitch.tolist(),
-    }
-    if at_attitude:
-        report |= {"roll": roll, "pitch": pitch}
-        report["determinant"] = float(determinant(start, roll, pitch, vehicle))
-    if not gait.is_constant:
-        times = gait.sample_times()
-        angles = gait.angles(times)
-        table = _instant(angles, vehicle, roll, pitch)
-        table["singularity_margin"] = margin_over_gait(angles, vehicle, roll, pitch).tolist()
-        table |= {"time": times.tolist(), "rates": gait.rates(times).tolist()}
-        if at_attitude:
-            table["determinant"] = determinant(angles, roll, pitch, vehicle).tolist()
-        report |= {
-            "period": gait.period,
-            "amplitude": gait.amplitude,
-            "max_rate": gait.max_rate if isfinite(gait.max_rate) else None,
-            "continuous": gait.is_continuous,
-            "min_rank": min(table["rank"]),
-            "min_singularity_margin": min(table["singularity_margin"]),
-            "time": table,
-        }
-    a1, a2, a3, a4 = start.tolist()
-    speeds = hover_rotor_speeds((a1, a2, a3, a4), vehicle) if gait.is_constant else None
-    report["warnings"] = gait_warnings(gait, vehicle) + _backward_rotors(speeds)
-    report["hover_rotor_speeds"] = speeds
-    return report
 
 
 def gait_warnings(gait: Gait, vehicle: Vehicle) -> list[str]:
@@ -154,39 +130,28 @@ def _backward_rotors(speeds: Quad | None) -> list[str]:
     return [f"{names} would have to spin backwards to hover"]
 
 
-def fault_report(tilts: Quad, vehicle: Vehicle, opposite_speed: float) -> dict[str, Any]:
-    """Hovering after the loss of each rotor (``tiltsim gait --faults``); rad and rad/s.
+def cross_loss(lost: int, tilts: Floats, vehicle: Vehicle) -> dict[str, Any]:
+    """Hovers without a rotor, 1 to 4: how far fixed tilts (rad) are from one, and with free tilts.
 
-    For each rotor: how far the tilt angles are from a hover on the other three, and a hover on
-    three with free tilt angles, the rotor opposite the failed one at ``opposite_speed``;
-    ``least_speed`` is the maximum speed that the rotors must reach for it.
+    ``free_tilts`` is a hover on three rotors, of which the one opposite the lost one turns at
+    `OPPOSITE_SPEED_RATIO`; ``least_speed`` is the maximum speed that the rotors must reach.
     """
-    losses = []
-    fixed = tilted_rotors(as_multirotor(vehicle, tilting=True, reverses=False), tilts)
-    for failed, hovers in zip(ROTORS, rotor_losses(fixed), strict=True):
-        free = fault_tolerance.three_rotor_hover(failed, vehicle, opposite_speed=opposite_speed)
-        factors = [0.0 if rotor == failed else 1.0 for rotor in ROTORS]
-        losses.append(
-            {
-                "rotor": failed,
-                "fixed_tilts_miss": fault_tolerance.fixed_tilt_imbalance(tilts, failed, vehicle),
-                "hovers_with_fixed_tilts": hovers is not None,
-                "least_speed": fault_tolerance.minimum_hover_speed(
-                    vehicle, factors=(factors[0], factors[1], factors[2], factors[3])
-                ),
-                "free_tilts": {
-                    "angles": list(free.tilts),
-                    "rotor_speeds": list(free.rotor_speeds),
-                    "roll": free.roll,
-                    "pitch": free.pitch,
-                    "authority": free.authority,
-                },
-            }
-        )
+    speed = OPPOSITE_SPEED_RATIO * vehicle.hover_rotor_speed
+    free = fault_tolerance.three_rotor_hover(lost, vehicle, opposite_speed=speed)
+    a, b, c, d = (0.0 if rotor == lost else 1.0 for rotor in ROTORS)
     return {
-        "hover_speed": vehicle.hover_rotor_speed,
-        "opposite_speed": opposite_speed,
-        "rotor_loss": losses,
+        "fixed_tilts_miss": fault_tolerance.fixed_tilt_imbalance(tilts, lost, vehicle),
+        "least_speed": fault_tolerance.minimum_hover_speed(vehicle, factors=(a, b, c, d)),
+        "free_tilts": {
+            "angles": list(free.tilts),
+            "lean": acos(cos(free.roll) * cos(free.pitch)),
+            "rotor_speeds": list(free.rotor_speeds),
+            "max_rotor_speed": free.max_rotor_speed,
+            "controllable": free.authority > NEARLY_SINGULAR,
+            "roll": free.roll,
+            "pitch": free.pitch,
+            "authority": free.authority,
+        },
     }
 
 
@@ -272,31 +237,6 @@ def vehicle_name(vehicle: Vehicle) -> str | dict[str, float]:
         if preset == vehicle:
             return name
     return dict(vehicle._asdict())
-
-
-def _instant(angles: Floats, vehicle: Vehicle, roll: float, pitch: float) -> dict[str, Any]:
-    """The singularity analysis of tilt angles of shape (4,) or (N, 4)."""
-    R, R_phi, R_theta = residuals(angles, vehicle)
-    dimension = torque_free_forces(force_matrix(angles), torque_matrix(angles, vehicle)).dimension
-    return {
-        "angles": angles.tolist(),
-        "rank": rank(angles, vehicle).tolist(),
-        "torque_free_dimension": dimension.tolist(),
-        "singular_attitudes": np.take(SINGULAR_ATTITUDES, dimension).tolist(),
-        "singular_values": singular_values(angles, vehicle).tolist(),
-        "R": R.tolist(),
-        "R_phi": R_phi.tolist(),
-        "R_theta": R_theta.tolist(),
-        "torque_free_direction": _vectors(torque_free_direction(angles, vehicle)),
-        "singularity_margin": singularity_margin(angles, vehicle, roll, pitch).tolist(),
-    }
-
-
-def _vectors(directions: Floats) -> Any:
-    """Vectors as lists, null for NaN."""
-    if directions.ndim > 1:
-        return [_vectors(direction) for direction in directions]
-    return None if np.isnan(directions).any() else directions.tolist()
 
 
 def _when(chosen: NDArray[np.bool_], times: Floats, gait: Gait) -> str:

@@ -1,17 +1,20 @@
-"""Analysis of any multirotor at fixed tilt angles, and of the fleet, as plain dicts for JSON.
+"""Analysis of gaits of any vehicle, and of the fleet, as plain dicts for JSON.
 
 Angles are in rad, everything else in SI units and body axes; values that do not exist are None.
 """
 
 from collections.abc import Sequence
+from math import isfinite
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
+from tiltsim.models.cross import as_multirotor
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.models.user_vehicle import read_user_vehicle
 from tiltsim.resources import shipped_folder
+from tiltsim.studies import gait_analysis
 from tiltsim_controllers.analysis.attainable import (
     AttainableSet,
     TiltedRotors,
@@ -34,8 +37,10 @@ from tiltsim_controllers.analysis.torque_free import (
     singularity_margin,
     torque_free_forces,
 )
+from tiltsim_controllers.gaits import plans
 from tiltsim_controllers.gaits.plans import Gait
 from tiltsim_controllers.mathematics.scalar import Floats
+from tiltsim_controllers.vehicle.parameters import Vehicle
 from tiltsim_controllers.vehicle.rotors import ROTOR_FLOATS, force_and_torque
 
 UNLIMITED: Final = 100.0
@@ -59,6 +64,9 @@ FLEET: Final[dict[str, tuple[float, ...]]] = {
 """Names of the files, with tilt angles (rad) that show the vehicle's capabilities."""
 FEW_ROTORS: Final = ("bicopter", "tricopter")
 """Vehicles whose tilts a law has to command, since a gait leaves too few inputs."""
+WORST: Final = ("rank", "torque_free_dimension", "singularity_margin")
+"""Numbers whose smallest over a period is reported."""
+
 KEYS: Final = (
     "rotors",
     "tilts",
@@ -71,7 +79,7 @@ KEYS: Final = (
 
 
 def tilted_rotors(
-    vehicle: Multirotor, angles: Sequence[float], limits: tuple[float, float] | None = None
+    vehicle: Multirotor, angles: Sequence[float] | Floats, limits: tuple[float, float] | None = None
 ) -> TiltedRotors:
     """The rotors of a vehicle at tilt angles (rad), one for each hinge.
 
@@ -90,95 +98,107 @@ def tilted_rotors(
     return TiltedRotors(force, torque, lower, upper, vehicle.mass * vehicle.gravity)
 
 
-def multirotor_report(
-    vehicle: Multirotor,
-    angles: Sequence[float],
+def gait_report(
+    gait: Gait,
+    vehicle: Vehicle | Multirotor,
     *,
     limits: tuple[float, float] | None = None,
-    roll: float = 0.0,
-    pitch: float = 0.0,
+    attitude: tuple[float, float] = (0.0, 0.0),
     faults: bool = False,
 ) -> dict[str, Any]:
-    """Singularities, hover and attainable sets (``tiltsim gait --mjcf FILE --json``).
+    """Singularities, hover and attainable sets of a gait (``tiltsim gait --json``).
 
     Args:
-        vehicle: of any number of rotors
-        angles: one for each tilt hinge, rad
-        limits: as for `tilted_rotors`
-        roll, pitch: attitude of the margin, rad
-        faults: whether to add the hovers without each rotor, and with other tilt angles
+        gait: Tilt angles over time.
+        vehicle: Their vehicle; for a cross of four rotors the closed forms of
+            `tiltsim.studies.gait_analysis` are added.
+        limits: See `tilted_rotors`.
+        attitude: Roll and pitch of the margins and the determinant, rad.
+        faults: Whether to add the hovers without each rotor, and with other tilt angles.
 
     Returns:
-        Rotor speeds are along the spins, rad/s. Without rotor speed limits ``attainable`` is None,
-        and ``side_force_share`` where the dimension is 3.
+        Values at time zero; rotor speeds are along the spins. A moving gait adds ``time``, a table
+        of arrays over one period, and the worst values over it. Without rotor speed limits
+        ``attainable`` is None, and ``side_force_share`` where the dimension is 3.
     """
-    rotors = tilted_rotors(vehicle, angles, limits)
-    forces = torque_free_forces(rotors.force, rotors.torque)
-    dimension, direction = int(forces.dimension), hover_direction(forces)
-    basis = np.linalg.svd(forces.projector)[0][:, :dimension]
-    strongest = np.linalg.norm(rotors.torque, axis=0).max()
-    values = np.linalg.svd(rotors.torque / strongest, compute_uv=False)
-    found = hover(rotors)
-    is_limited = limits is not None or bool(np.isfinite(vehicle.speed_ranges).all())
+    cross = vehicle if isinstance(vehicle, Vehicle) else None
+    craft, start = as_multirotor(vehicle, tilting=True, reverses=False), gait.angles(0.0)
+    rotors = tilted_rotors(craft, start, limits)
+    found, at_start = hover(rotors), _singularities(start, craft, cross, attitude)
+    dimension = at_start["torque_free_dimension"]
+    basis = np.linalg.svd(torque_free_forces(rotors.force, rotors.torque).projector)[0]
+    is_limited = limits is not None or bool(np.isfinite(craft.speed_ranges).all())
     report: dict[str, Any] = {
-        "rotors": len(vehicle.spins),
-        "tilts": vehicle.tilts,
-        "angles": list(angles),
-        "rank": int(forces.rank),
-        "singular_values": values.tolist(),
-        "torque_free_dimension": dimension,
-        "torque_free_forces": basis.T.tolist(),
-        "torque_free_direction": None if np.isnan(direction).any() else direction.tolist(),
-        "singular_attitudes": SINGULAR_ATTITUDES[dimension],
-        "singularity_margin": float(singularity_margin(forces, world_up(roll, pitch))),
-        "roll": roll,
-        "pitch": pitch,
-        "hover_rotor_speeds": None if found is None else _along(found, vehicle),
-        "hover": _hover(found, vehicle),
+        "gait": gait.name,
+        "source": gait.source,
+        "rotors": len(craft.spins),
+        "tilts": craft.tilts,
+        "roll": attitude[0],
+        "pitch": attitude[1],
+        **at_start,
+        "torque_free_forces": basis[:, :dimension].T.tolist(),
+        "hover": _hover(found, craft),
+        "hover_rotor_speeds": None if found is None else _along(found, craft),
         "side_force_share": side_force_share(rotors) if is_limited or dimension < 3 else None,
         "attainable": _attainable(rotors, found) if is_limited else None,
     }
-    if vehicle.tilts:
-        report["with_tilts"] = _with_tilts(vehicle, rotors)
+    if not gait.is_constant:
+        times = gait.sample_times()
+        table = _singularities(gait.angles(times), craft, cross, attitude)
+        report |= {
+            "period": gait.period,
+            "amplitude": gait.amplitude,
+            "max_rate": gait.max_rate if isfinite(gait.max_rate) else None,
+            "continuous": gait.is_continuous,
+            **{f"min_{key}": min(table[key]) for key in WORST},
+            "time": table | {"time": times.tolist(), "rates": gait.rates(times).tolist()},
+        }
+    if cross is not None:
+        report |= gait_analysis.cross_report(gait, cross)
+    else:
+        if craft.tilts:
+            report["with_tilts"] = _with_tilts(craft, rotors)
+        report["warnings"] = _warnings(report, is_limited=is_limited)
     if faults:
         report["faults"] = [
-            {
-                "rotor": lost + 1,
-                "hover": _hover(found, vehicle),
-                "free_tilts": _free_tilts(vehicle, rotors, lost) if vehicle.tilts else None,
-            }
-            for lost, found in enumerate(rotor_losses(rotors))
+            {"rotor": lost + 1, "hover": _hover(left, craft)}
+            | (
+                {"free_tilts": _free_tilts(craft, rotors, lost) if craft.tilts else None}
+                if cross is None
+                else gait_analysis.cross_loss(lost + 1, start, cross)
+            )
+            for lost, left in enumerate(rotor_losses(rotors))
         ]
-    report["warnings"] = _warnings(report, is_limited=is_limited)
     return report
 
 
-def period_report(vehicle: Multirotor, gait: Gait, roll: float, pitch: float) -> dict[str, Any]:
-    """The singularities of a moving gait over its period: a table of arrays, and their worst.
-
-    Args:
-        vehicle: of any number of rotors
-        gait: its tilt angles over time
-        roll, pitch: attitude of the margins, rad
-    """
-    times = gait.sample_times()
-    angles = gait.angles(times)
-    pairs = [force_and_torque(vehicle.table, row) for row in angles.tolist()]
-    force, torque = (np.array(matrices) for matrices in zip(*pairs, strict=True))
+def _singularities(
+    angles: Floats, craft: Multirotor, cross: Vehicle | None, attitude: tuple[float, float]
+) -> dict[str, Any]:
+    """The singularity analysis of tilt angles of shape (M,), or (K, M) in order of time."""
+    force, torque = force_and_torque(craft.table, angles)
     forces = torque_free_forces(force, torque)
-    margin = singularity_margin(forces, world_up(roll, pitch))
-    return {
-        "min_torque_free_dimension": int(forces.dimension.min()),
-        "min_singularity_margin": float(margin.min()),
-        "time": {
-            "time": times.tolist(),
-            "angles": angles.tolist(),
-            "rank": forces.rank.tolist(),
-            "torque_free_dimension": forces.dimension.tolist(),
-            "singular_attitudes": np.take(SINGULAR_ATTITUDES, forces.dimension).tolist(),
-            "singularity_margin": margin.tolist(),
-        },
+    largest = np.linalg.norm(torque, axis=-2).max(axis=-1)[..., np.newaxis, np.newaxis]
+    found = {
+        "angles": angles,
+        "rank": forces.rank,
+        "singular_values": np.linalg.svd(torque / largest, compute_uv=False),
+        "torque_free_dimension": forces.dimension,
+        "torque_free_direction": hover_direction(forces),
+        "singular_attitudes": np.take(SINGULAR_ATTITUDES, forces.dimension),
+        "singularity_margin": singularity_margin(forces, world_up(*attitude)),
     }
+    if cross is not None:
+        found |= gait_analysis.closed_forms(angles, cross, attitude)
+    directions = _vectors(found["torque_free_direction"])
+    return {key: found[key].tolist() for key in found} | {"torque_free_direction": directions}
+
+
+def _vectors(directions: Floats) -> Any:
+    """Vectors as lists, null for NaN."""
+    if directions.ndim > 1:
+        return [_vectors(direction) for direction in directions]
+    return None if np.isnan(directions).any() else directions.tolist()
 
 
 def _with_tilts(vehicle: Multirotor, rotors: TiltedRotors) -> dict[str, Any] | None:
@@ -201,7 +221,7 @@ def _speeds_along(w: Floats, spins: Sequence[float]) -> list[float]:
 
 
 def _free_tilts(vehicle: Multirotor, rotors: TiltedRotors, lost: int) -> dict[str, Any] | None:
-    """The least tilt angles that hover level without a rotor, given by its index."""
+    """The hover at the least tilt angles that keep level without a rotor, given by its index."""
     first = lost * ROTOR_FLOATS
     table = vehicle.table[:first] + vehicle.table[first + ROTOR_FLOATS :]
     remaining = rotors.without(lost)
@@ -213,12 +233,8 @@ def _free_tilts(vehicle: Multirotor, rotors: TiltedRotors, lost: int) -> dict[st
     force, torque = force_and_torque(table, tilts)
     hovering = hover(remaining._replace(force=force, torque=torque))
     assert hovering is not None
-    speeds = _speeds_along(found[1], np.delete(vehicle.spins, lost).tolist())
-    return {
-        "angles": tilts,
-        "rotor_speeds": np.insert(speeds, lost, 0.0).tolist(),
-        "controllable": hovering.controllable,
-    }
+    speeds = np.insert(np.copysign(np.sqrt(np.abs(found[1])), found[1]), lost, 0.0)
+    return {"angles": tilts} | (_hover(hovering._replace(rotor_speeds=speeds), vehicle) or {})
 
 
 def balance_report(
@@ -323,7 +339,7 @@ def fleet_report() -> list[dict[str, Any]]:
     for name, angles in FLEET.items():
         vehicle = read_user_vehicle(str(fleet_file(name)), "multirotor").vehicle
         assert isinstance(vehicle, Multirotor)
-        report = multirotor_report(vehicle, angles, faults=True)
+        report = gait_report(plans.fixed(angles), vehicle, faults=True)
         rows.append(
             {
                 "name": name,

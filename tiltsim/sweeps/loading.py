@@ -5,7 +5,6 @@ from collections.abc import Mapping
 from contextlib import suppress
 from copy import deepcopy
 from dataclasses import replace
-from importlib.metadata import version
 from os import PathLike, fsdecode
 from pathlib import Path
 from typing import Any, Final
@@ -23,10 +22,10 @@ from tiltsim.scenario.loading import (
     parse_scenario,
     without_none,
 )
-from tiltsim.scenario.metric_names import METRICS
+from tiltsim.scenario.metric_names import METRICS, split_metric
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.scenario.table import in_one_line
-from tiltsim.sweeps.definition import UNUSED, VERSIONS, SweepDefinition
+from tiltsim.sweeps.definition import UNUSED, VERSIONS, SweepDefinition, installed_versions
 from tiltsim.sweeps.expressions import names
 from tiltsim.sweeps.points import SweepPoints
 from tiltsim.sweeps.tables import (
@@ -87,7 +86,7 @@ def load_sweep(
         address,
         json.loads(sweep.model_dump_json(exclude_none=True)),
         json.loads(json.dumps(base)),
-        {name: version(name) for name in VERSIONS},
+        installed_versions(),
     )
     check_points(SweepPoints(definition))
     return replace(definition, files=file_digests(sorted(_named_files(sweep, base))))
@@ -269,7 +268,7 @@ def _check_names(points: SweepPoints) -> None:
     used += [("plot.metrics", name) for name in sweep.plot.metrics]
     used += [("bisect.holds.metric", bound.metric) for bound in bounds]
     for key, name in used:
-        vehicle = name.rpartition(".")[0]
+        vehicle, _ = split_metric(name)
         if reason := unknown_vehicle(vehicle, points.vehicles):
             raise definition.mistake(key, name, f"no vehicle {vehicle}; {reason}")
     taken = {*RESERVED, *METRICS, *(f"{name}_version" for name in VERSIONS)}

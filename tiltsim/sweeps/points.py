@@ -92,7 +92,6 @@ class SweepPoints:
         self.definition = definition
         self.sweep = tables.Sweep.model_validate(definition.sweep)
         self._known: dict[object, _Known] = {}  # one scenario of each kind, made in full
-        self._check_count()
         self._groups = self._make_groups()
         axes = self.sweep.axis
         self._drawn = [
@@ -102,6 +101,8 @@ class SweepPoints:
         self.cases = [axis for axis in axes if isinstance(axis, tables.CasesAxis)]
         samples = self.sweep.sample.count if self.sweep.sample is not None else 1
         self._lengths = [*(len(group) for group in self._groups), samples]
+        if len(self) > MAX_POINTS:
+            raise definition.mistake("axis", len(self), f"more than {MAX_POINTS} points")
 
     def __len__(self) -> int:
         """Number of points."""
@@ -277,18 +278,6 @@ class SweepPoints:
         if is_number(rule):
             return float(rule)
         raise self.definition.mistake(key, rule, "must be an expression or a list of them")
-
-    def _check_count(self) -> None:
-        """Refuse more points than a sweep may have, before any of them is made."""
-        sample = self.sweep.sample
-        points = 1 if sample is None else sample.count
-        groups: set[str] = set()
-        for axis in self.sweep.axis:
-            if isinstance(axis, tables.GridAxis) and axis.group not in groups:
-                points *= axis.length
-                groups |= {axis.group} if axis.group else set()
-        if points > MAX_POINTS:
-            raise self.definition.mistake("axis", points, f"more than {MAX_POINTS} points")
 
     def _make_groups(self) -> list[list[dict[str, Any]]]:
         members: dict[str, list[list[dict[str, Any]]]] = {}

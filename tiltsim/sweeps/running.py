@@ -16,10 +16,9 @@ from tiltsim.plants.plant import MIN_STEPS_TO_COMPILE
 from tiltsim.scenario.own_parts import is_trusted, require_trust, with_trust
 from tiltsim.sweeps.chunks import ChunkWork, FinishedChunk
 from tiltsim.sweeps.dataset import SweepResults, load_results, open_sweep_folder
-from tiltsim.sweeps.definition import SweepDefinition
+from tiltsim.sweeps.definition import SweepDefinition, installed_versions
 from tiltsim.sweeps.loading import check_points, load_sweep
 from tiltsim.sweeps.points import SweepPoints
-from tiltsim.sweeps.rows import installed_versions
 from tiltsim.system.arguments import Report, reported, true_or_false, whole_number
 from tiltsim.system.processes import ProcessDiedError, in_processes
 from tiltsim.system.text import short_repr

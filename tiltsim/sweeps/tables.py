@@ -10,7 +10,7 @@ from tiltsim.scenario.documents import leaves
 from tiltsim.scenario.expectation import Expectation
 from tiltsim.scenario.library import MAX_VALUES
 from tiltsim.scenario.messages import InvalidValueError, choose
-from tiltsim.scenario.metric_names import KEPT_METRICS, METRICS, is_metric
+from tiltsim.scenario.metric_names import KEPT_METRICS, METRICS, is_metric, split_metric
 from tiltsim.scenario.table import Many, Positive, Table, default, example, required
 from tiltsim_controllers.mathematics.scalar import clipped
 
@@ -88,11 +88,6 @@ class ListAxis(AxisTable):
                     "axis.values", row, f"must be a list with one value for each of {self.name}"
                 )
 
-    @property
-    def length(self) -> int:
-        """Number of points."""
-        return len(self.values)
-
     def rows(self) -> list[tuple[Any, ...]]:
         """The values of all keys, point by point."""
         return [tuple(value) if self.keys else (value,) for value in self.values]
@@ -106,11 +101,6 @@ class LinspaceAxis(AxisTable):
     stop: float = required("the last value [the key's]", 3.0)
     count: Annotated[int, Field(ge=2, le=MAX_VALUES)] = required("number of values", 9)
     group: Group = None
-
-    @property
-    def length(self) -> int:
-        """Number of points."""
-        return self.count
 
     def rows(self) -> list[tuple[Any, ...]]:
         """The values of all keys, point by point."""
@@ -175,11 +165,6 @@ class CasesAxis(AxisTable):
         if "." in self.key:
             raise self.mistake("key", "the key of cases is a name without a dot")
 
-    @property
-    def length(self) -> int:
-        """Number of cases."""
-        return len(self.cases)
-
     def rows(self) -> list[tuple[Any, ...]]:
         """The names of the cases."""
         return [(name,) for name in self.cases]
@@ -189,10 +174,7 @@ SampledAxis = UniformAxis | NormalAxis | SeedAxis  # axes with a value for every
 GridAxis = ListAxis | LinspaceAxis | CasesAxis
 """Axes with rows of values, crossed with the other axes or advancing with a group."""
 
-Axis = Annotated[
-    ListAxis | LinspaceAxis | CasesAxis | UniformAxis | NormalAxis | SeedAxis,
-    Field(discriminator="type"),
-]
+Axis = Annotated[GridAxis | SampledAxis, Field(discriminator="type")]
 
 
 class SampleTable(Table):
@@ -294,8 +276,7 @@ class Sweep(Table):
 
     def _check_values(self) -> None:
         for metric in self.metrics or ():
-            own = metric.rpartition(".")[2]
-            if own not in KEPT_METRICS:
+            if (own := split_metric(metric)[1]) not in KEPT_METRICS:
                 raise InvalidValueError("metrics", metric, choose(own, KEPT_METRICS))
         for metric in self.plot.metrics:
             if not is_metric(metric) or metric not in (self.metrics or (metric,)):

@@ -206,12 +206,7 @@ def attainable_forces(rotors: TiltedRotors) -> AttainableSet:
 
 
 def attainable_torques(rotors: TiltedRotors, up: Floats) -> AttainableSet:
-    """The torques (N m, body axes) while the lift along ``up`` carries the weight.
-
-    Args:
-        rotors: of the vehicle
-        up: world up in body axes, shape (3,)
-    """
+    """The torques (N m, body axes) while the lift along world ``up``, (3,), carries the weight."""
     conditions = (up @ rotors.force)[np.newaxis], np.array([rotors.weight])
     return _image_of_slice(rotors.torque, TORQUES, conditions, rotors[2:4])
 

@@ -88,13 +88,10 @@ def _hover(tilts: Quad, rotor_speeds: Quad, vehicle: Vehicle, lost: int | None) 
 
 
 def three_rotor_hover(lost: int, vehicle: Vehicle, *, opposite_speed: float) -> Hover:
-    """The hover without a rotor in which its two neighbors share the weight evenly.
+    """The hover without a rotor, 1 to 4, in which its two neighbors share the weight evenly.
 
-    Args:
-        lost: the lost rotor, 1 to 4
-        vehicle: the tiltrotor
-        opposite_speed: Speed of the rotor opposite the lost one, rad/s; it determines the authority
-            over the torque that only this rotor produces. At 0 the other two hover alone.
+    The ``opposite_speed`` (rad/s) of the rotor opposite the lost one determines the authority over
+    the torque that only this rotor produces. At 0 the other two hover alone.
 
     Raises:
         ValueError: If there is no such rotor, or the opposite rotor alone would outweigh the
@@ -126,7 +123,7 @@ def three_rotor_hover(lost: int, vehicle: Vehicle, *, opposite_speed: float) -> 
     return _hover(_quad(tilts), _quad(speeds), vehicle, lost)
 
 
-def fixed_tilt_imbalance(tilts: Quad, lost: int, vehicle: Vehicle) -> float:
+def fixed_tilt_imbalance(tilts: Quad | Floats, lost: int, vehicle: Vehicle) -> float:
     """Deviation (rad) of fixed tilts from hover without a rotor: ``a_i + a_k -+ 2 delta``.
 
     ``i`` and ``k`` are the neighbors of the rotor ``lost``. Zero where they hover alone, with the
@@ -134,7 +131,7 @@ def fixed_tilt_imbalance(tilts: Quad, lost: int, vehicle: Vehicle) -> float:
     """
     delta = atan(drag_ratio(vehicle))
     beside = tilts[lost % 4] + tilts[(lost + 2) % 4]
-    return beside - 2.0 * SPIN[lost - 1] * delta
+    return float(beside - 2.0 * SPIN[lost - 1] * delta)
 
 
 def minimum_hover_speed(

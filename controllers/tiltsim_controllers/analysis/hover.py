@@ -229,12 +229,9 @@ class MovedOutputs(NamedTuple):
 
 
 def moved_outputs(table: Sequence[float], tilts: Floats, w: Floats) -> MovedOutputs:
-    """The outputs of a level hover with rotor speeds and tilt angles as inputs.
+    """The outputs that rotor speeds and tilts (rad, shape (M,)) move in a hover with inputs w.
 
-    Args:
-        table: of the rotors, as for `level_hover`
-        tilts: tilt angles, rad, shape (M,)
-        w: rotor inputs ``varpi |varpi|``, rad^2/s^2, shape (N,)
+    They are ``varpi |varpi|``, rad^2/s^2, shape (N,); the table is as for `level_hover`.
     """
     rotors = rotors_in(table, 0, tilt_of_rotor(table))
     rows = input_matrix(rotors, tilts, w / np.abs(w).max())

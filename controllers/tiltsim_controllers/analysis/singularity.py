@@ -296,11 +296,7 @@ def acceptable_share(angles: ArrayLike, vehicle: Vehicle, half_width: float = pi
 
 
 def published_determinant(roll: ArrayLike, pitch: ArrayLike) -> Floats:
-    """The surface ``S(theta, phi)`` as published (ch. 2, Eqs. 44-46), dimensionless.
-
-    Args:
-        roll, pitch: Attitudes in rad, of any shapes that broadcast.
-    """
+    """The surface ``S(theta, phi)`` as published (ch. 2, Eqs. 44-46); angles in rad."""
     roll, pitch = np.asarray(roll, dtype=float), np.asarray(pitch, dtype=float)
     surface = np.cos(pitch) ** 2 * np.cos(roll) * (np.cos(roll) - np.sin(roll)) - 1.0
     return np.asarray(surface)

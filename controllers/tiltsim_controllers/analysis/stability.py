@@ -166,16 +166,12 @@ def reaction_gains(
 
 
 def largest_held_gain(step: float, time_constant: float, latency_steps: int) -> float:
-    """The ``mu`` up to which the loop is stable if the law is held over steps.
+    """The ``mu`` up to which the loop is stable if the law is held over steps (s).
 
-    Over a step, ``e`` becomes ``E e - mu (1 - E) e'`` with ``E = exp(-step / T)`` and ``e'`` of
-    ``latency_steps`` before: ``z^k (z - E) = -mu (1 - E)``. The first root to leave the unit circle
-    does so where the left side is real and negative.
-
-    Args:
-        step: Control time step, s.
-        time_constant: ``T``, s.
-        latency_steps: ``k``.
+    With the lag ``T = time_constant`` (s) and ``k = latency_steps``, ``e`` becomes over a step
+    ``E e - mu (1 - E) e'``, with ``E = exp(-step / T)`` and ``e'`` of k steps before:
+    ``z^k (z - E) = -mu (1 - E)``. The first root to leave the unit circle does so where the left
+    side is real and negative.
     """
     decay = exp(-step / time_constant)
     if decay == 1.0:

@@ -44,9 +44,7 @@ class TorqueFreeForces(NamedTuple):
 def torque_free_forces(force: ArrayLike, torque: ArrayLike) -> TorqueFreeForces:
     """Rank of ``tau`` and the space of torque-free forces.
 
-    Args:
-        force, torque: Effectiveness F and tau, each of shape (..., 3, N), in any unit; a rotor
-            that is lost has columns of zeros.
+    Effectiveness F and tau have shape (..., 3, N), any unit, with zeros for a rotor that is lost.
     """
     force, torque = np.asarray(force, float), np.asarray(torque, float)
     _, sizes, rows = np.linalg.svd(torque)
@@ -63,11 +61,8 @@ def torque_free_forces(force: ArrayLike, torque: ArrayLike) -> TorqueFreeForces:
 def singularity_margin(forces: TorqueFreeForces, up: ArrayLike = LEVEL) -> Floats:
     """Smallest rotation (rad) that brings world up to a singular direction: ``asin |P_V r3|``.
 
-    Zero where every attitude is singular; pi/2, the largest value, also where none is.
-
-    Args:
-        forces: of the vehicle at its tilt angles
-        up: world up in body axes, unit vectors of shape (..., 3)
+    Zero where every attitude is singular; pi/2, the largest value, also where none is. World up is
+    in body axes, shape (..., 3).
     """
     along = np.einsum("...ij,...j->...i", forces.projector, np.asarray(up, float))
     return np.asarray(np.arcsin(np.minimum(1.0, np.linalg.norm(along, axis=-1))))
@@ -107,11 +102,8 @@ def margin_over_flight(
 def controlled_axes(forces: TorqueFreeForces, up: ArrayLike, dimension: int) -> Floats:
     """Directions of force that a controller of k components controls, shape (..., k, 3).
 
-    Args:
-        forces: of the vehicle
-        up: world up in body axes, unit vectors of shape (..., 3)
-        dimension: 1, along ``up``; 2, and across it within the torque-free forces, or in the x-z
-            plane where these are all; 3, all
+    With ``dimension`` 1 along world up (body axes, shape (..., 3)); with 2 also across it within
+    the torque-free forces, or in the x-z plane where these are all; with 3 all.
     """
     up = np.asarray(up, float)
     if dimension == 3:
@@ -129,11 +121,8 @@ def decoupling_condition(force: ArrayLike, torque: ArrayLike, axes: ArrayLike) -
     """Smallest over largest singular value of ``[tau; axes F]``, of shape (...).
 
     Forces count in units of the strongest rotor's, torques in units of a rotor's force at the
-    longest lever.
-
-    Args:
-        force, torque: F and tau, shape (..., 3, N); zeros for a rotor that is lost
-        axes: directions of the force that are controlled, body axes, shape (..., k, 3)
+    longest lever. F and tau have shape (..., 3, N), with zeros for a rotor that is lost, the axes
+    of the force that are controlled (..., k, 3), body axes.
     """
     force, torque = np.asarray(force, float), np.asarray(torque, float)
     thrusts = np.linalg.norm(force, axis=-2)

@@ -89,10 +89,6 @@ class PathReport:
         return self.accepted and not self.warnings
 
 
-class PathRefusedError(ValueError):
-    """A path that neither published theorem accepts; the message gives the reasons."""
-
-
 def rectangle(alpha_1: Point, alpha_2: Point, color: str) -> Polyline:
     """The rectangle between two values of ``alpha_1`` and two of ``alpha_2`` (rad; ch. 6, 7)."""
     (left, right), (lower, upper) = alpha_1, alpha_2
@@ -156,12 +152,10 @@ def check_path(path: Path, vehicle: Vehicle) -> PathReport:
     return PathReport(theorem, tuple(reasons), crossings, tuple(warnings))
 
 
-def plan(
+def four_angle_gait(
     path: Path, period: float, vehicle: Vehicle, *, name: str = "two_color", source: str = ""
 ) -> Gait:
-    """The four-angle gait of a path that a published theorem accepts.
-
-    The path is followed at constant speed in the alpha_1-alpha_2 plane.
+    """The four-angle gait that follows a path, which is not checked, at constant speed.
 
     Args:
         path: in the alpha_1-alpha_2 plane
@@ -170,28 +164,17 @@ def plan(
         name, source: name and origin of the gait
 
     Raises:
-        PathRefusedError: If neither theorem accepts the path.
-        ValueError: See `check_path`; or if the period is not positive.
+        ValueError: If a color is unknown, the path has no length, or the period is not positive.
     """
-    report = check_path(path, vehicle)
-    if not report.accepted:
-        raise PathRefusedError("; ".join(report.reasons))
-    return four_angle_gait(path, period, vehicle, name=name, source=source)
-
-
-def four_angle_gait(
-    path: Path, period: float, vehicle: Vehicle, *, name: str = "two_color", source: str = ""
-) -> Gait:
-    """The four-angle gait of a path, without checking it.
-
-    Args:
-        path, period, vehicle, name, source: as for `plan`
-    """
-    if isinstance(path, Circle):
-        return plans.two_color_circle(
-            path.centre, path.radius, path.color, period, vehicle, name=name, source=source
-        )
     ratio = drag_ratio(vehicle)
+    if isinstance(path, Circle):
+        (first, second), radius = path.centre, path.radius
+        third, fourth = colored_angles(first, second, path.color, ratio)
+        along = radius if path.color == "red" else -radius
+        return plans.harmonic(
+            (first, radius, 0.0, second, 0.0, radius, third, along, 0.0, fourth, 0.0, along),
+            *(period, name, source),
+        )
     lengths = [
         xp.hypot(end[0] - start[0], end[1] - start[1])
         for leg in path.legs

@@ -38,6 +38,8 @@ DAMPING: Final = 0.85
 """Damping ratio of the position across."""
 SIDEWAYS_POSITION: Final = 0.5
 """... and where the push of torques limits attitude."""
+ALWAYS_LEANS: Final = 1e-9
+"""m: no way is short enough for side force alone to be faster."""
 AGILE_POSITION: Final = 0.9
 """The largest one over the root of the angular acceleration."""
 RISE: Final = 0.6, 1.4
@@ -172,8 +174,8 @@ def _correction(pole: float, damping: float) -> tuple[float, float]:
     return trust, float(abs(root)) ** 2 - 1.0 + trust
 
 
-def _across(craft: Craft) -> float:
-    """Acceleration of the feedback across, m/s^2."""
+def _feedback_push(craft: Craft) -> float:
+    """Largest acceleration of the feedback across, m/s^2."""
     greatest = float(craft.limits[1].sum()) / craft.mass / craft.gravity
     return min(20.0, ACROSS * craft.gravity * max(0.0, greatest**2 - 1.0) ** 0.5)
 
@@ -189,7 +191,7 @@ def ability(keys: Vectoring, craft: Craft, left: float, *, harmed: bool = False)
     """
     preferred = preferred_tilts(craft)
     rows = craft.wrench(preferred)
-    slope, (angular, yaw_angular) = side_slope(craft, rows), authority(craft, rows, preferred)
+    slope, (angular, yaw_angular) = side_slope(craft), authority(craft, rows, preferred)
     fastest, share = min(FASTEST[0], DELAY_MARGIN / left, (angular / ERROR) ** 0.5), POSITION_SHARE
     if harmed and slope == 0.0:
         sideways = SIDEWAYS_SHARE * sideways_limit(craft, rows)
@@ -198,10 +200,10 @@ def ability(keys: Vectoring, craft: Craft, left: float, *, harmed: bool = False)
     attitude, given = keys.attitude_bandwidth or fastest, keys.position_bandwidth
     cone, sizes = pose_cone(craft, rows, slope), np.square(rows[3:]).sum(axis=1)
     yaw_size = float(2.0 * sizes[2] / sizes[:2].sum())
-    most = direct = _across(craft)
+    most = direct = _feedback_push(craft)
     lean = atan(0.6 * most / craft.gravity)
     lean_time = LEAN[0] / attitude + LEAN[1] * (lean / angular) ** 0.5
-    across, near = min(FASTEST[2], share * attitude, AGILE_POSITION * angular**0.5), 1e-9
+    across, near = min(FASTEST[2], share * attitude, AGILE_POSITION * angular**0.5), ALWAYS_LEANS
     if cone == pi and (side := slope * craft.gravity) < most:
         # A lean pays once it shortens a way from rest to rest by more than the time that it takes.
         across, direct = RISE[0] * attitude, side
@@ -266,7 +268,7 @@ def design(
         **able._asdict(),
         damping=DAMPING,
         rise_damping=RISE[1],
-        acceleration=_across(craft),
+        acceleration=_feedback_push(craft),
         ascent=VERTICAL[0],
         descent=VERTICAL[1],
         greatest=TOTAL_SHARE * greatest,

@@ -89,22 +89,19 @@ def preferred_tilts(craft: Craft) -> Floats:
     return max((craft.tilts, np.zeros(len(craft.tilts))), key=margin)
 
 
-def side_slope(craft: Craft, rows: Floats) -> float:
-    """Side force per lift that level hover has in every direction within the limits.
-
-    Args:
-        craft: The vehicle.
-        rows: Force and torque per newton, shape (6, N).
-    """
+def side_slope(craft: Craft) -> float:
+    """Side force per lift that level hover has in every direction within the limits."""
     if craft.moving:
         return 0.0
     weight = craft.mass * craft.gravity
     angles = 2.0 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
     sides = [np.array([np.cos(angle), np.sin(angle), 0.0]) for angle in angles]
     low, most = craft.limits[0], np.minimum(SIDE_SHARE * craft.limits[1], 2.4 * craft.hover)
+    preferred = preferred_tilts(craft)
+    rows = craft.wrench(preferred)
     if craft.commanded:
         # A rotor that tilts within a range pushes like two rotors at its ends.
-        preferred, most_tilt = preferred_tilts(craft), TILT_SHARE * craft.tilt_range
+        most_tilt = TILT_SHARE * craft.tilt_range
         rows = np.hstack([craft.wrench(preferred + tilt) for tilt in (-most_tilt, most_tilt)])
         low, most = np.zeros(rows.shape[1]), np.tile(most, 2)
     return SLOPE_SHARE * least_force(craft, rows, sides, weight, (low, most)) / weight

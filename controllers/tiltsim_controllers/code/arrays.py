@@ -108,23 +108,12 @@ def flatten(value: Any) -> tuple[list[Any], Callable[[Iterable[Any]], Any]]:
 
 
 def take(values: Sequence[Number], index: Number) -> Number:
-    """The entry of a vector at an index, which is rounded down and limited to the vector.
-
-    Args:
-        values: Numbers, shape (N,).
-        index: From 0 on; NaN for a result of NaN.
-    """
+    """The entry of a vector at an index, rounded down and limited to it; NaN for NaN."""
     return take_row(values, index, 1)[0]
 
 
 def take_row(values: Sequence[Number], index: Number, width: int) -> Any:
-    """A row of a table at an index as in `take`, shape (width,).
-
-    Args:
-        values: The rows, one after the other.
-        index: From 0 on; NaN for a result of NaN.
-        width: Length of a row.
-    """
+    """A row of a table, whose rows of a width follow each other, at an index as in `take`."""
     last = float(len(values) // width - 1)
     place = make("where", make("gt", index, 0.0), index, 0.0)  # NaN becomes 0
     place = make("floor", make("where", make("lt", place, last), place, last))
@@ -137,16 +126,7 @@ def take_row(values: Sequence[Number], index: Number, width: int) -> Any:
 
 
 def take_span(values: Sequence[Number], start: Any, size: int) -> Any:
-    """Entries of a vector from an index on, which is limited to where they exist.
-
-    Args:
-        values: Numbers, shape (N,).
-        start: From 0 on, shape (...).
-        size: Number of entries.
-
-    Returns:
-        The entries, shape (size, ...).
-    """
+    """Entries of a vector from indices (...) on, which are limited to it: shape (size, ...)."""
     last = len(values) - size
     if isinstance(start, Expr):
         place = xp.floor(xp.clip(start, 0.0, float(last)))
@@ -167,10 +147,9 @@ def _entry(values: Sequence[Number], first: Expr, column: int) -> Number:
 
 
 def uniform(*integers: Number) -> Number:
-    """A uniform draw from (0, 1); see `tiltsim_controllers.code.operations.uniform`.
+    """A uniform draw from (0, 1) of a seed, a channel and an index.
 
-    Args:
-        integers: Seed, channel and index.
+    See `tiltsim_controllers.code.operations.uniform`.
     """
     return make("uniform", *integers)
 
@@ -178,9 +157,7 @@ def uniform(*integers: Number) -> Number:
 def normal(seed: Number, channel: Number, index: Number) -> Number:
     """A draw from the standard normal distribution (Box and Muller, 1958), below 6.7 in magnitude.
 
-    Args:
-        seed, channel, index: Integers, of which the lowest 32 bits are used. It uses the channels
-            ``2 channel`` and ``2 channel + 1`` of `uniform`.
+    From the channels ``2 channel`` and ``2 channel + 1`` of `uniform`; see there.
     """
     radius = xp.sqrt(-2.0 * xp.log(uniform(seed, 2.0 * channel, index)))
     return radius * xp.cos(2.0 * xp.pi * uniform(seed, 2.0 * channel + 1.0, index))
@@ -189,9 +166,7 @@ def normal(seed: Number, channel: Number, index: Number) -> Number:
 def branch(condition: Number, then: Callable[[], Any], otherwise: Callable[[], Any]) -> Any:
     """``then()`` where a condition holds, else ``otherwise()``; only that one is evaluated.
 
-    Args:
-        condition: True or false.
-        then, otherwise: Return numbers, arrays or tuples of them, both of the same shape.
+    Both return numbers, arrays or tuples of them, of equal shapes.
     """
     condition = as_condition(condition)
     if not isinstance(condition, Expr):
@@ -306,10 +281,8 @@ USER: Final = "user"
 def program_of(function: Callable[..., Any], **sizes: int) -> Program:
     """Trace a function of arrays, whose operations know no line of code.
 
-    Args:
-        function: Takes an array for each input, but the input itself for `USER`; returns numbers,
-            arrays and tuples of them.
-        sizes: Sizes of the inputs, by name.
+    It takes an array for each input of a size, but the input itself for `USER`, and returns
+    numbers, arrays and tuples of them.
     """
 
     def traced(*vectors: InputVector) -> list[Any]:

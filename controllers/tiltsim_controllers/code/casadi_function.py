@@ -26,14 +26,9 @@ _OPERATORS: Final = {
 
 
 def casadi_function(program: Program, name: str, result: str) -> Any:
-    """A `casadi.Function` of a column for every input, whose result is one column.
+    """A `casadi.Function` of a column for every input, whose ``result``, by name, is one column.
 
     Branches are evaluated lazily, loops are unrolled.
-
-    Args:
-        program: The program.
-        name: Name of the function.
-        result: Name of its result.
 
     Raises:
         TraceError: If the program needs random numbers, or the count of a loop is not known.

@@ -277,10 +277,8 @@ def argument_count(name: str) -> int:
 def lane_program(name: str, exact: bool = True) -> Program:
     """A program of `PROGRAMS`: its values, then for each whether it is the C library's.
 
-    Args:
-        name: Its name.
-        exact: Whether to find out; else values are within 2e-15 of the C library's, and the flag
-            is whether the arguments are within the range of the program.
+    If not ``exact``, values are within 2e-15 of the C library's, and the flag is whether the
+    arguments are within the range of the program.
     """
     function = _exact if exact else _quick
     return trace_vectors(lambda x: function(name, x), {"x": argument_count(name)})
@@ -355,13 +353,7 @@ exit:
 
 
 def functions_text(names: Sequence[str], lanes: Lanes, written: Callable[..., Any]) -> str:
-    """Text of `lane_text` and the programs, for some names of `PROGRAMS`.
-
-    Args:
-        names: Names of programs.
-        lanes: Number of lanes of a vector.
-        written: ``(name, program) -> text``.
-    """
+    """Text of `lane_text` and the programs of some names, each ``written(name, program)``."""
     exact = lanes.functions == "exact"
     parts = [
         lane_text(name, lanes) + written(f"{name}.program", lane_program(name, exact))

@@ -78,12 +78,9 @@ ALIGNED: Final = "align 8"
 def llvm_functions(
     programs: Mapping[str, Program], lanes: int = 1, functions: LaneMath = "library"
 ) -> str:
-    """The text of ``void name(double *argument, ..., double *results)`` for every program.
+    """The text of ``void name(double *argument, ..., double *results)`` for every program by name.
 
-    Args:
-        programs: By name.
-        lanes: Vehicles side by side; entry i of vehicle k lies at i * lanes + k.
-        functions: See `Lanes`.
+    Entry i of vehicle k, of those side by side in ``lanes``, lies at i * lanes + k; see `Lanes`.
     """
     side_by_side = Lanes(lanes, functions)
     declared: dict[str, str] = {}

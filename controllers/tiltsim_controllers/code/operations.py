@@ -18,12 +18,7 @@ WORD: Final = 0xFFFFFFFF
 
 
 def hash_word(word: Any, whole: Callable[[int], Any] = int) -> Any:
-    """Permute the 32-bit words so that the bits of neighbors are uncorrelated.
-
-    Args:
-        word: From 0 to 2^32 - 1.
-        whole: Its type, of at least 32 bits; overflow is ignored.
-    """
+    """Permute 32-bit words of a type, which may overflow, so that neighbors are uncorrelated."""
     word = word ^ (word >> 16)
     word = (word * whole(0x7FEB352D)) & whole(WORD)
     word = word ^ (word >> 15)

@@ -80,13 +80,7 @@ class InputVector(Sequence[Number]):
 def trace_vectors(
     function: Callable[..., Any], sizes: dict[str, int], graph: Graph | None = None
 ) -> Program:
-    """Trace a function of vectors.
-
-    Args:
-        function: Takes an `InputVector` per argument and returns a sequence of numbers.
-        sizes: Size of every argument, by name.
-        graph: An empty graph.
-    """
+    """Trace a function that takes an `InputVector` per size by name, and returns numbers."""
     graph = graph or Graph()
     with tracing_into(graph):
         vectors = [InputVector(graph, k, 0, size) for k, size in enumerate(sizes.values())]

@@ -190,11 +190,8 @@ def python_function(
     """The program on Python's floats, with the results of machine code.
 
     Where Python raises, as for a division by zero, the program runs again by IEEE's rules.
-
-    Args:
-        program: The program.
-        name: Name of the function, for debuggers.
-        fixed: Inputs that do not change, with their numbers; the function has the other inputs.
+    ``fixed`` has the numbers of inputs that do not change; the function has the other inputs.
+    Debuggers show its name.
     """
     try:
         fast = _compiled(program, name, fixed, careful=False)

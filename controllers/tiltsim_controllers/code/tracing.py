@@ -122,12 +122,7 @@ def as_array(value: Any) -> Any:
 
 
 def apply(op: str, *args: Any) -> Any:
-    """An operation on numbers, or on arrays entry by entry.
-
-    Args:
-        op: Name of an entry of `OPERATIONS` or `COMPOSED`.
-        args: Numbers and arrays of shapes that broadcast.
-    """
+    """An operation of `OPERATIONS` or `COMPOSED` on numbers, or on arrays that broadcast."""
     for value in args:
         if type(value) not in (float, Expr) and isinstance(value, (np.ndarray, list, tuple)):
             break
@@ -244,11 +239,9 @@ def graph_in_use() -> Graph:
 
 
 def make(op: str, *args: Any) -> Number:
-    """An operation on numbers: folded if all are known or one is neutral, else part of the graph.
+    """An operation of `OPERATIONS` on numbers, which is part of the graph if it cannot be folded.
 
-    Args:
-        op: Name of an entry of `OPERATIONS`.
-        args: Floats, bools and symbolic numbers.
+    It is folded if all numbers are known or one is neutral.
     """
     if Expr not in map(type, args):
         return OPERATIONS[op].value(*map(_number, args))

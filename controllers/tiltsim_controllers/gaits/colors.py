@@ -60,16 +60,11 @@ def require_color(color: str) -> None:
 
 @traceable
 def nearest_red_angles(tilts: Any, drag_ratio: Any, clearance: Any) -> Any:
-    """``alpha_1`` and ``alpha_2`` of the red gait nearest to moving tilts.
+    """``alpha_1`` and ``alpha_2`` of the red gait nearest to moving tilts, shape (4, 3) to (2, 3).
 
-    Args:
-        tilts: Angles with rates and accelerations (rad, s), shape (4, 3).
-        drag_ratio: ``r = K_m / (L K_f)``.
-        clearance: Distance (rad, below ``delta``) from the sides of the quadrant ``u < 0 < v``,
-            where rotors stop, and from a right angle beyond them, where ``R`` vanishes.
-
-    Returns:
-        Angles, rates and accelerations, at rest on a side, shape (2, 3).
+    Angles, rates and accelerations (rad, s), at rest on a side. The clearance (rad, below
+    ``delta``) is from the sides of the quadrant ``u < 0 < v``, where rotors stop, and from a right
+    angle beyond them, where ``R`` vanishes; the drag ratio is ``r = K_m / (L K_f)``.
     """
     delta = xp.arctan(drag_ratio)
     near, far = clearance - delta, 0.5 * xp.pi - delta - clearance

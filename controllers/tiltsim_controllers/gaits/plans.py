@@ -19,7 +19,6 @@ from numpy.typing import ArrayLike
 
 from tiltsim_controllers.code.arrays import as_number, is_known, xp
 from tiltsim_controllers.gaits.cat import FOOTFALLS, cat_keyframes
-from tiltsim_controllers.gaits.colors import colored_angles
 from tiltsim_controllers.gaits.motion import (
     CUBIC,
     FIXED,
@@ -33,7 +32,6 @@ from tiltsim_controllers.gaits.motion import (
 )
 from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.mathematics.splines import spline_knots
-from tiltsim_controllers.vehicle.parameters import Vehicle, drag_ratio
 
 _JUMP: Final = 1e-9
 """Change of an angle (rad) between two pieces that is more than rounding."""
@@ -322,10 +320,8 @@ def keyframes(
 def table(times: Sequence[float], angles: Sequence[Sequence[float]], *, repeats: bool) -> Gait:
     """A gait through the rows of a table along a cubic spline, whose acceleration is continuous.
 
-    Args:
-        times: s, from 0 and increasing, at least 2
-        angles: the tilt angles at each, rad
-        repeats: whether the gait starts over after the last row, smoothly, or holds it
+    Times (s) increase from 0; angles (rad) have a row each, at least 2. A gait that repeats starts
+    over after the last row, smoothly; else it holds it.
 
     Raises:
         ValueError: If a gait that repeats does not end where it begins.
@@ -342,36 +338,16 @@ def table(times: Sequence[float], angles: Sequence[Sequence[float]], *, repeats:
     return Gait("table", parameters, knots, tilts=len(angles[0]))
 
 
-def two_color_circle(
-    centre: tuple[float, float],
-    radius: float,
-    color: str,
-    period: float,
-    vehicle: Vehicle,
-    *,
-    name: str = "two_color",
-    source: str = "",
-) -> Gait:
-    """A circle in the alpha_1-alpha_2 plane on one color (ch. 8, Sec. 4).
+def harmonic(knots: Sequence[float], period: float, name: str, source: str = "") -> Gait:
+    """A harmonic motion about the means of the tilts.
 
     Args:
-        centre, radius: ``(alpha_1, alpha_2)`` of the center and the radius, rad
-        color: ``red`` or ``blue``
+        knots: mean, cosine and sine (rad) of each tilt, one after the other
         period: s
-        vehicle: its drag ratio sets the offset of the blue lines
         name, source: name and origin of the gait
-
-    Raises:
-        ValueError: If the color is unknown or the period not positive.
     """
-    # Mean, cosine and sine; the lines of a color have an offset, which only the mean takes.
-    ratio = drag_ratio(vehicle)
-    third, fourth = colored_angles(centre[0], centre[1], color, ratio)
-    slope = 1.0 if color == "red" else -1.0
-    front = (centre[0], radius, 0.0, centre[1], 0.0, radius)
-    back = (third, slope * radius, 0.0, fourth, 0.0, slope * radius)
     parameters = GaitParameters(HARMONIC, period=_positive(period))
-    return Gait(name, parameters, (*front, *back), source)
+    return Gait(name, parameters, tuple(knots), source, len(knots) // 3)
 
 
 def _positive(period: Any) -> Any:

@@ -50,12 +50,7 @@ class Compensating(Keys):
 
 @cache
 def record_of_limits(own: type[tuple[Any, ...]], rotors: int) -> Any:
-    """The type of the parameters of `compensated`.
-
-    Args:
-        own: Type of the law's parameters.
-        rotors: Their number.
-    """
+    """The type of the parameters of `compensated`, of the law's own type and a number of rotors."""
     each = vector_of(rotors)
     return make_record_type("Compensated", own=own, observer=float, low=each, high=each)
 
@@ -137,13 +132,7 @@ def mixed(observed: Observed, thrusts: Any, low: Any, high: Any) -> Any:
 
 
 def observer_rates(observed: Observed, first: int, bandwidth: Any) -> Any:
-    """Rates of `STATES`, shape (12,).
-
-    Args:
-        observed: By the law.
-        first: Index of their first.
-        bandwidth: 1/s.
-    """
+    """Rates of `STATES`, shape (12,), which begin at an index, given the bandwidth (1/s)."""
     velocity, force, omega, torque = observed.states[first:].reshape(4, 3)
     body, J, seen = observed.vehicle, observed.inertia, observed.body_rates
     push = observed.rotation @ (observed.force @ observed.thrusts) / body.mass

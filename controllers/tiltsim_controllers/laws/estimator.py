@@ -199,10 +199,7 @@ def propagated(packed: Any, through: Transition, noise: ImuNoise) -> Any:
 def corrected(now: Estimate, reading: Reading, gate: Any) -> tuple[Estimate, Outcome]:
     """The state after a measurement, component after component.
 
-    Args:
-        now: The state before it.
-        reading: The measurement.
-        gate: Largest normalized square of the innovation; beyond, the state stays.
+    Beyond the ``gate``, the largest normalized square of the innovation, the state stays.
     """
     packed, count = now.covariance, len(reading.innovation)
     full, H = packed[_PLACE], reading.jacobian

@@ -31,12 +31,8 @@ def error_dynamics(reference: Any, present: Sequence[Any], gains: Sequence[Any])
     """The n-th derivative of outputs with which their errors decay: ``r_n + k_1 e_(n-1) + ...``.
 
     It is ``r_n + k_1 (r_(n-1) - y_(n-1)) + ... + k_n (r_0 - y_0)`` (ch. 2, Eqs. A2-A5; ch. 4, Eqs.
-    26-27), ``r_i`` and ``y_i`` the i-th derivatives of reference and output.
-
-    Args:
-        reference: The reference and its n derivatives.
-        present: The outputs and n - 1 derivatives.
-        gains: ``k_1`` to ``k_n``, 1/s to 1/s^n.
+    26-27), with the reference ``r_0`` to ``r_n``, the present outputs ``y_0`` to ``y_(n-1)``, and
+    gains ``k_1`` to ``k_n``, 1/s to 1/s^n.
     """
     *lower, total = reference
     for gain, desired, actual in zip(gains, reversed(lower), reversed(present), strict=True):

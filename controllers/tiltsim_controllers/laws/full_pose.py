@@ -215,12 +215,9 @@ def full_pose(seen: Seen, p: Any, knots: Any, tilt_of_rotor: TiltOfRotor) -> Ste
 
 
 def pose_rank(table: Sequence[float], tilts: ArrayLike, w: ArrayLike) -> int:
-    """How many of the six outputs the inputs move independently.
+    """How many of the six outputs the inputs move independently, at tilts (rad, shape (M,)).
 
-    Args:
-        table: Table of the rotors, see `tiltsim_controllers.vehicle.rotors`.
-        tilts: rad, shape (M,).
-        w: ``varpi |varpi|`` of each rotor, of any unit, 0 for one that is not used, shape (N,).
+    The ``w`` are ``varpi |varpi|``, of any unit, 0 for a rotor that is not used, shape (N,).
     """
     squares = np.asarray(w, float)
     rotors = rotors_in(table, 0, tilt_of_rotor(table)).masked(squares != 0.0)

@@ -117,15 +117,10 @@ _NOT_READ: Final = frozenset({"law"})
 
 @cache
 def record_of(table: type[BaseModel], without: frozenset[str] = _NOT_READ, **further: type) -> Any:
-    """The type of the record of a law's parameters.
+    """The type of the record of a law's parameters: of ``further`` ones, then of the keys it reads.
 
     A tuple is a vector and a table a record; a choice is its index among the choices, False and
     True are 0 and 1, and no value is infinite.
-
-    Args:
-        table: The keys.
-        without: Keys that the law does not read.
-        further: Parameters other than keys, which come first.
     """
     kinds = {
         name: _number_type(key.annotation)

@@ -8,7 +8,7 @@ whose rates, held over a control period, carry them to their next values.
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Any, Final, Literal
 
 from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.laws.allocation import bounded_least_squares
@@ -38,6 +38,10 @@ from tiltsim_controllers.mathematics.moving import Moving, value_of, where
 from tiltsim_controllers.vehicle.rotors import by_tilt, moving_wrench_map, wrench_map, wrench_slope
 
 UP = (0.0, 0.0, 1.0)
+LIFT_SOFTNESS: Final = 1e-11
+"""Softness of the demanded lift where only rotors meet it; see `bounded_least_squares`."""
+TILTING_SOFTNESS: Final = (1e-4, 1e-4, 1e-8, 1e-10, 1e-10, 1e-8)
+"""Softness of force and torque that rotors and tilts meet together: roll and pitch come first."""
 
 
 class Vectoring(Keys):
@@ -187,7 +191,7 @@ def _allocated(known: Known, ahead: Ahead, goal: Any, usable: Any) -> tuple[Any,
     made = rows @ thrusts if free else unit * known.wrench(ahead.speeds, ahead.tilts)
     target = made + p.share * (unit * goal - made)
     lean = p.lean_softness
-    softness = xp.array([side, side, 1e-11, lean, lean, p.yaw_softness])
+    softness = xp.array([side, side, LIFT_SOFTNESS, lean, lean, p.yaw_softness])
     none = 1e9 * (1.0 - p.bounded)
     found = bounded_least_squares(
         rows, target, softness, xp.ones(count), start, low - none, high + none
@@ -218,7 +222,7 @@ def _with_tilts(
     found = bounded_least_squares(
         xp.hstack([pushing, leaning]),
         target,
-        xp.array([1e-4, 1e-4, 1e-8, 1e-10, 1e-10, 1e-8]),
+        xp.array(TILTING_SOFTNESS),
         xp.ones(count + len(command)),
         xp.hstack([(1.0 - p.pull) * thrusts, p.pull * usable * way]),
         xp.hstack([low, lower]),

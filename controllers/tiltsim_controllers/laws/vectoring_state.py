@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from tiltsim_controllers.code.arrays import repeat, take_row, xp
 from tiltsim_controllers.laws.observed import Failure, Observed, working
@@ -17,6 +17,10 @@ from tiltsim_controllers.vehicle.rotors import wrench_map
 
 MOTION = 20
 """States of the modeled motion and its disturbance."""
+SPARE_LIFT: Final = 0.3, 0.4
+"""Greatest lift over weight, less one, at which yaw yields to lift, and from which it does not."""
+YIELDING: Final = 1e-9
+"""Softness of a demand of yaw that yields: more than the softness of lift."""
 
 
 class Ability(NamedTuple):
@@ -214,6 +218,10 @@ def known_of(observed: Observed, p: Parameters) -> Known:
         torque_gain=learns * xp.array(p.torque_gain),
     )
     mass = body.mass / (1.0 + memory.excess)
+    # Yaw takes lift, as it slows rotors down: where little lift is spare, yaw yields to it.
+    spare = p.greatest * body.mass / (mass * body.gravity) - 1.0
+    needs = xp.clip((SPARE_LIFT[1] - spare) / (SPARE_LIFT[1] - SPARE_LIFT[0]), 0.0, 1.0)
+    p = p._replace(yaw_softness=p.yaw_softness + YIELDING * needs)
     thrust, slowest, fastest = table[: 3 * rotors].reshape(3, rotors)
     return Known(
         observed._replace(rotors=observed.rotors.masked(works)),

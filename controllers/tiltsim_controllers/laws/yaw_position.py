@@ -86,14 +86,10 @@ def gyroscopic_acceleration(omega: Any, vehicle: Vehicle) -> Any:
 
 
 def drift(state: Any, vehicle: Vehicle) -> Any:
-    """``Ma`` of ch. 2, Eq. (20): the derivatives of the outputs at zero input.
+    """``Ma`` of ch. 2, Eq. (20): the derivatives of the outputs at zero input, shape (4,).
 
-    Args:
-        state: `tiltsim_controllers.vehicle.body.EXTENDED_QUADROTOR_FIELDS`, shape (14,).
-        vehicle: That flies.
-
-    Returns:
-        The fourth derivative of the position (m/s^4) and the second of yaw (rad/s^2), shape (4,).
+    They are the fourth of the position (m/s^4) and the second of yaw (rad/s^2); the state is
+    `tiltsim_controllers.vehicle.body.EXTENDED_QUADROTOR_FIELDS`, shape (14,).
     """
     attitude, omega, thrust, thrust_rate = state[6:9], state[9:12], state[12], state[13]
     free, e3 = gyroscopic_acceleration(omega, vehicle), xp.array([0.0, 0.0, 1.0])
@@ -108,14 +104,11 @@ def drift(state: Any, vehicle: Vehicle) -> Any:
 
 
 def decoupling_matrix(state: Any, vehicle: Vehicle) -> Any:
-    """``Delta`` of ch. 2, Eqs. (20) and (42), for forces at the arms, shape (4, 4).
+    """``Delta`` of ch. 2, Eqs. (20) and (42), for forces at the arms, shape (4, 4); see `drift`.
 
     Yaw torque does not turn the thrust, so the upper three entries of the last column are zero.
     They are printed as non-zero due to errors in Eqs. (31) and (36): ``s_theta s_phi`` should read
     ``s_theta c_phi``.
-
-    Args:
-        state, vehicle: See `drift`.
     """
     roll, pitch, thrust = state[6], state[7], state[12]
     x, y, z = rotation_matrix(state[6:9]).T  # the body's axes

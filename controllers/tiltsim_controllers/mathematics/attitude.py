@@ -13,11 +13,7 @@ forward, right, down."""
 
 
 def rotation_matrix(attitude: Any) -> Any:
-    """The body-to-world rotation, shape (3, 3); its last row is world up in body axes.
-
-    Args:
-        attitude: Roll, pitch and yaw, rad, shape (3,).
-    """
+    """The body-to-world rotation (3, 3) of roll, pitch and yaw (rad); its last row is world up."""
     (sr, sp, sy), (cr, cp, cy) = xp.sin(attitude), xp.cos(attitude)
     return xp.array(
         [
@@ -56,10 +52,7 @@ def euler_angles(quaternion: Any) -> Any:
 def attitude_error(rotation: Any, desired: Any) -> Any:
     """``(R^T R_d - R_d^T R)^vee / 2``, body axes: the sine of the remaining angle, along its axis.
 
-    It also vanishes half a revolution away.
-
-    Args:
-        rotation, desired: Body to world, shape (3, 3) each.
+    It also vanishes half a revolution away. Both rotations are body to world, shape (3, 3).
     """
     turn = rotation.T @ desired
     return 0.5 * xp.array(

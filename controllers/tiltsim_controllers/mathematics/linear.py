@@ -29,14 +29,7 @@ def rejection(vector: Any, unit: Any) -> Any:
 
 
 def unit_remainder(row: Any, units: Any) -> Any:
-    """The part of a row that is orthogonal to unit rows, scaled to length 1.
-
-    NaN where rounding is all that is left.
-
-    Args:
-        row: Shape (N,).
-        units: Orthonormal rows, each of shape (N,).
-    """
+    """The part of a row orthogonal to unit rows, scaled to length 1; NaN for rounding."""
     rest = row
     for unit in units:
         rest = rejection(rest, unit)
@@ -90,13 +83,9 @@ def _across(matrix: Any, columns: tuple[int, ...], known: _Minors) -> Any:
 
 
 def solved(matrix: Any, desired: Any) -> Any:
-    """The ``x`` with ``matrix x = desired``; NaN where the matrix is singular.
+    """The ``x`` with ``matrix x = desired``, shapes (M, M) and (M,); NaN where it is singular.
 
     A trace has Cramer's rule.
-
-    Args:
-        matrix: Small, shape (M, M).
-        desired: Shape (M,).
     """
     if _is_plain(matrix, desired):
         try:
@@ -110,16 +99,10 @@ def solved(matrix: Any, desired: Any) -> Any:
 
 
 def orthonormal_rows(matrix: Any) -> list[Any]:
-    """Orthonormal rows with the span of the rows of a matrix (modified Gram-Schmidt).
+    """Orthonormal rows (N,) with the span of the M <= N rows of a matrix (modified Gram-Schmidt).
 
-    Normal equations would square the condition number.
-
-    Args:
-        matrix: Shape (M, N), M <= N.
-
-    Returns:
-        M unit rows of shape (N,), the first k of which span the first k rows of the matrix; NaN
-        from the first dependent row on.
+    Normal equations would square the condition number. The first k span the first k rows of the
+    matrix; NaN from the first dependent row on.
     """
     units: list[Any] = []
     for row in matrix:
@@ -146,13 +129,9 @@ def nearest_solution(matrix: Any, desired: Any, start: Any, units: Any = None) -
 
 
 def least_norm(matrix: Any, desired: Any) -> Any:
-    """The shortest ``x`` with ``matrix x = desired``; a second pass removes rounding errors.
+    """The shortest ``x`` with ``matrix x = desired``, shapes (M, N), M <= N, and (M,).
 
-    NaN where the rows depend on each other.
-
-    Args:
-        matrix: Shape (M, N), M <= N.
-        desired: Shape (M,).
+    A second pass removes rounding errors. NaN where the rows depend on each other.
     """
     units = orthonormal_rows(matrix)
     first = nearest_solution(matrix, desired, xp.zeros(matrix.shape[1]), units)
@@ -160,11 +139,9 @@ def least_norm(matrix: Any, desired: Any) -> Any:
 
 
 def solved_symmetric(matrix: Any, desired: Any) -> Any:
-    """The ``x`` with ``matrix x = desired`` of a positive definite matrix, by ``L D L^T``.
+    """The ``x`` with ``matrix x = desired`` of a positive definite matrix (M, M), by ``L D L^T``.
 
-    Args:
-        matrix: Symmetric, of which the lower triangle is read, shape (M, M).
-        desired: Shape (M,).
+    Its lower triangle is read.
     """
     size = len(desired)
     lower: list[list[Any]] = [[None] * size for _ in range(size)]

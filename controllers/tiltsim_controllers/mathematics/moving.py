@@ -71,12 +71,7 @@ class Moving:
 
 
 def product(multiply: Callable[[Any, Any], Any], x: Any, y: Any) -> Any:
-    """Any product of two quantities, one of which moves.
-
-    Args:
-        multiply: Linear in both arguments.
-        x, y: The factors.
-    """
+    """Any product of two quantities, one of which moves; ``multiply`` is linear in both."""
     if not isinstance(x, Moving):
         return Moving(*(multiply(x, part) for part in (y.value, y.rate, y.acceleration)))
     if not isinstance(y, Moving):

@@ -22,14 +22,10 @@ def clipped(value: float, low: float, high: float) -> float:
 
 
 def chi_square_quantile(probability: float, degrees: float) -> float:
-    """The number below which a chi-square variable stays with a probability.
+    """The number below which a chi-square variable of some degrees of freedom is, by probability.
 
     By the cube root, which is nearly normal (Wilson and Hilferty, 1931): within 2 % from 9 degrees
     of freedom on, and within 5 % in the upper tail for fewer; exact for one.
-
-    Args:
-        probability: Between 0 and 1.
-        degrees: Degrees of freedom.
     """
     from statistics import NormalDist
 

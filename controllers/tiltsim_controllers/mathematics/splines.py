@@ -38,12 +38,9 @@ def piece_at(position: Any, rows: int, begin: int, size: int, knots: Any) -> Any
 
 
 def polynomial_derivatives(since: Any, coefficients: Any, order: int) -> Any:
-    """Polynomials and their derivatives, shape (order + 1, ...).
+    """Polynomials at an argument (s) and their derivatives up to an order of 4, (order + 1, ...).
 
-    Args:
-        since: Argument, s.
-        coefficients: Highest power first, shape (powers, ...).
-        order: Number of derivatives, at most 4.
+    Coefficients are the highest power first, shape (powers, ...).
     """
     terms = [0.0 * coefficients[0]] * (order + 1)  # derivatives divided by 1, 1, 2, 6, 24
     for coefficient in coefficients:

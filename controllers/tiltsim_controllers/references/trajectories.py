@@ -45,9 +45,7 @@ def minimum_snap_knots(
 ) -> tuple[float, ...]:
     """The knots of `waypoint_motion`: one segment between two points, and a last one at rest.
 
-    Args:
-        points: waypoints, m, of three coordinates each
-        times: when they are reached, s: 0 and increasing
+    Points have three coordinates (m), times (s) start at 0 and increase.
 
     Raises:
         ValueError: If there are fewer than two points, the number of times differs, the times do
@@ -71,12 +69,10 @@ def table_knots(
 ) -> Values:
     """The knots of `waypoint_motion` through the rows of a table, with free ends.
 
-    Args:
-        times: s, increasing
-        points: m or rad, of any number of coordinates each
-        interpolation: ``minimum_snap``: of all motions through the points, the one that minimizes
-            the integral of squared snap; up to four points are joined by one polynomial, without
-            snap. ``cubic``: a spline of degree three, whose acceleration is continuous.
+    Times (s) increase; points (m or rad) have any number of coordinates. By ``minimum_snap``, of
+    all motions through the points the one that minimizes the integral of squared snap; up to four
+    points are joined by one polynomial, without snap. By ``cubic``, a spline of degree three, whose
+    acceleration is continuous.
     """
     if interpolation == "cubic" or len(points) <= 4:
         return spline_knots(times, points, COEFFICIENTS, degree=min(3, len(points) - 1))
@@ -127,16 +123,10 @@ class ReferenceParameters(NamedTuple):
 
 
 def reference_motion(time: Any, reference: ReferenceParameters, knots: Any = NO_KNOTS) -> Any:
-    """A reference and its first four derivatives, for controllers of up to fourth order.
+    """Position, velocity, acceleration, jerk and snap of a reference at a time (s), shape (5, 3).
 
-    Args:
-        time: s
-        reference: Type and parameters.
-        knots: Table data of the flight; `ReferenceParameters.offset` is the index where the knots
-            of waypoints or of a table begin.
-
-    Returns:
-        Position, velocity, acceleration, jerk and snap, m and s, world axes, shape (5, 3).
+    World axes, m and s. In the knots, the table data of a flight, waypoints and tables begin at
+    `ReferenceParameters.offset`.
     """
     r = reference
     if r.type == WAYPOINTS:

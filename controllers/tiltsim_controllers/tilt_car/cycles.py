@@ -4,7 +4,7 @@
 rotor speeds and the tilt, where two would suffice: each acceleration is produced along a curve of
 inputs, parametrized by the *lean* ``beta``, the angle from the thrusts' bisector to the
 acceleration. The minimum-norm controller moves the inputs perpendicular to these curves. The planes
-perpendicular to them are not tangent to any surfaces (`twist` is not zero: Frobenius), so inputs
+perpendicular to them are not tangent to any surfaces (Frobenius: ``n . curl n != 0``), so inputs
 that follow a closed path of accelerations do not return to their start: the lean advances by a
 holonomy, unobserved by the controller.
 
@@ -39,9 +39,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from tiltsim_controllers.mathematics.scalar import Floats, Pair
-from tiltsim_controllers.tilt_car.integrating import null_space_input
-from tiltsim_controllers.tilt_car.planned_direction import lyapunov_candidate
-from tiltsim_controllers.tilt_car.vehicle import TiltCar, input_matrix, turn_per_tilt
+from tiltsim_controllers.tilt_car.laws import lyapunov_candidate
+from tiltsim_controllers.tilt_car.vehicle import TiltCar, turn_per_tilt
 
 
 class Orbit(NamedTuple):
@@ -76,23 +75,6 @@ def drift_rate(lean: float, path: Orbit, car: TiltCar) -> float:
     return path.angular_frequency / (1.0 + turn_per_tilt(car) ** 2 * stiffness)
 
 
-def twist(speed_1: float, speed_2: float, car: TiltCar) -> float:
-    """``n . curl n`` of the unit null-space input ``n(omega_1, omega_2, alpha)``, per input.
-
-    Only if it were zero would the minimum-norm planes be tangent to surfaces (Frobenius), on which
-    every lap closes. By central differences at rotor speeds (rad/s); ``n`` is independent of tilt.
-    """
-    speeds = np.array([speed_1, speed_2])
-
-    def direction(speeds: Floats) -> Floats:
-        n = null_space_input(input_matrix(speeds, car))
-        return np.asarray(n / np.linalg.norm(n))
-
-    by_1, by_2 = _slopes(direction, speeds, 1e-5 * speeds).T
-    curl = np.array([by_2[2], -by_1[2], by_1[1] - by_2[0]])
-    return float(direction(speeds) @ curl)
-
-
 def _slopes(function: Callable[[Floats], Floats], at: Floats, steps: Floats) -> Floats:
     """Derivatives by the entries of a vector, as columns, by central differences."""
     sides = [(function(at + step), function(at - step)) for step in np.diag(steps)]
@@ -109,7 +91,7 @@ class Swing:
 
     half_angle: float  # ``theta``, rad
     half_period: float  # ``T / 2``, s
-    gains: Any  # of `planned_direction`
+    gains: Any  # of `tilt_car.laws`
     reference_acceleration: float = 1.0  # along x, m/s^2
 
     @property

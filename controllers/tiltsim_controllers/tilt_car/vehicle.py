@@ -65,11 +65,9 @@ def thrust_map(car: TiltCar) -> Any:
 
 
 def squared_speeds(acceleration: Any, car: TiltCar) -> Any:
-    """The squared rotor speeds (rad^2/s^2) for an acceleration, of any sign: Eq. (5).
+    """The squared rotor speeds (rad^2/s^2), of any sign, for an acceleration (2,): Eq. (5).
 
-    Args:
-        acceleration: Along the bisector and across it, m/s^2, shape (2,).
-        car: The vehicle.
+    It is along the bisector and across it, m/s^2.
     """
     same = acceleration[0] / xp.cos(car.half_angle)
     apart = acceleration[1] / xp.sin(car.half_angle)
@@ -83,25 +81,15 @@ def rotation(angle: Any) -> Any:
 
 
 def acceleration(direction: Any, squares: Any, car: TiltCar) -> Any:
-    """Acceleration (m/s^2, world), shape (2,); Eq. (3).
-
-    Args:
-        direction: Direction of the thrusts' bisector, rad.
-        squares: Squares of the rotor speeds, rad^2/s^2, shape (2,).
-        car: The vehicle.
-    """
+    """Acceleration (m/s^2, world), (2,), of a bisector's direction and squared speeds: Eq. (3)."""
     return rotation(direction) @ (thrust_map(car) @ squares)
 
 
 def input_matrix(speeds: Any, car: TiltCar) -> Any:
     """``Delta`` of Eqs. (9)-(11) in the frame of the thrusts' bisector, shape (2, 3).
 
-    The third derivative of the position per rate of both rotor speeds and of the tilt angle. The
-    rotation to the world (Eq. 4) multiplies the whole matrix.
-
-    Args:
-        speeds: Rotor speeds, rad/s, shape (2,).
-        car: The vehicle.
+    The third derivative of the position per rate of both rotor speeds (rad/s, shape (2,)) and of
+    the tilt angle. The rotation to the world (Eq. 4) multiplies the whole matrix.
     """
     rotors = thrust_map(car) * (2.0 * speeds)
     along, across = thrust_map(car) @ (speeds * speeds)

@@ -17,11 +17,8 @@ def rate_limited_command(command: Any, angle: Any, reach: float) -> Any:
 
     The servo ``alpha'' = omega^2 (command - alpha) - 2 zeta omega alpha'`` is a velocity loop
     ``alpha'' = 2 zeta omega (v - alpha')`` inside a position loop ``v = omega / (2 zeta)
-    (command - alpha)``. Limiting ``v`` to ``max_rate`` keeps the set point within the reach.
-
-    Args:
-        command, angle: Commands and present angles, rad, of equal shapes.
-        reach: ``2 zeta / omega max_rate``, rad; infinite without a limit.
+    (command - alpha)``. Limiting ``v`` to ``max_rate`` keeps the set point within the reach (rad)
+    of the present angle, ``2 zeta / omega max_rate``; it is infinite without a limit.
     """
     return xp.clip(command, angle - reach, angle + reach)
 
@@ -48,13 +45,7 @@ def thrust_factors(time: Any, faults: Any) -> Any:
 
 
 def servo_commands(time: Any, commands: Any, faults: Any) -> Any:
-    """The angles (rad) that tilt servos turn to: their commands unless they are stuck.
-
-    Args:
-        time: s.
-        commands: rad, shape (M,).
-        faults: See `faults_record`.
-    """
+    """The angles (rad, (M,)) that tilt servos turn to: their commands unless they are stuck."""
     tilts = len(commands)
     return xp.where(time >= faults.stuck_time[:tilts], faults.stuck_angle[:tilts], commands)
 

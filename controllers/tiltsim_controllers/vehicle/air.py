@@ -39,14 +39,10 @@ class Drag(NamedTuple):
 
 @traceable
 def drag_force(velocity: Any, drag: Drag) -> Any:
-    """Force (N), body axes, on a body that moves through the air.
+    """Force (N), body axes, on a body that moves through the air with a velocity (m/s), shape (3,).
 
     ``F_i = -(linear_i + density / 2 area_i |v|) v_i``. The linear part models the drag of the
     rotors (H-force), the quadratic part the drag of the fuselage.
-
-    Args:
-        velocity: m/s, body axes, shape (3,).
-        drag: The coefficients.
     """
     return -(drag.linear + 0.5 * drag.density * norm(velocity) * drag.area) * velocity
 
@@ -210,13 +206,9 @@ class GroundEffect(NamedTuple):
 def ground_effect(above: Any, rotor_radius: Any) -> Any:
     """Ratio of a rotor's thrust near the ground to its thrust far away, at equal power.
 
-    ``1 / (1 - (R / 4 h)^2)`` (Cheeseman and Bennett, at rest). Derived for single, level rotors
-    from a source and its image and valid above half a radius; below, the value at half a radius,
-    4/3, is used.
-
-    Args:
-        above: Height h of the rotors above the ground, m, of any shape.
-        rotor_radius: R, m; 0 for no ground effect.
+    ``1 / (1 - (R / 4 h)^2)`` (Cheeseman and Bennett, at rest) at the height h (m, any shape), R the
+    rotor's radius (m), 0 for no ground effect. Derived for single, level rotors from a source and
+    its image and valid above half a radius; below, the value at half a radius, 4/3, is used.
     """
     lowest = xp.where(rotor_radius > 0.0, 0.5 * rotor_radius, 1.0)
     ratio = rotor_radius / (4.0 * xp.maximum(above, lowest))
@@ -238,12 +230,9 @@ class Air(NamedTuple):
 
 @traceable
 def air_velocity(time: Any, states: Any, air: Air) -> Any:
-    """Velocity of the air (m/s, world), shape (3,): wind, gust and turbulence.
+    """Velocity of the air (m/s, world), shape (3,), at a time (s): wind, gust and turbulence.
 
-    Args:
-        time: s.
-        states: States of the turbulence's filters, shape (5,).
-        air: The air.
+    The turbulence's filters have `DRYDEN_STATES`.
     """
     gust = gust_profile(time, air.gust) * air.gust.velocity
     return air.wind + gust + dryden_velocity(states, air.turbulence)

@@ -47,11 +47,9 @@ class RotorcraftState(NamedTuple):
 
 
 def state_of(values: Any, tilt_of_rotor: tuple[int, ...]) -> RotorcraftState:
-    """The state by name.
+    """The state by name, of its fields one after the other, shape (12 + M + N,).
 
-    Args:
-        values: Fields of the state one after the other, shape (12 + M + N,).
-        tilt_of_rotor: The layout: the number of each rotor's tilt, from 0; -1 for a fixed rotor.
+    The layout is the number of each rotor's tilt, from 0; -1 for a fixed rotor.
     """
     first = 12 + max(tilt_of_rotor) + 1
     body = values[0:3], values[3:6], values[6:9], values[9:12]
@@ -174,12 +172,10 @@ class Load(NamedTuple):
 
 
 def wrench_of_loads(time: Any, rotation: Any, loads: Iterable[Load]) -> Any:
-    """Force (N) and torque (N m) about the center of mass, body axes, shape (6,).
+    """Force (N) and torque (N m) about the center of mass, body axes, shape (6,), at a time (s).
 
-    Args:
-        time: s.
-        rotation: From body to world axes, shape (3, 3).
-        loads: Each acts from its start until before its end.
+    The rotation is from body to world, shape (3, 3); a load acts from its start until before its
+    end.
     """
     total = xp.zeros(6)
     for load in loads:

@@ -102,12 +102,7 @@ def _flat(array: Any) -> Values:
 
 
 def craft_of(parameters: Any, tilt_of_rotor: TiltOfRotor) -> Craft:
-    """A vehicle from its parameters.
-
-    Args:
-        parameters: A `craft_record`, or the `Vehicle` of a cross.
-        tilt_of_rotor: The layout of its rotors.
-    """
+    """A vehicle from a `craft_record`, or from the `Vehicle` of a cross, given its layout."""
     rotors = len(tilt_of_rotor)
     if isinstance(parameters, Vehicle):
         return _on_cross(parameters, tilt_of_rotor)
@@ -158,12 +153,9 @@ def axis_slopes(craft: Craft, tilts: Any) -> Any:
 
 
 def wrench_of_lift(craft: Craft, tilts: Any, lifts: Any) -> Any:
-    """Force (N) and torque (N m) of additional thrusts without drag torque, shape (6,).
+    """Force (N) and torque (N m), (6,), of additional thrusts (N, (N,)) without drag torque.
 
-    Args:
-        craft: N rotors on M pods.
-        tilts: rad, shape (M,).
-        lifts: N, shape (N,).
+    The tilts are in rad, shape (M,).
     """
     axes = thrust_axes(craft, tilts)
     return xp.hstack([axes @ lifts, cross(places(craft, tilts), axes) @ lifts])

@@ -64,13 +64,11 @@ def cross_force(tilts: Any) -> Any:
 
 
 def torque_free_inputs(torque: Any) -> Any:
-    """The rotor inputs that span ``ker tau``, shape (4, ...); they may vanish below rank 3.
+    """The rotor inputs that span ``ker tau`` of `cross_torque`, shape (4, ...).
 
     Rotors 2 and 4 share a factor that cancels their roll torque, rotors 1 and 3 one that cancels
-    their pitch torque; the ratio of the two factors cancels the yaw torque.
-
-    Args:
-        torque: `cross_torque`.
+    their pitch torque; the ratio of the two factors cancels the yaw torque. They may vanish below
+    rank 3.
     """
     (_, x2, _, x4), (y1, _, y3, _), (z1, z2, z3, z4) = torque
     yaw_of_13, yaw_of_24 = z3 * y1 - z1 * y3, z4 * x2 - z2 * x4
@@ -99,11 +97,9 @@ Per ``c_i = s_i varpi_i |varpi_i|``, positive for upward thrust, in the units of
 
 @traceable
 def thrust_controls(wrench: Any, vehicle: Vehicle) -> Any:
-    """The ``c_i`` (rad^2/s^2), shape (4,), that produce a thrust and torques.
+    """The ``c_i`` (rad^2/s^2), shape (4,), that produce a thrust (N) and torques (N m), body axes.
 
-    Args:
-        wrench: Thrust (N) and torques (N m) about the body axes, z up, shape (4,).
-        vehicle: The quadrotor; its rotors make ``K_f, L K_f, L K_f, K_m`` of these per unit.
+    The rotors make ``K_f, L K_f, L K_f, K_m`` of these per unit.
     """
     lever = vehicle.arm_length * vehicle.thrust_coefficient
     units = xp.array([vehicle.thrust_coefficient, lever, lever, vehicle.drag_coefficient])

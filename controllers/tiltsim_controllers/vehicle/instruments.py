@@ -56,13 +56,9 @@ def reading_index(time: Any, period: Any) -> Any:
 
 @traceable
 def rotate_by_small_angle(quaternion: Any, vector: Any) -> Any:
-    """A unit quaternion rotated by a small rotation vector, to third order in the angle.
+    """A unit quaternion (4,) rotated by a small rotation vector (rad, body axes), to third order.
 
     The exact rotation has ``tan(angle / 2) = |vector| / 2``.
-
-    Args:
-        quaternion: Shape (4,), scalar first.
-        vector: The rotation vector in body axes, rad, shape (3,).
     """
     half = 0.5 * vector
     return quaternion_product(quaternion, xp.hstack([1.0, half])) / xp.sqrt(1.0 + half @ half)
@@ -125,10 +121,8 @@ def is_new(own: Any, time: Any, timestep: Any) -> Any:
 def arrival(own: Any, time: Any, timestep: Any) -> tuple[Any, Any]:
     """The number of the latest reading that has its delay behind it, and 1 if it just arrived.
 
-    Args:
-        own: Parameters, an `instrument_record`.
-        time: s.
-        timestep: s, between control steps.
+    At a time (s), given the time (s) between control steps; the parameters are an
+    `instrument_record`.
     """
     number = reading_index(time - own.delay, own.period)
     just = number > reading_index(time - own.delay - timestep, own.period)
@@ -146,25 +140,16 @@ def quantized(values: Any, resolution: Any) -> Any:
 
 @traceable
 def reading(own: Any, truth: Any, number: Any) -> Any:
-    """A reading of a vector of numbers.
-
-    Args:
-        own: Parameters, an `instrument_record`.
-        truth: The true values with the walk of their biases, shape (n,).
-        number: The number of the reading.
-    """
+    """A reading, by number, of the true values (n,) with the walk of their biases."""
     noise = own.noise * draws(own, number, 0.0, len(truth))
     return quantized(truth + own.bias + noise, own.resolution)
 
 
 @traceable
 def pose_reading(own: Any, truth: Any, number: Any) -> Any:
-    """A reading of a position (m) and a quaternion, shape (7,); errors turn about body axes.
+    """A reading, by number, of a position (m) and a quaternion, (7,); errors turn about body axes.
 
-    Args:
-        own: Parameters; the last three errors are angles, rad.
-        truth: Position and quaternion, shape (7,).
-        number: The number of the reading.
+    The last three errors of the parameters are angles, rad.
     """
     error = own.bias + own.noise * draws(own, number, 0.0, 6)
     position = quantized(truth[:3] + error[:3], own.resolution[:3])

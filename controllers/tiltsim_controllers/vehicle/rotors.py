@@ -72,12 +72,9 @@ class Rotor(NamedTuple):
 
 
 def turning_parts(vector: ArrayLike, along: ArrayLike, tilt: int) -> Floats:
-    """Constant, cosine and sine of a vector that turns with a pod, shape (3, 3).
+    """Constant, cosine and sine of a vector at zero tilt that turns about a unit vector, (3, 3).
 
-    Args:
-        vector: At zero tilt.
-        along: Unit vector of the hinge.
-        tilt: The number of the pod's tilt; -1 for a fixed vector.
+    The number of the pod's tilt is -1 for a fixed vector.
     """
     here, axis = np.asarray(vector, float), np.asarray(along, float)
     constant = axis * (axis @ here) if tilt >= 0 else here
@@ -139,12 +136,7 @@ def tilts_of(layout: TiltOfRotor) -> int:
 
 
 def force_and_torque(table: Sequence[float], tilts: ArrayLike = ()) -> tuple[Floats, Floats]:
-    """F and tau at tilt angles (rad), shape (..., 3, N) each, per unit of ``w``, body axes.
-
-    Args:
-        table: of the rotors
-        tilts: shape (..., tilts)
-    """
+    """F and tau of a table at tilts (rad, (..., M)), (..., 3, N) each, per unit of ``w``."""
     rows = np.reshape(np.array(table, float), (-1, ROTOR_FLOATS)).T
     angles = np.asarray(tilts, float)
     layout, fixed = list(tilt_of_rotor(table)), np.zeros((*angles.shape[:-1], 1))
@@ -172,13 +164,7 @@ class Rotors(NamedTuple):
 
 
 def rotors_in(knots: Any, at: float, tilt_of_rotor: TiltOfRotor) -> Rotors:
-    """The rotors of a flight's knots.
-
-    Args:
-        knots: Table data of a flight, which the table of the rotors is part of.
-        at: Where it begins.
-        tilt_of_rotor: The layout.
-    """
+    """The rotors of a layout in a flight's knots, in which their table begins at an index."""
     count = len(tilt_of_rotor)
     table = take_span(knots, at, ROTOR_FLOATS * count).reshape(count, -1)
     moves = np.array([float(tilt >= 0) for tilt in tilt_of_rotor])  # a trace knows these zeros
@@ -187,18 +173,13 @@ def rotors_in(knots: Any, at: float, tilt_of_rotor: TiltOfRotor) -> Rotors:
 
 
 def airframe(parameters: Any, knots: Any, tilt_of_rotor: TiltOfRotor) -> tuple[Body, Rotors]:
-    """The body and the rotors that a law knows of its vehicle.
+    """The body and the rotors that a law knows of its vehicle, given the knots of the flight.
 
-    The table of a `Vehicle`, whose four rotors lie on a cross, is made of its parameters, so that
-    a trace knows which entries are zero. Its forces, torques and masses are in units of the thrust
+    Parameters have a ``vehicle``: a `Body`, and ``rotors``, where the table begins in the knots; or
+    a `Vehicle`, whose four rotors lie on a cross. Its table is made of its parameters, so that a
+    trace knows which entries are zero. Its forces, torques and masses are in units of the thrust
     coefficient, as in ch. 3 and 4: products of small coefficients would underflow in single
     precision.
-
-    Args:
-        parameters: Their ``vehicle`` is a `Vehicle`, or a `Body` and ``rotors`` is the index of the
-            table in the knots.
-        knots: Table data of the flight.
-        tilt_of_rotor: The layout.
     """
     vehicle = parameters.vehicle
     if isinstance(vehicle, Body):
@@ -217,22 +198,12 @@ def airframe(parameters: Any, knots: Any, tilt_of_rotor: TiltOfRotor) -> tuple[B
 
 
 def of_rotors(rotors: Rotors, values: Any) -> Any:
-    """The values of the tilts by rotor, shape (N,): 0 for a fixed rotor.
-
-    Args:
-        rotors: The layout is used.
-        values: Values by tilt, shape (M,).
-    """
+    """The values of the tilts, shape (M,), by rotor, shape (N,): 0 for a fixed rotor."""
     return xp.hstack([values, 0.0])[np.array(rotors.tilt_of_rotor)]  # -1 is the last entry, 0
 
 
 def of_tilts(rotors: Rotors, values: Any) -> Any:
-    """Sums of the values of the rotors on each pod, shape (M,).
-
-    Args:
-        rotors: The layout is used.
-        values: Values of the rotors, shape (N,).
-    """
+    """Sums of the values of the rotors, shape (N,), on each pod, shape (M,)."""
     return xp.array([sum(values[i] for i in pod) for pod in _pods(rotors)])
 
 
@@ -243,13 +214,10 @@ def _pods(rotors: Rotors) -> list[list[int]]:
 
 
 def turned(rotors: Rotors, parts: Any, tilts: Any) -> Any:
-    """Vectors that turn with the pods of the rotors, shape (K, N).
+    """Vectors that turn with the pods of the rotors at tilt angles (rad, shape (M,)), shape (K, N).
 
-    Args:
-        rotors: The layout is used.
-        parts: Constant, cosine and sine of the vectors, shape (K, N) each; for a fixed rotor the
-            constant counts.
-        tilts: Tilt angles, rad, shape (M,).
+    The parts are constant, cosine and sine, shape (K, N) each; for a fixed rotor the constant
+    counts.
     """
     constant, cosine, sine = parts
     cosines, sines = of_rotors(rotors, xp.cos(tilts)), of_rotors(rotors, xp.sin(tilts))
@@ -257,12 +225,7 @@ def turned(rotors: Rotors, parts: Any, tilts: Any) -> Any:
 
 
 def wrench_map(rotors: Rotors, tilts: Any) -> Any:
-    """Force and torque per unit of ``w``, body axes, shape (6, N).
-
-    Args:
-        rotors: Rotors of the vehicle.
-        tilts: Tilt angles, rad, shape (M,).
-    """
+    """Force and torque per unit of ``w``, body axes, (6, N), at tilt angles (rad, shape (M,))."""
     return turned(rotors, (rotors.constant, rotors.cosine, rotors.sine), tilts)
 
 
@@ -287,10 +250,8 @@ def by_tilt(rotors: Rotors, columns: Any) -> Any:
 def rotor_accelerations(rates: Any, speeds: Any, slowest: Any = 0.0) -> Any:
     """Accelerations (rad/s^2), shape (N,), that change ``w = varpi |varpi|`` at given rates.
 
-    Args:
-        rates: Rates of ``w``, (rad/s)^2/s, shape (N,).
-        speeds: rad/s, signed, shape (N,).
-        slowest: A slower rotor counts as this fast, rad/s; NaN for a rotor at rest without it.
+    Speeds are signed, rad/s. A rotor slower than ``slowest`` (rad/s) counts as this fast; without
+    it a rotor at rest has NaN.
     """
     size = xp.maximum(abs(speeds), slowest)
     return 0.5 * rates / xp.where(size > 0.0, size, xp.nan)

@@ -18,11 +18,9 @@ from tiltsim_controllers.analysis.two_color_planner import (
     SWITCH_WARNING,
     Circle,
     Leg,
-    PathRefusedError,
     Polyline,
     check_path,
     four_angle_gait,
-    plan,
     polygon,
     rectangle,
 )
@@ -59,8 +57,6 @@ def test_e4_is_refused_where_it_crosses_l() -> None:
     for first, second in report.crossings:
         assert float(curve_l(first, AR_DRONE)) == pytest.approx(second, abs=1e-9)
         assert f"({first:.6f}, {second:.6f})" in report.reasons[0]
-    with pytest.raises(PathRefusedError, match="red crosses the curve L"):
-        plan(PATHS["E4"], 1.0, AR_DRONE)
 
 
 def test_a_red_path_that_only_touches_l_is_refused() -> None:
@@ -94,7 +90,7 @@ def test_color_switch_at_p_and_nowhere_else() -> None:
     report = check_path(switching, AR_DRONE)
     assert report.theorem == "generalized"
     assert report.warnings == (BLUE_WARNING, SWITCH_WARNING)
-    gait = plan(switching, 2.0, AR_DRONE)
+    gait = four_angle_gait(switching, 2.0, AR_DRONE)
     assert gait.is_continuous
     np.testing.assert_allclose(gait.angles([0.0, 1.0, 2.0]), [[*P, *P]] * 3, atol=1e-15)
     square = ((0.5, -0.5), (0.6, -0.5), (0.6, -0.6), (0.5, -0.5))
@@ -145,7 +141,7 @@ def test_a_path_without_length_is_no_gait() -> None:
 def test_gaits_stay_on_their_color_at_constant_speed(vehicle, color) -> None:
     path = polygon(((0.4, -0.8), (0.9, -0.3), (0.7, -0.7)), color)
     for planned in (path, Circle(color, (0.6, -0.6), 0.2)):
-        gait = plan(planned, 3.0, vehicle)
+        gait = four_angle_gait(planned, 3.0, vehicle)
         time = np.linspace(0.01, 2.99, 50)
         angles, rates = gait.angles(time), gait.rates(time)
         _, R_phi, R_theta = residuals(angles, vehicle)

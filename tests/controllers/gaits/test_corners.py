@@ -7,8 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tiltsim_controllers.analysis.two_color_planner import Circle, four_angle_gait
 from tiltsim_controllers.gaits.motion import anticipated_tilts, rounded_corner
-from tiltsim_controllers.gaits.plans import continuous_trot, fixed, keyframes, two_color_circle
+from tiltsim_controllers.gaits.plans import continuous_trot, fixed, keyframes
 from tiltsim_controllers.vehicle.parameters import PRESETS
 
 VEHICLE = PRESETS["ar_drone_2"]
@@ -87,7 +88,7 @@ def test_without_anticipation_the_gait_is_itself(gait):
 
 
 def test_smooth_gaits_are_left_alone():
-    circle = two_color_circle((0.1, -0.2), 0.3, "blue", 2.0, VEHICLE).biased(0.9).scaled(1.5)
+    circle = four_angle_gait(Circle("blue", (0.1, -0.2), 0.3), 2.0, VEHICLE).biased(0.9).scaled(1.5)
     for time in (0.0, 0.3, 1.7):
         motion = anticipated(circle, time, 0.1)
         found = differences(lambda t, time=time: circle.angles(time + t), 1e-3)

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from tests.natively import natively
 from tiltsim_controllers.analysis.published_gaits import smallest_margin
 from tiltsim_controllers.analysis.singularity import residuals
+from tiltsim_controllers.analysis.two_color_planner import Circle, four_angle_gait
 from tiltsim_controllers.gaits import plans
 from tiltsim_controllers.gaits.cat import FOOTFALLS, FORWARD, SWINGS, Footfall, cat_keyframes
 from tiltsim_controllers.gaits.colors import colored_angles
@@ -44,8 +45,8 @@ GAITS: dict[str, Gait] = {
         ],
         repeats=True,
     ),
-    "red_circle": plans.two_color_circle((0.5, -0.5), 0.3, "red", 1.5, AR_DRONE),
-    "blue_circle": plans.two_color_circle((0.1, -0.2), 0.4, "blue", 1.5, AR_DRONE),
+    "red_circle": four_angle_gait(Circle("red", (0.5, -0.5), 0.3), 1.5, AR_DRONE),
+    "blue_circle": four_angle_gait(Circle("blue", (0.1, -0.2), 0.4), 1.5, AR_DRONE),
 }
 GAITS |= {
     "penguin_small": plans.penguin("penguin_small", pi / 4, 2.0),
@@ -242,7 +243,7 @@ def test_bad_names_list_the_choices() -> None:
     with pytest.raises(ValueError, match="walk, run, transverse_gallop, rotary_gallop"):
         plans.cat("wallk", 0.5, 1.0)
     with pytest.raises(ValueError, match="red, blue"):
-        plans.two_color_circle((0.1, 0.2), 0.1, "green", 1.0, AR_DRONE)
+        four_angle_gait(Circle("green", (0.1, 0.2), 0.1), 1.0, AR_DRONE)
     with pytest.raises(ValueError, match="2 waypoints but 1 phases"):
         plans.waypoints([[0] * 4, [1] * 4], 1.0, [0.0])
 

@@ -19,7 +19,6 @@ from tiltsim_controllers.laws.outer_loop import (
     pointing_rates,
     push_along,
     shortened,
-    torque_for,
 )
 from tiltsim_controllers.laws.pid import Pid, pid
 from tiltsim_controllers.mathematics.attitude import attitude_error, rotation_matrix
@@ -79,14 +78,6 @@ def test_the_attitude_points_the_axis_along_the_force(seed):
     present = seen.rotation @ AXIS
     push = BODY.mass * force @ present / np.linalg.norm(AXIS)
     assert push_along(seen, acceleration, AXIS) == pytest.approx(push, rel=1e-12)
-
-
-@pytest.mark.parametrize("gyroscopic", [0.0, 1.0])
-def test_the_torque_turns_the_body(gyroscopic):
-    seen, angular = observed(4, gyroscopic=gyroscopic), np.array([2.0, 3.0, -5.0])
-    momentum = INERTIA @ seen.body_rates
-    expected = INERTIA @ angular + gyroscopic * np.cross(seen.body_rates, momentum)
-    np.testing.assert_allclose(torque_for(seen, angular), expected, rtol=1e-12)
 
 
 @pytest.mark.parametrize("gyroscopic", [0.0, 1.0])

@@ -19,12 +19,8 @@ from tests.controllers.tilt_car.lean import (
     restored_lean,
     split_of_lean,
 )
-from tiltsim_controllers.tilt_car.cycles import Orbit, drift_rate, lean_stiffness, orbit, twist
-from tiltsim_controllers.tilt_car.integrating import (
-    minimum_norm,
-    null_space_input,
-    restoring_inputs,
-)
+from tiltsim_controllers.tilt_car.cycles import Orbit, drift_rate, lean_stiffness, orbit
+from tiltsim_controllers.tilt_car.laws import minimum_norm, restoring_inputs
 from tiltsim_controllers.tilt_car.vehicle import (
     THESIS_CAR,
     TiltCar,
@@ -141,28 +137,6 @@ def test_there_and_back_along_one_path_undoes_the_drift():
     again = follow(back, forth, 1.0, 500, CAR)
     assert abs(lean_at(forth, CAR) - 0.1) > 1e-4
     np.testing.assert_allclose(again, inputs_of(0.1, 10.0, CAR), rtol=1e-9, atol=1e-9)
-
-
-def small_loop(centre, size, car):
-    """The change of the inputs over a small square of accelerations, along the law's planes."""
-    jerks = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))
-    values = centre
-    for jerk in jerks:
-        values = follow(lambda _t, j=jerk: j, values, size, 40, car)
-    return values - centre
-
-
-@pytest.mark.parametrize("lean", [-0.3, 0.0, 0.2])
-def test_small_loops_miss_by_the_twist_times_their_area(lean):
-    centre = inputs_of(lean, 10.0, THESIS_CAR)
-    size = 0.02
-    n = null_space_input(input_matrix(centre[:2], THESIS_CAR))
-    # The silent direction's length is the area of accelerations that a unit of inputs spans.
-    area_of_inputs = size * size / np.linalg.norm(n)
-    missed = small_loop(centre, size, THESIS_CAR) @ n / np.linalg.norm(n)
-    desired = -twist(centre[0], centre[1], THESIS_CAR) * area_of_inputs
-    assert missed == pytest.approx(desired, rel=0.05)
-    assert twist(centre[0], centre[1], THESIS_CAR) != 0.0
 
 
 def test_restoring_holds_the_lean_where_drift_and_rate_balance():

@@ -1,10 +1,10 @@
-"""Third- and fourth-derivative feedback linearization of the tilt-car (ch. 10, Secs. 3.1 and 6.1).
+"""Control laws of the tilt-car (ch. 10, Secs. 3.1, 5 and 6.1; ch. 11).
 
-The inputs, the first or second derivatives of both rotor speeds and of the tilt angle, are three;
-they determine two outputs, the third or fourth derivatives of the position. The controller takes
-the shortest of all solutions (`minimum_norm`, Eq. 12), which makes its states drift
-(`tiltsim_controllers.tilt_car.cycles`). Optionally a restoring rate in the null space turns the
-thrusts' bisector back toward the acceleration.
+**Third and fourth derivative.** The inputs, the first or second derivatives of both rotor speeds
+and of the tilt angle, are three; they determine two outputs, the third or fourth derivatives of the
+position. The controller takes the shortest of all solutions (`minimum_norm`, Eq. 12), which makes
+its states drift (`tiltsim_controllers.tilt_car.cycles`). Optionally a restoring rate in the null
+space turns the thrusts' bisector back toward the acceleration.
 
 The first derivatives of the inputs are states of the controller of the fourth derivative. As
 printed, the tilt's column of its decoupling matrix (Eq. 27) lacks the factor ``1 - I_T / I_B`` due
@@ -12,14 +12,20 @@ to the counter-rotation, which the ``decoupling`` ``exact`` includes. The rotor 
 integrates may drift below zero, where no thrust follows them. The controller then continues, as in
 the chapter, with speeds that no rotor has (windup), and fails; with ``anti_windup`` they stop at
 zero, and the other rotor and the tilt continue alone.
+
+**Planned direction.** The gait moves the tilt, the controller sets the squares of both rotor
+speeds: two inputs for two outputs, so that no state drifts. A thrust cannot pull, so negative
+squares become zero (ch. 11, Eq. 13), which ch. 11 writes with the switch matrix ``S_pq``.
 """
 
 from collections.abc import Sequence
 from typing import Any, ClassVar, Final, Literal
 
 from tiltsim_controllers.code.arrays import xp
+from tiltsim_controllers.gaits.motion import GaitParameters
 from tiltsim_controllers.laws.feedback import error_dynamics
 from tiltsim_controllers.laws.keys import (
+    Gains2,
     Gains4,
     GainSets,
     Keys,
@@ -36,6 +42,7 @@ from tiltsim_controllers.tilt_car.vehicle import (
     TiltCar,
     input_matrix,
     rotation,
+    squared_speeds,
     thrust_map,
     turn_per_tilt,
 )
@@ -99,14 +106,10 @@ PUBLISHED: Final = choice(FourthDerivative, "decoupling", "published")
 
 
 def minimum_norm(matrix: Any, desired: Any) -> Any:
-    """The shortest inputs for the desired outputs, ``Delta^T (Delta Delta^T)^-1`` (Eq. 12).
+    """The shortest inputs for the desired outputs (2,), ``Delta^T (Delta Delta^T)^-1`` (Eq. 12).
 
-    NaN where the matrix is rank-deficient: with both rotors at rest. With one rotor at rest it is
-    not, contrary to ch. 10: the tilt turns the other thrust.
-
-    Args:
-        matrix: `input_matrix`, shape (2, 3).
-        desired: Shape (2,).
+    NaN where `input_matrix` is rank-deficient: with both rotors at rest. With one rotor at rest it
+    is not, contrary to ch. 10: the tilt turns the other thrust.
     """
     (xx, xy), (_, yy) = gram = matrix @ matrix.T
     determinant = xx * yy - xy * xy
@@ -142,12 +145,9 @@ def body_derivatives(state: Any, car: TiltCar) -> Any:
     """Acceleration, jerk and drift ``M_P`` in the frame of the thrusts' bisector, shape (3, 2).
 
     Eq. (21) without its terms in the second derivatives of the inputs, written with the turn rate
-    of the bisector, ``(1 - I_T / I_B) alpha'``, for the products of ``J_psi`` and ``J_alpha``.
-
-    Args:
-        state: `tiltsim_controllers.tilt_car.vehicle.STATE_FIELDS`, then the controller's own tilt
-            rate (rad/s) and rotor accelerations (rad/s^2), shape (11,).
-        car: The vehicle.
+    of the bisector, ``(1 - I_T / I_B) alpha'``, for the products of ``J_psi`` and ``J_alpha``. The
+    state has `tiltsim_controllers.tilt_car.vehicle.STATE_FIELDS`, then the controller's own tilt
+    rate (rad/s) and rotor accelerations (rad/s^2), shape (11,).
     """
     speeds, tilt_rate, rates = state[6:8], state[8], state[9:11]
     turn = turn_per_tilt(car) * tilt_rate * xp.array([[0.0, -1.0], [1.0, 0.0]])
@@ -173,10 +173,7 @@ def _demanded(time: Any, state: Any, p: Any, derivatives: Sequence[Any]) -> Any:
 def third_derivative_inputs(time: Any, state: Any, p: Any) -> Any:
     """Rates of the rotor speeds (rad/s^2) and of the tilt angle (rad/s), shape (3,); Eq. (14).
 
-    Args:
-        time: s
-        state: `tiltsim_controllers.tilt_car.vehicle.STATE_FIELDS`, shape (8,).
-        p: `ThirdParameters`.
+    The state has `tiltsim_controllers.tilt_car.vehicle.STATE_FIELDS`, shape (8,).
     """
     speeds, matrix = state[6:8], input_matrix(state[6:8], p.vehicle)
     pushed = thrust_map(p.vehicle) @ (speeds * speeds)
@@ -188,13 +185,81 @@ def third_derivative_inputs(time: Any, state: Any, p: Any) -> Any:
 def fourth_derivative_inputs(time: Any, state: Any, p: Any) -> Any:
     """Second derivatives of rotor speeds (rad/s^3) and tilt angle (rad/s^2), (3,); Eq. (29).
 
-    Args:
-        time: s
-        state: See `body_derivatives`.
-        p: `FourthParameters`.
+    The state is as for `body_derivatives`.
     """
     pushed, moved, drift = body_derivatives(state, p.vehicle)
     matrix = input_matrix(state[6:8], p.vehicle)
     if p.decoupling == PUBLISHED:
         matrix = xp.hstack([matrix[:, :2], xp.array([[-pushed[1]], [pushed[0]]])])
     return minimum_norm(matrix, _demanded(time, state, p, [pushed, moved]) - drift)
+
+
+class PlannedDirectionGainTable(Keys):
+    """Explicit gains of the planned-direction law."""
+
+    x: Gains2 = required(
+        "K_X1, K_X2, on the errors of velocity and position along x [1/s, 1/s^2]", [12.0, 6.0]
+    )
+    y: Gains2 = required(
+        "K_Y1, K_Y2, on the errors of velocity and position along y [1/s, 1/s^2]", [9.0, 18.0]
+    )
+
+
+PlannedGains = record_of(PlannedDirectionGainTable)
+
+PLANNED_GAINS: Final = {
+    # Ours, both poles at -2: ch. 10 prints none.
+    "ch10": PlannedGains((4.0, 4.0), (4.0, 4.0)),
+    # ch. 11, Sec. 4.2
+    "ch11": PlannedGains((12.0, 6.0), (9.0, 18.0)),
+}
+"""Gains of the law with planned direction by name."""
+
+
+class PlannedDirection(Keys):
+    """Keys of `planned_direction_inputs`."""
+
+    gain_sets: ClassVar[GainSets] = {"gains": PLANNED_GAINS}
+
+    law: Literal["tilt_car_planned_direction"] = required(
+        "the tilt-car's rotor speeds control x and y; the tilt follows the gait"
+    )
+    gains: NamedGains[Literal["ch10", "ch11"], PlannedDirectionGainTable] = default(
+        "ch11", "ch11 is the thesis's set, ch10 has its poles at -2; or a table of gains"
+    )
+
+
+PlannedParameters = record_of(
+    PlannedDirection, vehicle=TiltCar, gait=GaitParameters, reference=ReferenceParameters
+)
+
+
+def demanded_acceleration(time: Any, state: Any, p: Any) -> Any:
+    """The desired acceleration (m/s^2, world), (2,); ch. 10, Eq. (20); ch. 11, Eqs. (9), (10).
+
+    The state begins with `tiltsim_controllers.tilt_car.vehicle.STATE_FIELDS`.
+    """
+    on_velocity, on_position = xp.array([p.gains.x, p.gains.y]).T
+    position, velocity, acceleration = reference_motion(time, p.reference)[:3, :2]
+    feedback = on_velocity * (velocity - state[2:4]) + on_position * (position - state[0:2])
+    return acceleration + feedback
+
+
+def demanded_squared_speeds(time: Any, state: Any, p: Any) -> Any:
+    """The desired squares of the rotor speeds (rad^2/s^2), of any sign; ch. 11, Eq. (12).
+
+    Arguments as for `demanded_acceleration`; shape (2,).
+    """
+    to_body = rotation(state[4] + state[5]).T
+    return squared_speeds(to_body @ demanded_acceleration(time, state, p), p.vehicle)
+
+
+def planned_direction_inputs(time: Any, state: Any, p: Any) -> Any:
+    """The squares of the rotor speeds (rad^2/s^2), never below zero; ch. 11, Eqs. (12), (13)."""
+    squares = demanded_squared_speeds(time, state, p)
+    return xp.where(squares < 0.0, 0.0, squares)  # NaN stays NaN
+
+
+def lyapunov_candidate(error_y: float, error_rate_y: float, gains: Any) -> float:
+    """Ch. 11's candidate ``L = e_y'^2 / 2 + K_Y2 e_y^2 / 2`` (Eq. 49), m^2/s^2."""
+    return 0.5 * error_rate_y * error_rate_y + 0.5 * gains.y[1] * error_y * error_y
