@@ -69,7 +69,7 @@ def test_modes_lost_in_the_rounding_of_a_period_are_not_listed():
     orbit = SimpleNamespace(
         matrix=np.diag([0.5, -1e-12]),
         timestep=2.0,
-        names=("z", "alpha_1"),
+        minimal=SimpleNamespace(names=("z", "alpha_1")),
         is_orbit=True,
         root=SimpleNamespace(residual=0.0),
         motion=SimpleNamespace(prefixes=()),
@@ -215,7 +215,7 @@ def test_an_orbit_is_sought_near_the_neighboring_orbit_first(continuous):
         gait("trot_continuous"), near=continuous.root.state, progress=flights.append
     )
     assert near.root.state == pytest.approx(continuous.root.state, abs=1e-9)
-    assert len(flights) < 6 * len(continuous.names) + 10  # periods in which it would settle
+    assert len(flights) < 6 * len(continuous.minimal.names) + 10  # periods in which it would settle
 
 
 def test_an_orbit_of_too_many_steps_is_refused_at_once():
