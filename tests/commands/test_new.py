@@ -36,7 +36,7 @@ def test_few_rotors_have_abilities_but_no_margin(kind, folder, capsys):
     """The margin is at given tilt angles, at which they cannot hover."""
     assert main(["new", kind]) == 0
     assert main(["gait", "--mjcf", f"{kind}.xml", "--faults"]) == 0
-    assert "without rotor 2       no hover" in capsys.readouterr().out
+    assert "without rotor 2       none at these tilt angles" in capsys.readouterr().out
     main(["run", f"{kind}.toml", "--set", "simulation.duration=0.04", "--out", "flight"])
     assert "min_singularity_margin" not in json.loads((folder / "flight/metrics.json").read_text())
     assert main(["plot", "flight"]) == 0

@@ -379,7 +379,7 @@ def test_free_tilts_hold_a_pose_that_a_gait_cannot():
         ),
         (
             {"controller": {"law": "geometric", "tilt_bandwidth": 5.0}},
-            "needs controller.tilts = free",
+            'needs controller.tilts = "free"',
         ),
     ],
 )

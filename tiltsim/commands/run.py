@@ -79,22 +79,20 @@ def run(
     if out is not None:
         prepare_flight_folder(out, loaded)
     if rerun is not None:
+        from tiltsim.views.rerun import require_rerun
+
+        require_rerun()
         prepare_file("--rerun", rerun, (".rrd",))
     for warning in () if quiet else _warnings(loaded):
         warn(warning)
-    with ExitStack() as stack:
-        if rerun is not None:
-            from tiltsim.views.rerun.live import RecordingProcess
-
-            recording = stack.enter_context(RecordingProcess(loaded))
-        flight = fly(loaded, live=live, connect=connect, quiet=quiet)
-        stack.enter_context(defer_interrupts())
-        if rerun is not None:
-            recording.start(flight, rerun)
+    flight = fly(loaded, live=live, connect=connect, quiet=quiet)
+    with defer_interrupts():
         if out is not None:
             flight.save(out)
         if rerun is not None:
-            recording.finish()
+            from tiltsim.views.rerun.recording import save_recording
+
+            save_recording([flight], rerun)
     if flight.end.kind == "interrupted":
         kept = f"; the flight so far is in {out}" if out is not None else ""
         print_line(f"tiltsim: interrupted at t = {flight.end.time:.3f} s{kept}", error=True)

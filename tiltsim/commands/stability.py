@@ -123,6 +123,8 @@ def run_stability(
 
 def parse_sweep(text: str, scenarios: Sequence[Scenario]) -> tuple[str, list[float]]:
     """The key and the values of ``--sweep``."""
+    from tiltsim.scenario.documents import value_at
+
     name, _, span = text.partition("=")
     key = SHORT_KEYS.get(name, name)
     parts = span.split(":") if span else []
@@ -132,9 +134,7 @@ def parse_sweep(text: str, scenarios: Sequence[Scenario]) -> tuple[str, list[flo
     except ValueError:
         raise InputError(f"--sweep {text}: write KEY=FROM:TO or KEY=FROM:TO:POINTS") from None
     if not parts:
-        value: Any = scenarios[0].model_dump()
-        for part in key.split("."):
-            value = value.get(part) if isinstance(value, dict) else None
+        value = value_at(scenarios[0].model_dump(), key)
         if not isinstance(value, float) or value == 0.0:
             raise InputError(
                 f"--sweep {text}: {key} has no value to start from; write {name}=FROM:TO"

@@ -64,10 +64,10 @@ class Metrics(dict[str, float | bool]):
 
     def get(self, name: str, default: Any = None) -> Any:
         """A metric, or another value where the flight does not have it."""
-        try:
-            return self[name]
-        except UnknownMetricError:
-            return default
+        vehicle, _, own = str(name).partition(".")
+        if own and vehicle in self.vehicles:
+            return self.vehicles[vehicle].get(own, default)
+        return super().get(name, default)
 
     def of_all_vehicles(self) -> dict[str, float | bool]:
         """The metrics with the companions', such as ``wing.duration``."""

@@ -15,8 +15,6 @@ from tiltsim.scenario.interaction import check_companions, object_refusals, unkn
 from tiltsim.scenario.linearizing_controllers import (
     AttitudeAltitudeController,
     AttitudeForceController,
-    FullPoseController,
-    check_decoupler,
 )
 from tiltsim.scenario.messages import InvalidValueError, choose
 from tiltsim.scenario.metric_names import split_metric
@@ -74,15 +72,9 @@ def _refusals(scenario: ScenarioTables) -> Refusals:
 
 
 def _engine(scenario: ScenarioTables) -> Refusals:
-    simulation = scenario.simulation
-    on_mujoco, in_jax = simulation.plant == "mujoco", simulation.engine == "jax"
-    if in_jax and on_mujoco:
+    if scenario.simulation.engine == "jax" and scenario.simulation.plant == "mujoco":
         reason = 'simulation.engine = "jax" is supported on the plants thesis and rigid_body'
         yield "simulation.plant", reason
-    if not in_jax and simulation.precision != "float64":
-        yield "simulation.precision", 'needs simulation.engine = "jax"'
-    if on_mujoco and simulation.batch_functions == "quick":
-        yield "simulation.batch_functions", 'needs simulation.plant = "thesis" or "rigid_body"'
 
 
 def _plant(scenario: ScenarioTables) -> Refusals:
@@ -213,8 +205,6 @@ def _reference(scenario: ScenarioTables) -> Refusals:
         option = " with gait_rate_feedforward" if own else ""
         reason = f"{law}{option} always includes all derivatives; set it to false"
         yield "reference.acceleration_feedforward", reason
-    if isinstance(controller, AttitudeAltitudeController):
-        check_decoupler(scenario, controller.decoupler)
 
 
 def _gait(scenario: ScenarioTables) -> Refusals:
@@ -240,8 +230,6 @@ def _gait(scenario: ScenarioTables) -> Refusals:
     if isinstance(reference, WaypointReference) and total > MAX_KNOTS:
         reason = f"too many waypoints: {total} numbers with the gait's, at most {MAX_KNOTS}"
         yield "reference.times", reason, len(reference.times)
-    if isinstance(controller, AttitudeForceController | FullPoseController):
-        controller.check_outputs(scenario, gait)
     if controller.commands_tilts and not gait.is_constant:
         give = "give the initial angles as a fixed gait"
         yield "gait.type", f"the {controller.law} law commands the tilts itself; {give}"

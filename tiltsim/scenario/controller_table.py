@@ -19,7 +19,7 @@ from tiltsim_controllers.laws.gains import (
     PolePlacementTable,
 )
 from tiltsim_controllers.laws.keys import GainSets, number_of, table_of
-from tiltsim_controllers.laws.multirotor_steps import FeedforwardTerms
+from tiltsim_controllers.laws.multirotor_keys import FeedforwardTerms
 from tiltsim_controllers.laws.observed import Failure
 from tiltsim_controllers.laws.supervised_vehicles import untilted_volume
 from tiltsim_controllers.laws.supervisor import STRATEGIES, UNTILTED, Supervisor
@@ -34,6 +34,10 @@ class SupervisorTable(Table):
 
     model_config = example(strategy="hold", min_margin=0.3)
     table_name = "controller.supervisor"
+    only_with: ClassVar = {
+        ("horizon",): ("strategy", "hold", "return_to_red"),
+        ("max_tilt_rate", "clearance"): ("strategy", "return_to_red"),
+    }
 
     strategy: Literal["scale", "hold", "return_to_red"] = default(
         "scale",
@@ -70,15 +74,6 @@ class SupervisorTable(Table):
         "distance on red from angles at which two rotors stop, below delta = atan(K_m / (L K_f)); "
         "needs strategy return_to_red [rad]",
     )
-
-    def _check_values(self) -> None:
-        for keys, strategies in (
-            (("horizon",), ("hold", "return_to_red")),
-            (("max_tilt_rate", "clearance"), ("return_to_red",)),
-        ):
-            if self.strategy not in strategies:
-                needs = f"needs controller.supervisor.strategy = {' or '.join(strategies)}"
-                self.require_defaults(keys, needs)
 
     def resolve(self, vehicle: Vehicle | Multirotor) -> Supervisor:
         """The supervisor's parameters for a vehicle.
@@ -339,10 +334,11 @@ class FailureAwareController(ControllerTable):
         0.0, "time from which failed_rotor is known [s]", 10.0
     )
 
-    def check_failed_rotor(self, rotors: int) -> None:
-        """Refuse a failed rotor that is not one of some number. Raises `mistake`."""
+    def check_scenario(self, scenario: Any) -> None:
+        rotors = scenario.vehicle.rotor_count
         if self.failed_rotor is not None and self.failed_rotor > rotors:
             raise self.mistake("failed_rotor", f"the vehicle has {rotors} rotors")
+        super().check_scenario(scenario)
 
     def resolve_failure(self) -> Failure:
         """The failed rotor that the law knows of."""

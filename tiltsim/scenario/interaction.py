@@ -7,7 +7,7 @@ takes them from the file that it is in. Time steps, ground and objects are the f
 from collections.abc import Mapping, Sequence
 from math import pi
 from pathlib import Path
-from typing import Annotated, Any, Final
+from typing import Annotated, Any, ClassVar, Final
 
 from pydantic import BeforeValidator, Field
 
@@ -46,27 +46,24 @@ class ObjectTable(Body, Table):
     """Something to touch: fixed in the world, on a hinge, or free."""
 
     table_name = "object"
+    only_with: ClassVar = {
+        ("file",): ("type", "mesh"),
+        ("mass",): ("joint", "hinged", "free"),
+        ("hinge", "axis", "damping"): ("joint", "hinged"),
+        ("velocity", "floating"): ("joint", "free"),
+    }
 
     def _check_values(self) -> None:
         if len(self.size) != SIZES[self.type]:
             raise self.mistake("size", f"a {self.type} has {SIZES[self.type]} of them")
-        if self.type == "mesh":
-            self._check_file()
-        else:
-            self.require("file", None, f"a {self.type} has none; set type = mesh, or remove it")
         if self.name in RESERVED:
             raise self.mistake("name", "is taken; choose another")
-        if self.joint == "fixed":
-            self.require("mass", None, "it is fixed; set joint = free or hinged, or remove it")
-        elif self.mass is None:
+        if self.joint != "fixed" and self.mass is None:
             raise self.mistake("mass", f"must be given, as joint = {self.joint}")
-        if self.joint != "hinged":
-            needs = "needs joint = hinged"
-            self.require_defaults(("hinge", "axis", "damping"), needs)
-        elif not any(self.axis):
+        if not any(self.axis):
             raise self.mistake("axis", "must not be zero")
-        if self.joint != "free":
-            self.require_defaults(("velocity", "floating"), "needs joint = free")
+        if self.type == "mesh":
+            self._check_file()
 
     def _check_file(self) -> None:
         file = Path(self.file or "")
@@ -94,6 +91,7 @@ class PayloadTable(Load, Table):
     """A load below the vehicle, on a cable that may be slack; the controller does not know it."""
 
     table_name = "payload"
+    only_with: ClassVar = {("swing", "swing_damping"): ("rigid", False)}
 
     swing: Annotated[float, Field(ge=-0.5 * pi, le=0.5 * pi)] = default(
         0.0, "angle of the cable at time zero, from straight down toward +x [rad]"
@@ -105,11 +103,6 @@ class PayloadTable(Load, Table):
         "measured angle of the cable; not with python; 0 does not [-]",
         0.5,
     )
-
-    def _check_values(self) -> None:
-        if self.rigid:
-            keys = ("swing", "swing_damping")
-            self.require_defaults(keys, "a rigid load does not swing; remove it")
 
 
 class CableTable(Cable, Table):

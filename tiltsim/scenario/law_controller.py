@@ -163,6 +163,8 @@ class LawController(LawTable):
 class TiltingTable(LawTable):
     """Tables of laws that may also command the tilts."""
 
+    only_with: ClassVar = {("tilt_bandwidth",): ("tilts", "free")}
+
     tilts: Literal["gait", "free"] = default(
         "gait",
         "whether the tilts follow the gait, or are the law's, the gait being the angles at the "
@@ -182,9 +184,7 @@ class TiltingTable(LawTable):
         return self.tilt_bandwidth
 
     def check_scenario(self, scenario: Any) -> None:
-        if not self.commands_tilts:
-            self.require_defaults(("tilt_bandwidth",), "needs controller.tilts = free")
-        elif not scenario.vehicle.has_tilting_rotors:
+        if self.commands_tilts and not scenario.vehicle.has_tilting_rotors:
             raise self.mistake("tilts", f"the rotors of the {scenario.vehicle.model} do not tilt")
         super().check_scenario(scenario)
 

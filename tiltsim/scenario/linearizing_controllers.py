@@ -1,6 +1,6 @@
 """The ``[controller]`` tables of feedback linearization: tiltrotor, quadrotor, multirotor."""
 
-from typing import Any, Final
+from typing import Any, ClassVar
 
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.controller_table import (
@@ -28,10 +28,8 @@ from tiltsim_controllers.laws.attitude_altitude import (
     AttitudeAltitude,
 )
 from tiltsim_controllers.laws.full_pose import FullPose, pose_rank
-from tiltsim_controllers.laws.multirotor_steps import RESTORING, AttitudeForce, Form
-from tiltsim_controllers.laws.quadrotor_attitude_altitude import QuadrotorAttitudeAltitude
-from tiltsim_controllers.laws.switching import Switching
-from tiltsim_controllers.laws.yaw_position import YawPosition
+from tiltsim_controllers.laws.multirotor_keys import RESTORING, AttitudeForce, Form
+from tiltsim_controllers.laws.quadrotor import QuadrotorAttitudeAltitude, Switching, YawPosition
 from tiltsim_controllers.mathematics.scalar import Floats, Triple
 from tiltsim_controllers.vehicle.parameters import Vehicle
 from tiltsim_controllers.vehicle.rotors import force_and_torque
@@ -53,18 +51,24 @@ class AttitudeAltitudeController(AttitudeAltitude, GaitFollowingController):
 
     vehicle_models = ("tiltrotor",)
     reference_kinds = ("position", "attitude_altitude")
+    only_with: ClassVar = {
+        ("leave_out", "anticipation", "rotor_inertia_feedforward"): ("gait_rate_feedforward", True),
+        ("max_acceleration", "max_angular_acceleration"): ("gait_rate_feedforward", True),
+    }
 
     def _check_values(self) -> None:
         if not self.gait_rate_feedforward:
-            needs = "needs controller.gait_rate_feedforward = true"
-            self.require_defaults(_RATE_KEYS, needs)
             if any(self.resolve_integral_gains()):
-                raise self.mistake("gains", f"integral action {needs}")
+                needs = "integral action needs controller.gait_rate_feedforward = true"
+                raise self.mistake("gains", needs)
             return
         for key, choices in (("decoupling", ("exact",)), ("decoupler", ("exact", "none"))):
             if getattr(self, key) not in choices:
                 needs = f"gait_rate_feedforward = true needs {' or '.join(choices)}"
                 raise self.mistake(key, needs)
+
+    def check_scenario(self, scenario: Any) -> None:
+        check_decoupler(scenario, self.decoupler)
 
     def error_loops(self, vehicle: Vehicle) -> list[ErrorLoop]:
         if self.gait_rate_feedforward:
@@ -79,16 +83,6 @@ class AttitudeAltitudeController(AttitudeAltitude, GaitFollowingController):
     @property
     def omits_reference_acceleration(self) -> bool:  # type: ignore[override]
         return not self.gait_rate_feedforward
-
-
-_RATE_KEYS: Final = (
-    "leave_out",
-    "anticipation",
-    "max_acceleration",
-    "max_angular_acceleration",
-    "rotor_inertia_feedforward",
-)
-"""Keys of `AttitudeAltitudeController` that only gait_rate_feedforward reads."""
 
 
 class FullPoseController(FullPose, FailureAwareController):
@@ -106,11 +100,12 @@ class FullPoseController(FullPose, FailureAwareController):
         on_acceleration, _, on_position = self.resolve_gains().position
         return on_position / on_acceleration
 
-    def check_outputs(self, scenario: Any, gait: Gait) -> None:
-        """Refuse a failed rotor that is not there, and inputs that do not move six outputs."""
+    def check_scenario(self, scenario: Any) -> None:
+        """Refuse inputs that do not move six outputs."""
+        super().check_scenario(scenario)
         vehicle, failed = scenario.vehicle.resolve(), self.failed_rotor
-        self.check_failed_rotor(scenario.vehicle.rotor_count)
         if isinstance(vehicle, Multirotor):
+            gait = scenario.gait.plan(vehicle)
             w = [spin * (rotor != failed) for rotor, spin in enumerate(vehicle.spins, start=1)]
             rank = pose_rank(vehicle.table, gait.angles(0.0).tolist(), w)
             if rank < 6:
@@ -156,10 +151,7 @@ class AttitudeForceController(AttitudeForce, GaitFollowingController, FailureAwa
     vehicle_models = ("multirotor",)
     reference_kinds = ("position", "pose", "attitude_altitude")
     follows_turns = True
-
-    def _check_values(self) -> None:
-        if self.norm == "speed":
-            self.require_defaults(("slowest_rotor",), 'needs controller.norm = "thrust"')
+    only_with: ClassVar = {("slowest_rotor",): ("norm", "thrust")}
 
     def resolve_force(self, vehicle: Multirotor, gait: Gait) -> Form:
         """The form of the law, whose components of force are checked over the gait."""
@@ -184,11 +176,11 @@ class AttitudeForceController(AttitudeForce, GaitFollowingController, FailureAwa
         """The `force_dimension`, with and without the failed rotor."""
         return min(force_dimension(vehicle, gait, lost) for lost in {None, self.failed_rotor})
 
-    def check_outputs(self, scenario: Any, gait: Gait) -> None:
+    def check_scenario(self, scenario: Any) -> None:
         """Refuse more components of force than the vehicle has, and a pose that it cannot take."""
-        self.check_failed_rotor(scenario.vehicle.rotor_count)
+        super().check_scenario(scenario)
         vehicle, reference = scenario.vehicle.resolve(), scenario.reference
-        dimension = self.resolve_force(vehicle, gait).dimension
+        dimension = self.resolve_force(vehicle, scenario.gait.plan(vehicle)).dimension
         self._check_scaling(vehicle, dimension)
         check_decoupler(scenario, self.decoupler)
         if reference.turns:

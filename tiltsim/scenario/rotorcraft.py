@@ -67,7 +67,6 @@ class AnyVehicleTable(Table, ABC):
     table_name = "vehicle"
     is_planar: ClassVar[bool] = False  # moves on a plane, without gravity, air or ground
     has_actuators: ClassVar[bool] = False  # which may lag, have limits and fail
-    any_tilts: ClassVar[bool] = False  # a gait has the tilts of the vehicle's file
 
     model: str
     if TYPE_CHECKING:
@@ -264,8 +263,6 @@ class MultirotorTable(RotorcraftTable):
     """Any number of rotors, each anywhere, fixed or on a hinge, described by an MJCF file alone."""
 
     model_config = example(model="multirotor", mjcf="mjcf/hexarotor.xml")
-
-    any_tilts = True
 
     model: Literal["multirotor"] = required(
         "2 to 16 rotors at any places, with any thrust axes, fixed or tilted about hinges of any "

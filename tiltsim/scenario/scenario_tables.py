@@ -4,7 +4,7 @@ from functools import reduce
 from operator import or_
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
-from pydantic import Field, PrivateAttr
+from pydantic import Field, PrivateAttr, model_validator
 
 from tiltsim.errors import InputError
 from tiltsim.models.rotor_table import Multirotor
@@ -28,7 +28,7 @@ from tiltsim.scenario.simulation_table import (
     AutopilotTable,
     InitialTable,
     SimulationTable,
-    WithAutopilot,
+    with_controller,
 )
 from tiltsim.scenario.surroundings import (
     Acceleration,
@@ -40,7 +40,7 @@ from tiltsim.scenario.surroundings import (
     SensorTable,
     Torque,
 )
-from tiltsim.scenario.table import Many, default
+from tiltsim.scenario.table import Many, Table, default
 from tiltsim.scenario.time_table import TimeTable
 from tiltsim.scenario.vehicle import ModelErrorTable, VehicleTable, VehicleUnion
 from tiltsim_controllers.vehicle.parameters import Vehicle
@@ -62,7 +62,7 @@ DESCRIPTIVE: Final = ("title", "source", "without", "ours", "claim", "expect")
 """Keys that describe and judge a flight, and change nothing in it."""
 
 
-class ScenarioTables(WithAutopilot):
+class ScenarioTables(Table):
     """One flight, fully specified; `tiltsim.scenario.scenario.Scenario` adds the checks."""
 
     title: str = default("", "one line about the flight", "My first flight")
@@ -114,6 +114,7 @@ class ScenarioTables(WithAutopilot):
     )
     claim: dict[ClaimName, ClaimTable] = default({}, "statements of the source")
 
+    _with_controller = model_validator(mode="before")(with_controller)
     _address: str = PrivateAttr("")
     _own: dict[str, Any] = PrivateAttr({})  # parts given in Python, by name
     _trusted: bool = PrivateAttr(False)  # see `tiltsim.scenario.own_parts`

@@ -3,9 +3,9 @@
 import re
 from collections.abc import Mapping
 from itertools import pairwise
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Any, ClassVar, Final, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from tiltsim.scenario.messages import InvalidValueError
 from tiltsim.scenario.table import (
@@ -45,6 +45,10 @@ class SimulationTable(Table):
 
     model_config = example(duration=20.0, plant="thesis")
     table_name = "simulation"
+    only_with: ClassVar = {
+        ("precision",): ("engine", "jax"),
+        ("batch_functions",): ("plant", "thesis", "rigid_body"),
+    }
 
     duration: Positive = default(40.0, "length of the flight [s]")
     timestep: Annotated[float, Field(ge=1e-6, le=0.1)] = default(
@@ -242,12 +246,12 @@ class AutopilotTable(Table):
         return 1.0 / self.rate
 
 
-def with_controller(document: Mapping[str, Any]) -> Mapping[str, Any]:
+def with_controller(document: Any) -> Any:
     """A scenario's document, with the controller and the control period of its autopilot.
 
     Raises `InvalidValueError` if it has another controller as well.
     """
-    table = document.get("autopilot")
+    table = document.get("autopilot") if isinstance(document, Mapping) else None
     if not isinstance(table, Mapping):
         return document
     controller = document.get("controller", CONTROLLER)
@@ -269,12 +273,3 @@ def with_controller(document: Mapping[str, Any]) -> Mapping[str, Any]:
             )
         changed["simulation"] = {"timestep": step, **simulation, "control_timestep": step}
     return changed
-
-
-class WithAutopilot(Table):
-    """A document in which an autopilot may take the controller's place."""
-
-    @model_validator(mode="before")
-    @classmethod
-    def _with_controller(cls, value: Any) -> Any:
-        return with_controller(value) if isinstance(value, Mapping) else value

@@ -1,6 +1,6 @@
 """Base class and number types of the tables of a scenario file."""
 
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from operator import attrgetter
 from typing import Annotated, Any, ClassVar, Self
@@ -16,7 +16,7 @@ from pydantic import (
 )
 
 from tiltsim.errors import InputError
-from tiltsim.scenario.messages import InvalidValueError, missing_keys, one_line_message
+from tiltsim.scenario.messages import InvalidValueError, missing_keys, one_line_message, show
 from tiltsim.system.text import short_repr, valid_unicode
 from tiltsim_controllers.laws.keys import ZEROS as ZEROS
 from tiltsim_controllers.laws.keys import Angle as Angle
@@ -59,6 +59,8 @@ class Table(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
     table_name: ClassVar[str] = ""  # before its keys in messages; empty for the whole document
+    only_with: ClassVar[Mapping[tuple[str, ...], tuple[Any, ...]]] = {}
+    """Keys that have an effect only with another key's values: its name, then the values."""
 
     @field_validator("*")
     @classmethod
@@ -71,6 +73,10 @@ class Table(BaseModel):
 
     @model_validator(mode="after")
     def _check_table(self) -> Self:
+        for keys, (other, *values) in self.only_with.items():
+            if getattr(self, other) not in values:
+                allowed = " or ".join(map(show, values))
+                self.require_defaults(keys, f"needs {self.table_name}.{other} = {allowed}")
         self._check_values()
         return self
 

@@ -19,6 +19,8 @@ from tiltsim_controllers.mathematics.moving import (
 TINY = 1e-24
 LEAST_PUSH: Final = 0.25
 """Acceleration of the feedback over the one in hover where nothing is spare."""
+STRAIGHT: Final = 0.5, 4.0
+"""Acceleration of the feedback straight up over the spare lift, and straight down, m/s^2."""
 UNALIGNED: Final = 0.1, 0.3
 """rad, the errors up to which an attitude is aligned, and from which it is not at all."""
 
@@ -125,8 +127,9 @@ def demanded(error: Moving, jerk_error: Any, ahead: Moving, frame: Frame, p: Any
         return 2.0 * damping * bandwidth * (speed * error[axes] + slope[axes])
 
     # Side force alone is faster over a short way than to lean, push and lean back.
-    way = value_of(error)[:2]
-    leans = xp.clip(xp.sqrt(way @ way + TINY) / p.near - 1.0, 0.0, 1.0)
+    way, height = value_of(error)[:2], abs(value_of(error)[2])
+    distance = xp.sqrt(way @ way + TINY)
+    leans = xp.clip(distance / p.near - 1.0, 0.0, 1.0)
     push = p.direct + leans * (p.acceleration - p.direct)
     # Reference and disturbance leave a part of the push across, and the feedback a share of it.
     rest = value_of(ahead - frame.force)
@@ -134,13 +137,18 @@ def demanded(error: Moving, jerk_error: Any, ahead: Moving, frame: Frame, p: Any
     push = push * xp.clip(spare / _across(frame.gravity, p), LEAST_PUSH, 1.0)
     delay = p.reversal + leans * (p.lean_time - p.reversal)
     across = feedback(slice(0, 2), p.position, p.damping, push, delay)
-    upward = feedback(slice(2, 3), p.rise, p.rise_damping, p.descent, p.reversal)
+    # Straight up or down, no lean needs the lift.
+    straight = xp.clip(1.0 - distance / (height + TINY), 0.0, 1.0)
+    spare = STRAIGHT[0] * (p.greatest - frame.gravity)
+    ascent = p.ascent + straight * xp.maximum(spare - p.ascent, 0.0)
+    descent = p.descent + straight * (STRAIGHT[1] - p.descent)
+    upward = feedback(slice(2, 3), p.rise, p.rise_damping, descent, p.reversal)
     # A motion away has to stop before any way back begins; more push stops it, as far as there is
     # time to lean back.
-    apart = way @ value_of(slope)[:2] / xp.sqrt(way @ way + TINY) - 0.5 * p.lean_time * push
+    apart = way @ value_of(slope)[:2] / distance - 0.5 * p.lean_time * push
     stopping = xp.clip(2.0 * p.damping * p.position * apart, 0.0, push)
     side = _within(across, push + stopping)
-    rise = _clipped(upward[0], -p.descent, p.ascent)
+    rise = _clipped(upward[0], -descent, ascent)
     target = ahead + stacked(side[0], side[1], rise) - frame.force
     lift = _clipped(target[2] + frame.gravity, 0.2 * frame.gravity, p.greatest)
     # No more side force than leaves the lift, and no lean beyond 60 degrees.

@@ -33,16 +33,14 @@ from tiltsim_controllers.laws.allocation import RotorRange
 from tiltsim_controllers.laws.feedback import DECOUPLERS
 from tiltsim_controllers.laws.gains import GAIN_SETS, Poles, gains_from_poles
 from tiltsim_controllers.laws.gait_feedforward import multirotor_law_of
-from tiltsim_controllers.laws.multirotor import independence
-from tiltsim_controllers.laws.multirotor_steps import (
-    EULER_ANGLES,
-    FeedforwardTerms,
-    Form,
+from tiltsim_controllers.laws.multirotor import (
     Tracking,
+    independence,
     rotation_control,
     side_control,
     turned,
 )
+from tiltsim_controllers.laws.multirotor_keys import EULER_ANGLES, FeedforwardTerms, Form
 from tiltsim_controllers.laws.observed import Failure
 from tiltsim_controllers.laws.supervisor import Supervisor
 from tiltsim_controllers.mathematics.attitude import attitude_error, rotation_matrix

@@ -128,7 +128,7 @@ def test_a_law_feels_contacts_and_the_swing_on_both_engines(tmp_path):
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"payload.rigid": True, "payload.swing": 0.0}, "a rigid load does not swing"),
+        ({"payload.rigid": True, "payload.swing": 0.0}, "needs payload.rigid = false"),
         ({"controller": {"law": "lqr"}}, "choose full_pose, vectoring"),
         ({"controller": {"law": "attitude_force"}}, "the attitude_force law does not follow"),
         ({"payload.swing_damping": 1.5}, "payload.swing_damping = 1.5"),

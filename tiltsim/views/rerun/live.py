@@ -1,8 +1,6 @@
-"""Recording a flight while it is simulated: streamed to a viewer, or by a separate process."""
+"""A flight in a viewer while it is simulated."""
 
-import gc
 import sys
-from pathlib import Path
 from queue import Empty, SimpleQueue
 from threading import Event, Thread
 from typing import Final, Self
@@ -14,9 +12,8 @@ from tiltsim.flight.flight import Flight
 from tiltsim.flight.metrics import End
 from tiltsim.laws.assembling import assemble
 from tiltsim.scenario.scenario import Scenario
-from tiltsim.system.processes import ProcessDiedError, answer, begin, give
 from tiltsim.system.text import printable
-from tiltsim.views.rerun import require_rerun, require_viewer
+from tiltsim.views.rerun import require_viewer
 from tiltsim.views.rerun.viewer import attach_viewer
 from tiltsim_controllers.mathematics.scalar import Floats
 
@@ -104,72 +101,3 @@ def _abandon_connection() -> None:
 
     rr.unregister_shutdown()
     sys.stderr.write("tiltsim: the viewer does not respond; the live view is incomplete\n")
-
-
-class RecordingProcess:
-    """Prepares a recording during the simulation and writes it while other files are written.
-
-    Importing Rerun and logging a vehicle take most of a second, which in a separate process does
-    not slow the simulation down. Use it as a context manager: call `start` after the flight and
-    `finish` after all other work.
-
-    Raises:
-        InputError: If the environment switches Rerun off.
-    """
-
-    def __init__(self, scenario: Scenario) -> None:
-        require_rerun()
-        self._process, self._connection = begin(_Writer())
-        self._work: tuple[Flight, Path] | None = None
-        give(self._connection, scenario)
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_error: object) -> None:
-        if self._work is None:
-            self._process.kill()
-        else:  # its answer is not needed, but the file is
-            self._answers()
-        self._connection.close()
-        self._process.join()
-
-    def start(self, flight: Flight, path: Path) -> None:
-        """Start writing the flight to a file."""
-        flight.columns  # noqa: B018  computed here, where the code is already compiled
-        self._work = give(self._connection, (flight, path))
-
-    def finish(self) -> None:
-        """Wait until the file of `start` is written.
-
-        Raises:
-            InputError: If the file cannot be written.
-        """
-        assert self._work is not None
-        (flight, path), errors = self._work, self._answers()
-        self._work = None
-        for error in errors:
-            if not isinstance(error, ProcessDiedError):
-                raise error
-        if errors:  # the process was killed
-            from tiltsim.views.rerun.recording import save_recording
-
-            save_recording([flight], path)
-
-    def _answers(self) -> list[BaseException]:
-        """The errors of preparing and writing in the process."""
-        found = [answer(self._connection, self._process).exception() for _ in range(2)]
-        return [error for error in found if error is not None]
-
-
-class _Writer:
-    """The work of the process: it is called with the scenario, then with flight and path."""
-
-    def __call__(self, item: Scenario | tuple[Flight, Path]) -> None:
-        gc.disable()  # the process is too short-lived for garbage collection to pay off
-        from tiltsim.views.rerun.recording import RecordingFile
-
-        if isinstance(item, Scenario):
-            self._file = RecordingFile([assemble(item, recorded=True)])
-        else:
-            self._file.save([item[0]], item[1])
