@@ -172,8 +172,8 @@ def test_lag_is_found_from_commands():
 def test_errors_in_logs_of_random_vehicles_are_as_large_as_their_deviations():
     """The squares of each parameter's errors in 40 logs are within their 95 % band.
 
-    A deviation that is wrong by 22 % leaves it, as many errors beyond two deviations would show
-    in 100 logs; and here also one that is too large.
+    A deviation that is 22 % too small leaves it, which would also put more than ten of 100 logs
+    beyond two deviations; and one that is 22 % too large.
     """
     logs, errors, chi2, outside = 40, [], [], 0
     for seed in range(logs):
