@@ -37,9 +37,9 @@ def pytest_collection(session):
 
 
 def pytest_collection_finish():
-    """From here on, cycles are searched for again, among what is new and not quite as often."""
+    """From here on, cycles are searched for again, among what is new and not nearly as often."""
     gc.freeze()
-    gc.set_threshold(20_000, 20, 20)
+    gc.set_threshold(200_000, 20, 20)
     gc.enable()
 
 

@@ -171,7 +171,7 @@ def _singularity_report(vehicle: Vehicle, roll: float, pitch: float) -> dict[str
         published_determinant,
         published_singular_curve,
     )
-    from tiltsim_controllers.laws.switching import PUBLISHED_ZONE
+    from tiltsim_controllers.laws.quadrotor import PUBLISHED_ZONE
 
     hover = vehicle.mass * vehicle.gravity
     curve_roll, curve_pitch = published_singular_curve()
