@@ -153,13 +153,13 @@ def swept(vector: Moving, omega: Any, omega_rate: Any) -> Moving:
     return Moving(rate, second + cross(omega, vector.rate), 0.0)
 
 
-NONE: Final = 0.0
+NO_DECOUPLER: Final = 0.0
 CONVENTIONAL: Final = 1.0
 MODIFIED: Final = 2.0
 EXACT: Final = 3.0
 
 DECOUPLERS: Final = {
-    "none": NONE,
+    "none": NO_DECOUPLER,
     "conventional": CONVENTIONAL,
     "modified": MODIFIED,
     "exact": EXACT,
