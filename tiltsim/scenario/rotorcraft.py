@@ -97,9 +97,9 @@ class AnyVehicleTable(Table, ABC):
         return (1.0,) * self.rotor_count
 
     @property
-    @abstractmethod
     def rotor_range(self) -> tuple[float | None, float | None]:
         """Smallest and largest speed (rad/s) of a rotor along its spin; None without limit."""
+        return 0.0, None  # thrusts push and cannot pull
 
     def refusals(self, _scenario: Any) -> Refusals:
         """Contradictions to a scenario of this vehicle: keys, reasons, and values not their own."""
@@ -110,11 +110,6 @@ class PlanarTable(AnyVehicleTable, ABC):
     """A vehicle that moves in the plane of x and y, whose laws control these two."""
 
     is_planar = True
-
-    @property
-    def rotor_range(self) -> tuple[float | None, float | None]:
-        """Thrusts push and cannot pull."""
-        return 0.0, None
 
     def refusals(self, scenario: Any) -> Refusals:
         """Motion out of the plane, references of yaw, and gaits that the law does not follow."""
