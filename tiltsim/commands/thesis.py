@@ -299,8 +299,7 @@ def run_report(
         from tiltsim.report.claim_rows import count
         from tiltsim.report.content import failure_text
         from tiltsim.report.flights import store
-        from tiltsim.report.made import Made
-        from tiltsim.report.making import make_report
+        from tiltsim.report.making import Made, make_report
         from tiltsim.report.pages import errors_page, page, rows_csv, rows_json
         from tiltsim.report.pages import markdown as markdown_of
         from tiltsim.scenario.own_parts import VARIABLE
