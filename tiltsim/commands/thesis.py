@@ -169,7 +169,7 @@ def _singularity_report(vehicle: Vehicle, roll: float, pitch: float) -> dict[str
         published_determinant,
         published_singular_curve,
     )
-    from tiltsim_controllers.laws.switching import PUBLISHED_ZONE
+    from tiltsim_controllers.laws.quadrotor import PUBLISHED_ZONE
 
     hover = vehicle.mass * vehicle.gravity
     curve_roll, curve_pitch = published_singular_curve()
@@ -297,8 +297,7 @@ def run_report(
         from tiltsim.report.claim_rows import count
         from tiltsim.report.content import failure_text
         from tiltsim.report.flights import store
-        from tiltsim.report.made import Made
-        from tiltsim.report.making import make_report
+        from tiltsim.report.making import Made, make_report
         from tiltsim.report.pages import errors_page, page, rows_csv, rows_json
         from tiltsim.report.pages import markdown as markdown_of
         from tiltsim.scenario.own_parts import VARIABLE
