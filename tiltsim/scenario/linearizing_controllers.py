@@ -29,9 +29,7 @@ from tiltsim_controllers.laws.attitude_altitude import (
 )
 from tiltsim_controllers.laws.full_pose import FullPose, pose_rank
 from tiltsim_controllers.laws.multirotor_keys import RESTORING, AttitudeForce, Form
-from tiltsim_controllers.laws.quadrotor_attitude_altitude import QuadrotorAttitudeAltitude
-from tiltsim_controllers.laws.switching import Switching
-from tiltsim_controllers.laws.yaw_position import YawPosition
+from tiltsim_controllers.laws.quadrotor import QuadrotorAttitudeAltitude, Switching, YawPosition
 from tiltsim_controllers.mathematics.scalar import Floats, Triple
 from tiltsim_controllers.vehicle.parameters import Vehicle
 from tiltsim_controllers.vehicle.rotors import force_and_torque

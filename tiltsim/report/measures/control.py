@@ -20,9 +20,9 @@ from tiltsim_controllers.analysis.singularity import (
     world_up,
 )
 from tiltsim_controllers.analysis.stability import is_hurwitz, third_order_loop
-from tiltsim_controllers.laws import quadrotor_attitude_altitude, yaw_position
 from tiltsim_controllers.laws.feedback import conventional_decoupler, modified_decoupler
 from tiltsim_controllers.laws.gains import GAIN_SETS
+from tiltsim_controllers.laws.quadrotor import ATTITUDE_GAINS, POSITION_GAINS
 from tiltsim_controllers.mathematics.attitude import euler_rates
 from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.vehicle.cross import torque_free_force
@@ -52,7 +52,7 @@ def exact_on_published_curve() -> Floats:
 
 def rightmost_root() -> complex:
     """The root with the largest real part of ch. 2's position loop."""
-    roots = np.roots((1.0, *yaw_position.GAIN_SETS["ch02"].position))
+    roots = np.roots((1.0, *POSITION_GAINS["ch02"].position))
     return complex(roots[np.argmax(roots.real)])
 
 
@@ -73,8 +73,8 @@ def eq_43_as_printed() -> bool:
 
 def quadrotor_gains_are_stable(law: str) -> bool:
     """Whether Appendix B's gains, of position or altitude, and of yaw stabilize their loops."""
-    module = yaw_position if law == "yaw_position" else quadrotor_attitude_altitude
-    return all(is_hurwitz((1.0, *gains)) for gains in module.GAIN_SETS["ch02"])
+    sets = POSITION_GAINS if law == "yaw_position" else ATTITUDE_GAINS
+    return all(is_hurwitz((1.0, *gains)) for gains in sets["ch02"])
 
 
 def attitude_altitude_is_singular() -> bool:

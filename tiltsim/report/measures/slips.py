@@ -18,7 +18,7 @@ from tiltsim_controllers.analysis.published_gaits import DETERMINANT_CASES
 from tiltsim_controllers.analysis.singularity import force_matrix, residuals, torque_matrix
 from tiltsim_controllers.analysis.two_color_map import curve_l, grid_roots
 from tiltsim_controllers.laws.gains import GAIN_SETS
-from tiltsim_controllers.laws.yaw_position import GAIN_SETS as QUADROTOR_GAINS
+from tiltsim_controllers.laws.quadrotor import POSITION_GAINS
 from tiltsim_controllers.mathematics.attitude import rotation_matrix
 from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.tilt_car.vehicle import (
@@ -207,7 +207,7 @@ def _derivative_by_yaw(mended: bool) -> float:
 
 def _ch2_gains(mended: bool) -> float:
     """Largest real part above zero of the position loop's roots with Appendix B's gains."""
-    gains = QUADROTOR_GAINS["stable" if mended else "ch02"]
+    gains = POSITION_GAINS["stable" if mended else "ch02"]
     return max(0.0, float(np.roots((1.0, *gains.position)).real.max()))
 
 
