@@ -8,8 +8,7 @@ import pytest
 from PIL import Image
 
 from tests.docs.pages import ROOT, code
-from tiltsim.report.claim import scenario_claims
-from tiltsim.report.claims import registered_claims
+from tiltsim.report.claims import registered_claims, scenario_claims
 from tiltsim.report.findings import ERRORS
 from tiltsim.scenario.library import library_entries
 from tiltsim.scenario.loading import load_scenario
