@@ -370,7 +370,7 @@ POSIX_ONLY = {
 
 GUARDED = {
     "tiltsim.engines.machine_code": {"os.getuid"},
-    "tiltsim.report.made": {"/proc/"},
+    "tiltsim.report.making": {"/proc/"},
     "tiltsim.studies.benchmark": {"/proc/", "resource"},
     "tiltsim.system.files": {"fcntl", "os.O_NOFOLLOW"},
     "tiltsim.system.processes": {

@@ -16,7 +16,7 @@ from tiltsim_controllers.laws.attitude_altitude import EXACT_DECOUPLING
 from tiltsim_controllers.laws.feedback import EXACT
 from tiltsim_controllers.laws.gains import GAIN_SETS, IntegralGains
 from tiltsim_controllers.laws.gait_feedforward import multirotor_law_of
-from tiltsim_controllers.laws.multirotor_steps import ROTATION, FeedforwardTerms, Form, Parameters
+from tiltsim_controllers.laws.multirotor_keys import ROTATION, FeedforwardTerms, Form, Parameters
 from tiltsim_controllers.laws.observed import Failure
 from tiltsim_controllers.laws.supervised_vehicles import Watched
 from tiltsim_controllers.laws.supervisor import Supervisor

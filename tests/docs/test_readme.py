@@ -7,8 +7,7 @@ import re
 from PIL import Image
 
 from tests.docs.pages import ROOT, code
-from tiltsim.report.claim import scenario_claims
-from tiltsim.report.claims import registered_claims
+from tiltsim.report.claims import registered_claims, scenario_claims
 from tiltsim.report.findings import ERRORS
 from tiltsim.scenario.loading import load_scenario
 

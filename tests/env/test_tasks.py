@@ -18,7 +18,7 @@ from tiltsim.env.environment import TiltrotorEnv
 from tiltsim.env.task import hover_reward
 from tiltsim.env.tasks import EPISODE_STEPS, TASKS
 from tiltsim.errors import InputError
-from tiltsim.plants.command import BuiltInController
+from tiltsim.plants.built_in import BuiltInController
 
 gymnasium = pytest.importorskip("gymnasium")
 

@@ -8,7 +8,7 @@ import pytest
 import tiltsim
 from tests.refusals import refusal
 from tiltsim.scenario.controller_table import FeedforwardTerm
-from tiltsim_controllers.laws.multirotor_steps import FeedforwardTerms
+from tiltsim_controllers.laws.multirotor_keys import FeedforwardTerms
 
 SCENARIO = "beyond/gait_feedforward#t2"
 

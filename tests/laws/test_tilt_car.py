@@ -21,7 +21,7 @@ from tiltsim.views.replay import thrust_sites, visible_model
 from tiltsim.views.rerun.recording import save_recording
 from tiltsim.views.rerun.scene import ground_height
 from tiltsim_controllers.tilt_car.cycles import Swing, limit_cycle, lyapunov, lyapunov_bound, orbit
-from tiltsim_controllers.tilt_car.planned_direction import GAIN_SETS
+from tiltsim_controllers.tilt_car.laws import PLANNED_GAINS
 from tiltsim_controllers.tilt_car.vehicle import THESIS_CAR, acceleration, counter_yaw_per_tilt
 
 CIRCLE = {"type": "circle", "position": [10.0, 0.0, 0.0], "radius": -10.0, "angular_frequency": 1.0}
@@ -173,7 +173,7 @@ def cycle(flight):
 
 def test_the_limit_cycle_on_the_thesis_plant_is_the_maps_fixed_point():
     flight = fly("ch11_penguin/straight_line#large", "thesis")
-    swing = Swing(pi / 6, 1.0, GAIN_SETS["ch11"])
+    swing = Swing(pi / 6, 1.0, PLANNED_GAINS["ch11"])
     fixed = limit_cycle(swing)
     error, rate = cycle(flight)
     np.testing.assert_allclose(error, fixed[0], rtol=1e-5)
@@ -189,7 +189,7 @@ def test_the_limit_cycle_on_the_thesis_plant_is_the_maps_fixed_point():
 
 def test_mujocos_servo_moves_the_limit_cycle_a_little():
     flight = fly("ch11_penguin/straight_line#large", "mujoco")
-    fixed = limit_cycle(Swing(pi / 6, 1.0, GAIN_SETS["ch11"]))
+    fixed = limit_cycle(Swing(pi / 6, 1.0, PLANNED_GAINS["ch11"]))
     error, rate = cycle(flight)
     np.testing.assert_allclose(error, fixed[0], rtol=0.03)
     np.testing.assert_allclose(rate, fixed[1], rtol=0.01)
@@ -206,7 +206,7 @@ def test_mujocos_servo_moves_the_limit_cycle_a_little():
 
 @on_both_plants
 def test_proposition_7_bounds_every_flight(plant):
-    bound = lyapunov_bound(Swing(pi / 6, 1.0, GAIN_SETS["ch11"]), 21)
+    bound = lyapunov_bound(Swing(pi / 6, 1.0, PLANNED_GAINS["ch11"]), 21)
     flight = fly("ch11_penguin/straight_line#large", plant)
     assert flight.metrics()["max_lyapunov"] < bound.critical < bound.published
 

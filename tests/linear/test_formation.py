@@ -126,7 +126,7 @@ def test_an_object_that_its_cable_alone_does_not_hold_is_refused(objects, reason
 def test_a_push_returns_to_its_force_as_its_matrix_says():
     """A second after the integral of the force was moved, but for the delay of the reading."""
     found = equilibrium_of(tiltsim.load_scenario("interaction/push#hold"))
-    names, motion, state = found.names, found.motion, found.root.state
+    names, motion, state = found.minimal.names, found.motion, found.root.state
     offset = np.zeros(motion.coordinates.size)
     offset[motion.coordinates.names.index("push_integral")] = 0.05
     start = motion.coordinates.moved(state, offset)
@@ -134,7 +134,7 @@ def test_a_push_returns_to_its_force_as_its_matrix_says():
     after = motion.coordinates.between(*ends)[found.kept]
     values, vectors = np.linalg.eig(found.matrix)
     moving = vectors @ np.diag(np.exp(values)) @ np.linalg.pinv(vectors)
-    expected = (moving @ (found.rows @ offset)).real
+    expected = (moving @ (found.minimal.rows @ offset)).real
     for name in ("push_integral", "filtered_push_force", "y"):
         index = names.index(name)
         assert after[index] == pytest.approx(expected[index], rel=1e-2), name

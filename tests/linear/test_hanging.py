@@ -111,15 +111,15 @@ def test_a_load_below_a_sampled_vehicle_returns_as_its_matrix_says():
     """Half a second later, but for a small motion of the cable's stretch, which it leaves out."""
     found = equilibrium_of(tiltsim.load_scenario("interaction/carry#held"))
     assert found.root.residual < 1e-9
-    names, motion, state = found.names, found.motion, found.root.state
+    names, motion, state = found.minimal.names, found.motion, found.root.state
     assert {"swing_shift_x", "state_modeled_rate_x"} < {*names}
     offset, samples = np.zeros(len(names)), 50
     for name, value in {"swing_x": 1e-4, "y": 1e-4, "rotor_speed_2": 5e-3}.items():
         offset[names.index(name)] = value
-    moved = motion.coordinates.moved(state, found.columns @ offset)
+    moved = motion.coordinates.moved(state, found.minimal.columns @ offset)
     after = motion.coordinates.between(state, motion.flown(0, moved, samples * found.steps))
     expected = np.linalg.matrix_power(found.matrix, samples) @ offset
-    flown = dict(zip(names, found.rows @ after, strict=True))
+    flown = dict(zip(names, found.minimal.rows @ after, strict=True))
     for name in ("x", "y", "vx", "vy", "swing_x", "swing_y", "swing_rate_x"):
         value = expected[names.index(name)]
         assert flown[name] == pytest.approx(value, rel=1e-3), name

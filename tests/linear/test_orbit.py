@@ -19,7 +19,7 @@ from tiltsim.linear.mujoco_motion import make_motion
 from tiltsim.linear.newton import derivative_at
 from tiltsim.linear.stability import Point, crossings, stability_at, sweep_stability
 from tiltsim_controllers.tilt_car.cycles import Swing, limit_cycle, multipliers
-from tiltsim_controllers.tilt_car.planned_direction import GAIN_SETS
+from tiltsim_controllers.tilt_car.laws import PLANNED_GAINS
 
 QUICK = {"simulation.engine": "python", "simulation.duration": 1.0}
 """A short flight that needs nothing compiled."""
@@ -69,7 +69,7 @@ def test_modes_lost_in_the_rounding_of_a_period_are_not_listed():
     orbit = SimpleNamespace(
         matrix=np.diag([0.5, -1e-12]),
         timestep=2.0,
-        names=("z", "alpha_1"),
+        minimal=SimpleNamespace(names=("z", "alpha_1")),
         is_orbit=True,
         root=SimpleNamespace(residual=0.0),
         motion=SimpleNamespace(prefixes=()),
@@ -159,7 +159,7 @@ def test_the_penguin_gait_agrees_with_the_map_of_half_a_period():
     )
     flights = []
     found = tiltsim.stability(scenario, progress=flights.append)
-    swing = Swing(half_angle=np.pi / 6.0, half_period=1.0, gains=GAIN_SETS["ch11"])
+    swing = Swing(half_angle=np.pi / 6.0, half_period=1.0, gains=PLANNED_GAINS["ch11"])
     half = multipliers(swing, limit_cycle(swing))
     assert found.period == pytest.approx(2.0)
     assert distance(np.sqrt(found.multipliers), half) < 2e-3
@@ -215,7 +215,7 @@ def test_an_orbit_is_sought_near_the_neighboring_orbit_first(continuous):
         gait("trot_continuous"), near=continuous.root.state, progress=flights.append
     )
     assert near.root.state == pytest.approx(continuous.root.state, abs=1e-9)
-    assert len(flights) < 6 * len(continuous.names) + 10  # periods in which it would settle
+    assert len(flights) < 6 * len(continuous.minimal.names) + 10  # periods in which it would settle
 
 
 def test_an_orbit_of_too_many_steps_is_refused_at_once():

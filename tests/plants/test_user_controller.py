@@ -19,7 +19,8 @@ from tiltsim.closed_loop.userdata import evaluation_time
 from tiltsim.errors import InputError
 from tiltsim.flight.reading import load_flight
 from tiltsim.laws.assembling import assemble, loop_of
-from tiltsim.plants.command import BuiltInController, Command, check_command
+from tiltsim.plants.built_in import BuiltInController
+from tiltsim.plants.command import Command, check_command
 from tiltsim.plants.commanded_plant import CommandedPlant
 from tiltsim.studies.multirotor_analysis import fleet_file
 from tiltsim.vehicles.rotorcraft import CROSS

@@ -303,17 +303,6 @@ def test_differences_are_named(points_of, text, difference):
     assert bool(found) == bool(difference)
 
 
-def test_keys_that_came_after_a_definition_was_written_have_their_defaults(points_of):
-    now = points_of(PERIODS).definition
-    old = SweepDefinition.from_json(now.to_json())
-    del old.base["sensors"], old.base["simulation"]["control_latency"], old.sweep["keep_flights"]
-    assert old.difference(now) == ""
-    changed = points_of(PERIODS + "[set]\nsimulation.timestep = 0.002").definition
-    assert "scenario.simulation.timestep" in old.difference(changed)
-    old.base["no_longer_known"] = 1
-    assert "no_longer_known was 1" in old.difference(now)
-
-
 @pytest.mark.parametrize("count", [200_000, 20_000])
 def test_huge_axes_are_refused_or_tried_in_a_few_places(points_of, count, monkeypatch):
     axis = PERIODS.replace("5", str(count))

@@ -29,7 +29,6 @@ from tiltsim.sweeps.dataset import load_results, open_sweep_folder
 from tiltsim.sweeps.loading import load_sweep
 from tiltsim.sweeps.points import SweepPoints
 from tiltsim.sweeps.running import run_sweep
-from tiltsim.system.files import digest
 from tiltsim.system.processes import ProcessDiedError
 from tiltsim.views.figures.sweep import sweep_figure
 
@@ -385,20 +384,15 @@ def test_an_unreadable_definition_is_refused(tmp_path):
     run_sweep(definition, tmp_path / "out")
     file = tmp_path / "out" / "sweep.json"
     whole = json.loads(file.read_text())
-    old = {key: value for key, value in whole.items() if key not in {"sha256", "files"}}
     for text, words in (
         ("{}", "keys are missing"),
         ("junk", "not the definition"),
         ("[" * 100_000, "keys are missing"),
         (json.dumps({**whole, "address": "other"}), "differs from its checksum"),
-        (json.dumps({**old, "versions": 3}), "versions = 3"),
-        (json.dumps({**old, "files": ["law.py"]}), "files = "),
-        (json.dumps({**old, "sweep": {**old["sweep"], "axes": []}}), "axes"),
+        (json.dumps({**whole, "versions": 3}), "differs from its checksum"),
+        (json.dumps({**whole, "sha256": None}), "differs from its checksum"),
     ):
         file.write_text(text)
         with pytest.raises(InputError, match=words) as caught:
             load_results(tmp_path / "out")
         assert "\n" not in str(caught.value)
-    for checksum in ({}, {"sha256": digest(json.dumps(old).encode())}):
-        file.write_text(json.dumps({**checksum, **old}))  # as earlier versions wrote it
-        assert len(load_results(tmp_path / "out")) == 12

@@ -182,7 +182,8 @@ def _of_scenario(address: str, options: GaitOptions) -> SelectedGait:
     vehicle, at = scenario.vehicle.resolve(), scenario.address
     if not isinstance(vehicle, Vehicle | Multirotor):
         raise InputError(
-            f"{at}: vehicle.model = {scenario.vehicle.model!r}: does not have a gait of rotors"
+            f"{at}: vehicle.model = {scenario.vehicle.model!r}: does not have a gait of four tilt "
+            "angles"
         )
     gait = replace(scenario.gait.plan(vehicle), source=scenario.source)
     if isinstance(vehicle, Multirotor):

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from tiltsim.flight.flight import Flight
     from tiltsim.flight.metrics import Verdict
     from tiltsim.scenario.scenario import Scenario
-    from tiltsim.views.rerun.live import LiveStream
+    from tiltsim.views.rerun.viewer import LiveStream
     from tiltsim_controllers.mathematics.scalar import Floats
 
 GREATEST_DEFLECTION: Final = 0.01
@@ -79,22 +79,20 @@ def run(
     if out is not None:
         prepare_flight_folder(out, loaded)
     if rerun is not None:
+        from tiltsim.views.rerun import require_rerun
+
+        require_rerun()
         prepare_file("--rerun", rerun, (".rrd",))
     for warning in () if quiet else _warnings(loaded):
         warn(warning)
-    with ExitStack() as stack:
-        if rerun is not None:
-            from tiltsim.views.rerun.live import RecordingProcess
-
-            recording = stack.enter_context(RecordingProcess(loaded))
-        flight = fly(loaded, live=live, connect=connect, quiet=quiet)
-        stack.enter_context(defer_interrupts())
-        if rerun is not None:
-            recording.start(flight, rerun)
+    flight = fly(loaded, live=live, connect=connect, quiet=quiet)
+    with defer_interrupts():
         if out is not None:
             flight.save(out)
         if rerun is not None:
-            recording.finish()
+            from tiltsim.views.rerun.recording import save_recording
+
+            save_recording([flight], rerun)
     if flight.end.kind == "interrupted":
         kept = f"; the flight so far is in {out}" if out is not None else ""
         print_line(f"tiltsim: interrupted at t = {flight.end.time:.3f} s{kept}", error=True)
@@ -190,7 +188,7 @@ def fly(scenario: Scenario, *, live: bool, connect: str | None, quiet: bool) -> 
     with ExitStack() as stack:
         stream: LiveStream | None = None
         if live or connect is not None:
-            from tiltsim.views.rerun.live import LiveStream
+            from tiltsim.views.rerun.viewer import LiveStream
 
             stream = stack.enter_context(LiveStream(scenario, connect))
         progress = stack.enter_context(show_progress(shown=not quiet))

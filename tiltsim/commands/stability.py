@@ -85,7 +85,6 @@ def run_stability(
             by ratio
         margins: at rest: gain, phase, delay and disk margins of the loop broken at one place
     """
-    figure.check()
     scenarios = load_scenarios([scenario, *more], overrides, trust)
     if sweep is not None and margins:
         raise InputError("--margins: not with --sweep, which has many points")
@@ -123,6 +122,8 @@ def run_stability(
 
 def parse_sweep(text: str, scenarios: Sequence[Scenario]) -> tuple[str, list[float]]:
     """The key and the values of ``--sweep``."""
+    from tiltsim.scenario.documents import value_at
+
     name, _, span = text.partition("=")
     key = SHORT_KEYS.get(name, name)
     parts = span.split(":") if span else []
@@ -132,9 +133,7 @@ def parse_sweep(text: str, scenarios: Sequence[Scenario]) -> tuple[str, list[flo
     except ValueError:
         raise InputError(f"--sweep {text}: write KEY=FROM:TO or KEY=FROM:TO:POINTS") from None
     if not parts:
-        value: Any = scenarios[0].model_dump()
-        for part in key.split("."):
-            value = value.get(part) if isinstance(value, dict) else None
+        value = value_at(scenarios[0].model_dump(), key)
         if not isinstance(value, float) or value == 0.0:
             raise InputError(
                 f"--sweep {text}: {key} has no value to start from; write {name}=FROM:TO"
@@ -271,7 +270,6 @@ def run_attraction(
         coarse (N): cells across before cells at the boundary are divided (default: %(default)s)
         refine (N): how often these are divided in four (default: %(default)s)
     """
-    figure.check()
     (loaded,) = load_scenarios([scenario], overrides, trust)
 
     from tiltsim.linear.attraction import attraction

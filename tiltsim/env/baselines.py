@@ -13,7 +13,8 @@ import numpy as np
 
 from tiltsim.env.gymnasium import GymnasiumEnv
 from tiltsim.env.tasks import TASKS
-from tiltsim.plants.command import BuiltInController, Command
+from tiltsim.plants.built_in import BuiltInController
+from tiltsim.plants.command import Command
 from tiltsim_controllers.mathematics.scalar import Floats
 
 Policy = Callable[[Any], Floats]  # from the observation to the action, both scaled to -1 .. 1.

@@ -23,7 +23,7 @@ from tiltsim_controllers.gaits.motion import planned_tilts
 from tiltsim_controllers.laws.allocation import RotorRange
 from tiltsim_controllers.laws.gait_feedforward import supervised_gait
 from tiltsim_controllers.laws.keys import number_of
-from tiltsim_controllers.laws.multirotor_steps import INTEGRAL_FIELDS
+from tiltsim_controllers.laws.multirotor_keys import INTEGRAL_FIELDS
 from tiltsim_controllers.laws.observed import Seen, Step
 from tiltsim_controllers.laws.supervisor import HOLD, Supervision
 from tiltsim_controllers.mathematics.records import make_record_type

@@ -29,7 +29,7 @@ from tiltsim_controllers.code.arrays import xp
 from tiltsim_controllers.laws import attitude_altitude, full_pose, gait_feedforward
 from tiltsim_controllers.laws.attitude_altitude import PUBLISHED_DECOUPLING
 from tiltsim_controllers.laws.multirotor import NULL_PART, SIGNALS, independence, present_wrench
-from tiltsim_controllers.laws.multirotor_steps import EULER_ANGLES, Form, Parameters
+from tiltsim_controllers.laws.multirotor_keys import EULER_ANGLES, Form, Parameters
 from tiltsim_controllers.laws.observed import UNHARMED, Seen, Step
 from tiltsim_controllers.laws.supervised_vehicles import (
     SUPERVISION,

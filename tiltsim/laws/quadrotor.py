@@ -17,7 +17,7 @@ from tiltsim.scenario.scenario import FlightPlan
 from tiltsim.vehicles.rotorcraft import EXTRA_COLUMNS
 from tiltsim_controllers.analysis.singularity import normalized_determinant, published_determinant
 from tiltsim_controllers.code.arrays import xp
-from tiltsim_controllers.laws import quadrotor_attitude_altitude, switching, yaw_position
+from tiltsim_controllers.laws import quadrotor
 from tiltsim_controllers.laws.observed import Seen, Step
 from tiltsim_controllers.mathematics.scalar import Floats, Vector
 from tiltsim_controllers.vehicle.body import BODY_FIELDS, PITCH, ROLL
@@ -138,7 +138,7 @@ def _tracked(seen: Seen, p: Any) -> Any:
 
 def _attitude_altitude(seen: Seen, p: Any, knots: Any) -> Step:
     return Step(
-        quadrotor_attitude_altitude.attitude_altitude_inputs(
+        quadrotor.attitude_altitude_inputs(
             seen.time, seen.state, p.vehicle, p.gains, p.reference, knots
         )
     )
@@ -146,14 +146,14 @@ def _attitude_altitude(seen: Seen, p: Any, knots: Any) -> Step:
 
 def _yaw_position(seen: Seen, p: Any, knots: Any) -> Step:
     state = xp.hstack([seen.state[:12], seen.states])
-    inputs = yaw_position.yaw_position_inputs(seen.time, state, p, knots)
+    inputs = quadrotor.yaw_position_inputs(seen.time, state, p, knots)
     return Step(inputs[:4], inputs[4:], _tracked(seen, p))
 
 
 def _switching(seen: Seen, p: Any, knots: Any) -> Step:
     state, reference = xp.hstack([seen.state[:12], seen.states]), p.reference
-    inputs = switching.switching_inputs(seen.time, state, p, knots)
-    inside = switching.in_attitude_zone(state[ROLL], state[PITCH], p.zone)
+    inputs = quadrotor.switching_inputs(seen.time, state, p, knots)
+    inside = quadrotor.in_attitude_zone(state[ROLL], state[PITCH], p.zone)
     demanded = xp.array([reference.roll, reference.pitch, reference.yaw])
     tracked = xp.where(inside, demanded, _tracked(seen, p))
     return Step(inputs[:4], inputs[4:], xp.hstack([tracked, xp.where(inside, 1.0, 0.0)]))
@@ -172,7 +172,7 @@ def _loop(step: Callable[[Seen, Any, Any], Step], record: Any, **options: Any) -
 
 YAW_POSITION: Final = _loop(
     _yaw_position,
-    yaw_position.Parameters,
+    quadrotor.YawPositionParameters,
     states=EXTENSION,
     initial=_extension,
     signals=REFERENCE_COLUMNS[3:],
@@ -188,7 +188,7 @@ YAW_POSITION: Final = _loop(
 
 QUADROTOR_ATTITUDE_ALTITUDE: Final = _loop(
     _attitude_altitude,
-    quadrotor_attitude_altitude.Parameters,
+    quadrotor.AttitudeAltitudeParameters,
     margins=upright_columns,
     follows_position=lambda _scenario: False,
 )
@@ -196,7 +196,7 @@ QUADROTOR_ATTITUDE_ALTITUDE: Final = _loop(
 
 SWITCHING: Final = _loop(
     _switching,
-    switching.Parameters,
+    quadrotor.SwitchingParameters,
     states=EXTENSION,
     initial=_extension,
     signals=(*REFERENCE_COLUMNS[3:], "attitude_zone"),

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from math import ceil
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +36,14 @@ INDEPENDENT: Final = 1e-6  # part of an angle (rad) that no other coordinate det
 
 FLIGHTS: Final = 150  # over a period, that an orbit takes to find
 SAMPLES: Final = 1000  # flown, that a rest point of a sampled controller takes
+
+
+class Minimal(NamedTuple):
+    """Coordinates of a state in which cables are taut, as linear functions of the plant's."""
+
+    names: tuple[str, ...]
+    rows: Floats  # these coordinates by the plant's, shape (these, plant's)
+    columns: Floats  # the plant's by these, shape (plant's, these)
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,39 +96,36 @@ class Equilibrium:
         )
 
     @cached_property
-    def _minimal(self) -> tuple[tuple[str, ...], Floats, Floats]:
-        """Names of the coordinates, their rows by the plant's, and the columns that move them.
+    def minimal(self) -> Minimal:
+        """The coordinates that are analyzed.
 
         Hung objects have the angles of their first cable and their rates, but for angles that
-        further cables determine: of these the most independent ones are taken.
+        further cables determine: the most independent ones are taken.
         """
-        motion, state = self.motion, self.root.state
-        coordinates = motion.coordinates
-        rows = np.eye(coordinates.size)[self.kept]
-        names = [coordinates.names[index] for index in self.kept]
+        motion, coordinates, state = self.motion, self.motion.coordinates, self.root.state
+        names = tuple(coordinates.names[index] for index in self.kept)
+        kept = np.eye(coordinates.size)[self.kept]
         if not motion.hung:
-            return tuple(names), rows, rows.T
-        possible = newton.derivative_at(
+            return Minimal(names, kept, kept.T)
+        # Changes of the state, by changes of any coordinate, that keep the cables taut.
+        taut = newton.derivative_at(
             lambda at: coordinates.between(state, motion.placed(at)), coordinates, state
         )
-        swings = newton.derivative_at(motion.swings, coordinates, state) @ possible
-        moved = rows @ possible
-        further = swings - swings @ np.linalg.pinv(moved) @ moved
-        chosen = independent(further)
-        labels = [name for each in motion.hung for name in each.swings]
-        rows = np.vstack((rows, swings[chosen]))
-        names += [labels[index] for index in chosen]
-        return tuple(names), rows, possible @ np.linalg.pinv(rows @ possible)
+        swings = newton.derivative_at(motion.swings, coordinates, state) @ taut
+        with_kept = kept @ taut
+        alone = swings - swings @ np.linalg.pinv(with_kept) @ with_kept
+        chosen = independent(alone)
+        names += tuple(motion.swing_names[index] for index in chosen)
+        rows = np.vstack((kept, swings[chosen]))
+        return Minimal(names, rows, taut @ np.linalg.pinv(rows @ taut))
 
     @property
     def values(self) -> Floats:
         """The coordinates, of the plant's from level at the origin, shape (coordinates,)."""
         coordinates, state = self.motion.coordinates, self.root.state
-        swings = self.motion.swings(state)
-        labels = [name for each in self.motion.hung for name in each.swings]
-        found = dict(zip(labels, swings, strict=True))
+        found = dict(zip(self.motion.swing_names, self.motion.swings(state), strict=True))
         found |= zip(coordinates.names, coordinates.between(coordinates.level(state), state))
-        return np.array([found[name] for name in self.names])
+        return np.array([found[name] for name in self.minimal.names])
 
     @property
     def corners(self) -> tuple[str, ...]:
@@ -140,25 +145,10 @@ class Equilibrium:
         return np.asarray(passed.reshape(2, -1).any(axis=0))
 
     @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the coordinates kept."""
-        return self._minimal[0]
-
-    @property
     def matrix(self) -> Floats:
         """The linear system: rates by coordinates, or in discrete time the state by the last."""
-        change = self.rows @ self.root.derivative @ self.columns
+        change = self.minimal.rows @ self.root.derivative @ self.minimal.columns
         return change if not self.steps else change + np.eye(len(change))
-
-    @property
-    def rows(self) -> Floats:
-        """The coordinates by the plant's, shape (coordinates, plant's)."""
-        return self._minimal[1]
-
-    @property
-    def columns(self) -> Floats:
-        """The plant's coordinates by these, shape (plant's, coordinates)."""
-        return self._minimal[2]
 
 
 def independent(rows: Floats) -> list[int]:

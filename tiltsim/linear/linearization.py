@@ -164,7 +164,7 @@ def linearization_at(found: Equilibrium) -> Linearization:
     by_input = jacobian(lambda each: map(varied, each), scales).matrix
     observed = derivative_at(lambda at: motion.observed(time, at), coordinates, state)
     feedback = derivative_at(lambda at: motion.commanded(time, at), coordinates, state)
-    names = found.names
+    names, rows, columns = found.minimal
     fields = closed_loop.sample_fields[1:]
 
     def signals(of: tuple[str, ...]) -> tuple[Signal, ...]:
@@ -173,10 +173,10 @@ def linearization_at(found: Equilibrium) -> Linearization:
 
     return Linearization(
         A=found.matrix,
-        B=found.rows @ by_input[:count],
-        C=observed @ found.columns,
+        B=rows @ by_input[:count],
+        C=observed @ columns,
         D=by_input[count:],
-        feedback=feedback @ found.columns,
+        feedback=feedback @ columns,
         states=signals(names),
         inputs=signals(motion.inputs),
         outputs=signals(fields),

@@ -7,11 +7,13 @@ loop's transfer matrix: ``det(I + g exp(-i w tau) L(i w)) = 0`` where one of the
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 from math import atan, inf, isfinite, pi
 from os import PathLike
 from typing import Any, Final
 
 import numpy as np
+from scipy.optimize import linear_sum_assignment
 
 from tiltsim.errors import InputError
 from tiltsim.linear.coordinates import is_of_vehicle
@@ -240,11 +242,8 @@ def _size(value: complex) -> float:
 def _tracked(eigenvalues: Any) -> Any:
     """Eigenvalues over frequency, each column a continuous locus."""
     tracked = eigenvalues.copy()
-    for row in range(1, len(tracked)):
-        left = list(tracked[row])
-        for column, before in enumerate(tracked[row - 1]):
-            nearest = min(range(len(left)), key=lambda i: abs(left[i] - before))
-            tracked[row, column] = left.pop(nearest)
+    for before, here in pairwise(tracked):
+        here[:] = here[linear_sum_assignment(np.abs(before[:, None] - here))[1]]
     return tracked
 
 

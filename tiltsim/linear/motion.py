@@ -21,7 +21,7 @@ from tiltsim.engines.programs import LoopPrograms
 from tiltsim.laws.assembling import assemble
 from tiltsim.linear import coordinates
 from tiltsim.linear.hanging import hung_in
-from tiltsim.plants.plant import EquationsPlant
+from tiltsim.plants.plant import EquationsPlant, Plant
 from tiltsim.scenario.scenario import Scenario
 from tiltsim_controllers.code.arrays import program_of, xp
 from tiltsim_controllers.code.python_source import python_function
@@ -31,7 +31,7 @@ LONG: Final = 1000
 """Steps, from which on a flight is long: worth a thread, and a derivative of fewer evaluations."""
 
 THREADS: Final = os.cpu_count() or 1
-ROWS_PER_THREAD: Final = 4  # flights of a thread between reports of progress
+PLANTS_PER_THREAD: Final = 4  # between reports of progress
 
 RECORDS: Final = "among_state"
 """Beginning of the names of the largest contact force and the time in contact so far."""
@@ -146,8 +146,13 @@ class Motion(ABC):
         """The state with the objects that hang where their cables are as long as they are."""
         return state
 
+    @property
+    def swing_names(self) -> list[str]:
+        """Names of the angles of the cables and their rates."""
+        return [name for each in self.hung for name in each.swings]
+
     def swings(self, state: Floats) -> Floats:
-        """Angles of the cables and their rates, in the order of ``hung``."""
+        """Angles of the cables and their rates, by `swing_names`."""
         return np.zeros(0)
 
     @property
@@ -164,8 +169,36 @@ class Motion(ABC):
         """The state as the end of a step leaves it: no rotor beyond its limits."""
 
     @abstractmethod
+    def _made(self, assembly: Assembly, engine: EngineName | None) -> Plant:
+        """A plant that flies an assembly of the scenario."""
+
+    @cached_property
+    def _plant(self) -> Any:
+        return self._made(self._flown_assembly, self.engine)
+
+    @cached_property
+    def _varied(self) -> Any:
+        """The plant whose inputs have offsets."""
+        return self._made(self.assembly, "python")
+
+    @abstractmethod
+    def _whole(self, step: int, state: Floats) -> Floats:
+        """The state of the plant after ``step`` physics steps."""
+
+    @abstractmethod
+    def _read(self, whole: Floats) -> Floats:
+        """The state that is part of the plant's."""
+
+    def _end(self, plant: Plant) -> Floats:
+        """The state that a plant has reached; NaN where the flight is lost."""
+        return np.full(len(self.initial), np.nan) if plant.fault() else self._read(plant.state)
+
     def flown(self, step: int, state: Floats, steps: int) -> Floats:
         """The state some physics steps after a step."""
+        plant = self._varied if self.offsets.any() else self._plant
+        plant.state = self._whole(step, state)
+        plant.advance(steps)
+        return self._end(plant)
 
     def flown_each(self, step: int, states: Sequence[Floats], steps: int) -> Iterator[Floats]:
         """The states ``steps`` physics steps after ``step``; NaN where a flight is lost.
@@ -173,9 +206,9 @@ class Motion(ABC):
         Long native flights are flown on all cores.
         """
         if self.engine == "native" and len(states) > 1 and steps >= LONG and not self.offsets.any():
-            size = ROWS_PER_THREAD * THREADS
-            for start in range(0, len(states), size):
-                yield from self._together(step, states[start : start + size], steps)
+            size = PLANTS_PER_THREAD * THREADS
+            for first in range(0, len(states), size):
+                yield from self._together(step, states[first : first + size], steps)
             return
         for state in states:
             try:
@@ -183,9 +216,15 @@ class Motion(ABC):
             except (ArithmeticError, ValueError):
                 yield np.full(len(state), np.nan)
 
-    @abstractmethod
     def _together(self, step: int, states: Sequence[Floats], steps: int) -> list[Floats]:
-        """`flown_each`, natively and on all cores."""
+        """`flown_each`, each on its own plant."""
+        self._plant.advance(0)  # compiles before threads do
+        plants = [self._made(self._flown_assembly, self.engine) for _ in states]
+        for plant, state in zip(plants, states, strict=True):
+            plant.state = self._whole(step, state)
+        with ThreadPoolExecutor(THREADS) as pool:
+            list(pool.map(lambda plant: plant.advance(steps), plants))
+        return [self._end(plant) for plant in plants]
 
     @abstractmethod
     def observed(self, time: float, state: Floats) -> Floats:
@@ -203,13 +242,8 @@ class EquationMotion(Motion):
     def _equations(self) -> Equations:
         return self.assembly.loop.required_equations
 
-    @cached_property
-    def _plant(self) -> EquationsPlant:
-        return EquationsPlant(self._flown_assembly, self.engine)
-
-    @cached_property
-    def _varied(self) -> EquationsPlant:
-        return EquationsPlant(self.assembly, "python")
+    def _made(self, assembly: Assembly, engine: EngineName | None) -> Plant:
+        return EquationsPlant(assembly, engine)
 
     @property
     def initial(self) -> Floats:
@@ -235,25 +269,11 @@ class EquationMotion(Motion):
         parameters, _ = self.assembly.setup
         return state if project is None else np.array(project(state.tolist(), parameters))
 
-    def flown(self, step: int, state: Floats, steps: int) -> Floats:
-        plant = self._varied if self.offsets.any() else self._plant
-        return self._flown_by(plant, step, state, steps)
+    def _whole(self, step: int, state: Floats) -> Floats:
+        return np.array((step, *state, *(0.0,) * self._equations.inputs_size))  # a sample is due
 
-    def _flown_by(self, plant: EquationsPlant, step: int, state: Floats, steps: int) -> Floats:
-        held = self._equations.inputs_size
-        plant.state = np.array((step, *state, *(0.0,) * held))  # a sample is due
-        plant.advance(steps)
-        return plant.state[1 : 1 + len(state)]
-
-    def _together(self, step: int, states: Sequence[Floats], steps: int) -> list[Floats]:
-        self._plant.advance(0)  # compiles before threads do
-
-        def fly(state: Floats) -> Floats:
-            plant = EquationsPlant(self._flown_assembly, self.engine)
-            return self._flown_by(plant, step, state, steps)
-
-        with ThreadPoolExecutor(THREADS) as pool:
-            return list(pool.map(fly, states))
+    def _read(self, whole: Floats) -> Floats:
+        return whole[1 : len(whole) - self._equations.inputs_size]
 
     def observed(self, time: float, state: Floats) -> Floats:
         values, setup = state.tolist(), self.assembly.setup

@@ -1,6 +1,6 @@
 """A closed loop in MuJoCo as functions of its state, for derivatives."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import cached_property
 from math import ceil
 from typing import Any, Final
@@ -8,14 +8,16 @@ from typing import Any, Final
 import mujoco
 import numpy as np
 
+from tiltsim.closed_loop.assembly import Assembly
 from tiltsim.closed_loop.userdata import EVALUATIONS, EVALUATIONS_PER_STEP, HEADER_SIZE
 from tiltsim.engines.base import EngineName
 from tiltsim.engines.control import control_callback
 from tiltsim.linear import coordinates
 from tiltsim.linear.hanging import Hanging
-from tiltsim.linear.motion import ROWS_PER_THREAD, THREADS, EquationMotion, Motion
+from tiltsim.linear.motion import EquationMotion, Motion
 from tiltsim.models.objects import FORCE
 from tiltsim.plants.mujoco_plant import MujocoPlant
+from tiltsim.plants.plant import Plant
 from tiltsim.scenario.scenario import Scenario
 from tiltsim_controllers.mathematics.scalar import Floats, Values
 
@@ -43,22 +45,18 @@ class MujocoMotion(Motion):
     def _hanging(self) -> Hanging:
         return Hanging(self._varied.model, self.hung)
 
-    @cached_property
-    def _varied(self) -> MujocoPlant:
-        return MujocoPlant(self.assembly, engine="python")
+    def _made(self, assembly: Assembly, engine: EngineName | None) -> Plant:
+        model = None if assembly is self.assembly else self._varied.model
+        return MujocoPlant(assembly, model, engine)
 
     @cached_property
-    def _plant(self) -> MujocoPlant:
-        return MujocoPlant(self._flown_assembly, self._varied.model, self.engine)
-
-    @cached_property
-    def _whole(self) -> Floats:
-        """An integration state: time, `qpos`, `qvel`, `act` and more."""
-        return self._varied.state
+    def _first(self) -> Floats:
+        """The integration state at time zero: time, `qpos`, `qvel`, `act` and more."""
+        return np.array(self._varied.state)
 
     @cached_property
     def initial(self) -> Floats:
-        return self._read(self._whole)
+        return self._read(self._first)
 
     @property
     def _part(self) -> slice:
@@ -66,7 +64,6 @@ class MujocoMotion(Motion):
         return slice(1, 1 + model.nq + model.nv + model.na)
 
     def _read(self, whole: Floats) -> Floats:
-        """The state of an integration state."""
         return self.placed(self._hanging.moved(whole[self._part], self._hanging.of_state, -1.0))
 
     def _split(self, state: Floats) -> list[Floats]:
@@ -109,7 +106,7 @@ class MujocoMotion(Motion):
         if not self.hung:
             return None
         plant = self._plant
-        plant.state = self._whole
+        plant.state = self._first
         plant.advance(ceil(SETTLING_TIME / self.scenario.simulation.timestep))
         return None if plant.fault() else self._hanging.distances(plant.data)
 
@@ -170,7 +167,7 @@ class MujocoMotion(Motion):
                 mujoco.mj_forward(model, data)
             model.tendon_limited[:] = limited
             before, readings = readings, self._readings(tensions)
-            if np.allclose(readings, before, rtol=0.0, atol=1e-12):
+            if np.abs(readings - before).max(initial=0.0) <= 1e-12:
                 break
         accelerations, tensions = self._hanging.hold(data)
         return data, tensions, accelerations, self._readings(tensions)
@@ -183,17 +180,8 @@ class MujocoMotion(Motion):
         activations[own] = np.clip(activations[own], low, high)
         return np.concatenate((*parts[:-1], activations))
 
-    def flown(self, step: int, state: Floats, steps: int) -> Floats:
-        plant = self._varied if self.offsets.any() else self._plant
-        plant.state = self._whole_at(step, state)
-        plant.advance(steps)
-        if plant.fault():  # MuJoCo has reset the state
-            return np.full(len(state), np.nan)
-        return self._read(plant.state)
-
-    def _whole_at(self, step: int, state: Floats) -> Floats:
-        """An integration state after ``step`` physics steps."""
-        whole = self._whole.copy()
+    def _whole(self, step: int, state: Floats) -> Floats:
+        whole = self._first.copy()
         whole[self._part] = self._whole_part(state, self._stretched)
         if self.scenario.object:
             readings = self._forward(step * self.scenario.simulation.timestep, state)[3]
@@ -202,23 +190,6 @@ class MujocoMotion(Motion):
         header = whole[self._varied.header_offset :][:HEADER_SIZE]
         header[EVALUATIONS] = step * header[EVALUATIONS_PER_STEP]
         return whole
-
-    def _together(self, step: int, states: Sequence[Floats], steps: int) -> list[Floats]:
-        batch, places = self._batch, np.arange(len(states), dtype=np.int32)
-        for place, state in enumerate(states):
-            batch.state[place] = self._whole_at(step, state)
-        batch.warning[:] = 0
-        with control_callback(self._plant.callback):
-            batch.rollout(steps, record=(), ids=places)
-        lost = batch.warning[places].reshape(len(states), -1).any(axis=1)
-        ends = [self._read(whole) for whole in batch.state[places]]
-        return [np.full(len(end), np.nan) if fell else end for end, fell in zip(ends, lost)]
-
-    @cached_property
-    def _batch(self) -> Any:
-        from mujoco.batch import Batch
-
-        return Batch(self._plant.model, ROWS_PER_THREAD * THREADS, THREADS)
 
     def observed(self, time: float, state: Floats) -> Floats:
         data, _, _, readings = self._forward(time, state)

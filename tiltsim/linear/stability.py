@@ -142,7 +142,7 @@ def stability_at(found: Equilibrium) -> Stability:
     eigenvalues = eigenvalues[np.argsort(-np.abs(eigenvalues), kind="stable")]
     poles = exponents(eigenvalues, timestep)
     finite = poles[np.isfinite(poles)]
-    modes = modes_of(matrix, found.names, timestep, error, found.motion.prefixes)
+    modes = modes_of(matrix, found.minimal.names, timestep, error, found.motion.prefixes)
     if found.is_orbit and timestep is not None:
         fastest = log(RESOLVED) / timestep
         modes = tuple(mode for mode in modes if mode.growth_rate > fastest)
@@ -155,7 +155,7 @@ def stability_at(found: Equilibrium) -> Stability:
         poles=None if found.is_orbit else finite[np.argsort(-finite.real, kind="stable")],
         multipliers=eigenvalues if found.is_orbit else None,
         modes=modes,
-        states=found.names,
+        states=found.minimal.names,
         matrix=matrix,
         equilibrium=found,
         left_out=found.left_out,

@@ -19,7 +19,7 @@ from tiltsim_controllers.laws.gains import (
     PolePlacementTable,
 )
 from tiltsim_controllers.laws.keys import GainSets, number_of, table_of
-from tiltsim_controllers.laws.multirotor_steps import FeedforwardTerms
+from tiltsim_controllers.laws.multirotor_keys import FeedforwardTerms
 from tiltsim_controllers.laws.observed import Failure
 from tiltsim_controllers.laws.supervised_vehicles import untilted_volume
 from tiltsim_controllers.laws.supervisor import STRATEGIES, UNTILTED, Supervisor
@@ -334,10 +334,11 @@ class FailureAwareController(ControllerTable):
         0.0, "time from which failed_rotor is known [s]", 10.0
     )
 
-    def check_failed_rotor(self, rotors: int) -> None:
-        """Refuse a failed rotor that is not one of some number. Raises `mistake`."""
+    def check_scenario(self, scenario: Any) -> None:
+        rotors = scenario.vehicle.rotor_count
         if self.failed_rotor is not None and self.failed_rotor > rotors:
             raise self.mistake("failed_rotor", f"the vehicle has {rotors} rotors")
+        super().check_scenario(scenario)
 
     def resolve_failure(self) -> Failure:
         """The failed rotor that the law knows of."""

@@ -23,7 +23,7 @@ from tiltsim.scenario.table import (
     example,
     required,
 )
-from tiltsim.scenario.time_table import GAIT_COLUMNS, Rows, TimeTable, gait_columns
+from tiltsim.scenario.time_table import Rows, TimeTable
 from tiltsim_controllers.analysis.two_color_planner import (
     Circle,
     Leg,
@@ -182,7 +182,7 @@ class TableGait(GaitTable, TimeTable):
     model_config = example(
         type="table", rows=[[0.0, 0.0, 0.0, 0.0, 0.0], [1.0, 0.3, -0.3, 0.3, -0.3]]
     )
-    columns = GAIT_COLUMNS
+    columns = ("time", "alpha_1", "alpha_2", "alpha_3", "alpha_4")
     largest = pi
 
     type: Literal["table"] = required("your own gait, as a table over time")
@@ -217,11 +217,12 @@ class TableGait(GaitTable, TimeTable):
     @classmethod
     def columns_among(cls, names: Sequence[str]) -> tuple[str, ...]:
         tilts = [i for i in range(1, MAX_ROTORS + 1) if f"alpha_{i}" in names]
-        return gait_columns(max(tilts, default=4))
+        return cls.columns_of_width(1 + max(tilts, default=4))
 
     @classmethod
-    def _columns_of_width(cls, width: int) -> tuple[str, ...]:
-        return gait_columns(width - 1)
+    def columns_of_width(cls, width: int) -> tuple[str, ...]:
+        every = ("time", *(f"alpha_{i}" for i in range(1, MAX_ROTORS + 1)))
+        return every[:width] if 1 < width <= len(every) else cls.columns
 
     @property
     def tilts(self) -> int:

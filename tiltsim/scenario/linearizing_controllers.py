@@ -28,10 +28,8 @@ from tiltsim_controllers.laws.attitude_altitude import (
     AttitudeAltitude,
 )
 from tiltsim_controllers.laws.full_pose import FullPose, pose_rank
-from tiltsim_controllers.laws.multirotor_steps import RESTORING, AttitudeForce, Form
-from tiltsim_controllers.laws.quadrotor_attitude_altitude import QuadrotorAttitudeAltitude
-from tiltsim_controllers.laws.switching import Switching
-from tiltsim_controllers.laws.yaw_position import YawPosition
+from tiltsim_controllers.laws.multirotor_keys import RESTORING, AttitudeForce, Form
+from tiltsim_controllers.laws.quadrotor import QuadrotorAttitudeAltitude, Switching, YawPosition
 from tiltsim_controllers.mathematics.scalar import Floats, Triple
 from tiltsim_controllers.vehicle.parameters import Vehicle
 from tiltsim_controllers.vehicle.rotors import force_and_torque
@@ -69,6 +67,9 @@ class AttitudeAltitudeController(AttitudeAltitude, GaitFollowingController):
                 needs = f"gait_rate_feedforward = true needs {' or '.join(choices)}"
                 raise self.mistake(key, needs)
 
+    def check_scenario(self, scenario: Any) -> None:
+        check_decoupler(scenario, self.decoupler)
+
     def error_loops(self, vehicle: Vehicle) -> list[ErrorLoop]:
         if self.gait_rate_feedforward:
             return feedforward_loops(self.resolve_gains(), self.resolve_integral_gains())
@@ -99,11 +100,12 @@ class FullPoseController(FullPose, FailureAwareController):
         on_acceleration, _, on_position = self.resolve_gains().position
         return on_position / on_acceleration
 
-    def check_outputs(self, scenario: Any, gait: Gait) -> None:
-        """Refuse a failed rotor that is not there, and inputs that do not move six outputs."""
+    def check_scenario(self, scenario: Any) -> None:
+        """Refuse inputs that do not move six outputs."""
+        super().check_scenario(scenario)
         vehicle, failed = scenario.vehicle.resolve(), self.failed_rotor
-        self.check_failed_rotor(scenario.vehicle.rotor_count)
         if isinstance(vehicle, Multirotor):
+            gait = scenario.gait.plan(vehicle)
             w = [spin * (rotor != failed) for rotor, spin in enumerate(vehicle.spins, start=1)]
             rank = pose_rank(vehicle.table, gait.angles(0.0).tolist(), w)
             if rank < 6:
@@ -174,11 +176,11 @@ class AttitudeForceController(AttitudeForce, GaitFollowingController, FailureAwa
         """The `force_dimension`, with and without the failed rotor."""
         return min(force_dimension(vehicle, gait, lost) for lost in {None, self.failed_rotor})
 
-    def check_outputs(self, scenario: Any, gait: Gait) -> None:
+    def check_scenario(self, scenario: Any) -> None:
         """Refuse more components of force than the vehicle has, and a pose that it cannot take."""
-        self.check_failed_rotor(scenario.vehicle.rotor_count)
+        super().check_scenario(scenario)
         vehicle, reference = scenario.vehicle.resolve(), scenario.reference
-        dimension = self.resolve_force(vehicle, gait).dimension
+        dimension = self.resolve_force(vehicle, scenario.gait.plan(vehicle)).dimension
         self._check_scaling(vehicle, dimension)
         check_decoupler(scenario, self.decoupler)
         if reference.turns:

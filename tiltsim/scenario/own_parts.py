@@ -9,7 +9,7 @@ import importlib.util
 import os
 import sys
 import traceback
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from math import ceil
 from os import PathLike
 from pathlib import Path
@@ -18,23 +18,16 @@ from typing import Any, Final
 import numpy as np
 
 from tiltsim.errors import InputError
-from tiltsim.models.vehicle_parts import MAX_ROTORS
 from tiltsim.scenario.controller import NumpyController, OwnFunctionController
 from tiltsim.scenario.documents import controller_name, given_keys
 from tiltsim.scenario.gait import TableGait
 from tiltsim.scenario.law_controller import LawController, is_law
 from tiltsim.scenario.library import MAX_ROWS
 from tiltsim.scenario.messages import show, tags_of
+from tiltsim.scenario.reference import TableReference
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.scenario.simulation_table import SimulationTable
-from tiltsim.scenario.time_table import (
-    GAIT_COLUMNS,
-    REFERENCE_COLUMNS,
-    WIDTHS,
-    reference_columns_among,
-    rows_of_columns,
-)
-from tiltsim.scenario.vehicle import VEHICLES
+from tiltsim.scenario.time_table import TimeTable, rows_of_columns
 from tiltsim.system.arguments import is_finite, real_array, true_or_false
 from tiltsim.system.files import digest, is_file
 from tiltsim.system.text import error_text, short_repr
@@ -174,8 +167,8 @@ _loaded: Final[dict[tuple[str, str, str], Any]] = {}
 SAMPLING_STEP: Final = 0.01
 """Seconds between the rows of a function of time, unless the flight is too long for that."""
 
-COLUMNS: Final = {"reference": REFERENCE_COLUMNS, "gait": GAIT_COLUMNS}
-"""Parts that can be given as a table over time, and their columns."""
+TABLES: Final[dict[str, type[TimeTable]]] = {"reference": TableReference, "gait": TableGait}
+"""Parts that can be given as a table over time."""
 
 KEPT_KEYS: Final = ("roll", "pitch", "yaw", "acceleration_feedforward")
 """Keys of a reference that stay when another motion is given."""
@@ -191,10 +184,10 @@ def replace_tables(document: dict[str, Any], given: Mapping[str, object]) -> Non
     Raises:
         InputError: In one line: the argument, the value and the allowed values.
     """
-    for name in filter(given.__contains__, COLUMNS):
+    for name in filter(given.__contains__, TABLES):
         old, kept = document.get(name), KEPT_KEYS if name == "reference" else ()
         stays = {key: old[key] for key in kept if key in old} if isinstance(old, dict) else {}
-        document[name] = _table(name, given[name], _has_any_tilts(document)) | stays
+        document[name] = _table(name, given[name]) | stays
 
 
 def given_parts(**parts: object) -> dict[str, object]:
@@ -276,24 +269,12 @@ def sample_functions(document: Mapping[str, Any], own: Mapping[str, Any]) -> Non
         duration = SimulationTable.model_fields["duration"].default
     # A flight of less than ten steps is sampled beyond its end.
     span = max(duration, 10 * SAMPLING_STEP)
-    for name in filter(own.__contains__, COLUMNS):
+    for name in filter(own.__contains__, TABLES):
         table = document.get(name)
         rows = table.get("rows") if isinstance(table, Mapping) else None
         if isinstance(rows, list) and (not rows or rows[-1][0] != span):
-            size = len(COLUMNS[name]) - 1
-            if name == "gait" and _has_any_tilts(document):
-                found = _size_of(own[name])
-                size = found if 1 <= found <= MAX_ROTORS else size
-            if name == "reference" and (given := _size_of(own[name])) + 1 in WIDTHS:
-                size = given
-            rows[:] = _samples(name, own[name], size, span)
-
-
-def _has_any_tilts(document: Mapping[str, Any]) -> bool:
-    """Whether the number of tilts of a gait is its vehicle's."""
-    vehicle = document.get("vehicle")
-    model = vehicle.get("model") if isinstance(vehicle, Mapping) else None
-    return isinstance(model, str) and model in VEHICLES and VEHICLES[model].any_tilts
+            columns = TABLES[name].columns_of_width(1 + _size_of(own[name]))
+            rows[:] = _samples(name, own[name], len(columns) - 1, span)
 
 
 def _size_of(function: Callable[[float], Any]) -> int:
@@ -305,15 +286,8 @@ def _size_of(function: Callable[[float], Any]) -> int:
     return values.size if values.ndim == 1 else 0
 
 
-def _table(name: str, value: Any, multirotor: bool) -> dict[str, Any]:
+def _table(name: str, value: Any) -> dict[str, Any]:
     """The table of a scenario for an argument."""
-    columns: Sequence[str] = COLUMNS[name]
-    if isinstance(value, Mapping) or hasattr(value, "columns"):
-        names = [*map(str, getattr(value, "column_names", getattr(value, "columns", value)))]
-        if name == "reference":
-            columns = reference_columns_among(names)
-        elif multirotor:
-            columns = TableGait.columns_among(names)
     kind = value.get("type") if isinstance(value, Mapping) else value
     if isinstance(kind, str) and kind in tags_of(Scenario, (name,))[1]:
         hint = f'override {{"{name}.type": "{kind}"}} for one of the built-in types'
@@ -325,10 +299,10 @@ def _table(name: str, value: Any, multirotor: bool) -> dict[str, Any]:
     if not (isinstance(value, Mapping) or hasattr(value, "columns")):
         raise InputError(
             f"{name} = {short_repr(value)}: must be a function of time, the name of a CSV or "
-            f"Parquet file, or a table with the columns {', '.join(columns)}"
+            f"Parquet file, or a table with the columns {', '.join(TABLES[name].columns)}"
         )
     try:
-        return {"type": "table", "rows": rows_of_columns(value, columns)}
+        return {"type": "table", "rows": rows_of_columns(value, TABLES[name].columns_among)}
     except InputError as error:
         raise InputError(f"{name}: {error}") from None
 

@@ -26,10 +26,8 @@ from tiltsim.scenario.time_table import (
     POSE_COLUMNS,
     QUATERNION_COLUMNS,
     REFERENCE_COLUMNS,
-    WIDTHS,
     Rows,
     TimeTable,
-    reference_columns_among,
     rows_with_angles,
 )
 from tiltsim_controllers.mathematics.scalar import Values
@@ -167,11 +165,15 @@ class TableReference(PositionReference, TimeTable):
 
     @classmethod
     def columns_among(cls, names: Sequence[str]) -> tuple[str, ...]:
-        return reference_columns_among(names)
+        turned = (POSE_COLUMNS, QUATERNION_COLUMNS)
+        has = [columns for columns in turned if {*columns[4:]} & {*names}]
+        if len(has) > 1:
+            raise InputError("has roll, pitch or yaw beside a quaternion; remove one of them")
+        return has[0] if has else cls.columns
 
     @classmethod
-    def _columns_of_width(cls, width: int) -> tuple[str, ...]:
-        return WIDTHS.get(width, cls.columns)
+    def columns_of_width(cls, width: int) -> tuple[str, ...]:
+        return {7: POSE_COLUMNS, 8: QUATERNION_COLUMNS}.get(width, cls.columns)
 
     @property
     def turns(self) -> bool:

@@ -25,17 +25,6 @@ REFERENCE_COLUMNS: Final = ("time", "x", "y", "z")
 POSE_COLUMNS: Final = (*REFERENCE_COLUMNS, "roll", "pitch", "yaw")
 QUATERNION_COLUMNS: Final = (*REFERENCE_COLUMNS, "qw", "qx", "qy", "qz")
 
-WIDTHS: Final = {len(names): names for names in (POSE_COLUMNS, QUATERNION_COLUMNS)}
-"""Columns of rows of a reference with an attitude, by their number."""
-
-
-def reference_columns_among(names: Sequence[str]) -> tuple[str, ...]:
-    """The columns that a reference with columns of these names has to have."""
-    has = [columns for columns in WIDTHS.values() if {*columns[4:]} & {*names}]
-    if len(has) > 1:
-        raise InputError("has roll, pitch or yaw beside a quaternion; remove one of them")
-    return has[0] if has else REFERENCE_COLUMNS
-
 
 def rows_with_angles(rows: Rows) -> Rows:
     """Rows with roll, pitch and yaw, unwrapped, for rows with quaternions.
@@ -58,13 +47,6 @@ def rows_with_angles(rows: Rows) -> Rows:
         raise InputError(f"row {number}: too close to a pitch of pi/2, where roll and yaw jump")
     return tuple((*row[:4], *own) for row, own in zip(rows, angles.tolist(), strict=True))
 
-
-def gait_columns(tilts: int) -> tuple[str, ...]:
-    """The columns of a gait with a number of tilt angles."""
-    return ("time", *(f"alpha_{i}" for i in range(1, tilts + 1)))
-
-
-GAIT_COLUMNS: Final = gait_columns(4)
 
 SHORTEST_STEP: Final = 1e-4  # seconds between the rows of any table
 NORM_TOLERANCE: Final = 0.01  # by which the norm of a quaternion may differ from one
@@ -103,8 +85,8 @@ class TimeTable(Table):
         return cls.columns
 
     @classmethod
-    def _columns_of_width(cls, width: int) -> tuple[str, ...]:
-        """The columns of rows with ``width`` numbers."""
+    def columns_of_width(cls, width: int) -> tuple[str, ...]:
+        """The columns of rows with ``width`` numbers; `columns` where no table has that width."""
         return cls.columns
 
     def ends_before(self, time: float) -> bool:
@@ -122,10 +104,7 @@ class TimeTable(Table):
 
     def csv(self) -> bytes:
         """The table as a CSV file, with all its digits."""
-        lines = [
-            self._columns_of_width(len(self._rows[0])),
-            *(map(repr, row) for row in self._rows),
-        ]
+        lines = [self.columns_of_width(len(self._rows[0])), *(map(repr, row) for row in self._rows)]
         return "".join(f"{','.join(line)}\n" for line in lines).encode()
 
     def _check_values(self) -> None:
@@ -134,17 +113,21 @@ class TimeTable(Table):
             raise self.mistake("file", "give one of file and rows")
         try:
             rows = _read_rows(Path(self.file), self.columns_among) if self.file else given or ()
-            columns = self._columns_of_width(len(rows[0]) if rows else 0)
+            columns = self.columns_of_width(len(rows[0]) if rows else 0)
             self._rows = _checked(rows, columns, self.largest)
         except InputError as error:
             key, reason = "rows" if self.file is None else "file", str(error)
             raise self.mistake(key, reason.removeprefix(f"{self.file}: ")) from None
 
 
-def rows_of_columns(table: Any, columns: Sequence[str]) -> list[Values]:
+ColumnsAmong = Callable[[Sequence[str]], Sequence[str]]
+
+
+def rows_of_columns(table: Any, columns_among: ColumnsAmong) -> list[Values]:
     """Rows of a table of another library. Raises `InputError` in one line."""
-    names = getattr(table, "column_names", getattr(table, "columns", table))
-    _check_names([*map(str, names)], columns)
+    names = [*map(str, getattr(table, "column_names", getattr(table, "columns", table)))]
+    columns = columns_among(names)
+    _check_names(names, columns)
     values = {name: _column(name, table[name]) for name in columns}
     lengths = {name: len(column) for name, column in values.items()}
     if len({*lengths.values()}) > 1:
@@ -161,9 +144,6 @@ def _column(name: str, given: Any) -> list[float]:
     if column.ndim != 1:
         raise InputError(f"column {name} = {short_repr(given)}: must be a list of numbers")
     return column.tolist()
-
-
-ColumnsAmong = Callable[[Sequence[str]], Sequence[str]]
 
 
 def _read_rows(file: Path, columns_among: ColumnsAmong) -> list[Values]:
@@ -224,7 +204,7 @@ def _read_parquet(file: Path, columns_among: ColumnsAmong) -> list[Values]:
         for name in columns:  # text could be long beyond any limit once it is decompressed
             if (kind := str(opened.schema_arrow.field(name).type)) not in _NUMBERS:
                 raise InputError(f"column {name} is of type {kind}; choose {', '.join(_NUMBERS)}")
-        return rows_of_columns(opened.read(columns=[*columns]), columns)
+        return rows_of_columns(opened.read(columns=[*columns]), columns_among)
 
 
 def _check_names(names: Sequence[str], columns: Sequence[str]) -> None:

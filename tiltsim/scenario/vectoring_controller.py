@@ -35,10 +35,6 @@ class VectoringController(Vectoring, FailureAwareController, TiltingTable, LawCo
     def position_stiffness(self) -> float | None:  # type: ignore[override]
         return None if self.position_bandwidth is None else self.position_bandwidth**2
 
-    def check_scenario(self, scenario: Any) -> None:
-        super().check_scenario(scenario)
-        self.check_failed_rotor(scenario.vehicle.rotor_count)
-
     def error_loops(self, vehicle: Any) -> list[ErrorLoop]:
         return []
 

@@ -12,14 +12,8 @@ from tiltsim.errors import InputError
 from tiltsim.flight.flight import Flight
 from tiltsim.flight.metrics import End
 from tiltsim.laws.assembling import assemble
-from tiltsim.plants.command import (
-    Command,
-    Controller,
-    ControllerError,
-    Observation,
-    Observer,
-    built_in_command,
-)
+from tiltsim.plants.built_in import built_in_command
+from tiltsim.plants.command import Command, Controller, ControllerError, Observation, Observer
 from tiltsim.plants.commanded_plant import UserControlledPlant
 from tiltsim.plants.mujoco_plant import MujocoPlant, flight_model
 from tiltsim.plants.plant import take_sample

@@ -1,6 +1,7 @@
 """Flying a chunk of a sweep: from points to rows, searches for boundaries included.
 
-Only this module of the sweeps calls the simulation.
+Only this module of the sweeps calls the simulation. Rows depend neither on the computer nor on the
+other flights, so that a chunk gives equal rows wherever and whenever it is flown.
 """
 
 import json
@@ -11,17 +12,19 @@ from functools import lru_cache, partial
 from math import ceil, copysign
 from typing import Any, Final, NamedTuple
 
+import pyarrow as pa
+
 from tiltsim.engines.base import EngineName
 from tiltsim.errors import InputError
 from tiltsim.flight.flight import Flight
 from tiltsim.flight.metrics import Verdict
 from tiltsim.plants.plant import with_engine
+from tiltsim.scenario.metric_names import is_boolean
 from tiltsim.scenario.own_parts import require_trust, with_trust
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.simulation.batch import fly
-from tiltsim.sweeps.definition import SweepDefinition, installed_versions
+from tiltsim.sweeps.definition import VERSIONS, SweepDefinition, installed_versions
 from tiltsim.sweeps.points import SweepPoints
-from tiltsim.sweeps.rows import rows_to_table
 from tiltsim.system.parquet import parquet_bytes
 from tiltsim.system.text import valid_unicode
 
@@ -186,6 +189,44 @@ def _row(
         **{name: result.metrics.get(name) for name in points.metrics},
         "scenario": json.dumps(document),
     }
+
+
+def rows_to_table(points: SweepPoints, rows: Sequence[Mapping[str, Any]]) -> pa.Table:
+    """Rows as an Arrow table, in the schema of the sweep, versions added."""
+    versions = {f"{name}_version": number for name, number in installed_versions().items()}
+    return pa.Table.from_pylist([{**row, **versions} for row in rows], schema=schema(points))
+
+
+def schema(points: SweepPoints) -> pa.Schema:
+    """The columns of a sweep's dataset; the definition is among the schema's metadata."""
+    first = points.point(0)
+    bisect = points.sweep.bisect
+    searched = {} if bisect is None else {bisect.key: bisect.start}
+    values = first | searched | points.derived(first | searched)
+    fields = [pa.field("index", pa.int64(), nullable=False)]
+    for key in points.columns:
+        fields.append(pa.field(key, _column_type(values.get(key, 0.0))))
+    if bisect is not None:
+        fields.append(pa.field("flights", pa.int64(), nullable=False))
+    fields += [
+        pa.field("end", pa.string(), nullable=False),
+        pa.field("end_time", pa.float64(), metadata={"unit": "s"}),
+        pa.field("cause", pa.string(), nullable=False),
+    ]
+    for name in points.metrics:
+        fields.append(pa.field(name, pa.bool_() if is_boolean(name) else pa.float64()))
+    names = ("scenario", *(f"{name}_version" for name in VERSIONS))
+    fields += [pa.field(name, pa.string(), nullable=False) for name in names]
+    return pa.schema(fields, metadata={"sweep": points.definition.to_json()})
+
+
+def _column_type(value: object) -> pa.DataType:
+    if isinstance(value, list | tuple):
+        return pa.list_(_column_type(value[0] if value else 0.0))
+    for kind, column in ((bool, pa.bool_()), (int, pa.int64()), (str, pa.string())):
+        if isinstance(value, kind):
+            return column
+    return pa.float64()
 
 
 def _fly_scenarios(

@@ -2,9 +2,10 @@
 
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, Final
 
@@ -15,11 +16,10 @@ import pyarrow as pa
 from tiltsim.errors import InputError
 from tiltsim.scenario.messages import show
 from tiltsim.scenario.table import in_one_line
-from tiltsim.sweeps.chunks import FinishedChunk
+from tiltsim.sweeps.chunks import FinishedChunk, schema
 from tiltsim.sweeps.definition import SweepDefinition
 from tiltsim.sweeps.expressions import evaluate
 from tiltsim.sweeps.points import SweepPoints
-from tiltsim.sweeps.rows import finished_parts, part_file, read_rows, schema
 from tiltsim.sweeps.tables import Sweep
 from tiltsim.system.files import (
     is_file,
@@ -29,7 +29,7 @@ from tiltsim.system.files import (
     remove_leftovers,
     replacing,
 )
-from tiltsim.system.parquet import UnreadableError, parquet_writer
+from tiltsim.system.parquet import CHECKSUM, UnreadableError, open_parquet, parquet_writer
 from tiltsim.system.public import optional_package
 from tiltsim.system.text import html_table, short_repr
 
@@ -41,6 +41,63 @@ FLIGHTS: Final = "flights"
 
 ROW_GROUP: Final = 4096  # rows held in memory while the parts are joined
 _TABLES: Final = re.compile(r"\d{6,}\.parquet")  # names in the folders of parts and flights
+
+
+def part_file(folder: Path, number: int) -> Path:
+    """The file of a chunk in the folder of a sweep."""
+    return folder / PARTS / f"{number:06d}.parquet"
+
+
+def finished_parts(folder: Path, points: SweepPoints) -> dict[int, Path]:
+    """The files of the finished chunks by number; other files beside them are no parts."""
+    files = {number: part_file(folder, number) for number in range(points.chunks)}
+    return {number: file for number, file in files.items() if file.exists()}
+
+
+def read_rows(
+    file: Path, points: SweepPoints, indices: Sequence[int], *, scenarios: bool = True
+) -> pa.Table:
+    """The rows in one file of a sweep.
+
+    Args:
+        file: A part, or the whole dataset.
+        points: The points of the sweep.
+        indices: The points whose rows the file must hold.
+        scenarios: Whether to read the column of scenarios as well.
+
+    Raises:
+        InputError: If the file is damaged, or holds anything else.
+    """
+    try:
+        with open_parquet(file) as opened:
+            found, further = opened.schema_arrow, opened.metadata.metadata or {}
+            names = [name for name in found.names if scenarios or name != "scenario"]
+            table = opened.read(columns=names)
+    except UnreadableError as error:
+        raise UnreadableError(f"{error}; delete it, and it is made again") from error
+    text = (found.metadata or {}).get(b"sweep", b"").decode(errors="replace")
+    difference = _difference(text, points.definition.to_json())
+    if not difference and CHECKSUM.encode() not in further:
+        difference = "has no checksum, as tiltsim writes it"
+    if not difference and table["index"].to_pylist() != list(indices):
+        difference = "holds the rows of other points"
+    if difference:
+        raise InputError(f"{file}: {difference}; delete it or move it away")
+    return table
+
+
+@lru_cache(maxsize=8)
+def _difference(found: str, expected: str) -> str:
+    """The difference of a file's definition from the sweep's; empty if it gives equal rows."""
+    if found == expected:
+        return ""
+    try:
+        difference = SweepDefinition.from_json(found).difference(
+            SweepDefinition.from_json(expected)
+        )
+    except ValueError:
+        return "not of a sweep"
+    return f"of another sweep: {difference}" if difference else ""
 
 
 class SweepFolder:

@@ -50,17 +50,19 @@ class _Namespace:
 
     def __getattr__(self, name: str) -> Callable[..., Any]:
         function = getattr(np, name)
+        is_ufunc = isinstance(function, np.ufunc)
 
         def call(*args: Any, **options: Any) -> Any:
-            if isinstance(function, np.ufunc) and any(isinstance(a, Expr) for a in args):
+            if is_ufunc and Expr in map(type, args):
                 return apply(UFUNCS[function], *args)
             return as_array(function(*args, **options))
 
+        setattr(self, name, call)  # found at once from now on
         return call
 
     def where(self, condition: Any, yes: Any, no: Any) -> Any:
         """Entries of one array or of another, by a condition."""
-        if any(isinstance(value, Expr | Array) for value in (condition, yes, no)):
+        if not {Expr, Array}.isdisjoint(map(type, (condition, yes, no))):
             return apply("where", condition, yes, no)
         return np.where(condition, yes, no)[()]  # a number where all are numbers
 
@@ -70,10 +72,10 @@ class _Namespace:
 
     def array(self, values: Any) -> Any:
         """An array of numbers, vectors or matrices."""
-        if not isinstance(values, tuple | list | np.ndarray):
+        if not isinstance(values, (tuple, list, np.ndarray)):
             values = [*values]  # a part of a program's input
         made = np.array(values)  # finds out faster whether there are symbolic numbers
-        if made.dtype == object and any(isinstance(value, Expr) for value in made.flat):
+        if made.dtype == object and Expr in map(type, made.flat):
             return made.view(Array)
         return made if made.dtype in (float, complex) else np.array(values, float)
 
@@ -246,16 +248,16 @@ def traceable(function: Function) -> Function:
 
 
 def _is_plain(value: Any) -> bool:
-    return isinstance(value, tuple | list) and not hasattr(value, "_fields")
+    return isinstance(value, (tuple, list)) and not hasattr(value, "_fields")
 
 
 def as_arrays(value: Any) -> Any:
     """Tuples and lists of numbers as arrays, also in records; tuples of ints are indices."""
-    if not isinstance(value, tuple | list):
+    if not isinstance(value, (tuple, list)):
         return value
     if hasattr(value, "_fields"):
         return type(value)(*map(as_arrays, value))
-    if value and all(isinstance(entry, int) for entry in value):
+    if value and isinstance(value[0], int) and all(isinstance(one, int) for one in value):
         return value
     return xp.array(value)
 

@@ -15,7 +15,7 @@ from tiltsim_controllers.laws.attitude_altitude import LAYOUT, OPTIONS, Attitude
 from tiltsim_controllers.laws.feedback import NONE
 from tiltsim_controllers.laws.keys import record_of
 from tiltsim_controllers.laws.multirotor import attitude_force, present_wrench
-from tiltsim_controllers.laws.multirotor_steps import WITH_GAIT, Form
+from tiltsim_controllers.laws.multirotor_keys import WITH_GAIT, Form
 from tiltsim_controllers.laws.observed import Seen, Step
 from tiltsim_controllers.laws.supervised_vehicles import SUPERVISION, multirotor_supervision_of
 from tiltsim_controllers.laws.supervisor import Supervision, gait_time
@@ -65,7 +65,7 @@ def supervised_gait(
 def gait_law_of(layout: TiltOfRotor, form: Form, supervision: Supervision) -> Callable[..., Step]:
     """The control law of vehicles of a layout, `attitude_force` with the tilts of the gait.
 
-    Its parameters are `Parameters`, or `multirotor_steps.Parameters` with the table of the rotors
+    Its parameters are `Parameters`, or `multirotor_keys.Parameters` with the table of the rotors
     in the knots. The supervisor's functions are used where the form is supervised.
     """
     leans_with_gait = form.dimension < 3 and not form.forward and tilts_of(layout) > 0

@@ -38,11 +38,25 @@ controller
 Each of these terms can be omitted, to measure its effect.
 """
 
+from collections.abc import Sequence
 from typing import Any, Final, NamedTuple
 
 from tiltsim_controllers.code.arrays import traceable, xp
 from tiltsim_controllers.laws.attitude_altitude import PUBLISHED_DECOUPLING
-from tiltsim_controllers.laws.feedback import NONE, attitude_motion, swept
+from tiltsim_controllers.laws.feedback import (
+    EXACT,
+    NONE,
+    angular_jerk,
+    attitude_jerk,
+    attitude_motion,
+    body_rate_matrix,
+    decoupled,
+    force_control,
+    integrator_rate,
+    limited_acceleration,
+    position_feedback,
+    swept,
+)
 from tiltsim_controllers.laws.force_directions import (
     factors,
     jerk_along,
@@ -50,23 +64,11 @@ from tiltsim_controllers.laws.force_directions import (
     nearest_in_plane,
     share,
 )
-from tiltsim_controllers.laws.multirotor_steps import (
-    ROTATION,
-    Form,
-    altitude_control,
-    desired_direction,
-    euler_control,
-    horizontal_control,
-    lean,
-    rotation_control,
-    side_control,
-    tracking,
-    turned,
-)
+from tiltsim_controllers.laws.multirotor_keys import ROTATION, Form
 from tiltsim_controllers.laws.observed import UNHARMED, Seen, Step, working
-from tiltsim_controllers.mathematics.attitude import rotation_matrix
+from tiltsim_controllers.mathematics.attitude import attitude_error, rotation_matrix, wrapped
 from tiltsim_controllers.mathematics.linear import cross, nearest_solution
-from tiltsim_controllers.mathematics.moving import Moving, at_rest, stacked
+from tiltsim_controllers.mathematics.moving import Moving, at_rest, cosine, sine, stacked, value_of
 from tiltsim_controllers.references.trajectories import POSES, reference_attitude, reference_motion
 from tiltsim_controllers.vehicle.body import (
     RotorcraftState,
@@ -98,9 +100,93 @@ class Present(NamedTuple):
     direction: Any  # the ``direction`` of `force_directions`, moving or not
 
 
-def _target(time: Any, parameters: Any, knots: Any) -> tuple[Moving, Moving, Moving]:
+def turned(time: Any, angle: Any, duration: Any) -> Any:
+    """An angle (rad) that is reached from zero within a duration (s), with continuous acceleration.
+
+    ``angle s^3 (10 - 15 s + 6 s^2)``; without a duration the angle itself.
+    """
+    turns = time < duration
+    period = xp.where(turns, duration, 1.0)
+    s = Moving(xp.where(turns, time / period, 1.0), xp.where(turns, 1.0 / period, 0.0), 0.0)
+    return angle * (s * s * s * (10.0 + s * (6.0 * s - 15.0)))
+
+
+class Tracking(NamedTuple):
+    """Motion to track, world axes."""
+
+    error: Moving  # position error, m
+    acceleration: Moving  # acceleration of the reference, m/s^2, as far as the law passes it on
+
+
+def _tracking(now: RotorcraftState, reference: Any, specific: Any, p: Any) -> Tracking:
+    """The motion to track; reference (5, 3) and force per mass (3,) are in world axes, m and s."""
+    ahead = p.terms.reference_derivatives * reference[2:]
+    fall = xp.array([0.0, 0.0, p.vehicle.gravity])
+    error = Moving(
+        reference[0] - now.position, reference[1] - now.velocity, ahead[0] - (specific - fall)
+    )
+    return Tracking(error, Moving(ahead[0], ahead[1], ahead[2]))
+
+
+def _horizontal_control(motion: Tracking, jerk: Any, integrals: Any, p: Any) -> tuple[Moving, Any]:
+    """Desired acceleration along x and y (m/s^2), and integrator rates (m), at a jerk (m/s^3)."""
+    k3 = p.terms.integral_action * p.integral.position
+    error, ahead = motion.error[:2], motion.acceleration[:2]
+    back = position_feedback(error, ahead.rate - jerk[:2], integrals[:2], (*p.gains.position, k3))
+    rates = integrator_rate(error.value, back.value, p.max_acceleration)
+    return ahead + limited_acceleration(back, p.max_acceleration), rates
+
+
+def side_control(motion: Tracking, integrals: Any, p: Any) -> tuple[Any, Any]:
+    """Desired jerk (m/s^3) of x and y as far as force moves them, and integrator rates (m)."""
+    k4 = p.terms.integral_action * p.side_integral
+    gains = (*p.side_gains, k4)
+    error, limit = motion.error[:2], p.max_acceleration
+    return force_control(error, motion.acceleration.rate[:2], integrals[:2], gains, limit)
+
+
+def _altitude_control(motion: Tracking, integrals: Any, p: Any) -> tuple[Any, Any]:
+    """Desired vertical jerk (m/s^3; ch. 4, Eq. 27, with an integral), and integrator rate (m)."""
+    k4 = p.terms.integral_action * p.integral.altitude
+    gains, limit = (*p.gains.altitude, k4), p.max_acceleration
+    return force_control(motion.error[2], motion.acceleration.rate[2], integrals[2], gains, limit)
+
+
+def _euler_control(roll: Moving, pitch: Moving, attitude: Moving, p: Any) -> Any:
+    """Desired second derivatives (rad/s^3) of the body rates by Euler angles; yaw is at rest."""
+    yaw = attitude.value[2]
+    desired = stacked(roll, pitch, yaw + wrapped(p.reference.yaw - yaw))
+    jerk = attitude_jerk(desired, attitude, p.gains.attitude, p.max_angular_acceleration)
+    return angular_jerk(attitude, jerk) if p.terms.euler_rates else jerk
+
+
+def rotation_control(
+    attitude: Sequence[Moving], rotation: Any, omega: Any, omega_rate: Any, p: Any
+) -> Any:
+    """Desired second derivatives (rad/s^3) of the body rates, by the rotation that remains.
+
+    Args:
+        attitude: References of roll, pitch and yaw, rad.
+        rotation: Body to world, shape (3, 3).
+        omega, omega_rate: Body rates (rad/s) and their rates (rad/s^2), shape (3,) each.
+        p: Parameters of the controller.
+    """
+    desired = rotation_matrix(xp.array([angle.value for angle in attitude]))
+    # Rates of the desired attitude in its own axes, then in body axes.
+    rates = stacked(*(Moving(angle.rate, angle.acceleration, 0.0) for angle in attitude))
+    turning = rotation.T @ (desired @ (body_rate_matrix(*attitude[:2]) @ rates))
+    second = turning.rate - cross(omega, turning.value)
+    return attitude_jerk(
+        Moving(attitude_error(rotation, desired), turning.value, second),
+        Moving(0.0, omega, omega_rate),
+        p.gains.attitude,
+        p.max_angular_acceleration,
+    )
+
+
+def _target(time: Any, p: Any, knots: Any) -> tuple[Moving, Moving, Moving]:
     """References of roll, pitch and yaw, rad."""
-    target, duration = parameters.reference, parameters.turn_time
+    target, duration = p.reference, p.turn_time
     if target.type == POSES:
         roll, pitch, yaw = reference_attitude(time, target, knots)[:3].T
         return Moving(*roll), Moving(*pitch), Moving(*yaw)
@@ -108,65 +194,51 @@ def _target(time: Any, parameters: Any, knots: Any) -> tuple[Moving, Moving, Mov
     return roll, pitch, at_rest(target.yaw)
 
 
-def _horizontal(
-    present: Present,
-    motion: Any,
-    target: tuple[Moving, Moving, Moving],
-    yaw: Any,
-    integrals: Any,
-    parameters: Any,
-    form: Form,
-) -> tuple[Moving, Moving, Any, Any]:
-    """References of roll and pitch (rad), then of x and y jerk by force and integrator rates."""
-    terms, omega, dimension = parameters.terms, present.state.omega, form.dimension
-    jerk, rates = xp.zeros(2), xp.zeros(2)
-    if dimension > 1:
-        jerk, rates = side_control(motion, integrals, parameters)
-    if dimension == 3 or parameters.decoupler == NONE:
-        return *target[:2], jerk, rates
-    force, specific = present.direction, present.specific
-    body_jerk = xp.zeros(3)  # counts only for the attitude's rates
-    if dimension == 2:
+def _leaning(
+    present: Present, motion: Tracking, yaw: Any, integrals: Any, p: Any, form: Form
+) -> tuple[Moving, Moving, Any]:
+    """References of roll and pitch (rad) that move the vehicle, and integrator rates (m)."""
+    force, specific, omega = present.direction, present.specific, present.state.omega
+    gravity, body_jerk = p.vehicle.gravity, xp.zeros(3)  # counts only for the attitude's rates
+    if form.dimension == 2:
         body_jerk = cross(omega, specific.value) + specific.rate
-    elif terms.attitude_rates:
-        body_jerk = jerk_along(force, specific.value, omega, terms.gait_rates)
-    leaning, rates = horizontal_control(motion, present.rotation @ body_jerk, integrals, parameters)
+    elif p.terms.attitude_rates:
+        body_jerk = jerk_along(force, specific.value, omega, p.terms.gait_rates)
+    leaning, rates = _horizontal_control(motion, present.rotation @ body_jerk, integrals, p)
     along = stacked(leaning[0], leaning[1], motion.acceleration[2])
-    if dimension == 2:
-        force = nearest_in_plane(desired_direction(along, yaw, parameters.vehicle.gravity), force)
-    return *lean(force, along, yaw, parameters), jerk, rates
+    if form.dimension == 2:  # in axes of the yaw
+        (x, y, z), s, c = (along[0], along[1], along[2]), sine(yaw), cosine(yaw)
+        force = nearest_in_plane(stacked(x * c + y * s, y * c - x * s, gravity + z), force)
+    if p.decoupler == EXACT and p.terms.attitude_rates != 0.0:
+        roll, pitch = decoupled(p.decoupler, along, yaw, gravity, force)
+        return roll, pitch, rates
+    roll, pitch = decoupled(p.decoupler, along.value, value_of(yaw), gravity, value_of(force))
+    return at_rest(roll), at_rest(pitch), rates
 
 
 def _control(
-    present: Present,
-    reference: Any,
-    target: tuple[Moving, Moving, Moving],
-    integrals: Any,
-    parameters: Any,
-    form: Form,
+    present: Present, reference: Any, target: Any, integrals: Any, p: Any, form: Form
 ) -> tuple[Any, ...]:
-    """Position and attitude control.
-
-    Returns the desired jerk (m/s^3, world axes), the desired second derivatives of the body rates
-    (rad/s^3), the rates of the integrals (m) and the references of roll and pitch (rad).
-    """
-    now, rotation, terms = present.state, present.rotation, parameters.terms
+    """Desired jerk (m/s^3, world), second derivatives of body rates, integral rates, lean (rad)."""
+    now, rotation, terms = present.state, present.rotation, p.terms
     attitude = attitude_motion(
         now.attitude, now.omega, present.omega_rate, exact=terms.euler_rates != 0.0
     )
-    yaw = attitude[2]
-    if parameters.attitude_error == ROTATION or not (terms.attitude_rates or form.own_yaw):
-        yaw = target[2] if parameters.reference.type == POSES else parameters.reference.yaw
-    motion = tracking(now, reference, rotation @ present.specific.value, parameters)
-    roll, pitch, jerk, rates = _horizontal(
-        present, motion, target, yaw, integrals, parameters, form
-    )
-    climb, climb_rate = altitude_control(motion, integrals, parameters)
-    if parameters.attitude_error == ROTATION:
-        leaning = roll, pitch, target[2]
-        angular = rotation_control(leaning, rotation, now.omega, present.omega_rate, parameters)
+    (roll, pitch, yaw_ref), yaw = target, attitude[2]
+    if p.attitude_error == ROTATION or not (terms.attitude_rates or form.own_yaw):
+        yaw = yaw_ref if p.reference.type == POSES else p.reference.yaw
+    motion = _tracking(now, reference, rotation @ present.specific.value, p)
+    jerk, rates = xp.zeros(2), xp.zeros(2)
+    if form.dimension > 1:
+        jerk, rates = side_control(motion, integrals, p)
+    if form.dimension < 3 and p.decoupler != NONE:
+        roll, pitch, rates = _leaning(present, motion, yaw, integrals, p, form)
+    climb, climb_rate = _altitude_control(motion, integrals, p)
+    if p.attitude_error == ROTATION:
+        leaning = roll, pitch, yaw_ref
+        angular = rotation_control(leaning, rotation, now.omega, present.omega_rate, p)
     else:
-        angular = euler_control(roll, pitch, attitude, parameters)
+        angular = _euler_control(roll, pitch, attitude, p)
     jerk, rates = xp.hstack([jerk, climb]), xp.hstack([rates, climb_rate])
     return jerk, angular, rates, xp.array([roll.value, pitch.value])
 
@@ -184,7 +256,7 @@ def _per_unknown(wrench: Any, speeds: Any, published: bool, form: Form) -> tuple
     return xp.vstack([wrench[:3] * gain, wrench[3:] * turns]), wrench[:3] * turns
 
 
-def _start(w: Any, speeds: Any, parameters: Any, form: Form) -> Any:
+def _start(w: Any, speeds: Any, p: Any, form: Form) -> Any:
     """Unknowns to which the solution is nearest: zero, or a motion toward the least power.
 
     The power is proportional to the sum of ``|varpi|^3``.
@@ -193,22 +265,13 @@ def _start(w: Any, speeds: Any, parameters: Any, form: Form) -> Any:
     if count == 3 + form.dimension:
         return xp.zeros(count)  # there is one solution
     if form.norm == "thrust":
-        return -parameters.restoring * w
+        return -p.restoring * w
     total = abs(speeds).sum()
-    return -parameters.restoring * count / xp.where(total == 0.0, xp.inf, total) * w
+    return -p.restoring * count / xp.where(total == 0.0, xp.inf, total) * w
 
 
-def null_part(wrench: Any, up: Any, w: Any, form: Form) -> Any:
-    """The share of ``w`` that the outputs do not see, whatever the norm, from 0 to 1.
-
-    In the norm of rotor accelerations a rotor that comes to rest would take the share with it.
-
-    Args:
-        wrench: Force and torque per unit of ``w``, shape (6, N).
-        up: World up in body axes, shape (3,).
-        w: ``varpi |varpi|`` of the rotors, shape (N,).
-        form: Options of the law.
-    """
+def _null_part(wrench: Any, up: Any, w: Any, form: Form) -> Any:
+    """The share of ``w`` that the outputs do not see, whatever the norm, from 0 to 1."""
     if len(w) <= 3 + form.dimension:
         return 0.0
     units = factors(wrench, wrench[:3], up, form.dimension, form.forward).units
@@ -240,20 +303,20 @@ def independence(wrench: Any, up: Any, side: Any, form: Form) -> Any:
     return xp.where(product > 0.0, product, 0.0)
 
 
-def present_wrench(seen: Seen, parameters: Any, knots: Any, layout: TiltOfRotor) -> tuple[Any, Any]:
+def present_wrench(seen: Seen, p: Any, knots: Any, layout: TiltOfRotor) -> tuple[Any, Any]:
     """Force and torque per unit of ``w`` (6, N) without failed rotors, and world up in body axes.
 
     Args:
-        seen, parameters, knots, layout: See `attitude_force`.
+        seen, p, knots, layout: See `attitude_force`.
     """
-    now, (_, rotors) = state_of(seen.state, layout), airframe(parameters, knots, layout)
-    works = working(seen.time, getattr(parameters, "failure", UNHARMED), len(layout))
+    now, (_, rotors) = state_of(seen.state, layout), airframe(p, knots, layout)
+    works = working(seen.time, getattr(p, "failure", UNHARMED), len(layout))
     wrench = moving_wrench_map(rotors.masked(works), at_rest(now.tilts)).value
     return wrench, rotation_matrix(now.attitude)[2]
 
 
 def attitude_force(
-    seen: Seen, plan: Any, parameters: Any, knots: Any, layout: TiltOfRotor, form: Form
+    seen: Seen, plan: Any, p: Any, knots: Any, layout: TiltOfRotor, form: Form
 ) -> Step:
     """Rotor accelerations (rad/s^2), integrator rates (m), and as signals (`SIGNALS`) the rest.
 
@@ -264,17 +327,17 @@ def attitude_force(
         seen: Its states are the `INTEGRAL_FIELDS`.
         plan: Tilt angles (rad) with two derivatives by which the body is to turn, shape (M, 3);
             None for pods that do not move, or whose motion does not count.
-        parameters: `Parameters` of `multirotor_steps` or of `gait_feedforward`.
+        p: `Parameters` of `multirotor_keys` or of `gait_feedforward`.
         knots: Table data of the flight, with the table of the rotors.
         layout: Tilts of the rotors.
         form: Options of the law.
     """
     time, measured = seen.time, seen.measured
-    now, (body, rotors) = state_of(seen.state, layout), airframe(parameters, knots, layout)
-    reference = reference_motion(time, parameters.reference, knots)
-    terms, omega, w = parameters.terms, now.omega, now.speeds * abs(now.speeds)
+    now, (body, rotors) = state_of(seen.state, layout), airframe(p, knots, layout)
+    reference = reference_motion(time, p.reference, knots)
+    terms, omega, w = p.terms, now.omega, now.speeds * abs(now.speeds)
     if form.losses:
-        works = working(time, parameters.failure, len(layout))
+        works = working(time, p.failure, len(layout))
         rotors, w = rotors.masked(works), works * w
 
     # Force and torque, and their rates as the pods turn at constant rotor speeds.
@@ -283,7 +346,7 @@ def attitude_force(
     force, torque = wrench[:3], wrench[3:]
     momentum = Moving(*xp.zeros((3, 3)))  # of the rotors' spin
     if form.spin:
-        per_rotor = parameters.rotor_inertia / parameters.vehicle.thrust_coefficient
+        per_rotor = p.rotor_inertia / p.vehicle.thrust_coefficient
         momentum = turning[:3] @ (per_rotor * rotors.spins * now.speeds)
 
     # Newton and Euler.
@@ -293,7 +356,7 @@ def attitude_force(
         remaining = torque - swept(momentum, omega, xp.zeros(3)).value
         omega_rate = angular_acceleration(body, remaining, omega, terms.gyroscopic_torque)
     spin = swept(momentum, omega, omega_rate)
-    published = parameters.decoupling == PUBLISHED_DECOUPLING
+    published = p.decoupling == PUBLISHED_DECOUPLING
     unknown, pushes = _per_unknown(rows, now.speeds, published, form)
     found = factors(unknown, pushes, rotation[2], form.dimension, form.forward)
     direction = found.direction
@@ -302,18 +365,16 @@ def attitude_force(
         direction = moving_direction(planned, rotation[2], form.dimension)
     specific = Moving(force / body.mass, change[:3] / body.mass, 0.0)
     present = Present(now, rotation, omega_rate, specific, direction)
-    target = _target(time, parameters, knots)
-    jerk, omega_jerk, rates, lean_ref = _control(
-        present, reference, target, seen.states, parameters, form
-    )
+    target = _target(time, p, knots)
+    jerk, omega_jerk, rates, lean_ref = _control(present, reference, target, seen.states, p, form)
 
     # Rates of torque and force that remain for the rotors.
     twist = torque_rate(body, omega, omega_rate, omega_jerk, terms.gyroscopic_torque) + spin.rate
     push = body.mass * (rotation.T @ jerk) - cross(omega, force)
     desired = xp.hstack([twist - change[3:], found.axes @ (push - change[:3])])
-    matrix, start = xp.vstack([unknown[3:], found.rows]), _start(w, now.speeds, parameters, form)
+    matrix, start = xp.vstack([unknown[3:], found.rows]), _start(w, now.speeds, p, form)
     inputs = nearest_solution(matrix, desired, start, found.units)
     if form.norm == "thrust":
-        inputs = rotor_accelerations(inputs, now.speeds, parameters.slowest_rotor)
-    unseen = null_part(rows, rotation[2], w, form)
+        inputs = rotor_accelerations(inputs, now.speeds, p.slowest_rotor)
+    unseen = _null_part(rows, rotation[2], w, form)
     return Step(inputs, rates, xp.hstack([lean_ref, target[2].value, unseen]))

@@ -24,7 +24,7 @@ from tiltsim_controllers.code.arrays import traceable, xp
 from tiltsim_controllers.gaits.colors import nearest_red_angles
 from tiltsim_controllers.gaits.motion import NO_KNOTS
 from tiltsim_controllers.laws.force_directions import factors, share
-from tiltsim_controllers.laws.supervisor import UNTILTED, Supervision, Supervisor, WayBack
+from tiltsim_controllers.laws.supervisor import UNTILTED, Supervision, Supervisor
 from tiltsim_controllers.mathematics.linear import norm
 from tiltsim_controllers.mathematics.moving import Moving
 from tiltsim_controllers.mathematics.records import Vector3
@@ -159,9 +159,6 @@ def _return_speed(planned: Any, supervisor: Supervisor, drag_ratio: Any) -> Any:
 
 
 SUPERVISION: Final = Supervision(
-    4,
-    lambda _time, parameters: drag_ratio(parameters.vehicle),
-    assess,
-    WayBack(_towards_red, _return_speed),
+    4, lambda _, p: drag_ratio(p.vehicle), assess, _towards_red, _return_speed
 )
 """Its functions; the ``vehicle`` is the drag ratio ``r = K_m / (L K_f)``."""

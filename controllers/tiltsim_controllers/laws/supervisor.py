@@ -34,12 +34,10 @@ from tiltsim_controllers.gaits.motion import NO_KNOTS, GaitParameters, planned_t
 from tiltsim_controllers.mathematics.attitude import rotation_matrix
 from tiltsim_controllers.mathematics.linear import cross
 
-SCALE: Final = 0.0
-HOLD: Final = 1.0
-RETURN_TO_RED: Final = 2.0
-
-STRATEGIES: Final = {"scale": SCALE, "hold": HOLD, "return_to_red": RETURN_TO_RED}
+STRATEGIES: Final = {"scale": 0.0, "hold": 1.0, "return_to_red": 2.0}
 """Strategies by their name in a scenario."""
+
+SCALE, HOLD, RETURN_TO_RED = STRATEGIES.values()
 
 SCALE_GRID: Final = 16
 """Intervals of the scale that are checked, from the whole gait to none."""
@@ -76,19 +74,6 @@ class Supervisor(NamedTuple):
     horizon: float = 0.0  # s of the gait to look ahead
     max_rate: float = 0.0  # rad/s, of the fastest tilt on the way to red and back
     clearance: float = 0.0  # rad, of red gaits from the curve L
-
-
-class WayBack(NamedTuple):
-    """The gait to which a vehicle's tilts can return; planned tilts have shape (M, 3)."""
-
-    tilts: Callable[..., Any]
-    """``(planned, motion, supervisor, vehicle)``: the planned tilts, moved by a fraction."""
-    speed: Callable[..., Any]
-    """``(planned, supervisor, vehicle)``: rate (1/s) along the way at the maximum tilt rate."""
-
-
-NO_WAY_BACK: Final = WayBack(lambda planned, *_: planned, lambda *_: 0.0)
-"""For vehicles without `RETURN_TO_RED`, which is refused for them."""
 
 
 @traceable
@@ -131,25 +116,15 @@ def turned_along(up: Any, start: Any, end: Any) -> Any:
     return xp.where(turns, along * up + cross(axis, up) + share * axis, up)
 
 
-class Supervised(NamedTuple):
-    """A supervisor in a flight: how far a vehicle is from its thresholds."""
-
-    assess: Callable[..., tuple[Any, Any, Any]]  # see `Supervision`
-    supervisor: Supervisor  # thresholds
-    vehicle: Any  # parameters of the vehicle
-    knots: Any  # table data of the flight
-
-    def look(self, tilts: Any, up: Any) -> tuple[Any, Any]:
-        """Clearance, and the direction in which the vehicle hovers."""
-        margin, determinant, direction = self.assess(tilts, up, self.vehicle, self.knots)
-        return _relative_clearance(margin, determinant, self.supervisor), direction
+Look = Callable[[Any, Any], tuple[Any, Any]]
+"""``(tilts, up)``: clearance, and the direction in which the vehicle hovers."""
 
 
-def _largest_scale(tilts: Any, up: Any, supervised: Supervised) -> Any:
+def _largest_scale(tilts: Any, up: Any, look: Look) -> Any:
     """`Supervision.gait_scale` at an attitude."""
 
     def clearance_at(scale: Any) -> Any:
-        return supervised.look(scale * tilts, up)[0]
+        return look(scale * tilts, up)[0]
 
     def lower(step: Any, scale: Any, left: Any, nearest: Any, most: Any) -> tuple[Any, ...]:
         better = left > most
@@ -177,21 +152,23 @@ def _largest_scale(tilts: Any, up: Any, supervised: Supervised) -> Any:
     return branch(whole >= 0.0, lambda: 1.0, searched)
 
 
-def _smallest_ahead(clock: Any, up: Any, tilts_at: Callable[..., Any], now: Supervised) -> Any:
+def _smallest_ahead(
+    clock: Any, up: Any, tilts_at: Callable[..., Any], horizon: Any, look: Look
+) -> Any:
     """The smallest clearance up to the horizon at the supervisor's present state.
 
     The vehicle meets each sample's tilts with the lean of a moment before. In hover it leans with
     their direction; it stays as far away from that as it is now.
     """
-    spacing = now.supervisor.horizon / LOOKAHEAD_SAMPLES
-    smallest, start = now.look(tilts_at(clock), up)
+    spacing = horizon / LOOKAHEAD_SAMPLES
+    smallest, start = look(tilts_at(clock), up)
 
     def glance(sample: Any, smallest: Any, before: Any) -> tuple[Any, Any]:
         ahead = clock + spacing * (sample + 1.0)
         before = branch(
-            spacing > FOLLOWED, lambda: now.look(tilts_at(ahead - FOLLOWED), up)[1], lambda: before
+            spacing > FOLLOWED, lambda: look(tilts_at(ahead - FOLLOWED), up)[1], lambda: before
         )
-        clearance, direction = now.look(tilts_at(ahead), turned_along(up, start, before))
+        clearance, direction = look(tilts_at(ahead), turned_along(up, start, before))
         return xp.minimum(smallest, clearance), direction
 
     return repeat(LOOKAHEAD_SAMPLES, glance, xp.minimum(1.0, smallest), start)[0]
@@ -211,7 +188,20 @@ class Supervision(NamedTuple):
     """``(tilts, up, vehicle, knots)``: margin (rad), determinant (`UNTILTED` at best), and the
     direction (body axes, of any length and sense) that keeps its attitude in hover; ``up`` is
     world up in body axes."""
-    way_back: WayBack = NO_WAY_BACK  # the gait to which the tilts can return
+    towards_red: Any = None
+    """``(planned, motion, supervisor, vehicle)``: planned tilts, (M, 3), moved by a fraction toward
+    the gait to which they can return; None for vehicles without `RETURN_TO_RED`."""
+    return_speed: Any = None
+    """``(planned, supervisor, vehicle)``: rate (1/s) along the way at the maximum tilt rate."""
+
+    def look(self, supervisor: Supervisor, vehicle: Any, knots: Any) -> Look:
+        """How far a vehicle is from the thresholds of its supervisor."""
+
+        def look(tilts: Any, up: Any) -> tuple[Any, Any]:
+            margin, determinant, direction = self.assess(tilts, up, vehicle, knots)
+            return _relative_clearance(margin, determinant, supervisor), direction
+
+        return look
 
     @traceable
     def gait_scale(
@@ -228,10 +218,10 @@ class Supervision(NamedTuple):
         """
         if supervisor.strategy != SCALE:
             return 1.0
-        supervised = Supervised(self.assess, supervisor, vehicle, knots)
+        look = self.look(supervisor, vehicle, knots)
         return branch(
             (supervisor.min_margin > 0.0) | (supervisor.min_determinant > 0.0),
-            lambda: _largest_scale(tilts, _up(roll, pitch), supervised),
+            lambda: _largest_scale(tilts, _up(roll, pitch), look),
             lambda: 1.0,
         )
 
@@ -250,7 +240,7 @@ class Supervision(NamedTuple):
         if supervisor.strategy == HOLD:
             return _on_clock(planned, motion)
         if supervisor.strategy == RETURN_TO_RED:
-            return self.way_back.tilts(planned, motion, supervisor, vehicle)
+            return self.towards_red(planned, motion, supervisor, vehicle)
         return scale * planned
 
     @traceable
@@ -278,13 +268,13 @@ class Supervision(NamedTuple):
             return self.tilts(planned, 1.0, still, supervisor, vehicle)[:, 0]
 
         clock = gait_time(time, still, supervisor)
-        now = Supervised(self.assess, supervisor, vehicle, knots)
-        share = _smallest_ahead(clock, _up(roll, pitch), tilts_at, now) / BAND
+        look, up = self.look(supervisor, vehicle, knots), _up(roll, pitch)
+        share = _smallest_ahead(clock, up, tilts_at, supervisor.horizon, look) / BAND
         if supervisor.strategy == HOLD:
             desired = 1.0 - xp.minimum(1.0, xp.maximum(0.0, share))
         else:
             planned = planned_tilts(time, gait, knots, self.tilt_count)
-            speed = self.way_back.speed(planned, supervisor, vehicle)
+            speed = self.return_speed(planned, supervisor, vehicle)
             desired = -speed * xp.minimum(1.0, xp.maximum(-1.0, share))
             # Four lags: the motion to either end is critically damped.
             desired = xp.maximum(-state / (4.0 * LAG), desired)

@@ -39,7 +39,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from tiltsim_controllers.mathematics.scalar import Floats, Pair
-from tiltsim_controllers.tilt_car.planned_direction import lyapunov_candidate
+from tiltsim_controllers.tilt_car.laws import lyapunov_candidate
 from tiltsim_controllers.tilt_car.vehicle import TiltCar, turn_per_tilt
 
 
@@ -91,7 +91,7 @@ class Swing:
 
     half_angle: float  # ``theta``, rad
     half_period: float  # ``T / 2``, s
-    gains: Any  # of `planned_direction`
+    gains: Any  # of `tilt_car.laws`
     reference_acceleration: float = 1.0  # along x, m/s^2
 
     @property

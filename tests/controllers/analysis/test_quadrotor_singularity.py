@@ -12,7 +12,7 @@ from tiltsim_controllers.analysis.singularity import (
     published_determinant,
     published_singular_curve,
 )
-from tiltsim_controllers.laws.yaw_position import decoupling_matrix
+from tiltsim_controllers.laws.quadrotor import decoupling_matrix
 from tiltsim_controllers.vehicle.parameters import PRESETS
 
 QUADROTOR = PRESETS["ar_drone_2_unrounded"]

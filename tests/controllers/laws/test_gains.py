@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tiltsim_controllers.laws import yaw_position
 from tiltsim_controllers.laws.gains import GAIN_SETS, Gains, Poles
-from tiltsim_controllers.tilt_car import integrating, planned_direction
+from tiltsim_controllers.laws.quadrotor import POSITION_GAINS
+from tiltsim_controllers.tilt_car.laws import FOURTH_GAINS, PLANNED_GAINS, THIRD_GAINS
 
 AXES = ("roll", "pitch", "yaw", "altitude")
 
@@ -49,14 +49,14 @@ def test_the_published_sets_are_as_printed():
 
 def test_other_sets_are_as_printed_and_ours_have_the_poles_that_they_say():
     """Ch. 2, App. B; ch. 11, Sec. 4.2; of ch. 10, which prints none, multiple poles."""
-    assert yaw_position.GAIN_SETS["ch02"] == ((10.0, 20.0, 50.0, 500.0), (5.0, 5.0))
-    assert yaw_position.GAIN_SETS["stable"].yaw == yaw_position.GAIN_SETS["ch02"].yaw
-    assert planned_direction.GAIN_SETS["ch11"] == ((12.0, 6.0), (9.0, 18.0))
+    assert POSITION_GAINS["ch02"] == ((10.0, 20.0, 50.0, 500.0), (5.0, 5.0))
+    assert POSITION_GAINS["stable"].yaw == POSITION_GAINS["ch02"].yaw
+    assert PLANNED_GAINS["ch11"] == ((12.0, 6.0), (9.0, 18.0))
     loops = (
-        (planned_direction.GAIN_SETS["ch10"].x, -2.0),
-        (planned_direction.GAIN_SETS["ch10"].y, -2.0),
-        (integrating.THIRD_GAINS["ch10"], -2.0),
-        (integrating.FOURTH_GAINS["ch10"], -3.0),
+        (PLANNED_GAINS["ch10"].x, -2.0),
+        (PLANNED_GAINS["ch10"].y, -2.0),
+        (THIRD_GAINS["ch10"], -2.0),
+        (FOURTH_GAINS["ch10"], -3.0),
     )
     for gains, pole in loops:
         np.testing.assert_allclose([1.0, *gains], np.poly([pole] * len(gains)), rtol=1e-12)

@@ -36,7 +36,7 @@ from tiltsim_controllers.laws.gains import (
     third_order_gains,
 )
 from tiltsim_controllers.laws.gait_feedforward import Parameters
-from tiltsim_controllers.laws.multirotor_steps import EULER_ANGLES, FeedforwardTerms
+from tiltsim_controllers.laws.multirotor_keys import EULER_ANGLES, FeedforwardTerms
 from tiltsim_controllers.laws.supervisor import Supervisor
 from tiltsim_controllers.mathematics.moving import Moving
 from tiltsim_controllers.references.trajectories import REFERENCE_TYPES, ReferenceParameters

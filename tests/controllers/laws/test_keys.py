@@ -8,7 +8,7 @@ from typing import Annotated, ClassVar, Literal
 import pytest
 from pydantic import Field
 
-from tiltsim_controllers.laws import multirotor_steps
+from tiltsim_controllers.laws import multirotor_keys
 from tiltsim_controllers.laws.attitude_altitude import DECOUPLINGS, AttitudeAltitude
 from tiltsim_controllers.laws.feedback import DECOUPLERS
 from tiltsim_controllers.laws.keys import (
@@ -22,7 +22,7 @@ from tiltsim_controllers.laws.keys import (
     record_of,
     table_of,
 )
-from tiltsim_controllers.laws.multirotor_steps import AttitudeForce
+from tiltsim_controllers.laws.multirotor_keys import AttitudeForce
 
 
 class Table(Keys):
@@ -88,5 +88,5 @@ def test_a_table_stays_as_it_is():
 def test_choices_have_the_numbers_that_the_laws_compare_with(law):
     for key, codes in (("decoupler", DECOUPLERS), ("decoupling", DECOUPLINGS)):
         assert {name: choice(law, key, name) for name in codes} == codes
-    errors = {"rotation": multirotor_steps.ROTATION, "euler_angles": multirotor_steps.EULER_ANGLES}
+    errors = {"rotation": multirotor_keys.ROTATION, "euler_angles": multirotor_keys.EULER_ANGLES}
     assert {name: choice(AttitudeForce, "attitude_error", name) for name in errors} == errors

@@ -33,16 +33,14 @@ from tiltsim_controllers.laws.allocation import RotorRange
 from tiltsim_controllers.laws.feedback import DECOUPLERS
 from tiltsim_controllers.laws.gains import GAIN_SETS, Poles, gains_from_poles
 from tiltsim_controllers.laws.gait_feedforward import multirotor_law_of
-from tiltsim_controllers.laws.multirotor import independence
-from tiltsim_controllers.laws.multirotor_steps import (
-    EULER_ANGLES,
-    FeedforwardTerms,
-    Form,
+from tiltsim_controllers.laws.multirotor import (
     Tracking,
+    independence,
     rotation_control,
     side_control,
     turned,
 )
+from tiltsim_controllers.laws.multirotor_keys import EULER_ANGLES, FeedforwardTerms, Form
 from tiltsim_controllers.laws.observed import Failure
 from tiltsim_controllers.laws.supervisor import Supervisor
 from tiltsim_controllers.mathematics.attitude import attitude_error, rotation_matrix
@@ -66,7 +64,7 @@ AS_PUBLISHED = FeedforwardTerms(0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
 def differences(todays, general):
     """Relative differences of the two laws at random states, the four accelerations together."""
     found = []
-    for time, state in random_states(200):
+    for time, state in random_states(80):
         expected, value = np.array(todays(time, state)), np.array(general(time, state))
         found.append(np.abs(value[: len(expected)] - expected).max() / np.abs(expected).max())
     return np.array(found)

@@ -25,14 +25,7 @@ from tiltsim_controllers.laws.supervised_vehicles import (
     multirotor_supervision_of,
     watched,
 )
-from tiltsim_controllers.laws.supervisor import (
-    BAND,
-    LAG,
-    STRATEGIES,
-    Supervised,
-    Supervisor,
-    turned_along,
-)
+from tiltsim_controllers.laws.supervisor import BAND, LAG, STRATEGIES, Supervisor, turned_along
 from tiltsim_controllers.vehicle.cross import cross_table
 from tiltsim_controllers.vehicle.parameters import PRESETS, drag_ratio
 from tiltsim_controllers.vehicle.rotors import tilt_of_rotor
@@ -48,8 +41,7 @@ WATCH = Supervisor(min_margin=0.3, min_determinant=1.0)
 
 def clearance_of(code, tilts, up, limits, vehicle, knots=NO_KNOTS):
     """Distance above the thresholds by the largest possible."""
-    supervised = Supervised(code.assess, limits, vehicle, knots)
-    return supervised.look(np.array(tilts), np.array(up))[0]
+    return code.look(limits, vehicle, knots)(np.array(tilts), np.array(up))[0]
 
 
 angles = st.tuples(*[st.floats(-1.5, 1.5)] * 4)

@@ -7,26 +7,27 @@ from math import isnan, pi
 import numpy as np
 import pytest
 
-import tiltsim_controllers.laws.quadrotor_attitude_altitude as attitude_altitude
-import tiltsim_controllers.laws.yaw_position as yaw_position
 from tests.controllers.flights import fly, quadrotor_rates, rk4_step
 from tests.natively import compiled_law
 from tiltsim_controllers.laws.keys import choice, number_of
-from tiltsim_controllers.laws.quadrotor_attitude_altitude import attitude_altitude_inputs
-from tiltsim_controllers.laws.switching import (
+from tiltsim_controllers.laws.quadrotor import (
+    ATTITUDE_GAINS,
+    POSITION_GAINS,
     PUBLISHED_ZONE,
-    Parameters,
     Switching,
+    SwitchingParameters,
+    attitude_altitude_inputs,
     attitude_altitude_thrust_rate,
     in_attitude_zone,
     switching_inputs,
+    yaw_position_inputs,
 )
 from tiltsim_controllers.references.trajectories import REFERENCE_TYPES, ReferenceParameters
 from tiltsim_controllers.vehicle.parameters import PRESETS
 
 QUADROTOR = PRESETS["ar_drone_2_unrounded"]
 WEIGHT = QUADROTOR.mass * QUADROTOR.gravity
-GAINS = attitude_altitude.GAIN_SETS["ch02"]
+GAINS = ATTITUDE_GAINS["ch02"]
 EXTENSIONS = ("bumpless", "held", "running")
 ZONE = number_of(Switching(law="switching"), "zone")
 START = (*[0.0] * 6, 0.5, -0.5, 0.0, 0.0, 0.0, 0.0, WEIGHT, 0.0)
@@ -43,10 +44,10 @@ def parameters(extension, roll=0.01, pitch=0.0, gains="ch02"):
         roll=roll,
         pitch=-pitch,
     )
-    return Parameters(
+    return SwitchingParameters(
         QUADROTOR,
         reference,
-        yaw_position.GAIN_SETS[gains],
+        POSITION_GAINS[gains],
         GAINS,
         ZONE,
         choice(Switching, "extension", extension),
@@ -130,10 +131,10 @@ def test_each_law_flies_in_its_zone(extension):
             if extension == "held":
                 np.testing.assert_array_equal(inputs[4:], 0.0)
             if extension == "running":
-                outside = yaw_position.yaw_position_inputs(1.0, state, law)
+                outside = yaw_position_inputs(1.0, state, law)
                 np.testing.assert_array_equal(inputs[4:], outside[4:])
         else:
-            outside = yaw_position.yaw_position_inputs(1.0, state, law)
+            outside = yaw_position_inputs(1.0, state, law)
             np.testing.assert_array_equal(inputs, outside)
 
 

@@ -25,7 +25,7 @@ from tests.controllers.laws.test_gait_feedforward import (
 from tests.thesis import force_matrix, torque_matrix
 from tiltsim_controllers.gaits.plans import keyframes
 from tiltsim_controllers.laws.feedback import DECOUPLERS, attitude_jerk, exact_decoupler
-from tiltsim_controllers.laws.multirotor_steps import FeedforwardTerms
+from tiltsim_controllers.laws.multirotor_keys import FeedforwardTerms
 from tiltsim_controllers.mathematics.moving import Moving
 from tiltsim_controllers.references.trajectories import REFERENCE_TYPES, ReferenceParameters
 

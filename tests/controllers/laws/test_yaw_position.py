@@ -12,9 +12,9 @@ from tests.controllers.flights import fly, quadrotor_rates, rk4_step
 from tests.natively import compiled_law
 from tiltsim_controllers.analysis.singularity import normalized_determinant, published_determinant
 from tiltsim_controllers.analysis.stability import is_hurwitz
-from tiltsim_controllers.laws.yaw_position import (
-    GAIN_SETS,
-    Parameters,
+from tiltsim_controllers.laws.quadrotor import (
+    POSITION_GAINS,
+    YawPositionParameters,
     decoupling_matrix,
     drift,
     moments_of,
@@ -169,11 +169,11 @@ def test_ma_is_the_plants_derivative_at_zero_input():
         np.testing.assert_allclose(ma, numerical, rtol=0, atol=1e-6 * (1 + np.abs(ma).max()))
 
 
-@pytest.mark.parametrize("gains", GAIN_SETS)
+@pytest.mark.parametrize("gains", POSITION_GAINS)
 def test_the_outputs_move_as_appendix_b_demands(gains):
     random = np.random.default_rng(4)
-    parameters = Parameters(QUADROTOR, CIRCLE._replace(yaw=0.3), GAIN_SETS[gains])
-    k = GAIN_SETS[gains]
+    parameters = YawPositionParameters(QUADROTOR, CIRCLE._replace(yaw=0.3), POSITION_GAINS[gains])
+    k = POSITION_GAINS[gains]
     time = 2.0
     reference = reference_motion(time, parameters.reference)
     for _ in range(CASES):
@@ -219,7 +219,9 @@ def test_the_reference_derivatives_are_derivatives():
 
 # --- flights -----------------------------------------------------------------------------------
 
-PARAMETERS = {name: Parameters(QUADROTOR, CIRCLE, gains) for name, gains in GAIN_SETS.items()}
+PARAMETERS = {
+    name: YawPositionParameters(QUADROTOR, CIRCLE, gains) for name, gains in POSITION_GAINS.items()
+}
 
 
 def flight(gains, duration, step):
@@ -238,10 +240,10 @@ def position_polynomial(gains):
 
 
 def test_the_published_gains_are_unstable_by_themselves_and_ours_are_not():
-    published = position_polynomial(GAIN_SETS["ch02"])
+    published = position_polynomial(POSITION_GAINS["ch02"])
     assert not is_hurwitz(published)
     np.testing.assert_allclose(max(np.roots(published).real), 1.30, atol=5e-3)
-    stable = position_polynomial(GAIN_SETS["stable"])
+    stable = position_polynomial(POSITION_GAINS["stable"])
     assert is_hurwitz(stable)
     np.testing.assert_allclose(np.roots(stable), [-2.5] * 4, atol=2e-3)
 

@@ -23,9 +23,9 @@ from tiltsim_controllers.tilt_car.cycles import (
     mirrored_map,
     multipliers,
 )
-from tiltsim_controllers.tilt_car.planned_direction import GAIN_SETS, Gains
+from tiltsim_controllers.tilt_car.laws import PLANNED_GAINS, PlannedGains
 
-CH11 = Swing(pi / 6, 1.0, GAIN_SETS["ch11"])
+CH11 = Swing(pi / 6, 1.0, PLANNED_GAINS["ch11"])
 lyapunov_bound = cache(lyapunov_bound)
 
 
@@ -72,7 +72,7 @@ def test_the_map_is_the_integrated_error(error, rate):
 
 @pytest.mark.parametrize("gains", [(9.0, 18.0), (4.0, 4.0), (2.0, 8.0)])
 def test_free_motion_is_right_for_any_damping(gains):
-    swing = Swing(pi / 6, 1.0, Gains((12.0, 6.0), gains))
+    swing = Swing(pi / 6, 1.0, PlannedGains((12.0, 6.0), gains))
     step = 1e-5
     state = (0.3, -0.2)
     here, ahead, behind = (swing.after_both_push(0.4 + side, state) for side in (0.0, step, -step))
@@ -145,7 +145,7 @@ def test_beyond_l_critical_nothing_gains(scale):
 
 
 def test_in_a_short_half_both_rotors_push_all_the_time():
-    short = Swing(pi / 6, 0.05, GAIN_SETS["ch11"])
+    short = Swing(pi / 6, 0.05, PLANNED_GAINS["ch11"])
     start = (0.3, 0.9)
     half = half_period(short, start)
     assert half.free_time == 0.05

@@ -20,7 +20,7 @@ from tests.controllers.tilt_car.lean import (
     split_of_lean,
 )
 from tiltsim_controllers.tilt_car.cycles import Orbit, drift_rate, lean_stiffness, orbit
-from tiltsim_controllers.tilt_car.integrating import minimum_norm, restoring_inputs
+from tiltsim_controllers.tilt_car.laws import minimum_norm, restoring_inputs
 from tiltsim_controllers.tilt_car.vehicle import (
     THESIS_CAR,
     TiltCar,

@@ -18,8 +18,7 @@ from tiltsim_controllers.references.trajectories import (
     ReferenceParameters,
     reference_motion,
 )
-from tiltsim_controllers.tilt_car import integrating
-from tiltsim_controllers.tilt_car import planned_direction as planned
+from tiltsim_controllers.tilt_car import laws
 from tiltsim_controllers.tilt_car.vehicle import (
     THESIS_CAR,
     TiltCar,
@@ -130,7 +129,7 @@ def test_drift_and_columns_make_the_fourth_derivative():
     (w1, d1, s1), (w2, d2, s2), (alpha, d3, s3) = INPUTS
     yaw = -counter_yaw_per_tilt(CAR) * alpha
     state = np.array([0.0, 0.0, 0.0, 0.0, yaw, alpha, w1, w2, d3, d1, d2])
-    drift = integrating.body_derivatives(state, CAR)[2]
+    drift = laws.body_derivatives(state, CAR)[2]
     body = drift + matrix_at(w1, w2) @ (s1, s2, s3)
     np.testing.assert_allclose(rotation(yaw + alpha) @ body, desired, rtol=1e-12)
 
@@ -140,24 +139,22 @@ def test_the_inverse_is_numpys(speed_1, speed_2, x, y):
     matrix, outputs = matrix_at(speed_1, speed_2), np.array([x, y])
     desired = np.linalg.pinv(matrix) @ outputs
     scale = np.abs(desired).max() + 1e-9
-    np.testing.assert_allclose(
-        integrating.minimum_norm(matrix, outputs), desired, atol=1e-9 * scale
-    )
+    np.testing.assert_allclose(laws.minimum_norm(matrix, outputs), desired, atol=1e-9 * scale)
 
 
 def test_one_rotor_at_rest_leaves_full_rank_two_do_not():
     one, outputs = matrix_at(80.0, 0.0), np.array([1.0, 2.0])
     assert np.linalg.matrix_rank(one) == 2
-    inputs = integrating.minimum_norm(one, outputs)
+    inputs = laws.minimum_norm(one, outputs)
     assert inputs[1] == 0.0
     np.testing.assert_allclose(one @ inputs, outputs)
-    assert np.isnan(integrating.minimum_norm(matrix_at(0.0, 0.0), outputs)).all()
+    assert np.isnan(laws.minimum_norm(matrix_at(0.0, 0.0), outputs)).all()
 
 
 @given(speeds, speeds)
 def test_silent_inputs_are_not_felt(speed_1, speed_2):
     matrix = matrix_at(speed_1, speed_2)
-    n = integrating.null_space_input(matrix)
+    n = laws.null_space_input(matrix)
     scale = np.linalg.norm(matrix) * np.linalg.norm(n)
     np.testing.assert_allclose(matrix @ n, 0.0, atol=1e-12 * scale)
 
@@ -167,7 +164,7 @@ def test_restoring_turns_the_middle_and_nothing_else(speed_1, speed_2, rate):
     matrix = matrix_at(speed_1, speed_2)
     along, across = thrust_map(CAR) @ (speed_1**2, speed_2**2)
     lean = np.arctan2(across, along)
-    inputs = integrating.restoring_inputs(lean, rate, matrix, CAR)
+    inputs = laws.restoring_inputs(lean, rate, matrix, CAR)
     scale = np.linalg.norm(matrix) * np.linalg.norm(inputs) + 1e-12
     np.testing.assert_allclose(matrix @ inputs, 0.0, atol=1e-10 * scale)
     # The acceleration stands still in the world, so the lean changes as the middle turns.
@@ -177,10 +174,8 @@ def test_restoring_turns_the_middle_and_nothing_else(speed_1, speed_2, rate):
 @pytest.mark.parametrize("restoring_rate", [0.0, 2.0])
 def test_the_third_derivative_law_makes_the_jerk_it_wants(restoring_rate):
     state = np.array([1.0, -2.0, 3.0, -4.0, -0.3, 0.9, 90.0, 70.0])
-    parameters = integrating.ThirdParameters(
-        CAR, CIRCLE_10, integrating.THIRD_GAINS["ch10"], restoring_rate
-    )
-    inputs = integrating.third_derivative_inputs(0.7, state, parameters)
+    parameters = laws.ThirdParameters(CAR, CIRCLE_10, laws.THIRD_GAINS["ch10"], restoring_rate)
+    inputs = laws.third_derivative_inputs(0.7, state, parameters)
     made = rotation(0.6) @ matrix_at(90.0, 70.0) @ inputs
     reference = reference_motion(0.7, CIRCLE_10)[:, :2]
     pushed = acceleration(0.6, np.array([90.0**2, 70.0**2]), CAR)
@@ -194,12 +189,12 @@ def test_the_third_derivative_law_makes_the_jerk_it_wants(restoring_rate):
 
 
 def test_nothing_restores_the_lean_where_a_rotor_rests():
-    assert not integrating.restoring_inputs(0.3, 2.0, matrix_at(80.0, 0.0), CAR).any()
+    assert not laws.restoring_inputs(0.3, 2.0, matrix_at(80.0, 0.0), CAR).any()
 
 
 def fourth_parameters(decoupling):
-    code = choice(integrating.FourthDerivative, "decoupling", decoupling)
-    return integrating.FourthParameters(CAR, CIRCLE_10, code, 0.0, integrating.FOURTH_GAINS["ch10"])
+    code = choice(laws.FourthDerivative, "decoupling", decoupling)
+    return laws.FourthParameters(CAR, CIRCLE_10, code, 0.0, laws.FOURTH_GAINS["ch10"])
 
 
 def test_the_fourth_derivative_law_makes_the_snap_it_demands():
@@ -207,7 +202,7 @@ def test_the_fourth_derivative_law_makes_the_snap_it_demands():
     yaw = -0.3
     state = np.array([1.0, -2.0, 3.0, -4.0, yaw, alpha, w1, w2, d3, d1, d2])
     law = fourth_parameters("exact")
-    second = integrating.fourth_derivative_inputs(0.7, state, law)
+    second = laws.fourth_derivative_inputs(0.7, state, law)
     motion = [(*values[:2], last) for values, last in zip(INPUTS, second)]
     frame = rotation(yaw + alpha - turn_per_tilt(CAR) * alpha)
     ax, jx, made = (
@@ -228,7 +223,7 @@ def test_the_fourth_derivative_law_makes_the_snap_it_demands():
 def test_the_printed_tilt_column_lacks_the_yaws_answer():
     state = np.array([0.1, 0.2, 0.3, 0.4, -0.2, 0.5, 90.0, 70.0, 1.0, 2.0, -3.0])
     inputs = {
-        name: integrating.fourth_derivative_inputs(0.3, state, fourth_parameters(name))
+        name: laws.fourth_derivative_inputs(0.3, state, fourth_parameters(name))
         for name in ("published", "exact")
     }
     made = {}
@@ -243,7 +238,7 @@ def test_the_printed_tilt_column_lacks_the_yaws_answer():
 # --- planned direction -------------------------------------------------------------------------
 
 LINE_1 = ReferenceParameters(LINE, acceleration=(1.0, 0.0, 0.0))
-LAW = planned.Parameters(THESIS_CAR, GaitParameters(FIXED), LINE_1, planned.GAIN_SETS["ch11"])
+LAW = laws.PlannedParameters(THESIS_CAR, GaitParameters(FIXED), LINE_1, laws.PLANNED_GAINS["ch11"])
 
 
 @given(angles, st.floats(-1.0, 1.0), st.floats(-1.0, 1.0), st.floats(-2.0, 2.0))
@@ -255,23 +250,23 @@ def test_the_planned_law_is_eqs_12_and_13(direction, x, y, vy):
         [1.0 + 12.0 * (vx_ref - 0.3) + 6.0 * (x_ref - x), 9.0 * (0.0 - vy) + 18.0 * (0.0 - y)]
     )
     printed = np.linalg.solve(rotation(direction) @ printed_j_theta(THESIS_CAR), desired)
-    squares = planned.demanded_squared_speeds(time, state, LAW)
+    squares = laws.demanded_squared_speeds(time, state, LAW)
     np.testing.assert_allclose(squares, printed, rtol=1e-9, atol=1e-6)
-    inputs = planned.planned_direction_inputs(time, state, LAW)
+    inputs = laws.planned_direction_inputs(time, state, LAW)
     np.testing.assert_array_equal(inputs, np.maximum(squares, 0.0))
 
 
 def test_the_thrusts_direction_is_yaw_and_tilt_together():
     direct, shared = (np.array([0.1, 0.2, 0.3, 0.4, *angles]) for angles in ((0.5, 0), (0.8, -0.3)))
-    expected = planned.demanded_squared_speeds(1.7, direct, LAW)
-    found = planned.demanded_squared_speeds(1.7, shared, LAW)
+    expected = laws.demanded_squared_speeds(1.7, direct, LAW)
+    found = laws.demanded_squared_speeds(1.7, shared, LAW)
     np.testing.assert_allclose(found, expected, rtol=1e-12)
 
 
 @given(st.floats(-0.5, 0.5), st.floats(-1.5, 1.5), st.sampled_from([-pi / 3, pi / 3]))
 def test_proposition_4_states_which_rotors_push(error, error_rate, direction):
     state = np.array([0.5, -error, 1.0, -error_rate, direction, 0.0])  # e_x = e_x' = 0 at 1 s
-    square_1, square_2 = planned.demanded_squared_speeds(1.0, state, LAW)
+    square_1, square_2 = laws.demanded_squared_speeds(1.0, state, LAW)
     push = 9.0 * error_rate + 18.0 * error
     if abs(abs(push) - 3**-0.5) < 1e-6:
         return
@@ -284,5 +279,5 @@ def test_proposition_4_states_which_rotors_push(error, error_rate, direction):
 
 
 def test_the_lyapunov_candidate_is_eq_74():
-    candidate = planned.lyapunov_candidate(0.2, 0.7, planned.GAIN_SETS["ch11"])
+    candidate = laws.lyapunov_candidate(0.2, 0.7, laws.PLANNED_GAINS["ch11"])
     assert candidate == pytest.approx(0.5 * 0.7**2 + 9.0 * 0.2**2)

@@ -16,7 +16,7 @@ from tiltsim.laws.assembling import LOOPS, assemble, loop_of
 from tiltsim.scenario.loading import merge
 from tiltsim.simulation.simulate import make_plant
 from tiltsim_controllers.code.arrays import traceable, xp
-from tiltsim_controllers.laws.yaw_position import gyroscopic_acceleration
+from tiltsim_controllers.laws.quadrotor import gyroscopic_acceleration
 
 MOTION = ("x", "y", "z", "roll", "pitch", "yaw")
 TILTROTOR = {

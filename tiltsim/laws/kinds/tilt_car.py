@@ -19,7 +19,7 @@ from tiltsim_controllers.gaits.motion import planned_tilts
 from tiltsim_controllers.laws.observed import Seen, Step
 from tiltsim_controllers.mathematics.scalar import Floats, Vector
 from tiltsim_controllers.references.trajectories import reference_motion
-from tiltsim_controllers.tilt_car import integrating, planned_direction
+from tiltsim_controllers.tilt_car import laws
 from tiltsim_controllers.tilt_car.vehicle import TiltCar, acceleration, counter_yaw_per_tilt
 
 PLANE: Final = ("x", "y", "vx", "vy")  # position and velocity, m and m/s
@@ -227,14 +227,14 @@ class _Integrating(CarFunctions):
 
 
 def _third(seen: Seen, p: Any, knots: Any) -> Step:
-    found = integrating.third_derivative_inputs(seen.time, seen.state, p)
+    found = laws.third_derivative_inputs(seen.time, seen.state, p)
     return Step(found[:2], found[2:], reference_motion(seen.time, p.reference)[2, :2])
 
 
 def _fourth(seen: Seen, p: Any, knots: Any) -> Step:
     state = xp.hstack([seen.state, seen.states[1:]])
     _, tilt_rate, *accelerations = seen.states
-    second = integrating.fourth_derivative_inputs(seen.time, state, p)
+    second = laws.fourth_derivative_inputs(seen.time, state, p)
     rates = xp.hstack([tilt_rate, second[2], second[:2]])
     demanded = reference_motion(seen.time, p.reference)[2, :2]
     return Step(xp.array(accelerations), rates, demanded)
@@ -325,11 +325,11 @@ class _Planned(CarFunctions):
 def _step(seen: Seen, p: Any, knots: Any) -> Step:
     time, state = seen.time, seen.state
     signals = [
-        planned_direction.demanded_acceleration(time, state, p),
-        planned_direction.demanded_squared_speeds(time, state, p),
+        laws.demanded_acceleration(time, state, p),
+        laws.demanded_squared_speeds(time, state, p),
         _tilt(time, p, knots)[:1],
     ]
-    inputs = planned_direction.planned_direction_inputs(time, state, p)
+    inputs = laws.planned_direction_inputs(time, state, p)
     return Step(inputs, signals=xp.hstack(signals))
 
 
@@ -338,7 +338,7 @@ def _columns(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Fl
     error: Any = samples["y_ref"] - samples["y"]
     error_rate: Any = samples["vy_ref"] - samples["vy"]
     gains = setup.parameters.law.gains
-    lyapunov: Any = planned_direction.lyapunov_candidate(error, error_rate, gains)
+    lyapunov: Any = laws.lyapunov_candidate(error, error_rate, gains)
     switches = {
         f"switch_{rotor}": (samples[name] > 0.0).astype(float)
         for rotor, name in zip(ROTORS, SQUARES, strict=True)
@@ -348,7 +348,7 @@ def _columns(samples: Mapping[str, Floats], setup: ControlSetup) -> dict[str, Fl
 
 _PLANNED: Final = Law(
     _step,
-    planned_direction.Parameters,
+    laws.PlannedParameters,
     signals=(*DEMANDED, *SQUARES, "alpha_ref"),
     units={
         **dict.fromkeys(SQUARES, "rad^2/s^2"),
@@ -361,12 +361,9 @@ _PLANNED: Final = Law(
 _DERIVATIVES: Final = {f"rotor_acceleration_{rotor}": "rad/s^2" for rotor in ROTORS}
 
 LOOPS: Final = {
-    "tilt_car_third_derivative": _integrating(_third, integrating.ThirdParameters, {}, twice=False),
+    "tilt_car_third_derivative": _integrating(_third, laws.ThirdParameters, {}, twice=False),
     "tilt_car_fourth_derivative": _integrating(
-        _fourth,
-        integrating.FourthParameters,
-        {"alpha_ref_rate": "rad/s", **_DERIVATIVES},
-        twice=True,
+        _fourth, laws.FourthParameters, {"alpha_ref_rate": "rad/s", **_DERIVATIVES}, twice=True
     ),
     "tilt_car_planned_direction": _Planned(_PLANNED).car_loop(0, 2, commands_thrusts=True),
 }

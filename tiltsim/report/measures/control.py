@@ -20,9 +20,9 @@ from tiltsim_controllers.analysis.singularity import (
     world_up,
 )
 from tiltsim_controllers.analysis.stability import is_hurwitz, third_order_loop
-from tiltsim_controllers.laws import quadrotor_attitude_altitude, yaw_position
 from tiltsim_controllers.laws.feedback import conventional_decoupler, modified_decoupler
 from tiltsim_controllers.laws.gains import GAIN_SETS
+from tiltsim_controllers.laws.quadrotor import ATTITUDE_GAINS, POSITION_GAINS
 from tiltsim_controllers.mathematics.attitude import euler_rates
 from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.vehicle.cross import torque_free_force
@@ -52,27 +52,29 @@ def exact_on_published_curve() -> Floats:
 
 def rightmost_root() -> complex:
     """The root with the largest real part of ch. 2's position loop."""
-    roots = np.roots((1.0, *yaw_position.GAIN_SETS["ch02"].position))
+    roots = np.roots((1.0, *POSITION_GAINS["ch02"].position))
     return complex(roots[np.argmax(roots.real)])
+
+
+def eq_43(roll: float, pitch: float, yaw: float) -> Floats:
+    """The matrix of Eq. (43) as printed, without its last row and column."""
+    (sf, st, sp), (cf, cp) = np.sin([roll, pitch, yaw]), np.cos([roll, yaw])
+    first = cp * st * cf - cp * st * sf + sp * sf + sp * cf
+    second = sp * st * cf - sp * st * sf - cp * sf - cp * cf
+    return np.array([[first, sp * cf, cp], [second, -cp * cf, sp], [0.0, sf, st]])
 
 
 def eq_43_as_printed() -> bool:
     """Whether S is the determinant of the matrix of Eq. (43), with its printed zero."""
-    rng = np.random.default_rng(0)
-    worst = 0.0
-    for phi, theta, psi in rng.uniform(-1.5, 1.5, (200, 3)):
-        (sf, st, sp), (cf, cp) = np.sin([phi, theta, psi]), np.cos([phi, psi])
-        first = cp * st * cf - cp * st * sf + sp * sf + sp * cf
-        second = sp * st * cf - sp * st * sf - cp * sf - cp * cf
-        matrix = [[first, sp * cf, cp], [second, -cp * cf, sp], [0.0, sf, st]]
-        worst = max(worst, abs(np.linalg.det(matrix) - published_determinant(phi, theta)))
-    return bool(worst < 1e-12)
+    angles = np.random.default_rng(0).uniform(-1.5, 1.5, (200, 3))
+    exact = np.linalg.det([eq_43(*each) for each in angles])
+    return bool(np.abs(exact - published_determinant(*angles[:, :2].T)).max() < 1e-12)
 
 
 def quadrotor_gains_are_stable(law: str) -> bool:
     """Whether Appendix B's gains, of position or altitude, and of yaw stabilize their loops."""
-    module = yaw_position if law == "yaw_position" else quadrotor_attitude_altitude
-    return all(is_hurwitz((1.0, *gains)) for gains in module.GAIN_SETS["ch02"])
+    sets = POSITION_GAINS if law == "yaw_position" else ATTITUDE_GAINS
+    return all(is_hurwitz((1.0, *gains)) for gains in sets["ch02"])
 
 
 def attitude_altitude_is_singular() -> bool:

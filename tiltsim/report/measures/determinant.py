@@ -131,15 +131,17 @@ def triangle_is_regular(case: str) -> bool:
     return len(signs) == 1
 
 
+def residuals_of_switch(pair: tuple[float, float]) -> Floats:
+    """R on the straight line from (1, 1) to (-1, -1), for the other two angles (rad)."""
+    line = np.linspace(1.0, -1.0, 2001)
+    first, third = (np.full_like(line, angle) for angle in pair)
+    return residuals(np.stack([first, line, third, line], axis=-1), _VEHICLE).R
+
+
 def switching_crosses(case: str) -> bool:
-    """Whether R changes sign on the straight line from (1, 1) to (-1, -1), for every pair."""
-    line = np.linspace(1.0, -1.0, 201)
-    for alpha_1, alpha_3 in DETERMINANT_CASES[case].pairs:
-        angles = np.stack([0 * line + alpha_1, line, 0 * line + alpha_3, line], axis=-1)
-        R = residuals(angles, _VEHICLE).R
-        if R.min() > 0.0 or R.max() < 0.0:
-            return False
-    return True
+    """Whether R changes sign on that line, for every pair."""
+    lines = map(residuals_of_switch, DETERMINANT_CASES[case].pairs)
+    return all(R.min() <= 0.0 <= R.max() for R in lines)
 
 
 def return_to_no_tilt_is_regular() -> bool:

@@ -11,14 +11,14 @@ from typing import Final
 
 import numpy as np
 
-from tiltsim.report.measures.control import accelerations, torques
-from tiltsim.report.measures.determinant import determinant_coefficients, terms
+from tiltsim.report.measures.control import accelerations, eq_43, torques
+from tiltsim.report.measures.determinant import residuals_of_switch, terms_off
 from tiltsim.report.measures.tilt_car import counter_yaw
 from tiltsim_controllers.analysis.published_gaits import DETERMINANT_CASES
 from tiltsim_controllers.analysis.singularity import force_matrix, residuals, torque_matrix
 from tiltsim_controllers.analysis.two_color_map import curve_l, grid_roots
 from tiltsim_controllers.laws.gains import GAIN_SETS
-from tiltsim_controllers.laws.yaw_position import GAIN_SETS as QUADROTOR_GAINS
+from tiltsim_controllers.laws.quadrotor import POSITION_GAINS
 from tiltsim_controllers.mathematics.attitude import rotation_matrix
 from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.tilt_car.vehicle import (
@@ -85,42 +85,35 @@ def _thrust_twice(mended: bool) -> float:
     return _relative(before / _VEHICLE.mass * force * 2.0 * np.abs(_SPEEDS), exact)
 
 
-def _terms_off(part: str, printed: str, mended: bool, moved: dict[str, str]) -> float:
-    """How far terms, of which some are moved to another product, are from exact, above 0.001."""
-    values = terms(printed)
-    for wrong, right in moved.items() if mended else ():
-        number, _, name = wrong.partition(" ")
-        values[name] -= float(number)
-        values[right] = values.get(right, 0.0) + float(number)
-    exact = getattr(determinant_coefficients(), part)
-    return max(0.0, *(abs(values.get(n, 0.0) - float(exact[n])) - 1e-3 for n in exact))
+def _roll_terms_off(more: str) -> float:
+    """How far the terms `_ROLL` and some more are from R_phi, above 0.001."""
+    return max(0.0, *(abs(off) - 1e-3 for off in terms_off("R_phi", _ROLL + more).values()))
 
 
 _ROLL: Final = "1.000 ccsc - 1.000 sccc - 1.000 csss + 2.880 ccss + 2.880 cssc - 2.880 scss "
 """The terms with the sine of roll that ch. 3, 5 and 6 print alike."""
 
 
+_MOVED: Final = "+ 1.000 sscs - 2.880 sscc + 2.880 scss - 2.880 sccs"
+"""The right last terms, with -2.880 moved from the product scss to sccs."""
+
+
 def _ch3_terms(mended: bool) -> float:
-    moved = {"-2.880 sscs": "sscc", "-2.880 scss": "sccs"}
-    return _terms_off("R_phi", _ROLL + "+ 1.000 sscs - 2.880 sscs", mended, moved)
+    return _roll_terms_off(_MOVED if mended else "+ 1.000 sscs - 2.880 sscs")
 
 
 def _ch5_terms(mended: bool) -> float:
-    moved = {"1.000 sssc": "sscs", "-2.880 scss": "sccs"}
-    return _terms_off("R_phi", _ROLL + "+ 1.000 sssc - 2.880 sscc", mended, moved)
+    return _roll_terms_off(_MOVED if mended else "+ 1.000 sssc - 2.880 sscc")
 
 
 def _ch6_term(mended: bool) -> float:
-    printed = _ROLL + "+ 1.000 sscs - 2.880 sscc"
-    return _terms_off("R_phi", printed, mended, {"-2.880 scss": "sccs"})
+    return _roll_terms_off(_MOVED if mended else "+ 1.000 sscs - 2.880 sscc")
 
 
 def _crossing(mended: bool) -> float:
     """Pairs with alpha_1 = -alpha_3 that need not cross; mended: of those below 1.4."""
-    line = np.linspace(1.0, -1.0, 2001)
     pairs = [p for p in DETERMINANT_CASES["negative"].pairs if not mended or abs(p[0]) < 1.4]
-    gaits = (np.stack([0 * line + a, line, 0 * line + b, line], axis=-1) for a, b in pairs)
-    return float(sum(bool((residuals(gait, _VEHICLE).R > 0.0).all()) for gait in gaits))
+    return float(sum(residuals_of_switch(pair).min() > 0.0 for pair in pairs))
 
 
 def _ch2_matrices(roll: float, pitch: float, yaw: float) -> tuple[Floats, Floats, Floats]:
@@ -178,13 +171,9 @@ def yaw_position_matrix_holds() -> bool:
 
 def eq_43_is_the_product() -> bool:
     """Whether P Delta Q, with printed P and Q and the exact Delta, is the matrix of Eq. (43)."""
-    roll, pitch, yaw = 0.3, 0.4, 0.5
-    p, q, delta = _ch2_matrices(roll, pitch, yaw)
-    (sf, st, sp), (cf, cp) = np.sin([roll, pitch, yaw]), np.cos([roll, yaw])
-    printed = np.diag([0.0, 0.0, st, 1.0])
-    printed[0, :3] = cp * st * cf - cp * st * sf + sp * sf + sp * cf, sp * cf, cp
-    printed[1, :3] = sp * st * cf - sp * st * sf - cp * sf - cp * cf, -cp * cf, sp
-    printed[2, 1] = sf
+    angles, printed = (0.3, 0.4, 0.5), np.eye(4)
+    p, q, delta = _ch2_matrices(*angles)
+    printed[:3, :3] = eq_43(*angles)
     return _relative(p @ delta @ q, printed) < RIGHT
 
 
@@ -218,7 +207,7 @@ def _derivative_by_yaw(mended: bool) -> float:
 
 def _ch2_gains(mended: bool) -> float:
     """Largest real part above zero of the position loop's roots with Appendix B's gains."""
-    gains = QUADROTOR_GAINS["stable" if mended else "ch02"]
+    gains = POSITION_GAINS["stable" if mended else "ch02"]
     return max(0.0, float(np.roots((1.0, *gains.position)).real.max()))
 
 

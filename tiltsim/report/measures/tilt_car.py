@@ -20,9 +20,9 @@ from tiltsim_controllers.tilt_car.cycles import (
     lyapunov_bound,
     lyapunov_growth,
 )
-from tiltsim_controllers.tilt_car.planned_direction import GAIN_SETS as PENGUIN_GAINS
-from tiltsim_controllers.tilt_car.planned_direction import (
-    Parameters,
+from tiltsim_controllers.tilt_car.laws import (
+    PLANNED_GAINS,
+    PlannedParameters,
     demanded_squared_speeds,
     planned_direction_inputs,
 )
@@ -137,7 +137,7 @@ def fails_after_a_rotor_stops(flights: Flown, small: float) -> bool:
     return flights[0]["min_rotor_speed"] == 0.0 and error > small
 
 
-_GAINS: Final = PENGUIN_GAINS["ch11"]
+_GAINS: Final = PLANNED_GAINS["ch11"]
 SWING: Final = Swing(half_angle=pi / 6, half_period=1.0, gains=_GAINS)
 _SQRT_3: Final = sqrt(3.0)
 
@@ -243,7 +243,7 @@ def switch_matrix_is_the_limit() -> bool:
     state = (0.0, 0.0, 0.0, 0.0, 0.0)
     for alpha, x, y in rng.uniform(-2.0, 2.0, (200, 3)).tolist():
         line = ReferenceParameters(LINE, (x, y, 0.0))
-        law = Parameters(THESIS_CAR, GaitParameters(FIXED), line, _GAINS)
+        law = PlannedParameters(THESIS_CAR, GaitParameters(FIXED), line, _GAINS)
         at = (*state, alpha, 0.0, 0.0)
         squares = np.array(demanded_squared_speeds(0.0, at, law))
         switch = np.diag((squares > 0.0).astype(float))

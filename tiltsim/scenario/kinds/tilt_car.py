@@ -12,8 +12,7 @@ from tiltsim.scenario.rotorcraft import PlanarTable, ServoTable
 from tiltsim.scenario.table import Angle, Period, Positive, default, required
 from tiltsim_controllers.gaits import plans
 from tiltsim_controllers.gaits.plans import Gait as PlannedGait
-from tiltsim_controllers.tilt_car.integrating import FourthDerivative, ThirdDerivative
-from tiltsim_controllers.tilt_car.planned_direction import PlannedDirection
+from tiltsim_controllers.tilt_car.laws import FourthDerivative, PlannedDirection, ThirdDerivative
 from tiltsim_controllers.tilt_car.vehicle import THESIS_CAR, TiltCar, turn_per_tilt
 
 

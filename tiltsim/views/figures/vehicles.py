@@ -41,7 +41,7 @@ from tiltsim_controllers.analysis.torque_free import (
     torque_free_forces,
 )
 from tiltsim_controllers.gaits.plans import Gait
-from tiltsim_controllers.laws.switching import PUBLISHED_ZONE
+from tiltsim_controllers.laws.quadrotor import PUBLISHED_ZONE
 from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.vehicle.parameters import Vehicle
 

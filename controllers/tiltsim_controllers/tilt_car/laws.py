@@ -1,10 +1,10 @@
-"""Third- and fourth-derivative feedback linearization of the tilt-car (ch. 10, Secs. 3.1 and 6.1).
+"""Control laws of the tilt-car (ch. 10, Secs. 3.1, 5 and 6.1; ch. 11).
 
-The inputs, the first or second derivatives of both rotor speeds and of the tilt angle, are three;
-they determine two outputs, the third or fourth derivatives of the position. The controller takes
-the shortest of all solutions (`minimum_norm`, Eq. 12), which makes its states drift
-(`tiltsim_controllers.tilt_car.cycles`). Optionally a restoring rate in the null space turns the
-thrusts' bisector back toward the acceleration.
+**Third and fourth derivative.** The inputs, the first or second derivatives of both rotor speeds
+and of the tilt angle, are three; they determine two outputs, the third or fourth derivatives of the
+position. The controller takes the shortest of all solutions (`minimum_norm`, Eq. 12), which makes
+its states drift (`tiltsim_controllers.tilt_car.cycles`). Optionally a restoring rate in the null
+space turns the thrusts' bisector back toward the acceleration.
 
 The first derivatives of the inputs are states of the controller of the fourth derivative. As
 printed, the tilt's column of its decoupling matrix (Eq. 27) lacks the factor ``1 - I_T / I_B`` due
@@ -12,14 +12,20 @@ to the counter-rotation, which the ``decoupling`` ``exact`` includes. The rotor 
 integrates may drift below zero, where no thrust follows them. The controller then continues, as in
 the chapter, with speeds that no rotor has (windup), and fails; with ``anti_windup`` they stop at
 zero, and the other rotor and the tilt continue alone.
+
+**Planned direction.** The gait moves the tilt, the controller sets the squares of both rotor
+speeds: two inputs for two outputs, so that no state drifts. A thrust cannot pull, so negative
+squares become zero (ch. 11, Eq. 13), which ch. 11 writes with the switch matrix ``S_pq``.
 """
 
 from collections.abc import Sequence
 from typing import Any, ClassVar, Final, Literal
 
 from tiltsim_controllers.code.arrays import xp
+from tiltsim_controllers.gaits.motion import GaitParameters
 from tiltsim_controllers.laws.feedback import error_dynamics
 from tiltsim_controllers.laws.keys import (
+    Gains2,
     Gains4,
     GainSets,
     Keys,
@@ -36,6 +42,7 @@ from tiltsim_controllers.tilt_car.vehicle import (
     TiltCar,
     input_matrix,
     rotation,
+    squared_speeds,
     thrust_map,
     turn_per_tilt,
 )
@@ -185,3 +192,74 @@ def fourth_derivative_inputs(time: Any, state: Any, p: Any) -> Any:
     if p.decoupling == PUBLISHED:
         matrix = xp.hstack([matrix[:, :2], xp.array([[-pushed[1]], [pushed[0]]])])
     return minimum_norm(matrix, _demanded(time, state, p, [pushed, moved]) - drift)
+
+
+class PlannedDirectionGainTable(Keys):
+    """Explicit gains of the planned-direction law."""
+
+    x: Gains2 = required(
+        "K_X1, K_X2, on the errors of velocity and position along x [1/s, 1/s^2]", [12.0, 6.0]
+    )
+    y: Gains2 = required(
+        "K_Y1, K_Y2, on the errors of velocity and position along y [1/s, 1/s^2]", [9.0, 18.0]
+    )
+
+
+PlannedGains = record_of(PlannedDirectionGainTable)
+
+PLANNED_GAINS: Final = {
+    # Ours, both poles at -2: ch. 10 prints none.
+    "ch10": PlannedGains((4.0, 4.0), (4.0, 4.0)),
+    # ch. 11, Sec. 4.2
+    "ch11": PlannedGains((12.0, 6.0), (9.0, 18.0)),
+}
+"""Gains of the law with planned direction by name."""
+
+
+class PlannedDirection(Keys):
+    """Keys of `planned_direction_inputs`."""
+
+    gain_sets: ClassVar[GainSets] = {"gains": PLANNED_GAINS}
+
+    law: Literal["tilt_car_planned_direction"] = required(
+        "the tilt-car's rotor speeds control x and y; the tilt follows the gait"
+    )
+    gains: NamedGains[Literal["ch10", "ch11"], PlannedDirectionGainTable] = default(
+        "ch11", "ch11 is the thesis's set, ch10 has its poles at -2; or a table of gains"
+    )
+
+
+PlannedParameters = record_of(
+    PlannedDirection, vehicle=TiltCar, gait=GaitParameters, reference=ReferenceParameters
+)
+
+
+def demanded_acceleration(time: Any, state: Any, p: Any) -> Any:
+    """The desired acceleration (m/s^2, world), (2,); ch. 10, Eq. (20); ch. 11, Eqs. (9), (10).
+
+    The state begins with `tiltsim_controllers.tilt_car.vehicle.STATE_FIELDS`.
+    """
+    on_velocity, on_position = xp.array([p.gains.x, p.gains.y]).T
+    position, velocity, acceleration = reference_motion(time, p.reference)[:3, :2]
+    feedback = on_velocity * (velocity - state[2:4]) + on_position * (position - state[0:2])
+    return acceleration + feedback
+
+
+def demanded_squared_speeds(time: Any, state: Any, p: Any) -> Any:
+    """The desired squares of the rotor speeds (rad^2/s^2), of any sign; ch. 11, Eq. (12).
+
+    Arguments as for `demanded_acceleration`; shape (2,).
+    """
+    to_body = rotation(state[4] + state[5]).T
+    return squared_speeds(to_body @ demanded_acceleration(time, state, p), p.vehicle)
+
+
+def planned_direction_inputs(time: Any, state: Any, p: Any) -> Any:
+    """The squares of the rotor speeds (rad^2/s^2), never below zero; ch. 11, Eqs. (12), (13)."""
+    squares = demanded_squared_speeds(time, state, p)
+    return xp.where(squares < 0.0, 0.0, squares)  # NaN stays NaN
+
+
+def lyapunov_candidate(error_y: float, error_rate_y: float, gains: Any) -> float:
+    """Ch. 11's candidate ``L = e_y'^2 / 2 + K_Y2 e_y^2 / 2`` (Eq. 49), m^2/s^2."""
+    return 0.5 * error_rate_y * error_rate_y + 0.5 * gains.y[1] * error_y * error_y
