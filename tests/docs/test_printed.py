@@ -11,6 +11,7 @@ import re
 import sys
 import tempfile
 from decimal import Decimal
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -18,10 +19,24 @@ import pytest
 from tests.docs.pages import ROOT
 from tests.docs.shell import commands
 from tiltsim.cli import main
+from tiltsim.errors import DONE
 
 PAGES = ("docs/autopilot.md", "docs/interaction.md", "docs/stability.md")
 PRINTED = re.compile(r"^```sh\n((?:(?!^```).*\n)*)^```\n\n?^```\n((?:(?!^```).*\n)+)^```$", re.M)
 NUMBER = re.compile(r"(?<![\w.#])-?\d+(?:\.\d+)?(?:e[-+]\d+)?")
+
+
+@cache
+def commands_with_output():
+    """The commands that are run here, to their end."""
+    found = [each[1] for page in PAGES for each in PRINTED.finditer(page_text(page))]
+    with tempfile.TemporaryDirectory() as folder:
+        return {tuple(each) for code in found for each in commands(code, Path(folder))}
+
+
+def page_text(page):
+    """The text of a page."""
+    return (ROOT / page).read_text(encoding="utf-8")
 
 
 def lines_of(code):
@@ -30,7 +45,7 @@ def lines_of(code):
     with tempfile.TemporaryDirectory() as folder, contextlib.redirect_stdout(text):
         for program, *arguments in commands(code, Path(folder)):
             if program == "tiltsim":
-                main(arguments)
+                assert main(arguments) == DONE, arguments
     return text.getvalue().splitlines()
 
 
@@ -66,7 +81,7 @@ def present(shown, printed):
 
 def as_printed(page):
     """The text of a page, before and after its figures are renewed."""
-    text = (ROOT / page).read_text(encoding="utf-8")
+    text = page_text(page)
 
     def renewed(found):
         shown = found[2].splitlines()

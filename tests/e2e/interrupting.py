@@ -24,11 +24,14 @@ MEANT = {signal.SIGINT: 130, signal.SIGTERM: 143}
 PATIENCE = 60.0
 """Time (s) within which an interrupted sweep ends: longer than XLA's compiler takes."""
 
-SWEEPS = {"native": ("mujoco", 20.0, 40, 8), "jax": ("thesis", 0.1, 6, 3)}
-"""For an engine: plant, duration (s) of a flight, number of flights, flights per chunk."""
+SWEEPS = {
+    "native": ("ch04_tracking/setpoint#rho_065_modified", "mujoco", 20.0, 40, 8),
+    "jax": ("ch10_state_drift/planned_direction", "thesis", 0.1, 6, 3),  # compiled in a second
+}
+"""For an engine: scenario, plant, duration (s) of a flight, flights, flights per chunk."""
 
 SWEEP = """
-scenario = "ch04_tracking/setpoint#rho_065_modified"
+scenario = "{scenario}"
 chunk_size = {chunk}
 [set]
 "simulation.engine" = "{engine}"
@@ -49,13 +52,13 @@ standard_deviation = 0.01
 count = 1
 seed = 1
 """
-"""A sweep many of whose flights diverge, of which MuJoCo warns."""
+"""A sweep; in MuJoCo, many of its flights diverge, of which MuJoCo warns."""
 
 
 def sweep_file(folder, engine):
     """The sweep of an engine."""
-    plant, duration, flights, chunk = SWEEPS[engine]
-    values = {"engine": engine, "plant": plant, "duration": duration}
+    scenario, plant, duration, flights, chunk = SWEEPS[engine]
+    values = {"scenario": scenario, "engine": engine, "plant": plant, "duration": duration}
     file = folder / f"{engine}.toml"
     file.write_text(SWEEP.format(**values, flights=flights, chunk=chunk), encoding="utf-8")
     return file

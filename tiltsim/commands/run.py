@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from tiltsim.flight.flight import Flight
     from tiltsim.flight.metrics import Verdict
     from tiltsim.scenario.scenario import Scenario
-    from tiltsim.views.rerun.live import LiveStream
+    from tiltsim.views.rerun.viewer import LiveStream
     from tiltsim_controllers.mathematics.scalar import Floats
 
 GREATEST_DEFLECTION: Final = 0.01
@@ -188,7 +188,7 @@ def fly(scenario: Scenario, *, live: bool, connect: str | None, quiet: bool) -> 
     with ExitStack() as stack:
         stream: LiveStream | None = None
         if live or connect is not None:
-            from tiltsim.views.rerun.live import LiveStream
+            from tiltsim.views.rerun.viewer import LiveStream
 
             stream = stack.enter_context(LiveStream(scenario, connect))
         progress = stack.enter_context(show_progress(shown=not quiet))

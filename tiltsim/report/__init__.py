@@ -1,6 +1,6 @@
 """The reproduction report: the claims of the thesis compared with measured values.
 
-A **statement** (`tiltsim.report.statement.Statement`, whose fields are the keys of its table) is
+A **statement** (`tiltsim.report.claim.Statement`, whose fields are the keys of its table) is
 one thing that the thesis says. Its ``id`` is the anchor on the page, never changed once published.
 
 A **row** (`tiltsim.report.claim.Claim`) is one case of a statement. Its id is the statement's id

@@ -25,7 +25,7 @@ from markupsafe import Markup
 from PIL import Image
 
 from tiltsim.report import content, flights
-from tiltsim.report.claim import Claim, ClaimVerdict
+from tiltsim.report.claim import Claim, ClaimVerdict, Origin
 from tiltsim.report.claim_rows import COMPUTED, Row, count, count_statements
 from tiltsim.report.content import (
     Group,
@@ -36,9 +36,8 @@ from tiltsim.report.content import (
     why_of,
 )
 from tiltsim.report.flights import PLANTS
-from tiltsim.report.made import Made
+from tiltsim.report.making import Made
 from tiltsim.report.pictures import Drawing
-from tiltsim.report.statement import Origin
 from tiltsim.system.text import printable_markdown
 
 _TEMPLATES: Final = Path(__file__).parent / "templates"

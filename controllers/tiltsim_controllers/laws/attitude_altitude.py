@@ -27,11 +27,10 @@ from tiltsim_controllers.vehicle.body import (
 from tiltsim_controllers.vehicle.parameters import Vehicle
 from tiltsim_controllers.vehicle.rotors import airframe, rotor_accelerations, wrench_map
 
-PUBLISHED_DECOUPLING: Final = 0.0
-EXACT_DECOUPLING: Final = 1.0
-
-DECOUPLINGS: Final = {"published": PUBLISHED_DECOUPLING, "exact": EXACT_DECOUPLING}
+DECOUPLINGS: Final = {"published": 0.0, "exact": 1.0}
 """Forms of the decoupling matrix by their name in a scenario."""
+
+PUBLISHED_DECOUPLING, EXACT_DECOUPLING = DECOUPLINGS.values()
 
 LAYOUT: Final = (0, 1, 2, 3)
 """Every rotor of the tiltrotor has its own tilt."""
