@@ -5,6 +5,7 @@ The names of a companion's, as of its columns, begin with its own.
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
+from itertools import pairwise
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -75,7 +76,8 @@ class Coordinates(NamedTuple):
     def _parts(self, vector: Floats, entries: int) -> list[Floats]:
         """Numbers and rotations by turns, of a vector in which rotations have these entries."""
         firsts = (at + number * (entries - 3) for number, at in enumerate(self.turns))
-        return np.split(vector, [place for at in firsts for place in (at, at + entries)])
+        places = (0, *(place for at in firsts for place in (at, at + entries)), len(vector))
+        return [vector[first:last] for first, last in pairwise(places)]
 
     def _joined(self, numbers: Pairwise, rotations: Pairwise, *pair: Iterable[Floats]) -> Floats:
         """A function of two vectors, part by part."""
