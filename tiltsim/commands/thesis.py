@@ -53,7 +53,6 @@ def run_map(
     """
     from tiltsim.studies.gait_analysis import map_report
 
-    figure.check()
     refuse_both(leg=leg, circle=circle)
     parameters = vehicle or parse_vehicle(DEFAULT_VEHICLE)
     path = _path(leg, circle, parameters)
@@ -150,7 +149,6 @@ def run_singularity(
         vehicle (PRESET): default: ar_drone_2_unrounded
     """
     parameters = vehicle or parse_vehicle("ar_drone_2_unrounded")
-    figure.check()
     report = _singularity_report(parameters, roll or 0.0, pitch or 0.0)
 
     figure.show(

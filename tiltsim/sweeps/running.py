@@ -8,7 +8,7 @@ from concurrent.futures import CancelledError
 from os import PathLike
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, Final, cast
+from typing import Any, Final
 
 from tiltsim.engines.base import EngineName
 from tiltsim.errors import InputError
@@ -136,7 +136,13 @@ def fly_on_cluster(work: ChunkWork, numbers: list[int], address: str) -> Iterato
             first = [submit() for _ in range(min(len(waiting), _window(client)))]
             submitted = as_completed(first, loop=client.loop)
             for future in submitted:
-                part = _result(future, address)
+                try:
+                    part: FinishedChunk = future.result()
+                except (CancelledError, CommClosedError):
+                    raise  # the scheduler is lost
+                except Exception as error:
+                    failed = f"{type(error).__name__}: {str(error).partition(chr(10))[0]}"
+                    raise InputError(f"--cluster {address}: a worker failed: {failed}") from error
                 _compare_versions(part, address)
                 future.release()
                 while waiting and submitted.count() < _window(client):
@@ -174,21 +180,6 @@ def _connect(address: str) -> Any:
             f"--cluster {address}: the scheduler has no workers; start some: dask worker {address}"
         )
     return client
-
-
-def _result(future: Any, address: str) -> FinishedChunk:
-    """The result of a chunk; without the scheduler, Dask's errors of a lost connection."""
-    from distributed.comm import CommClosedError
-
-    try:
-        return cast("FinishedChunk", future.result())
-    except (CancelledError, CommClosedError):
-        raise
-    except Exception as error:
-        raise InputError(
-            f"--cluster {address}: a worker failed: {type(error).__name__}: "
-            f"{str(error).partition(chr(10))[0]}"
-        ) from error
 
 
 def _window(client: Any) -> int:
