@@ -64,7 +64,7 @@ AS_PUBLISHED = FeedforwardTerms(0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
 def differences(todays, general):
     """Relative differences of the two laws at random states, the four accelerations together."""
     found = []
-    for time, state in random_states(200):
+    for time, state in random_states(80):
         expected, value = np.array(todays(time, state)), np.array(general(time, state))
         found.append(np.abs(value[: len(expected)] - expected).max() / np.abs(expected).max())
     return np.array(found)

@@ -1,6 +1,7 @@
-"""Claims that need no flight or several: rows in the files of this folder, one per chapter.
+"""All claims: of scenario files, and of the files of this folder, one per chapter.
 
-A table is a statement, like the ``[claim.NAME]`` of scenarios, with the keys of its row::
+Claims here need no flight, or several. A table is a statement, like the ``[claim.NAME]`` of
+scenarios, with the keys of its row::
 
     [ch6-blue-offset]
     source = "ch. 6, Sec. 3, Eq. (13)"
