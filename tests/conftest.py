@@ -60,3 +60,12 @@ def pytest_collection_modifyitems(items):
         return not (long or item.get_closest_marker("viewer"))
 
     items.sort(key=is_late)
+
+
+@pytest.fixture(scope="session")
+def scenarios():
+    """All scenarios of the shipped library."""
+    from tiltsim.scenario.library import library_entries
+    from tiltsim.scenario.loading import load_scenario
+
+    return [load_scenario(address) for address, _, _ in library_entries()]
