@@ -156,7 +156,7 @@ def swept(vector: Moving, omega: Any, omega_rate: Any) -> Moving:
 DECOUPLERS: Final = {"none": 0.0, "conventional": 1.0, "modified": 2.0, "exact": 3.0}
 """Decouplers by their name in a scenario."""
 
-NONE, CONVENTIONAL, MODIFIED, EXACT = DECOUPLERS.values()
+NO_DECOUPLER, CONVENTIONAL, MODIFIED, EXACT = DECOUPLERS.values()
 
 
 @traceable

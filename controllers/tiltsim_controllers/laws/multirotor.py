@@ -45,7 +45,7 @@ from tiltsim_controllers.code.arrays import traceable, xp
 from tiltsim_controllers.laws.attitude_altitude import PUBLISHED_DECOUPLING
 from tiltsim_controllers.laws.feedback import (
     EXACT,
-    NONE,
+    NO_DECOUPLER,
     angular_jerk,
     attitude_jerk,
     attitude_motion,
@@ -231,7 +231,7 @@ def _control(
     jerk, rates = xp.zeros(2), xp.zeros(2)
     if form.dimension > 1:
         jerk, rates = side_control(motion, integrals, p)
-    if form.dimension < 3 and p.decoupler != NONE:
+    if form.dimension < 3 and p.decoupler != NO_DECOUPLER:
         roll, pitch, rates = _leaning(present, motion, yaw, integrals, p, form)
     climb, climb_rate = _altitude_control(motion, integrals, p)
     if p.attitude_error == ROTATION:
