@@ -20,7 +20,6 @@ numbers of ``thresholds.toml``; ``{a,b}`` in an address for both.
 """
 
 import re
-import tomllib
 from collections.abc import Iterator, Mapping
 from functools import cache, partial
 from itertools import product
@@ -30,6 +29,7 @@ from typing import Any, Final
 from tiltsim.report.claim import CHAPTER, Claim, Statement, origins_of, slug
 from tiltsim.report.measures import evaluate
 from tiltsim.scenario.expectation import Expectation
+from tiltsim.scenario.library import read_toml
 from tiltsim.scenario.metric_names import metric_of, unit_of
 from tiltsim.scenario.scenario import Scenario
 
@@ -61,8 +61,7 @@ def registered_claims(scaled: str = "", factor: float = 1.0) -> tuple[Claim, ...
 @cache
 def words(name: str) -> dict[str, Any]:
     """A file of this folder."""
-    text = (Path(__file__).parent / f"{name}.toml").read_text(encoding="utf-8")
-    return tomllib.loads(text)
+    return read_toml(Path(__file__).parent / f"{name}.toml")
 
 
 def _chapter(tables: dict[str, Any], shared: Mapping[str, Any]) -> Iterator[Claim]:
