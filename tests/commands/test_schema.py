@@ -9,7 +9,6 @@ import pytest
 from pydantic import ConfigDict, TypeAdapter
 
 from tiltsim.cli import main
-from tiltsim.commands import files
 from tiltsim.commands.files import scenario_schema, sweep_schema
 from tiltsim.commands.key_tables import key_tables
 from tiltsim.scenario.scenario_tables import ScenarioTables
@@ -26,11 +25,6 @@ PROPERTIES = [
     for name, table in {**SWEEP["$defs"], "Sweep": SWEEP, **DEFINITIONS}.items()
     for key, value in table["properties"].items()
 ]
-
-
-@pytest.fixture(autouse=True)
-def schema_made_once(monkeypatch):
-    monkeypatch.setattr(files, "scenario_schema", lambda: SCHEMA)
 
 
 @pytest.mark.parametrize(("address", "shown"), [("", "''"), ("[[]]", "[[]]"), ("gaits", "gaits")])

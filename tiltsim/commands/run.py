@@ -153,7 +153,8 @@ def _warnings(scenario: Scenario) -> Iterator[str]:
             f"vehicle.mjcf: the {scenario.controller.law} controller assumes the center of mass at "
             f"the body's origin{diagonal}; not modeled: {own.unmodeled_properties}"
         )
-    through = [name for name in own.obstacles if not _touches(name, scenario)]
+    touching = ("collision",) if scenario.ground is not None else ()
+    through = [name for name in own.obstacles if not name.endswith(touching)]
     if through:
         yield (
             f"vehicle.mjcf: the vehicle passes through geom {through[0]!r}: contacts are those of "
@@ -170,10 +171,6 @@ def _warnings(scenario: Scenario) -> Iterator[str]:
             + (", which the ideal pods of the thesis plant neglect" if ideal else "")
             + "; more armature or a higher vehicle.tilt_servo.natural_frequency stiffens it"
         )
-
-
-def _touches(geom: str, scenario: Scenario) -> bool:
-    return scenario.ground is not None and geom.endswith("collision")
 
 
 def fly(scenario: Scenario, *, live: bool, connect: str | None, quiet: bool) -> Flight:

@@ -331,17 +331,16 @@ def companions_of(scenario: Any) -> tuple[Any, ...]:
 
 def check_companions(scenario: Any) -> None:
     """Refuse companions of equal names, or whose scenario does not fly beside the others."""
-    if len(scenario.companion) > MAX_COMPANIONS:
-        count = len(scenario.companion)
-        raise InvalidValueError("companion", count, f"at most {MAX_COMPANIONS} of them")
+    if (count := len(scenario.companion)) > MAX_COMPANIONS:
+        scenario.refuse("companion", f"at most {MAX_COMPANIONS} of them", count)
     if scenario.downwash is not None and not scenario.companion:
-        raise scenario.mistake("downwash", "needs a [[companion]]; remove it")
+        scenario.refuse("downwash", "needs a [[companion]]; remove it")
     names = [table.name for table in (*scenario.companion, *scenario.object)]
     for table in scenario.companion:
         if names.count(table.name) > 1 or table.name in RESERVED:
             raise table.mistake("name", "is taken; choose another")
     if scenario.companion and (reason := _conflict(scenario, scenario)):
-        raise InvalidValueError("companion", names[0], f"with companions {reason}")
+        scenario.refuse("companion", f"with companions {reason}", names[0])
     for table, each in zip(scenario.companion, companions_of(scenario), strict=True):
         if reason := _conflict(each, scenario):
             raise table.mistake("name", reason)

@@ -143,7 +143,12 @@ def fly_on_cluster(work: ChunkWork, numbers: list[int], address: str) -> Iterato
                 except Exception as error:
                     failed = f"{type(error).__name__}: {str(error).partition(chr(10))[0]}"
                     raise InputError(f"--cluster {address}: a worker failed: {failed}") from error
-                _compare_versions(part, address)
+                for name, here in installed_versions().items():
+                    if (there := part.versions[name]) != here:
+                        raise InputError(
+                            f"--cluster {address}: a worker runs {name} {there}, this machine "
+                            f"{here}; install the same versions"
+                        )
                 future.release()
                 while waiting and submitted.count() < _window(client):
                     submitted.add(submit())
@@ -186,16 +191,6 @@ def _window(client: Any) -> int:
     """Number of chunks to have submitted: two per thread, so that no thread waits for work."""
     workers = client.scheduler_info()["workers"].values()
     return 2 * max(1, sum(int(worker["nthreads"]) for worker in workers))
-
-
-def _compare_versions(part: FinishedChunk, address: str) -> None:
-    for name, here in installed_versions().items():
-        there = part.versions[name]
-        if there != here:
-            raise InputError(
-                f"--cluster {address}: a worker runs {name} {there}, this machine {here}; install "
-                "the same versions"
-            )
 
 
 def sweep(
