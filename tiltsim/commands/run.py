@@ -79,20 +79,22 @@ def run(
     if out is not None:
         prepare_flight_folder(out, loaded)
     if rerun is not None:
-        from tiltsim.views.rerun import require_rerun
-
-        require_rerun()
         prepare_file("--rerun", rerun, (".rrd",))
     for warning in () if quiet else _warnings(loaded):
         warn(warning)
-    flight = fly(loaded, live=live, connect=connect, quiet=quiet)
-    with defer_interrupts():
+    with ExitStack() as stack:
+        if rerun is not None:
+            from tiltsim.views.rerun.recording_process import RecordingProcess
+
+            recording = stack.enter_context(RecordingProcess(loaded))
+        flight = fly(loaded, live=live, connect=connect, quiet=quiet)
+        stack.enter_context(defer_interrupts())
+        if rerun is not None:
+            recording.start(flight, rerun)
         if out is not None:
             flight.save(out)
         if rerun is not None:
-            from tiltsim.views.rerun.recording import save_recording
-
-            save_recording([flight], rerun)
+            recording.finish()
     if flight.end.kind == "interrupted":
         kept = f"; the flight so far is in {out}" if out is not None else ""
         print_line(f"tiltsim: interrupted at t = {flight.end.time:.3f} s{kept}", error=True)

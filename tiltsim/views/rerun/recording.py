@@ -28,7 +28,8 @@ FLUSH_INTERVAL: Final = 3600.0
 class Recording:
     """A recording of one flight or several, without rows at first.
 
-    The identifier depends on the arguments only.
+    The constructor prepares everything that does not need the flights, so that it can run during
+    the simulation. The identifier depends on its arguments only.
 
     Args:
         assemblies: One per flight.
@@ -107,28 +108,42 @@ class Recording:
         self.finish([flight.end for flight in flights])
 
 
+class RecordingFile(Recording):
+    """A recording of complete flights for a file; equal flights give equal files."""
+
+    def __init__(
+        self, assemblies: Sequence[Assembly], names: Sequence[str] = (), vehicle: str = ""
+    ) -> None:
+        # Flushed by row and byte counts only: timed flushes would make no two files equal.
+        batching = rr.ChunkBatcherConfig(flush_tick=FLUSH_INTERVAL)
+        super().__init__(assemblies, names, vehicle, batching=batching)
+        self._content = self.stream.memory_recording()  # as Rerun does not report a full disk
+
+    def save(self, flights: Sequence[Flight], path: Path) -> None:
+        """Write the flights, one per assembly, atomically.
+
+        Raises:
+            InputError: If the file cannot be written.
+        """
+        self.stream.send_blueprint(self.blueprint(flights), make_active=False, make_default=True)
+        self.write(flights)
+        content = self._content.drain_as_bytes()
+        self.stream.disconnect()
+        with replacing(path) as temporary:
+            temporary.write_bytes(content)
+
+
 def save_recording(
     flights: Sequence[Flight], path: Path, names: Sequence[str] = (), vehicle: str = ""
 ) -> None:
-    """Write flights into one file, atomically; equal flights give equal files.
+    """Write flights into one file; see `RecordingFile`.
 
     Args:
         flights: One or several.
         path: The file.
         names: Names of several, by default `flight_names`.
         vehicle: The only one that is shown; empty for all.
-
-    Raises:
-        InputError: If the file cannot be written, or the environment disables Rerun.
     """
     flights = vehicles_named(vehicle, flights)
-    # Flushed by row and byte counts only: timed flushes would make no two files equal.
-    batching = rr.ChunkBatcherConfig(flush_tick=FLUSH_INTERVAL)
-    recording = Recording([one.assembly for one in flights], names, vehicle, batching=batching)
-    content = recording.stream.memory_recording()  # as Rerun does not report a full disk
-    views = recording.blueprint(flights)
-    recording.stream.send_blueprint(views, make_active=False, make_default=True)
-    recording.write(flights)
-    with replacing(path) as temporary:
-        temporary.write_bytes(content.drain_as_bytes())
-    recording.stream.disconnect()
+    assemblies = [flight.assembly for flight in flights]
+    RecordingFile(assemblies, names, vehicle).save(flights, path)
