@@ -72,11 +72,14 @@ def expecting(tmp_path):
     return write
 
 
-def test_a_command_refuses_an_option_that_it_does_not_have(capsys):
+@pytest.mark.parametrize(
+    ("option", "answer"), [("--json", "--json"), ("--outt", "--outt; did you mean --out?")]
+)
+def test_a_command_refuses_an_option_that_it_does_not_have(capsys, option, answer):
     with pytest.raises(SystemExit) as stopped:
-        main(["run", SETPOINT, "--json"])
+        main(["run", SETPOINT, option])
     assert stopped.value.code == 2
-    line = "tiltsim: unrecognized arguments: --json (see tiltsim run --help)\n"
+    line = f"tiltsim: unrecognized arguments: {answer} (see tiltsim run --help)\n"
     assert capsys.readouterr().err == line
 
 
