@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import os
 import signal
 import sys
 
@@ -11,6 +12,9 @@ from coverage import Coverage
 from hypothesis import settings
 
 from tests import tracing
+
+# As the command line does, before numpy loads; every core has a process already.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 # A busy machine may take long for an example; nothing that is tested depends on it.
 settings.register_profile("tiltsim", deadline=None)
@@ -56,3 +60,12 @@ def pytest_collection_modifyitems(items):
         return not (long or item.get_closest_marker("viewer"))
 
     items.sort(key=is_late)
+
+
+@pytest.fixture(scope="session")
+def scenarios():
+    """All scenarios of the shipped library."""
+    from tiltsim.scenario.library import library_entries
+    from tiltsim.scenario.loading import load_scenario
+
+    return [load_scenario(address) for address, _, _ in library_entries()]

@@ -30,14 +30,13 @@ def machine_code_in_lanes(program, lanes, **options):
     run = MachineCode(text).function("run", None, *pointers)
 
     def call(rows):
-        results = []
-        for first in range(0, len(rows), lanes):
-            own = [rows[min(first + lane, len(rows) - 1)] for lane in range(lanes)]
-            values = np.ascontiguousarray(np.transpose(np.array(own, float)))
-            found = np.empty((len(program.block.results), lanes))
-            run(values.ctypes.data, found.ctypes.data)
-            results += np.transpose(found).tolist()[: len(rows) - first]
-        return results
+        rows = np.array(rows, float)
+        padded = np.append(rows, np.repeat(rows[-1:], -len(rows) % lanes, axis=0), axis=0)
+        groups = np.ascontiguousarray(padded.reshape(-1, lanes, rows.shape[1]).transpose(0, 2, 1))
+        found = np.empty((len(groups), len(program.block.results), lanes))
+        for values, results in zip(groups, found, strict=True):
+            run(values.ctypes.data, results.ctypes.data)
+        return found.transpose(0, 2, 1).reshape(len(padded), -1)[: len(rows)].tolist()
 
     return call
 

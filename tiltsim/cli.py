@@ -102,7 +102,10 @@ class Parser(argparse.ArgumentParser):
         """Refuse unknown arguments at once, so that a command names its own ``--help``."""
         known, unknown = super().parse_known_args(args, namespace)
         if unknown:
-            self.error(f"unrecognized arguments: {' '.join(unknown)}")
+            from tiltsim.scenario.messages import did_you_mean
+
+            hint = did_you_mean(unknown[0], self._option_string_actions)
+            self.error(f"unrecognized arguments: {' '.join(unknown)}; {hint}".rstrip("; "))
         return known, unknown
 
 

@@ -99,7 +99,8 @@ def save_blocks(name, folder):
     """Save the blocks that a page says to save."""
     for start, file in SAVED_AS.get(name, {}).items():
         (text,) = (block.code for block in blocks(name) if block.code.startswith(start))
-        (folder / file).write_text(text)
+        functions, _, _flight = text.partition("\n\n\nscenario = ")
+        (folder / file).write_text(functions)
 
 
 def check_toml(text, folder):

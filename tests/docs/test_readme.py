@@ -4,23 +4,14 @@ from __future__ import annotations
 
 import re
 
-import pytest
 from PIL import Image
 
 from tests.docs.pages import ROOT, code
-from tiltsim.report.claim import scenario_claims
-from tiltsim.report.claims import registered_claims
+from tiltsim.report.claims import registered_claims, scenario_claims
 from tiltsim.report.findings import ERRORS
-from tiltsim.scenario.library import library_entries
 from tiltsim.scenario.loading import load_scenario
 
 README = (ROOT / "README.md").read_text(encoding="utf-8")
-
-
-@pytest.fixture(scope="module")
-def scenarios():
-    """All scenarios of the shipped library."""
-    return [load_scenario(address) for address, _, _ in library_entries()]
 
 
 def page(name):

@@ -32,13 +32,11 @@ key = "initial.position[0]"
 values = [0.0, 0.1]
 """
 
-schemas = cache(lambda: {"scenario": scenario_schema(), "sweep": sweep_schema()})
-
 
 @cache
 def known_values():
     """Values by dotted key of scenarios, drawn until all tables of the schema had their turn."""
-    documents = Documents(schemas()["scenario"], Random(1), strange=0.0)
+    documents = Documents(scenario_schema(), Random(1), strange=0.0)
     found = {}
     for _ in range(300):
         found |= dotted(documents.draw())
@@ -70,7 +68,7 @@ def options_of(command):
 
 def scenario_file(random, folder):
     """A scenario file: read, and flown for a moment if it is valid."""
-    document = Documents(schemas()["scenario"], random).draw()
+    document = Documents(scenario_schema(), random).draw()
     content = toml_document(document).encode(errors="surrogatepass")
     if random.random() < 0.3:
         library = sorted((shipped_folder("scenarios")).rglob("*.toml"))
@@ -85,7 +83,7 @@ def scenario_file(random, folder):
 def sweep_file(random, folder):
     """A sweep file."""
     file = folder / "sweep.toml"
-    document = Documents(schemas()["sweep"], random).draw()
+    document = Documents(sweep_schema(), random).draw()
     if random.random() < 0.8:
         document["scenario"] = SETPOINT
         document.setdefault("set", {})

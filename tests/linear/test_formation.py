@@ -10,6 +10,8 @@ import pytest
 import tiltsim
 from tiltsim.errors import InputError
 from tiltsim.linear.equilibrium import equilibrium_of
+from tiltsim.linear.linearization import linearization_at
+from tiltsim.linear.stability import stability_at
 
 HEXAROTOR = {
     "vehicle": {"model": "multirotor", "mjcf": "mjcf/tilt_hexarotor.xml", "max_rotor_speed": 838.0},
@@ -61,7 +63,8 @@ def test_vehicles_that_nothing_couples_keep_their_poles_and_their_feedback():
     changes = GEOMETRIC | {"simulation": {"integrator": "implicitfast"}, "expect": []}
     wing = tiltsim.linearize(tiltsim.load_scenario("fleet/hexarotor#hover", changes))
     scenario = tiltsim.parse_scenario(HEXAROTOR | {"companion": [WING]})
-    both = tiltsim.linearize(scenario)
+    found = equilibrium_of(scenario)
+    both = linearization_at(found)
     assert apart(both.poles, np.concatenate((alone.poles, wing.poles))) < 1e-9
     names, inputs = ([each.name for each in of] for of in (both.states, both.inputs))
     for prefix, one in (("", alone), ("wing_", wing)):
@@ -73,7 +76,7 @@ def test_vehicles_that_nothing_couples_keep_their_poles_and_their_feedback():
         assert not both.feedback[np.ix_(rows, others)].any()
         units = [both.states[index].unit for index in own]
         assert units == [each.unit for each in one.states]
-    modes = {mode.name for mode in tiltsim.stability(scenario).modes}
+    modes = {mode.name for mode in stability_at(found).modes}
     assert {"altitude", "wing altitude"} <= modes
 
 

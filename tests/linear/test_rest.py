@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from math import factorial
 
 import numpy as np
@@ -10,13 +11,21 @@ import pytest
 import tiltsim
 from tiltsim.commands.stability import stability_text
 from tiltsim.linear.equilibrium import equilibrium_of
+from tiltsim.linear.linearization import linearization_at
 from tiltsim.linear.modes import exponents, is_stable, modes_of, spectrum
 from tiltsim.linear.mujoco_motion import make_motion
 from tiltsim.linear.newton import ERROR, derivative_at
+from tiltsim.linear.stability import stability_at
 from tiltsim_controllers.analysis.stability import error_loops
 
 SETPOINT = "ch04_tracking/setpoint#rho_065_modified"
 THESIS = {"simulation.plant": "thesis"}
+
+
+@cache
+def setpoint(plant="mujoco"):
+    """The rest point of the published flight, found once."""
+    return equilibrium_of(tiltsim.load_scenario(SETPOINT, {"simulation.plant": plant}))
 
 
 def random_hover(seed):
@@ -124,8 +133,7 @@ def test_matrix_and_poles_agree_with_a_flown_step(seed, engine):
 
 def test_the_plants_have_the_same_poles_but_for_the_servos():
     """Pods of 1e-9 kg move the other poles by less than a millionth."""
-    thesis = tiltsim.stability(tiltsim.load_scenario(SETPOINT, THESIS)).poles
-    mujoco = tiltsim.stability(SETPOINT)
+    thesis, mujoco = stability_at(setpoint("thesis")).poles, stability_at(setpoint())
     assert distance(mujoco.poles / 800.0, thesis / 800.0) < 1e-6
     servos = next(mode for mode in mujoco.modes if mode.name == "tilt servos")
     assert (servos.count, servos.frequency) == (8, pytest.approx(300.0, rel=1e-4))
@@ -133,9 +141,8 @@ def test_the_plants_have_the_same_poles_but_for_the_servos():
 
 def test_the_differences_are_as_good_as_symbolic_derivatives():
     casadi = pytest.importorskip("casadi")
-    scenario = tiltsim.load_scenario(SETPOINT, THESIS)
-    system = tiltsim.linearize(scenario)
-    found = equilibrium_of(scenario)
+    found = setpoint("thesis")
+    system, scenario = linearization_at(found), found.motion.scenario
     coordinates, at = found.motion.coordinates, found.root.state
     symbolic = tiltsim.symbolic(scenario)
     state = casadi.SX.sym("state", len(at))
@@ -148,9 +155,8 @@ def test_the_differences_are_as_good_as_symbolic_derivatives():
 
 def test_a_linear_system_predicts_a_flight():
     """A small step of a rotor's acceleration, in MuJoCo, to the square of its size."""
-    system = tiltsim.linearize(SETPOINT)
-    motion = make_motion(tiltsim.load_scenario(SETPOINT), "python")
-    found = equilibrium_of(motion.scenario)
+    found = setpoint()
+    system, motion = linearization_at(found), make_motion(found.motion.scenario, "python")
     start, coordinates = found.root.state, motion.coordinates
     motion.offsets[1] = 1e-2
     steps = 20
@@ -196,16 +202,17 @@ def test_a_sampled_controller_gives_a_system_in_discrete_time():
     """On a set point of slow gains, sampled at 10 ms: near the continuous one."""
     slow = random_hover(1)
     sampled = slow.replace({"simulation.control_timestep": 0.01})
-    system = tiltsim.linearize(sampled)
+    found = equilibrium_of(sampled)
+    system = linearization_at(found)
     assert system.timestep == pytest.approx(0.01)
     poles = exponents(system.poles, system.timestep)
     continuous = tiltsim.linearize(slow).poles
     assert 1e-3 < distance(poles, continuous) < 0.5
-    assert tiltsim.stability(sampled).poles.real.max() < 1e-3
+    assert stability_at(found).poles.real.max() < 1e-3
 
 
 def test_results_are_one_line_in_python_and_a_table_in_a_notebook():
-    found = tiltsim.stability(SETPOINT)
+    found = stability_at(setpoint())
     assert repr(found) == "<Stability of a rest point: stable, 0 neutral of 24 states>"
     assert found._repr_html_().count("<tr>") == 1 + len(found.modes)
     system = tiltsim.linearize(SETPOINT)
@@ -251,7 +258,7 @@ def test_the_slowest_mode_comes_first():
     matrix[1:3, 1:3] = [[-0.1, 50.0], [-50.0, -0.1]]
     modes = modes_of(matrix, ("z", "p", "q", "x"), None)
     assert [mode.frequency for mode in modes] == [0.0, pytest.approx(50.0, rel=1e-4), 1.0]
-    found = tiltsim.stability(tiltsim.load_scenario(SETPOINT, THESIS))
+    found = stability_at(setpoint("thesis"))
     assert (np.diff(found.poles.real) <= 0.0).all()
 
 
@@ -396,15 +403,16 @@ LIMITED_ON = [pytest.param("rigid_body", marks=pytest.mark.slow), "mujoco"]
 
 @pytest.mark.parametrize("plant", LIMITED_ON)
 def test_a_rotor_at_its_limit_has_no_linear_system(plant):
-    state = tiltsim.linearize(limited(None, plant)).state
-    speed = max(abs(value) for name, value in state.items() if name.startswith("rotor")) + 1e-7
+    free = equilibrium_of(limited(None, plant))
+    rotors = [name.startswith("rotor") for name in free.minimal.names]
+    speed = np.abs(free.values[rotors]).max() + 1e-7
     at_limit = tiltsim.stability(limited(speed, plant))
     assert {f"rotor_speed_{rotor}" for rotor in (1, 2, 3, 4)} <= set(at_limit.corners)
     assert np.abs(at_limit.equilibrium.root.state).max() < speed + 1e-6  # not beyond it
     assert at_limit.report()["corners"] == list(at_limit.corners)
     assert "corners" in stability_text(at_limit)
     with pytest.raises(tiltsim.InputError, match="rests at a limit or at the edge of a dead zone"):
-        tiltsim.linearize(limited(speed, plant))
+        linearization_at(at_limit.equilibrium)
 
 
 @pytest.mark.parametrize("plant", LIMITED_ON)

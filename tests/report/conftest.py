@@ -4,9 +4,6 @@ from __future__ import annotations
 
 import pytest
 
-from tiltsim.scenario.library import library_entries
-from tiltsim.scenario.loading import load_scenario
-
 HOVER = """
 title = "Hover"
 source = "ch. 4, Sec. 6.1, Fig. 4"
@@ -102,12 +99,6 @@ max = 1.0
 claim = "Rotors are slow"
 published = false
 """
-
-
-@pytest.fixture(scope="session")
-def scenarios():
-    """All scenarios of the shipped library."""
-    return [load_scenario(address) for address, _, _ in library_entries()]
 
 
 @pytest.fixture(scope="session")

@@ -13,7 +13,7 @@ from html import unescape
 
 import pytest
 
-from tiltsim.report.made import Made
+from tiltsim.report.making import Made
 from tiltsim.report.pages import page
 
 NAMES = ("chromium", "chromium-browser", "google-chrome")

@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tiltsim.errors import InputError
-from tiltsim.report.claim import Claim, ClaimVerdict, scenario_claims, verdict_on, worst
-from tiltsim.report.statement import Origin, Statement
+from tiltsim.report.claim import Claim, ClaimVerdict, Origin, Statement, verdict_on, worst
+from tiltsim.report.claims import scenario_claims
 from tiltsim.scenario.loading import parse_scenario
 
 MISPRINT = {"fault": "misprint", "why": "a slip", "error": "eq-66"}

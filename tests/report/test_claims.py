@@ -7,8 +7,8 @@ import random
 import numpy as np
 import pytest
 
-from tiltsim.report.claim import ClaimVerdict, scenario_claims, verdict_on
-from tiltsim.report.claims import registered_claims, words
+from tiltsim.report.claim import ClaimVerdict, verdict_on
+from tiltsim.report.claims import registered_claims, scenario_claims, words
 from tiltsim.report.measures.determinant import determinant_coefficients, terms_off
 from tiltsim.scenario.library import library_entries
 from tiltsim.scenario.loading import load_scenario

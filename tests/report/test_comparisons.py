@@ -5,8 +5,7 @@ from __future__ import annotations
 import pytest
 
 from tiltsim.report.flights import other_address
-from tiltsim.report.made import Made
-from tiltsim.report.making import make_report
+from tiltsim.report.making import Made, make_report
 from tiltsim.report.pages import page
 
 PUSHED = """

@@ -9,8 +9,7 @@ from collections import defaultdict
 import pytest
 
 from tests.docs.pages import ROOT
-from tiltsim.report.claim import scenario_claims
-from tiltsim.report.claims import registered_claims
+from tiltsim.report.claims import registered_claims, scenario_claims
 from tiltsim.report.findings import ERRORS
 from tiltsim.report.measures.slips import RIGHT, deviation
 

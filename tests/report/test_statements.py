@@ -10,11 +10,10 @@ from pathlib import Path
 import pytest
 
 import tiltsim.report.claims as claim_modules
-from tiltsim.report.claim import scenario_claims
-from tiltsim.report.claims import registered_claims
+from tiltsim.report.claim import ID
+from tiltsim.report.claims import registered_claims, scenario_claims
 from tiltsim.report.findings import FINDINGS
 from tiltsim.report.pictures import PICTURES
-from tiltsim.report.statement import ID
 from tiltsim.scenario.metric_names import METRICS
 
 NAMES = "|".join([*METRICS, *(name.replace("_", " ") for name in METRICS)])

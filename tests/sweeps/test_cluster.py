@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from contextlib import contextmanager, suppress
+from importlib.util import find_spec
 
 import pytest
 
@@ -18,7 +19,9 @@ from tiltsim.errors import InputError
 from tiltsim.sweeps.loading import load_sweep
 from tiltsim.sweeps.running import _connect, run_sweep
 
-pytest.importorskip("distributed", reason="needs the extra tiltsim[cluster]")
+pytestmark = pytest.mark.skipif(
+    find_spec("distributed") is None, reason="needs the extra tiltsim[cluster]"
+)
 
 DASK = (sys.executable, "-m", "distributed.cli.dask_{}")
 
@@ -134,7 +137,7 @@ def test_only_a_missing_dask_is_called_so(monkeypatch, error, words):
             if name == "distributed":
                 raise error
 
-    monkeypatch.delitem(sys.modules, "distributed")
+    monkeypatch.delitem(sys.modules, "distributed", raising=False)
     monkeypatch.setattr(sys, "meta_path", [Broken(), *sys.meta_path])
     with pytest.raises(InputError, match=words):
         _connect("tcp://127.0.0.1:1")

@@ -50,3 +50,10 @@ def test_the_library_in_the_package_is_chosen(tmp_path, monkeypatch, file, sessi
     assert "PYGLFW_LIBRARY" not in variables_for_processes()
     monkeypatch.setenv("PYGLFW_LIBRARY", "mine")
     assert "PYGLFW_LIBRARY" not in variables_for_processes()
+
+
+def test_matrices_take_one_core_unless_the_user_says_how_many(monkeypatch):
+    monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)
+    assert variables_for_processes()["OPENBLAS_NUM_THREADS"] == "1"
+    monkeypatch.setenv("OPENBLAS_NUM_THREADS", "4")
+    assert "OPENBLAS_NUM_THREADS" not in variables_for_processes()

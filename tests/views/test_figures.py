@@ -242,7 +242,8 @@ def test_flights_of_one_scenario_are_compared_by_their_folders(tmp_path, monkeyp
 def test_the_page_of_a_variant_names_it():
     def subtitle(address):
         scenario = tiltsim.parse_scenario(BASE | RECIPES["trot"], address)
-        page = plot(replace(flight("trot"), assembly=assemble(scenario)))
+        named = replace(flight("trot"), assembly=assemble(scenario))
+        page = plot(named, panels="altitude", size="220mm x 80mm")
         title, line = (text.get_text() for text in page.texts)
         assert title == "A trot around a circle"
         return line
@@ -293,11 +294,13 @@ def test_values_near_overflow_are_drawn(name, values, tmp_path):
     torn = replace(whole, samples=samples)
     for shown in ([torn], [torn, whole]):
         figure = plot(shown, labels=["torn", "whole"][: len(shown)])
-        style.save(figure, tmp_path / "figure.png")
+        with matplotlib.rc_context({"savefig.dpi": 40}):
+            style.save(figure, tmp_path / "figure.png")
 
 
 def test_a_quadrotor_has_no_panel_of_tilt_angles():
-    tables = BASE | {"vehicle": {"model": "quadrotor"}, "controller": {"law": "pid"}}
+    tables = {"vehicle": {"model": "quadrotor"}, "controller": {"law": "pid"}}
+    tables["simulation"] = {**BASE["simulation"], "duration": 0.1}
     assert {*axes_by_title(plot(tiltsim.simulate(tables)))} == PANELS - {"Tilt angles"}
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from tests.flights import flight
 from tiltsim.simulation.simulate import simulate
-from tiltsim.views.rerun.live import LiveStream
+from tiltsim.views.rerun.viewer import LiveStream
 
 
 class BlockedRecorder:
@@ -43,10 +43,10 @@ def listener():
 
 
 def stream_to(recorder, url, monkeypatch, farewell=30.0):
-    from tiltsim.views.rerun import live
+    from tiltsim.views.rerun import viewer
 
-    monkeypatch.setattr(live, "attach_viewer", lambda *_: None)
-    monkeypatch.setattr(live, "SHUTDOWN_TIMEOUT", farewell)
+    monkeypatch.setattr(viewer, "attach_viewer", lambda *_: None)
+    monkeypatch.setattr(viewer, "SHUTDOWN_TIMEOUT", farewell)
     stream = LiveStream(flight("fixed").scenario, url)
     monkeypatch.setattr(stream, "_recording", recorder)
     return stream

@@ -24,8 +24,8 @@ from tests.views.viewer_shot import (
 from tiltsim.errors import InputError
 from tiltsim.flight.reading import load_flight
 from tiltsim.simulation.simulate import simulate
-from tiltsim.views.rerun.live import LiveStream
 from tiltsim.views.rerun.recording import save_recording
+from tiltsim.views.rerun.viewer import LiveStream
 from tiltsim.views.signals import signals_of
 
 needs_driver = pytest.mark.skipif(bool(missing_driver()), reason=missing_driver())

@@ -242,7 +242,7 @@ def run_arena(
     """
     from dataclasses import asdict
 
-    from tiltsim.report.made import Made
+    from tiltsim.report.making import Made
     from tiltsim.resources import shipped_folder
     from tiltsim.studies.arena import FOLDER, OURS, chosen_vehicles, fly_matches, matches
     from tiltsim.studies.comparison import refusal
@@ -339,7 +339,7 @@ def _tuned(
     """Search gains, and write them into a file after each search: an interrupt keeps them."""
     from dataclasses import asdict
 
-    from tiltsim.report.made import Made
+    from tiltsim.report.making import Made
     from tiltsim.studies.tuning import tune_all, tuning_document
 
     total, found = sum(map(len, tables.values())), {}

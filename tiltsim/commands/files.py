@@ -2,6 +2,7 @@
 
 import json
 import shlex
+from functools import cache
 from pathlib import Path
 from typing import Any, Final
 
@@ -207,6 +208,7 @@ def run_schema(address: str | None = None, *, sweep: bool = False, markdown: boo
     return 0
 
 
+@cache
 def scenario_schema() -> dict[str, Any]:
     """The schema of a scenario file: a base, and variants that may change any of its tables.
 
@@ -233,6 +235,7 @@ def scenario_schema() -> dict[str, Any]:
     return schema
 
 
+@cache
 def sweep_schema() -> dict[str, Any]:
     """The schema of a sweep file."""
     from tiltsim.sweeps.tables import Sweep

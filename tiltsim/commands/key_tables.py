@@ -87,12 +87,6 @@ class KeyTable:
             names += [".".join(part) for part in product(*parts)]
         return names
 
-    @property
-    def depth(self) -> int:
-        """Dots in an address with all tags."""
-        place = self.places[0]
-        return len(place) + sum(bool(step.tags) for step in place) - 1
-
 
 def key_tables(schema: dict[str, Any]) -> list[KeyTable]:
     """The tables of a schema, each after the one that contains it; the document itself first."""
@@ -104,7 +98,10 @@ def key_tables(schema: dict[str, Any]) -> list[KeyTable]:
             tables[table.name] = replace(known, places=(*known.places, place))
         else:
             toml = above + _toml(table, place, table.value.get("examples", [{}])[0])
-            tables[table.name] = KeyTable(table.name, (place,), *_contents(table), toml)
+            required, meaning = table.value.get("required", ()), table.value.get("description", "")
+            keys = [_key(name, node, name in required) for name, node in table.properties.items()]
+            keys.sort(key=lambda key: (key.name not in TAG_KEYS, key.default != "required"))
+            tables[table.name] = KeyTable(table.name, (place,), meaning, tuple(keys), toml)
         for key, node in table.properties.items():
             if table.name == "Variant" and key in schema["properties"]:
                 continue  # a variant may have every key of the document
@@ -117,13 +114,6 @@ def key_tables(schema: dict[str, Any]) -> list[KeyTable]:
 
     visit(Node(schema, schema["$defs"]), (), "")
     return list(tables.values())
-
-
-def _contents(table: Node) -> tuple[str, tuple[Key, ...]]:
-    required = table.value.get("required", ())
-    keys = [_key(name, node, name in required) for name, node in table.properties.items()]
-    keys.sort(key=lambda key: (key.name not in TAG_KEYS, key.default != "required"))
-    return table.value.get("description", ""), tuple(keys)
 
 
 def _key(name: str, node: Node, required: bool) -> Key:
@@ -245,19 +235,14 @@ def page(tables: Sequence[KeyTable]) -> str:
     for name, place in chapters.items():
         parts += ["", f"## `{head_of(place)}`"]
         own = [table for table in others if table.places[0][0].name == name]
-        shared = shared_keys(own)
+        counts = Counter(key for table in own for key in table.keys)
+        shared = [key for key, count in counts.items() if count > 1]
         if shared:
             parts += ["", "Keys that several of the following tables have:", ""]
             parts += map(_item, shared)
         above = {*document.keys, *shared}
         parts += [line for table in own for line in _section(table, above)]
     return "\n".join(parts) + "\n"
-
-
-def shared_keys(tables: Sequence[KeyTable]) -> list[Key]:
-    """The keys that at least two of the tables have, whatever their examples."""
-    counts = Counter(key for table in tables for key in table.keys)
-    return [key for key, count in counts.items() if count > 1]
 
 
 def description(tables: Sequence[KeyTable], address: str) -> str:
@@ -327,8 +312,9 @@ def _title(table: KeyTable) -> str:
 
 
 def _narrow(table: KeyTable) -> str:
-    """The addresses of a table that tell it from others."""
-    return ", ".join(name for name in table.addresses() if name.count(".") == table.depth)
+    """The addresses of a table that tell it from others: all tags are in them."""
+    most = max(name.count(".") for name in table.addresses())
+    return ", ".join(name for name in table.addresses() if name.count(".") == most)
 
 
 def _item(key: Key) -> str:

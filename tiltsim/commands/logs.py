@@ -109,7 +109,6 @@ def run_replay(
         window (S): length of a window, s (default: %(default)s)
         chart (FILE): a map of the log's signals, see tiltsim import
     """
-    figure.check()
     (loaded,) = load_scenarios([scenario], overrides, trust)
     from tiltsim.logs.identify import replay
     from tiltsim.logs.log import UNITS
@@ -167,7 +166,6 @@ def run_identify(
         chart (FILE): a map of the log's signals, see tiltsim import
         out (FILE): also write the scenario with the values found
     """
-    figure.check()
     (loaded,) = load_scenarios([scenario], overrides, trust)
     from tiltsim.logs.identify import identify
     from tiltsim.logs.reading import read_log

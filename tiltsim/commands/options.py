@@ -118,6 +118,9 @@ class PlotOptions(FigureOptions):
 
     plot: Path | None = None
 
+    def __post_init__(self) -> None:
+        self.check()
+
     def check(self, panels: Sequence[str] = ()) -> None:
         """Raise `InputError` for options without ``--plot``, and for a file of no use."""
         given = {

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from tiltsim.flight.flight import Flight
     from tiltsim.flight.metrics import Verdict
     from tiltsim.scenario.scenario import Scenario
-    from tiltsim.views.rerun.live import LiveStream
+    from tiltsim.views.rerun.viewer import LiveStream
     from tiltsim_controllers.mathematics.scalar import Floats
 
 GREATEST_DEFLECTION: Final = 0.01
@@ -153,7 +153,8 @@ def _warnings(scenario: Scenario) -> Iterator[str]:
             f"vehicle.mjcf: the {scenario.controller.law} controller assumes the center of mass at "
             f"the body's origin{diagonal}; not modeled: {own.unmodeled_properties}"
         )
-    through = [name for name in own.obstacles if not _touches(name, scenario)]
+    touching = ("collision",) if scenario.ground is not None else ()
+    through = [name for name in own.obstacles if not name.endswith(touching)]
     if through:
         yield (
             f"vehicle.mjcf: the vehicle passes through geom {through[0]!r}: contacts are those of "
@@ -172,10 +173,6 @@ def _warnings(scenario: Scenario) -> Iterator[str]:
         )
 
 
-def _touches(geom: str, scenario: Scenario) -> bool:
-    return scenario.ground is not None and geom.endswith("collision")
-
-
 def fly(scenario: Scenario, *, live: bool, connect: str | None, quiet: bool) -> Flight:
     """Simulate, showing the progress and, if requested, a live view.
 
@@ -188,7 +185,7 @@ def fly(scenario: Scenario, *, live: bool, connect: str | None, quiet: bool) -> 
     with ExitStack() as stack:
         stream: LiveStream | None = None
         if live or connect is not None:
-            from tiltsim.views.rerun.live import LiveStream
+            from tiltsim.views.rerun.viewer import LiveStream
 
             stream = stack.enter_context(LiveStream(scenario, connect))
         progress = stack.enter_context(show_progress(shown=not quiet))

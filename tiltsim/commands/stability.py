@@ -85,7 +85,6 @@ def run_stability(
             by ratio
         margins: at rest: gain, phase, delay and disk margins of the loop broken at one place
     """
-    figure.check()
     scenarios = load_scenarios([scenario, *more], overrides, trust)
     if sweep is not None and margins:
         raise InputError("--margins: not with --sweep, which has many points")
@@ -271,7 +270,6 @@ def run_attraction(
         coarse (N): cells across before cells at the boundary are divided (default: %(default)s)
         refine (N): how often these are divided in four (default: %(default)s)
     """
-    figure.check()
     (loaded,) = load_scenarios([scenario], overrides, trust)
 
     from tiltsim.linear.attraction import attraction

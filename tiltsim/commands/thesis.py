@@ -53,7 +53,6 @@ def run_map(
     """
     from tiltsim.studies.gait_analysis import map_report
 
-    figure.check()
     refuse_both(leg=leg, circle=circle)
     parameters = vehicle or parse_vehicle(DEFAULT_VEHICLE)
     path = _path(leg, circle, parameters)
@@ -150,7 +149,6 @@ def run_singularity(
         vehicle (PRESET): default: ar_drone_2_unrounded
     """
     parameters = vehicle or parse_vehicle("ar_drone_2_unrounded")
-    figure.check()
     report = _singularity_report(parameters, roll or 0.0, pitch or 0.0)
 
     figure.show(
@@ -299,8 +297,7 @@ def run_report(
         from tiltsim.report.claim_rows import count
         from tiltsim.report.content import failure_text
         from tiltsim.report.flights import store
-        from tiltsim.report.made import Made
-        from tiltsim.report.making import make_report
+        from tiltsim.report.making import Made, make_report
         from tiltsim.report.pages import errors_page, page, rows_csv, rows_json
         from tiltsim.report.pages import markdown as markdown_of
         from tiltsim.scenario.own_parts import VARIABLE

@@ -21,26 +21,19 @@ from tiltsim.engines.base import Callback, EngineName, check_model, vectors_of
 from tiltsim.engines.glue import CALLBACK, EMPTY, filled
 from tiltsim.engines.glue import RECORDER as RECORDER_TEXT
 from tiltsim.engines.machine_code import MachineCode, mjdata_layout
-from tiltsim.engines.programs import KEPT, LoopPrograms, setup_of
+from tiltsim.engines.programs import KEPT, LoopPrograms, control_program, setup_of
 from tiltsim.system.files import one_thread_at_a_time
 from tiltsim.system.hooks import mujoco_hooks
 from tiltsim_controllers.code.llvm_text import llvm_functions
-from tiltsim_controllers.code.program import Program
 from tiltsim_controllers.code.python_source import python_function
-
-
-@one_thread_at_a_time
-@lru_cache(maxsize=KEPT)
-def control_program(key: ProgramKey, name: str) -> Program:
-    """A program of `LoopPrograms.in_mujoco`."""
-    return LoopPrograms(key).in_mujoco(name)[name]
 
 
 def control_step(assembly: Assembly, user: list[float], name: str) -> Callable[..., Any]:
     """A function ``(header, *vectors, ctrl)`` of a loop, with parameters and knots bound.
 
-    The vectors are `tiltsim.engines.base.Vectors`; the name is one of `LoopPrograms.in_mujoco`.
-    Expressions of parameters and knots alone are evaluated once.
+    The vectors are `tiltsim.engines.base.Vectors`; the name is one of
+    `tiltsim.engines.programs.LoopPrograms.functions_in_mujoco`. Expressions of parameters and
+    knots alone are evaluated once.
     """
     key = program_key(assembly)
     if assembly.traced:
@@ -109,9 +102,8 @@ def compile_control(key: ProgramKey) -> Any:
         nan=nan,
         width=width,
     )
-    code = MachineCode(
-        llvm_functions(LoopPrograms(key).in_mujoco("controls", "hold", "sample")) + glue
-    )
+    programs = {name: control_program(key, name) for name in ("controls", "hold", "sample")}
+    code = MachineCode(llvm_functions(programs) + glue)
     return code.function("callback", None, _POINTER, _POINTER)
 
 

@@ -1,6 +1,7 @@
 """The functions of a closed loop as programs of a few vectors; memory for recorded samples."""
 
 from collections.abc import Callable, Sequence
+from functools import lru_cache
 from math import copysign, inf
 from typing import Any, Final, NamedTuple
 
@@ -19,6 +20,7 @@ from tiltsim.closed_loop.userdata import (
 from tiltsim.engines.base import Vectors
 from tiltsim.equations.solvers import Integration, make_step
 from tiltsim.scenario.interaction import MAX_COMPANIONS
+from tiltsim.system.files import one_thread_at_a_time
 from tiltsim_controllers.code.arrays import as_arrays, program_of, xp
 from tiltsim_controllers.code.arrays import flatten as flattened
 from tiltsim_controllers.code.program import Program
@@ -94,11 +96,6 @@ class LoopPrograms:
     def user_size(self) -> int:
         """Number of parameters and knots."""
         return self._loop.record_size + self._key.knots
-
-    def in_mujoco(self, *names: str) -> dict[str, Program]:
-        """Programs of `functions_in_mujoco` by name."""
-        functions = self.functions_in_mujoco()
-        return {name: functions[name].traced() for name in names}
 
     def functions_in_mujoco(self) -> dict[str, LoopFunction]:
         """Functions of MuJoCo's vectors.
@@ -211,6 +208,13 @@ class LoopPrograms:
 
         sizes = {"values": len(self._loop.sample_fields) - 1, "head": HEAD_SIZE - REFERENCE + 1}
         return program_of(run, time=1, **sizes, user=self.user_size)
+
+
+@one_thread_at_a_time
+@lru_cache(maxsize=KEPT)
+def control_program(key: ProgramKey, name: str) -> Program:
+    """The program of a function of `LoopPrograms.functions_in_mujoco`."""
+    return LoopPrograms(key).functions_in_mujoco()[name].traced()
 
 
 def setup_of(loop: ClosedLoop, user: Sequence[float]) -> ControlSetup:

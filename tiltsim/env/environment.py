@@ -52,11 +52,16 @@ class Environment(dm_env.Environment):  # type: ignore[misc]
         task: Its scenario, observation, reward and termination make an episode.
         seed: Seed of the draws; default: the ``simulation.seed`` of the task's scenario. Equal
             seeds and equal actions give equal episodes, bit for bit.
+
+    Attributes:
+        scenario: The scenario of the present episode.
+        end: How and why the episode ended; None during the episode.
+        generator: The generator that draws the scenarios of later episodes.
     """
 
     def __init__(self, task: Task, *, seed: int | None = None) -> None:
         self.task = task
-        self._scenario = task.scenario
+        self.scenario = task.scenario
         self._action_spec = task.action_spec()
         self._observation_spec = task.observation_spec()
         self._plant: CommandedPlant | None = None
@@ -64,7 +69,7 @@ class Environment(dm_env.Environment):  # type: ignore[misc]
         self._renderer: FlightRenderer | None = None
         self._rendered = ""
         self._initial_state: Floats | None = None
-        self._end: End | None = None
+        self.end: End | None = None
         self.reseed(seed)
 
     def action_spec(self) -> specs.BoundedArray:
@@ -77,15 +82,15 @@ class Environment(dm_env.Environment):  # type: ignore[misc]
 
     def reset(self) -> dm_env.TimeStep:
         """Begin a new episode. Raises `InputError` if its drawn scenario cannot be flown."""
-        scenario = self.task.initialize_episode(self._generator)
-        if self._plant is None or self._initial_state is None or scenario is not self._scenario:
+        scenario = self.task.initialize_episode(self.generator)
+        if self._plant is None or self._initial_state is None or scenario is not self.scenario:
             self._plant = self._make_plant(scenario)
             self._initial_state = self._plant.state
         else:
             self._plant.state = self._initial_state
         self._steps_left = scenario.simulation.steps
         self._monitor = TerminationMonitor(self._assembly)
-        self._end = None
+        self.end = None
         self._samples = [take_sample(self._plant)]
         self._wall_time = 0.0
         self._observation = self.task.get_observation(self._plant)
@@ -96,7 +101,7 @@ class Environment(dm_env.Environment):  # type: ignore[misc]
         assembly = assemble(scenario)
         key = assembly.loop, len(assembly.setup.knots), model_cache_key(scenario)
         model = self._plant.model if self._plant is not None and key == self._model_key else None
-        self._scenario, self._assembly, self._model_key = scenario, assembly, key
+        self.scenario, self._assembly, self._model_key = scenario, assembly, key
         return CommandedPlant(assembly, model)
 
     def step(self, action: npt.ArrayLike) -> dm_env.TimeStep:
@@ -104,10 +109,10 @@ class Environment(dm_env.Environment):  # type: ignore[misc]
 
         Raises ValueError if the action has the wrong shape or a non-finite entry.
         """
-        if self._plant is None or self._end is not None:
+        if self._plant is None or self.end is not None:
             return self.reset()
         clipped = clip_action(action, self._action_spec)
-        steps = min(max(1, self._scenario.simulation.control_steps), self._steps_left)
+        steps = min(max(1, self.scenario.simulation.control_steps), self._steps_left)
         start = perf_counter()
         self.task.before_step(clipped, self._plant)
         self._plant.advance(steps)
@@ -117,23 +122,23 @@ class Environment(dm_env.Environment):  # type: ignore[misc]
         if np.isfinite(sample).all():
             self._samples.append(sample)
             self._observation = self.task.get_observation(self._plant)
-        self._end = self._monitor.check(self._plant, sample)
-        if self._end is None:
-            self._end = self.task.get_termination(sample, self._observation)
-        if self._end is None and self._steps_left == 0:
-            self._end = End("completed", self._plant.time)
+        self.end = self._monitor.check(self._plant, sample)
+        if self.end is None:
+            self.end = self.task.get_termination(sample, self._observation)
+        if self.end is None and self._steps_left == 0:
+            self.end = End("completed", self._plant.time)
         observation = dict(self._observation)
-        if self._end is not None and self._end.kind != "completed":
+        if self.end is not None and self.end.kind != "completed":
             return dm_env.termination(0.0, observation)
         reward = self.task.get_reward(observation, clipped)
-        if self._end is None:
+        if self.end is None:
             return dm_env.transition(reward, observation)
         return dm_env.truncation(reward, observation)
 
     def reseed(self, seed: int | np.random.Generator | None = None) -> None:
         """Restart the random draws of later episodes; None takes the scenario's seed."""
         try:
-            self._generator = np.random.default_rng(
+            self.generator = np.random.default_rng(
                 self.task.scenario.simulation.seed if seed is None else seed
             )
         except (TypeError, ValueError):
@@ -142,28 +147,13 @@ class Environment(dm_env.Environment):  # type: ignore[misc]
                 f"environment: seed = {shown}: must be a whole number from 0"
             ) from None
 
-    @property
-    def generator(self) -> np.random.Generator:
-        """The generator that draws the scenarios of later episodes."""
-        return self._generator
-
-    @property
-    def scenario(self) -> Scenario:
-        """The scenario of the present episode."""
-        return self._scenario
-
-    @property
-    def end(self) -> End | None:
-        """How and why the episode ended; None during the episode."""
-        return self._end
-
     def flight(self) -> Flight:
         """The episode so far, with one sample per control step; "interrupted" until it ends.
 
         Raises `InputError` before the first episode.
         """
         plant = self._begun()
-        end = self._end or End("interrupted", plant.time, "the episode has not ended")
+        end = self.end or End("interrupted", plant.time, "the episode has not ended")
         return Flight(self._assembly, np.array(self._samples), end, "python", self._wall_time)
 
     def render(self) -> npt.NDArray[np.uint8]:
@@ -173,7 +163,7 @@ class Environment(dm_env.Environment):  # type: ignore[misc]
         """
         from tiltsim.views.video.rendering import QUALITIES, FlightRenderer
 
-        flight, shown = self.flight(), repr(self._scenario.vehicle)
+        flight, shown = self.flight(), repr(self.scenario.vehicle)
         if self._renderer is None or shown != self._rendered:
             self.close()
             self._renderer, self._rendered = FlightRenderer(flight, QUALITIES["draft"]), shown

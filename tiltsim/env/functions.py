@@ -81,6 +81,7 @@ class EnvFunctions:
     Attributes:
         scenario: The scenario of the task, before any draws.
         keys: Keys of the scenario that a domain draws for an episode.
+        actions, observations: Numbers of entries of an action and of an observation.
 
     Raises:
         InputError: If the task is none of these, or draws anything but numbers of a flight.
@@ -125,16 +126,7 @@ class EnvFunctions:
         self._low, self._high = spec.minimum, spec.maximum
         bounds = task.observation_spec().values()
         self._bounds = np.concatenate([entry.maximum * np.ones(entry.shape) for entry in bounds])
-
-    @property
-    def actions(self) -> int:
-        """Number of entries of an action."""
-        return len(self._low)
-
-    @property
-    def observations(self) -> int:
-        """Number of entries of an observation."""
-        return len(self._bounds)
+        self.actions, self.observations = len(self._low), len(self._bounds)
 
     def draw(self, generators: Sequence[np.random.Generator]) -> Floats:
         """Numbers for `reset`, a row for each generator; they draw as a single environment does."""

@@ -8,7 +8,7 @@ from pydantic import ValidationError
 
 from tiltsim.closed_loop.assembly import ProgramKey, choices_of
 from tiltsim.closed_loop.loop import ClosedLoop, ControlSetup
-from tiltsim.engines.programs import LoopPrograms
+from tiltsim.engines.programs import control_program
 from tiltsim.errors import InputError
 from tiltsim.laws.law_loop import NO_PARAMETERS, REMEDY, FlownLaw, LawError, airframe_of, law_loop
 from tiltsim.laws.layers.instruments import instruments_of, with_instruments
@@ -143,7 +143,7 @@ def loop_of_law(scenario: Scenario, *, recorded: bool = False) -> ClosedLoop:
 def _refusal(loop: ClosedLoop, parameters: Any, reference: Any, knots: int) -> str:
     """Why a loop cannot be traced, in one line; empty if it can be."""
     try:
-        LoopPrograms(ProgramKey(loop, parameters, reference, knots)).in_mujoco("controls")
+        control_program(ProgramKey(loop, parameters, reference, knots), "controls")
     except TraceError as error:
         return str(error)
     except Exception as error:

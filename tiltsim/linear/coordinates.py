@@ -5,6 +5,7 @@ The names of a companion's, as of its columns, begin with its own.
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
+from itertools import pairwise
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -14,11 +15,7 @@ from tiltsim.closed_loop.loop import ClosedLoop
 from tiltsim.laws.assembling import assemble
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.vehicles.rotorcraft.others import SWING
-from tiltsim_controllers.mathematics.attitude import (
-    quaternion_of_rotation,
-    quaternion_product,
-    rotation_of_quaternion,
-)
+from tiltsim_controllers.mathematics import attitude
 from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.vehicle.body import BODY_FIELDS, ROTATION_NAMES
 
@@ -79,7 +76,8 @@ class Coordinates(NamedTuple):
     def _parts(self, vector: Floats, entries: int) -> list[Floats]:
         """Numbers and rotations by turns, of a vector in which rotations have these entries."""
         firsts = (at + number * (entries - 3) for number, at in enumerate(self.turns))
-        return np.split(vector, [place for at in firsts for place in (at, at + entries)])
+        places = (0, *(place for at in firsts for place in (at, at + entries)), len(vector))
+        return [vector[first:last] for first, last in pairwise(places)]
 
     def _joined(self, numbers: Pairwise, rotations: Pairwise, *pair: Iterable[Floats]) -> Floats:
         """A function of two vectors, part by part."""
@@ -112,7 +110,7 @@ def _turn_rates(rotation: Floats, derivative: Floats) -> Floats:
     """The body rates of a rotation, from the derivative of its entries."""
     if len(rotation) == QUATERNION:
         inverse = rotation * (1.0, -1.0, -1.0, -1.0)
-        return np.asarray(2.0 * quaternion_product(inverse, derivative)[1:])
+        return np.asarray(2.0 * attitude.quaternion_product(inverse, derivative)[1:])
     skew = rotation.reshape(3, 3).T @ derivative.reshape(3, 3)
     turning = (skew[2, 1] - skew[1, 2], skew[0, 2] - skew[2, 0], skew[1, 0] - skew[0, 1])
     return 0.5 * np.array(turning)
@@ -121,7 +119,7 @@ def _turn_rates(rotation: Floats, derivative: Floats) -> Floats:
 def _quaternion(rotation: Floats) -> Floats:
     """The unit quaternion of a rotation, which may be a matrix."""
     if len(rotation) == MATRIX:
-        rotation = quaternion_of_rotation(rotation.reshape(3, 3))
+        rotation = attitude.quaternion_of_rotation(rotation.reshape(3, 3))
     return rotation / np.linalg.norm(rotation)
 
 
@@ -129,16 +127,16 @@ def _turned(rotation: Floats, vector: Floats) -> Floats:
     """A rotation, turned by a vector in body axes."""
     half = 0.5 * float(np.linalg.norm(vector))
     turn = np.array((np.cos(half), *(0.5 * np.sinc(half / np.pi) * vector)))
-    turned = quaternion_product(_quaternion(rotation), turn)
+    turned = attitude.quaternion_product(_quaternion(rotation), turn)
     if len(rotation) == MATRIX:
-        return rotation_of_quaternion(turned).ravel()
+        return attitude.rotation_of_quaternion(turned).ravel()
     return turned
 
 
 def _turn(start: Floats, end: Floats) -> Floats:
     """The vector, in the axes of ``start``, of the turn from one rotation to another."""
     inverse = _quaternion(start) * (1.0, -1.0, -1.0, -1.0)
-    turn = quaternion_product(inverse, _quaternion(end))
+    turn = attitude.quaternion_product(inverse, _quaternion(end))
     if turn[0] < 0.0:
         turn = -turn
     half = np.arctan2(np.linalg.norm(turn[1:]), turn[0])

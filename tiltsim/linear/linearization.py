@@ -23,7 +23,6 @@ from tiltsim.linear.coordinates import (
 )
 from tiltsim.linear.equilibrium import Equilibrium, equilibrium_of
 from tiltsim.linear.newton import derivative_at, jacobian, steps_at
-from tiltsim.models.rotor_table import Multirotor
 from tiltsim.scenario.linearizing_controllers import force_dimension, upper_side
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.rotorcraft import RotorcraftTable
@@ -36,7 +35,7 @@ from tiltsim_controllers.code.casadi_function import casadi_function
 from tiltsim_controllers.code.messages import TraceError
 from tiltsim_controllers.laws.supervised_vehicles import Watched, multirotor_supervision_of
 from tiltsim_controllers.mathematics.attitude import rotation_matrix
-from tiltsim_controllers.mathematics.scalar import Floats, Triple
+from tiltsim_controllers.mathematics.scalar import Floats
 
 INPUT_SCALE: Final = 100.0
 """Rotor accelerations (rad/s^2) are of this order, and their steps in differences; others of 1."""
@@ -220,32 +219,23 @@ def _input_names(assembly: Assembly, size: int) -> tuple[str, ...]:
     return tuple(names)
 
 
-class _Side(NamedTuple):
-    """Singular directions of a vehicle: its rotors, its components of force, and its upper side."""
-
-    vehicle: Multirotor
-    dimension: int
-    upper: Triple
-
-
-def _upper_side(scenario: Scenario) -> _Side | None:
-    """For `_margin`; None where no attitude has a margin."""
+def _margin_of(scenario: Scenario) -> Callable[[Mapping[str, Any]], Any] | None:
+    """The angle (rad) to the nearest singular attitude, as a function of a sample; None without."""
     if not isinstance(scenario.vehicle, RotorcraftTable):
         return None
     craft = airframe(scenario)
-    dimension = force_dimension(craft.vehicle, craft.gait)[0]
+    vehicle, dimension = craft.vehicle, force_dimension(craft.vehicle, craft.gait)[0]
     if craft.rotors < FEWEST_WITH_MARGIN or not dimension:
         return None
-    return _Side(craft.vehicle, dimension, upper_side(craft.vehicle, craft.gait))
+    watched = Watched(per_volume=1.0, side=upper_side(vehicle, craft.gait))
+    supervision = multirotor_supervision_of(vehicle.tilt_of_rotor, dimension)
 
+    def margin(seen: Mapping[str, Any]) -> Any:
+        up = rotation_matrix(xp.array([seen[name] for name in ("roll", "pitch", "yaw")]))[2]
+        tilts = xp.array([seen[f"alpha_{tilt + 1}"] for tilt in range(vehicle.tilts)])
+        return supervision.assess(tilts, up, watched, xp.array(vehicle.table))[0]
 
-def _margin(side: _Side, seen: Mapping[str, Any]) -> Any:
-    """Angle (rad) to the nearest singular attitude, from the fields of a sample."""
-    vehicle, watched = side.vehicle, Watched(per_volume=1.0, side=side.upper)
-    up = rotation_matrix(xp.array([seen[name] for name in ("roll", "pitch", "yaw")]))[2]
-    tilts = xp.array([seen[f"alpha_{tilt + 1}"] for tilt in range(vehicle.tilts)])
-    supervision = multirotor_supervision_of(vehicle.tilt_of_rotor, side.dimension)
-    return supervision.assess(tilts, up, watched, xp.array(vehicle.table))[0]
+    return margin
 
 
 def symbolic(scenario: Scenario | str | PathLike[str] | Mapping[str, Any]) -> Symbolic:
@@ -285,12 +275,12 @@ def symbolic(scenario: Scenario | str | PathLike[str] | Mapping[str, Any]) -> Sy
         seen = equations.observe(time[0], state, inputs, *setup)
         return xp.array(assembly.loop.sign_check_values(time[0], xp.array(seen), *setup))
 
-    fields, side = assembly.loop.sample_fields[1:], _upper_side(scenario)
+    fields, margin_at = assembly.loop.sample_fields[1:], _margin_of(scenario)
 
     def margin(time: Any, state: Any, inputs: Any) -> Any:
-        assert side is not None
+        assert margin_at is not None
         seen = dict(zip(fields, equations.observe(time[0], state, inputs, *setup), strict=True))
-        return xp.array([_margin(side, seen)])
+        return xp.array([margin_at(seen)])
 
     sizes = {"time": 1, "state": len(initial)}
 
@@ -306,7 +296,7 @@ def symbolic(scenario: Scenario | str | PathLike[str] | Mapping[str, Any]) -> Sy
         function(controller, "inputs"),
         function(closed_loop, "rates"),
         function(sample, "sample"),
-        function(margin, "margin", inputs=equations.inputs_size) if side else None,
+        function(margin, "margin", inputs=equations.inputs_size) if margin_at else None,
         function(signs, "signs", inputs=equations.inputs_size),
         initial,
         entry_names(equation_coordinates(assembly, len(initial))),

@@ -57,9 +57,9 @@ class Log(ColumnsOverTime):
     origin: Mapping[str, str] = field(default_factory=dict)  # of a flight: `Flight.origin`
 
     @classmethod
-    def of_flight(cls, flight: Flight, name: str = "") -> Log:
+    def of_flight(cls, flight: Flight) -> Log:
         """The columns of a flight of tiltsim."""
-        name = name or flight.scenario.address or flight.scenario.title
+        name = flight.scenario.address or flight.scenario.title
         return cls(name, flight.columns, flight.units, (), flight.origin())
 
     def __repr__(self) -> str:

@@ -16,7 +16,8 @@ import numpy as np
 from tiltsim.closed_loop.assembly import Assembly, program_key
 from tiltsim.closed_loop.userdata import EVALUATIONS, HEADER_SIZE
 from tiltsim.engines.base import vectors_of
-from tiltsim.engines.control import control_callback, control_program, control_step
+from tiltsim.engines.control import control_callback, control_step
+from tiltsim.engines.programs import control_program
 from tiltsim.errors import InputError
 from tiltsim.laws.assembling import commanded_parameters, planned_servo_commands, with_command
 from tiltsim.laws.law import servo_lead

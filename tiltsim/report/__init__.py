@@ -1,6 +1,6 @@
 """The reproduction report: the claims of the thesis compared with measured values.
 
-A **statement** (`tiltsim.report.statement.Statement`, whose fields are the keys of its table) is
+A **statement** (`tiltsim.report.claim.Statement`, whose fields are the keys of its table) is
 one thing that the thesis says. Its ``id`` is the anchor on the page, never changed once published.
 
 A **row** (`tiltsim.report.claim.Claim`) is one case of a statement. Its id is the statement's id
@@ -39,17 +39,8 @@ the same claim and case but different ``plant`` are one row. ``claim`` may also 
 then is the whole statement; files of the library use tables.
 
 **Analysis or several flights are needed.** The row is in a file of `tiltsim.report.claims`, one
-per chapter, with an expression of metrics and of functions of `tiltsim.report.measures`::
-
-    [ch4-period]
-    source = "ch. 4, Sec. 7.2, Figs. 8-9"
-    statement = "The error grows with the period of the trot"
-    thesis = "“…”"
-    criterion = "The largest error after 20 s grows from T = 1 s to 2 s and from 2 s to 3 s"
-    value = "all(diff(sup_position_error_after_20s) > 0)"
-    flights = ["ch04_tracking/line#instant_t{1,2,3}_modified"]
-
-The value is yes or no, a number, or several numbers.
+per chapter, with an expression of metrics and of functions of `tiltsim.report.measures`. Its value
+is yes or no, a number, or several numbers.
 
 No measured value is written down: verdicts are computed when the report is made. Texts may have
 `code` between backticks. ``tests/report/test_statements.py`` checks every row.

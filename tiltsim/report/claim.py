@@ -1,22 +1,143 @@
-"""Claims, and the verdict on a measured value compared with a published one."""
+"""Statements of the thesis, their cases, and verdicts on measured values."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import re
+import unicodedata
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass
 from decimal import Decimal
+from enum import Enum
 from math import isfinite
-from pathlib import Path
-from typing import Final, TypeAlias
+from typing import Any, Final, Self, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from tiltsim.flight.metrics import Verdict
-from tiltsim.report.statement import CHAPTER, Described, Origin, Statement, origins_of, slug
 from tiltsim.scenario.expectation import Expectation
-from tiltsim.scenario.metric_names import metric_of, unit_of
-from tiltsim.scenario.scenario import Scenario
+
+CHAPTER: Final = re.compile(r"ch\. (\d+)")
+ID: Final = re.compile(r"ch(\d+)(-[a-z0-9]+)+")
+
+_SPELLED: Final = {
+    "α": "alpha", "δ": "delta", "Δ": "delta", "η": "eta", "θ": "theta", "π": "pi", "ρ": "rho",
+    "τ": "tau", "φ": "phi", "ψ": "psi", "ω": "omega", "−": "minus ", "<": "below",
+}  # fmt: skip
+
+
+class Described(Enum):
+    """Words for readers, with their meaning in one sentence."""
+
+    meaning: str
+
+    def __new__(cls, words: str, meaning: str) -> Self:
+        """A member with its words as value."""
+        member = object.__new__(cls)
+        member._value_ = words
+        member.meaning = meaning
+        return member
+
+
+class Origin(Described):
+    """A part of a test that does not come from the thesis; a row may have several."""
+
+    PATH = "path ours", "the thesis's figure with the gait's path is not available: we drew one"
+    GAINS = "gains ours", "the thesis prints no gains: we chose them"
+    KEYFRAMES = (
+        "keyframes fitted",
+        "its keyframes are not available: ours were fitted to its statements",
+    )
+    PARAMETERS = (
+        "parameters ours",
+        "the thesis does not give all masses or coefficients: we chose them",
+    )
+    FLIGHT = (
+        "flight ours",
+        "the thesis flies nothing here: the flight tests what its statement implies",
+    )
+    START = "start ours", "the thesis does not print the initial state: we chose it"
+    LIMITS = "no rotor limits", "the flight ignores the rotor limits that its chapter states"
+    FEEDBACK = (
+        "feedback ours",
+        "the thesis does not say whether a derivative is measured or modeled",
+    )
+
+
+def origins_of(ours: Iterable[str]) -> tuple[Origin, ...]:
+    """The origins that a file names: "gains"."""
+    return tuple(Origin[name.upper()] for name in ours)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Statement:
+    """One statement of the thesis; its rows are the cases in which it is tested.
+
+    Raises `ValueError` if a field is empty or the fields contradict each other.
+    """
+
+    id: str  # anchor on the page, never changed once published: "ch4-period"
+    source: str  # chapter first, then section, figure or equation: "ch. 3, Sec. 4, Eq. (19)".
+    text: str  # the statement in one sentence of ours
+    thesis: str  # the sentence that makes it, quoted or paraphrased, or a description of the figure
+    criterion: str = ""
+    """Criterion of reproduction, and of failure, in words; none if it is not testable."""
+    note: str = ""  # note that a reader needs to judge it, shown with every row
+    origins: tuple[Origin, ...] = ()
+    """Our own choices in every row, in addition to ``ours`` of its flights."""
+    fitted: bool = False  # whether parameters were chosen so that it holds
+    finding: str = ""
+    """Key of the finding that settles it; rows refuted by one finding are one error."""
+    missing: str = ""  # information that the text omits, so that the statement is not testable
+    pictures: tuple[str, ...] = ()
+    """Names of pictures that show it, in addition to the pictures of its flights."""
+    tests: tuple[str, ...] = ()
+    """Tests beside the row's own: "controllers/analysis/test_x.py::test_y"."""
+
+    @classmethod
+    def of_table(cls, name: str, *, statement: str, ours: Iterable[str] = (), **more: Any) -> Self:
+        """From a TOML table: of a scenario file or of a file beside a module of claims.
+
+        Args:
+            name: Its id.
+            statement: The text.
+            ours: Names of its origins: "gains".
+            more: The other fields under their names.
+        """
+        return cls(id=name, text=statement, origins=origins_of(ours), **more)
+
+    def __post_init__(self) -> None:
+        for name in ("text", "thesis", "criterion"):
+            if not (getattr(self, name).strip() or (name == "criterion" and self.missing)):
+                raise ValueError(f"{self.id}: {name} is empty")
+        chapter, named = CHAPTER.match(self.source), ID.fullmatch(self.id)
+        if chapter is None:
+            raise ValueError(f"source {self.source!r}: must begin with a chapter: 'ch. 3, Sec.'")
+        if named is None or named[1] != chapter[1]:
+            raise ValueError(f"id {self.id!r}: must be like 'ch{chapter[1]}-two-words'")
+
+    @property
+    def chapter(self) -> int:
+        """The chapter's number."""
+        found = CHAPTER.match(self.source)
+        assert found is not None
+        return int(found[1])
+
+    @property
+    def place(self) -> tuple[int, ...]:
+        """Numbers of its first section, for the order of the text; an appendix comes last."""
+        if "App." in self.source:
+            return (99,)
+        section = re.search(r"Secs?\. ([\d.]*\d)", self.source)
+        return tuple(map(int, section[1].split("."))) if section else ()
+
+
+def slug(text: str) -> str:
+    """A text as part of an address: "ρ = -0.65, circle" is "rho-minus-0-65-circle"."""
+    spelled = re.sub(r"-(?=\d)", " minus ", "".join(_SPELLED.get(c, c) for c in text))
+    plain = unicodedata.normalize("NFKD", spelled).encode("ascii", "ignore").decode().lower()
+    return re.sub(r"[^a-z0-9]+", "-", plain).strip("-")
+
 
 Value: TypeAlias = "float | bool | tuple[float, ...]"
 """A measured value: a number, yes or no, or several numbers."""
@@ -236,60 +357,3 @@ def plain(measured: ArrayLike) -> Value:
 def worst(verdicts: list[ClaimVerdict]) -> ClaimVerdict:
     """The worst of several verdicts."""
     return max(verdicts, key=lambda verdict: verdict.rank)
-
-
-def scenario_claims(scenario: Scenario) -> list[Claim]:
-    """The claims of a scenario, in order: its expectations with a ``published`` value.
-
-    A scenario beyond the thesis, whose ``source`` names no chapter, has none.
-    """
-    if CHAPTER.match(scenario.source) is None:
-        return []
-    return [
-        Claim(
-            statement=_statement(scenario, expectation),
-            case=", ".join(filter(None, (scenario.title, case := _case(scenario, expectation)))),
-            key=slug(f"{_short(scenario.address)} {case}"),
-            where=scenario.source,
-            published=expectation.published,
-            unit=unit_of(expectation.metric),
-            tolerance=expectation.published_tolerance,
-            in_kind=expectation.in_kind,
-            why=expectation.why,
-            origins=origins_of(scenario.ours),
-            flights=(scenario.address,),
-            expectation=expectation,
-        )
-        for expectation in scenario.expect
-        if expectation.published is not None
-    ]
-
-
-def _case(scenario: Scenario, expectation: Expectation) -> str:
-    """The label; the metric, if the flight has the claim for several and the file has no label."""
-    metrics = {other.metric for other in scenario.expect if other.claim == expectation.claim}
-    return expectation.case or (expectation.metric.replace("_", " ") if len(metrics) > 1 else "")
-
-
-def _short(address: str) -> str:
-    """File and variant, without folders: "line walk_third"."""
-    file, _, variant = address.partition("#")
-    return f"{Path(file).stem} {variant}"
-
-
-def _statement(scenario: Scenario, expectation: Expectation) -> Statement:
-    """From the table that the expectation names; otherwise its own words are the statement."""
-    table = scenario.claim.get(expectation.claim)
-    if table is not None:
-        return Statement.of_table(expectation.claim, source=scenario.source, **table.model_dump())
-    measured = metric_of(expectation.metric).described.capitalize()
-    words = expectation.claim or measured
-    chapter = CHAPTER.match(scenario.source)
-    assert chapter is not None
-    return Statement(
-        id=f"ch{chapter[1]}-{slug(words)[:50].strip('-')}",
-        source=scenario.source,
-        text=words,
-        thesis=words,
-        criterion=f"{measured}, compared with the published value.",
-    )

@@ -11,8 +11,17 @@ from pathlib import Path
 from typing import Final
 
 from tiltsim.flight.metrics import Verdict, check_expectations
-from tiltsim.report.claim import Claim, ClaimVerdict, Value, scenario_claims, verdict_on, worst
-from tiltsim.report.claims import registered_claims, words
+from tiltsim.report.claim import (
+    Claim,
+    ClaimVerdict,
+    Origin,
+    Statement,
+    Value,
+    origins_of,
+    verdict_on,
+    worst,
+)
+from tiltsim.report.claims import registered_claims, scenario_claims, words
 from tiltsim.report.flights import (
     PLANTS,
     FlightRecord,
@@ -23,7 +32,6 @@ from tiltsim.report.flights import (
     sources_digest,
     store,
 )
-from tiltsim.report.statement import Origin, Statement, origins_of
 from tiltsim.scenario.scenario import Scenario
 
 COMPUTED: Final = "computed"  # name of the cell of a row without flights

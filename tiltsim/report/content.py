@@ -10,12 +10,11 @@ from itertools import groupby
 from math import floor, inf, isfinite, log10
 from typing import Final
 
-from tiltsim.report.claim import Claim, ClaimVerdict
+from tiltsim.report.claim import Claim, ClaimVerdict, Origin, Statement
 from tiltsim.report.claim_rows import Cell, Criterion, Failure, Row, count, count_statements, errors
 from tiltsim.report.findings import ERRORS, FINDINGS, Finding, PublishedError
 from tiltsim.report.flights import Comparison, Flights, ReportEntry
 from tiltsim.report.pictures import Drawing, Picture
-from tiltsim.report.statement import Origin, Statement
 from tiltsim.scenario.metric_names import metric_of
 from tiltsim.scenario.scenario import Scenario
 

@@ -23,7 +23,7 @@ import tiltsim_controllers
 from tiltsim.errors import InputError
 from tiltsim.flight.flight import Flight
 from tiltsim.folders import FLYING
-from tiltsim.report.statement import CHAPTER
+from tiltsim.report.claim import CHAPTER
 from tiltsim.resources import shipped_folder
 from tiltsim.scenario.loading import load_scenario, named_files
 from tiltsim.scenario.metric_names import WALL_CLOCK_METRICS, unit_of
@@ -57,14 +57,8 @@ class FlightRecord:
         return self.end != "completed"
 
 
-@dataclass(frozen=True)
-class Unsupported:
-    """Why a scenario is not supported on a plant, in one line."""
-
-    reason: str
-
-
-Flights = Mapping[tuple[str, Plant], FlightRecord | Unsupported]
+Flights = Mapping[tuple[str, Plant], FlightRecord | str]
+"""Records by address and plant, or why the scenario is not supported there, in one line."""
 
 
 @dataclass(frozen=True)
@@ -73,7 +67,7 @@ class ReportEntry:
 
     address: str
     scenario: Scenario
-    plants: dict[Plant, Scenario | Unsupported]
+    plants: dict[Plant, Scenario | str]
 
 
 def report_entries(addresses: list[str]) -> list[ReportEntry]:
@@ -82,7 +76,7 @@ def report_entries(addresses: list[str]) -> list[ReportEntry]:
     for address in addresses:
         scenario = load_scenario(address)
         require_trust(scenario)
-        plants: dict[Plant, Scenario | Unsupported] = {}
+        plants: dict[Plant, Scenario | str] = {}
         for plant in PLANTS:
             if plant == scenario.simulation.plant:
                 plants[plant] = scenario
@@ -90,7 +84,7 @@ def report_entries(addresses: list[str]) -> list[ReportEntry]:
             try:
                 plants[plant] = variant_for(address, plant)
             except InputError as error:
-                plants[plant] = Unsupported(str(error).removeprefix(f"{address}: "))
+                plants[plant] = str(error).removeprefix(f"{address}: ")
         entries.append(ReportEntry(address, scenario, plants))
     return entries
 
@@ -105,7 +99,7 @@ def fly(
     folder: Path,
     jobs: int,
     progress: Callable[[int, int], None] = lambda done, total: None,
-) -> dict[tuple[str, Plant], FlightRecord | Unsupported]:
+) -> dict[tuple[str, Plant], FlightRecord | str]:
     """Records of scenarios on both plants: stored ones from the folder, the others flown.
 
     Args:
@@ -118,11 +112,11 @@ def fly(
         InputError: If a process dies or fails.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    flights: dict[tuple[str, Plant], FlightRecord | Unsupported] = {}
+    flights: dict[tuple[str, Plant], FlightRecord | str] = {}
     missing: list[tuple[int, str, Plant, Path]] = []
     for entry in entries:
         for plant, scenario in entry.plants.items():
-            if isinstance(scenario, Unsupported):
+            if isinstance(scenario, str):
                 flights[entry.address, plant] = scenario
                 continue
             file = folder / f"{flight_key(scenario)}.json"

@@ -10,7 +10,6 @@ import csv
 import io
 import json
 import re
-import tomllib
 from base64 import b64encode
 from collections.abc import Iterable
 from html import escape
@@ -25,7 +24,7 @@ from markupsafe import Markup
 from PIL import Image
 
 from tiltsim.report import content, flights
-from tiltsim.report.claim import Claim, ClaimVerdict
+from tiltsim.report.claim import Claim, ClaimVerdict, Origin
 from tiltsim.report.claim_rows import COMPUTED, Row, count, count_statements
 from tiltsim.report.content import (
     Group,
@@ -36,9 +35,9 @@ from tiltsim.report.content import (
     why_of,
 )
 from tiltsim.report.flights import PLANTS
-from tiltsim.report.made import Made
+from tiltsim.report.making import Made
 from tiltsim.report.pictures import Drawing
-from tiltsim.report.statement import Origin
+from tiltsim.scenario.library import read_toml
 from tiltsim.system.text import printable_markdown
 
 _TEMPLATES: Final = Path(__file__).parent / "templates"
@@ -71,10 +70,6 @@ def errors_page(report: Report) -> str:
     return _rendered("errors.md", report, rounding=rounding).rstrip() + "\n"
 
 
-def _toml(name: str) -> dict[str, Any]:
-    return tomllib.loads((_TEMPLATES.parent / name).read_text(encoding="utf-8"))
-
-
 def _rendered(template: str, report: Report, **more: Any) -> str:
     environment = Environment(
         loader=FileSystemLoader(_TEMPLATES),
@@ -98,7 +93,7 @@ def _rendered(template: str, report: Report, **more: Any) -> str:
         "prose": _prose,
         "statements": lambda rows: sum(count_statements(rows).values()),
     }
-    thesis = _toml("thesis.toml")
+    thesis = read_toml(_TEMPLATES.parent / "thesis.toml")
     return environment.get_template(template).render(
         {**vars(content), **vars(flights)}
         | {
@@ -106,7 +101,7 @@ def _rendered(template: str, report: Report, **more: Any) -> str:
             "thesis": thesis["thesis"],
             "thesis_bibtex": thesis["bibtex"].strip(),
             "journals": {int(number): text for number, text in thesis["chapters"].items()},
-            "withdrawn": _toml("withdrawn.toml") if report.findings else {},
+            "withdrawn": read_toml(_TEMPLATES.parent / "withdrawn.toml") if report.findings else {},
             "verdicts": list(ClaimVerdict),
             "origins": list(Origin),
         }

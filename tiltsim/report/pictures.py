@@ -1,7 +1,6 @@
 """The figures of the report, a few per chapter, drawn with `tiltsim.views.figures` and stored."""
 
 import hashlib
-import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
@@ -28,6 +27,7 @@ from tiltsim.report.flights import (
     store,
     variant_for,
 )
+from tiltsim.scenario.library import read_toml
 from tiltsim.scenario.loading import load_scenario
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.simulation.simulate import simulate_to_end
@@ -189,9 +189,7 @@ def _picture(name: str, chapter: int, caption: str, **how: Any) -> Picture:
 
 PICTURES: Final[tuple[Picture, ...]] = tuple(
     _picture(name, **table)
-    for name, table in tomllib.loads(
-        (Path(__file__).parent / "pictures.toml").read_text(encoding="utf-8")
-    ).items()
+    for name, table in read_toml(Path(__file__).parent / "pictures.toml").items()
 )
 """All figures, in order."""
 

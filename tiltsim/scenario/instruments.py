@@ -12,7 +12,6 @@ from tiltsim.scenario.table import (
     Angles3,
     NonNegative,
     Positive,
-    Refusals,
     Table,
     Vector3,
     default,
@@ -256,39 +255,43 @@ class InstrumentTables(Table):
         return {name: table for name, table in found.items() if table is not None}
 
 
-def instrument_refusals(scenario: Any) -> Refusals:
+def check_instruments(scenario: Any) -> None:
     """Instruments that a flight cannot read, and an estimator that lacks some."""
     found, sensors, controller = scenario.sensors.instruments, scenario.sensors, scenario.controller
     planar, step = scenario.vehicle.is_planar, scenario.simulation.control_timestep
     if controller.estimator is not None:
         key = "controller.estimator"
         if controller.is_external or planar:
-            yield key, "needs a law of a rotorcraft other than python; remove it"
+            scenario.refuse(key, "needs a law of a rotorcraft other than python; remove it")
         if "imu" not in found or not {"mocap", "gps"} & {*found}:
-            yield key, "needs [sensors.imu], and [sensors.mocap] or [sensors.gps]"
+            scenario.refuse(key, "needs [sensors.imu], and [sensors.mocap] or [sensors.gps]")
         if sensors.have_errors:
-            yield key, "reads instruments; remove noise and bias keys of [sensors] itself"
+            scenario.refuse(
+                key, "reads instruments; remove noise and bias keys of [sensors] itself"
+            )
     if not found:
         return
     first = f"sensors.{next(iter(found))}"
     if planar:
-        yield first, f"the {scenario.vehicle.model} has no instruments; remove it"
+        scenario.refuse(first, f"the {scenario.vehicle.model} has no instruments; remove it")
     if controller.is_external:
         choice = 'choose controller.law = "numpy", or remove it'
-        yield first, f"a Python controller observes the state, not readings; {choice}"
+        scenario.refuse(first, f"a Python controller observes the state, not readings; {choice}")
     if scenario.has_contacts:
         others = "[ground], [[object]], [tool], [payload] and [[companion]]"
-        yield first, f"does not sense contacts; remove it, or {others}"
+        scenario.refuse(first, f"does not sense contacts; remove it, or {others}")
     if step == 0.0:
         reason = f"[{first}] is read at control steps; must be above 0"
-        yield "simulation.control_timestep", reason
+        scenario.refuse("simulation.control_timestep", reason)
     for name, table in found.items():
         period = table.period(step)
         if period < step * (1.0 - 1e-9):
             reason = f"at most {1.0 / step:g}, one reading each simulation.control_timestep"
-            yield f"sensors.{name}.rate", reason
+            scenario.refuse(f"sensors.{name}.rate", reason)
         if table.delay > (latest := MOST_UNDER_WAY * period):
-            yield f"sensors.{name}.delay", f"at most {MOST_UNDER_WAY} readings late, {latest:g}"
+            scenario.refuse(
+                f"sensors.{name}.delay", f"at most {MOST_UNDER_WAY} readings late, {latest:g}"
+            )
     if sensors.imu is not None and any(sensors.imu.position) and controller.commands_tilts:
         reason = "must be zero for a law that commands the tilts, which turn the body themselves"
-        yield "sensors.imu.position", reason
+        scenario.refuse("sensors.imu.position", reason)

@@ -19,17 +19,7 @@ from tiltsim.scenario.controller import OwnFunctionController
 from tiltsim.scenario.documents import merge
 from tiltsim.scenario.library import find_scenario_file, read_toml
 from tiltsim.scenario.messages import InvalidValueError, choose
-from tiltsim.scenario.table import (
-    ZEROS,
-    Name,
-    Positive,
-    Refusals,
-    Table,
-    Vector3,
-    default,
-    example,
-    required,
-)
+from tiltsim.scenario.table import ZEROS, Name, Positive, Table, Vector3, default, example, required
 from tiltsim.system.files import is_file
 from tiltsim.system.public import public
 
@@ -122,9 +112,9 @@ def objects_of(scenario: Any) -> Objects | None:
     return Objects(scenario.object, scenario.tool, scenario.payload, scenario.cable)
 
 
-def object_refusals(scenario: Any) -> Refusals:
+def check_objects(scenario: Any) -> None:
     """Objects, tools and loads where nothing could fly with them, or push them."""
-    yield from _cable_refusals(scenario)
+    _check_cables(scenario)
     controller, vehicle = scenario.controller, scenario.vehicle
     if scenario.reference.type == "push":
         scenario.reference.after_gait((), scenario)
@@ -133,43 +123,45 @@ def object_refusals(scenario: Any) -> Refusals:
                 "choose full_pose, vectoring with position_bandwidth, geometric with tilts = free, "
                 "numpy with push_stiffness, or python"
             )
-            yield "reference.type", f"the {controller.law} law cannot push; {able}"
+            scenario.refuse("reference.type", f"the {controller.law} law cannot push; {able}")
         scenario.reference.check_impedance(scenario)
     damps = scenario.payload is not None and scenario.payload.swing_damping
     if damps and not controller.is_external:
         if not controller.damps_swing:
             able = "choose full_pose, vectoring, geometric, pid, indi or numpy"
             reason = f"the {controller.law} law does not follow a reference's acceleration; {able}"
-            yield "payload.swing_damping", reason
+            scenario.refuse("payload.swing_damping", reason)
         if scenario.reference.kind == "attitude_altitude":
-            yield "payload.swing_damping", "needs a reference of position"
+            scenario.refuse("payload.swing_damping", "needs a reference of position")
     keys = ("object", "tool", "payload", "companion")
     key = next((name for name in keys if getattr(scenario, name)), None)
     if key is None:
         return
     if vehicle.is_planar:
-        yield "vehicle.model", f"[{key}] is for rotorcraft only; remove it"
+        scenario.refuse("vehicle.model", f"[{key}] is for rotorcraft only; remove it")
     if scenario.simulation.plant != "mujoco":
         reason = f"its equations have no contacts and no [{key}]; use mujoco"
-        yield "simulation.plant", reason
+        scenario.refuse("simulation.plant", reason)
     if scenario.simulation.integrator != "implicitfast":
         reason = f'must be "implicitfast" with [{key}]: the others gain energy at contacts and'
-        yield "simulation.integrator", f"{reason} cables"
+        scenario.refuse("simulation.integrator", f"{reason} cables")
     if controller.measures_angular_acceleration:
         reason = f"does not know the forces of [{key}]; choose model"
-        yield "controller.angular_acceleration", reason
+        scenario.refuse("controller.angular_acceleration", reason)
     names = [table.name for table in scenario.object]
     least = 2.0 * scenario.simulation.timestep
     for table in scenario.object:
         if names.count(table.name) > 1:
-            yield "object.name", "there are two of this name", table.name
+            scenario.refuse("object.name", "there are two of this name", table.name)
         if table.softness < least:
-            yield "object.softness", f"must be at least two time steps, {least:g}", table.softness
+            scenario.refuse(
+                "object.softness", f"must be at least two time steps, {least:g}", table.softness
+            )
     file = scenario.any_rotorcraft.user_vehicle
     bare = scenario.tool is None and file is not None and not file.has_contact_geoms
     if scenario.object and bare:
         reason = "add a [tool], or name geoms that end in 'collision'"
-        yield "object", f"nothing of vehicle.mjcf can touch it: {reason}"
+        scenario.refuse("object", f"nothing of vehicle.mjcf can touch it: {reason}")
 
 
 def unknown_vehicle(name: str, companions: Sequence[str]) -> str:
@@ -179,19 +171,19 @@ def unknown_vehicle(name: str, companions: Sequence[str]) -> str:
     return choose(name, companions) if companions else "there is no [[companion]]"
 
 
-def _cable_refusals(scenario: Any) -> Refusals:
+def _check_cables(scenario: Any) -> None:
     objects = {table.name: table.joint for table in scenario.object}
     vehicles = ["", *(table.name for table in scenario.companion)]
     names = [table.name for table in scenario.cable] + ["cable"] * (scenario.payload is not None)
     free = [name for name, joint in objects.items() if joint == "free"]
     for table in scenario.cable:
         if names.count(table.name) > 1 or table.name in (*RESERVED, *objects, *vehicles):
-            yield "cable.name", "is taken; choose another", table.name
+            scenario.refuse("cable.name", "is taken; choose another", table.name)
         if table.object not in free:
             reason = choose(table.object, free) if free else "there is no free [[object]]"
-            yield "cable.object", reason, table.object
+            scenario.refuse("cable.object", reason, table.object)
         if reason := unknown_vehicle(table.vehicle, vehicles[1:]):
-            yield "cable.vehicle", reason, table.vehicle
+            scenario.refuse("cable.vehicle", reason, table.vehicle)
 
 
 TAKEN: Final = (
@@ -339,17 +331,16 @@ def companions_of(scenario: Any) -> tuple[Any, ...]:
 
 def check_companions(scenario: Any) -> None:
     """Refuse companions of equal names, or whose scenario does not fly beside the others."""
-    if len(scenario.companion) > MAX_COMPANIONS:
-        count = len(scenario.companion)
-        raise InvalidValueError("companion", count, f"at most {MAX_COMPANIONS} of them")
+    if (count := len(scenario.companion)) > MAX_COMPANIONS:
+        scenario.refuse("companion", f"at most {MAX_COMPANIONS} of them", count)
     if scenario.downwash is not None and not scenario.companion:
-        raise scenario.mistake("downwash", "needs a [[companion]]; remove it")
+        scenario.refuse("downwash", "needs a [[companion]]; remove it")
     names = [table.name for table in (*scenario.companion, *scenario.object)]
     for table in scenario.companion:
         if names.count(table.name) > 1 or table.name in RESERVED:
             raise table.mistake("name", "is taken; choose another")
     if scenario.companion and (reason := _conflict(scenario, scenario)):
-        raise InvalidValueError("companion", names[0], f"with companions {reason}")
+        scenario.refuse("companion", f"with companions {reason}", names[0])
     for table, each in zip(scenario.companion, companions_of(scenario), strict=True):
         if reason := _conflict(each, scenario):
             raise table.mistake("name", reason)

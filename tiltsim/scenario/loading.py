@@ -195,37 +195,30 @@ def locate_named_files(
     Raises:
         InputError: If the code lies elsewhere.
     """
-    for keys, key, is_code in _file_keys(document):
-        *_, last = key.rpartition(".")
-        name = keys[last]
+    for keys, table, key, is_code in _file_keys(document):
+        name = keys[key]
         if address is not None and is_code and not _lies_in(folder, name.rpartition(":")[0]):
             raise InputError(
-                f"{address}: {key} = {show(name)}: must lie in the folder of the "
+                f"{address}: {table}.{key} = {show(name)}: must lie in the folder of the "
                 "scenario file, by a relative path; for other files use tiltsim run "
                 "--controller FILE.py:NAME"
             )
-        keys[last] = str((folder / name).absolute())
+        keys[key] = str((folder / name).absolute())
 
 
 def named_files(document: Mapping[str, Any]) -> set[Path]:
     """The files that a document names, with all files that its MJCF can include and name."""
     files: set[Path] = set()
-    for keys, key, is_code in _file_keys(document):
-        *_, last = key.rpartition(".")
-        name = keys[last]
-        if is_code:
-            files.add(Path(name.rpartition(":")[0]))
-            continue
-        files.add(Path(name))
-        if last != "mjcf":
-            continue
+    for keys, _, key, is_code in _file_keys(document):
+        file = Path(keys[key].rpartition(":")[0] if is_code else keys[key])
+        files.add(file)
         with suppress(ValueError, OSError):  # where it is flown, it is refused
-            files |= check_mjcf(Path(name))
+            files |= check_mjcf(file) if key == "mjcf" else set()
     return files
 
 
-def _file_keys(document: Mapping[str, Any]) -> Iterator[tuple[dict[str, Any], str, bool]]:
-    """Table and dotted key of each file that a document names, and whether it is code."""
+def _file_keys(document: Mapping[str, Any]) -> Iterator[tuple[dict[str, Any], str, str, bool]]:
+    """The tables of a document that name a file: their names, the key, and whether it is code."""
     for table, key, mark in FILE_KEYS:
         found = document.get(table)
         for keys in found if isinstance(found, list) else [found]:
@@ -233,7 +226,7 @@ def _file_keys(document: Mapping[str, Any]) -> Iterator[tuple[dict[str, Any], st
                 continue
             name = keys.get(key)
             if isinstance(name, str) and mark in name:
-                yield keys, f"{table}.{key}", mark == ".py:"
+                yield keys, table, key, mark == ".py:"
 
 
 def _lies_in(folder: Path, name: str) -> bool:

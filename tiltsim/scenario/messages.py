@@ -251,17 +251,13 @@ def _locate(
         in_list = isinstance(value, list | tuple) and isinstance(part, int) and part < len(value)
         if in_table or in_list:
             value = value[part]
-            tag = _tag_of(value) if isinstance(value, Mapping) else None
+            known = value if isinstance(value, Mapping) else {}
+            tag = next((known[key] for key in TAG_KEYS if key in known), None)
         elif not (keep_last and position == len(location) - 1):
             continue
         keys.append(f"[{part}]" if isinstance(part, int) else f".{part}")
     key = "".join(keys).removeprefix(".").encode("unicode_escape").decode()
     return shortened(key) or "scenario", value
-
-
-def _tag_of(table: Mapping[str, Any]) -> object:
-    """The kind that a table of a document has."""
-    return next((table[key] for key in TAG_KEYS if key in table), None)
 
 
 def tags_of(schema: type[BaseModel], location: tuple[Any, ...]) -> tuple[str, list[str]]:

@@ -63,27 +63,27 @@ def require_trust(scenario: Scenario) -> None:
         )
 
 
-def describe(error: BaseException, own_frames: int = 1) -> str:
-    """An error in one line: its type, its message, and the line of the controller's code.
-
-    The first ``own_frames`` calls of its traceback are ours.
-    """
-    return error_text(error) + _place(error, own_frames)
-
-
-def _place(error: BaseException, own_frames: int) -> str:
-    """The last line of the controller's own file, or function in a notebook, in a traceback."""
-    frames = traceback.extract_tb(error.__traceback__)[own_frames:]
-    if not frames:
-        return ""
-    last = [frame for frame in frames if frame.filename == frames[0].filename][-1]
-    file = Path(last.filename)
-    if not is_file(file):
-        return f" (line {last.lineno} of {last.name})"
-    return f" ({file.name}, line {last.lineno})"
-
-
 _LIBRARIES: Final = ("numpy", "jax", "tiltsim", "tiltsim_controllers")
+
+
+def _users_frame(error: BaseException) -> traceback.FrameSummary | None:
+    """The last call in the user's own file in the traceback of an error; None without one."""
+    loaded = (sys.modules[library] for library in _LIBRARIES if library in sys.modules)
+    libraries = tuple(f"{Path(str(module.__file__)).parent}{os.sep}" for module in loaded)
+    frames = traceback.extract_tb(error.__traceback__)
+    own = [frame for frame in frames if not frame.filename.startswith(libraries)]
+    return [frame for frame in own if frame.filename == own[0].filename][-1] if own else None
+
+
+def describe(error: BaseException) -> str:
+    """An error in one line: its type, its message, and the line of the controller's code."""
+    frame = _users_frame(error)
+    if frame is None:
+        return error_text(error)
+    file = Path(frame.filename)
+    in_file = f"{file.name}, line {frame.lineno}"
+    place = in_file if is_file(file) else f"line {frame.lineno} of {frame.name}"
+    return f"{error_text(error)} ({place})"
 
 
 def users_line(error: BaseException) -> str:
@@ -91,11 +91,8 @@ def users_line(error: BaseException) -> str:
 
     Empty where no such code was called.
     """
-    loaded = (sys.modules[library] for library in _LIBRARIES if library in sys.modules)
-    libraries = tuple(str(Path(str(module.__file__)).parent) for module in loaded)
-    frames = traceback.extract_tb(error.__traceback__)
-    own = [frame for frame in frames if not frame.filename.startswith(libraries)]
-    return f"{own[-1].filename}:{own[-1].lineno}: " if own else ""
+    frame = _users_frame(error)
+    return f"{frame.filename}:{frame.lineno}: " if frame else ""
 
 
 def load_function(scenario: Scenario) -> Any:

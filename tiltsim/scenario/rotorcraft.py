@@ -11,15 +11,7 @@ from tiltsim.models.parts import RotorLimits, TiltServo
 from tiltsim.models.rotor_table import Multirotor
 from tiltsim.models.user_vehicle import UserVehicle
 from tiltsim.scenario.gait import FixedGait
-from tiltsim.scenario.table import (
-    NonNegative,
-    Positive,
-    Refusals,
-    Table,
-    default,
-    example,
-    required,
-)
+from tiltsim.scenario.table import NonNegative, Positive, Table, default, example, required
 from tiltsim_controllers.mathematics.scalar import Values
 from tiltsim_controllers.vehicle.parameters import Vehicle
 from tiltsim_controllers.vehicle.rotors import Rotor
@@ -97,13 +89,12 @@ class AnyVehicleTable(Table, ABC):
         return (1.0,) * self.rotor_count
 
     @property
-    @abstractmethod
     def rotor_range(self) -> tuple[float | None, float | None]:
         """Smallest and largest speed (rad/s) of a rotor along its spin; None without limit."""
+        return 0.0, None  # thrusts push and cannot pull
 
-    def refusals(self, _scenario: Any) -> Refusals:
+    def check_scenario(self, scenario: Any) -> None:
         """Contradictions to a scenario of this vehicle: keys, reasons, and values not their own."""
-        yield from ()
 
 
 class PlanarTable(AnyVehicleTable, ABC):
@@ -111,12 +102,7 @@ class PlanarTable(AnyVehicleTable, ABC):
 
     is_planar = True
 
-    @property
-    def rotor_range(self) -> tuple[float | None, float | None]:
-        """Thrusts push and cannot pull."""
-        return 0.0, None
-
-    def refusals(self, scenario: Any) -> Refusals:
+    def check_scenario(self, scenario: Any) -> None:
         """Motion out of the plane, references of yaw, and gaits that the law does not follow."""
         initial, controller, gait = scenario.initial, scenario.controller, scenario.gait
         out_of_plane: dict[str, tuple[float, ...]] = {
@@ -129,15 +115,17 @@ class PlanarTable(AnyVehicleTable, ABC):
         out_of_plane |= {f"reference.{key}": vector[2:] for key, vector in spatial}
         for key, components in out_of_plane.items():
             if any(components):
-                yield key, f"the {self.model} stays in its plane: only x, y and yaw may be nonzero"
+                scenario.refuse(
+                    key, f"the {self.model} stays in its plane: only x, y and yaw may be nonzero"
+                )
         scenario.require("reference.yaw", 0.0, f"yaw is not an output of the {self.model}'s laws")
         law, allowed = f"the {controller.law} law", controller.gait_types
         if allowed != ("fixed",):
             if gait.type not in allowed:
-                yield "gait.type", f"{law} needs one of {', '.join(allowed)}"
+                scenario.refuse("gait.type", f"{law} needs one of {', '.join(allowed)}")
             return
         if gait.type != "fixed":
-            yield "gait.type", f"{law} does not use a gait; remove [gait]"
+            scenario.refuse("gait.type", f"{law} does not use a gait; remove [gait]")
         scenario.require("gait", FixedGait(), f"{law} commands the tilt itself; remove [gait]")
 
 
@@ -300,7 +288,7 @@ class MultirotorTable(RotorcraftTable):
     def pod_inertias(self) -> Values:
         return self.file.pod_inertias
 
-    def refusals(self, scenario: Any) -> Refusals:
+    def check_scenario(self, scenario: Any) -> None:
         """Servos without tilts, and laws for which the rotors are too few."""
         tilts, controller = self.has_tilting_rotors, scenario.controller
         if not tilts:
@@ -310,9 +298,9 @@ class MultirotorTable(RotorcraftTable):
         if too_few and not controller.commands_tilts:
             reason = f"{self.rotor_count} rotors control attitude and lift only together with"
             if not tilts:
-                yield "vehicle.mjcf", f"{reason} their tilts, and none of them tilts"
+                scenario.refuse("vehicle.mjcf", f"{reason} their tilts, and none of them tilts")
             choice = "choose full_pose, or geometric with tilts = free"
-            yield "controller.law", f"{reason} their tilts; {choice}"
+            scenario.refuse("controller.law", f"{reason} their tilts; {choice}")
 
     def _check_values(self) -> None:
         self._check_rotor_inertia(self.resolve().max_rotor_inertia)

@@ -3,7 +3,7 @@
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from operator import attrgetter
-from typing import Annotated, Any, ClassVar, Self
+from typing import Annotated, Any, ClassVar, NoReturn, Self
 
 from pydantic import (
     BaseModel,
@@ -40,10 +40,6 @@ Row = Annotated[Many[float], Field(min_length=2, max_length=17)]  # of a time an
 PositiveEach = Annotated[Many[Positive], Field(min_length=2, max_length=16)]
 Limit = Annotated[float, Field(allow_inf_nan=True)]
 Range = Annotated[tuple[Limit, Limit], Field(strict=False)]
-
-
-Refusals = Iterator[tuple[str, str] | tuple[str, str, object]]
-"""Key and reason of each refusal, and a value where it is not the key's."""
 
 
 def example(**keys: Any) -> ConfigDict:
@@ -112,6 +108,10 @@ class Table(BaseModel):
         is_table = isinstance(value, BaseModel)
         shown = value.model_dump(exclude_unset=True) if is_table else value
         return InvalidValueError(f"{self.table_name}.{key}".removeprefix("."), shown, allowed)
+
+    def refuse(self, key: str, reason: str, *value: object) -> NoReturn:
+        """Refuse a dotted key for a reason, or a ``value`` that is not the key's own."""
+        raise InvalidValueError(key, value[0], reason) if value else self.mistake(key, reason)
 
     def require(self, key: str, value: object, reason: str) -> None:
         """Refuse any other value of a dotted key, for a reason."""

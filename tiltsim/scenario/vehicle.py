@@ -15,7 +15,7 @@ from tiltsim.scenario.kinds import KINDS, tables_of, union_of
 from tiltsim.scenario.messages import InvalidValueError
 from tiltsim.scenario.rotorcraft import AnyVehicleTable, RotorcraftTable, TiltServoTable
 from tiltsim.scenario.simulation_table import InitialTable
-from tiltsim.scenario.table import NotTiny, Positive, Refusals, Table, default, example
+from tiltsim.scenario.table import NotTiny, Positive, Table, default, example
 from tiltsim_controllers.mathematics.scalar import Values
 from tiltsim_controllers.vehicle.parameters import PRESETS, Vehicle
 
@@ -128,7 +128,7 @@ class VehicleTable(RotorcraftTable):
     def has_actuators(self) -> bool:  # type: ignore[override]
         return self.has_tilting_rotors
 
-    def refusals(self, scenario: Any) -> Refusals:
+    def check_scenario(self, scenario: Any) -> None:
         """Without hinges the rotors produce the commanded thrust at once."""
         if self.has_actuators:
             return
@@ -142,7 +142,6 @@ class VehicleTable(RotorcraftTable):
         reason = f"not supported for the {self.model}, whose rotors do not tilt and produce the"
         for key, ideal in keys.items():
             scenario.require(key, ideal, f"{reason} commanded thrust at once; remove it")
-        yield from ()
 
     def _check_values(self) -> None:
         if self.mjcf is not None:

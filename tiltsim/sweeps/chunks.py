@@ -199,14 +199,12 @@ def rows_to_table(points: SweepPoints, rows: Sequence[Mapping[str, Any]]) -> pa.
 
 def schema(points: SweepPoints) -> pa.Schema:
     """The columns of a sweep's dataset; the definition is among the schema's metadata."""
-    first = points.point(0)
-    bisect = points.sweep.bisect
-    searched = {} if bisect is None else {bisect.key: bisect.start}
-    values = first | searched | points.derived(first | searched)
+    first = points.point(0) | points.sweep.search
+    values = first | points.derived(first)
     fields = [pa.field("index", pa.int64(), nullable=False)]
     for key in points.columns:
         fields.append(pa.field(key, _column_type(values.get(key, 0.0))))
-    if bisect is not None:
+    if points.sweep.search:
         fields.append(pa.field("flights", pa.int64(), nullable=False))
     fields += [
         pa.field("end", pa.string(), nullable=False),

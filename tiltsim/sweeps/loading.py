@@ -170,7 +170,7 @@ def _base(sweep: Sweep, folder: Path | None, address: str) -> dict[str, Any]:
 
 def _first_values(sweep: Sweep) -> dict[str, Any]:
     """A value of each axis and of the search, by key of the scenario; none of relative axes."""
-    first: dict[str, Any] = {} if sweep.bisect is None else {sweep.bisect.key: sweep.bisect.start}
+    first: dict[str, Any] = {**sweep.search}
     for axis in sweep.axis:
         match axis:
             case CasesAxis() | AxisTable(relative=True):
@@ -216,11 +216,9 @@ def check_points(points: SweepPoints) -> list[Scenario]:
     tried = points.along_each_group(VALUES_TRIED)
     for values in tried:
         _check_types(points, tried[0], values)
-    bisect = points.sweep.bisect
-    start = {} if bisect is None else {bisect.key: bisect.start}
     for values in tried:
         _check_search(points, values)
-    return [points.scenario(values | start) for values in tried]
+    return [points.scenario(values | points.sweep.search) for values in tried]
 
 
 def _check_types(points: SweepPoints, first: Mapping[str, Any], values: Mapping[str, Any]) -> None:
@@ -261,8 +259,6 @@ def _check_names(points: SweepPoints) -> None:
             read |= _names_in(rule)
         except ValueError as error:
             raise definition.mistake(key, rule, str(error)) from None
-    targets = [key for axis in sweep.axis for key in axis.targets]
-    targets += [sweep.bisect.key] if sweep.bisect is not None else []
     bounds = () if sweep.bisect is None else sweep.bisect.holds
     used = [("metrics", name) for name in sweep.metrics or ()]
     used += [("plot.metrics", name) for name in sweep.plot.metrics]
@@ -272,11 +268,11 @@ def _check_names(points: SweepPoints) -> None:
         if reason := unknown_vehicle(vehicle, points.vehicles):
             raise definition.mistake(key, name, f"no vehicle {vehicle}; {reason}")
     taken = {*RESERVED, *METRICS, *(f"{name}_version" for name in VERSIONS)}
-    for key in (*targets, *sweep.derive):
+    for key in (*sweep.targets, *sweep.derive):
         if key in taken:
             raise definition.mistake("axis.key", key, "is a column of every result; rename it")
     named = {axis.key for axis in points.cases}
-    for key in targets:
+    for key in sweep.targets:
         if "." not in key and key not in read | named:
             allowed = (
                 "a name without a dot must be used in [derive] or [plot]; keys of the scenario "

@@ -151,10 +151,8 @@ class SweepPoints:
     @cached_property
     def columns(self) -> tuple[str, ...]:
         """The columns of axes and derived keys in the results."""
-        keys = [key for axis in self.sweep.axis for key in axis.targets]
-        if self.sweep.bisect is not None:
-            keys += [self.sweep.bisect.key, f"{self.sweep.bisect.key}_beyond"]
-        return (*keys, *self.sweep.derive)
+        beyond = (f"{key}_beyond" for key in self.sweep.search)
+        return (*self.sweep.targets, *beyond, *self.sweep.derive)
 
     def point(self, index: int) -> dict[str, Any]:
         """The values that the axes set at a point, by key."""

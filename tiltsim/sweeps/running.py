@@ -8,7 +8,7 @@ from concurrent.futures import CancelledError
 from os import PathLike
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, Final, cast
+from typing import Any, Final
 
 from tiltsim.engines.base import EngineName
 from tiltsim.errors import InputError
@@ -136,8 +136,19 @@ def fly_on_cluster(work: ChunkWork, numbers: list[int], address: str) -> Iterato
             first = [submit() for _ in range(min(len(waiting), _window(client)))]
             submitted = as_completed(first, loop=client.loop)
             for future in submitted:
-                part = _result(future, address)
-                _compare_versions(part, address)
+                try:
+                    part: FinishedChunk = future.result()
+                except (CancelledError, CommClosedError):
+                    raise  # the scheduler is lost
+                except Exception as error:
+                    failed = f"{type(error).__name__}: {str(error).partition(chr(10))[0]}"
+                    raise InputError(f"--cluster {address}: a worker failed: {failed}") from error
+                for name, here in installed_versions().items():
+                    if (there := part.versions[name]) != here:
+                        raise InputError(
+                            f"--cluster {address}: a worker runs {name} {there}, this machine "
+                            f"{here}; install the same versions"
+                        )
                 future.release()
                 while waiting and submitted.count() < _window(client):
                     submitted.add(submit())
@@ -176,35 +187,10 @@ def _connect(address: str) -> Any:
     return client
 
 
-def _result(future: Any, address: str) -> FinishedChunk:
-    """The result of a chunk; without the scheduler, Dask's errors of a lost connection."""
-    from distributed.comm import CommClosedError
-
-    try:
-        return cast("FinishedChunk", future.result())
-    except (CancelledError, CommClosedError):
-        raise
-    except Exception as error:
-        raise InputError(
-            f"--cluster {address}: a worker failed: {type(error).__name__}: "
-            f"{str(error).partition(chr(10))[0]}"
-        ) from error
-
-
 def _window(client: Any) -> int:
     """Number of chunks to have submitted: two per thread, so that no thread waits for work."""
     workers = client.scheduler_info()["workers"].values()
     return 2 * max(1, sum(int(worker["nthreads"]) for worker in workers))
-
-
-def _compare_versions(part: FinishedChunk, address: str) -> None:
-    for name, here in installed_versions().items():
-        there = part.versions[name]
-        if there != here:
-            raise InputError(
-                f"--cluster {address}: a worker runs {name} {there}, this machine {here}; install "
-                "the same versions"
-            )
 
 
 def sweep(

@@ -268,6 +268,16 @@ class Sweep(Table):
     )
     plot: PlotTable = default(PlotTable(), "how tiltsim plot draws the sweep")
 
+    @property
+    def search(self) -> dict[str, float]:
+        """The key that is searched, and its first value; empty without ``[bisect]``."""
+        return {} if self.bisect is None else {self.bisect.key: self.bisect.start}
+
+    @property
+    def targets(self) -> list[str]:
+        """The keys that the axes and the search set."""
+        return [*(key for axis in self.axis for key in axis.targets), *self.search]
+
     @field_validator("set", "derive", mode="before")
     @classmethod
     def _dotted(cls, value: Any) -> Any:
@@ -292,9 +302,7 @@ class Sweep(Table):
             )
         if self.sample is not None and not drawn:
             raise self.mistake("sample.count", "no axis is of type uniform, normal or seed")
-        targets = [key for axis in self.axis for key in axis.targets]
-        targets += [self.bisect.key] if self.bisect is not None else []
-        targets += [*self.derive]
+        targets = [*self.targets, *self.derive]
         twice = next((key for key in targets if targets.count(key) > 1), None)
         if twice is not None:
             raise InvalidValueError("axis.key", twice, "set twice")

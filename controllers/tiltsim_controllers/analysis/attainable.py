@@ -74,16 +74,12 @@ class AttainableSet:
     @property
     def lower(self) -> Floats:
         """Minimum of each coordinate; NaN if empty."""
-        return np.min(self.vertices, axis=0) if not self.is_empty else self._nan
+        return np.fmin.reduce(self.vertices, axis=0, initial=np.nan)
 
     @property
     def upper(self) -> Floats:
         """Maximum of each coordinate; NaN if empty."""
-        return np.max(self.vertices, axis=0) if not self.is_empty else self._nan
-
-    @property
-    def _nan(self) -> Floats:
-        return np.full(len(self.labels), np.nan)
+        return np.fmax.reduce(self.vertices, axis=0, initial=np.nan)
 
 
 class TiltedRotors(NamedTuple):

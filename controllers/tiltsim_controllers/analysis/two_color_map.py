@@ -39,6 +39,7 @@ due to the rounding of its coefficients; the margin of a blue gait is zero.
 
 from collections import Counter
 from dataclasses import dataclass
+from itertools import product
 from math import acos, atan, atan2, cos, hypot, pi, sin
 from typing import Final, Literal
 
@@ -130,24 +131,26 @@ def find_roots(
     mixed = _cross(roll_form[0], pitch_form[1]) + _cross(roll_form[1], pitch_form[0])
     square_s = _cross(roll_form[1], pitch_form[1])
     mean, wave = 0.5 * (square_c + square_s), hypot(0.5 * (square_c - square_s), 0.5 * mixed)
-    if wave < _END_TOLERANCE * scale**2:
-        raise ValueError(_not_isolated(alpha_1, alpha_2))
     middle = atan2(0.5 * mixed, 0.5 * (square_c - square_s))
-    spread = acos(min(1.0, max(-1.0, -mean / wave)))
-    roots = []
+    spread = acos(min(1.0, max(-1.0, -mean / wave))) if wave else 0.0
+    offset, roots, isolated = 2.0 * delta(vehicle), [], wave >= _END_TOLERANCE * scale**2
     for double_angle in (middle + spread, middle - spread):
         third = 0.5 * double_angle
         direction = np.array([cos(third), sin(third)])
         lines = [direction @ roll_form, direction @ pitch_form]
         line = max(lines, key=lambda pair: float(np.abs(pair).max()))
-        if np.abs(line).max() < _END_TOLERANCE * scale:
-            raise ValueError(_not_isolated(alpha_1, alpha_2))
-        fourth = atan2(-line[0], line[1])
-        roots += [
-            _classify(alpha_1, alpha_2, a, b, vehicle, same_plane)
-            for a in _representatives(third)
-            for b in _representatives(fourth)
-        ]
+        if not isolated or np.abs(line).max() < _END_TOLERANCE * scale:
+            raise ValueError(
+                f"(alpha_1, alpha_2) = ({alpha_1:g}, {alpha_2:g}): on alpha_1 = delta or alpha_2 ="
+                " -delta the roots are not isolated"
+            )
+        for a, b in product(_ends(third), _ends(atan2(-line[0], line[1]))):
+            planes = (
+                _plane(a, alpha_1, offset - alpha_1, same_plane),
+                _plane(b, alpha_2, -offset - alpha_2, same_plane),
+            )
+            angles = alpha_1, alpha_2, a, b
+            roots.append(Root(*angles, float(residuals(angles, vehicle).R), *planes))
     return sorted(roots, key=lambda root: (root.alpha_3, root.alpha_4))
 
 
@@ -177,17 +180,6 @@ def root_classes(roots: list[list[list[Root]]]) -> Counter[str]:
     return Counter(f"({root.plane_3},{root.plane_4})" for cell in inside for root in cell)
 
 
-def _classify(
-    alpha_1: float, alpha_2: float, alpha_3: float, alpha_4: float, vehicle: Vehicle, same: float
-) -> Root:
-    offset, angles = 2.0 * delta(vehicle), (alpha_1, alpha_2, alpha_3, alpha_4)
-    planes = (
-        _plane(alpha_3, alpha_1, offset - alpha_1, same),
-        _plane(alpha_4, alpha_2, -offset - alpha_2, same),
-    )
-    return Root(*angles, float(residuals(angles, vehicle).R), *planes)
-
-
 def _plane(angle: float, growing: float, falling: float, same: float) -> Literal["+", "-", "?"]:
     if _distance(growing, falling) < same:
         return "?"
@@ -199,7 +191,7 @@ def _distance(angle: float, other: float) -> float:
     return abs((angle - other + pi / 2) % pi - pi / 2)
 
 
-def _representatives(angle: float) -> list[float]:
+def _ends(angle: float) -> list[float]:
     """The values of ``angle`` modulo pi in [-pi/2, pi/2]: both ends if it is one of them."""
     wrapped = (angle + pi / 2) % pi - pi / 2
     if pi / 2 - abs(wrapped) < _END_TOLERANCE:
@@ -209,10 +201,3 @@ def _representatives(angle: float) -> list[float]:
 
 def _cross(first: Floats, second: Floats) -> float:
     return float(first[0] * second[1] - first[1] * second[0])
-
-
-def _not_isolated(alpha_1: float, alpha_2: float) -> str:
-    return (
-        f"(alpha_1, alpha_2) = ({alpha_1:g}, {alpha_2:g}): on alpha_1 = delta or alpha_2 = -delta "
-        "the roots are not isolated"
-    )

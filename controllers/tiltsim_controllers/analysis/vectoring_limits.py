@@ -5,6 +5,7 @@ Side force that needs no lean, and the poses that it holds, come from linear pro
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import product
 from math import atan, inf, pi
 from typing import Final
@@ -104,7 +105,7 @@ def side_slope(craft: Craft) -> float:
         most_tilt = TILT_SHARE * craft.tilt_range
         rows = np.hstack([craft.wrench(preferred + tilt) for tilt in (-most_tilt, most_tilt)])
         low, most = np.zeros(rows.shape[1]), np.tile(most, 2)
-    return SLOPE_SHARE * least_force(craft, rows, sides, weight, (low, most)) / weight
+    return SLOPE_SHARE * least_force(rows, sides, weight, (low, most)) / weight
 
 
 def pose_cone(craft: Craft, rows: Floats, slope: float) -> float:
@@ -119,30 +120,36 @@ def pose_cone(craft: Craft, rows: Floats, slope: float) -> float:
     ways = [np.array(way) for way in product((-1.0, 0.0, 1.0), repeat=3) if any(way)]
     units = [way / np.linalg.norm(way) for way in ways]
     holds_all = slope > 0.0 and not craft.commanded
-    if holds_all and least_force(craft, rows, units, 0.0, (craft.limits[0], most)) > weight:
+    if holds_all and least_force(rows, units, 0.0, (craft.limits[0], most)) > weight:
         return pi
     return atan(slope / SLOPE_SHARE if craft.commanded else slope)
 
 
 def least_force(
-    craft: Craft, rows: Floats, ways: Sequence[Floats], lift: float, limits: tuple[Floats, Floats]
+    rows: Floats, ways: Sequence[Floats], lift: float, limits: tuple[Floats, Floats]
 ) -> float:
     """The least over some directions of the greatest force (N) without torque; 0 for none.
 
     Args:
-        craft: The vehicle.
         rows: Force and torque per newton, shape (6, N).
         ways: Unit vectors of the directions, body axes.
         lift: N, that the rotors make as well, along z.
         limits: Least and greatest thrusts, N, shape (N,) each.
     """
+    return _least_force(rows.tobytes(), np.array(ways).tobytes(), lift, np.array(limits).tobytes())
+
+
+@lru_cache(maxsize=64)
+def _least_force(rows_of: bytes, ways: bytes, lift: float, limits: bytes) -> float:
+    """`least_force` of arrays as bytes, kept because a flight needs it several times."""
     from scipy.optimize import linprog  # a third of a second to import
 
+    rows = np.frombuffer(rows_of).reshape(6, -1)
     if np.linalg.matrix_rank(rows, tol=1e-6) < 6:
         return 0.0
-    bounds = [*zip(*limits, strict=True), (0, None)]
+    bounds = [*np.frombuffer(limits).reshape(2, -1).T.tolist(), (0, None)]
     forces = []
-    for way in ways:
+    for way in np.frombuffer(ways).reshape(-1, 3):
         found = linprog(
             np.array([*np.zeros(rows.shape[1]), -1.0]),
             A_eq=np.column_stack([rows, [*-way, 0.0, 0.0, 0.0]]),

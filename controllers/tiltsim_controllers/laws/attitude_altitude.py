@@ -10,7 +10,7 @@ from typing import Any, Final, Literal
 from tiltsim_controllers.code.arrays import traceable, xp
 from tiltsim_controllers.gaits.motion import NO_KNOTS, GaitParameters
 from tiltsim_controllers.laws.allocation import RotorRange
-from tiltsim_controllers.laws.feedback import NONE, decoupled
+from tiltsim_controllers.laws.feedback import NO_DECOUPLER, decoupled
 from tiltsim_controllers.laws.gains import Gains, GivenGains
 from tiltsim_controllers.laws.keys import Keys, default, record_of
 from tiltsim_controllers.laws.observed import Seen, Step
@@ -27,11 +27,10 @@ from tiltsim_controllers.vehicle.body import (
 from tiltsim_controllers.vehicle.parameters import Vehicle
 from tiltsim_controllers.vehicle.rotors import airframe, rotor_accelerations, wrench_map
 
-PUBLISHED_DECOUPLING: Final = 0.0
-EXACT_DECOUPLING: Final = 1.0
-
-DECOUPLINGS: Final = {"published": PUBLISHED_DECOUPLING, "exact": EXACT_DECOUPLING}
+DECOUPLINGS: Final = {"published": 0.0, "exact": 1.0}
 """Forms of the decoupling matrix by their name in a scenario."""
+
+PUBLISHED_DECOUPLING, EXACT_DECOUPLING = DECOUPLINGS.values()
 
 LAYOUT: Final = (0, 1, 2, 3)
 """Every rotor of the tiltrotor has its own tilt."""
@@ -104,11 +103,12 @@ def torque_free_force(force: Any, torque: Any) -> Any:
 def _attitude_reference(now: RotorcraftState, target: Any, wrench: Any, p: Any) -> Any:
     """Roll, pitch and yaw to track (rad), shape (3,); ch. 4, Eqs. 28-30."""
     reference, gravity, yaw = p.reference, p.vehicle.gravity, p.reference.yaw
-    if p.decoupler == NONE:
+    if p.decoupler == NO_DECOUPLER:
         return xp.array([reference.roll, reference.pitch, yaw])
     p_ref, v_ref, a_ref = target
     K_1, K_2 = p.gains.position
-    ax, ay, _ = a_ref + K_1 * (v_ref - now.velocity) + K_2 * (p_ref - now.position)  # Eq. 28
+    # Eq. 28 demands the horizontal acceleration alone: the altitude has its own dynamics, Eq. 27.
+    ax, ay, _ = a_ref + K_1 * (v_ref - now.velocity) + K_2 * (p_ref - now.position)
     n = torque_free_force(wrench[:3], wrench[3:])  # F_X / (m g) of Eq. 30 is n_x / n_z
     roll, pitch = decoupled(p.decoupler, (ax, ay, a_ref[2]), yaw, gravity, n)
     return xp.array([roll, pitch, yaw])
@@ -130,16 +130,16 @@ def attitude_altitude(seen: Seen, p: Any, knots: Any = NO_KNOTS) -> Step:
         knots: Table data of the reference.
     """
     now, (body, rotors) = state_of(seen.state, LAYOUT), airframe(p, (), LAYOUT)
-    # The reference's acceleration is zero unless reference.acceleration_feedforward is set.
+    # Position, velocity and acceleration by row; the last is zero in ch. 4, see the function.
     target = position_reference(seen.time, p.reference, knots).reshape(3, 3)
     wrench = wrench_map(rotors, now.tilts)
     F, tau = wrench[:3], wrench[3:]
-    w = now.speeds * abs(now.speeds)
+    w = now.speeds * abs(now.speeds)  # w_i = varpi_i |varpi_i|, ch. 3, Eq. 1
 
     # Second derivatives of y (ch. 3, Eq. 10). Body rates count as rates of the angles (Eq. 8).
     r3 = rotation_matrix(now.attitude)[2]
-    lift = r3 @ F
-    omega_rate = seen.measured  # by a sensor
+    lift = r3 @ F  # vertical force of each rotor per unit of w
+    omega_rate = seen.measured  # None: no sensor measures it, then ch. 3, Eq. 4
     if omega_rate is None:
         omega_rate = inverse_inertia_matrix(body) @ (tau @ w)
     z_acceleration = lift @ w / body.mass - body.gravity
@@ -147,7 +147,7 @@ def attitude_altitude(seen: Seen, p: Any, knots: Any = NO_KNOTS) -> Step:
     # Demanded third derivatives (Eqs. 26 and 27). The reference of the attitude counts as at rest.
     tracked = _attitude_reference(now, target, wrench, p)
     error = tracked - now.attitude
-    error = xp.array([error[0], error[1], wrapped(error[2])])
+    error = xp.array([error[0], error[1], wrapped(error[2])])  # yaw turns the short way
     K_P1, K_P2, K_P3 = p.gains.attitude
     omega_jerk = K_P3 * error - K_P2 * now.omega - K_P1 * omega_rate
     K_PZ1, K_PZ2, K_PZ3 = p.gains.altitude
@@ -158,7 +158,7 @@ def attitude_altitude(seen: Seen, p: Any, knots: Any = NO_KNOTS) -> Step:
         + K_PZ1 * (az_ref - z_acceleration)
     )
 
-    # Eqs. 18 and 19; Ma is due to the thrusts, which turn with the body.
+    # Right side of Eq. 19, times I and m; Ma is the force's change as it turns with the body.
     Ma = r3 @ cross(now.omega, F @ w)
     desired = xp.hstack([inertia_matrix(body) @ omega_jerk, body.mass * z_jerk - Ma])
 

@@ -153,18 +153,10 @@ def swept(vector: Moving, omega: Any, omega_rate: Any) -> Moving:
     return Moving(rate, second + cross(omega, vector.rate), 0.0)
 
 
-NONE: Final = 0.0
-CONVENTIONAL: Final = 1.0
-MODIFIED: Final = 2.0
-EXACT: Final = 3.0
-
-DECOUPLERS: Final = {
-    "none": NONE,
-    "conventional": CONVENTIONAL,
-    "modified": MODIFIED,
-    "exact": EXACT,
-}
+DECOUPLERS: Final = {"none": 0.0, "conventional": 1.0, "modified": 2.0, "exact": 3.0}
 """Decouplers by their name in a scenario."""
+
+NO_DECOUPLER, CONVENTIONAL, MODIFIED, EXACT = DECOUPLERS.values()
 
 
 @traceable

@@ -191,12 +191,13 @@ def full_pose(seen: Seen, p: Any, knots: Any, tilt_of_rotor: TiltOfRotor) -> Ste
     omega_rate = angular_acceleration(body, torque, now.omega, 0.0)  # without gyroscopic torque
 
     # Demanded third derivatives of the position, and of the attitude by its error in body axes.
-    ref = reference_motion(time, p.reference, knots)
-    jerk = error_dynamics(ref[:4], (now.position, now.velocity, acceleration), p.gains.position)
+    motion = reference_motion(time, p.reference, knots)  # position and its derivatives, by row
+    jerk = error_dynamics(motion[:4], (now.position, now.velocity, acceleration), p.gains.position)
     target = reference_attitude(time, p.reference, knots)
     R_d, (k1, k2, k3) = rotation_matrix(target[0]), p.gains.attitude
     omega_jerk = k3 * attitude_error(R, R_d) - k2 * now.omega - k1 * omega_rate
     if p.reference.type == POSES:  # only then does the desired attitude move
+        # Its body rates, with two derivatives, move the errors that the gains act on.
         ahead = turning_rates(target, R.T @ R_d, now.omega, omega_rate)
         omega_jerk = omega_jerk + ahead.acceleration + k1 * ahead.rate + k2 * ahead.value
 

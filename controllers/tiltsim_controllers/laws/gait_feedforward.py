@@ -12,7 +12,7 @@ from tiltsim_controllers.code.arrays import traceable
 from tiltsim_controllers.gaits.motion import FIXED, NO_KNOTS, anticipated_tilts, planned_tilts
 from tiltsim_controllers.laws.allocation import limited_accelerations
 from tiltsim_controllers.laws.attitude_altitude import LAYOUT, OPTIONS, AttitudeAltitude
-from tiltsim_controllers.laws.feedback import NONE
+from tiltsim_controllers.laws.feedback import NO_DECOUPLER
 from tiltsim_controllers.laws.keys import record_of
 from tiltsim_controllers.laws.multirotor import attitude_force, present_wrench
 from tiltsim_controllers.laws.multirotor_keys import WITH_GAIT, Form
@@ -74,7 +74,7 @@ def gait_law_of(layout: TiltOfRotor, form: Form, supervision: Supervision) -> Ca
     def law(seen: Seen, p: Any, knots: Any = NO_KNOTS) -> Step:
         plan = None
         moves = (p.gait.type != FIXED or form.supervised) and p.terms.attitude_rates != 0.0
-        if leans_with_gait and (moves or form.own_yaw) and p.decoupler != NONE:
+        if leans_with_gait and (moves or form.own_yaw) and p.decoupler != NO_DECOUPLER:
             if form.supervised:
                 plan, _ = supervised_gait(seen, p, knots, supervision, p.anticipation)
             else:

@@ -101,7 +101,7 @@ def moment(observed: Observed, p: Geometric, attitude: Any, rates: Any) -> Any:
     The gyroscopic torque is 0 on the thesis's equations, which omit it.
     """
     J, R, Omega = observed.inertia, observed.rotation, observed.body_rates
-    j = xp.trace(J) / 3.0
+    j = xp.trace(J) / 3.0  # mean moment of inertia: gains in rad/s for any vehicle
     k_R, k_Omega = j * p.attitude_bandwidth**2, 2.0 * j * p.attitude_damping * p.attitude_bandwidth
     e_R, e_Omega = -attitude_error(R, attitude), Omega - rates  # Eqs. 10 and 11
     gyroscopic = observed.gyroscopic * cross(Omega, J @ Omega)

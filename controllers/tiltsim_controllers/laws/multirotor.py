@@ -45,7 +45,7 @@ from tiltsim_controllers.code.arrays import traceable, xp
 from tiltsim_controllers.laws.attitude_altitude import PUBLISHED_DECOUPLING
 from tiltsim_controllers.laws.feedback import (
     EXACT,
-    NONE,
+    NO_DECOUPLER,
     angular_jerk,
     attitude_jerk,
     attitude_motion,
@@ -231,7 +231,7 @@ def _control(
     jerk, rates = xp.zeros(2), xp.zeros(2)
     if form.dimension > 1:
         jerk, rates = side_control(motion, integrals, p)
-    if form.dimension < 3 and p.decoupler != NONE:
+    if form.dimension < 3 and p.decoupler != NO_DECOUPLER:
         roll, pitch, rates = _leaning(present, motion, yaw, integrals, p, form)
     climb, climb_rate = _altitude_control(motion, integrals, p)
     if p.attitude_error == ROTATION:
@@ -270,17 +270,8 @@ def _start(w: Any, speeds: Any, p: Any, form: Form) -> Any:
     return -p.restoring * count / xp.where(total == 0.0, xp.inf, total) * w
 
 
-def null_part(wrench: Any, up: Any, w: Any, form: Form) -> Any:
-    """The share of ``w`` that the outputs do not see, whatever the norm, from 0 to 1.
-
-    In the norm of rotor accelerations a rotor that comes to rest would take the share with it.
-
-    Args:
-        wrench: Force and torque per unit of ``w``, shape (6, N).
-        up: World up in body axes, shape (3,).
-        w: ``varpi |varpi|`` of the rotors, shape (N,).
-        form: Options of the law.
-    """
+def _null_part(wrench: Any, up: Any, w: Any, form: Form) -> Any:
+    """The share of ``w`` that the outputs do not see, whatever the norm, from 0 to 1."""
     if len(w) <= 3 + form.dimension:
         return 0.0
     units = factors(wrench, wrench[:3], up, form.dimension, form.forward).units
@@ -385,5 +376,5 @@ def attitude_force(
     inputs = nearest_solution(matrix, desired, start, found.units)
     if form.norm == "thrust":
         inputs = rotor_accelerations(inputs, now.speeds, p.slowest_rotor)
-    unseen = null_part(rows, rotation[2], w, form)
+    unseen = _null_part(rows, rotation[2], w, form)
     return Step(inputs, rates, xp.hstack([lean_ref, target[2].value, unseen]))

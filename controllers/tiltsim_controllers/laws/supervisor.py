@@ -34,12 +34,10 @@ from tiltsim_controllers.gaits.motion import NO_KNOTS, GaitParameters, planned_t
 from tiltsim_controllers.mathematics.attitude import rotation_matrix
 from tiltsim_controllers.mathematics.linear import cross
 
-SCALE: Final = 0.0
-HOLD: Final = 1.0
-RETURN_TO_RED: Final = 2.0
-
-STRATEGIES: Final = {"scale": SCALE, "hold": HOLD, "return_to_red": RETURN_TO_RED}
+STRATEGIES: Final = {"scale": 0.0, "hold": 1.0, "return_to_red": 2.0}
 """Strategies by their name in a scenario."""
+
+SCALE, HOLD, RETURN_TO_RED = STRATEGIES.values()
 
 SCALE_GRID: Final = 16
 """Intervals of the scale that are checked, from the whole gait to none."""

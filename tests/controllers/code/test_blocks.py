@@ -112,7 +112,7 @@ def test_a_program_has_the_same_values_in_jax(function, in_segments, monkeypatch
         compiled = jax.jit(run)
         for x in points(function)[:20]:
             np.testing.assert_allclose(compiled(x), law(x.tolist()), rtol=1e-12, atol=1e-12)
-        assert jax.jacfwd(run)(np.array([1.0, 0.5, 3.0])).shape[1] == 3
+        assert jax.jit(jax.jacfwd(run))(np.array([1.0, 0.5, 3.0])).shape[1] == 3
 
 
 def test_loops_of_a_known_count_and_tables_have_derivatives_in_jax():
@@ -124,6 +124,7 @@ def test_loops_of_a_known_count_and_tables_have_derivatives_in_jax():
 
     program = trace_vectors(search, {"x": 2})
 
+    @jax.jit
     def run(x):
         return results_in_jax(program, [x], "float64", in_segments=False)[0]
 
@@ -131,7 +132,7 @@ def test_loops_of_a_known_count_and_tables_have_derivatives_in_jax():
         start = np.array([2.0, 1.5])
         # With x0 = a it is a^4 + a^2 + 2 a + 3, and the entry 4 of the table.
         assert run(start) == python_function(program)([2.0, 1.5])[0] == 27.0 + 4.0
-        assert jax.grad(run)(start).tolist() == [38.0, 0.0]
+        assert jax.jit(jax.grad(run))(start).tolist() == [38.0, 0.0]
         assert run(np.array([4.0, 0.0])) == python_function(program)([4.0, 0.0])[0]
 
 

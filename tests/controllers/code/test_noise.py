@@ -84,6 +84,6 @@ def test_on_arrays_of_jax_a_draw_is_the_one_in_python(wide):
         return results_in_jax(program, [(index,)], dtype, in_segments=False)[0]
 
     with jax.enable_x64(wide):
-        found = jax.vmap(drawn)(np.arange(50.0))
+        found = jax.jit(jax.vmap(drawn))(np.arange(50.0))
     expected = [normal(7.0, 3.0, float(index)) for index in range(50)]
     np.testing.assert_allclose(found, expected, rtol=1e-13 if wide else 2e-3)

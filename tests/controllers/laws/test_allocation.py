@@ -248,7 +248,7 @@ def allocated(rows, requested, box):
 
 @pytest.mark.parametrize("rotors", [4, 5, 7, 12])
 def test_any_number_of_rotors_reaches_the_optima_of_the_linear_programs(rotors):
-    vehicles = random_vehicles(rotors, 200)
+    vehicles = random_vehicles(rotors, 100)
     rows, requests, boxes = (np.array(part) for part in zip(*vehicles, strict=True))
     found = np.array([allocated(*vehicle) for vehicle in vehicles])
     assert (found >= boxes[..., 0]).all()

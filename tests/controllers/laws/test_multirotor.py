@@ -64,7 +64,7 @@ AS_PUBLISHED = FeedforwardTerms(0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
 def differences(todays, general):
     """Relative differences of the two laws at random states, the four accelerations together."""
     found = []
-    for time, state in random_states(200):
+    for time, state in random_states(80):
         expected, value = np.array(todays(time, state)), np.array(general(time, state))
         found.append(np.abs(value[: len(expected)] - expected).max() / np.abs(expected).max())
     return np.array(found)
@@ -214,9 +214,9 @@ def test_a_vehicle_stays_level_in_a_side_wind_which_its_integrators_cancel():
 def test_with_two_force_components_it_leans_only_across_them():
     vehicle = Vehicle(ring(6, 0.35, along=(1.0, 0.0, 0.0)), HEXAROTOR, 2)
     law, knots = parameters_of(vehicle)
-    aside = fly(vehicle, law, knots, 2.0, wind=(0.0, 1.0, 0.0))
+    aside = fly(vehicle, law, knots, 1.0, wind=(0.0, 1.0, 0.0))
     assert np.abs(aside.up[:, :2]).max() < 1e-8
-    ahead = fly(vehicle, law, knots, 2.0, wind=(1.0, 0.0, 0.0))
+    ahead = fly(vehicle, law, knots, 1.0, wind=(1.0, 0.0, 0.0))
     assert np.abs(ahead.up[:, 0]).max() > 0.05
     assert np.abs(ahead.up[:, 1]).max() < 1e-8
 

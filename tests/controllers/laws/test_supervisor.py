@@ -58,7 +58,6 @@ def regular(scales, tilts, roll, pitch):
     )
 
 
-@settings(deadline=None, max_examples=150)
 @example((0.0, 0.0, -1.0, -1.5), 0.0, -0.5)
 @given(angles, leans, leans)
 def test_tilts_that_pass_are_regular_and_slightly_larger_ones_are_not(tilts, roll, pitch):

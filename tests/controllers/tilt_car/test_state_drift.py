@@ -20,7 +20,7 @@ from tests.controllers.tilt_car.lean import (
     split_of_lean,
 )
 from tiltsim_controllers.tilt_car.cycles import Orbit, drift_rate, lean_stiffness, orbit
-from tiltsim_controllers.tilt_car.laws import minimum_norm, restoring_inputs
+from tiltsim_controllers.tilt_car.laws import minimum_norm, null_space_input, restoring_inputs
 from tiltsim_controllers.tilt_car.vehicle import (
     THESIS_CAR,
     TiltCar,
@@ -137,6 +137,36 @@ def test_there_and_back_along_one_path_undoes_the_drift():
     again = follow(back, forth, 1.0, 500, CAR)
     assert abs(lean_at(forth, CAR) - 0.1) > 1e-4
     np.testing.assert_allclose(again, inputs_of(0.1, 10.0, CAR), rtol=1e-9, atol=1e-9)
+
+
+def null_direction(speeds, car):
+    n = null_space_input(input_matrix(speeds, car))
+    return n / np.linalg.norm(n)
+
+
+def twist(speeds, car):
+    """``n . curl n`` of the null direction, which no tilt changes, by central differences.
+
+    Only if it were zero would the law's planes be tangent to surfaces (Frobenius).
+    """
+    steps = np.diag(1e-5 * speeds)
+    ends = [(null_direction(speeds + h, car), null_direction(speeds - h, car)) for h in steps]
+    by_1, by_2 = [(up - down) / (2.0 * h.sum()) for (up, down), h in zip(ends, steps, strict=True)]
+    return null_direction(speeds, car) @ (by_2[2], -by_1[2], by_1[1] - by_2[0])
+
+
+@pytest.mark.parametrize("lean", [-0.3, 0.0, 0.2])
+def test_small_loops_miss_by_the_twist_times_their_area(lean):
+    start, size = inputs_of(lean, 10.0, THESIS_CAR), 0.02
+    end = start
+    for side in ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)):
+        end = follow(lambda _t, jerk=side: jerk, end, size, 40, THESIS_CAR)
+    n = null_space_input(input_matrix(start[:2], THESIS_CAR))
+    # The null direction's length is the area of accelerations that a unit of inputs spans.
+    missed = (end - start) @ n / np.linalg.norm(n)
+    desired = -twist(start[:2], THESIS_CAR) * size * size / np.linalg.norm(n)
+    assert desired != 0.0
+    assert missed == pytest.approx(desired, rel=0.05)
 
 
 def test_restoring_holds_the_lean_where_drift_and_rate_balance():

@@ -207,8 +207,8 @@ def test_the_way_to_red_is_no_faster_than_requested():
     ("changes", "message"),
     [
         ({"controller.supervisor.min_margin": 1.6}, "controller.supervisor.min_margin = 1.6"),
-        ({"controller.supervisor.horizon": 1.0}, "strategy = hold or return_to_red"),
-        ({"controller.supervisor.clearance": 0.2}, "strategy = return_to_red"),
+        ({"controller.supervisor.horizon": 1.0}, 'strategy = "hold" or "return_to_red"'),
+        ({"controller.supervisor.clearance": 0.2}, 'strategy = "return_to_red"'),
         ({**RED, "controller.supervisor.clearance": 0.2}, "must be below 0.1671"),
         ({**RED, "controller.supervisor.clearance": 0.07}, "below min_determinant = 2"),
         ({"controller.supervisor.strategy": "stop"}, "scale, hold or return_to_red"),

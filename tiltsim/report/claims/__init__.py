@@ -1,6 +1,7 @@
-"""Claims that need no flight or several: rows in the files of this folder, one per chapter.
+"""All claims: of scenario files, and of the files of this folder, one per chapter.
 
-A table is a statement, like the ``[claim.NAME]`` of scenarios, with the keys of its row::
+Claims here need no flight, or several. A table is a statement, like the ``[claim.NAME]`` of
+scenarios, with the keys of its row::
 
     [ch6-blue-offset]
     source = "ch. 6, Sec. 3, Eq. (13)"
@@ -19,16 +20,18 @@ numbers of ``thresholds.toml``; ``{a,b}`` in an address for both.
 """
 
 import re
-import tomllib
 from collections.abc import Iterator, Mapping
 from functools import cache, partial
 from itertools import product
 from pathlib import Path
 from typing import Any, Final
 
-from tiltsim.report.claim import Claim
+from tiltsim.report.claim import CHAPTER, Claim, Statement, origins_of, slug
 from tiltsim.report.measures import evaluate
-from tiltsim.report.statement import Statement, origins_of
+from tiltsim.scenario.expectation import Expectation
+from tiltsim.scenario.library import read_toml
+from tiltsim.scenario.metric_names import metric_of, unit_of
+from tiltsim.scenario.scenario import Scenario
 
 _NAME: Final = re.compile(r"{(\w+)(?:\.(\w+))?}")
 _OF_ROWS: Final = (
@@ -58,8 +61,7 @@ def registered_claims(scaled: str = "", factor: float = 1.0) -> tuple[Claim, ...
 @cache
 def words(name: str) -> dict[str, Any]:
     """A file of this folder."""
-    text = (Path(__file__).parent / f"{name}.toml").read_text(encoding="utf-8")
-    return tomllib.loads(text)
+    return read_toml(Path(__file__).parent / f"{name}.toml")
 
 
 def _chapter(tables: dict[str, Any], shared: Mapping[str, Any]) -> Iterator[Claim]:
@@ -110,3 +112,60 @@ def _expanded(pattern: str) -> list[str]:
     parts = re.split(r"{([^{}]*,[^{}]*)}", pattern)
     choices = (part.split(",") if index % 2 else [part] for index, part in enumerate(parts))
     return ["".join(chosen) for chosen in product(*choices)]
+
+
+def scenario_claims(scenario: Scenario) -> list[Claim]:
+    """The claims of a scenario, in order: its expectations with a ``published`` value.
+
+    A scenario beyond the thesis, whose ``source`` names no chapter, has none.
+    """
+    if CHAPTER.match(scenario.source) is None:
+        return []
+    return [
+        Claim(
+            statement=_statement(scenario, expectation),
+            case=", ".join(filter(None, (scenario.title, case := _case(scenario, expectation)))),
+            key=slug(f"{_short(scenario.address)} {case}"),
+            where=scenario.source,
+            published=expectation.published,
+            unit=unit_of(expectation.metric),
+            tolerance=expectation.published_tolerance,
+            in_kind=expectation.in_kind,
+            why=expectation.why,
+            origins=origins_of(scenario.ours),
+            flights=(scenario.address,),
+            expectation=expectation,
+        )
+        for expectation in scenario.expect
+        if expectation.published is not None
+    ]
+
+
+def _case(scenario: Scenario, expectation: Expectation) -> str:
+    """The label; the metric, if the flight has the claim for several and the file has no label."""
+    metrics = {other.metric for other in scenario.expect if other.claim == expectation.claim}
+    return expectation.case or (expectation.metric.replace("_", " ") if len(metrics) > 1 else "")
+
+
+def _short(address: str) -> str:
+    """File and variant, without folders: "line walk_third"."""
+    file, _, variant = address.partition("#")
+    return f"{Path(file).stem} {variant}"
+
+
+def _statement(scenario: Scenario, expectation: Expectation) -> Statement:
+    """From the table that the expectation names; otherwise its own words are the statement."""
+    table = scenario.claim.get(expectation.claim)
+    if table is not None:
+        return Statement.of_table(expectation.claim, source=scenario.source, **table.model_dump())
+    measured = metric_of(expectation.metric).described.capitalize()
+    words = expectation.claim or measured
+    chapter = CHAPTER.match(scenario.source)
+    assert chapter is not None
+    return Statement(
+        id=f"ch{chapter[1]}-{slug(words)[:50].strip('-')}",
+        source=scenario.source,
+        text=words,
+        thesis=words,
+        criterion=f"{measured}, compared with the published value.",
+    )

@@ -7,7 +7,6 @@ The texts, in the TOML files of this folder, contain no measured number: express
 """
 
 import re
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +14,7 @@ from typing import Any, Final
 
 from tiltsim.report.measures import evaluate
 from tiltsim.report.measures.slips import deviation
+from tiltsim.scenario.library import read_toml
 
 _NUMBER: Final = re.compile(r"{([^{}]+?)(?::([^{}:]*))?}")
 """An expression in braces with the format of its value."""
@@ -73,7 +73,7 @@ class Finding:
 
 
 def _tables(name: str) -> dict[str, Any]:
-    return tomllib.loads((Path(__file__).parent / f"{name}.toml").read_text(encoding="utf-8"))
+    return read_toml(Path(__file__).parent / f"{name}.toml")
 
 
 FINDINGS: Final = tuple(

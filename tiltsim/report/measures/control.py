@@ -6,19 +6,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tiltsim_controllers.analysis.attainable import (
-    AttainableSet,
-    attainable_accelerations,
-    attainable_torque_thrust,
-    published_speed_limits,
-)
+from tiltsim_controllers.analysis import attainable, singularity
+from tiltsim_controllers.analysis.attainable import AttainableSet
 from tiltsim_controllers.analysis.published_gaits import PUBLISHED_GAITS
-from tiltsim_controllers.analysis.singularity import (
-    normalized_determinant,
-    published_determinant,
-    published_singular_curve,
-    world_up,
-)
 from tiltsim_controllers.analysis.stability import is_hurwitz, third_order_loop
 from tiltsim_controllers.laws.feedback import conventional_decoupler, modified_decoupler
 from tiltsim_controllers.laws.gains import GAIN_SETS
@@ -32,7 +22,7 @@ _VEHICLE: Final = PRESETS["ar_drone_2"]
 _QUADROTOR: Final = PRESETS["ar_drone_2_unrounded"]
 _HOVER: Final = _QUADROTOR.mass * _QUADROTOR.gravity
 _SINGULAR: Final = 1e-9
-_LIMITS: Final = published_speed_limits(_VEHICLE)
+_LIMITS: Final = attainable.published_speed_limits(_VEHICLE)
 
 
 def attitudes(limit: float, count: int) -> Floats:
@@ -42,12 +32,14 @@ def attitudes(limit: float, count: int) -> Floats:
 
 def exact_determinant(roll: ArrayLike, pitch: ArrayLike, thrust: float = _HOVER) -> Floats:
     """The exact determinant at attitudes (rad) and a thrust (N), over its value in level hover."""
-    return normalized_determinant(np.asarray(roll), np.asarray(pitch), thrust, _QUADROTOR)
+    return singularity.normalized_determinant(
+        np.asarray(roll), np.asarray(pitch), thrust, _QUADROTOR
+    )
 
 
 def exact_on_published_curve() -> Floats:
     """The exact determinant on S = 0, over its value in level hover."""
-    return exact_determinant(*published_singular_curve())
+    return exact_determinant(*singularity.published_singular_curve())
 
 
 def rightmost_root() -> complex:
@@ -68,7 +60,7 @@ def eq_43_as_printed() -> bool:
     """Whether S is the determinant of the matrix of Eq. (43), with its printed zero."""
     angles = np.random.default_rng(0).uniform(-1.5, 1.5, (200, 3))
     exact = np.linalg.det([eq_43(*each) for each in angles])
-    return bool(np.abs(exact - published_determinant(*angles[:, :2].T)).max() < 1e-12)
+    return bool(np.abs(exact - singularity.published_determinant(*angles[:, :2].T)).max() < 1e-12)
 
 
 def quadrotor_gains_are_stable(law: str) -> bool:
@@ -83,7 +75,7 @@ def attitude_altitude_is_singular() -> bool:
     for roll in angles:
         for pitch in angles:
             rates = euler_rates(np.array([roll, pitch, 0.0]), np.eye(3))
-            lift = float(world_up(roll, pitch)[2])
+            lift = float(singularity.world_up(roll, pitch)[2])
             if abs(lift * np.linalg.det(rates)) < _SINGULAR:
                 return True
     return False
@@ -98,7 +90,7 @@ def axis_has_no_influence(roll_sign: float, pitch_sign: float) -> bool:
 
 def zone_holds_the_curve() -> bool:
     """Whether the zone of Eq. (47) contains all of S = 0."""
-    roll, pitch = published_singular_curve()
+    roll, pitch = singularity.published_singular_curve()
     inside = (np.abs(pitch) <= 0.5) & (roll >= -np.pi / 2) & (roll <= 0.2)
     return bool(inside.all())
 
@@ -127,7 +119,7 @@ def gait_angles(number: int, *, exact: bool = False) -> list[float]:
 def torques(number: int, thrust: float | None = None, *, exact: bool = False) -> AttainableSet:
     """Roll and pitch torques and thrusts of a gait without yaw torque, at a vertical thrust (N)."""
     angles = gait_angles(number, exact=exact)
-    return attainable_torque_thrust(angles, _VEHICLE, _LIMITS, vertical_thrust=thrust)
+    return attainable.attainable_torque_thrust(angles, _VEHICLE, _LIMITS, vertical_thrust=thrust)
 
 
 def torques_are_coupled(number: int) -> bool:
@@ -139,12 +131,12 @@ def torques_are_coupled(number: int) -> bool:
 
 def accelerations(number: int) -> tuple[float, ...]:
     """Attainable accelerations in body axes, m/s^2: least along x and y, largest along x and y."""
-    reached = attainable_accelerations(gait_angles(number), _VEHICLE, _LIMITS)
+    reached = attainable.attainable_accelerations(gait_angles(number), _VEHICLE, _LIMITS)
     return (*reached.lower.tolist(), *reached.upper.tolist())
 
 
 def accelerations_are_a_rectangle(number: int) -> bool:
     """Whether their set has four corners, with two values along each axis."""
-    corners = attainable_accelerations(gait_angles(number), _VEHICLE, _LIMITS).vertices
+    corners = attainable.attainable_accelerations(gait_angles(number), _VEHICLE, _LIMITS).vertices
     spans = [np.unique(np.round(axis, 9)) for axis in corners.T]
     return len(corners) == 4 and all(len(span) == 2 for span in spans)

@@ -21,12 +21,7 @@ from tiltsim_controllers.laws.gains import GAIN_SETS
 from tiltsim_controllers.laws.quadrotor import POSITION_GAINS
 from tiltsim_controllers.mathematics.attitude import rotation_matrix
 from tiltsim_controllers.mathematics.scalar import Floats
-from tiltsim_controllers.tilt_car.vehicle import (
-    THESIS_CAR,
-    acceleration,
-    input_matrix,
-    turn_per_tilt,
-)
+from tiltsim_controllers.tilt_car import vehicle
 from tiltsim_controllers.vehicle.parameters import PRESETS
 
 RIGHT: Final = 1e-6  # deviation below which a formula counts as right
@@ -267,7 +262,7 @@ def _iff(mended: bool) -> float:
     """States in which the rank of [D1 | D2] is not 2 exactly if both, or either, rotor turns."""
     wrong = 0
     for speeds in ((200.0, 150.0), (200.0, 0.0), (0.0, 200.0), (0.0, 0.0)):
-        columns = input_matrix(np.array(speeds), THESIS_CAR)
+        columns = vehicle.input_matrix(np.array(speeds), vehicle.THESIS_CAR)
         stated = any(speeds) if mended else all(speeds)
         wrong += (np.linalg.matrix_rank(columns) == 2) != stated
     return float(wrong)
@@ -280,10 +275,10 @@ def _tilt_column(mended: bool) -> float:
     column of the tilt in the acceleration, yaw following by Eq. (2): no other term contains it.
     """
     tilt, step, squares = 0.7, 1e-6, np.array([150.0**2, 120.0**2])
-    turn = turn_per_tilt(THESIS_CAR)
+    turn = vehicle.turn_per_tilt(vehicle.THESIS_CAR)
 
     def at(alpha: float) -> Floats:
-        return np.array(acceleration(turn * alpha, squares, THESIS_CAR))
+        return np.array(vehicle.acceleration(turn * alpha, squares, vehicle.THESIS_CAR))
 
     ahead, behind, (x, y) = at(tilt + step), at(tilt - step), at(tilt)
     exact = np.subtract(ahead, behind) / (2.0 * step)

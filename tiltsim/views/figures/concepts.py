@@ -21,11 +21,7 @@ from tiltsim_controllers.analysis.two_color_map import curve_l, delta, point_p, 
 from tiltsim_controllers.gaits.cat import FORWARD, SWINGS
 from tiltsim_controllers.gaits.colors import colored_angles
 from tiltsim_controllers.gaits.plans import cat, continuous_trot
-from tiltsim_controllers.laws.feedback import (
-    conventional_decoupler,
-    exact_decoupler,
-    modified_decoupler,
-)
+from tiltsim_controllers.laws import feedback
 from tiltsim_controllers.mathematics.scalar import Floats
 from tiltsim_controllers.vehicle.body import ROTORS
 from tiltsim_controllers.vehicle.parameters import PRESETS, Vehicle, drag_ratio
@@ -201,9 +197,9 @@ def _lean_at_rest(name: str, n: Floats, vehicle: Vehicle) -> tuple[float, float,
     force = (float(n[0]), float(n[1]), float(n[2]))
     gravity = vehicle.gravity
     leans = {
-        "conventional": lambda: conventional_decoupler(0.0, 0.0, 0.0, gravity),
-        "modified": lambda: modified_decoupler(0.0, 0.0, 0.0, gravity, force),
-        "exact": lambda: exact_decoupler(0.0, 0.0, 0.0, 0.0, gravity, force),
+        "conventional": lambda: feedback.conventional_decoupler(0.0, 0.0, 0.0, gravity),
+        "modified": lambda: feedback.modified_decoupler(0.0, 0.0, 0.0, gravity, force),
+        "exact": lambda: feedback.exact_decoupler(0.0, 0.0, 0.0, 0.0, gravity, force),
     }
     return (*leans[name](), 0.0)
 
@@ -272,7 +268,7 @@ def _roll_pitch_plane(axes: Axes, n: Floats, vehicle: Vehicle) -> None:
     axes.plot(*attitude_plane.singular_curves(n)[0].T, color=style.SINGULAR, lw=1.8)
     style.roll_pitch_axes(axes)
     drawing.text(axes, (-0.9, -1.33), "unreachable\nmargin < 0", color=style.SINGULAR)
-    hover = exact_decoupler(0.0, 0.0, 0.0, 0.0, vehicle.gravity, tuple(n[0]))
+    hover = feedback.exact_decoupler(0.0, 0.0, 0.0, 0.0, vehicle.gravity, tuple(n[0]))
     nearest = attitude_plane.nearest_singular(n, np.array([LEANING]))[0]
     axes.plot(*np.array([LEANING, nearest]).T, color=style.PURPLE, lw=2.4)
     for attitude, name in ((LEANING, "leaning"), ((0.0, 0.0), "level"), (hover, "hover")):

@@ -19,14 +19,8 @@ from tiltsim.studies.gait_analysis import NEARLY_SINGULAR
 from tiltsim.views.attitude_plane import MIN_DIRECTION_TILT
 from tiltsim.views.figures import style
 from tiltsim.views.figures.layout import Page, add_legend, new_page, place_legends
+from tiltsim_controllers.analysis import singularity
 from tiltsim_controllers.analysis.fault_tolerance import minimum_hover_speed
-from tiltsim_controllers.analysis.singularity import (
-    determinant,
-    margin_over_gait,
-    singular_values,
-    torque_free_direction,
-    unacceptable_attitudes,
-)
 from tiltsim_controllers.analysis.two_color_map import curve_l, delta, point_p, red_residual
 from tiltsim_controllers.analysis.two_color_planner import Circle, Path, check_path
 from tiltsim_controllers.gaits.plans import Gait
@@ -110,19 +104,21 @@ def _roll_pitch(axes: Axes, gait: Gait, vehicle: Vehicle) -> set[str]:
     angles = gait.angles(times)
     edges = np.linspace(-pi / 2, pi / 2, 302)
     roll, pitch = np.meshgrid(*[0.5 * (edges[1:] + edges[:-1])] * 2)
-    level = determinant(angles[0], 0.0, 0.0, vehicle)
-    beyond = [determinant(instant, roll, pitch, vehicle) * level <= 0.0 for instant in angles]
+    level = singularity.determinant(angles[0], 0.0, 0.0, vehicle)
+    beyond = [
+        singularity.determinant(instant, roll, pitch, vehicle) * level <= 0.0 for instant in angles
+    ]
     share = np.mean(beyond, axis=0)
-    curves = [unacceptable_attitudes(instant, vehicle, 721) for instant in angles]
+    curves = [singularity.unacceptable_attitudes(instant, vehicle, 721) for instant in angles]
     singular = sum(curve.kind == "everywhere" for curve in curves)
-    values = singular_values(angles, vehicle)
+    values = singularity.singular_values(angles, vehicle)
     conditioning = float((values[:, 2] / values[:, 0]).min())
     nearly = not singular and conditioning < NEARLY_SINGULAR
     if singular or nearly:
         share = np.full_like(share, singular / len(curves) or 1.0)
     style.shade_share(axes, edges, share)
     colors = colormaps[style.SEQUENTIAL](np.arange(len(curves)) / len(curves) * _LAST_SHADE)
-    n = np.nan_to_num(torque_free_direction(angles, vehicle))
+    n = np.nan_to_num(singularity.torque_free_direction(angles, vehicle))
     drawn = np.hypot(n[:, 0], n[:, 1]) > MIN_DIRECTION_TILT
     for curve, color, is_drawn in zip(curves, colors, drawn, strict=True):
         if is_drawn:
@@ -179,7 +175,7 @@ def _margin(axes: Axes, gaits: list[tuple[Gait, str]], vehicle: Vehicle) -> None
     longest = lowest = 0.0
     for (gait, label), look in zip(gaits, ["-", "--", "-.", ":"] * len(gaits), strict=False):
         times = _times(gait)
-        margin = margin_over_gait(gait.angles(times), vehicle)
+        margin = singularity.margin_over_gait(gait.angles(times), vehicle)
         longest, lowest = max(longest, gait.period or 1.0), min(lowest, float(margin.min()))
         axes.plot(times, margin, look, label=label.replace("_", " "))
     axes.axhline(0.0, color=style.INK, lw=0.8)

@@ -13,14 +13,8 @@ from tiltsim.flight.flight import VECTORS, Flight
 from tiltsim.laws.law import SUPERVISION
 from tiltsim.system.text import Quantity
 from tiltsim.views import attitude_plane
-from tiltsim.views.figures import style
-from tiltsim.views.figures.flight_lines import (
-    MOST_LINES,
-    Shown,
-    many_periods,
-    mark_end,
-    plot_flights,
-)
+from tiltsim.views.figures import flight_lines, style
+from tiltsim.views.figures.flight_lines import Shown
 from tiltsim.views.signals import (
     AXES,
     FLOORS,
@@ -102,8 +96,8 @@ def column_panel(flights: Sequence[Flight], name: str) -> Panel:
     about = None if one is None else vector_signals(one.assembly, name, [name])
 
     def draw(axes: Axes, shown: Sequence[Shown]) -> None:
-        if len(shown) > MOST_LINES:
-            plot_flights(axes, shown, [one.flight[name] for one in shown])
+        if len(shown) > flight_lines.MOST_LINES:
+            flight_lines.plot_flights(axes, shown, [one.flight[name] for one in shown])
         else:
             for one in shown:
                 time, values = one.flight["time"], one.flight[name]
@@ -111,7 +105,7 @@ def column_panel(flights: Sequence[Flight], name: str) -> Panel:
                 if reference := reference_of(one.flight.assembly, name):
                     color = one.look["color"] if "marker" in one.look else style.INK
                     axes.plot(time, one.flight[reference], color=color, ls=":", lw=0.8)
-                mark_end(axes, one, values)
+                flight_lines.mark_end(axes, one, values)
         axes.set_ylabel(shown[0].flight.assembly.loop.label(name).text)
 
     return Panel(draw, signals=about, needs=name)
@@ -172,7 +166,7 @@ def _distance(axes: Axes, shown: Sequence[Shown]) -> None:
     """The distance of every flight from its reference."""
     panels = (signals_of(one.flight.assembly)["position_error"] for one in shown)
     away = [panel.compared[0].of(one.flight) for panel, one in zip(panels, shown, strict=True)]
-    plot_flights(axes, shown, away)
+    flight_lines.plot_flights(axes, shown, away)
     axes.set_ylabel("position error (m)")
 
 
@@ -184,7 +178,7 @@ def _margins(axes: Axes, shown: Sequence[Shown]) -> None:
     axes.axhspan(0.0, threshold, color=style.UNREACHABLE, lw=0.0, label=text)
     margins = [one.flight["singularity_margin"] for one in shown]
     sided = [np.abs(margin) if single else np.maximum(margin, 0.0) for margin in margins]
-    plot_flights(axes, shown, sided)
+    flight_lines.plot_flights(axes, shown, sided)
     if single:
         flight, margin = shown[0].flight, margins[0]
         if SUPERVISION in flight.columns:
@@ -212,14 +206,14 @@ def _determinant(axes: Axes, shown: Sequence[Shown]) -> None:
         text = f"determinant below {lowest:g}"
         axes.axhspan(0.0, lowest, color=style.UNREACHABLE, lw=0.0, label=text)
     values = [np.maximum(one.flight["determinant"], 0.0) for one in shown]
-    plot_flights(axes, shown, values)
+    flight_lines.plot_flights(axes, shown, values)
     axes.set_ylim(0.0, max(4.0, *(1.05 * float(each.max()) for each in values)))
     axes.set_ylabel("determinant n · r₃")
 
 
 def _supervisor(axes: Axes, shown: Sequence[Shown]) -> None:
     """The intervention of each supervisor."""
-    plot_flights(axes, shown, [one.flight[SUPERVISION] for one in shown])
+    flight_lines.plot_flights(axes, shown, [one.flight[SUPERVISION] for one in shown])
     axes.set(ylim=(-0.03, 1.03), ylabel="supervisor (0 to 1)")
 
 
@@ -362,7 +356,7 @@ def set_scale(axes: Axes, signals: Signals, shown: Sequence[Shown]) -> None:
     flights = [one.flight for one in shown]
     ends = [float(flight["time"][-1]) for flight in flights]
     begin, end = min(signals.settling, 0.5 * max(ends)), max(ends)
-    longest = many_periods(flights) if signals.moves else 0.0
+    longest = flight_lines.many_periods(flights) if signals.moves else 0.0
     if 0.0 < signals.latest < 0.5 * end:
         begin = end - signals.latest
         axes.set_xlim(begin, end)

@@ -14,6 +14,7 @@ from scipy.spatial import ConvexHull
 
 from tiltsim.views.figures import style
 from tiltsim.views.signals import FLOORS
+from tiltsim_controllers.analysis import singularity, torque_free
 from tiltsim_controllers.analysis.attainable import (
     ALMOST_FLAT,
     HOVER_THRUST,
@@ -27,19 +28,6 @@ from tiltsim_controllers.analysis.attainable import (
 )
 from tiltsim_controllers.analysis.hover import hover
 from tiltsim_controllers.analysis.published_gaits import DETERMINANT_CASES, TRIANGLE
-from tiltsim_controllers.analysis.singularity import (
-    normalized_determinant,
-    published_determinant,
-    published_singular_curve,
-    residuals,
-    world_up,
-)
-from tiltsim_controllers.analysis.torque_free import (
-    LEVEL,
-    SINGULAR_ATTITUDES,
-    singularity_margin,
-    torque_free_forces,
-)
 from tiltsim_controllers.gaits.plans import Gait
 from tiltsim_controllers.laws.quadrotor import PUBLISHED_ZONE
 from tiltsim_controllers.mathematics.scalar import Floats
@@ -61,7 +49,7 @@ def determinant_figure(case: str, vehicle: Vehicle) -> Figure:
 
     def determinant(pair: tuple[float, float], alpha_2: Floats, alpha_4: Floats) -> Floats:
         first, third = (np.full_like(alpha_2, angle) for angle in pair)
-        return residuals(np.stack([first, alpha_2, third, alpha_4], axis=-1), vehicle).R
+        return singularity.residuals(np.stack([first, alpha_2, third, alpha_4], axis=-1), vehicle).R
 
     restriction, pairs = DETERMINANT_CASES[case]
     shades = colormaps[style.SEQUENTIAL](np.linspace(0.0, 0.9, len(pairs)))
@@ -126,8 +114,8 @@ def surfaces(vehicle: Vehicle, samples: int = 121) -> tuple[Floats, ...]:
     """
     side = np.linspace(-_LIMIT, _LIMIT, samples)
     roll, pitch = np.meshgrid(side, side)
-    exact = normalized_determinant(roll, pitch, vehicle.mass * vehicle.gravity, vehicle)
-    return roll, pitch, published_determinant(roll, pitch), exact
+    exact = singularity.normalized_determinant(roll, pitch, vehicle.mass * vehicle.gravity, vehicle)
+    return roll, pitch, singularity.published_determinant(roll, pitch), exact
 
 
 @style.paper_style()
@@ -153,7 +141,7 @@ def singularity_figure(vehicle: Vehicle) -> Figure:
         figure.colorbar(shades, ax=contour, shrink=0.85)
         contour.set_title(title)
         style.roll_pitch_axes(contour)
-    curve = published_singular_curve()
+    curve = singularity.published_singular_curve()
     alone = figure.add_subplot(grid[0, 2])
     alone.plot(*curve, color=style.RED)
     alone.plot(0.0, 0.0, "o", ms=3.5, color=style.INK)
@@ -190,7 +178,7 @@ def multirotor_figure(rotors: TiltedRotors, kind: str) -> Figure:
         return figure
     figure = style.new_figure(8.0, 3.4)
     found = hover(rotors)
-    up = LEVEL if found is None else found.force / rotors.weight
+    up = torque_free.LEVEL if found is None else found.force / rotors.weight
     sets = (
         ("Force without torque, by weight", attainable_forces(rotors), rotors.weight, "$F_{}/mg$"),
         ("Torque while the lift carries the weight", attainable_torques(rotors, np.array(up)), 1.0,
@@ -205,11 +193,11 @@ def multirotor_figure(rotors: TiltedRotors, kind: str) -> Figure:
 
 def _margins(axes: Axes, rotors: TiltedRotors) -> None:
     """The margin over roll and pitch, with the singular attitudes in red."""
-    forces = torque_free_forces(rotors.force, rotors.torque)
+    forces = torque_free.torque_free_forces(rotors.force, rotors.torque)
     angles = np.linspace(-pi / 2, pi / 2, _POINTS)
     roll, pitch = np.meshgrid(angles, angles)
-    margin = singularity_margin(forces, world_up(roll, pitch))
-    name = SINGULAR_ATTITUDES[int(forces.dimension)]
+    margin = torque_free.singularity_margin(forces, singularity.world_up(roll, pitch))
+    name = torque_free.SINGULAR_ATTITUDES[int(forces.dimension)]
     axes.set_title(f"Singular attitudes: {name}")
     axes.plot(0.0, 0.0, "+", color=style.INK, ms=8, mew=1.2)
     if float(np.ptp(margin)) < FLOORS["rad"]:  # of one shade
@@ -225,7 +213,9 @@ def _margins(axes: Axes, rotors: TiltedRotors) -> None:
     bar.set_ticks([0.0, pi / 4, pi / 2], labels=["0", "π/4", "π/2"])
     if name == "great circle":
         normal = np.linalg.svd(forces.projector)[0][:, 0]
-        axes.contour(roll, pitch, world_up(roll, pitch) @ normal, [0.0], colors=style.SINGULAR)
+        axes.contour(
+            roll, pitch, singularity.world_up(roll, pitch) @ normal, [0.0], colors=style.SINGULAR
+        )
     elif name == "two directions":
         up = np.linalg.svd(forces.projector)[0][:, 2]
         up = up if up[2] >= 0.0 else -up

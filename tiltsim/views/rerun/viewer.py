@@ -1,8 +1,9 @@
-"""Opening the Rerun viewer, or connecting to a running one."""
+"""The Rerun viewer: opened or connected to, for flights, recordings, and a flight in progress."""
 
 from __future__ import annotations
 
 import os
+import socket
 import subprocess
 import sys
 from collections.abc import Callable, Sequence
@@ -10,23 +11,39 @@ from contextlib import redirect_stdout
 from functools import partial
 from io import StringIO
 from pathlib import Path
+from queue import Empty, SimpleQueue
 from tempfile import TemporaryFile
+from threading import Event, Thread
 from time import monotonic, sleep
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, Self
+from urllib.parse import urlsplit
+from uuid import uuid4
+
+import numpy as np
 
 from tiltsim.errors import InputError
 from tiltsim.flight.flight import Flight, as_flights, vehicles_named
+from tiltsim.flight.metrics import End
+from tiltsim.laws.assembling import assemble
+from tiltsim.scenario.scenario import Scenario
 from tiltsim.system.public import optional_package
-from tiltsim.system.text import short_repr
-from tiltsim.views.rerun import DEFAULT_URL, require_viewer, viewer_listens
+from tiltsim.system.text import printable, short_repr
+from tiltsim.views.rerun import require_rerun
+from tiltsim.views.video import has_display
+from tiltsim_controllers.mathematics.scalar import Floats
 
 if TYPE_CHECKING:
     import rerun as rr
     import rerun.blueprint as rrb
 
+DEFAULT_URL: Final = "rerun+http://127.0.0.1:9876/proxy"  # default address of a viewer
+CONNECT_TIMEOUT: Final = 2.0  # s
 RECORDING_START: Final = b"RRF"  # first bytes of every recording; the version follows
 START_TIME: Final = 20.0  # time (s) that the viewer may take to start
 SETTLING: Final = 1.0  # time (s) within which a viewer without a usable screen ends
+SEND_INTERVAL: Final = 0.25  # s of wall time between pieces; each costs about 0.04 s
+SHUTDOWN_TIMEOUT: Final = 5.0
+"""Time (s) to wait after the flight until the viewer has received the remaining samples."""
 
 
 def view(flights: Flight | Sequence[Flight], *, url: str | None = None, vehicle: str = "") -> Any:
@@ -162,3 +179,116 @@ def attach_viewer(recording: rr.RecordingStream, url: str | None, blueprint: rrb
             options = "--hide-welcome-screen", "--expect-data-soon"
             _open_viewer(*options, until=partial(viewer_listens, url))
     recording.connect_grpc(url, default_blueprint=blueprint)
+
+
+def require_viewer(url: str | None) -> None:
+    """Raise `InputError` unless a viewer listens at a URL or, without one, there is a screen."""
+    require_rerun()
+    if url is not None:
+        parts = urlsplit(url)
+        try:
+            known = parts.scheme in {"rerun+http", "rerun+https", "rerun"}
+            valid = known and parts.path == "/proxy" and bool(parts.hostname) and parts.port != 0
+        except ValueError:
+            valid = False
+        if not valid:
+            raise InputError(f"address {url}: not a viewer's; expected, e.g., {DEFAULT_URL}")
+        if not viewer_listens(url):
+            text = f"address {url}: no viewer listens there; start one with the command rerun"
+            raise InputError(text)
+    elif not has_display():
+        raise InputError(
+            "no screen to open the Rerun viewer on (DISPLAY and WAYLAND_DISPLAY are not set); "
+            "save a recording with --rerun FILE.rrd, or --connect to a viewer on another machine"
+        )
+
+
+def viewer_listens(url: str) -> bool:
+    """Whether something accepts connections at a viewer's address."""
+    parts = urlsplit(url)
+    try:
+        socket.create_connection((str(parts.hostname), parts.port or 9876), CONNECT_TIMEOUT).close()
+    except (OSError, UnicodeError):  # the latter for a host with a label that is too long
+        return False
+    return True
+
+
+class LiveStream:
+    """Sends samples to a viewer from a separate thread as they are recorded.
+
+    The simulation only puts its samples into an unbounded queue, so that a slow or closed viewer
+    never delays it. Use it as a context manager and as `simulate`'s observer. ``url`` is the
+    viewer's address; None opens a viewer.
+
+    Raises:
+        InputError: If no viewer listens at the address, or there is no screen to open one on.
+    """
+
+    def __init__(self, scenario: Scenario, url: str | None = None) -> None:
+        require_viewer(url)
+        # After the check, as Rerun takes a second to load.
+        from tiltsim.views.rerun.recording import Recording
+
+        self._assembly = assemble(scenario, recorded=True)
+        # A unique name: a viewer would merge two flights of one scenario into one recording.
+        recording = Recording([self._assembly], salt=uuid4().hex)
+        self._recording, self._stream = recording, recording.stream
+        attach_viewer(self._stream, url, recording.blueprint(live=True))
+        self._samples: SimpleQueue[Floats] = SimpleQueue()
+        self._end: End | None = None
+        self._over = Event()
+        # A daemon thread, so that a frozen viewer does not keep the program from exiting.
+        self._thread = Thread(target=self._send_all, name="live stream", daemon=True)
+
+    def __call__(self, sample: Floats) -> None:
+        """Queue a sample of the flight; returns immediately."""
+        self._samples.put(sample)
+
+    def __enter__(self) -> Self:
+        """Start sending."""
+        self._thread.start()
+        return self
+
+    def finish(self, end: End) -> None:
+        """Set how the flight ended; sent after its last sample."""
+        self._end = end
+
+    def __exit__(self, *_error: object) -> None:
+        """Send the remaining samples and stop, within `SHUTDOWN_TIMEOUT` seconds at most."""
+        self._over.set()
+        self._thread.join(SHUTDOWN_TIMEOUT)
+        if self._thread.is_alive():
+            _abandon_connection()
+
+    def _send_all(self) -> None:
+        try:
+            self._recording.draw_references(self._assembly.scenario.simulation.duration)
+            while not self._over.wait(SEND_INTERVAL):
+                self._send_queued()
+            self._send_queued()
+            if self._end is not None:
+                self._recording.finish([self._end])
+            self._stream.disconnect()
+        except Exception as error:  # the flight continues regardless of viewer errors
+            sys.stderr.write(f"tiltsim: live view ended: {printable(error)}\n")
+
+    def _send_queued(self) -> None:
+        """Send all queued samples as one piece of the flight."""
+        samples = []
+        try:
+            while True:
+                samples.append(self._samples.get_nowait())
+        except Empty:
+            pass
+        if samples:
+            now = float(samples[-1][0])
+            piece = Flight(self._assembly, np.array(samples), End("completed", now), "python", 0.0)
+            self._recording.append([piece])
+
+
+def _abandon_connection() -> None:
+    """Let the program exit before the viewer has received everything: Rerun would wait forever."""
+    import rerun as rr
+
+    rr.unregister_shutdown()
+    sys.stderr.write("tiltsim: the viewer does not respond; the live view is incomplete\n")
