@@ -191,7 +191,7 @@ class Overlay:
             squares = (now[f"rotor_speed_{rotor}"] ** 2 for rotor in (1, 2))
             rows["rotor speeds squared"] = ", ".join(f"{each:.0f}" for each in squares) + " rad2/s2"
             rows["direction error"] = f"{now['direction_ref'] - now['direction']:+.2f} rad"
-        if not rows:
+        if not rows and "yaw" in now:
             rows["yaw"] = f"{now['yaw']:+.2f} rad"
         return rows
 
