@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from functools import cached_property
+from collections.abc import Iterable
 from math import nan
 from typing import TYPE_CHECKING, Final, Protocol
 
@@ -12,10 +11,9 @@ import numpy as np
 from tiltsim.closed_loop.assembly import Assembly, program_key
 from tiltsim.engines.base import EngineName
 from tiltsim.engines.programs import Recorder
-from tiltsim.engines.sample_evaluation import termination_checks
 from tiltsim.engines.steppers import Integrated, Layout, NativeStepper, PythonStepper, observation
 from tiltsim.scenario.scenario import Scenario
-from tiltsim_controllers.mathematics.scalar import Floats, Values
+from tiltsim_controllers.mathematics.scalar import Floats
 
 if TYPE_CHECKING:
     from tiltsim.arrays.flying import JaxStepper
@@ -24,7 +22,6 @@ if TYPE_CHECKING:
 class Plant(Protocol):
     """A vehicle under control, advanced step by step and restartable from its state."""
 
-    _assembly: Assembly
     engine: EngineName
     state: Floats
     """Everything that the future depends on, as a vector; assign it to restart there."""
@@ -36,17 +33,22 @@ class Plant(Protocol):
     def advance(self, steps: int) -> None:
         """Take physics steps."""
 
-    def record(self, samples: int, steps: int) -> Floats:
-        """Take samples, one every ``steps`` physics steps, on the native engine.
+    def record(self, samples: int, steps: int) -> Floats | None:
+        """Take ``samples`` samples, one every ``steps`` physics steps: shape (samples, fields).
 
-        Returns:
-            ``samples`` rows, all but the last checked, shape (samples, fields). Fewer where the
-            flight ended on the way; the state of the plant is then undefined.
+        None where a sample or the physics engine shows that the flight ended on the way; the state
+        of the plant is then undefined.
         """
+        if self.engine == "native":
+            return self._record_natively(samples, steps)
+        rows = []
+        for _ in range(samples):
+            self.advance(steps)
+            rows.append(take_sample(self))
+        return None if self.fault() else np.array(rows)
 
-    @cached_property
-    def _checks(self) -> Callable[[float, Values], Values]:
-        return termination_checks(self._assembly)
+    def _record_natively(self, samples: int, steps: int) -> Floats | None:
+        """`record` on the native engine."""
 
     def observe(self) -> tuple[float, ...]:
         """The present values of a sample's fields after the time: `ClosedLoop.sample_fields`."""
@@ -167,12 +169,12 @@ class EquationsPlant(Plant):
         now = self._stepper.advance(self._step_index, self.state[1:], steps)
         self.state = np.array([self._step_index + steps, *now])
 
-    def record(self, samples: int, steps: int) -> Floats:
-        checked = self._checks(self.time, self.observe())[1:]
-        recorder = Recorder(self._assembly, samples, steps, checked)
+    def _record_natively(self, samples: int, steps: int) -> Floats | None:
+        checked = self._assembly.sign_check_values(self.time, self.observe())
+        recorder = Recorder(self._assembly, samples, steps, steps, checked)
         found = self._native.record(self._step_index, self.state[1:], samples, steps, recorder)
         self.state = np.array([found[0], *found[1]])
-        return recorder.samples
+        return None if recorder.terminated else recorder.samples
 
     def observe(self) -> tuple[float, ...]:
         try:
