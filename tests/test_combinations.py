@@ -27,6 +27,7 @@ from tiltsim.scenario.scenario_tables import DESCRIPTIVE
 from tiltsim.scenario.simulation_table import SimulationTable
 from tiltsim.scenario.vehicle import VehicleUnion
 from tiltsim.studies.multirotor_analysis import FLEET, fleet_file
+from tiltsim.views.figures import layout
 from tiltsim.views.figures.style import save
 from tiltsim.views.rerun.recording import save_recording
 from tiltsim.views.video.offscreen import Overlay
@@ -488,8 +489,12 @@ COLUMNS_DRAWN = set()
 
 @pytest.mark.slow
 @pytest.mark.parametrize("layer", LAYERS)
-def test_every_law_takes_every_table_and_key_or_refuses_it_in_a_line(layer, tmp_path):
-    """Its vehicles, and the plants, take the groups of keys in turn, or else the table alone."""
+def test_every_law_takes_every_table_and_key_or_refuses_it_in_a_line(layer, tmp_path, monkeypatch):
+    """Its vehicles, and the plants, take the groups of keys in turn, or else the table alone.
+
+    Panels of new columns are drawn, but not laid out, which takes longer than the flight.
+    """
+    monkeypatch.setattr(layout, "place_legends", lambda _page: None)
     number = [*LAYERS].index(layer)
     for change in together(layer):
         for law in dict(FITTING):

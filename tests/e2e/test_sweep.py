@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -52,6 +53,20 @@ def grid(tmp_path):
     return file
 
 
+@pytest.fixture(scope="module")
+def flown(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("grid")
+    (folder / "grid.toml").write_text(GRID, encoding="utf-8")
+    swept(folder / "grid.toml", folder / "out")
+    return folder
+
+
+@pytest.fixture
+def finished(flown, tmp_path):
+    """A copy of the folder with the grid and, in ``out``, its results."""
+    return shutil.copytree(flown, tmp_path / "finished")
+
+
 def test_sweep_writes_one_dataset_and_prints_a_summary(grid, tmp_path, capsys):
     out = tmp_path / "out"
     assert main(["sweep", str(grid), "--out", str(out), "--jobs", "1"]) == 0
@@ -65,13 +80,13 @@ def test_sweep_writes_one_dataset_and_prints_a_summary(grid, tmp_path, capsys):
     assert capsys.readouterr() == ("", "")
 
 
-def test_a_continued_sweep_prints_how_much_is_finished(grid, tmp_path, capsys):
-    command = ["sweep", str(grid), "--out", str(tmp_path / "out"), "--jobs", "1"]
-    assert main([*command, "--quiet"]) == 0
+def test_a_continued_sweep_prints_how_much_is_finished(finished, capsys):
+    out = finished / "out"
+    command = ["sweep", str(finished / "grid.toml"), "--out", str(out), "--jobs", "1"]
     assert main(command) == 0
     assert capsys.readouterr().err == "A grid: all 12 flights finished, nothing to fly\n"
     for number in (3, 7):
-        (tmp_path / "out" / "parts" / f"{number:06d}.parquet").unlink()
+        (out / "parts" / f"{number:06d}.parquet").unlink()
     assert main(command) == 0
     assert capsys.readouterr().err == "A grid: 10 of 12 flights finished, 2 to fly\n"
 
@@ -88,9 +103,9 @@ def test_set_changes_the_base(grid, tmp_path):
     assert set(pq.read_table(tmp_path / "out" / "sweep.parquet")["end_time"].to_pylist()) == {0.004}
 
 
-def test_a_changed_sweep_is_refused(grid, tmp_path, capsys):
-    options = ["--out", str(tmp_path / "out"), "--jobs", "1", "--quiet"]
-    assert main(["sweep", str(grid), *options]) == 0
+def test_a_changed_sweep_is_refused(finished, capsys):
+    options = ["--out", str(finished / "out"), "--jobs", "1", "--quiet"]
+    grid = finished / "grid.toml"
     grid.write_text(GRID.replace("count = 2", "count = 5"), encoding="utf-8")
     assert main(["sweep", str(grid), *options]) == 2
     error = capsys.readouterr().err
@@ -159,8 +174,8 @@ def swept(file, out):
     return out
 
 
-def test_plot_draws_a_map_of_two_axes(grid, tmp_path, capsys):
-    out = swept(grid, tmp_path / "out")
+def test_plot_draws_a_map_of_two_axes(finished, capsys):
+    out = finished / "out"
     assert main(["plot", str(out), "--metric", "max_abs_roll"]) == 0
     assert (out / "sweep.png").read_bytes().startswith(b"\x89PNG")
     figure = sweep_figure(load_results(out), ("max_abs_roll",))

@@ -336,7 +336,7 @@ def test_native_code_notices_at_which_sample_the_others_are_singular():
     tables = merge(WITHOUT_ONE, {"simulation": {"engine": "native"}})
     assembly = assemble(tiltsim.load_scenario(document("pentarotor", PENTAROTOR, **tables)))
     for samples, ends in ((8, False), (9, True)):
-        assert (make_plant(assembly).record(samples, 1) is None) == ends
+        assert (len(make_plant(assembly).record(samples, 1)) < samples) == ends
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,6 @@ import pytest
 import tiltsim
 import tiltsim.engines.sample_evaluation
 import tiltsim.plants.plant
-import tiltsim.simulation.native_batch
 from tests.flights import TILT_CAR
 from tests.laws.layers.test_actuation import EVERYTHING
 from tests.laws.layers.test_air import STORM
@@ -20,12 +19,14 @@ from tests.laws.test_laws import GUST, LAWS
 from tests.refusals import refusal
 from tiltsim.laws.assembling import LOOPS, assemble, loop_of
 from tiltsim.plants.mujoco_plant import MujocoPlant, flight_model, model_cache_key
+from tiltsim.plants.plant import take_sample
 from tiltsim.resources import shipped_folder
 from tiltsim.scenario.loading import merge
 from tiltsim.scenario.scenario_tables import Gait
 from tiltsim.simulation import batch
 from tiltsim.simulation.batch import fly
-from tiltsim.simulation.native_batch import ROWS_PER_THREAD
+from tiltsim.simulation.native_batch import WAITING
+from tiltsim.simulation.simulate import TerminationMonitor, fly_chunk, make_plant
 from tiltsim.system import arguments
 
 TROT = {"amplitude": 0.3, "period": 0.8}
@@ -211,9 +212,9 @@ def test_flights_end_early_on_the_same_step_with_the_same_cause(plant):
 
 
 @pytest.mark.slow
-def test_a_row_that_ends_early_makes_room_for_the_next():
-    """More flights than rows, an hour each, if they did not diverge in the first second."""
-    many = [scenario(UPSIDE_DOWN, duration=3600.0, record_timestep=1.0)] * (ROWS_PER_THREAD + 4)
+def test_a_flight_that_ends_early_makes_room_for_the_next():
+    """An hour each, if they did not diverge in the first second."""
+    many = [scenario(UPSIDE_DOWN, duration=3600.0, record_timestep=1.0)] * (WAITING + 4)
     results = list(fly(many, threads=1))
     assert len(results) == len(many)
     assert {result.end.time for result in results} == {results[0].end.time}
@@ -221,24 +222,25 @@ def test_a_row_that_ends_early_makes_room_for_the_next():
     assert all(result.flight is None for result in results)
 
 
-def test_an_early_end_is_located_from_the_last_calls_on(monkeypatch):
-    """Calls of 64 steps: at most two of them and one recording interval are flown again."""
+def test_an_early_end_is_located_from_the_last_good_sample_on(monkeypatch):
     steps_taken = []
     advance = MujocoPlant.advance
 
-    def counted(plant, steps, *rest):
+    def counted(plant, steps):
         steps_taken.append(steps)
-        return advance(plant, steps, *rest)
+        return advance(plant, steps)
 
-    flown = scenario(LATE_LOSS, duration=3600.0, record_timestep=0.05)
-    monkeypatch.setattr(tiltsim.simulation.native_batch, "CALL_TIME", 0.0)
+    flown = scenario(LATE_LOSS, duration=3.0, record_timestep=0.05)
+    alone, assembly = tiltsim.simulate(flown), assemble(flown)
+    plant, monitor = make_plant(assembly), TerminationMonitor(assembly)
+    assert monitor.check(plant, take_sample(plant)) is None
     monkeypatch.setattr(MujocoPlant, "advance", counted)
-    (row,) = fly([flown], keep_samples=True)
-    assert 2.0 < row.end.time < 2.1
-    assert 0 < sum(steps_taken) <= 2 * 64 + 50
-    alone = tiltsim.simulate(flown)
-    assert row.end == alone.end
-    np.testing.assert_array_equal(row.flight.samples, alone.samples)
+    samples, end = fly_chunk(plant, monitor, 60, 50)
+    assert 2.0 < end.time < 2.1
+    assert end == alone.end
+    np.testing.assert_array_equal(samples, alone.samples[1:])
+    assert steps_taken[:3] == [60 * 50, 50 * (len(samples) - 1), 50]
+    assert sum(steps_taken[3:]) <= 50
 
 
 # --- layers around the laws ---------------------------------------------------------------------
@@ -527,14 +529,10 @@ def test_functions_that_processes_cannot_import_are_refused():
 
 
 def test_a_batch_reports_flights_whose_results_wait_for_others(monkeypatch):
-    class Flown:
-        def __init__(self, assemblies, *_):
-            self.flights = len(assemblies)
+    def flown(assemblies, *_):
+        return ((place, SimpleNamespace(has_failed=False)) for place in range(len(assemblies)))
 
-        def results(self):
-            return ((place, SimpleNamespace(has_failed=False)) for place in range(self.flights))
-
-    monkeypatch.setattr(batch, "NativeBatch", Flown)
+    monkeypatch.setattr(batch, "fly_in_mujoco", flown)
     monkeypatch.setattr(batch, "_way_to_fly", lambda assembly, _: assembly.scenario.title)
     monkeypatch.setattr(arguments, "INTERVAL", 0.0)
     counts = []

@@ -234,9 +234,7 @@ def _next_time(header: Any) -> Any:
     return evaluation_time(header[EVALUATIONS], header[EVALUATIONS_PER_STEP], header[TIMESTEP])
 
 
-SAMPLES, CAPACITY, TERMINATED = map(
-    RecorderHead._fields.index, ("samples", "capacity", "terminated")
-)
+SAMPLES, TERMINATED = map(RecorderHead._fields.index, ("samples", "terminated"))
 
 UNLIMITED: Final = (inf, inf, inf, 0.0, inf)
 """The head, up to its capacity, of a recorder that never takes a sample."""
@@ -270,14 +268,12 @@ class Recorder:
     """Memory for the samples of one flight, to which native code writes.
 
     The callback takes a sample before the step that ends an interval, the first after a full one.
-    Once there is no room for more, or a sample ends the flight, it returns NaN controls: MuJoCo
-    warns of them and a batch stops there.
+    Once there is no room for more, or a sample ends the flight, it returns NaN controls.
 
     Args:
         assembly: The flight.
         samples: How many to take.
-        interval, last_interval: Evaluations of the control step between samples, and between the
-            last two.
+        interval: Evaluations of the control step between samples.
         checked: The numbers that must keep their signs, as they are now; see `ClosedLoop`.
 
     Attributes:
@@ -286,12 +282,7 @@ class Recorder:
     """
 
     def __init__(
-        self,
-        assembly: Assembly,
-        samples: int,
-        interval: int,
-        last_interval: int,
-        checked: Sequence[float],
+        self, assembly: Assembly, samples: int, interval: int, checked: Sequence[float]
     ) -> None:
         loop = assembly.loop
         width = len(loop.sample_fields)
@@ -299,8 +290,7 @@ class Recorder:
         self._memory = np.zeros(HEAD_SIZE + SIDES + samples * width + 1)
         self.head = self._memory[: HEAD_SIZE + SIDES]
         self.rows = self._memory[HEAD_SIZE + SIDES : -1].reshape(samples, width)
-        left = interval if samples > 1 else last_interval
-        self.head[:HEAD_SIZE] = recorder_head(assembly, left, samples, interval, last_interval)
+        self.head[:HEAD_SIZE] = recorder_head(assembly, interval, samples, interval, interval)
         if len(checked) > SIDES:
             raise ValueError(f"{loop.model}: {len(checked)} sign checks, at most {SIDES}")
         for index, value in enumerate(checked):
@@ -313,15 +303,10 @@ class Recorder:
 
     @property
     def samples(self) -> Floats:
-        """The samples taken so far, shape (N, len(loop.sample_fields))."""
-        return self.rows[: int(self.head[SAMPLES])]
+        """The samples so far that do not end the flight, shape (N, len(loop.sample_fields))."""
+        return self.rows[: int(self.head[SAMPLES]) - self.terminated]
 
     @property
     def terminated(self) -> bool:
         """Whether the last sample ends the flight."""
         return bool(self.head[TERMINATED])
-
-    @property
-    def full(self) -> bool:
-        """Whether all samples have been taken."""
-        return bool(self.head[SAMPLES] == self.head[CAPACITY])

@@ -256,31 +256,17 @@ class MujocoPlant(Plant):
         before = int(mujoco.mjtState.mjSTATE_USERDATA) - 1
         return int(mujoco.mj_stateSize(self.model, _INTEGRATION & before))
 
-    def recorder(self, samples: int, steps: int, last_steps: int) -> Recorder:
-        """Memory for the samples of the native engine; its address goes to ``userdata[RECORDER]``.
-
-        Args:
-            samples: Number of samples.
-            steps, last_steps: Physics steps between samples, and before the last one.
-        """
-        evaluations = self._evaluations_per_step
-        return Recorder(
-            self._assembly,
-            samples,
-            steps * evaluations,
-            last_steps * evaluations,
-            self._assembly.sign_check_values(self.time, self.observe()),
-        )
-
-    def _record_natively(self, samples: int, steps: int) -> Floats | None:
-        recorder = self.recorder(samples, steps, steps)
+    def record(self, samples: int, steps: int) -> Floats:
+        evaluations = steps * self._evaluations_per_step
+        checked = self._checks(self.time, self.observe())[1:]
+        recorder = Recorder(self._assembly, samples, evaluations, checked)
         self.data.userdata[RECORDER] = recorder.address
         try:
             self.advance(samples * steps)
         finally:
             self.data.userdata[RECORDER] = 0.0
         if recorder.terminated or self.fault():
-            return None
+            return recorder.samples
         return np.vstack([recorder.samples, (self.time, *self.observe())])
 
     def observe(self) -> tuple[float, ...]:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from functools import cached_property
 from math import nan
 from typing import TYPE_CHECKING, Final, Protocol
 
@@ -11,9 +12,10 @@ import numpy as np
 from tiltsim.closed_loop.assembly import Assembly, program_key
 from tiltsim.engines.base import EngineName
 from tiltsim.engines.programs import Recorder
+from tiltsim.engines.sample_evaluation import termination_checks
 from tiltsim.engines.steppers import Integrated, Layout, NativeStepper, PythonStepper, observation
 from tiltsim.scenario.scenario import Scenario
-from tiltsim_controllers.mathematics.scalar import Floats
+from tiltsim_controllers.mathematics.scalar import Floats, Values
 
 if TYPE_CHECKING:
     from tiltsim.arrays.flying import JaxStepper
@@ -22,6 +24,7 @@ if TYPE_CHECKING:
 class Plant(Protocol):
     """A vehicle under control, advanced step by step and restartable from its state."""
 
+    _assembly: Assembly
     engine: EngineName
     state: Floats
     """Everything that the future depends on, as a vector; assign it to restart there."""
@@ -33,22 +36,17 @@ class Plant(Protocol):
     def advance(self, steps: int) -> None:
         """Take physics steps."""
 
-    def record(self, samples: int, steps: int) -> Floats | None:
-        """Take ``samples`` samples, one every ``steps`` physics steps: shape (samples, fields).
+    def record(self, samples: int, steps: int) -> Floats:
+        """Take samples, one every ``steps`` physics steps, on the native engine.
 
-        None where a sample or the physics engine shows that the flight ended on the way; the state
-        of the plant is then undefined.
+        Returns:
+            ``samples`` rows, all but the last checked, shape (samples, fields). Fewer where the
+            flight ended on the way; the state of the plant is then undefined.
         """
-        if self.engine == "native":
-            return self._record_natively(samples, steps)
-        rows = []
-        for _ in range(samples):
-            self.advance(steps)
-            rows.append(take_sample(self))
-        return None if self.fault() else np.array(rows)
 
-    def _record_natively(self, samples: int, steps: int) -> Floats | None:
-        """`record` on the native engine."""
+    @cached_property
+    def _checks(self) -> Callable[[float, Values], Values]:
+        return termination_checks(self._assembly)
 
     def observe(self) -> tuple[float, ...]:
         """The present values of a sample's fields after the time: `ClosedLoop.sample_fields`."""
@@ -169,12 +167,12 @@ class EquationsPlant(Plant):
         now = self._stepper.advance(self._step_index, self.state[1:], steps)
         self.state = np.array([self._step_index + steps, *now])
 
-    def _record_natively(self, samples: int, steps: int) -> Floats | None:
-        checked = self._assembly.sign_check_values(self.time, self.observe())
-        recorder = Recorder(self._assembly, samples, steps, steps, checked)
+    def record(self, samples: int, steps: int) -> Floats:
+        checked = self._checks(self.time, self.observe())[1:]
+        recorder = Recorder(self._assembly, samples, steps, checked)
         found = self._native.record(self._step_index, self.state[1:], samples, steps, recorder)
         self.state = np.array([found[0], *found[1]])
-        return None if recorder.terminated else recorder.samples
+        return recorder.samples
 
     def observe(self) -> tuple[float, ...]:
         try:

@@ -20,7 +20,7 @@ from tiltsim.scenario.loading import as_scenario
 from tiltsim.scenario.own_parts import require_trust
 from tiltsim.scenario.scenario import Scenario
 from tiltsim.scenario.vehicle import VehicleTable
-from tiltsim.simulation.native_batch import LaneBatch, NativeBatch, lanes_for
+from tiltsim.simulation.native_batch import LaneBatch, fly_in_mujoco, lanes_for
 from tiltsim.simulation.simulate import simulate_assembly
 from tiltsim.system.arguments import (
     Report,
@@ -253,7 +253,7 @@ def _fly_window(
         elif chosen[0].scenario.simulation.plant != "mujoco":
             flown = LaneBatch(chosen, lanes_for(len(chosen)), threads, pool, result).results()
         else:
-            flown = NativeBatch(chosen, threads, pool, result).results()
+            flown = fly_in_mujoco(chosen, threads, pool, result)
         yield from ((indices[place], outcome) for place, outcome in flown)
 
 

@@ -1,7 +1,6 @@
 """Simulate a scenario: advance the plant, record samples, find the end."""
 
 from collections.abc import Callable, Iterable, Mapping
-from functools import cached_property
 from math import copysign, isfinite
 from os import PathLike
 from time import perf_counter
@@ -45,7 +44,7 @@ class TerminationMonitor:
     def __init__(self, assembly: Assembly) -> None:
         self._assembly, self._loop, self._setup = assembly, assembly.loop, assembly.setup
         self._reference, self._knots = assembly.reference, assembly.knots
-        self._follows_position = assembly.follows_position
+        self._checks = termination_checks(assembly)
         self._sides: dict[int, float] = {}
 
     def check(self, plant: Plant | None, sample: Floats) -> End | None:
@@ -53,45 +52,19 @@ class TerminationMonitor:
 
         It is of the plant's present state; None for a flight on arrays, which reports no fault.
         """
-        state = dict(zip(self._loop.sample_fields, sample.tolist(), strict=True))
-        time = state["time"]
+        time, *values = sample.tolist()
+        state = dict(zip(self._loop.sample_fields, (time, *values), strict=True))
         finite = all(map(isfinite, state.values()))
+        checks = self._checks(time, values) if finite else ()
         fault = "" if plant is None else plant.fault()
         if fault:
-            singular = (
-                self._check_signs(time, state, self._checks(plant, state)) if finite else None
-            )
-            return singular or End("diverged", time, fault)
+            return self._check_signs(time, state, checks) or End("diverged", time, fault)
         if not finite:
             name = next(name for name, value in state.items() if not isfinite(value))
             return End("diverged", time, f"{name} is no longer finite")
-        checks = self._checks(plant, state)
         return self._check_limits(time, state, int(checks[0])) or self._check_signs(
             time, state, checks
         )
-
-    def _checks(self, plant: Plant | None, state: dict[str, float]) -> Values:
-        """The code of the limit that a sample exceeds, and the numbers whose signs are checked."""
-        time, *values = state.values()
-        if plant is not None and plant.engine == "python" and self._assembly.traced:
-            return self._traced_checks(time, tuple(values))
-        limits = self._reference, self._knots, self._follows_position
-        code = self._loop.kind.limit_exceeded(time, values, *limits)
-        return code, *self._loop.sign_check_values(time, values, *self._setup)
-
-    @cached_property
-    def _traced_checks(self) -> Callable[[float, Values], Values]:
-        """For flights in Python: all their samples are checked here, natively a few."""
-        return termination_checks(self._assembly)
-
-    def passes(self, plant: Plant, samples: Floats) -> bool:
-        """Whether none of the samples that `Plant.record` returned ends the flight.
-
-        Native code has checked all but the last; see `tiltsim.engines.programs.Recorder`.
-        """
-        if plant.engine == "native":
-            samples = samples[-1:]
-        return all(self.check(plant, sample) is None for sample in samples)
 
     def _check_limits(self, time: float, state: dict[str, float], code: int) -> End | None:
         if code == WITHIN_LIMITS:
@@ -127,7 +100,7 @@ class TerminationMonitor:
 CHUNK_TIME: Final = 0.1
 """Wall time (s) of native code between checks of the samples and the keyboard."""
 
-FIRST_CHUNK: Final = 8  # samples
+FIRST_STEPS: Final = 500  # of the first chunk of native code
 LARGEST_CHUNK: Final = 100_000
 
 Observer = Callable[[Floats], None]
@@ -217,17 +190,22 @@ def simulate_to_end(scenario: Scenario) -> Flight:
 
 
 def simulate_assembly(
-    assembly: Assembly, observer: Observer | None = None, *, report: Report = lambda time: None
+    assembly: Assembly,
+    observer: Observer | None = None,
+    *,
+    plant: Plant | None = None,
+    report: Report = lambda time: None,
 ) -> Flight:
     """`simulate` for a flight that is assembled already.
 
     Args:
         assembly: The flight.
         observer: See `simulate`.
+        plant: Its plant at time zero; default: the one that the scenario requests.
         report: Called with the simulated time (s) after every chunk of samples.
     """
     simulation = assembly.scenario.simulation
-    plant = make_plant(assembly)
+    plant = plant or make_plant(assembly)
     monitor = TerminationMonitor(assembly)
     samples: list[Floats] = []
 
@@ -240,7 +218,9 @@ def simulate_assembly(
     try:
         record(take_sample(plant))
         end = monitor.check(plant, samples[0])
-        steps_left, chunk = simulation.steps, FIRST_CHUNK if plant.engine == "native" else 1
+        steps_left, chunk = simulation.steps, 1
+        if plant.engine == "native":
+            chunk = FIRST_STEPS // simulation.record_steps
         while steps_left > 0 and end is None:
             steps = min(simulation.record_steps, steps_left)
             count = max(1, min(chunk, steps_left // steps))
@@ -291,8 +271,7 @@ def fly_chunk(
 ) -> tuple[Iterable[Floats], End | None]:
     """Fly one or more recording intervals.
 
-    If the flight ends within them, they are repeated sample by sample, and the last one step by
-    step, to find the exact step.
+    If the flight ends within them, the last one is repeated step by step, to find the exact step.
 
     Args:
         plant, monitor: The plant, which is advanced, and the monitor of its flight.
@@ -305,23 +284,21 @@ def fly_chunk(
     before = plant.state
     if samples > 1:
         flown = plant.record(samples, steps)
-        if flown is not None and monitor.passes(plant, flown):
+        if len(flown) == samples and monitor.check(plant, flown[-1]) is None:
             return flown, None
+        plant.state, flown = before, flown[: samples - 1]
+        plant.advance(len(flown) * steps)
+        if plant.fault():
+            plant.state, flown = before, flown[:0]
+        rest, end = fly_chunks(plant, monitor, [(1, steps)] * (samples - len(flown)))
+        return [*flown, *rest], end
+    plant.advance(steps)
+    sample = take_sample(plant)
+    end = monitor.check(plant, sample)
+    if end is not None:
         plant.state = before
-    recorded = []
-    for _ in range(samples):
-        before = plant.state
-        plant.advance(steps)
-        sample = take_sample(plant)
-        end = monitor.check(plant, sample)
-        if end is not None:
-            plant.state = before
-            sample, end = _first_bad_step(plant, monitor, steps, sample, end)
-        if np.isfinite(sample).all():
-            recorded.append(sample)
-        if end is not None:
-            return recorded, end
-    return recorded, None
+        sample, end = _first_bad_step(plant, monitor, steps, sample, end)
+    return [sample] if np.isfinite(sample).all() else [], end
 
 
 def intervals_of(assembly: Assembly) -> list[int]:
@@ -331,13 +308,13 @@ def intervals_of(assembly: Assembly) -> list[int]:
     return [simulation.record_steps] * full + [rest] * (rest > 0)
 
 
-def fly_intervals(
-    plant: Plant, monitor: TerminationMonitor, intervals: Iterable[int]
+def fly_chunks(
+    plant: Plant, monitor: TerminationMonitor, chunks: Iterable[tuple[int, int]]
 ) -> tuple[list[Floats], End | None]:
-    """Fly recording intervals of some steps each; see `fly_chunk`."""
+    """`fly_chunk` one after the other, until the flight ends."""
     samples: list[Floats] = []
-    for interval in intervals:
-        found, end = fly_chunk(plant, monitor, 1, interval)
+    for chunk in chunks:
+        found, end = fly_chunk(plant, monitor, *chunk)
         samples.extend(found)
         if end is not None:
             return samples, end
