@@ -94,6 +94,12 @@ def push_along(observed: Observed, acceleration: Any, axis: Any) -> Any:
     return body.mass * (force @ axis) / norm(axis)
 
 
+def torque_for(observed: Observed, angular: Any) -> Any:
+    """The torque (N m) of an angular acceleration (rad/s^2), body axes, shape (3,) each."""
+    momentum = observed.inertia @ observed.body_rates
+    return observed.inertia @ angular + observed.gyroscopic * cross(observed.body_rates, momentum)
+
+
 def lift_without_torque(observed: Observed) -> Any:
     """The shortest thrusts without torque whose force has 1 N along body z, shape (N,).
 
