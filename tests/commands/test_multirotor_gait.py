@@ -136,6 +136,7 @@ def test_the_summary_is_readable(capsys):
         (["x.toml"], "--mjcf: cannot be combined with SCENARIO"),
         (["--list"], "--list: takes no other option than --json"),
         (["--figure", "faults", "--plot", "f.png"], "choose roll_pitch or attainable"),
+        (["--figure", "determinant", "--plot", "f.png"], "choose roll_pitch or attainable"),
         (["--figure", "attainable"], "--figure attainable: needs --plot FILE"),
         (["--speed-limits", "3"], "needs MIN,MAX"),
     ],

@@ -313,6 +313,13 @@ def test_huge_axes_are_refused_or_tried_in_a_few_places(points_of, count, monkey
         points_of(axis + AMPLITUDES + MASS + "[sample]\ncount = 1000000")
 
 
+def test_more_points_than_a_machine_word_counts_are_refused(points_of):
+    keys = ("gait.period", "gait.amplitude", "vehicle.mass", "reference.yaw", "initial.yaw")
+    axes = (PERIODS.replace("gait.period", key).replace("5", "20000") for key in keys)
+    with pytest.raises(InputError, match=f"axis = {20_000**5}: more than 10000000 points"):
+        points_of("".join(axes))
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [

@@ -67,7 +67,7 @@ def run(
         print(json_text([asdict(row) for row in rows]) if json else list_text(rows))
         return 0
     _check_options(scenario, gait, figure)
-    if figure.kind == "determinant":
+    if figure.kind == "determinant" and gait.mjcf is None:
         analysis = _of_determinant(gait, figure)
     else:
         limits = figure.speed_limits

@@ -256,7 +256,7 @@ class InstrumentTables(Table):
 
 
 def check_instruments(scenario: Any) -> None:
-    """Instruments that a flight cannot read, and an estimator that lacks some."""
+    """Refuse instruments that a flight cannot read, and an estimator that lacks some."""
     found, sensors, controller = scenario.sensors.instruments, scenario.sensors, scenario.controller
     planar, step = scenario.vehicle.is_planar, scenario.simulation.control_timestep
     if controller.estimator is not None:

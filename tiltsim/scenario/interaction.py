@@ -113,7 +113,7 @@ def objects_of(scenario: Any) -> Objects | None:
 
 
 def check_objects(scenario: Any) -> None:
-    """Objects, tools and loads where nothing could fly with them, or push them."""
+    """Refuse objects, tools and loads where nothing could fly with them, or push them."""
     _check_cables(scenario)
     controller, vehicle = scenario.controller, scenario.vehicle
     if scenario.reference.type == "push":

@@ -94,7 +94,7 @@ class AnyVehicleTable(Table, ABC):
         return 0.0, None  # thrusts push and cannot pull
 
     def check_scenario(self, scenario: Any) -> None:
-        """Contradictions to a scenario of this vehicle: keys, reasons, and values not their own."""
+        """Refuse a scenario that contradicts its vehicle. Raises `InvalidValueError`."""
 
 
 class PlanarTable(AnyVehicleTable, ABC):
@@ -103,7 +103,7 @@ class PlanarTable(AnyVehicleTable, ABC):
     is_planar = True
 
     def check_scenario(self, scenario: Any) -> None:
-        """Motion out of the plane, references of yaw, and gaits that the law does not follow."""
+        """Refuse motion out of the plane, a reference of yaw, and a gait that the law ignores."""
         initial, controller, gait = scenario.initial, scenario.controller, scenario.gait
         out_of_plane: dict[str, tuple[float, ...]] = {
             "initial.position": initial.position[2:],
@@ -289,7 +289,7 @@ class MultirotorTable(RotorcraftTable):
         return self.file.pod_inertias
 
     def check_scenario(self, scenario: Any) -> None:
-        """Servos without tilts, and laws for which the rotors are too few."""
+        """Refuse servos without tilts, and laws for which the rotors are too few."""
         tilts, controller = self.has_tilting_rotors, scenario.controller
         if not tilts:
             reason = "vehicle.mjcf has no tilts; remove it"

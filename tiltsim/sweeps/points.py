@@ -101,8 +101,9 @@ class SweepPoints:
         self.cases = [axis for axis in axes if isinstance(axis, tables.CasesAxis)]
         samples = self.sweep.sample.count if self.sweep.sample is not None else 1
         self._lengths = [*(len(group) for group in self._groups), samples]
-        if len(self) > MAX_POINTS:
-            raise definition.mistake("axis", len(self), f"more than {MAX_POINTS} points")
+        points = prod(self._lengths)  # may be too large for `len`
+        if points > MAX_POINTS:
+            raise definition.mistake("axis", points, f"more than {MAX_POINTS} points")
 
     def __len__(self) -> int:
         """Number of points."""

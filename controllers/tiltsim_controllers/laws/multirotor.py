@@ -272,6 +272,7 @@ def _start(w: Any, speeds: Any, p: Any, form: Form) -> Any:
 
 def _null_part(wrench: Any, up: Any, w: Any, form: Form) -> Any:
     """The share of ``w`` that the outputs do not see, whatever the norm, from 0 to 1."""
+    # In the norm of accelerations a rotor that comes to rest would take the share with it.
     if len(w) <= 3 + form.dimension:
         return 0.0
     units = factors(wrench, wrench[:3], up, form.dimension, form.forward).units

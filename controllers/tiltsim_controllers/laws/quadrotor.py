@@ -70,7 +70,7 @@ POSITION_GAINS: Final = {
     # Ours: the same k_1, all four poles of the position loop at -2.5.
     "stable": PositionGains((10.0, 37.5, 62.5, 39.0625), (5.0, 5.0)),
 }
-"""PositionGains by name (ch. 2, Eqs. A2-A6)."""
+"""Gains of yaw-position control by name (ch. 2, Eqs. A2-A6)."""
 
 YawPositionGains = NamedGains[Literal["ch02", "stable"], YawPositionGainTable]
 YAW_POSITION_GAINS: Final = (
@@ -194,7 +194,7 @@ class QuadrotorAttitudeGainTable(Keys):
 AttitudeGains = record_of(QuadrotorAttitudeGainTable)
 
 ATTITUDE_GAINS: Final = {"ch02": AttitudeGains((10.0, 10.0), (10.0, 10.0))}
-"""AttitudeGains by name; ch. 2, Eqs. (A8)-(A9)."""
+"""Gains of attitude-altitude control by name; ch. 2, Eqs. (A8)-(A9)."""
 
 QuadrotorAttitudeGains = NamedGains[Literal["ch02"], QuadrotorAttitudeGainTable]
 
