@@ -17,7 +17,7 @@ from tiltsim.flight.flight import Flight
 from tiltsim.flight.metrics import End
 from tiltsim.scenario.loading import load_scenario, parse_scenario
 from tiltsim.scenario.metric_names import BOOLEAN_METRICS, METRICS
-from tiltsim.vehicles.metrics import in_last_second, when_settled
+from tiltsim.vehicles.metrics import _contact_metrics, in_last_second, when_settled
 from tiltsim.vehicles.rotorcraft import COLUMNS
 
 R = 2.423e-7 / (0.1785 * 8.048e-6)  # K_m / (L K_f), ch. 3
@@ -83,6 +83,28 @@ def test_all_metrics_are_declared_and_in_this_order():
     others |= of_the_supervisor | of_objects
     assert set(METRICS) - set(metrics) == others
     assert list(metrics) == [name for name in METRICS if name in metrics]
+
+
+def test_forces_count_from_a_second_after_their_ramp_and_swings_in_the_last_second():
+    time = np.linspace(0.0, 10.0, 101)
+    commanded = np.clip(time, 0.0, 4.0)  # N; the last sample of the ramp is at 3.9 s
+    error = np.where(time > 4.95, np.where(np.arange(101) % 2, 0.3, -0.1), 7.0)
+    swing = np.where(time > 8.95, 0.05, 0.2)
+    columns = {
+        "time": time,
+        "push_force_ref": commanded,
+        "push_force": commanded + error,
+        "cable_tension": np.where(time == 2.0, 3.0, 1.0),
+        "sling_tension": np.where(time == 6.0, 5.0, 1.0),
+        "swing_x": 0.6 * swing,
+        "swing_y": -0.8 * swing,
+    }
+    found = _contact_metrics(columns, in_last_second(time, 0.1))
+    counted = error[time > 4.95]
+    assert found["rms_force_error"] == pytest.approx(np.sqrt(np.mean(counted**2)))
+    assert found["max_cable_tension"] == 5.0
+    assert found["max_swing"] == pytest.approx(0.2)
+    assert found["final_swing"] == pytest.approx(0.05)
 
 
 def test_orbits_are_measured_from_the_center_of_the_circle():

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -11,7 +14,16 @@ from tiltsim.laws.assembling import assemble
 from tiltsim.studies.benchmark import compiled_time_per_call
 from tiltsim_controllers.analysis.vectoring_design import TRACKING
 from tiltsim_controllers.analysis.vectoring_limits import Craft, side_slope
-from tiltsim_controllers.laws.vectoring_steps import Frame, braked, demanded, turn_by
+from tiltsim_controllers.laws.vectoring_state import following, predicted, servo_doubts
+from tiltsim_controllers.laws.vectoring_steps import (
+    Frame,
+    Motion,
+    braked,
+    demanded,
+    moved,
+    turn_by,
+    turning,
+)
 from tiltsim_controllers.mathematics.moving import Moving
 from tiltsim_controllers.vehicle.rotors import force_and_torque, table_per_newton
 
@@ -489,3 +501,88 @@ def test_side_force_of_tilts_stays_within_their_range():
         slopes.append(side_slope(tilting))
         assert 0.5 * np.tan(0.9 * most) < slopes[-1] / 0.8 < np.tan(0.9 * most)
     assert slopes[0] < slopes[1]
+
+
+def designed(vehicle):
+    """Parameters of the law in the world of these tests."""
+    changed = tables(vehicle, 1.0)
+    law = tiltsim.load_scenario(changed).controller
+    return law.law_parameters(tiltsim.airframe(changed))
+
+
+def test_the_model_of_rotors_is_their_lag():
+    """Commands ramp over a period of 4 ms, and speeds follow them with a lag of 30 ms."""
+    p, steps, (before, first, last) = designed("quadrotor"), 1000, (300.0, 400.0, 650.0)
+    speed = before
+    for step in range(steps):
+        command = first + (last - first) * (step + 0.5) / steps
+        speed += (command - speed) * (1.0 - np.exp(-0.004 / steps / 0.03))
+    found = following(SimpleNamespace(p=p), before, (first, last))
+    assert found == pytest.approx(speed, rel=1e-8)  # of the sum
+    assert p.begun == pytest.approx(1.0 - np.exp(-0.002 / 0.03))
+    assert p.gone == pytest.approx(1.0 - np.exp(-0.004 / 0.03))
+
+
+@pytest.mark.parametrize("vehicle", SPEEDS)
+def test_every_demand_is_soft(vehicle):
+    """A softness of zero or less would make the allocation's system singular."""
+    p = designed(vehicle)
+    for able in (p, p.after):
+        assert min(able.side_softness, able.lean_softness, able.yaw_softness) > 0.0
+
+
+def test_a_lean_is_corrected_about_its_axis():
+    still = Motion(np.zeros(3), np.zeros(3), np.eye(3), np.zeros(3))
+    p, error = designed("quadrotor"), np.array([2e-3, 5e-3, 0.0])
+    found = turning(still, turn_by(error), np.zeros(3), np.zeros(3), p)
+    np.testing.assert_allclose(found, p.attitude**2 * error, rtol=1e-4, atol=1e-9)
+
+
+def test_a_servo_that_does_not_move_is_doubted():
+    """A second servo that moves is not, nor one that has arrived."""
+    p, doubt = SimpleNamespace(patience=0.05, period=0.004), np.zeros(3)
+    seen = SimpleNamespace(
+        tilt_commands=np.array([0.3, 0.3, 0.1]),
+        tilt_angles=np.array([0.0, 0.0, 0.1]),
+        tilt_rates=np.array([0.0, 6.0, 0.0]),
+    )
+    for call in range(1, 30):
+        known = SimpleNamespace(seen=seen, p=p, memory=SimpleNamespace(doubt=doubt))
+        rates, usable = servo_doubts(known)
+        doubt = doubt + p.period * rates
+        np.testing.assert_allclose(doubt, [min(call * 0.004, 0.1), 0.0, 0.0], atol=1e-15)
+        assert usable.tolist() == [float(call < 13), 1.0, 1.0]
+
+
+def test_the_state_ahead_is_reached_by_the_commands_on_their_way():
+    p = SimpleNamespace(
+        predicts=1.0, late=0.003, begun=0.2, period=0.004, keep=0.8, old=0.12, new=0.08
+    )
+    frame = Frame(1.3, 9.81, np.diag([0.01, 0.012, 0.02]), 1.0, np.zeros(3), np.zeros(3))
+    rate = np.array([0.4, -0.7, 0.3])
+    body, speeds = Motion(np.ones(3), 2.0 * rate, turn_by(rate), rate), np.full(4, 300.0)
+    asked = np.array([[300.0, 320.0, 310.0, 305.0], [350.0, 340.0, 300.0, 390.0], [400.0] * 4])
+
+    def wrench(speeds, tilts):
+        return np.hstack([0.1, 0.2, 4e-5 * speeds @ speeds, 1e-7 * speeds[:3] ** 2])
+
+    none = np.zeros(0)
+    seen = SimpleNamespace(
+        thrusts=speeds,
+        tilt_commands=none,
+        tilt_angles=none,
+        tilt_rates=none,
+        rotor_speeds=speeds,
+        reference=SimpleNamespace(tilt_rates=none),
+    )
+    known = SimpleNamespace(seen=seen, p=p, asked=asked, now=body, frame=frame, wrench=wrench)
+    known.memory = SimpleNamespace(points=none)
+    found = predicted(known, none)
+    for before, after in pairwise(asked):
+        then = 0.8 * speeds + 0.12 * before + 0.08 * after
+        body, speeds = moved(body, wrench(0.5 * (speeds + then), none), frame, 0.004), then
+    speeds = speeds + 0.2 * (asked[-1] - speeds)
+    for part, expected in zip(found.now, moved(body, wrench(speeds, none), frame, 0.003)):
+        np.testing.assert_allclose(part, expected, rtol=1e-13)
+    np.testing.assert_allclose(found.speeds, speeds, rtol=1e-13)
+    assert found.time == pytest.approx(0.011)

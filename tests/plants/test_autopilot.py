@@ -204,6 +204,13 @@ def test_a_port_in_use_is_refused():
             tiltsim.simulate(scenario(taken.getsockname()[1]))
 
 
+def test_reversed_rotors_push_down():
+    mixer = Mixer(scenario(9002))
+    speeds = np.full(len(mixer.vehicle.spins), 300.0)
+    up, down = (mixer.lift(tiltsim.Command(rotor_speeds=way * speeds)) for way in (1.0, -1.0))
+    assert down == -up < 0.0
+
+
 def test_the_frame_of_a_tilting_vehicle_gives_each_motion_alone():
     files = ardupilot_files(scenario(9002, tilting=True))
     rows = [

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
 import pytest
+from pydantic import TypeAdapter
 
 import tiltsim
 from tiltsim.errors import InputError
+from tiltsim.scenario.controller import CONTROLLERS
 from tiltsim.scenario.documents import parse_override, split_key
 from tiltsim.scenario.library import MAX_FILE_SIZE, MAX_VALUES, read_toml
 from tiltsim.scenario.loading import load_scenario
@@ -69,3 +73,12 @@ def test_expressions():
 def test_definitions_of_sweeps():
     with pytest.raises(ValueError, match="keys are missing or unknown"):
         SweepDefinition.from_json('{"a":' * 900 + "1" + "}" * 900)
+
+
+@pytest.mark.parametrize("law", CONTROLLERS)
+def test_defaults_are_values_that_keys_allow(law):
+    """Tables take defaults unchecked."""
+    for field in CONTROLLERS[law].model_fields.values():
+        if not field.is_required():
+            kind = Annotated[(field.annotation, *field.metadata)] if field.metadata else None
+            TypeAdapter(kind or field.annotation).validate_python(field.default)
