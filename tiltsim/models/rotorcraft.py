@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import KW_ONLY, dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, Final, cast
+from typing import Any, Final, NamedTuple, cast
 
 import mujoco
 import numpy as np
@@ -68,10 +68,14 @@ class RotorcraftSpec(ModelSpec):
         return self.tilts > 0 and self.tilt_servo.max_angle is not None
 
     @property
-    def as_read(self) -> tuple[str, UserVehicle | None, float, Pod]:
-        """All that decides how a file is read; the third is the length of the arms, m."""
-        arm_length = self.vehicle.arm_length if isinstance(self.vehicle, Vehicle) else 0.0
-        return self.model, self.user_vehicle, arm_length, self.pod
+    def as_read(self) -> _AsRead:
+        """The vehicle without the parts of a flight."""
+        return _AsRead(
+            self.model,
+            self.user_vehicle,
+            self.vehicle.arm_length if isinstance(self.vehicle, Vehicle) else 0.0,
+            self.pod,
+        )
 
     @property
     def touches(self) -> bool:
@@ -148,29 +152,37 @@ def _set_parameters(own: mujoco.MjSpec, spec: RotorcraftSpec) -> None:
         own.actuator(f"thrust_{i}").gear = gear
 
 
+class _AsRead(NamedTuple):
+    """All that decides how a file is read."""
+
+    model: str
+    user_vehicle: UserVehicle | None
+    arm_length: float
+    pod: Pod
+
+
 @lru_cache(maxsize=64)  # dm_control takes a hundred times longer than MuJoCo's compiler
-def _complete(model: str, own: UserVehicle | None, arm_length: float, pod: Pod) -> mujoco.MjSpec:
+def _complete(read: _AsRead) -> mujoco.MjSpec:
     """A shipped vehicle with these arms and pods, or a user's as it is."""
-    shipped = shipped_folder("mjcf") / f"{model}.xml"
+    own = read.user_vehicle
+    shipped = shipped_folder("mjcf") / f"{read.model}.xml"
     root = mjcf_editing.parse_mjcf(shipped if own is None else Path(own.path))
     if own is None:
-        _scale_lengths(root, arm_length)
-        if model == "tiltrotor":
-            _set_pods(root, pod)
+        _scale_lengths(root, read.arm_length)
+        if read.model == "tiltrotor":
+            _set_pods(root, read.pod)
     return mjcf_editing.spec_of(root)
 
 
 @lru_cache(maxsize=64)
-def _bare(
-    read: tuple[str, UserVehicle | None, float, Pod], contacts: bool, wrench: bool
-) -> mujoco.MjSpec | None:
+def _bare(read: _AsRead, contacts: bool, wrench: bool) -> mujoco.MjSpec | None:
     """It without visuals; None where they act."""
-    complete, (model, own, *_) = _complete(*read), read
-    if own is not None and model != "multirotor":
+    complete = _complete(read)
+    if read.user_vehicle is not None and read.model != "multirotor":
         return None
     bare = complete.copy()
     mjcf_editing.remove_visuals(bare, contacts=contacts, kept=["imu"] * wrench)
-    return bare if own is None or _moves_alike(complete, bare) else None
+    return bare if read.user_vehicle is None or _moves_alike(complete, bare) else None
 
 
 def _bare_of(spec: RotorcraftSpec) -> mujoco.MjSpec | None:
@@ -182,7 +194,7 @@ def _compose(spec: RotorcraftSpec, whole: bool) -> mujoco.MjSpec:
     """The vehicle with all parts of a flight, complete or without visuals."""
     vehicle, servo, user_vehicle = spec.vehicle, spec.tilt_servo, spec.user_vehicle
     bare = None if whole else _bare_of(spec)
-    root = (_complete(*spec.as_read) if bare is None else bare).copy()
+    root = (_complete(spec.as_read) if bare is None else bare).copy()
     mjcf_editing.set_integration(root, spec)
     constraint = spec.touches or spec.has_stops
     mjcf_editing.set_flags(root, contact=spec.touches, constraint=constraint)

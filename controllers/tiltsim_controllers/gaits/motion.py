@@ -16,7 +16,10 @@ from tiltsim_controllers.mathematics.splines import piece_at, polynomial_derivat
 NO_KNOTS: Final = (0.0,)
 """The knots of a flight without tilt angles."""
 
-FIXED, LINEAR, CUBIC, HARMONIC = map(float, range(4))
+FIXED: Final = 0.0
+LINEAR: Final = 1.0
+CUBIC: Final = 2.0
+HARMONIC: Final = 3.0
 
 POWERS: Final = {FIXED: 1, LINEAR: 2, CUBIC: 4}
 """Coefficients of a polynomial, by the type of the gait: highest power first."""

@@ -80,7 +80,13 @@ def table_knots(
     return spline_knots(times, points, COEFFICIENTS, degree=COEFFICIENTS - 1, ends=(free, free))
 
 
-SETPOINT, LINE, CIRCLE, ATTITUDE_ALTITUDE, LISSAJOUS, WAYPOINTS, POSES = map(float, range(7))
+SETPOINT: Final = 0.0
+LINE: Final = 1.0
+CIRCLE: Final = 2.0
+ATTITUDE_ALTITUDE: Final = 3.0
+LISSAJOUS: Final = 4.0
+WAYPOINTS: Final = 5.0
+POSES: Final = 6.0
 
 REFERENCE_TYPES: Final = {
     "setpoint": SETPOINT,
